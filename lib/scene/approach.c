@@ -90,7 +90,7 @@ static ebpo_status go_pairs(void *context, uint64_t begin, uint64_t end, unsigne
         t->ways[i] = (ebpo_scene_way){
             .a = pair->a, .b = pair->b, .time = t->from, .clearance = pair->clearance
         };
-        status = scene_collider(t->scene, pair, &looks.collider, error);
+        status = scene_collider(t->scene, pair, 1, &looks.collider, error);
         if (status == EBPO_OK)
             status = go(t, &looks, &t->ways[i], error);
         ebpo_collider_free(looks.collider);

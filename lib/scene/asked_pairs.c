@@ -20,13 +20,13 @@ static bool keep_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count)
     return true;
 }
 
-/* One after the other: questions then share them. */
-static ebpo_status make_models(ebpo_scene *scene, const scene_pairs_list *list, ebpo_error *error)
+ebpo_status scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pairs, uint64_t count,
+                              ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_model *model;
-    for (uint64_t i = 0; i < 2 * list->count && status == EBPO_OK; i++) {
-        uint64_t instance = i % 2 ? list->pairs[i / 2].b : list->pairs[i / 2].a;
+    for (uint64_t i = 0; i < 2 * count && status == EBPO_OK; i++) {
+        uint64_t instance = i % 2 ? pairs[i / 2].b : pairs[i / 2].a;
         status = ebpo_scene_model(scene, scene->instances[instance].as.model, &model, error);
     }
     return status;
@@ -47,7 +47,7 @@ ebpo_status scene_list_pairs(ebpo_scene *scene, double from, double to, scene_pa
 {
     ebpo_status status = scene_keep_pairs(scene, from, to, out, error);
     if (status == EBPO_OK)
-        status = make_models(scene, out, error);
+        status = scene_make_models(scene, out->pairs, out->count, error);
     if (status != EBPO_OK) {
         free(out->pairs);
         *out = (scene_pairs_list){ 0 };
@@ -66,15 +66,15 @@ static bool has_mesh(const ebpo_scene *scene, uint64_t instance)
     return ebpo_file_info(ebpo_scene_file(scene, model))->parts & EBPO_PART_MESH;
 }
 
-ebpo_status scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
+ebpo_status scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair, unsigned threads,
                            ebpo_collider **out, ebpo_error *error)
 {
-    ebpo_collider_options single = EBPO_COLLIDER_OPTIONS_INIT;
-    single.threads = 1;
+    ebpo_collider_options how = EBPO_COLLIDER_OPTIONS_INIT;
+    how.threads = threads;
     *out = NULL;
     if (!has_mesh(scene, pair->a) || !has_mesh(scene, pair->b))
         return EBPO_OK;
-    return ebpo_collider_of_parts(model_of(scene, pair->a), model_of(scene, pair->b), &single, out,
+    return ebpo_collider_of_parts(model_of(scene, pair->a), model_of(scene, pair->b), &how, out,
                                   error);
 }
 

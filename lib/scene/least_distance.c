@@ -161,7 +161,7 @@ static ebpo_status find_least(const least_search *how, const ebpo_scene_pair *pa
     *out = (ebpo_scene_least){
         .a = pair->a, .b = pair->b, .time = how->from, .hi = INFINITY, .clearance = pair->clearance
     };
-    ebpo_status status = scene_collider(how->scene, pair, &s.looks.collider, error);
+    ebpo_status status = scene_collider(how->scene, pair, 1, &s.looks.collider, error);
     if (status == EBPO_OK)
         status = begin_parts(&s, how->from, how->to, error);
     if (status == EBPO_OK)

@@ -11,6 +11,7 @@
 #include "base/sized.h"
 #include "scene/asked_pairs.h"
 #include "scene/left_out.h"
+#include "scene/meeting_facts.h"
 
 typedef struct asking {
     const ebpo_scene *scene;
@@ -19,36 +20,6 @@ typedef struct asking {
     scene_pairs_list list;
     ebpo_scene_meeting *meetings;
 } asking;
-
-/* Counts pairs of faces by kind, and keeps the first by numbers; only whether there is one that
- * crosses, where that is enough. */
-typedef struct tally {
-    ebpo_scene_meeting *m;
-    bool enough;
-} tally;
-
-static void keep_first(ebpo_scene_meeting *m, const ebpo_face_pair *p)
-{
-    if (p->face_a < m->face_a || (p->face_a == m->face_a && p->face_b < m->face_b)) {
-        m->face_a = p->face_a;
-        m->face_b = p->face_b;
-    }
-}
-
-static bool count_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
-{
-    const tally *t = user;
-    for (uint64_t i = 0; i < count; i++) {
-        t->m->touching += pairs[i].kind == EBPO_PAIR_TOUCHING;
-        t->m->crossing += pairs[i].kind == EBPO_PAIR_CROSSING;
-        t->m->coplanar += pairs[i].kind == EBPO_PAIR_COPLANAR;
-        if (t->enough && t->m->crossing)
-            return false;
-        if (!t->enough)
-            keep_first(t->m, &pairs[i]);
-    }
-    return true;
-}
 
 static ebpo_meeting_kind kind_of(const ebpo_scene_meeting *m)
 {
@@ -59,55 +30,82 @@ static ebpo_meeting_kind kind_of(const ebpo_scene_meeting *m)
 }
 
 /* Whether the clearance is kept, which ends sooner; and if not, the distance. */
-static ebpo_status ask_clearance(ebpo_collider *collider, const ebpo_collide_options *options,
-                                 ebpo_scene_meeting *m, ebpo_error *error)
+static ebpo_status ask_clearance(const scene_two *two, ebpo_scene_meeting *m, ebpo_error *error)
 {
     ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
     ebpo_clearance found;
     how.at_least = m->clearance;
-    ebpo_status status = ebpo_collide_distance(collider, options, &how, &found, error);
+    ebpo_status status = ebpo_collide_distance(two->collider, two->options, &how, &found, error);
     if (status != EBPO_OK || found.at_least == 1)
         return status;
-    how.at_least = -1;
-    status = ebpo_collide_distance(collider, options, &how, &found, error);
+    status = ebpo_collide_distance(two->collider, two->options, NULL, &found, error);
     m->kind = EBPO_MEETING_NEAR;
-    m->distance = found.distance.hi;
-    m->face_a = found.pair.face_a;
-    m->face_b = found.pair.face_b;
+    if (status == EBPO_OK)
+        scene_tell_nearest(two, &found, m);
     return status;
 }
 
-static ebpo_status ask_faces(const asking *a, ebpo_collider *collider,
-                             const ebpo_collide_options *options, ebpo_scene_meeting *m,
-                             ebpo_error *error)
+/* What solids are to each other says more than what their faces are. */
+static ebpo_status ask_relation(const scene_two *two, ebpo_scene_meeting *m, ebpo_error *error)
+{
+    ebpo_relation_result found;
+    ebpo_status status = ebpo_collide_relation(two->collider, two->options, &found, error);
+    m->relation = found.relation;
+    if (found.relation == EBPO_INTERSECTING && (two->solid[0] || two->solid[1]))
+        m->kind = EBPO_MEETING_PROTRUDING;
+    if (found.relation == EBPO_A_INSIDE_B || found.relation == EBPO_B_INSIDE_A)
+        m->kind = EBPO_MEETING_ENCLOSED;
+    if (found.relation == EBPO_EQUAL)
+        m->kind = EBPO_MEETING_DUPLICATE;
+    return status;
+}
+
+static ebpo_status ask_apart(const scene_two *two, ebpo_scene_meeting *m, ebpo_error *error)
+{
+    ebpo_clearance found;
+    ebpo_status status = two->how->relate ? ask_relation(two, m, error) : EBPO_OK;
+    if (status != EBPO_OK)
+        return status;
+    if (m->kind == EBPO_MEETING_NONE) {
+        status = m->clearance > 0 ? ask_clearance(two, m, error) : EBPO_OK;
+    } else {
+        status = ebpo_collide_distance(two->collider, two->options, NULL, &found, error);
+        if (status == EBPO_OK)
+            scene_tell_nearest(two, &found, m);
+    }
+    return status == EBPO_OK ? scene_tell_depths(two, m, error) : status;
+}
+
+static ebpo_status ask_faces(const scene_two *two, ebpo_scene_meeting *m, ebpo_error *error)
 {
     int32_t found = 0;
     ebpo_face_pair first;
-    ebpo_status status = ebpo_collide_first(collider, options, &first, &found, error);
+    ebpo_status status = ebpo_collide_first(two->collider, two->options, &first, &found, error);
     if (status != EBPO_OK)
         return status;
     if (found <= 0)
-        return m->clearance > 0 ? ask_clearance(collider, options, m, error) : EBPO_OK;
-    m->face_a = first.face_a;
-    m->face_b = first.face_b;
-    tally t = { m, !a->how.count };
-    if (t.enough && first.kind == EBPO_PAIR_CROSSING)
-        m->crossing = 1;
-    else
-        status = ebpo_collide_all(collider, options, count_faces, &t, error);
+        return ask_apart(two, m, error);
+    status = scene_tell_contacts(two, &first, m, error);
     m->kind = kind_of(m);
-    return status;
+    if (status == EBPO_OK && two->how->relate)
+        status = ask_relation(two, m, error);
+    return status == EBPO_OK ? scene_tell_depths(two, m, error) : status;
 }
 
-/* What has been left out of a file must not matter. */
+/* What has been left out of a file must not matter; inside a solid any face may. */
 static ebpo_status check_left_out(const asking *a, const ebpo_scene_pair *pair, ebpo_error *error)
 {
     double gap = INFINITY;
     uint64_t lacking = 0;
     ebpo_status status = scene_left_out(a->scene, pair, a->time, &gap, &lacking, error);
-    if (status == EBPO_OK && !(gap > pair->clearance))
+    if (status == EBPO_OK && (!(gap > pair->clearance) || (a->how.relate && gap < INFINITY)))
         status = scene_lacks(a->scene, pair, lacking, a->time, error);
     return status;
+}
+
+static bool is_solid(const ebpo_scene *scene, uint64_t instance)
+{
+    return ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].as.model))->solid;
 }
 
 static ebpo_status ask_pair(const asking *a, uint64_t n, ebpo_error *error)
@@ -116,18 +114,18 @@ static ebpo_status ask_pair(const asking *a, uint64_t n, ebpo_error *error)
     ebpo_scene_meeting *m = &a->meetings[n];
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
-    *m = (ebpo_scene_meeting){ .a = pair->a,
-                               .b = pair->b,
-                               .face_a = EBPO_NO_FACE,
-                               .face_b = EBPO_NO_FACE,
-                               .clearance = pair->clearance };
+    *m = (ebpo_scene_meeting){ .a = pair->a, .b = pair->b, .clearance = pair->clearance };
+    scene_forget_facts(m);
     ebpo_status status = scene_pose_pair(a->scene, pair, a->time, &options, error);
     if (status == EBPO_OK)
         status = check_left_out(a, pair, error);
     if (status == EBPO_OK)
-        status = scene_collider(a->scene, pair, &collider, error);
+        status = scene_collider(a->scene, pair, 1, &collider, error);
+    scene_two two = {
+        &a->how, collider, &options, { is_solid(a->scene, pair->a), is_solid(a->scene, pair->b) }
+    };
     if (status == EBPO_OK && collider)
-        status = ask_faces(a, collider, &options, m, error);
+        status = ask_faces(&two, m, error);
     ebpo_collider_free(collider);
     return status;
 }
@@ -159,6 +157,9 @@ ebpo_status ebpo_scene_meet(ebpo_scene *scene, double time, const ebpo_scene_ask
     EBPO_DEFAULT_FP;
     asking a = { .scene = scene, .how = EBPO_SCENE_ASK_OPTIONS_INIT, .time = time };
     ebpo_status status = EBPO_TAKE(ebpo_scene_ask_options, &a.how, options, error);
+    if (status == EBPO_OK && !(a.how.depth >= 0 && a.how.depth < INFINITY))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "depths within %g: is no length", a.how.depth);
+    a.how.relate |= a.how.depth > 0;
     if (status == EBPO_OK)
         status = scene_list_pairs(scene, time, time, &a.list, error);
     a.meetings = ebpo_alloc(a.list.count, sizeof *a.meetings);
@@ -173,5 +174,26 @@ ebpo_status ebpo_scene_meet(ebpo_scene *scene, double time, const ebpo_scene_ask
         *asked = a.list.count;
     free(a.list.pairs);
     free(a.meetings);
+    return status;
+}
+
+ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_t a, uint64_t b, double time,
+                               unsigned threads, ebpo_pairs_fn take, void *user, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    asking one = { .scene = scene, .time = time };
+    ebpo_scene_pair pair = { a, b, 0 };
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_collider *collider = NULL;
+    ebpo_status status = scene_pose_pair(scene, &pair, time, &options, error);
+    if (status == EBPO_OK)
+        status = scene_make_models(scene, &pair, 1, error);
+    if (status == EBPO_OK)
+        status = check_left_out(&one, &pair, error);
+    if (status == EBPO_OK)
+        status = scene_collider(scene, &pair, threads, &collider, error);
+    if (status == EBPO_OK && collider)
+        status = ebpo_collide_all(collider, &options, take, user, error);
+    ebpo_collider_free(collider);
     return status;
 }

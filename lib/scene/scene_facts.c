@@ -77,3 +77,26 @@ ebpo_status ebpo_scene_get_camera(const ebpo_scene *scene, uint64_t camera, ebpo
         return EBPO_E_ARGUMENT;
     return EBPO_GIVE(ebpo_scene_camera, out, &scene->cameras[camera]);
 }
+
+ebpo_status ebpo_scene_get_stats(const ebpo_scene *scene, ebpo_scene_stats *out)
+{
+    ebpo_scene_stats s = EBPO_SCENE_STATS_INIT;
+    for (uint64_t i = 0; i < scene->files_count; i++) {
+        const scene_file *f = &scene->files[i];
+        ebpo_file_stats read = EBPO_FILE_STATS_INIT;
+        ebpo_model_stats model = EBPO_MODEL_STATS_INIT;
+        if (!f->file)
+            continue;
+        (void)ebpo_file_get_stats(f->file, &read);
+        s.files++;
+        s.bytes_read += read.bytes_read;
+        s.reads += read.reads;
+        if (!f->model)
+            continue;
+        (void)ebpo_model_get_stats(f->model, &model);
+        s.models++;
+        s.memory += model.memory;
+        s.loads += model.loads;
+    }
+    return EBPO_GIVE(ebpo_scene_stats, out, &s);
+}

@@ -520,15 +520,55 @@ static bool count_leasts(void *user, const ebpo_scene_least *list, uint64_t coun
     return true;
 }
 
+static ebpo_status record_scene(const ebpo_scene *scene, const ebpo_scene_meeting *meeting,
+                                ebpo_error *error)
+{
+    ebpo_scene_record *record;
+    ebpo_scene_frame frame = { .time = 1, .asked = 1 };
+    ebpo_status status = ebpo_scene_record_new(scene, scratch("report.h5"), &record, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_record_add(record, &frame, meeting, 1, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_record_finish(record, error);
+    ebpo_scene_record_free(record);
+    unlink(scratch("report.h5"));
+    return status;
+}
+
+static bool count_face_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    *(uint64_t *)user += count + (pairs[0].kind == EBPO_PAIR_APART);
+    return true;
+}
+
+/* Of the two that meet. */
+static ebpo_status look_at_meeting(ebpo_scene *scene, ebpo_error *error)
+{
+    uint64_t pairs = 0;
+    ebpo_scene_stats stats = EBPO_SCENE_STATS_INIT;
+    ebpo_scene_meeting meeting = { .b = 1, .face_a = EBPO_NO_FACE };
+    ebpo_status status = ebpo_scene_collide(scene, 0, 1, 1, 1, count_face_pairs, &pairs, error);
+    if (status == EBPO_OK)
+        status = record_scene(scene, &meeting, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_get_stats(scene, &stats);
+    return status == EBPO_OK && (pairs == 0 || stats.files != 1 || stats.models != 1)
+               ? EBPO_E_ARGUMENT
+               : status;
+}
+
 static ebpo_status meet_in_scene(ebpo_scene *scene, ebpo_error *error)
 {
     uint64_t meetings = 0, asked = 0;
     ebpo_scene_ask_options how = EBPO_SCENE_ASK_OPTIONS_INIT;
     how.threads = 1;
-    how.count = true;
+    how.count = how.places = how.relate = true;
+    how.depth = 0.1;
     ebpo_status status = ebpo_scene_meet(scene, 1, &how, count_meetings, &meetings, &asked, error);
     ebpo_scene_way_options along = EBPO_SCENE_WAY_OPTIONS_INIT;
     uint64_t ways = 0;
+    if (status == EBPO_OK)
+        status = look_at_meeting(scene, error);
     along.threads = 1;
     along.tolerance = 0.01;
     if (status == EBPO_OK)

@@ -75,6 +75,12 @@ const char *words_codec(ebpo_codec codec)
     return (unsigned)codec < 3 ? codec_words[codec] : "unknown";
 }
 
+bool words_end_with(const char *text, const char *end)
+{
+    size_t length = strlen(text), n = strlen(end);
+    return length > n && strcmp(text + length - n, end) == 0;
+}
+
 void words_hex(const uint8_t digest[32], char out[65])
 {
     for (int i = 0; i < 32; i++)

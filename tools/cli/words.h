@@ -28,6 +28,7 @@ bool words_read_unit(const char *text, const char *const *units, const uint64_t 
                      uint64_t *out);
 /* 64M, 1G, 512K, 1000000: powers of 1024. */
 bool words_read_size(const char *text, uint64_t *out);
+bool words_end_with(const char *text, const char *end);
 void words_hex(const uint8_t digest[32], char out[65]);
 
 /* NULL-terminated, in the order of the enums; for option tables. */

@@ -13,6 +13,7 @@
 #include "cli/pose_args.h"
 #include "cli/progress.h"
 #include "cli/query_args.h"
+#include "cli/words.h"
 #include "cmd/commands.h"
 
 enum { MODELS = ARGS_OPERANDS_MAX - 1 };
@@ -170,12 +171,6 @@ static int ask_points(const values *v, ebpo_boolean *b)
 
 /* --- cells --- */
 
-static bool ends_with(const char *text, const char *end)
-{
-    size_t length = strlen(text), n = strlen(end);
-    return length > n && strcmp(text + length - n, end) == 0;
-}
-
 static ebpo_status convert(ebpo_mesh *mesh, const values *v, ebpo_progress progress,
                            ebpo_error *error)
 {
@@ -210,7 +205,7 @@ static ebpo_status write_cells(const ebpo_boolean_cells *cells, const values *v,
         snprintf(error->message, sizeof error->message,
                  "%s: there are no %s cells at level %" PRId64 "; give a higher level", v->out,
                  v->inner ? "inner" : "such", v->level);
-    } else if (ends_with(v->out, ".ply")) {
+    } else if (words_end_with(v->out, ".ply")) {
         status = ebpo_mesh_write_ply(&mesh, v->out, error);
     } else {
         status = convert(&mesh, v, progress, error);
@@ -256,7 +251,7 @@ static int check_values(const values *v, const char **models, uint32_t count)
                              v->inside ? "--inside" : "--distance");
     if (v->inner && !v->out)
         return command_usage("boolean", "--inner belongs to --output");
-    if (v->out && !ends_with(v->out, ".ply") && !ends_with(v->out, ".ebpo.h5"))
+    if (v->out && !words_end_with(v->out, ".ply") && !words_end_with(v->out, ".ebpo.h5"))
         return command_usage("boolean",
                              "--output '%s': expected a name that ends with .ply or "
                              ".ebpo.h5",

@@ -9,6 +9,7 @@
 #include "cli/pose_args.h"
 #include "cli/progress.h"
 #include "cli/query_args.h"
+#include "cli/words.h"
 #include "cmd/collide_far.h"
 #include "cmd/commands.h"
 
@@ -156,12 +157,6 @@ static ebpo_status ask_levels(const collide_values *v, ebpo_collider *c,
     return status;
 }
 
-static bool ends_with(const char *text, const char *end)
-{
-    size_t n = strlen(text), m = strlen(end);
-    return n > m && strcmp(text + n - m, end) == 0;
-}
-
 /* What is asked on the command line, one after the other. */
 static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
                            ebpo_error *error)
@@ -175,7 +170,8 @@ static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_colli
         status = ask_relation(v, c, how, error);
     if (status == EBPO_OK && v->out)
         status =
-            ebpo_collide_write(c, how, ends_with(v->out, ".ply") ? EBPO_PAIRS_PLY : EBPO_PAIRS_HDF5,
+            ebpo_collide_write(c, how,
+                               words_end_with(v->out, ".ply") ? EBPO_PAIRS_PLY : EBPO_PAIRS_HDF5,
                                v->out, error);
     if (status == EBPO_OK && (v->far.distance || v->far.depth))
         return collide_far_ask(&v->far, v->query.json, c, how, error);
@@ -233,7 +229,7 @@ static int run(void *given, const char **operand)
     if (v->self && (v->query.all || v->pose_a || v->pose_b || v->relation || v->out))
         return command_usage("collide",
                              "--self takes neither --all nor poses, --relation or --output");
-    if (v->out && !ends_with(v->out, ".h5") && !ends_with(v->out, ".ply"))
+    if (v->out && !words_end_with(v->out, ".h5") && !words_end_with(v->out, ".ply"))
         return command_usage("collide", "--output %s: expected a name that ends in .h5 or .ply",
                              v->out);
     if (v->query.level >= 0 &&

@@ -32,11 +32,18 @@ static const arg_option options[] = {
         "from the cameras) or inside"),
     OPTION_REAL("margin", 0, scene_values, margin, "D", 1e-300, 1e300,
                 "plan, pack: what comes so near, beyond the clearance, is needed too"),
-    OPTION_TEXT("output", 'o', scene_values, out, "DIR", "pack: the folder to make"),
+    OPTION_TEXT("output", 'o', scene_values, out, "PATH",
+                "pack: the folder to make; report: a file that ends in .h5"),
     OPTION_TEXT("target-size", 0, scene_values, target_size, "S",
                 "pack: models of at most this many bytes (K, M, G: powers of 1024) together, with "
                 "the least error"),
-    OPTION_FLAG("count", 0, scene_values, count, "report: count all pairs of faces that meet"),
+    OPTION_FLAG("count", 0, scene_values, count,
+                "report: count all pairs of faces that meet, and lines of contact"),
+    OPTION_FLAG("places", 0, scene_values, places, "report: also where"),
+    OPTION_FLAG("solids", 0, scene_values, solids,
+                "report: how solids lie to each other: protruding, enclosed, duplicate"),
+    OPTION_REAL("depth", 0, scene_values, depth, "D", 1e-300, 1e300,
+                "report: how deep one is in the other, within D"),
     OPTION_FLAG("least", 0, scene_values, least,
                 "approach: how near they come at all times, and when"),
     OPTION_THREADS(scene_values, threads),
@@ -89,6 +96,8 @@ static const char *wrong_report(const scene_values *v)
 {
     if (v->json && v->csv)
         return "--json and --csv exclude each other";
+    if (v->out && !words_end_with(v->out, ".h5"))
+        return "--output of a report is a file that ends in .h5";
     if (v->to > v->from && !(v->step > 0))
         return "from one time to another a report needs --step";
     if (v->to > v->from && !((v->to - v->from) / v->step < FRAMES_MOST))

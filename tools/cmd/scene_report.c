@@ -3,146 +3,120 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "cli/json.h"
 #include "cli/progress.h"
-
-static const char *const kinds[] = { "none", "near", "touching", "coplanar", "crossing" };
+#include "cmd/scene_rows.h"
 
 typedef struct report {
     const scene_values *v;
-    const ebpo_scene *scene;
-    double time;
+    ebpo_scene *scene;
+    ebpo_scene_ask_options how;
     uint64_t meetings, frames_met, asked;
+    scene_frame frame;
+    uint64_t capacity; /* of its meetings */
+    bool prints;       /* rows on standard output */
     json j;
+    ebpo_scene_record *record; /* NULL: none is written */
 } report;
 
-static const char *name_of(const report *r, uint64_t instance)
-{
-    ebpo_scene_instance i = EBPO_SCENE_INSTANCE_INIT;
-    (void)ebpo_scene_get_instance(r->scene, instance, &i);
-    return i.name;
-}
+/* --- a frame --- */
 
-static void meeting_json(report *r, const ebpo_scene_meeting *m)
-{
-    json *j = &r->j;
-    json_object(j, NULL);
-    json_text(j, "a", name_of(r, m->a));
-    json_text(j, "b", name_of(r, m->b));
-    json_text(j, "kind", kinds[m->kind]);
-    json_uint(j, "face_a", m->face_a);
-    json_uint(j, "face_b", m->face_b);
-    if (r->v->count) {
-        json_uint(j, "touching", m->touching);
-        json_uint(j, "coplanar", m->coplanar);
-        json_uint(j, "crossing", m->crossing);
-    }
-    json_real(j, "clearance", m->clearance);
-    json_real(j, "distance", m->distance);
-    json_end(j);
-}
-
-/* Quotes are doubled. */
-static void csv_text(const char *text)
-{
-    putchar('"');
-    for (; *text; text++) {
-        if (*text == '"')
-            putchar('"');
-        putchar(*text);
-    }
-    putchar('"');
-}
-
-static void counts_csv(const report *r, const ebpo_scene_meeting *m)
-{
-    if (r->v->count)
-        printf(",%llu,%llu,%llu", (unsigned long long)m->touching, (unsigned long long)m->coplanar,
-               (unsigned long long)m->crossing);
-}
-
-static void meeting_csv(const report *r, const ebpo_scene_meeting *m)
-{
-    printf("%.17g,", r->time);
-    csv_text(name_of(r, m->a));
-    putchar(',');
-    csv_text(name_of(r, m->b));
-    printf(",%s,%.17g,%llu,%llu", kinds[m->kind], m->distance, (unsigned long long)m->face_a,
-           (unsigned long long)m->face_b);
-    counts_csv(r, m);
-    putchar('\n');
-}
-
-static void meeting_words(const report *r, const ebpo_scene_meeting *m)
-{
-    printf("%.9g\t%s\t%s\t%s", r->time, kinds[m->kind], name_of(r, m->a), name_of(r, m->b));
-    if (m->kind == EBPO_MEETING_NEAR)
-        printf("\t%.9g of %.9g", m->distance, m->clearance);
-    else if (r->v->count)
-        printf("\t%llu pairs of faces",
-               (unsigned long long)(m->touching + m->coplanar + m->crossing));
-    putchar('\n');
-}
-
-static bool print_meetings(void *user, const ebpo_scene_meeting *meetings, uint64_t count)
+static bool keep_meetings(void *user, const ebpo_scene_meeting *meetings, uint64_t count)
 {
     report *r = user;
-    r->meetings += count;
-    r->frames_met++;
-    for (uint64_t i = 0; i < count; i++) {
-        if (r->v->json)
-            meeting_json(r, &meetings[i]);
-        else if (r->v->csv)
-            meeting_csv(r, &meetings[i]);
-        else
-            meeting_words(r, &meetings[i]);
+    if (count > r->capacity) {
+        free(r->frame.meetings);
+        r->frame.meetings = malloc(count * sizeof *meetings);
+        r->capacity = r->frame.meetings ? count : 0;
     }
+    if (r->frame.meetings)
+        memcpy(r->frame.meetings, meetings, count * sizeof *meetings);
+    r->frame.count = count;
     return true;
 }
 
-static ebpo_status frame(report *r, ebpo_scene *scene, const ebpo_scene_ask_options *how,
-                         ebpo_error *error)
+static ebpo_status ask_frame(report *r, double time, ebpo_error *error)
 {
-    uint64_t asked = 0;
+    ebpo_scene_stats before = EBPO_SCENE_STATS_INIT, after = EBPO_SCENE_STATS_INIT;
+    scene_frame *f = &r->frame;
     double begun = progress_now();
-    if (r->v->json) {
-        json_object(&r->j, NULL);
-        json_real(&r->j, "time", r->time);
-        json_array(&r->j, "meetings");
+    (void)ebpo_scene_get_stats(r->scene, &before);
+    f->count = 0;
+    f->cost = (ebpo_scene_frame){ .time = time };
+    ebpo_status status =
+        ebpo_scene_meet(r->scene, time, &r->how, keep_meetings, r, &f->cost.asked, error);
+    if (status == EBPO_OK && f->count && !f->meetings) {
+        snprintf(error->message, sizeof error->message, "no memory for %llu meetings",
+                 (unsigned long long)f->count);
+        status = error->status = EBPO_E_MEMORY;
     }
-    ebpo_status status = ebpo_scene_meet(scene, r->time, how, print_meetings, r, &asked, error);
-    r->asked += asked;
-    if (r->v->json) {
-        json_end(&r->j);
-        json_uint(&r->j, "pairs_asked", asked);
-        json_real(&r->j, "seconds", progress_now() - begun);
-        json_end(&r->j);
-    }
+    (void)ebpo_scene_get_stats(r->scene, &after);
+    f->cost.nanoseconds = (uint64_t)((progress_now() - begun) * 1e9);
+    f->cost.bytes_read = after.bytes_read - before.bytes_read;
+    f->cost.models = after.models - before.models;
+    f->cost.loads = after.loads - before.loads;
+    r->asked += f->cost.asked;
+    r->meetings += f->count;
+    r->frames_met += f->count > 0;
     return status;
 }
 
-/* Of the frame `n`: the last one is at the last time. */
-static double time_of(const scene_values *v, uint64_t n, uint64_t frames)
+/* --- what is told of it --- */
+
+static void frame_json(report *r)
 {
-    return n + 1 == frames ? v->to : v->from + v->step * (double)n;
+    const ebpo_scene_frame *cost = &r->frame.cost;
+    json_object(&r->j, NULL);
+    json_real(&r->j, "time", cost->time);
+    json_array(&r->j, "meetings");
+    for (uint64_t i = 0; i < r->frame.count; i++)
+        scene_row_json(&r->j, r->v, r->scene, &r->frame.meetings[i]);
+    json_end(&r->j);
+    json_uint(&r->j, "pairs_asked", cost->asked);
+    json_real(&r->j, "seconds", (double)cost->nanoseconds * 1e-9);
+    json_uint(&r->j, "bytes_read", cost->bytes_read);
+    json_uint(&r->j, "models_read", cost->models);
+    json_uint(&r->j, "loads", cost->loads);
+    json_end(&r->j);
 }
 
-static void begin(report *r)
+static void print_frame(report *r)
 {
-    if (r->v->json) {
+    const scene_frame *f = &r->frame;
+    if (r->v->json)
+        frame_json(r);
+    for (uint64_t i = 0; i < f->count && !r->v->json; i++)
+        (r->v->csv ? scene_row_csv : scene_row_words)(r->v, r->scene, f->cost.time,
+                                                      &f->meetings[i]);
+}
+
+static ebpo_status tell_frame(report *r, ebpo_error *error)
+{
+    const scene_frame *f = &r->frame;
+    if (r->prints)
+        print_frame(r);
+    return r->record ? ebpo_scene_record_add(r->record, &f->cost, f->meetings, f->count, error)
+                     : EBPO_OK;
+}
+
+static ebpo_status begin(report *r, ebpo_error *error)
+{
+    if (r->prints && r->v->json) {
         json_begin(&r->j, stdout);
         json_object(&r->j, NULL);
         json_array(&r->j, "frames");
-    } else if (r->v->csv) {
-        printf("time,a,b,kind,distance,face_a,face_b%s\n",
-               r->v->count ? ",touching,coplanar,crossing" : "");
+    } else if (r->prints && r->v->csv) {
+        scene_head_csv(r->v);
     }
+    return r->v->out ? ebpo_scene_record_new(r->scene, r->v->out, &r->record, error) : EBPO_OK;
 }
 
-static void finish(report *r, uint64_t frames, double seconds)
+static ebpo_status finish(report *r, uint64_t frames, double seconds, ebpo_error *error)
 {
-    if (r->v->json) {
+    if (r->prints && r->v->json) {
         json_end(&r->j);
         json_uint(&r->j, "pairs_asked", r->asked);
         json_uint(&r->j, "pairs_that_meet", r->meetings);
@@ -154,30 +128,49 @@ static void finish(report *r, uint64_t frames, double seconds)
                 (unsigned long long)frames, (unsigned long long)r->frames_met,
                 (unsigned long long)r->asked, (unsigned long long)r->meetings, seconds);
     }
+    return r->record ? ebpo_scene_record_finish(r->record, error) : EBPO_OK;
+}
+
+/* --- all frames --- */
+
+/* Of the frame `n`: the last one is at the last time. */
+static double time_of(const scene_values *v, uint64_t n, uint64_t frames)
+{
+    return n + 1 == frames ? v->to : v->from + v->step * (double)n;
+}
+
+static uint64_t frames_of(const scene_values *v)
+{
+    return v->to > v->from /* the command has seen to it that these are not too many */
+               ? 1 + (uint64_t)ceil((v->to - v->from) / v->step * (1 - 0x1p-40))
+               : 1;
 }
 
 ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *scene,
                          ebpo_error *error)
 {
-    report r = { .v = v, .scene = scene };
-    ebpo_scene_ask_options how = EBPO_SCENE_ASK_OPTIONS_INIT;
+    report r = { .v = v, .scene = scene, .how = EBPO_SCENE_ASK_OPTIONS_INIT };
     double begun = progress_now();
-    uint64_t frames = 1;
-    ebpo_status status = EBPO_OK;
+    uint64_t frames = frames_of(v);
     progress_line line;
     (void)path;
-    if (v->to > v->from) /* the command has seen to it that these are not too many */
-        frames += (uint64_t)ceil((v->to - v->from) / v->step * (1 - 0x1p-40));
-    how.count = v->count;
-    how.threads = (unsigned)v->threads;
-    how.progress = progress_start(&line, "scene", v->quiet);
-    begin(&r);
+    r.prints = !v->out || v->csv || v->json;
+    r.how.count = v->count;
+    r.how.places = v->places;
+    r.how.relate = v->solids || v->depth > 0;
+    r.how.depth = v->depth;
+    r.how.threads = (unsigned)v->threads;
+    r.how.progress = progress_start(&line, "scene", v->quiet);
+    ebpo_status status = begin(&r, error);
     for (uint64_t n = 0; n < frames && status == EBPO_OK; n++) {
-        r.time = time_of(v, n, frames);
-        status = frame(&r, scene, &how, error);
+        status = ask_frame(&r, time_of(v, n, frames), error);
+        if (status == EBPO_OK)
+            status = tell_frame(&r, error);
     }
     progress_wipe(&line);
     if (status == EBPO_OK)
-        finish(&r, frames, progress_now() - begun);
+        status = finish(&r, frames, progress_now() - begun, error);
+    ebpo_scene_record_free(r.record);
+    free(r.frame.meetings);
     return status;
 }

@@ -5,6 +5,13 @@
 
 #include "cmd/scene_run.h"
 
+/* What was asked at a time. */
+typedef struct scene_frame {
+    ebpo_scene_frame cost;
+    ebpo_scene_meeting *meetings;
+    uint64_t count;
+} scene_frame;
+
 ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *scene,
                          ebpo_error *error);
 

@@ -5,12 +5,12 @@
 #include <ebpo/ebpo.h>
 
 typedef struct scene_values {
-    double time, from, to;          /* NAN: not given; then from and to are settled */
-    double step, tolerance, margin; /* 0: not given */
+    double time, from, to;                 /* NAN: not given; then from and to are settled */
+    double step, tolerance, margin, depth; /* 0: not given */
     const char *out, *target_size;
     int purpose; /* an ebpo_scene_purpose */
     int64_t threads;
-    bool outside, remote, json, csv, count, least, quiet;
+    bool outside, remote, json, csv, count, places, solids, least, quiet;
 } scene_values;
 
 #define SCENE_VALUES_INIT                                                             \

@@ -4,12 +4,13 @@
  *   Making      ebpo_scene_open (a file: format-spec/scene.md), ebpo_scene_new,
  *               ebpo_scene_add_model, ebpo_scene_add_instance
  *   What it is  ebpo_scene_get_counts, ebpo_scene_get_model, ebpo_scene_get_instance,
- *               ebpo_scene_get_camera, ebpo_scene_pair_rule
+ *               ebpo_scene_get_camera, ebpo_scene_get_stats, ebpo_scene_pair_rule
  *   Models      ebpo_scene_load, ebpo_scene_file, ebpo_scene_model
  *   In time     ebpo_scene_pose, ebpo_scene_motion, ebpo_scene_instance_box, ebpo_scene_box
- *   Who meets   ebpo_scene_pairs (boxes), ebpo_scene_meet (faces),
+ *   Who meets   ebpo_scene_pairs (boxes), ebpo_scene_meet (faces), ebpo_scene_collide (of two),
  *               ebpo_scene_approach, ebpo_scene_least_distances (all times)
- *   What of it   ebpo_scene_plan, ebpo_scene_pack
+ *   As a file   ebpo_scene_record_new
+ *   What of it  ebpo_scene_plan, ebpo_scene_pack
  *
  *     ebpo_scene *scene = NULL;
  *     ebpo_scene_open("plant.scene.json", NULL, &scene, &error);
@@ -24,6 +25,7 @@
 #ifndef EBPO_SCENE_H
 #define EBPO_SCENE_H
 
+#include <ebpo/collide.h>
 #include <ebpo/pose.h>
 #include <ebpo/subset.h>
 
@@ -212,6 +214,31 @@ typedef struct ebpo_scene_model_facts {
 EBPO_API ebpo_status ebpo_scene_get_model(const ebpo_scene *scene, uint64_t model,
                                           ebpo_scene_model_facts *out);
 
+typedef struct ebpo_scene_stats {
+    size_t struct_size; /* EBPO_SCENE_STATS_INIT sets it */
+
+    /* Files that are open, and those of which a model has been made. */
+    uint64_t files, models;
+
+    /* Bytes of memory that these models take. */
+    uint64_t memory;
+
+    /* Bytes read of files, and how many times. */
+    uint64_t bytes_read, reads;
+
+    /* Subtrees loaded because a question needed them, of models that are not all in memory. */
+    uint64_t loads;
+} ebpo_scene_stats;
+
+#define EBPO_SCENE_STATS_INIT EBPO_SIZED(ebpo_scene_stats)
+
+/*
+ * What its models have cost so far. EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ *
+ * Threads: one per scene.
+ */
+EBPO_API ebpo_status ebpo_scene_get_stats(const ebpo_scene *scene, ebpo_scene_stats *out);
+
 /*
  * As it was added. EBPO_E_ARGUMENT: no such instance, or `out` was not begun with its macro.
  *
@@ -386,10 +413,15 @@ typedef enum ebpo_meeting_kind {
     EBPO_MEETING_NEAR = 1,     /* none meet, but they are nearer than their clearance */
     EBPO_MEETING_TOUCHING = 2, /* faces have common points, none has inner ones */
     EBPO_MEETING_COPLANAR = 3, /* faces lie on each other, none cross */
-    EBPO_MEETING_CROSSING = 4  /* faces cross */
+    EBPO_MEETING_CROSSING = 4, /* faces cross */
+
+    /* Only if ebpo_scene_ask_options.relate, and then instead of those above: */
+    EBPO_MEETING_PROTRUDING = 5, /* a part of one is inside the other, a solid, a part sticks out */
+    EBPO_MEETING_ENCLOSED = 6,   /* one is within the other, a solid; it may touch it from within */
+    EBPO_MEETING_DUPLICATE = 7   /* both are the same points */
 } ebpo_meeting_kind;
 
-/* Of two instances, a < b, whose faces meet or come too near. */
+/* Of two instances, a < b, whose faces meet or come too near, or of which one is in the other. */
 typedef struct ebpo_scene_meeting {
     uint64_t a, b;
 
@@ -405,13 +437,39 @@ typedef struct ebpo_scene_meeting {
      */
     uint64_t touching, crossing, coplanar;
 
-    /* What the scene wants between them, and of EBPO_MEETING_NEAR what there is, exact; else 0. */
+    /*
+     * What the scene wants between them, and what there is between faces, exact, of
+     * EBPO_MEETING_NEAR and where one is within the other without touching it; else 0.
+     */
     double clearance, distance;
 
-    /* An ebpo_meeting_kind, the greatest that any pair of faces has. */
+    /* An ebpo_meeting_kind; without `relate` the greatest that any pair of faces has. */
     int32_t kind;
 
-    int32_t reserved;
+    /* An ebpo_relation of a to b, if ebpo_scene_ask_options.relate, else EBPO_RELATION_OPEN. */
+    int32_t relation;
+
+    /*
+     * Lines along which they cross, as ebpo_collide_polylines joins them, if
+     * ebpo_scene_ask_options.count; UINT64_MAX: more segments than a collider joins.
+     */
+    uint64_t contacts;
+
+    /*
+     * A point in the world, as far as doubles tell, if ebpo_scene_ask_options.places: one that the
+     * two faces have in common, or the middle between their nearest points. NAN: not asked, or a
+     * model is not all in memory.
+     */
+    double place[3];
+
+    /* A box of `place` and, if ebpo_scene_ask_options.count too, of all contact segments. */
+    double place_min[3], place_max[3];
+
+    /*
+     * Of a in b and of b in a, as ebpo_collide_depth gives them within
+     * ebpo_scene_ask_options.depth; 0 to INFINITY: not asked, or in a surface.
+     */
+    ebpo_certain depth[2];
 } ebpo_scene_meeting;
 
 /* Meetings, lent until it returns. False: enough. */
@@ -426,10 +484,23 @@ typedef struct ebpo_scene_ask_options {
     /* 0: all cores. The answers do not depend on it. */
     unsigned threads;
 
-    /* Count all pairs of faces that meet. */
+    /* Count all pairs of faces that meet, and lines along which they cross. */
     bool count;
 
-    uint8_t reserved[3];
+    /* Tell where. */
+    bool places;
+
+    /*
+     * Tell how solids lie to each other (ebpo_collide_relation), of all pairs asked: some 60 bytes
+     * a face of both models, for each thread.
+     */
+    bool relate;
+
+    uint8_t reserved;
+
+    /* Tell how deep what is inside is, within so much, in the world's unit; and `relate`. 0: do
+     * not. */
+    double depth;
 } ebpo_scene_ask_options;
 
 #define EBPO_SCENE_ASK_OPTIONS_INIT EBPO_SIZED(ebpo_scene_ask_options)
@@ -437,13 +508,14 @@ typedef struct ebpo_scene_ask_options {
 /*
  * The narrow phase at a time: of the pairs of ebpo_scene_pairs those whose faces meet or are nearer
  * to each other than the pair's clearance, exact on posed coordinates (collide.h), ascending by a,
- * then b. An instance within another that no face comes near is no meeting. Models are made as
- * ebpo_scene_model does; all pairs of a model are asked of one. `asked`, the number of pairs asked,
- * may be NULL.
+ * then b. An instance within another that no face comes near is a meeting only if options.relate.
+ * Models are made as ebpo_scene_model does; all pairs of a model are asked of one. `asked`, the
+ * number of pairs asked, may be NULL.
  *
- * EBPO_E_ARGUMENT: not loaded, no such time, or a pose (ebpo_pose_check). EBPO_E_ABSENT: a model
- * has no mesh, or is a subset without faces that may matter. EBPO_E_LIMIT: a model is not all in
- * memory (ebpo_load_options). EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_E_ARGUMENT: not loaded, no such time, a pose (ebpo_pose_check), or options.depth is no such
+ * length. EBPO_E_ABSENT: a model has no mesh, or is a subset without faces that may matter: of
+ * those that are related all may. EBPO_E_LIMIT: a model is not all in memory (ebpo_load_options).
+ * EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
  *
  * Threads: one per scene; further ones live for the call.
  */
@@ -451,6 +523,95 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_meet(ebpo_scene *scene, double tim
                                                    const ebpo_scene_ask_options *options,
                                                    ebpo_scene_meetings_fn take, void *user,
                                                    uint64_t *asked, ebpo_error *error);
+
+/*
+ * Every pair of faces of two instances that meet at a time, as ebpo_collide_all gives them of their
+ * models.
+ *
+ * threads   0: all cores. The answers do not depend on it
+ *
+ * EBPO_E_ARGUMENT: no such instance. Other errors are those of ebpo_scene_meet.
+ *
+ * Threads: one per scene; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_t a, uint64_t b,
+                                                      double time, unsigned threads,
+                                                      ebpo_pairs_fn take, void *user,
+                                                      ebpo_error *error);
+
+/* ---- as a file ---- */
+
+/* A report of what was asked at several times, being written. */
+typedef struct ebpo_scene_record ebpo_scene_record;
+
+/* One time. */
+typedef struct ebpo_scene_frame {
+    double time;
+
+    /* Pairs that were asked about; nanoseconds that it took. */
+    uint64_t asked, nanoseconds;
+
+    /* Meanwhile: bytes read of files, models made, subtrees loaded (ebpo_scene_stats). */
+    uint64_t bytes_read, models, loads;
+} ebpo_scene_frame;
+
+/*
+ * Begins a file for any HDF5 from 1.8 on, which appears whole, when it is finished, or not at all.
+ * Arrays have an attribute `meaning`, in words.
+ *
+ *   /instances/names       uint8 [bytes]  names, each ended by a 0, by number
+ *   /instances/model       int64 [i]      numbers of models
+ *   /models/names          uint8 [bytes]
+ *   /frames/time           double [n]     in the scene's seconds
+ *   /frames/first_meeting  int64 [n]      the frame's meetings begin there in /meetings
+ *   /frames/meetings       int64 [n]      and are so many
+ *   /frames/asked, nanoseconds, bytes_read, models, loads   int64 [n]   of ebpo_scene_frame
+ *   /meetings/frame        int64 [m]
+ *   /meetings/instances    int64 [m][2]   a and b
+ *   /meetings/kind         uint8 [m]      an ebpo_meeting_kind
+ *   /meetings/relation     uint8 [m]      an ebpo_relation
+ *   /meetings/faces        int64 [m][2]   of a and of b, in the sources; -1: none
+ *   /meetings/pairs        int64 [m][3]   of faces: touching, coplanar, crossing
+ *   /meetings/contacts     int64 [m]      -1: not told
+ *   /meetings/clearance, distance   double [m]
+ *   /meetings/place        double [m][3]  NAN: not asked
+ *   /meetings/place_box    double [m][6]  lower corner, upper corner
+ *   /meetings/depth        double [m][4]  of a in b from, to; of b in a from, to
+ *
+ * EBPO_E_IO: it cannot be written. EBPO_E_MEMORY.
+ *
+ * Threads: one per scene. The scene may not change before the record is freed.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_record_new(const ebpo_scene *scene, const char *path,
+                                                         ebpo_scene_record **out,
+                                                         ebpo_error *error);
+
+/*
+ * Adds a time and what ebpo_scene_meet gave. EBPO_E_IO, EBPO_E_MEMORY.
+ *
+ * Threads: one per record.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_record_add(ebpo_scene_record *record,
+                                                         const ebpo_scene_frame *frame,
+                                                         const ebpo_scene_meeting *meetings,
+                                                         uint64_t count, ebpo_error *error);
+
+/*
+ * The file appears. EBPO_E_IO.
+ *
+ * Threads: one per record.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_record_finish(ebpo_scene_record *record,
+                                                            ebpo_error *error);
+
+/*
+ * NULL is fine. What is not finished leaves nothing behind.
+ *
+ * Threads: one per record.
+ */
+EBPO_API void ebpo_scene_record_free(ebpo_scene_record *record);
+
+/* ---- on the way ---- */
 
 /* Two instances, a < b, on their way. */
 typedef struct ebpo_scene_way {
