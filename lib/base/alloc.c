@@ -24,6 +24,17 @@ void *ebpo_alloc_zero(uint64_t count, size_t size)
     return size_ok(count, size, &bytes) ? calloc(1, bytes) : NULL;
 }
 
+void *ebpo_alloc_lines(uint64_t count, size_t size)
+{
+    enum { LINE = 64 };
+    size_t bytes;
+    if (!size_ok(count, size, &bytes) || bytes > PTRDIFF_MAX - LINE)
+        return NULL;
+    bytes = (bytes + LINE - 1) / LINE * LINE;
+    void *block = aligned_alloc(LINE, bytes);
+    return block ? memset(block, 0, bytes) : NULL;
+}
+
 void *ebpo_realloc(void *block, uint64_t count, size_t size)
 {
     size_t bytes;

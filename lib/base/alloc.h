@@ -15,6 +15,8 @@ static inline bool ebpo_mul_ok(uint64_t a, uint64_t b, uint64_t *out)
 void *ebpo_alloc(uint64_t count, size_t size);
 /* The same, zeroed. */
 void *ebpo_alloc_zero(uint64_t count, size_t size);
+/* The same, at the beginning of a cache line: for what is read and written by vectors. */
+void *ebpo_alloc_lines(uint64_t count, size_t size);
 /* Resizes to count * size bytes; on NULL the old block stays valid. */
 void *ebpo_realloc(void *block, uint64_t count, size_t size);
 

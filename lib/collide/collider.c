@@ -49,7 +49,7 @@ ebpo_status ebpo_collider_of_parts(ebpo_model *a, ebpo_model *b,
         status = ebpo_check_mesh(b, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_collider *c = ebpo_alloc_zero(1, sizeof *c);
+    ebpo_collider *c = ebpo_alloc_lines(1, sizeof *c);
     if (!c)
         return ebpo_fail_memory(error, sizeof *c);
     c->model[0] = a;
@@ -66,6 +66,9 @@ void ebpo_collider_free(ebpo_collider *c)
     if (!c)
         return;
     ebpo_pair_walk_free(&c->walk);
+    for (unsigned i = 0; c->walks && i < c->walk_count; i++)
+        ebpo_pair_walk_free(&c->walks[i]);
+    free(c->walks);
     ebpo_gap_free(c->gap);
     for (int i = 0; i < 2; i++) {
         ebpo_context_free(c->context[i]);

@@ -13,7 +13,9 @@
 struct ebpo_collider {
     ebpo_model *model[2]; /* as the caller has them */
     ebpo_collider_options options;
-    ebpo_pair_walk walk; /* of the calling thread */
+    ebpo_pair_walk walk;   /* of the calling thread */
+    ebpo_pair_walk *walks; /* of the threads of all pairs, between questions; NULL: none are here */
+    unsigned walk_count;
     uint64_t node_pairs, block_pairs, exact;
     uint64_t subtree_pairs, subtrees, loads, bytes_read; /* of models in parts */
     struct ebpo_gap_search *gap;                         /* of distances, once one has been asked */

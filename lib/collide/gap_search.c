@@ -4,7 +4,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/alloc.h"
 
@@ -37,13 +36,7 @@ void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
     ebpo_gap_set_way(g, way);
 }
 
-ebpo_gap_search *ebpo_gap_new(void)
-{
-    ebpo_gap_search *g = aligned_alloc(64, (sizeof *g + 63) / 64 * 64);
-    if (g)
-        memset(g, 0, sizeof *g);
-    return g;
-}
+ebpo_gap_search *ebpo_gap_new(void) { return ebpo_alloc_lines(1, sizeof(ebpo_gap_search)); }
 
 void ebpo_gap_free(ebpo_gap_search *g)
 {

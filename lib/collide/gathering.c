@@ -69,16 +69,27 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
+/* The collider's, if they are not in use: a question may be asked by what is given another's pairs.
+ */
+static bool take_walks(ebpo_gathering *g)
+{
+    ebpo_collider *c = g->question->collider;
+    if (c->walks) {
+        g->walk = c->walks;
+        g->threads = c->walk_count;
+        c->walks = NULL;
+        return true;
+    }
+    g->threads = ebpo_thread_count(c->options.threads);
+    g->walk = ebpo_alloc_lines(g->threads, sizeof *g->walk);
+    return g->walk != NULL;
+}
+
 static ebpo_status prepare(ebpo_gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
                            uint32_t end, ebpo_error *error)
 {
-    unsigned wanted = ebpo_thread_count(g->question->collider->options.threads);
-    if (!g->walk) {
-        g->walk = ebpo_alloc_zero(wanted, sizeof *g->walk);
-        if (!g->walk)
-            return ebpo_fail_memory(error, wanted * sizeof *g->walk);
-        g->threads = wanted;
-    }
+    if (!g->walk && !take_walks(g))
+        return ebpo_fail_memory(error, g->threads * sizeof *g->walk);
     for (unsigned i = 0; i < g->threads; i++) {
         ebpo_pair_walk_begin(&g->walk[i], pair);
         g->walk[i].first = false;
@@ -129,11 +140,23 @@ ebpo_status ebpo_gather(ebpo_gathering *g, const ebpo_accel_pair *pair, uint32_t
     return put_together(g, pair, error);
 }
 
+/* For the next question; stacks and pairs have another size then. */
+static void give_walks_back(ebpo_gathering *g)
+{
+    ebpo_collider *c = g->question->collider;
+    for (unsigned i = 0; g->walk && i < g->threads; i++)
+        ebpo_pair_walk_free(&g->walk[i]);
+    if (c->walks) {
+        free(g->walk);
+        return;
+    }
+    c->walks = g->walk;
+    c->walk_count = g->threads;
+}
+
 void ebpo_gathering_free(ebpo_gathering *g)
 {
-    for (unsigned i = 0; i < g->threads; i++)
-        ebpo_pair_walk_free(&g->walk[i]);
-    free(g->walk);
+    give_walks_back(g);
     free(g->part);
     free(g->met);
 }

@@ -1,49 +1,46 @@
-/* By digits from the least on; few pairs by comparing. */
+/* By digits from the least on, of so many bits that counting them takes no longer than moving. */
 #include "collide/met_sort.h"
 
-#include <stdlib.h>
 #include <string.h>
 
-enum { DIGIT_BITS = 11, DIGITS = 1 << DIGIT_BITS, FEW = 2000 };
+enum { LEAST_BITS = 4, MOST_BITS = 11 };
 
-static inline uint32_t digit_of(const ebpo_met_pair *m, bool by_a, unsigned shift)
+static inline uint32_t digit_of(const ebpo_met_pair *m, bool by_a, unsigned shift, unsigned bits)
 {
-    return (by_a ? m->a : m->b) >> shift & (DIGITS - 1);
+    return (by_a ? m->a : m->b) >> shift & ((1u << bits) - 1);
 }
 
 static void pass(const ebpo_met_pair *from, ebpo_met_pair *to, uint64_t count, bool by_a,
-                 unsigned shift)
+                 unsigned shift, unsigned bits)
 {
-    uint64_t begin[DIGITS + 1] = { 0 };
+    uint64_t begin[(1 << MOST_BITS) + 1];
+    memset(begin, 0, ((1u << bits) + 1) * sizeof *begin);
     for (uint64_t i = 0; i < count; i++)
-        begin[digit_of(&from[i], by_a, shift) + 1]++;
-    for (int d = 0; d < DIGITS; d++)
+        begin[digit_of(&from[i], by_a, shift, bits) + 1]++;
+    for (unsigned d = 0; d < 1u << bits; d++)
         begin[d + 1] += begin[d];
     for (uint64_t i = 0; i < count; i++)
-        to[begin[digit_of(&from[i], by_a, shift)]++] = from[i];
+        to[begin[digit_of(&from[i], by_a, shift, bits)]++] = from[i];
 }
 
-static int compare(const void *x, const void *y)
+static unsigned bits_for(uint64_t count)
 {
-    const ebpo_met_pair *p = x, *q = y;
-    if (p->a != q->a)
-        return p->a < q->a ? -1 : 1;
-    return (p->b > q->b) - (p->b < q->b);
+    unsigned bits = LEAST_BITS;
+    while (bits < MOST_BITS && count >> bits > 1)
+        bits++;
+    return bits;
 }
 
 void ebpo_met_sort(ebpo_met_pair *met, ebpo_met_pair *spare, uint64_t count, uint32_t most_a,
                    uint32_t most_b)
 {
-    if (count <= FEW) {
-        if (count)
-            qsort(met, count, sizeof *met, compare);
-        return;
-    }
     ebpo_met_pair *from = met, *to = spare;
+    unsigned bits = bits_for(count);
+    if (count < 2)
+        return;
     for (int by_a = 0; by_a < 2; by_a++)
-        for (unsigned shift = 0; shift < 32 && (by_a ? most_a : most_b) >> shift;
-             shift += DIGIT_BITS) {
-            pass(from, to, count, by_a, shift);
+        for (unsigned shift = 0; shift < 32 && (by_a ? most_a : most_b) >> shift; shift += bits) {
+            pass(from, to, count, by_a, shift, bits);
             ebpo_met_pair *other = from;
             from = to;
             to = other;

@@ -14,6 +14,7 @@ void ebpo_pair_walk_free(ebpo_pair_walk *w)
     free(w->met);
     w->stack = NULL;
     w->met = NULL;
+    w->capacity = w->met_capacity = 0;
 }
 
 bool ebpo_pair_walk_room(ebpo_pair_walk *w, uint64_t more)

@@ -31,6 +31,7 @@ typedef struct ebpo_turned_node {
     float size;                          /* no box is longer */
     uint32_t node;                       /* EBPO_NO_CHILD: none is here */
     uint8_t lanes;
+    bool slabs; /* a child has one */
 } ebpo_turned_node;
 
 enum { EBPO_TURNED_NODES = 8 };
@@ -59,6 +60,7 @@ struct ebpo_pair_walk {
     uint32_t begin, end; /* faces of the first accel that matter */
     ebpo_node_pair *stack;
     uint64_t top, capacity;
+    uint64_t group; /* of the first contact: where the last group of the stack begins */
     ebpo_met_pair *met;
     uint64_t met_count, met_capacity;
     uint32_t met_slot[2];                    /* of the pair that was found last */

@@ -6,7 +6,7 @@ void ebpo_pair_walk_begin(ebpo_pair_walk *w, const ebpo_accel_pair *pair)
     w->pair = pair;
     w->kernels = ebpo_walk_kernels_best();
     w->filter = ebpo_pair_kernels_best();
-    w->top = w->met_count = 0;
+    w->top = w->group = w->met_count = 0;
     w->begin = 0;
     w->end = pair->accel[0]->face_count;
     for (int i = 0; i < 2 * EBPO_TURNED_NODES; i++)
