@@ -25,12 +25,6 @@ static void turn(const double m[3][3], const double x[3], double out[3])
         out[i] = m[i][0] * x[0] + m[i][1] * x[1] + m[i][2] * x[2];
 }
 
-static void rotation_of(const ebpo_posing *p, double out[3][3])
-{
-    for (int i = 0; i < 9; i++)
-        out[i / 3][i % 3] = p->matrix[i / 3][i % 3] / p->scale;
-}
-
 static void to_floats(const double m[3][3], float out[3][3], float size[3][3])
 {
     for (int i = 0; i < 9; i++) {
@@ -84,7 +78,7 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
         out->accel[i] = accel[i];
         out->posing[i] = posing[i];
         per_world[i] = accel[i]->scale / posing[i]->posing.scale;
-        rotation_of(&posing[i]->posing, rotation[i]);
+        ebpo_posing_rotation(&posing[i]->posing, rotation[i]);
     }
     choose_units(out, per_world);
     double unit = (double)out->unit[0] * per_world[0],

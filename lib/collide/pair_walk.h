@@ -34,7 +34,7 @@ typedef struct ebpo_turned_node {
     bool slabs; /* a child has one */
 } ebpo_turned_node;
 
-enum { EBPO_TURNED_NODES = 8 };
+enum { EBPO_TURNED_BITS = 4, EBPO_TURNED_NODES = 1 << EBPO_TURNED_BITS };
 
 typedef struct ebpo_pair_walk ebpo_pair_walk;
 

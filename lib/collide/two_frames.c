@@ -4,13 +4,6 @@
 
 #include <math.h>
 
-/* Rows of the rotation, as doubles have it. */
-static void rotation_of(const ebpo_posing *p, double out[3][3])
-{
-    for (int i = 0; i < 9; i++)
-        out[i / 3][i % 3] = p->matrix[i / 3][i % 3] / p->scale;
-}
-
 static double greatest(const double x[3]) { return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2]))); }
 
 /* Frame `from` seen from frame `to`; offset: from's centre less to's, in the world. */
@@ -41,7 +34,7 @@ void ebpo_two_frames_make(ebpo_two_frames *out, const ebpo_accel *const accel[2]
         const ebpo_posing *p = &posing[s].posing;
         double length = accel[s]->reach / accel[s]->scale,
                far = greatest(accel[s]->centre) + length;
-        rotation_of(p, rotation[s]);
+        ebpo_posing_rotation(p, rotation[s]);
         ebpo_posing_apply(p, accel[s]->centre, centre[s]);
         out->frame[s].unit = (float)(p->scale / accel[s]->scale * unit);
         size += length * p->scale * unit;

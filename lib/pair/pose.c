@@ -83,6 +83,12 @@ ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose, const doub
     return EBPO_OK;
 }
 
+void ebpo_posing_rotation(const ebpo_posing *p, double out[3][3])
+{
+    for (int i = 0; i < 9; i++)
+        out[i / 3][i % 3] = p->matrix[i / 3][i % 3] / p->scale;
+}
+
 double ebpo_posing_error(const ebpo_posing *p, double length)
 {
     double most = 0;

@@ -30,6 +30,9 @@ static inline void ebpo_posing_apply(const ebpo_posing *p, const double x[3], do
     }
 }
 
+/* Rows of the rotation, as doubles have it. */
+void ebpo_posing_rotation(const ebpo_posing *p, double out[3][3]);
+
 /* No posed coordinate on any axis is farther than this from that of the true motion (nearest
  * rotation, no rounding) for vertices at most `length` from the model's origin. */
 double ebpo_posing_error(const ebpo_posing *p, double length);
