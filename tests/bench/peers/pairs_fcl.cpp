@@ -2,6 +2,7 @@
 //
 //     pairs_fcl MODEL.ply POSES QUESTION ROUNDS [PAIRS]     QUESTION: first, all, distance
 #include <fcl/fcl.h>
+#include <malloc.h>
 
 #include "pairs.hpp"
 
@@ -52,6 +53,12 @@ static double ask(const tree &t, const bench::pose &p, const std::string &questi
     return static_cast<double>(contacts.size());
 }
 
+static size_t allocated()
+{
+    struct mallinfo2 all = mallinfo2();
+    return all.uordblks + all.hblkhd;
+}
+
 int main(int count, char **argument)
 {
     if (count < 5)
@@ -59,11 +66,12 @@ int main(int count, char **argument)
     bench::mesh<double> m = bench::read_ply<double>(argument[1]);
     std::shared_ptr<tree> t;
     timespec a, b;
+    size_t before = allocated();
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &a);
     t = make_tree(m);
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &b);
     double build = (double)(b.tv_sec - a.tv_sec) + 1e-9 * (double)(b.tv_nsec - a.tv_nsec);
-    printf("made %.3f %d\n", build, t->memUsage(false));
+    printf("made %.3f %zu\n", build, allocated() - before);
     return bench::run_poses(argument + 2,
                             [&](const bench::pose &p, const std::string &question,
                                 bench::face_pairs &pairs) { return ask(*t, p, question, pairs); });
