@@ -9,166 +9,32 @@
 #include "base/alloc.h"
 #include "base/clock.h"
 #include "base/error.h"
-#include "cache/cache_slots.h"
-
-/* What there must be room for. The background yields to everyone else, and drops nothing that was
- * asked for together. */
-typedef struct demand {
-    uint64_t key, peak;
-    bool ahead;
-    bool aside; /* of what is set aside anyway */
-    bool known; /* the peak, from an attempt before */
-} demand;
-
-struct ebpo_cache {
-    ebpo_cache_source source;
-    char name[32];
-    uint64_t budget;
-    pthread_mutex_t lock;   /* guards all below; never held while the source is called */
-    pthread_cond_t changed; /* loads ended, room came free */
-    /* the background has something to do: apart from `changed`, or each unpin would wake it */
-    pthread_cond_t asked;
-    ebpo_cache_slots slots;
-    uint64_t pinned; /* bytes of items that are in use */
-    uint64_t aside_most, aside;
-    /* bytes reserved for loads under way, and of items on their way out: these become free or
-     * pinned without anyone's help */
-    uint64_t passing;
-    /* gets that wait for room are served in the order they came, or a large one might wait for ever
-     */
-    uint64_t tickets, serving;
-    ebpo_cache_stats stats;
-    bool ahead_runs, stop;
-    pthread_t ahead_thread;
-    uint64_t ahead[EBPO_CACHE_AHEAD];
-    unsigned ahead_count, ahead_next;
-    uint64_t asking; /* how often something was asked for */
-};
+#include "cache/cache_room.h"
 
 static void pin(ebpo_cache *c, ebpo_cache_slot *s)
 {
     if (s->pins++ == 0) {
-        ebpo_cache_slots_unlink(&c->slots, s);
-        c->pinned += s->bytes;
+        ebpo_cache_slots_unlink(&c->pool->slots, s);
+        c->pool->pinned += s->bytes;
     }
-}
-
-/* --- room --- */
-
-static void count_bytes(ebpo_cache *c, uint64_t bytes)
-{
-    c->stats.bytes += bytes;
-    if (c->stats.bytes > c->stats.peak_bytes)
-        c->stats.peak_bytes = c->stats.bytes;
-}
-
-static bool asked_ahead(const ebpo_cache *c, uint64_t key)
-{
-    for (unsigned i = 0; i < c->ahead_count; i++)
-        if (c->ahead[i] == key)
-            return true;
-    return false;
-}
-
-/* Releases items that are out of the table. Their bytes count until they are really gone, or
- * another thread would use them twice. */
-static void release_all(ebpo_cache *c, ebpo_cache_slot *leaving)
-{
-    uint64_t bytes = 0;
-    if (!leaving)
-        return;
-    pthread_mutex_unlock(&c->lock);
-    for (ebpo_cache_slot *next; leaving; leaving = next) {
-        next = leaving->chain;
-        bytes += leaving->bytes;
-        c->source.release(c->source.user, leaving->item);
-        free(leaving);
-    }
-    pthread_mutex_lock(&c->lock);
-    c->stats.bytes -= bytes;
-    c->passing -= bytes;
-    pthread_cond_broadcast(&c->changed);
-}
-
-static void drop(ebpo_cache *c, ebpo_cache_slot *s, ebpo_cache_slot **leaving)
-{
-    ebpo_cache_slots_unlink(&c->slots, s);
-    ebpo_cache_slots_take(&c->slots, s);
-    c->passing += s->bytes;
-    s->chain = *leaving;
-    *leaving = s;
-}
-
-/* Bytes that the background may not drop: what was asked for together. */
-static uint64_t kept_for(const ebpo_cache *c, const demand *d)
-{
-    uint64_t bytes = 0;
-    for (unsigned i = 0; d->ahead && i < c->ahead_count; i++) {
-        const ebpo_cache_slot *s = ebpo_cache_slots_find(&c->slots, c->ahead[i]);
-        bytes += s && s->state == READY && !s->pins ? s->bytes : 0;
-    }
-    return bytes;
-}
-
-static uint64_t sum(uint64_t a, uint64_t b) { return a > UINT64_MAX - b ? UINT64_MAX : a + b; }
-
-typedef enum capacity { ROOM_MADE, ROOM_LATER, ROOM_NEVER } capacity;
-
-/* Reserves d->peak, dropping the least recently used items. ROOM_LATER: when loads under way end.
- */
-static capacity make_room(ebpo_cache *c, const demand *d)
-{
-    while (c->budget && sum(c->stats.bytes, d->peak) > c->budget) {
-        uint64_t held =
-            sum(sum(sum(c->pinned, kept_for(c, d)), d->aside ? 0 : d->peak), c->aside_most);
-        if (held > c->budget)
-            return ROOM_NEVER;
-        if (sum(held, c->passing) > c->budget)
-            return ROOM_LATER;
-        ebpo_cache_slot *leaving = NULL;
-        uint64_t left = sum(c->stats.bytes, d->peak);
-        for (ebpo_cache_slot *s = c->slots.oldest, *newer; s && left > c->budget; s = newer) {
-            newer = s->newer;
-            if (d->ahead && asked_ahead(c, s->key))
-                continue;
-            left -= s->bytes;
-            drop(c, s, &leaving);
-            c->stats.evicted++;
-        }
-        release_all(c, leaving);
-    }
-    count_bytes(c, d->peak);
-    c->passing += d->peak;
-    return ROOM_MADE;
-}
-
-static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error)
-{
-    demand d = { .peak = peak };
-    uint64_t ticket = c->tickets++;
-    capacity got = ROOM_LATER;
-    while (ticket != c->serving || (got = make_room(c, &d)) == ROOM_LATER)
-        pthread_cond_wait(&c->changed, &c->lock);
-    c->serving++;
-    pthread_cond_broadcast(&c->changed);
-    if (got == ROOM_MADE)
-        return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_LIMIT,
-                     "the %s cache's budget is %" PRIu64 " bytes, of which %" PRIu64
-                     " are in use, and one %s more takes up to %" PRIu64 "; a budget of %" PRIu64
-                     " would do",
-                     c->name, c->budget, sum(c->pinned, c->aside_most), c->name, peak,
-                     sum(sum(c->pinned, c->aside_most), peak));
 }
 
 /* --- loading --- */
 
-/* What was reserved for a load. */
-static void give_back(ebpo_cache *c, uint64_t reserved)
+static uint64_t sum(uint64_t a, uint64_t b) { return a > UINT64_MAX - b ? UINT64_MAX : a + b; }
+
+static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error)
 {
-    c->stats.bytes -= reserved;
-    c->passing -= reserved;
-    pthread_cond_broadcast(&c->changed);
+    ebpo_cache_pool *p = c->pool;
+    ebpo_cache_demand d = { .cache = c, .peak = peak };
+    if (ebpo_cache_wait_for_room(p, &d))
+        return EBPO_OK;
+    uint64_t used = sum(sum(p->pinned, p->taken), p->aside_most);
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the %s cache's budget is %" PRIu64 " bytes, of which %" PRIu64
+                     " are in use, and one %s more takes up to %" PRIu64 "; a budget of %" PRIu64
+                     " would do",
+                     c->name, p->budget, used, c->name, peak, sum(used, peak));
 }
 
 /* Ends a load: `reserved` gives way to the item, which is pinned by whoever waits for it (and `own`
@@ -176,17 +42,17 @@ static void give_back(ebpo_cache *c, uint64_t reserved)
 static void end_load(ebpo_cache *c, ebpo_cache_slot *s, bool loaded, uint64_t reserved,
                      unsigned own)
 {
-    give_back(c, reserved);
+    ebpo_cache_give_back(c, reserved);
     if (loaded) {
         s->state = READY;
         s->pins = own + s->waiters;
-        count_bytes(c, s->bytes);
+        ebpo_cache_count_bytes(c->pool, c, s->bytes);
         if (s->pins)
-            c->pinned += s->bytes;
+            c->pool->pinned += s->bytes;
         else
-            ebpo_cache_slots_link(&c->slots, s);
+            ebpo_cache_slots_link(&c->pool->slots, s);
     } else {
-        ebpo_cache_slots_take(&c->slots, s);
+        ebpo_cache_slots_take(&c->pool->slots, s);
         s->state = FAILED;
         if (s->waiters == 0)
             free(s);
@@ -209,10 +75,11 @@ static ebpo_status call_load(ebpo_cache *c, ebpo_cache_slot *s, uint64_t reserve
 {
     void *item = NULL;
     uint64_t bytes = 0;
-    ebpo_status status = c->source.load(c->source.user, s->key, c->budget ? reserved : UINT64_MAX,
-                                        &item, &bytes, error);
+    ebpo_status status =
+        c->source.load(c->source.user, s->key, c->pool->budget ? reserved : UINT64_MAX, &item,
+                       &bytes, error);
     *needed = status == EBPO_E_LIMIT && bytes > reserved ? bytes : 0;
-    if (status == EBPO_OK && bytes > reserved && c->budget) {
+    if (status == EBPO_OK && bytes > reserved && c->pool->budget) {
         c->source.release(c->source.user, item);
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "%s %" PRIu64 " takes %" PRIu64 " bytes, and at most %" PRIu64
@@ -235,12 +102,12 @@ static ebpo_status load_with_room(ebpo_cache *c, ebpo_cache_slot *s, uint64_t pe
         if (status != EBPO_OK)
             return status;
         *reserved = peak;
-        pthread_mutex_unlock(&c->lock);
+        pthread_mutex_unlock(&c->pool->lock);
         status = call_load(c, s, peak, &needed, error);
-        pthread_mutex_lock(&c->lock);
+        pthread_mutex_lock(&c->pool->lock);
         if (!needed)
             return status;
-        give_back(c, *reserved);
+        ebpo_cache_give_back(c, *reserved);
         *reserved = 0;
         peak = needed;
     }
@@ -250,13 +117,13 @@ static ebpo_status load_with_room(ebpo_cache *c, ebpo_cache_slot *s, uint64_t pe
 static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
     ebpo_cache_slot *s =
-        ebpo_cache_slots_add(&c->slots, key); /* from here on others wait for this load */
+        ebpo_cache_slots_add(&c->pool->slots, c, key); /* from here on others wait for this load */
     uint64_t peak = 0, reserved = 0;
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
-    pthread_mutex_unlock(&c->lock);
+    pthread_mutex_unlock(&c->pool->lock);
     ebpo_status status = estimate(c, key, &peak, error);
-    pthread_mutex_lock(&c->lock);
+    pthread_mutex_lock(&c->pool->lock);
     if (status == EBPO_OK)
         status = load_with_room(c, s, peak, &reserved, error);
     if (status == EBPO_OK) {
@@ -272,7 +139,7 @@ static bool wait_for(ebpo_cache *c, ebpo_cache_slot *s, void **item)
 {
     s->waiters++;
     while (s->state == LOADING)
-        pthread_cond_wait(&c->changed, &c->lock);
+        pthread_cond_wait(&c->pool->changed, &c->pool->lock);
     s->waiters--;
     if (s->state == READY) {
         *item = s->item;
@@ -285,7 +152,7 @@ static bool wait_for(ebpo_cache *c, ebpo_cache_slot *s, void **item)
 
 static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
-    for (ebpo_cache_slot *s; (s = ebpo_cache_slots_find(&c->slots, key)) != NULL;) {
+    for (ebpo_cache_slot *s; (s = ebpo_cache_slots_find(&c->pool->slots, c, key)) != NULL;) {
         if (s->state == READY) {
             pin(c, s);
             *item = s->item;
@@ -300,7 +167,7 @@ static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_e
 /* Pins an item that is there. */
 static bool take_ready(ebpo_cache *c, uint64_t key, void **item)
 {
-    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->slots, key);
+    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->pool->slots, c, key);
     if (!s || s->state != READY)
         return false;
     pin(c, s);
@@ -313,14 +180,14 @@ ebpo_status ebpo_cache_get(ebpo_cache *c, uint64_t key, void **item, bool *hit, 
 {
     ebpo_status status = EBPO_OK;
     *item = NULL;
-    pthread_mutex_lock(&c->lock);
+    pthread_mutex_lock(&c->pool->lock);
     bool there = take_ready(c, key, item);
     if (!there) {
         double begin = ebpo_seconds();
         status = wait_or_load(c, key, item, error);
         c->stats.load_seconds += ebpo_seconds() - begin;
     }
-    pthread_mutex_unlock(&c->lock);
+    pthread_mutex_unlock(&c->pool->lock);
     if (hit)
         *hit = there;
     return status;
@@ -328,84 +195,95 @@ ebpo_status ebpo_cache_get(ebpo_cache *c, uint64_t key, void **item, bool *hit, 
 
 bool ebpo_cache_try(ebpo_cache *c, uint64_t key, void **item)
 {
-    pthread_mutex_lock(&c->lock);
+    pthread_mutex_lock(&c->pool->lock);
     bool there = take_ready(c, key, item);
-    pthread_mutex_unlock(&c->lock);
+    pthread_mutex_unlock(&c->pool->lock);
     return there;
 }
 
 bool ebpo_cache_has(ebpo_cache *c, uint64_t key)
 {
-    pthread_mutex_lock(&c->lock);
-    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->slots, key);
+    pthread_mutex_lock(&c->pool->lock);
+    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->pool->slots, c, key);
     bool there = s && s->state == READY;
-    pthread_mutex_unlock(&c->lock);
+    pthread_mutex_unlock(&c->pool->lock);
     return there;
 }
 
 void ebpo_cache_unpin(ebpo_cache *c, uint64_t key)
 {
-    pthread_mutex_lock(&c->lock);
-    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->slots, key);
+    pthread_mutex_lock(&c->pool->lock);
+    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->pool->slots, c, key);
     if (s && s->pins && --s->pins == 0) {
-        c->pinned -= s->bytes;
-        ebpo_cache_slots_link(&c->slots, s);
-        pthread_cond_broadcast(&c->changed);
+        c->pool->pinned -= s->bytes;
+        ebpo_cache_slots_link(&c->pool->slots, s);
+        pthread_cond_broadcast(&c->pool->changed);
     }
-    pthread_mutex_unlock(&c->lock);
+    pthread_mutex_unlock(&c->pool->lock);
 }
 
 /* --- aside --- */
 
-void ebpo_cache_set_aside(ebpo_cache *c, uint64_t most) { c->aside_most = most; }
+void ebpo_cache_set_aside(ebpo_cache *c, uint64_t most)
+{
+    pthread_mutex_lock(&c->pool->lock);
+    c->pool->aside_most += most - c->aside_most;
+    c->aside_most = most;
+    pthread_mutex_unlock(&c->pool->lock);
+}
 
 bool ebpo_cache_take_aside(ebpo_cache *c, uint64_t bytes)
 {
-    demand d = { .peak = bytes, .aside = true };
-    pthread_mutex_lock(&c->lock);
+    ebpo_cache_demand d = { .cache = c, .peak = bytes, .aside = true };
+    pthread_mutex_lock(&c->pool->lock);
     bool taken = bytes <= c->aside_most - c->aside;
     if (taken) {
         c->aside += bytes;
-        taken = make_room(c, &d) == ROOM_MADE;
-        *(taken ? &c->passing : &c->aside) -= bytes;
+        taken = ebpo_cache_make_room(c->pool, &d) == ROOM_MADE;
+        *(taken ? &c->pool->passing : &c->aside) -= bytes;
     }
-    pthread_mutex_unlock(&c->lock);
+    pthread_mutex_unlock(&c->pool->lock);
     return taken;
 }
 
 void ebpo_cache_give_back_aside(ebpo_cache *c, uint64_t bytes)
 {
-    pthread_mutex_lock(&c->lock);
+    pthread_mutex_lock(&c->pool->lock);
     c->aside -= bytes;
     c->stats.bytes -= bytes;
-    pthread_cond_broadcast(&c->changed);
-    pthread_mutex_unlock(&c->lock);
+    c->pool->bytes -= bytes;
+    pthread_cond_broadcast(&c->pool->changed);
+    pthread_mutex_unlock(&c->pool->lock);
 }
 
 /* --- ahead --- */
 
 /* Loads d->key in the background, or lets it be; false when it must wait for the loads of others.
  * Nobody waits for our key meanwhile: whoever wants it loads it. */
-static bool load_ahead(ebpo_cache *c, demand *d)
+static bool load_ahead(ebpo_cache *c, ebpo_cache_demand *d)
 {
-    ebpo_cache_slot *s =
-        ebpo_cache_slots_find(&c->slots, d->key) ? NULL : ebpo_cache_slots_add(&c->slots, d->key);
+    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->pool->slots, c, d->key)
+                             ? NULL
+                             : ebpo_cache_slots_add(&c->pool->slots, c, d->key);
     if (!s)
         return true;
     if (!d->known) {
-        pthread_mutex_unlock(&c->lock);
+        pthread_mutex_unlock(&c->pool->lock);
         d->known = estimate(c, d->key, &d->peak, NULL) == EBPO_OK;
-        pthread_mutex_lock(&c->lock);
+        pthread_mutex_lock(&c->pool->lock);
     }
-    capacity got = !d->known ? ROOM_NEVER : c->serving != c->tickets ? ROOM_LATER : make_room(c, d);
+    ebpo_cache_capacity got = !d->known ? ROOM_NEVER
+                              : c->pool->serving != c->pool->tickets
+                                  ? ROOM_LATER
+                                  : ebpo_cache_make_room(c->pool, d);
     if (got != ROOM_MADE) {
         end_load(c, s, false, 0, 0);
         return got == ROOM_NEVER;
     }
-    pthread_mutex_unlock(&c->lock);
+    pthread_mutex_unlock(&c->pool->lock);
     uint64_t needed;
     bool loaded = call_load(c, s, d->peak, &needed, NULL) == EBPO_OK;
-    pthread_mutex_lock(&c->lock);
+    pthread_mutex_lock(&c->pool->lock);
     c->stats.prefetched += loaded;
     end_load(c, s, loaded, d->peak, 0);
     return true;
@@ -414,25 +292,25 @@ static bool load_ahead(ebpo_cache *c, demand *d)
 static void *run_ahead(void *context)
 {
     ebpo_cache *c = context;
-    demand d = { .ahead = true };
-    pthread_mutex_lock(&c->lock);
+    ebpo_cache_demand d = { .cache = c, .ahead = true };
+    pthread_mutex_lock(&c->pool->lock);
     while (!c->stop) {
         if (c->ahead_next == c->ahead_count) {
-            pthread_cond_wait(&c->asked, &c->lock);
+            pthread_cond_wait(&c->asked, &c->pool->lock);
             continue;
         }
         uint64_t asking = c->asking;
         if (!d.known || d.key != c->ahead[c->ahead_next])
-            d = (demand){ .key = c->ahead[c->ahead_next], .ahead = true };
+            d = (ebpo_cache_demand){ .cache = c, .key = c->ahead[c->ahead_next], .ahead = true };
         bool done = load_ahead(c, &d);
         if (done)
             d.known = false;
         if (done && asking == c->asking)
             c->ahead_next++;
         else if (!done && asking == c->asking && !c->stop)
-            pthread_cond_wait(&c->changed, &c->lock);
+            pthread_cond_wait(&c->pool->changed, &c->pool->lock);
     }
-    pthread_mutex_unlock(&c->lock);
+    pthread_mutex_unlock(&c->pool->lock);
     return NULL;
 }
 
@@ -454,86 +332,111 @@ static void take_list(ebpo_cache *c, const uint64_t *keys, unsigned count)
     c->ahead_count = c->ahead_next = 0;
     c->asking++;
     for (unsigned i = 0; i < count && i < EBPO_CACHE_AHEAD; i++)
-        if (!asked_ahead(c, keys[i]))
+        if (!ebpo_cache_asked_ahead(c, keys[i]))
             c->ahead[c->ahead_count++] = keys[i];
     for (unsigned i = c->ahead_count; i-- > 0;) {
-        ebpo_cache_slot *s = ebpo_cache_slots_find(&c->slots, c->ahead[i]);
+        ebpo_cache_slot *s = ebpo_cache_slots_find(&c->pool->slots, c, c->ahead[i]);
         if (s && s->state == READY && !s->pins) {
-            ebpo_cache_slots_unlink(&c->slots, s);
-            ebpo_cache_slots_link(&c->slots, s);
+            ebpo_cache_slots_unlink(&c->pool->slots, s);
+            ebpo_cache_slots_link(&c->pool->slots, s);
         }
     }
 }
 
 void ebpo_cache_prefetch(ebpo_cache *c, const uint64_t *keys, unsigned count)
 {
-    pthread_mutex_lock(&c->lock);
+    pthread_mutex_lock(&c->pool->lock);
     take_list(c, keys, count);
     if (!c->ahead_runs && c->ahead_count)
         c->ahead_runs = start_ahead(c);
     pthread_cond_signal(&c->asked);
-    pthread_cond_broadcast(&c->changed);
-    pthread_mutex_unlock(&c->lock);
+    pthread_cond_broadcast(&c->pool->changed);
+    pthread_mutex_unlock(&c->pool->lock);
 }
 
 /* --- the whole --- */
 
+ebpo_status ebpo_cache_make_in(ebpo_cache **out, const ebpo_cache_source *source, const char *name,
+                               ebpo_cache_pool *pool, ebpo_error *error)
+{
+    ebpo_cache *c = *out = ebpo_alloc_zero(1, sizeof *c);
+    if (!c)
+        return ebpo_fail_memory(error, sizeof *c);
+    c->source = *source;
+    strncpy(c->name, name, sizeof c->name - 1);
+    c->pool = pool;
+    pthread_cond_init(&c->asked, NULL);
+    return EBPO_OK;
+}
+
 ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, const char *name,
                             uint64_t budget, ebpo_error *error)
 {
+    ebpo_cache_pool *pool;
     *out = NULL;
-    ebpo_cache *c = ebpo_alloc_zero(1, sizeof *c);
-    if (!c || !ebpo_cache_slots_make(&c->slots)) {
-        free(c);
-        return ebpo_fail_memory(error, sizeof *c);
+    ebpo_status status = ebpo_cache_pool_make(&pool, budget, error);
+    if (status == EBPO_OK)
+        status = ebpo_cache_make_in(out, source, name, pool, error);
+    if (status == EBPO_OK)
+        (*out)->alone = true;
+    else
+        ebpo_cache_pool_free(pool);
+    return status;
+}
+
+/* The lock is held. */
+static void clear(ebpo_cache *c)
+{
+    ebpo_cache_slot *leaving = NULL;
+    for (ebpo_cache_slot *s = c->pool->slots.oldest, *newer; s; s = newer) {
+        newer = s->newer;
+        if (s->owner == c)
+            ebpo_cache_drop(c->pool, s, &leaving);
     }
-    c->source = *source;
-    strncpy(c->name, name, sizeof c->name - 1);
-    c->budget = budget;
-    pthread_mutex_init(&c->lock, NULL);
-    pthread_cond_init(&c->changed, NULL);
-    pthread_cond_init(&c->asked, NULL);
-    *out = c;
-    return EBPO_OK;
+    ebpo_cache_release_all(c->pool, leaving);
 }
 
 void ebpo_cache_clear(ebpo_cache *c)
 {
-    ebpo_cache_slot *leaving = NULL;
-    pthread_mutex_lock(&c->lock);
-    while (c->slots.oldest)
-        drop(c, c->slots.oldest, &leaving);
-    release_all(c, leaving);
-    pthread_mutex_unlock(&c->lock);
+    pthread_mutex_lock(&c->pool->lock);
+    clear(c);
+    pthread_mutex_unlock(&c->pool->lock);
 }
 
 void ebpo_cache_get_stats(ebpo_cache *c, ebpo_cache_stats *out)
 {
-    pthread_mutex_lock(&c->lock);
+    pthread_mutex_lock(&c->pool->lock);
     *out = c->stats;
-    pthread_mutex_unlock(&c->lock);
+    pthread_mutex_unlock(&c->pool->lock);
+}
+
+static void stop_ahead(ebpo_cache *c)
+{
+    pthread_mutex_lock(&c->pool->lock);
+    c->stop = true;
+    pthread_cond_broadcast(&c->pool->changed);
+    pthread_cond_signal(&c->asked);
+    pthread_mutex_unlock(&c->pool->lock);
+    if (c->ahead_runs)
+        pthread_join(c->ahead_thread, NULL);
 }
 
 void ebpo_cache_free(ebpo_cache *c)
 {
     if (!c)
         return;
-    pthread_mutex_lock(&c->lock);
-    c->stop = true;
-    pthread_cond_broadcast(&c->changed);
-    pthread_cond_signal(&c->asked);
-    pthread_mutex_unlock(&c->lock);
-    if (c->ahead_runs)
-        pthread_join(c->ahead_thread, NULL);
-    for (uint64_t i = 0; i < c->slots.bucket_count; i++)
-        for (ebpo_cache_slot *s = c->slots.bucket[i], *next; s; s = next) {
-            next = s->chain;
-            c->source.release(c->source.user, s->item);
-            free(s);
-        }
+    ebpo_cache_pool *p = c->pool;
+    stop_ahead(c);
+    pthread_mutex_lock(&p->lock);
+    clear(c);
+    while (c->leaving) /* others drop them, to make room */
+        pthread_cond_wait(&p->changed, &p->lock);
+    p->bytes -= c->aside;
+    p->aside_most -= c->aside_most;
+    pthread_cond_broadcast(&p->changed);
+    pthread_mutex_unlock(&p->lock);
     pthread_cond_destroy(&c->asked);
-    pthread_cond_destroy(&c->changed);
-    pthread_mutex_destroy(&c->lock);
-    free(c->slots.bucket);
+    if (c->alone)
+        ebpo_cache_pool_free(p);
     free(c);
 }

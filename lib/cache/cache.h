@@ -3,38 +3,15 @@
 #ifndef EBPO_CACHE_CACHE_H
 #define EBPO_CACHE_CACHE_H
 
-#include <ebpo/base.h>
-
-typedef struct ebpo_cache ebpo_cache;
-
-/* Where items come from. Called without locks held, by any thread; estimate and load never twice at
- * a time for one key. They may use other caches, and of this one ebpo_cache_take_aside only. */
-typedef struct ebpo_cache_source {
-    void *user;
-    /* Bytes that loading `key` will take, the item itself included; room for that is made first.
-     * *keep: what the item takes once loaded. */
-    ebpo_status (*estimate)(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
-                            ebpo_error *error);
-    /* May take `most` bytes meanwhile: what was said, UINT64_MAX without a budget. *bytes: of the
-     * item. Where that does not do: EBPO_E_LIMIT, with what might do, more than `most`, in *bytes;
-     * then room for so much is made, and it is called again. An item that is larger is dropped,
-     * and the get fails with EBPO_E_LIMIT. */
-    ebpo_status (*load)(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
-                        ebpo_error *error);
-    void (*release)(void *user, void *item);
-} ebpo_cache_source;
-
-typedef struct ebpo_cache_stats {
-    uint64_t hits;                       /* finds that needed no waiting */
-    uint64_t loads, prefetched, evicted; /* by get, in the background, to make room */
-    /* items, what loads under way may take, and what has been taken aside */
-    uint64_t bytes, peak_bytes;
-    double load_seconds; /* that callers of get waited */
-} ebpo_cache_stats;
+#include "cache/cache_pool.h"
 
 /* `budget` in bytes, 0: no limit. `name` ("subtree") is for messages. */
 EBPO_MUST_USE ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source,
                                           const char *name, uint64_t budget, ebpo_error *error);
+/* One of those that share a pool, which outlives it. */
+EBPO_MUST_USE ebpo_status ebpo_cache_make_in(ebpo_cache **out, const ebpo_cache_source *source,
+                                             const char *name, ebpo_cache_pool *pool,
+                                             ebpo_error *error);
 /* Stops the background thread, releases all items; none may be pinned. NULL is fine. */
 void ebpo_cache_free(ebpo_cache *cache);
 
@@ -56,7 +33,6 @@ bool ebpo_cache_try(ebpo_cache *cache, uint64_t key, void **item);
  * and not among the keys asked for; its failures are silent (the key will be loaded when it is
  * needed). At most EBPO_CACHE_AHEAD keys; what is beyond is ignored. Those that are there already
  * count as just used. */
-enum { EBPO_CACHE_AHEAD = 64 };
 void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count);
 
 /* Of the budget so many bytes at most may be taken for what stays beside the items; loads are

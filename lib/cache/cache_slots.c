@@ -13,15 +13,18 @@ bool ebpo_cache_slots_make(ebpo_cache_slots *t)
     return t->bucket != NULL;
 }
 
-static ebpo_cache_slot **bucket_of(ebpo_cache_slot **bucket, uint64_t bucket_count, uint64_t key)
+static ebpo_cache_slot **bucket_of(ebpo_cache_slot **bucket, uint64_t bucket_count,
+                                   const struct ebpo_cache *owner, uint64_t key)
 {
-    return &bucket[ebpo_hash_number(key) & (bucket_count - 1)];
+    uint64_t hash = ebpo_hash_number(ebpo_hash_number((uintptr_t)owner) + key);
+    return &bucket[hash & (bucket_count - 1)];
 }
 
-ebpo_cache_slot *ebpo_cache_slots_find(const ebpo_cache_slots *t, uint64_t key)
+ebpo_cache_slot *ebpo_cache_slots_find(const ebpo_cache_slots *t, const struct ebpo_cache *owner,
+                                       uint64_t key)
 {
-    ebpo_cache_slot *s = *bucket_of(t->bucket, t->bucket_count, key);
-    while (s && s->key != key)
+    ebpo_cache_slot *s = *bucket_of(t->bucket, t->bucket_count, owner, key);
+    while (s && (s->key != key || s->owner != owner))
         s = s->chain;
     return s;
 }
@@ -36,7 +39,7 @@ static void grow(ebpo_cache_slots *t)
     for (uint64_t i = 0; i < t->bucket_count; i++)
         for (ebpo_cache_slot *s = t->bucket[i], *next; s; s = next) {
             next = s->chain;
-            ebpo_cache_slot **to = bucket_of(bucket, count, s->key);
+            ebpo_cache_slot **to = bucket_of(bucket, count, s->owner, s->key);
             s->chain = *to;
             *to = s;
         }
@@ -45,15 +48,16 @@ static void grow(ebpo_cache_slots *t)
     t->bucket_count = count;
 }
 
-ebpo_cache_slot *ebpo_cache_slots_add(ebpo_cache_slots *t, uint64_t key)
+ebpo_cache_slot *ebpo_cache_slots_add(ebpo_cache_slots *t, struct ebpo_cache *owner, uint64_t key)
 {
     ebpo_cache_slot *s = ebpo_alloc_zero(1, sizeof *s);
     if (!s)
         return NULL;
     if (t->count++ == t->bucket_count)
         grow(t);
+    s->owner = owner;
     s->key = key;
-    ebpo_cache_slot **to = bucket_of(t->bucket, t->bucket_count, key);
+    ebpo_cache_slot **to = bucket_of(t->bucket, t->bucket_count, owner, key);
     s->chain = *to;
     *to = s;
     return s;
@@ -61,7 +65,7 @@ ebpo_cache_slot *ebpo_cache_slots_add(ebpo_cache_slots *t, uint64_t key)
 
 void ebpo_cache_slots_take(ebpo_cache_slots *t, ebpo_cache_slot *s)
 {
-    ebpo_cache_slot **at = bucket_of(t->bucket, t->bucket_count, s->key);
+    ebpo_cache_slot **at = bucket_of(t->bucket, t->bucket_count, s->owner, s->key);
     while (*at != s)
         at = &(*at)->chain;
     *at = s->chain;

@@ -2,6 +2,7 @@
 #include "geom/strict_fp.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
@@ -9,6 +10,7 @@
 #include "base/sized.h"
 #include "collide/collider.h"
 #include "collide/nearest_pair.h"
+#include "collide/subtree_distance.h"
 #include "pair/contact.h"
 #include "pair/triangle_pair.h"
 
@@ -18,20 +20,6 @@ static ebpo_status check_options(const ebpo_clearance_options *o, ebpo_error *er
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the distance's tolerance has to be 0 or more and finite, and the "
                          "distance asked for a number");
-    return EBPO_OK;
-}
-
-/* Of the collider; it stays, as what it holds is the start of the next. */
-static ebpo_status begin_search(ebpo_collision *q, ebpo_error *error)
-{
-    ebpo_collider *c = q->collider;
-    const ebpo_accel *accel[2] = { q->model[0]->whole, q->model[1]->whole };
-    ebpo_posing posing[2] = { q->posing[0].posing, q->posing[1].posing };
-    if (!c->gap)
-        c->gap = ebpo_gap_new();
-    if (!c->gap)
-        return ebpo_fail_memory(error, sizeof *c->gap);
-    ebpo_gap_begin(c->gap, accel, posing, q->reach);
     return EBPO_OK;
 }
 
@@ -49,56 +37,79 @@ static void meeting_point(const ebpo_face_two *f, ebpo_pair_kind kind, double po
 static void tell_pair(const ebpo_collision *q, const ebpo_nearest_pair *n, ebpo_clearance *out)
 {
     const ebpo_face_two *f = &n->best;
-    const ebpo_accel *first = q->model[0]->whole, *second = q->model[1]->whole;
-    ebpo_met_pair met = { ebpo_accel_slot_face(first, f->slot[0]),
-                          ebpo_accel_slot_face(second, f->slot[1]), EBPO_PAIR_APART };
+    int a = q->turned, b = !q->turned;
+    ebpo_pair_kind kind = EBPO_PAIR_APART;
     double point[2][3];
     for (int i = 0; i < 6; i++)
         point[i / 3][i % 3] = f->bounds.point[i / 3][i % 3];
     if (n->meets) {
-        met.kind = (int32_t)ebpo_triangle_pair((const double(*)[3])f->corner[0],
-                                               (const double(*)[3])f->corner[1]);
-        meeting_point(f, (ebpo_pair_kind)met.kind, point);
+        kind =
+            ebpo_triangle_pair((const double(*)[3])f->corner[0], (const double(*)[3])f->corner[1]);
+        meeting_point(f, kind, point);
     }
-    out->pair = ebpo_collision_pair(q, first, second, &met);
+    out->pair =
+        (ebpo_face_pair){ f->source[a], f->source[b], f->file[a], f->file[b], (int32_t)kind, 0 };
     for (int k = 0; k < 3; k++) {
-        out->point_a[k] = point[q->turned][k];
-        out->point_b[k] = point[!q->turned][k];
+        out->point_a[k] = point[a][k];
+        out->point_b[k] = point[b][k];
     }
 }
 
-static ebpo_status search(ebpo_collision *q, const ebpo_clearance_options *o, ebpo_clearance *out,
+/* --- from one question to the next --- */
+
+static ebpo_face_two in_order(const ebpo_collision *q, const ebpo_face_two *f)
+{
+    ebpo_face_two out = *f;
+    for (int i = 0; i < 2 && q->turned; i++) {
+        out.file[i] = f->file[!i];
+        out.source[i] = f->source[!i];
+        memcpy(out.own[i], f->own[!i], sizeof out.own[i]);
+    }
+    return out;
+}
+
+static ebpo_status keep(const ebpo_collision *q, const ebpo_nearest_pair *n, ebpo_error *error)
+{
+    ebpo_collider *c = q->collider;
+    if (!c->nearest)
+        c->nearest = ebpo_alloc_zero(1, sizeof *c->nearest);
+    if (!c->nearest)
+        return ebpo_fail_memory(error, sizeof *c->nearest);
+    *c->nearest = in_order(q, &n->best);
+    return EBPO_OK;
+}
+
+static void start(const ebpo_collision *q, ebpo_nearest_pair *n)
+{
+    const ebpo_posing posing[2] = { q->posing[0].posing, q->posing[1].posing };
+    ebpo_face_two known = in_order(q, q->collider->nearest);
+    ebpo_nearest_pair_start(n, posing, &known);
+    if (ebpo_nearest_pair_is_done(n))
+        ebpo_nearest_pair_leave(n, 0);
+}
+
+/* --- the search --- */
+
+static bool has_faces(const ebpo_model *m)
+{
+    return m->whole ? m->whole->bound_count > 0 : m->info->face_count > 0;
+}
+
+static ebpo_status search(const ebpo_collision *q, bool warm, ebpo_nearest_pair *n,
                           ebpo_error *error)
 {
     ebpo_collider *c = q->collider;
-    int32_t meet = 0;
-    ebpo_status status = begin_search(q, error);
-    if (status == EBPO_OK) /* of models that meet bounds say little: that walk is better at it */
-        status = ebpo_collision_first(q, "distance", &meet, error);
-    if (status != EBPO_OK)
-        return status;
-    ebpo_nearest_pair n = { .tolerance = o->tolerance,
-                            .at_least = o->at_least < 0 ? NAN : o->at_least,
-                            .late = q->late,
-                            .progress = &q->options.progress,
-                            .meets = meet == 1,
-                            .warm = o->warm && c->has_nearest };
-    for (int s = 0; s < 2; s++)
-        n.best.slot[s] = n.meets ? c->walk.met_slot[s] : c->nearest[s != q->turned];
-    status = ebpo_nearest_pair_find(c->gap, &n, error);
-    if (status != EBPO_OK)
-        return status;
-    c->node_pairs += c->gap->node_pairs;
-    c->block_pairs += c->gap->block_pairs;
-    out->distance = ebpo_certain_of(n.lo, n.hi);
-    out->at_least = n.is_at_least;
-    if (!n.found)
+    const ebpo_accel *accel[2] = { q->model[0]->whole, q->model[1]->whole };
+    if (!c->gap)
+        c->gap = ebpo_gap_new();
+    if (!c->gap)
+        return ebpo_fail_memory(error, sizeof *c->gap);
+    if (warm && c->nearest)
+        start(q, n);
+    if (ebpo_nearest_pair_is_done(n))
         return EBPO_OK;
-    tell_pair(q, &n, out);
-    c->has_nearest = true;
-    for (int s = 0; s < 2; s++)
-        c->nearest[s != q->turned] = n.best.slot[s];
-    return EBPO_OK;
+    return ebpo_collision_is_in_parts(q) ? ebpo_distance_of_parts(q, n, error)
+                                         : ebpo_distance_of_accels(q, accel, true, n, error);
 }
 
 ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *options,
@@ -115,13 +126,27 @@ ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *
     if (status == EBPO_OK)
         status = check_options(&wanted, error);
     if (status == EBPO_OK)
-        status = ebpo_collision_begin_whole(&q, c, options, error);
+        status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;
-    if (q.model[0]->whole->bound_count == 0 || q.model[1]->whole->bound_count == 0) {
+    if (!has_faces(q.model[0]) || !has_faces(q.model[1])) {
         out->distance = ebpo_certain_of(INFINITY, INFINITY);
         out->at_least = wanted.at_least < 0 ? -1 : 1;
         return EBPO_OK;
     }
-    return search(&q, &wanted, out, error);
+    ebpo_nearest_pair n = { .tolerance = wanted.tolerance,
+                            .at_least = wanted.at_least < 0 ? NAN : wanted.at_least,
+                            .late = q.late,
+                            .progress = &q.options.progress };
+    ebpo_nearest_pair_begin(&n);
+    status = search(&q, wanted.warm, &n, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_nearest_pair_end(&n);
+    out->distance = ebpo_certain_of(n.lo, n.hi);
+    out->at_least = n.is_at_least;
+    if (!n.found)
+        return EBPO_OK;
+    tell_pair(&q, &n, out);
+    return keep(&q, &n, error);
 }

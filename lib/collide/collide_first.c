@@ -26,12 +26,11 @@ static ebpo_status search(const ebpo_collision *q, ebpo_pair_walk *w, const char
     return EBPO_OK;
 }
 
-ebpo_status ebpo_collision_first(const ebpo_collision *q, const char *stage, int32_t *found,
-                                 ebpo_error *error)
+ebpo_status ebpo_collision_first(const ebpo_collision *q, const ebpo_accel *const accel[2],
+                                 const char *stage, int32_t *found, ebpo_error *error)
 {
     ebpo_pair_walk *w = &q->collider->walk;
     ebpo_accel_pair pair;
-    const ebpo_accel *accel[2] = { q->model[0]->whole, q->model[1]->whole };
     const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
     *found = 0;
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
@@ -57,8 +56,10 @@ ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *opt
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK && ebpo_collision_is_in_parts(&q))
         return ebpo_first_of_parts(&q, out, found, error);
-    if (status == EBPO_OK)
-        status = ebpo_collision_first(&q, "first contact", found, error);
+    if (status != EBPO_OK)
+        return status;
+    const ebpo_accel *accel[2] = { q.model[0]->whole, q.model[1]->whole };
+    status = ebpo_collision_first(&q, accel, "first contact", found, error);
     if (status == EBPO_OK && *found == 1)
         *out = ebpo_collision_pair(&q, q.model[0]->whole, q.model[1]->whole, &c->walk.met[0]);
     return status;

@@ -32,7 +32,7 @@ ebpo_status ebpo_collide_levels(ebpo_collider *c, const ebpo_collide_options *op
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    ebpo_level_search g = { .count = 0 };
+    ebpo_level_search g = { .open_pairs = 0 };
     *out = (ebpo_level_result){ .common = -1, .contact = -1 };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)

@@ -34,6 +34,7 @@ enum { ROWS = 512 };
 
 typedef struct writing {
     const ebpo_collision *question;
+    ebpo_pair_faces places;
     ebpo_h5_out out;
     ebpo_h5_table table[TABLES];
     int64_t faces[ROWS][2], file_faces[ROWS][2], contact_faces[ROWS][2];
@@ -70,12 +71,14 @@ static bool flush(writing *w)
     return w->status == EBPO_OK;
 }
 
-static void note_contact(writing *w, const ebpo_face_pair *pair)
+static bool note_contact(writing *w, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
     ebpo_contact_segment s;
     uint64_t n = w->contacts++;
-    ebpo_pose_pair(w->question, pair, &faces);
+    w->status = ebpo_pose_pair(&w->places, pair, &faces, w->error);
+    if (w->status != EBPO_OK)
+        return false;
     ebpo_contact_of(&faces, pair, &s);
     memcpy(w->points[n], s.point, sizeof s.point);
     w->contact_faces[n][0] = (int64_t)s.face_a;
@@ -84,6 +87,7 @@ static void note_contact(writing *w, const ebpo_face_pair *pair)
         w->on[n][2 * i] = s.on_a[i];
         w->on[n][2 * i + 1] = s.on_b[i];
     }
+    return true;
 }
 
 static bool take_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
@@ -96,8 +100,8 @@ static bool take_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
         w->file_faces[n][0] = (int64_t)pairs[i].file_face_a;
         w->file_faces[n][1] = (int64_t)pairs[i].file_face_b;
         w->kind[n] = (uint8_t)pairs[i].kind;
-        if (pairs[i].kind == EBPO_PAIR_CROSSING)
-            note_contact(w, &pairs[i]);
+        if (pairs[i].kind == EBPO_PAIR_CROSSING && !note_contact(w, &pairs[i]))
+            return false;
         if (w->pairs == ROWS && !flush(w))
             return false;
     }
@@ -135,7 +139,10 @@ static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_pu
     w->error = error;
     for (int i = 0; i < TABLES; i++)
         w->table[i] = (ebpo_h5_table)EBPO_H5_TABLE_INIT;
-    ebpo_status status = write_tables(w, path, target);
+    ebpo_status status = ebpo_pair_faces_begin(&w->places, q, error);
+    if (status == EBPO_OK)
+        status = write_tables(w, path, target);
+    ebpo_pair_faces_end(&w->places);
     free(w);
     return status;
 }
@@ -202,9 +209,7 @@ ebpo_status ebpo_collide_write(ebpo_collider *c, const ebpo_collide_options *opt
     ebpo_publish target = EBPO_PUBLISH_INIT;
     if (format != EBPO_PAIRS_HDF5 && format != EBPO_PAIRS_PLY)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: no format of pairs", path);
-    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
-    if (status == EBPO_OK)
-        status = ebpo_collider_slots(c, error);
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&target, path, error);
     if (status == EBPO_OK)

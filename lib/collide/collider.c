@@ -70,6 +70,7 @@ void ebpo_collider_free(ebpo_collider *c)
         ebpo_pair_walk_free(&c->walks[i]);
     free(c->walks);
     ebpo_gap_free(c->gap);
+    free(c->nearest);
     for (int i = 0; i < 2; i++) {
         ebpo_context_free(c->context[i]);
         free(c->slots[i]);
@@ -151,16 +152,29 @@ ebpo_status ebpo_collision_begin_whole(ebpo_collision *out, ebpo_collider *c,
 {
     ebpo_status status = ebpo_collision_begin(out, c, options, error);
     if (status == EBPO_OK && ebpo_collision_is_in_parts(out))
-        status = ebpo_fail(error, EBPO_E_LIMIT,
-                           "a model is not all in memory, as all questions but for first contact, "
-                           "all pairs and levels need it: give a larger budget, or fetch a file "
-                           "that is far away");
+        status =
+            ebpo_fail(error, EBPO_E_LIMIT,
+                      "a model is not all in memory, as its relation to another one and depths "
+                      "need it: give a larger budget, or fetch a file that is far away");
     return status;
 }
 
 bool ebpo_collision_is_late(const ebpo_collision *q)
 {
     return q->late != UINT64_MAX && ebpo_clock() >= q->late;
+}
+
+/* Of both files; of one, once. */
+uint64_t ebpo_collision_bytes_read(const ebpo_collision *q)
+{
+    uint64_t bytes = 0;
+    for (int i = 0; i < 2; i++) {
+        ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
+        if ((i == 0 || q->model[0]->file != q->model[1]->file) &&
+            ebpo_file_get_stats(q->model[i]->file, &stats) == EBPO_OK)
+            bytes += stats.bytes_read;
+    }
+    return bytes;
 }
 
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *q, const ebpo_accel *first,

@@ -19,10 +19,9 @@ struct ebpo_collider {
     uint64_t node_pairs, block_pairs, exact;
     uint64_t subtree_pairs, subtrees, loads, bytes_read; /* of models in parts */
     struct ebpo_gap_search *gap;                         /* of distances, once one has been asked */
-    bool has_nearest;
-    uint32_t nearest[2];      /* slots of the last nearest pair, of the caller's A and B */
-    ebpo_context *context[2]; /* of depths, once one has been asked of that model */
-    uint32_t *slots[2];       /* by numbers in the file, once they have been asked for */
+    struct ebpo_face_two *nearest; /* the last nearest pair, of the caller's A and B; or NULL */
+    ebpo_context *context[2];      /* of depths, once one has been asked of that model */
+    uint32_t *slots[2];            /* by numbers in the file, once they have been asked for */
 };
 
 /* A question: options checked, models in the order that swapping does not change. */
@@ -47,10 +46,14 @@ EBPO_MUST_USE ebpo_status ebpo_collision_begin_whole(ebpo_collision *out, ebpo_c
 
 bool ebpo_collision_is_late(const ebpo_collision *collision);
 
-/* The first contact: the collider's walk has it as met[0] and met_slot. found: as of
- * ebpo_collide_first. */
-EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision, const char *stage,
+/* The first contact of two accels of the question's models: the collider's walk has it as met[0]
+ * and met_slot. found: as of ebpo_collide_first. */
+EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision,
+                                               const ebpo_accel *const accel[2], const char *stage,
                                                int32_t *found, ebpo_error *error);
+
+/* That have been read of both files. */
+uint64_t ebpo_collision_bytes_read(const ebpo_collision *collision);
 
 /* A model is not all in memory. */
 bool ebpo_collision_is_in_parts(const ebpo_collision *collision);

@@ -28,7 +28,7 @@ typedef struct segment {
 } segment;
 
 typedef struct lines {
-    const ebpo_collision *question;
+    ebpo_pair_faces places;
     uint64_t most; /* segments */
     segment *segment;
     end_key *key; /* two for each segment */
@@ -39,6 +39,8 @@ typedef struct lines {
     uint64_t *faces;
     uint64_t points_capacity, normals_capacity, faces_capacity;
     bool full, no_memory;
+    ebpo_error *error; /* of `status` */
+    ebpo_status status;
 } lines;
 
 /* --- gathering --- */
@@ -63,16 +65,15 @@ static void unit_normal(const double t[3][3], double out[3])
         out[k] /= length;
 }
 
-/* The feature of face `slot` of the caller's model m that `on` names. */
-static bool set_feature(lines *l, int m, uint32_t slot, unsigned on, uint32_t out[2])
+/* The feature of a face of the caller's model m, with its corners in the file, that `on` names. */
+static bool set_feature(lines *l, int m, uint64_t face, const double t[3][3], unsigned on,
+                        uint32_t out[2])
 {
-    double t[3][3];
     if (on > 5) {
         out[0] = NONE;
-        out[1] = slot;
+        out[1] = (uint32_t)face;
         return true;
     }
-    ebpo_accel_triangle(l->question->collider->model[m]->whole, slot, t);
     out[1] = NONE;
     if (on < 3)
         return ebpo_corner_id(&l->corners[m], t[on], &out[0]);
@@ -85,6 +86,7 @@ static bool set_feature(lines *l, int m, uint32_t slot, unsigned on, uint32_t ou
     return true;
 }
 
+/* False: no memory. */
 static bool add_segment(lines *l, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
@@ -93,15 +95,19 @@ static bool add_segment(lines *l, const ebpo_face_pair *pair)
         return false;
     segment *s = &l->segment[l->count];
     *s = (segment){ .after = NONE, .before = NONE };
-    ebpo_pose_pair(l->question, pair, &faces);
+    l->status = ebpo_pose_pair(&l->places, pair, &faces, l->error);
+    if (l->status != EBPO_OK)
+        return true;
     ebpo_contact_of(&faces, pair, &s->contact);
     for (int m = 0; m < 2; m++)
         unit_normal((const double(*)[3])faces.corner[m], s->normal[m]);
     for (unsigned e = 0; e < 2; e++) {
         end_key *k = &l->key[2 * l->count + e];
         k->end = (uint32_t)(2 * l->count + e);
-        if (!set_feature(l, 0, faces.slot[0], s->contact.on_a[e], k->on[0]) ||
-            !set_feature(l, 1, faces.slot[1], s->contact.on_b[e], k->on[1]))
+        const double(*own[2])[3] = { (const double(*)[3])faces.own[0],
+                                     (const double(*)[3])faces.own[1] };
+        if (!set_feature(l, 0, pair->file_face_a, own[0], s->contact.on_a[e], k->on[0]) ||
+            !set_feature(l, 1, pair->file_face_b, own[1], s->contact.on_b[e], k->on[1]))
             return false;
     }
     l->count++;
@@ -118,7 +124,7 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
         if (l->full)
             return false;
         l->no_memory = !add_segment(l, &pairs[i]);
-        if (l->no_memory)
+        if (l->no_memory || l->status != EBPO_OK)
             return false;
     }
     return true;
@@ -232,6 +238,7 @@ static ebpo_status failed(const lines *l, ebpo_error *error)
 
 static void free_lines(lines *l)
 {
+    ebpo_pair_faces_end(&l->places);
     for (int i = 0; i < 2; i++)
         ebpo_corner_ids_free(&l->corners[i]);
     free(l->segment);
@@ -248,14 +255,16 @@ ebpo_status ebpo_collide_polylines(ebpo_collider *c, const ebpo_collide_options 
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    lines l = { .question = &q, .most = c->options.memory / SEGMENT_BYTES };
+    lines l = { .error = error, .most = c->options.memory / SEGMENT_BYTES };
     if (l.most > SEGMENTS_MOST)
         l.most = SEGMENTS_MOST;
-    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
-        status = ebpo_collider_slots(c, error);
+        status = ebpo_pair_faces_begin(&l.places, &q, error);
     if (status == EBPO_OK)
         status = ebpo_collide_all(c, options, take_pairs, &l, error);
+    if (status == EBPO_OK)
+        status = l.status;
     if (status == EBPO_OK && (l.full || l.no_memory))
         status = failed(&l, error);
     if (status == EBPO_OK) {

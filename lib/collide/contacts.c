@@ -13,6 +13,8 @@
 ebpo_status ebpo_collider_slots(ebpo_collider *c, ebpo_error *error)
 {
     for (int i = 0; i < 2; i++) {
+        if (!c->model[i]->whole)
+            continue;
         if (!c->slots[i])
             c->slots[i] = ebpo_face_slots(c->model[i]->whole);
         if (!c->slots[i])
@@ -21,14 +23,35 @@ ebpo_status ebpo_collider_slots(ebpo_collider *c, ebpo_error *error)
     return EBPO_OK;
 }
 
-void ebpo_pose_pair(const ebpo_collision *q, const ebpo_face_pair *pair, ebpo_posed_pair *out)
+ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f, const ebpo_collision *q, ebpo_error *error)
+{
+    ebpo_collider *c = q->collider;
+    f->question = q;
+    ebpo_status status = ebpo_collider_slots(c, error);
+    for (int i = 0; i < 2 && status == EBPO_OK; i++)
+        ebpo_faces_by_number_begin(&f->side[i], c->model[i], c->slots[i]);
+    return status;
+}
+
+void ebpo_pair_faces_end(ebpo_pair_faces *f)
+{
+    for (int i = 0; i < 2; i++)
+        ebpo_faces_by_number_end(&f->side[i]);
+}
+
+ebpo_status ebpo_pose_pair(ebpo_pair_faces *f, const ebpo_face_pair *pair, ebpo_posed_pair *out,
+                           ebpo_error *error)
 {
     const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
     for (int i = 0; i < 2; i++) {
-        out->slot[i] = q->collider->slots[i][face[i]];
-        ebpo_posed_triangle(q->collider->model[i]->whole, &q->posing[q->turned ^ i].posing,
-                            out->slot[i], out->corner[i]);
+        const ebpo_posing *posing = &f->question->posing[f->question->turned ^ i].posing;
+        ebpo_status status = ebpo_faces_by_number_get(&f->side[i], face[i], out->own[i], error);
+        if (status != EBPO_OK)
+            return status;
+        for (int k = 0; k < 3; k++)
+            ebpo_posing_apply(posing, out->own[i][k], out->corner[i][k]);
     }
+    return EBPO_OK;
 }
 
 void ebpo_contact_of(const ebpo_posed_pair *faces, const ebpo_face_pair *pair,
@@ -48,20 +71,24 @@ void ebpo_contact_of(const ebpo_posed_pair *faces, const ebpo_face_pair *pair,
 enum { SEGMENTS_AT_ONCE = 512 };
 
 typedef struct telling {
-    const ebpo_collision *question;
+    ebpo_pair_faces faces;
     ebpo_segments_fn take;
     void *user;
+    ebpo_error *error; /* of `status` */
+    ebpo_status status;
 } telling;
 
 static bool tell(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    const telling *t = user;
+    telling *t = user;
     ebpo_contact_segment out[SEGMENTS_AT_ONCE];
     uint64_t n = 0;
     for (uint64_t i = 0; i < count; i++) {
         ebpo_posed_pair faces;
         if (pairs[i].kind == EBPO_PAIR_CROSSING) {
-            ebpo_pose_pair(t->question, &pairs[i], &faces);
+            t->status = ebpo_pose_pair(&t->faces, &pairs[i], &faces, t->error);
+            if (t->status != EBPO_OK)
+                return false;
             ebpo_contact_of(&faces, &pairs[i], &out[n++]);
         }
         if (n == SEGMENTS_AT_ONCE || (n > 0 && i + 1 == count)) {
@@ -78,9 +105,12 @@ ebpo_status ebpo_collide_contacts(ebpo_collider *c, const ebpo_collide_options *
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
+    telling t = { .take = take, .user = user, .error = error };
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
-        status = ebpo_collider_slots(c, error);
-    telling t = { &q, take, user };
-    return status == EBPO_OK ? ebpo_collide_all(c, options, tell, &t, error) : status;
+        status = ebpo_pair_faces_begin(&t.faces, &q, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_all(c, options, tell, &t, error);
+    ebpo_pair_faces_end(&t.faces);
+    return status == EBPO_OK ? t.status : status;
 }

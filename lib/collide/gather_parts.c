@@ -189,19 +189,6 @@ static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user,
 
 /* --- both questions --- */
 
-/* Of both files; of one, once. */
-static uint64_t bytes_read(const ebpo_collision *q)
-{
-    uint64_t bytes = 0;
-    for (int i = 0; i < 2; i++) {
-        ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
-        if ((i == 0 || q->model[0]->file != q->model[1]->file) &&
-            ebpo_file_get_stats(q->model[i]->file, &stats) == EBPO_OK)
-            bytes += stats.bytes_read;
-    }
-    return bytes;
-}
-
 static ebpo_status begin(gathering_parts *g, unsigned threads, ebpo_error *error)
 {
     const ebpo_collision *q = g->question;
@@ -210,7 +197,7 @@ static ebpo_status begin(gathering_parts *g, unsigned threads, ebpo_error *error
     if (!g->walk)
         return ebpo_fail_memory(error, threads * sizeof *g->walk);
     g->threads = threads;
-    g->read_before = bytes_read(q);
+    g->read_before = ebpo_collision_bytes_read(q);
     for (int i = 0; i < 2 && status == EBPO_OK; i++)
         status =
             ebpo_posed_subtrees_make(&g->subtrees[i], q->model[i], &q->posing[i].posing, error);
@@ -229,7 +216,7 @@ static ebpo_status begin(gathering_parts *g, unsigned threads, ebpo_error *error
 
 static void end(gathering_parts *g)
 {
-    g->question->collider->bytes_read += bytes_read(g->question) - g->read_before;
+    g->question->collider->bytes_read += ebpo_collision_bytes_read(g->question) - g->read_before;
     for (unsigned i = 0; i < g->threads; i++) {
         count(g, &g->walk[i]);
         ebpo_subtree_walk_free(&g->walk[i]);

@@ -3,17 +3,12 @@
 #include "collide/level_search.h"
 
 #include <math.h>
-#include <stdlib.h>
 
-#include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
 
 static const char stage[] = "pairs of nodes";
 
-/* A node may list a face that only comes near, within 1/256 of the cell's size on each axis
- * (format-spec, section 5); and some room for rounding. */
-static const double near_share = 0x1.1p-8;
 /* Of a black cell's side, what is near its walls is not asked about. */
 static const double wall_share = 0x1p-14;
 
@@ -23,7 +18,7 @@ typedef enum content { NOTHING, FACES, SOLID } content;
 
 static content content_of(const ebpo_level_search *g, int side, const ebpo_posed_node *node)
 {
-    const ebpo_info *info = g->side[side].model->info;
+    const ebpo_info *info = g->nodes.side[side].model->info;
     if (ebpo_entry_kind_of(node->entry) != EBPO_ENTRY_UNIFORM)
         return FACES;
     return info->solid && ebpo_rule_inside(info->rule, ebpo_entry_winding(node->entry)) ? SOLID
@@ -35,12 +30,6 @@ static bool has_children(const ebpo_level_search *g, const ebpo_posed_node *node
     int level = g->question->options.level;
     return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY &&
            (level < 0 || node->cell.level < level);
-}
-
-static double slack_of(const ebpo_level_search *g, const ebpo_posed_node node[2])
-{
-    return ebpo_posed_slack(&g->side[0], node[0].cell, g->question->reach) +
-           ebpo_posed_slack(&g->side[1], node[1].cell, g->question->reach);
 }
 
 /* --- a point of both solids --- */
@@ -81,7 +70,7 @@ static bool shares_point(const ebpo_level_search *g, double solid[8][3], double 
     int within = 0;
     double middle[3], reach = g->question->reach;
     if (!black)
-        widen(other, 2 * near_share);
+        widen(other, 2 * EBPO_NEAR_SHARE);
     for (int c = 0; c < 8; c++)
         within += is_within((const double(*)[3])solid, other[c], reach);
     for (int i = 0; i < 3; i++)
@@ -96,102 +85,42 @@ static bool certainly_meet(const ebpo_level_search *g, const ebpo_posed_node nod
         double solid[8][3], other[8][3];
         if (has[i] != SOLID)
             continue;
-        ebpo_posed_cell(&g->side[i], node[i].cell, solid);
-        ebpo_posed_cell(&g->side[1 - i], node[1 - i].cell, other);
+        ebpo_posed_cell(&g->nodes.side[i], node[i].cell, solid);
+        ebpo_posed_cell(&g->nodes.side[1 - i], node[1 - i].cell, other);
         if (shares_point(g, solid, other, has[1 - i] == SOLID))
             return true;
     }
     return false;
 }
 
-/* --- the heap --- */
-
-static void swap(ebpo_level_pair *a, ebpo_level_pair *b)
-{
-    ebpo_level_pair c = *a;
-    *a = *b;
-    *b = c;
-}
-
-static ebpo_status push(ebpo_level_search *g, const ebpo_level_pair *pair, ebpo_error *error)
-{
-    if (!ebpo_grow(&g->heap, &g->capacity, g->count + 1, sizeof *g->heap))
-        return ebpo_fail_memory(error, (g->count + 1) * sizeof *g->heap);
-    uint64_t at = g->count++;
-    g->heap[at] = *pair;
-    for (; at > 0 && g->heap[at].gap < g->heap[(at - 1) / 2].gap; at = (at - 1) / 2)
-        swap(&g->heap[at], &g->heap[(at - 1) / 2]);
-    return EBPO_OK;
-}
-
-static ebpo_level_pair pop(ebpo_level_search *g)
-{
-    ebpo_level_pair least = g->heap[0];
-    g->heap[0] = g->heap[--g->count];
-    for (uint64_t at = 0, child; (child = 2 * at + 1) < g->count; at = child) {
-        if (child + 1 < g->count && g->heap[child + 1].gap < g->heap[child].gap)
-            child++;
-        if (!(g->heap[child].gap < g->heap[at].gap))
-            break;
-        swap(&g->heap[at], &g->heap[child]);
-    }
-    return least;
-}
-
 /* --- pairs --- */
-
-/* Each node with faces has one in its cell or near it. */
-static double far_bound(const ebpo_level_search *g, const ebpo_posed_node node[2])
-{
-    double corner[2][8][3], near = 0;
-    ebpo_convex convex[2];
-    for (int i = 0; i < 2; i++) {
-        ebpo_posed_cell(&g->side[i], node[i].cell, corner[i]);
-        convex[i] = (ebpo_convex){ 8, (const double(*)[3])corner[i] };
-        near += near_share * ebpo_posed_diagonal(&g->side[i], node[i].cell);
-    }
-    return ebpo_convex_span(&convex[0], &convex[1]) + near + slack_of(g, node);
-}
-
-static ebpo_status gap_of(ebpo_level_search *g, const ebpo_posed_node node[2], double *out,
-                          ebpo_error *error)
-{
-    ebpo_convex convex[2];
-    for (int i = 0; i < 2; i++) {
-        ebpo_status status = ebpo_posed_envelope(&g->side[i], node[i].cell, &convex[i], error);
-        if (status != EBPO_OK)
-            return status;
-    }
-    *out = fmax(ebpo_convex_gap(&convex[0], &convex[1], INFINITY) - slack_of(g, node), 0);
-    return EBPO_OK;
-}
 
 static ebpo_status add(ebpo_level_search *g, const ebpo_posed_node node[2], double gap,
                        ebpo_error *error)
 {
     content has[2] = { content_of(g, 0, &node[0]), content_of(g, 1, &node[1]) };
-    ebpo_level_pair pair = { { node[0], node[1] }, 0 };
+    ebpo_node_gap pair = { { node[0], node[1] }, 0 };
     bool faces = has[0] == FACES && has[1] == FACES;
     if (has[0] == NOTHING || has[1] == NOTHING || (!faces && g->meets))
         return EBPO_OK;
-    ebpo_status status = gap_of(g, node, &pair.gap, error);
+    ebpo_status status = ebpo_node_gap_of(&g->nodes, node, &pair.gap, error);
     pair.gap = fmax(pair.gap, gap); /* the nodes are in those above them */
     if (status != EBPO_OK || pair.gap > g->hi || (!faces && pair.gap > 0))
         return status;
     if (faces)
-        g->hi = fmin(g->hi, far_bound(g, node));
+        g->hi = fmin(g->hi, ebpo_node_far_bound(&g->nodes, node));
     else if (certainly_meet(g, node, has))
         g->meets = true;
-    return push(g, &pair, error);
+    return ebpo_node_gaps_push(&g->nodes, &pair, error);
 }
 
-static bool has_faces(const ebpo_level_search *g, const ebpo_level_pair *pair)
+static bool has_faces(const ebpo_level_search *g, const ebpo_node_gap *pair)
 {
     return content_of(g, 0, &pair->node[0]) == FACES && content_of(g, 1, &pair->node[1]) == FACES;
 }
 
 /* It is not divided. */
-static void close_pair(ebpo_level_search *g, const ebpo_level_pair *pair)
+static void close_pair(ebpo_level_search *g, const ebpo_node_gap *pair)
 {
     bool faces = has_faces(g, pair);
     if (faces)
@@ -202,16 +131,14 @@ static void close_pair(ebpo_level_search *g, const ebpo_level_pair *pair)
     g->open_pairs += faces;
 }
 
-static ebpo_status divide(ebpo_level_search *g, const ebpo_level_pair *pair, ebpo_error *error)
+static ebpo_status divide(ebpo_level_search *g, const ebpo_node_gap *pair, ebpo_error *error)
 {
     bool down[2] = { has_children(g, &pair->node[0]), has_children(g, &pair->node[1]) };
-    bool larger = ebpo_posed_diagonal(&g->side[0], pair->node[0].cell) >=
-                  ebpo_posed_diagonal(&g->side[1], pair->node[1].cell);
-    int side = !down[0] ? 1 : !down[1] ? 0 : !larger;
+    int side = !down[0] ? 1 : !down[1] ? 0 : ebpo_node_larger(&g->nodes, pair->node);
     ebpo_posed_node part[2] = { pair->node[0], pair->node[1] };
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
-        part[side] = ebpo_posed_child(&g->side[side], &pair->node[side], octant);
+        part[side] = ebpo_posed_child(&g->nodes.side[side], &pair->node[side], octant);
         status = add(g, part, pair->gap, error);
     }
     return status;
@@ -222,14 +149,15 @@ static ebpo_status divide(ebpo_level_search *g, const ebpo_level_pair *pair, ebp
 /* Nothing is decided of what waits; its least gap is all that is known. */
 static void close_all(ebpo_level_search *g)
 {
-    for (uint64_t i = 0; i < g->count; i++)
-        close_pair(g, &g->heap[i]);
-    g->count = 0;
+    for (uint64_t i = 0; i < g->nodes.count; i++)
+        close_pair(g, &g->nodes.heap[i]);
+    g->nodes.count = 0;
 }
 
 static bool is_full(const ebpo_level_search *g)
 {
-    return g->count * sizeof *g->heap + g->side[0].bytes + g->side[1].bytes >
+    return g->nodes.count * sizeof *g->nodes.heap + g->nodes.side[0].bytes +
+               g->nodes.side[1].bytes >
            g->question->collider->options.memory;
 }
 
@@ -238,8 +166,8 @@ static bool is_full(const ebpo_level_search *g)
 static ebpo_status search(ebpo_level_search *g, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    while (g->count > 0 && status == EBPO_OK) {
-        ebpo_level_pair pair = pop(g);
+    while (g->nodes.count > 0 && status == EBPO_OK) {
+        ebpo_node_gap pair = ebpo_node_gaps_pop(&g->nodes);
         bool faces = has_faces(g, &pair);
         g->question->collider->node_pairs++;
         if ((!faces && g->meets) || pair.gap > g->lo)
@@ -260,21 +188,15 @@ static ebpo_status search(ebpo_level_search *g, ebpo_error *error)
 
 ebpo_status ebpo_level_search_run(ebpo_level_search *g, const ebpo_collision *q, ebpo_error *error)
 {
-    ebpo_status status = EBPO_OK;
     g->question = q;
     g->lo = g->hi = INFINITY;
-    for (int i = 0; i < 2 && status == EBPO_OK; i++)
-        status = ebpo_posed_subtrees_make(&g->side[i], q->model[i], &q->posing[i].posing, error);
+    ebpo_status status = ebpo_node_gaps_begin(&g->nodes, q, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_posed_node root[2] = { ebpo_posed_root(&g->side[0]), ebpo_posed_root(&g->side[1]) };
+    ebpo_posed_node root[2] = { ebpo_posed_root(&g->nodes.side[0]),
+                                ebpo_posed_root(&g->nodes.side[1]) };
     status = add(g, root, 0, error);
     return status == EBPO_OK ? search(g, error) : status;
 }
 
-void ebpo_level_search_free(ebpo_level_search *g)
-{
-    for (int i = 0; i < 2; i++)
-        ebpo_posed_subtrees_free(&g->side[i]);
-    free(g->heap);
-}
+void ebpo_level_search_free(ebpo_level_search *g) { ebpo_node_gaps_free(&g->nodes); }

@@ -3,21 +3,12 @@
 #ifndef EBPO_COLLIDE_LEVEL_SEARCH_H
 #define EBPO_COLLIDE_LEVEL_SEARCH_H
 
-#include "collide/collider.h"
-#include "collide/posed_subtrees.h"
-
-/* Two nodes with something of each model in them; `gap`: they are not nearer to each other. */
-typedef struct ebpo_level_pair {
-    ebpo_posed_node node[2];
-    double gap;
-} ebpo_level_pair;
+#include "collide/node_gaps.h"
 
 /* Zero at first. */
 typedef struct ebpo_level_search {
     const ebpo_collision *question;
-    ebpo_posed_subtrees side[2];
-    ebpo_level_pair *heap; /* those of the least gaps first */
-    uint64_t count, capacity;
+    ebpo_node_gaps nodes;
     /* out */
     double lo, hi;       /* of the distance of faces */
     uint64_t open_pairs; /* that may have faces that meet */

@@ -14,32 +14,32 @@ typedef const double (*corners)[3];
 
 /* --- one pair --- */
 
-static void look(const ebpo_gap_search *g, const uint32_t slot[2], ebpo_face_two *out)
+static void pose(const ebpo_posing *const posing[2], ebpo_face_two *out)
 {
-    for (int s = 0; s < 2; s++) {
-        double t[3][3];
-        out->slot[s] = slot[s];
-        ebpo_accel_triangle(g->accel[s], slot[s], t);
-        for (int i = 0; i < 3; i++)
-            ebpo_posing_apply(&g->posing[s].posing, t[i], out->corner[s][i]);
-    }
+    for (int i = 0; i < 6; i++)
+        ebpo_posing_apply(posing[i / 3], out->own[i / 3][i % 3], out->corner[i / 3][i % 3]);
     ebpo_triangles_distance_bounds(CORNERS(out, 0), CORNERS(out, 1), &out->bounds);
 }
 
-static uint64_t position(const ebpo_gap_search *g, const ebpo_face_two *f, int side)
+static void look(const ebpo_gap_search *g, const uint32_t slot[2], ebpo_face_two *out)
 {
-    const ebpo_accel *s = g->accel[side];
-    return ebpo_accel_file_face(s, ebpo_accel_slot_face(s, f->slot[side]));
+    const ebpo_posing *posing[2] = { &g->posing[0].posing, &g->posing[1].posing };
+    for (int s = 0; s < 2; s++) {
+        uint32_t local = ebpo_accel_slot_face(g->accel[s], slot[s]);
+        out->file[s] = ebpo_accel_file_face(g->accel[s], local);
+        out->source[s] = ebpo_accel_source_face(g->accel[s], local);
+        ebpo_accel_triangle(g->accel[s], slot[s], out->own[s]);
+    }
+    pose(posing, out);
 }
 
 /* Of equal distances the first in the order of the files. */
-static bool earlier(const ebpo_gap_search *g, const ebpo_face_two *f, const ebpo_face_two *than)
+static bool earlier(const ebpo_face_two *f, const ebpo_face_two *than)
 {
-    uint64_t a = position(g, f, 0), b = position(g, than, 0);
-    return a != b ? a < b : position(g, f, 1) < position(g, than, 1);
+    return f->file[0] != than->file[0] ? f->file[0] < than->file[0] : f->file[1] < than->file[1];
 }
 
-static bool nearer(const ebpo_gap_search *g, const ebpo_face_two *f, const ebpo_face_two *than)
+static bool nearer(const ebpo_face_two *f, const ebpo_face_two *than)
 {
     if (f->bounds.hi < than->bounds.lo)
         return true;
@@ -50,7 +50,7 @@ static bool nearer(const ebpo_gap_search *g, const ebpo_face_two *f, const ebpo_
                             CORNERS(than, 1), &than->bounds))
         order = ebpo_triangles_distance_compare(CORNERS(f, 0), CORNERS(f, 1), CORNERS(than, 0),
                                                 CORNERS(than, 1));
-    return order < 0 || (order == 0 && earlier(g, f, than));
+    return order < 0 || (order == 0 && earlier(f, than));
 }
 
 /* --- all that wait --- */
@@ -91,26 +91,32 @@ static void take_within_tolerance(ebpo_nearest_pair *n, const ebpo_face_two *giv
     n->found = true;
 }
 
+/* False: enough. */
+static bool consider(ebpo_nearest_pair *n, const ebpo_face_two *f)
+{
+    if (!(f->bounds.lo > 0) &&
+        ebpo_triangle_pair(CORNERS(f, 0), CORNERS(f, 1)) != EBPO_PAIR_APART) {
+        n->best = *f;
+        n->found = n->meets = true;
+        return false;
+    }
+    if (!isnan(n->at_least))
+        return compare_to_asked(n, f);
+    if (n->tolerance > 0)
+        take_within_tolerance(n, f);
+    else if (!n->found || nearer(f, &n->best)) {
+        n->best = *f;
+        n->found = true;
+    }
+    return true;
+}
+
 static bool take(ebpo_gap_search *g, ebpo_nearest_pair *n, const uint32_t slot[2])
 {
     ebpo_face_two f;
     look(g, slot, &f);
-    if (!(f.bounds.lo > 0) &&
-        ebpo_triangle_pair(CORNERS(&f, 0), CORNERS(&f, 1)) != EBPO_PAIR_APART) {
-        n->best = f;
-        n->found = n->meets = true;
-        return false;
-    }
     ebpo_gap_set_best(g, to_unit(g, f.bounds.hi), slot[0], slot[1]);
-    if (!isnan(n->at_least))
-        return compare_to_asked(n, &f);
-    if (n->tolerance > 0)
-        take_within_tolerance(n, &f);
-    else if (!n->found || nearer(g, &f, &n->best)) {
-        n->best = f;
-        n->found = true;
-    }
-    return true;
+    return consider(n, &f);
 }
 
 static bool go_on(ebpo_gap_search *g)
@@ -153,12 +159,10 @@ static void end_exact(ebpo_nearest_pair *n)
     n->lo = n->hi = ebpo_triangles_distance(CORNERS(&n->best, 0), CORNERS(&n->best, 1));
 }
 
-static void end_open(const ebpo_gap_search *g, ebpo_nearest_pair *n)
+static void end_open(ebpo_nearest_pair *n)
 {
     n->hi = n->found ? n->best.bounds.hi : INFINITY;
-    n->lo = fmin(n->lo, n->hi);
-    if (g->ended)
-        n->lo = fmin(n->lo, left_over(g));
+    n->lo = fmin(fmin(n->lo, n->hi), n->left);
     if (n->tolerance > 0)
         n->lo = fmin(n->lo, n->hi - n->tolerance);
     else if (n->found)
@@ -166,58 +170,93 @@ static void end_open(const ebpo_gap_search *g, ebpo_nearest_pair *n)
     n->lo = fmax(n->lo, 0);
 }
 
-static void end(const ebpo_gap_search *g, ebpo_nearest_pair *n)
+void ebpo_nearest_pair_end(ebpo_nearest_pair *n)
 {
     bool asked = !isnan(n->at_least);
     if (n->meets) {
         n->lo = n->hi = 0;
         n->is_at_least = asked ? n->at_least <= 0 : -1;
     } else if (asked) {
-        if (n->is_at_least < 0 && !g->ended)
+        if (n->is_at_least < 0 && !n->ended)
             n->is_at_least = 1;
         n->lo = n->is_at_least == 1 ? n->at_least : fmin(n->lo, n->at_least);
         if (n->is_at_least == 1)
             n->hi = INFINITY;
         else
-            end_open(g, n);
-    } else if (!g->ended && n->tolerance == 0 && n->found)
+            end_open(n);
+    } else if (!n->ended && n->tolerance == 0 && n->found)
         end_exact(n);
     else
-        end_open(g, n);
+        end_open(n);
 }
 
-ebpo_status ebpo_nearest_pair_find(ebpo_gap_search *g, ebpo_nearest_pair *n, ebpo_error *error)
+void ebpo_nearest_pair_leave(ebpo_nearest_pair *n, double left)
 {
-    uint32_t start[2] = { n->best.slot[0], n->best.slot[1] };
+    n->ended = true;
+    n->left = fmin(n->left, left);
+}
+
+/* --- the search --- */
+
+void ebpo_nearest_pair_begin(ebpo_nearest_pair *n)
+{
+    n->lo = n->left = INFINITY;
+    n->found = n->meets = n->ended = false;
+    n->status = EBPO_OK;
+    n->is_at_least = -1;
+}
+
+void ebpo_nearest_pair_start(ebpo_nearest_pair *n, const ebpo_posing posing[2],
+                             const ebpo_face_two *pair)
+{
+    const ebpo_posing *const two[2] = { &posing[0], &posing[1] };
+    ebpo_face_two f = *pair;
+    pose(two, &f);
+    (void)consider(n, &f);
+}
+
+void ebpo_nearest_pair_met(ebpo_nearest_pair *n, const ebpo_gap_search *g, const uint32_t slot[2])
+{
+    look(g, slot, &n->best);
+    n->found = n->meets = true;
+}
+
+double ebpo_nearest_pair_limit(const ebpo_nearest_pair *n)
+{
+    if (!isnan(n->at_least))
+        return n->at_least;
+    return n->found ? n->best.bounds.hi - n->tolerance : INFINITY;
+}
+
+bool ebpo_nearest_pair_is_done(const ebpo_nearest_pair *n)
+{
+    return n->meets || n->is_at_least >= 0 || n->ended || n->status != EBPO_OK;
+}
+
+/* What waits, and what nobody has judged yet. */
+static void judge_rest(ebpo_gap_search *g, ebpo_nearest_pair *n)
+{
+    if (ebpo_nearest_pair_is_done(n) || !judge(g) || n->meets || !isnan(n->at_least))
+        return;
+    if (n->tolerance > 0 && g->best < INFINITY)
+        take(g, n, g->best_slot);
+}
+
+ebpo_status ebpo_nearest_pair_search(ebpo_nearest_pair *n, ebpo_gap_search *g, ebpo_error *error)
+{
+    double limit = ebpo_nearest_pair_limit(n);
     g->user = n;
     g->judge = judge;
     g->go_on = go_on;
     g->tolerance = (float)(n->tolerance * g->posing[0].unit * (1 - 0x1p-20));
-    n->lo = INFINITY;
-    n->found = n->meets;
-    n->status = EBPO_OK;
     n->error = error;
-    n->is_at_least = -1;
-    if (n->meets) {
-        look(g, start, &n->best);
-        end(g, n);
-        return EBPO_OK;
-    }
-    if (!isnan(n->at_least))
-        ebpo_gap_set_limit(g, to_unit(g, n->at_least));
-    bool more = !n->warm || take(g, n, start);
-    if (more)
-        ebpo_gap_walk_best()(g);
+    if (limit < INFINITY)
+        ebpo_gap_set_limit(g, to_unit(g, limit));
+    ebpo_gap_walk_best()(g);
     if (g->no_memory)
         return ebpo_fail_memory(error, g->capacity * sizeof *g->stack);
-    if (n->status != EBPO_OK)
-        return n->status;
-    if (more && !n->meets && n->is_at_least < 0)
-        more = judge(g);
-    if (n->status != EBPO_OK)
-        return n->status;
-    if (more && !n->meets && isnan(n->at_least) && n->tolerance > 0 && g->best < INFINITY)
-        take(g, n, g->best_slot);
-    end(g, n);
-    return EBPO_OK;
+    judge_rest(g, n);
+    if (g->ended)
+        ebpo_nearest_pair_leave(n, left_over(g));
+    return n->status;
 }

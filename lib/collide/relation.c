@@ -20,6 +20,7 @@ static const char stage[] = "relation";
 /* Models in the question's order. */
 typedef struct relating {
     const ebpo_collision *question;
+    ebpo_pair_faces places;
     ebpo_two_models two;
     ebpo_relation_result *out;
     uint64_t *met[2], *seen[2]; /* a bit for each face: it meets one of the other; was looked at */
@@ -104,23 +105,24 @@ static bool look_at_pair(relating *r, const ebpo_face_pair *pair)
 
 /* --- contacts --- */
 
-static bool all_have_area(const relating *r, const ebpo_face_pair *pair)
+static bool all_have_area(relating *r, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
-    ebpo_pose_pair(r->question, pair, &faces);
-    for (int i = 0; i < 2; i++) {
+    r->status = ebpo_pose_pair(&r->places, pair, &faces, r->error);
+    for (int i = 0; i < 2 && r->status == EBPO_OK; i++) {
         const double(*t)[3] = (const double(*)[3])faces.corner[i];
         if (ebpo_zero_area(t[0], t[1], t[2]))
             return false;
     }
-    return true;
+    return r->status == EBPO_OK;
 }
 
-/* What a pair tells of two surfaces. */
-static void note_pair(relating *r, const ebpo_face_pair *pair)
+/* What a pair tells of two surfaces. False: `status`. */
+static bool note_pair(relating *r, const ebpo_face_pair *pair)
 {
     r->both |= pair->kind != EBPO_PAIR_TOUCHING;
     r->touch = r->touch || r->both || all_have_area(r, pair);
+    return r->status == EBPO_OK;
 }
 
 static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t count)
@@ -131,7 +133,7 @@ static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t coun
         set_bit(r->met[turned], pairs[i].file_face_a);
         set_bit(r->met[!turned], pairs[i].file_face_b);
         if (surfaces(r))
-            note_pair(r, &pairs[i]);
+            more = note_pair(r, &pairs[i]);
         else if (pairs[i].kind == EBPO_PAIR_CROSSING)
             more = look_at_pair(r, &pairs[i]);
     }
@@ -407,15 +409,16 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
     ebpo_collision q;
     *out = (ebpo_relation_result){ EBPO_RELATION_OPEN, -1 };
     ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
+    relating r = { .question = &q, .out = out, .error = error };
     if (status == EBPO_OK)
-        status = ebpo_collider_slots(c, error);
+        status = ebpo_pair_faces_begin(&r.places, &q, error);
     if (status != EBPO_OK)
         return status;
-    relating r = { .question = &q, .out = out, .error = error };
     status = relate(&r, error);
     ebpo_relation relation = relation_of(&r);
     out->relation = (int32_t)(q.turned ? turned(relation) : relation);
     ebpo_two_models_end(&r.two);
+    ebpo_pair_faces_end(&r.places);
     for (int m = 0; m < 2; m++) {
         free(r.met[m]);
         free(r.seen[m]);

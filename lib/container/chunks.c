@@ -395,8 +395,9 @@ static void release(void *user, void *item)
     free(item);
 }
 
-static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budget, bool counted,
-                        ebpo_error *error)
+/* pool: NULL, or what the budget is of. */
+static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
+                        ebpo_cache_pool *pool, bool counted, ebpo_error *error)
 {
     *out = NULL;
     ebpo_chunks *c = ebpo_alloc_zero(1, sizeof *c);
@@ -409,7 +410,8 @@ static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budge
     ebpo_cache_source source = { c, estimate, load, release };
     ebpo_status status = counted ? EBPO_OK : read_seen(c, error);
     if (status == EBPO_OK)
-        status = ebpo_cache_make(&c->cache, &source, "chunk", budget, error);
+        status = pool ? ebpo_cache_make_in(&c->cache, &source, "chunk", pool, error)
+                      : ebpo_cache_make(&c->cache, &source, "chunk", budget, error);
     if (status == EBPO_OK)
         *out = c;
     else
@@ -420,13 +422,19 @@ static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budge
 ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
                              ebpo_error *error)
 {
-    return make(out, file, budget, false, error);
+    return make(out, file, budget, NULL, false, error);
+}
+
+ebpo_status ebpo_chunks_make_in(ebpo_chunks **out, const ebpo_file *file, ebpo_cache_pool *pool,
+                                ebpo_error *error)
+{
+    return make(out, file, 0, pool, false, error);
 }
 
 ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
                                      ebpo_error *error)
 {
-    return make(out, file, budget, true, error);
+    return make(out, file, budget, NULL, true, error);
 }
 
 void ebpo_chunks_free(ebpo_chunks *chunks)

@@ -12,6 +12,9 @@
 typedef struct ebpo_chunks ebpo_chunks;
 EBPO_MUST_USE ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file,
                                            uint64_t budget, ebpo_error *error);
+/* The same under a budget that others share. */
+EBPO_MUST_USE ebpo_status ebpo_chunks_make_in(ebpo_chunks **out, const ebpo_file *file,
+                                              ebpo_cache_pool *pool, ebpo_error *error);
 /* The same for one thread at a time, and counted: nothing is read or announced but what was asked
  * for, and nothing after which the file would have read more than the
  * limit (ebpo_chunks_limit; none at first). Then EBPO_E_LIMIT, and ebpo_chunks_refused is true. */

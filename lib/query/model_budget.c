@@ -1,4 +1,4 @@
-/* Which levels stay, and who gets which share of the budget. */
+/* Which levels stay. */
 #include "geom/strict_fp.h"
 
 #include "query/model_budget.h"
@@ -11,34 +11,12 @@
 #include "base/sized.h"
 #include "container/reader.h"
 #include "query/query_top.h"
+#include "query/shared_budget.h"
 #include "query/skeleton.h"
 
-/* Decoded chunks: an eighth of the budget, within these. */
-enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MOST = 128 << 20 };
 /* Of a cache: a path needs the subtree where it is, those around, and room to load the next. More
  * of them, smaller ones, are faster to load. */
 enum { SUBTREES_NEEDED = 64, SUBTREES_WANTED = 320 };
-
-uint64_t ebpo_chunk_budget(uint64_t budget)
-{
-    return budget / 8 < CHUNKS_LEAST  ? CHUNKS_LEAST
-           : budget / 8 > CHUNKS_MOST ? CHUNKS_MOST
-                                      : budget / 8;
-}
-
-/* Skeletons of subtrees, at most: searches that go everywhere gain more by them than by a few more
- * subtrees. Of what is beyond the least, so that small budgets do for what they would do for
- * without them. */
-uint64_t ebpo_skeleton_budget(const ebpo_model_options *o, uint64_t budget)
-{
-    const uint64_t least = CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
-    return o->loading == EBPO_LOAD_CACHE && budget > least ? (budget - least) / 4 : 0;
-}
-
-uint64_t ebpo_beside_subtrees(const ebpo_model_options *o, uint64_t budget)
-{
-    return ebpo_chunk_budget(budget) + ebpo_skeleton_budget(o, budget);
-}
 
 static ebpo_slice_size whole_size(const ebpo_info *info)
 {
@@ -81,7 +59,7 @@ static int choose_cut(const ebpo_info *info, const ebpo_model_options *o, uint64
 /* A budget that choose_cut accepts, not much more than the least. */
 static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
 {
-    uint64_t budget = CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
+    uint64_t budget = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
     while (choose_cut(info, o, budget) < 0 && budget < UINT64_C(1) << 60)
         budget += budget / 8;
     return budget;
@@ -99,6 +77,8 @@ static bool reads_parts(const ebpo_file *file, bool default_memory)
 
 bool ebpo_usual_memory(const ebpo_file *file, ebpo_model_options *o)
 {
+    if (o->budget)
+        o->memory = ebpo_budget_left(o->budget);
     bool usual = !o->memory && ebpo_input_is_far(&file->in);
     if (usual && o->cut_level < 0)
         o->memory = FAR_MEMORY;
@@ -178,6 +158,10 @@ ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *o, 
     if (o->loading > EBPO_LOAD_NODES)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "model options: there is no way of loading number %d", (int)o->loading);
+    if (o->budget && o->loading != EBPO_LOAD_CACHE)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "model options: models that share a budget keep what they load "
+                         "(EBPO_LOAD_CACHE)");
     ebpo_accel_estimate_whole(info, &keep, &out->whole);
     least = least_budget(info, o);
     out->least = least < out->whole ? least : out->whole;

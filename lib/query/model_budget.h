@@ -1,18 +1,13 @@
-/* How a model's budget is shared, and what is chosen by it: from the counts in the file's head. */
+/* What is chosen by a model's budget: from the counts in the file's head. */
 #ifndef EBPO_QUERY_MODEL_BUDGET_H
 #define EBPO_QUERY_MODEL_BUDGET_H
 
 #include <ebpo/query.h>
 
-/* For loading one at least. */
-enum { EBPO_SUBTREES_LEAST = 1 << 20 };
+#include "query/budget_shares.h"
 
-/* Bytes for decoded chunks, for skeletons, and for both: what is not for the top and subtrees. */
-uint64_t ebpo_chunk_budget(uint64_t budget);
-uint64_t ebpo_skeleton_budget(const ebpo_model_options *options, uint64_t budget);
-uint64_t ebpo_beside_subtrees(const ebpo_model_options *options, uint64_t budget);
-
-/* Sets the budget of a file far away where nobody asked for one; true then. */
+/* Sets the budget: what is left of one that is shared, or that of a file far away where nobody
+ * asked for one; true then. */
 bool ebpo_usual_memory(const ebpo_file *file, ebpo_model_options *options);
 
 /* Everything at once, or the cut level. Errors are those of ebpo_model_memory. */

@@ -14,6 +14,7 @@
 #include "base/fp_env.h"
 #include "base/sized.h"
 #include "query/model_budget.h"
+#include "query/shared_budget.h"
 
 /* --- subtrees for the cache --- */
 
@@ -108,33 +109,78 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
     return status;
 }
 
-static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
+/* Caches under the model's own budget; 0: none. */
+static ebpo_status make_own(ebpo_model *m, const ebpo_cache_source *source, ebpo_error *error)
 {
-    uint64_t budget = m->options.memory, chunks = 0, cache = 0, skeletons = UINT64_MAX;
-    ebpo_status status = ebpo_top_read(&m->top, m->file, cut_level, m->options.threads, error);
+    uint64_t budget = m->options.memory, chunks = budget ? ebpo_chunk_budget(budget) : 0;
+    uint64_t taken = m->top->bytes + ebpo_beside_subtrees(&m->options, budget);
+    if (budget && taken + EBPO_SUBTREES_LEAST > budget)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "levels 0 to %d and a cache take more than the budget of %" PRIu64
+                         " bytes; give %" PRIu64 " or a lower cut level",
+                         m->top->cut_level, budget, taken + EBPO_SUBTREES_LEAST);
+    ebpo_status status = ebpo_chunks_make(&m->chunks, m->file, chunks, error);
     if (status != EBPO_OK)
         return status;
-    if (budget) {
-        chunks = ebpo_chunk_budget(budget);
-        uint64_t taken = m->top->bytes + ebpo_beside_subtrees(&m->options, budget);
-        if (taken + EBPO_SUBTREES_LEAST > budget)
-            return ebpo_fail(error, EBPO_E_LIMIT,
-                             "levels 0 to %d and a cache take more than the budget of %" PRIu64
-                             " bytes; give %" PRIu64 " or a lower cut level",
-                             cut_level, budget, taken + EBPO_SUBTREES_LEAST);
-        skeletons =
-            ebpo_skeletons_room(m->top->below_count, ebpo_skeleton_budget(&m->options, budget));
-        cache = budget - m->top->bytes - chunks;
-    }
-    status = ebpo_chunks_make(&m->chunks, m->file, chunks, error);
+    return ebpo_cache_make(&m->cache, source, "subtree",
+                           budget ? budget - m->top->bytes - chunks : 0, error);
+}
+
+/* Caches under the budget of several models. */
+static ebpo_status make_shared(ebpo_model *m, const ebpo_cache_source *source, ebpo_error *error)
+{
+    ebpo_budget *shared = m->options.budget;
+    ebpo_status status = ebpo_cache_pool_take(ebpo_budget_subtrees(shared), m->top->bytes, error);
+    if (status != EBPO_OK)
+        return status;
+    m->shared_taken = m->top->bytes;
+    status = ebpo_chunks_make_in(&m->chunks, m->file, ebpo_budget_chunks(shared), error);
+    if (status != EBPO_OK)
+        return status;
+    return ebpo_cache_make_in(&m->cache, source, "subtree", ebpo_budget_subtrees(shared), error);
+}
+
+static uint64_t skeleton_room(ebpo_model *m)
+{
+    uint64_t budget = m->options.memory;
+    if (!budget || m->options.loading != EBPO_LOAD_CACHE)
+        return budget ? 0 : UINT64_MAX;
+    uint64_t room =
+        ebpo_skeletons_room(m->top->below_count, ebpo_skeleton_budget(&m->options, budget));
+    if (!m->options.budget)
+        return room;
+    m->shared_skeletons = ebpo_budget_take_skeletons(m->options.budget, room);
+    return ebpo_skeletons_room(m->top->below_count, m->shared_skeletons);
+}
+
+static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
+{
     ebpo_cache_source source = { m, estimate_subtree, load_subtree, release_subtree };
+    ebpo_status status = ebpo_top_read(&m->top, m->file, cut_level, m->options.threads, error);
     if (status == EBPO_OK)
-        status = ebpo_cache_make(&m->cache, &source, "subtree", cache, error);
+        status = m->options.budget ? make_shared(m, &source, error) : make_own(m, &source, error);
+    uint64_t skeletons = status == EBPO_OK ? skeleton_room(m) : 0;
     if (status == EBPO_OK && m->options.loading == EBPO_LOAD_CACHE && skeletons) {
         m->skeletons = ebpo_skeletons_make(m->top->below_count, skeletons, m->cache);
-        if (!m->skeletons)
+        if (!m->skeletons && m->options.budget)
+            ebpo_cache_set_aside(m->cache, 0); /* others use it all just now */
+        else if (!m->skeletons)
             return ebpo_fail_memory(error, m->top->below_count * sizeof(void *));
     }
+    return status;
+}
+
+/* All in memory, under a budget that is shared. EBPO_E_LIMIT: that has no room for it. */
+static ebpo_status open_shared_whole(ebpo_model *m, uint64_t peak, ebpo_error *error)
+{
+    ebpo_budget *shared = m->options.budget;
+    if (!ebpo_budget_take_whole(shared, peak))
+        return EBPO_E_LIMIT;
+    m->options.memory = peak;
+    ebpo_status status = open_whole(m, error);
+    uint64_t bytes = status == EBPO_OK ? ebpo_accel_bytes(m->whole) : 0;
+    ebpo_budget_give_back_whole(shared, peak - bytes);
+    m->shared_taken = bytes;
     return status;
 }
 
@@ -143,7 +189,9 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     ebpo_model_plan plan;
     ebpo_status status = ebpo_plan_model(m->file, &m->options, m->default_memory, &plan, error);
     if (status == EBPO_OK && plan.resident) {
-        status = open_whole(m, error);
+        uint64_t memory = m->options.memory;
+        status = m->options.budget ? open_shared_whole(m, plan.whole, error) : open_whole(m, error);
+        m->options.memory = memory;
         /* more than ordinary models of its counts take */
         if (status != EBPO_E_LIMIT || !m->options.memory)
             return status;
@@ -183,6 +231,18 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     return EBPO_OK;
 }
 
+static void give_back_shared(ebpo_model *m)
+{
+    ebpo_budget *shared = m->options.budget;
+    if (!shared)
+        return;
+    ebpo_budget_give_back_skeletons(shared, m->shared_skeletons);
+    if (m->whole)
+        ebpo_budget_give_back_whole(shared, m->shared_taken);
+    else
+        ebpo_cache_pool_give_back(ebpo_budget_subtrees(shared), m->shared_taken);
+}
+
 void ebpo_model_free(ebpo_model *m)
 {
     if (!m)
@@ -192,6 +252,7 @@ void ebpo_model_free(ebpo_model *m)
     ebpo_chunks_free(m->chunks);
     ebpo_top_free(m->top);
     ebpo_top_free(m->deep);
+    give_back_shared(m);
     ebpo_accel_free(m->whole);
     free(m);
 }
@@ -200,7 +261,7 @@ static void gather_stats(const ebpo_model *m, ebpo_model_stats *out)
 {
     out->resident = m->whole != NULL;
     out->cut_level = m->top ? m->top->cut_level : 0;
-    out->budget = m->options.memory;
+    out->budget = m->options.budget ? ebpo_budget_bytes(m->options.budget) : m->options.memory;
     out->open_seconds = m->open_seconds;
     ebpo_file_stats file = EBPO_FILE_STATS_INIT;
     ebpo_file_get_stats(m->file, &file);
@@ -306,7 +367,9 @@ ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **o
     ebpo_status status = ebpo_cache_get(m->cache, key, &item, &hit, error);
     c->loaded += !hit;
     if (status != EBPO_OK)
-        return status == EBPO_E_LIMIT && m->options.memory ? too_little(m, below, error) : status;
+        return status == EBPO_E_LIMIT && m->options.memory && !m->options.budget
+                   ? too_little(m, below, error)
+                   : status;
     *out = c->pinned = item;
     c->pinned_key = key;
     return EBPO_OK;

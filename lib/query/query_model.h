@@ -22,6 +22,7 @@ struct ebpo_model {
     const ebpo_info *info;
     ebpo_locator locator; /* of the deepest level's cells */
     ebpo_model_options options;
+    uint64_t shared_taken, shared_skeletons; /* of a budget that is shared: for good */
     bool default_memory; /* nobody asked for a budget, but the file is far away */
     const ebpo_kernels *kernels;
     ebpo_accel *whole;   /* everything, or NULL: */

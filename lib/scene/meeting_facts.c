@@ -41,9 +41,11 @@ static void set_place(ebpo_scene_meeting *m, const double place[3])
  * crosses, where that is enough. */
 typedef struct tally {
     ebpo_scene_meeting *m;
-    const ebpo_collision *question; /* to ask where; NULL: not asked */
+    ebpo_pair_faces *faces; /* to ask where; NULL: not asked */
     ebpo_face_pair first;
     bool enough;
+    ebpo_error *error; /* of `status` */
+    ebpo_status status;
 } tally;
 
 static bool comes_first(const ebpo_face_pair *p, const ebpo_face_pair *q)
@@ -51,14 +53,17 @@ static bool comes_first(const ebpo_face_pair *p, const ebpo_face_pair *q)
     return p->face_a < q->face_a || (p->face_a == q->face_a && p->face_b < q->face_b);
 }
 
-static void note_segment(const tally *t, const ebpo_face_pair *pair)
+static bool note_segment(tally *t, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
     ebpo_contact_segment s;
-    ebpo_pose_pair(t->question, pair, &faces);
+    t->status = ebpo_pose_pair(t->faces, pair, &faces, t->error);
+    if (t->status != EBPO_OK)
+        return false;
     ebpo_contact_of(&faces, pair, &s);
     widen(t->m, s.point[0]);
     widen(t->m, s.point[1]);
+    return true;
 }
 
 static bool count_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
@@ -72,8 +77,8 @@ static bool count_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
             return false;
         if (!t->enough && comes_first(&pairs[i], &t->first))
             t->first = pairs[i];
-        if (t->question && pairs[i].kind == EBPO_PAIR_CROSSING)
-            note_segment(t, &pairs[i]);
+        if (t->faces && pairs[i].kind == EBPO_PAIR_CROSSING && !note_segment(t, &pairs[i]))
+            return false;
     }
     return true;
 }
@@ -101,10 +106,13 @@ static ebpo_status tell_lines(const scene_two *two, ebpo_scene_meeting *m, ebpo_
 /* --- where --- */
 
 /* A point of both faces: an end of their common segment, or what their nearest features have. */
-static void common_point(const ebpo_collision *q, const ebpo_face_pair *pair, double out[3])
+static ebpo_status common_point(ebpo_pair_faces *of, const ebpo_face_pair *pair, double out[3],
+                                ebpo_error *error)
 {
     ebpo_posed_pair faces;
-    ebpo_pose_pair(q, pair, &faces);
+    ebpo_status status = ebpo_pose_pair(of, pair, &faces, error);
+    if (status != EBPO_OK)
+        return status;
     const double(*a)[3] = (const double(*)[3])faces.corner[0];
     const double(*b)[3] = (const double(*)[3])faces.corner[1];
     if (pair->kind == EBPO_PAIR_CROSSING) {
@@ -116,6 +124,7 @@ static void common_point(const ebpo_collision *q, const ebpo_face_pair *pair, do
         ebpo_triangles_distance_bounds(a, b, &bounds);
         memcpy(out, bounds.point[0], sizeof bounds.point[0]);
     }
+    return EBPO_OK;
 }
 
 /* The distance of models that meet begins with their first contact, and tells a point of it: that
@@ -143,29 +152,44 @@ void scene_tell_nearest(const scene_two *two, const ebpo_clearance *nearest, ebp
 
 /* --- of faces that meet --- */
 
-static ebpo_status count_all(const scene_two *two, const ebpo_collision *q,
+/* `faces`: NULL, or to tell where. */
+static ebpo_status count_all(const scene_two *two, ebpo_pair_faces *faces,
                              const ebpo_face_pair *first, ebpo_scene_meeting *m, ebpo_error *error)
 {
-    tally t = { m, two->how->places && q ? q : NULL, *first, false };
+    tally t = { m, faces, *first, false, error, EBPO_OK };
     double place[3];
-    ebpo_status status = t.question ? ebpo_collider_slots(two->collider, error) : EBPO_OK;
+    ebpo_status status = ebpo_collide_all(two->collider, two->options, count_faces, &t, error);
     if (status == EBPO_OK)
-        status = ebpo_collide_all(two->collider, two->options, count_faces, &t, error);
+        status = t.status;
     if (status != EBPO_OK)
         return status;
     m->face_a = t.first.face_a;
     m->face_b = t.first.face_b;
-    if (t.question) {
-        common_point(q, &t.first, place);
+    if (faces)
+        status = common_point(faces, &t.first, place, error);
+    if (faces && status == EBPO_OK)
         set_place(m, place);
-    }
-    return q && m->crossing ? tell_lines(two, m, error) : EBPO_OK;
+    return status == EBPO_OK && m->crossing ? tell_lines(two, m, error) : status;
+}
+
+static ebpo_status count_places(const scene_two *two, const ebpo_face_pair *first,
+                                ebpo_scene_meeting *m, ebpo_error *error)
+{
+    ebpo_collision question;
+    ebpo_pair_faces faces = { .question = &question };
+    ebpo_status status = ebpo_collision_begin(&question, two->collider, two->options, error);
+    if (status == EBPO_OK)
+        status = ebpo_pair_faces_begin(&faces, &question, error);
+    if (status == EBPO_OK)
+        status = count_all(two, &faces, first, m, error);
+    ebpo_pair_faces_end(&faces);
+    return status;
 }
 
 static ebpo_status find_kind(const scene_two *two, const ebpo_face_pair *first,
                              ebpo_scene_meeting *m, ebpo_error *error)
 {
-    tally t = { m, NULL, *first, true };
+    tally t = { m, NULL, *first, true, error, EBPO_OK };
     m->crossing = first->kind == EBPO_PAIR_CROSSING;
     return m->crossing ? EBPO_OK
                        : ebpo_collide_all(two->collider, two->options, count_faces, &t, error);
@@ -174,17 +198,13 @@ static ebpo_status find_kind(const scene_two *two, const ebpo_face_pair *first,
 ebpo_status scene_tell_contacts(const scene_two *two, const ebpo_face_pair *first,
                                 ebpo_scene_meeting *m, ebpo_error *error)
 {
-    ebpo_collision question;
-    ebpo_status status = ebpo_collision_begin(&question, two->collider, two->options, error);
-    if (status != EBPO_OK)
-        return status;
-    bool whole = !ebpo_collision_is_in_parts(&question);
     m->face_a = first->face_a;
     m->face_b = first->face_b;
     if (two->how->count)
-        return count_all(two, whole ? &question : NULL, first, m, error);
-    status = find_kind(two, first, m, error);
-    return status == EBPO_OK && two->how->places && whole ? place_of_first(two, m, error) : status;
+        return two->how->places ? count_places(two, first, m, error)
+                                : count_all(two, NULL, first, m, error);
+    ebpo_status status = find_kind(two, first, m, error);
+    return status == EBPO_OK && two->how->places ? place_of_first(two, m, error) : status;
 }
 
 /* Whether a point of one is inner to the other; else nothing is deep, and a search, at faces that

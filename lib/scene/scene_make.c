@@ -60,6 +60,7 @@ static void close_files(ebpo_scene *scene)
         ebpo_close(scene->files[i].file);
         free(scene->files[i].path);
     }
+    ebpo_budget_free(scene->how.budget);
 }
 
 void ebpo_scene_free(ebpo_scene *scene)

@@ -192,7 +192,8 @@ ebpo_status ebpo_scene_load(ebpo_scene *scene, const ebpo_load_options *options,
     EBPO_DEFAULT_FP;
     ebpo_load_options own = EBPO_LOAD_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_load_options, &own, options, error);
-    scene->how.memory = own.memory;
+    if (status == EBPO_OK && own.memory && !scene->how.budget)
+        status = ebpo_budget_new(own.memory, &scene->how.budget, error);
     if (status == EBPO_OK && !ebpo_progress_stage(&own.progress, "opening models", error))
         status = EBPO_E_CANCELLED;
     for (uint64_t i = 0; i < scene->models_count && status == EBPO_OK; i++) {

@@ -282,6 +282,34 @@ static ebpo_status call_ask_subtree(every_call_env *e)
 }
 static ebpo_status call_ask_nodes(every_call_env *e) { return load_by(e, EBPO_LOAD_NODES, false); }
 
+/* Two models of which one is in memory, and one in parts. */
+static ebpo_status share(every_call_env *e, ebpo_budget *budget)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *whole = NULL;
+    ebpo_budget_stats stats = EBPO_BUDGET_STATS_INIT;
+    options.threads = 1;
+    options.budget = budget;
+    ebpo_status status = ebpo_model_new(e->file, &options, &whole, e->error);
+    options.cut_level = 2;
+    if (status == EBPO_OK)
+        status = ask(e, &options);
+    if (status == EBPO_OK)
+        status = ebpo_budget_get_stats(budget, &stats);
+    ebpo_model_free(whole);
+    return status;
+}
+
+static ebpo_status call_budget(every_call_env *e)
+{
+    ebpo_budget *budget;
+    ebpo_status status = ebpo_budget_new(64 << 20, &budget, e->error);
+    if (status == EBPO_OK)
+        status = share(e, budget);
+    ebpo_budget_free(budget);
+    return status;
+}
+
 static ebpo_status call_measure(every_call_env *e)
 {
     ebpo_mass mass = EBPO_MASS_INIT;
@@ -660,6 +688,7 @@ const every_call every_call_answers[] = {
     { "ask_ahead", call_ask_ahead },
     { "ask_subtree", call_ask_subtree },
     { "ask_nodes", call_ask_nodes },
+    { "budget", call_budget },
     { "measure", call_measure },
     { "deviation", call_deviation },
     { "limit", call_limit },

@@ -357,6 +357,116 @@ START_TEST(what_is_set_aside_is_taken_from_the_items_as_it_is_needed)
 }
 END_TEST
 
+/* --- shared --- */
+
+/* Both of one source, of keys that differ. */
+static ebpo_cache_pool *pool;
+static ebpo_cache *other;
+
+static void begin_two(uint64_t budget, uint64_t size, uint64_t peak)
+{
+    begin_with(budget, size, peak);
+    ebpo_cache_free(cache);
+    ebpo_cache_source from = { src, estimate, load, release };
+    ck_assert_int_eq(ebpo_cache_pool_make(&pool, budget, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_cache_make_in(&cache, &from, "thing", pool, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_cache_make_in(&other, &from, "other", pool, NULL), EBPO_OK);
+}
+
+static void finish_two(void)
+{
+    uint64_t now, peak, taken;
+    ebpo_cache_free(other);
+    finish();
+    ebpo_cache_pool_get_bytes(pool, &now, &peak, &taken);
+    ck_assert_uint_eq(now, 0);
+    ebpo_cache_pool_free(pool);
+}
+
+static void use_other(uint64_t key)
+{
+    void *it;
+    ck_assert_int_eq(ebpo_cache_get(other, key, &it, NULL, NULL), EBPO_OK);
+    ck_assert_uint_eq(((item *)it)->key, key);
+    ebpo_cache_unpin(other, key);
+}
+
+START_TEST(of_caches_that_share_a_budget_the_least_recently_used_goes_whoever_it_is)
+{
+    begin_two(400, 100, 100);
+    use(1);
+    use_other(11);
+    use(2);
+    use_other(12);
+    ck_assert(use(1));
+    use_other(13);
+    ck_assert(src->live[1] && !src->live[11] && src->live[2] && src->live[12]);
+    ck_assert(!ebpo_cache_has(cache, 12) && ebpo_cache_has(other, 12));
+    use(3);
+    ck_assert(src->live[1] && !src->live[2] && src->live[12] && src->live[13]);
+    ebpo_cache_clear(other);
+    ck_assert(src->live[1] && src->live[3] && !src->live[12] && !src->live[13]);
+    finish_two();
+}
+END_TEST
+
+START_TEST(what_is_taken_for_good_of_a_shared_budget_is_dropped_for)
+{
+    uint64_t now, peak, taken;
+    ebpo_error error = EBPO_ERROR_INIT;
+    begin_two(400, 100, 100);
+    use(1);
+    use_other(11);
+    get(2);
+    ck_assert_int_eq(ebpo_cache_pool_take(pool, 301, &error), EBPO_E_LIMIT);
+    ck_assert_msg(strstr(error.message, "301 bytes of a shared budget are not free"), "%s",
+                  error.message);
+    ck_assert_int_eq(ebpo_cache_pool_take(pool, 250, NULL), EBPO_OK);
+    ck_assert(!src->live[1] && !src->live[11] && src->live[2]);
+    ebpo_cache_pool_get_bytes(pool, &now, &peak, &taken);
+    ck_assert_uint_eq(now, 350);
+    ck_assert_uint_eq(taken, 250);
+    ck_assert_uint_le(peak, 400);
+    void *it;
+    ck_assert_int_eq(ebpo_cache_get(other, 12, &it, NULL, NULL), EBPO_E_LIMIT);
+    ebpo_cache_unpin(cache, 2);
+    use_other(12);
+    ebpo_cache_pool_give_back(pool, 250);
+    finish_two();
+}
+END_TEST
+
+static void *use_either(void *context)
+{
+    uint64_t state = *(const uint64_t *)context;
+    for (int i = 0; i < 2000; i++) {
+        uint64_t r = ebpo_test_random(&state), key = r / 2 % 40;
+        void *it;
+        ebpo_cache *from = r % 2 ? cache : other;
+        key += r % 2 ? 0 : 100;
+        if (ebpo_cache_get(from, key, &it, NULL, NULL) != EBPO_OK)
+            continue;
+        ebpo_cache_unpin(from, key);
+        if (i % 500 == 0)
+            ebpo_cache_clear(from);
+    }
+    return NULL;
+}
+
+/* The source counts all bytes of both, at every moment. */
+START_TEST(a_shared_budget_holds_under_four_threads)
+{
+    pthread_t thread[4];
+    uint64_t seed[4] = { 1, 2, 3, 4 };
+    begin_two(1500, 100, 130);
+    for (int i = 0; i < 4; i++)
+        ck_assert_int_eq(pthread_create(&thread[i], NULL, use_either, &seed[i]), 0);
+    for (int i = 0; i < 4; i++)
+        pthread_join(thread[i], NULL);
+    finish_two();
+}
+END_TEST
+
 START_TEST(a_failed_load_tells_why_and_leaves_nothing)
 {
     begin_with(300, 100, 120);
@@ -794,6 +904,9 @@ Suite *test_suite(void)
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, random_operations_agree_with_a_plain_model, 1, 6);
     tcase_add_test(tests, what_is_set_aside_is_taken_from_the_items_as_it_is_needed);
+    tcase_add_test(tests, of_caches_that_share_a_budget_the_least_recently_used_goes_whoever_it_is);
+    tcase_add_test(tests, what_is_taken_for_good_of_a_shared_budget_is_dropped_for);
+    tcase_add_test(tests, a_shared_budget_holds_under_four_threads);
     tcase_add_test(tests, pinned_items_stay_and_the_message_says_what_would_do);
     tcase_add_test(tests, a_failed_load_tells_why_and_leaves_nothing);
     tcase_add_test(tests, an_item_beyond_its_estimate_does_not_break_the_budget);

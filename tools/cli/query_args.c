@@ -123,8 +123,8 @@ bool query_options_from(const char *name, const query_values *v, ebpo_model_opti
 
 /* --- sessions --- */
 
-int query_open(query_session *s, const char *name, const char *path,
-               const ebpo_model_options *options, int level, const remote_values *remote)
+int query_open_file(query_session *s, const char *name, const char *path,
+                    const ebpo_model_options *options, int level, const remote_values *remote)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     if (!command_wants_hdf5(name, path))
@@ -134,10 +134,23 @@ int query_open(query_session *s, const char *name, const char *path,
     const ebpo_info *info = ebpo_file_info(s->file);
     if (!command_has_level(name, info, level) || !command_has_level(name, info, options->cut_level))
         return EXIT_USAGE;
+    return EXIT_FINE;
+}
+
+int query_open_model(query_session *s, const char *name, const ebpo_model_options *options)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status = ebpo_model_new(s->file, options, &s->model, &error);
     if (status == EBPO_OK)
         status = ebpo_context_new(s->model, &s->context, &error);
     return status == EBPO_OK ? EXIT_FINE : command_failed(name, &error);
+}
+
+int query_open(query_session *s, const char *name, const char *path,
+               const ebpo_model_options *options, int level, const remote_values *remote)
+{
+    int code = query_open_file(s, name, path, options, level, remote);
+    return code == EXIT_FINE ? query_open_model(s, name, options) : code;
 }
 
 void query_close(query_session *s)

@@ -105,6 +105,10 @@ typedef struct query_session {
  * (-1: none is asked for). query_close in any case. */
 int query_open(query_session *s, const char *name, const char *path,
                const ebpo_model_options *options, int level, const remote_values *remote);
+/* The same in two steps. */
+int query_open_file(query_session *s, const char *name, const char *path,
+                    const ebpo_model_options *options, int level, const remote_values *remote);
+int query_open_model(query_session *s, const char *name, const ebpo_model_options *options);
 void query_close(query_session *s);
 
 #endif

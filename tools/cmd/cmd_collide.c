@@ -214,6 +214,43 @@ static int ask(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_collide_opt
     return command_flush("collide") ? EXIT_FINE : EXIT_FAILED;
 }
 
+/* --memory is of both models together: all of both if they fit, else both in parts that share it.
+ */
+static ebpo_status share_memory(const query_session *a, const query_session *b,
+                                ebpo_model_options *holding, ebpo_error *error)
+{
+    ebpo_model_options without = *holding;
+    ebpo_model_plan plan[2] = { EBPO_MODEL_PLAN_INIT, EBPO_MODEL_PLAN_INIT };
+    without.memory = 0;
+    ebpo_status status = ebpo_model_memory(a->file, &without, &plan[0], error);
+    if (status == EBPO_OK)
+        status = ebpo_model_memory(b->file, &without, &plan[1], error);
+    bool all = holding->cut_level < 0 && plan[0].whole + plan[1].whole <= holding->memory;
+    if (status != EBPO_OK || all)
+        return status;
+    return ebpo_budget_new(holding->memory, &holding->budget, error);
+}
+
+static int open_both(query_session *a, query_session *b, const collide_values *v,
+                     const char **operand, ebpo_model_options *holding)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    const char *path[2] = { operand[0], operand[1] };
+    bool one = v->self || strcmp(path[0], path[1]) == 0; /* then it is in memory once */
+    int level = (int)v->query.level;
+    int code = query_open_file(a, "collide", path[0], holding, level, &v->query.remote);
+    if (code == EXIT_FINE && !one)
+        code = query_open_file(b, "collide", path[1], holding, level, &v->query.remote);
+    if (code == EXIT_FINE && !one && holding->memory &&
+        share_memory(a, b, holding, &error) != EBPO_OK)
+        return command_failed("collide", &error);
+    if (code == EXIT_FINE)
+        code = query_open_model(a, "collide", holding);
+    if (code == EXIT_FINE && !one)
+        code = query_open_model(b, "collide", holding);
+    return code;
+}
+
 static int run(void *given, const char **operand)
 {
     collide_values *v = given;
@@ -242,16 +279,12 @@ static int run(void *given, const char **operand)
     how.deadline_ns = distance.deadline_ns;
     how.level = distance.level;
     answers_begin("collide");
-    int code =
-        query_open(&a, "collide", operand[0], &holding, (int)v->query.level, &v->query.remote);
-    bool one = v->self || strcmp(operand[0], operand[1]) == 0; /* then it is in memory once */
-    if (code == EXIT_FINE && !one)
-        code =
-            query_open(&b, "collide", operand[1], &holding, (int)v->query.level, &v->query.remote);
+    int code = open_both(&a, &b, v, operand, &holding);
     if (code == EXIT_FINE)
-        code = ask(v, a.model, one ? a.model : b.model, &how);
+        code = ask(v, a.model, b.model ? b.model : a.model, &how);
     query_close(&b);
     query_close(&a);
+    ebpo_budget_free(holding.budget);
     return code;
 }
 

@@ -46,6 +46,9 @@ static const arg_option options[] = {
                 "report: how deep one is in the other, within D"),
     OPTION_FLAG("least", 0, scene_values, least,
                 "approach: how near they come at all times, and when"),
+    OPTION_TEXT("memory", 0, scene_values, memory, "SIZE",
+                "report, approach: bytes that all models may use together (64M, 1G); default: as "
+                "many as they need"),
     OPTION_THREADS(scene_values, threads),
     OPTION_FLAG("outside", 0, scene_values, outside,
                 "files that the scene names may lie outside its folder"),
@@ -155,6 +158,8 @@ static int run(void *given, const char **operand)
     if (status == EBPO_OK && v->target_size &&
         (!words_read_size(v->target_size, &target) || !target))
         wrong = "--target-size is a number of bytes such as 500K or 20M";
+    if (status == EBPO_OK && v->memory && !words_read_size(v->memory, &load.memory))
+        wrong = "--memory is a number of bytes such as 64M or 1G";
     if (wrong) {
         ebpo_scene_free(scene);
         return command_usage("scene", "%s", wrong);

@@ -7,7 +7,7 @@
 typedef struct scene_values {
     double time, from, to;                 /* NAN: not given; then from and to are settled */
     double step, tolerance, margin, depth; /* 0: not given */
-    const char *out, *target_size;
+    const char *out, *target_size, *memory;
     int purpose; /* an ebpo_scene_purpose */
     int64_t threads;
     bool outside, remote, json, csv, count, places, solids, least, quiet;

@@ -13,8 +13,10 @@
  *   One mesh         ebpo_mesh_crossings
  *
  * Poses are those of pose.h: decisions are exact on posed coordinates. Swapping the models, threads
- * and processors change nothing; nor do budgets, but for the one pair of ebpo_collide_first. What
- * the kinds of pairs mean: docs/develop/collision.md.
+ * and processors change nothing; nor do budgets, but for the one pair of faces that meet which
+ * ebpo_collide_first and ebpo_collide_distance tell. Of models in parts (ebpo/query.h: a budget, a
+ * cut level) ebpo_collide_relation and ebpo_collide_depth cannot be asked. What the kinds of pairs
+ * mean: docs/develop/collision.md.
  */
 #ifndef EBPO_COLLIDE_H
 #define EBPO_COLLIDE_H
@@ -52,8 +54,7 @@ typedef struct ebpo_collider ebpo_collider;
 /*
  * options: NULL for the usual ones. Both models must outlive it.
  *
- * EBPO_E_ABSENT: a file has no mesh, or is a subset. EBPO_E_LIMIT: a model is not all in memory.
- * EBPO_E_ARGUMENT, EBPO_E_MEMORY.
+ * EBPO_E_ABSENT: a file has no mesh, or is a subset. EBPO_E_ARGUMENT, EBPO_E_MEMORY.
  *
  * Threads: any; many colliders may share models.
  */
@@ -159,7 +160,8 @@ typedef struct ebpo_relation_result {
  * of shells that meet nothing a face of each; of models that only touch, every face in contact is
  * looked at. Each model takes 4 bytes a face more in the collider, and some 60 for the call.
  *
- * Errors of ebpo_collide_first; after the deadline it succeeds. EBPO_E_ABSENT: as for ebpo_inside.
+ * EBPO_E_LIMIT: a model is in parts. Other errors are those of ebpo_collide_first; after the
+ * deadline it succeeds. EBPO_E_ABSENT: as for ebpo_inside.
  *
  * Threads: one per collider; further ones live for the call.
  */
@@ -227,8 +229,8 @@ typedef bool (*ebpo_segments_fn)(void *user, const ebpo_contact_segment *segment
 
 /*
  * Of the pairs of ebpo_collide_all that are EBPO_PAIR_CROSSING, in that order. When the models are
- * swapped the segments are the same, with their ends exchanged. Each model takes 4 bytes a face
- * more in the collider.
+ * swapped the segments are the same, with their ends exchanged. Each model that is all in memory
+ * takes 4 bytes a face more in the collider; of one in parts faces are read once more, by chunks.
  *
  * Errors as for ebpo_collide_all.
  *
@@ -284,7 +286,8 @@ typedef enum ebpo_pairs_format {
     EBPO_PAIRS_HDF5 = 0,
 
     /* Both meshes at their poses, first A's, in the order of the files; faces have a colour: red
-     * (255, 0, 0) where they meet one of the other model, else a grey. */
+     * (255, 0, 0) where they meet one of the other model, else a grey. Both meshes are in memory
+     * meanwhile, beside all budgets. */
     EBPO_PAIRS_PLY = 1
 } ebpo_pairs_format;
 
@@ -368,10 +371,14 @@ typedef struct ebpo_clearance {
  * soon as that is decided: 1: the distance is in at_least .. INFINITY, and no pair is told; 0: the
  * pair that was told is nearer. After the deadline `distance` is what is certain by then.
  *
+ * Of models in parts subtrees are loaded whose envelopes are not farther apart than what has been
+ * found, the nearest first. Exact distances and their pairs are the same; of intervals lo and hi,
+ * and of faces that meet which two are told, depend on the parts.
+ *
  * options, clearance   NULL for the usual ones
  *
- * EBPO_E_LIMIT: also a model is not all in memory. EBPO_E_ARGUMENT: also a tolerance below 0 or
- * infinite, at_least is no number. Others as for ebpo_collide_first.
+ * EBPO_E_ARGUMENT: also a tolerance below 0 or infinite, at_least is no number. Others as for
+ * ebpo_collide_first.
  *
  * Threads: one per collider.
  */
@@ -391,7 +398,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_distance(ebpo_collider *collider
  * a_in_b, b_in_a   NULL: not asked
  *
  * EBPO_E_NOT_SOLID: what the depth in it is asked of is a surface. EBPO_E_ARGUMENT: also the
- * tolerance. Others as for ebpo_collide_first.
+ * tolerance. EBPO_E_LIMIT: a model is in parts. Others as for ebpo_collide_first.
  *
  * Threads: one per collider.
  */

@@ -3,6 +3,7 @@
  * allows.
  *
  *   Models           ebpo_model_new, and ebpo_context_new for each thread; ebpo_model_memory
+ *   One budget       ebpo_budget_new
  *   Point in solid   ebpo_inside, ebpo_inside_many
  *   Distance         ebpo_distance, ebpo_distance_many, ebpo_distance_within
  *   Rays             ebpo_ray_first, ebpo_ray_any, ebpo_ray_all, and each of these for many
@@ -54,6 +55,9 @@ typedef enum ebpo_loading {
     EBPO_LOAD_NODES = 2
 } ebpo_loading;
 
+/* Bytes of memory that models share: ebpo_budget_new. */
+typedef struct ebpo_budget ebpo_budget;
+
 typedef struct ebpo_model_options {
     size_t struct_size; /* EBPO_MODEL_OPTIONS_INIT sets it */
 
@@ -89,11 +93,18 @@ typedef struct ebpo_model_options {
     unsigned threads;
 
     ebpo_progress progress;
+
+    /*
+     * Bytes that several models share, in place of `memory`; NULL: none. Such a model is all
+     * in memory as long as those that are take up to half of the budget together, else in parts,
+     * and `loading` is EBPO_LOAD_CACHE.
+     */
+    ebpo_budget *budget;
 } ebpo_model_options;
 
-#define EBPO_MODEL_OPTIONS_INIT                                                      \
-    {                                                                                \
-        sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL } \
+#define EBPO_MODEL_OPTIONS_INIT                                                            \
+    {                                                                                      \
+        sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL }, NULL \
     }
 
 /* What is in memory of a file, made for speed. Threads share it. */
@@ -237,6 +248,48 @@ typedef struct ebpo_model_stats {
  * Threads: any.
  */
 EBPO_API ebpo_status ebpo_model_get_stats(const ebpo_model *model, ebpo_model_stats *out);
+
+/* ---- one budget for several models ---- */
+
+/*
+ * What ebpo_model_options.budget takes: all that its models take is of these bytes, as for
+ * ebpo_model_options.memory. Subtrees and chunks that were used least recently go first, whichever
+ * model's they are; levels above the cuts, and models that are all in memory, stay. Each model
+ * holds its own, also of one file: for two places of one file use one model.
+ *
+ * bytes    greater than 0
+ *
+ * EBPO_E_LIMIT: too few for any model. EBPO_E_ARGUMENT: 0. EBPO_E_MEMORY.
+ *
+ * Threads: any; its models may be asked by different threads.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget **out,
+                                                   ebpo_error *error);
+
+/*
+ * After its models; NULL is fine.
+ *
+ * Threads: one per budget.
+ */
+EBPO_API void ebpo_budget_free(ebpo_budget *budget);
+
+typedef struct ebpo_budget_stats {
+    size_t struct_size; /* EBPO_BUDGET_STATS_INIT sets it */
+
+    /* Bytes: what was given, what is taken of it now, and the most that ever was. */
+    uint64_t budget, memory, memory_peak;
+} ebpo_budget_stats;
+
+#define EBPO_BUDGET_STATS_INIT EBPO_SIZED(ebpo_budget_stats)
+
+/*
+ * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ *
+ * Threads: any.
+ */
+EBPO_API ebpo_status ebpo_budget_get_stats(const ebpo_budget *budget, ebpo_budget_stats *out);
+
+/* ---- contexts ---- */
 
 /* One thread's work with a model: position, scratch, what it holds in memory. */
 typedef struct ebpo_context ebpo_context;

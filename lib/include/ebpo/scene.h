@@ -295,7 +295,10 @@ EBPO_API bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t
 typedef struct ebpo_load_options {
     size_t struct_size; /* EBPO_LOAD_OPTIONS_INIT sets it */
 
-    /* Bytes of memory for each model that is asked questions, as in ebpo_model_options. */
+    /*
+     * Bytes of memory for all models that are asked questions, together, as of ebpo_budget_new;
+     * those of the first call that gives any. 0: as much as they need.
+     */
     uint64_t memory;
 
     ebpo_progress progress;
@@ -457,8 +460,7 @@ typedef struct ebpo_scene_meeting {
 
     /*
      * A point in the world, as far as doubles tell, if ebpo_scene_ask_options.places: one that the
-     * two faces have in common, or the middle between their nearest points. NAN: not asked, or a
-     * model is not all in memory.
+     * two faces have in common, or the middle between their nearest points. NAN: not asked.
      */
     double place[3];
 
@@ -514,7 +516,8 @@ typedef struct ebpo_scene_ask_options {
  *
  * EBPO_E_ARGUMENT: not loaded, no such time, a pose (ebpo_pose_check), or options.depth is no such
  * length. EBPO_E_ABSENT: a model has no mesh, or is a subset without faces that may matter: of
- * those that are related all may. EBPO_E_LIMIT: a model is not all in memory (ebpo_load_options).
+ * those that are related all may. EBPO_E_LIMIT: too little memory (ebpo_load_options), or
+ * options.relate and a model that is in parts.
  * EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
  *
  * Threads: one per scene; further ones live for the call.
