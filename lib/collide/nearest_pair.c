@@ -233,29 +233,39 @@ bool ebpo_nearest_pair_is_done(const ebpo_nearest_pair *n)
     return n->meets || n->is_at_least >= 0 || n->ended || n->status != EBPO_OK;
 }
 
-/* What waits, and what nobody has judged yet. */
-static void judge_rest(ebpo_gap_search *g, ebpo_nearest_pair *n)
+/* What is known limits the search. */
+static void begin_search(const ebpo_nearest_pair *n, ebpo_gap_search *g)
+{
+    g->tolerance = (float)(n->tolerance * g->posing[0].unit * (1 - 0x1p-20));
+    if (!isnan(n->at_least)) {
+        ebpo_gap_set_limit(g, to_unit(g, n->at_least));
+    } else if (n->found) {
+        g->best = to_unit(g, n->best.bounds.hi);
+        ebpo_gap_set_limit(g, g->best - g->tolerance);
+    }
+}
+
+/* What waits, and the pair that is less than `before` and that nobody has judged yet. */
+static void judge_rest(ebpo_gap_search *g, ebpo_nearest_pair *n, float before)
 {
     if (ebpo_nearest_pair_is_done(n) || !judge(g) || n->meets || !isnan(n->at_least))
         return;
-    if (n->tolerance > 0 && g->best < INFINITY)
+    if (n->tolerance > 0 && g->best < before)
         take(g, n, g->best_slot);
 }
 
 ebpo_status ebpo_nearest_pair_search(ebpo_nearest_pair *n, ebpo_gap_search *g, ebpo_error *error)
 {
-    double limit = ebpo_nearest_pair_limit(n);
     g->user = n;
     g->judge = judge;
     g->go_on = go_on;
-    g->tolerance = (float)(n->tolerance * g->posing[0].unit * (1 - 0x1p-20));
     n->error = error;
-    if (limit < INFINITY)
-        ebpo_gap_set_limit(g, to_unit(g, limit));
+    begin_search(n, g);
+    float before = g->best;
     ebpo_gap_walk_best()(g);
     if (g->no_memory)
         return ebpo_fail_memory(error, g->capacity * sizeof *g->stack);
-    judge_rest(g, n);
+    judge_rest(g, n, before);
     if (g->ended)
         ebpo_nearest_pair_leave(n, left_over(g));
     return n->status;
