@@ -53,6 +53,8 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
 {
     ebpo_face_pair pair;
     ebpo_collider_stats stats = EBPO_COLLIDER_STATS_INIT;
+    const double up[3] = { 0, 0, 1 };
+    ebpo_way_out way;
     ebpo_clearance clearance;
     ebpo_certain depth[2];
     ebpo_relation_result relation;
@@ -72,6 +74,8 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
         status = ebpo_collide_distance(collider, options, NULL, &clearance, error);
     if (status == EBPO_OK)
         status = ebpo_collide_depth(collider, options, 0.5, &depth[0], &depth[1], error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_way_out(collider, options, up, &way, error);
     if (status == EBPO_OK)
         status = ebpo_collide_relation(collider, options, &relation, error);
     if (status == EBPO_OK)

@@ -173,7 +173,7 @@ static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_colli
             ebpo_collide_write(c, how,
                                words_end_with(v->out, ".ply") ? EBPO_PAIRS_PLY : EBPO_PAIRS_HDF5,
                                v->out, error);
-    if (status == EBPO_OK && (v->far.distance || v->far.depth))
+    if (status == EBPO_OK && collide_far_asked(&v->far))
         return collide_far_ask(&v->far, v->query.json, c, how, error);
     if (status == EBPO_OK && v->query.all)
         return ebpo_collide_all(c, how, take_pairs, v, error);
@@ -270,7 +270,7 @@ static int run(void *given, const char **operand)
         return command_usage("collide", "--output %s: expected a name that ends in .h5 or .ply",
                              v->out);
     if (v->query.level >= 0 &&
-        (v->self || v->query.all || v->far.distance || v->far.depth || v->relation || v->out))
+        (v->self || v->query.all || collide_far_asked(&v->far) || v->relation || v->out))
         return command_usage("collide", "--level takes no other question");
     if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
         !read_pose("pose-b", v->pose_b, &how.pose_b) ||

@@ -2,17 +2,37 @@
 
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "cli/command.h"
 #include "cli/json.h"
 
-bool collide_far_fits(const collide_far *f, bool others)
+/* Three numbers with blanks or commas between. */
+static bool read_direction(const char *text, double out[3])
+{
+    for (int k = 0; k < 3; k++) {
+        char *end;
+        text += strspn(text, k ? " ,\t" : " \t");
+        out[k] = strtod(text, &end);
+        if (end == text)
+            return false;
+        text = end;
+    }
+    return text[strspn(text, " \t")] == '\0';
+}
+
+bool collide_far_asked(const collide_far *f) { return f->distance || f->depth || f->way_out; }
+
+bool collide_far_fits(collide_far *f, bool others)
 {
     const char *wrong = NULL;
-    bool asked = f->distance || f->depth;
-    if ((asked && others) || (f->distance && f->depth) || (!asked && f->tolerance > 0))
-        wrong = "--distance and --depth take neither --all nor --self nor each other, and only "
-                "they take --tolerance";
+    if ((collide_far_asked(f) && others) || f->distance + f->depth + (f->way_out != NULL) > 1 ||
+        (!f->distance && !f->depth && f->tolerance > 0))
+        wrong = "--distance, --depth and --way-out take neither --all nor --self nor each other, "
+                "and only the first two take --tolerance";
+    else if (f->way_out && !read_direction(f->way_out, f->direction))
+        wrong = "--way-out expects a direction, three numbers 'X Y Z'";
     else if (f->at_least >= 0 && (!f->distance || f->tolerance > 0))
         wrong = "--at-least is for --distance, without --tolerance";
     else if (f->depth && !(f->tolerance > 0))
@@ -117,9 +137,33 @@ static ebpo_status ask_depth(const collide_far *f, bool as_json, ebpo_collider *
     return EBPO_OK;
 }
 
+/* --- the way out --- */
+
+static ebpo_status ask_way_out(const collide_far *f, bool as_json, ebpo_collider *c,
+                               const ebpo_collide_options *how, ebpo_error *error)
+{
+    static const char *const figures[] = { "exact", "interval", "bound" };
+    ebpo_way_out w;
+    ebpo_status status = ebpo_collide_way_out(c, how, f->direction, &w, error);
+    if (status != EBPO_OK)
+        return status;
+    bool any = w.pair.face_a != EBPO_NO_FACE;
+    printf("%s", as_json ? "{" : "");
+    print_bounds(as_json, &w.t);
+    if (as_json)
+        printf(", \"figure\": \"%s\"", figures[w.t.figure]);
+    if (any)
+        printf(as_json ? ", \"face_a\": %" PRIu64 ", \"face_b\": %" PRIu64
+                       : " %" PRIu64 " %" PRIu64,
+               w.pair.face_a, w.pair.face_b);
+    puts(as_json ? "}" : "");
+    return EBPO_OK;
+}
+
 ebpo_status collide_far_ask(const collide_far *f, bool as_json, ebpo_collider *c,
                             const ebpo_collide_options *how, ebpo_error *error)
 {
-    return f->distance ? ask_distance(f, as_json, c, how, error)
-                       : ask_depth(f, as_json, c, how, error);
+    return f->way_out    ? ask_way_out(f, as_json, c, how, error)
+           : f->distance ? ask_distance(f, as_json, c, how, error)
+                         : ask_depth(f, as_json, c, how, error);
 }

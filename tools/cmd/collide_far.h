@@ -1,4 +1,4 @@
-/* ebpo collide --distance and --depth: asking and printing. */
+/* ebpo collide --distance, --depth and --way-out: asking and printing. */
 #ifndef EBPO_TOOLS_COLLIDE_FAR_H
 #define EBPO_TOOLS_COLLIDE_FAR_H
 
@@ -8,25 +8,32 @@
 typedef struct collide_far {
     bool distance, depth;
     double tolerance, at_least;
+    const char *way_out; /* X Y Z, or NULL */
+    double direction[3]; /* set by collide_far_fits */
 } collide_far;
 
-#define COLLIDE_FAR_INIT        \
-    {                           \
-        false, false, 0.0, -1.0 \
+#define COLLIDE_FAR_INIT                           \
+    {                                              \
+        false, false, 0.0, -1.0, NULL, { 0, 0, 0 } \
     }
 
-#define COLLIDE_FAR_OPTIONS(type, member)                                                     \
-    OPTION_FLAG("distance", 0, type, member.distance,                                         \
-                "print how far apart the faces are: two bounds, and the nearest faces"),      \
-        OPTION_FLAG("depth", 0, type, member.depth,                                           \
-                    "how deep A's faces are in B, a solid, and B's in A; needs --tolerance"), \
-        OPTION_REAL("tolerance", 0, type, member.tolerance, "T", 0, DBL_MAX,                  \
-                    "bounds may be so far apart; 0, the default of --distance: exact"),       \
-        OPTION_REAL("at-least", 0, type, member.at_least, "D", 0, DBL_MAX,                    \
+#define COLLIDE_FAR_OPTIONS(type, member)                                                       \
+    OPTION_FLAG("distance", 0, type, member.distance,                                           \
+                "print how far apart the faces are: two bounds, and the nearest faces"),        \
+        OPTION_FLAG("depth", 0, type, member.depth,                                             \
+                    "how deep A's faces are in B, a solid, and B's in A; needs --tolerance"),   \
+        OPTION_TEXT("way-out", 0, type, member.way_out, "'X Y Z'",                              \
+                    "how far A has to be moved along this direction to be clear of B, and the " \
+                    "faces that part last"),                                                    \
+        OPTION_REAL("tolerance", 0, type, member.tolerance, "T", 0, DBL_MAX,                    \
+                    "bounds may be so far apart; 0, the default of --distance: exact"),         \
+        OPTION_REAL("at-least", 0, type, member.at_least, "D", 0, DBL_MAX,                      \
                     "with --distance: only whether it is at least D")
 
 /* False, and a message on standard error: they do not go together. others: --all or --self. */
-bool collide_far_fits(const collide_far *far, bool others);
+bool collide_far_fits(collide_far *far, bool others);
+
+bool collide_far_asked(const collide_far *far);
 
 ebpo_status collide_far_ask(const collide_far *far, bool as_json, ebpo_collider *collider,
                             const ebpo_collide_options *how, ebpo_error *error);

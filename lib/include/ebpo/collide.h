@@ -9,6 +9,7 @@
  *   As a file        ebpo_collide_write
  *   How far          ebpo_collide_distance
  *   How deep         ebpo_collide_depth
+ *   The way out      ebpo_collide_way_out
  *   By levels        ebpo_collide_levels
  *   One mesh         ebpo_mesh_crossings
  *
@@ -406,6 +407,37 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_depth(ebpo_collider *collider,
                                                       const ebpo_collide_options *options,
                                                       double tolerance, ebpo_certain *a_in_b,
                                                       ebpo_certain *b_in_a, ebpo_error *error);
+
+/* ---- the way out ---- */
+
+typedef struct ebpo_way_out {
+    /* Exact: the double nearest to it; after the deadline an interval or a bound. */
+    ebpo_certain t;
+
+    /* The faces that part last, of several at the same time the first in the order of
+     * ebpo_collide_all; EBPO_NO_FACE: none was found. */
+    ebpo_face_pair pair;
+} ebpo_way_out;
+
+/*
+ * How far A has to be moved along a direction to be clear of B: the least t >= 0 so that A, moved
+ * by any t' * direction with t' > t, has no point in common with B; of solids, no inner point
+ * either. Moved by t itself they touch in the pair that is told; if there is none (t is 0) they
+ * meet neither where they are nor on the way. Posed coordinates are moved without rounding. t is
+ * not the first moment at which they part: what comes later is in the way, too.
+ *
+ * direction   of any length, which is the unit of t; its 1-norm within 2^-500 .. 2^500
+ *
+ * EBPO_E_LIMIT: also a model is not all in memory. EBPO_E_ARGUMENT: also the direction. Others as
+ * for ebpo_collide_first; after the deadline it succeeds.
+ *
+ * Threads: one per collider.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_way_out(ebpo_collider *collider,
+                                                        const ebpo_collide_options *options,
+                                                        const double direction[3],
+                                                        ebpo_way_out *out, ebpo_error *error);
+
 /* ---- by levels ---- */
 
 typedef struct ebpo_level_result {

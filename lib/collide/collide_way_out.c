@@ -1,0 +1,56 @@
+/* How far one model has to be moved to be clear of another. */
+#include "geom/strict_fp.h"
+
+#include <math.h>
+
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "collide/way_search.h"
+
+/* The question's first model's direction, times a power of two, which is told. */
+static int set_direction(ebpo_way_search *s, const double direction[3])
+{
+    int exponent;
+    (void)frexp(fmax(fabs(direction[0]), fmax(fabs(direction[1]), fabs(direction[2]))), &exponent);
+    for (int k = 0; k < 3; k++)
+        s->direction[k] =
+            ldexp(s->question->turned ? -direction[k] : direction[k], -exponent) + 0.0;
+    return exponent;
+}
+
+static void tell(const ebpo_way_search *s, int exponent, ebpo_way_out *out)
+{
+    double lo = 0, hi = ldexp(s->hi, -exponent) * (1 + 0x1p-50);
+    *out = (ebpo_way_out){ .pair = { EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE,
+                                     EBPO_PAIR_APART, 0 } };
+    if (s->last.ever) {
+        ebpo_sweep_time t = s->last;
+        t.unit -= exponent;
+        lo = ebpo_sweep_time_round(&t);
+        out->pair = ebpo_collision_pair(s->question, s->side[0].accel, s->side[1].accel, &s->pair);
+    }
+    out->t = ebpo_certain_of(lo, s->hi < 0 ? lo : fmax(lo, hi));
+}
+
+ebpo_status ebpo_collide_way_out(ebpo_collider *c, const ebpo_collide_options *options,
+                                 const double direction[3], ebpo_way_out *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_collision q;
+    double size = fabs(direction[0]) + fabs(direction[1]) + fabs(direction[2]);
+    if (!(size > 0x1p-500 && size < 0x1p500))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "a direction of three finite numbers, not all 0, is needed");
+    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_way_search s = { .question = &q, .hi = -1 };
+    int exponent = set_direction(&s, direction);
+    ebpo_sweep_time_init(&s.last);
+    if (q.model[0]->whole->bound_count > 0 && q.model[1]->whole->bound_count > 0)
+        status = ebpo_way_search_run(&s, error);
+    if (status == EBPO_OK)
+        tell(&s, exponent, out);
+    ebpo_sweep_time_clear(&s.last);
+    return status;
+}

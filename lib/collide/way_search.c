@@ -1,0 +1,249 @@
+#include "geom/strict_fp.h"
+
+#include "collide/way_search.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+
+/* --- the heap --- */
+
+static bool push(ebpo_way_search *s, const ebpo_way_pair *pair)
+{
+    if (!ebpo_grow(&s->pairs, &s->capacity, s->count + 1, sizeof *s->pairs))
+        return false;
+    uint64_t at = s->count++;
+    for (uint64_t up; at > 0 && s->pairs[up = (at - 1) / 2].most < pair->most; at = up)
+        s->pairs[at] = s->pairs[up];
+    s->pairs[at] = *pair;
+    return true;
+}
+
+static ebpo_way_pair pop(ebpo_way_search *s)
+{
+    ebpo_way_pair out = s->pairs[0], last = s->pairs[--s->count];
+    uint64_t at = 0;
+    for (uint64_t next; (next = 2 * at + 1) < s->count; at = next) {
+        next += next + 1 < s->count && s->pairs[next + 1].most > s->pairs[next].most;
+        if (!(s->pairs[next].most > last.most))
+            break;
+        s->pairs[at] = s->pairs[next];
+    }
+    s->pairs[at] = last;
+    return out;
+}
+
+/* --- extents along the three axes --- */
+
+typedef struct extent {
+    double low[3], high[3];
+} extent;
+
+static extent extent_of(const ebpo_way_search *s, int which, uint32_t ref)
+{
+    const ebpo_way_side *side = &s->side[which];
+    const ebpo_bound *b = &side->accel->bound[ref / 8];
+    double middle[3], half[3];
+    extent out;
+    for (int k = 0; k < 3; k++) {
+        ebpo_bound_sides ends = ebpo_bound_side(b, (int)(ref % 8), k);
+        middle[k] = (ends.low + ends.high) / 2;
+        half[k] = (ends.high - ends.low) / 2;
+    }
+    for (int i = 0; i < 3; i++) {
+        const double *row = side->row[i];
+        double at = row[0] * middle[0] + row[1] * middle[1] + row[2] * middle[2] + side->base[i],
+               reach = fabs(row[0]) * half[0] + fabs(row[1]) * half[1] + fabs(row[2]) * half[2];
+        out.low[i] = at - reach;
+        out.high[i] = at + reach;
+    }
+    return out;
+}
+
+/* The greatest t at which boxes with these extents may have a common point; less than 0: none. */
+static double most_of(const ebpo_way_search *s, const extent *a, const extent *b)
+{
+    for (int i = 1; i < 3; i++)
+        if (b->low[i] - a->high[i] > s->lost || a->low[i] - b->high[i] > s->lost)
+            return -1;
+    double along = b->high[0] - a->low[0] + s->lost;
+    return along < 0 ? -1 : along / s->step * (1 + 0x1p-40);
+}
+
+/* Two axes at right angles to the direction, and to each other. */
+static void make_axes(const double d[3], double axis[3][3])
+{
+    double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    int least = 0;
+    for (int k = 0; k < 3; k++) {
+        axis[0][k] = d[k] / length;
+        least = fabs(d[k]) < fabs(d[least]) ? k : least;
+    }
+    int u = (least + 1) % 3, v = (least + 2) % 3;
+    length = sqrt(axis[0][u] * axis[0][u] + axis[0][v] * axis[0][v]);
+    axis[1][least] = 0;
+    axis[1][u] = -axis[0][v] / length;
+    axis[1][v] = axis[0][u] / length;
+    for (int k = 0; k < 3; k++) {
+        int p = (k + 1) % 3, q = (k + 2) % 3;
+        axis[2][k] = axis[0][p] * axis[1][q] - axis[0][q] * axis[1][p];
+    }
+}
+
+static double dot(const double x[3], const double y[3])
+{
+    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+}
+
+static void make_side(ebpo_way_search *s, int which, const double axis[3][3])
+{
+    ebpo_way_side *side = &s->side[which];
+    double centre[3];
+    side->accel = s->question->model[which]->whole;
+    side->posing = &s->question->posing[which].posing;
+    ebpo_posing_apply(side->posing, side->accel->centre, centre);
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 3; k++) {
+            double column[3] = { side->posing->matrix[0][k], side->posing->matrix[1][k],
+                                 side->posing->matrix[2][k] };
+            side->row[i][k] = dot(axis[i], column) / side->accel->scale;
+        }
+        side->base[i] = dot(axis[i], centre);
+    }
+}
+
+/* --- faces --- */
+
+static bool comes_first(const ebpo_way_search *s, const ebpo_met_pair *x, const ebpo_met_pair *y)
+{
+    uint64_t a = ebpo_accel_file_face(s->side[0].accel, x->a),
+             b = ebpo_accel_file_face(s->side[0].accel, y->a);
+    return a != b ? a < b
+                  : ebpo_accel_file_face(s->side[1].accel, x->b) <
+                        ebpo_accel_file_face(s->side[1].accel, y->b);
+}
+
+static void look_at_faces(ebpo_way_search *s, const double a[3][3], const double b[3][3],
+                          const ebpo_met_pair *pair)
+{
+    double most = ebpo_sweep_most(a, b, s->direction, INFINITY);
+    ebpo_sweep_time t;
+    s->looked++;
+    if (most < s->sure)
+        return;
+    ebpo_sweep_time_init(&t);
+    ebpo_sweep_last(a, b, s->direction, &t);
+    int order = t.ever && mpz_sgn(t.numerator) >= 0 ? ebpo_sweep_time_compare(&t, &s->last) : -1;
+    if (order > 0 || (order == 0 && comes_first(s, pair, &s->pair))) {
+        mpz_swap(t.numerator, s->last.numerator);
+        mpz_swap(t.denominator, s->last.denominator);
+        s->last.unit = t.unit;
+        s->last.ever = true;
+        s->pair = *pair;
+        s->sure = fmax(0, nextafter(ebpo_sweep_time_round(&s->last), 0));
+    }
+    ebpo_sweep_time_clear(&t);
+}
+
+static void look_at_blocks(ebpo_way_search *s, uint32_t block_a, uint32_t block_b)
+{
+    const uint32_t block[2] = { block_a, block_b };
+    const ebpo_meshlet *m[2];
+    double corner[2][EBPO_BLOCK][3][3];
+    for (int w = 0; w < 2; w++) {
+        m[w] = ebpo_accel_meshlet(s->side[w].accel, block[w]);
+        for (uint32_t lane = 0; lane < m[w]->faces; lane++)
+            ebpo_posed_triangle(s->side[w].accel, s->side[w].posing, block[w] * EBPO_BLOCK + lane,
+                                corner[w][lane]);
+    }
+    for (uint32_t i = 0; i < m[0]->faces; i++)
+        for (uint32_t j = 0; j < m[1]->faces; j++) {
+            ebpo_met_pair pair = { m[0]->face + i, m[1]->face + j, EBPO_PAIR_APART };
+            look_at_faces(s, (const double(*)[3])corner[0][i], (const double(*)[3])corner[1][j],
+                          &pair);
+        }
+}
+
+/* --- the search --- */
+
+static uint32_t child_of(const ebpo_way_search *s, int which, uint32_t ref)
+{
+    return s->side[which].accel->bound[ref / 8].child[ref % 8];
+}
+
+static double size_of(const extent *e)
+{
+    return e->high[0] - e->low[0] + (e->high[1] - e->low[1]) + (e->high[2] - e->low[2]);
+}
+
+/* All children of one node with one child, or a node's children, of the other model. */
+static ebpo_status offer_children(ebpo_way_search *s, int which, uint32_t node, uint32_t other,
+                                  ebpo_error *error)
+{
+    extent seen[2];
+    seen[!which] = extent_of(s, !which, other);
+    for (uint32_t i = 0; i < s->side[which].accel->bound[node].count; i++) {
+        uint32_t ref[2];
+        ref[which] = node * 8 + i;
+        ref[!which] = other;
+        seen[which] = extent_of(s, which, ref[which]);
+        ebpo_way_pair pair = { most_of(s, &seen[0], &seen[1]), ref[0], ref[1] };
+        if (pair.most < s->sure)
+            continue;
+        if (!push(s, &pair))
+            return ebpo_fail_memory(error, s->capacity * sizeof *s->pairs);
+    }
+    return EBPO_OK;
+}
+
+/* The larger one, if both are nodes. */
+static ebpo_status divide(ebpo_way_search *s, const ebpo_way_pair *pair, ebpo_error *error)
+{
+    uint32_t child[2] = { child_of(s, 0, pair->a), child_of(s, 1, pair->b) };
+    bool block[2] = { child[0] & EBPO_IS_BLOCK, child[1] & EBPO_IS_BLOCK };
+    if (block[0] && block[1]) {
+        look_at_blocks(s, child[0] & ~EBPO_IS_BLOCK, child[1] & ~EBPO_IS_BLOCK);
+        return EBPO_OK;
+    }
+    extent a = extent_of(s, 0, pair->a), b = extent_of(s, 1, pair->b);
+    int which = block[0] || (!block[1] && size_of(&b) > size_of(&a));
+    return offer_children(s, which, child[which], which ? pair->a : pair->b, error);
+}
+
+static ebpo_status begin(ebpo_way_search *s, ebpo_error *error)
+{
+    double axis[3][3];
+    make_axes(s->direction, axis);
+    for (int w = 0; w < 2; w++)
+        make_side(s, w, (const double(*)[3])axis);
+    s->step = dot(axis[0], s->direction);
+    s->lost = 0x1p-40 * s->question->reach;
+    ebpo_status status = EBPO_OK;
+    const ebpo_accel *b = s->side[1].accel;
+    for (uint32_t j = 0; j < b->bound[b->top].count && status == EBPO_OK; j++)
+        status = offer_children(s, 0, s->side[0].accel->top, b->top * 8 + j, error);
+    return status;
+}
+
+ebpo_status ebpo_way_search_run(ebpo_way_search *s, ebpo_error *error)
+{
+    const ebpo_progress *progress = &s->question->options.progress;
+    ebpo_status status = begin(s, error);
+    while (status == EBPO_OK && s->count > 0 && s->pairs[0].most >= s->sure) {
+        if (ebpo_collision_is_late(s->question))
+            break;
+        if (s->looked % 64 == 0 && !ebpo_progress_step(progress, "way out", 0, 0, error)) {
+            status = EBPO_E_CANCELLED;
+            break;
+        }
+        ebpo_way_pair pair = pop(s);
+        status = divide(s, &pair, error);
+    }
+    s->hi = s->count > 0 && s->pairs[0].most >= s->sure ? s->pairs[0].most : -1;
+    free(s->pairs);
+    s->pairs = NULL;
+    return status;
+}
