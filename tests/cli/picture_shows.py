@@ -1,5 +1,5 @@
-"""picture_shows.py FILE.png WIDTH HEIGHT: a PNG of that size with a light border and something
-darker inside. Filters 0 to 4 of 8-bit RGB."""
+"""picture_shows.py FILE.png WIDTH HEIGHT [red]: a PNG of that size with a light border and
+something darker inside; or with something red. Filters 0 to 4 of 8-bit RGB."""
 import struct
 import sys
 import zlib
@@ -44,6 +44,12 @@ width, height, raw = rows_of(data)
 assert (width, height) == (int(sys.argv[2]), int(sys.argv[3])), (width, height)
 rows = unfilter(width, height, raw)
 assert min(rows[0]) > 200 and all(row[0] > 200 for row in rows), "the border is not light"
+if len(sys.argv) > 4:
+    red = sum(row[i] > 100 and max(row[i + 1:i + 3]) < 70 for row in rows
+              for i in range(0, 3 * width, 3))
+    assert red > width * height // 2000, f"red: {red} pixels"
+    print("fine")
+    sys.exit()
 dark = sum(row[i] < 200 for row in rows for i in range(0, 3 * width, 3))
 assert width * height // 10 < dark < width * height * 9 // 10, dark
 print("fine")

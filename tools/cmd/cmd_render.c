@@ -223,7 +223,7 @@ static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const came
                              const int at[4], ebpo_error *error)
 {
     static const uint8_t ink[3] = { 60, 66, 76 };
-    raster_style style = { { 0.30, 0.48, 0.66 }, t->closed, j->v.edges };
+    raster_style style = { { 0.30, 0.48, 0.66 }, t->closed, j->v.edges, NULL };
     if (t->level == MESH)
         memcpy(style.colour, (const double[3]){ 0.66, 0.54, 0.40 }, sizeof style.colour);
     int caption = caption_height(j, at[2]), drawn = at[3] - caption;

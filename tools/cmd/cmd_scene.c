@@ -33,7 +33,9 @@ static const arg_option options[] = {
     OPTION_REAL("margin", 0, scene_values, margin, "D", 1e-300, 1e300,
                 "plan, pack: what comes so near, beyond the clearance, is needed too"),
     OPTION_TEXT("output", 'o', scene_values, out, "PATH",
-                "pack: the folder to make; report: a file that ends in .h5"),
+                "pack: the folder to make; report: a file that ends in .h5, .html (a page of "
+                "clashes) or .png "
+                "(pictures)"),
     OPTION_TEXT("target-size", 0, scene_values, target_size, "S",
                 "pack: models of at most this many bytes (K, M, G: powers of 1024) together, with "
                 "the least error"),
@@ -99,8 +101,9 @@ static const char *wrong_report(const scene_values *v)
 {
     if (v->json && v->csv)
         return "--json and --csv exclude each other";
-    if (v->out && !words_end_with(v->out, ".h5"))
-        return "--output of a report is a file that ends in .h5";
+    if (v->out && !words_end_with(v->out, ".h5") && !words_end_with(v->out, ".html") &&
+        !words_end_with(v->out, ".png"))
+        return "--output of a report ends in .h5, .html or .png";
     if (v->to > v->from && !(v->step > 0))
         return "from one time to another a report needs --step";
     if (v->to > v->from && !((v->to - v->from) / v->step < FRAMES_MOST))

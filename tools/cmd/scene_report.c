@@ -6,8 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "clash/clash_page.h"
+#include "clash/clash_pictures.h"
 #include "cli/json.h"
 #include "cli/progress.h"
+#include "cli/words.h"
 #include "cmd/scene_rows.h"
 
 typedef struct report {
@@ -19,7 +22,13 @@ typedef struct report {
     uint64_t capacity; /* of its meetings */
     bool prints;       /* rows on standard output */
     json j;
-    ebpo_scene_record *record; /* NULL: none is written */
+    const char *path;
+    uint64_t frames, told;
+    /* What is written, as the name of v->out ends; else NULL and false. */
+    ebpo_scene_record *record;
+    clash_strip *strip;
+    bool page;
+    clash_list clashes;
 } report;
 
 /* --- a frame --- */
@@ -93,17 +102,45 @@ static void print_frame(report *r)
                                                       &f->meetings[i]);
 }
 
+/* Frames are as many as pictures, or spread evenly. */
+static bool is_pictured(const report *r)
+{
+    uint64_t n = r->told, most = r->frames < CLASH_TILES ? r->frames : CLASH_TILES;
+    return n == 0 || n * (most - 1) / (r->frames - 1) != (n - 1) * (most - 1) / (r->frames - 1);
+}
+
 static ebpo_status tell_frame(report *r, ebpo_error *error)
 {
     const scene_frame *f = &r->frame;
+    ebpo_status status = EBPO_OK;
     if (r->prints)
         print_frame(r);
-    return r->record ? ebpo_scene_record_add(r->record, &f->cost, f->meetings, f->count, error)
-                     : EBPO_OK;
+    if (r->record)
+        status = ebpo_scene_record_add(r->record, &f->cost, f->meetings, f->count, error);
+    if (r->page)
+        status = clash_add(&r->clashes, f->cost.time, f->meetings, f->count, error);
+    if (r->strip && is_pictured(r))
+        status = clash_strip_add(r->strip, f->cost.time, f->meetings, f->count, error);
+    r->told++;
+    return status;
+}
+
+static ebpo_status begin_strip(report *r, ebpo_error *error)
+{
+    const char *missing = clash_pictures_missing();
+    int tiles = r->frames < CLASH_TILES ? (int)r->frames : CLASH_TILES;
+    if (!missing)
+        r->strip = clash_strip_new(r->scene, r->v->from, r->v->to, tiles, (unsigned)r->v->threads);
+    if (r->strip)
+        return EBPO_OK;
+    snprintf(error->message, sizeof error->message, "%s: %s", r->v->out,
+             missing ? missing : "no memory for the picture");
+    return error->status = missing ? EBPO_E_UNSUPPORTED : EBPO_E_MEMORY;
 }
 
 static ebpo_status begin(report *r, ebpo_error *error)
 {
+    const char *out = r->v->out;
     if (r->prints && r->v->json) {
         json_begin(&r->j, stdout);
         json_object(&r->j, NULL);
@@ -111,10 +148,35 @@ static ebpo_status begin(report *r, ebpo_error *error)
     } else if (r->prints && r->v->csv) {
         scene_head_csv(r->v);
     }
-    return r->v->out ? ebpo_scene_record_new(r->scene, r->v->out, &r->record, error) : EBPO_OK;
+    if (out && words_end_with(out, ".png"))
+        return begin_strip(r, error);
+    return out && !r->page ? ebpo_scene_record_new(r->scene, out, &r->record, error) : EBPO_OK;
 }
 
-static ebpo_status finish(report *r, uint64_t frames, double seconds, ebpo_error *error)
+/* Of the worst ones, as many as people look at. */
+enum { PICTURES_MOST = 60 };
+
+static ebpo_status write_page(report *r, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    clash_sort(&r->clashes);
+    for (uint64_t i = 0; i < r->clashes.count && i < PICTURES_MOST && status == EBPO_OK; i++)
+        status = clash_draw(r->scene, &r->clashes.clash[i], (unsigned)r->v->threads, error);
+    return status == EBPO_OK ? clash_page(&r->clashes, r->scene, r->path, r->v->from, r->v->to,
+                                          r->frames, r->v->out, error)
+                             : status;
+}
+
+static ebpo_status finish_files(report *r, ebpo_error *error)
+{
+    if (r->record)
+        return ebpo_scene_record_finish(r->record, error);
+    if (r->strip)
+        return clash_strip_write(r->strip, r->v->out, error);
+    return r->page ? write_page(r, error) : EBPO_OK;
+}
+
+static void finish(report *r, double seconds)
 {
     if (r->prints && r->v->json) {
         json_end(&r->j);
@@ -125,10 +187,9 @@ static ebpo_status finish(report *r, uint64_t frames, double seconds, ebpo_error
     } else if (!r->v->quiet) {
         fprintf(stderr,
                 "%llu times, %llu of them with meetings; %llu pairs asked, %llu meet; %.3g s\n",
-                (unsigned long long)frames, (unsigned long long)r->frames_met,
+                (unsigned long long)r->frames, (unsigned long long)r->frames_met,
                 (unsigned long long)r->asked, (unsigned long long)r->meetings, seconds);
     }
-    return r->record ? ebpo_scene_record_finish(r->record, error) : EBPO_OK;
 }
 
 /* --- all frames --- */
@@ -151,26 +212,31 @@ ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *sc
 {
     report r = { .v = v, .scene = scene, .how = EBPO_SCENE_ASK_OPTIONS_INIT };
     double begun = progress_now();
-    uint64_t frames = frames_of(v);
     progress_line line;
-    (void)path;
+    r.path = path;
+    r.frames = frames_of(v);
+    r.page = v->out && words_end_with(v->out, ".html");
     r.prints = !v->out || v->csv || v->json;
-    r.how.count = v->count;
-    r.how.places = v->places;
-    r.how.relate = v->solids || v->depth > 0;
+    r.how.count = v->count || r.page;
+    r.how.places = v->places || r.page;
+    r.how.relate = v->solids || v->depth > 0 || r.page;
     r.how.depth = v->depth;
     r.how.threads = (unsigned)v->threads;
     r.how.progress = progress_start(&line, "scene", v->quiet);
     ebpo_status status = begin(&r, error);
-    for (uint64_t n = 0; n < frames && status == EBPO_OK; n++) {
-        status = ask_frame(&r, time_of(v, n, frames), error);
+    for (uint64_t n = 0; n < r.frames && status == EBPO_OK; n++) {
+        status = ask_frame(&r, time_of(v, n, r.frames), error);
         if (status == EBPO_OK)
             status = tell_frame(&r, error);
     }
+    if (status == EBPO_OK)
+        status = finish_files(&r, error);
     progress_wipe(&line);
     if (status == EBPO_OK)
-        status = finish(&r, frames, progress_now() - begun, error);
+        finish(&r, progress_now() - begun);
     ebpo_scene_record_free(r.record);
+    clash_strip_free(r.strip);
+    clash_free(&r.clashes);
     free(r.frame.meetings);
     return status;
 }

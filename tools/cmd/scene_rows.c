@@ -3,12 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 
-const char *scene_kind_word(int32_t kind)
-{
-    static const char *const words[] = { "none",     "near",       "touching", "coplanar",
-                                         "crossing", "protruding", "enclosed", "duplicate" };
-    return words[kind];
-}
+#include "clash/clash_list.h"
 
 const char *scene_instance_name(const ebpo_scene *scene, uint64_t instance)
 {
@@ -52,7 +47,7 @@ void scene_row_json(json *j, const scene_values *v, const ebpo_scene *scene,
     json_object(j, NULL);
     json_text(j, "a", scene_instance_name(scene, m->a));
     json_text(j, "b", scene_instance_name(scene, m->b));
-    json_text(j, "kind", scene_kind_word(m->kind));
+    json_text(j, "kind", clash_kind_word(m->kind));
     if (relation)
         json_text(j, "relation", relation);
     json_uint(j, "face_a", m->face_a);
@@ -118,7 +113,7 @@ void scene_row_csv(const scene_values *v, const ebpo_scene *scene, double time,
     csv_text(scene_instance_name(scene, m->a));
     putchar(',');
     csv_text(scene_instance_name(scene, m->b));
-    printf(",%s,%.17g,%llu,%llu", scene_kind_word(m->kind), m->distance,
+    printf(",%s,%.17g,%llu,%llu", clash_kind_word(m->kind), m->distance,
            (unsigned long long)m->face_a, (unsigned long long)m->face_b);
     for (int i = 0; i < 4 && v->count; i++)
         csv_count(counts[i]);
@@ -145,7 +140,7 @@ void scene_row_words(const scene_values *v, const ebpo_scene *scene, double time
                      const ebpo_scene_meeting *m)
 {
     uint64_t pairs = m->touching + m->coplanar + m->crossing;
-    printf("%.9g\t%s\t%s\t%s", time, scene_kind_word(m->kind), scene_instance_name(scene, m->a),
+    printf("%.9g\t%s\t%s\t%s", time, clash_kind_word(m->kind), scene_instance_name(scene, m->a),
            scene_instance_name(scene, m->b));
     if (m->kind == EBPO_MEETING_ENCLOSED)
         printf("\t%s is inside",

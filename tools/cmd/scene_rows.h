@@ -5,9 +5,6 @@
 #include "cli/json.h"
 #include "cmd/scene_run.h"
 
-/* Of an ebpo_meeting_kind. */
-const char *scene_kind_word(int32_t kind);
-
 /* Until the scene is freed. */
 const char *scene_instance_name(const ebpo_scene *scene, uint64_t instance);
 

@@ -51,6 +51,25 @@ ebpo_status picture_encode_png(const uint8_t *pixels, int width, int height, int
     return status;
 }
 
+char *picture_data_uri(const uint8_t *bytes, size_t size)
+{
+    static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/",
+                      head[] = "data:image/png;base64,";
+    char *text = malloc(sizeof head + (size + 2) / 3 * 4), *at = text;
+    if (!text)
+        return NULL;
+    memcpy(text, head, sizeof head);
+    at += sizeof head - 1;
+    for (size_t i = 0; i < size; i += 3) {
+        uint32_t v = (uint32_t)bytes[i] << 16 | (i + 1 < size ? (uint32_t)bytes[i + 1] << 8 : 0) |
+                     (i + 2 < size ? bytes[i + 2] : 0);
+        for (unsigned k = 0; k < 4; k++)
+            *at++ = i + k <= size ? digits[v >> (18 - 6 * k) & 63] : '=';
+    }
+    *at = 0;
+    return text;
+}
+
 ebpo_status picture_write_png(const picture *p, const char *path, ebpo_error *error)
 {
     void *bytes;

@@ -25,6 +25,9 @@ EBPO_MUST_USE ebpo_status picture_encode_png(const uint8_t *pixels, int width, i
                                              int channels, const char *what, void **bytes,
                                              size_t *size, ebpo_error *error);
 
+/* Of a PNG in memory: "data:image/png;base64,...", to be freed; NULL: no memory. */
+char *picture_data_uri(const uint8_t *bytes, size_t size);
+
 /* As a PNG file, whole or not at all. */
 EBPO_MUST_USE ebpo_status picture_write_png(const picture *p, const char *path, ebpo_error *error);
 

@@ -171,6 +171,8 @@ static void draw_face(raster *r, uint64_t face)
     bool front = dot(n, to_eye) > 0;
     if (!front && r->style->closed)
         return;
+    if (front && r->style->paint && r->style->paint[face] & RASTER_HOLLOW)
+        return;
     unsigned outlines = r->style->edges ? outline(r, face, n) : 0;
     for (int k = 0; k < 3; k++)
         r->normal[face][k] = (float)(front ? n[k] : -n[k]);
@@ -222,8 +224,14 @@ static double occlusion(const raster *r, int x, int y, const sample *at, const f
 
 /* Key light from the upper left, a weak fill from the right, the sky above, a gloss. Linear light.
  */
-static void light(const raster *r, const float n[3], double hidden, double out[3])
+static void light(const raster *r, uint32_t face, double hidden, double out[3])
 {
+    static const double other[3] = { 0.30, 0.48, 0.66 }, red[3] = { 0.85, 0.04, 0.03 };
+    int paint = r->style->paint ? r->style->paint[face] : RASTER_PLAIN;
+    const double *colour = paint & RASTER_RED     ? red
+                           : paint & RASTER_OTHER ? other
+                                                  : r->style->colour;
+    const float *n = r->normal[face];
     static const double key[3] = { -0.46, 0.62, 0.635 }, fill[3] = { 0.86, 0.10, 0.50 },
                         half[3] = { -0.254, 0.343, 0.904 };
     double m[3] = { (double)n[0], (double)n[1], (double)n[2] };
@@ -236,9 +244,8 @@ static void light(const raster *r, const float n[3], double hidden, double out[3
     static const double warm[3] = { 1.0, 0.97, 0.92 }, cool[3] = { 0.90, 0.95, 1.0 };
     for (int i = 0; i < 3; i++) {
         double ambient = (0.07 + 0.22 * sky) * cool[i] * open;
-        out[i] =
-            r->style->colour[i] * (ambient + direct * (0.95 * k * warm[i] + 0.16 * f * cool[i])) +
-            gloss * direct;
+        out[i] = colour[i] * (ambient + direct * (0.95 * k * warm[i] + 0.16 * f * cool[i])) +
+                 gloss * direct;
     }
 }
 
@@ -277,8 +284,8 @@ static void resolve_pixel(const raster *r, int x, int y, double reach, uint8_t *
             const sample *at = &r->samples[(size_t)j * (size_t)r->width + (size_t)i];
             double c[3] = { r->linear[rgb[0]], r->linear[rgb[1]], r->linear[rgb[2]] };
             if (at->inverse > 0) {
-                const float *n = r->normal[at->what & ~EDGE];
-                light(r, n, occlusion(r, i, j, at, n, reach), c);
+                uint32_t face = at->what & ~EDGE;
+                light(r, face, occlusion(r, i, j, at, r->normal[face], reach), c);
                 for (int k = 0; k < 3 && at->what & EDGE; k++)
                     c[k] = 0.45 * c[k] + 0.55 * ink[k];
             }

@@ -19,10 +19,14 @@ typedef struct camera {
 void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double elevation, int up_axis,
                 int width, int height);
 
+/* How a face is painted; with RASTER_HOLLOW only where its back is seen. */
+enum { RASTER_PLAIN = 0, RASTER_OTHER = 1, RASTER_RED = 2, RASTER_HOLLOW = 4 };
+
 typedef struct raster_style {
-    double colour[3]; /* linear, 0 .. 1 */
-    bool closed;      /* back faces are never seen: leave them out */
-    bool edges;       /* draw the outlines of polygons */
+    double colour[3];     /* linear, 0 .. 1 */
+    bool closed;          /* back faces are never seen: leave them out */
+    bool edges;           /* draw the outlines of polygons */
+    const uint8_t *paint; /* of each face; NULL: RASTER_PLAIN, which is `colour` */
 } raster_style;
 
 /* Draws the mesh into the rectangle (x, y, width, height) of the picture, over what is there.

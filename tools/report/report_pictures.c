@@ -29,26 +29,6 @@ static ebpo_status no_memory(ebpo_error *error)
     return error->status = EBPO_E_MEMORY;
 }
 
-/* "data:image/png;base64,..." or NULL. */
-static char *data_uri(const uint8_t *bytes, size_t size)
-{
-    static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/",
-                      head[] = "data:image/png;base64,";
-    char *text = malloc(sizeof head + (size + 2) / 3 * 4), *at = text;
-    if (!text)
-        return NULL;
-    memcpy(text, head, sizeof head);
-    at += sizeof head - 1;
-    for (size_t i = 0; i < size; i += 3) {
-        uint32_t v = (uint32_t)bytes[i] << 16 | (i + 1 < size ? (uint32_t)bytes[i + 1] << 8 : 0) |
-                     (i + 2 < size ? bytes[i + 2] : 0);
-        for (unsigned k = 0; k < 4; k++)
-            *at++ = i + k <= size ? digits[v >> (18 - 6 * k) & 63] : '=';
-    }
-    *at = 0;
-    return text;
-}
-
 /* The same picture on black and on white tells how much of each pixel is covered. */
 static void make_see_through(const picture *black, const picture *white, uint8_t *rgba)
 {
@@ -84,7 +64,7 @@ static ebpo_status draw(const comparison *c, const ebpo_mesh *mesh, const camera
         make_see_through(&on[0], &on[1], rgba);
         status = picture_encode_png(rgba, width, height, 4, "picture", &png, &size, error);
     }
-    if (status == EBPO_OK && !(*uri = data_uri(png, size)))
+    if (status == EBPO_OK && !(*uri = picture_data_uri(png, size)))
         status = no_memory(error);
     picture_free(&on[0]);
     picture_free(&on[1]);
@@ -135,7 +115,7 @@ static ebpo_status fit(const comparison *c, ebpo_file *const *file, camera *view
 static ebpo_status one_method(comparison *c, method *m, ebpo_file *file, const camera *view,
                               ebpo_error *error)
 {
-    static const raster_style style = { { 0.30, 0.48, 0.66 }, true, false };
+    static const raster_style style = { { 0.30, 0.48, 0.66 }, true, false, NULL };
     ebpo_status status = EBPO_OK;
     for (int i = c->first;
          i <= method_last(c, m) && i < c->first + LEVELS_DRAWN && status == EBPO_OK; i++) {
@@ -150,7 +130,9 @@ static ebpo_status one_method(comparison *c, method *m, ebpo_file *file, const c
 
 static ebpo_status portrait(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
-    raster_style style = { { 0.66, 0.54, 0.40 }, m->info.solid && m->info.report.manifold, false };
+    raster_style style = {
+        { 0.66, 0.54, 0.40 }, m->info.solid && m->info.report.manifold, false, NULL
+    };
     ebpo_mesh mesh = { 0 };
     camera view;
     ebpo_read_options read = reading(c->v->threads, NULL);
