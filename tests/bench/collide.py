@@ -151,7 +151,7 @@ CROSSINGS_HEAD = [
     "Armadillo of 150 K (table 30, not optimised: 0.090, 0.146, 4.271 and 0.984). Table 33, whether they "
     "meet, optimised: 29.2 us for 2.5 M with 2.5 M, 35.8 for 346 K with itself, 20.7 for 346 K with 2.5 M. "
     "Those are times of other machines.", "",
-    "| models | budget each | memory, MB | first contact, us: mean, worst | loads a step | pairs a step | "
+    "| models | budget each | at first, MB | first contact, us: mean, worst | loads a step | pairs a step | "
     "all pairs, us: mean, worst | us a pair | loads a step | read, MB a step |",
     "|---|---|---|---|---|---|---|---|---|---|"]
 
