@@ -87,7 +87,24 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
     return status;
 }
 
-static ebpo_status collide(ebpo_model *model, ebpo_error *error)
+static bool take_segments(void *user, const ebpo_contact_segment *segments, uint64_t count)
+{
+    (void)segments;
+    *(uint64_t *)user += count;
+    return true;
+}
+
+/* What models in parts may be asked as well. */
+static ebpo_status ask_parts(ebpo_collider *c, const ebpo_collide_options *o, ebpo_error *error)
+{
+    ebpo_clearance clearance;
+    uint64_t segments = 0;
+    ebpo_status status = ebpo_collide_distance(c, o, NULL, &clearance, error);
+    return status == EBPO_OK ? ebpo_collide_contacts(c, o, take_segments, &segments, error)
+                             : status;
+}
+
+static ebpo_status collide(ebpo_model *model, bool whole, ebpo_error *error)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
@@ -99,7 +116,7 @@ static ebpo_status collide(ebpo_model *model, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_collider_new(model, model, NULL, &collider, error);
     if (status == EBPO_OK)
-        status = ask_two(collider, &options, error);
+        status = whole ? ask_two(collider, &options, error) : ask_parts(collider, &options, error);
     ebpo_collider_free(collider);
     return status;
 }
@@ -241,8 +258,8 @@ static ebpo_status ask_all(ebpo_model *model, ebpo_error *error)
         status = ebpo_model_get_stats(model, &stats);
     if (status == EBPO_OK)
         status = ask_boolean(model, error);
-    if (status == EBPO_OK && stats.resident)
-        status = collide(model, error);
+    if (status == EBPO_OK)
+        status = collide(model, stats.resident, error);
     ebpo_context_free(context);
     return status;
 }
