@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "collide/faces_by_number.h"
 
 #include <string.h>

@@ -59,7 +59,8 @@ grep -q '^5	crossing	' "$work/out" || fail "parts meet"
 "$ebpo" scene pairs --from 0 --to 10 "$work/plant/plant.scene.json" >"$work/out" 2>&1 || fail pairs
 [ "$(grep -c '	tool	' "$work/out")" -gt 10 ] || fail "the tool flies through"
 if "$ebpo" render "$work/cube.ebpo.h5" "$work/cube.png" 2>/dev/null; then
-    sh "$samples/clash_report.sh" "$work/clashes" 60 >"$work/out" 2>&1 || fail clash_report.sh
+    PATH=$(cd "$(dirname "$ebpo")" && pwd):$PATH sh "$samples/clash_report.sh" "$work/clashes" 60 \
+        >"$work/out" 2>&1 || fail clash_report.sh
     grep -q '^clashes.h5$' "$work/out" || fail "the clash report is written"
     grep -q '<b>tool</b>.*protruding' "$work/clashes/clashes.html" || fail "the tool clashes"
     [ "$(grep -c '<img' "$work/clashes/clashes.html")" -gt 3 ] || fail "clashes have pictures"

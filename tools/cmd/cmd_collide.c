@@ -16,7 +16,8 @@
 typedef struct collide_values {
     query_values query;
     const char *pose_a, *pose_b, *out;
-    bool self, relation, quiet;
+    bool first, self, relation, quiet;
+    uint64_t printed; /* pairs */
     collide_far far;
 } collide_values;
 
@@ -24,6 +25,8 @@ static const arg_option options[] = {
     OPTION_TEXT("pose-a", 0, collide_values, pose_a, "POSE",
                 "'" POSE_FORM "': where A is: scaled, turned by a quaternion, moved"),
     OPTION_TEXT("pose-b", 0, collide_values, pose_b, "POSE", "the same of B"),
+    OPTION_FLAG("first", 0, collide_values, first,
+                "print one pair of faces that meet; the default unless something else is asked"),
     OPTION_FLAG("all", 0, query_values, all, "print every pair of faces that meet"),
     OPTION_FLAG("self", 0, collide_values, self,
                 "faces of one model that meet otherwise than as neighbours"),
@@ -85,7 +88,8 @@ static void print_pair(bool as_json, const ebpo_face_pair *p)
 
 static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    const collide_values *v = user;
+    collide_values *v = user;
+    v->printed += count;
     for (uint64_t i = 0; i < count; i++)
         print_pair(v->query.json, &pairs[i]);
     return command_flush("collide");
@@ -157,6 +161,17 @@ static ebpo_status ask_levels(const collide_values *v, ebpo_collider *c,
     return status;
 }
 
+/* Every pair, and a word if there is none; JSON is an object for each pair. */
+static ebpo_status ask_pairs(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
+                             ebpo_error *error)
+{
+    ebpo_status status = v->self ? ebpo_collide_self(c, how, take_pairs, v, error)
+                                 : ebpo_collide_all(c, how, take_pairs, v, error);
+    if (status == EBPO_OK && !v->printed && !v->query.json)
+        puts("none");
+    return status;
+}
+
 /* What is asked on the command line, one after the other. */
 static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
                            ebpo_error *error)
@@ -164,8 +179,6 @@ static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_colli
     ebpo_status status = EBPO_OK;
     if (v->query.level >= 0)
         return ask_levels(v, c, how, error);
-    if (v->self)
-        return ebpo_collide_self(c, how, take_pairs, v, error);
     if (v->relation)
         status = ask_relation(v, c, how, error);
     if (status == EBPO_OK && v->out)
@@ -175,9 +188,10 @@ static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_colli
                                v->out, error);
     if (status == EBPO_OK && collide_far_asked(&v->far))
         return collide_far_ask(&v->far, v->query.json, c, how, error);
-    if (status == EBPO_OK && v->query.all)
-        return ebpo_collide_all(c, how, take_pairs, v, error);
-    return status == EBPO_OK && !v->relation && !v->out ? ask_first(v, c, how, error) : status;
+    if (status == EBPO_OK && (v->query.all || v->self))
+        return ask_pairs(v, c, how, error);
+    bool other = v->relation || v->out;
+    return status == EBPO_OK && (v->first || !other) ? ask_first(v, c, how, error) : status;
 }
 
 static void tell_stats(const ebpo_collider *c)
@@ -266,11 +280,14 @@ static int run(void *given, const char **operand)
     if (v->self && (v->query.all || v->pose_a || v->pose_b || v->relation || v->out))
         return command_usage("collide",
                              "--self takes neither --all nor poses, --relation or --output");
+    if (v->first && (v->self || v->query.all || collide_far_asked(&v->far)))
+        return command_usage("collide", "--first takes neither --all, --self, --distance, --depth "
+                                        "nor --way-out");
     if (v->out && !words_end_with(v->out, ".h5") && !words_end_with(v->out, ".ply"))
         return command_usage("collide", "--output %s: expected a name that ends in .h5 or .ply",
                              v->out);
-    if (v->query.level >= 0 &&
-        (v->self || v->query.all || collide_far_asked(&v->far) || v->relation || v->out))
+    if (v->query.level >= 0 && (v->first || v->self || v->query.all || collide_far_asked(&v->far) ||
+                                v->relation || v->out))
         return command_usage("collide", "--level takes no other question");
     if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
         !read_pose("pose-b", v->pose_b, &how.pose_b) ||
