@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#include "geom/length.h"
+
 static double dot(const double x[3], const double y[3])
 {
     return (x[0] * y[0] + x[1] * y[1]) + x[2] * y[2];
@@ -49,7 +51,7 @@ double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough
         v[k] -= from[k];
     for (int turn = 0; turn < DIRECTIONS; turn++) {
         double length2 = dot(v, v), along, step2 = 0, back = 0;
-        if (!(length2 > 0 && length2 < INFINITY))
+        if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* squares are not what they should be */
             break;
         const double *p = farthest(a, v, 1), *q = farthest(b, v, -1);
         for (int k = 0; k < 3; k++)
@@ -75,11 +77,7 @@ double ebpo_convex_span(const ebpo_convex *a, const ebpo_convex *b)
 {
     double most = 0;
     for (int i = 0; i < a->count; i++)
-        for (int j = 0; j < b->count; j++) {
-            double d[3];
-            for (int k = 0; k < 3; k++)
-                d[k] = b->point[j][k] - a->point[i][k];
-            most = fmax(most, dot(d, d));
-        }
-    return sqrt(most) * (1 + 0x1p-40);
+        for (int j = 0; j < b->count; j++)
+            most = fmax(most, ebpo_length_between(a->point[i], b->point[j]));
+    return most * (1 + 0x1p-40);
 }

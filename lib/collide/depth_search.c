@@ -12,16 +12,19 @@
 #include "base/parallel.h"
 #include "collide/pair_walk.h"
 #include "geom/distance.h"
+#include "geom/length.h"
 
 /* --- one point --- */
 
-/* How deep it is in the solid, less than 0 outside: surely within *lo .. *hi. */
+/* How deep it is in the solid, less than 0 outside: surely within *lo .. *hi. rounding: how far it
+ * may be from where it should be. */
 static ebpo_status depth_at(ebpo_depth_search *s, const double w[3], double *lo, double *hi,
-                            ebpo_error *error)
+                            double *rounding, ebpo_error *error)
 {
     double p[3], doubt, scale = s->solid->posing.scale;
     ebpo_distance_result r;
     ebpo_unpose(s->solid, w, p, &doubt);
+    *rounding = doubt * scale;
     s->asked++;
     ebpo_status status = ebpo_distance(s->context, p, NULL, &r, error);
     if (status != EBPO_OK)
@@ -81,14 +84,16 @@ static ebpo_depth_part pop(ebpo_depth_search *s)
 
 /* --- parts --- */
 
-/* The part is within `radius` of the centre; `own`: the centre is a point of it. */
+/* The part is within `radius` of the centre; `own`: the centre is a point of it. What rounding
+ * alone leaves in doubt is no reason to divide it: parts of faces that lie on others have no end.
+ */
 static ebpo_status offer(ebpo_depth_search *s, ebpo_depth_part *part, const double centre[3],
                          double radius, bool own, ebpo_error *error)
 {
-    double lo, hi;
+    double lo, hi, rounding;
     if (!ebpo_posed_solid_near(s->solid, centre, radius))
         return EBPO_OK;
-    ebpo_status status = depth_at(s, centre, &lo, &hi, error);
+    ebpo_status status = depth_at(s, centre, &lo, &hi, &rounding, error);
     if (status != EBPO_OK)
         return status;
     if (own)
@@ -96,7 +101,8 @@ static ebpo_status offer(ebpo_depth_search *s, ebpo_depth_part *part, const doub
     part->most = (hi + radius) * (hi + radius > 0 ? 1 + 0x1p-50 : 1);
     if (own && part->most > s->lo && s->context->warm)
         part->most = fmin(part->most, most_at_corners(s, (const double(*)[3])part->corner));
-    if (!(part->most > s->lo + s->tolerance) || (own && !(radius > 4 * s->lost))) {
+    double enough = s->lo + s->tolerance + 4 * (rounding + s->lost);
+    if (!(part->most > enough) || (own && !(radius > 4 * s->lost))) {
         s->left = fmax(s->left, part->most);
         return EBPO_OK;
     }
@@ -119,14 +125,6 @@ static ebpo_status offer_child(ebpo_depth_search *s, uint32_t ref, ebpo_error *e
     return offer(s, &part, centre, radius, false, error);
 }
 
-static double length_between(const double a[3], const double b[3])
-{
-    double square = 0;
-    for (int k = 0; k < 3; k++)
-        square += (a[k] - b[k]) * (a[k] - b[k]);
-    return sqrt(square);
-}
-
 static ebpo_status offer_triangle(ebpo_depth_search *s, const double a[3], const double b[3],
                                   const double c[3], ebpo_error *error)
 {
@@ -137,7 +135,7 @@ static ebpo_status offer_triangle(ebpo_depth_search *s, const double a[3], const
         centre[k] = a[k] + ((b[k] - a[k]) + (c[k] - a[k])) / 3;
     for (int i = 0; i < 3; i++) {
         memcpy(part.corner[i], corner[i], sizeof part.corner[i]);
-        radius = fmax(radius, length_between(corner[i], centre));
+        radius = fmax(radius, ebpo_length_between(corner[i], centre));
     }
     return offer(s, &part, centre, radius * (1 + 0x1p-50) + s->lost, true, error);
 }
@@ -154,17 +152,44 @@ static ebpo_status divide_block(ebpo_depth_search *s, uint32_t block, ebpo_error
     return status;
 }
 
-/* Into four, by the middles of the edges. */
+/* The middle of corner k and the next one. */
+static void middle_of(const ebpo_depth_part *p, int k, double out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = p->corner[k][i] + (p->corner[(k + 1) % 3][i] - p->corner[k][i]) / 2;
+}
+
+/* Into two, by the middle of edge k. */
+static ebpo_status halve_triangle(ebpo_depth_search *s, const ebpo_depth_part *p, int k,
+                                  ebpo_error *error)
+{
+    double middle[3];
+    const double *opposite = p->corner[(k + 2) % 3];
+    middle_of(p, k, middle);
+    ebpo_status status = offer_triangle(s, p->corner[k], middle, opposite, error);
+    return status == EBPO_OK ? offer_triangle(s, middle, p->corner[(k + 1) % 3], opposite, error)
+                             : status;
+}
+
+/* Into four, by the middles of the edges; but a long one into two, as quarters of it would lie
+ * beside each other, ever more of them as near to what is near to one. */
 static ebpo_status divide_triangle(ebpo_depth_search *s, const ebpo_depth_part *p,
                                    ebpo_error *error)
 {
-    double middle[3][3];
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++)
-            middle[i][k] = p->corner[i][k] + (p->corner[(i + 1) % 3][k] - p->corner[i][k]) / 2;
+    double middle[3][3], length[3];
+    int longest = 0, shortest = 0;
+    for (int k = 0; k < 3; k++) {
+        length[k] = ebpo_length_between(p->corner[k], p->corner[(k + 1) % 3]);
+        longest = length[k] > length[longest] ? k : longest;
+        shortest = length[k] < length[shortest] ? k : shortest;
+    }
+    if (length[longest] > 2 * length[shortest])
+        return halve_triangle(s, p, longest, error);
+    for (int k = 0; k < 3; k++)
+        middle_of(p, k, middle[k]);
     ebpo_status status = offer_triangle(s, middle[0], middle[1], middle[2], error);
-    for (int i = 0; i < 3 && status == EBPO_OK; i++)
-        status = offer_triangle(s, p->corner[i], middle[i], middle[(i + 2) % 3], error);
+    for (int k = 0; k < 3 && status == EBPO_OK; k++)
+        status = offer_triangle(s, p->corner[k], middle[k], middle[(k + 2) % 3], error);
     return status;
 }
 

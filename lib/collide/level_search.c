@@ -44,6 +44,8 @@ static bool is_within(const double corner[8][3], const double p[3], double reach
             length2 += (to[i] - from[i]) * (to[i] - from[i]);
             along += (to[i] - from[i]) * (p[i] - from[i]);
         }
+        if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* squares are not what they should be */
+            return false;
         double room = wall_share * length2 + 0x1p-44 * reach * sqrt(length2);
         if (!(along > room && along < length2 - room))
             return false;

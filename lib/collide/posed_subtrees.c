@@ -9,6 +9,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/hash.h"
+#include "geom/length.h"
 #include "geom/plane_clip.h"
 #include "octree/octcode.h"
 #include "query/query_node.h"
@@ -129,9 +130,7 @@ double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double rea
 
 double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell)
 {
-    const double *size = s->model->info->box_size;
-    double length2 = (size[0] * size[0] + size[1] * size[1]) + size[2] * size[2];
-    return sqrt(length2) * s->posing.scale / (double)(1u << cell.level);
+    return ebpo_length(s->model->info->box_size) * s->posing.scale / (double)(1u << cell.level);
 }
 
 /* --- envelopes --- */

@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "geom/length.h"
 
 typedef struct finding {
     ebpo_subtree_pairs *out;
@@ -35,11 +36,6 @@ static bool cells_apart(const finding *f, const ebpo_posed_node node[2])
     return ebpo_convex_gap(&convex[0], &convex[1], slack) > slack;
 }
 
-static double length_of(const double x[3])
-{
-    return sqrt((x[0] * x[0] + x[1] * x[1]) + x[2] * x[2]);
-}
-
 static double apart_of(const finding *f, const ebpo_posed_node node[2])
 {
     double corner[2][8][3], d[3];
@@ -47,8 +43,8 @@ static double apart_of(const finding *f, const ebpo_posed_node node[2])
         ebpo_posed_cell(f->side[i], node[i].cell, corner[i]);
     for (int k = 0; k < 3; k++)
         d[k] = (corner[0][0][k] + corner[0][7][k]) - (corner[1][0][k] + corner[1][7][k]);
-    return length_of(d) / (ebpo_posed_diagonal(f->side[0], node[0].cell) +
-                           ebpo_posed_diagonal(f->side[1], node[1].cell));
+    return ebpo_length(d) / (ebpo_posed_diagonal(f->side[0], node[0].cell) +
+                             ebpo_posed_diagonal(f->side[1], node[1].cell));
 }
 
 static bool is_pruned(const ebpo_posed_subtrees *s, uint32_t number)

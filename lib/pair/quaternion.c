@@ -33,7 +33,7 @@ bool ebpo_quaternion_normalise(double q[4])
     return true;
 }
 
-void ebpo_quaternion_matrix(const double q[4], double m[3][3])
+void ebpo_quaternion_matrix(const double q[4], double (*m)[3])
 {
     double x = q[0], y = q[1], z = q[2], w = q[3];
     m[0][0] = 1 - 2 * (y * y + z * z);

@@ -57,6 +57,12 @@ static bool print_ways(void *user, const ebpo_scene_way *ways, uint64_t count)
     return true;
 }
 
+/* So many looks as are allowed, or what files lack, left more in doubt than was asked for. */
+static bool is_open(const listing *l, const ebpo_scene_least *w)
+{
+    return w->hi - w->lo > l->v->tolerance * (1 + 0x1p-20);
+}
+
 static void least_json(listing *l, const ebpo_scene_least *w)
 {
     json *j = &l->j;
@@ -66,6 +72,7 @@ static void least_json(listing *l, const ebpo_scene_least *w)
     json_real(j, "time", w->time);
     json_real(j, "distance_lo", w->lo);
     json_real(j, "distance_hi", w->hi);
+    json_bool(j, "open", is_open(l, w));
     json_real(j, "clearance", w->clearance);
     json_uint(j, "looks", w->looks);
     json_end(j);
@@ -78,13 +85,14 @@ static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t coun
     for (uint64_t i = 0; i < count; i++) {
         const ebpo_scene_least *w = &list[i];
         l->reached += w->lo <= w->clearance;
-        l->open += w->lo <= w->clearance && w->hi > w->clearance;
+        bool open = is_open(l, w);
+        l->open += open;
         l->looks += w->looks;
         if (l->v->json)
             least_json(l, w);
         else
-            printf("%.9g\tleast\t%s\t%s\t%.9g to %.9g\n", w->time, name_of(l, w->a),
-                   name_of(l, w->b), w->lo, w->hi);
+            printf("%.9g\tleast\t%s\t%s\t%.9g to %.9g%s\n", w->time, name_of(l, w->a),
+                   name_of(l, w->b), w->lo, w->hi, open ? "\topen" : "");
     }
     return true;
 }
