@@ -51,7 +51,7 @@ static bool read_digest(const char *hex, uint8_t out[32])
     for (int i = 0; i < 32 && fits; i++) {
         int high = digit(hex[2 * i]), low = digit(hex[2 * i + 1]);
         fits = high >= 0 && low >= 0;
-        out[i] = (uint8_t)(high << 4 | low);
+        out[i] = fits ? (uint8_t)(high << 4 | low) : 0;
     }
     return fits;
 }
