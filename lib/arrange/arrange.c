@@ -454,6 +454,10 @@ static ebpo_status run(arranging a, int level, ebpo_error *error)
     a.to = ebpo_alloc_zero(1, sizeof *a.to);
     if (a.to)
         a.to->workspace = mesh->workspace;
+    if (a.to && mesh->arrangement) {
+        a.to->whole_vertices = mesh->arrangement->whole_vertices;
+        a.to->whole_faces = mesh->arrangement->whole_faces;
+    }
     status = a.to ? measure_all(&a, level, error) : ebpo_fail_memory(error, sizeof *a.to);
     if (status == EBPO_OK)
         status = sort_vertices(&a, error);

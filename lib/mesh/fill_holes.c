@@ -190,6 +190,9 @@ static ebpo_status run(filling *f, ebpo_error *error)
     status = ebpo_boundary_loops(&f->loops, &f->boundary, &f->stars, mesh, f->threads, error);
     if (status != EBPO_OK || f->loops.count == 0)
         return status;
+    status = ebpo_mesh_check_whole(mesh, error);
+    if (status != EBPO_OK)
+        return status;
     f->added = f->loops.first[f->loops.count] - 2 * f->loops.count;
     status = ebpo_loops_rank(&f->before, &f->loops, mesh, f->threads, error);
     if (status == EBPO_OK)

@@ -24,6 +24,8 @@ struct ebpo_arrangement {
     uint32_t *vertex_source;   /* [vertex_count] numbers in the source */
     uint32_t *face_source;     /* [face_count] */
     ebpo_workspace *workspace; /* the mesh's, of all arrays */
+    /* of a component: what the mesh has of which it is one, mended; else 0 */
+    uint64_t whole_vertices, whole_faces;
 };
 
 /* NULL: nothing. */
@@ -38,6 +40,21 @@ static inline uint64_t ebpo_mesh_source_face(const ebpo_mesh *mesh, uint64_t f)
 {
     return mesh->arrangement ? mesh->arrangement->face_source[f] : f;
 }
+
+/* How many there are of them; of a component, in the whole mesh. */
+static inline uint64_t ebpo_mesh_whole_vertices(const ebpo_mesh *mesh)
+{
+    return mesh->arrangement && mesh->arrangement->whole_vertices
+               ? mesh->arrangement->whole_vertices
+               : mesh->vertex_count;
+}
+static inline uint64_t ebpo_mesh_whole_faces(const ebpo_mesh *mesh)
+{
+    return mesh->arrangement && mesh->arrangement->whole_faces ? mesh->arrangement->whole_faces
+                                                               : mesh->face_count;
+}
+/* EBPO_E_ARGUMENT for a component: mending gives numbers anew, but its own are another mesh's. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_check_whole(const ebpo_mesh *mesh, ebpo_error *error);
 
 /* Position of vertex i (< vertex_count) as doubles; exact for both kinds of coordinates. */
 static inline void ebpo_mesh_position(const ebpo_mesh *mesh, uint64_t i, double out[3])

@@ -29,3 +29,11 @@ ebpo_status ebpo_mesh_check_shape(const ebpo_mesh *mesh, ebpo_error *error)
                               "an array that the counts promise is NULL; allocate it");
     return EBPO_OK;
 }
+
+ebpo_status ebpo_mesh_check_whole(const ebpo_mesh *mesh, ebpo_error *error)
+{
+    if (!mesh->arrangement || !mesh->arrangement->whole_faces)
+        return EBPO_OK;
+    return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
+                          "a component cannot be mended; mend the mesh that it comes from");
+}

@@ -220,6 +220,9 @@ static ebpo_status run(welding *w, ebpo_error *error)
                                                              : group_by_table(w, error);
     if (status != EBPO_OK || w->kept == mesh->vertex_count)
         return status;
+    status = ebpo_mesh_check_whole(mesh, error);
+    if (status != EBPO_OK)
+        return status;
     w->from = ebpo_array_alloc(mesh->workspace, w->kept, sizeof *w->from);
     if (!w->from)
         return ebpo_workspace_fail(mesh->workspace, w->kept * sizeof *w->from, error);

@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/alloc.h"
@@ -56,38 +55,14 @@ static void remove_folder(const ebpo_scene *scene, const char *folder)
     rmdir(folder);
 }
 
-static ebpo_status begin_folder(packing *p)
-{
-    static const char ending[] = ".part-XXXXXX";
-    size_t size = strlen(p->folder);
-    struct stat st;
-    while (size > 1 && p->folder[size - 1] == '/')
-        size--;
-    if (stat(p->folder, &st) == 0)
-        return ebpo_fail_file(p->error, EBPO_E_IO, p->folder,
-                              "is there already; a scene is packed into a new folder");
-    p->making = malloc(size + sizeof ending);
-    if (!p->making)
-        return ebpo_fail_memory(p->error, size + sizeof ending);
-    memcpy(p->making, p->folder, size);
-    memcpy(p->making + size, ending, sizeof ending);
-    if (mkdtemp(p->making))
-        return EBPO_OK;
-    free(p->making);
-    p->making = NULL;
-    return ebpo_fail_errno(p->error, p->folder, "the folder cannot be made");
-}
-
-/* As any folder that the user makes. */
 static ebpo_status publish_folder(packing *p)
 {
-    mode_t mask = umask(0);
-    umask(mask);
-    if (chmod(p->making, 0777 & ~mask) != 0 || rename(p->making, p->folder) != 0)
-        return ebpo_fail_errno(p->error, p->folder, "the folder cannot be put in its place");
-    free(p->making);
-    p->making = NULL;
-    return EBPO_OK;
+    ebpo_status status = ebpo_folder_publish(p->making, p->folder, p->error);
+    if (status == EBPO_OK) {
+        free(p->making);
+        p->making = NULL;
+    }
+    return status;
 }
 
 /* ---- models ---- */
@@ -222,7 +197,7 @@ ebpo_status ebpo_scene_pack(ebpo_scene *scene, const char *folder, double from, 
     ebpo_scene_packed *list = NULL;
     ebpo_status status = check(&p, options);
     if (status == EBPO_OK)
-        status = begin_folder(&p);
+        status = ebpo_folder_begin(folder, &p.making, error);
     if (status == EBPO_OK)
         status = scene_plan_needs(&p.needs);
     if (status == EBPO_OK)

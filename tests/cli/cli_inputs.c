@@ -75,6 +75,44 @@ static const char *const solids[] = { "tetrahedron",    "cube",           "cube_
                                       "mobius",         "blob",           "overlapping_cubes",
                                       "zero_area_face", "repeated_faces", "inside_out_cube" };
 
+static void add(ebpo_mesh *mesh, ebpo_mesh other)
+{
+    ebpo_test_append(mesh, &other);
+    ebpo_mesh_free(&other);
+}
+
+static void move(ebpo_mesh *mesh, double x, double y, double z)
+{
+    static const double same[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
+    ebpo_test_transform(mesh, same, (double[3]){ x, y, z });
+}
+
+static ebpo_mesh box(double low, double high, uint32_t n)
+{
+    return ebpo_test_box((double[3]){ low, low, low }, (double[3]){ high, high, high }, n);
+}
+
+/* Seven components, of which six are left: a cavity before the box that it is in, another box in
+ * the cavity, one that crosses the first, one with a side on that one's, a sheet through the first
+ * three, one that is inside out. Faces stand in any order. No two have a vertex in one place. */
+static ebpo_mesh several_parts(void)
+{
+    ebpo_mesh mesh = box(1, 3, 2), beside = box(5, 6, 1), sheet = ebpo_test_sheet(6, 5),
+              inside_out = box(7, 8, 1);
+    ebpo_test_reverse(&mesh);
+    move(&beside, 0, -1.25, -1.25);
+    move(&sheet, -1, -1, 1.75);
+    ebpo_test_reverse(&inside_out);
+    add(&mesh, box(0, 4, 3));
+    add(&mesh, box(1.5, 2.5, 1));
+    add(&mesh, box(3.5, 5, 2));
+    add(&mesh, beside);
+    add(&mesh, sheet);
+    add(&mesh, inside_out);
+    ebpo_test_shuffle(&mesh, 2);
+    return mesh;
+}
+
 int main(int argc, char **argv)
 {
     if (argc == 3 && strcmp(argv[1], "--large") == 0) {
@@ -95,6 +133,8 @@ int main(int argc, char **argv)
     ebpo_mesh split = ebpo_test_make("cube");
     ebpo_test_split_vertices(&split);
     write_mesh(&split, in_folder(argv[1], "split_cube.ply"));
+    ebpo_mesh parts = several_parts();
+    write_mesh(&parts, in_folder(argv[1], "parts.ply"));
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         write_bytes(in_folder(argv[1], texts[i].file), texts[i].text, strlen(texts[i].text));
     return 0;

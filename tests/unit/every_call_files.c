@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "every_call.h"
 #include "scratch.h"
@@ -52,6 +53,18 @@ static ebpo_status call_outputs(every_call_env *e)
     if (status == EBPO_OK)
         status = ebpo_write_file(scratch("text"), "text", 4, e->error);
     ebpo_abandon_outputs();
+    return status;
+}
+
+static ebpo_status call_folder(every_call_env *e)
+{
+    char *making = NULL;
+    ebpo_status status = ebpo_folder_begin(scratch("folder"), &making, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_folder_publish(making, scratch("folder"), e->error);
+    if (making)
+        rmdir(status == EBPO_OK ? scratch("folder") : making);
+    free(making);
     return status;
 }
 
@@ -313,6 +326,7 @@ const every_call every_call_files[] = {
     { "facts", call_facts },
     { "workspace", call_workspace },
     { "outputs", call_outputs },
+    { "folder", call_folder },
     { "filters", call_filters },
     { "open", call_open },
     { "open_memory", call_open_memory },

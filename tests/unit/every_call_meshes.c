@@ -104,6 +104,26 @@ static ebpo_status call_weld(every_call_env *e) { return mend(e, EVERY_CALL_SPLI
 static ebpo_status call_orient(every_call_env *e) { return mend(e, EVERY_CALL_TURNED, orient); }
 static ebpo_status call_fill_holes(every_call_env *e) { return mend(e, EVERY_CALL_HOLED, fill); }
 
+static ebpo_status call_components(every_call_env *e)
+{
+    ebpo_mesh mesh, part = { 0 };
+    ebpo_components *components = NULL;
+    ebpo_component facts = EBPO_COMPONENT_INIT;
+    ebpo_status status = read_mesh(e, EVERY_CALL_CROSSING, &mesh);
+    if (status == EBPO_OK)
+        status =
+            ebpo_components_new(&mesh, 1, (ebpo_progress){ NULL, NULL }, &components, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_components_get(components, ebpo_components_count(components) - 1, &facts,
+                                     e->error);
+    if (status == EBPO_OK)
+        status = ebpo_components_mesh(components, 0, &part, e->error);
+    ebpo_mesh_free(&part);
+    ebpo_components_free(components);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
 static ebpo_status prepare(ebpo_mesh *mesh, ebpo_prepared *out, ebpo_error *error)
 {
     ebpo_prepare_options options = EBPO_PREPARE_OPTIONS_INIT;
@@ -203,6 +223,7 @@ const every_call every_call_meshes[] = {
     { "weld", call_weld },
     { "orient", call_orient },
     { "fill_holes", call_fill_holes },
+    { "components", call_components },
     { "prepare", call_prepare },
     { "crossings", call_crossings },
     { "build", call_build },

@@ -16,6 +16,7 @@
 #include "cli/subtree_args.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
+#include "cmd/convert_parts.h"
 #include "cmd/subset_run.h"
 
 typedef struct values {
@@ -28,7 +29,7 @@ typedef struct values {
     uint32_t with, without;
     int codec, rule, profile;
     mending mend;
-    bool require_solid, json, quiet;
+    bool require_solid, split_components, json, quiet;
     const char *unit, *crs, *date;
 } values;
 
@@ -79,6 +80,9 @@ static const arg_option options[] = {
                 "(evenodd) or positive"),
     OPTION_FLAG("require-solid", 0, values, require_solid,
                 "exit with code 3 if the mesh is not a solid"),
+    OPTION_FLAG("split-components", 0, values, split_components,
+                "OUT is a new folder: a file for each component (faces that share vertices, with "
+                "the cavities in it), and a scene of them; the other options hold for each file"),
     OPTION_TEXT("unit", 0, values, unit, "U", "unit of length to record, such as mm"),
     OPTION_TEXT("crs", 0, values, crs, "C",
                 "coordinate reference system to record, such as EPSG:25832"),
@@ -302,6 +306,36 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
     return status;
 }
 
+/* What the files of all components are made with. */
+typedef struct part_build {
+    const values *v;
+    const ebpo_subset_options *need;
+} part_build;
+
+static ebpo_status build_part(void *user, mesh_input *part, const char *path,
+                              ebpo_progress progress, ebpo_error *error)
+{
+    const part_build *b = user;
+    ebpo_build_times times = EBPO_BUILD_TIMES_INIT;
+    return build_and_write(b->v, part, path, b->need, progress, &times, error);
+}
+
+static ebpo_status build_parts(const values *v, mesh_input *p, const char *folder,
+                               const ebpo_subset_options *need, ebpo_progress progress,
+                               double begun, ebpo_error *error)
+{
+    part_build build = { v, need };
+    parts_run run = { .build = build_part,
+                      .user = &build,
+                      .folder = folder,
+                      .unit = v->unit,
+                      .json = v->json,
+                      .quiet = v->quiet,
+                      .threads = (unsigned)v->threads,
+                      .progress = progress };
+    return parts_write(&run, p, begun, error);
+}
+
 /* What is known before the mesh is read; the rest afterwards. */
 static stage_facts plan_stages(const values *v, const char *in)
 {
@@ -345,7 +379,8 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
     stage_facts stages = plan_stages(v, in);
     int plan[STAGE_PLAN_MAX];
     mesh_input p = { .mesh = { 0 } };
-    progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
+    if (!v->split_components)
+        progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
     double begun = progress_now();
     ebpo_status status =
         mesh_input_read(&p, in, v->mend, workspace, (unsigned)v->threads, progress, error);
@@ -354,6 +389,11 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
         return status;
     print_reports(v, &p, in);
     status = refuse(v, &p, in, workspace, error);
+    if (status == EBPO_OK && v->split_components) {
+        status = build_parts(v, &p, out, need, progress, begun, error);
+        progress_wipe(&line);
+        return status;
+    }
     if (status == EBPO_OK)
         status = build_and_write(v, &p, out, need, progress, &stages.times, error);
     else
@@ -381,12 +421,14 @@ static int run(void *given, const char **operand)
         code = check_need(v, &need);
     if (code != EXIT_FINE)
         return code;
-    ebpo_status status = ebpo_check_output(operand[1], &error);
+    ebpo_status status = v->split_components ? parts_begin(operand[1], &error)
+                                             : ebpo_check_output(operand[1], &error);
     if (status == EBPO_OK)
         status = memory_make(&workspace, &v->memory, &error);
     if (status == EBPO_OK)
         status = convert(v, operand[0], operand[1], &need, workspace, &error);
     ebpo_workspace_free(workspace);
+    parts_end();
     return status == EBPO_OK ? EXIT_FINE : command_failed("convert", &error);
 }
 

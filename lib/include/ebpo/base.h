@@ -5,7 +5,8 @@
  *   Structs    those that begin with their size, and EBPO_..._INIT
  *   Errors     ebpo_status, ebpo_error
  *   Progress   ebpo_progress
- *   Outputs    ebpo_write_file, ebpo_check_output, ebpo_abandon_outputs
+ *   Outputs    ebpo_write_file, ebpo_check_output, ebpo_abandon_outputs,
+ *              ebpo_folder_begin, ebpo_folder_publish
  *
  * Rules that hold for every function:
  *
@@ -223,6 +224,30 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_check_output(const char *path, ebpo_erro
  * Threads: any.
  */
 EBPO_API void ebpo_abandon_outputs(void);
+
+/*
+ * Makes a folder beside `folder`, to be filled and then put in its place. It is
+ * the caller's: where it is not published, he removes it and what is in it.
+ *
+ * making   the new folder's path. Freed by free(). On failure NULL.
+ *
+ * EBPO_E_IO: `folder` is there already, or nothing can be made beside it.
+ * EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_folder_begin(const char *folder, char **making,
+                                                     ebpo_error *error);
+
+/*
+ * Renames it, whole, with the rights of any folder that the user makes.
+ *
+ * EBPO_E_IO: it cannot be put there; it is still where it was.
+ *
+ * Threads: one at a time in the process, as it looks at the umask.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_folder_publish(const char *making, const char *folder,
+                                                       ebpo_error *error);
 
 #ifdef __cplusplus
 }

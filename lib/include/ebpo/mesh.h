@@ -8,6 +8,8 @@
  *   Checking   ebpo_mesh_check
  *   Order      ebpo_mesh_arrange
  *   Mending    ebpo_mesh_weld, ebpo_mesh_orient, ebpo_mesh_fill_holes
+ *   Parts      ebpo_components_new, ebpo_components_count, ebpo_components_get,
+ *              ebpo_components_mesh, ebpo_components_free
  */
 #ifndef EBPO_MESH_H
 #define EBPO_MESH_H
@@ -402,6 +404,94 @@ typedef struct ebpo_prepared {
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh,
                                                      const ebpo_prepare_options *options,
                                                      ebpo_prepared *out, ebpo_error *error);
+
+/* ---- components ---- */
+
+/*
+ * Faces that share vertices are a component. Of those, one that is closed (each
+ * edge is used as often in one direction as in the other) and has a negative
+ * volume is a cavity: it is put to the closed one of positive volume that has its
+ * first vertex (of its first face in the source) inside, where the winding number
+ * is not zero, which is decided exactly; of several, to the one of least volume. A
+ * cavity in none of them, and what is open, stands alone.
+ */
+typedef struct ebpo_components ebpo_components;
+
+typedef struct ebpo_component {
+    size_t struct_size; /* EBPO_COMPONENT_INIT sets it */
+
+    uint64_t vertex_count;
+    uint64_t face_count;
+
+    /* Least number of its faces in the source. */
+    uint64_t first_face;
+
+    bool closed;
+
+    /* Those that were put to it. */
+    uint64_t cavities;
+} ebpo_component;
+
+#define EBPO_COMPONENT_INIT EBPO_SIZED(ebpo_component)
+
+/*
+ * Finds them. They are in the order of their first faces in the source. Vertices
+ * that no face names belong to none.
+ *
+ * mesh      borrowed until ebpo_components_free; it may not change
+ * threads   0: all cores. The result does not depend on it.
+ * out       freed by ebpo_components_free. On failure NULL.
+ *
+ * EBPO_E_FORMAT: no faces, or one names a vertex that is not there.
+ * EBPO_E_ARGUMENT: the struct is not valid. EBPO_E_LIMIT, EBPO_E_CANCELLED,
+ * EBPO_E_IO, EBPO_E_MEMORY.
+ *
+ * Threads: any, while nobody changes the mesh.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_components_new(const ebpo_mesh *mesh, unsigned threads,
+                                                       ebpo_progress progress,
+                                                       ebpo_components **out, ebpo_error *error);
+
+/*
+ * NULL is fine.
+ *
+ * Threads: one per object.
+ */
+EBPO_API void ebpo_components_free(ebpo_components *components);
+
+/*
+ * How many; 0 for NULL.
+ *
+ * Threads: any.
+ */
+EBPO_API uint64_t ebpo_components_count(const ebpo_components *components);
+
+/*
+ * One of them, from 0.
+ *
+ * EBPO_E_ARGUMENT: there is none of that number, or `out` has no size.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_components_get(const ebpo_components *components,
+                                                       uint64_t number, ebpo_component *out,
+                                                       ebpo_error *error);
+
+/*
+ * One of them as a mesh, which keeps the numbers of the source: reports and files
+ * made of it tell those of the whole. It is in the whole mesh's workspace. Mend
+ * the whole mesh before: ebpo_mesh_weld and ebpo_mesh_fill_holes refuse a
+ * component in which they have something to do.
+ *
+ * out   freed by ebpo_mesh_free. On failure it is cleared.
+ *
+ * EBPO_E_ARGUMENT: there is none of that number. EBPO_E_IO, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_components_mesh(const ebpo_components *components,
+                                                        uint64_t number, ebpo_mesh *out,
+                                                        ebpo_error *error);
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,118 @@
+/* Which components are closed, and their volumes. */
+#include "geom/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/arrays.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "mesh/component_parts.h"
+#include "mesh/stars.h"
+#include "mesh/sum.h"
+
+enum { VERTEX_GRAIN = 1 << 13, COMPONENT_GRAIN = 64 };
+
+typedef struct measuring {
+    ebpo_components *components;
+    ebpo_stars stars;
+    ebpo_star *star; /* one for each thread */
+} measuring;
+
+/* ---- edges ---- */
+
+static bool balances(const ebpo_link *links, uint64_t uses)
+{
+    uint64_t out = 0;
+    for (uint64_t i = 0; i < uses; i++)
+        out += links[i].out;
+    return 2 * out == uses;
+}
+
+static ebpo_status visit_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
+{
+    measuring *m = context;
+    ebpo_components *c = m->components;
+    ebpo_star *star = &m->star[worker];
+    EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, v, begin, end) {
+        if (!ebpo_star_gather(star, &m->stars, c->mesh, (uint32_t)v))
+            return ebpo_workspace_fail(c->mesh->workspace, star->capacity * 2 * sizeof *star->links,
+                                       error);
+        for (uint64_t i = 0, next; i < star->count; i = next) {
+            next = ebpo_star_run_end(star, i);
+            if (ebpo_link_neighbour(&star->links[i]) > v && !balances(star->links + i, next - i))
+                __atomic_store_n(&c->list[c->number[v]].open, true, __ATOMIC_RELAXED);
+        }
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status look_at_edges(measuring *m, unsigned threads, const ebpo_progress *progress,
+                                 ebpo_error *error)
+{
+    const ebpo_mesh *mesh = m->components->mesh;
+    ebpo_status status = ebpo_stars_build(&m->stars, mesh, threads, progress, error);
+    m->star = ebpo_alloc_zero(threads, sizeof *m->star);
+    if (status == EBPO_OK && !m->star)
+        status = ebpo_fail_memory(error, threads * sizeof *m->star);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(threads, NULL, mesh->vertex_count, VERTEX_GRAIN, visit_vertices,
+                                   m, progress, "components", error);
+    for (unsigned t = 0; m->star && t < threads; t++)
+        ebpo_star_free(&m->star[t]);
+    free(m->star);
+    ebpo_stars_free(&m->stars);
+    return status;
+}
+
+/* ---- volumes ---- */
+
+/* Six times that of the tetrahedron from `base`. */
+static double term_of(mesh_component *c, const ebpo_mesh *mesh, uint64_t face, const double base[3])
+{
+    double t[3][3], cross[3];
+    for (uint64_t k = 0; k < 3; k++) {
+        ebpo_mesh_position(mesh, mesh->faces[3 * face + k], t[k]);
+        for (int i = 0; i < 3; i++) {
+            c->min[i] = t[k][i] < c->min[i] ? t[k][i] : c->min[i];
+            c->max[i] = t[k][i] > c->max[i] ? t[k][i] : c->max[i];
+        }
+    }
+    ebpo_face_cross(t[0], t[1], t[2], cross);
+    return (t[0][0] - base[0]) * cross[0] + (t[0][1] - base[1]) * cross[1] +
+           (t[0][2] - base[2]) * cross[2];
+}
+
+/* Terms are summed exactly, so their order does not matter. */
+static ebpo_status sum_volumes(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    measuring *m = context;
+    ebpo_components *c = m->components;
+    (void)worker, (void)error;
+    for (uint64_t n = begin; n < end; n++) {
+        mesh_component *one = &c->list[n];
+        ebpo_sum sum = { .adds = 0 };
+        double base[3];
+        ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)one->face], base);
+        for (int k = 0; k < 3; k++)
+            one->min[k] = INFINITY, one->max[k] = -INFINITY;
+        EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[n], c->faces.begin[n + 1])
+            ebpo_sum_add(&sum, term_of(one, c->mesh, c->faces.of[i], base));
+        one->volume = one->open ? 0 : ebpo_sum_value(&sum) / 6;
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
+                                    const ebpo_progress *progress, ebpo_error *error)
+{
+    measuring m = { .components = c };
+    threads = ebpo_thread_count(threads);
+    ebpo_status status = look_at_edges(&m, threads, progress, error);
+    return status == EBPO_OK ? ebpo_parallel_for(threads, NULL, c->count, COMPONENT_GRAIN,
+                                                 sum_volumes, &m, progress, "components", error)
+                             : status;
+}

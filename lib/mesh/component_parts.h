@@ -1,0 +1,40 @@
+/* Components of a mesh while they are being found, and grouped. */
+#ifndef EBPO_MESH_COMPONENT_PARTS_H
+#define EBPO_MESH_COMPONENT_PARTS_H
+
+#include "mesh/mesh_parts.h"
+
+/* Faces that share vertices. */
+typedef struct mesh_component {
+    uint64_t first; /* the least source number of its faces */
+    uint32_t face;  /* that face, in the mesh as it is */
+    bool open;      /* an edge is not used as often in one direction as in the other */
+    double volume;  /* of a closed one, signed */
+    double min[3], max[3];
+    uint32_t host; /* of a cavity: what it is in; else itself */
+} mesh_component;
+
+/* Numbers of faces or vertices, those of one group together, each group's ascending. */
+typedef struct mesh_groups {
+    uint64_t *begin; /* [groups + 1] into `of` */
+    uint32_t *of;
+} mesh_groups;
+
+struct ebpo_components {
+    const ebpo_mesh *mesh;
+    uint64_t count;        /* first all, then those that are no cavity of another one */
+    mesh_component *list;  /* [all] */
+    ebpo_component *facts; /* [count] */
+    uint32_t *number; /* [vertex_count] the component; EBPO_NO_INDEX: no face names the vertex */
+    uint32_t *place;  /* [vertex_count] among its component's vertices */
+    mesh_groups faces, vertices;
+};
+
+/* Edges and volumes; needs the groups of faces. */
+EBPO_MUST_USE ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
+                                                  const ebpo_progress *progress, ebpo_error *error);
+
+/* Sets each one's host; needs what is measured. */
+EBPO_MUST_USE ebpo_status ebpo_cavities_place(const ebpo_components *c, ebpo_error *error);
+
+#endif

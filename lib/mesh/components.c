@@ -1,0 +1,291 @@
+/* Components of a mesh, cavities with what they are in, and each as a mesh of its own. */
+#include "geom/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/arrays.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/parallel.h"
+#include "base/sized.h"
+#include "mesh/component_parts.h"
+
+/* ---- which faces share vertices ---- */
+
+static uint32_t root_of(uint32_t *above, uint32_t v)
+{
+    while (above[v] != v)
+        v = above[v] = above[above[v]];
+    return v;
+}
+
+static void join(uint32_t *above, uint32_t a, uint32_t b)
+{
+    a = root_of(above, a);
+    b = root_of(above, b);
+    above[a < b ? b : a] = a < b ? a : b;
+}
+
+static ebpo_status check_corners(const ebpo_mesh *mesh, ebpo_error *error)
+{
+    if (mesh->face_count == 0)
+        return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
+                              "has no faces; give a triangle mesh, not a point cloud");
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, 3 * mesh->face_count) {
+        if (mesh->faces[i] >= mesh->vertex_count)
+            return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
+                                  "face %llu names vertex %lu, but there are %llu vertices; repair "
+                                  "the file or drop the face",
+                                  (unsigned long long)ebpo_mesh_source_face(mesh, i / 3),
+                                  (unsigned long)mesh->faces[i],
+                                  (unsigned long long)mesh->vertex_count);
+    }
+    return EBPO_OK;
+}
+
+/* Each vertex' root, the lowest vertex of its component. */
+static void join_vertices(const ebpo_mesh *mesh, uint32_t *above)
+{
+    EBPO_FOR_ITEMS(mesh->workspace, v, 0, mesh->vertex_count)
+        above[v] = (uint32_t)v;
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
+        const uint32_t *corner = mesh->faces + 3 * f;
+        join(above, corner[0], corner[1]);
+        join(above, corner[0], corner[2]);
+    }
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count)
+        above[v] = above[above[v]]; /* what is lower is done already */
+}
+
+static int compare_first(const void *x, const void *y)
+{
+    const mesh_component *a = x, *b = y;
+    return a->first < b->first ? -1 : 1;
+}
+
+/* Numbered by their first faces in the source. */
+static ebpo_status list_components(ebpo_components *c, const uint32_t *above, ebpo_error *error)
+{
+    const ebpo_mesh *mesh = c->mesh;
+    uint64_t capacity = 0;
+    ebpo_array_fill(mesh->workspace, c->number, 0xff, mesh->vertex_count * sizeof *c->number);
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
+        uint32_t *number = &c->number[above[mesh->faces[3 * f]]];
+        uint64_t source = ebpo_mesh_source_face(mesh, f);
+        if (*number == EBPO_NO_INDEX) {
+            if (!ebpo_array_grow(mesh->workspace, &c->list, &capacity, c->count + 1,
+                                 sizeof *c->list))
+                return ebpo_workspace_fail(mesh->workspace, (c->count + 1) * sizeof *c->list,
+                                           error);
+            *number = (uint32_t)c->count;
+            c->list[c->count++] = (mesh_component){ .first = UINT64_MAX };
+        }
+        if (source < c->list[*number].first) {
+            c->list[*number].first = source;
+            c->list[*number].face = (uint32_t)f;
+        }
+    }
+    qsort(c->list, c->count, sizeof *c->list, compare_first);
+    for (uint64_t i = 0; i < c->count; i++)
+        c->number[above[mesh->faces[3 * (uint64_t)c->list[i].face]]] = (uint32_t)i;
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count)
+        c->number[v] = c->number[above[v]];
+    return EBPO_OK;
+}
+
+/* ---- groups ---- */
+
+/* The component of face or vertex i. */
+static uint32_t component_of(const ebpo_components *c, bool faces, uint64_t i)
+{
+    return c->number[faces ? c->mesh->faces[3 * i] : i];
+}
+
+/* Counted, then each in its place: ascending within a group. */
+static void fill_groups(const ebpo_components *c, bool faces, mesh_groups *g)
+{
+    uint64_t items = faces ? c->mesh->face_count : c->mesh->vertex_count, sum = 0;
+    memset(g->begin, 0, (c->count + 1) * sizeof *g->begin);
+    EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, 0, items) {
+        uint32_t number = component_of(c, faces, i);
+        if (number != EBPO_NO_INDEX)
+            g->begin[number]++;
+    }
+    for (uint64_t i = 0; i <= c->count; i++) {
+        uint64_t size = g->begin[i];
+        g->begin[i] = sum;
+        sum += size;
+    }
+    EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, 0, items) {
+        uint32_t number = component_of(c, faces, i);
+        if (number != EBPO_NO_INDEX)
+            g->of[g->begin[number]++] = (uint32_t)i;
+    }
+    memmove(g->begin + 1, g->begin, c->count * sizeof *g->begin);
+    g->begin[0] = 0;
+}
+
+static ebpo_status make_groups(const ebpo_components *c, bool faces, mesh_groups *g,
+                               ebpo_error *error)
+{
+    uint64_t items = faces ? c->mesh->face_count : c->mesh->vertex_count;
+    g->begin = ebpo_array_alloc(c->mesh->workspace, c->count + 1, sizeof *g->begin);
+    g->of = ebpo_array_alloc(c->mesh->workspace, items, sizeof *g->of);
+    if (!g->begin || !g->of)
+        return ebpo_workspace_fail(c->mesh->workspace, items * sizeof *g->of, error);
+    fill_groups(c, faces, g);
+    return EBPO_OK;
+}
+
+/* ---- cavities join what they are in ---- */
+
+/* By their first faces, which a cavity may hold. `moved`: what becomes of each component. */
+static void number_hosts(ebpo_components *c, uint32_t *moved)
+{
+    uint64_t count = 0;
+    memset(moved, 0xff, c->count * sizeof *moved);
+    for (uint64_t i = 0; i < c->count; i++) {
+        uint32_t host = c->list[i].host;
+        if (moved[host] == EBPO_NO_INDEX) {
+            c->facts[count] = (ebpo_component){ .struct_size = sizeof *c->facts,
+                                                .first_face = c->list[i].first,
+                                                .closed = !c->list[host].open };
+            moved[host] = (uint32_t)count++;
+        }
+        c->facts[moved[host]].cavities += host != i;
+    }
+    for (uint64_t i = 0; i < c->count; i++)
+        moved[i] = moved[c->list[i].host]; /* a host is its own */
+    c->count = count;
+}
+
+static ebpo_status join_cavities(ebpo_components *c, ebpo_error *error)
+{
+    ebpo_workspace *workspace = c->mesh->workspace;
+    uint32_t *moved = ebpo_array_alloc(workspace, c->count, sizeof *moved);
+    c->facts = ebpo_array_alloc(workspace, c->count, sizeof *c->facts);
+    if (!moved || !c->facts) {
+        ebpo_array_free(workspace, moved);
+        return ebpo_workspace_fail(workspace, c->count * sizeof *c->facts, error);
+    }
+    number_hosts(c, moved);
+    EBPO_FOR_ITEMS_SCATTERED(workspace, v, 0, c->mesh->vertex_count) {
+        if (c->number[v] != EBPO_NO_INDEX)
+            c->number[v] = moved[c->number[v]];
+    }
+    ebpo_array_free(workspace, moved);
+    return EBPO_OK;
+}
+
+/* ---- all of it ---- */
+
+static ebpo_status find(ebpo_components *c, ebpo_error *error)
+{
+    const ebpo_mesh *mesh = c->mesh;
+    uint64_t n = mesh->vertex_count;
+    uint32_t *above = ebpo_array_alloc(mesh->workspace, n, sizeof *above);
+    c->number = ebpo_array_alloc(mesh->workspace, n, sizeof *c->number);
+    ebpo_status status = above && c->number
+                             ? EBPO_OK
+                             : ebpo_workspace_fail(mesh->workspace, 2 * n * sizeof *above, error);
+    if (status == EBPO_OK) {
+        join_vertices(mesh, above);
+        status = list_components(c, above, error);
+    }
+    ebpo_array_free(mesh->workspace, above);
+    return status == EBPO_OK ? make_groups(c, true, &c->faces, error) : status;
+}
+
+/* Where each vertex is among its component's. */
+static ebpo_status number_vertices(ebpo_components *c, ebpo_error *error)
+{
+    const ebpo_mesh *mesh = c->mesh;
+    ebpo_status status = make_groups(c, false, &c->vertices, error);
+    if (status != EBPO_OK)
+        return status;
+    c->place = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *c->place);
+    if (!c->place)
+        return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * sizeof *c->place, error);
+    for (uint64_t n = 0; n < c->count; n++) {
+        uint64_t begin = c->vertices.begin[n];
+        EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, begin, c->vertices.begin[n + 1])
+            c->place[c->vertices.of[i]] = (uint32_t)(i - begin);
+        c->facts[n].vertex_count = c->vertices.begin[n + 1] - begin;
+        c->facts[n].face_count = c->faces.begin[n + 1] - c->faces.begin[n];
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status make(ebpo_components *c, unsigned threads, const ebpo_progress *progress,
+                        ebpo_error *error)
+{
+    if (!ebpo_progress_stage(progress, "components", error))
+        return EBPO_E_CANCELLED;
+    ebpo_status status = find(c, error);
+    if (status == EBPO_OK)
+        status = ebpo_components_measure(c, threads, progress, error);
+    if (status == EBPO_OK)
+        status = ebpo_cavities_place(c, error);
+    if (status == EBPO_OK)
+        status = join_cavities(c, error);
+    if (status != EBPO_OK)
+        return status;
+    fill_groups(c, true, &c->faces);
+    return number_vertices(c, error);
+}
+
+ebpo_status ebpo_components_new(const ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
+                                ebpo_components **out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    *out = NULL;
+    ebpo_status status = ebpo_mesh_check_shape(mesh, error);
+    if (status == EBPO_OK)
+        status = check_corners(mesh, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_components *c = ebpo_alloc_zero(1, sizeof *c);
+    if (!c)
+        return ebpo_fail_memory(error, sizeof *c);
+    c->mesh = mesh;
+    status = make(c, threads, &progress, error);
+    if (status == EBPO_OK)
+        *out = c;
+    else
+        ebpo_components_free(c);
+    return status;
+}
+
+void ebpo_components_free(ebpo_components *c)
+{
+    if (!c)
+        return;
+    ebpo_workspace *workspace = c->mesh->workspace;
+    ebpo_array_free(workspace, c->number);
+    ebpo_array_free(workspace, c->place);
+    ebpo_array_free(workspace, c->faces.of);
+    ebpo_array_free(workspace, c->vertices.of);
+    ebpo_array_free(workspace, c->faces.begin);
+    ebpo_array_free(workspace, c->vertices.begin);
+    ebpo_array_free(workspace, c->list);
+    ebpo_array_free(workspace, c->facts);
+    free(c);
+}
+
+uint64_t ebpo_components_count(const ebpo_components *c) { return c ? c->count : 0; }
+
+ebpo_status ebpo_components_get(const ebpo_components *c, uint64_t number, ebpo_component *out,
+                                ebpo_error *error)
+{
+    static const ebpo_component nothing = EBPO_COMPONENT_INIT;
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_component, out, error);
+    if (status != EBPO_OK)
+        return status;
+    bool there = c && number < c->count;
+    EBPO_GIVE(ebpo_component, out, there ? &c->facts[number] : &nothing);
+    return there ? EBPO_OK
+                 : ebpo_fail(error, EBPO_E_ARGUMENT, "there is no component %llu",
+                             (unsigned long long)number);
+}

@@ -1,0 +1,56 @@
+#!/usr/bin/env python3
+"""components_agree.py TOOL WHOLE.ebpo.h5 FOLDER: what `ebpo convert --split-components` has written
+to FOLDER is the whole: each face once, by its number there; and what meets in the scene is what
+`ebpo collide --self` finds in the whole between components (of which no two may have a vertex in one
+place: it takes their faces for neighbours). Prints how many of each."""
+import itertools
+import json
+import subprocess
+import sys
+
+tool, whole, folder = sys.argv[1:]
+
+
+def run(*arguments, text=None):
+    done = subprocess.run([tool, *arguments], input=text, capture_output=True, check=True,
+                          encoding="utf-8")
+    return done.stdout
+
+
+def faces_of(path):
+    return json.loads(run("box", "--json", path, text="-1e30 -1e30 -1e30 1e30 1e30 1e30\n"))
+
+
+def pairs_of(lines):
+    """(the lower face, the higher one, what they are to each other)."""
+    return {(*sorted(map(int, line.split()[:2])), line.split()[2]) for line in lines.splitlines()
+            if line != "none"}
+
+
+with open(f"{folder}/components.scene.json", encoding="utf-8") as file:
+    scene = json.load(file)
+parts = {name: f"{folder}/{model['file']}" for name, model in scene["models"].items()}
+assert [i["name"] for i in scene["instances"]] == list(parts) == sorted(parts)
+assert all(set(i) == {"name", "model"} and i["name"] == i["model"] for i in scene["instances"])
+
+owner = {}
+for name, path in parts.items():
+    for face in faces_of(path):
+        assert face not in owner, f"face {face} is in {owner[face]} and {name}"
+        owner[face] = name
+assert sorted(owner) == sorted(faces_of(whole)) == list(range(len(owner)))
+
+of_parts = {}
+for a, b in itertools.combinations(parts, 2):
+    met = pairs_of(run("collide", "-q", "--all", parts[a], parts[b]))
+    assert all({owner[f], owner[g]} == {a, b} for f, g, _ in met)
+    if met:
+        of_parts[a, b] = met
+of_whole = {p for p in pairs_of(run("collide", "-q", "--self", whole)) if owner[p[0]] != owner[p[1]]}
+assert set().union(*of_parts.values()) == of_whole, (of_parts, of_whole)
+
+report = run("scene", "report", "-q", "--count", f"{folder}/components.scene.json").splitlines()
+told = {tuple(line.split("\t")[2:4]): int(line.split("\t")[4].split()[0]) for line in report}
+assert told == {pair: len(met) for pair, met in of_parts.items()}, (told, of_parts)
+print(len(parts), "components,", len(owner), "faces,", len(of_parts), "pairs meet,",
+      len(of_whole), "pairs of faces")

@@ -1,0 +1,28 @@
+/* `ebpo convert --split-components`: a folder with a file for each component, and a scene. */
+#ifndef EBPO_TOOLS_CONVERT_PARTS_H
+#define EBPO_TOOLS_CONVERT_PARTS_H
+
+#include "cli/mesh_input.h"
+
+typedef struct parts_run {
+    /* Builds a file; the mesh is freed in any case. */
+    ebpo_status (*build)(void *user, mesh_input *part, const char *path, ebpo_progress progress,
+                         ebpo_error *error);
+    void *user;
+    const char *folder, *unit; /* unit: NULL: none */
+    bool json, quiet;
+    unsigned threads;
+    ebpo_progress progress;
+} parts_run;
+
+/* Makes the folder beside its place, before anything is read; the exit's clean-up is set. */
+EBPO_MUST_USE ebpo_status parts_begin(const char *folder, ebpo_error *error);
+
+/* Of the mesh, mended: frees it. Then the folder is in its place, and what it holds is told. */
+EBPO_MUST_USE ebpo_status parts_write(const parts_run *run, mesh_input *whole, double begun,
+                                      ebpo_error *error);
+
+/* Removes what was made and not put in its place. Harmless at any time. */
+void parts_end(void);
+
+#endif
