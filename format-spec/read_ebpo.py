@@ -69,19 +69,49 @@ def leaf_refs(level, first):
     return values[order].astype("u4")
 
 
+def arrays(file):
+    """README.md, "Arrays": {path: dataset}, of those that the head calls for; what else stands there is ignored."""
+    listed_parts = parts_of(file)
+    mesh, planes, leaf_planes = (part in listed_parts for part in ("mesh", "planes", "leaf-planes"))
+    out, groups, attrs = {}, 1, file.attrs
+    for number in range(one(attrs["level_count"])):
+        path = f"/levels/{number:02d}"
+        level = file[path]
+        s = {name: one(value) for name, value in level.attrs.items()}
+        solid = text(attrs["kind"]) == "solid"
+        rows = {"types": groups, "plane_counts": planes * s["gray"], "planes": planes * s["planes"],
+                "leaf_winding": solid * s["leaf"], "black_winding": solid * s["black"], "white_winding": solid * s["white"],
+                "leaf_skip": mesh * s["leaf"], "leaf_new": mesh * s["leaf"], "leaf_ref_count": mesh * s["leaf"],
+                "leaf_refs": mesh * s["faces_referenced"], "types_index": groups > 4096, "gray_index": planes and s["gray"] > 4096,
+                "leaf_index": (mesh or leaf_planes) and s["leaf"] > 4096,
+                "leaf_plane_counts": leaf_planes * s["leaf"], "leaf_planes": leaf_planes * s["leaf_planes"]}
+        out.update({f"{path}/{name}": level[name] for name, count in rows.items()
+                    if count and (name not in ("black_winding", "white_winding") or name in level)})
+        groups = s["gray"]
+    several = one(attrs["face_count"]) > (2048 if "subtrees" in listed_parts else 4096)
+    names = ["/mesh/vertices", "/mesh/faces"] + ["/mesh/faces_index"] * several if mesh else []
+    names += ["/maps/vertex_source", "/maps/face_source"] if "maps" in listed_parts else []
+    if "subtrees" in listed_parts:
+        names += ["/subtrees/index", "/subtrees/counts", "/subtrees/places"] + ["/subtrees/outer"] * ("outer" in file["/subtrees"])
+    out.update({name: file[name] for name in names})
+    return out
+
+
+def level_arrays(file, number):
+    """The same of one level, by their names there."""
+    folder = f"/levels/{number:02d}/"
+    return {path[len(folder):]: dataset for path, dataset in arrays(file).items() if path.startswith(folder)}
+
+
 CODINGS = {"leaf_skip": ("skips", "delta"), "leaf_refs": ("gap",), "mesh/vertices": ("delta",), "mesh/faces": ("high-water",),
            "maps/vertex_source": ("delta",), "maps/face_source": ("delta",)}
 
 
 def check_codings(file):
-    """README.md, "Codings": each array names the one that it has. `delta` at leaf_skip is of 1.0."""
-    def check(name, item):
-        if isinstance(item, h5py.Dataset) and not name.startswith("x-"):
-            word, wanted = text(item.attrs["coding"]), name.split("/")[-1] if name.startswith("levels/") else name
-            assert word in CODINGS.get(wanted, ("plain",)), f"/{name}: coding {word}"
-    for group in ("levels", "mesh", "maps", "subtrees"):
-        if group in file:
-            file[group].visititems(lambda name, item, group=group: check(f"{group}/{name}", item))
+    """README.md, "Codings": each array names the one that it has. `delta` at leaf_skip is of older files."""
+    for path, item in arrays(file).items():
+        wanted = path.split("/")[-1] if path.startswith("/levels/") else path[1:]
+        assert text(item.attrs["coding"]) in CODINGS.get(wanted, ("plain",)), f"{path}: its coding"
 
 
 def full_rows(dataset):
@@ -109,14 +139,11 @@ def as_without_subtrees(name, dataset):
 
 def content_sha256(file):
     """README.md, "Content checksum"."""
-    names, parts = [], text(file.attrs["required_parts"]).split() + text(file.attrs["optional_parts"]).split()
-    for group in ("levels", "mesh", "maps"):
-        if group in parts:
-            file[group].visititems(lambda name, item, group=group:
-                                   names.append(f"/{group}/{name}") if isinstance(item, h5py.Dataset) else None)
-    total = hashlib.sha256()
-    for name in sorted(names):
-        values = as_without_subtrees(name, file[name]) if "subtrees" in file else file[name][...]
+    total, subtrees = hashlib.sha256(), "subtrees" in parts_of(file)
+    for name, dataset in sorted(arrays(file).items()):
+        if name.startswith("/subtrees/"):
+            continue
+        values = as_without_subtrees(name, dataset) if subtrees else dataset[...]
         if values is not None:
             total.update(name.encode() + b"\0" + hashlib.sha256(values.tobytes()).digest())
     return total.hexdigest()
@@ -127,11 +154,11 @@ def check_subtrees(file):
     counts, index = (file[f"/subtrees/{name}"] for name in ("counts", "index"))
     rows, sums = counts.chunks[0], np.cumsum(counts[...].astype("u8"), axis=0)
     assert (index[1:] == sums[rows - 1:(len(index) - 1) * rows:rows]).all() and not index[0].any()
-    root, levels = int(file.attrs["subtree_level"]), int(file.attrs["level_count"])
+    root, levels = one(file.attrs["subtree_level"]), one(file.attrs["level_count"])
     subtree, own, column = np.arange(len(counts)), 0, 6
     firsts, refs = np.full(len(counts), -1), [np.zeros(0, "i8") for _ in range(len(counts))]
     for number in range(root + 1, levels):
-        level = file[f"/levels/{number:02d}"]
+        level = level_arrays(file, number)
         types = (level["types"][...][:, None] >> (2 * np.arange(8, dtype="u2"))) & 3
         of = np.repeat(subtree, 8).reshape(-1, 8)
 
@@ -170,7 +197,7 @@ def distances(numbers, rows, at):
 def check_faces_of_subtrees(file, counts, sums, firsts, refs):
     """Where a subtree's faces and vertices begin, and the blocks from elsewhere that it needs.
     `firsts`: the least leaf_first of its leaves, -1 without any; `refs`: what these refer to."""
-    if "mesh" not in file:
+    if "mesh" not in parts_of(file):
         return
     corners = faces(file["/mesh/faces"]).reshape(-1, 3).astype("i8")
     before = (sums - counts).astype("i8")
@@ -189,7 +216,11 @@ def check_faces_of_subtrees(file, counts, sums, firsts, refs):
 
 
 def check_places(file):
-    """The list of chunks leads to where HDF5 says that they are."""
+    """The list of chunks leads to where HDF5 says that they are; it is ignored where its attributes are not true."""
+    own = file["/subtrees/places"].id.get_chunk_info(0)
+    stated = {name: one(value) for name, value in file["/subtrees/places"].attrs.items() if name in ("file_bytes", "offset")}
+    if stated != {"file_bytes": pathlib.Path(file.filename).stat().st_size, "offset": own.byte_offset}:
+        return
     names = ["types", "plane_counts", "planes", "leaf_winding", "black_winding", "white_winding",
              "leaf_skip", "leaf_new", "leaf_ref_count", "leaf_refs", "types_index", "gray_index",
              "leaf_index", "leaf_plane_counts", "leaf_planes"]
@@ -208,8 +239,7 @@ def check_places(file):
             seen[path] += 1
         at += int(size)
     assert all(count == file[path].id.get_num_chunks() for path, count in seen.items())
-    own = places.id.get_chunk_info(0)
-    assert (own.byte_offset, own.byte_offset + own.size) == (places.attrs["offset"], places.attrs["file_bytes"])
+    assert own.byte_offset + own.size == stated["file_bytes"]
 
 
 def listed(values):
@@ -221,17 +251,29 @@ def listed(values):
     return values.ravel().tolist()
 
 
+def one(value):
+    """A number or a text: a scalar, or a row of one."""
+    value = np.asarray(value).reshape(-1)[0]
+    return value.item() if hasattr(value, "item") else value
+
+
 def text(value):
-    return value.decode() if isinstance(value, bytes) else str(value)
+    """Up to its first zero byte, however it is padded."""
+    value = one(value)
+    return (value if isinstance(value, bytes) else str(value).encode()).split(b"\0")[0].decode()
+
+
+def parts_of(file):
+    return text(file.attrs["required_parts"]).split() + text(file.attrs["optional_parts"]).split()
 
 
 def read_level(file, number, parts):
-    level = file[f"/levels/{number:02d}"]
+    level, attrs = level_arrays(file, number), file[f"/levels/{number:02d}"].attrs
 
     def plain(name, dtype):
         return listed(level[name][...].astype(dtype)) if name in level else None
 
-    out = {"level": number, "gray_volume": float(level.attrs["gray_volume"]), "leaf_volume": float(level.attrs["leaf_volume"])}
+    out = {"level": number, "gray_volume": one(attrs["gray_volume"]), "leaf_volume": one(attrs["leaf_volume"])}
     out["types"] = plain("types", "u2")
     out["plane_counts"] = plain("plane_counts", "u1")
     out["planes"] = plain("planes", "u4")
@@ -249,10 +291,10 @@ def read_level(file, number, parts):
 
 def check_pruned(file, subset):
     """Subsets: an empty group for each pruned node, and on the last level all gray nodes pruned."""
-    count = int(file.attrs["level_count"])
+    count = one(file.attrs["level_count"])
     levels = [file[f"/levels/{number:02d}"] for number in range(count)]
     for number, level in enumerate(levels):
-        gray, pruned = int(level.attrs["gray"]), int(level.attrs.get("pruned", 0))
+        gray, pruned = one(level.attrs["gray"]), one(level.attrs.get("pruned", 0))
         empty = gray if number + 1 == count else int((levels[number + 1]["types"][...] == 0).sum())
         assert not subset or pruned == empty, f"level {number}: {pruned} pruned nodes, {empty} empty groups"
         assert subset or (pruned == 0 and (gray == 0) == (number + 1 == count)), f"level {number}: pruned nodes in a file that is no subset"
@@ -277,8 +319,8 @@ def nodes(file):
     """All nodes breadth first: octcode, type, rank, cell, the half-spaces that are its own."""
     out, parents = [], []
     origin, size = file.attrs["box_origin"], file.attrs["box_size"]
-    for number in range(int(file.attrs["level_count"])):
-        level = file[f"/levels/{number:02d}"]
+    for number in range(one(file.attrs["level_count"])):
+        level = level_arrays(file, number)
         rank, grays, at = [0] * 4, [], {"": 0, "leaf_": 0}
         lists = {part: [level[part + name][...] if part + name in level else None for name in ("plane_counts", "planes")]
                  for part in ("", "leaf_")}
@@ -334,7 +376,9 @@ def near(a, b):
 
 
 def plain_value(value):
-    return text(value) if isinstance(value, bytes) else value.tolist() if hasattr(value, "tolist") else value
+    if np.asarray(value).size > 1:
+        return value.tolist()
+    return text(value) if isinstance(one(value), (bytes, str)) else one(value)
 
 
 def check_nodes(path, expected):
@@ -358,19 +402,19 @@ def check_vectors(folder):
 
 def read(path):
     with h5py.File(path, "r") as file:
-        assert text(file.attrs["format"]) == "EBP-Octree in HDF5" and file.attrs["format_version_major"] == 1
+        assert text(file.attrs["format"]) == "EBP-Octree in HDF5" and one(file.attrs["format_version_major"]) == 1
         assert text(file.attrs.get("format_version", "")) != "1.0-draft"
         required = text(file.attrs["required_parts"]).split()
         unknown = set(required) - {"levels", "mesh", "planes", "maps", "leaf-planes", "subtrees", "pruned"}
         assert not unknown, f"needs {unknown}"
-        parts = set(required + text(file.attrs["optional_parts"]).split())
+        parts = set(parts_of(file))
         assert content_sha256(file) == text(file.attrs["content_sha256"]), "content_sha256 differs"
         check_pruned(file, "pruned" in parts)
         check_codings(file)
         if "subtrees" in parts:
             check_subtrees(file)
         out = {name: text(file.attrs[name]) for name in ("kind", "winding_rule", "coordinate_type")}
-        out["levels"] = [read_level(file, number, parts) for number in range(int(file.attrs["level_count"]))]
+        out["levels"] = [read_level(file, number, parts) for number in range(one(file.attrs["level_count"]))]
         mesh, maps = "mesh" in parts, "maps" in parts
         out["mesh"] = {
             "level": None,

@@ -97,6 +97,9 @@ static ebpo_status get_fact(ebpo_h5_in *in, ebpo_h5_id id, const char *object, c
     case EBPO_FACT_YES_NO: status = get_limited(in, id, object, f, field, error); break;
     case EBPO_FACT_INTEGER: status = ebpo_h5_get_int(in, id, object, f->name, field, error); break;
     case EBPO_FACT_HINT:
+        if (ebpo_h5_get_count(in, id, object, f->name, field, NULL) != EBPO_OK)
+            *(uint64_t *)field = 0; /* absent, or of another program's type: no hint */
+        return EBPO_OK;
     case EBPO_FACT_COUNT: status = ebpo_h5_get_count(in, id, object, f->name, field, error); break;
     case EBPO_FACT_REAL: status = ebpo_h5_get_real(in, id, object, f->name, field, 0, error); break;
     case EBPO_FACT_REAL3:
@@ -106,7 +109,7 @@ static ebpo_status get_fact(ebpo_h5_in *in, ebpo_h5_id id, const char *object, c
     }
     if (status != EBPO_E_ABSENT)
         return status;
-    if (f->kind == EBPO_FACT_NOTE || f->kind == EBPO_FACT_HINT)
+    if (f->kind == EBPO_FACT_NOTE)
         return EBPO_OK;
     return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, object, -1,
                         "attribute %s is missing; get a fresh copy of the file", f->name);
@@ -134,10 +137,12 @@ static ebpo_status get_version(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
             error, EBPO_E_VERSION, in->shown,
             "format version %d.%d, and this library reads version %d; use a newer one",
             info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
-    char words[32]; /* they are for people, but files of the draft have the same numbers */
-    if (status == EBPO_OK &&
-        ebpo_h5_get_text(in, root, "/", "format_version", words, sizeof words, NULL) == EBPO_OK &&
-        strcmp(words, "1.0-draft") == 0)
+    char words[32] = ""; /* for people, but files of the draft have the same numbers */
+    if (status == EBPO_OK)
+        status = ebpo_h5_get_text(in, root, "/", "format_version", words, sizeof words, error);
+    if (status == EBPO_E_ABSENT)
+        return EBPO_OK;
+    if (status == EBPO_OK && strcmp(words, "1.0-draft") == 0)
         status = ebpo_fail_file(error, EBPO_E_VERSION, in->shown,
                                 "was written while the format was a draft, which is not read any "
                                 "more; convert the model again");
@@ -236,7 +241,7 @@ static ebpo_status get_known(ebpo_h5_in *in, ebpo_h5_id root, const char *name,
 {
     char word[64];
     ebpo_status status = ebpo_h5_get_text(in, root, "/", name, word, sizeof word, error);
-    if (status == EBPO_E_ABSENT)
+    if (status == EBPO_E_ABSENT || (status == EBPO_OK && !*word))
         return EBPO_OK;
     *out = -1;
     for (int i = 0; word_of(i) && status == EBPO_OK; i++)

@@ -13,7 +13,7 @@
 #include "http/http_source.h"
 
 /* The word says how the numbers are to be read: with another one they would be read wrong. In files
- * of 1.0 `delta` stands at leaf_skip, too. */
+ * of 1.0, and in the first ones of 1.1, `delta` stands at leaf_skip, too. */
 static bool coding_known(const ebpo_array_spec *spec, const char *word)
 {
     return strcmp(word, spec->coding) == 0 ||
@@ -172,13 +172,12 @@ static ebpo_status open_places(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
         status = ebpo_h5_look_at_array(h5, a->path, &id, error);
     if (status != EBPO_OK)
         return status;
-    status = ebpo_h5_get_count(h5, id, a->path, "file_bytes", &bytes, error);
-    if (status == EBPO_OK)
-        status = ebpo_h5_get_count(h5, id, a->path, "offset", &offset, error);
+    bool stated = ebpo_h5_get_count(h5, id, a->path, "file_bytes", &bytes, NULL) == EBPO_OK &&
+                  ebpo_h5_get_count(h5, id, a->path, "offset", &offset, NULL) == EBPO_OK;
     ebpo_h5_close_id(id);
-    file->has_places = status == EBPO_OK && bytes == file->info.file_bytes && a->chunks &&
+    file->has_places = stated && bytes == file->info.file_bytes && a->chunks &&
                        offset == a->chunks[0].address;
-    return status == EBPO_E_ABSENT ? EBPO_OK : status;
+    return EBPO_OK;
 }
 
 static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)

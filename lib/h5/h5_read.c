@@ -23,6 +23,15 @@ static hid_t file_access(ebpo_h5_driver *driver)
     return fapl;
 }
 
+/* libhdf5 would look for the signature behind a user block as well; then no address is a place in
+ * the file. */
+static bool begins_as_hdf5(const ebpo_h5_driver *driver)
+{
+    static const char SIGNATURE[] = "\x89HDF\r\n\x1a\n";
+    return driver->head_bytes < sizeof SIGNATURE - 1 ||
+           memcmp(driver->head, SIGNATURE, sizeof SIGNATURE - 1) == 0;
+}
+
 ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_error *error)
 {
     *in = (ebpo_h5_in){ .shown = input->shown, .file = -1, .file_bytes = input->source.size };
@@ -34,7 +43,7 @@ ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_error *error)
         return status;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    hid_t fapl = file_access(in->driver);
+    hid_t fapl = begins_as_hdf5(in->driver) ? file_access(in->driver) : -1;
     in->file = fapl < 0 ? -1 : H5Fopen(in->shown, H5F_ACC_RDONLY, fapl);
     if (in->file < 0)
         status = ebpo_h5_fail(
@@ -262,6 +271,7 @@ static int list_filters(hid_t dcpl, unsigned element_size, int ids[3])
     return count;
 }
 
+/* Shuffled elements of one byte are what they were: h5repack shuffles all arrays alike. */
 static bool find_pipeline(hid_t dcpl, unsigned element_size, ebpo_pipeline *pipeline)
 {
     static const struct {
@@ -277,7 +287,7 @@ static bool find_pipeline(hid_t dcpl, unsigned element_size, ebpo_pipeline *pipe
     int ids[3] = { 0 };
     int count = list_filters(dcpl, element_size, ids);
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
-        int shuffles = known[i].shuffled && element_size > 1;
+        int shuffles = known[i].shuffled && (element_size > 1 || ids[0] == H5Z_FILTER_SHUFFLE);
         if (count != known[i].count + shuffles || (shuffles && ids[0] != H5Z_FILTER_SHUFFLE))
             continue;
         bool same = true;

@@ -23,21 +23,54 @@ void need(bool ok, const char *what)
         die("libhdf5", what);
 }
 
-void set_text(const char *object, const char *name, const char *text)
+/* In place of what was there: another length is another type. */
+static void put_anew(const char *object, const char *name, hid_t type, hid_t space, hid_t memory,
+                     const void *value)
 {
-    hid_t id = H5Oopen(changed, object, H5P_DEFAULT), type = H5Tcopy(H5T_C_S1),
-          space = H5Screate(H5S_SCALAR);
-    H5Tset_size(type, *text ? strlen(text) : 1);
-    H5Tset_strpad(type, H5T_STR_NULLPAD);
-    H5Tset_cset(type, H5T_CSET_UTF8);
+    hid_t id = H5Oopen(changed, object, H5P_DEFAULT);
     if (H5Aexists(id, name) > 0)
-        H5Adelete(id, name); /* another length is another type */
+        H5Adelete(id, name);
     hid_t attribute = H5Acreate2(id, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
-    need(H5Awrite(attribute, type, text) >= 0, name);
+    need(H5Awrite(attribute, memory, value) >= 0, name);
     H5Aclose(attribute);
     H5Sclose(space);
-    H5Tclose(type);
     H5Oclose(id);
+}
+
+void set_text_as(const char *object, const char *name, const char *text, size_t size,
+                 H5T_str_t padding)
+{
+    char bytes[1024] = "";
+    bool variable = size == H5T_VARIABLE;
+    hid_t type = H5Tcopy(H5T_C_S1);
+    need(variable || size <= sizeof bytes, name);
+    memcpy(bytes, text, strlen(text));
+    H5Tset_size(type, size);
+    H5Tset_strpad(type, padding);
+    H5Tset_cset(type, padding == H5T_STR_NULLPAD ? H5T_CSET_UTF8 : H5T_CSET_ASCII);
+    put_anew(object, name, type, H5Screate(H5S_SCALAR), type,
+             variable ? (const void *)&text : bytes);
+    H5Tclose(type);
+}
+
+void set_text(const char *object, const char *name, const char *text)
+{
+    set_text_as(object, name, text, *text ? strlen(text) : 1, H5T_STR_NULLPAD);
+}
+
+void set_row(const char *object, const char *name, hid_t type, int64_t value)
+{
+    hsize_t one = 1;
+    put_anew(object, name, type, H5Screate_simple(1, &one, NULL), H5T_NATIVE_INT64, &value);
+}
+
+uint64_t count_of(const char *object, const char *name)
+{
+    uint64_t value = 0;
+    hid_t attribute = H5Aopen_by_name(changed, object, name, H5P_DEFAULT, H5P_DEFAULT);
+    need(H5Aread(attribute, H5T_NATIVE_UINT64, &value) >= 0, name);
+    H5Aclose(attribute);
+    return value;
 }
 
 static void set_number(const char *object, const char *name, hid_t type, int64_t value)
@@ -125,23 +158,54 @@ static hid_t make_array(const new_array *a, const char *path)
     return id;
 }
 
-void replace(const char *path, new_array a)
+static void write_values(hid_t id, const char *path, const new_array *a)
 {
     static const int64_t zeros[4096];
+    if (!a->unwritten)
+        need(H5Dwrite(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT,
+                      a->values ? a->values : zeros) >= 0,
+             path);
+}
+
+void add_array(const char *path, new_array a)
+{
+    hid_t id = make_array(&a, path);
+    write_values(id, path, &a);
+    H5Dclose(id);
+}
+
+void replace(const char *path, new_array a)
+{
     hid_t old = H5Dopen2(changed, path, H5P_DEFAULT);
     need(old >= 0, path);
     drop(path);
     hid_t id = make_array(&a, path);
-    if (!a.unwritten)
-        need(H5Dwrite(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT,
-                      a.values ? a.values : zeros) >= 0,
-             path);
+    write_values(id, path, &a);
     copy_text(old, id, "coding");
     copy_text(old, id, "about");
     H5Dclose(id);
     H5Dclose(old);
 }
 
+void refilter(const char *path, void (*filters)(hid_t))
+{
+    int64_t values[64];
+    hsize_t dims[2] = { 0, 0 };
+    hid_t id = H5Dopen2(changed, path, H5P_DEFAULT), space = H5Dget_space(id),
+          type = H5Dget_type(id);
+    need(H5Sget_simple_extent_npoints(space) <= 64, path);
+    H5Sget_simple_extent_dims(space, dims, NULL);
+    need(H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, path);
+    replace(path, (new_array){ .type = type,
+                               .rows = dims[0],
+                               .cols = dims[1],
+                               .chunk = dims[0],
+                               .filters = filters,
+                               .values = values });
+    H5Tclose(type);
+    H5Sclose(space);
+    H5Dclose(id);
+}
 void checksum(hid_t dcpl) { H5Pset_fletcher32(dcpl); }
 void scale_offset(hid_t dcpl) { H5Pset_scaleoffset(dcpl, H5Z_SO_INT, H5Z_SO_INT_MINBITS_DEFAULT); }
 

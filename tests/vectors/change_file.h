@@ -20,9 +20,15 @@ void spill(const char *path, const void *data, size_t size);
 void change_objects(const char *path, void (*change)(void));
 
 void set_text(const char *object, const char *name, const char *text);
+/* `size`: bytes of the type, or H5T_VARIABLE; `padding`: one of H5T_STR_. */
+void set_text_as(const char *object, const char *name, const char *text, size_t size,
+                 H5T_str_t padding);
 void set_int(const char *object, const char *name, int64_t value);
 void set_count(const char *object, const char *name, int64_t value);
 void set_reals(const char *name, double a, double b, double c);
+/* One dimension of one value, in place of a scalar or of another type. */
+void set_row(const char *object, const char *name, hid_t type, int64_t value);
+uint64_t count_of(const char *object, const char *name);
 void add_count(const char *object, const char *name, uint64_t value);
 void drop_attribute(const char *object, const char *name);
 void drop(const char *path);
@@ -39,6 +45,10 @@ typedef struct new_array {
     const int64_t *values; /* NULL: zeros, at most 4096 */
 } new_array;
 void replace(const char *path, new_array a);
+/* One where there was none, without attributes. */
+void add_array(const char *path, new_array a);
+/* The same values, filtered otherwise: of at most 64 elements. */
+void refilter(const char *path, void (*filters)(hid_t));
 void checksum(hid_t dcpl); /* filters: fletcher32 */
 void scale_offset(hid_t dcpl);
 

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <zstd.h>
 
 #include "change_file.h"
 #include "vector_read.h"
@@ -37,6 +38,9 @@ static void v_format(void) { set_text("/", "format", "EBP-Octree in HDF6"); }
 static void v_format_missing(void) { drop_attribute("/", "format"); }
 static void v_draft(void) { set_text("/", "format_version", "1.0-draft"); }
 static void v_major(void) { set_int("/", "format_version_major", 2); }
+static void v_variable(void) { set_text_as("/", "unit", "m", H5T_VARIABLE, H5T_STR_NULLTERM); }
+static void v_maps_alone(void) { set_text("/", "optional_parts", "planes maps"); }
+static void v_absent_part(void) { set_count("/levels/01", "leaf_planes", 3); }
 static void v_required(void) { set_text("/", "required_parts", "levels mesh animation"); }
 static void v_no_levels_part(void) { set_text("/", "required_parts", "mesh"); }
 static void v_part_twice(void) { set_text("/", "optional_parts", "planes planes"); }
@@ -68,7 +72,12 @@ static void v_max_level(void) { set_int("/", "max_level", 0); }
 static void v_faces_huge(void) { set_count("/", "face_count", (int64_t)1 << 40); }
 static void v_faces_more(void) { set_count("/", "source_face_count", 3); }
 static void v_source_less(void) { set_count("/", "source_vertex_count", 3); }
-static void v_gray_deep(void) { set_count("/levels/01", "gray", 1); }
+/* In place of a leaf, so that there are eight nodes still. */
+static void v_gray_deep(void)
+{
+    set_count("/levels/01", "gray", 1);
+    set_count("/levels/01", "leaf", count_of("/levels/01", "leaf") - 1);
+}
 static void v_nodes(void) { set_count("/levels/01", "white", 77); }
 static void v_planes_many(void) { set_count("/levels/00", "planes", 256); }
 static void v_planes_count(void) { set_count("/levels/00", "planes", 200); }
@@ -87,7 +96,10 @@ static void v_subtree_level(void) { set_int("/", "subtree_level", 0); }
 static void v_subtree_table(void) { drop("/subtrees/counts"); }
 /* Its bytes stay, so that it still holds for a reader. */
 static void v_places_array(void) { poke("/subtrees/places", 1, INT64_C(4097) << 32 | 8); }
-static void v_places_bytes(void) { poke("/subtrees/places", 1, 1 << 30); }
+static void v_places_end(void) { poke("/subtrees/places", 1, 1 << 30); }
+static void v_places_bytes(void) { poke("/subtrees/places", 0, 1027); } /* of two, unfiltered */
+static void v_places(void) { drop("/subtrees/places"); }
+static void v_outer(void) { drop("/subtrees/outer"); }
 static void v_soft_link(void)
 {
     drop("/mesh/faces");
@@ -165,6 +177,23 @@ static void v_filter_mask(void)
     need(H5Dwrite_chunk(id, H5P_DEFAULT, 2, at, sizeof shuffled, shuffled) >= 0, "chunk");
     H5Dclose(id);
 }
+/* The chunk's bytes as they were, in a frame that does not notice damage. */
+static void v_no_checksum(void)
+{
+    static const char path[] = "/mesh/faces";
+    uint8_t stored[4096], raw[4096], frame[4096];
+    hsize_t at[2] = { 0, 0 }, size = 0;
+    uint32_t mask;
+    (void)chunk_address(path, &size);
+    hid_t id = H5Dopen2(changed, path, H5P_DEFAULT);
+    need(size <= sizeof stored && H5Dread_chunk(id, H5P_DEFAULT, at, &mask, stored) >= 0, path);
+    size_t bytes = ZSTD_decompress(raw, sizeof raw, stored, (size_t)size);
+    need(!ZSTD_isError(bytes), "ZSTD_decompress");
+    bytes = ZSTD_compress(frame, sizeof frame, raw, bytes, 3); /* content size, no checksum */
+    need(!ZSTD_isError(bytes), "ZSTD_compress");
+    need(H5Dwrite_chunk(id, H5P_DEFAULT, 0, at, bytes, frame) >= 0, "chunk");
+    H5Dclose(id);
+}
 static void v_coding(void) { set_text("/mesh/faces", "coding", "zebra"); }
 static void v_coding_missing(void) { drop_attribute("/mesh/faces", "coding"); }
 static void v_minor(void) { set_int("/", "format_version_minor", -1); }
@@ -231,7 +260,15 @@ static void v_map_twice(void) { poke("/maps/face_source", 1, 0); }
 static void v_map_far(void) { poke("/maps/vertex_source", 0, 200); }
 static void v_content(void) { poke("/mesh/vertices", 0, 2); }
 
-typedef enum late_change { NONE, CUT, FLIP_CHUNK, FLIP_HEAD, SWAP_CHUNK, NOT_HDF5 } late_change;
+typedef enum late_change {
+    NONE,
+    CUT,
+    FLIP_CHUNK,
+    FLIP_HEAD,
+    SWAP_CHUNK,
+    NOT_HDF5,
+    USER_BLOCK
+} late_change;
 
 typedef struct failed_vector {
     const char *name, *base;
@@ -244,6 +281,7 @@ typedef struct failed_vector {
 static const failed_vector failed[] = {
     { "not_hdf5", LEAVES, NULL, NOT_HDF5, "2", "whole HDF5 file" },
     { "cut_off", LEAVES, NULL, CUT, "2", "whole HDF5 file" },
+    { "user_block", LEAVES, NULL, USER_BLOCK, "2", "begins with its superblock" },
     { "head_bit_flipped", LEAVES, NULL, FLIP_HEAD, "2", "all metadata is checksummed" },
     { "format_wrong", LEAVES, v_format, NONE, "3", "it is not `EBP-Octree in HDF5`" },
     { "format_missing", LEAVES, v_format_missing, NONE, "3", "it is not `EBP-Octree in HDF5`" },
@@ -253,6 +291,7 @@ static const failed_vector failed[] = {
       "A reader must refuse a word in `required_parts` that it does not know" },
     { "required_part_levels_missing", LEAVES, v_no_levels_part, NONE, "3", "`levels` is missing" },
     { "part_listed_twice", LEAVES, v_part_twice, NONE, "3", "a known word stands twice" },
+    { "maps_without_mesh", NO_MESH, v_maps_alone, NONE, "3", "Refuse `maps` without `mesh`" },
     { "subset_without_its_word", BOXED, v_subset_word, NONE, "3",
       "The word `pruned` is there if and only if a node is pruned" },
     { "subset_of_missing", BOXED, v_subset_of, NONE, "3", "a subset without it" },
@@ -266,13 +305,18 @@ static const failed_vector failed[] = {
       "Every array of these tables whose rows the head counts must be there" },
     { "places_of_another_array", CHUNKS, v_places_array, NONE, "9",
       "has more or fewer chunks in the list than it has" },
-    { "places_of_impossible_bytes", CHUNKS, v_places_bytes, NONE, "9",
-      "more than its filters can make of it" },
+    { "places_beyond_the_end", CHUNKS, v_places_end, NONE, "9",
+      "reaches beyond the end of the file" },
+    { "places_of_impossible_bytes", CHUNKS, v_places_bytes, NONE, "9", "more than it can have" },
+    { "places_missing", SUBTREES, v_places, NONE, "9", "`/subtrees/places` must be there" },
+    { "subtree_outer_missing", CHUNKS, v_outer, NONE, "9",
+      "its rows are not as many as columns 4 and 5 of all subtrees add up to" },
     { "pruned_in_a_whole_file", DEEP, v_pruned_whole, NONE, "4",
       "`pruned` is 0 in files that are no subsets" },
     { "attribute_missing", LEAVES, v_attribute_missing, NONE, "3",
       "A required attribute that is missing" },
     { "attribute_of_wrong_type", LEAVES, v_attribute_type, NONE, "2", "refuse other types" },
+    { "text_of_variable_length", LEAVES, v_variable, NONE, "2", "refuse text of variable length" },
     { "kind_unknown", LEAVES, v_kind, NONE, "3", "another word" },
     { "unit_with_control_character", LEAVES, v_control, NONE, "1", "no control characters" },
     { "digest_not_hexadecimal", LEAVES, v_digest_text, NONE, "3", "not 64 digits `0-9 a-f`" },
@@ -293,6 +337,8 @@ static const failed_vector failed[] = {
     { "nodes_do_not_add_up", LEAVES, v_nodes, NONE, "4", "is 8 for each group" },
     { "planes_more_than_nodes_can_have", LEAVES, v_planes_many, NONE, "4",
       "more than 255 for each node" },
+    { "count_of_absent_part", LEAVES, v_absent_part, NONE, "4",
+      "Refuse a count of an absent part that is not 0" },
     { "planes_count_wrong", DEEP, v_planes_count, NONE, "4",
       "Its rows are as many as the column *shape* says" },
     { "new_faces_do_not_add_up", LEAVES, v_new_sum, NONE, "4",
@@ -323,6 +369,8 @@ static const failed_vector failed[] = {
     { "array_with_other_filter", ONE, v_filter, NONE, "2",
       "A reader must refuse any other pipeline" },
     { "chunk_bit_flipped", LEAVES, NULL, FLIP_CHUNK, "2", "the frame's checksum" },
+    { "chunk_frame_without_checksum", LEAVES, v_no_checksum, NONE, "2",
+      "a frame without its checksum" },
     { "chunk_frame_of_other_size", LEAVES, NULL, SWAP_CHUNK, "2",
       "does not decode to exactly its size" },
     { "root_with_siblings", LEAVES, v_root_siblings, NONE, "4", "level 0: bits 2 .. 15 not 0" },
@@ -386,6 +434,12 @@ static void change_bytes(const char *path, late_change late)
     case FLIP_HEAD: data[60] ^= 16; break;
     case SWAP_CHUNK: memcpy(data + faces, data + types, other_size); break;
     case NOT_HDF5: memset(data, ' ', size = 64); break;
+    case USER_BLOCK:
+        data = realloc(data, size + 512);
+        memmove(data + 512, data, size);
+        memset(data, ' ', 512);
+        size += 512;
+        break;
     case NONE: break;
     }
     spill(path, data, size);

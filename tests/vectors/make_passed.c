@@ -137,8 +137,9 @@ static void write_vector(const char *name, ebpo_tree *tree, ebpo_codec codec, ui
     write_laid_out(name, tree, codec, parts, 0);
 }
 
-/* A passed vector as another program may have left it, or a later version. */
-static void derive(const char *name, const char *base, void (*change)(void))
+/* A passed vector as another program may have left it, or a later version; `behind`: bytes that
+ * follow the HDF5 file. */
+static void derive_longer(const char *name, const char *base, void (*change)(void), size_t behind)
 {
     char path[512];
     size_t size;
@@ -150,10 +151,20 @@ static void derive(const char *name, const char *base, void (*change)(void))
     spill(path, data, size);
     free(data);
     change_objects(path, change);
+    data = slurp(path, &size);
+    data = realloc(data, size + behind);
+    memset(data + size, 0, behind);
+    spill(path, data, size + behind);
+    free(data);
     if (vector_read(path, &back, &error) != EBPO_OK)
         die(name, error.message);
     write_json(name, &back);
     ebpo_tree_free(&back);
+}
+
+static void derive(const char *name, const char *base, void (*change)(void))
+{
+    derive_longer(name, base, change, 0);
 }
 
 static void subset(ebpo_tree *tree, const char *base, const ebpo_subset_options *options)
@@ -234,22 +245,8 @@ static void without_filters(void)
         "/levels/00/leaf_new", "/levels/00/leaf_ref_count", "/mesh/vertices",
         "/mesh/faces",         "/maps/vertex_source",       "/maps/face_source"
     };
-    for (size_t i = 0; i < sizeof paths / sizeof *paths; i++) {
-        int64_t values[64];
-        hsize_t dims[2] = { 0, 0 };
-        hid_t id = H5Dopen2(changed, paths[i], H5P_DEFAULT), space = H5Dget_space(id),
-              type = H5Dget_type(id);
-        H5Sget_simple_extent_dims(space, dims, NULL);
-        need(H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, paths[i]);
-        replace(paths[i], (new_array){ .type = type,
-                                       .rows = dims[0],
-                                       .cols = dims[1],
-                                       .chunk = dims[0],
-                                       .values = values });
-        H5Tclose(type);
-        H5Sclose(space);
-        H5Dclose(id);
-    }
+    for (size_t i = 0; i < sizeof paths / sizeof *paths; i++)
+        refilter(paths[i], NULL);
 }
 
 static void of_a_later_version(void)
@@ -282,12 +279,70 @@ static void without_the_word_maps(void)
     H5Lmove(changed, "/x-maps", changed, "/maps", H5P_DEFAULT, H5P_DEFAULT);
 }
 
+/* Texts that end in zeros or in none, of ASCII; rows of one value; hints of other types; and the
+ * name that leaf_skip's coding had. */
+static void with_attributes_of_others(void)
+{
+    set_text_as("/", "format", "EBP-Octree in HDF5", 40, H5T_STR_NULLTERM);
+    set_text_as("/", "kind", "solid", 5, H5T_STR_SPACEPAD);
+    set_text_as("/mesh/vertices", "coding", "delta", 12, H5T_STR_NULLTERM);
+    set_text("/", "date", "");
+    set_text("/", "selection", "");
+    set_row("/", "face_count", H5T_STD_U64LE, 4);
+    set_row("/", "level_count", H5T_STD_I64LE, 2);
+    set_row("/", "chunk_index_bytes", H5T_STD_I32BE, -1);
+    set_text("/", "chunk_index_offset", "behind the levels");
+    set_text("/levels/01/leaf_skip", "coding", "delta");
+}
+
+/* On paths of this page, of parts that are listed; the first two where the head counts no rows. */
+static void with_arrays_not_called_for(void)
+{
+    add_array("/levels/00/leaf_skip", (new_array){ H5T_STD_U32LE, 0, 0, 1, .unwritten = true });
+    add_array("/levels/00/leaf_new", (new_array){ H5T_IEEE_F64BE, 3, 0, 0 });
+    add_array("/levels/01/leaf_planes", (new_array){ H5T_STD_U32LE, 2, 0, 2 });
+    add_array("/levels/01/colours", (new_array){ H5T_STD_U8LE, 2, 3, 1 });
+    add_array("/mesh/faces_index", (new_array){ H5T_STD_U64LE, 1, 1, 1 });
+    need(H5Lcreate_soft("/elsewhere", changed, "/maps/names", H5P_DEFAULT, H5P_DEFAULT) >= 0,
+         "link");
+}
+
+static void shuffle_and_deflate(hid_t dcpl)
+{
+    H5Pset_shuffle(dcpl);
+    H5Pset_deflate(dcpl, 1);
+    H5Pset_fletcher32(dcpl);
+}
+
+/* As `h5repack -f SHUF -f GZIP=1 -f FLET` leaves arrays of one byte. */
+static void shuffle_bytes(void)
+{
+    refilter("/levels/00/leaf_winding", shuffle_and_deflate);
+    refilter("/levels/00/leaf_new", shuffle_and_deflate);
+    refilter("/levels/00/leaf_ref_count", shuffle_and_deflate);
+}
+
+/* The list is false, and nobody may look at it. */
+static void without_offset_of_places(void)
+{
+    drop_attribute("/subtrees/places", "offset");
+    poke("/subtrees/places", 1, INT64_C(4097) << 32 | 8);
+}
+static void with_false_places(void) { poke("/subtrees/places", 1, INT64_C(4097) << 32 | 8); }
+
 static void make_derived(void)
 {
     derive("18_one_leaf_bare", "03_one_leaf", without_filters);
     derive("19_unknown_optional_part", "03_one_leaf", of_a_later_version);
     derive("20_version_1_0", "05_two_levels", of_version_1_0);
     derive("33_part_not_listed", "05_two_levels", without_the_word_maps);
+    derive("34_attributes_of_other_programs", "05_two_levels", with_attributes_of_others);
+    derive("35_arrays_not_called_for", "05_two_levels", with_arrays_not_called_for);
+    derive("36_shuffled_bytes", "02_one_leaf_deflate", shuffle_bytes);
+    derive("37_places_without_offset", "17_chunks_of_subtrees_unfiltered",
+           without_offset_of_places);
+    derive_longer("38_bytes_behind_the_end", "17_chunks_of_subtrees_unfiltered",
+                  with_false_places, 16);
 }
 
 /* --- what meshes may be like --- */

@@ -3,9 +3,9 @@
 export const CHUNK_BYTES_MAX = 65536; // before compression
 export const FILTER = { deflate: 1, shuffle: 2, fletcher32: 3, zstd: 32015 };
 
-/** 'zstd', 'deflate', 'checksum' or 'bare' for an array's filters, or undefined when they are none of the format's. */
+/** 'zstd', 'deflate', 'checksum' or 'bare' for an array's filters, or undefined when they are none of the format's. Single bytes may be shuffled, too. */
 export function pipelineOf(filters, elementSize) {
-  const ids = filters.map((f) => f.id), shuffle = elementSize > 1 ? [FILTER.shuffle] : [];
+  const ids = filters.map((f) => f.id), shuffle = elementSize > 1 || ids[0] === FILTER.shuffle ? [FILTER.shuffle] : [];
   const is = (...wanted) => wanted.length === ids.length && wanted.every((id, i) => id === ids[i]);
   if (ids.length && ids[0] === FILTER.shuffle && filters[0].values[0] !== elementSize)
     return undefined;
@@ -16,7 +16,7 @@ export function pipelineOf(filters, elementSize) {
   return is(FILTER.fletcher32) ? 'checksum' : is() ? 'bare' : undefined;
 }
 
-/** The most bytes that an encoded chunk can have: generous for both compressors. */
+/** The most bytes that an encoded chunk may have. */
 export function chunkBound(bytes) {
   return bytes + (bytes >> 8) + 1024;
 }

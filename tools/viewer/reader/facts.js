@@ -50,7 +50,7 @@ class Facts {
   }
 
   text(name, most = 4096) {
-    const view = this.#get(name, 1, (t) => t.class === 'text' && t.padded && t.utf8 && t.size >= 1 && t.size <= most, 'a fixed-length UTF-8 text of a sensible length');
+    const view = this.#get(name, 1, (t) => t.class === 'text' && t.size >= 1 && t.size <= most, 'a fixed-length UTF-8 text of a sensible length');
     const bytes = new Uint8Array(view.buffer, view.byteOffset, view.byteLength), end = bytes.indexOf(0);
     const value = text(end < 0 ? bytes : bytes.subarray(0, end));
     if (value === undefined)
@@ -64,6 +64,15 @@ class Facts {
     if (value > BigInt(most))
       throw this.fail(name, 'it has a value that the format does not allow');
     return Number(value);
+  }
+
+  /** A count that may be absent, or of another program's type: then 0. */
+  hint(name) {
+    try {
+      return this.count(name);
+    } catch {
+      return 0;
+    }
   }
 
   int(name, least = 0, most = 2 ** 20) {
@@ -125,7 +134,7 @@ export function readFacts(attributes) {
   out.parts = readParts(facts);
   out.generator = facts.text('generator');
   for (const name of TEXTS)
-    out[name] = facts.has(name) ? facts.text(name) : undefined;
+    out[name] = facts.has(name) ? facts.text(name) || undefined : undefined;
   for (const name of Object.keys(WORDS))
     out[name] = facts.word(name);
   for (const name of FLAGS)
@@ -133,7 +142,7 @@ export function readFacts(attributes) {
   for (const name of COUNTS)
     out[name] = facts.count(name);
   for (const name of HINTS)
-    out[name] = facts.has(name) ? facts.count(name) : 0;
+    out[name] = facts.hint(name);
   for (const name of NUMBERS)
     out[name] = facts.int(name);
   out.mesh_genus = facts.int('mesh_genus', Number.MIN_SAFE_INTEGER, Number.MAX_SAFE_INTEGER);
@@ -301,7 +310,7 @@ const ROOT_ARRAYS = {
   '/maps/face_source': [0, [4], false, (info) => has(info, 'maps', info.face_count)],
 };
 
-/** Throws unless an array's attribute names the coding that the format has for it. In files of 1.0 `delta` stands at leaf_skip, too. */
+/** Throws unless an array's attribute names the coding that the format has for it. In older files `delta` stands at leaf_skip. */
 export function checkCoding(attributes, path) {
   const word = new Facts(attributes, path).text('coding', 15), name = path.startsWith('/levels/') ? path.slice(path.lastIndexOf('/') + 1) : path;
   if (!(CODINGS[name] ?? ['plain']).includes(word))

@@ -150,7 +150,7 @@ export class Hdf5 {
     const [base, extension, end, root] = [c.address(), c.address(), c.address(), c.address()];
     this.#checksum(0, 44, '');
     c.must(sizes[0] === 8 && sizes[1] === 8 && base === 0 && extension === undefined, 'the HDF5 file has another layout than EBP-Octree files have');
-    if (end !== this.size || root === undefined)
+    if (end === undefined || end > this.size || root === undefined)
       throw foreign();
     return root;
   }
@@ -329,7 +329,7 @@ function dataspace(c) {
   return { rank, dims, fixed: most.every((m, i) => m === dims[i]) && dims.every((d) => d !== undefined) };
 }
 
-/** { class: 'integer', size, signed, little } or { class: 'float' ... } or { class: 'text', size, padded, utf8 } or { class: 'other' }. */
+/** { class: 'integer', size, signed, little } or { class: 'float' ... } or { class: 'text', size } or { class: 'other' }. */
 function datatype(c) {
   const kind = c.u8(), bits = c.uint(3), size = c.u32();
   if ((kind & 15) === 0) {
@@ -342,7 +342,7 @@ function datatype(c) {
     return { class: size === 8 && bits === 0x3f20 && ieee.every((byte, i) => c.bytes[at + i] === byte) ? 'double' : 'other', size };
   }
   if ((kind & 15) === 3)
-    return { class: 'text', size, padded: (bits & 15) === 1, utf8: (bits >> 4 & 15) === 1 };
+    return { class: 'text', size }; // however it is padded, it ends at its first zero byte
   return { class: 'other', size };
 }
 
