@@ -175,8 +175,8 @@ static ebpo_status open_places(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
     bool stated = ebpo_h5_get_count(h5, id, a->path, "file_bytes", &bytes, NULL) == EBPO_OK &&
                   ebpo_h5_get_count(h5, id, a->path, "offset", &offset, NULL) == EBPO_OK;
     ebpo_h5_close_id(id);
-    file->has_places = stated && bytes == file->info.file_bytes && a->chunks &&
-                       offset == a->chunks[0].address;
+    file->has_places =
+        stated && bytes == file->info.file_bytes && a->chunks && offset == a->chunks[0].address;
     return EBPO_OK;
 }
 

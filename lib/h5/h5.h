@@ -134,8 +134,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_look_at_array(ebpo_h5_in *in, const char *path
                                                 ebpo_error *error);
 
 /* Attributes of an open group; `object` names it in messages. EBPO_E_ABSENT (without a message)
- * when there is none, EBPO_E_FORMAT for another type or size. Text: fixed length, at most size - 1
- * bytes, UTF-8 without control characters. */
+ * when there is none, EBPO_E_FORMAT for another type or size. Text: of fixed length, at most size -
+ * 1 bytes up to its first zero byte, UTF-8 without control characters. */
 EBPO_MUST_USE ebpo_status ebpo_h5_get_text(ebpo_h5_in *in, ebpo_h5_id id, const char *object,
                                            const char *name, char *text, size_t size,
                                            ebpo_error *error);

@@ -169,22 +169,27 @@ bool ebpo_h5_text_ok(const char *text)
     return true;
 }
 
+/* However it is padded, a text ends at its first zero byte, and its length is up to there. */
 static ebpo_status read_text(ebpo_h5_in *in, hid_t id, const char *object, const char *name,
                              char *text, size_t size, ebpo_error *error)
 {
+    enum { STORED_MOST = 65536 }; /* an attribute in a header has no more */
     hid_t attribute, type;
     ebpo_status status = open_attribute(in, id, object, name, 1, &attribute, &type, error);
+    size_t length = status == EBPO_OK ? H5Tget_size(type) : 0;
+    bool fits = length && length <= STORED_MOST && H5Tget_class(type) == H5T_STRING &&
+                H5Tis_variable_str(type) == 0;
+    char *stored = fits ? ebpo_alloc_zero(length + 1, 1) : NULL;
     memset(text, 0, size);
-    if (status == EBPO_OK) {
-        size_t length = H5Tget_size(type);
-        if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || length == 0 ||
-            length >= size || H5Aread(attribute, type, text) < 0 || !ebpo_h5_text_ok(text))
-            status =
-                attribute_fails(in, object, name,
-                                "it is not a fixed-length UTF-8 text of a sensible length", error);
-    }
-    if (status != EBPO_OK)
-        text[0] = 0;
+    if (fits && !stored)
+        status = ebpo_fail_memory(error, length + 1);
+    if (stored && H5Aread(attribute, type, stored) >= 0 && strlen(stored) < size &&
+        ebpo_h5_text_ok(stored))
+        memcpy(text, stored, strlen(stored));
+    else if (status == EBPO_OK)
+        status = attribute_fails(in, object, name,
+                                 "it is not a fixed-length UTF-8 text of a sensible length", error);
+    free(stored);
     close_attribute(attribute, type);
     return status;
 }

@@ -298,11 +298,15 @@ static void with_attributes_of_others(void)
 /* On paths of this page, of parts that are listed; the first two where the head counts no rows. */
 static void with_arrays_not_called_for(void)
 {
-    add_array("/levels/00/leaf_skip", (new_array){ H5T_STD_U32LE, 0, 0, 1, .unwritten = true });
-    add_array("/levels/00/leaf_new", (new_array){ H5T_IEEE_F64BE, 3, 0, 0 });
-    add_array("/levels/01/leaf_planes", (new_array){ H5T_STD_U32LE, 2, 0, 2 });
-    add_array("/levels/01/colours", (new_array){ H5T_STD_U8LE, 2, 3, 1 });
-    add_array("/mesh/faces_index", (new_array){ H5T_STD_U64LE, 1, 1, 1 });
+    add_array("/levels/00/leaf_skip",
+              (new_array){ .type = H5T_STD_U32LE, .rows = 0, .chunk = 1, .unwritten = true });
+    add_array("/levels/00/leaf_new", (new_array){ .type = H5T_IEEE_F64BE, .rows = 3 });
+    add_array("/levels/01/leaf_planes",
+              (new_array){ .type = H5T_STD_U32LE, .rows = 2, .chunk = 2 });
+    add_array("/levels/01/colours",
+              (new_array){ .type = H5T_STD_U8LE, .rows = 2, .cols = 3, .chunk = 1 });
+    add_array("/mesh/faces_index",
+              (new_array){ .type = H5T_STD_U64LE, .rows = 1, .cols = 1, .chunk = 1 });
     need(H5Lcreate_soft("/elsewhere", changed, "/maps/names", H5P_DEFAULT, H5P_DEFAULT) >= 0,
          "link");
 }
@@ -341,8 +345,8 @@ static void make_derived(void)
     derive("36_shuffled_bytes", "02_one_leaf_deflate", shuffle_bytes);
     derive("37_places_without_offset", "17_chunks_of_subtrees_unfiltered",
            without_offset_of_places);
-    derive_longer("38_bytes_behind_the_end", "17_chunks_of_subtrees_unfiltered",
-                  with_false_places, 16);
+    derive_longer("38_bytes_behind_the_end", "17_chunks_of_subtrees_unfiltered", with_false_places,
+                  16);
 }
 
 /* --- what meshes may be like --- */

@@ -50,10 +50,10 @@ class Facts {
   }
 
   text(name, most = 4096) {
-    const view = this.#get(name, 1, (t) => t.class === 'text' && t.size >= 1 && t.size <= most, 'a fixed-length UTF-8 text of a sensible length');
+    const view = this.#get(name, 1, (t) => t.class === 'text' && t.size >= 1 && t.size <= 65536, 'a fixed-length UTF-8 text of a sensible length');
     const bytes = new Uint8Array(view.buffer, view.byteOffset, view.byteLength), end = bytes.indexOf(0);
     const value = text(end < 0 ? bytes : bytes.subarray(0, end));
-    if (value === undefined)
+    if (value === undefined || (end < 0 ? bytes.length : end) > most)
       throw this.fail(name, 'it is not a fixed-length UTF-8 text of a sensible length');
     return value;
   }
