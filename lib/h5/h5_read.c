@@ -23,15 +23,6 @@ static hid_t file_access(ebpo_h5_driver *driver)
     return fapl;
 }
 
-/* libhdf5 would look for the signature behind a user block as well; then no address is a place in
- * the file. */
-static bool begins_as_hdf5(const ebpo_h5_driver *driver)
-{
-    static const char SIGNATURE[] = "\x89HDF\r\n\x1a\n";
-    return driver->head_bytes < sizeof SIGNATURE - 1 ||
-           memcmp(driver->head, SIGNATURE, sizeof SIGNATURE - 1) == 0;
-}
-
 ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_error *error)
 {
     *in = (ebpo_h5_in){ .shown = input->shown, .file = -1, .file_bytes = input->source.size };
@@ -43,7 +34,7 @@ ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_error *error)
         return status;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    hid_t fapl = begins_as_hdf5(in->driver) ? file_access(in->driver) : -1;
+    hid_t fapl = file_access(in->driver);
     in->file = fapl < 0 ? -1 : H5Fopen(in->shown, H5F_ACC_RDONLY, fapl);
     if (in->file < 0)
         status = ebpo_h5_fail(

@@ -260,15 +260,7 @@ static void v_map_twice(void) { poke("/maps/face_source", 1, 0); }
 static void v_map_far(void) { poke("/maps/vertex_source", 0, 200); }
 static void v_content(void) { poke("/mesh/vertices", 0, 2); }
 
-typedef enum late_change {
-    NONE,
-    CUT,
-    FLIP_CHUNK,
-    FLIP_HEAD,
-    SWAP_CHUNK,
-    NOT_HDF5,
-    USER_BLOCK
-} late_change;
+typedef enum late_change { NONE, CUT, FLIP_CHUNK, FLIP_HEAD, SWAP_CHUNK, NOT_HDF5 } late_change;
 
 typedef struct failed_vector {
     const char *name, *base;
@@ -281,7 +273,6 @@ typedef struct failed_vector {
 static const failed_vector failed[] = {
     { "not_hdf5", LEAVES, NULL, NOT_HDF5, "2", "whole HDF5 file" },
     { "cut_off", LEAVES, NULL, CUT, "2", "whole HDF5 file" },
-    { "user_block", LEAVES, NULL, USER_BLOCK, "2", "begins with its superblock" },
     { "head_bit_flipped", LEAVES, NULL, FLIP_HEAD, "2", "all metadata is checksummed" },
     { "format_wrong", LEAVES, v_format, NONE, "3", "it is not `EBP-Octree in HDF5`" },
     { "format_missing", LEAVES, v_format_missing, NONE, "3", "it is not `EBP-Octree in HDF5`" },
@@ -434,12 +425,6 @@ static void change_bytes(const char *path, late_change late)
     case FLIP_HEAD: data[60] ^= 16; break;
     case SWAP_CHUNK: memcpy(data + faces, data + types, other_size); break;
     case NOT_HDF5: memset(data, ' ', size = 64); break;
-    case USER_BLOCK:
-        data = realloc(data, size + 512);
-        memmove(data + 512, data, size);
-        memset(data, ' ', 512);
-        size += 512;
-        break;
     case NONE: break;
     }
     spill(path, data, size);
