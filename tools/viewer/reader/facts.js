@@ -294,6 +294,7 @@ const LEVEL_ARRAYS = {
   leaf_plane_counts: [0, [1], false, (info, s) => has(info, 'leaf-planes', s.leaf)],
   leaf_planes: [0, [4], false, (info, s) => has(info, 'leaf-planes', s.leaf_planes)],
 };
+export const LEVEL_ARRAY_COUNT = Object.keys(LEVEL_ARRAYS).length;
 const CODINGS = { // others: plain
   leaf_skip: ['skips', 'delta'], leaf_refs: ['gap'], '/mesh/vertices': ['delta'], '/mesh/faces': ['high-water'], '/maps/vertex_source': ['delta'],
   '/maps/face_source': ['delta'],

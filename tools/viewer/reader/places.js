@@ -1,5 +1,6 @@
 // Where all chunks lie, by the list that files with subtrees have: format-spec/README.md, section 9, "Places".
 import { formatError } from './error.js';
+import { LEVELS_MAX, LEVEL_ARRAY_COUNT } from './facts.js';
 
 /** The number of an array in that list. `order`: of the arrays of a level. */
 export function placeNumber(path, level, order) {
@@ -10,6 +11,11 @@ const ROOT_NUMBERS = { '/mesh/vertices': 4096, '/mesh/faces': 4097, '/mesh/faces
   '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/outer': 4114, '/subtrees/places': 4115 }; // the last one is not in its list
 
 const WHERE = '/subtrees/places';
+
+// Whether a number is that of an array which may be in the list; others are gaps, or of later versions.
+function isArray(number) {
+  return number < 64 * LEVELS_MAX ? number % 64 < LEVEL_ARRAY_COUNT : number !== ROOT_NUMBERS[WHERE] && Object.values(ROOT_NUMBERS).includes(number);
+}
 
 /** Whether the list is still true: other programs that write the file anew leave it as it was. */
 export function placesHold(places, size) {
@@ -53,6 +59,8 @@ export function readPlaces(rows, arrays, size) {
         throw formatError(WHERE, `a chunk of ${array.path} has a size that it cannot have`);
       chunks.push({ at, bytes });
     }
+    if (!array && isArray(rows[i + 1]))
+      throw formatError(WHERE, 'it has a chunk of an array that the file does not have');
     at += bytes;
   }
   for (const [array, chunks] of out) {
