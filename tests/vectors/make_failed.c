@@ -42,6 +42,12 @@ static void v_variable(void) { set_text_as("/", "unit", "m", H5T_VARIABLE, H5T_S
 static void v_maps_alone(void) { set_text("/", "optional_parts", "planes maps"); }
 static void v_absent_part(void) { set_count("/levels/01", "leaf_planes", 3); }
 static void v_required(void) { set_text("/", "required_parts", "levels mesh animation"); }
+static void v_required_first(void)
+{
+    v_required();
+    drop_attribute("/", "epsilon");
+    set_text("/", "kind", "liquid");
+}
 static void v_no_levels_part(void) { set_text("/", "required_parts", "mesh"); }
 static void v_part_twice(void) { set_text("/", "optional_parts", "planes planes"); }
 static void v_subset_word(void) { set_text("/", "required_parts", "levels mesh"); }
@@ -194,6 +200,24 @@ static void v_no_checksum(void)
     need(H5Dwrite_chunk(id, H5P_DEFAULT, 0, at, bytes, frame) >= 0, "chunk");
     H5Dclose(id);
 }
+/* One frame, which is right, with hundreds of empty blocks before the others. RFC 8878, 3.1.1. */
+static void v_long_chunk(void)
+{
+    static const char path[] = "/mesh/faces";
+    enum { EMPTY_BLOCKS = 3 * 400 };
+    uint8_t stored[4096], frame[4096 + EMPTY_BLOCKS] = { 0 };
+    hsize_t at[2] = { 0, 0 }, size = 0;
+    uint32_t mask;
+    (void)chunk_address(path, &size);
+    hid_t id = H5Dopen2(changed, path, H5P_DEFAULT);
+    need(size <= sizeof stored && H5Dread_chunk(id, H5P_DEFAULT, at, &mask, stored) >= 0, path);
+    need(stored[4] >> 5 == 1 && (stored[4] & 3) == 0, "a frame of a single segment");
+    size_t header = 4 + 1 + 1; /* magic number, descriptor, size in one byte */
+    memcpy(frame, stored, header);
+    memcpy(frame + header + EMPTY_BLOCKS, stored + header, (size_t)size - header);
+    need(H5Dwrite_chunk(id, H5P_DEFAULT, 0, at, (size_t)size + EMPTY_BLOCKS, frame) >= 0, "chunk");
+    H5Dclose(id);
+}
 static void v_coding(void) { set_text("/mesh/faces", "coding", "zebra"); }
 static void v_coding_missing(void) { drop_attribute("/mesh/faces", "coding"); }
 static void v_minor(void) { set_int("/", "format_version_minor", -1); }
@@ -280,6 +304,8 @@ static const failed_vector failed[] = {
     { "version_draft", LEAVES, v_draft, NONE, "3", "it is `1.0-draft`" },
     { "required_part_unknown", LEAVES, v_required, NONE, "3",
       "A reader must refuse a word in `required_parts` that it does not know" },
+    { "required_part_unknown_told_first", LEAVES, v_required_first, NONE, "3",
+      "A reader must judge `format`, the version and the lists of parts before all else" },
     { "required_part_levels_missing", LEAVES, v_no_levels_part, NONE, "3", "`levels` is missing" },
     { "part_listed_twice", LEAVES, v_part_twice, NONE, "3", "a known word stands twice" },
     { "maps_without_mesh", NO_MESH, v_maps_alone, NONE, "3", "Refuse `maps` without `mesh`" },
@@ -360,6 +386,8 @@ static const failed_vector failed[] = {
     { "array_with_other_filter", ONE, v_filter, NONE, "2",
       "A reader must refuse any other pipeline" },
     { "chunk_bit_flipped", LEAVES, NULL, FLIP_CHUNK, "2", "the frame's checksum" },
+    { "chunk_larger_than_it_can_be", LEAVES, v_long_chunk, NONE, "2",
+      "takes more than its raw bytes, a 256th of them, and 1,024" },
     { "chunk_frame_without_checksum", LEAVES, v_no_checksum, NONE, "2",
       "a frame without its checksum" },
     { "chunk_frame_of_other_size", LEAVES, NULL, SWAP_CHUNK, "2",

@@ -286,6 +286,7 @@ static void with_attributes_of_others(void)
     set_text_as("/", "format", "EBP-Octree in HDF5", 40, H5T_STR_NULLTERM);
     set_text_as("/", "kind", "solid", 5, H5T_STR_SPACEPAD);
     set_text_as("/mesh/vertices", "coding", "delta", 12, H5T_STR_NULLTERM);
+    set_text("/", "optional_parts", "seasons planes maps seasons");
     set_text("/", "date", "");
     set_text("/", "selection", "");
     set_row("/", "face_count", H5T_STD_U64LE, 4);

@@ -1,6 +1,6 @@
 #!/bin/sh
 # The zstd filter as a plugin, in the hands of HDF5's own tools: test_plugin.sh PLUGIN_FOLDER
-# VECTORS
+# VECTORS EBPO
 set -u
 export HDF5_PLUGIN_PATH="$1"
 vector="$2/passed/05_two_levels.ebpo.h5"
@@ -19,6 +19,8 @@ h5repack -f SHUF -f UD=32015,0,1,5 "$plain" "$work/packed.h5" ||
     fail "h5repack compresses with the plugin"
 h5dump -p -d /mesh/faces "$work/packed.h5" | grep -q 'FILTER_ID 32015' ||
     fail "the filter is recorded"
+h5repack -f SHUF -f GZIP=6 -f FLET "$vector" "$work/deflate.h5" &&
+    "$3" verify --quiet "$work/deflate.h5" || fail "h5repack makes the pipeline deflate"
 
 # What the specification says of tools without the plugin.
 HDF5_PLUGIN_PATH=/nowhere h5dump -d /mesh/faces "$vector" >"$work/dump" 2>&1 ; [ $? = 1 ] ||
