@@ -242,6 +242,63 @@ def check_places(file):
     assert own.byte_offset + own.size == stated["file_bytes"]
 
 
+def attribute_values(dataset, kind):
+    """README.md, "Attributes": rows of values, by the array's coding. `kind`: a type of numpy."""
+    code, word = dataset.dtype, text(dataset.attrs["coding"])
+    assert word in ("plain", "columns") and code.itemsize == np.dtype(kind).itemsize, dataset.name
+    if word == "plain":
+        return dataset[...].view(kind)
+    parts = []
+    for part in in_chunks(dataset):
+        columns = part.reshape(-1).reshape(part.size // len(part), len(part))
+        ordered = np.cumsum(unzigzag(columns), axis=1, dtype=unzigzag(columns).dtype)
+        if np.dtype(kind).kind == "f":
+            ordered = np.where(ordered < 0, ordered ^ np.iinfo(ordered.dtype).max, ordered)
+        parts.append(np.ascontiguousarray(ordered.T).reshape(part.shape))
+    return np.concatenate(parts).view(kind)
+
+
+ATTRIBUTE_TYPES = {"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+                   "float32": "f4", "float64": "f8"}
+
+
+def read_attributes(file):
+    """README.md, "Attributes": the part as vectors' .attributes.json have it, if its checksum is right."""
+    group, digests, out = file["/attributes"], {}, []
+
+    def digest(path, values):
+        digests[path] = hashlib.sha256(np.ascontiguousarray(values).tobytes()).digest()
+        return values
+
+    for number in range(int(group.attrs["arrays"])):
+        path = f"/attributes/{number:03d}"
+        array, kind = file[path], ATTRIBUTE_TYPES[text(file[path].attrs["type"])]
+        one = {name: text(array.attrs[name]) for name in ("element", "names", "type")}
+        one["list"] = text(array.attrs["list"]) if "list" in array.attrs else None
+        assert one["list"] is None or one["list"] in list(ATTRIBUTE_TYPES)[:6]
+        different = one["list"] is not None and array.attrs["different"] == 1
+        values = digest(path, attribute_values(array, "u8" if different else kind))
+        one["rows"], one["ends"] = len(values), listed(values) if different else None
+        if different:
+            ends = values.astype("i8")
+            assert (np.diff(ends, prepend=0) >= 0).all(), f"{path}: ends"
+            items = f"{path}_items"
+            values = digest(items, attribute_values(file[items], kind)) if items in file else np.zeros(0, kind)
+            assert ends[-1] == len(values), f"{path}: items"
+        assert one["element"] not in ("vertex", "face") or one["rows"] == file.attrs[one["element"] + "_count"], path
+        columns = len(one["names"].split(" "))
+        assert values.ndim == 1 or columns == values.shape[1] or one["list"] is not None, path
+        bits = values.view("u%d" % values.dtype.itemsize)
+        one["bits"] = listed(bits)                       # of floats: as integers, as NaN is none of JSON's numbers
+        out.append(one)
+    header = digest("/attributes/header", file["/attributes/header"][...]) if "header" in group else None
+    total = hashlib.sha256()
+    for path in sorted(digests):
+        total.update(path.encode() + b"\0" + digests[path])
+    assert total.hexdigest() == text(group.attrs["sha256"]), "attributes: sha256 differs"
+    return {"header": None if header is None else header.tobytes().decode("latin-1"), "arrays": out}
+
+
 def listed(values):
     if values is None:
         return None
@@ -395,6 +452,10 @@ def check_vectors(folder):
         stem = str(path)[:-len(".ebpo.h5")]
         found, wanted = read(path), json.loads(pathlib.Path(stem + ".json").read_text())
         assert same(found, wanted, found["coordinate_type"] == "float32"), path.name
+        with h5py.File(path, "r") as file:
+            if "attributes" in text(file.attrs["optional_parts"]).split():
+                wanted = json.loads(pathlib.Path(stem + ".attributes.json").read_text())
+                assert read_attributes(file) == wanted, path.name
         if pathlib.Path(stem + ".nodes.json").exists():
             check_nodes(path, json.loads(pathlib.Path(stem + ".nodes.json").read_text()))
         print(path.name)

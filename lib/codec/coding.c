@@ -135,3 +135,62 @@ void ebpo_integers_decode(const uint8_t *file, size_t file_size, bool is_signed,
         }
     }
 }
+
+static void put_native(void *values, size_t size, uint64_t i, uint64_t value)
+{
+    switch (size) {
+    case 1: ((uint8_t *)values)[i] = (uint8_t)value; break;
+    case 2: ((uint16_t *)values)[i] = (uint16_t)value; break;
+    case 4: ((uint32_t *)values)[i] = (uint32_t)value; break;
+    default: ((uint64_t *)values)[i] = value;
+    }
+}
+
+static void store(uint8_t *file, size_t size, uint64_t value)
+{
+    switch (size) {
+    case 1: *file = (uint8_t)value; break;
+    case 2: ebpo_store16(file, (uint16_t)value); break;
+    case 4: ebpo_store32(file, (uint32_t)value); break;
+    default: ebpo_store64(file, value);
+    }
+}
+
+static uint64_t sortable(uint64_t bits, size_t size)
+{
+    return size == 4 ? ebpo_float_order32((uint32_t)bits) : ebpo_float_order64(bits);
+}
+
+/* The difference as a number of `size` bytes: its sign is that of its highest bit. */
+static uint64_t zigzag_of(uint64_t difference, size_t size)
+{
+    unsigned unused = 64 - 8 * (unsigned)size;
+    return ebpo_zigzag64((uint64_t)((int64_t)(difference << unused) >> unused));
+}
+
+void ebpo_columns_encode(const void *values, size_t size, bool floats, uint64_t rows, uint32_t cols,
+                         uint8_t *file)
+{
+    for (uint32_t c = 0; c < cols; c++) {
+        uint64_t before = 0;
+        for (uint64_t i = 0; i < rows; i++, file += size) {
+            uint64_t value = native(values, size, i * cols + c);
+            if (floats)
+                value = sortable(value, size);
+            store(file, size, zigzag_of(value - before, size));
+            before = value;
+        }
+    }
+}
+
+void ebpo_columns_decode(const uint8_t *file, size_t size, bool floats, uint64_t rows,
+                         uint32_t cols, void *values)
+{
+    for (uint32_t c = 0; c < cols; c++) {
+        uint64_t value = 0;
+        for (uint64_t i = 0; i < rows; i++, file += size) {
+            value += ebpo_unzigzag64(load(file, size, false));
+            put_native(values, size, i * cols + c, floats ? sortable(value, size) : value);
+        }
+    }
+}

@@ -34,6 +34,15 @@ void ebpo_points64_decode(const uint8_t *file, uint64_t rows, double *xyz);
 void ebpo_numbers_encode(const uint32_t *numbers, uint64_t rows, uint8_t *file);
 void ebpo_numbers_decode(const uint8_t *file, uint64_t rows, uint32_t *numbers);
 
+/* Columns: [rows][cols] of unsigned integers of 1, 2, 4 or 8 bytes, in the machine's byte order; in
+ * `file` column after column, of each value the difference to the one before (0 before the first),
+ * wrapping, zigzag. `floats`: the values are bits of floats (4 or 8 bytes), as integers that sort
+ * as these do. */
+void ebpo_columns_encode(const void *values, size_t size, bool floats, uint64_t rows, uint32_t cols,
+                         uint8_t *file);
+void ebpo_columns_decode(const uint8_t *file, size_t size, bool floats, uint64_t rows,
+                         uint32_t cols, void *values);
+
 /* Corners of faces, [rows][3], by the number `*seen` of vertices used so far: 0 stands for vertex
  * *seen (which is then seen), k > 0 for *seen - k. False (with *seen as far as it got) when a
  * corner names a vertex beyond the next new one; or, decoding, a vertex below 0. */

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "arrange/arrange.h"
+#include "attributes/attributes.h"
 #include "base/alloc.h"
 #include "base/clock.h"
 #include "base/error.h"
@@ -148,6 +149,8 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
         info->mend = *mend;
     info->report = *report;
     info->parts = o->parts;
+    if (!ebpo_attributes_hold(mesh->attributes) || !(o->parts & EBPO_PART_MESH))
+        info->parts &= ~(uint32_t)EBPO_PART_ATTRIBUTES;
 }
 
 /* A tree that is deeper than the order is good for needs another one. */
@@ -297,7 +300,8 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
         out->level[i].workspace = mesh->workspace;
     ebpo_status status = EBPO_TAKE(ebpo_build_options, &wanted, options, error);
     /* other bits stand for other needs of arrays */
-    wanted.parts &= EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES;
+    wanted.parts &= EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES |
+                    EBPO_PART_ATTRIBUTES;
     if (status == EBPO_OK && wanted.times)
         status = EBPO_CHECK_SIZED(ebpo_build_times, wanted.times, error);
     if (status == EBPO_OK) {

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "attributes/attributes.h"
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
@@ -153,6 +154,7 @@ ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, eb
     ebpo_mesh *m = &out->mesh;
     *m = *mesh;
     m->arrangement = NULL;
+    mesh->attributes = NULL; /* they are the tree's */
     m->xyz32 = mesh->xyz64 ? NULL : ebpo_array_alloc(b->workspace, nv, 3 * sizeof(float));
     m->xyz64 = mesh->xyz64 ? ebpo_array_alloc(b->workspace, nv, 3 * sizeof(double)) : NULL;
     m->faces = ebpo_array_alloc(b->workspace, nf, 3 * sizeof(uint32_t));
@@ -165,6 +167,10 @@ ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, eb
         status = ebpo_workspace_fail(b->workspace, nv * 16 + nf * 16, error);
     else
         status = move_all(&job, final, error);
+    if (status == EBPO_OK)
+        status = ebpo_attributes_pick(m->attributes, "vertex", out->vertex_source, nv, error);
+    if (status == EBPO_OK)
+        status = ebpo_attributes_pick(m->attributes, "face", out->face_source, nf, error);
     ebpo_array_free(b->workspace, face_at);
     ebpo_array_free(b->workspace, final);
     return status;

@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/sized.h"
+#include "container/attribute_arrays.h"
 #include "container/content.h"
 #include "container/reader.h"
 
@@ -88,5 +89,7 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
     ebpo_expect_tree(file);
     status =
         ebpo_parallel_for(read.threads, NULL, j.count, 1, digest_arrays, &j, NULL, "check", error);
-    return status == EBPO_OK ? compare(&j, error) : status;
+    if (status == EBPO_OK)
+        status = compare(&j, error);
+    return status == EBPO_OK ? ebpo_attributes_check(file, &read, error) : status;
 }

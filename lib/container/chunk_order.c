@@ -31,7 +31,7 @@ static int by_subtree(const void *a, const void *b)
 /* Which arrays come next. */
 typedef struct choice {
     int first_level, last_level; /* of the arrays of levels */
-    enum { WHOLE, TOP_INDEXES, NODES, LISTS, MESH, MAPS, TABLE } kind;
+    enum { WHOLE, TOP_INDEXES, NODES, LISTS, MESH, MAPS, TABLE, OF_MESH, REST } kind;
 } choice;
 
 /* Else what nodes are. */
@@ -56,6 +56,8 @@ static bool chosen(const choice *c, const ebpo_array_out *a)
     case MESH:
         return a->id == EBPO_A_VERTICES || a->id == EBPO_A_FACES || a->id == EBPO_A_FACE_SOURCE;
     case MAPS: return a->id == EBPO_A_VERTEX_SOURCE;
+    case OF_MESH: return a->id == EBPO_A_ATTRIBUTE && a->rows_of != EBPO_A_ATTRIBUTE;
+    case REST: return a->id == EBPO_A_ATTRIBUTE && a->rows_of == EBPO_A_ATTRIBUTE;
     case TABLE: return a->id == EBPO_A_SUBTREE_COUNTS || a->id == EBPO_A_SUBTREE_OUTER;
     }
     return false;
@@ -77,7 +79,9 @@ static void add_by_subtree(ordering *o, const choice *c)
         const ebpo_array_out *a = &o->plan->array[chunk->array];
         uint64_t row = (uint64_t)chunk->chunk * a->shape.chunk_rows;
         chunk->subtree =
-            ebpo_subtree_of_row(&o->plan->subtrees, &o->plan->info, a->id, a->level, row);
+            a->id == EBPO_A_ATTRIBUTE
+                ? ebpo_subtree_of_row(&o->plan->subtrees, &o->plan->info, a->rows_of, 0, row)
+                : ebpo_subtree_of_row(&o->plan->subtrees, &o->plan->info, a->id, a->level, row);
     }
     if (o->out->count > begin)
         qsort(o->out->chunk + begin, o->out->count - begin, sizeof *o->out->chunk, by_subtree);
@@ -99,6 +103,8 @@ static void order_subtrees(ordering *o)
     add_by_subtree(o, &(choice){ deep, last, LISTS });
     add_by_subtree(o, &(choice){ 0, 0, MESH });
     add_by_subtree(o, &(choice){ 0, 0, MAPS });
+    add_by_subtree(o, &(choice){ 0, 0, OF_MESH });
+    add(o, &(choice){ 0, 0, REST });
 }
 
 ebpo_status ebpo_chunk_order_make(ebpo_chunk_order *out, const ebpo_plan *plan, ebpo_error *error)

@@ -10,7 +10,8 @@ enum {
     CHUNK_MOST = 32768,
     MAP_ROWS = 2048,
     FACES_INDEX_ROWS = 512,
-    OUTER_ROWS = 4096
+    OUTER_ROWS = 4096,
+    ATTRIBUTE_ROWS = 2048
 };
 
 __extension__ typedef unsigned __int128 wide; /* of rows there are at most 2^40 */
@@ -50,6 +51,7 @@ static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, 
     case EBPO_A_FACES_INDEX: return FACES_INDEX_ROWS;
     case EBPO_A_SUBTREE_COUNTS: return ebpo_subtree_rows(info);
     case EBPO_A_SUBTREE_OUTER: return OUTER_ROWS;
+    case EBPO_A_ATTRIBUTE: return ATTRIBUTE_ROWS;
     default: break;
     }
     if (id >= EBPO_LEVEL_ARRAYS || level <= ebpo_last_whole_level(info) || ebpo_schema_is_index(id))

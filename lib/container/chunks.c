@@ -9,6 +9,7 @@
 #include "base/arrays.h"
 #include "base/hash.h"
 #include "codec/coding.h"
+#include "container/attribute_arrays.h"
 #include "container/chunks.h"
 
 enum { CHUNK_BITS = 48, AROUND = 4 };
@@ -20,6 +21,8 @@ static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
     uint64_t number = array->id < EBPO_LEVEL_ARRAYS
                           ? (uint64_t)array->level * EBPO_LEVEL_ARRAYS + array->id
                           : (uint64_t)EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + array->id;
+    if (array->id == EBPO_A_ATTRIBUTE)
+        number += 1 + (uint64_t)array->level;
     return number << CHUNK_BITS | chunk;
 }
 
@@ -28,7 +31,9 @@ static const ebpo_array_in *array_of(const ebpo_chunks *c, uint64_t key)
     uint64_t number = key >> CHUNK_BITS, levels = (uint64_t)EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS;
     return number < levels
                ? &c->file->level_array[number / EBPO_LEVEL_ARRAYS][number % EBPO_LEVEL_ARRAYS]
-               : &c->file->root_array[number - levels];
+           : number - levels <= EBPO_A_ATTRIBUTE
+               ? &c->file->root_array[number - levels]
+               : &c->file->attributes.array[number - levels - EBPO_A_ATTRIBUTE - 1];
 }
 
 static uint64_t chunk_of(uint64_t key) { return key & ((UINT64_C(1) << CHUNK_BITS) - 1); }
@@ -112,6 +117,7 @@ static ebpo_status decode(const ebpo_chunks *c, const ebpo_array_in *array, uint
     case EBPO_A_FACES: return decode_faces(c, chunk, rows, raw, item, error);
     case EBPO_A_VERTEX_SOURCE:
     case EBPO_A_FACE_SOURCE: return decode_map(c, array->id, rows, raw, item, error);
+    case EBPO_A_ATTRIBUTE: ebpo_attribute_decode(c->file, array, rows, raw, item); return EBPO_OK;
     default: memcpy(item, raw, rows * ebpo_h5_row_bytes(&array->shape)); return EBPO_OK;
     }
 }

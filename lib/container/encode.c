@@ -1,6 +1,7 @@
 /* Rows to bytes, see plan.h. */
 #include "base/endian.h"
 #include "codec/coding.h"
+#include "container/attribute_arrays.h"
 #include "container/plan.h"
 
 static void encode_skips(const ebpo_level *level, const ebpo_h5_shape *shape, uint64_t row,
@@ -68,6 +69,7 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
         (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &seen, file);
         break;
     case EBPO_A_VERTEX_SOURCE: ebpo_numbers_encode(tree->vertex_source + row, rows, file); break;
+    case EBPO_A_ATTRIBUTE: ebpo_attributes_encode(plan, array, row, rows, file); break;
     case EBPO_A_FACE_SOURCE: ebpo_numbers_encode(tree->face_source + row, rows, file); break;
     default: {
         uint64_t cols = array->shape.cols ? array->shape.cols : 1;

@@ -53,6 +53,12 @@ void ebpo_expect_root(ebpo_expected *e, uint32_t needs)
             ebpo_expect_array(e, &e->file->root_array[id]);
 }
 
+void ebpo_expect_attributes(ebpo_expected *e)
+{
+    for (int i = 0; i < e->file->attributes.arrays; i++)
+        ebpo_expect_array(e, &e->file->attributes.array[i]);
+}
+
 static int compare_ranges(const void *a, const void *b)
 {
     uint64_t x = ((const ebpo_range *)a)->offset, y = ((const ebpo_range *)b)->offset;
@@ -148,5 +154,6 @@ void ebpo_expect_tree(const ebpo_file *file)
     for (int level = 0; level < file->info.level_count; level++)
         ebpo_expect_level(&e, level, 0);
     ebpo_expect_root(&e, ~0u);
+    ebpo_expect_attributes(&e);
     ebpo_expect_all(&e);
 }

@@ -22,6 +22,8 @@ static const char *check_mesh_counts(const ebpo_info *info)
         return "the mesh has more vertices or faces than its source and the mending account for";
     if (info->parts & EBPO_PART_MAPS && !(info->parts & EBPO_PART_MESH))
         return "there are maps but no mesh";
+    if (info->parts & EBPO_PART_ATTRIBUTES && !(info->parts & EBPO_PART_MESH))
+        return "there are attributes but no mesh";
     return NULL;
 }
 

@@ -27,6 +27,11 @@ EBPO_MUST_USE ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_i
 EBPO_MUST_USE ebpo_status ebpo_facts_get_level(ebpo_h5_in *in, ebpo_h5_id group, const char *path,
                                                ebpo_level_summary *level, ebpo_error *error);
 
+/* One digest, of any object. */
+EBPO_MUST_USE ebpo_status ebpo_facts_get_digest(ebpo_h5_in *in, ebpo_h5_id id, const char *object,
+                                                const char *name, uint8_t digest[32],
+                                                ebpo_error *error);
+
 /* Checks that the facts agree with each other: ranges, and sums over the levels. For files
  * (EBPO_E_FORMAT) and for callers' trees (EBPO_E_ARGUMENT). */
 EBPO_MUST_USE ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_status as,

@@ -58,6 +58,16 @@ static ebpo_status get_digest(ebpo_h5_in *in, ebpo_h5_id id, const char *object,
     return EBPO_OK;
 }
 
+ebpo_status ebpo_facts_get_digest(ebpo_h5_in *in, ebpo_h5_id id, const char *object,
+                                  const char *name, uint8_t digest[32], ebpo_error *error)
+{
+    ebpo_status status = get_digest(in, id, object, name, digest, error);
+    return status == EBPO_E_ABSENT
+               ? ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, object, -1,
+                              "attribute %s is missing; get a fresh copy of the file", name)
+               : status;
+}
+
 static ebpo_status get_limited(ebpo_h5_in *in, ebpo_h5_id id, const char *object,
                                const ebpo_fact *f, void *field, ebpo_error *error)
 {

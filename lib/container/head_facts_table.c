@@ -86,6 +86,7 @@ const ebpo_part_word ebpo_part_words[] = {
     { "planes", EBPO_PART_PLANES, false },
     { "maps", EBPO_PART_MAPS, false },
     { "leaf-planes", EBPO_PART_LEAF_PLANES, false },
+    { "attributes", EBPO_PART_ATTRIBUTES, false },
     { "subtrees", EBPO_WORD_SUBTREES, true },
     { "pruned", EBPO_WORD_PRUNED, true },
 };

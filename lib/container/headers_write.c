@@ -2,6 +2,7 @@
 
 #include <stdio.h>
 
+#include "container/attribute_arrays.h"
 #include "container/head_facts.h"
 
 /* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that
@@ -83,6 +84,8 @@ static ebpo_status make_array(ebpo_headers *h, ebpo_array_out *a, const ebpo_fir
     if (status == EBPO_OK && first)
         status = ebpo_h5_put_chunk(&h->out, a->path, a->handle, &a->shape, 0, first->data,
                                    first->bytes, error);
+    if (status == EBPO_OK && a->id == EBPO_A_ATTRIBUTE)
+        return ebpo_attributes_put_array(&h->out, h->plan, a, error);
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(&h->out, a->handle, "coding", ebpo_schema[a->id].coding, error);
     if (status == EBPO_OK)
@@ -97,8 +100,9 @@ static ebpo_status lay_out(ebpo_headers *h, const char *path, const char *shown,
 {
     ebpo_plan *plan = h->plan;
     h->out.codec_level = h->codec_level;
-    ebpo_status status = ebpo_h5_create(&h->out, path, shown, head_bytes,
-                                        3 + (plan->info.subtree_level != 0), error);
+    ebpo_status status =
+        ebpo_h5_create(&h->out, path, shown, head_bytes,
+                       3 + (plan->info.subtree_level != 0) + (plan->attributes != NULL), error);
     if (status == EBPO_OK)
         status = ebpo_h5_root(&h->out, &h->root, error);
     if (status == EBPO_OK)
@@ -111,6 +115,8 @@ static ebpo_status lay_out(ebpo_headers *h, const char *path, const char *shown,
         status = make_root_group(h, "/maps", EBPO_NEEDS_MAPS, error);
     if (status == EBPO_OK)
         status = make_root_group(h, "/subtrees", EBPO_NEEDS_SUBTREES, error);
+    if (status == EBPO_OK)
+        status = ebpo_attributes_put_group(&h->out, plan, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)
         status = make_array(h, &plan->array[i], i == 0 ? &first : NULL, error);
     if (status == EBPO_OK && h->places.shape.rows)

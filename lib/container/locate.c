@@ -7,13 +7,19 @@
 #include "container/open.h"
 #include "container/places.h"
 
+enum {
+    OF_LEVELS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS,
+    OF_FORMAT = OF_LEVELS + EBPO_ARRAYS - EBPO_LEVEL_ARRAYS /* then come attributes */
+};
+
 static ebpo_array_in *array_number(ebpo_file *file, int i)
 {
-    int levels = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS;
-    return i < levels ? &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS]
-                      : &file->root_array[EBPO_LEVEL_ARRAYS + i - levels];
+    return i < OF_LEVELS   ? &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS]
+           : i < OF_FORMAT ? &file->root_array[EBPO_LEVEL_ARRAYS + i - OF_LEVELS]
+                           : &file->attributes.array[i - OF_FORMAT];
 }
-enum { ALL_ARRAYS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS - EBPO_LEVEL_ARRAYS };
+
+static int all_arrays(const ebpo_file *file) { return OF_FORMAT + file->attributes.arrays; }
 
 /* --- by HDF5's index --- */
 
@@ -50,7 +56,7 @@ static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
     ebpo_status status = ebpo_h5_open(&h5, &file->in, error);
     if (status == EBPO_OK)
         ebpo_h5_expect_index(&h5, index);
-    for (int i = 0; i < ALL_ARRAYS && status == EBPO_OK; i++)
+    for (int i = 0; i < all_arrays(file) && status == EBPO_OK; i++)
         status = locate_array(file, &h5, array_number(file, i), error);
     status = ebpo_h5_close(&h5, status, error);
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
@@ -62,7 +68,15 @@ static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
 typedef struct listing {
     ebpo_file *file;
     uint64_t seen[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS], seen_root[EBPO_ARRAYS];
+    uint64_t seen_attribute[1 + 2 * EBPO_ATTRIBUTE_ARRAYS];
 } listing;
+
+static uint64_t *seen_of(listing *l, ebpo_array_id id, int level)
+{
+    return id < EBPO_LEVEL_ARRAYS   ? &l->seen[level][id]
+           : id == EBPO_A_ATTRIBUTE ? &l->seen_attribute[level]
+                                    : &l->seen_root[id];
+}
 
 static ebpo_status list_fails(const ebpo_file *file, const char *what, const char *path,
                               ebpo_error *error)
@@ -75,11 +89,12 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_h5_chunk chunk, 
 {
     int level;
     ebpo_array_id id = ebpo_place_array(number, &level);
-    if (id == EBPO_ARRAYS)
-        return EBPO_OK; /* a gap, or of a part that is not known */
-    ebpo_array_in *a =
-        id < EBPO_LEVEL_ARRAYS ? &l->file->level_array[level][id] : &l->file->root_array[id];
-    uint64_t *seen = id < EBPO_LEVEL_ARRAYS ? &l->seen[level][id] : &l->seen_root[id];
+    if (id == EBPO_ARRAYS || (id == EBPO_A_ATTRIBUTE && level >= l->file->attributes.arrays))
+        return EBPO_OK; /* a gap, or of a part that is not known, or not listed */
+    ebpo_array_in *a = id < EBPO_LEVEL_ARRAYS   ? &l->file->level_array[level][id]
+                       : id == EBPO_A_ATTRIBUTE ? &l->file->attributes.array[level]
+                                                : &l->file->root_array[id];
+    uint64_t *seen = seen_of(l, id, level);
     if (!a->present || *seen == ebpo_h5_chunk_count(&a->shape))
         return list_fails(l->file, "the list has more chunks than", a->path, error);
     if (chunk.bytes == 0 ||
@@ -111,9 +126,9 @@ static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chun
     return a->chunks ? EBPO_OK : ebpo_fail_memory(error, *chunks * sizeof *a->chunks);
 }
 
-static ebpo_status end_array(const listing *l, const ebpo_array_in *a, ebpo_error *error)
+static ebpo_status end_array(listing *l, const ebpo_array_in *a, ebpo_error *error)
 {
-    uint64_t seen = a->id < EBPO_LEVEL_ARRAYS ? l->seen[a->level][a->id] : l->seen_root[a->id];
+    uint64_t seen = *seen_of(l, a->id, a->level);
     return !a->present || a->id == EBPO_A_PLACES || seen == ebpo_h5_chunk_count(&a->shape)
                ? EBPO_OK
                : list_fails(l->file, "the list has fewer chunks than", a->path, error);
@@ -125,7 +140,7 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
     listing *l = ebpo_alloc_zero(1, sizeof *l);
     uint64_t at = file->info.head_bytes, chunks = 0;
     ebpo_status status = l ? EBPO_OK : ebpo_fail_memory(error, sizeof *l);
-    for (int i = 0; i < ALL_ARRAYS && status == EBPO_OK; i++)
+    for (int i = 0; i < all_arrays(file) && status == EBPO_OK; i++)
         status = begin_array(file, array_number(file, i), &chunks, error);
     if (l)
         l->file = file;
@@ -138,7 +153,7 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
                                 (ebpo_h5_chunk){ at, ebpo_place_bytes_of(places[i]) }, error);
         at += ebpo_place_bytes_of(places[i]);
     }
-    for (int i = 0; i < ALL_ARRAYS && status == EBPO_OK; i++)
+    for (int i = 0; i < all_arrays(file) && status == EBPO_OK; i++)
         status = end_array(l, array_number(file, i), error);
     free(l);
     return status;
@@ -147,7 +162,7 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
 /* A list half read is none. */
 static void forget(ebpo_file *file)
 {
-    for (int i = 0; i < ALL_ARRAYS; i++) {
+    for (int i = 0; i < all_arrays(file); i++) {
         ebpo_array_in *a = array_number(file, i);
         if (a->present && ebpo_h5_chunk_count(&a->shape) > 1) {
             free(a->chunks);

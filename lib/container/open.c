@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
+#include "container/attribute_arrays.h"
 #include "container/head_facts.h"
 #include "container/open.h"
 #include "http/http_source.h"
@@ -120,14 +121,16 @@ ebpo_stored_sizes ebpo_reader_sizes(const ebpo_file *file)
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
         *(uint64_t *)(void *)((char *)&sizes + ebpo_schema[id].bytes) +=
             file->root_array[id].stored_bytes;
+    for (int i = 0; i < file->attributes.arrays; i++)
+        sizes.attribute_bytes += file->attributes.array[i].stored_bytes;
     return sizes;
 }
 
 ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
 {
     ebpo_stored_sizes sizes = ebpo_reader_sizes(file);
-    uint64_t stored =
-        sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes + sizes.subtree_bytes;
+    uint64_t stored = sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes +
+                      sizes.subtree_bytes + sizes.attribute_bytes;
     for (int level = 0; level < file->info.level_count; level++)
         stored += sizes.level_bytes[level];
     if (stored > file->info.file_bytes)
@@ -155,6 +158,8 @@ static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
             status = check_pipeline(file, &file->level_array[level][id], error);
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS && status == EBPO_OK; id++)
         status = check_pipeline(file, &file->root_array[id], error);
+    for (int i = 0; i < file->attributes.arrays && status == EBPO_OK; i++)
+        status = check_pipeline(file, &file->attributes.array[i], error);
     return status;
 }
 
@@ -202,6 +207,8 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
         }
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES && status == EBPO_OK; id++)
         status = open_array(file, h5, (ebpo_array_id)id, 0, error);
+    if (status == EBPO_OK)
+        status = ebpo_attributes_open(file, h5, error);
     ebpo_pipeline pipeline = file->level_array[0][EBPO_A_TYPES].shape.pipeline;
     info->codec = pipeline == EBPO_PIPELINE_ZSTD      ? EBPO_CODEC_ZSTD
                   : pipeline == EBPO_PIPELINE_DEFLATE ? EBPO_CODEC_DEFLATE
@@ -332,6 +339,7 @@ void ebpo_close(ebpo_file *file)
         free(file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS].chunks);
     for (int i = 0; i < EBPO_ARRAYS; i++)
         free(file->root_array[i].chunks);
+    ebpo_attributes_close(file);
     ebpo_input_close(&file->in);
     ebpo_idle_readers_free(&file->idle);
     pthread_mutex_destroy(&file->lock);

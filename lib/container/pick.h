@@ -4,6 +4,7 @@
 #ifndef EBPO_CONTAINER_PICK_H
 #define EBPO_CONTAINER_PICK_H
 
+#include "attributes/attributes.h"
 #include "container/level_runs.h"
 
 /* All nodes of ascending runs that do not overlap, as one level: group_count is the sum of the
@@ -19,6 +20,17 @@ EBPO_MUST_USE ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_r
 EBPO_MUST_USE ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id,
                                          const uint32_t *rows, uint64_t count, unsigned threads,
                                          void *out, ebpo_error *error);
+
+/* The same of an array of attributes (attribute_arrays.h): values, ends or items. */
+EBPO_MUST_USE ebpo_status ebpo_pick_attribute_rows(ebpo_chunks *chunks, int number,
+                                                   const uint32_t *rows, uint64_t count,
+                                                   unsigned threads, void *out, ebpo_error *error);
+
+/* Rows of all attributes of an element into `to`, which has the file's arrays without values and
+ * no workspace. */
+EBPO_MUST_USE ebpo_status ebpo_pick_attributes(ebpo_chunks *chunks, ebpo_attributes *to,
+                                               const char *element, const uint32_t *rows,
+                                               uint64_t count, unsigned threads, ebpo_error *error);
 
 /* Announces what picking these faces takes (parts: mesh, maps), and the vertices that come first
  * with the chunks that hold them: most that the faces use. */

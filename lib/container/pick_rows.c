@@ -119,15 +119,11 @@ static ebpo_status sort_rows(const gathering *g, uint64_t count, uint64_t *begin
     return EBPO_OK;
 }
 
-ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *rows,
-                           uint64_t count, unsigned threads, void *out, ebpo_error *error)
+static ebpo_status pick_rows(ebpo_chunks *chunks, const ebpo_array_in *array, const uint32_t *rows,
+                             uint64_t count, unsigned threads, void *out, ebpo_error *error)
 {
-    const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, 0);
-    bool vertices = id == EBPO_A_VERTICES, wide = chunks->file->info.double_coordinates;
     gathering g = { .chunks = chunks, .array = array, .rows = rows, .out = out };
-    g.row_bytes = vertices             ? 3 * (wide ? sizeof(double) : sizeof(float))
-                  : id == EBPO_A_FACES ? 3 * sizeof(uint32_t)
-                                       : sizeof(uint32_t);
+    g.row_bytes = ebpo_h5_row_bytes(&array->shape); /* decoding changes no array's width */
     if (!array->present)
         return ebpo_fail_at(error, EBPO_E_ABSENT, chunks->file->in.shown, array->path, -1,
                             "the file does not hold this array");
@@ -140,7 +136,8 @@ ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t
         ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
         for (uint64_t c = 0; c < number; c++)
             if (begin[c] < begin[c + 1])
-                ebpo_chunks_expect(chunks, &e, id, 0, c * array->shape.chunk_rows, 1);
+                ebpo_chunks_expect(chunks, &e, array->id, array->level, c * array->shape.chunk_rows,
+                                   1);
         ebpo_expect_all(&e);
         g.begin = begin;
         g.order = order;
@@ -150,4 +147,18 @@ ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t
     free(begin);
     free(order);
     return status;
+}
+
+ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *rows,
+                           uint64_t count, unsigned threads, void *out, ebpo_error *error)
+{
+    return pick_rows(chunks, ebpo_reader_array(chunks->file, id, 0), rows, count, threads, out,
+                     error);
+}
+
+ebpo_status ebpo_pick_attribute_rows(ebpo_chunks *chunks, int number, const uint32_t *rows,
+                                     uint64_t count, unsigned threads, void *out, ebpo_error *error)
+{
+    return pick_rows(chunks, ebpo_reader_array(chunks->file, EBPO_A_ATTRIBUTE, number), rows, count,
+                     threads, out, error);
 }

@@ -13,7 +13,7 @@
 /* The number of an array in the list. */
 uint32_t ebpo_place_number(ebpo_array_id id, int level);
 /* EBPO_ARRAYS: none that this library knows. */
-ebpo_array_id ebpo_place_array(uint32_t number, int *level);
+ebpo_array_id ebpo_place_array(uint32_t number, int *level); /* of attributes: any number */
 
 /* A row of the list. */
 static inline uint64_t ebpo_place(uint32_t number, uint64_t bytes)

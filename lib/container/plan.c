@@ -8,8 +8,10 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/arrays.h"
+#include "base/text.h"
 #include "codec/coding.h"
 #include "container/array_check.h"
+#include "container/attribute_arrays.h"
 #include "container/chunk_rows.h"
 #include "container/head_facts.h"
 #include "container/rank_index.h"
@@ -24,6 +26,7 @@ void ebpo_plan_free(ebpo_plan *plan)
         for (int i = 0; i < EBPO_INDEXES; i++)
             free(plan->index[level][i]);
     free(plan->faces_index);
+    free(plan->attribute);
     ebpo_subtree_sums_free(&plan->subtrees);
     memset(plan, 0, sizeof *plan);
 }
@@ -50,7 +53,7 @@ static bool texts_ok(const ebpo_info *info)
         { info->date, sizeof info->date },
     };
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
-        if (!memchr(texts[i].text, 0, texts[i].size) || !ebpo_h5_text_ok(texts[i].text))
+        if (!memchr(texts[i].text, 0, texts[i].size) || !ebpo_text_ok(texts[i].text))
             return false;
     return true;
 }
@@ -70,7 +73,10 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
     info->top_bytes = 0;
     info->parts &= options->parts;
     if (!(info->parts & EBPO_PART_MESH))
-        info->parts &= ~(uint32_t)EBPO_PART_MAPS;
+        info->parts &= ~(uint32_t)(EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
+    plan->attributes = info->parts & EBPO_PART_ATTRIBUTES ? tree->mesh.attributes : NULL;
+    if (!plan->attributes)
+        info->parts &= ~(uint32_t)EBPO_PART_ATTRIBUTES;
     if (!info->generator[0])
         snprintf(info->generator, sizeof info->generator, "ebpo %s", EBPO_VERSION);
     if (info->parts & EBPO_PART_MESH) {
@@ -253,9 +259,12 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
         status = index_faces(plan, &check, error);
     if (status == EBPO_OK && plan->info.subtree_level)
         status = ebpo_subtree_sums_make(&plan->subtrees, tree, &plan->info, error);
+    if (status == EBPO_OK)
+        status = ebpo_attributes_plan(plan, shown, error);
     if (status != EBPO_OK)
         goto done;
-    plan->array = ebpo_alloc((uint64_t)plan->info.level_count * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS,
+    plan->array = ebpo_alloc((uint64_t)plan->info.level_count * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS +
+                                 ebpo_attributes_planned(plan),
                              sizeof *plan->array);
     if (!plan->array) {
         status = ebpo_fail_memory(error, sizeof *plan->array);
@@ -266,6 +275,7 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
             add_array(plan, (ebpo_array_id)id, level);
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES; id++)
         add_array(plan, (ebpo_array_id)id, 0);
+    ebpo_attributes_add_arrays(plan, pipeline_of(plan->info.codec));
 done:
     if (status != EBPO_OK)
         ebpo_plan_free(plan);

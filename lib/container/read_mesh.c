@@ -9,6 +9,7 @@
 #include "base/sized.h"
 #include "base/arrays.h"
 #include "codec/coding.h"
+#include "container/attribute_arrays.h"
 #include "container/reader.h"
 
 void ebpo_tree_free(ebpo_tree *tree)
@@ -131,8 +132,15 @@ ebpo_status ebpo_file_read_mesh(const ebpo_file *file, const ebpo_read_options *
         return absent(file, "mesh", error);
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
     ebpo_expect_root(&expected, EBPO_NEEDS_MESH);
+    if (read.attributes)
+        ebpo_expect_attributes(&expected);
     ebpo_expect_all(&expected);
-    return read_mesh(file, out, &read, error);
+    status = read_mesh(file, out, &read, error);
+    if (status == EBPO_OK && read.attributes)
+        status = ebpo_attributes_read(file, &read, &out->attributes, error);
+    if (status != EBPO_OK)
+        ebpo_mesh_free(out);
+    return status;
 }
 
 static ebpo_status take_numbers(void *context, const ebpo_array_in *array, uint64_t chunk,
@@ -234,6 +242,7 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
     ebpo_expect_tree(file);
     out->info = file->info;
     out->workspace = read.workspace;
+    read.attributes = 1;
     status = read_parts(file, out, &read, error);
     if (status != EBPO_OK)
         ebpo_tree_free(out);
@@ -311,6 +320,22 @@ static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place,
     return EBPO_OK;
 }
 
+/* rows[place[i]] = i */
+static ebpo_status reorder_attributes(ebpo_mesh *mesh, const char *element, const uint32_t *place,
+                                      uint64_t count, ebpo_error *error)
+{
+    if (!mesh->attributes)
+        return EBPO_OK;
+    uint32_t *rows = ebpo_array_alloc(mesh->workspace, count, sizeof *rows);
+    if (!rows)
+        return ebpo_workspace_fail(mesh->workspace, count * sizeof *rows, error);
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, count)
+        rows[place[i]] = (uint32_t)i;
+    ebpo_status status = ebpo_attributes_pick(mesh->attributes, element, rows, count, error);
+    ebpo_array_free(mesh->workspace, rows);
+    return status;
+}
+
 static ebpo_status to_source_order(const ebpo_file *file, ebpo_mesh *mesh,
                                    const ebpo_read_options *read, ebpo_error *error)
 {
@@ -329,6 +354,10 @@ static ebpo_status to_source_order(const ebpo_file *file, ebpo_mesh *mesh,
         status = reorder_vertices(mesh, vertex_place, error);
     if (status == EBPO_OK)
         status = reorder_faces(mesh, vertex_place, face_place, error);
+    if (status == EBPO_OK)
+        status = reorder_attributes(mesh, "vertex", vertex_place, mesh->vertex_count, error);
+    if (status == EBPO_OK)
+        status = reorder_attributes(mesh, "face", face_place, mesh->face_count, error);
     ebpo_array_free(workspace, vertex_place);
     ebpo_array_free(workspace, face_place);
     return status;
@@ -348,10 +377,14 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
         return status;
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
     ebpo_expect_root(&expected, EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS);
+    if (read.attributes)
+        ebpo_expect_attributes(&expected);
     ebpo_expect_all(&expected);
     status = ebpo_file_read_mesh(file, &read, out, error);
     if (status == EBPO_OK && maps)
         status = to_source_order(file, out, &read, error);
+    if (status == EBPO_OK && (!maps || file->info.mend.welded_vertices))
+        ebpo_attributes_drop_others(out->attributes); /* numbers of vertices are the source's */
     if (source_order)
         *source_order = status == EBPO_OK && maps;
     if (status != EBPO_OK)

@@ -31,6 +31,8 @@ void ebpo_expect_array(ebpo_expected *expected, const ebpo_array_in *array);
 void ebpo_expect_level(ebpo_expected *expected, int level, uint32_t without);
 /* The arrays of the root that are there for any of these needs. */
 void ebpo_expect_root(ebpo_expected *expected, uint32_t needs);
+/* Those of attributes. */
+void ebpo_expect_attributes(ebpo_expected *expected);
 /* Announces the whole file. */
 void ebpo_expect_tree(const ebpo_file *file);
 /* Announces what looking up a subtree takes, if the file has subtrees and says so: levels down to

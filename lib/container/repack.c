@@ -19,7 +19,9 @@ static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
     if (status != EBPO_OK)
         return status;
     bool same = memcmp(file->info.content_sha256, from->info.content_sha256,
-                       sizeof file->info.content_sha256) == 0;
+                       sizeof file->info.content_sha256) == 0 &&
+                memcmp(file->attributes.sha256, from->attributes.sha256,
+                       sizeof file->attributes.sha256) == 0;
     if (same)
         status = ebpo_file_check_content(file, read, error);
     ebpo_close(file);

@@ -54,6 +54,14 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
                       .coding = "plain",                                    \
                       .about = about_ },
 #include "container/array_table.inc"
+    [EBPO_A_ATTRIBUTE] = { .name = "/attributes",
+                           .per = EBPO_PER_CHUNK,
+                           .needs = EBPO_NEEDS_ATTRIBUTES,
+                           .sizes = 1 + 2 + 4 + 8,
+                           .since = 1,
+                           .bytes = offsetof(ebpo_stored_sizes, attribute_bytes),
+                           .coding = "",
+                           .about = "" },
 };
 
 const ebpo_count_spec ebpo_counts[EBPO_COUNTS] = {

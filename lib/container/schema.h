@@ -17,6 +17,9 @@ typedef enum ebpo_array_id {
 #define ROOT_ARRAY(ID, ...)  EBPO_A_##ID,
 #define TABLE_ARRAY(ID, ...) EBPO_A_##ID,
 #include "container/array_table.inc"
+    /* all arrays of /attributes, which files have as many of as they like: the `level` is then the
+     * number of the array there (attribute_arrays.h) */
+    EBPO_A_ATTRIBUTE,
     EBPO_ARRAYS
 } ebpo_array_id;
 
@@ -44,6 +47,7 @@ enum {
     EBPO_NEEDS_MESH = EBPO_PART_MESH,
     EBPO_NEEDS_MAPS = EBPO_PART_MAPS,
     EBPO_NEEDS_LEAF_PLANES = EBPO_PART_LEAF_PLANES,
+    EBPO_NEEDS_ATTRIBUTES = EBPO_PART_ATTRIBUTES,
     EBPO_NEEDS_MESH_OR_LEAF_PLANES = EBPO_PART_MESH | EBPO_PART_LEAF_PLANES,
     EBPO_NEEDS_SUBTREES = 1 << 28,
     EBPO_NEEDS_SOLID = 1 << 29,

@@ -173,7 +173,4 @@ EBPO_MUST_USE ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, u
                                              ebpo_h5_chunk **chunks, uint64_t *stored_bytes,
                                              ebpo_error *error);
 
-/* True for UTF-8 without control characters. */
-bool ebpo_h5_text_ok(const char *text);
-
 #endif

@@ -6,6 +6,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "h5/driver.h"
 #include "h5/h5.h"
 #include "h5/scope.h"
@@ -138,29 +139,6 @@ static void close_attribute(hid_t attribute, hid_t type)
         H5Aclose(attribute);
 }
 
-bool ebpo_h5_text_ok(const char *text)
-{
-    const uint8_t *p = (const uint8_t *)text;
-    while (*p) {
-        unsigned more = *p < 0x80                 ? 0
-                        : *p >= 0xc2 && *p < 0xe0 ? 1
-                        : *p >= 0xe0 && *p < 0xf0 ? 2
-                        : *p >= 0xf0 && *p < 0xf5 ? 3
-                                                  : 9;
-        if (more == 9 || *p < 0x20 || *p == 0x7f)
-            return false;
-        if ((*p == 0xe0 && p[1] < 0xa0) || (*p == 0xed && p[1] >= 0xa0) ||
-            (*p == 0xf0 && p[1] < 0x90) || (*p == 0xf4 && p[1] >= 0x90) ||
-            (*p == 0xc2 && p[1] < 0xa0))
-            return false; /* overlong, surrogate, beyond Unicode, control */
-        for (p++; more; more--, p++)
-            if (*p < 0x80 || *p > 0xbf)
-                return false;
-    }
-    return true;
-}
-
-/* However it is padded, a text ends at its first zero byte, and its length is up to there. */
 static ebpo_status read_text(ebpo_h5_in *in, hid_t id, const char *object, const char *name,
                              char *text, size_t size, ebpo_error *error)
 {
@@ -175,7 +153,7 @@ static ebpo_status read_text(ebpo_h5_in *in, hid_t id, const char *object, const
     if (fits && !stored)
         status = ebpo_fail_memory(error, length + 1);
     if (stored && H5Aread(attribute, type, stored) >= 0 && strlen(stored) < size &&
-        ebpo_h5_text_ok(stored))
+        ebpo_text_ok(stored))
         memcpy(text, stored, strlen(stored));
     else if (status == EBPO_OK)
         status = attribute_fails(in, object, name,

@@ -51,23 +51,27 @@ static void hash_end(hashing *h)
         pthread_join(h->thread, NULL);
 }
 
+static ebpo_status parse_ply(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
+                             const ebpo_mesh_read_options *wanted, ebpo_error *error)
+{
+    return ebpo_ply_parse_all(out, file->data, file->size, path, wanted->workspace,
+                              wanted->attributes != 0, wanted->threads, &wanted->progress, error);
+}
+
 static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
-                         ebpo_workspace *workspace, unsigned threads, const ebpo_progress *progress,
-                         ebpo_error *error)
+                         const ebpo_mesh_read_options *wanted, ebpo_error *error)
 {
     const char *dot = strrchr(ebpo_path_name(path), '.');
     ebpo_import_format format;
     if (ebpo_ply_recognise(file->data, file->size))
-        return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads,
-                                     progress, error);
+        return parse_ply(out, file, path, wanted, error);
     if (ebpo_import_recognise(&format, file->data, file->size, path))
-        return !ebpo_progress_stage(progress, "reading", error)
+        return !ebpo_progress_stage(&wanted->progress, "reading", error)
                    ? EBPO_E_CANCELLED
-                   : ebpo_import_memory(out, format, file->data, file->size, path, workspace,
-                                        error);
+                   : ebpo_import_memory(out, format, file->data, file->size, path,
+                                        wanted->workspace, error);
     if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
-        return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads,
-                                     progress, error);
+        return parse_ply(out, file, path, wanted, error);
     return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(path),
                           "neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file");
 }
@@ -88,7 +92,7 @@ ebpo_status ebpo_mesh_read(const char *path, const ebpo_mesh_read_options *optio
         return status;
     ebpo_workspace_watch(workspace, file.mapped, (size_t)file.size);
     hash_begin(&hash);
-    status = parse(out, &file, path, workspace, wanted.threads, &wanted.progress, error);
+    status = parse(out, &file, path, &wanted, error);
     hash_end(&hash);
     out->workspace = workspace;
     if (status == EBPO_OK)

@@ -1,6 +1,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "attributes/attributes.h"
 #include "base/arrays.h"
 #include "mesh/mesh_parts.h"
 
@@ -22,5 +23,11 @@ void ebpo_mesh_free(ebpo_mesh *mesh)
     ebpo_array_free(mesh->workspace, mesh->xyz64);
     ebpo_array_free(mesh->workspace, mesh->faces);
     ebpo_arrangement_free(mesh->arrangement);
+    ebpo_attributes_free(mesh->attributes);
     memset(mesh, 0, sizeof *mesh);
+}
+
+const char *ebpo_mesh_attributes_lost(const ebpo_mesh *mesh)
+{
+    return mesh->attributes && mesh->attributes->lost[0] ? mesh->attributes->lost : NULL;
 }

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "attributes/attributes.h"
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
@@ -160,6 +161,46 @@ static ebpo_status number_sources(welding *w, ebpo_error *error)
     return status;
 }
 
+/* Tells how many of the vertices that go have other values than the one that stays. */
+static void note_differences(const welding *w)
+{
+    const ebpo_mesh *mesh = w->mesh;
+    uint64_t differ = 0;
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count) {
+        uint64_t stays = w->from[w->map[v]];
+        differ += stays != v && !ebpo_attributes_equal_rows(mesh->attributes, "vertex",
+                                                            ebpo_mesh_source_vertex(mesh, v),
+                                                            ebpo_mesh_source_vertex(mesh, stays));
+    }
+    if (differ)
+        ebpo_attributes_lose(mesh->attributes,
+                             "what %llu joined vertices have that differs from the one that stays",
+                             (unsigned long long)differ);
+}
+
+/* Attributes are in the order of the source: those of the vertices that stay, in that order. */
+static ebpo_status weld_attributes(welding *w, ebpo_error *error)
+{
+    ebpo_mesh *mesh = w->mesh;
+    uint32_t *rows = w->from; /* without an arrangement it is ascending */
+    if (!mesh->attributes)
+        return EBPO_OK;
+    note_differences(w);
+    if (mesh->arrangement) {
+        rows = ebpo_array_alloc(mesh->workspace, w->kept, sizeof *rows);
+        if (!rows)
+            return ebpo_workspace_fail(mesh->workspace, w->kept * sizeof *rows, error);
+        uint64_t kept = 0;
+        EBPO_FOR_ITEMS(mesh->workspace, s, 0, mesh->vertex_count)
+            if (w->stays[s / WORD] >> s % WORD & 1)
+                rows[kept++] = (uint32_t)s;
+    }
+    ebpo_status status = ebpo_attributes_pick(mesh->attributes, "vertex", rows, w->kept, error);
+    if (mesh->arrangement)
+        ebpo_array_free(mesh->workspace, rows);
+    return status;
+}
+
 /* --- writing the result: nothing can fail from here on --- */
 
 static ebpo_status rename_corners(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -229,6 +270,8 @@ static ebpo_status run(welding *w, ebpo_error *error)
     choose(w);
     if (mesh->arrangement)
         status = number_sources(w, error);
+    if (status == EBPO_OK)
+        status = weld_attributes(w, error);
     if (status == EBPO_OK)
         status =
             ebpo_parallel_for(0, NULL, mesh->face_count, GRAIN, rename_corners, w, NULL, "", error);

@@ -8,12 +8,14 @@
 #include "base/error.h"
 #include "ply/decimal.h"
 #include "ply/ply_ascii.h"
+#include "ply/ply_attributes.h"
 #include "ply/ply_faces.h"
 
 typedef struct rows {
     ply_parser *p;
     const ply_element *element;
     uint64_t row;
+    uint64_t to; /* of attributes: of a face that of its first triangle */
     bool store;
 } rows;
 
@@ -99,6 +101,21 @@ static ebpo_status skip_tokens(rows *r, uint64_t count)
     return EBPO_OK;
 }
 
+static ebpo_status store_list(rows *r, const ply_property *property, uint64_t count)
+{
+    unsigned bytes = ebpo_ply_type_bytes(property->type);
+    uint8_t *items;
+    ebpo_status status = ebpo_ply_put_list(r->p, property, r->to, count, &items);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        ply_word token;
+        if (!next_token(r->p, &token))
+            return ebpo_ply_fail_end(r->p, r->element, r->row);
+        ebpo_ply_store_bits(items + i * bytes, bytes,
+                            ebpo_ply_text_bits(r->p, property, token, r->row));
+    }
+    return status;
+}
+
 static ebpo_status read_list(rows *r, const ply_property *property)
 {
     ply_parser *p = r->p;
@@ -118,6 +135,8 @@ static ebpo_status read_list(rows *r, const ply_property *property)
     }
     if (r->store && property->role == PLY_ROLE_CORNERS)
         return read_corners(r, (uint64_t)count);
+    if (r->store && ebpo_ply_is_attribute(property))
+        return store_list(r, property, (uint64_t)count);
     return skip_tokens(r, (uint64_t)count);
 }
 
@@ -131,6 +150,9 @@ static ebpo_status read_property(rows *r, const ply_property *property)
     if (r->store && property->role != PLY_ROLE_NONE && !parse_coordinate(r, property, token))
         return fail_token(r,
                           property->type < PLY_FLOAT32 ? "no whole number:" : "no number:", token);
+    if (r->store && ebpo_ply_is_attribute(property))
+        ebpo_ply_put_value(r->p, property, r->to,
+                           ebpo_ply_text_bits(r->p, property, token, r->row));
     return EBPO_OK;
 }
 
@@ -150,7 +172,9 @@ static ebpo_status end_row(rows *r)
 static ebpo_status read_row(rows *r)
 {
     const ply_property *property = r->p->header.property + r->element->first;
-    ebpo_status status = EBPO_OK;
+    bool face = r->element->kind == PLY_KIND_FACE;
+    r->to = face ? r->p->mesh->face_count : r->row;
+    ebpo_status status = face && r->store ? ebpo_ply_attributes_reserve(r->p, r->to + 1) : EBPO_OK;
     for (uint64_t i = 0; i < r->element->properties && status == EBPO_OK; i++)
         status = read_property(r, property + i);
     if (status == EBPO_OK)
@@ -164,7 +188,9 @@ static ebpo_status read_row(rows *r)
 
 ebpo_status ebpo_ply_ascii_element(ply_parser *p, const ply_element *element, bool store)
 {
-    rows r = { .p = p, .element = element, .store = store && element->kind != PLY_KIND_OTHER };
+    rows r = { .p = p,
+               .element = element,
+               .store = store && (element->kind != PLY_KIND_OTHER || p->lost) };
     ebpo_status status = EBPO_OK;
     if (!element->properties) /* rows without values: nothing is written for them that we need to
                                  see */

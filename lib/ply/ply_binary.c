@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "ply/ply_attributes.h"
 #include "ply/ply_binary.h"
 #include "ply/ply_faces.h"
 #include "ply/ply_number.h"
@@ -20,7 +21,8 @@ typedef struct rows {
     ply_parser *p;
     const ply_element *element;
     uint64_t row;
-    bool swap; /* the file's byte order is not the machine's */
+    uint64_t to; /* of attributes: of a face that of its first triangle */
+    bool swap;   /* the file's byte order is not the machine's */
     bool store;
 } rows;
 
@@ -48,6 +50,18 @@ static ebpo_status store_corners(rows *r, const ply_property *property, uint64_t
     return EBPO_OK;
 }
 
+static ebpo_status store_list(rows *r, const ply_property *property, uint64_t count)
+{
+    ply_parser *p = r->p;
+    unsigned bytes = ebpo_ply_type_bytes(property->type);
+    uint8_t *items;
+    ebpo_status status = ebpo_ply_put_list(p, property, r->to, count, &items);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        ebpo_ply_store_bits(items + i * bytes, bytes,
+                            ebpo_ply_load(p->data + p->at + i * bytes, bytes, r->swap));
+    return status;
+}
+
 static ebpo_status read_list(rows *r, const ply_property *property)
 {
     ply_parser *p = r->p;
@@ -67,15 +81,28 @@ static ebpo_status read_list(rows *r, const ply_property *property)
     ebpo_status status = EBPO_OK;
     if (r->store && property->role == PLY_ROLE_CORNERS)
         status = store_corners(r, property, (uint64_t)count);
+    else if (r->store && ebpo_ply_is_attribute(property))
+        status = store_list(r, property, (uint64_t)count);
     if (status == EBPO_OK)
         p->at += (uint64_t)count * bytes;
     return status;
+}
+
+/* The row's number among attributes, with room for it. */
+static ebpo_status begin_row(rows *r)
+{
+    bool face = r->element->kind == PLY_KIND_FACE;
+    r->to = face ? r->p->mesh->face_count : r->row;
+    return face && r->store ? ebpo_ply_attributes_reserve(r->p, r->to + 1) : EBPO_OK;
 }
 
 static ebpo_status read_row(rows *r)
 {
     ply_parser *p = r->p;
     const ply_property *property = p->header.property + r->element->first;
+    ebpo_status begun = begin_row(r);
+    if (begun != EBPO_OK)
+        return begun;
     for (uint64_t i = 0; i < r->element->properties; i++, property++) {
         if (property->list) {
             ebpo_status status = read_list(r, property);
@@ -88,6 +115,8 @@ static ebpo_status read_row(rows *r)
             return ebpo_ply_fail_end(p, r->element, r->row);
         if (r->store && property->role != PLY_ROLE_NONE)
             ebpo_ply_store_coordinate(p->mesh, r->row, property, p->data + p->at, r->swap);
+        else if (r->store && ebpo_ply_is_attribute(property))
+            ebpo_ply_put_value(p, property, r->to, ebpo_ply_load(p->data + p->at, bytes, r->swap));
         p->at += bytes;
     }
     if (r->store && r->element->kind == PLY_KIND_FACE)
@@ -115,11 +144,11 @@ ebpo_status ebpo_ply_binary_element(ply_parser *p, const ply_element *element, b
     rows r = { .p = p,
                .element = element,
                .swap = (int)p->header.encoding == (int)FOREIGN,
-               .store = store && element->kind != PLY_KIND_OTHER };
-    if (!r.store && !element->has_list)
+               .store = store && (element->kind != PLY_KIND_OTHER || p->lost) };
+    if (!element->properties || (!r.store && !element->has_list))
         return step_over(&r);
     ebpo_status status = EBPO_OK;
-    if (r.store && element->kind == PLY_KIND_VERTEX)
+    if (r.store && (element->kind == PLY_KIND_VERTEX || element->kind == PLY_KIND_OTHER))
         status = ebpo_ply_plain_vertices(p, element, r.swap, &r.row);
     else if (r.store && element->kind == PLY_KIND_FACE)
         status = ebpo_ply_plain_faces(p, element, r.swap, &r.row);

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/arrays.h"
 #include "geom/polygon.h"
+#include "ply/ply_attributes.h"
 #include "ply/ply_faces.h"
 
 #define MOST_FACES (UINT64_C(0xfffffffe))
@@ -40,7 +41,7 @@ static ebpo_status face_capacity(ply_parser *p, uint64_t more)
                          3 * sizeof *mesh->faces))
         return ebpo_workspace_fail(mesh->workspace,
                                    (mesh->face_count + more) * 3 * sizeof *mesh->faces, p->error);
-    return EBPO_OK;
+    return ebpo_ply_attributes_reserve(p, mesh->face_count + more);
 }
 
 static void add_triangle(ebpo_mesh *mesh, uint32_t a, uint32_t b, uint32_t c)
@@ -93,10 +94,11 @@ static ebpo_status triangulate(ply_parser *p, uint32_t n, uint64_t row)
             row, n);
     p->mesh->polygons_triangulated++;
     p->mesh->polygons_concave += kind == EBPO_POLYGON_CONCAVE;
+    uint64_t first = p->mesh->face_count;
     for (uint32_t i = 0; i < n - 2; i++)
         add_triangle(p->mesh, p->corners[triangle[i][0]], p->corners[triangle[i][1]],
                      p->corners[triangle[i][2]]);
-    return EBPO_OK;
+    return ebpo_ply_repeat_face(p, first);
 }
 
 ebpo_status ebpo_ply_add_polygon(ply_parser *p, uint64_t row)

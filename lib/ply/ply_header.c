@@ -208,7 +208,7 @@ static ebpo_status property_statement(reader *r, const ply_word *words, int n)
     ply_header *h = r->header;
     if (!h->elements)
         return fail(r, "no element stands before", words[0]);
-    ply_property property = { .list = n > 1 && is(words[1], "list") };
+    ply_property property = { .list = n > 1 && is(words[1], "list"), .attribute = -1 };
     if (n != (property.list ? 5 : 3))
         return fail(r, "too few or too many words in", words[0]);
     if (!parse_type(words[n - 2], &property.type))
@@ -236,8 +236,10 @@ static ebpo_status statement(reader *r, ply_word line, bool *ended)
 {
     ply_word words[MAX_WORDS];
     int n = split(line, words);
-    if (n == 0 || is(words[0], "comment") || is(words[0], "obj_info"))
+    if (n == 0 || is(words[0], "comment") || is(words[0], "obj_info")) {
+        r->header->notes++;
         return EBPO_OK;
+    }
     if (is(words[0], "format"))
         return format_statement(r, words, n);
     if (is(words[0], "element"))
@@ -250,6 +252,7 @@ static ebpo_status statement(reader *r, ply_word line, bool *ended)
     }
     /* Blender 2.47 left the word "comment" out of its first line. Later on, a line that is not
      * understood could change what the body means. */
+    r->header->notes++;
     return r->header->elements ? fail(r, "unknown statement", words[0]) : EBPO_OK;
 }
 

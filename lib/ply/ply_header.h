@@ -38,6 +38,8 @@ typedef struct ply_property {
     ply_type count_type; /* of a list's length */
     bool list;
     ply_role role;
+    int attribute; /* number of the array that takes the values, and which column; -1: none */
+    unsigned column;
 } ply_property;
 
 typedef struct ply_element {
@@ -60,6 +62,7 @@ typedef struct ply_header {
     ply_property *property;
     uint64_t properties, property_capacity;
     int64_t vertex, face, strips; /* element numbers, or -1 */
+    uint64_t notes;               /* lines that are comments, or obj_info, or not understood */
 } ply_header;
 
 enum { PLY_HEADER_LONGEST = 1 << 20 };

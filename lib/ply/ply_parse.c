@@ -12,6 +12,7 @@
 #include "io/file_source.h"
 #include "ply/ply.h"
 #include "ply/ply_ascii.h"
+#include "ply/ply_attributes.h"
 #include "ply/ply_binary.h"
 #include "ply/ply_state.h"
 
@@ -185,12 +186,13 @@ static void release(ply_parser *p)
         freelocale(p->c_locale);
     free(p->corners);
     free(p->scratch);
+    free(p->lost);
     ebpo_ply_header_free(&p->header);
 }
 
-ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t size,
-                                  const char *name, ebpo_workspace *workspace, unsigned threads,
-                                  const ebpo_progress *progress, ebpo_error *error)
+ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t size, const char *name,
+                               ebpo_workspace *workspace, bool attributes, unsigned threads,
+                               const ebpo_progress *progress, ebpo_error *error)
 {
     ebpo_mesh mesh = { .workspace = workspace };
     ply_parser p = { .data = data,
@@ -207,8 +209,12 @@ ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t 
         status = check_parts(&p);
     if (status == EBPO_OK)
         status = allocate(&p);
+    if (status == EBPO_OK && attributes)
+        status = ebpo_ply_attributes_plan(&p);
     if (status == EBPO_OK)
         status = read_body(&p);
+    if (status == EBPO_OK)
+        status = ebpo_ply_attributes_end(&p);
     if (status == EBPO_OK) {
         trim(&p);
         describe(&p);
@@ -216,6 +222,7 @@ ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t 
         ebpo_array_free(workspace, mesh.xyz32);
         ebpo_array_free(workspace, mesh.xyz64);
         ebpo_array_free(workspace, mesh.faces);
+        ebpo_attributes_free(mesh.attributes);
         mesh = (ebpo_mesh){ 0 };
     }
     release(&p);

@@ -4,6 +4,7 @@
 
 #include "base/parallel.h"
 #include "base/arrays.h"
+#include "ply/ply_attributes.h"
 #include "ply/ply_number.h"
 #include "ply/ply_plain.h"
 
@@ -29,6 +30,13 @@ static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
                                   t->p->size);
 }
 
+static void put(const plain *t, const ply_property *property, uint64_t row, const uint8_t *at)
+{
+    if (ebpo_ply_is_attribute(property))
+        ebpo_ply_put_value(t->p, property, row,
+                           ebpo_ply_load(at, ebpo_ply_type_bytes(property->type), t->swap));
+}
+
 static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
                             ebpo_error *error)
 {
@@ -40,6 +48,8 @@ static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigne
         for (uint64_t i = 0; i < t->element->properties; i++) {
             if (property[i].role != PLY_ROLE_NONE)
                 ebpo_ply_store_coordinate(t->p->mesh, row, &property[i], at, t->swap);
+            else
+                put(t, &property[i], row, at);
             at += ebpo_ply_type_bytes(property[i].type);
         }
     return EBPO_OK;
@@ -54,6 +64,18 @@ static ebpo_status deviate(plain *t, uint64_t row)
     return EBPO_E_FORMAT;
 }
 
+/* The other properties of a row of a triangle. */
+static void put_face(const plain *t, uint64_t row, const uint8_t *at)
+{
+    const ply_property *property = t->p->header.property + t->element->first;
+    for (uint64_t i = 0; i < t->element->properties; i++) {
+        put(t, &property[i], t->first + row, at);
+        at += property[i].list ? ebpo_ply_type_bytes(property[i].count_type) +
+                                     3 * ebpo_ply_type_bytes(property[i].type)
+                               : ebpo_ply_type_bytes(property[i].type);
+    }
+}
+
 /* After a row that deviates nothing is where it was expected; those rows are read again. */
 static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                          ebpo_error *error)
@@ -65,7 +87,7 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
     (void)worker, (void)error;
     const uint8_t *at = t->p->data + t->p->at + begin * t->row_bytes + t->corners_at;
     uint32_t *face = t->p->mesh->faces + 3 * (t->first + begin);
-    for (uint64_t row = begin; row < end; row++, at += t->row_bytes)
+    for (uint64_t row = begin; row < end; row++, at += t->row_bytes) {
         for (unsigned k = 0; k <= 3; k++) {
             int64_t value = k ? ebpo_ply_load_integer(at + count_bytes + (k - 1) * bytes,
                                                       t->corners->type, t->swap)
@@ -75,6 +97,9 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
             if (k)
                 *face++ = (uint32_t)value;
         }
+        if (t->p->lost && t->element->properties > 1)
+            put_face(t, row, at - t->corners_at);
+    }
     return EBPO_OK;
 }
 

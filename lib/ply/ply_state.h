@@ -6,6 +6,7 @@
 #include <ebpo/mesh.h>
 #include <locale.h>
 
+#include "attributes/attributes.h"
 #include "ply/ply_header.h"
 
 typedef struct ply_parser {
@@ -26,6 +27,8 @@ typedef struct ply_parser {
     locale_t c_locale; /* ascii only */
     const ebpo_progress *progress;
     uint64_t next_report; /* offset */
+    bool *lost; /* [arrays of attributes] a value does not fit its type; NULL: none are read */
+    uint64_t faces_reserved; /* rows that faces' attributes have room for */
     ebpo_error *error;
 } ply_parser;
 

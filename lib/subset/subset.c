@@ -17,7 +17,8 @@ uint32_t ebpo_profile_parts(ebpo_profile profile)
     case EBPO_PROFILE_COLLISION: return EBPO_PART_PLANES | EBPO_PART_MESH;
     case EBPO_PROFILE_FULL: break;
     }
-    return EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES;
+    return EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES |
+           EBPO_PART_ATTRIBUTES;
 }
 
 /* The box against the root cell and against one that was kept before: then nothing but their common
@@ -75,7 +76,7 @@ static ebpo_status resolve_options(ebpo_cutting *c)
     c->last_level = o->last_level < 0 || o->last_level > deepest ? deepest : o->last_level;
     c->parts = c->from->parts & o->parts;
     if (!(c->parts & EBPO_PART_MESH))
-        c->parts &= ~(uint32_t)EBPO_PART_MAPS;
+        c->parts &= ~(uint32_t)(EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
     c->box = ebpo_root_box(c->from);
     *info = *c->from;
     if (!c->from->pruned)

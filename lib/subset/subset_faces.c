@@ -6,8 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "attributes/attributes.h"
 #include "base/alloc.h"
 #include "base/error.h"
+#include "container/attribute_arrays.h"
 #include "octree/node_types.h"
 #include "subset/subset_parts.h"
 
@@ -121,6 +123,26 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
     return good ? EBPO_OK : ebpo_fail_memory(c->error, c->from->vertex_count * sizeof *v->number);
 }
 
+/* Of a subset, what other elements have is left out: its numbers are of things that may be gone.
+ * Where nothing was pruned, all is as it was. */
+static ebpo_status begin_attributes(ebpo_cutting *c)
+{
+    ebpo_read_options read = ebpo_read_threads(c->options->threads);
+    ebpo_attributes **to = &c->out->mesh.attributes;
+    if (!c->out->info.pruned)
+        return ebpo_attributes_read(c->file, &read, to, c->error);
+    return ebpo_attributes_read_head(c->file, &read, to, c->error);
+}
+
+static ebpo_status take_attributes(ebpo_cutting *c, const char *element, const uint32_t *rows,
+                                   uint64_t count)
+{
+    ebpo_attributes *to = c->out->mesh.attributes;
+    return to && c->out->info.pruned ? ebpo_pick_attributes(c->chunks, to, element, rows, count,
+                                                            c->options->threads, c->error)
+                                     : EBPO_OK;
+}
+
 static ebpo_status take_vertices(ebpo_cutting *c)
 {
     ebpo_tree *out = c->out;
@@ -145,6 +167,8 @@ static ebpo_status take_vertices(ebpo_cutting *c)
                                       c->options->threads, out->vertex_source, c->error)
                      : ebpo_fail_memory(c->error, v.count * sizeof *out->vertex_source);
     }
+    if (status == EBPO_OK)
+        status = take_attributes(c, "vertex", v.old, v.count);
     free(v.old);
     return status;
 }
@@ -165,13 +189,17 @@ static ebpo_status take_faces(ebpo_cutting *c, const numbering *n)
                                                    c->options->threads, out->face_source, c->error)
                                   : ebpo_fail_memory(c->error, n->count * sizeof *out->face_source);
     }
+    if (status == EBPO_OK && c->parts & EBPO_PART_ATTRIBUTES)
+        status = begin_attributes(c);
+    if (status == EBPO_OK)
+        status = take_attributes(c, "face", n->old, n->count);
     return status == EBPO_OK ? take_vertices(c) : status;
 }
 
 /* Face lists of nothing are no part. */
 static void drop_lists(ebpo_cutting *c)
 {
-    c->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS);
+    c->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
     for (int i = 0; i < c->out->info.level_count; i++) {
         ebpo_level *l = &c->out->level[i];
         ebpo_level_drop(l, EBPO_NEEDS_MESH);
@@ -198,6 +226,8 @@ ebpo_status ebpo_cut_faces(ebpo_cutting *c)
         status = take_faces(c, &n);
     else if (status == EBPO_OK)
         drop_lists(c);
+    if (c->out->info.pruned)
+        ebpo_attributes_drop_others(c->out->mesh.attributes);
     free(n.old);
     return status;
 }

@@ -86,6 +86,7 @@ static ebpo_status check_source(const ebpo_file *file, const ebpo_verify_options
 {
     ebpo_error own = EBPO_ERROR_INIT;
     ebpo_read_options read = reading(options);
+    read.attributes = options->source->attributes != NULL;
     ebpo_mesh stored;
     bool ordered = false;
     if (ebpo_file_info(file)->pruned)

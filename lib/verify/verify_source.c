@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "attributes/attributes.h"
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/arrays.h"
@@ -28,6 +29,7 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspa
 {
     *out = *mesh;
     out->workspace = workspace;
+    out->attributes = NULL; /* copied below */
     out->xyz32 = NULL;
     out->xyz64 = NULL;
     out->faces = ebpo_array_alloc(workspace, mesh->face_count, 3 * sizeof *out->faces);
@@ -46,7 +48,10 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspa
         memcpy(out->faces + 3 * i, mesh->faces + 3 * i, 3 * sizeof *out->faces);
     EBPO_FOR_ITEMS(workspace, i, 0, mesh->vertex_count)
         memcpy((char *)xyz + i * vertex_size(mesh), vertex_bytes(mesh, i), vertex_size(mesh));
-    return EBPO_OK;
+    ebpo_status status = ebpo_attributes_copy(&out->attributes, mesh->attributes, workspace, error);
+    if (status != EBPO_OK)
+        ebpo_mesh_free(out);
+    return status;
 }
 
 /* In the order of preparing a mesh: weld, orient, fill. */
@@ -95,6 +100,49 @@ static void compare_in_order(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_m
             ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE,
                                  &(ebpo_verify_place){ 0, i, EBPO_NO_PLANE },
                                  "the face (by its source number) has other corners in the file");
+}
+
+static bool same_head(const ebpo_attribute *a, const ebpo_attribute *b)
+{
+    return strcmp(a->element, b->element) == 0 && strcmp(a->names, b->names) == 0 &&
+           a->type == b->type && a->list == b->list;
+}
+
+/* Row i of the file's array is that of number `number[i]`, or i without numbers; numbers from
+ * `rows` on are of faces that mending has added. */
+static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
+                         const ebpo_attribute *stored, const uint32_t *number,
+                         ebpo_workspace *workspace)
+{
+    uint64_t differ = 0;
+    EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, stored->rows) {
+        uint64_t at = number ? number[i] : i;
+        differ += at < source->rows && !ebpo_attribute_same_row(source, at, stored, i);
+    }
+    tally->checks[EBPO_VERIFY_SOURCE] += stored->rows - 1;
+    CHECK(differ == 0, "%" PRIu64 " rows of the attribute %s of %s are not those of the source",
+          differ, stored->names, stored->element);
+}
+
+/* The file's arrays are the source's, in their order, but for those of elements that were left
+ * out. */
+static void compare_attributes(ebpo_tally *tally, const ebpo_mesh *source, const ebpo_mesh *stored,
+                               const ebpo_maps *maps)
+{
+    const ebpo_attributes *a = source->attributes, *b = stored->attributes;
+    uint64_t k = 0;
+    for (uint64_t i = 0; a && b && i < a->count; i++) {
+        bool here = k < b->count && same_head(&a->array[i], &b->array[k]);
+        const uint32_t *number = !maps ? NULL
+                                 : ebpo_attribute_is_of(&a->array[i], "vertex")
+                                     ? maps->vertex_source
+                                     : maps->face_source;
+        if (here)
+            compare_rows(tally, &a->array[i], &b->array[k++], number, stored->workspace);
+        else if (ebpo_attribute_is_of_mesh(&a->array[i]))
+            CHECK(false, "the attribute %s of %s is not where the source has it", a->array[i].names,
+                  a->array[i].element);
+    }
 }
 
 static int compare_vertices(const void *a, const void *b, void *mesh)
@@ -182,6 +230,7 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
                     &(ebpo_verify_place){ 0, maps.face_source[i], EBPO_NO_PLANE },
                     "the face (by its source number) has other corners in the file");
         }
+        compare_attributes(tally, whole, &part, &maps);
     }
     ebpo_maps_free(&maps);
     ebpo_mesh_free(&part);
@@ -212,6 +261,8 @@ static ebpo_status compare(ebpo_tally *tally, const ebpo_mesh *mended, const ebp
               mended->vertex_count, mended->face_count, stored->vertex_count, stored->face_count);
     if (comparable && ordered)
         compare_in_order(tally, mended, stored);
+    if (comparable && ordered)
+        compare_attributes(tally, mended, stored, NULL);
     if (comparable && !ordered)
         status = compare_as_sets(tally, mended, stored, false, error);
     if (comparable && !ordered && status == EBPO_OK)

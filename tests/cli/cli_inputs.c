@@ -57,6 +57,17 @@ static const struct {
                    "element face 6\nproperty list uchar int vertex_indices\nend_header\n"
                    "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 0 1\n1 0 1\n0 1 1\n1 1 1\n"
                    "4 0 4 6 2\n4 1 3 7 5\n4 0 1 5 4\n4 2 6 7 3\n4 0 2 3 1\n4 4 5 7 6\n" },
+    { "coloured.ply",
+      "ply\nformat ascii 1.0\ncomment by hand\nobj_info none\nelement vertex 5\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float x\n"
+      "property float y\nproperty float z\nproperty double quality\nelement face 5\n"
+      "property short label\nproperty list uchar uint vertex_index\n"
+      "property list uchar float texcoord\nproperty list uint int words\nelement edge 2\n"
+      "property int vertex1\nproperty int vertex2\nend_header\n"
+      "255 0 0 0 0 0 0.5\n0 255 0 1 0 0 1e300\n0 0 255 1 1 0 -0\n9 8 7 0 1 0 nan\n"
+      "1 2 3 0.5 0.5 1 -inf\n"
+      "-3 4 0 3 2 1 2 0 0.5 0\n1 3 0 1 4 2 1 2 1 -7\n2 3 1 2 4 2 3 4 2 8 9\n"
+      "3 3 2 3 4 2 5 6 0\n4 3 3 0 4 2 7 8 3 1 2 3\n0 1\n3 4\n" },
     { "tetrahedron.stl", "solid t\n"
                          "facet normal 0 0 -1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 "
                          "0\nendloop\nendfacet\n"

@@ -4,6 +4,6 @@
 
 #include <ebpo/file.h>
 
-#define READ_BY(threads) (&(ebpo_read_options){ sizeof(ebpo_read_options), (threads), NULL, 0 })
+#define READ_BY(threads) (&(ebpo_read_options){ sizeof(ebpo_read_options), (threads), NULL, 0, 0 })
 
 #endif

@@ -22,15 +22,17 @@ static ebpo_status call_facts(every_call_env *e)
     int32_t normal[3], distance;
     char redacted[64], second[64];
     unsigned arrays = 0;
+    ebpo_attribute_facts attribute = EBPO_ATTRIBUTE_FACTS_INIT;
     while (ebpo_file_array(e->file, arrays, &facts))
         arrays++;
+    (void)ebpo_file_attribute(e->file, 0, &attribute);
     (void)ebpo_plane_decode(0, normal, &distance);
     (void)ebpo_export_second_file(EBPO_EXPORT_XDMF, "x.xdmf", second, sizeof second);
     bool good = arrays && ebpo_version() && ebpo_version_number() == EBPO_VERSION_NUMBER &&
                 ebpo_status_name(EBPO_OK) && ebpo_export_format_name(EBPO_EXPORT_OBJ) &&
                 ebpo_is_url(ebpo_url_redact("http://a:b@c/", redacted, sizeof redacted)) &&
-                ebpo_profile_parts(EBPO_PROFILE_LOD) && ebpo_subset_memory(1000, 16) &&
-                ebpo_file_info(e->file)->level_count > 0;
+                ebpo_attribute_type_text(0) && ebpo_profile_parts(EBPO_PROFILE_LOD) &&
+                ebpo_subset_memory(1000, 16) && ebpo_file_info(e->file)->level_count > 0;
     return good ? ebpo_file_get_stats(e->file, &stats) : EBPO_E_ARGUMENT;
 }
 
@@ -228,6 +230,16 @@ static ebpo_status call_read_maps(every_call_env *e)
     return status;
 }
 
+/* The file has none. */
+static ebpo_status call_read_attribute(every_call_env *e)
+{
+    ebpo_attribute_values values;
+    ebpo_read_options options = reading(e);
+    ebpo_status status = ebpo_file_read_attribute(e->file, 0, &options, &values, e->error);
+    ebpo_attribute_values_free(&values);
+    return status == EBPO_E_ABSENT ? EBPO_OK : status;
+}
+
 static ebpo_status call_check_content(every_call_env *e)
 {
     ebpo_read_options options = reading(e);
@@ -337,6 +349,7 @@ const every_call every_call_files[] = {
     { "read_mesh", call_read_mesh },
     { "read_source_mesh", call_read_source_mesh },
     { "read_maps", call_read_maps },
+    { "read_attribute", call_read_attribute },
     { "check_content", call_check_content },
     { "write", call_write },
     { "subset_of_tree", call_subset_of_tree },

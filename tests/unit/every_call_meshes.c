@@ -10,6 +10,7 @@ static ebpo_status read_mesh(every_call_env *e, const char *name, ebpo_mesh *mes
     ebpo_mesh_read_options options = EBPO_MESH_READ_OPTIONS_INIT;
     options.threads = 1;
     options.workspace = e->workspace;
+    options.attributes = 1;
     return ebpo_mesh_read(scratch(name), &options, mesh, e->error);
 }
 
@@ -17,6 +18,7 @@ static ebpo_status call_read(every_call_env *e)
 {
     ebpo_mesh mesh;
     ebpo_status status = read_mesh(e, EVERY_CALL_PLY, &mesh);
+    (void)ebpo_mesh_attributes_lost(&mesh);
     ebpo_mesh_free(&mesh);
     return status;
 }

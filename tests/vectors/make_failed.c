@@ -26,6 +26,7 @@ static const char *folder;
 #define CHUNKS    "17_chunks_of_subtrees_unfiltered"
 #define LISTS     "28_leaf_index"
 #define INDEXED   "29_types_and_gray_index"
+#define COLOURED  "39_attributes"
 
 /* As the library writes it; elements of one byte are not shuffled. */
 static void zstd(hid_t dcpl)
@@ -282,6 +283,27 @@ static void v_corner_first(void) { poke("/mesh/faces", 0, 1); }
 static void v_faces_index(void) { poke("/mesh/faces_index", 1, 3); }
 static void v_map_twice(void) { poke("/maps/face_source", 1, 0); }
 static void v_map_far(void) { poke("/maps/vertex_source", 0, 200); }
+static void v_attributes_changed(void) { poke("/attributes/000", 0, 2); }
+static void v_attributes_missing(void) { drop("/attributes/003"); }
+static void v_attributes_many(void) { set_count("/attributes", "arrays", 1001); }
+static void v_attributes_type(void) { set_text("/attributes/003", "type", "int64"); }
+static void v_attributes_width(void) { set_text("/attributes/003", "type", "int32"); }
+static void v_attributes_names(void) { set_text("/attributes/000", "names", "red green"); }
+static void v_attributes_element(void) { set_text("/attributes/003", "element", "edge"); }
+static void v_attributes_coding(void) { set_text("/attributes/001", "coding", "delta"); }
+static void v_attributes_ends(void) { poke("/attributes/006", 2, 1); }
+static void v_attributes_items(void) { poke("/attributes/006", 3, 8); }
+static void v_attributes_no_mesh(void)
+{
+    set_text("/", "required_parts", "levels");
+    for (const char *const *path =
+             (const char *const[]){ "/levels/00", "/levels/01", "/levels/02", NULL };
+         *path; path++) {
+        set_count(*path, "faces_new", 0);
+        set_count(*path, "faces_referenced", 0);
+    }
+    set_text("/", "optional_parts", "planes attributes");
+}
 static void v_content(void) { poke("/mesh/vertices", 0, 2); }
 
 typedef enum late_change { NONE, CUT, FLIP_CHUNK, FLIP_HEAD, SWAP_CHUNK, NOT_HDF5 } late_change;
@@ -436,6 +458,24 @@ static const failed_vector failed[] = {
     { "gray_index_wrong", INDEXED, v_gray_index, NONE, "4", "differs" },
     { "leaf_index_wrong", LISTS, v_leaf_index, NONE, "4", "differs" },
     { "content_changed", LEAVES, v_content, NONE, "3", "it does not match" },
+    { "attributes_changed", COLOURED, v_attributes_changed, NONE, "18", "it does not match" },
+    { "attributes_array_missing", COLOURED, v_attributes_missing, NONE, "18",
+      "how many arrays there are" },
+    { "attributes_too_many", COLOURED, v_attributes_many, NONE, "18", "above 1,000" },
+    { "attributes_of_unknown_type", COLOURED, v_attributes_type, NONE, "18", "another word" },
+    { "attributes_of_other_width", COLOURED, v_attributes_width, NONE, "18",
+      "it is not as wide as `type`" },
+    { "attributes_without_names", COLOURED, v_attributes_names, NONE, "18",
+      "not as many as columns" },
+    { "attributes_of_other_rows", COLOURED, v_attributes_element, NONE, "18",
+      "must have equally many rows" },
+    { "attributes_of_unknown_coding", COLOURED, v_attributes_coding, NONE, "18",
+      "`plain` or `columns`" },
+    { "attributes_lists_end_before", COLOURED, v_attributes_ends, NONE, "18",
+      "less than the row before" },
+    { "attributes_lists_end_beyond", COLOURED, v_attributes_items, NONE, "18",
+      "not as many as the last end" },
+    { "attributes_without_mesh", COLOURED, v_attributes_no_mesh, NONE, "18", "only with `mesh`" },
 };
 
 static void change_bytes(const char *path, late_change late)

@@ -8,8 +8,10 @@
 
 #include <ebpo/build.h>
 
+#include "attributes_json.h"
 #include "change_file.h"
 #include "nodes_json.h"
+#include "ply/ply.h"
 #include "solids.h"
 #include "subset/subset_parts.h"
 #include "tree_json.h"
@@ -103,6 +105,14 @@ static void write_json(const char *name, const ebpo_tree *tree)
         die(path, "cannot be written");
     tree_json(out, tree);
     fclose(out);
+    if (tree->mesh.attributes) {
+        snprintf(path, sizeof path, "%s/passed/%s.attributes.json", folder, name);
+        out = fopen(path, "w");
+        if (!out)
+            die(path, "cannot be written");
+        attributes_json(out, tree->mesh.attributes);
+        fclose(out);
+    }
     if (!nodes_json_fits(tree))
         return;
     snprintf(path, sizeof path, "%s/passed/%s.ebpo.h5", folder, name);
@@ -437,6 +447,52 @@ static void make_large(void)
     write_vector("32_chunks_of_maps", &tree, EBPO_CODEC_ZSTD, EBPO_PART_MESH | EBPO_PART_MAPS);
 }
 
+/* --- attributes --- */
+
+/* Of every kind: colours and normals, also one that is none, lists of one length and of different
+ * ones, another element, comments, one of them in Latin 1. */
+static const char coloured[] =
+    "ply\nformat ascii 1.0\ncomment a tetrahedron, f\xfcr Leser\nobj_info made by hand\n"
+    "element vertex 4\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+    "property float x\nproperty float y\nproperty float z\n"
+    "property float nx\nproperty float ny\nproperty float nz\nproperty double quality\n"
+    "property int8 mark\n"
+    "element face 4\nproperty short label\nproperty list uchar uint vertex_indices\n"
+    "property list uchar float texcoord\nproperty list ushort int words\n"
+    "element edge 2\nproperty uint vertex1\nproperty uint vertex2\nproperty ushort kind\n"
+    "element camera 0\nproperty float view_px\n"
+    "end_header\n"
+    "255 0 0 0 0 0 0 0 -1 0.5 -128\n0 255 0 1 0 0 1 0 0 1e300 127\n"
+    "0 0 255 0 1 0 0 1 0 -0 0\n128 128 128 0 0 1 nan -inf 1.5 0.1 -1\n"
+    "-3 3 0 2 1 6 0 0 1 0 0 1 0\n32767 3 0 1 3 6 0 0 0.5 0 0.5 1 2 7 -7\n"
+    "-32768 3 0 3 2 6 0.25 0 1 0 0 1 1 2147483647\n0 3 1 2 3 6 0 0 1 0 0 1 3 1 2 3\n"
+    "0 1 7\n2 3 65535\n";
+
+static ebpo_mesh read_coloured(void)
+{
+    ebpo_mesh mesh;
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (ebpo_ply_parse_all(&mesh, (const uint8_t *)coloured, sizeof coloured - 1, "coloured.ply",
+                           NULL, true, 1, NULL, &error) != EBPO_OK)
+        die("coloured", error.message);
+    return mesh;
+}
+
+static void make_attributes(void)
+{
+    ebpo_tree tree;
+    ebpo_subset_options box = EBPO_SUBSET_OPTIONS_INIT;
+    build_mesh(&tree, read_coloured(), (how){ 2, 1, 0, 0, 0 });
+    write_vector("39_attributes", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build_mesh(&tree, read_coloured(), (how){ 3, 1, EBPO_PART_LEAF_PLANES, 0, 0 });
+    write_laid_out("40_attributes_subtrees_unfiltered", &tree, EBPO_CODEC_NONE, ~0u, 1);
+    box.boxed = true;
+    for (int k = 0; k < 3; k++)
+        box.max[k] = 0.2;
+    subset(&tree, "40_attributes_subtrees_unfiltered", &box);
+    write_vector("41_attributes_of_a_subset", &tree, EBPO_CODEC_NONE, ~0u);
+}
+
 void make_passed(const char *to)
 {
     folder = to;
@@ -446,4 +502,5 @@ void make_passed(const char *to)
     make_derived();
     make_meshes();
     make_large();
+    make_attributes();
 }

@@ -7,6 +7,7 @@
 #include <zlib.h>
 #include <zstd.h>
 
+#include "attributes_json.h"
 #include "check_main.h"
 #include "scratch.h"
 #include "tree_json.h"
@@ -50,6 +51,21 @@ static unsigned each(const char *part, const char *companion,
     return count;
 }
 
+static void check_attributes(const char *path, const ebpo_attributes *attributes)
+{
+    char other[1024], *json = NULL;
+    size_t json_size = 0, size;
+    snprintf(other, sizeof other, "%.*s.attributes.json", (int)(strlen(path) - strlen(".ebpo.h5")),
+             path);
+    FILE *out = open_memstream(&json, &json_size);
+    attributes_json(out, attributes);
+    fclose(out);
+    char *expected = slurp(other, &size);
+    ck_assert_str_eq(json, expected);
+    free(json);
+    free(expected);
+}
+
 static void check_passed(const char *path, const char *expected_path)
 {
     ebpo_tree tree;
@@ -64,6 +80,8 @@ static void check_passed(const char *path, const char *expected_path)
     ck_assert_str_eq(json, expected);
     free(json);
     free(expected);
+    if (tree.mesh.attributes)
+        check_attributes(path, tree.mesh.attributes);
     ebpo_tree_free(&tree);
 }
 

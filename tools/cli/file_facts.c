@@ -156,7 +156,7 @@ static uint64_t other_bytes(const ebpo_info *info, const ebpo_stored_sizes *stor
 {
     uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info, stored) +
                    stored->mesh_vertex_bytes + stored->mesh_face_bytes + stored->map_bytes +
-                   stored->subtree_bytes;
+                   stored->subtree_bytes + stored->attribute_bytes;
     return info->file_bytes > sum ? info->file_bytes - sum : 0;
 }
 
@@ -198,6 +198,7 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info,
     print_bytes(out, "faces", info, stored->mesh_face_bytes);
     print_bytes(out, "maps", info, stored->map_bytes);
     print_bytes(out, "subtrees", info, stored->subtree_bytes);
+    print_bytes(out, "attributes", info, stored->attribute_bytes);
     print_bytes(out, "other", info, other_bytes(info, stored));
     print_bytes(out, "file", info, info->file_bytes);
 }
@@ -240,7 +241,40 @@ void facts_arrays(FILE *out, const ebpo_file *file)
     }
 }
 
+void facts_attributes(FILE *out, const ebpo_file *file)
+{
+    ebpo_attribute_facts a = EBPO_ATTRIBUTE_FACTS_INIT;
+    for (unsigned n = 0; ebpo_file_attribute(file, n, &a); n++) {
+        char stored[32];
+        fprintf(out, "  %s %-9s %s", n ? "           " : "attributes", a.element, a.names);
+        fprintf(out, ", %s%s", a.list ? "lists of " : "", ebpo_attribute_type_text(a.type));
+        if (a.has_range)
+            fprintf(out, ", %.9g to %.9g", a.range[0], a.range[1]);
+        fprintf(out, ", %s\n", words_bytes(stored, sizeof stored, a.stored_bytes));
+    }
+}
+
 /* --- JSON --- */
+
+void facts_attributes_json(json *j, const ebpo_file *file)
+{
+    ebpo_attribute_facts a = EBPO_ATTRIBUTE_FACTS_INIT;
+    json_array(j, "attributes");
+    for (unsigned n = 0; ebpo_file_attribute(file, n, &a); n++) {
+        json_object(j, NULL);
+        json_text(j, "element", a.element);
+        json_text(j, "names", a.names);
+        json_text(j, "type", ebpo_attribute_type_text(a.type));
+        json_bool(j, "list", a.list);
+        json_uint(j, "rows", a.rows);
+        json_uint(j, "columns", a.columns);
+        if (a.has_range)
+            json_reals(j, "range", a.range, 2);
+        json_uint(j, "stored_bytes", a.stored_bytes);
+        json_end(j);
+    }
+    json_end(j);
+}
 
 void facts_arrays_json(json *j, const ebpo_file *file)
 {
@@ -363,6 +397,7 @@ static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes
     json_uint(j, "faces", stored->mesh_face_bytes);
     json_uint(j, "maps", stored->map_bytes);
     json_uint(j, "subtrees", stored->subtree_bytes);
+    json_uint(j, "attributes", stored->attribute_bytes);
     json_uint(j, "other", other_bytes(info, stored));
     json_end(j);
     if (!info->subtree_level)

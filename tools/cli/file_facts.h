@@ -40,4 +40,8 @@ void facts_json(json *j, const char *path, const ebpo_info *info, const ebpo_sto
 void facts_arrays(FILE *out, const ebpo_file *file);
 void facts_arrays_json(json *j, const ebpo_file *file);
 
+/* The attributes of a file, with what their values reach. */
+void facts_attributes(FILE *out, const ebpo_file *file);
+void facts_attributes_json(json *j, const ebpo_file *file);
+
 #endif

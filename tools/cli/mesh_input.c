@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked,
+ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked, bool attributes,
                             ebpo_workspace *workspace, unsigned threads, ebpo_progress progress,
                             ebpo_error *error)
 {
@@ -11,6 +11,7 @@ ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked,
     how.progress = wanted.progress = progress;
     how.threads = wanted.threads = threads;
     how.workspace = workspace;
+    how.attributes = attributes;
     wanted.weld = asked.weld;
     wanted.orient = asked.orient;
     wanted.fill_holes = asked.fill_holes;
@@ -21,6 +22,7 @@ ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked,
         return status;
     out->as_read = out->mesh;
     out->as_read.faces = NULL;
+    out->as_read.attributes = NULL;
     status = ebpo_mesh_prepare(&out->mesh, &wanted, &out->prepared, error);
     if (status != EBPO_OK)
         ebpo_mesh_free(&out->mesh);

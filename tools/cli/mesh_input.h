@@ -23,9 +23,11 @@ typedef struct mesh_input {
     ebpo_prepared prepared; /* what was found and mended */
 } mesh_input;
 
-/* On failure nothing is left to free; else ebpo_mesh_free(&out->mesh). */
+/* `attributes`: properties beyond positions and corners are read as well. On failure nothing is
+ * left to free; else ebpo_mesh_free(&out->mesh). */
 EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked,
-                                          ebpo_workspace *workspace, unsigned threads,
-                                          ebpo_progress progress, ebpo_error *error);
+                                          bool attributes, ebpo_workspace *workspace,
+                                          unsigned threads, ebpo_progress progress,
+                                          ebpo_error *error);
 
 #endif

@@ -100,7 +100,7 @@ static ebpo_status check(const values *v, const char *path, mesh_input *p,
     progress_line line;
     ebpo_progress progress = progress_start(&line, "check", v->quiet);
     ebpo_status status =
-        mesh_input_read(p, path, v->mend, workspace, (unsigned)v->threads, progress, error);
+        mesh_input_read(p, path, v->mend, false, workspace, (unsigned)v->threads, progress, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;

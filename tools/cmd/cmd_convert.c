@@ -34,8 +34,9 @@ typedef struct values {
 } values;
 
 static const char *const with_words[] = { "leaf-planes", NULL };
-static const char *const without_words[] = { "planes", "mesh", "maps",
-                                             NULL }; /* word i is ebpo_part bit i */
+/* word i is ebpo_part bit i, but for the last: leaf planes are not made unless asked for */
+static const char *const without_words[] = { "planes", "mesh", "maps", "attributes", NULL };
+enum { WITHOUT_ATTRIBUTES = 1 << 3 };
 
 static const arg_option options[] = {
     OPTION_INT("max-level", 0, values, max_level, "N", 0, 20,
@@ -60,8 +61,8 @@ static const arg_option options[] = {
                "seed for kmedoids and random; default 1"),
     OPTION_SET("with", 0, values, with, "LIST", with_words, "also store: leaf-planes"),
     OPTION_SET("without", 0, values, without, "LIST", without_words,
-               "leave out: maps, mesh (and with it the maps), planes; separated by commas, may be "
-               "repeated"),
+               "leave out: attributes (colours and the like), maps, mesh (and with it the maps and "
+               "attributes), planes; separated by commas, may be repeated"),
     OPTION_WORD("profile", 0, values, profile, "NAME", profile_words,
                 "instead of --with and --without: full (all parts), lod (for viewers: no mesh), "
                 "collision (for exact questions: mesh, no maps); the same file as 'ebpo subset "
@@ -146,14 +147,17 @@ static bool chooses_parts(const values *v)
 
 static uint32_t parts_of(const values *v)
 {
-    uint32_t without = v->without;
+    uint32_t without = v->without & WITHOUT_ATTRIBUTES
+                           ? (v->without & ~(uint32_t)WITHOUT_ATTRIBUTES) | EBPO_PART_ATTRIBUTES
+                           : v->without;
     if (v->profile >= 0 ||
         chooses_parts(
             v)) /* all are built, so that the file is the one that a subset of the full one is */
         return ebpo_profile_parts(EBPO_PROFILE_FULL);
     if (without & EBPO_PART_MESH)
-        without |= EBPO_PART_MAPS;
-    uint32_t parts = (EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS) & ~without;
+        without |= EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES;
+    uint32_t parts =
+        (EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES) & ~without;
     return v->with ? parts | EBPO_PART_LEAF_PLANES : parts;
 }
 
@@ -168,6 +172,9 @@ static void print_reports(const values *v, const mesh_input *p, const char *in)
             findings_print(stdout, "after mending", &p->mesh, &p->prepared.report, false);
     }
     command_flush("convert");
+    const char *lost = ebpo_mesh_attributes_lost(&p->mesh);
+    if (lost)
+        fprintf(stderr, "ebpo convert: %s: note: not kept: %s\n", in, lost);
     findings_warn(stderr, "convert", in, &p->prepared.report, &p->prepared.record);
 }
 
@@ -382,8 +389,8 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
     if (!v->split_components)
         progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
     double begun = progress_now();
-    ebpo_status status =
-        mesh_input_read(&p, in, v->mend, workspace, (unsigned)v->threads, progress, error);
+    ebpo_status status = mesh_input_read(&p, in, v->mend, parts_of(v) & EBPO_PART_ATTRIBUTES,
+                                         workspace, (unsigned)v->threads, progress, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;

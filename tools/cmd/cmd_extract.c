@@ -112,6 +112,20 @@ static ebpo_status take_subtree(const ebpo_file *file, const values *v, const ch
     return status;
 }
 
+/* What stands in other elements is written where numbers of vertices are those of the source. */
+static void warn_of_elements(const ebpo_file *file, bool source_order, const char *path)
+{
+    ebpo_attribute_facts a = EBPO_ATTRIBUTE_FACTS_INIT;
+    bool others = false;
+    for (unsigned n = 0; ebpo_file_attribute(file, n, &a); n++)
+        others = others || (strcmp(a.element, "vertex") != 0 && strcmp(a.element, "face") != 0);
+    if (others && (!source_order || ebpo_file_info(file)->mend.welded_vertices))
+        fprintf(stderr,
+                "ebpo extract: %s: note: other elements are left out, as their numbers of vertices "
+                "are the source's\n",
+                remote_shown(path));
+}
+
 static ebpo_status take(ebpo_file *file, const values *v, const char *path,
                         ebpo_workspace *workspace, ebpo_progress progress, extracted *out,
                         ebpo_error *error)
@@ -128,12 +142,15 @@ static ebpo_status take(ebpo_file *file, const values *v, const char *path,
     }
     bool source_order = false;
     ebpo_read_options read = reading(v->threads, workspace);
+    read.attributes = 1;
     ebpo_status status = ebpo_file_read_source_mesh(file, &read, &out->mesh, &source_order, error);
     if (status == EBPO_OK && !source_order)
         fprintf(
             stderr,
             "ebpo extract: %s: note: has no maps, so vertices and faces are in the file's order\n",
             remote_shown(path));
+    if (status == EBPO_OK)
+        warn_of_elements(file, source_order, path);
     if (status == EBPO_OK && ebpo_file_info(file)->pruned)
         fprintf(stderr,
                 "ebpo extract: %s: note: is a subset, so its mesh is only part of the model's\n",

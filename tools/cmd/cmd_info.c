@@ -55,6 +55,7 @@ static void print_words(const values *v, const char *path, const ebpo_file *file
     facts_print(stdout, path, info, stored);
     if (v->memory)
         memory_facts(stdout, plan);
+    facts_attributes(stdout, file);
     putchar('\n');
     facts_table(stdout, info, stored);
     if (v->arrays)
@@ -71,6 +72,7 @@ static void print_json(const values *v, const char *path, const ebpo_file *file,
     facts_json(&j, path, ebpo_file_info(file), stored);
     if (v->memory)
         memory_facts_json(&j, "memory", plan);
+    facts_attributes_json(&j, file);
     if (v->arrays)
         facts_arrays_json(&j, file);
     remote_json(&j, t, &v->remote);

@@ -125,6 +125,7 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
     read.progress = progress;
     read.workspace = workspace;
     read.threads = (unsigned)v->threads;
+    read.attributes = 1;
     if (status == EBPO_OK)
         status = remote_open(&file, path, &v->remote, error);
     if (status == EBPO_OK && v->against)

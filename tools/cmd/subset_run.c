@@ -53,7 +53,8 @@ static uint32_t part_named(const char *word, size_t length)
                   { "maps", EBPO_PART_MAPS },
                   { "envelopes", EBPO_PART_PLANES },
                   { "planes", EBPO_PART_PLANES },
-                  { "leaf-planes", EBPO_PART_LEAF_PLANES } };
+                  { "leaf-planes", EBPO_PART_LEAF_PLANES },
+                  { "attributes", EBPO_PART_ATTRIBUTES } };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (strlen(names[i].word) == length && memcmp(names[i].word, word, length) == 0)
             return names[i].part;
@@ -119,8 +120,8 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
             v->box);
     if (v->parts && !read_parts(v->parts, &out->parts))
         return command_usage(name,
-                             "--parts: '%s' is not a list of mesh, maps, envelopes, leaf-planes, "
-                             "or of these with a minus sign before each",
+                             "--parts: '%s' is not a list of mesh, maps, attributes, envelopes, "
+                             "leaf-planes, or of these with a minus sign before each",
                              v->parts);
     if (v->parts && v->profile >= 0)
         return command_usage(name, "--parts and --profile cannot be used together");
@@ -164,7 +165,7 @@ ebpo_status subset_settle(const subset_values *v, const ebpo_info *info, const c
                      "--parts asks for maps without the mesh that they number; add mesh");
     if (!v->parts && v->profile < 0 && out->last_level >= 0 &&
         out->last_level < info->level_count - 1)
-        out->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS);
+        out->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
     if (v->profile == EBPO_PROFILE_LOD && !(info->parts & EBPO_PART_LEAF_PLANES) && !v->quiet)
         fprintf(stderr,
                 "note: %s stores no leaf planes, so leaves will have their parents' envelopes; "

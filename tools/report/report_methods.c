@@ -108,7 +108,7 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
     mesh_input p;
-    ebpo_status status = mesh_input_read(&p, mesh, (mending){ false, false, false }, NULL,
+    ebpo_status status = mesh_input_read(&p, mesh, (mending){ false, false, false }, false, NULL,
                                          (unsigned)c->v->threads, c->progress, error);
     if (status != EBPO_OK)
         return status;

@@ -157,12 +157,12 @@ typedef struct ebpo_build_options {
     ebpo_build_times *times;
 } ebpo_build_options;
 
-#define EBPO_BUILD_OPTIONS_INIT                                                              \
-    {                                                                                        \
-        sizeof(ebpo_build_options), -1, 16, 0.003,                                           \
-            EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, EBPO_RULE_NONZERO, false, 0, \
-            EBPO_SELECT_INHERIT, 40, 0, EBPO_NORMALS_SPHERICAL, 1, NULL, NULL, NULL,         \
-            { NULL, NULL }, NULL                                                             \
+#define EBPO_BUILD_OPTIONS_INIT                                                                 \
+    {                                                                                           \
+        sizeof(ebpo_build_options), -1, 16, 0.003,                                              \
+            EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES,          \
+            EBPO_RULE_NONZERO, false, 0, EBPO_SELECT_INHERIT, 40, 0, EBPO_NORMALS_SPHERICAL, 1, \
+            NULL, NULL, NULL, { NULL, NULL }, NULL                                              \
     }
 
 /*

@@ -58,10 +58,11 @@ typedef enum ebpo_rule {
 
 /* Parts of a file, as bits. */
 typedef enum ebpo_part {
-    EBPO_PART_PLANES = 1,     /* envelope planes of gray nodes */
-    EBPO_PART_MESH = 2,       /* vertices, faces, and the leaves' lists of faces */
-    EBPO_PART_MAPS = 4,       /* numbers in the source, of vertices and faces */
-    EBPO_PART_LEAF_PLANES = 8 /* stored envelope planes of leaves */
+    EBPO_PART_PLANES = 1,      /* envelope planes of gray nodes */
+    EBPO_PART_MESH = 2,        /* vertices, faces, and the leaves' lists of faces */
+    EBPO_PART_MAPS = 4,        /* numbers in the source, of vertices and faces */
+    EBPO_PART_LEAF_PLANES = 8, /* stored envelope planes of leaves */
+    EBPO_PART_ATTRIBUTES = 16  /* what the source says of vertices and faces beyond these */
 } ebpo_part;
 
 typedef enum ebpo_codec {
@@ -546,6 +547,51 @@ typedef struct ebpo_array_facts {
  * Threads: any. */
 EBPO_API bool ebpo_file_array(const ebpo_file *file, unsigned n, ebpo_array_facts *out);
 
+/* An array of attributes: numbers that vertices, faces or other elements have. */
+typedef struct ebpo_attribute_facts {
+    size_t struct_size; /* EBPO_ATTRIBUTE_FACTS_INIT sets it */
+
+    /* "vertex", "face", or another element of the source. */
+    char element[64];
+
+    /* Of each column, with one space between them. */
+    char names[256];
+
+    /* Of the values: an ebpo_attribute_type. */
+    uint64_t type;
+
+    uint64_t rows;
+
+    /* Of a list: its items, if all lists are as long; else 0. */
+    uint64_t columns;
+
+    /* 1: a list in each row. */
+    uint64_t list;
+
+    /* 1: the file states the range. */
+    uint64_t has_range;
+
+    /* Least and greatest of all values. */
+    double range[2];
+
+    /* Compressed; after ebpo_file_locate. */
+    uint64_t stored_bytes;
+} ebpo_attribute_facts;
+
+#define EBPO_ATTRIBUTE_FACTS_INIT EBPO_SIZED(ebpo_attribute_facts)
+
+/*
+ * The n-th array of attributes of the file, n from 0.
+ *
+ * False when there are fewer; `out` is then as it was.
+ *
+ * Threads: any.
+ */
+EBPO_API bool ebpo_file_attribute(const ebpo_file *file, unsigned n, ebpo_attribute_facts *out);
+
+/* The name of an ebpo_attribute_type: "int8" to "float64"; NULL: no such type. Static. */
+EBPO_API const char *ebpo_attribute_type_text(uint64_t type);
+
 /* Bytes that parts take in the file, compressed. */
 typedef struct ebpo_stored_sizes {
     size_t struct_size; /* EBPO_STORED_SIZES_INIT sets it */
@@ -555,6 +601,8 @@ typedef struct ebpo_stored_sizes {
 
     /* Of the table of subtrees. */
     uint64_t subtree_bytes;
+
+    uint64_t attribute_bytes;
 } ebpo_stored_sizes;
 
 #define EBPO_STORED_SIZES_INIT EBPO_SIZED(ebpo_stored_sizes)
@@ -600,11 +648,17 @@ typedef struct ebpo_read_options {
      * ebpo_file_repack) are not read without: EBPO_E_ARGUMENT unless it is 0.
      */
     uint64_t without;
+
+    /*
+     * 1: ebpo_file_read_mesh and ebpo_file_read_source_mesh read attributes as well, if
+     * the file has them. Trees always have them.
+     */
+    uint64_t attributes;
 } ebpo_read_options;
 
-#define EBPO_READ_OPTIONS_INIT                \
-    {                                         \
-        sizeof(ebpo_read_options), 0, NULL, 0 \
+#define EBPO_READ_OPTIONS_INIT                   \
+    {                                            \
+        sizeof(ebpo_read_options), 0, NULL, 0, 0 \
     }
 
 /*
@@ -665,6 +719,44 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_maps(const ebpo_file *file,
  * Threads: one per struct.
  */
 EBPO_API void ebpo_maps_free(ebpo_maps *maps);
+
+/* The values of an array of attributes. */
+typedef struct ebpo_attribute_values {
+    /*
+     * [rows][columns] of the array's type, in the machine's byte order; of lists of
+     * different lengths the items of all, row after row
+     */
+    void *values;
+
+    /* [rows] of such lists, how many items all rows up to this one have; else NULL */
+    uint64_t *ends;
+
+    /* In `values`. */
+    uint64_t count;
+
+    /* Owns both; NULL: malloc's */
+    ebpo_workspace *workspace;
+} ebpo_attribute_values;
+
+/*
+ * Reads the n-th array of attributes, in the order of the file's vertices or faces.
+ * Freed by ebpo_attribute_values_free. On failure `out` is cleared.
+ *
+ * EBPO_E_ABSENT: the file has fewer. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_attribute(const ebpo_file *file, unsigned n,
+                                                            const ebpo_read_options *options,
+                                                            ebpo_attribute_values *out,
+                                                            ebpo_error *error);
+
+/*
+ * Frees the arrays and clears the struct.
+ *
+ * Threads: one per struct.
+ */
+EBPO_API void ebpo_attribute_values_free(ebpo_attribute_values *values);
 
 /*
  * Reads everything. Freed by ebpo_tree_free.

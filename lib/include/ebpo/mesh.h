@@ -22,6 +22,18 @@ extern "C" {
 
 /* ---- meshes ---- */
 
+/* Of the values of an attribute. */
+typedef enum ebpo_attribute_type {
+    EBPO_ATTRIBUTE_INT8,
+    EBPO_ATTRIBUTE_UINT8,
+    EBPO_ATTRIBUTE_INT16,
+    EBPO_ATTRIBUTE_UINT16,
+    EBPO_ATTRIBUTE_INT32,
+    EBPO_ATTRIBUTE_UINT32,
+    EBPO_ATTRIBUTE_FLOAT32,
+    EBPO_ATTRIBUTE_FLOAT64
+} ebpo_attribute_type;
+
 /*
  * An indexed triangle mesh: plain data. Members may be read, and set by callers
  * who make a mesh themselves. They clear the struct, allocate the arrays with
@@ -73,6 +85,13 @@ typedef struct ebpo_mesh {
      * arrays may be in it, or malloc's.
      */
     ebpo_workspace *workspace;
+
+    /*
+     * What else the file says of vertices and faces (`attributes` of
+     * ebpo_mesh_read_options). The mesh owns it, and it goes where the mesh goes.
+     * NULL: nothing.
+     */
+    struct ebpo_attributes *attributes;
 } ebpo_mesh;
 
 /*
@@ -81,6 +100,14 @@ typedef struct ebpo_mesh {
  * Threads: one per mesh.
  */
 EBPO_API void ebpo_mesh_free(ebpo_mesh *mesh);
+
+/*
+ * What of the file's attributes could not be kept, in words; NULL: nothing was
+ * lost, or none were asked for. Lives as long as the mesh.
+ *
+ * Threads: any, while nobody changes the mesh.
+ */
+EBPO_API const char *ebpo_mesh_attributes_lost(const ebpo_mesh *mesh);
 
 /* ---- reading and writing ---- */
 
@@ -97,11 +124,17 @@ typedef struct ebpo_mesh_read_options {
      * after the mesh. NULL: as much memory as it takes.
      */
     ebpo_workspace *workspace;
+
+    /*
+     * 1: also reads what a PLY says of vertices, faces and other elements beyond
+     * positions and corners, and its comments; ebpo_build takes it over. 0: not.
+     */
+    uint64_t attributes;
 } ebpo_mesh_read_options;
 
-#define EBPO_MESH_READ_OPTIONS_INIT                             \
-    {                                                           \
-        sizeof(ebpo_mesh_read_options), 0, { NULL, NULL }, NULL \
+#define EBPO_MESH_READ_OPTIONS_INIT                                \
+    {                                                              \
+        sizeof(ebpo_mesh_read_options), 0, { NULL, NULL }, NULL, 0 \
     }
 
 /*
@@ -143,7 +176,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_points_parse_ply(const void *data, uint6
 
 /*
  * Writes a binary little-endian PLY, which appears whole or not at all: vertices
- * as floats or doubles, as the mesh holds them, triangles as int32 or uint32.
+ * as floats or doubles, as the mesh holds them, triangles as int32 or uint32. With
+ * attributes: properties in the order and of the types of the PLY that they were
+ * read from, and its comments; the mesh must then be in the order of its source.
  *
  * EBPO_E_ARGUMENT: the mesh is not valid. EBPO_E_IO, EBPO_E_MEMORY.
  *

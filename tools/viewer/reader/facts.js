@@ -5,7 +5,7 @@ import { text } from './hdf5.js';
 
 export const LEVELS_MAX = 21, INDEX_ROWS = 4096;
 const MESH_MAX = 2 ** 32 - 2, NODES_MAX = 2 ** 40;
-const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'subtrees', 'pruned'];
+const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'attributes', 'subtrees', 'pruned'];
 
 const WORDS = { kind: ['surface', 'solid'], winding_rule: ['nonzero', 'evenodd', 'positive'], coordinate_type: ['float32', 'float64'] };
 const TEXTS = ['source_name', 'source_format', 'unit', 'crs', 'date'];

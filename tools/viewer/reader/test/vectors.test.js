@@ -26,7 +26,8 @@ for (const name of readdirSync(join(vectors, 'passed')).filter((n) => n.endsWith
     assert.deepEqual(found, wanted);
   });
 
-for (const name of readdirSync(join(vectors, 'failed')).filter((n) => n.endsWith('.h5')))
+// Attributes are not given, and so not looked at (section 18).
+for (const name of readdirSync(join(vectors, 'failed')).filter((n) => n.endsWith('.h5') && !n.startsWith('attributes_')))
   test(`${name} is refused`, async () => {
     const [status, said] = load('failed', name.replace('.ebpo.h5', '.txt')).toString().split('\n');
     await assert.rejects(readAll(load('failed', name), name), (error) => {

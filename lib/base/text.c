@@ -1,0 +1,25 @@
+#include "base/text.h"
+
+#include <stdint.h>
+
+bool ebpo_text_ok(const char *text)
+{
+    const uint8_t *p = (const uint8_t *)text;
+    while (*p) {
+        unsigned more = *p < 0x80                 ? 0
+                        : *p >= 0xc2 && *p < 0xe0 ? 1
+                        : *p >= 0xe0 && *p < 0xf0 ? 2
+                        : *p >= 0xf0 && *p < 0xf5 ? 3
+                                                  : 9;
+        if (more == 9 || *p < 0x20 || *p == 0x7f)
+            return false;
+        if ((*p == 0xe0 && p[1] < 0xa0) || (*p == 0xed && p[1] >= 0xa0) ||
+            (*p == 0xf0 && p[1] < 0x90) || (*p == 0xf4 && p[1] >= 0x90) ||
+            (*p == 0xc2 && p[1] < 0xa0))
+            return false; /* overlong, surrogate, beyond Unicode, control */
+        for (p++; more; more--, p++)
+            if (*p < 0x80 || *p > 0xbf)
+                return false;
+    }
+    return true;
+}
