@@ -2,7 +2,7 @@
 #include <stdio.h>
 
 #include "base/sized.h"
-#include "container/reader.h"
+#include "container/file_in.h"
 
 static const ebpo_array_in *find(const ebpo_file *file, unsigned n)
 {

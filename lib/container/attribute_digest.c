@@ -3,7 +3,8 @@
 
 #include "base/array_loops.h"
 #include "codec/coding.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_digest.h"
+#include "container/attribute_paths.h"
 #include "container/content.h"
 
 enum { PIECE = 1 << 16 };

@@ -6,7 +6,8 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/sized.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_open.h"
+#include "container/attribute_paths.h"
 #include "container/head_facts.h"
 
 static ebpo_status wrong(const ebpo_file *file, const char *path, const char *what,

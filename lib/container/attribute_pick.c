@@ -4,7 +4,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_paths.h"
 #include "container/pick.h"
 
 typedef struct picking {

@@ -8,19 +8,10 @@
 #include "base/sha256.h"
 #include "base/text.h"
 #include "codec/coding.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_digest.h"
+#include "container/attribute_paths.h"
+#include "container/attribute_plan.h"
 #include "container/chunk_rows.h"
-
-const char ebpo_coding_plain[] = "plain", ebpo_coding_columns[] = "columns";
-
-void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES])
-{
-    if (number == 0)
-        snprintf(path, EBPO_PATH_BYTES, "/attributes/header");
-    else
-        snprintf(path, EBPO_PATH_BYTES, "/attributes/%03d%s", (number - 1) / 2,
-                 number % 2 ? "" : "_items");
-}
 
 /* --- checking --- */
 

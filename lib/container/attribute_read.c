@@ -7,7 +7,9 @@
 #include "base/error.h"
 #include "base/sized.h"
 #include "codec/coding.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_digest.h"
+#include "container/attribute_paths.h"
+#include "container/attribute_read.h"
 #include "container/reader.h"
 
 static bool floats_in(const ebpo_file *file, const ebpo_array_in *array)

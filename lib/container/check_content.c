@@ -4,7 +4,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/sized.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_read.h"
 #include "container/content.h"
 #include "container/reader.h"
 

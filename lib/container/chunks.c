@@ -9,7 +9,7 @@
 #include "base/arrays.h"
 #include "base/hash.h"
 #include "codec/coding.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_read.h"
 #include "container/chunks.h"
 
 enum { CHUNK_BITS = 48, AROUND = 4 };

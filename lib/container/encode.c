@@ -1,7 +1,7 @@
 /* Rows to bytes, see plan.h. */
 #include "base/endian.h"
 #include "codec/coding.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_plan.h"
 #include "container/plan.h"
 
 static void encode_skips(const ebpo_level *level, const ebpo_h5_shape *shape, uint64_t row,

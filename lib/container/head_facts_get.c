@@ -132,7 +132,9 @@ static ebpo_status get_version(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
     static const ebpo_fact minor = { "format_version_minor", EBPO_FACT_NUMBER,
                                      EBPO_FACT_AT(version_minor) };
     char format[32];
-    ebpo_status status = ebpo_h5_get_text(in, root, "/", "format", format, sizeof format, NULL);
+    ebpo_status status = ebpo_h5_get_text(in, root, "/", "format", format, sizeof format, error);
+    if (status == EBPO_E_MEMORY)
+        return status;
     if (status != EBPO_OK || strcmp(format, EBPO_FORMAT_NAME) != 0)
         return ebpo_fail_file(error, EBPO_E_FORMAT, in->shown,
                               "an HDF5 file, but not an EBP-Octree (its root attribute format does "

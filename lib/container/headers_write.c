@@ -2,7 +2,7 @@
 
 #include <stdio.h>
 
-#include "container/attribute_arrays.h"
+#include "container/attribute_plan.h"
 #include "container/head_facts.h"
 
 /* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that

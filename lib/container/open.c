@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_open.h"
 #include "container/head_facts.h"
 #include "container/open.h"
 #include "http/http_source.h"

@@ -11,7 +11,7 @@
 #include "base/text.h"
 #include "codec/coding.h"
 #include "container/array_check.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_plan.h"
 #include "container/chunk_rows.h"
 #include "container/head_facts.h"
 #include "container/rank_index.h"

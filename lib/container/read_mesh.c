@@ -9,7 +9,7 @@
 #include "base/sized.h"
 #include "base/arrays.h"
 #include "codec/coding.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_read.h"
 #include "container/reader.h"
 
 void ebpo_tree_free(ebpo_tree *tree)

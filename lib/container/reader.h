@@ -2,7 +2,7 @@
 #ifndef EBPO_CONTAINER_READER_H
 #define EBPO_CONTAINER_READER_H
 
-#include "container/open.h"
+#include "container/file_in.h"
 
 /* What will be read, collected and then announced; nothing is done for sources that do not want to
  * know. For one thread.

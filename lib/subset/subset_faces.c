@@ -9,7 +9,7 @@
 #include "attributes/attributes.h"
 #include "base/alloc.h"
 #include "base/error.h"
-#include "container/attribute_arrays.h"
+#include "container/attribute_read.h"
 #include "octree/node_types.h"
 #include "subset/subset_parts.h"
 
