@@ -10,16 +10,16 @@ command -v npm >/dev/null || viewer="$viewer npm"
 modules=no
 # dpkg-dev tells meson where libraries go on Debian.
 packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev \
-    libgmp-dev nettle-dev libassimp-dev libpng-dev libcairo2-dev libjs-chart.js \
+    g++ libgmp-dev nettle-dev libassimp-dev libpng-dev libcairo2-dev libjs-chart.js \
     libcurl4-openssl-dev libqhull-dev libjansson-dev"
 for option in "$@"; do
     case $option in
     --tests)
         packages="$packages abigail-tools check git hdf5-tools python3 python3-h5py python3-numpy \
-            clang clang-format libclang-rt-14-dev g++ mandoc chromium $viewer"
+            clang clang-format libclang-rt-14-dev mandoc chromium $viewer"
         [ $modules = yes ] || modules=tests ;;
     --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;
-    --bench) packages="$packages g++ libembree-dev libcgal-dev libfcl-dev python3 linux-perf valgrind" ;;
+    --bench) packages="$packages libembree-dev libcgal-dev libfcl-dev python3 linux-perf valgrind" ;;
     --paraview) packages="$packages paraview python3-paraview xvfb xauth" ;;
     --viewer) packages="$packages $viewer" modules=yes ;;
     *) echo "usage: install-deps.sh [--tests] [--demo] [--bench] [--viewer] [--paraview]" \

@@ -43,6 +43,16 @@ static ebpo_status call_parse_points(every_call_env *e)
     return status;
 }
 
+static ebpo_status call_rows(every_call_env *e)
+{
+    double *rows;
+    uint64_t count;
+    ebpo_status status = ebpo_rows_read(scratch(EVERY_CALL_MODEL), "/mesh/vertices", 3, 3, 0, &rows,
+                                        &count, e->error);
+    free(rows);
+    return status;
+}
+
 static ebpo_status call_write_ply(every_call_env *e)
 {
     ebpo_mesh mesh;
@@ -219,6 +229,7 @@ const every_call every_call_meshes[] = {
     { "read", call_read },
     { "import", call_import },
     { "parse_points", call_parse_points },
+    { "rows", call_rows },
     { "write_ply", call_write_ply },
     { "check", call_check },
     { "arrange", call_arrange },

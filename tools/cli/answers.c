@@ -2,377 +2,295 @@
 
 #include <inttypes.h>
 #include <math.h>
-#include <stddef.h>
-#include <stdio_ext.h>
+#include <stdio.h>
 #include <string.h>
 
-#include "cli/command.h"
+#include "cli/numbers.h"
 
 const char *const where_words[] = { "OUT", "IN", "ON", "MAYBE" };
 
-/* --- answers leave whole --- */
+/* --- pieces of an answer: each is put at `at`, and where it ends is returned --- */
 
-/* A pipe takes so much at once; the last answer under it leaves before the next one begins. ANSWER:
- * the longest one, but for lists of hits and faces. */
-enum { CHUNK = 4096, ANSWER = 512 };
-
-static const char *printing; /* the command */
-
-void answers_begin(const char *name)
+static inline char *put_text(char *at, const char *text)
 {
-    printing = name;
-    setvbuf(stdout, NULL, _IOFBF, 1 << 18);
+    size_t length = strlen(text);
+    memcpy(at, text, length);
+    return at + length;
 }
 
-static void leave_whole(void)
+static inline char *put_u64(char *at, uint64_t v)
 {
-    if (__fpending(stdout) > CHUNK - ANSWER)
-        /* a failure stays with the stream: the loop of questions sees it */
-        command_flush(printing);
+    for (int i = 0; i < 8; i++)
+        at[i] = (char)(v >> 8 * i);
+    return at + 8;
 }
 
-/* --- raw --- */
+static inline char *put_double(char *at, double v)
+{
+    uint64_t bits;
+    memcpy(&bits, &v, sizeof bits);
+    return put_u64(at, bits);
+}
+
+/* Between the numbers of a line. */
+static inline char between(answer_form form) { return form == ANSWERS_CSV ? ',' : ' '; }
+
+static char *put_json_real(char *at, const char *lead, double v)
+{
+    at = put_text(at, lead);
+    return isfinite(v) ? number_write(at, v) : put_text(at, "null");
+}
+
+static char *put_json_reals(char *at, const char *lead, const double v[3])
+{
+    at = put_json_real(at, lead, v[0]);
+    at = put_json_real(at, ", ", v[1]);
+    at = put_json_real(at, ", ", v[2]);
+    return put_text(at, "]");
+}
+
+/* What ends an answer in each form, and the answer with it. */
+static void end(answer_text *t, answer_form form, char *at)
+{
+    if (form != ANSWERS_RAW)
+        *at++ = '\n';
+    answer_text_end(t, at);
+    answer_text_close(t);
+}
 
 void raw_u64(FILE *out, uint64_t v)
 {
-    uint8_t b[8];
-    for (int i = 0; i < 8; i++)
-        b[i] = (uint8_t)(v >> 8 * i);
+    char b[8];
+    put_u64(b, v);
     fwrite(b, 1, sizeof b, out);
 }
 
 void raw_double(FILE *out, double v)
 {
-    uint64_t bits;
-    memcpy(&bits, &v, sizeof bits);
-    raw_u64(out, bits);
-}
-
-static void raw_doubles(const double *v, int count)
-{
-    for (int i = 0; i < count; i++)
-        raw_double(stdout, v[i]);
-}
-
-/* --- JSON lines --- */
-
-static void compact_real(const char *lead, double v)
-{
-    if (isfinite(v))
-        printf("%s%.17g", lead, v);
-    else
-        printf("%snull", lead);
-}
-
-static void compact_reals(const char *lead, const double v[3])
-{
-    compact_real(lead, v[0]);
-    compact_real(", ", v[1]);
-    compact_real(", ", v[2]);
-    putchar(']');
+    char b[8];
+    put_double(b, v);
+    fwrite(b, 1, sizeof b, out);
 }
 
 /* --- inside --- */
 
-static void inside_json(const ebpo_inside_result *r)
+static char *inside_json(char *at, const ebpo_inside_result *r)
 {
-    printf("{\"where\": \"%s\", \"winding\": %" PRId32, where_words[r->where], r->winding);
+    at = put_text(put_text(at, "{\"where\": \""), where_words[r->where]);
+    at = number_write_int(put_text(at, "\", \"winding\": "), r->winding);
     if (r->where == EBPO_MAYBE)
-        compact_real(", \"doubt\": ", r->doubt);
-    puts("}");
+        at = put_json_real(at, ", \"doubt\": ", r->doubt);
+    return put_text(at, "}");
 }
 
-static void inside_text(const ebpo_inside_result *r)
+static char *inside_line(char *at, char between, const ebpo_inside_result *r)
 {
-    printf("%s %" PRId32, where_words[r->where], r->winding);
-    if (r->where == EBPO_MAYBE)
-        printf(" %.17g", r->doubt);
-    putchar('\n');
+    at = put_text(at, where_words[r->where]);
+    *at++ = between;
+    at = number_write_int(at, r->winding);
+    if (r->where == EBPO_MAYBE) {
+        *at++ = between;
+        at = number_write(at, r->doubt);
+    }
+    return at;
 }
 
-void answers_inside(answer_form form, const ebpo_inside_result *results, uint64_t count)
+void answers_inside(answer_text *t, answer_form form, const ebpo_inside_result *results,
+                    uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++) {
         const ebpo_inside_result *r = &results[i];
+        char *at = answer_text_room(t);
         if (form == ANSWERS_RAW)
-            raw_u64(stdout, (uint64_t)(uint32_t)r->winding << 32 | (uint32_t)r->where);
-        else if (form == ANSWERS_JSON)
-            inside_json(r);
+            at = put_u64(at, (uint64_t)(uint32_t)r->winding << 32 | (uint32_t)r->where);
         else
-            inside_text(r);
-        leave_whole();
+            at = form == ANSWERS_JSON ? inside_json(at, r) : inside_line(at, between(form), r);
+        end(t, form, at);
     }
 }
 
 /* --- distance --- */
 
-static void distance_json(bool limited, const ebpo_distance_result *r)
+static char *distance_json(char *at, const ebpo_distance_result *r)
 {
-    if (limited) {
-        compact_real("{\"lo\": ", r->lo);
-        compact_real(", \"hi\": ", r->hi);
-        putchar('}');
-        return;
-    }
-    compact_real("{\"distance\": ", r->distance);
+    at = put_json_real(at, "{\"distance\": ", r->distance);
     if (isfinite(r->distance)) {
-        compact_reals(", \"point\": [", r->point);
-        compact_reals(", \"normal\": [", r->normal);
+        at = put_json_reals(at, ", \"point\": [", r->point);
+        at = put_json_reals(at, ", \"normal\": [", r->normal);
     } else {
-        fputs(", \"point\": null, \"normal\": null", stdout);
+        at = put_text(at, ", \"point\": null, \"normal\": null");
     }
-    if (r->face == EBPO_NO_FACE)
-        fputs(", \"face\": null}", stdout);
-    else
-        printf(", \"face\": %" PRIu64 "}", r->face);
+    at = put_text(at, ", \"face\": ");
+    at = r->face == EBPO_NO_FACE ? put_text(at, "null") : number_write_uint(at, r->face);
+    return put_text(at, "}");
 }
 
-static void distance_text(bool limited, const ebpo_distance_result *r)
+static char *distance_line(char *at, char between, const ebpo_distance_result *r)
 {
-    if (limited) {
-        printf("%.17g %.17g", r->lo, r->hi);
-        return;
-    }
-    printf("%.17g", r->distance);
-    for (int k = 0; k < 6; k++)
+    at = number_write(at, r->distance);
+    for (int k = 0; k < 6; k++) {
+        *at++ = between;
         if (isfinite(r->distance))
-            printf(" %.17g", k < 3 ? r->point[k] : r->normal[k - 3]);
+            at = number_write(at, k < 3 ? r->point[k] : r->normal[k - 3]);
         else
-            fputs(" -", stdout);
-    if (r->face == EBPO_NO_FACE)
-        fputs(" -", stdout);
-    else
-        printf(" %" PRIu64, r->face);
-}
-
-static void distance_raw(bool limited, const ebpo_distance_result *r)
-{
-    if (limited) {
-        raw_double(stdout, r->lo);
-        raw_double(stdout, r->hi);
-        return;
+            *at++ = '-';
     }
-    raw_double(stdout, r->distance);
-    raw_doubles(r->point, 3);
-    raw_doubles(r->normal, 3);
-    raw_u64(stdout, r->face);
+    *at++ = between;
+    return r->face == EBPO_NO_FACE ? put_text(at, "-") : number_write_uint(at, r->face);
 }
 
-static void put_distance(answer_form form, bool limited, const ebpo_distance_result *r)
+static char *distance_raw(char *at, const ebpo_distance_result *r)
 {
-    (form == ANSWERS_RAW    ? distance_raw
-     : form == ANSWERS_JSON ? distance_json
-                            : distance_text)(limited, r);
+    at = put_double(at, r->distance);
+    for (int k = 0; k < 6; k++)
+        at = put_double(at, k < 3 ? r->point[k] : r->normal[k - 3]);
+    return put_u64(at, r->face);
 }
 
-void answers_distance(answer_form form, bool limited, const ebpo_distance_result *results,
-                      uint64_t count)
+static char *put_limited(char *at, answer_form form, const ebpo_distance_result *r)
+{
+    if (form == ANSWERS_RAW)
+        return put_double(put_double(at, r->lo), r->hi);
+    if (form == ANSWERS_JSON)
+        return put_text(put_json_real(put_json_real(at, "{\"lo\": ", r->lo), ", \"hi\": ", r->hi),
+                        "}");
+    at = number_write(at, r->lo);
+    *at++ = between(form);
+    return number_write(at, r->hi);
+}
+
+static char *put_distance(char *at, answer_form form, const ebpo_distance_result *r)
+{
+    return form == ANSWERS_RAW    ? distance_raw(at, r)
+           : form == ANSWERS_JSON ? distance_json(at, r)
+                                  : distance_line(at, between(form), r);
+}
+
+void answers_distance(answer_text *t, answer_form form, bool limited,
+                      const ebpo_distance_result *results, uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++) {
-        put_distance(form, limited, &results[i]);
-        if (form != ANSWERS_RAW)
-            putchar('\n');
-        leave_whole();
+        char *at = answer_text_room(t);
+        at = limited ? put_limited(at, form, &results[i]) : put_distance(at, form, &results[i]);
+        end(t, form, at);
     }
 }
 
 /* --- the nearest faces: their number is known at the end only --- */
 
-void answers_near(answer_form form, const ebpo_near_face *face, bool first)
+void answers_near(answer_text *t, answer_form form, const ebpo_near_face *face, bool first)
 {
     ebpo_distance_result r = { .distance = face->distance, .face = face->face };
+    char *at = answer_text_room(t);
     memcpy(r.point, face->point, sizeof r.point);
     memcpy(r.normal, face->normal, sizeof r.normal);
     if (form == ANSWERS_JSON)
-        fputs(first ? "[" : ", ", stdout);
-    put_distance(form, false, &r);
-    if (form == ANSWERS_TEXT) {
-        putchar('\n');
-        leave_whole(); /* lists in JSON leave when they are whole, or too long for that */
-    }
+        at = put_text(at, first ? "[" : ", ");
+    at = put_distance(at, form, &r);
+    if (form == ANSWERS_TEXT || form == ANSWERS_CSV)
+        end(t, form, at);
+    else
+        answer_text_end(t, at); /* such lists leave when they are whole, or too long for that */
 }
 
-void answers_near_end(answer_form form, bool none)
+void answers_near_end(answer_text *t, answer_form form, bool none)
 {
     static const ebpo_distance_result nothing = { .distance = INFINITY,
                                                   .point = { NAN, NAN, NAN },
                                                   .face = EBPO_NO_FACE };
+    char *at = answer_text_room(t);
     if (form == ANSWERS_RAW)
-        distance_raw(false, &nothing);
+        at = distance_raw(at, &nothing);
     else if (form == ANSWERS_JSON)
-        puts(none ? "[]" : "]");
-    else
-        putchar('\n');
-    leave_whole();
+        at = put_text(at, none ? "[]" : "]");
+    end(t, form, at);
 }
 
 /* --- rays and boxes --- */
 
-static void hit_json(const char *lead, const ebpo_ray_hit *hit)
+static char *put_hit(char *at, answer_form form, const ebpo_ray_hit *hit)
 {
-    printf("%s{\"t\": %.17g, \"face\": %" PRIu64 ", \"side\": %" PRId32 "}", lead, hit->t,
-           hit->face, hit->side);
+    if (form == ANSWERS_RAW)
+        return put_u64(put_u64(put_double(at, hit->t), hit->face), (uint64_t)(int64_t)hit->side);
+    bool json = form == ANSWERS_JSON;
+    char lead[2] = { json ? 0 : between(form), 0 };
+    at = number_write(put_text(at, json ? "{\"t\": " : ""), hit->t);
+    at = number_write_uint(put_text(at, json ? ", \"face\": " : lead), hit->face);
+    at = number_write_int(put_text(at, json ? ", \"side\": " : lead), hit->side);
+    return put_text(at, json ? "}" : "");
 }
 
-static void hit_raw(const ebpo_ray_hit *hit)
+void answers_ray_first(answer_text *t, answer_form form, const ebpo_ray_hit *hits, uint64_t count)
 {
-    raw_double(stdout, hit->t);
-    raw_u64(stdout, hit->face);
-    raw_u64(stdout, (uint64_t)(int64_t)hit->side);
-}
-
-static void hit_text(const ebpo_ray_hit *hit)
-{
-    printf("%.17g %" PRIu64 " %" PRId32, hit->t, hit->face, hit->side);
-}
-
-void answers_ray_first(answer_form form, const ebpo_ray_hit *hits, uint64_t count)
-{
+    static const char *const nothing[] = { "-", "null", "", "-,-,-" };
     for (uint64_t i = 0; i < count; i++) {
-        bool none = hits[i].face == EBPO_NO_FACE;
-        if (form == ANSWERS_RAW)
-            hit_raw(&hits[i]);
-        else if (none)
-            fputs(form == ANSWERS_JSON ? "null" : "-", stdout);
-        else if (form == ANSWERS_JSON)
-            hit_json("", &hits[i]);
-        else
-            hit_text(&hits[i]);
-        if (form != ANSWERS_RAW)
-            putchar('\n');
-        leave_whole();
+        bool none = hits[i].face == EBPO_NO_FACE && form != ANSWERS_RAW;
+        char *at = answer_text_room(t);
+        end(t, form, none ? put_text(at, nothing[form]) : put_hit(at, form, &hits[i]));
     }
 }
 
-void answers_ray_any(answer_form form, const bool *any, uint64_t count)
+void answers_ray_any(answer_text *t, answer_form form, const bool *any, uint64_t count)
 {
     static const char *const words[2][2] = { { "no", "yes" }, { "false", "true" } };
     for (uint64_t i = 0; i < count; i++) {
-        if (form == ANSWERS_RAW)
-            raw_u64(stdout, any[i]);
-        else
-            puts(words[form == ANSWERS_JSON][any[i]]);
-        leave_whole();
+        char *at = answer_text_room(t);
+        end(t, form,
+            form == ANSWERS_RAW ? put_u64(at, any[i])
+                                : put_text(at, words[form == ANSWERS_JSON][any[i]]));
     }
 }
 
 /* Of an answer that is a list: what is before it, and after it. */
-static void begin_list(answer_form form, uint64_t count)
+static void begin_list(answer_text *t, answer_form form, uint64_t count)
 {
-    if (form == ANSWERS_RAW)
-        raw_u64(stdout, count);
-    else if (form == ANSWERS_JSON)
-        putchar('[');
-    else
-        printf("%" PRIu64, count);
+    char *at = answer_text_room(t);
+    answer_text_end(t, form == ANSWERS_RAW    ? put_u64(at, count)
+                       : form == ANSWERS_JSON ? put_text(at, "[")
+                                              : number_write_uint(at, count));
 }
 
-static void end_list(answer_form form)
+static void end_list(answer_text *t, answer_form form)
 {
+    end(t, form, put_text(answer_text_room(t), form == ANSWERS_JSON ? "]" : ""));
+}
+
+/* Room for the next item of a list, with what is before it. */
+static char *next_item(answer_text *t, answer_form form, bool first)
+{
+    char *at = answer_text_room(t);
+    if (form == ANSWERS_JSON)
+        return put_text(at, first ? "" : ", ");
     if (form != ANSWERS_RAW)
-        puts(form == ANSWERS_JSON ? "]" : "");
-    leave_whole();
+        *at++ = between(form);
+    return at;
 }
 
-void answers_ray_all(answer_form form, const ebpo_ray_hit *hits, uint64_t count)
+void answers_ray_all(answer_text *t, answer_form form, const ebpo_ray_hit *hits, uint64_t count)
 {
-    begin_list(form, count);
+    begin_list(t, form, count);
     for (uint64_t i = 0; i < count; i++)
-        if (form == ANSWERS_RAW)
-            hit_raw(&hits[i]);
-        else if (form == ANSWERS_JSON)
-            hit_json(i ? ", " : "", &hits[i]);
-        else {
-            putchar(' ');
-            hit_text(&hits[i]);
-        }
-    end_list(form);
+        answer_text_end(t, put_hit(next_item(t, form, i == 0), form, &hits[i]));
+    end_list(t, form);
 }
 
-void answers_box(answer_form form, const uint64_t *faces, uint64_t count)
+void answers_box(answer_text *t, answer_form form, const uint64_t *faces, uint64_t count)
 {
-    begin_list(form, count);
-    for (uint64_t i = 0; i < count; i++)
-        if (form == ANSWERS_RAW)
-            raw_u64(stdout, faces[i]);
-        else
-            printf("%s%" PRIu64, form == ANSWERS_JSON ? (i ? ", " : "") : " ", faces[i]);
-    end_list(form);
-}
-
-/* --- sums --- */
-
-static const struct sum {
-    const char *name;
-    size_t offset;
-    enum { SUM_BOOL, SUM_INT, SUM_UINT, SUM_REAL, SUM_FIVE } kind;
-} sums[] = {
-    { "resident", offsetof(ebpo_model_stats, resident), SUM_BOOL },
-    { "cut_level", offsetof(ebpo_model_stats, cut_level), SUM_INT },
-    { "memory", offsetof(ebpo_model_stats, memory), SUM_UINT },
-    { "memory_peak", offsetof(ebpo_model_stats, memory_peak), SUM_UINT },
-    { "budget", offsetof(ebpo_model_stats, budget), SUM_UINT },
-    { "hits", offsetof(ebpo_model_stats, hits), SUM_UINT },
-    { "loads", offsetof(ebpo_model_stats, loads), SUM_UINT },
-    { "prefetched", offsetof(ebpo_model_stats, prefetched), SUM_UINT },
-    { "evicted", offsetof(ebpo_model_stats, evicted), SUM_UINT },
-    { "bytes_read", offsetof(ebpo_model_stats, bytes_read), SUM_UINT },
-    { "reads", offsetof(ebpo_model_stats, reads), SUM_UINT },
-    { "open_seconds", offsetof(ebpo_model_stats, open_seconds), SUM_REAL },
-    { "load_seconds", offsetof(ebpo_model_stats, load_seconds), SUM_REAL },
-    { "leaves", offsetof(ebpo_model_stats, leaves), SUM_UINT },
-    { "leaves_of_kind", offsetof(ebpo_model_stats, leaves_of_kind), SUM_FIVE },
-    { "leaves_one_wall", offsetof(ebpo_model_stats, leaves_one_wall), SUM_UINT },
-    { "distances", offsetof(ebpo_model_stats, distances), SUM_UINT },
-    { "distance_subtrees", offsetof(ebpo_model_stats, distance_subtrees), SUM_UINT },
-    { "distance_loads", offsetof(ebpo_model_stats, distance_loads), SUM_UINT },
-    { "skeleton_bytes", offsetof(ebpo_model_stats, skeleton_bytes), SUM_UINT },
-};
-enum { SUMS = sizeof sums / sizeof *sums };
-
-void stats_print(FILE *out, bool as_json, const ebpo_model_stats *stats)
-{
-    for (int i = 0; i < SUMS; i++) {
-        const char *field = (const char *)stats + sums[i].offset;
-        const uint64_t *u = (const void *)field;
-        if (as_json)
-            fprintf(out, "%s\"%s\": ", i ? ", " : "{", sums[i].name);
-        else
-            fprintf(out, "%s%s ", i ? ", " : "", sums[i].name);
-        switch (sums[i].kind) {
-        case SUM_BOOL:
-            fputs(*(const bool *)field ? (as_json ? "true" : "yes") : (as_json ? "false" : "no"),
-                  out);
-            break;
-        case SUM_INT: fprintf(out, "%d", *(const int *)(const void *)field); break;
-        case SUM_UINT: fprintf(out, "%" PRIu64, *u); break;
-        case SUM_REAL: fprintf(out, "%.6f", *(const double *)(const void *)field); break;
-        case SUM_FIVE:
-            fprintf(out,
-                    as_json ? "[%" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %" PRIu64 "]"
-                            : "%" PRIu64 "/%" PRIu64 "/%" PRIu64 "/%" PRIu64 "/%" PRIu64,
-                    u[0], u[1], u[2], u[3], u[4]);
-        }
+    begin_list(t, form, count);
+    for (uint64_t i = 0; i < count; i++) {
+        char *at = next_item(t, form, i == 0);
+        answer_text_end(t, form == ANSWERS_RAW ? put_u64(at, faces[i])
+                                               : number_write_uint(at, faces[i]));
     }
-    fputs(as_json ? "}\n" : "\n", out);
+    end_list(t, form);
 }
 
-void stats_json(json *j, const char *key, const ebpo_model_stats *stats)
+/* --- names of columns --- */
+
+void answers_header(answer_text *t, answer_form form, const char *names)
 {
-    json_object(j, key);
-    for (int i = 0; i < SUMS; i++) {
-        const char *field = (const char *)stats + sums[i].offset;
-        switch (sums[i].kind) {
-        case SUM_BOOL: json_bool(j, sums[i].name, *(const bool *)field); break;
-        case SUM_INT: json_int(j, sums[i].name, *(const int *)(const void *)field); break;
-        case SUM_UINT: json_uint(j, sums[i].name, *(const uint64_t *)(const void *)field); break;
-        case SUM_REAL: json_real(j, sums[i].name, *(const double *)(const void *)field); break;
-        case SUM_FIVE:
-            json_array(j, sums[i].name);
-            for (int k = 0; k < 5; k++)
-                json_uint(j, NULL, ((const uint64_t *)(const void *)field)[k]);
-            json_end(j);
-        }
-    }
-    json_end(j);
+    char *at = answer_text_room(t);
+    for (const char *c = names; *c; c++)
+        *at++ = *c == ',' ? between(form) : *c;
+    end(t, form, at);
 }

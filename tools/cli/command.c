@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 int command_failed(const char *name, const ebpo_error *error)
 {
@@ -86,15 +87,32 @@ bool command_has_level(const char *name, const ebpo_info *info, int64_t level)
     return false;
 }
 
-bool command_flush(const char *name)
+static bool not_written(const char *name, int number)
 {
     static bool said;
-    errno = 0;
-    if (fflush(stdout) == 0 && !ferror(stdout))
-        return true;
     if (!said)
         fprintf(stderr, "ebpo%s%s: standard output: %s\n", name ? " " : "", name ? name : "",
-                errno ? strerror(errno) : "could not be written");
+                number ? strerror(number) : "could not be written");
     said = true;
     return false;
+}
+
+bool command_not_written(const char *name) { return not_written(name, errno); }
+
+bool command_flush(const char *name)
+{
+    errno = 0;
+    return (fflush(stdout) == 0 && !ferror(stdout)) || not_written(name, errno);
+}
+
+bool command_write(const char *name, const char *bytes, size_t count)
+{
+    while (count > 0) {
+        ssize_t done = write(STDOUT_FILENO, bytes, count);
+        if (done < 0 && errno != EINTR)
+            return not_written(name, errno);
+        bytes += done > 0 ? done : 0;
+        count -= done > 0 ? (size_t)done : 0;
+    }
+    return true;
 }

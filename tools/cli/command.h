@@ -37,4 +37,10 @@ bool command_has_level(const char *name, const ebpo_info *info, int64_t level);
  * which is said on stderr, once (exit with EXIT_FAILED). `name` NULL: no command's. */
 bool command_flush(const char *name);
 
+/* Says why standard output could not be written, once. False. */
+bool command_not_written(const char *name);
+
+/* Bytes to standard output, past stdio's buffer. False as above. */
+bool command_write(const char *name, const char *bytes, size_t count);
+
 #endif

@@ -1,334 +1,315 @@
 #include "cli/points.h"
 
-#include <ebpo/mesh.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
-#include <math.h>
+#include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "cli/command.h"
-
-enum { ROOM = 1 << 18 };
-
-/* What an attempt to take a row came to. */
-typedef enum taken { TAKEN, NOTHING_THERE, MORE_NEEDED, NOT_GOOD } taken;
+#include "cli/points_input.h"
 
 int points_width(points_kind kind) { return kind == POINTS ? 3 : kind == POINTS_RAYS ? 7 : 6; }
 
 int points_raw_width(points_kind kind) { return kind == POINTS ? 3 : 6; }
 
-__attribute__((format(printf, 2, 3))) static taken fail(points *p, const char *format, ...)
+bool points_fault(points_block *b, uint64_t at, const char *format, ...)
 {
     va_list list;
     va_start(list, format);
-    command_flush(p->command); /* the answers so far come first where both go to one place */
-    fprintf(stderr, "ebpo %s: %s: ", p->command, p->name);
-    vfprintf(stderr, format, list);
-    fputc('\n', stderr);
+    vsnprintf(b->fault, sizeof b->fault, format, list);
     va_end(list);
+    b->fault_at = at;
+    b->failed = true;
+    return false;
+}
+
+/* --- opening --- */
+
+static bool cannot(points *p, const char *what, int number)
+{
+    fprintf(stderr, "ebpo %s: %s: %s%s%s\n", p->command, p->name, what, number ? ": " : "",
+            number ? strerror(number) : "");
     p->failed = true;
-    return NOT_GOOD;
+    return false;
 }
-
-/* The place of the row read last, as people count: lines, or points from 1. */
-__attribute__((format(printf, 2, 3))) static taken fail_row(points *p, const char *format, ...)
-{
-    static const char *const names[] = { "point", "ray", "box" };
-    char text[160];
-    va_list list;
-    va_start(list, format);
-    vsnprintf(text, sizeof text, format, list);
-    va_end(list);
-    if (p->ply || p->raw)
-        return fail(p, "%s %" PRIu64 ": %s", p->ply ? "vertex" : names[p->kind], p->row, text);
-    return fail(p, "line %" PRIu64 ": %s", p->line, text);
-}
-
-/* --- bytes --- */
 
 bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw,
                  double tmax)
 {
     bool standard = !path || strcmp(path, "-") == 0;
+    struct stat st;
     *p = (points){ .command = by,
                    .name = standard ? "standard input" : path,
                    .kind = kind,
                    .raw = raw,
                    .tmax = tmax,
+                   .layout = { points_raw_width(kind), 8, false },
                    .fd = STDIN_FILENO,
-                   .capacity = ROOM };
+                   .wake = -1,
+                   .rest_capacity = POINTS_LINE };
+    if (!standard && points_is_dataset(path))
+        return points_open_dataset(p, path);
     if (!standard)
         p->fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
     if (p->fd < 0)
-        return fail(p, "cannot be opened: %s", strerror(errno)) == TAKEN;
-    p->buffer = malloc(p->capacity + 1);
-    if (!p->buffer)
-        return fail(p, "not enough memory") == TAKEN;
-    return true;
+        return cannot(p, "cannot be opened", errno);
+    off_t at = lseek(p->fd, 0, SEEK_CUR);
+    if (at >= 0 && fstat(p->fd, &st) == 0 && S_ISREG(st.st_mode) && st.st_size > at)
+        p->bytes_total = (uint64_t)(st.st_size - at);
+    p->rows_known = raw && p->bytes_total;
+    p->rows_total = p->bytes_total / (8 * (uint64_t)p->layout.per_row);
+    p->rest = malloc(p->rest_capacity + 1);
+    return p->rest || cannot(p, "not enough memory", 0);
+}
+
+void points_block_free(points_block *b)
+{
+    free(b->bytes);
+    free(b->room);
+    *b = (points_block){ .bytes = NULL };
 }
 
 void points_close(points *p)
 {
     if (p->fd > STDIN_FILENO)
         close(p->fd);
-    free(p->buffer);
-    free(p->ply);
+    free(p->rest);
+    free(p->held);
+    points_block_free(&p->batch);
     *p = (points){ .fd = -1 };
 }
 
-/* Reads on, behind what is left in the buffer. False after an error. */
-static bool fill(points *p)
+/* --- bytes --- */
+
+/* False: who waits has been told to stop. */
+static bool wait_for_more(const points *p)
 {
-    memmove(p->buffer, p->buffer + p->at, p->end - p->at);
-    p->end -= p->at;
-    p->at = 0;
+    struct pollfd both[] = { { .fd = p->wake, .events = POLLIN },
+                             { .fd = p->fd, .events = POLLIN } };
+    while (p->wake >= 0 && poll(both, 2, -1) < 0 && errno == EINTR)
+        ;
+    return !(both[0].revents & POLLIN);
+}
+
+/* -1: it cannot be read. */
+static ssize_t read_some(points *p, points_block *b, char *to, size_t most)
+{
     ssize_t got;
+    if (!wait_for_more(p)) {
+        p->ended = true;
+        return 0;
+    }
     do
-        got = read(p->fd, p->buffer + p->end, p->capacity - p->end);
+        got = read(p->fd, to, most);
     while (got < 0 && errno == EINTR);
     if (got < 0)
-        return fail(p, "cannot be read: %s", strerror(errno)) == TAKEN;
-    p->end += (size_t)got;
-    p->ended = got == 0;
-    return true;
+        points_fault(b, 0, "cannot be read: %s", strerror(errno));
+    p->ended |= got <= 0;
+    p->bytes_taken += got > 0 ? (uint64_t)got : 0;
+    return got;
 }
 
-/* --- checks that all kinds of input share --- */
-
-static taken check_row(points *p, const double *row)
+bool points_fill(points *p, points_block *b)
 {
-    for (int i = 0; i < points_raw_width(p->kind); i++)
-        if (!isfinite(row[i]))
-            return fail_row(p, "number %d is not finite", i + 1);
-    if (p->kind == POINTS_RAYS && row[3] == 0 && row[4] == 0 && row[5] == 0)
-        return fail_row(p, "the direction is 0 0 0");
-    if (p->kind == POINTS_RAYS && !(row[6] >= 0))
-        return fail_row(p, "tmax must be 0 or more");
-    for (int k = 0; k < 3 && p->kind == POINTS_BOXES; k++)
-        if (row[k] > row[3 + k])
-            return fail_row(p, "the lower corner of a box comes first, but %c0 is greater than %c1",
-                            "xyz"[k], "xyz"[k]);
-    return TAKEN;
+    ssize_t got = read_some(p, b, p->rest + p->rest_count, p->rest_capacity - p->rest_count);
+    p->rest_count += got > 0 ? (size_t)got : 0;
+    return got >= 0;
 }
 
-/* --- text --- */
-
-static char *skip_blanks(char *s)
+bool points_fill_all(points *p, points_block *b)
 {
-    while (*s == ' ' || *s == '\t' || *s == '\r' || *s == '\v' || *s == '\f')
-        s++;
-    return s;
-}
-
-static taken wrong_count(points *p)
-{
-    static const char *const expected[] = {
-        "expected three numbers", "expected six or seven numbers: origin, direction and tmax",
-        "expected six numbers: the lower and the upper corner"
-    };
-    return fail_row(p, "%s", expected[p->kind]);
-}
-
-/* The program never leaves the "C" locale, so strtod rounds correctly and knows the dot only. */
-static taken parse_line(points *p, char *s, double *row)
-{
-    int count = 0, most = points_width(p->kind);
-    s = skip_blanks(s);
-    if (!*s || *s == '#')
-        return NOTHING_THERE;
-    while (*s && *s != '#') {
-        char *end;
-        if (count == most)
-            return wrong_count(p);
-        row[count] = strtod(s, &end);
-        if (end == s || !strchr(" \t\r\v\f,#", *end))
-            return wrong_count(p);
-        if (!isfinite(row[count++]))
-            return fail_row(p, "number %d is not finite", count);
-        s = skip_blanks(end);
-        if (*s == ',')
-            s = skip_blanks(s + 1);
-    }
-    if (count < points_raw_width(p->kind))
-        return wrong_count(p);
-    if (count < most)
-        row[count] = p->tmax;
-    return check_row(p, row);
-}
-
-static taken take_line(points *p, double *row)
-{
-    char *begin = p->buffer + p->at, *end = memchr(begin, '\n', p->end - p->at);
-    if (!end) {
-        if (!p->ended && p->end - p->at < p->capacity)
-            return MORE_NEEDED;
-        if (!p->ended) {
-            p->line++;
-            return fail_row(p,
-                            "is longer than %d bytes; this is not a text file of points (--raw "
-                            "reads raw doubles)",
-                            ROOM);
-        }
-        if (p->at == p->end)
-            return MORE_NEEDED;
-        end = p->buffer + p->end; /* the last line may lack its end */
-    }
-    p->at = (size_t)(end - p->buffer) + (end < p->buffer + p->end);
-    p->line++;
-    if (memchr(begin, 0, (size_t)(end - begin)))
-        return fail_row(
-            p, "contains a zero byte; this is not a text file of points (--raw reads raw doubles)");
-    *end = 0;
-    if (p->line == 1 && strncmp(begin, "\xef\xbb\xbf", 3) == 0) /* byte order mark */
-        begin += 3;
-    return parse_line(p, begin, row);
-}
-
-/* --- raw doubles --- */
-
-static double load_little(const char *at)
-{
-    uint8_t b[8];
-    uint64_t bits = 0;
-    double v;
-    memcpy(b, at, sizeof b);
-    for (int i = 7; i >= 0; i--)
-        bits = bits << 8 | b[i];
-    memcpy(&v, &bits, sizeof v);
-    return v;
-}
-
-static taken take_raw(points *p, double *row)
-{
-    int width = points_raw_width(p->kind);
-    size_t bytes = (size_t)width * 8, left = p->end - p->at;
-    if (left < bytes && (!p->ended || !left))
-        return MORE_NEEDED;
-    if (left < bytes)
-        return fail(p,
-                    "%zu bytes are left over at the end, but each item takes %zu; the input is cut "
-                    "short or is something else",
-                    left, bytes);
-    for (int i = 0; i < width; i++)
-        row[i] = load_little(p->buffer + p->at + 8 * i);
-    if (p->kind == POINTS_RAYS)
-        row[6] = p->tmax;
-    p->at += bytes;
-    p->row++;
-    return check_row(p, row);
-}
-
-/* --- PLY --- */
-
-/* Reads to the end; a PLY is taken whole. */
-static bool read_all(points *p)
-{
-    while (!p->ended && !p->failed) {
-        if (p->end == p->capacity) {
-            char *wider =
-                p->capacity <= SIZE_MAX / 4 ? realloc(p->buffer, 2 * p->capacity + 1) : NULL;
+    while (!p->ended) {
+        if (p->rest_count == p->rest_capacity) {
+            char *wider = p->rest_capacity <= SIZE_MAX / 4
+                              ? realloc(p->rest, 2 * p->rest_capacity + 1)
+                              : NULL;
             if (!wider)
-                return fail(p, "not enough memory for %zu bytes", 2 * p->capacity) == TAKEN;
-            p->buffer = wider;
-            p->capacity *= 2;
+                return points_fault(b, 0, "not enough memory for %zu bytes", 2 * p->rest_capacity);
+            p->rest = wider;
+            p->rest_capacity *= 2;
         }
-        fill(p);
+        points_fill(p, b);
     }
-    return !p->failed;
+    return !b->failed;
 }
 
-static void read_ply(points *p)
+void points_drop(points *p, size_t bytes)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    if (p->kind != POINTS) {
-        fail(p, "is a PLY file, which holds points; give %s as text or with --raw",
-             p->kind == POINTS_RAYS ? "rays" : "boxes");
-        return;
+    p->rest_count -= bytes;
+    memmove(p->rest, p->rest + bytes, p->rest_count);
+}
+
+/* --- blocks --- */
+
+/* More comes without waiting; files have all there is. */
+static bool more_is_there(const points *p)
+{
+    struct pollfd one = { .fd = p->fd, .events = POLLIN };
+    return poll(&one, 1, 0) > 0;
+}
+
+static bool block_room(points_block *b, size_t bytes)
+{
+    if (b->capacity < bytes) {
+        free(b->bytes);
+        b->bytes = malloc(bytes + 1);
+        b->capacity = b->bytes ? bytes : 0;
     }
-    if (!read_all(p))
-        return;
-    if (ebpo_points_parse_ply(p->buffer, p->end, p->name, &p->ply, &p->ply_count, &error) !=
-        EBPO_OK) {
-        fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
-        p->failed = true;
+    return b->bytes || points_fault(b, 0, "not enough memory");
+}
+
+static void keep_rest(points *p, points_block *b, size_t from)
+{
+    p->rest_count = b->count - from;
+    memcpy(p->rest, b->bytes + from, p->rest_count);
+    b->count = from;
+}
+
+/* Whole lines, as many as are there; the last one may lack its end. */
+static void take_lines(points *p, points_block *b)
+{
+    size_t whole = 0, looked = 0;
+    for (;;) {
+        const char *last = memrchr(b->bytes + looked, '\n', b->count - looked);
+        whole = last ? (size_t)(last - b->bytes) + 1 : whole;
+        looked = b->count;
+        if (p->ended || b->count == POINTS_LINE ||
+            (whole && (b->count >= POINTS_TEXT || !more_is_there(p))))
+            break;
+        size_t target = b->count < POINTS_TEXT ? POINTS_TEXT : POINTS_LINE;
+        ssize_t got = read_some(p, b, b->bytes + b->count, target - b->count);
+        b->count += got > 0 ? (size_t)got : 0;
     }
-    p->at = p->end;
+    if (b->failed || (!p->ended && !whole)) {
+        size_t all = b->count;
+        b->count = whole;
+        if (!b->failed && all == POINTS_LINE)
+            points_fault(b, POINTS_BEHIND,
+                         "is longer than %d bytes; this is not a text file of points (--raw reads "
+                         "raw doubles)",
+                         POINTS_LINE);
+    } else if (!p->ended) {
+        keep_rest(p, b, whole);
+    }
 }
 
-static taken take_vertex(points *p, double *row)
+/* Whole rows, as many as are there. */
+static void take_numbers(points *p, points_block *b)
 {
-    if (p->ply_at == p->ply_count)
-        return MORE_NEEDED; /* there is no more */
-    memcpy(row, p->ply + 3 * p->ply_at++, 3 * sizeof *row);
-    p->row = p->ply_at - 1; /* vertices are numbered from 0 everywhere */
-    return check_row(p, row);
+    size_t each = (size_t)(p->layout.per_row * p->layout.bytes), most = POINTS_BATCH * each;
+    while (!p->ended && b->count < most && (b->count < each || more_is_there(p))) {
+        ssize_t got = read_some(p, b, b->bytes + b->count, most - b->count);
+        b->count += got > 0 ? (size_t)got : 0;
+    }
+    size_t left = b->count % each;
+    if (!p->ended)
+        keep_rest(p, b, b->count - left);
+    else if (left && !b->failed)
+        points_fault(b, 0,
+                     "%zu bytes are left over at the end, but each item takes %zu; the input is "
+                     "cut short or is something else",
+                     left, each);
+    b->count -= p->ended ? left : 0;
 }
 
-/* --- batches --- */
-
-enum { HEAD = 8 }; /* bytes of HDF5's signature */
-
-static bool begins_as_hdf5(const points *p)
+static void take_held(points *p, points_block *b)
 {
-    return p->end >= HEAD && memcmp(p->buffer, "\211HDF\r\n\032\n", HEAD) == 0;
+    uint64_t left = p->rows_total - p->held_at;
+    b->row_count = left < POINTS_BATCH ? left : POINTS_BATCH;
+    b->rows = p->held + p->held_at * (uint64_t)points_width(p->kind);
+    p->held_at += b->row_count;
 }
 
-/* Raw doubles may begin with these four bytes, but hardly with letters behind: then the first one
- * is about 1e219 or 1e243. */
-static bool begins_as_ply(const points *p)
+static void begin(points *p, points_block *b)
 {
-    if (p->end < 4 || memcmp(p->buffer, "ply", 3) != 0 ||
-        (p->buffer[3] != '\n' && p->buffer[3] != '\r'))
-        return false;
-    for (size_t i = 5; i < HEAD && p->raw; i++)
-        if (i >= p->end || p->buffer[i] < 'a' || p->buffer[i] > 'z')
-            return false;
-    return true;
-}
-
-/* The first bytes tell a PLY, and files of other kinds. A short line of text is not kept waiting
- * for more. */
-static void begin(points *p)
-{
+    if (!p->begun && !p->failed)
+        p->ended |= !points_recognise(p, b);
     p->begun = true;
-    while (p->end < (p->raw || (p->end && p->buffer[0] == '\211') ? HEAD : 4) && !p->ended &&
-           !p->failed)
-        fill(p);
-    static const char *const wanted[] = { "points", "rays", "boxes" };
-    if (p->failed)
-        return;
-    if (begins_as_hdf5(p))
-        fail(p, "is an HDF5 file and holds no %s; the model comes first, then what to ask about",
-             wanted[p->kind]);
-    else if (begins_as_ply(p) && !p->raw)
-        read_ply(p);
-    else if (begins_as_ply(p) && p->kind == POINTS)
-        fail(p, "is a PLY file, not raw doubles; leave out --raw");
-    else if (begins_as_ply(p))
-        fail(p, "is a PLY file, which holds points; give %s as text or as raw doubles",
-             wanted[p->kind]);
+}
+
+bool points_begin(points *p)
+{
+    begin(p, &p->batch);
+    return !p->failed && points_pass(p, &p->batch);
+}
+
+bool points_take(points *p, points_block *b)
+{
+    b->begin = b->count = 0;
+    b->lines = b->row_count = b->fault_at = 0;
+    b->rows = NULL;
+    b->failed = false;
+    begin(p, b);
+    if (b->failed || p->failed)
+        return b->failed;
+    if (p->held) {
+        take_held(p, b);
+        return b->row_count > 0;
+    }
+    size_t bytes =
+        p->raw ? (size_t)(POINTS_BATCH * p->layout.per_row * p->layout.bytes) : (size_t)POINTS_LINE;
+    if (!block_room(b, bytes > p->rest_count ? bytes : p->rest_count))
+        return p->ended = true;
+    memcpy(b->bytes, p->rest, p->rest_count);
+    b->count = p->rest_count;
+    p->rest_count = 0;
+    if (p->raw)
+        take_numbers(p, b);
+    else
+        take_lines(p, b);
+    if (!p->raw && p->header && !p->fields && !b->failed)
+        points_take_header(p, b);
+    p->ended |= b->failed;
+    return b->count > 0 || b->failed;
+}
+
+/* --- in order --- */
+
+/* Places are told as people count: lines, or points from 1. */
+static void say(const points *p, const points_block *b)
+{
+    static const char *const names[] = { "point", "ray", "box" };
+    fprintf(stderr, "ebpo %s: %s: ", p->command, p->name);
+    if (b->fault_at && (p->raw || p->held))
+        fprintf(stderr, "%s %" PRIu64 ": ", p->from_zero ? "vertex" : names[p->kind],
+                p->row + b->fault_at - p->from_zero);
+    else if (b->fault_at)
+        fprintf(stderr, "line %" PRIu64 ": ", p->line + b->fault_at);
+    fprintf(stderr, "%s\n", b->fault);
+}
+
+bool points_pass(points *p, points_block *b)
+{
+    if (b->failed)
+        say(p, b);
+    p->failed |= b->failed;
+    p->line += b->lines;
+    p->row += b->row_count;
+    return !b->failed;
 }
 
 uint64_t points_next(points *p, double *rows)
 {
-    uint64_t count = 0;
-    int width = points_width(p->kind);
-    if (!p->begun)
-        begin(p);
-    while (count < POINTS_BATCH && !p->failed) {
-        double *row = rows + count * (uint64_t)width;
-        taken t = p->ply ? take_vertex(p, row) : p->raw ? take_raw(p, row) : take_line(p, row);
-        if (t == TAKEN)
-            count++;
-        else if (t == MORE_NEEDED &&
-                 (count || p->ended ||
-                  !fill(p))) /* what is there is answered before more is waited for */
-            break;
+    points_block *b = &p->batch;
+    uint64_t width = (uint64_t)points_width(p->kind);
+    while (p->batch_at == b->row_count) {
+        p->batch_at = 0;
+        if (!points_pass(p, b) || p->failed || !points_take(p, b)) {
+            b->row_count = b->lines = 0;
+            b->failed = false;
+            return 0;
+        }
+        points_parse(p, b);
     }
+    uint64_t count = b->row_count - p->batch_at;
+    count = count < POINTS_BATCH ? count : POINTS_BATCH;
+    memcpy(rows, b->rows + p->batch_at * width, count * width * sizeof *rows);
+    p->batch_at += count;
     return count;
 }

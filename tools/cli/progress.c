@@ -95,6 +95,11 @@ ebpo_progress progress_start(progress_line *line, const char *command, bool quie
     return (ebpo_progress){ report, line };
 }
 
+void progress_tell(progress_line *line, const char *stage, uint64_t done, uint64_t total)
+{
+    (void)report(line, stage, done, total);
+}
+
 void progress_plan(progress_line *line, const int *plan, int count, const uint64_t *faces)
 {
     line->plan = plan;

@@ -26,6 +26,8 @@ typedef struct progress_line {
 
 /* What to hand to the library; `line` must live as long as the work. */
 ebpo_progress progress_start(progress_line *line, const char *command, bool quiet);
+/* Work that the command does itself: how far it is. */
+void progress_tell(progress_line *line, const char *stage, uint64_t done, uint64_t total);
 /* Says which stages will come, so that the line tells how many are left, and gives rates in faces.
  * Both must live as long as the work. */
 void progress_plan(progress_line *line, const int *plan, int count, const uint64_t *faces);

@@ -132,25 +132,29 @@ int query_open_file(query_session *s, const char *name, const char *path,
     if (remote_open(&s->file, path, remote, &error) != EBPO_OK)
         return command_failed(name, &error);
     const ebpo_info *info = ebpo_file_info(s->file);
-    if (!command_has_level(name, info, level) || !command_has_level(name, info, options->cut_level))
-        return EXIT_USAGE;
-    return EXIT_FINE;
+    return command_has_level(name, info, level) && command_has_level(name, info, options->cut_level)
+               ? EXIT_FINE
+               : EXIT_USAGE;
 }
 
 int query_open_model(query_session *s, const char *name, const ebpo_model_options *options)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_model_new(s->file, options, &s->model, &error);
-    if (status == EBPO_OK)
-        status = ebpo_context_new(s->model, &s->context, &error);
-    return status == EBPO_OK ? EXIT_FINE : command_failed(name, &error);
+    return ebpo_model_new(s->file, options, &s->model, &error) == EBPO_OK
+               ? EXIT_FINE
+               : command_failed(name, &error);
 }
 
 int query_open(query_session *s, const char *name, const char *path,
                const ebpo_model_options *options, int level, const remote_values *remote)
 {
+    ebpo_error error = EBPO_ERROR_INIT;
     int code = query_open_file(s, name, path, options, level, remote);
-    return code == EXIT_FINE ? query_open_model(s, name, options) : code;
+    if (code == EXIT_FINE)
+        code = query_open_model(s, name, options);
+    return code != EXIT_FINE || ebpo_context_new(s->model, &s->context, &error) == EBPO_OK
+               ? code
+               : command_failed(name, &error);
 }
 
 void query_close(query_session *s)

@@ -14,7 +14,7 @@ typedef struct query_values {
     int64_t cut_level, threads, level, nearest;
     double max_distance, tmax, within;
     int inside_mode, distance_mode, ray_sides; /* indices into the words below */
-    bool prefetch, raw, json, unsigned_distance, no_warm, all, any;
+    bool prefetch, raw, json, unsigned_distance, no_warm, all, any, header, csv, npy;
     remote_values remote;
 } query_values;
 #define QUERY_VALUES_INIT                                                         \
@@ -26,14 +26,22 @@ typedef struct query_values {
 /* Rows for the tables of options. In other structs query_values comes first. */
 #define QUERY_MODEL_OPTIONS QUERY_MODEL_OPTIONS_FOR("opening")
 /* `work`: what takes threads. */
-#define QUERY_MODEL_OPTIONS_FOR(work)                                                            \
-    OPTION_TEXT("memory", 0, query_values, memory, "SIZE",                                       \
-                "bytes that the model may use: 64M, 1G, 512K (powers of 1024); 0, the default: " \
-                "as many as it needs"),                                                          \
-        OPTION_INT("cut-level", 0, query_values, cut_level, "C", 0, 20,                          \
-                   "keep levels 0 to C in memory and load subtrees below on demand; default: "   \
-                   "everything at once if --memory allows"),                                     \
-        OPTION_INT("threads", 0, query_values, threads, "N", 0, 256,                             \
+#define QUERY_MODEL_OPTIONS_FOR(work)                                                        \
+    QUERY_MODEL_ROWS("bytes that the model may use: 64M, 1G, 512K (powers of 1024); 0, the " \
+                     "default: as many as it needs",                                         \
+                     "everything at once if --memory allows", work)
+/* Of commands that decide as they go how much of the model they hold. */
+#define QUERY_ASKING_OPTIONS                                                                     \
+    QUERY_MODEL_ROWS("bytes that the model may use: 64M, 1G, 512K (powers of 1024); 0: as many " \
+                     "as it needs; default: as many as the questions need, at most half of "     \
+                     "what is free",                                                             \
+                     "by --memory", "opening and for questions")
+#define QUERY_MODEL_ROWS(memory_text, cut_default, work)                              \
+    OPTION_TEXT("memory", 0, query_values, memory, "SIZE", memory_text),              \
+        OPTION_INT("cut-level", 0, query_values, cut_level, "C", 0, 20,               \
+                   "keep levels 0 to C in memory and load subtrees below on demand; " \
+                   "default: " cut_default),                                          \
+        OPTION_INT("threads", 0, query_values, threads, "N", 0, 256,                  \
                    "threads for " work "; 0, the default: all cores")
 
 /* Rays and boxes look at many subtrees anyway: nothing is loaded ahead of them. */
@@ -44,6 +52,10 @@ typedef struct query_values {
 #define QUERY_FORM_OPTIONS(raw_text)                                                           \
     OPTION_FLAG("raw", 0, query_values, raw, raw_text),                                        \
         OPTION_FLAG("json", 0, query_values, json, "print a JSON object for each, on a line"), \
+        OPTION_FLAG("csv", 0, query_values, csv, "commas between the numbers of an answer"),   \
+        OPTION_FLAG("npy", 0, query_values, npy, "answers as a NumPy array, for numpy.load"),  \
+        OPTION_FLAG("header", 0, query_values, header,                                         \
+                    "the first line names columns, in the answers, too"),                      \
         OPTION_FLAG("stats", 0, query_values, remote.stats,                                    \
                     "print what it took on standard error at the end"),                        \
         REMOTE_HTTP_OPTIONS(query_values, remote)
@@ -105,7 +117,7 @@ typedef struct query_session {
  * (-1: none is asked for). query_close in any case. */
 int query_open(query_session *s, const char *name, const char *path,
                const ebpo_model_options *options, int level, const remote_values *remote);
-/* The same in two steps. */
+/* The same in two steps, without a context. */
 int query_open_file(query_session *s, const char *name, const char *path,
                     const ebpo_model_options *options, int level, const remote_values *remote);
 int query_open_model(query_session *s, const char *name, const ebpo_model_options *options);

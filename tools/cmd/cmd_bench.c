@@ -11,6 +11,7 @@
 #include "bench/bench_points.h"
 #include "bench/bench_run.h"
 #include "cli/answers.h"
+#include "cli/model_sums.h"
 #include "cli/command.h"
 #include "cli/query_args.h"
 #include "cli/words.h"

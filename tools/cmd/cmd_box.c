@@ -6,7 +6,7 @@
 #include "cmd/query_run.h"
 
 static const arg_option options[] = {
-    QUERY_MODEL_OPTIONS,
+    QUERY_ASKING_OPTIONS,
     QUERY_FORM_OPTIONS(
         "each box is six doubles, each answer a uint64 count and that many uint64 (little-endian)"),
     { 0 },
@@ -23,18 +23,32 @@ static const arg_spec spec = {
     .options = options,
 };
 
-static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows,
-                          uint64_t count, ebpo_error *error)
+static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
+                          ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         const uint64_t *faces;
         uint64_t found;
-        status = ebpo_faces_in_box(context, rows + 6 * i, rows + 6 * i + 3, &faces, &found, error);
+        status =
+            ebpo_faces_in_box(w->context, rows + 6 * i, rows + 6 * i + 3, &faces, &found, error);
         if (status == EBPO_OK)
-            answers_box(job->form, faces, found);
+            answers_box(w->text, job->form, faces, found);
     }
     return status;
+}
+
+static const char *columns(const query_job *job)
+{
+    (void)job;
+    return "count,faces";
+}
+
+static const char *dtype(const query_job *job, unsigned *bytes)
+{
+    (void)job;
+    *bytes = 0;
+    return NULL; /* lists of faces */
 }
 
 static const query_values usual = QUERY_VALUES_INIT;
@@ -42,7 +56,14 @@ static const query_values usual = QUERY_VALUES_INIT;
 static int run(void *given, const char **operand)
 {
     query_values *v = given;
-    query_job job = { .command = "box", .values = v, .kind = POINTS_BOXES, .answer = answer };
+    query_job job = { .command = "box",
+                      .values = v,
+                      .kind = POINTS_BOXES,
+                      .parts_share = 0.25, /* docs/measured/asking.md */
+
+                      .answer = answer,
+                      .columns = columns,
+                      .dtype = dtype };
     return query_run(&job, operand[0], operand[1]);
 }
 

@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "cli/answers.h"
 #include "cli/command.h"
 #include "cli/pose_args.h"
 #include "cli/progress.h"
@@ -295,7 +294,7 @@ static int run(void *given, const char **operand)
         return EXIT_USAGE;
     how.deadline_ns = distance.deadline_ns;
     how.level = distance.level;
-    answers_begin("collide");
+    setvbuf(stdout, NULL, _IOFBF, 1 << 18);
     int code = open_both(&a, &b, v, operand, &holding);
     if (code == EXIT_FINE)
         code = ask(v, a.model, b.model ? b.model : a.model, &how);

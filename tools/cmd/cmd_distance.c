@@ -22,7 +22,7 @@ static const arg_option options[] = {
                 "do not start from the previous answer; the answers are the same"),
     QUERY_LIMIT_OPTIONS(
         "look only at levels 0 to L and print lo and hi, between which the distance lies"),
-    QUERY_MODEL_OPTIONS,
+    QUERY_ASKING_OPTIONS,
     QUERY_PREFETCH_OPTION,
     QUERY_FORM_OPTIONS("each point is three doubles, each answer seven doubles and a uint64, or lo "
                        "and hi; lists end with a face of 2^64 - 1 (little-endian)"),
@@ -47,6 +47,7 @@ static bool limited(const ebpo_distance_options *o)
 }
 
 typedef struct listing {
+    answer_text *text;
     answer_form form;
     bool begun;
 } listing;
@@ -54,12 +55,12 @@ typedef struct listing {
 static bool list(void *user, const ebpo_near_face *face)
 {
     listing *l = user;
-    answers_near(l->form, face, !l->begun);
+    answers_near(l->text, l->form, face, !l->begun);
     l->begun = true;
-    return !ferror(stdout);
+    return !l->text->failed && !l->text->refused;
 }
 
-static ebpo_status answer_lists(const query_job *job, ebpo_context *context, const double *rows,
+static ebpo_status answer_lists(const query_job *job, query_worker *w, const double *rows,
                                 uint64_t count, ebpo_error *error)
 {
     ebpo_within_options o = EBPO_WITHIN_OPTIONS_INIT;
@@ -67,24 +68,41 @@ static ebpo_status answer_lists(const query_job *job, ebpo_context *context, con
     o.radius = job->values->within;
     o.most = (uint64_t)job->values->nearest;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        listing l = { job->form, false };
-        status = ebpo_distance_within(context, rows + 3 * i, &o, list, &l, error);
+        listing l = { w->text, job->form, false };
+        status = ebpo_distance_within(w->context, rows + 3 * i, &o, list, &l, error);
         if (status == EBPO_OK)
-            answers_near_end(job->form, !l.begun);
+            answers_near_end(w->text, job->form, !l.begun);
     }
     return status;
 }
 
-static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows,
-                          uint64_t count, ebpo_error *error)
+static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
+                          ebpo_error *error)
 {
-    ebpo_distance_result *results = job->results;
     if (count && query_lists(job->values))
-        return answer_lists(job, context, rows, count, error);
-    ebpo_status status = ebpo_distance_many(context, rows, count, &job->distance, results, error);
+        return answer_lists(job, w, rows, count, error);
+    ebpo_status status =
+        ebpo_distance_many(w->context, rows, count, &job->distance, w->results, error);
     if (status == EBPO_OK)
-        answers_distance(job->form, limited(&job->distance), results, count);
+        answers_distance(w->text, job->form, limited(&job->distance), w->results, count);
     return status;
+}
+
+static const char *columns(const query_job *job)
+{
+    return limited(&job->distance) && !query_lists(job->values) ? "lo,hi"
+                                                                : "distance,x,y,z,nx,ny,nz,face";
+}
+
+static const char *dtype(const query_job *job, unsigned *bytes)
+{
+    if (query_lists(job->values))
+        return NULL;
+    *bytes = limited(&job->distance) ? 16 : 64;
+    return limited(&job->distance)
+               ? "[('lo', '<f8'), ('hi', '<f8')]"
+               : "[('distance', '<f8'), ('point', '<f8', (3,)), ('normal', '<f8', (3,)), ('face', "
+                 "'<u8')]";
 }
 
 static const query_values usual = QUERY_VALUES_INIT;
@@ -95,10 +113,14 @@ static int run(void *given, const char **operand)
     if (!query_distance_fits("distance", v) ||
         (v->level >= 0 && !query_accepts("distance", v, QUERY_MAX_DISTANCE, "--level")))
         return EXIT_USAGE;
-    static ebpo_distance_result results[POINTS_BATCH];
-    query_job job = {
-        .command = "distance", .values = v, .kind = POINTS, .answer = answer, .results = results
-    };
+    query_job job = { .command = "distance",
+                      .values = v,
+                      .kind = POINTS,
+                      .result_bytes = sizeof(ebpo_distance_result),
+                      .parts_share = 0.65, /* docs/measured/asking.md */
+                      .answer = answer,
+                      .columns = columns,
+                      .dtype = dtype };
     return query_run(&job, operand[0], operand[1]);
 }
 

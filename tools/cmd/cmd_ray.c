@@ -1,7 +1,6 @@
 /* ebpo ray: what rays hit. */
 #include <float.h>
 #include <stddef.h>
-#include <string.h>
 
 #include "cli/command.h"
 #include "cmd/commands.h"
@@ -15,7 +14,7 @@ static const arg_option options[] = {
                 "which faces count: both, the default; front, met against their normal; back"),
     OPTION_REAL("tmax", 0, query_values, tmax, "T", 0, DBL_MAX,
                 "for rays without their own tmax: they end at origin + T direction"),
-    QUERY_MODEL_OPTIONS_FOR("opening and for rays"),
+    QUERY_ASKING_OPTIONS,
     QUERY_FORM_OPTIONS(
         "each ray is six doubles, each answer a double, a uint64 and an int64, or with --any a "
         "uint64 (little-endian)"),
@@ -35,44 +34,52 @@ static const arg_spec spec = {
 };
 
 /* Rows are rays. */
-_Static_assert(sizeof(ebpo_ray) == POINTS_WIDEST * sizeof(double), "as points_next fills them");
-static struct {
-    ebpo_ray rays[POINTS_BATCH];
-    ebpo_ray_hit first[POINTS_BATCH];
-    bool any[POINTS_BATCH];
-} batch;
+_Static_assert(sizeof(ebpo_ray) == POINTS_WIDEST * sizeof(double), "as points_parse fills them");
 
-static ebpo_status answer_all(const query_job *job, ebpo_context *context, uint64_t count,
-                              const ebpo_ray_options *how, ebpo_error *error)
+static ebpo_status answer_all(const query_job *job, query_worker *w, const ebpo_ray *rays,
+                              uint64_t count, const ebpo_ray_options *how, ebpo_error *error)
 {
     const ebpo_ray_hit *hits;
     const uint64_t *begin;
-    ebpo_status status = ebpo_ray_all_many(context, batch.rays, count, how, &hits, &begin, error);
+    ebpo_status status = ebpo_ray_all_many(w->context, rays, count, how, &hits, &begin, error);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        answers_ray_all(job->form, hits + begin[i], begin[i + 1] - begin[i]);
+        answers_ray_all(w->text, job->form, hits + begin[i], begin[i + 1] - begin[i]);
     return status;
 }
 
-static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows,
-                          uint64_t count, ebpo_error *error)
+static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
+                          ebpo_error *error)
 {
+    const ebpo_ray *rays = (const ebpo_ray *)(const void *)rows;
     ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
     ebpo_status status;
     how.sides = (ebpo_ray_sides)job->values->ray_sides;
-    how.threads = (unsigned)job->values->threads;
-    memcpy(batch.rays, rows, count * sizeof *batch.rays);
+    how.threads = 1; /* others ask about other rays */
     if (job->values->all)
-        return answer_all(job, context, count, &how, error);
+        return answer_all(job, w, rays, count, &how, error);
     if (job->values->any) {
-        status = ebpo_ray_any_many(context, batch.rays, count, &how, batch.any, error);
+        status = ebpo_ray_any_many(w->context, rays, count, &how, w->results, error);
         if (status == EBPO_OK)
-            answers_ray_any(job->form, batch.any, count);
+            answers_ray_any(w->text, job->form, w->results, count);
         return status;
     }
-    status = ebpo_ray_first_many(context, batch.rays, count, &how, batch.first, error);
+    status = ebpo_ray_first_many(w->context, rays, count, &how, w->results, error);
     if (status == EBPO_OK)
-        answers_ray_first(job->form, batch.first, count);
+        answers_ray_first(w->text, job->form, w->results, count);
     return status;
+}
+
+static const char *columns(const query_job *job)
+{
+    return job->values->any ? "hit" : job->values->all ? "hits,t,face,side" : "t,face,side";
+}
+
+static const char *dtype(const query_job *job, unsigned *bytes)
+{
+    *bytes = job->values->any ? 8 : 24;
+    return job->values->all   ? NULL
+           : job->values->any ? "'<u8'"
+                              : "[('t', '<f8'), ('face', '<u8'), ('side', '<i8')]";
 }
 
 static const query_values usual = QUERY_VALUES_INIT;
@@ -82,7 +89,14 @@ static int run(void *given, const char **operand)
     query_values *v = given;
     if (v->any && v->all)
         return command_usage("ray", "--any has no effect with --all; leave out one of them");
-    query_job job = { .command = "ray", .values = v, .kind = POINTS_RAYS, .answer = answer };
+    query_job job = { .command = "ray",
+                      .values = v,
+                      .kind = POINTS_RAYS,
+                      .result_bytes = sizeof(ebpo_ray_hit),
+                      .parts_share = 0.6, /* docs/measured/asking.md */
+                      .answer = answer,
+                      .columns = columns,
+                      .dtype = dtype };
     return query_run(&job, operand[0], operand[1]);
 }
 

@@ -1,57 +1,95 @@
 #include "cmd/query_run.h"
 
+#include <sched.h>
 #include <stdio.h>
-#include <stdlib.h>
+#include <unistd.h>
 
 #include "cli/command.h"
+#include "cli/model_sums.h"
+#include "cli/npy_answers.h"
+#include "cmd/query_holding.h"
+#include "cmd/query_pipe.h"
 
-static int answer_all(const query_job *job, ebpo_context *context, points *in, double *rows)
-{
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_status status = job->answer(job, context, rows, 0, &error);
-    uint64_t count = 0;
-    while (status == EBPO_OK && (count = points_next(in, rows)) > 0) {
-        status = job->answer(job, context, rows, count, &error);
-        if (!command_flush(job->command)) /* an answer that cannot be delivered ends the work */
-            return EXIT_FAILED;
-    }
-    if (status != EBPO_OK)
-        return command_failed(job->command, &error);
-    return in->failed ? EXIT_FAILED : EXIT_FINE;
-}
-
-static void tell_stats(const query_job *job, const query_session *session)
+static void tell_stats(const query_job *job, const query_holding *holding)
 {
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
-    traffic t = traffic_of(session->file);
-    ebpo_model_get_stats(session->model, &stats);
+    traffic t = traffic_of(holding->session.file);
+    ebpo_model_get_stats(holding->session.model, &stats);
     stats_print(stderr, job->values->json, &stats);
+    query_holding_tell(holding, job->values->json);
     remote_tell(&t, &job->values->remote, job->values->json);
+}
+
+/* Cores that this process may use, unless a number was given. Ways of loading that keep nothing
+ * have one thread: each would drop what the other one has. */
+static unsigned threads_for(const query_values *v, const ebpo_model_options *holding)
+{
+    cpu_set_t set;
+    int cores = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
+    unsigned wanted = v->threads ? (unsigned)v->threads : (unsigned)cores;
+    wanted = wanted < QUERY_THREADS_MOST ? wanted : QUERY_THREADS_MOST;
+    return holding->loading == EBPO_LOAD_CACHE && wanted ? wanted : 1;
+}
+
+static int ask(query_job *job, query_holding *holding, points *in,
+               const ebpo_model_options *options)
+{
+    progress_line line;
+    /* the line stands between answers where both go to one terminal */
+    (void)progress_start(&line, job->command, isatty(STDOUT_FILENO));
+    in->header = job->values->header;
+    npy_answers npy = { .command = job->command };
+    bool as_npy = job->values->npy;
+    if (as_npy)
+        npy.dtype = job->dtype(job, &npy.bytes);
+    if (as_npy && !npy_begin(&npy, in))
+        return EXIT_FAILED;
+    int code = query_pipe_run(job, holding, in, threads_for(job->values, options), &line);
+    progress_wipe(&line);
+    return as_npy && !npy_end(&npy) ? EXIT_FAILED : code;
+}
+
+/* Forms of answers exclude each other; --raw, which tells of the questions too, gives way to them.
+ */
+static bool fits(const query_job *job)
+{
+    const query_values *v = job->values;
+    unsigned bytes;
+    const char *given = v->npy ? "--npy" : "--csv", *other = v->json ? "--json" : "--csv";
+    if ((v->npy && v->csv) || (v->json && (v->npy || v->csv)))
+        (void)command_usage(job->command, "%s has no effect with %s; leave out one of them", given,
+                            other);
+    else if (v->npy && !job->dtype(job, &bytes))
+        (void)command_usage(job->command, "--npy takes answers of one size each, not lists");
+    else
+        return true;
+    return false;
 }
 
 int query_run(query_job *job, const char *model, const char *path)
 {
     const query_values *v = job->values;
-    ebpo_model_options holding;
-    query_session session = QUERY_SESSION_INIT;
+    ebpo_model_options options;
+    query_holding holding;
     points in;
-    if (!query_options_from(job->command, v, &holding, &job->inside, &job->distance))
+    if (!query_options_from(job->command, v, &options, &job->inside, &job->distance))
         return EXIT_USAGE;
-    job->form = v->json ? ANSWERS_JSON : v->raw ? ANSWERS_RAW : ANSWERS_TEXT;
-    answers_begin(job->command);
+    if (!fits(job))
+        return EXIT_USAGE;
+    job->form = v->json  ? ANSWERS_JSON
+                : v->npy ? ANSWERS_RAW
+                : v->csv ? ANSWERS_CSV
+                : v->raw ? ANSWERS_RAW
+                         : ANSWERS_TEXT;
     int code = EXIT_FAILED;
-    double *rows = malloc(sizeof *rows * POINTS_BATCH * POINTS_WIDEST);
-    bool opened = points_open(&in, job->command, path, job->kind, v->raw, v->tmax);
-    if (!rows)
-        (void)command_no_memory(job->command);
-    else if (opened)
-        code = query_open(&session, job->command, model, &holding, (int)v->level, &v->remote);
-    if (session.context)
-        code = answer_all(job, session.context, &in, rows);
-    if (session.context && v->remote.stats)
-        tell_stats(job, &session);
-    query_close(&session);
+    if (points_open(&in, job->command, path, job->kind, v->raw, v->tmax)) {
+        code = query_holding_open(&holding, job->command, model, v, &options, job->parts_share);
+        if (code == EXIT_FINE)
+            code = ask(job, &holding, &in, &options);
+        if (holding.session.model && v->remote.stats)
+            tell_stats(job, &holding);
+        query_holding_close(&holding);
+    }
     points_close(&in);
-    free(rows);
     return code;
 }

@@ -3,7 +3,9 @@
  *
  *   base.h        versions, errors, progress, outputs
  *   workspace.h   how much memory the work may use
+ *   memory.h      how much there is
  *   mesh.h        triangle meshes: reading, checking, mending
+ *   rows.h        numbers from any HDF5 file
  *   build.h       from a mesh to a tree
  *   file.h        files: writing, opening, reading
  *   http.h        files on web servers
@@ -29,7 +31,9 @@
 
 #include <ebpo/base.h>
 #include <ebpo/workspace.h>
+#include <ebpo/memory.h>
 #include <ebpo/mesh.h>
+#include <ebpo/rows.h>
 #include <ebpo/build.h>
 #include <ebpo/file.h>
 #include <ebpo/http.h>

@@ -1,0 +1,36 @@
+/*
+ * EBP-Octree in HDF5: rows of numbers from any HDF5 file, to ask about.
+ */
+#ifndef EBPO_ROWS_H
+#define EBPO_ROWS_H
+
+#include <ebpo/base.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/*
+ * Reads a dataset of rows x columns, of integers or floats of any size and byte order, as doubles;
+ * what a double cannot hold is rounded to the nearest. It is read as a whole.
+ *
+ * dataset        such as "/points"
+ * least, most    how many columns it may have; 1 to 64
+ * fill           the value of columns from the dataset's to `most`
+ * rows           [*count][most] doubles. Freed by free(). On failure NULL.
+ *
+ * EBPO_E_IO: the file cannot be read. EBPO_E_FORMAT: it is no HDF5 file, has no such dataset, or
+ * one of another shape or type. EBPO_E_ARGUMENT, EBPO_E_MEMORY. libhdf5 reads the file: do not give
+ * it files of strangers.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_rows_read(const char *path, const char *dataset,
+                                                  unsigned least, unsigned most, double fill,
+                                                  double **rows, uint64_t *count,
+                                                  ebpo_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

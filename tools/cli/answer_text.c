@@ -1,0 +1,87 @@
+#include "cli/answer_text.h"
+
+#include <stdlib.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+
+enum { FIRST = 1 << 16 };
+
+bool answer_text_init(answer_text *t)
+{
+    *t = (answer_text){ .bytes = malloc(FIRST), .capacity = FIRST };
+    return t->bytes != NULL;
+}
+
+void answer_text_free(answer_text *t)
+{
+    free(t->bytes);
+    free(t->cuts);
+    *t = (answer_text){ .bytes = NULL };
+}
+
+static void empty(answer_text *t) { t->count = t->answer = t->piece = t->cut_count = 0; }
+
+void answer_text_lose(answer_text *t)
+{
+    t->failed = true;
+    empty(t);
+}
+
+void answer_text_forget(answer_text *t, size_t count)
+{
+    while (t->cut_count > 0 && t->cuts[t->cut_count - 1] > count)
+        t->cut_count--;
+    t->piece = t->cut_count ? t->cuts[t->cut_count - 1] : 0;
+    t->count = t->answer = count;
+}
+
+char *answer_text_grow(answer_text *t)
+{
+    if (t->count >= ANSWER_SPILL && t->spill) {
+        t->spilled = true;
+        t->spill(t, t->user);
+    }
+    if (t->count + ANSWER_MOST > t->capacity) {
+        char *wider = realloc(t->bytes, 2 * t->capacity);
+        if (wider) {
+            t->bytes = wider;
+            t->capacity *= 2;
+        } else
+            answer_text_lose(t);
+    }
+    return t->bytes + t->count;
+}
+
+void answer_text_cut(answer_text *t, size_t at)
+{
+    if (t->cut_count == t->cut_capacity) {
+        size_t capacity = t->cut_capacity ? 2 * t->cut_capacity : 64;
+        size_t *wider = realloc(t->cuts, capacity * sizeof *wider);
+        if (!wider) {
+            answer_text_lose(t);
+            return;
+        }
+        t->cuts = wider;
+        t->cut_capacity = capacity;
+    }
+    t->cuts[t->cut_count++] = t->piece = at;
+}
+
+bool answer_text_leave(answer_text *t, const char *command)
+{
+    struct stat st;
+    bool fine = !t->failed && !t->refused,
+         file = fstat(STDOUT_FILENO, &st) == 0 && S_ISREG(st.st_mode);
+    size_t at = 0;
+    for (size_t i = 0; fine && !file && i < t->cut_count; i++) {
+        fine = command_write(command, t->bytes + at, t->cuts[i] - at);
+        at = t->cuts[i];
+    }
+    if (fine && at < t->count)
+        fine = command_write(command, t->bytes + at, t->count - at);
+    empty(t);
+    t->refused |= !fine;
+    return fine;
+}

@@ -1,0 +1,66 @@
+/* Answers as bytes, until they leave: a buffer that grows, and knows where an answer ends. */
+#ifndef EBPO_TOOLS_ANSWER_TEXT_H
+#define EBPO_TOOLS_ANSWER_TEXT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct answer_text answer_text;
+struct answer_text {
+    char *bytes;
+    size_t count, capacity;
+    size_t answer, piece; /* where the last answer ended, and the last piece */
+    size_t *cuts;         /* [cut_count] ends of pieces: answers together, at most 4096 bytes */
+    size_t cut_count, cut_capacity;
+    bool failed;  /* for want of memory; what was there is lost */
+    bool refused; /* it could not be written, which has been said */
+    bool spilled; /* some has left; set and never reset here */
+    /* What is there leaves early, as it is too long to be kept; empties the text. */
+    void (*spill)(answer_text *t, void *user);
+    void *user;
+};
+
+/* Longest answer, but for lists of hits and faces, whose items are shorter. */
+enum { ANSWER_MOST = 512 };
+
+/* False: not enough memory. answer_text_free in any case. */
+bool answer_text_init(answer_text *t);
+void answer_text_free(answer_text *t);
+
+/* What answer_text_room does where there is too little room, or too much in it. */
+char *answer_text_grow(answer_text *t);
+/* A pipe takes so many bytes at once, or nothing; so much is kept before it spills. */
+enum { ANSWER_PIECE = 4096, ANSWER_SPILL = 1 << 20 };
+
+/* Where ANSWER_MOST bytes may be written; answer_text_end tells how far they go. Never NULL: where
+ * there is no memory, what is there is lost, and `failed` says so. */
+static inline char *answer_text_room(answer_text *t)
+{
+    return t->count < ANSWER_SPILL && t->count + ANSWER_MOST <= t->capacity ? t->bytes + t->count
+                                                                            : answer_text_grow(t);
+}
+static inline void answer_text_end(answer_text *t, const char *end)
+{
+    t->count = (size_t)(end - t->bytes);
+}
+
+void answer_text_cut(answer_text *t, size_t at);
+/* What is there ends an answer; what is short enough to stay with it leaves with it. */
+static inline void answer_text_close(answer_text *t)
+{
+    if (t->count - t->piece > ANSWER_PIECE && t->answer > t->piece)
+        answer_text_cut(t, t->answer);
+    t->answer = t->count;
+}
+
+/* What came behind the first `count` bytes, of a text that has not spilled since. */
+void answer_text_forget(answer_text *t, size_t count);
+/* Loses all of it; what comes is lost, too, when it leaves. */
+void answer_text_lose(answer_text *t);
+
+/* Writes all of it to standard output, to a pipe in its pieces, and empties it. False: it could not
+ * be written, which is said. `command` is for the message. */
+bool answer_text_leave(answer_text *t, const char *command);
+
+#endif

@@ -1,0 +1,120 @@
+#include "cli/numbers.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* --- reading --- */
+
+/* What may stand behind a number: then the fast reader and strtod saw the same one. */
+static bool ends_number(char c)
+{
+    return c == 0 || c == ' ' || c == '\t' || c == ',' || c == '\r' || c == '\v' || c == '\f' ||
+           c == '#' || c == '\n';
+}
+
+/* Hexadecimal numbers, those beyond the range and all that is wrong are strtod's. */
+double number_read(const char *text, const char *end, const char **after)
+{
+    double v = 0;
+#ifdef EBPO_HAVE_CHARCONV
+    const char *digits = text + (*text == '+' && text + 1 < end && text[1] != '-');
+    if (number_charconv_read(digits, end, after, &v) && (*after == end || ends_number(**after)))
+        return v;
+#else
+    (void)end;
+    (void)ends_number;
+#endif
+    char *stop;
+    v = strtod(text, &stop);
+    *after = stop;
+    return v;
+}
+
+/* --- printing --- */
+
+#ifndef EBPO_HAVE_CHARCONV
+static char *digits_of(char *out, double v)
+{
+    int length = 0;
+    for (int more = 0; more <= 16; more++) {
+        length = snprintf(out, NUMBER_ROOM, "%.*e", more, v);
+        if (strtod(out, NULL) == v)
+            break;
+    }
+    return out + length;
+}
+#else
+#define digits_of number_charconv_digits
+#endif
+
+static char *zeros(char *out, int count)
+{
+    if (count > 0)
+        memset(out, '0', (size_t)count);
+    return count > 0 ? out + count : out;
+}
+
+/* Digits "123" of 1.23e`exponent` without an exponent, which is -4 to 16. */
+static char *write_fixed(char *out, const char *digits, int count, int exponent)
+{
+    int whole = exponent < 0 ? 0 : exponent + 1 < count ? exponent + 1 : count;
+    memcpy(out, digits, (size_t)whole);
+    out = zeros(out + whole, exponent < 0 ? 1 : exponent + 1 - count);
+    if (whole < count) {
+        *out++ = '.';
+        out = zeros(out, -exponent - 1);
+        memcpy(out, digits + whole, (size_t)(count - whole));
+        out += count - whole;
+    }
+    return out;
+}
+
+char *number_write(char *out, double v)
+{
+    char text[NUMBER_ROOM + 1], digits[NUMBER_ROOM];
+    if (!isfinite(v))
+        return out + snprintf(out, NUMBER_ROOM, "%g", v);
+    if (signbit(v))
+        *out++ = '-';
+    if (v == 0) {
+        *out = '0';
+        return out + 1;
+    }
+    char *end = digits_of(text, fabs(v)), *e = text + 1;
+    int count = 1, exponent = 0;
+    digits[0] = text[0];
+    for (e += *e == '.'; *e != 'e'; e++)
+        digits[count++] = *e;
+    for (const char *d = e + 2; d < end; d++)
+        exponent = 10 * exponent + (*d - '0');
+    exponent = e[1] == '-' ? -exponent : exponent;
+    if (exponent >= -4 && exponent < 17)
+        return write_fixed(out, digits, count, exponent);
+    memcpy(out, text, (size_t)(end - text));
+    return out + (end - text);
+}
+
+char *number_write_uint(char *out, uint64_t v)
+{
+    char digits[20];
+    int count = 0;
+    if (v < 10) { /* most winding numbers */
+        *out = (char)('0' + v);
+        return out + 1;
+    }
+    do
+        digits[count++] = (char)('0' + v % 10);
+    while ((v /= 10) > 0);
+    while (count > 0)
+        *out++ = digits[--count];
+    return out;
+}
+
+char *number_write_int(char *out, int64_t v)
+{
+    if (v < 0)
+        *out++ = '-';
+    return number_write_uint(out, v < 0 ? -(uint64_t)v : (uint64_t)v);
+}

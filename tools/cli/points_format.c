@@ -1,0 +1,200 @@
+/* What kind of file holds the points: told by its first bytes. */
+#include <ebpo/mesh.h>
+#include <ebpo/rows.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "cli/points_input.h"
+
+enum { HEAD = 8 }; /* bytes of HDF5's signature */
+
+static const char *const wanted[] = { "points", "rays", "boxes" };
+
+/* --- PLY --- */
+
+static bool read_ply(points *p, points_block *b)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (p->kind != POINTS)
+        return points_fault(b, 0,
+                            "is a PLY file, which holds points; give %s as text or with --raw",
+                            wanted[p->kind]);
+    if (!points_fill_all(p, b))
+        return false;
+    if (ebpo_points_parse_ply(p->rest, p->rest_count, p->name, &p->held, &p->rows_total, &error) !=
+        EBPO_OK) {
+        fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
+        p->failed = true;
+        return false;
+    }
+    p->from_zero = true; /* vertices are numbered from 0 everywhere */
+    p->rows_known = true;
+    return true;
+}
+
+/* --- NumPy arrays --- */
+
+/* The word behind 'name': in the head, which is a Python dictionary; or NULL. */
+static const char *npy_value(const char *head, const char *name)
+{
+    const char *at = strstr(head, name);
+    at = at ? strchr(at + strlen(name), ':') : NULL;
+    while (at && (*++at == ' '))
+        ;
+    return at;
+}
+
+static bool npy_type(points *p, const char *descr)
+{
+    p->layout.big_endian = descr[1] == '>';
+    p->layout.bytes = descr[3] == '4' ? 4 : 8;
+    return strchr("<>", descr[1]) && descr[2] == 'f' && strchr("48", descr[3]) && descr[4] == '\'';
+}
+
+/* "(N, 3)" */
+static bool npy_shape(points *p, const char *shape)
+{
+    uint64_t rows;
+    int columns, length = 0;
+    int least = points_raw_width(p->kind), most = points_width(p->kind);
+    if (sscanf(shape, "(%" SCNu64 ", %d%n", &rows, &columns, &length) != 2 ||
+        shape[length] != ')' || columns < least || columns > most)
+        return false;
+    p->layout.per_row = columns;
+    p->rows_total = rows;
+    p->rows_known = true;
+    return true;
+}
+
+static bool npy_head(points *p, points_block *b, const char *head)
+{
+    const char *descr = npy_value(head, "'descr'"), *order = npy_value(head, "'fortran_order'"),
+               *shape = npy_value(head, "'shape'");
+    if (!descr || !order || !shape || *descr != '\'')
+        return points_fault(b, 0, "has a head that is no NumPy array's");
+    if (!npy_type(p, descr))
+        return points_fault(b, 0, "holds numbers of type %.*s; give float64 or float32 (astype)",
+                            (int)strcspn(descr + 1, "'") + 2, descr);
+    if (strncmp(order, "False", 5) != 0)
+        return points_fault(b, 0, "is stored column by column; save numpy.ascontiguousarray of it");
+    if (!npy_shape(p, shape))
+        return points_fault(b, 0, "has the shape %.*s; %s are rows of %s",
+                            (int)strcspn(shape, ")") + 1, shape, wanted[p->kind],
+                            p->kind == POINTS        ? "three"
+                            : p->kind == POINTS_RAYS ? "six or seven"
+                                                     : "six");
+    return true;
+}
+
+/* Magic, version, length of the head, head, numbers. */
+static bool read_npy(points *p, points_block *b)
+{
+    enum { BEFORE = 12, LONGEST = 1 << 16 };
+    char head[4096];
+    while (p->rest_count < BEFORE && !p->ended && points_fill(p, b))
+        ;
+    const uint8_t *u = (const uint8_t *)p->rest;
+    size_t before = u[6] == 1 ? 10 : 12,
+           length = u[6] == 1 ? (size_t)u[8] | (size_t)u[9] << 8
+                              : (size_t)u[8] | (size_t)u[9] << 8 | (size_t)u[10] << 16;
+    while (p->rest_count < before + length && length < sizeof head && !p->ended &&
+           points_fill(p, b))
+        ;
+    if (b->failed)
+        return false;
+    if (p->rest_count < before + length || length >= sizeof head || u[6] < 1 || u[6] > 3)
+        return points_fault(b, 0, "has a head that is no NumPy array's");
+    memcpy(head, p->rest + before, length);
+    head[length] = 0;
+    points_drop(p, before + length);
+    p->raw = true;
+    return npy_head(p, b, head);
+}
+
+/* --- HDF5 datasets --- */
+
+/* The colon in "FILE.h5:/path"; or NULL. */
+static const char *dataset_colon(const char *path)
+{
+    const char *colon = NULL;
+    for (const char *at = strstr(path, ":/"); at; at = strstr(at + 1, ":/"))
+        colon = at;
+    return colon;
+}
+
+bool points_is_dataset(const char *path)
+{
+    struct stat st;
+    return dataset_colon(path) && stat(path, &st) != 0;
+}
+
+bool points_open_dataset(points *p, const char *path)
+{
+    const char *colon = dataset_colon(path);
+    char *file = strndup(path, (size_t)(colon - path));
+    ebpo_error error = { .status = EBPO_E_MEMORY };
+    p->begun = p->rows_known = true;
+    p->failed = !file || ebpo_rows_read(file, colon + 1, (unsigned)points_raw_width(p->kind),
+                                        (unsigned)points_width(p->kind), p->tmax, &p->held,
+                                        &p->rows_total, &error) != EBPO_OK;
+    free(file);
+    if (p->failed)
+        fprintf(stderr, "ebpo %s: %s\n", p->command,
+                error.message[0] ? error.message : ebpo_status_name(error.status));
+    return !p->failed;
+}
+
+/* --- all of them --- */
+
+static bool begins(const points *p, const char *with, size_t count)
+{
+    return p->rest_count >= count && memcmp(p->rest, with, count) == 0;
+}
+
+/* Raw doubles may begin with these four bytes, but hardly with letters behind: then the first one
+ * is about 1e219 or 1e243. */
+static bool begins_as_ply(const points *p)
+{
+    if (!begins(p, "ply\n", 4) && !begins(p, "ply\r", 4))
+        return false;
+    for (size_t i = 5; i < HEAD && p->raw; i++)
+        if (i >= p->rest_count || p->rest[i] < 'a' || p->rest[i] > 'z')
+            return false;
+    return true;
+}
+
+static bool recognise(points *p, points_block *b)
+{
+    if (begins(p, "\211HDF\r\n\032\n", HEAD))
+        return points_fault(
+            b, 0, "is an HDF5 file and holds no %s; the model comes first, then what to ask about",
+            wanted[p->kind]);
+    if (begins(p, "\223NUMPY", 6))
+        return read_npy(p, b);
+    if (begins_as_ply(p) && !p->raw)
+        return read_ply(p, b);
+    if (begins_as_ply(p) && p->kind == POINTS)
+        return points_fault(b, 0, "is a PLY file, not raw doubles; leave out --raw");
+    if (begins_as_ply(p))
+        return points_fault(b, 0,
+                            "is a PLY file, which holds points; give %s as text or as raw doubles",
+                            wanted[p->kind]);
+    if (!p->raw && begins(p, "\xef\xbb\xbf", 3)) /* byte order mark */
+        points_drop(p, 3);
+    return true;
+}
+
+/* A short line of text is not kept waiting for more. */
+bool points_recognise(points *p, points_block *b)
+{
+    for (;;) {
+        bool binary = p->rest_count && (uint8_t)p->rest[0] > 0x7f && (uint8_t)p->rest[0] != 0xef;
+        if (p->rest_count >= (p->raw || binary ? HEAD : 4) || p->ended || b->failed)
+            break;
+        points_fill(p, b);
+    }
+    return !b->failed && recognise(p, b);
+}

@@ -1,0 +1,219 @@
+/* Numbers from the bytes of a block. */
+#include "cli/points_input.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/numbers.h"
+
+/* --- checks that all kinds of input share --- */
+
+static bool check_row(const points *p, points_block *b, uint64_t at, const double *row)
+{
+    for (int i = 0; i < points_raw_width(p->kind); i++)
+        if (!isfinite(row[i]))
+            return points_fault(b, at, "number %d is not finite", i + 1);
+    if (p->kind == POINTS_RAYS && row[3] == 0 && row[4] == 0 && row[5] == 0)
+        return points_fault(b, at, "the direction is 0 0 0");
+    if (p->kind == POINTS_RAYS && !(row[6] >= 0))
+        return points_fault(b, at, "tmax must be 0 or more");
+    for (int k = 0; k < 3 && p->kind == POINTS_BOXES; k++)
+        if (row[k] > row[3 + k])
+            return points_fault(b, at,
+                                "the lower corner of a box comes first, but %c0 is greater than "
+                                "%c1",
+                                "xyz"[k], "xyz"[k]);
+    return true;
+}
+
+static bool rows_room(const points *p, points_block *b, uint64_t rows)
+{
+    if (b->room_rows < rows) {
+        free(b->room);
+        b->room = malloc(rows * (uint64_t)points_width(p->kind) * sizeof *b->room);
+        b->room_rows = b->room ? rows : 0;
+    }
+    b->rows = b->room;
+    return b->room || points_fault(b, 0, "not enough memory");
+}
+
+/* --- raw numbers --- */
+
+static double load(points_layout layout, const char *at)
+{
+    uint64_t bits = 0;
+    double v;
+    float f;
+    for (int i = 0; i < layout.bytes; i++)
+        bits |= (uint64_t)(uint8_t)at[layout.big_endian ? layout.bytes - 1 - i : i] << 8 * i;
+    uint32_t half = (uint32_t)bits;
+    memcpy(&f, &half, sizeof f);
+    memcpy(&v, &bits, sizeof v);
+    return layout.bytes == 4 ? (double)f : v;
+}
+
+/* Rows that may be taken as they stand. */
+static bool stands_as_rows(const points *p)
+{
+    return p->layout.bytes == 8 && p->layout.per_row == points_width(p->kind) &&
+           p->layout.big_endian == (__BYTE_ORDER__ == __ORDER_BIG_ENDIAN__);
+}
+
+static bool all_finite(const double *v, uint64_t count)
+{
+    const uint64_t exponent = UINT64_C(0x7ff) << 52;
+    uint64_t bad = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        uint64_t bits;
+        memcpy(&bits, v + i, sizeof bits);
+        bad |= (bits & exponent) == exponent;
+    }
+    return !bad;
+}
+
+static void check_rows(const points *p, points_block *b, uint64_t count)
+{
+    uint64_t width = (uint64_t)points_width(p->kind), good = 0;
+    if (p->kind == POINTS && all_finite(b->rows, 3 * count))
+        good = count;
+    while (good < count && check_row(p, b, good + 1, b->rows + good * width))
+        good++;
+    b->row_count = good;
+}
+
+static void parse_numbers(const points *p, points_block *b)
+{
+    uint64_t width = (uint64_t)points_width(p->kind), each = (uint64_t)p->layout.per_row,
+             bytes = (uint64_t)p->layout.bytes, count = b->count / (each * bytes);
+    if (stands_as_rows(p))
+        b->rows = (const double *)(const void *)b->bytes;
+    else if (!rows_room(p, b, count))
+        return;
+    for (uint64_t i = 0; i < count && b->rows == b->room; i++) {
+        double *row = b->room + i * width;
+        row[width - 1] = p->tmax;
+        for (uint64_t k = 0; k < each; k++)
+            row[k] = load(p->layout, b->bytes + (i * each + k) * bytes);
+    }
+    check_rows(p, b, count);
+}
+
+/* --- text --- */
+
+static bool is_blank(char c)
+{
+    return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
+}
+
+static char *skip_blanks(char *s)
+{
+    while (is_blank(*s))
+        s++;
+    return s;
+}
+
+static bool wrong_count(const points *p, points_block *b)
+{
+    static const char *const expected[] = {
+        "expected three numbers", "expected six or seven numbers: origin, direction and tmax",
+        "expected six numbers: the lower and the upper corner"
+    };
+    return points_fault(b, b->lines, "%s", expected[p->kind]);
+}
+
+static bool parse_blanks(const points *p, points_block *b, char *s, char *end, double *row,
+                         int *count)
+{
+    while (*s && *s != '#') {
+        const char *after;
+        if (*count == points_width(p->kind))
+            return wrong_count(p, b);
+        row[*count] = number_read(s, end, &after);
+        if (after == s || !(is_blank(*after) || *after == ',' || *after == '#' || !*after))
+            return wrong_count(p, b);
+        if (!isfinite(row[(*count)++]))
+            return points_fault(b, b->lines, "number %d is not finite", *count);
+        s = skip_blanks((char *)after);
+        if (*s == ',')
+            s = skip_blanks(s + 1);
+    }
+    return true;
+}
+
+/* Where a header told which fields count. */
+static bool parse_fields(const points *p, points_block *b, char *s, char *end, double *row,
+                         int *count)
+{
+    char *field[POINTS_FIELDS];
+    int fields = points_split(p->separator, s, end, field);
+    if (fields != p->fields)
+        return points_fault(b, b->lines, "has %d fields, but the header names %d", fields,
+                            p->fields);
+    for (int i = 0; i < points_width(p->kind) && p->field[i] >= 0; i++) {
+        char *at = field[p->field[i]];
+        const char *after;
+        row[i] = number_read(at, at + strlen(at), &after);
+        if (after == at || *after)
+            return points_fault(b, b->lines, "'%.40s' is not a number", at);
+        if (!isfinite(row[i]))
+            return points_fault(b, b->lines, "number %d is not finite", i + 1);
+        *count = i + 1;
+    }
+    return true;
+}
+
+/* False: it is wrong. Empty lines and comments hold no row. */
+static bool parse_line(const points *p, points_block *b, char *s, char *end)
+{
+    double *row = b->room + b->row_count * (uint64_t)points_width(p->kind);
+    int count = 0;
+    s = skip_blanks(s);
+    if (!*s || *s == '#')
+        return true;
+    if (!(p->fields ? parse_fields : parse_blanks)(p, b, s, end, row, &count))
+        return false;
+    if (count < points_raw_width(p->kind))
+        return wrong_count(p, b);
+    if (count < points_width(p->kind))
+        row[count] = p->tmax;
+    b->row_count++;
+    return check_row(p, b, b->lines, row) || (b->row_count--, false);
+}
+
+static void parse_text(const points *p, points_block *b)
+{
+    char *s = b->bytes + b->begin, *all = b->bytes + b->count;
+    const char *zero = memchr(s, 0, (size_t)(all - s));
+    /* the shortest row: a digit and what is behind it, for each number */
+    if (!rows_room(p, b, (uint64_t)(all - s) / (2 * (uint64_t)points_raw_width(p->kind)) + 1))
+        return;
+    while (s < all) {
+        char *end = memchr(s, '\n', (size_t)(all - s));
+        end = end ? end : all;
+        b->lines++;
+        if (zero && zero < end) {
+            points_fault(b, b->lines,
+                         "contains a zero byte; this is not a text file of points (--raw reads raw "
+                         "doubles)");
+            return;
+        }
+        *end = 0;
+        if (!parse_line(p, b, s, end))
+            return;
+        s = end + 1;
+    }
+}
+
+/* A fault that taking the block found is behind all of its rows; those found here come before. */
+void points_parse(const points *p, points_block *b)
+{
+    bool behind = b->failed && b->fault_at; /* the line after the last one */
+    if (p->held)
+        check_rows(p, b, b->row_count);
+    else if (b->count > b->begin)
+        (p->raw ? parse_numbers : parse_text)(p, b);
+    if (behind && b->fault_at == POINTS_BEHIND)
+        b->fault_at = b->lines + 1;
+}

@@ -1,0 +1,342 @@
+#include "cmd/query_pipe.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+
+/* Blocks under way for each thread: while the oldest one is waited for, others are done. */
+enum { BLOCKS_EACH = 4, FIRST_PIECE = 16 };
+
+/* A block of questions, and its answers. */
+typedef struct slot {
+    struct pipe_line *pipe;
+    points_block block;
+    answer_text text;
+    uint64_t number;
+    bool done;
+    ebpo_status status;
+    ebpo_error error;
+} slot;
+
+typedef struct crew {
+    struct pipe_line *pipe;
+    query_worker worker;
+    pthread_t thread;
+    bool started;
+} crew;
+
+typedef struct pipe_line {
+    const query_job *job;
+    query_holding *holding;
+    points *in;
+    progress_line *progress;
+    unsigned threads; /* at most */
+    atomic_uint working;
+    uint64_t slots;
+    slot *slot; /* [slots] block i is in slot i % slots */
+    crew *crew; /* [threads] */
+    pthread_mutex_t taking;
+    uint64_t taken;        /* blocks; under `taking` */
+    pthread_mutex_t state; /* of all below */
+    pthread_cond_t moved;  /* `left` or `stopped` has changed */
+    uint64_t left;         /* blocks whose answers have left */
+    uint64_t rows_left, bytes_left;
+    bool leaving, stopped;
+    int code;
+} pipe_line;
+
+/* --- answers leave in order --- */
+
+static void stop(pipe_line *p)
+{
+    p->stopped = true;
+    if (p->in->wake >= 0)
+        (void)eventfd_write(p->in->wake, 1);
+    pthread_cond_broadcast(&p->moved);
+}
+
+/* A block with very long answers does not keep them: it waits for its turn. */
+static void spill(answer_text *t, void *user)
+{
+    slot *s = user;
+    pipe_line *p = s->pipe;
+    pthread_mutex_lock(&p->state);
+    while (p->left != s->number && !p->stopped)
+        pthread_cond_wait(&p->moved, &p->state);
+    bool gone = p->stopped;
+    pthread_mutex_unlock(&p->state);
+    if (gone)
+        answer_text_lose(t);
+    else
+        (void)answer_text_leave(t, p->job->command);
+}
+
+/* Of a file it is known how much there is, so that the number of questions can be estimated. */
+static void tell_progress(pipe_line *p, const slot *s)
+{
+    uint64_t total = p->in->rows_known ? p->in->rows_total : 0;
+    p->rows_left += s->block.row_count;
+    p->bytes_left += s->block.count;
+    if (!total && p->in->bytes_total && p->bytes_left)
+        total =
+            (uint64_t)((double)p->rows_left * ((double)p->in->bytes_total / (double)p->bytes_left));
+    progress_tell(p->progress, "questions", p->rows_left, total);
+}
+
+/* The answers, then what is wrong behind them. False: nothing may follow. */
+static bool leave(pipe_line *p, slot *s)
+{
+    bool left = answer_text_leave(&s->text, p->job->command);
+    if (!left || s->status != EBPO_OK || s->block.failed)
+        progress_wipe(p->progress);
+    if (!left)
+        p->code = s->text.failed ? command_no_memory(p->job->command) : EXIT_FAILED;
+    else if (s->status != EBPO_OK)
+        p->code = command_failed(p->job->command, &s->error);
+    else if (!points_pass(p->in, &s->block))
+        p->code = EXIT_FAILED;
+    else
+        tell_progress(p, s);
+    return p->code == EXIT_FINE;
+}
+
+/* Who finishes the oldest block lets it leave, with all those behind it that are done. */
+static void finish(pipe_line *p, slot *s)
+{
+    pthread_mutex_lock(&p->state);
+    s->done = true;
+    for (;;) {
+        slot *oldest = &p->slot[p->left % p->slots];
+        if (p->leaving || p->stopped || !oldest->done || oldest->number != p->left)
+            break;
+        p->leaving = true;
+        pthread_mutex_unlock(&p->state);
+        bool go_on = leave(p, oldest);
+        pthread_mutex_lock(&p->state);
+        p->leaving = oldest->done = false;
+        p->left++;
+        if (!go_on)
+            stop(p);
+        pthread_cond_broadcast(&p->moved);
+    }
+    pthread_mutex_unlock(&p->state);
+}
+
+/* --- one block --- */
+
+static bool results_room(query_worker *w, size_t each, uint64_t rows)
+{
+    if (each && w->row_room < rows) {
+        free(w->results);
+        w->results = malloc(rows * each);
+        w->row_room = w->results ? rows : 0;
+    }
+    return !each || w->row_room >= rows;
+}
+
+/* Of questions that fail together, those before the first one that fails are answered. */
+static ebpo_status answer_rows(const query_job *job, query_worker *w, const double *rows,
+                               uint64_t count, ebpo_error *error)
+{
+    size_t before = w->text->count;
+    ebpo_status status = job->answer(job, w, rows, count, error);
+    if (status == EBPO_OK || count == 1 || w->text->count != before || w->text->spilled)
+        return status;
+    status = EBPO_OK;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        status = job->answer(job, w, rows + i * (uint64_t)points_width(job->kind), 1, error);
+    return status;
+}
+
+/* How many questions there will be; 0: not known. */
+static double total_of(const points *in, const points_block *b)
+{
+    if (in->rows_known)
+        return (double)in->rows_total;
+    return (double)in->bytes_total * (double)b->row_count / (double)(b->count ? b->count : 1);
+}
+
+/* Rows of a block. Others may hold what these need: they are asked again where nobody else asks. */
+static ebpo_status answer_piece(pipe_line *p, query_worker *w, const double *rows, uint64_t count,
+                                double total, ebpo_error *error)
+{
+    size_t before = w->text->count;
+    ebpo_status status = query_holding_enter(p->holding, &w->context, total, error);
+    if (status != EBPO_OK)
+        return status;
+    double begin = progress_now();
+    status = answer_rows(p->job, w, rows, count, error);
+    query_holding_leave(p->holding, count, progress_now() - begin);
+    if (status == EBPO_E_LIMIT && p->working > 1 && !w->text->spilled &&
+        query_holding_enter_alone(p->holding, &w->context)) {
+        answer_text_forget(w->text, before);
+        status = answer_rows(p->job, w, rows, count, error);
+        query_holding_leave(p->holding, count, 0);
+    }
+    return status;
+}
+
+/* The first questions come in small pieces, each as large as all before it: after each it may be
+ * decided to bring in all of the model. */
+static void answer(pipe_line *p, query_worker *w, slot *s)
+{
+    const points_block *b = &s->block;
+    uint64_t width = (uint64_t)points_width(p->job->kind), piece = b->row_count;
+    double total = total_of(p->in, b);
+    ebpo_error none = EBPO_ERROR_INIT;
+    s->error = none;
+    s->status = EBPO_OK;
+    w->text = &s->text;
+    w->text->spilled = false;
+    if (!results_room(w, p->job->result_bytes, b->row_count)) {
+        s->text.failed = true;
+        return;
+    }
+    for (uint64_t at = 0; at < b->row_count && s->status == EBPO_OK; at += piece) {
+        bool first = s->number == 0 && p->holding->waiting;
+        piece = !first ? b->row_count : at ? at : FIRST_PIECE;
+        piece = piece < b->row_count - at ? piece : b->row_count - at;
+        s->status = answer_piece(p, w, b->rows + at * width, piece, total, &s->error);
+    }
+}
+
+/* --- threads --- */
+
+static void *work(void *user);
+
+/* Another thread joins when there is more than a little to do. */
+static void call_another(pipe_line *p)
+{
+    crew *next = &p->crew[p->working];
+    if (p->working < p->threads && pthread_create(&next->thread, NULL, work, next) == 0) {
+        next->started = true;
+        p->working++;
+    }
+}
+
+/* NULL: there is no more. */
+static slot *take(pipe_line *p)
+{
+    pthread_mutex_lock(&p->taking);
+    pthread_mutex_lock(&p->state);
+    while (!p->stopped && p->taken - p->left >= p->slots)
+        pthread_cond_wait(&p->moved, &p->state);
+    bool gone = p->stopped;
+    pthread_mutex_unlock(&p->state);
+    slot *s = &p->slot[p->taken % p->slots];
+    if (gone || !points_take(p->in, &s->block)) {
+        s = NULL;
+    } else {
+        s->number = p->taken++;
+        if (s->number > 0 || s->block.count > POINTS_BATCH * 8)
+            call_another(p);
+    }
+    pthread_mutex_unlock(&p->taking);
+    return s;
+}
+
+static void *work(void *user)
+{
+    crew *c = user;
+    pipe_line *p = c->pipe;
+    for (slot *s = take(p); s; s = take(p)) {
+        points_parse(p->in, &s->block);
+        answer(p, &c->worker, s);
+        finish(p, s);
+    }
+    return NULL;
+}
+
+/* --- all of it --- */
+
+static bool make(pipe_line *p)
+{
+    p->slot = calloc(p->slots, sizeof *p->slot);
+    p->crew = calloc(p->threads, sizeof *p->crew);
+    if (!p->slot || !p->crew)
+        return false;
+    for (uint64_t i = 0; i < p->slots; i++) {
+        if (!answer_text_init(&p->slot[i].text))
+            return false;
+        p->slot[i].pipe = p;
+        p->slot[i].text.spill = spill;
+        p->slot[i].text.user = &p->slot[i];
+    }
+    for (unsigned i = 0; i < p->threads; i++)
+        p->crew[i].pipe = p;
+    p->in->wake = p->threads > 1 ? eventfd(0, EFD_CLOEXEC) : -1;
+    return true;
+}
+
+static void unmake(pipe_line *p)
+{
+    for (unsigned i = 0; p->crew && i < p->threads; i++) {
+        query_holding_forget(p->holding, &p->crew[i].worker.context);
+        free(p->crew[i].worker.results);
+    }
+    for (uint64_t i = 0; p->slot && i < p->slots; i++) {
+        points_block_free(&p->slot[i].block);
+        answer_text_free(&p->slot[i].text);
+    }
+    if (p->in->wake >= 0)
+        close(p->in->wake);
+    p->in->wake = -1;
+    free(p->slot);
+    free(p->crew);
+}
+
+/* What cannot be asked at all, and the line of names. */
+static int ask_nothing(pipe_line *p, query_worker *w)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    w->text = &p->slot[0].text;
+    ebpo_status status = query_holding_enter(p->holding, &w->context, 0, &error);
+    if (status == EBPO_OK) {
+        status = p->job->answer(p->job, w, NULL, 0, &error);
+        query_holding_leave(p->holding, 0, 0);
+    }
+    if (status != EBPO_OK)
+        return command_failed(p->job->command, &error);
+    if (p->job->values->header && p->job->form != ANSWERS_JSON && p->job->form != ANSWERS_RAW)
+        answers_header(w->text, p->job->form, p->job->columns(p->job));
+    return EXIT_FINE;
+}
+
+int query_pipe_run(const query_job *job, query_holding *holding, points *in, unsigned threads,
+                   progress_line *progress)
+{
+    pipe_line p = { .job = job, .holding = holding, .in = in, .progress = progress };
+    p.threads = threads;
+    p.slots = threads > 1 ? (uint64_t)threads * BLOCKS_EACH : 1;
+    pthread_mutex_init(&p.taking, NULL);
+    pthread_mutex_init(&p.state, NULL);
+    pthread_cond_init(&p.moved, NULL);
+    p.code = make(&p) ? EXIT_FINE : command_no_memory(job->command);
+    if (p.code == EXIT_FINE)
+        p.code = ask_nothing(&p, &p.crew[0].worker);
+    if (p.code == EXIT_FINE) {
+        p.working = 1;
+        work(&p.crew[0]);
+        /* a thread that joins late may call another one: none is called after the last take */
+        for (unsigned i = 1; i < threads; i++) {
+            pthread_mutex_lock(&p.taking);
+            bool started = p.crew[i].started;
+            pthread_mutex_unlock(&p.taking);
+            if (started)
+                pthread_join(p.crew[i].thread, NULL);
+        }
+        if (p.code == EXIT_FINE && !answer_text_leave(&p.slot[0].text, job->command))
+            p.code = EXIT_FAILED; /* a line of names without answers */
+        if (p.code == EXIT_FINE && in->failed)
+            p.code = EXIT_FAILED;
+    }
+    unmake(&p);
+    pthread_mutex_destroy(&p.taking);
+    pthread_mutex_destroy(&p.state);
+    pthread_cond_destroy(&p.moved);
+    return p.code;
+}
