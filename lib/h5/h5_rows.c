@@ -62,7 +62,11 @@ static ebpo_status read_set(const dataset *d, unsigned most, double *rows, ebpo_
     bool good = memory >= 0 &&
                 H5Sselect_hyperslab(memory, H5S_SELECT_SET, from, NULL, d->size, NULL) >= 0 &&
                 H5Dread(d->set, H5T_NATIVE_DOUBLE, memory, H5S_ALL, H5P_DEFAULT, rows) >= 0;
-    ebpo_status status = good ? EBPO_OK : fail(d, "the dataset cannot be read", error);
+    ebpo_status status = EBPO_OK;
+    if (!good)
+        status = ebpo_h5_short_of_memory()
+                     ? ebpo_fail_memory(error, d->size[0] * d->size[1] * sizeof *rows)
+                     : fail(d, "the dataset cannot be read", error);
     if (memory >= 0)
         H5Sclose(memory);
     return status;

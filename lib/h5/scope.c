@@ -36,6 +36,20 @@ static herr_t take_first(unsigned depth, const H5E_error2_t *entry, void *data)
     return 1; /* the innermost is enough */
 }
 
+static herr_t take_memory(unsigned depth, const H5E_error2_t *entry, void *data)
+{
+    (void)depth;
+    *(bool *)data |= entry->maj_num == H5E_RESOURCE && entry->min_num == H5E_NOSPACE;
+    return 0;
+}
+
+bool ebpo_h5_short_of_memory(void)
+{
+    bool found = false;
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_memory, &found);
+    return found;
+}
+
 ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown,
                          const char *object, const char *what)
 {

@@ -21,6 +21,9 @@ void ebpo_h5_leave(ebpo_h5_scope *scope);
 ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown,
                          const char *object, const char *what);
 
+/* Whether the failing call, right before, lacked memory. */
+bool ebpo_h5_short_of_memory(void);
+
 /* The stored type for integers of `size` bytes, little-endian; -1 for another size. */
 hid_t ebpo_h5_integer_type(unsigned size, bool is_signed);
 

@@ -9,6 +9,14 @@ enum { DEFAULT_LEVEL = 3 };
 /* HDF5 keeps chunk sizes in 32 bits. */
 static const uint64_t CHUNK_MAX = UINT32_MAX;
 
+/* HDF5 takes 0 as a sign of failure, and this as its cause. */
+static size_t short_of_memory(void)
+{
+    H5Epush2(H5E_DEFAULT, __FILE__, __func__, __LINE__, H5E_ERR_CLS, H5E_RESOURCE, H5E_NOSPACE,
+             "not enough memory for a chunk");
+    return 0;
+}
+
 static size_t replace(void **buffer, size_t *buffer_size, void *block, size_t capacity, size_t used)
 {
     free(*buffer);
@@ -44,9 +52,11 @@ failed:
 /* A frame that states its size: one call. */
 static size_t expand_known(uint64_t size, size_t bytes, size_t *buffer_size, void **buffer)
 {
-    void *block = size && size <= CHUNK_MAX ? malloc((size_t)size) : NULL;
-    if (!block)
+    void *block = NULL;
+    if (!size || size > CHUNK_MAX)
         return 0;
+    if (!(block = malloc((size_t)size)))
+        return short_of_memory();
     size_t used = ZSTD_decompress(block, (size_t)size, *buffer, bytes);
     if (ZSTD_isError(used) || used != size) {
         free(block);

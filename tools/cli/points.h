@@ -5,69 +5,7 @@
 #ifndef EBPO_TOOLS_POINTS_H
 #define EBPO_TOOLS_POINTS_H
 
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-
-typedef enum points_kind {
-    POINTS,      /* x y z */
-    POINTS_RAYS, /* ox oy oz dx dy dz tmax; the last number may be missing */
-    POINTS_BOXES /* x0 y0 z0 x1 y1 z1, the lower corner first */
-} points_kind;
-
-enum { POINTS_BATCH = 4096, POINTS_WIDEST = 7 };
-
-/* Doubles in a row as it is asked about: 3, 7, 6. */
-int points_width(points_kind kind);
-/* Doubles of one in raw input: 3, 6, 6. */
-int points_raw_width(points_kind kind);
-
-/* How the bytes of numbers that are not text are to be understood. */
-typedef struct points_layout {
-    int per_row; /* 6 or 7 for rays, as points_width for others */
-    int bytes;   /* of a number: 8 or 4 */
-    bool big_endian;
-} points_layout;
-
-typedef struct points_block {
-    char *bytes; /* [capacity + 1] */
-    size_t begin, count, capacity;
-    const double *rows; /* [row_count][points_width], after points_parse */
-    uint64_t row_count;
-    double *room; /* rows that are not those of the bytes */
-    uint64_t room_rows;
-    uint64_t lines;    /* of text, those before `begin` included */
-    bool failed;       /* behind its last row: */
-    uint64_t fault_at; /* line or row from 1 in this block, 0: the input as a whole */
-    char fault[200];
-} points_block;
-
-typedef struct points {
-    const char *command, *name; /* for messages */
-    points_kind kind;
-    bool raw;    /* doubles, or what `layout` tells */
-    bool header; /* the first line of text names columns; may be set after points_open */
-    double tmax; /* of rays that tell none */
-    int fd;
-    int wake; /* when this can be read, waiting ends, as at the end of the input; -1: nothing */
-    uint64_t bytes_total, bytes_taken; /* of a file; 0: not known how many */
-    char *rest;                        /* [rest_capacity] what was read and is not taken */
-    size_t rest_count, rest_capacity;
-    bool begun, ended;
-    _Atomic bool failed; /* said on stderr, the command shall end with EXIT_FAILED */
-    uint64_t line, row;  /* that have passed */
-    points_layout layout;
-    bool rows_known;          /* how many there are in all: */
-    uint64_t rows_total;      /* may be cut short */
-    bool from_zero;           /* rows are told as "vertex 0" */
-    double *held;             /* all rows, of what is read as a whole; or NULL */
-    uint64_t held_at;         /* those that have been taken */
-    int field[POINTS_WIDEST]; /* with a header: where each number stands; -1: nowhere */
-    int fields;               /* and how many fields a line has; 0: not known yet */
-    char separator;           /* between them; 0: blanks */
-    points_block batch;       /* of points_next */
-    uint64_t batch_at;
-} points;
+#include "cli/points_input.h"
 
 /* `by`: the command. `path` NULL or "-": standard input. False: it cannot be opened (said on
  * stderr). points_close in any case. */
@@ -81,12 +19,9 @@ bool points_begin(points *p);
 /* The next bytes, as many as are there without waiting, but at least one row's; false at the end,
  * and after what makes going on senseless. Blocks begin as zeros. One thread at a time. */
 bool points_take(points *p, points_block *block);
-/* Reads its numbers. Any thread. */
-void points_parse(const points *p, points_block *block);
 /* After its answers have left, in order. False: the block was cut short by what is wrong, which has
  * been said on stderr. */
 bool points_pass(points *p, points_block *block);
-void points_block_free(points_block *block);
 
 /* All of this on one thread: fills rows[POINTS_BATCH][points_width]; their number, 0 at the end or
  * after an error. */

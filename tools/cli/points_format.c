@@ -7,7 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "cli/points_input.h"
+#include "cli/points_format.h"
 
 enum { HEAD = 8 }; /* bytes of HDF5's signature */
 

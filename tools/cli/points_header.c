@@ -3,7 +3,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "cli/points_input.h"
+#include "cli/points_header.h"
 
 static bool is_blank(char c)
 {

@@ -1,5 +1,6 @@
 /* Numbers from the bytes of a block. */
-#include "cli/points_input.h"
+#include "cli/points_header.h"
+#include "cli/points_parse.h"
 
 #include <inttypes.h>
 #include <math.h>

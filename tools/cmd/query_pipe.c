@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "cli/command.h"
+#include "cli/points_parse.h"
 
 /* Blocks under way for each thread: while the oldest one is waited for, others are done. */
 enum { BLOCKS_EACH = 4, FIRST_PIECE = 16 };

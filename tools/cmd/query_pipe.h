@@ -5,7 +5,7 @@
 
 #include "cli/progress.h"
 #include "cmd/query_holding.h"
-#include "cmd/query_run.h"
+#include "cmd/query_job.h"
 
 /* Answers all of `in`; returns an exit code. `threads`: at most so many, at least 1; few questions
  * take fewer. */

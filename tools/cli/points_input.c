@@ -1,0 +1,94 @@
+#include "cli/points_input.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+int points_width(points_kind kind) { return kind == POINTS ? 3 : kind == POINTS_RAYS ? 7 : 6; }
+
+int points_raw_width(points_kind kind) { return kind == POINTS ? 3 : 6; }
+
+bool points_fault(points_block *b, uint64_t at, const char *format, ...)
+{
+    va_list list;
+    va_start(list, format);
+    vsnprintf(b->fault, sizeof b->fault, format, list);
+    va_end(list);
+    b->fault_at = at;
+    b->failed = true;
+    return false;
+}
+
+void points_block_free(points_block *b)
+{
+    free(b->bytes);
+    free(b->room);
+    *b = (points_block){ .bytes = NULL };
+}
+
+/* False: who waits has been told to stop. */
+static bool wait_for_more(const points *p)
+{
+    struct pollfd both[] = { { .fd = p->wake, .events = POLLIN },
+                             { .fd = p->fd, .events = POLLIN } };
+    while (p->wake >= 0 && poll(both, 2, -1) < 0 && errno == EINTR)
+        ;
+    return !(both[0].revents & POLLIN);
+}
+
+ssize_t points_read_some(points *p, points_block *b, char *to, size_t most)
+{
+    ssize_t got;
+    if (!wait_for_more(p)) {
+        p->ended = true;
+        return 0;
+    }
+    do
+        got = read(p->fd, to, most);
+    while (got < 0 && errno == EINTR);
+    if (got < 0)
+        points_fault(b, 0, "cannot be read: %s", strerror(errno));
+    p->ended |= got <= 0;
+    p->bytes_taken += got > 0 ? (uint64_t)got : 0;
+    return got;
+}
+
+bool points_fill(points *p, points_block *b)
+{
+    ssize_t got = points_read_some(p, b, p->rest + p->rest_count, p->rest_capacity - p->rest_count);
+    p->rest_count += got > 0 ? (size_t)got : 0;
+    return got >= 0;
+}
+
+bool points_fill_all(points *p, points_block *b)
+{
+    while (!p->ended) {
+        if (p->rest_count == p->rest_capacity) {
+            char *wider = p->rest_capacity <= SIZE_MAX / 4
+                              ? realloc(p->rest, 2 * p->rest_capacity + 1)
+                              : NULL;
+            if (!wider)
+                return points_fault(b, 0, "not enough memory for %zu bytes", 2 * p->rest_capacity);
+            p->rest = wider;
+            p->rest_capacity *= 2;
+        }
+        points_fill(p, b);
+    }
+    return !b->failed;
+}
+
+void points_drop(points *p, size_t bytes)
+{
+    p->rest_count -= bytes;
+    memmove(p->rest, p->rest + bytes, p->rest_count);
+}
+
+bool points_more_is_there(const points *p)
+{
+    struct pollfd one = { .fd = p->fd, .events = POLLIN };
+    return poll(&one, 1, 0) > 0;
+}

@@ -1,0 +1,36 @@
+/* What a command for questions asks: how blocks are answered, and what answers look like. */
+#ifndef EBPO_TOOLS_QUERY_JOB_H
+#define EBPO_TOOLS_QUERY_JOB_H
+
+#include "cli/answers.h"
+#include "cli/points.h"
+#include "cli/query_args.h"
+
+/* Who answers: a thread with what is its own. */
+typedef struct query_worker {
+    ebpo_context *context;
+    void *results; /* [row_room] of `result_bytes` */
+    uint64_t row_room;
+    answer_text *text; /* where answers go */
+} query_worker;
+
+typedef struct query_job query_job;
+struct query_job {
+    const char *command;
+    const query_values *values;
+    points_kind kind;
+    size_t result_bytes; /* of the answer to one row */
+    double parts_share;  /* as query_holding_open takes it */
+    /* Answers rows[count][points_width(kind)] and prints. Asked with no rows first, so that what
+     * cannot be asked at all is said before input is waited for. */
+    ebpo_status (*answer)(const query_job *job, query_worker *worker, const double *rows,
+                          uint64_t count, ebpo_error *error);
+    const char *(*columns)(const query_job *job); /* names of what a line of answers holds */
+    /* What --raw prints for an answer, as a NumPy type; NULL: lists have none. */
+    const char *(*dtype)(const query_job *job, unsigned *bytes);
+    ebpo_inside_options inside; /* these are set by query_run */
+    ebpo_distance_options distance;
+    answer_form form;
+};
+
+#endif
