@@ -34,6 +34,7 @@ typedef struct survey {
     unsigned threads;
     ebpo_bound_goal goal;
     uint64_t first; /* of `order`, of the block at hand */
+    bool spent;     /* questions, before the tolerance was met */
     const ebpo_progress *progress;
     ebpo_error *error;
 } survey;
@@ -171,10 +172,32 @@ static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_devia
     return status;
 }
 
+/* What a coarser level is certain of holds for what lies in it. */
+static void bound_by_coarser(survey *s, double at_most)
+{
+    for (uint64_t i = 0; i < s->count && at_most > 0; i++) {
+        ebpo_reach_bound *b = &s->nodes[i].bound;
+        b->hi = fmax(b->lo, fmin(b->hi, at_most));
+    }
+}
+
+static bool has_spent(const survey *s, const ebpo_deviation_options *o, const ebpo_deviation *out)
+{
+    if (out->hi <= (1 + o->tolerance) * out->lo)
+        return false;
+    bool spent = o->questions && out->questions >= o->questions;
+    for (uint64_t i = 0; i < s->count && !spent; i++)
+        spent = s->nodes[i].bound.questions >= QUESTIONS_MOST;
+    return spent;
+}
+
 static ebpo_status bound_level(survey *s, const ebpo_deviation_options *o, ebpo_deviation *out)
 {
     ebpo_level_nodes tree = ebpo_lod_model_nodes(s->tree);
     ebpo_node root = ebpo_level_root(&tree);
+    free(s->order);
+    s->order = NULL;
+    s->count = 0;
     ebpo_status status = list_nodes(s, &tree, &root);
     if (status == EBPO_OK && !(s->order = ebpo_alloc(s->count, sizeof *s->order)))
         status = ebpo_fail_memory(s->error, s->count * sizeof *s->order);
@@ -184,6 +207,7 @@ static ebpo_status bound_level(survey *s, const ebpo_deviation_options *o, ebpo_
     if (status == EBPO_OK)
         status = ebpo_parallel_for(s->threads, NULL, s->count, 16, bound_some, s, s->progress,
                                    "looking at envelopes", s->error);
+    bound_by_coarser(s, o->at_most);
     if (status == EBPO_OK)
         status = sort_nodes(s);
     if (status != EBPO_OK)
@@ -193,6 +217,23 @@ static ebpo_status bound_level(survey *s, const ebpo_deviation_options *o, ebpo_
     for (uint64_t i = 0; i < s->count; i++)
         out->hi = fmax(out->hi, s->nodes[i].bound.hi);
     out->questions = count_questions(s);
+    s->spent = has_spent(s, o, out);
+    return status;
+}
+
+/* Envelopes nest, so no level reaches farther than the one before, which has other pieces to cut
+ * and may have got on better. */
+static ebpo_status ask_coarser(survey *s, const ebpo_deviation_options *o, ebpo_deviation *out)
+{
+    ebpo_status status = EBPO_OK;
+    while (s->spent && s->level > 0 && !(o->at_most > 0) && status == EBPO_OK) {
+        ebpo_deviation coarser = EBPO_DEVIATION_INIT;
+        s->level--;
+        status = bound_level(s, o, &coarser);
+        if (status == EBPO_OK)
+            out->hi = fmax(out->lo, fmin(out->hi, coarser.hi));
+        out->questions += coarser.questions;
+    }
     return status;
 }
 
@@ -242,6 +283,9 @@ static ebpo_status check(const ebpo_info *info, const ebpo_info *model, int leve
     if (!(o->tolerance > 0) || !(o->tolerance <= 1e6))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "tolerance %g: give a number above 0, such as 0.05", o->tolerance);
+    if (!(o->at_most >= 0))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "at_most %g: give what a coarser level reaches at most, or 0", o->at_most);
     if (o->samples > UINT32_MAX)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "more than 4294967295 samples; a million give the mean to three digits");
@@ -288,6 +332,8 @@ ebpo_status ebpo_deviation_level(ebpo_model *model, const ebpo_file *file, int l
         status = make_bounders(&s, model);
     if (status == EBPO_OK)
         status = bound_level(&s, o, &found);
+    if (status == EBPO_OK)
+        status = ask_coarser(&s, o, &found);
     for (unsigned i = 0; s.bounders && i < s.threads; i++)
         ebpo_bounder_free(&s.bounders[i]);
     free(s.bounders);

@@ -11,7 +11,7 @@ enum {
     /* a leaf, and a gray node below the first levels, adds at most this many to its parent's */
     EBPO_PLANES_MAX = 32,
     EBPO_PLANES_CANDIDATES = 512, /* and chooses among at most so many */
-    /* the theses' selections, which start from the cell; more than a byte counts is not stored */
+    /* the theses' selections, which start from the cell, choose no more: a byte counts them */
     EBPO_PLANES_STORED = 255
 };
 
@@ -69,7 +69,9 @@ int ebpo_select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
 
 /* How many of `count` candidates: `percent` of them, rounded up (EBP 2017, equation 5); or, with
  * k_root > 0, BP's K: k_root / 2^level, halved on while it is not below `count` (2008, 3.5.1); all
- * of them where that is below 1 to begin with (as there). */
+ * of them where that is below 1 to begin with (as there). EBPO_PLANES_STORED where it would be more:
+ * what cannot be stored must not be chosen, or the clusters of what is stored are not the best
+ * ones. */
 int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
 /* Every candidate that may remove 0.03 % of the cell or more, deepest cut first, then needles:

@@ -30,7 +30,8 @@ const ebpo_selection_traits *ebpo_selection_describe(ebpo_selection selection)
     return method ? &method->traits : NULL;
 }
 
-int ebpo_selection_wanted(int count, int level, double percent, double k_root)
+/* Equation 5, or BP's K. */
+static int asked_for(int count, int level, double percent, double k_root)
 {
     if (!(k_root > 0))
         return (int)ceil(count * percent / 100);
@@ -40,4 +41,10 @@ int ebpo_selection_wanted(int count, int level, double percent, double k_root)
     while (k >= count && k >= 2)
         k /= 2;
     return k > count ? count : (int)k;
+}
+
+int ebpo_selection_wanted(int count, int level, double percent, double k_root)
+{
+    int wanted = asked_for(count, level, percent, k_root);
+    return wanted < EBPO_PLANES_STORED ? wanted : EBPO_PLANES_STORED;
 }

@@ -187,11 +187,15 @@ START_TEST(counts_wanted_are_those_of_the_theses)
     ck_assert_int_eq(ebpo_selection_wanted(11, 3, 40, 0), 5); /* rounded up */
     ck_assert_int_eq(ebpo_selection_wanted(1, 0, 10, 0), 1);
     ck_assert_int_eq(ebpo_selection_wanted(0, 0, 40, 0), 0);
-    ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 694), 694);
-    ck_assert_int_eq(ebpo_selection_wanted(1000, 1, 40, 694), 347);
+    ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 250), 250);
+    ck_assert_int_eq(ebpo_selection_wanted(1000, 2, 40, 694), 173);
     ck_assert_int_eq(ebpo_selection_wanted(100, 1, 40, 694), 86);   /* 347, 173.5, 86.75 */
     ck_assert_int_eq(ebpo_selection_wanted(100, 10, 40, 694), 100); /* K below 1: all of them */
     ck_assert_int_eq(ebpo_selection_wanted(1, 0, 40, 694), 1);
+    /* never more than a file stores: what is chosen is kept */
+    ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 694), EBPO_PLANES_STORED);
+    ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 0), EBPO_PLANES_STORED);
+    ck_assert_int_eq(ebpo_selection_wanted(1000, 30, 40, 694), EBPO_PLANES_STORED);
 }
 END_TEST
 
@@ -438,6 +442,62 @@ START_TEST(selections_and_their_numbers_that_make_no_sense_are_refused)
 }
 END_TEST
 
+/* --- more planes --- */
+
+/* Volume beyond the solid's at the root, in parts of the solid's. */
+static double root_excess(const ebpo_build_options *options)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    double volume;
+    write_file(ebpo_test_torus(2, 0.7, 40, 20), options);
+    ebpo_file *file = open_file();
+    double solid = ebpo_file_info(file)->report.volume;
+    ck_assert(ebpo_lod_level(file, 0, NULL, NULL, &volume, &error) == EBPO_OK);
+    ck_assert_uint_le(ebpo_file_info(file)->level[0].plane_count, EBPO_PLANES_STORED);
+    ebpo_close(file);
+    return volume / solid - 1;
+}
+
+/* Clusters of normals are not nested: a step may lose so much of the excess, no more. */
+static const double step_may_lose = 0.02;
+
+static void falls(ebpo_build_options *o, double *option, const double *value, int count)
+{
+    double first = 0, before = INFINITY, now = 0;
+    for (int i = 0; i < count; i++) {
+        *option = value[i];
+        now = root_excess(o);
+        ck_assert_msg(now <= before * (1 + step_may_lose),
+                      "%s: excess %g with %g, %g with the number before",
+                      ebpo_selection_describe(o->select)->name, now, value[i], before);
+        before = now;
+        first = i ? first : now;
+    }
+    ck_assert_msg(now < 0.9 * first, "%s: excess %g, then %g",
+                  ebpo_selection_describe(o->select)->name, first, now);
+}
+
+/* As in the theses (BP 2008, tables 3.6 to 3.8; EBP 2017, table 20). The last ones ask for more
+ * planes than a node stores. */
+START_TEST(more_planes_make_the_root_tighter)
+{
+    static const double percent[] = { 5, 10, 20, 40, 80 }, k_root[] = { 20, 60, 200, 400, 1200 };
+    for (int s = 0; s < EBPO_SELECTION_COUNT; s++) {
+        ebpo_build_options o = EBPO_BUILD_OPTIONS_INIT;
+        if (!ebpo_selection_describe((ebpo_selection)s)->from_leaves)
+            continue;
+        o.select = (ebpo_selection)s;
+        o.max_level = 1;
+        o.leaf_faces = 0;
+        o.parts |= EBPO_PART_LEAF_PLANES;
+        falls(&o, &o.percent, percent, 5);
+        if (o.select != EBPO_SELECT_KMEDOIDS)
+            continue;
+        falls(&o, &o.k_root, k_root, 5);
+    }
+}
+END_TEST
+
 /* --- the limit --- */
 
 static bool has_hulls(ebpo_file *file)
@@ -527,7 +587,8 @@ END_TEST
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("selections");
-    TCase *tests = tcase_create("choosing"), *files = tcase_create("files");
+    TCase *tests = tcase_create("choosing"), *files = tcase_create("files"),
+          *more = tcase_create("more planes");
     tcase_set_timeout(tests, 300);
     tcase_add_test(tests, no_swap_of_a_medoid_makes_kmedoids_cheaper);
     tcase_add_test(tests, least_offset_takes_those_that_moved_least);
@@ -548,5 +609,9 @@ Suite *test_suite(void)
     tcase_add_loop_test(files, no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close,
                         0, ebpo_test_solid_count);
     suite_add_tcase(suite, files);
+    tcase_set_timeout(more, 600);
+    tcase_add_checked_fixture(more, enter, leave);
+    tcase_add_test(more, more_planes_make_the_root_tighter);
+    suite_add_tcase(suite, more);
     return suite;
 }

@@ -182,6 +182,7 @@ static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_progres
     for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++) {
         out[i] = (ebpo_deviation)EBPO_DEVIATION_INIT;
         status = ebpo_deviation_level(model, file, i, &wanted, &out[i], error);
+        wanted.at_most = out[i].hi;
     }
     ebpo_model_free(model);
     return status;

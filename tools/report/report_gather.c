@@ -96,7 +96,7 @@ static ebpo_status deviations(comparison *c, method *m, ebpo_file *file, ebpo_mo
         if (status != EBPO_OK)
             return method_without(m, "Hausdorff distance", status, error);
         f[OF_FAR_LO] = far.lo;
-        f[OF_FAR_HI] = far.hi;
+        f[OF_FAR_HI] = options.at_most = far.hi;
         f[OF_FAR_MEAN] = far.mean;
         f[OF_FAR_RMS] = far.rms;
     }

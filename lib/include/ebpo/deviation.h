@@ -35,11 +35,19 @@ typedef struct ebpo_deviation_options {
     unsigned threads;
 
     ebpo_progress progress;
+
+    /*
+     * The `hi` of a coarser level of the same file, if it is known: envelopes
+     * nest, so this level's is not greater. 0: not known. A level that has spent
+     * its distances before it met the tolerance then asks the coarser ones, each
+     * with as many distances.
+     */
+    double at_most;
 } ebpo_deviation_options;
 
-#define EBPO_DEVIATION_OPTIONS_INIT                                          \
-    {                                                                        \
-        sizeof(ebpo_deviation_options), 0.05, 20000, 1, 0, 0, { NULL, NULL } \
+#define EBPO_DEVIATION_OPTIONS_INIT                                             \
+    {                                                                           \
+        sizeof(ebpo_deviation_options), 0.05, 20000, 1, 0, 0, { NULL, NULL }, 0 \
     }
 
 /* Lengths are in the model's unit. */
@@ -65,7 +73,7 @@ typedef struct ebpo_deviation {
     /* How many samples lie on the level's surface, of those that were drawn. */
     uint64_t samples;
 
-    /* How many distances were taken for the bounds. */
+    /* How many distances were taken for the bounds, those of coarser levels too. */
     uint64_t questions;
 } ebpo_deviation;
 
@@ -94,7 +102,7 @@ typedef struct ebpo_deviation {
  *          each node of the level
  *
  * EBPO_E_ABSENT: the model has no mesh, or is a subset itself. EBPO_E_ARGUMENT:
- * no such level; a tolerance of 0; or a file that is neither the model's nor a
+ * no such level; a tolerance of 0; an at_most below 0; or a file that is neither the model's nor a
  * subset of it, as far as their digests tell, or else their sources and how they
  * were built. EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
  *
