@@ -153,6 +153,48 @@ START_TEST(a_limit_of_questions_leaves_wider_bounds_that_hold)
 }
 END_TEST
 
+/* A wall thinner than any cell: everywhere outside is close to inside, and bounds stay wide. */
+static ebpo_mesh shell(void)
+{
+    ebpo_mesh mesh = ebpo_test_torus(3, 1, 24, 12), inner = ebpo_test_torus(3, 1 - 1e-9, 24, 12);
+    ebpo_test_reverse(&inner);
+    ebpo_test_append(&mesh, &inner);
+    ebpo_mesh_free(&inner);
+    return mesh;
+}
+
+static ebpo_deviation hurried(query_model *m, int level, double at_most)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_deviation_options o = EBPO_DEVIATION_OPTIONS_INIT;
+    ebpo_deviation out = EBPO_DEVIATION_INIT;
+    o.samples = 0;
+    o.questions = 400;
+    o.at_most = at_most;
+    ck_assert_msg(ebpo_deviation_level(m->model, m->file, level, &o, &out, &error) == EBPO_OK, "%s",
+                  error.message);
+    ck_assert(out.lo <= out.hi);
+    return out;
+}
+
+START_TEST(no_level_reaches_farther_than_the_one_before)
+{
+    query_model m;
+    double told = 0, alone = INFINITY;
+    query_model_make(&m, "shell", shell(), &stored);
+    for (int level = 0; level < m.info.level_count; level++) {
+        ebpo_deviation with = hurried(&m, level, told), without = hurried(&m, level, 0);
+        ck_assert_msg(!level || with.hi <= told, "level %d: %g, and %g before", level, with.hi,
+                      told);
+        ck_assert_msg(without.hi <= alone, "level %d: %g, and %g before", level, without.hi, alone);
+        told = with.hi;
+        alone = without.hi;
+        ck_assert(told >= twin_reach(m.file, level, &m.mesh, true, 100, 1) - 1e-9 * m.size);
+    }
+    query_model_free(&m);
+}
+END_TEST
+
 START_TEST(scale_and_place_scale_and_place_the_result)
 {
     static const double scale[] = { 0x1p-1000, 0x1p-500, 0x1p-20, 0x1p20, 0x1p500, 0x1p900 };
@@ -245,8 +287,11 @@ START_TEST(what_cannot_be_measured_is_refused)
         ebpo_close(part);
         unlink(path);
     }
-    ebpo_deviation_options canceled = EBPO_DEVIATION_OPTIONS_INIT;
+    ebpo_deviation_options canceled = EBPO_DEVIATION_OPTIONS_INIT, below = canceled;
     ebpo_deviation out = EBPO_DEVIATION_INIT;
+    below.at_most = -1;
+    ck_assert_int_eq(ebpo_deviation_level(m.model, m.file, 2, &below, &out, &error),
+                     EBPO_E_ARGUMENT);
     canceled.progress.report = cancel;
     ck_assert_int_eq(ebpo_deviation_level(m.model, m.file, 2, &canceled, &out, &error),
                      EBPO_E_CANCELLED);
@@ -265,6 +310,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, a_cavity_within_an_envelope_counts);
     tcase_add_test(tests, threads_do_not_change_the_result);
     tcase_add_test(tests, a_limit_of_questions_leaves_wider_bounds_that_hold);
+    tcase_add_test(tests, no_level_reaches_farther_than_the_one_before);
     tcase_add_test(tests, scale_and_place_scale_and_place_the_result);
     tcase_add_test(tests, what_cannot_be_measured_is_refused);
     suite_add_tcase(suite, tests);

@@ -22,11 +22,12 @@ static const arg_option options[] = {
     OPTION_SET("select", 0, report_values, select, "LIST", selection_words,
                "for a mesh: make a file with each of these selections of planes: inherit, "
                "kmedoids, offset, random; default: inherit"),
-    OPTION_REAL("percent", 0, report_values, percent, "P", 0, 100,
-                "for the theses' selections: percentage of the candidates; default 40"),
-    OPTION_TEXT("k-root", 0, report_values, k_root, "K",
+    OPTION_TEXT("percent", 0, report_values, percent, "LIST",
+                "for the theses' selections: percentage of the candidates; several, such as "
+                "10,20,40, make a method of each; default 40"),
+    OPTION_TEXT("k-root", 0, report_values, k_root, "LIST",
                 "instead of --percent: K planes at the root, or 'K%' of the faces, and half as "
-                "many at each further level (BP-Octree)"),
+                "many at each further level (BP-Octree); several as with --percent"),
     OPTION_WORD("normals", 0, report_values, normals, "NAME", normals_words,
                 "distance between normals for kmedoids: spherical (the default) or angle"),
     OPTION_INT("max-level", 0, report_values, max_level, "N", 0, 20,
@@ -75,6 +76,64 @@ static int wrong(const char *option, const char *value, const char *expected)
 
 /* --- options --- */
 
+/* The next of a list with commas; false: there is none, or it is too long. */
+static bool next_word(const char **at, char *word, size_t capacity)
+{
+    size_t length = strcspn(*at, ",");
+    if (!length || length >= capacity)
+        return false;
+    memcpy(word, *at, length);
+    word[length] = 0;
+    *at += length + ((*at)[length] == ',' && (*at)[length + 1]);
+    return true;
+}
+
+static int add_setting(comparison *c, const report_values *v, const char *word)
+{
+    char *end;
+    plane_setting *s = &c->setting[c->settings++];
+    s->percent = v->percent ? strtod(word, &end) : 40;
+    if (v->percent && (*end || !(s->percent >= 0) || !(s->percent <= 100)))
+        return wrong("--percent", word, "a number from 0 to 100");
+    if (!v->percent)
+        snprintf(s->k_root, sizeof s->k_root, "%s", word);
+    snprintf(s->word, sizeof s->word, v->percent ? "-%s%%" : "-K%s", word);
+    for (const plane_setting *other = c->setting; other < s; other++)
+        if (strcmp(other->word, s->word) == 0)
+            return wrong(v->percent ? "--percent" : "--k-root", word,
+                         "another number than one before it");
+    selection_options chosen = { v->select,  v->percent ? s->percent : -1,
+                                 v->epsilon, v->percent ? NULL : s->k_root,
+                                 v->normals, -1 };
+    return selection_check("report", &chosen);
+}
+
+/* How many planes the theses' selections take. */
+static int read_settings(comparison *c, const report_values *v)
+{
+    const char *list = v->percent ? v->percent : v->k_root;
+    char word[sizeof c->setting->k_root];
+    int code = EXIT_FINE;
+    selection_options all = { v->select, v->percent ? 1 : -1, v->epsilon, NULL, v->normals, -1 };
+    if (!list) { /* the seed is of the points, too */
+        c->setting[c->settings++].percent = 40;
+        return selection_check("report", &all);
+    }
+    if (v->percent && v->k_root)
+        return command_usage("report", "--percent and --k-root cannot be used together; give one");
+    for (const char *at = list; *at && code == EXIT_FINE;) {
+        if (c->settings == SETTINGS_MAX || !next_word(&at, word, sizeof word))
+            return wrong(v->percent ? "--percent" : "--k-root", list,
+                         "at most 12 numbers with commas between them");
+        code = add_setting(c, v, word);
+    }
+    if (c->settings == 0)
+        return wrong(v->percent ? "--percent" : "--k-root", list, "a number");
+    if (c->settings == 1)
+        c->setting[0].word[0] = 0;
+    return code;
+}
+
 static int read_options(comparison *c, report_values *v, bool mesh)
 {
     char rest;
@@ -88,20 +147,17 @@ static int read_options(comparison *c, report_values *v, bool mesh)
         !(fabs(c->azimuth) <= 360) || !(fabs(c->elevation) <= 90))
         return wrong("--view", v->view,
                      "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
-    bool building = v->select || v->percent >= 0 || v->k_root || v->normals >= 0 ||
-                    v->max_level >= 0 || v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
+    bool building = v->select || v->percent || v->k_root || v->normals >= 0 || v->max_level >= 0 ||
+                    v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
     if (!mesh && building)
         return command_usage(
             "report", "--select, --percent, --k-root, --normals, --max-level, --leaf-faces, "
                       "--epsilon and --keep only apply to a mesh, from which files are made");
     const ebpo_build_options usual = EBPO_BUILD_OPTIONS_INIT;
     v->select = v->select ? v->select : 1u << EBPO_SELECT_INHERIT;
-    /* the seed is of the points, too */
-    selection_options chosen = { v->select, v->percent, v->epsilon, v->k_root, v->normals, -1 };
-    int code = selection_check("report", &chosen);
+    int code = read_settings(c, v);
     if (code != EXIT_FINE)
         return code;
-    v->percent = v->percent >= 0 ? v->percent : usual.percent;
     v->normals = v->normals >= 0 ? v->normals : (int)usual.normals;
     v->leaf_faces = v->leaf_faces >= 0 ? v->leaf_faces : usual.leaf_faces;
     v->epsilon = v->epsilon >= 0 ? v->epsilon : usual.epsilon;
@@ -217,8 +273,7 @@ static void default_place(const char *operand, char *out, size_t capacity)
     snprintf(out, capacity, "report-%s", stem);
 }
 
-static const report_values usual = { .percent = -1,
-                                     .normals = -1,
+static const report_values usual = { .normals = -1,
                                      .max_level = -1,
                                      .leaf_faces = -1,
                                      .epsilon = -1,

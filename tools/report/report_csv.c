@@ -29,6 +29,11 @@ static void one_method(FILE *out, const comparison *c, const method *m)
         for (int k = 0; k < DEADLINE_FIGURES; k++)
             line(out, m->name, -1, parameter, &deadline_figures[k], m->due[i][k]);
     }
+    for (int i = 0; i < BUDGETS; i++) {
+        snprintf(parameter, sizeof parameter, "memory/%u", budget_parts[i]);
+        for (int k = 0; k < BUDGET_FIGURES; k++)
+            line(out, m->name, -1, parameter, &budget_figures[k], m->budget[i][k]);
+    }
     for (int i = 0; i < m->need_count; i++) {
         snprintf(parameter, sizeof parameter, "%s=%.17g",
                  m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes", m->need[i].asked);

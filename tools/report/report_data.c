@@ -6,6 +6,12 @@
 #include <unistd.h>
 
 const unsigned deadlines_us[DEADLINES] = { 1, 2, 5, 10, 20, 50, 100, 1000 };
+const unsigned budget_parts[BUDGETS] = { 1, 2, 4, 8, 16 };
+
+#define NO_VOLUME "a surface, or a solid without volume, has none that could be exceeded"
+#define NO_MESH   "the file has no mesh, see below"
+#define NO_INSIDE "a surface has no inside"
+#define NOT_TIMED "this could not be asked of the method, see below"
 
 const figure_name level_figures[LEVEL_FIGURES] = {
     [OF_BYTES] = { "bytes", "B", false, "of the level in the file" },
@@ -19,28 +25,36 @@ const figure_name level_figures[LEVEL_FIGURES] = {
                     "of the envelopes that stand for the model at this level; leaves by their "
                     "stored planes, else by planes derived from their faces" },
     [OF_EXCESS] = { "excess", "%", false,
-                    "volume of the envelopes beyond the solid's, in percent of the solid's" },
+                    "volume of the envelopes beyond the solid's, in percent of the solid's",
+                    NO_VOLUME },
     [OF_LEVELS_VOLUME] = { "levels_volume", "model^3", false,
                            "the same from levels 0 to this one alone, without the mesh: leaves "
                            "without stored planes have their parent's envelope" },
-    [OF_LEVELS_EXCESS] = { "levels_excess", "%", false, "its excess" },
+    [OF_LEVELS_EXCESS] = { "levels_excess", "%", false, "its excess", NO_VOLUME },
     [OF_LIMIT_VOLUME] = { "limit_volume", "model^3", false,
                           "of the convex hulls of the solid in each cell: no convex envelope is "
-                          "smaller" },
-    [OF_LIMIT_EXCESS] = { "limit_excess", "%", false, "its excess" },
-    [OF_EXCESS_TO_LIMIT] = { "excess_to_limit", "1", false, "excess / limit_excess" },
+                          "smaller",
+                          NO_MESH },
+    [OF_LIMIT_EXCESS] = { "limit_excess", "%", false, "its excess", NO_VOLUME },
+    [OF_EXCESS_TO_LIMIT] = { "excess_to_limit", "1", false, "excess / limit_excess",
+                             "the limit is the solid itself, or there is no limit or no volume" },
     [OF_FAR_LO] = { "hausdorff_lo", "model", false,
                     "the one-sided Hausdorff distance from the envelopes to the model is at least "
-                    "this" },
-    [OF_FAR_HI] = { "hausdorff_hi", "model", false, "and certainly at most this" },
+                    "this",
+                    NO_MESH },
+    [OF_FAR_HI] = { "hausdorff_hi", "model", false, "and certainly at most this", NO_MESH },
     [OF_FAR_MEAN] = { "distance_mean", "model", false,
-                      "mean distance from the level's surface to the model, sampled" },
-    [OF_FAR_RMS] = { "distance_rms", "model", false, "root of its mean square" },
+                      "mean distance from the level's surface to the model, sampled",
+                      "no sample lies on the level's surface, or the file has no mesh" },
+    [OF_FAR_RMS] = { "distance_rms", "model", false, "root of its mean square",
+                     "no sample lies on the level's surface, or the file has no mesh" },
     [OF_MAYBE_UNIFORM] = { "maybe_uniform", "1", false,
                            "share of points, uniform in the model's box, that a point-in-solid "
-                           "test to this level leaves open" },
+                           "test to this level leaves open",
+                           NO_INSIDE },
     [OF_MAYBE_NEAR] = { "maybe_near", "1", false,
-                        "the same of points within 1 % of the diagonal from the surface" },
+                        "the same of points within 1 % of the diagonal from the surface",
+                        "a surface has no inside, and a file without mesh no points near it" },
     [OF_WIDTH_MEAN] = { "width_mean", "model", false,
                         "of the interval that holds the distance, known to this level; uniform "
                         "points" },
@@ -49,17 +63,26 @@ const figure_name level_figures[LEVEL_FIGURES] = {
     [OF_WIDTH_P99] = { "width_p99", "model", false, "99 % of the points have a narrower one" },
     [OF_INSIDE_NS] = { "inside_ns", "ns", true,
                        "a point-in-solid test to this level, uniform points, many at a time, one "
-                       "thread" },
+                       "thread",
+                       NO_INSIDE },
     [OF_DISTANCE_NS] = { "distance_ns", "ns", true, "a distance to this level, the same way" },
     [OF_HAVE_SECONDS] = { "have_seconds", "s", true,
                           "to open the file and read levels 0 to this one, after the system was "
                           "asked to forget the file" },
     [OF_READ_BYTES] = { "read_bytes", "B", false, "asked of the file for that" },
     [OF_READS] = { "reads", "reads", false, "in so many reads" },
+    [OF_LINE_BYTES] = { "line_bytes", "B", false,
+                        "sent by a server for that: the file's first 128 KiB, and what else is "
+                        "needed in pieces of 4 KiB",
+                        NOT_TIMED },
+    [OF_LINE_TRIPS] = { "line_trips", "trips", false,
+                        "round trips to the server, the first 128 KiB included; what is announced "
+                        "together comes together",
+                        NOT_TIMED },
     [OF_THESIS_BYTES] = { "thesis_bytes", "B", false,
-                          "what the theses' cost model takes for the level" },
+                          "what the theses' cost model takes for the level", NO_MESH },
     [OF_THESIS_CUMULATIVE] = { "thesis_cumulative_bytes", "B", false,
-                               "and for levels 0 to this one" },
+                               "and for levels 0 to this one", NO_MESH },
 };
 
 const figure_name whole_figures[WHOLE_FIGURES] = {
@@ -69,41 +92,66 @@ const figure_name whole_figures[WHOLE_FIGURES] = {
     [OF_ALL_PLANES] = { "all_planes", "planes", false, "stored in the file" },
     [OF_BUILD_SECONDS] = { "build_seconds", "s", true,
                            "to build the tree from the checked mesh; files that were there before "
-                           "do not tell" },
+                           "do not tell",
+                           "files that were there before do not tell" },
     [OF_OPEN_SECONDS] = { "open_seconds", "s", true,
                           "to take the whole model into memory, made for questions" },
-    [OF_MEMORY_BYTES] = { "memory_bytes", "B", false, "that it takes there" },
+    [OF_MEMORY_BYTES] = { "memory_bytes", "B", false, "that it takes there", NOT_TIMED },
     [OF_EXACT_INSIDE_NS] = { "exact_inside_ns", "ns", true,
                              "an exact point-in-solid test, uniform points, many at a time, one "
-                             "thread" },
-    [OF_EXACT_DISTANCE_NS] = { "exact_distance_ns", "ns", true, "an exact distance, the same way" },
+                             "thread",
+                             "a surface has no inside, and a file without mesh no exact answers" },
+    [OF_EXACT_DISTANCE_NS] = { "exact_distance_ns", "ns", true, "an exact distance, the same way",
+                               NO_MESH },
 };
 
 const figure_name deadline_figures[DEADLINE_FIGURES] = {
     [OF_DUE_EXACT] = { "deadline_exact", "1", true,
-                       "share of distances that are exact by then; uniform points, one at a time" },
+                       "share of distances that are exact by then; uniform points, one at a time",
+                       NOT_TIMED },
     [OF_DUE_WIDTH_MEDIAN] = { "deadline_width_median", "model", true,
                               "width of the interval that is certain by then: half of the points "
-                              "have a narrower one" },
+                              "have a narrower one",
+                              NOT_TIMED },
     [OF_DUE_WIDTH_P99] = { "deadline_width_p99", "model", true,
-                           "99 % of the points have a narrower one" },
+                           "99 % of the points have a narrower one", NOT_TIMED },
     [OF_DUE_TOOK_MEDIAN] = { "deadline_took_median", "ns", true,
-                             "time that the answer took: half took less" },
-    [OF_DUE_TOOK_P99] = { "deadline_took_p99", "ns", true, "99 % took less" },
-    [OF_DUE_TOOK_MAX] = { "deadline_took_max", "ns", true, "the longest" },
+                             "time that the answer took: half took less", NOT_TIMED },
+    [OF_DUE_TOOK_P99] = { "deadline_took_p99", "ns", true, "99 % took less", NOT_TIMED },
+    [OF_DUE_TOOK_MAX] = { "deadline_took_max", "ns", true, "the longest", NOT_TIMED },
     [OF_DUE_LATE] = { "deadline_late", "1", true,
-                      "share of answers that took longer than the deadline" },
+                      "share of answers that took longer than the deadline", NOT_TIMED },
+};
+
+const figure_name budget_figures[BUDGET_FIGURES] = {
+    [OF_BUDGET_BYTES] = { "budget_bytes", "B", false, "the budget for all of a model's memory",
+                          NOT_TIMED },
+    [OF_BUDGET_LEVEL] = { "budget_level", "level", false,
+                          "the deepest level that stays in memory; all where everything fits",
+                          "everything is in memory, or the budget is too small, see below" },
+    [OF_BUDGET_WIDTH] = { "budget_width_median", "model", false,
+                          "what stays in memory tells of a distance: half of the points have a "
+                          "narrower interval; 0 where everything fits",
+                          NOT_TIMED },
+    [OF_BUDGET_NS] = { "budget_distance_ns", "ns", true,
+                       "an exact distance, uniform points, one at a time, loads included",
+                       NOT_TIMED },
+    [OF_BUDGET_LOADS] = { "budget_loads", "loads", false, "subtrees loaded for a distance, mean",
+                          NOT_TIMED },
+    [OF_BUDGET_READ] = { "budget_read_bytes", "B", false, "read for a distance, mean", NOT_TIMED },
 };
 
 const figure_name need_figures[NEED_FIGURES] = {
     [OF_NEED_BYTES] = { "need_bytes", "B", false, "of the file that was cut to the need" },
     [OF_NEED_FAR_LO] = { "need_hausdorff_lo", "model", false,
-                         "its envelopes reach beyond the model by at least this" },
-    [OF_NEED_FAR_HI] = { "need_hausdorff_hi", "model", false, "and certainly by at most this" },
+                         "its envelopes reach beyond the model by at least this", NO_MESH },
+    [OF_NEED_FAR_HI] = { "need_hausdorff_hi", "model", false, "and certainly by at most this",
+                         NO_MESH },
     [OF_NEED_RATIO] = { "need_ratio", "1", false,
                         "need_hausdorff_hi / the error that was asked for, or / what the whole "
                         "file reaches where that is more (leaves cannot be refined); need_bytes / "
-                        "the size: 1 or less keeps the word" },
+                        "the size: 1 or less keeps the word",
+                        NO_MESH },
     [OF_NEED_SECONDS] = { "need_seconds", "s", true, "to make the file" },
 };
 
@@ -134,6 +182,7 @@ void method_begin(method *m, const char *name, const char *path)
     fill_nan(m->whole, WHOLE_FIGURES);
     fill_nan(&m->level[0][0], EBPO_LEVELS_MAX * LEVEL_FIGURES);
     fill_nan(&m->due[0][0], DEADLINES * DEADLINE_FIGURES);
+    fill_nan(&m->budget[0][0], BUDGETS * BUDGET_FIGURES);
     for (int i = 0; i < ROUNDS; i++) {
         round_times *r = &m->round[i];
         fill_nan(r->have, EBPO_LEVELS_MAX);

@@ -12,8 +12,10 @@
 
 enum {
     METHODS_MAX = ARGS_OPERANDS_MAX,
-    METHOD_NOTES = 6,
+    METHOD_NOTES = 10,
+    SETTINGS_MAX = METHODS_MAX,
     DEADLINES = 8,
+    BUDGETS = 5,
     NEEDS = 8,
     ROUNDS = 3,
     REPORT_QUESTIONS =
@@ -49,6 +51,8 @@ typedef enum level_figure {
     OF_HAVE_SECONDS,
     OF_READ_BYTES,
     OF_READS,
+    OF_LINE_BYTES,
+    OF_LINE_TRIPS,
     OF_THESIS_BYTES,
     OF_THESIS_CUMULATIVE,
     LEVEL_FIGURES
@@ -79,6 +83,17 @@ typedef enum deadline_figure {
     DEADLINE_FIGURES
 } deadline_figure;
 
+/* Of a memory budget. */
+typedef enum budget_figure {
+    OF_BUDGET_BYTES,
+    OF_BUDGET_LEVEL,
+    OF_BUDGET_WIDTH,
+    OF_BUDGET_NS,
+    OF_BUDGET_LOADS,
+    OF_BUDGET_READ,
+    BUDGET_FIGURES
+} budget_figure;
+
 /* Of a file that was cut to a need. */
 typedef enum need_figure {
     OF_NEED_BYTES,
@@ -94,11 +109,14 @@ typedef struct figure_name {
     const char *name, *unit;
     bool timed; /* differs from run to run */
     const char *meaning;
+    /* why it may be absent, where it may and no note of the method says so */
+    const char *absent;
 } figure_name;
 extern const figure_name level_figures[LEVEL_FIGURES], whole_figures[WHOLE_FIGURES],
-    deadline_figures[DEADLINE_FIGURES], need_figures[NEED_FIGURES];
+    deadline_figures[DEADLINE_FIGURES], budget_figures[BUDGET_FIGURES], need_figures[NEED_FIGURES];
 
 extern const unsigned deadlines_us[DEADLINES];
+extern const unsigned budget_parts[BUDGETS]; /* budgets are memory_bytes divided by these */
 
 typedef enum need_kind { NEED_ERROR, NEED_SIZE } need_kind;
 
@@ -123,7 +141,7 @@ typedef struct method {
     ebpo_stored_sizes stored;
     int levels; /* of the file */
     double whole[WHOLE_FIGURES], level[EBPO_LEVELS_MAX][LEVEL_FIGURES],
-        due[DEADLINES][DEADLINE_FIGURES];
+        due[DEADLINES][DEADLINE_FIGURES], budget[BUDGETS][BUDGET_FIGURES];
     round_times round[ROUNDS];
     need_result need[NEEDS];
     int need_count, note_count;
@@ -132,10 +150,10 @@ typedef struct method {
 } method;
 
 typedef struct report_values {
-    const char *out, *levels, *k_root;
+    const char *out, *levels, *percent, *k_root;
     uint32_t select;
     int normals, up;
-    double percent, epsilon;
+    double epsilon;
     int64_t max_level, leaf_faces, points, seed, threads;
     const char *view;
     arg_list names;
@@ -143,8 +161,17 @@ typedef struct report_values {
     remote_values remote;
 } report_values;
 
+/* How many planes the theses' selections take; each setting makes a method of each of them. */
+typedef struct plane_setting {
+    double percent;
+    char k_root[24]; /* instead, if not "" */
+    char word[32];   /* behind the selection's name; "" where there is one setting */
+} plane_setting;
+
 typedef struct comparison {
     const report_values *v;
+    plane_setting setting[SETTINGS_MAX];
+    int settings;
     int first, last; /* levels that are measured; last is at most a method's last one */
     double azimuth, elevation;
     method *methods; /* [count] */
@@ -194,6 +221,11 @@ EBPO_MUST_USE ebpo_status report_deadlines(comparison *c, method *m, ebpo_model 
                                            ebpo_error *error);
 /* After the last round. */
 void report_settle(const comparison *c, method *m);
+/* What having each level takes on a line to a server. */
+EBPO_MUST_USE ebpo_status report_lines(comparison *c, method *m, ebpo_error *error);
+/* Distances while not all of the model is in memory. After memory_bytes is known. */
+EBPO_MUST_USE ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file,
+                                         ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
                                        ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_pictures(comparison *c, ebpo_error *error);

@@ -120,7 +120,7 @@ static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_er
     if (status == EBPO_OK && c->v->need)
         status = report_needs(c, m, file, model, error);
     ebpo_model_free(model);
-    return status;
+    return status == EBPO_OK ? report_budgets(c, m, file, error) : status;
 }
 
 ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
@@ -132,6 +132,8 @@ ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
         status = volumes(c, m, file, error);
     if (status == EBPO_OK)
         status = levels_alone(c, m, file, error);
+    if (status == EBPO_OK)
+        status = report_lines(c, m, error);
     if (status == EBPO_OK)
         status = report_thesis(c, m, file, error);
     if (status == EBPO_OK)

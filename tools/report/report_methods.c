@@ -84,7 +84,8 @@ static int add_file(comparison *c, const char *path)
 
 /* --- from a mesh --- */
 
-static void build_options(const comparison *c, int selection, ebpo_build_options *o)
+static void build_options(const comparison *c, int selection, const plane_setting *setting,
+                          ebpo_build_options *o)
 {
     const report_values *v = c->v;
     *o = (ebpo_build_options)EBPO_BUILD_OPTIONS_INIT;
@@ -93,7 +94,7 @@ static void build_options(const comparison *c, int selection, ebpo_build_options
     o->epsilon = v->epsilon;
     o->parts |= EBPO_PART_LEAF_PLANES; /* so that each method's levels hold all of its own planes */
     o->select = (ebpo_selection)selection;
-    o->percent = v->percent;
+    o->percent = setting->percent;
     o->normals = (ebpo_normal_distance)v->normals;
     o->seed = (uint64_t)v->seed;
     o->threads = (unsigned)v->threads;
@@ -101,8 +102,9 @@ static void build_options(const comparison *c, int selection, ebpo_build_options
 }
 
 /* The builder consumes the mesh, so it is read for each. */
-static ebpo_status build_one(comparison *c, const char *mesh, int selection, const char *path,
-                             double *seconds, ebpo_error *error)
+static ebpo_status build_one(comparison *c, const char *mesh, int selection,
+                             const plane_setting *setting, const char *path, double *seconds,
+                             ebpo_error *error)
 {
     ebpo_build_options build;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
@@ -117,8 +119,9 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
             progress_wipe(c->progress.user);
         findings_warn(stderr, "report", mesh, &p.prepared.report, &p.prepared.record);
     }
-    build_options(c, selection, &build);
-    status = selection_k_root(c->v->k_root, p.mesh.face_count, &build.k_root, error);
+    build_options(c, selection, setting, &build);
+    status = selection_k_root(setting->k_root[0] ? setting->k_root : NULL, p.mesh.face_count,
+                              &build.k_root, error);
     if (status != EBPO_OK) {
         ebpo_mesh_free(&p.mesh);
         return status;
@@ -135,23 +138,43 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
     return status;
 }
 
+static int build_method(comparison *c, const char *mesh, int selection,
+                        const plane_setting *setting)
+{
+    char path[sizeof c->folder + 64];
+    ebpo_error error = EBPO_ERROR_INIT;
+    double seconds = 0;
+    snprintf(path, sizeof path, "%s/%s%s.ebpo.h5", c->folder, selection_words[selection],
+             setting->word);
+    if (build_one(c, mesh, selection, setting, path, &seconds, &error) != EBPO_OK)
+        return command_failed("report", &error);
+    int code = add_file(c, path);
+    if (code == EXIT_FINE)
+        c->methods[c->count - 1].whole[OF_BUILD_SECONDS] = seconds;
+    return code;
+}
+
+static int settings_of(const comparison *c, int selection)
+{
+    return ebpo_selection_describe((ebpo_selection)selection)->from_leaves ? c->settings : 1;
+}
+
 static int build_all(comparison *c, const char *mesh)
 {
-    for (int i = 0; selection_words[i]; i++) {
-        char path[sizeof c->folder + 32];
-        ebpo_error error = EBPO_ERROR_INIT;
-        double seconds = 0;
-        if (!(c->v->select >> i & 1))
-            continue;
-        snprintf(path, sizeof path, "%s/%s.ebpo.h5", c->folder, selection_words[i]);
-        if (build_one(c, mesh, i, path, &seconds, &error) != EBPO_OK)
-            return command_failed("report", &error);
-        int code = add_file(c, path);
-        if (code != EXIT_FINE)
-            return code;
-        c->methods[c->count - 1].whole[OF_BUILD_SECONDS] = seconds;
-    }
-    return EXIT_FINE;
+    static const plane_setting none = { .percent = 40 };
+    int code = EXIT_FINE, count = 0;
+    for (int i = 0; selection_words[i]; i++)
+        count += c->v->select >> i & 1 ? settings_of(c, i) : 0;
+    if (count > METHODS_MAX)
+        return told("more than 12 methods; give fewer selections, or fewer numbers of planes",
+                    mesh);
+    for (int i = 0; selection_words[i]; i++)
+        for (int k = 0; c->v->select >> i & 1 && k < settings_of(c, i) && code == EXIT_FINE; k++)
+            code = build_method(c, mesh, i,
+                                ebpo_selection_describe((ebpo_selection)i)->from_leaves
+                                    ? &c->setting[k]
+                                    : &none);
+    return code;
 }
 
 /* --- both --- */

@@ -34,12 +34,17 @@ static bool is_dot(const char *name) { return strcmp(name, ".") == 0 || strcmp(n
 static const char *const fixed_names[] = { "report.csv", "report.json", "report.html", NULL };
 #define MODEL_ENDING ".ebpo.h5"
 
+/* "inherit.ebpo.h5", "kmedoids-10%.ebpo.h5", "kmedoids-K0.5%.ebpo.h5" */
 static bool is_selection_file(const char *name)
 {
+    size_t length = strlen(name), ending = strlen(MODEL_ENDING);
+    if (length < ending || strcmp(name + length - ending, MODEL_ENDING) != 0)
+        return false;
     for (int i = 0; selection_words[i]; i++) {
-        size_t length = strlen(selection_words[i]);
-        if (strncmp(name, selection_words[i], length) == 0 &&
-            strcmp(name + length, MODEL_ENDING) == 0)
+        size_t word = strlen(selection_words[i]), rest = length - ending;
+        if (strncmp(name, selection_words[i], word) == 0 &&
+            (word == rest ||
+             (name[word] == '-' && word + 1 + strspn(name + word + 1, "K0123456789.e+-%") >= rest)))
             return true;
     }
     return false;

@@ -13,6 +13,8 @@ static void names(json *j, const char *scope, const figure_name *q, int count)
         json_text(j, "unit", q[i].unit);
         json_bool(j, "timed", q[i].timed);
         json_text(j, "meaning", q[i].meaning);
+        if (q[i].absent)
+            json_text(j, "absent", q[i].absent);
         json_end(j);
     }
 }
@@ -28,6 +30,13 @@ static void one_method(json *j, const comparison *c, const method *m)
     json_object(j, NULL);
     json_text(j, "name", m->name);
     json_text(j, "file", remote_shown(m->path));
+    const ebpo_selection_traits *selection =
+        ebpo_selection_describe((ebpo_selection)m->info.selection);
+    json_text(j, "selection", selection ? selection->name : "other");
+    if (m->info.percent > 0)
+        json_real(j, "percent", m->info.percent);
+    if (m->info.k_root > 0)
+        json_real(j, "k_root", m->info.k_root);
     json_int(j, "levels_in_file", m->levels);
     json_bool(j, "leaf_planes_stored", m->info.parts & EBPO_PART_LEAF_PLANES);
     figures(j, whole_figures, m->whole, WHOLE_FIGURES);
@@ -44,6 +53,14 @@ static void one_method(json *j, const comparison *c, const method *m)
         json_object(j, NULL);
         json_uint(j, "microseconds", deadlines_us[i]);
         figures(j, deadline_figures, m->due[i], DEADLINE_FIGURES);
+        json_end(j);
+    }
+    json_end(j);
+    json_array(j, "budgets");
+    for (int i = 0; i < BUDGETS; i++) {
+        json_object(j, NULL);
+        json_uint(j, "part", budget_parts[i]);
+        figures(j, budget_figures, m->budget[i], BUDGET_FIGURES);
         json_end(j);
     }
     json_end(j);
@@ -112,6 +129,7 @@ void report_to_json(FILE *out, const comparison *c, bool in_page)
     names(&j, "method", whole_figures, WHOLE_FIGURES);
     names(&j, "level", level_figures, LEVEL_FIGURES);
     names(&j, "deadline", deadline_figures, DEADLINE_FIGURES);
+    names(&j, "budget", budget_figures, BUDGET_FIGURES);
     names(&j, "need", need_figures, NEED_FIGURES);
     json_end(&j);
     json_array(&j, "methods");
