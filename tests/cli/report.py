@@ -49,6 +49,7 @@ def from_json(told):
                                                            for d in m["deadlines"]]
         places += [("", "=".join([k, repr_c(n[k])]), n) for n in m["needs"]
                    for k in ("max_error", "target_bytes") if k in n]
+        places += [("", f"memory/{b['part']}", b) for b in m["budgets"]]
         for level, parameter, figures in places:
             found.update({(m["name"], level, parameter, k): v for k, v in figures.items()
                           if k in of})
@@ -186,6 +187,7 @@ def shapes(told, folder):
     limit is one."""
     for m in told["methods"]:
         file = folder / f"{m['name']}.ebpo.h5"
+        farthest = math.inf
         for l in m["levels"]:
             run("extract", "-q", file, folder / "level.ply", "--level", l["level"])
             answers = run("distance", "--json", file, folder / "level.ply")
@@ -194,6 +196,8 @@ def shapes(told, folder):
             slack = 1e-6 * told["model"]["diagonal"]
             assert (reach <= l["hausdorff_hi"] + slack), (m["name"], l["level"], reach,
                                                           l["hausdorff_hi"])
+            assert l["hausdorff_hi"] <= farthest, "farther than the level before"
+            farthest = l["hausdorff_hi"]
             assert (0 <= l["hausdorff_lo"] <= l["hausdorff_hi"]
                     and l["distance_mean"] <= l["distance_rms"] * (1 + 1e-12) <= l["hausdorff_hi"] + slack)
             if l["limit_volume"] is not None:
@@ -202,6 +206,46 @@ def shapes(told, folder):
                         or math.isclose(l["excess_to_limit"], l["excess"] / l["limit_excess"],
                                         rel_tol=1e-12))
         (folder / "level.ply").unlink()
+
+
+def lines_and_budgets(told):
+    """A server sends no less than the levels, nor more than the file; trips are at least the first.
+    With less memory, less stays and more is loaded."""
+    for m in told["methods"]:
+        trips = [l["line_trips"] for l in m["levels"]]
+        sent = [l["line_bytes"] for l in m["levels"]]
+        assert trips[0] >= 1 and sorted(trips) == trips and sorted(sent) == sent, (trips, sent)
+        assert all(l["line_bytes"] >= min(l["cumulative_bytes"], m["file_bytes"])
+                   and l["line_bytes"] <= m["file_bytes"] for l in m["levels"])
+        assert [b["part"] for b in m["budgets"]] == [1, 2, 4, 8, 16]
+        whole = m["budgets"][0]
+        assert (whole["budget_bytes"] == m["memory_bytes"] and whole["budget_loads"] == 0
+                and whole["budget_width_median"] == 0 and whole["budget_level"] is None)
+        for b in m["budgets"][1:]:
+            if b["budget_distance_ns"] is None:
+                assert any("memory budgets" in note for note in m["notes"]), m["notes"]
+            elif b["budget_level"] is not None:
+                assert b["budget_width_median"] > 0 and b["budget_distance_ns"] > 0
+
+
+def settings(inputs):
+    """Several numbers of planes in one run: a method of each, named after it; kept, and replaced."""
+    folder = folder_of(inputs, "settings")
+    arguments = ("--keep", "--no-pictures", "--max-level", "1", folder_of(inputs, "torus.ply"))
+    for options, names, key, values in (
+        (("--select", "inherit,offset", "--percent", "10,40"),
+         ["inherit", "offset-10%", "offset-40%"], "percent", [None, 10, 40]),
+        (("--select", "kmedoids", "--k-root", "8,1%"), ["kmedoids-K8", "kmedoids-K1%"], "k_root",
+         [8, None])):
+        rows, told = report(folder, *options, *arguments)
+        agree(rows, told)
+        assert [m["name"] for m in told["methods"]] == names
+        assert all(m["build_seconds"] > 0 for m in told["methods"])
+        assert all((folder / f"{name}.ebpo.h5").exists() for name in names)
+        for m, v in zip(told["methods"], values):
+            assert v is None or m[key] == v, (m["name"], m.get(key))
+    share = told["methods"][1]["k_root"]
+    assert abs(share - told["model"]["faces"] / 100) < 1e-9, share
 
 
 def needs(told):
@@ -231,6 +275,7 @@ def usual(inputs):
     questions(told, folder)
     shapes(told, folder)
     needs(told)
+    lines_and_budgets(told)
     assert ([m["name"] for m in told["methods"]] == ["inherit", "kmedoids", "offset", "random"]
             and all(m["build_seconds"] > 0 for m in told["methods"]))
     thesis_is_at_least(told)
@@ -337,7 +382,7 @@ def without_mesh(inputs):
 def main():
     with tempfile.TemporaryDirectory() as inputs:
         subprocess.run([INPUTS, inputs], check=True)
-        for case in (usual, files, surface, single_leaf, no_volume, without_mesh):
+        for case in (usual, settings, files, surface, single_leaf, no_volume, without_mesh):
             case(inputs)
             print(f"{case.__name__}: fine")
 

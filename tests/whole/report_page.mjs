@@ -44,7 +44,7 @@ const UNITS = { '': 1, '%': 1, '×': 1, B: 1, KB: 1e3, MB: 1e6, s: 1, ms: 1e-3, 
 function valueOf(text) {
   if (text === '–')
     return null;
-  const [, digits, unit] = /^([0-9.,e+-]+) ?(\S*)$/.exec(text) ?? assert.fail(`'${text}' is no figure`);
+  const [, digits, unit] = /^([0-9.,e+-]+)\*? ?(\S*)$/.exec(text) ?? assert.fail(`'${text}' is no figure`);
   assert.ok(unit in UNITS, text);
   return Number(digits.replaceAll(',', '')) * UNITS[unit];
 }
@@ -66,6 +66,25 @@ const GLANCE = [
   figure('file_bytes'), figure('levels_in_file'), figure('all_planes'), null, null, null, figure('build_seconds'),
   figure('open_seconds'), figure('memory_bytes'), figure('exact_inside_ns', 1e-9), figure('exact_distance_ns', 1e-9),
 ];
+
+const LINES = [[0.1, 1.25e6], [0.02, 1.25e7]];
+const onLine = ([trip, rate]) => (l) => (l?.line_trips == null ? null : l.line_trips * trip + l.line_bytes / rate);
+const LINE = [figure('line_bytes'), figure('line_trips'), ...LINES.map(onLine)];
+
+// The levels whose excess stands beside the build's time: the first, one in the middle, the last.
+function levelsOf(told) {
+  const deepest = Math.max(...told.methods.map((m) => m.levels.at(-1).level));
+  const numbers = Array.from({ length: deepest - told.levels.first + 1 }, (_, i) => told.levels.first + i);
+  return { numbers, some: [...new Set([numbers[0], numbers[Math.floor(numbers.length / 2)], numbers.at(-1)])] };
+}
+
+const excessAt = (n) => (m) => m.levels.find((l) => l.level === n)?.excess ?? null;
+
+function buildColumns(told) {
+  const sum = (m) => (m.levels.some((l) => l.excess === null) ? null : m.levels.reduce((s, l) => s + 100 + l.excess, 0));
+  const all = (m) => m.levels.at(-1).cumulative_bytes;
+  return [figure('build_seconds'), figure('all_planes'), all, ...levelsOf(told).some.map(excessAt), sum];
+}
 
 function lengths(told, ...names) {
   return names.map((n) => (told.model.diagonal > 0 ? figure(n, 100 / told.model.diagonal) : () => null));
@@ -98,8 +117,7 @@ function rowsAgree(table, rows, columns, what) {
 const perMethod = (told, columns) => told.methods.flatMap((_, i) => columns.map((c) => (row) => c(row[i])));
 
 function tablesAgree(told, { tables, ofMethods }) {
-  const { methods } = told, deepest = Math.max(...methods.map((m) => m.levels.at(-1).level));
-  const numbers = Array.from({ length: deepest - told.levels.first + 1 }, (_, i) => told.levels.first + i);
+  const { methods } = told, { numbers } = levelsOf(told);
   const levelRows = numbers.map((n) => methods.map((m) => m.levels.find((l) => l.level === n)));
   const dueRows = methods[0].deadlines.map((_, i) => methods.map((m) => m.deadlines[i]));
   const [width] = lengths(told, 'deadline_width_p99');
@@ -107,6 +125,11 @@ function tablesAgree(told, { tables, ofMethods }) {
   rowsAgree(tables.glance, methods, GLANCE, 'glance');
   rowsAgree(tables.limit, levelRows, [null, ...perMethod(told, LIMIT)], 'limit');
   rowsAgree(tables.deadlines, dueRows, perMethod(told, due), 'deadlines');
+  rowsAgree(tables.build, methods.filter((m) => m.build_seconds !== null), buildColumns(told), 'build');
+  rowsAgree(tables.lines, levelRows, perMethod(told, LINE), 'lines');
+  const [known] = lengths(told, 'budget_width_median'), loads = figure('budget_loads'), read = figure('budget_read_bytes');
+  const budget = [figure('budget_bytes'), figure('budget_level'), known, figure('budget_distance_ns', 1e-9), loads, read];
+  rowsAgree(tables.budgets, methods[0].budgets.map((_, i) => methods.map((m) => m.budgets[i])), perMethod(told, budget), 'budgets');
   rowsAgree(tables.transmission, levelRows, perMethod(told, SENT), 'transmission');
   if (methods.length === 1) {
     const need = [figure('need_bytes'), ...lengths(told, 'need_hausdorff_lo', 'need_hausdorff_hi'), figure('need_ratio')];
@@ -134,6 +157,13 @@ const plotAxes = (told) => {
     'volume-by-time': [have, alone], 'farthest-by-time': [have, far(told, 'hausdorff_hi')],
     'maybe-by-time': [figure('inside_ns', 1e-9), figure('maybe_uniform', 100)],
     'width-by-time': [figure('distance_ns', 1e-9), far(told, 'width_median')],
+    ...Object.fromEntries(['slow', 'fast'].flatMap((name, i) => [
+      [`volume-by-${name}-line`, [onLine(LINES[i]), alone]],
+      [`farthest-by-${name}-line`, [onLine(LINES[i]), far(told, 'hausdorff_hi')]],
+    ])),
+    ...Object.fromEntries(['first', 'middle'].map((name, i) => [`${name}-by-build`, [figure('build_seconds'), excessAt(levelsOf(told).some[i] ?? levelsOf(told).some[0])]])),
+    'width-by-memory': [figure('budget_bytes'), far(told, 'budget_width_median')],
+    'distance-by-memory': [figure('budget_bytes'), figure('budget_distance_ns', 1e-9)],
     'width-by-deadline': [deadline, far(told, 'deadline_width_p99')],
     'taken-by-deadline': [deadline, figure('deadline_took_p99', 1e-9), figure('deadline_took_median', 1e-9)],
     ...(told.methods.some((m) => m.levels.some((l) => l.thesis_bytes !== null)) && {
@@ -151,7 +181,12 @@ function pointsOf(rows, x, y) {
 
 // Lines of each method, dotted ones after the others.
 function expectedLines(told, name, [x, ...ys]) {
-  const rows = (m) => (name.endsWith('deadline') ? m.deadlines : m.levels);
+  if (name.endsWith('build')) { // a line for each selection
+    const families = [...new Set(told.methods.map((m) => m.selection))], [y] = ys;
+    const members = (s) => told.methods.filter((m) => m.selection === s);
+    return families.map((s) => [s, pointsOf(members(s), x, y)]).filter(([, points]) => points.length);
+  }
+  const rows = (m) => (name.endsWith('deadline') ? m.deadlines : name.endsWith('memory') ? m.budgets : m.levels);
   return ys.flatMap((y) => told.methods.map((m) => [m.name, pointsOf(rows(m), x, y)])).filter(([, points]) => points.length);
 }
 
@@ -191,6 +226,7 @@ function look() {
     done: document.documentElement.dataset.shown, title: document.querySelector('h1').textContent, text, pictures,
     wide: document.documentElement.scrollWidth - innerWidth, tables: Object.fromEntries(placed),
     ofMethods: [...document.querySelectorAll('#tables table')].map(texts), plots: Object.fromEntries(plots),
+    unexplained: [...document.querySelectorAll('td.none')].filter((td) => !td.title || !byId('missing').innerText.includes(td.title)).length,
     shownPlots: [...document.querySelectorAll('canvas')].filter((c) => c.checkVisibility()).length,
   };
 }
@@ -212,6 +248,7 @@ async function show(browser, folder, viewport, colorScheme) {
 function everywhere(told, seen, pictures) {
   assert.equal(seen.done, 'all');
   assert.equal(seen.title, told.model.name);
+  assert.equal(seen.unexplained, 0, 'dashes without a reason');
   assert.ok(seen.wide <= 0, `wider than the window by ${seen.wide}`);
   assert.ok(!/\b(NaN|undefined|null|Infinity)\b|\[object/.test(seen.text), 'a figure that is none');
   assert.ok(seen.pictures.every(Boolean) && seen.pictures.length === pictures, `${seen.pictures.length} pictures, not ${pictures}`);
@@ -241,7 +278,7 @@ async function checkAll(browser) {
   run(ebpo, ['convert', '-q', '--max-level', '2', input('sphere.ply'), a]);
   run(ebpo, ['convert', '-q', '--max-level', '3', '--with', 'leaf-planes', input('sphere.ply'), b]);
   run(ebpo, ['convert', '-q', '--max-level', '2', '--without', 'mesh', input('torus.ply'), bare]);
-  await check(browser, 'usual', { plots: 10, pictures: 0 }, '--select', 'inherit,kmedoids,offset,random', '--no-pictures', '--max-level', '3', input('torus.ply'));
+  await check(browser, 'usual', { plots: 10, pictures: 0 }, '--select', 'inherit,kmedoids,offset', '--percent', '10,40', '--no-pictures', '--max-level', '3', input('torus.ply'));
   const odd = await check(browser, 'files', { plots: 10, pictures: 8 }, '--name', 'short', '--name', ODD, a, b);
   assert.ok(odd.text.split(ODD).length > 5);
   await check(browser, 'some', { plots: 8, pictures: 3 }, '--need', '--levels', '1-2', b);

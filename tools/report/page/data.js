@@ -21,4 +21,19 @@ function leastOf(some, of) {
   return figures.length ? Math.min(...figures) : null;
 }
 
+// In the middle of the levels that are measured.
+const MIDDLE = levels[Math.floor(levels.length / 2)];
+
+// EBP 2017, chart 18: what the envelopes of all levels fill, in percent of the solid.
+function sumOfLevels(method) {
+  const all = method.levels.map((l) => l.excess);
+  return all.includes(null) ? null : all.reduce((sum, excess) => sum + 100 + excess, 0);
+}
+
+// Simulated: round trips one after the other, and all bytes at the line's rate.
+const LINES = [
+  { name: '10 Mbit/s, 100 ms', trip: 0.1, rate: 1.25e6 }, { name: '100 Mbit/s, 20 ms', trip: 0.02, rate: 1.25e7 },
+];
+const lineTime = (line) => (l) => (l.line_trips === null ? null : l.line_trips * line.trip + l.line_bytes / line.rate);
+
 const least = (level, of) => leastOf(methods.map((m) => levelOf(m, level)), of);

@@ -85,7 +85,7 @@ function showPictures() {
 
 function showNotes() {
   const ofMethods = methods.flatMap((m) => m.notes.map((note) => `${m.name}: ${note}`));
-  const notes = [...(report.without_pictures ? [`no pictures: ${report.without_pictures}`] : []), ...ofMethods];
+  const notes = [...(report.without_pictures ? [`no pictures: ${report.without_pictures}`] : []), ...ofMethods, ...reasons];
   byId('missing').hidden = notes.length === 0;
   byId('missing').querySelector('ul').append(...notes.map((note) => element('li', {}, note)));
   for (const q of report.quantities)

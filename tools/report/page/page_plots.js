@@ -9,6 +9,9 @@ const BYTES_SO_FAR = { name: 'bytes so far', as: BYTE, of: (l) => l.cumulative_b
 const LEVEL_TIME = { name: 'time to have the level', as: TIME, of: (l) => l.have_seconds };
 const INSIDE_TIME = { name: 'time of a question', as: TIME, of: (l) => fromNs(l.inside_ns) };
 const DISTANCE_TIME = { name: 'time of a question', as: TIME, of: (l) => fromNs(l.distance_ns) };
+const [SLOW_TIME, FAST_TIME] = LINES.map((line) => ({ name: `time to have the level, ${line.name}`, as: TIME, of: lineTime(line) }));
+const BUDGET = { name: 'memory', as: BYTE, of: (b) => b.budget_bytes };
+const BUILD = { name: 'time of the build', as: TIME, of: (m) => m.build_seconds };
 const DEADLINE = { name: 'deadline', as: TIME, of: (d) => 1e-6 * d.microseconds };
 
 const excess = (of) => ({ name: 'excess of volume, % of the solid', as: PERCENT, of, limit: (l) => l.limit_excess });
@@ -27,6 +30,11 @@ const MAYBE_NEAR = {
 const MAYBE_UNIFORM = { name: 'MAYBE, % of uniform points', as: PERCENT, of: (l) => percent(l.maybe_uniform) };
 const WIDTH = { name: '% of the diagonal', as: PERCENT, of: (l) => ofDiagonal(l.width_median) };
 const CERTAIN = { name: '% of the diagonal', as: PERCENT, of: (d) => ofDiagonal(d.deadline_width_p99) };
+const IN_MEMORY = { name: '% of the diagonal', as: PERCENT, of: (b) => ofDiagonal(b.budget_width_median) };
+const EXACT = { name: 'time of a question', as: TIME, of: (b) => fromNs(b.budget_distance_ns) };
+const excessAt = (level) => ({
+  name: `excess of volume at level ${level}, %`, as: PERCENT, of: (m) => levelOf(m, level)?.excess ?? null,
+});
 const TAKEN = {
   name: 'time taken', as: TIME, of: (d) => fromNs(d.deadline_took_p99), dotted: (d) => fromNs(d.deadline_took_median),
 };
@@ -47,6 +55,14 @@ const axesOf = {
   'farthest-by-time': [LEVEL_TIME, FARTHEST],
   'maybe-by-time': [INSIDE_TIME, MAYBE_UNIFORM],
   'width-by-time': [DISTANCE_TIME, WIDTH],
+  'first-by-build': [BUILD, excessAt(levels[0])],
+  'middle-by-build': [BUILD, excessAt(MIDDLE)],
+  'volume-by-slow-line': [SLOW_TIME, LEVELS_ALONE],
+  'farthest-by-slow-line': [SLOW_TIME, FARTHEST],
+  'volume-by-fast-line': [FAST_TIME, LEVELS_ALONE],
+  'farthest-by-fast-line': [FAST_TIME, FARTHEST],
+  'width-by-memory': [BUDGET, IN_MEMORY],
+  'distance-by-memory': [BUDGET, EXACT],
   'width-by-deadline': [DEADLINE, CERTAIN],
   'taken-by-deadline': [DEADLINE, TAKEN],
   'sent-so-far': [LEVEL, SENT_SO_FAR],
@@ -56,7 +72,7 @@ const axesOf = {
 // --- series ---
 
 function methodSeries(x, of, dotted) {
-  const rows = (m) => (x === DEADLINE ? m.deadlines : m.levels);
+  const rows = (m) => (x === DEADLINE ? m.deadlines : x === BUDGET ? m.budgets : m.levels);
   const points = (m) => rows(m).map((r) => ({ x: x.of(r), y: of(r), level: r.level }));
   return methods.map((m, method) => ({ name: m.name, method, dotted, points: points(m) }));
 }
@@ -77,7 +93,20 @@ function promise() {
   return { name: 'promised', points: methods[0].deadlines.map((d) => ({ x: DEADLINE.of(d), y: DEADLINE.of(d) })) };
 }
 
+// A line for each selection, through its numbers of planes.
+function buildSeries(y) {
+  const families = [...new Set(methods.map((m) => m.selection))];
+  const numberOf = (m) => (m.percent ? `${m.percent} %` : m.k_root ? `K = ${format.number(m.k_root)}` : undefined);
+  return families.map((name) => {
+    const members = methods.filter((m) => m.selection === name);
+    const points = members.map((m) => ({ x: BUILD.of(m), y: y.of(m), note: numberOf(m) }));
+    return { name, method: methods.indexOf(members[0]), points };
+  });
+}
+
 function seriesOf(x, y) {
+  if (x === BUILD)
+    return buildSeries(y);
   return [
     ...methodSeries(x, y.of, false),
     ...(y.dotted ? methodSeries(x, y.dotted, true) : []),

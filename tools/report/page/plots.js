@@ -68,20 +68,23 @@ function dataset({ name, method, points, dotted }) {
   };
 }
 
-// Which point of the first series is which level; left out where numbers would stand on each other.
+// Which point of the first series is which level, or which number of planes any point has; left out where numbers would
+// stand on each other.
 const levelNumbers = {
   id: 'levelNumbers',
   afterDatasetsDraw(chart) {
-    const { ctx } = chart, levels = chart.data.datasets[0].data.map((p) => p.level);
+    const { ctx } = chart, noted = chart.data.datasets.some((d) => d.data.some((p) => p.note));
+    const marks = chart.data.datasets.slice(0, noted ? undefined : 1).flatMap((d, k) => (
+      chart.getDatasetMeta(k).data.map(({ x, y }, i) => ({ x, y, text: d.data[i].note ?? d.data[i].level }))));
     let last;
     ctx.save();
     Object.assign(ctx, { font: `11px ${Chart.defaults.font.family}`, textAlign: 'center', lineWidth: 3 });
     Object.assign(ctx, { lineJoin: 'round', fillStyle: styleColour('soft'), strokeStyle: styleColour('card') });
-    for (const [i, { x, y }] of chart.getDatasetMeta(0).data.entries()) {
-      if (last && Math.hypot(x - last.x, y - last.y) < 13)
+    for (const { x, y, text } of marks) {
+      if (text === undefined || (last && Math.hypot(x - last.x, y - last.y) < 13))
         continue;
-      ctx.strokeText(levels[i], x, y - 9);
-      ctx.fillText(levels[i], x, y - 9);
+      ctx.strokeText(text, x, y - 9);
+      ctx.fillText(text, x, y - 9);
       last = { x, y };
     }
     ctx.restore();
@@ -91,7 +94,7 @@ const levelNumbers = {
 // --- the plot ---
 
 function tooltip(x, y) {
-  const title = ([{ dataset, raw }]) => dataset.label + (raw.level === undefined ? '' : `, level ${raw.level}`);
+  const title = ([{ dataset, raw }]) => dataset.label + (raw.level === undefined ? '' : `, level ${raw.level}`) + (raw.note ? `, ${raw.note}` : '');
   const say = (axis, v) => (axis.as === format.level ? [] : [`${axis.name}: ${axis.as(v)}`]);
   return { displayColors: false, callbacks: { title, label: ({ raw }) => [...say(y, raw.y), ...say(x, raw.x)] } };
 }
@@ -134,7 +137,8 @@ function plot(figure, x, y, series) {
   canvas.ariaLabel = `${caption.textContent}: ${y.name} against ${x.name}`;
   caption.append(element('small', {}, y.name));
   figure.append(element('div', {}, canvas));
-  const numbered = x.as !== format.level && datasets[0].data[0].level !== undefined;
+  const marked = (p) => p.level !== undefined || p.note;
+  const numbered = x.as !== format.level && datasets.some((d) => d.data.some(marked));
   const chart = new Chart(canvas, {
     type: 'scatter', data: { datasets }, plugins: numbered ? [levelNumbers] : [], options: options(x, y, datasets),
   });

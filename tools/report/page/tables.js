@@ -8,11 +8,19 @@ function element(tag, properties, ...children) {
   return made;
 }
 
-// A column is { title, value: (row) => figure, as: a function of format, best: (row) => boolean }; best may be missing.
+// Why there are dashes on the page.
+const reasons = new Set();
+
+// A column is { title, value: (row) => figure, as: a function of format, best: (row) => boolean, why: (row) => the reason
+// of a dash }; best may be missing.
 function cell(column, row, first) {
   const text = column.as(column.value(row)), td = element('td', {}, text);
   td.classList.toggle('first', first);
   td.classList.toggle('none', text === NONE);
+  if (text === NONE) {
+    td.title = column.why(row);
+    reasons.add(td.title);
+  }
   td.classList.toggle('best', Boolean(column.best?.(row)));
   return td;
 }
