@@ -20,7 +20,7 @@ typedef struct values {
 
 static const arg_option options[] = {
     OPTION_TEXT("against", 0, values, against, "IN.ply",
-                "also compare the model with its source, bit for bit"),
+                "also compare positions and corners with those of the source, bit for bit"),
     OPTION_INT("samples", 0, values, samples, "N", 0, 9007199254740992.0,
                "number of cells whose labels are checked by an independent winding number; 0, the "
                "default: all if there are at most four million, else one million"),
@@ -54,7 +54,8 @@ static const struct kind {
     { offsetof(ebpo_verify_report, nesting), "nesting", "envelopes lie in their parents'" },
     { offsetof(ebpo_verify_report, labels), "labels", "white, black, winding numbers" },
     { offsetof(ebpo_verify_report, lists), "lists", "faces are listed where they touch" },
-    { offsetof(ebpo_verify_report, source), "source", "the model equals its source" },
+    { offsetof(ebpo_verify_report, source), "source",
+      "positions and corners equal the source's" },
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
@@ -63,7 +64,7 @@ static const ebpo_verify_count *count_of(const ebpo_verify_report *report, int i
     return (const ebpo_verify_count *)(const void *)((const char *)report + kinds[i].offset);
 }
 
-static void print_words(const ebpo_verify_report *report, const char *path)
+static void print_words(const ebpo_verify_report *report, const char *path, const char *against)
 {
     printf("%-12s %14s %11s\n", "kind", "checks", "violations");
     for (int i = 0; i < KINDS; i++) {
@@ -74,6 +75,8 @@ static void print_words(const ebpo_verify_report *report, const char *path)
         else
             printf("%-12s %14s %11s   %s\n", kinds[i].name, "not made", "-", kinds[i].what);
     }
+    if (against)
+        printf("%s: other properties, such as colours and normals, were not compared\n", against);
     if (!report->violations)
         printf("%s: fine: %llu checks, no violation\n", path, (unsigned long long)report->checks);
 }
@@ -168,7 +171,7 @@ static int run(void *given, const char **operand)
     if (v->json)
         print_json(&report, operand[0], &t, &v->remote);
     else if (!v->quiet)
-        print_words(&report, remote_shown(operand[0]));
+        print_words(&report, remote_shown(operand[0]), v->against);
     command_flush("verify");
     print_violations(&report, remote_shown(operand[0]));
     if (!v->json)

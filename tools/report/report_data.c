@@ -8,10 +8,13 @@
 const unsigned deadlines_us[DEADLINES] = { 1, 2, 5, 10, 20, 50, 100, 1000 };
 const unsigned budget_parts[BUDGETS] = { 1, 2, 4, 8, 16 };
 
-#define NO_VOLUME "a surface, or a solid without volume, has none that could be exceeded"
-#define NO_MESH   "the file has no mesh, see below"
-#define NO_INSIDE "a surface has no inside"
-#define NOT_TIMED "this could not be asked of the method, see below"
+#define NO_VOLUME                                                                            \
+    "a surface, or a solid without volume, has none that could be exceeded; or volumes are " \
+    "beyond the range of a double, and there is nothing that they are taken by instead"
+#define OUT_OF_RANGE "in the model's unit cubed it is beyond the range of a double"
+#define NO_MESH      "the file has no mesh, see below"
+#define NO_INSIDE    "a surface has no inside"
+#define NOT_TIMED    "this could not be asked of the method, see below"
 
 const figure_name level_figures[LEVEL_FIGURES] = {
     [OF_BYTES] = { "bytes", "B", false, "of the level in the file" },
@@ -23,21 +26,25 @@ const figure_name level_figures[LEVEL_FIGURES] = {
     [OF_LEAF_PLANES] = { "leaf_planes", "planes", false, "stored for the level's leaves" },
     [OF_VOLUME] = { "envelope_volume", "model^3", false,
                     "of the envelopes that stand for the model at this level; leaves by their "
-                    "stored planes, else by planes derived from their faces" },
+                    "stored planes, else by planes derived from their faces",
+                    OUT_OF_RANGE },
     [OF_EXCESS] = { "excess", "%", false,
                     "volume of the envelopes beyond the solid's, in percent of the solid's",
                     NO_VOLUME },
     [OF_LEVELS_VOLUME] = { "levels_volume", "model^3", false,
                            "the same from levels 0 to this one alone, without the mesh: leaves "
-                           "without stored planes have their parent's envelope" },
+                           "without stored planes have their parent's envelope",
+                           OUT_OF_RANGE },
     [OF_LEVELS_EXCESS] = { "levels_excess", "%", false, "its excess", NO_VOLUME },
     [OF_LIMIT_VOLUME] = { "limit_volume", "model^3", false,
                           "of the convex hulls of the solid in each cell: no convex envelope is "
                           "smaller",
                           NO_MESH },
-    [OF_LIMIT_EXCESS] = { "limit_excess", "%", false, "its excess", NO_VOLUME },
+    [OF_LIMIT_EXCESS] = { "limit_excess", "%", false, "its excess",
+                          "the file has no mesh, no volume, or one beyond the range of a double" },
     [OF_EXCESS_TO_LIMIT] = { "excess_to_limit", "1", false, "excess / limit_excess",
-                             "the limit is the solid itself, or there is no limit or no volume" },
+                             "the limit is the solid itself, or there is none, or no volume within "
+                             "the range of a double" },
     [OF_FAR_LO] = { "hausdorff_lo", "model", false,
                     "the one-sided Hausdorff distance from the envelopes to the model is at least "
                     "this",

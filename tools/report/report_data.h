@@ -138,6 +138,9 @@ typedef struct round_times {
 typedef struct method {
     char name[64], path[4096];
     ebpo_info info;
+    /* where volumes are beyond the range of a double: what the solid fills of the root cell, by
+     * which excess is taken; else 0 */
+    double solid_share;
     ebpo_stored_sizes stored;
     int levels; /* of the file */
     double whole[WHOLE_FIGURES], level[EBPO_LEVELS_MAX][LEVEL_FIGURES],

@@ -29,14 +29,73 @@ static void from_head(const comparison *c, method *m)
 
 /* --- what the levels are --- */
 
+/* The volume of the root cell, or of a cell far below it, is no normal double. */
+static bool is_out_of_range(const ebpo_info *info)
+{
+    double volume = info->box_size[0] * info->box_size[1] * info->box_size[2];
+    return !isnormal(volume) || !isnormal(ldexp(volume, -60));
+}
+
+/* Volume within the mesh in root cells: free of the model's scale. */
+static double share_of_root(const ebpo_info *info, const ebpo_mesh *mesh)
+{
+    double sum = 0;
+    for (uint64_t i = 0; i < mesh->face_count; i++) {
+        double p[3][3];
+        for (uint64_t v = 0; v < 3; v++)
+            for (uint64_t k = 0; k < 3; k++) {
+                uint64_t at = 3 * (uint64_t)mesh->faces[3 * i + v] + k;
+                double x = mesh->xyz32 ? (double)mesh->xyz32[at] : mesh->xyz64[at];
+                p[v][k] = x / info->box_size[k] - info->box_origin[k] / info->box_size[k];
+            }
+        sum += p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
+               p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
+               p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
+    }
+    return fabs(sum) / 6;
+}
+
+/* Where volumes are beyond the range of a double. */
+static ebpo_status solid_in_root(const comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_mesh mesh = { 0 };
+    if (!m->info.solid || !is_out_of_range(&m->info))
+        return EBPO_OK;
+    read.threads = (unsigned)c->v->threads;
+    ebpo_status status = ebpo_file_read_mesh(file, &read, &mesh, error);
+    if (status != EBPO_OK)
+        return method_without(m, "excess, with volumes beyond a double's range", status, error);
+    m->solid_share = share_of_root(&m->info, &mesh);
+    ebpo_mesh_free(&mesh);
+    return EBPO_OK;
+}
+
+static ebpo_status excess_in_root(const comparison *c, method *m, ebpo_file *file, int level,
+                                  ebpo_error *error)
+{
+    ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
+    ebpo_mesh polygons = { 0 };
+    options.threads = (unsigned)c->v->threads;
+    options.progress = c->progress;
+    ebpo_status status = ebpo_lod_level(file, level, &options, &polygons, NULL, error);
+    if (status == EBPO_OK)
+        m->level[level][OF_EXCESS] =
+            100 * (share_of_root(&m->info, &polygons) - m->solid_share) / m->solid_share;
+    ebpo_mesh_free(&polygons);
+    return status;
+}
+
 /* With all that the file holds. */
 static ebpo_status volumes(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
-    ebpo_status status = EBPO_OK;
+    ebpo_status status = solid_in_root(c, m, file, error);
     for (int i = c->first; i <= method_last(c, m) && status == EBPO_OK; i++) {
         double *f = m->level[i];
         status = facts_derived(file, i, (unsigned)c->v->threads, c->progress, &f[OF_VOLUME], error);
         f[OF_EXCESS] = facts_excess(&m->info, f[OF_VOLUME]);
+        if (status == EBPO_OK && m->solid_share > 0)
+            status = excess_in_root(c, m, file, i, error);
     }
     return status;
 }
@@ -54,7 +113,11 @@ static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_
         status = ebpo_stream_next_level(stream, &told, &more, error);
         if (status == EBPO_OK && i >= c->first) {
             m->level[i][OF_LEVELS_VOLUME] = told.volume;
-            m->level[i][OF_LEVELS_EXCESS] = facts_excess(&m->info, told.volume);
+            /* with leaf planes in the file, the levels alone are all that is known */
+            m->level[i][OF_LEVELS_EXCESS] =
+                !(m->solid_share > 0)                   ? facts_excess(&m->info, told.volume)
+                : m->info.parts & EBPO_PART_LEAF_PLANES ? m->level[i][OF_EXCESS]
+                                                        : NAN;
         }
     }
     ebpo_stream_free(stream);

@@ -131,7 +131,8 @@ typedef struct ebpo_build_options {
 
     /*
      * The theses' selections: which share of the candidates is taken, in
-     * percent, above 0 and at most 100, rounded up (EBP 2017, equation 5).
+     * percent, above 0 and at most 100, rounded up (EBP 2017, equation 5). Never
+     * more than 255, also with k_root: so many can be stored.
      */
     double percent;
 

@@ -17,7 +17,7 @@ function modelFacts() {
     fact('faces', format.count(model.faces)),
     fact('vertices', format.count(model.vertices), model.coordinates),
     fact('kind', model.kind, inside ? model.rule : 'no inside'),
-    ...(inside ? [fact('volume', fourDigits(model.volume), model.unit)] : []),
+    ...(inside ? [fact('volume', model.volume === null ? 'beyond a double' : fourDigits(model.volume), model.unit)] : []),
     fact('area', fourDigits(model.area)),
     fact('size', size, `diagonal ${fourDigits(model.diagonal)}`),
     ...(model.source ? [fact('source', model.source, format.bytes(model.source_bytes))] : []),
