@@ -4,6 +4,7 @@
 
 #include <ebpo/limit.h>
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -37,15 +38,21 @@ typedef struct job {
     uint64_t node_count, node_capacity;
     double *volume; /* [node_count] in cells */
     double black;
-    scratch *scratch; /* [threads] */
+    bool in_root_cells; /* volumes */
+    scratch *scratch;   /* [threads] */
 } job;
+
+static double cell_volume(const job *j, int level)
+{
+    return j->in_root_cells ? ldexp(1, -3 * level) : ebpo_cell_volume(&j->model.box, level);
+}
 
 /* --- which nodes --- */
 
 static bool list_nodes(job *j, const ebpo_node *node)
 {
     if (node->type == EBPO_BLACK)
-        j->black += ebpo_cell_volume(&j->model.box, node->cell.level);
+        j->black += cell_volume(j, node->cell.level);
     if (ebpo_node_is_uniform(node))
         return true;
     if (node->type == EBPO_GRAY && node->cell.level < j->level) {
@@ -244,15 +251,14 @@ ebpo_status ebpo_limit_level(const ebpo_file *file, int level, const ebpo_limit_
     if (status != EBPO_OK)
         return status;
     unsigned threads = ebpo_thread_count(asked.threads);
+    j.in_root_cells = asked.in_root_cells != 0;
     status = prepare(&j, file, level, threads, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(threads, NULL, j.node_count, 1, hulls, &j, &asked.progress,
                                    "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
         /* not 0 times infinity */
-        double volume = j.volume[i] > 0
-                            ? j.volume[i] * ebpo_cell_volume(&j.model.box, j.nodes[i].cell.level)
-                            : 0;
+        double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0;
         found.volume += volume;
         found.gray_volume += j.nodes[i].type == EBPO_GRAY ? volume : 0;
         found.flat += j.volume[i] == 0;

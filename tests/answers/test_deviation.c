@@ -310,9 +310,12 @@ Suite *test_suite(void)
     tcase_add_test(tests, a_cavity_within_an_envelope_counts);
     tcase_add_test(tests, threads_do_not_change_the_result);
     tcase_add_test(tests, a_limit_of_questions_leaves_wider_bounds_that_hold);
-    tcase_add_test(tests, no_level_reaches_farther_than_the_one_before);
     tcase_add_test(tests, scale_and_place_scale_and_place_the_result);
     tcase_add_test(tests, what_cannot_be_measured_is_refused);
     suite_add_tcase(suite, tests);
+    TCase *levels = tcase_create("levels");
+    tcase_set_timeout(levels, 900);
+    tcase_add_test(levels, no_level_reaches_farther_than_the_one_before);
+    suite_add_tcase(suite, levels);
     return suite;
 }

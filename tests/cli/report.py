@@ -10,6 +10,7 @@ import math
 import os
 import pathlib
 import re
+import struct
 import subprocess
 import sys
 import tempfile
@@ -248,6 +249,45 @@ def settings(inputs):
     assert abs(share - told["model"]["faces"] / 100) < 1e-9, share
 
 
+def beyond_doubles(inputs):
+    """Excess is free of scale: what it is at 1 it is at 1e300 and 1e-250, where no volume is a
+    double."""
+    tables = []
+    text = folder_of(inputs, "torus.ply").read_bytes()
+    for scale in (1, 1e300, 1e-250):
+        mesh = folder_of(inputs, "scaled.ply")
+        mesh.write_bytes(scaled(text, scale))
+        _, told = report(folder_of(inputs, "scaled"), "--no-pictures", "--max-level", "2", mesh)
+        tables.append([[l[k] for k in ("excess", "levels_excess", "limit_excess",
+                                       "excess_to_limit")] for l in told["methods"][0]["levels"]])
+    for table in tables[1:]:
+        for row, expected in zip(table, tables[0], strict=True):
+            for a, b in zip(row, expected):
+                assert (a is None) == (b is None) and (a is None or
+                                                       math.isclose(a, b, rel_tol=1e-3)), (a, b)
+
+
+def scaled(ply, factor):
+    """A PLY with coordinates times a factor, as ASCII doubles."""
+    head, body = ply.split(b"end_header\n", 1)
+    assert b"binary_little_endian" in head or b"ascii" in head, head
+    count = int(re.search(rb"element vertex (\d+)", head).group(1))
+    kind = "d" if b"double" in head else "f"
+    if b"ascii" in head:
+        lines = body.decode().splitlines()
+        points = [[float(x) for x in line.split()[:3]] for line in lines[:count]]
+        faces = [line.split() for line in lines[count:]]
+    else:
+        size = struct.calcsize("<3" + kind)
+        points = list(struct.iter_unpack("<3" + kind, body[:size * count]))
+        faces = [t for t in struct.iter_unpack("<B3i", body[size * count:])]
+    made = (f"ply\nformat ascii 1.0\nelement vertex {count}\nproperty double x\nproperty double "
+            f"y\nproperty double z\nelement face {len(faces)}\n"
+            "property list uchar int vertex_indices\nend_header\n")
+    made += "".join("%.17g %.17g %.17g\n" % tuple(x * factor for x in p) for p in points)
+    return (made + "".join(" ".join(map(str, f)) + "\n" for f in faces)).encode()
+
+
 def needs(told):
     for m in told["methods"]:
         for n in m["needs"]:
@@ -382,7 +422,7 @@ def without_mesh(inputs):
 def main():
     with tempfile.TemporaryDirectory() as inputs:
         subprocess.run([INPUTS, inputs], check=True)
-        for case in (usual, settings, files, surface, single_leaf, no_volume, without_mesh):
+        for case in (usual, settings, beyond_doubles, files, surface, single_leaf, no_volume, without_mesh):
             case(inputs)
             print(f"{case.__name__}: fine")
 

@@ -506,7 +506,7 @@ static bool has_hulls(ebpo_file *file)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status =
         ebpo_limit_level(file, 0,
-                         &(ebpo_limit_options){ sizeof(ebpo_limit_options), 1, { NULL, NULL } },
+                         &(ebpo_limit_options){ sizeof(ebpo_limit_options), 1, { NULL, NULL }, 0 },
                          &limit, &error);
     ck_assert(status == EBPO_OK || status == EBPO_E_ABSENT);
     if (status == EBPO_E_ABSENT)
@@ -530,7 +530,7 @@ START_TEST(hulls_of_a_convex_solid_fill_it_at_every_level)
             ebpo_error error = EBPO_ERROR_INIT;
             ck_assert(ebpo_limit_level(file, level,
                                        &(ebpo_limit_options){
-                                           sizeof(ebpo_limit_options), 2, { NULL, NULL } },
+                                           sizeof(ebpo_limit_options), 2, { NULL, NULL }, 0 },
                                        &limit, &error) == EBPO_OK);
             ck_assert_msg(fabs(limit.volume / info->report.volume - 1) < 1e-7,
                           "solid %zu, level %d: hulls fill %.9f", i, level,
@@ -566,7 +566,7 @@ START_TEST(no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close)
             double volume;
             ck_assert(ebpo_limit_level(file, level,
                                        &(ebpo_limit_options){
-                                           sizeof(ebpo_limit_options), 2, { NULL, NULL } },
+                                           sizeof(ebpo_limit_options), 2, { NULL, NULL }, 0 },
                                        &limit, &error) == EBPO_OK);
             ck_assert(ebpo_lod_level(file, level, NULL, NULL, &volume, &error) == EBPO_OK);
             ck_assert_msg(volume >= limit.volume - 1e-9 * root,

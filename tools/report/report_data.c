@@ -41,7 +41,7 @@ const figure_name level_figures[LEVEL_FIGURES] = {
                           "smaller",
                           NO_MESH },
     [OF_LIMIT_EXCESS] = { "limit_excess", "%", false, "its excess",
-                          "the file has no mesh, no volume, or one beyond the range of a double" },
+                          "the file has no mesh or no volume, or this build no qhull" },
     [OF_EXCESS_TO_LIMIT] = { "excess_to_limit", "1", false, "excess / limit_excess",
                              "the limit is the solid itself, or there is none, or no volume within "
                              "the range of a double" },

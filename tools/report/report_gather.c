@@ -140,6 +140,14 @@ static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error 
         f[OF_LIMIT_VOLUME] = limit.volume;
         f[OF_LIMIT_EXCESS] = facts_excess(&m->info, limit.volume);
         f[OF_EXCESS_TO_LIMIT] = facts_excess_ratio(&m->info, f[OF_VOLUME], limit.volume);
+        if (!(m->solid_share > 0))
+            continue;
+        options.in_root_cells = 1;
+        status = ebpo_limit_level(file, i, &options, &limit, error);
+        if (status != EBPO_OK)
+            return status;
+        f[OF_LIMIT_EXCESS] = 100 * (limit.volume - m->solid_share) / m->solid_share;
+        f[OF_EXCESS_TO_LIMIT] = f[OF_LIMIT_EXCESS] > 1e-7 ? f[OF_EXCESS] / f[OF_LIMIT_EXCESS] : NAN;
     }
     return EBPO_OK;
 }

@@ -17,14 +17,20 @@ typedef struct ebpo_limit_options {
     unsigned threads;
 
     ebpo_progress progress;
+
+    /*
+     * 1: volumes are counted in root cells, 0 to 1, which is free of the model's
+     * scale. 0: in its unit cubed.
+     */
+    uint64_t in_root_cells;
 } ebpo_limit_options;
 
-#define EBPO_LIMIT_OPTIONS_INIT                       \
-    {                                                 \
-        sizeof(ebpo_limit_options), 0, { NULL, NULL } \
+#define EBPO_LIMIT_OPTIONS_INIT                          \
+    {                                                    \
+        sizeof(ebpo_limit_options), 0, { NULL, NULL }, 0 \
     }
 
-/* Volumes are in the model's unit cubed. */
+/* Volumes are in the model's unit cubed, unless root cells were asked for. */
 typedef struct ebpo_limit {
     size_t struct_size; /* EBPO_LIMIT_INIT sets it */
 
@@ -51,9 +57,9 @@ typedef struct ebpo_limit {
  * faces there), summed over a level. qhull computes it from the parts of faces in
  * the cell and from the cell's corners that are inside.
  *
- * The sum is rounded and not certified: a figure to compare with. It is infinite
- * or 0 where the volume of a cell is no normal double, which takes coordinates
- * beyond about 1e102 or below 1e-102.
+ * The sum is rounded and not certified: a figure to compare with. In the model's
+ * unit cubed it is infinite or 0 where the volume of a cell is no normal double,
+ * which takes coordinates beyond about 1e102 or below 1e-102.
  *
  * EBPO_E_ABSENT: the file has no mesh, or the library was built without qhull.
  * EBPO_E_ARGUMENT: no such level. EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors
