@@ -50,7 +50,6 @@ static ebpo_status one_budget(comparison *c, method *m, ebpo_file *file, int i, 
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     ebpo_model *model = NULL;
     double *f = m->budget[i];
-    f[OF_BUDGET_BYTES] = ceil(m->whole[OF_MEMORY_BYTES] / budget_parts[i]);
     options.memory = budget_parts[i] == 1 ? 0 : (uint64_t)f[OF_BUDGET_BYTES];
     options.threads = (unsigned)c->v->threads;
     ebpo_status status = ebpo_model_new(file, &options, &model, error);
@@ -66,6 +65,8 @@ static ebpo_status one_budget(comparison *c, method *m, ebpo_file *file, int i, 
 
 ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
+    for (int i = 0; i < BUDGETS; i++)
+        m->budget[i][OF_BUDGET_BYTES] = ceil(m->whole[OF_MEMORY_BYTES] / budget_parts[i]);
     for (int i = 0; i < BUDGETS; i++) {
         if (c->progress.report)
             c->progress.report(c->progress.user, "memory budgets", (uint64_t)i, BUDGETS);
