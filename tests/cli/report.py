@@ -218,6 +218,8 @@ def lines_and_budgets(told):
         assert trips[0] >= 1 and sorted(trips) == trips and sorted(sent) == sent, (trips, sent)
         assert all(l["line_bytes"] >= min(l["cumulative_bytes"], m["file_bytes"])
                    and l["line_bytes"] <= m["file_bytes"] for l in m["levels"])
+        kept = [l["level_memory_bytes"] for l in m["levels"]]
+        assert sorted(kept) == kept and kept[0] > 0, kept
         assert [b["part"] for b in m["budgets"]] == [1, 2, 4, 8, 16]
         whole = m["budgets"][0]
         assert (whole["budget_bytes"] == m["memory_bytes"] and whole["budget_loads"] == 0

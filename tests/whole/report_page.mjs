@@ -102,7 +102,7 @@ function shapeColumns(told, method) {
 const answerColumns = (told) => [
   figure('maybe_uniform', 100), figure('maybe_near', 100), figure('inside_ns', 1e-9),
   ...lengths(told, 'width_mean', 'width_median', 'width_p99'), figure('distance_ns', 1e-9),
-  figure('have_seconds'), figure('read_bytes'), figure('reads'),
+  figure('have_seconds'), figure('read_bytes'), figure('reads'), figure('level_memory_bytes'),
 ];
 
 function rowsAgree(table, rows, columns, what) {
@@ -162,8 +162,9 @@ const plotAxes = (told) => {
       [`farthest-by-${name}-line`, [onLine(LINES[i]), far(told, 'hausdorff_hi')]],
     ])),
     ...Object.fromEntries(['first', 'middle'].map((name, i) => [`${name}-by-build`, [figure('build_seconds'), excessAt(levelsOf(told).some[i] ?? levelsOf(told).some[0])]])),
-    'width-by-memory': [figure('budget_bytes'), far(told, 'budget_width_median')],
-    'distance-by-memory': [figure('budget_bytes'), figure('budget_distance_ns', 1e-9)],
+    'volume-by-memory': [figure('level_memory_bytes'), alone],
+    'width-by-memory': [figure('level_memory_bytes'), far(told, 'width_median')],
+    'distance-by-budget': [figure('budget_bytes'), figure('budget_distance_ns', 1e-9)],
     'width-by-deadline': [deadline, far(told, 'deadline_width_p99')],
     'taken-by-deadline': [deadline, figure('deadline_took_p99', 1e-9), figure('deadline_took_median', 1e-9)],
     ...(told.methods.some((m) => m.levels.some((l) => l.thesis_bytes !== null)) && {
@@ -186,7 +187,7 @@ function expectedLines(told, name, [x, ...ys]) {
     const members = (s) => told.methods.filter((m) => m.selection === s);
     return families.map((s) => [s, pointsOf(members(s), x, y)]).filter(([, points]) => points.length);
   }
-  const rows = (m) => (name.endsWith('deadline') ? m.deadlines : name.endsWith('memory') ? m.budgets : m.levels);
+  const rows = (m) => (name.endsWith('deadline') ? m.deadlines : name.endsWith('budget') ? m.budgets : m.levels);
   return ys.flatMap((y) => told.methods.map((m) => [m.name, pointsOf(rows(m), x, y)])).filter(([, points]) => points.length);
 }
 

@@ -63,14 +63,43 @@ static ebpo_status one_budget(comparison *c, method *m, ebpo_file *file, int i, 
     return status;
 }
 
+/* What levels take in memory. */
+static ebpo_status level_memory(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    for (int i = c->first; i <= method_last(c, m); i++) {
+        ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+        ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+        ebpo_model *model = NULL;
+        options.cut_level = i;
+        options.threads = (unsigned)c->v->threads;
+        ebpo_status status = ebpo_model_new(file, &options, &model, error);
+        if (status == EBPO_OK) {
+            ebpo_model_get_stats(model, &stats);
+            m->level[i][OF_LEVEL_MEMORY] = (double)stats.memory;
+        }
+        ebpo_model_free(model);
+        if (status == EBPO_E_IO || status == EBPO_E_CANCELLED)
+            return status;
+        if (status == EBPO_OK)
+            continue;
+        method_note(m, "memory of levels", error->message);
+        *error = (ebpo_error)EBPO_ERROR_INIT;
+        return EBPO_OK;
+    }
+    return EBPO_OK;
+}
+
 ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
+    ebpo_status status = level_memory(c, m, file, error);
+    if (status != EBPO_OK)
+        return status;
     for (int i = 0; i < BUDGETS; i++)
         m->budget[i][OF_BUDGET_BYTES] = ceil(m->whole[OF_MEMORY_BYTES] / budget_parts[i]);
     for (int i = 0; i < BUDGETS; i++) {
         if (c->progress.report)
             c->progress.report(c->progress.user, "memory budgets", (uint64_t)i, BUDGETS);
-        ebpo_status status = one_budget(c, m, file, i, error);
+        status = one_budget(c, m, file, i, error);
         if (status == EBPO_OK)
             continue;
         if (status == EBPO_E_IO || status == EBPO_E_CANCELLED)

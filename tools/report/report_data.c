@@ -86,6 +86,10 @@ const figure_name level_figures[LEVEL_FIGURES] = {
                         "round trips to the server, the first 128 KiB included; what is announced "
                         "together comes together",
                         NOT_TIMED },
+    [OF_LEVEL_MEMORY] = { "level_memory_bytes", "B", false,
+                          "memory of a model that keeps levels 0 to this one and loads what is "
+                          "below when it is asked for; before anything is loaded",
+                          NOT_TIMED },
     [OF_THESIS_BYTES] = { "thesis_bytes", "B", false,
                           "what the theses' cost model takes for the level", NO_MESH },
     [OF_THESIS_CUMULATIVE] = { "thesis_cumulative_bytes", "B", false,

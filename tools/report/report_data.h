@@ -53,6 +53,7 @@ typedef enum level_figure {
     OF_READS,
     OF_LINE_BYTES,
     OF_LINE_TRIPS,
+    OF_LEVEL_MEMORY,
     OF_THESIS_BYTES,
     OF_THESIS_CUMULATIVE,
     LEVEL_FIGURES

@@ -63,7 +63,11 @@ static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, eb
     options.samples = 0;
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
-    ebpo_status status = ebpo_deviation_level(model, file, m->levels - 1, &options, &far, error);
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < m->levels && status == EBPO_OK; i++) {
+        status = ebpo_deviation_level(model, file, i, &options, &far, error);
+        options.at_most = far.hi;
+    }
     *reach = status == EBPO_OK ? far.hi : 0;
     return method_without(m, "Hausdorff distance", status, error);
 }

@@ -10,6 +10,7 @@ const LEVEL_TIME = { name: 'time to have the level', as: TIME, of: (l) => l.have
 const INSIDE_TIME = { name: 'time of a question', as: TIME, of: (l) => fromNs(l.inside_ns) };
 const DISTANCE_TIME = { name: 'time of a question', as: TIME, of: (l) => fromNs(l.distance_ns) };
 const [SLOW_TIME, FAST_TIME] = LINES.map((line) => ({ name: `time to have the level, ${line.name}`, as: TIME, of: lineTime(line) }));
+const LEVEL_MEMORY = { name: 'memory of levels 0 to this one', as: BYTE, of: (l) => l.level_memory_bytes };
 const BUDGET = { name: 'memory', as: BYTE, of: (b) => b.budget_bytes };
 const BUILD = { name: 'time of the build', as: TIME, of: (m) => m.build_seconds };
 const DEADLINE = { name: 'deadline', as: TIME, of: (d) => 1e-6 * d.microseconds };
@@ -30,7 +31,6 @@ const MAYBE_NEAR = {
 const MAYBE_UNIFORM = { name: 'MAYBE, % of uniform points', as: PERCENT, of: (l) => percent(l.maybe_uniform) };
 const WIDTH = { name: '% of the diagonal', as: PERCENT, of: (l) => ofDiagonal(l.width_median) };
 const CERTAIN = { name: '% of the diagonal', as: PERCENT, of: (d) => ofDiagonal(d.deadline_width_p99) };
-const IN_MEMORY = { name: '% of the diagonal', as: PERCENT, of: (b) => ofDiagonal(b.budget_width_median) };
 const EXACT = { name: 'time of a question', as: TIME, of: (b) => fromNs(b.budget_distance_ns) };
 const excessAt = (level) => ({
   name: `excess of volume at level ${level}, %`, as: PERCENT, of: (m) => levelOf(m, level)?.excess ?? null,
@@ -61,8 +61,9 @@ const axesOf = {
   'farthest-by-slow-line': [SLOW_TIME, FARTHEST],
   'volume-by-fast-line': [FAST_TIME, LEVELS_ALONE],
   'farthest-by-fast-line': [FAST_TIME, FARTHEST],
-  'width-by-memory': [BUDGET, IN_MEMORY],
-  'distance-by-memory': [BUDGET, EXACT],
+  'volume-by-memory': [LEVEL_MEMORY, LEVELS_ALONE],
+  'width-by-memory': [LEVEL_MEMORY, WIDTH],
+  'distance-by-budget': [BUDGET, EXACT],
   'width-by-deadline': [DEADLINE, CERTAIN],
   'taken-by-deadline': [DEADLINE, TAKEN],
   'sent-so-far': [LEVEL, SENT_SO_FAR],

@@ -156,6 +156,7 @@ const DISTANCE = [
 ];
 const TO_HAVE = [
   seconds('time', 'have_seconds'), bytes('read', 'read_bytes'), count('reads', 'reads'),
+  bytes('memory', 'level_memory_bytes'),
 ];
 
 // With leaf planes in the file, the levels alone are all that is known.
