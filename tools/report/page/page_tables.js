@@ -25,7 +25,7 @@ const perQuestion = columnAs(format.number);
 function upperBound(title, lo, hi) {
   const wide = (l) => l[hi] > 1.0501 * l[lo];
   return {
-    ...columnAs((l) => `${format.number(ofDiagonal(l[hi]))}${wide(l) ? '*' : ''}`)(title, (l) => (l[hi] === null || !(model.diagonal > 0) ? null : l)),
+    ...columnAs(known((l) => `${format.number(ofDiagonal(l[hi]))}${wide(l) ? '*' : ''}`))(title, (l) => (l[hi] === null || !(model.diagonal > 0) ? null : l)),
     why: reason(hi),
   };
 }
