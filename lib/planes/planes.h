@@ -69,9 +69,9 @@ int ebpo_select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
 
 /* How many of `count` candidates: `percent` of them, rounded up (EBP 2017, equation 5); or, with
  * k_root > 0, BP's K: k_root / 2^level, halved on while it is not below `count` (2008, 3.5.1); all
- * of them where that is below 1 to begin with (as there). EBPO_PLANES_STORED where it would be more:
- * what cannot be stored must not be chosen, or the clusters of what is stored are not the best
- * ones. */
+ * of them where that is below 1 to begin with (as there). EBPO_PLANES_STORED where it would be
+ * more: what cannot be stored must not be chosen, or the clusters of what is stored are not the
+ * best ones. */
 int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
 /* Every candidate that may remove 0.03 % of the cell or more, deepest cut first, then needles:

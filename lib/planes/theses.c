@@ -12,8 +12,8 @@
 #include "planes/planes.h"
 
 /* Clips by the chosen candidates in ascending order of their numbers. Those that cut nothing when
- * their turn comes are not kept. Not more than `most` are chosen (ebpo_selection_wanted): candidates
- * are sorted by direction, and what was left out here would all face one way. */
+ * their turn comes are not kept. Not more than `most` are chosen (ebpo_selection_wanted):
+ * candidates are sorted by direction, and what was left out here would all face one way. */
 static int take(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
                 uint32_t *codes)
 {

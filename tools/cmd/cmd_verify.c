@@ -20,7 +20,8 @@ typedef struct values {
 
 static const arg_option options[] = {
     OPTION_TEXT("against", 0, values, against, "IN.ply",
-                "also compare positions and corners with those of the source, bit for bit"),
+                "also compare the model with its source, bit for bit: positions, corners, and the "
+                "attributes that the file keeps"),
     OPTION_INT("samples", 0, values, samples, "N", 0, 9007199254740992.0,
                "number of cells whose labels are checked by an independent winding number; 0, the "
                "default: all if there are at most four million, else one million"),
@@ -54,8 +55,7 @@ static const struct kind {
     { offsetof(ebpo_verify_report, nesting), "nesting", "envelopes lie in their parents'" },
     { offsetof(ebpo_verify_report, labels), "labels", "white, black, winding numbers" },
     { offsetof(ebpo_verify_report, lists), "lists", "faces are listed where they touch" },
-    { offsetof(ebpo_verify_report, source), "source",
-      "positions and corners equal the source's" },
+    { offsetof(ebpo_verify_report, source), "source", "what the file keeps equals the source's" },
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
@@ -64,7 +64,29 @@ static const ebpo_verify_count *count_of(const ebpo_verify_report *report, int i
     return (const ebpo_verify_count *)(const void *)((const char *)report + kinds[i].offset);
 }
 
-static void print_words(const ebpo_verify_report *report, const char *path, const char *against)
+/* What of the source could not be compared, as the file has it not. */
+typedef struct unseen {
+    char words[512]; /* "": nothing */
+} unseen;
+
+static unseen unseen_of(const ebpo_file *file, const ebpo_mesh *source)
+{
+    uint64_t parts = ebpo_file_info(file)->parts;
+    unseen u = { "" };
+    const char *lost = ebpo_mesh_attributes_lost(source);
+    if (source->attributes && !(parts & EBPO_PART_ATTRIBUTES))
+        snprintf(u.words, sizeof u.words,
+                 "its attributes, such as colours and normals: the file keeps none");
+    else if (source->attributes && !(parts & EBPO_PART_MAPS))
+        snprintf(u.words, sizeof u.words,
+                 "its attributes, such as colours and normals: the file has no maps");
+    else if (lost)
+        snprintf(u.words, sizeof u.words, "what is not kept: %s", lost);
+    return u;
+}
+
+static void print_words(const ebpo_verify_report *report, const char *path, const char *against,
+                        const unseen *u)
 {
     printf("%-12s %14s %11s\n", "kind", "checks", "violations");
     for (int i = 0; i < KINDS; i++) {
@@ -75,8 +97,8 @@ static void print_words(const ebpo_verify_report *report, const char *path, cons
         else
             printf("%-12s %14s %11s   %s\n", kinds[i].name, "not made", "-", kinds[i].what);
     }
-    if (against)
-        printf("%s: other properties, such as colours and normals, were not compared\n", against);
+    if (u->words[0])
+        printf("%s: not compared: %s\n", against, u->words);
     if (!report->violations)
         printf("%s: fine: %llu checks, no violation\n", path, (unsigned long long)report->checks);
 }
@@ -92,8 +114,8 @@ static void print_violations(const ebpo_verify_report *report, const char *path)
     }
 }
 
-static void print_json(const ebpo_verify_report *report, const char *path, const traffic *t,
-                       const remote_values *remote)
+static void print_json(const ebpo_verify_report *report, const char *path, const unseen *u,
+                       const traffic *t, const remote_values *remote)
 {
     json j;
     json_begin(&j, stdout);
@@ -102,6 +124,8 @@ static void print_json(const ebpo_verify_report *report, const char *path, const
     json_bool(&j, "fine", report->violations == 0);
     json_uint(&j, "checks", report->checks);
     json_uint(&j, "violations", report->violations);
+    if (u->words[0])
+        json_text(&j, "not_compared", u->words);
     json_object(&j, "kinds");
     for (int i = 0; i < KINDS; i++) {
         const ebpo_verify_count *c = count_of(report, i);
@@ -118,7 +142,7 @@ static void print_json(const ebpo_verify_report *report, const char *path, const
 }
 
 static ebpo_status verify(const values *v, const char *path, ebpo_progress progress,
-                          ebpo_verify_report *report, traffic *t, ebpo_error *error)
+                          ebpo_verify_report *report, unseen *u, traffic *t, ebpo_error *error)
 {
     ebpo_mesh source = { 0 };
     ebpo_file *file = NULL;
@@ -144,6 +168,8 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
     }
     if (status == EBPO_OK)
         *t = traffic_of(file);
+    if (status == EBPO_OK && v->against)
+        *u = unseen_of(file, &source);
     ebpo_mesh_free(&source);
     ebpo_close(file);
     ebpo_workspace_free(workspace);
@@ -163,15 +189,16 @@ static int run(void *given, const char **operand)
     ebpo_progress progress = progress_start(&line, "verify", v->quiet);
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
+    unseen u = { "" };
     traffic t;
-    ebpo_status status = verify(v, operand[0], progress, &report, &t, &error);
+    ebpo_status status = verify(v, operand[0], progress, &report, &u, &t, &error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return command_failed("verify", &error);
     if (v->json)
-        print_json(&report, operand[0], &t, &v->remote);
+        print_json(&report, operand[0], &u, &t, &v->remote);
     else if (!v->quiet)
-        print_words(&report, remote_shown(operand[0]), v->against);
+        print_words(&report, remote_shown(operand[0]), v->against, &u);
     command_flush("verify");
     print_violations(&report, remote_shown(operand[0]));
     if (!v->json)
