@@ -17,13 +17,13 @@ const unsigned budget_parts[BUDGETS] = { 1, 2, 4, 8, 16 };
 #define NOT_TIMED    "this could not be asked of the method, see below"
 
 const figure_name level_figures[LEVEL_FIGURES] = {
-    [OF_BYTES] = { "bytes", "B", false, "of the level in the file" },
+    [OF_BYTES] = { "bytes", "B", false, "of the level in the file", NULL },
     [OF_CUMULATIVE_BYTES] = { "cumulative_bytes", "B", false,
-                              "of the head and of levels 0 to this one" },
-    [OF_GRAY] = { "gray", "nodes", false, "gray nodes of the level" },
-    [OF_LEAVES] = { "leaf", "nodes", false, "leaves of the level" },
-    [OF_PLANES] = { "planes", "planes", false, "stored for the level's gray nodes" },
-    [OF_LEAF_PLANES] = { "leaf_planes", "planes", false, "stored for the level's leaves" },
+                              "of the head and of levels 0 to this one", NULL },
+    [OF_GRAY] = { "gray", "nodes", false, "gray nodes of the level", NULL },
+    [OF_LEAVES] = { "leaf", "nodes", false, "leaves of the level", NULL },
+    [OF_PLANES] = { "planes", "planes", false, "stored for the level's gray nodes", NULL },
+    [OF_LEAF_PLANES] = { "leaf_planes", "planes", false, "stored for the level's leaves", NULL },
     [OF_VOLUME] = { "envelope_volume", "model^3", false,
                     "of the envelopes that stand for the model at this level; leaves by their "
                     "stored planes, else by planes derived from their faces",
@@ -64,20 +64,24 @@ const figure_name level_figures[LEVEL_FIGURES] = {
                         "a surface has no inside, and a file without mesh no points near it" },
     [OF_WIDTH_MEAN] = { "width_mean", "model", false,
                         "of the interval that holds the distance, known to this level; uniform "
-                        "points" },
-    [OF_WIDTH_MEDIAN] = { "width_median", "model", false,
-                          "half of the points have a narrower one" },
-    [OF_WIDTH_P99] = { "width_p99", "model", false, "99 % of the points have a narrower one" },
+                        "points",
+                        NULL },
+    [OF_WIDTH_MEDIAN] = { "width_median", "model", false, "half of the points have a narrower one",
+                          NULL },
+    [OF_WIDTH_P99] = { "width_p99", "model", false, "99 % of the points have a narrower one",
+                       NULL },
     [OF_INSIDE_NS] = { "inside_ns", "ns", true,
                        "a point-in-solid test to this level, uniform points, many at a time, one "
                        "thread",
                        NO_INSIDE },
-    [OF_DISTANCE_NS] = { "distance_ns", "ns", true, "a distance to this level, the same way" },
+    [OF_DISTANCE_NS] = { "distance_ns", "ns", true, "a distance to this level, the same way",
+                         NULL },
     [OF_HAVE_SECONDS] = { "have_seconds", "s", true,
                           "to open the file and read levels 0 to this one, after the system was "
-                          "asked to forget the file" },
-    [OF_READ_BYTES] = { "read_bytes", "B", false, "asked of the file for that" },
-    [OF_READS] = { "reads", "reads", false, "in so many reads" },
+                          "asked to forget the file",
+                          NULL },
+    [OF_READ_BYTES] = { "read_bytes", "B", false, "asked of the file for that", NULL },
+    [OF_READS] = { "reads", "reads", false, "in so many reads", NULL },
     [OF_LINE_BYTES] = { "line_bytes", "B", false,
                         "sent by a server for that: the file's first 128 KiB, and what else is "
                         "needed in pieces of 4 KiB",
@@ -98,15 +102,15 @@ const figure_name level_figures[LEVEL_FIGURES] = {
 
 const figure_name whole_figures[WHOLE_FIGURES] = {
     [OF_FILE_BYTES] = { "file_bytes", "B", false,
-                        "of the file, mesh included where it is in the file" },
-    [OF_HEAD_BYTES] = { "head_bytes", "B", false, "in front of level 0" },
-    [OF_ALL_PLANES] = { "all_planes", "planes", false, "stored in the file" },
+                        "of the file, mesh included where it is in the file", NULL },
+    [OF_HEAD_BYTES] = { "head_bytes", "B", false, "in front of level 0", NULL },
+    [OF_ALL_PLANES] = { "all_planes", "planes", false, "stored in the file", NULL },
     [OF_BUILD_SECONDS] = { "build_seconds", "s", true,
                            "to build the tree from the checked mesh; files that were there before "
                            "do not tell",
                            "files that were there before do not tell" },
     [OF_OPEN_SECONDS] = { "open_seconds", "s", true,
-                          "to take the whole model into memory, made for questions" },
+                          "to take the whole model into memory, made for questions", NULL },
     [OF_MEMORY_BYTES] = { "memory_bytes", "B", false, "that it takes there", NOT_TIMED },
     [OF_EXACT_INSIDE_NS] = { "exact_inside_ns", "ns", true,
                              "an exact point-in-solid test, uniform points, many at a time, one "
@@ -153,7 +157,7 @@ const figure_name budget_figures[BUDGET_FIGURES] = {
 };
 
 const figure_name need_figures[NEED_FIGURES] = {
-    [OF_NEED_BYTES] = { "need_bytes", "B", false, "of the file that was cut to the need" },
+    [OF_NEED_BYTES] = { "need_bytes", "B", false, "of the file that was cut to the need", NULL },
     [OF_NEED_FAR_LO] = { "need_hausdorff_lo", "model", false,
                          "its envelopes reach beyond the model by at least this", NO_MESH },
     [OF_NEED_FAR_HI] = { "need_hausdorff_hi", "model", false, "and certainly by at most this",
@@ -163,7 +167,7 @@ const figure_name need_figures[NEED_FIGURES] = {
                         "file reaches where that is more (leaves cannot be refined); need_bytes / "
                         "the size: 1 or less keeps the word",
                         NO_MESH },
-    [OF_NEED_SECONDS] = { "need_seconds", "s", true, "to make the file" },
+    [OF_NEED_SECONDS] = { "need_seconds", "s", true, "to make the file", NULL },
 };
 
 int method_last(const comparison *c, const method *m)
