@@ -23,8 +23,8 @@ static void fail(const ebpo_error *error)
 int main(int argc, char **argv)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_file *file;
-    ebpo_model *model;
+    ebpo_file *file = NULL;
+    ebpo_model *model = NULL;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     if (argc != 2) {
         fprintf(stderr, "usage: memory_kinds FILE.ebpo.h5\n");
