@@ -13,14 +13,15 @@
 #include "geom/predicates.h"
 #include "octree/rule.h"
 
-ebpo_status ebpo_two_models_begin(ebpo_two_models *two, const ebpo_collision *q, ebpo_error *error)
+ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places, ebpo_error *error)
 {
+    const ebpo_collision *q = places->question;
     ebpo_status status = EBPO_OK;
     *two = (ebpo_two_models){ 0 };
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
         int caller = (int)q->turned ^ i;
         const ebpo_pose *pose = caller ? &q->options.pose_b : &q->options.pose_a;
-        two->slots[i] = q->collider->slots[caller];
+        two->faces[i] = &places->side[caller];
         two->solid[i] = q->model[i]->info->solid;
         two->rule[i] = q->model[i]->info->rule;
         status = ebpo_posed_solid_make(&two->model[i], q->model[i], pose, error);
@@ -36,6 +37,31 @@ void ebpo_two_models_end(ebpo_two_models *two)
         ebpo_context_free(two->context[i]);
     ebpo_face_cuts_free(&two->pieces);
     ebpo_face_cuts_free(&two->others);
+}
+
+void ebpo_two_models_let_go(ebpo_two_models *two)
+{
+    for (int i = 0; i < 2; i++)
+        ebpo_context_let_go(two->context[i]);
+}
+
+uint64_t ebpo_two_models_loads(const ebpo_two_models *two)
+{
+    uint64_t loads = 0;
+    for (int i = 0; i < 2; i++)
+        loads += two->context[i] ? two->context[i]->loaded : 0;
+    return loads;
+}
+
+ebpo_status ebpo_two_models_face(const ebpo_two_models *two, int m, uint64_t face, double out[3][3],
+                                 bool *has_area, ebpo_error *error)
+{
+    double own[3][3];
+    ebpo_status status = ebpo_faces_by_number_get(two->faces[m], face, own, error);
+    for (int k = 0; k < 3 && status == EBPO_OK; k++)
+        ebpo_posing_apply(&two->model[m].posing, own[k], out[k]);
+    *has_area = status == EBPO_OK && !ebpo_zero_area(out[0], out[1], out[2]);
+    return status;
 }
 
 /* --- faces that meet a face --- */
@@ -150,20 +176,16 @@ static ebpo_status visit_pieces(looking *l, ebpo_face_cuts *pieces, ebpo_error *
     return status == EBPO_E_CANCELLED ? EBPO_OK : status;
 }
 
-static bool pose_face(const ebpo_two_models *two, int m, uint64_t face, double t[3][3])
-{
-    ebpo_posed_triangle(two->model[m].model->whole, &two->model[m].posing, two->slots[m][face], t);
-    return !ebpo_zero_area(t[0], t[1], t[2]);
-}
-
 ebpo_status ebpo_look_around_face(ebpo_two_models *two, int m, uint64_t face, ebpo_around_fn visit,
                                   void *user, ebpo_error *error)
 {
     double t[3][3];
-    if (!pose_face(two, m, face, t))
-        return EBPO_OK;
+    bool has_area;
+    ebpo_status status = ebpo_two_models_face(two, m, face, t, &has_area, error);
+    if (status != EBPO_OK || !has_area)
+        return status;
     ebpo_face_cuts_begin(&two->pieces, (const double(*)[3])t, false);
-    ebpo_status status = cut_face(two, &two->pieces, m, face, (const double(*)[3])t, error);
+    status = cut_face(two, &two->pieces, m, face, (const double(*)[3])t, error);
     looking l = { two, &two->pieces, m, visit, user, false };
     return status == EBPO_OK ? visit_pieces(&l, &two->pieces, error) : status;
 }
@@ -219,16 +241,18 @@ static bool note_side(void *user, const ebpo_around *around)
 static ebpo_status ask_face(asking *a, uint64_t face, const mpq_t x[3], ebpo_error *error)
 {
     double t[3][3];
+    bool has_area;
     ebpo_two_models *two = a->two;
-    if (!pose_face(two, a->m, face, t))
-        return EBPO_OK;
+    ebpo_status status = ebpo_two_models_face(two, a->m, face, t, &has_area, error);
+    if (status != EBPO_OK || !has_area)
+        return status;
     ebpo_face_cuts_begin(&two->others, (const double(*)[3])t, true);
     if (!ebpo_face_cuts_target(&two->others, x))
         return EBPO_OK;
     a->on = true;
     a->in = !two->solid[a->m];
-    ebpo_status status =
-        a->in ? EBPO_OK : cut_face(two, &two->others, a->m, face, (const double(*)[3])t, error);
+    if (!a->in)
+        status = cut_face(two, &two->others, a->m, face, (const double(*)[3])t, error);
     looking l = { two, &two->others, a->m, note_side, a, true };
     return status == EBPO_OK && !a->in ? visit_pieces(&l, &two->others, error) : status;
 }
@@ -272,11 +296,13 @@ ebpo_status ebpo_face_has_common_point(ebpo_two_models *two, int m, uint64_t fac
                                        ebpo_error *error)
 {
     double t[3][3];
+    bool has_area;
     *has = false;
-    if (!pose_face(two, m, face, t))
-        return EBPO_OK;
+    ebpo_status status = ebpo_two_models_face(two, m, face, t, &has_area, error);
+    if (status != EBPO_OK || !has_area)
+        return status;
     ebpo_face_cuts_begin(&two->pieces, (const double(*)[3])t, true);
-    ebpo_status status = cut_face(two, &two->pieces, m, face, (const double(*)[3])t, error);
+    status = cut_face(two, &two->pieces, m, face, (const double(*)[3])t, error);
     common c = { two, has };
     if (status == EBPO_OK)
         status = ebpo_face_pieces_vertices(&two->pieces, ask_both, &c, error);

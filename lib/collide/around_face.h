@@ -2,7 +2,7 @@
 #ifndef EBPO_COLLIDE_AROUND_FACE_H
 #define EBPO_COLLIDE_AROUND_FACE_H
 
-#include "collide/collider.h"
+#include "collide/contacts.h"
 #include "collide/face_pieces.h"
 #include "collide/posed_sides.h"
 
@@ -10,16 +10,20 @@
 typedef struct ebpo_two_models {
     ebpo_posed_solid model[2];
     ebpo_context *context[2];
-    const uint32_t *slots[2];
+    ebpo_faces_by_number *faces[2];
     bool solid[2];
     ebpo_rule rule[2];
     ebpo_face_cuts pieces, /* of the face in question, */
         others;            /* and of faces around a vertex of it */
 } ebpo_two_models;
 
-/* Needs the collider's slots. Errors of posing and of contexts. */
-EBPO_MUST_USE ebpo_status ebpo_two_models_begin(ebpo_two_models *two,
-                                                const ebpo_collision *collision, ebpo_error *error);
+/* Looks faces up in `places`, which lives longer. Errors of posing and of contexts. */
+EBPO_MUST_USE ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places,
+                                                ebpo_error *error);
+/* Others may have the room of subtrees, until the next question. */
+void ebpo_two_models_let_go(ebpo_two_models *two);
+/* Subtrees that it had to load. */
+uint64_t ebpo_two_models_loads(const ebpo_two_models *two);
 void ebpo_two_models_end(ebpo_two_models *two);
 
 /* Sides of a face: where its normal points to, and behind it. */
@@ -33,6 +37,10 @@ typedef struct ebpo_around {
 
 /* False: enough, and the call succeeds. */
 typedef bool (*ebpo_around_fn)(void *user, const ebpo_around *around);
+
+/* A face of model m at its pose; *has_area: not all in one line. */
+EBPO_MUST_USE ebpo_status ebpo_two_models_face(const ebpo_two_models *two, int m, uint64_t face,
+                                               double out[3][3], bool *has_area, ebpo_error *error);
 
 /* Every piece of a face of model m, by its number in the file. A face without area has none. */
 EBPO_MUST_USE ebpo_status ebpo_look_around_face(ebpo_two_models *two, int m, uint64_t face,

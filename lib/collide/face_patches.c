@@ -47,28 +47,30 @@ static bool join_face(joining *j, uint32_t *patch, uint32_t face, const double t
     return true;
 }
 
-ebpo_status ebpo_face_patches(const ebpo_accel *whole, const uint32_t *slots,
+ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
                               const uint64_t *left_out, uint32_t **out, ebpo_error *error)
 {
     joining j = { 0 };
-    uint32_t *patch = ebpo_alloc(whole->face_count, sizeof *patch);
+    uint32_t count = subtree->face_count - subtree->outer_count;
+    uint32_t *patch = ebpo_alloc(count, sizeof *patch);
     bool fine = patch != NULL;
-    for (uint32_t f = 0; f < whole->face_count && fine; f++)
+    for (uint32_t f = 0; f < count && fine; f++)
         patch[f] = f;
-    for (uint32_t f = 0; f < whole->face_count && fine; f++) {
+    for (uint32_t f = 0; f < count && fine; f++) {
         double t[3][3];
-        if (left_out && left_out[f / 64] >> f % 64 & 1)
+        uint64_t number = subtree->first_face + f;
+        if (left_out[number / 64] >> number % 64 & 1)
             continue;
-        ebpo_accel_triangle(whole, slots[f], t);
+        ebpo_accel_triangle(subtree, slots[subtree->outer_count + f], t);
         fine = join_face(&j, patch, f, (const double(*)[3])t);
     }
-    for (uint32_t f = 0; f < whole->face_count && fine; f++)
+    for (uint32_t f = 0; f < count && fine; f++)
         patch[f] = first_of(patch, f);
     ebpo_corner_ids_free(&j.corners);
     free(j.user);
     if (!fine) {
         free(patch);
-        return ebpo_fail_memory(error, whole->face_count * sizeof *patch);
+        return ebpo_fail_memory(error, count * sizeof *patch);
     }
     *out = patch;
     return EBPO_OK;

@@ -4,10 +4,11 @@
 
 #include "accel/accel.h"
 
-/* For each face of a whole model, by its number in the file, the first face of its patch: those
- * that are connected to it by corners (equal coordinates) of faces that are not left out (a bit for
- * each face; NULL: none is). One that is left out is alone. The caller frees it. */
-EBPO_MUST_USE ebpo_status ebpo_face_patches(const ebpo_accel *whole, const uint32_t *slots,
+/* For each own face of a subtree, by its number in the file less first_face, the first face of its
+ * patch: those that are connected to it by corners (equal coordinates) of own faces that are not
+ * left out (a bit for each face of the file). One that is left out is alone. The caller frees it.
+ */
+EBPO_MUST_USE ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
                                             const uint64_t *left_out, uint32_t **out,
                                             ebpo_error *error);
 

@@ -1,11 +1,11 @@
-/* Where a whole model's faces are in its blocks. Any thread. */
+/* Where the faces of a subtree, or of a whole model, are in its blocks. Any thread. */
 #ifndef EBPO_COLLIDE_FACE_SLOTS_H
 #define EBPO_COLLIDE_FACE_SLOTS_H
 
 #include "accel/accel.h"
 
-/* Slots by numbers in the file, which are local numbers in a whole model. NULL: no memory. The
- * caller frees it. */
-uint32_t *ebpo_face_slots(const ebpo_accel *whole);
+/* Slots by local numbers, which in a whole model are those in the file. NULL: no memory. The caller
+ * frees it. */
+uint32_t *ebpo_face_slots(const ebpo_accel *subtree);
 
 #endif

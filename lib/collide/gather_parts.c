@@ -160,6 +160,8 @@ enum { GIVEN_AT_ONCE = 1024 };
 static bool give(const gathering_parts *g, ebpo_pairs_fn take, void *user)
 {
     ebpo_face_pair out[GIVEN_AT_ONCE];
+    for (unsigned i = 0; i < g->threads; i++) /* who takes them may want the room */
+        ebpo_subtree_walk_let_go(&g->walk[i]);
     for (uint64_t at = 0; at < g->count; at += GIVEN_AT_ONCE) {
         uint64_t n = g->count - at < GIVEN_AT_ONCE ? g->count - at : GIVEN_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)

@@ -12,7 +12,7 @@
 #include "base/parallel.h"
 #include "collide/around_face.h"
 #include "collide/contacts.h"
-#include "collide/face_patches.h"
+#include "collide/unmet_patches.h"
 #include "geom/predicates.h"
 
 static const char stage[] = "relation";
@@ -44,6 +44,11 @@ static bool is_decided(const relating *r)
     if (mixed(r))
         return r->both && r->only[r->two.solid[0]];
     return r->both && (surfaces(r) ? r->only[0] || r->only[1] : r->only[0] && r->only[1]);
+}
+
+static uint64_t face_count(const relating *r, int m)
+{
+    return r->question->model[m]->info->face_count;
 }
 
 static bool bit(const uint64_t *bits, uint64_t i) { return bits[i / 64] >> i % 64 & 1; }
@@ -154,6 +159,7 @@ static ebpo_status take_pairs(relating *r, ebpo_pairs_fn take, ebpo_error *error
 {
     const ebpo_collision *q = r->question;
     ebpo_collide_options options = options_left(r);
+    ebpo_two_models_let_go(&r->two);
     ebpo_status status = ebpo_collide_all(q->collider, &options, take, r, error);
     if (status == EBPO_E_CANCELLED && ebpo_collision_is_late(q)) {
         r->open = true;
@@ -170,7 +176,7 @@ static bool goes_on(const relating *r)
 static void look_at_met(relating *r)
 {
     for (int m = 0; m < 2; m++) {
-        uint64_t count = r->question->model[m]->whole->face_count;
+        uint64_t count = face_count(r, m);
         for (uint64_t f = 0; f < count && goes_on(r); f++)
             if (bit(r->met[m], f))
                 (void)look_at(r, m, f);
@@ -179,26 +185,26 @@ static void look_at_met(relating *r)
 
 /* --- faces without contact --- */
 
-/* Patches of them are on one side of the other model; does the rest of a patch tell nothing more
- * once the last face has been seen? */
-static bool patch_is_done(const relating *r, int m)
+/* Patches of them are on one side of the other model. Does another face on that side (`in`: in it)
+ * tell nothing more? */
+static bool side_is_told(const relating *r, int m, bool in)
 {
     if (mixed(r))
-        return true;
-    return r->last[!m] ? r->both && r->only[!m] : r->only[m];
+        return in ? r->both : r->only[m];
+    return in ? r->both && r->only[!m] : r->only[m];
 }
 
-/* Faces that meet none of the other model, as long as their patch may tell more. */
-static void look_through(relating *r, int m, const uint32_t *patch, uint64_t *done)
+/* Own faces of a subtree that meet none of the other model, as long as their patch may tell more.
+ */
+static void look_through(relating *r, const ebpo_unmet_patches *u, uint64_t *done)
 {
-    uint64_t count = r->question->model[m]->whole->face_count;
-    for (uint64_t f = 0; f < count && goes_on(r); f++) {
-        if (bit(r->met[m], f) || bit(done, patch[f]))
+    for (uint64_t i = 0; i < u->count && goes_on(r); i++) {
+        if (bit(r->met[u->m], u->first + i) || bit(done, u->patch[i]))
             continue;
         r->told = false;
-        (void)look_at(r, m, f);
-        if (r->told && patch_is_done(r, m))
-            set_bit(done, patch[f]);
+        (void)look_at(r, u->m, u->first + i);
+        if (r->told && side_is_told(r, u->m, r->last[!u->m] != 0))
+            set_bit(done, u->patch[i]);
     }
 }
 
@@ -209,23 +215,40 @@ static ebpo_status fail_bits(uint64_t count, ebpo_error *error)
     return ebpo_fail_memory(error, count / 8);
 }
 
-static void look_at_patches(relating *r, int m)
+static void look_at_subtree(relating *r, ebpo_unmet_patches *u, uint64_t number)
 {
-    const ebpo_accel *whole = r->question->model[m]->whole;
-    uint32_t *patch;
-    uint64_t *done;
-    if ((mixed(r) && r->two.solid[m]) || !goes_on(r))
-        return;
-    r->status = ebpo_face_patches(whole, r->two.slots[m], r->met[m], &patch, r->error);
+    r->status = ebpo_unmet_patches_find(u, number, r->met[u->m], r->error);
     if (r->status != EBPO_OK)
         return;
-    done = make_bits(whole->face_count);
+    uint64_t *done = make_bits(u->count);
     if (done)
-        look_through(r, m, patch, done);
+        look_through(r, u, done);
     else
-        r->status = fail_bits(whole->face_count, r->error);
+        r->status = fail_bits(u->count, r->error);
     free(done);
-    free(patch);
+}
+
+/* All faces of the subtree are on a side that has been told: it need not be loaded. */
+static bool is_settled(relating *r, const ebpo_unmet_patches *u, uint64_t number)
+{
+    int in = -1;
+    if (side_is_told(r, u->m, true) || side_is_told(r, u->m, false))
+        r->status = ebpo_unmet_patches_side(u, number, &in, r->error);
+    return in >= 0 && side_is_told(r, u->m, in);
+}
+
+static void look_at_patches(relating *r, int m)
+{
+    ebpo_unmet_patches u;
+    if (mixed(r) && r->two.solid[m])
+        return;
+    ebpo_unmet_patches_begin(&u, r->question, &r->two, m);
+    for (uint64_t i = 0; i < u.subtrees && goes_on(r); i++) {
+        if (!is_settled(r, &u, i) && r->status == EBPO_OK)
+            look_at_subtree(r, &u, i);
+        r->open |= ebpo_collision_is_late(r->question);
+    }
+    ebpo_unmet_patches_end(&u);
 }
 
 /* --- common points of models that have no inner ones in common --- */
@@ -263,7 +286,7 @@ static bool take_sound(void *user, const ebpo_face_pair *pairs, uint64_t count)
 static ebpo_status find_touch(relating *r, ebpo_error *error)
 {
     ebpo_status status = take_pairs(r, take_sound, error);
-    uint64_t count = r->question->model[0]->whole->face_count;
+    uint64_t count = face_count(r, 0);
     for (uint64_t f = 0; f < count && status == EBPO_OK && !r->touch && !r->open; f++) {
         if (bit(r->met[0], f))
             status = ebpo_face_has_common_point(&r->two, 0, f, &r->touch, error);
@@ -274,18 +297,15 @@ static ebpo_status find_touch(relating *r, ebpo_error *error)
 
 /* --- the relation --- */
 
-static bool has_unmet_area(const relating *r, int m)
+static bool has_unmet_area(relating *r, int m)
 {
-    const ebpo_posed_solid *s = &r->two.model[m];
-    for (uint64_t f = 0; f < s->model->whole->face_count; f++) {
+    bool has = false;
+    for (uint64_t f = 0; f < face_count(r, m) && r->status == EBPO_OK && !has; f++) {
         double t[3][3];
-        if (bit(r->met[m], f))
-            continue;
-        ebpo_posed_triangle(s->model->whole, &s->posing, r->two.slots[m][f], t);
-        if (!ebpo_zero_area(t[0], t[1], t[2]))
-            return true;
+        if (!bit(r->met[m], f))
+            r->status = ebpo_two_models_face(&r->two, m, f, t, &has, r->error);
     }
-    return false;
+    return has;
 }
 
 /* One file twice, at one pose. */
@@ -300,7 +320,7 @@ static bool is_same(const ebpo_collision *q)
 /* Whether there is anything. */
 static void look_for_any(relating *r)
 {
-    uint64_t count = r->question->model[0]->whole->face_count;
+    uint64_t count = face_count(r, 0);
     r->out->contact = count > 0;
     if (surfaces(r))
         r->both = r->touch = has_unmet_area(r, 0);
@@ -383,14 +403,14 @@ static bool boxes_apart(const ebpo_two_models *two)
 static ebpo_status relate(relating *r, ebpo_error *error)
 {
     const ebpo_collision *q = r->question;
-    ebpo_status status = ebpo_two_models_begin(&r->two, q, error);
+    ebpo_status status = ebpo_two_models_begin(&r->two, &r->places, error);
     if (status != EBPO_OK)
         return status;
     r->out->contact = boxes_apart(&r->two) ? 0 : -1;
     if (r->out->contact == 0)
         return EBPO_OK;
     for (int m = 0; m < 2; m++) {
-        uint64_t count = q->model[m]->whole->face_count;
+        uint64_t count = face_count(r, m);
         r->met[m] = make_bits(count);
         r->seen[m] = make_bits(count);
         if (!r->met[m] || !r->seen[m])
@@ -402,26 +422,41 @@ static ebpo_status relate(relating *r, ebpo_error *error)
     return r->status;
 }
 
+/* What subtrees cost, in both questions that are asked meanwhile and besides. */
+static void count_loads(const relating *r, uint64_t bytes_told, uint64_t read_before)
+{
+    ebpo_collider *c = r->question->collider;
+    c->loads += ebpo_two_models_loads(&r->two);
+    c->bytes_read = bytes_told + ebpo_collision_bytes_read(r->question) - read_before;
+}
+
+static void end(relating *r)
+{
+    ebpo_two_models_end(&r->two);
+    ebpo_pair_faces_end(&r->places);
+    for (int m = 0; m < 2; m++) {
+        free(r->met[m]);
+        free(r->seen[m]);
+    }
+}
+
 ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *options,
                                   ebpo_relation_result *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
     *out = (ebpo_relation_result){ EBPO_RELATION_OPEN, -1 };
-    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     relating r = { .question = &q, .out = out, .error = error };
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&r.places, &q, error);
     if (status != EBPO_OK)
         return status;
+    uint64_t told = c->bytes_read, before = ebpo_collision_bytes_read(&q);
     status = relate(&r, error);
     ebpo_relation relation = relation_of(&r);
     out->relation = (int32_t)(q.turned ? turned(relation) : relation);
-    ebpo_two_models_end(&r.two);
-    ebpo_pair_faces_end(&r.places);
-    for (int m = 0; m < 2; m++) {
-        free(r.met[m]);
-        free(r.seen[m]);
-    }
+    count_loads(&r, told, before);
+    end(&r);
     return status;
 }

@@ -29,6 +29,12 @@ uint64_t ebpo_subtree_walk_loads(const ebpo_subtree_walk *w)
     return loads;
 }
 
+void ebpo_subtree_walk_let_go(ebpo_subtree_walk *w)
+{
+    for (int i = 0; i < 2; i++)
+        ebpo_context_let_go(w->context[i]);
+}
+
 void ebpo_subtree_walk_free(ebpo_subtree_walk *w)
 {
     for (int i = 0; i < 2; i++)

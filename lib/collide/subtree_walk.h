@@ -31,6 +31,8 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_walk_pair(ebpo_subtree_walk *w,
                                                  const ebpo_subtree_pair *pair, ebpo_error *error);
 /* Subtrees that it had to load. */
 uint64_t ebpo_subtree_walk_loads(const ebpo_subtree_walk *w);
+/* Others may have the room of its subtrees. */
+void ebpo_subtree_walk_let_go(ebpo_subtree_walk *w);
 void ebpo_subtree_walk_free(ebpo_subtree_walk *w);
 
 int ebpo_told_pair_compare(const void *x, const void *y);

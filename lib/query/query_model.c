@@ -310,10 +310,11 @@ ebpo_status ebpo_context_new(ebpo_model *model, ebpo_context **out, ebpo_error *
     return EBPO_OK;
 }
 
-static void let_go(ebpo_context *c)
+void ebpo_context_let_go(ebpo_context *c)
 {
-    if (c->pinned)
-        ebpo_cache_unpin(c->model->cache, c->pinned_key);
+    if (!c || !c->pinned)
+        return;
+    ebpo_cache_unpin(c->model->cache, c->pinned_key);
     c->pinned = NULL;
 }
 
@@ -321,7 +322,7 @@ void ebpo_context_free(ebpo_context *c)
 {
     if (!c)
         return;
-    let_go(c);
+    ebpo_context_let_go(c);
     free(c->open);
     free(c->hits);
     free(c->hit_begin);
@@ -359,7 +360,7 @@ ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **o
         *out = c->pinned;
         return EBPO_OK;
     }
-    let_go(c);
+    ebpo_context_let_go(c);
     if (m->options.loading != EBPO_LOAD_CACHE)
         ebpo_cache_clear(m->cache);
     uint64_t key = ebpo_context_key(c, below);

@@ -115,8 +115,11 @@ static inline uint64_t ebpo_context_key(const ebpo_context *c, uint64_t below)
                                                               : ebpo_subtree_key(below, false);
 }
 
-/* The subtree with this number, in memory until the context asks for another one. */
+/* The subtree with this number, in memory until the context asks for another one, or lets go of it.
+ */
 EBPO_MUST_USE ebpo_status ebpo_context_subtree(ebpo_context *context, uint32_t below,
                                                ebpo_accel **out, ebpo_error *error);
+/* Others may have its room; NULL is fine. */
+void ebpo_context_let_go(ebpo_context *context);
 
 #endif

@@ -254,6 +254,36 @@ static void check_contacts(const two_models *t, const ebpo_pose pose[2], bool fi
     free(want.bytes);
 }
 
+/* --- how they lie to each other --- */
+
+static ebpo_relation_result relate(ebpo_collider *c, const ebpo_pose pose[2])
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_relation_result out;
+    options.pose_a = pose[0];
+    options.pose_b = pose[1];
+    ASSERT_OK(ebpo_collide_relation(c, &options, &out, error));
+    return out;
+}
+
+static int32_t turned_relation(int32_t r)
+{
+    return r == EBPO_A_INSIDE_B ? EBPO_B_INSIDE_A : r == EBPO_B_INSIDE_A ? EBPO_A_INSIDE_B : r;
+}
+
+static void check_relation(const two_models *t, const ebpo_pose pose[2], const char *what)
+{
+    const ebpo_pose back[2] = { pose[1], pose[0] };
+    ebpo_relation_result want = relate(t->whole, pose), both = relate(t->parts, pose),
+                         one = relate(t->one, pose), swapped = relate(t->swapped, back);
+    swapped.relation = turned_relation(swapped.relation);
+    ck_assert_msg(memcmp(&want, &both, sizeof want) == 0 && memcmp(&want, &one, sizeof want) == 0 &&
+                      memcmp(&want, &swapped, sizeof want) == 0,
+                  "%s: relation %d, of parts %d, %d, %d; contact %d, %d, %d, %d", what,
+                  want.relation, both.relation, one.relation, swapped.relation, want.contact,
+                  both.contact, one.contact, swapped.contact);
+}
+
 START_TEST(parts_give_what_whole_models_do)
 {
     two_models t;
@@ -270,6 +300,7 @@ START_TEST(parts_give_what_whole_models_do)
         check_distances(&t, pose, what);
         check_others(&t, pose, what);
         check_contacts(&t, pose, kind % 2 == 0, what);
+        check_relation(&t, pose, what);
     }
     free_two(&t);
 }
@@ -300,6 +331,25 @@ static uint64_t evicted(const ebpo_model *m)
     return stats.evicted;
 }
 
+static ebpo_collider_stats stats_of(const ebpo_collider *c)
+{
+    ebpo_collider_stats out = EBPO_COLLIDER_STATS_INIT;
+    ck_assert_int_eq(ebpo_collider_get_stats(c, &out), EBPO_OK);
+    return out;
+}
+
+/* What is read is told. */
+static void check_far_relations(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose *b,
+                                int32_t expected)
+{
+    const ebpo_pose pose[2] = { EBPO_POSE_INIT, *b };
+    ebpo_collider_stats before = stats_of(parts);
+    ebpo_relation_result want = relate(whole, pose), got = relate(parts, pose);
+    ck_assert_int_eq(want.relation, expected);
+    ck_assert(memcmp(&want, &got, sizeof want) == 0);
+    ck_assert_uint_gt(stats_of(parts).bytes_read, before.bytes_read);
+}
+
 /* Two models, each of which would take more than all of it. */
 START_TEST(one_budget_holds_for_both)
 {
@@ -307,10 +357,12 @@ START_TEST(one_budget_holds_for_both)
     ebpo_budget *budget;
     ebpo_model *part[2];
     ebpo_budget_stats stats = EBPO_BUDGET_STATS_INIT;
-    ebpo_pose pose = EBPO_POSE_INIT, away = EBPO_POSE_INIT;
+    ebpo_pose pose = EBPO_POSE_INIT, away = EBPO_POSE_INIT, small = EBPO_POSE_INIT;
     pose.translation[0] = 0.31;
     pose.translation[2] = 0.17;
     away.translation[2] = 1.9;
+    small.scale = 0.125;
+    small.translation[0] = 2;
     for (int i = 0; i < 2; i++)
         query_model_make(&m[i], "fine torus", ebpo_test_torus(2, 0.7 + 0.01 * i, 256, 128),
                          &query_variants[0]);
@@ -327,6 +379,10 @@ START_TEST(one_budget_holds_for_both)
     ck_assert_double_gt(far.distance.hi, 0);
     ck_assert(memcmp(&far, &same, sizeof far) == 0);
     ck_assert_uint_gt(evicted(part[0]) + evicted(part[1]), 0);
+    check_far_relations(whole, parts, &pose, EBPO_INTERSECTING);
+    check_far_relations(whole, parts, &small, EBPO_B_INSIDE_A);
+    small.translation[0] = 0;
+    check_far_relations(whole, parts, &small, EBPO_DISJOINT);
     ck_assert_int_eq(ebpo_budget_get_stats(budget, &stats), EBPO_OK);
     ck_assert_uint_gt(stats.memory_peak, BUDGET / 3);
     ck_assert_uint_le(stats.memory_peak, BUDGET);

@@ -336,10 +336,25 @@ static int32_t ask(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b, const ebpo
     return out.relation;
 }
 
-static int32_t ask_both_ways(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b, const ebpo_pose *pb)
+static ebpo_model *in_parts(const query_model *m, int cut_level)
 {
-    int32_t r = ask(a, pa, b, pb);
-    ck_assert_int_eq(ask(b, pb, a, pa), turned(r));
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *out;
+    options.cut_level = cut_level;
+    ASSERT_OK(ebpo_model_new(m->file, &options, &out, error));
+    return out;
+}
+
+/* Swapped, and in parts. */
+static int32_t ask_both_ways(const query_model *a, const ebpo_pose *pa, const query_model *b,
+                             const ebpo_pose *pb)
+{
+    int32_t r = ask(a->model, pa, b->model, pb);
+    ebpo_model *parts[2] = { in_parts(a, 1), in_parts(b, 2) };
+    ck_assert_int_eq(ask(b->model, pb, a->model, pa), turned(r));
+    ck_assert_int_eq(ask(parts[0], pa, parts[1], pb), r);
+    ebpo_model_free(parts[0]);
+    ebpo_model_free(parts[1]);
     return r;
 }
 
@@ -364,7 +379,7 @@ static void check_models(const grid_model *a, const grid_model *b, uint64_t seed
                   gb = i ? random_pose(&state, i % 3 == 2) : still();
         ebpo_pose pa = pose_of(&ga), pb = pose_of(&gb);
         cells ca = fill(a, &ga, ma.info.rule), cb = fill(b, &gb, mb.info.rule);
-        int32_t want = twin(&ca, &cb), got = ask_both_ways(ma.model, &pa, mb.model, &pb);
+        int32_t want = twin(&ca, &cb), got = ask_both_ways(&ma, &pa, &mb, &pb);
         ck_assert_msg(want == got, "seed %llu, pose %d: %s, not %s", (unsigned long long)seed, i,
                       names[got], names[want]);
         free(ca.winding);
@@ -483,11 +498,11 @@ START_TEST(known_relations)
     turned_pose.rotation[1][0] = 0.8;
     query_model a = make(known[_i].a, 1, 0), b = make(known[_i].b, 4, 0);
     ck_assert_int_eq(a.info.solid, known[_i].a->solid);
-    int32_t got = ask_both_ways(a.model, &here, b.model, &here);
+    int32_t got = ask_both_ways(&a, &here, &b, &here);
     ck_assert_msg(got == known[_i].relation, "%d: %s, not %s", _i, names[got],
                   names[known[_i].relation]);
     if (known[_i].relation == EBPO_EQUAL || known[_i].relation == EBPO_DISJOINT) {
-        got = ask_both_ways(a.model, &turned_pose, b.model, &turned_pose);
+        got = ask_both_ways(&a, &turned_pose, &b, &turned_pose);
         ck_assert_msg(got == known[_i].relation || known[_i].relation == EBPO_EQUAL,
                       "%d, turned: %s", _i, names[got]);
     }
@@ -503,7 +518,7 @@ static void check_points(query_model *a, query_model *b, const double shift[3], 
     ebpo_pose pa = EBPO_POSE_INIT, pb = EBPO_POSE_INIT;
     facts f = { 0 };
     memcpy(pb.translation, shift, sizeof pb.translation);
-    int32_t got = ask_both_ways(a->model, &pa, b->model, &pb);
+    int32_t got = ask_both_ways(a, &pa, b, &pb);
     for (uint64_t i = 0; i < query_scaled(200); i++) {
         double x[2][3];
         query_truth truth[2];
