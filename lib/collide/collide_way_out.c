@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "base/fp_env.h"
-#include "collide/way_search.h"
+#include "collide/subtree_way.h"
 
 /* The question's first model's direction, times a power of two, which is told. */
 static int set_direction(ebpo_way_search *s, const double direction[3])
@@ -21,13 +21,11 @@ static int set_direction(ebpo_way_search *s, const double direction[3])
 static void tell(const ebpo_way_search *s, int exponent, ebpo_way_out *out)
 {
     double lo = 0, hi = ldexp(s->hi, -exponent) * (1 + 0x1p-50);
-    *out = (ebpo_way_out){ .pair = { EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE,
-                                     EBPO_PAIR_APART, 0 } };
+    *out = (ebpo_way_out){ .pair = s->pair };
     if (s->last.ever) {
         ebpo_sweep_time t = s->last;
         t.unit -= exponent;
         lo = ebpo_sweep_time_round(&t);
-        out->pair = ebpo_collision_pair(s->question, s->side[0].accel, s->side[1].accel, &s->pair);
     }
     out->t = ebpo_certain_of(lo, s->hi < 0 ? lo : fmax(lo, hi));
 }
@@ -41,14 +39,15 @@ ebpo_status ebpo_collide_way_out(ebpo_collider *c, const ebpo_collide_options *o
     if (!(size > 0x1p-500 && size < 0x1p500))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "a direction of three finite numbers, not all 0, is needed");
-    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_way_search s = { .question = &q, .hi = -1 };
+    ebpo_way_search s = { .question = &q };
     int exponent = set_direction(&s, direction);
-    ebpo_sweep_time_init(&s.last);
-    if (q.model[0]->whole->bound_count > 0 && q.model[1]->whole->bound_count > 0)
-        status = ebpo_way_search_run(&s, error);
+    ebpo_way_search_begin(&s);
+    const ebpo_accel *const whole[2] = { q.model[0]->whole, q.model[1]->whole };
+    status = ebpo_collision_is_in_parts(&q) ? ebpo_way_of_parts(&s, error)
+                                            : ebpo_way_search_run(&s, whole, error);
     if (status == EBPO_OK)
         tell(&s, exponent, out);
     ebpo_sweep_time_clear(&s.last);

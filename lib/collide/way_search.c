@@ -38,16 +38,12 @@ static ebpo_way_pair pop(ebpo_way_search *s)
 
 /* --- extents along the three axes --- */
 
-typedef struct extent {
-    double low[3], high[3];
-} extent;
-
-static extent extent_of(const ebpo_way_search *s, int which, uint32_t ref)
+static ebpo_way_extent extent_of(const ebpo_way_search *s, int which, uint32_t ref)
 {
     const ebpo_way_side *side = &s->side[which];
     const ebpo_bound *b = &side->accel->bound[ref / 8];
     double middle[3], half[3];
-    extent out;
+    ebpo_way_extent out;
     for (int k = 0; k < 3; k++) {
         ebpo_bound_sides ends = ebpo_bound_side(b, (int)(ref % 8), k);
         middle[k] = (ends.low + ends.high) / 2;
@@ -63,8 +59,7 @@ static extent extent_of(const ebpo_way_search *s, int which, uint32_t ref)
     return out;
 }
 
-/* The greatest t at which boxes with these extents may have a common point; less than 0: none. */
-static double most_of(const ebpo_way_search *s, const extent *a, const extent *b)
+double ebpo_way_most(const ebpo_way_search *s, const ebpo_way_extent *a, const ebpo_way_extent *b)
 {
     for (int i = 1; i < 3; i++)
         if (b->low[i] - a->high[i] > s->lost || a->low[i] - b->high[i] > s->lost)
@@ -98,32 +93,33 @@ static double dot(const double x[3], const double y[3])
     return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
 }
 
-static void make_side(ebpo_way_search *s, int which, const double axis[3][3])
+static void make_side(ebpo_way_search *s, int which, const ebpo_accel *accel)
 {
     ebpo_way_side *side = &s->side[which];
     double centre[3];
-    side->accel = s->question->model[which]->whole;
+    side->accel = accel;
     side->posing = &s->question->posing[which].posing;
     ebpo_posing_apply(side->posing, side->accel->centre, centre);
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) {
             double column[3] = { side->posing->matrix[0][k], side->posing->matrix[1][k],
                                  side->posing->matrix[2][k] };
-            side->row[i][k] = dot(axis[i], column) / side->accel->scale;
+            side->row[i][k] = dot(s->axis[i], column) / side->accel->scale;
         }
-        side->base[i] = dot(axis[i], centre);
+        side->base[i] = dot(s->axis[i], centre);
     }
 }
 
 /* --- faces --- */
 
-static bool comes_first(const ebpo_way_search *s, const ebpo_met_pair *x, const ebpo_met_pair *y)
+/* In the order of the question's models. */
+static bool comes_first(const ebpo_way_search *s, const ebpo_met_pair *x)
 {
     uint64_t a = ebpo_accel_file_face(s->side[0].accel, x->a),
-             b = ebpo_accel_file_face(s->side[0].accel, y->a);
-    return a != b ? a < b
-                  : ebpo_accel_file_face(s->side[1].accel, x->b) <
-                        ebpo_accel_file_face(s->side[1].accel, y->b);
+             b = ebpo_accel_file_face(s->side[1].accel, x->b);
+    const uint64_t has[2] = { s->pair.file_face_a, s->pair.file_face_b };
+    bool turned = s->question->turned;
+    return a != has[turned] ? a < has[turned] : b < has[!turned];
 }
 
 static void look_at_faces(ebpo_way_search *s, const double a[3][3], const double b[3][3],
@@ -137,12 +133,12 @@ static void look_at_faces(ebpo_way_search *s, const double a[3][3], const double
     ebpo_sweep_time_init(&t);
     ebpo_sweep_last(a, b, s->direction, &t);
     int order = t.ever && mpz_sgn(t.numerator) >= 0 ? ebpo_sweep_time_compare(&t, &s->last) : -1;
-    if (order > 0 || (order == 0 && comes_first(s, pair, &s->pair))) {
+    if (order > 0 || (order == 0 && comes_first(s, pair))) {
         mpz_swap(t.numerator, s->last.numerator);
         mpz_swap(t.denominator, s->last.denominator);
         s->last.unit = t.unit;
         s->last.ever = true;
-        s->pair = *pair;
+        s->pair = ebpo_collision_pair(s->question, s->side[0].accel, s->side[1].accel, pair);
         s->sure = fmax(0, nextafter(ebpo_sweep_time_round(&s->last), 0));
     }
     ebpo_sweep_time_clear(&t);
@@ -174,7 +170,7 @@ static uint32_t child_of(const ebpo_way_search *s, int which, uint32_t ref)
     return s->side[which].accel->bound[ref / 8].child[ref % 8];
 }
 
-static double size_of(const extent *e)
+static double size_of(const ebpo_way_extent *e)
 {
     return e->high[0] - e->low[0] + (e->high[1] - e->low[1]) + (e->high[2] - e->low[2]);
 }
@@ -183,14 +179,14 @@ static double size_of(const extent *e)
 static ebpo_status offer_children(ebpo_way_search *s, int which, uint32_t node, uint32_t other,
                                   ebpo_error *error)
 {
-    extent seen[2];
+    ebpo_way_extent seen[2];
     seen[!which] = extent_of(s, !which, other);
     for (uint32_t i = 0; i < s->side[which].accel->bound[node].count; i++) {
         uint32_t ref[2];
         ref[which] = node * 8 + i;
         ref[!which] = other;
         seen[which] = extent_of(s, which, ref[which]);
-        ebpo_way_pair pair = { most_of(s, &seen[0], &seen[1]), ref[0], ref[1] };
+        ebpo_way_pair pair = { ebpo_way_most(s, &seen[0], &seen[1]), ref[0], ref[1] };
         if (pair.most < s->sure)
             continue;
         if (!push(s, &pair))
@@ -208,19 +204,24 @@ static ebpo_status divide(ebpo_way_search *s, const ebpo_way_pair *pair, ebpo_er
         look_at_blocks(s, child[0] & ~EBPO_IS_BLOCK, child[1] & ~EBPO_IS_BLOCK);
         return EBPO_OK;
     }
-    extent a = extent_of(s, 0, pair->a), b = extent_of(s, 1, pair->b);
+    ebpo_way_extent a = extent_of(s, 0, pair->a), b = extent_of(s, 1, pair->b);
     int which = block[0] || (!block[1] && size_of(&b) > size_of(&a));
     return offer_children(s, which, child[which], which ? pair->a : pair->b, error);
 }
 
-static ebpo_status begin(ebpo_way_search *s, ebpo_error *error)
+void ebpo_way_search_begin(ebpo_way_search *s)
 {
-    double axis[3][3];
-    make_axes(s->direction, axis);
-    for (int w = 0; w < 2; w++)
-        make_side(s, w, (const double(*)[3])axis);
-    s->step = dot(axis[0], s->direction);
+    ebpo_sweep_time_init(&s->last);
+    make_axes(s->direction, s->axis);
+    s->step = dot(s->axis[0], s->direction);
     s->lost = 0x1p-40 * s->question->reach;
+    s->hi = -1;
+    s->pair = (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE,    EBPO_NO_FACE,
+                                EBPO_NO_FACE, EBPO_PAIR_APART, 0 };
+}
+
+static ebpo_status offer_tops(ebpo_way_search *s, ebpo_error *error)
+{
     ebpo_status status = EBPO_OK;
     const ebpo_accel *b = s->side[1].accel;
     for (uint32_t j = 0; j < b->bound[b->top].count && status == EBPO_OK; j++)
@@ -228,10 +229,15 @@ static ebpo_status begin(ebpo_way_search *s, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_way_search_run(ebpo_way_search *s, ebpo_error *error)
+ebpo_status ebpo_way_search_run(ebpo_way_search *s, const ebpo_accel *const accel[2],
+                                ebpo_error *error)
 {
     const ebpo_progress *progress = &s->question->options.progress;
-    ebpo_status status = begin(s, error);
+    if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
+        return EBPO_OK;
+    for (int w = 0; w < 2; w++)
+        make_side(s, w, accel[w]);
+    ebpo_status status = offer_tops(s, error);
     while (status == EBPO_OK && s->count > 0 && s->pairs[0].most >= s->sure) {
         if (ebpo_collision_is_late(s->question))
             break;
@@ -242,8 +248,10 @@ ebpo_status ebpo_way_search_run(ebpo_way_search *s, ebpo_error *error)
         ebpo_way_pair pair = pop(s);
         status = divide(s, &pair, error);
     }
-    s->hi = s->count > 0 && s->pairs[0].most >= s->sure ? s->pairs[0].most : -1;
+    if (s->count > 0 && s->pairs[0].most >= s->sure)
+        s->hi = fmax(s->hi, s->pairs[0].most);
     free(s->pairs);
     s->pairs = NULL;
+    s->count = s->capacity = 0;
     return status;
 }

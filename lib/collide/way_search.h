@@ -25,20 +25,33 @@ typedef struct ebpo_way_search {
     /* In: */
     const ebpo_collision *question;
     double direction[3]; /* in which the question's first model moves; the greatest is 1/2 .. 1 */
-    /* Out: the last contact, in units of that direction, and who has it, by local numbers; none
-     * before 0. */
+    /* Out: the last contact, in units of that direction, and who has it; none before 0. */
     ebpo_sweep_time last;
-    ebpo_met_pair pair;
-    double hi; /* it is not later, certainly: less than 0, none is */
+    ebpo_face_pair pair; /* of the caller's A and B */
+    double hi;           /* what was left out is not later, certainly: less than 0, nothing was */
     /* Begins as 0: */
     ebpo_way_side side[2];
+    double axis[3][3];    /* at right angles; the first is the direction */
     double step, lost;    /* direction along the first axis; what rounding moves extents by */
     double sure;          /* `last` is not earlier */
     ebpo_way_pair *pairs; /* a heap, the greatest first */
     uint64_t count, capacity, looked;
 } ebpo_way_search;
 
-/* EBPO_E_MEMORY, EBPO_E_CANCELLED. `last` is the caller's to clear, also then. */
-EBPO_MUST_USE ebpo_status ebpo_way_search_run(ebpo_way_search *search, ebpo_error *error);
+/* Where a convex set, or what is in it, is along the axes. */
+typedef struct ebpo_way_extent {
+    double low[3], high[3];
+} ebpo_way_extent;
+
+/* Once; `last` is the caller's to clear. */
+void ebpo_way_search_begin(ebpo_way_search *search);
+
+/* The greatest t at which what has these extents may have a common point; less than 0: none. */
+double ebpo_way_most(const ebpo_way_search *search, const ebpo_way_extent *a,
+                     const ebpo_way_extent *b);
+
+/* Goes on with two accels of the question's models. EBPO_E_MEMORY, EBPO_E_CANCELLED. */
+EBPO_MUST_USE ebpo_status ebpo_way_search_run(ebpo_way_search *search,
+                                              const ebpo_accel *const accel[2], ebpo_error *error);
 
 #endif

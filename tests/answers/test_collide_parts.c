@@ -284,6 +284,49 @@ static void check_relation(const two_models *t, const ebpo_pose pose[2], const c
                   both.contact, one.contact, swapped.contact);
 }
 
+/* --- the way out --- */
+
+static ebpo_way_out way_out(ebpo_collider *c, const ebpo_pose pose[2], const double d[3],
+                            uint64_t deadline)
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_way_out out;
+    options.pose_a = pose[0];
+    options.pose_b = pose[1];
+    options.deadline_ns = deadline;
+    ASSERT_OK(ebpo_collide_way_out(c, &options, d, &out, error));
+    return out;
+}
+
+static ebpo_way_out turned_way(ebpo_way_out w)
+{
+    const ebpo_face_pair p = w.pair;
+    w.pair = (ebpo_face_pair){ p.face_b, p.face_a, p.file_face_b, p.file_face_a, p.kind, 0 };
+    return w;
+}
+
+/* Along an axis many faces part at the same time. */
+static void check_way_out(const two_models *t, const ebpo_pose pose[2], uint64_t *state,
+                          const char *what)
+{
+    const ebpo_pose back[2] = { pose[1], pose[0] };
+    double d[3], against[3];
+    uint64_t axis = ebpo_test_random(state) % 6;
+    for (uint64_t k = 0; k < 3; k++) {
+        d[k] = axis < 3 ? (double)(axis == k) : ebpo_test_random_unit(state) - 0.5;
+        against[k] = -d[k];
+    }
+    ebpo_way_out want = way_out(t->whole, pose, d, 0), both = way_out(t->parts, pose, d, 0),
+                 one = way_out(t->one, pose, d, 0), late = way_out(t->parts, pose, d, 1),
+                 swapped = turned_way(way_out(t->swapped, back, against, 0));
+    ck_assert_int_eq(want.t.figure, EBPO_FIGURE_EXACT);
+    ck_assert_msg(memcmp(&want, &both, sizeof want) == 0 && memcmp(&want, &one, sizeof want) == 0 &&
+                      memcmp(&want, &swapped, sizeof want) == 0,
+                  "%s: out by %.17g, of parts %.17g, %.17g, %.17g", what, want.t.lo, both.t.lo,
+                  one.t.lo, swapped.t.lo);
+    ck_assert_msg(late.t.lo <= want.t.lo && want.t.lo <= late.t.hi, "%s: late way out", what);
+}
+
 START_TEST(parts_give_what_whole_models_do)
 {
     two_models t;
@@ -301,6 +344,7 @@ START_TEST(parts_give_what_whole_models_do)
         check_others(&t, pose, what);
         check_contacts(&t, pose, kind % 2 == 0, what);
         check_relation(&t, pose, what);
+        check_way_out(&t, pose, &state, what);
     }
     free_two(&t);
 }
@@ -339,15 +383,33 @@ static ebpo_collider_stats stats_of(const ebpo_collider *c)
 }
 
 /* What is read is told. */
-static void check_far_relations(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose *b,
-                                int32_t expected)
+static void check_far_relation(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose pose[2],
+                               int32_t expected)
 {
-    const ebpo_pose pose[2] = { EBPO_POSE_INIT, *b };
     ebpo_collider_stats before = stats_of(parts);
     ebpo_relation_result want = relate(whole, pose), got = relate(parts, pose);
     ck_assert_int_eq(want.relation, expected);
     ck_assert(memcmp(&want, &got, sizeof want) == 0);
     ck_assert_uint_gt(stats_of(parts).bytes_read, before.bytes_read);
+}
+
+static void check_far_way_out(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose pose[2])
+{
+    const double d[3] = { 1, 0.25, 0.5 };
+    ebpo_collider_stats before = stats_of(parts);
+    ebpo_way_out want = way_out(whole, pose, d, 0), got = way_out(parts, pose, d, 0);
+    ck_assert_double_gt(want.t.lo, 0);
+    ck_assert(memcmp(&want, &got, sizeof want) == 0);
+    ck_assert_uint_gt(stats_of(parts).loads, before.loads);
+    ck_assert_uint_gt(stats_of(parts).bytes_read, before.bytes_read);
+}
+
+static void check_far(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose *b,
+                      int32_t relation)
+{
+    const ebpo_pose pose[2] = { EBPO_POSE_INIT, *b };
+    check_far_relation(whole, parts, pose, relation);
+    check_far_way_out(whole, parts, pose);
 }
 
 /* Two models, each of which would take more than all of it. */
@@ -379,10 +441,10 @@ START_TEST(one_budget_holds_for_both)
     ck_assert_double_gt(far.distance.hi, 0);
     ck_assert(memcmp(&far, &same, sizeof far) == 0);
     ck_assert_uint_gt(evicted(part[0]) + evicted(part[1]), 0);
-    check_far_relations(whole, parts, &pose, EBPO_INTERSECTING);
-    check_far_relations(whole, parts, &small, EBPO_B_INSIDE_A);
+    check_far(whole, parts, &pose, EBPO_INTERSECTING);
+    check_far(whole, parts, &small, EBPO_B_INSIDE_A);
     small.translation[0] = 0;
-    check_far_relations(whole, parts, &small, EBPO_DISJOINT);
+    check_far(whole, parts, &small, EBPO_DISJOINT);
     ck_assert_int_eq(ebpo_budget_get_stats(budget, &stats), EBPO_OK);
     ck_assert_uint_gt(stats.memory_peak, BUDGET / 3);
     ck_assert_uint_le(stats.memory_peak, BUDGET);
