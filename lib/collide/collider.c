@@ -154,8 +154,8 @@ ebpo_status ebpo_collision_begin_whole(ebpo_collision *out, ebpo_collider *c,
     if (status == EBPO_OK && ebpo_collision_is_in_parts(out))
         status =
             ebpo_fail(error, EBPO_E_LIMIT,
-                      "a model is not all in memory, as its relation to another one and depths "
-                      "need it: give a larger budget, or fetch a file that is far away");
+                      "a model is not all in memory, as depths need it: give a larger budget, or "
+                      "fetch a file that is far away");
     return status;
 }
 

@@ -16,8 +16,8 @@
  * Poses are those of pose.h: decisions are exact on posed coordinates. Swapping the models, threads
  * and processors change nothing; nor do budgets, but for the one pair of faces that meet which
  * ebpo_collide_first and ebpo_collide_distance tell. Of models in parts (ebpo/query.h: a budget, a
- * cut level) ebpo_collide_relation and ebpo_collide_depth cannot be asked. What the kinds of pairs
- * mean: docs/develop/collision.md.
+ * cut level) ebpo_collide_depth cannot be asked. What the kinds of pairs mean:
+ * docs/develop/collision.md.
  */
 #ifndef EBPO_COLLIDE_H
 #define EBPO_COLLIDE_H
@@ -159,10 +159,13 @@ typedef struct ebpo_relation_result {
 /*
  * How the models lie to each other, exact. A pair of faces that cross nearly always decides, and
  * of shells that meet nothing a face of each; of models that only touch, every face in contact is
- * looked at. Each model takes 4 bytes a face more in the collider, and some 60 for the call.
+ * looked at. Each model that is all in memory takes 4 bytes a face more in the collider, and some
+ * 60 for the call; one in parts half a byte a face, and some 60 for each of a subtree's. Of that,
+ * subtrees with faces in contact are loaded, and of faces without contact those that may lie on a
+ * side of the other model where none has been seen.
  *
- * EBPO_E_LIMIT: a model is in parts. Other errors are those of ebpo_collide_first; after the
- * deadline it succeeds. EBPO_E_ABSENT: as for ebpo_inside.
+ * Errors are those of ebpo_collide_first; after the deadline it succeeds. EBPO_E_ABSENT: as for
+ * ebpo_inside.
  *
  * Threads: one per collider; further ones live for the call.
  */
@@ -426,10 +429,12 @@ typedef struct ebpo_way_out {
  * meet neither where they are nor on the way. Posed coordinates are moved without rounding. t is
  * not the first moment at which they part: what comes later is in the way, too.
  *
+ * Of models in parts subtrees are loaded whose envelopes part later than what has been found.
+ *
  * direction   of any length, which is the unit of t; its 1-norm within 2^-500 .. 2^500
  *
- * EBPO_E_LIMIT: also a model is not all in memory. EBPO_E_ARGUMENT: also the direction. Others as
- * for ebpo_collide_first; after the deadline it succeeds.
+ * EBPO_E_ARGUMENT: also the direction. Others as for ebpo_collide_first; after the deadline it
+ * succeeds.
  *
  * Threads: one per collider.
  */
