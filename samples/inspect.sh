@@ -1,6 +1,6 @@
 #!/bin/sh
-# Looks into a file with HDF5's own tools: what it is, what it holds, one level. Needs no
-# environment variable once ebpo is installed.
+# Looks into a file with HDF5's own tools: what it is, what it holds, one level. Their plugin is that
+# of the ebpo which the shell finds, unless HDF5_PLUGIN_PATH says otherwise.
 # Usage: samples/inspect.sh FILE.ebpo.h5 [LEVEL]
 set -eu
 file=${1:?usage: inspect.sh FILE.ebpo.h5 [LEVEL]}
@@ -9,6 +9,9 @@ case ${2:-1} in
 [0-9][0-9]) level=$2 ;;
 *) echo "inspect.sh: $2 is no level; levels are 0 to 20" >&2; exit 2 ;;
 esac
+
+plugin=$(ebpo --version --verbose 2>/dev/null | sed -n 's,^HDF5 plugin: /,/,p')
+[ -z "$plugin" ] || export HDF5_PLUGIN_PATH="${HDF5_PLUGIN_PATH-$plugin}"
 
 h5ls "$file" >/dev/null 2>&1 || { echo "inspect.sh: $file: not there, or not an HDF5 file" \
     >&2; exit 1; }

@@ -4,8 +4,8 @@
 set -eu
 cd "$(dirname "$0")/.."
 sh tools/install-deps.sh --demo
-# /usr/local/lib is where the loader looks on every Debian.
-meson setup build-quick --libdir=lib -Dtests=disabled $([ -d build-quick ] && echo --reconfigure)
+# The plugin goes where HDF5's own tools look for it.
+meson setup build-quick -Dplugin_dir=system -Dtests=disabled $([ -d build-quick ] && echo --reconfigure)
 ninja -C build-quick
 sudo=
 [ "$(id -u)" = 0 ] || sudo=sudo

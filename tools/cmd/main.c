@@ -9,6 +9,7 @@
 #include "cli/signals.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
+#include "cmd/version_facts.h"
 
 static const command *const commands[] = {
     &command_convert, &command_check,  &command_info,   &command_levels, &command_view,
@@ -34,10 +35,12 @@ static void usage(FILE *out)
     for (int i = 0; i < COMMANDS; i++)
         fprintf(out, "  %-10s %s\n", commands[i]->spec->command, commands[i]->spec->summary);
     fprintf(out, "  %-10s %s\n", "help", "describe a command and its options: ebpo help COMMAND");
-    fprintf(out, "\n  --version  print the version and exit\n\nexit codes: 0 success, 1 bad data "
-                 "or input/output, 2 wrong usage, 3 not a solid where one is required, 4 (repack) "
-                 "the content "
-                 "would differ\n");
+    fprintf(out,
+            "\n  --version  print the version and exit; with --verbose, where the program, its "
+            "library and the HDF5 plugin are\n\nexit codes: 0 success, 1 bad data "
+            "or input/output, 2 wrong usage, 3 not a solid where one is required, 4 (repack) "
+            "the content "
+            "would differ\n");
 }
 
 static int unknown_command(const char *name)
@@ -87,12 +90,8 @@ static int dispatch(int argc, char **argv)
         return EXIT_USAGE;
     }
     const char *name = argv[1];
-    if (strcmp(name, "--version") == 0 || strcmp(name, "-V") == 0) {
-        char format[32];
-        printf("ebpo %s, format %s\n", ebpo_version(),
-               words_format(format, sizeof format, EBPO_FORMAT_MAJOR, EBPO_FORMAT_MINOR));
-        return EXIT_FINE;
-    }
+    if (strcmp(name, "--version") == 0 || strcmp(name, "-V") == 0)
+        return version_tell(argv[2]);
     if (strcmp(name, "help") == 0 || strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0)
         return help(argc, argv);
     const command *c = find(name);

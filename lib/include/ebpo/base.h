@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: what all parts of the library share.
  *
  *   Versions   EBPO_VERSION_NUMBER, ebpo_version

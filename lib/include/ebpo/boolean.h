@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: unions, intersections and differences of solids at poses, by query.
  *
  *   Expressions     ebpo_boolean_new

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: from a mesh to a tree.
  *
  *     ebpo_mesh mesh;

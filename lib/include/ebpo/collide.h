@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: two models that meet.
  *
  *   Two models       ebpo_collider_new, one for each thread that asks

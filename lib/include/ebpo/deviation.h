@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: how far a level's envelopes reach beyond the model.
  */
 #ifndef EBPO_DEVIATION_H

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: the whole public interface.
  *
  *   base.h        versions, errors, progress, outputs

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: levels and the mesh in other programs' formats. PLY is
  * written by ebpo_mesh_write_ply (mesh.h).
  */

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: what an .ebpo.h5 file holds, reading and writing it.
  * format-spec/ describes the same, byte by byte.
  *

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: files on web servers and object stores, read by ranges.
  *
  *     ebpo_open("https://example.org/model.ebpo.h5", &file, &error);

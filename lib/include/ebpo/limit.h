@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: what no convex envelope can be better than.
  */
 #ifndef EBPO_LIMIT_H

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: a level as closed polygons.
  */
 #ifndef EBPO_LOD_H

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: how much memory there is.
  */
 #ifndef EBPO_MEMORY_H

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: triangle meshes.
  *
  *   Reading    ebpo_mesh_read, ebpo_points_parse_ply

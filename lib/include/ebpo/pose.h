@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: where a model is in the world.
  *
  * Each vertex is brought to the world by its model's pose, in doubles, with one rounding for each

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: questions to a file, with as much of it in memory as one
  * allows.
  *

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: rows of numbers from any HDF5 file, to ask about.
  */
 #ifndef EBPO_ROWS_H

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: scenes. Models at many places, that move.
  *
  *   Making      ebpo_scene_open (a file: format-spec/scene.md), ebpo_scene_new,

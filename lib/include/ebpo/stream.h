@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: levels, coarse to fine, one after the other.
  *
  *     ebpo_stream_new(file, NULL, &stream, &error);

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: a smaller file from a file. Levels, a box, parts, or as
  * much as fits.
  *

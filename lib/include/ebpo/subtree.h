@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: a part of a model as plain arrays. The subtree of a node: its nodes, their
  * envelopes, and its faces with coordinates.
  *

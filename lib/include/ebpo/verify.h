@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: proving that a file keeps its promises.
  */
 #ifndef EBPO_VERIFY_H

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: nodes in the order in which they matter to an observer, as
  * many as a budget allows.
  *

@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: how much memory reading, building and verifying may use.
  *
  *     ebpo_workspace_options options = EBPO_WORKSPACE_OPTIONS_INIT;

@@ -1,0 +1,76 @@
+#!/bin/sh
+# What is installed works from wherever it lies, for a user who owns nothing else: test_install.sh
+# MESON BUILD_ROOT SOURCE_ROOT PREFIX EBPO_INPUTS. Leaves the build folder as it was.
+set -u
+meson=$1 build=$2 source=$3 prefix=$4 inputs=$5
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+fail() { echo "FAILED: $1"; cat "$work/out"; exit 1; }
+unset LD_LIBRARY_PATH HDF5_PLUGIN_PATH
+
+# What `ninja uninstall` reads is of the user's own installation.
+log=$build/meson-logs/install-log.txt
+[ -f "$log" ] && cp -p "$log" "$work/log"
+DESTDIR="$work/all" "$meson" install -C "$build" --no-rebuild >"$work/out" 2>&1
+installed=$?
+if [ -f "$work/log" ]; then cp -p "$work/log" "$log"; else rm -f "$log"; fi
+[ $installed = 0 ] || fail "meson install"
+
+# Nothing lies beside the prefix.
+find "$work/all" ! -type d ! -path "$work/all$prefix/*" >"$work/out"
+[ ! -s "$work/out" ] || fail "files outside of the prefix"
+
+# Elsewhere, and with spaces: the program finds its library and the plugin.
+own="$work/a private prefix"
+mv "$work/all$prefix" "$own" && own=$(cd "$own" && pwd -P)
+ebpo=$own/bin/ebpo
+"$ebpo" --version --verbose >"$work/out" 2>&1 || fail "ebpo --version --verbose"
+library=$(sed -n 's/^library: \(.*\) ([0-9.]*)$/\1/p' "$work/out")
+plugin=$(sed -n 's/^HDF5 plugin: //p' "$work/out")
+grep -qx "program: $ebpo" "$work/out" || fail "which program runs"
+case $library in "$own"/*/libebpo.so.*) ;; *) fail "which library runs" ;; esac
+case $plugin in "$own"/*) ;; *) fail "where the plugin is" ;; esac
+[ -f "$plugin/libebpo_h5zstd.so" ] || fail "the plugin is not where it is said to be"
+
+# A file, and HDF5's own tools with the plugin.
+"$inputs" "$work" >"$work/out" 2>&1 || fail inputs
+"$ebpo" convert -q "$work/sphere.ply" "$work/s.ebpo.h5" >"$work/out" 2>&1 || fail convert
+"$ebpo" verify -q "$work/s.ebpo.h5" --against "$work/sphere.ply" >"$work/out" 2>&1 || fail verify
+if command -v h5dump >/dev/null; then
+    HDF5_PLUGIN_PATH=$plugin h5dump -d /mesh/faces "$work/s.ebpo.h5" >"$work/out" 2>&1 || fail h5dump
+fi
+
+# An older copy in the loader's way is told by name, and a newer program told apart from it.
+mkdir "$work/old" && cp "$library" "$work/old/$(basename "$(ls -d "${library%.so.*}".so.?)")" || exit 1
+LD_LIBRARY_PATH="$work/old" "$ebpo" --version --verbose >"$work/out" 2>&1 &&
+    fail "an older copy is not noticed"
+grep -q "^library: $work/old/libebpo" "$work/out" || fail "the copy is not named"
+grep -q "^ebpo: the library that runs is not the one .*$library; $work/old/.* loader's way" "$work/out" ||
+    fail "what to do about the copy"
+
+# Programs of others find the library by pkg-config, as it is installed.
+grep -qx 'libdir=${prefix}/lib.*' "$own"/lib*/pkgconfig/ebpo.pc 2>"$work/out" ||
+    grep -rqx 'libdir=${prefix}/lib.*' "$own"/lib/*/pkgconfig/ebpo.pc 2>>"$work/out" || fail "ebpo.pc"
+
+# Configured for a machine whose programs do not run here, none is run.
+cat >"$work/cross.txt" <<'CROSS'
+[binaries]
+c = 'cc'
+ar = 'ar'
+pkgconfig = 'pkg-config'
+pkg-config = 'pkg-config'
+[properties]
+needs_exe_wrapper = true
+[host_machine]
+system = 'linux'
+cpu_family = 'x86_64'
+cpu = 'x86_64'
+endian = 'little'
+CROSS
+"$meson" setup "$work/cross" "$source" --cross-file "$work/cross.txt" -Dtests=disabled \
+    --prefix "$own" >"$work/out" 2>&1 || fail "meson setup for another machine"
+"$meson" setup "$work/system" "$source" --cross-file "$work/cross.txt" -Dtests=disabled \
+    -Dplugin_dir=system >"$work/out" 2>&1 && fail "HDF5 is asked, which cannot run"
+grep -q 'plugin_dir=system asks HDF5 itself, which cannot run here; name the folder' "$work/out" ||
+    fail "what to do when HDF5 cannot be asked"
+echo fine
