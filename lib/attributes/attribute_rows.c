@@ -1,5 +1,7 @@
 /* Rows of attributes: others of them, in another order; lists that are columns; what values reach.
  */
+#include "geom/strict_fp.h"
+
 #include <string.h>
 
 #include "attributes/attributes.h"

@@ -1,4 +1,6 @@
 /* A component as a mesh of its own, which knows the numbers of the source. */
+#include "geom/strict_fp.h"
+
 #include <stdlib.h>
 #include <string.h>
 
