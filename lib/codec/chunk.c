@@ -85,19 +85,51 @@ uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes)
     return high << 16 | low;
 }
 
-static ebpo_status zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw,
-                               size_t raw_bytes, uint8_t *out, size_t *out_bytes)
+/* A shuffled chunk is planes of bytes that have little in common: the low ones are noise, the high
+ * ones nearly all alike. Each in a block of its own has a table of codes of its own. Short matches
+ * are left alone: in such planes they cost more than single bytes. Chunks too small to gain by any
+ * of that are as HDF5's filter makes them. */
+static bool zstd_begin(ZSTD_CCtx *out, int level, size_t raw_bytes)
 {
+    enum { LARGE = 4096, LEVEL_OF_LARGE = 7, MATCH_LEAST = 6 };
+    bool effort = !level && raw_bytes >= LARGE;
+    if (!level)
+        level = effort ? LEVEL_OF_LARGE : EBPO_ZSTD_LEVEL;
+    return !ZSTD_isError(ZSTD_CCtx_reset(out, ZSTD_reset_session_and_parameters)) &&
+           !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_compressionLevel, level)) &&
+           !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_checksumFlag, 1)) &&
+           (!effort || !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_minMatch, MATCH_LEAST)));
+}
+
+static size_t zstd_planes(ZSTD_CCtx *zstd, const uint8_t *raw, size_t raw_bytes, size_t plane,
+                          uint8_t *out)
+{
+    ZSTD_outBuffer to = { out, ebpo_chunk_bound(raw_bytes), 0 };
+    size_t left = ZSTD_CCtx_setPledgedSrcSize(zstd, raw_bytes);
+    for (size_t at = 0; at < raw_bytes && left == 0; at += plane) {
+        ZSTD_inBuffer from = { raw + at, plane, 0 };
+        left = ZSTD_compressStream2(zstd, &to, &from,
+                                    at + plane == raw_bytes ? ZSTD_e_end : ZSTD_e_flush);
+    }
+    return left ? (size_t)-1 : to.pos; /* an error, as ZSTD_isError has it */
+}
+
+static ebpo_status zstd_encode(ebpo_chunk_coder *coder, int level, size_t element_size,
+                               const uint8_t *raw, size_t raw_bytes, uint8_t *out,
+                               size_t *out_bytes)
+{
+    enum { PLANE_LEAST = 1024 }; /* a table of codes takes some 100 bytes */
+    size_t plane = raw_bytes / element_size;
     if (!coder->zstd_out)
         coder->zstd_out = ZSTD_createCCtx();
     if (!coder->zstd_out)
         return EBPO_E_MEMORY;
-    size_t failed = ZSTD_isError(ZSTD_CCtx_setParameter(coder->zstd_out, ZSTD_c_compressionLevel,
-                                                        level ? level : EBPO_ZSTD_LEVEL));
-    failed |= ZSTD_isError(ZSTD_CCtx_setParameter(coder->zstd_out, ZSTD_c_checksumFlag, 1));
-    if (failed)
+    if (!zstd_begin(coder->zstd_out, level, raw_bytes))
         return EBPO_E_ARGUMENT;
-    size_t size = ZSTD_compress2(coder->zstd_out, out, ebpo_chunk_bound(raw_bytes), raw, raw_bytes);
+    size_t size =
+        element_size > 1 && plane >= PLANE_LEAST
+            ? zstd_planes(coder->zstd_out, raw, raw_bytes, plane, out)
+            : ZSTD_compress2(coder->zstd_out, out, ebpo_chunk_bound(raw_bytes), raw, raw_bytes);
     *out_bytes = size;
     return ZSTD_isError(size) ? EBPO_E_MEMORY : EBPO_OK; /* the bound leaves no other cause */
 }
@@ -122,7 +154,7 @@ ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, i
         raw = coder->scratch;
     }
     if (pipeline == EBPO_PIPELINE_ZSTD)
-        return zstd_encode(coder, level, raw, raw_bytes, out, out_bytes);
+        return zstd_encode(coder, level, element_size, raw, raw_bytes, out, out_bytes);
     if (pipeline == EBPO_PIPELINE_DEFLATE) {
         status = deflate_encode(level, raw, raw_bytes, out, out_bytes);
     } else {

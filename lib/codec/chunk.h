@@ -7,7 +7,7 @@
 
 enum {
     EBPO_CHUNK_BYTES_MAX = 65536, /* of one chunk before compression */
-    EBPO_ZSTD_LEVEL = 3,
+    EBPO_ZSTD_LEVEL = 3,          /* of small chunks; what headers state */
     EBPO_DEFLATE_LEVEL = 6
 };
 
@@ -33,7 +33,7 @@ void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder);
 size_t ebpo_chunk_bound(size_t raw_bytes);
 
 /* Encodes raw_bytes (a multiple of element_size) into `out` of ebpo_chunk_bound(raw_bytes) bytes.
- * `level` 0: the default. */
+ * `level` 0: the default, which in zstd goes by the chunk's size. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
                                             int level, size_t element_size, const uint8_t *raw,
                                             size_t raw_bytes, uint8_t *out, size_t *out_bytes);

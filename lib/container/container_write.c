@@ -87,16 +87,6 @@ static void digest_slots(writer *w)
     }
 }
 
-/* Small chunks cost bytes: where nobody asks for a level, somewhat more effort for the arrays that
- * it makes smaller. Faces and lists of them it makes larger. */
-static int level_for(const writer *w, const ebpo_array_out *array)
-{
-    enum { ZSTD_MORE = 5 };
-    bool more = w->plan.info.subtree_level && w->options->codec == EBPO_CODEC_ZSTD &&
-                array->id != EBPO_A_FACES && array->id != EBPO_A_LEAF_REFS;
-    return more && w->options->codec_level == 0 ? ZSTD_MORE : w->options->codec_level;
-}
-
 /* Item 0 digests the whole window, the others compress one slot each. */
 static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
@@ -108,9 +98,10 @@ static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, un
             continue;
         }
         slot *s = &w->slots[i - 1];
-        ebpo_status status = ebpo_chunk_encode(&w->coders[worker], s->array->shape.pipeline,
-                                               level_for(w, s->array), s->array->shape.element_size,
-                                               s->raw, s->raw_bytes, s->stored, &s->stored_bytes);
+        ebpo_status status =
+            ebpo_chunk_encode(&w->coders[worker], s->array->shape.pipeline, w->options->codec_level,
+                              s->array->shape.element_size, s->raw, s->raw_bytes, s->stored,
+                              &s->stored_bytes);
         if (status != EBPO_OK)
             return ebpo_fail_at(error, status, w->head.out.shown, s->array->path, -1,
                                 "a chunk could not be compressed");

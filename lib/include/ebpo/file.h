@@ -352,8 +352,8 @@ typedef struct ebpo_write_options {
     ebpo_codec codec;
 
     /*
-     * 0: the default, 6 of deflate and 3 of zstd; in files with subtrees 5 for all
-     * but faces and lists of them, which it would make larger.
+     * 0: the default, 6 of deflate; of zstd 3 for small chunks, and from 4 KiB on
+     * 7 without matches of less than six bytes.
      */
     int codec_level;
 
