@@ -124,7 +124,8 @@ function showLines() {
 
 function showBudgets() {
   const row = (b, i) => ({ title: b.part === 1 ? 'all' : `1/${b.part}`, of: methods.map((m) => m.budgets[i]) });
-  byId('memory').hidden = !methods.some((m) => m.budgets.some((b) => b.budget_distance_ns !== null));
+  byId('memory').hidden = !methods.some((m) => m.levels.some((l) => l.level_memory_bytes !== null)
+    || m.budgets.some((b) => b.budget_distance_ns !== null));
   showTable('budgets', 'memory', byMethod([
     bytes('budget', 'budget_bytes'), levelNumber('to level', 'budget_level'), lengths('width, %', 'budget_width_median'),
     nanoseconds('exact', 'budget_distance_ns'), perQuestion('loads', 'budget_loads'), bytes('read', 'budget_read_bytes'),
