@@ -102,6 +102,44 @@ ebpo_status ebpo_attributes_pick(ebpo_attributes *attributes, const char *elemen
     return EBPO_OK;
 }
 
+/* Row i is moved from rows[i], which is never before it: what is written has been read. */
+static void keep_columns(ebpo_workspace *workspace, ebpo_attribute *a, const uint32_t *rows,
+                         uint64_t count)
+{
+    size_t bytes = ebpo_attribute_row_bytes(a);
+    EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, count) {
+        if (rows[i] != i)
+            memcpy(a->values + i * bytes, a->values + rows[i] * bytes, bytes);
+    }
+}
+
+static void keep_lists(ebpo_workspace *workspace, ebpo_attribute *a, const uint32_t *rows,
+                       uint64_t count)
+{
+    size_t bytes = ebpo_attribute_bytes(a->type);
+    uint64_t at = 0;
+    EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, count) {
+        uint64_t begin = list_begin(a, rows[i]), items = a->ends[rows[i]] - begin;
+        memmove(a->values + at * bytes, a->values + begin * bytes, items * bytes);
+        a->ends[i] = at += items;
+    }
+}
+
+void ebpo_attributes_keep(ebpo_attributes *attributes, const char *element, const uint32_t *rows,
+                          uint64_t count)
+{
+    for (uint64_t i = 0; i < attributes->count; i++) {
+        ebpo_attribute *a = &attributes->array[i];
+        if (!ebpo_attribute_is_of(a, element))
+            continue;
+        if (a->ends)
+            keep_lists(attributes->workspace, a, rows, count);
+        else
+            keep_columns(attributes->workspace, a, rows, count);
+        a->rows = count;
+    }
+}
+
 /* Items of a row, and where they begin. */
 static uint64_t items_of(const ebpo_attribute *a, uint64_t row, uint64_t *begin)
 {
@@ -146,7 +184,7 @@ void ebpo_attribute_even_out(ebpo_workspace *workspace, ebpo_attribute *a)
 
 /* --- ranges --- */
 
-static double value_of(const uint8_t *at, ebpo_attribute_type type)
+double ebpo_attribute_number(const uint8_t *at, ebpo_attribute_type type)
 {
     union {
         int8_t i8;
@@ -178,7 +216,7 @@ bool ebpo_attribute_range(const ebpo_attribute *a, ebpo_workspace *workspace, do
     size_t bytes = ebpo_attribute_bytes(a->type);
     uint64_t count = ebpo_attribute_value_count(a);
     EBPO_FOR_ITEMS(workspace, i, 0, count) {
-        double v = value_of(a->values + i * bytes, a->type);
+        double v = ebpo_attribute_number(a->values + i * bytes, a->type);
         if (v != v)
             continue;
         if (!found || v < range[0])

@@ -92,6 +92,11 @@ EBPO_MUST_USE ebpo_status ebpo_attributes_pick(ebpo_attributes *attributes, cons
                                                const uint32_t *rows, uint64_t count,
                                                ebpo_error *error);
 
+/* Of an element only `count` rows stay, those that `rows` names in ascending order; cannot
+ * fail, as it takes no memory. */
+void ebpo_attributes_keep(ebpo_attributes *attributes, const char *element, const uint32_t *rows,
+                          uint64_t count);
+
 /* Whether row i of an array is row k of another one (or the same) of its type, bit for bit. */
 bool ebpo_attribute_same_row(const ebpo_attribute *a, uint64_t i, const ebpo_attribute *b,
                              uint64_t k);
@@ -109,6 +114,9 @@ typedef struct ebpo_attribute_name {
     size_t n;
 } ebpo_attribute_name;
 unsigned ebpo_attribute_names_together(const ebpo_attribute_name *names, unsigned count);
+
+/* The value of this type that stands there, at any address: exact. */
+double ebpo_attribute_number(const uint8_t *at, ebpo_attribute_type type);
 
 /* Least and greatest value, NaN aside; false: there is none. */
 bool ebpo_attribute_range(const ebpo_attribute *a, ebpo_workspace *workspace, double range[2]);

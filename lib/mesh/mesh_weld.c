@@ -24,6 +24,7 @@ typedef struct welding {
     uint64_t *heads;
     uint64_t *stays;  /* of an arranged mesh: bit s: vertex s of the source stays */
     uint64_t *before; /* [words of `stays`] bits set before it */
+    uint32_t *rows;   /* of an arranged mesh with attributes: [kept] rows of these that stay */
 } welding;
 
 static ebpo_status check_indices(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -178,27 +179,20 @@ static void note_differences(const welding *w)
                              (unsigned long long)differ);
 }
 
-/* Attributes are in the order of the source: those of the vertices that stay, in that order. */
-static ebpo_status weld_attributes(welding *w, ebpo_error *error)
+/* Attributes are in the order of the source: these vertices stay, in that order. */
+static ebpo_status list_rows(welding *w, ebpo_error *error)
 {
     ebpo_mesh *mesh = w->mesh;
-    uint32_t *rows = w->from; /* without an arrangement it is ascending */
-    if (!mesh->attributes)
+    uint64_t kept = 0;
+    if (!mesh->attributes || !mesh->arrangement)
         return EBPO_OK;
-    note_differences(w);
-    if (mesh->arrangement) {
-        rows = ebpo_array_alloc(mesh->workspace, w->kept, sizeof *rows);
-        if (!rows)
-            return ebpo_workspace_fail(mesh->workspace, w->kept * sizeof *rows, error);
-        uint64_t kept = 0;
-        EBPO_FOR_ITEMS(mesh->workspace, s, 0, mesh->vertex_count)
-            if (w->stays[s / WORD] >> s % WORD & 1)
-                rows[kept++] = (uint32_t)s;
-    }
-    ebpo_status status = ebpo_attributes_pick(mesh->attributes, "vertex", rows, w->kept, error);
-    if (mesh->arrangement)
-        ebpo_array_free(mesh->workspace, rows);
-    return status;
+    w->rows = ebpo_array_alloc(mesh->workspace, w->kept, sizeof *w->rows);
+    if (!w->rows)
+        return ebpo_workspace_fail(mesh->workspace, w->kept * sizeof *w->rows, error);
+    EBPO_FOR_ITEMS(mesh->workspace, s, 0, mesh->vertex_count)
+        if (w->stays[s / WORD] >> s % WORD & 1)
+            w->rows[kept++] = (uint32_t)s;
+    return EBPO_OK;
 }
 
 /* --- writing the result: nothing can fail from here on --- */
@@ -213,6 +207,15 @@ static ebpo_status rename_corners(void *context, uint64_t begin, uint64_t end, u
             w->mesh->faces[i] = w->map[w->mesh->faces[i]];
     }
     return EBPO_OK;
+}
+
+static void move_attributes(const welding *w)
+{
+    ebpo_attributes *attributes = w->mesh->attributes;
+    if (!attributes)
+        return;
+    note_differences(w);
+    ebpo_attributes_keep(attributes, "vertex", w->rows ? w->rows : w->from, w->kept);
 }
 
 /* A group's new index is never greater than that of any of its vertices, so moving in ascending
@@ -271,12 +274,14 @@ static ebpo_status run(welding *w, ebpo_error *error)
     if (mesh->arrangement)
         status = number_sources(w, error);
     if (status == EBPO_OK)
-        status = weld_attributes(w, error);
+        status = list_rows(w, error);
     if (status == EBPO_OK)
         status =
             ebpo_parallel_for(0, NULL, mesh->face_count, GRAIN, rename_corners, w, NULL, "", error);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK) {
+        move_attributes(w);
         move_vertices(w);
+    }
     return status;
 }
 
@@ -296,6 +301,7 @@ ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error
     ebpo_array_free(mesh->workspace, w.map);
     ebpo_array_free(mesh->workspace, w.from);
     ebpo_array_free(mesh->workspace, w.stays);
+    ebpo_array_free(mesh->workspace, w.rows);
     ebpo_array_free(mesh->workspace, w.before);
     free(w.heads);
     return status;

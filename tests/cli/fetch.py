@@ -5,11 +5,14 @@ import json
 import os
 import re
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+
+import same_ply
 
 failures = []
 
@@ -207,6 +210,64 @@ def interrupt(tool, folder, path, url):
     os.remove(out)
 
 
+def colour(plain, path):
+    """The binary mesh once more, with colours, a label for each face, lists, and an element of its own."""
+    mesh = same_ply.Ply(plain)
+    (kinds, vertices), (_, faces) = mesh.element("vertex"), mesh.element("face")
+    scalar = {"f": "float", "d": "double"}[kinds[0][0][0]]
+    lines = ["ply", "format binary_little_endian 1.0", "comment coloured", f"element vertex {len(vertices)}",
+             *(f"property {scalar} {axis}" for axis in "xyz"), *(f"property uchar {c}" for c in ("red", "green", "blue")),
+             f"element face {len(faces)}", "property list uchar int vertex_indices", "property short label",
+             "property list uchar ushort tags", "element camera 2", "property double angle", "end_header", ""]
+    with open(path, "wb") as out:
+        out.write("\n".join(lines).encode())
+        for i, row in enumerate(vertices):
+            out.write(b"".join(row) + bytes((i * 7 & 255, i >> 3 & 255, 255 - (i & 255))))
+        for i, row in enumerate(faces):
+            tags = struct.pack(f"<{i % 3}H", *range(i & 65535, (i & 65535) + i % 3)) if i < 65000 else b""
+            out.write(b"\3" + row[0] + struct.pack("<hB", i % 999 - 500, len(tags) // 2) + tags)
+        out.write(struct.pack("<2d", 0.5, float("inf")))
+
+
+def comes_back(tool, folder, ply, near, compare):
+    """Whether what a file gives back is what the source says."""
+    back = os.path.join(folder, "back.ply")
+    done = run(tool, "extract", "-q", "--mesh", near, back)
+    try:
+        compare(same_ply.Ply(ply), same_ply.Ply(back))
+    except SystemExit as e:
+        return False, e
+    return done.returncode == 0 and run(tool, "verify", "-q", near).returncode == 0, done.stderr
+
+
+def attributes(tool, plain, url):
+    """Colours and the like come with what is fetched, and only then."""
+    with tempfile.TemporaryDirectory() as folder:
+        ply, path, out = (os.path.join(folder, name) for name in ("c.ply", "c.ebpo.h5", "o.ebpo.h5"))
+        colour(plain, ply)
+        for layout in ("none", "64"):
+            run(tool, "convert", "-q", "--subtree-faces", layout, ply, path)
+            Handler.data, sent = content(path), {}
+            Handler.etag = f'"{layout}"'
+            for name, options, compare in (
+                    ("all", [], same_ply.compare), ("box", ["--box=0,0,-1,2,2,1"], same_ply.compare_subset),
+                    ("bare", ["--parts=-attributes"], None), ("none", ["--box=-.1,-.1,-.1,.1,.1,.1"], None)):
+                Handler.reset()
+                done = run(tool, "fetch", "-q", *options, url, out)
+                sent[name] = Handler.sent
+                expect(f"attributes, {layout}, {name}: fetch", done.returncode == 0, done.stderr)
+                if compare:
+                    expect(f"attributes, {layout}, {name}", *comes_back(tool, folder, ply, out, compare))
+                else:
+                    expect(f"attributes, {layout}, {name}: verify", run(tool, "verify", "-q", out).returncode == 0)
+            told = json.loads(run(tool, "info", "--json", path).stdout)
+            stored = told["bytes"]["attributes"]
+            expect(f"attributes, {layout}: what is left out is not fetched",
+                   stored > 10000 and sent["bare"] <= sent["all"] - stored // 2, (sent, stored))
+            expect(f"attributes, {layout}: straight from the server", *comes_back(tool, folder, ply, url,
+                                                                                 same_ply.compare))
+
+
 def main():
     tool, generate = sys.argv[1:3]
     with tempfile.TemporaryDirectory() as folder:
@@ -227,6 +288,9 @@ def main():
         resume(tool, folder, path, url)
         change(tool, folder, path, url)
         interrupt(tool, folder, path, url)
+        small = os.path.join(folder, "small.ply")
+        subprocess.run([generate, "--base", "torus", "--faces", "20000", small], check=True, capture_output=True)
+        attributes(tool, small, url)
         done = run(tool, "fetch", url + "/nothing", "/proc/nowhere/x.ebpo.h5")
         expect("no folder", done.returncode in (1, 2)
                and done.stderr.startswith("ebpo fetch: /proc/nowhere/x.ebpo.h5"), done.stderr)

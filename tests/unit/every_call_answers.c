@@ -277,6 +277,19 @@ static ebpo_status ask(every_call_env *e, const ebpo_model_options *options)
     return status;
 }
 
+static ebpo_status call_sample(every_call_env *e)
+{
+    static const double point[2][3] = { { 4, 0, 0 }, { 3, 0, 1 } };
+    static const uint64_t face[2] = { 0, EBPO_NO_FACE };
+    double values[2];
+    ebpo_sampler *sampler;
+    ebpo_status status = ebpo_sampler_new(e->file, "vertex:red", 1, &sampler, e->error);
+    if (status == EBPO_OK && ebpo_sampler_columns(sampler) == 1)
+        status = ebpo_sample(sampler, point[0], face, 2, values, e->error);
+    ebpo_sampler_free(sampler);
+    return status;
+}
+
 static ebpo_status call_ask(every_call_env *e)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
@@ -704,6 +717,7 @@ static ebpo_status call_scene_new(every_call_env *e)
 }
 
 const every_call every_call_answers[] = {
+    { "sample", call_sample },
     { "ask", call_ask },
     { "ask_cached", call_ask_cached },
     { "ask_ahead", call_ask_ahead },

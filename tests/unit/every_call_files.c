@@ -231,14 +231,13 @@ static ebpo_status call_read_maps(every_call_env *e)
     return status;
 }
 
-/* The file has none. */
 static ebpo_status call_read_attribute(every_call_env *e)
 {
     ebpo_attribute_values values;
     ebpo_read_options options = reading(e);
     ebpo_status status = ebpo_file_read_attribute(e->file, 0, &options, &values, e->error);
     ebpo_attribute_values_free(&values);
-    return status == EBPO_E_ABSENT ? EBPO_OK : status;
+    return status;
 }
 
 static ebpo_status call_check_content(every_call_env *e)

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "attributes/attributes.h"
 #include "base/workspace.h"
 #include "check_main.h"
 #include "every_call.h"
@@ -33,8 +34,32 @@ void every_call_resume(void) { failing_allocations_resume(); }
 
 /* --- what is read --- */
 
+/* Vertices get a colour, faces lists of 0 to 2 items. */
+static void colour(ebpo_mesh *mesh)
+{
+    ebpo_attribute red = { .element = "vertex", .names = "red", .columns = 1 },
+                   tags = { .element = "face", .names = "tags", .columns = 1 };
+    red.type = EBPO_ATTRIBUTE_UINT8;
+    red.list = EBPO_ATTRIBUTE_NO_LIST;
+    tags.type = EBPO_ATTRIBUTE_INT16;
+    tags.list = EBPO_ATTRIBUTE_UINT8;
+    red.rows = mesh->vertex_count;
+    tags.rows = mesh->face_count;
+    ebpo_attributes *made = mesh->attributes = ebpo_attributes_make(NULL);
+    ck_assert(made && ebpo_attributes_add(made, &red) && ebpo_attributes_add(made, &tags));
+    ebpo_attribute *a = made->array;
+    ck_assert(ebpo_attribute_reserve(NULL, &a[0], a[0].rows, 0) &&
+              ebpo_attribute_reserve(NULL, &a[1], a[1].rows, 2 * a[1].rows));
+    for (uint64_t i = 0; i < a[0].rows; i++)
+        a[0].values[i] = (uint8_t)i;
+    for (uint64_t i = 0, end = 0; i < a[1].rows; i++)
+        a[1].ends[i] = end += i % 3;
+    memset(a[1].values, 7, 2 * sizeof(int16_t) * a[1].rows);
+}
+
 static void write_mesh(ebpo_mesh *mesh, const char *name)
 {
+    colour(mesh);
     fine(ebpo_mesh_write_ply(mesh, scratch(name), &error));
     ebpo_mesh_free(mesh);
 }
@@ -70,6 +95,7 @@ static void write_model(uint32_t n)
     ebpo_prepared prepared = EBPO_PREPARED_INIT;
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     ebpo_tree tree;
+    colour(&mesh);
     fine(ebpo_mesh_write_ply(&mesh, scratch(EVERY_CALL_PLY), &error));
     fine(ebpo_mesh_prepare(&mesh, NULL, &prepared, &error));
     options.leaf_faces = 8;
@@ -218,6 +244,73 @@ START_TEST(a_call_survives_any_allocation_that_fails)
 }
 END_TEST
 
+/* --- welding with attributes: all of it, or nothing --- */
+
+static const char split_ply[] =
+    "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\n"
+    "property float z\nproperty uchar red\nproperty list uchar short words\nproperty double q\n"
+    "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0 1 0 1\n1 0 0 2 2 21 22 2\n0 1 0 3 1 31 3\n"
+    "1 0 0 4 3 41 42 43 4\n1 1 0 5 2 51 52 5\n0 1 0 6 0 6\n3 0 1 2\n3 3 4 5\n";
+
+static ebpo_mesh read_split(bool arranged, ebpo_workspace *workspace)
+{
+    ebpo_mesh_read_options options = EBPO_MESH_READ_OPTIONS_INIT;
+    ebpo_progress nobody = { NULL, NULL };
+    ebpo_mesh mesh;
+    options.attributes = 1;
+    options.workspace = workspace;
+    fine(ebpo_mesh_read(scratch("split.ply"), &options, &mesh, &error));
+    if (arranged)
+        fine(ebpo_mesh_arrange(&mesh, 1, nobody, &error));
+    return mesh;
+}
+
+/* Rows of the three arrays, which have these bytes and ends. */
+static void expect_rows(const ebpo_mesh *mesh, uint64_t rows, const uint8_t *red,
+                        const uint64_t *ends, const int16_t *words)
+{
+    const ebpo_attribute *a = mesh->attributes->array;
+    ck_assert(mesh->vertex_count == rows && mesh->attributes->count == 3);
+    for (int i = 0; i < 3; i++)
+        ck_assert_uint_eq(a[i].rows, rows);
+    ck_assert(memcmp(a[0].values, red, rows) == 0);
+    ck_assert(memcmp(a[1].ends, ends, rows * sizeof *ends) == 0);
+    ck_assert(memcmp(a[1].values, words, ends[rows - 1] * sizeof *words) == 0);
+    for (uint64_t i = 0; i < rows; i++) {
+        double q;
+        memcpy(&q, a[2].values + i * sizeof q, sizeof q);
+        ck_assert_double_eq(q, red[i]);
+    }
+}
+
+START_TEST(a_weld_that_fails_changes_nothing)
+{
+    static const uint64_t ends[] = { 0, 2, 3, 6, 8, 8 }, kept[] = { 0, 2, 3, 5 };
+    static const int16_t words[] = { 21, 22, 31, 41, 42, 43, 51, 52 },
+                         kept_words[] = { 21, 22, 31, 51, 52 };
+    bool arranged = _i % 2, more = true;
+    every_call_env e;
+    begin(&e, _i / 2);
+    fine(ebpo_write_file(scratch("split.ply"), split_ply, sizeof split_ply - 1, &error));
+    for (uint64_t n = 1; more; n++) {
+        ebpo_mesh mesh = read_split(arranged, e.workspace);
+        failing_allocations_begin(n, false);
+        ebpo_status status = ebpo_mesh_weld(&mesh, NULL, &error);
+        more = failing_allocations_end() >= n;
+        if (status == EBPO_OK) {
+            expect_rows(&mesh, 4, (const uint8_t *)"\1\2\3\5", kept, kept_words);
+            ck_assert_ptr_nonnull(ebpo_mesh_attributes_lost(&mesh));
+        } else {
+            expect_rows(&mesh, 6, (const uint8_t *)"\1\2\3\4\5\6", ends, words);
+            ck_assert_ptr_null(ebpo_mesh_attributes_lost(&mesh));
+        }
+        ebpo_mesh_free(&mesh);
+    }
+    finish(&e);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     enum { SECONDS = 600 };
@@ -230,6 +323,7 @@ Suite *test_suite(void)
     tcase_set_timeout(failing, SECONDS);
     tcase_add_unchecked_fixture(failing, write_small, remove_all);
     tcase_add_loop_test(failing, a_call_survives_any_allocation_that_fails, 0, 2 * call_count());
+    tcase_add_loop_test(failing, a_weld_that_fails_changes_nothing, 0, 4);
     suite_add_tcase(suite, failing);
     return suite;
 }

@@ -7,6 +7,7 @@
  *   Point in solid   ebpo_inside, ebpo_inside_many
  *   Distance         ebpo_distance, ebpo_distance_many, ebpo_distance_within
  *   Rays             ebpo_ray_first, ebpo_ray_any, ebpo_ray_all, and each of these for many
+ *   Attributes       ebpo_sampler_new, ebpo_sample: of points on faces
  *   Boxes            ebpo_faces_in_box, ebpo_triangles_in_box
  *   Mass             ebpo_measure
  *
@@ -713,6 +714,74 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all_many(ebpo_context *context, cons
                                                      const ebpo_ray_options *options,
                                                      const ebpo_ray_hit **hits,
                                                      const uint64_t **begin, ebpo_error *error);
+
+/* ---- attributes at hits ---- */
+
+/* So many values for a point, at most. */
+enum { EBPO_SAMPLER_MOST = 16 };
+
+/* Attributes of a file (ebpo_file_attribute), ready to be told at points on faces. Threads share
+ * it. */
+typedef struct ebpo_sampler ebpo_sampler;
+
+/*
+ * Reads the named attributes, and what finds them: at 4 bytes a face the maps, if the file has
+ * them, and for attributes of vertices the mesh (12 bytes a face, 12 or 24 a vertex), whatever the
+ * model's budget. The file must stay open as long as the sampler.
+ *
+ * names     separated by commas: "quality", "red,green,blue", or with the element, "face:red".
+ *           Without that, vertices come before faces; of equal names the first in the file is
+ *           taken. A list of one length for all rows gives all its items; others are not found
+ * threads   for reading. 0: all cores
+ *
+ * EBPO_E_ABSENT: no such attribute, or the file has no mesh. EBPO_E_ARGUMENT: more than
+ * EBPO_SAMPLER_MOST values. EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_sampler_new(const ebpo_file *file, const char *names,
+                                                    unsigned threads, ebpo_sampler **out,
+                                                    ebpo_error *error);
+
+/*
+ * NULL is fine.
+ *
+ * Threads: one per sampler.
+ */
+EBPO_API void ebpo_sampler_free(ebpo_sampler *sampler);
+
+/*
+ * Values for each point: 1 to EBPO_SAMPLER_MOST.
+ *
+ * Threads: any.
+ */
+EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
+
+/*
+ * Attributes at points on faces, as distances (`point` and `face`) and rays (origin + t direction)
+ * give them: of faces the face's own; of vertices A, B and C, those of the corners a, b and c,
+ * weighed by where the point p is. Labels and lists of numbers are weighed as well.
+ *
+ * In doubles without fused operations: e = b - a, f = c - a, d = p - a, scaled by powers of two;
+ * D = (e.e)(f.f) - (e.f)(e.f); w_b = ((f.f)(d.e) - (e.f)(d.f)) / D and
+ * w_c = ((e.e)(d.f) - (e.f)(d.e)) / D, 0 if less; w_a = 1 - w_b - w_c, 0 if less; each is divided
+ * by their sum. Scalar products add x, y, z in this order. The value is (w_a A + w_b B) + w_c C
+ * without what weighs 0, and never outside of the values that take part: at a corner it is the
+ * corner's, where all three are equal it is that. If D is at most 2^-900, where the greatest
+ * coordinate of e and f is 1 to 2, the face has no area: the weights are those along the longest of
+ * ab, ac, bc, the first of equal ones, where d is nearest to it.
+ *
+ * points   [count][3] finite
+ * faces    [count] as in ebpo_distance_result; EBPO_NO_FACE: the values are NAN
+ * values   [count][columns] in the order of `names`
+ *
+ * EBPO_E_ARGUMENT: a point is not finite, or the file has no such face.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_sample(const ebpo_sampler *sampler, const double *points,
+                                               const uint64_t *faces, uint64_t count,
+                                               double *values, ebpo_error *error);
 
 /* ---- boxes ---- */
 

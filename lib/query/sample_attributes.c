@@ -1,0 +1,369 @@
+/* Attributes where points lie on faces: of vertices weighed by where the point is on its face, of
+ * faces the face's own. How exactly is said in query.h. */
+#include "geom/strict_fp.h"
+
+#include <ebpo/query.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "attributes/attributes.h"
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "container/file_in.h"
+
+/* A part of an array: one of its columns, or all of a list's. */
+typedef struct sampled {
+    const ebpo_attribute *head; /* the file's */
+    unsigned array, first, columns;
+    bool of_vertices, owner; /* owner: the first one with these values */
+    ebpo_attribute_values values;
+} sampled;
+
+struct ebpo_sampler {
+    const ebpo_file *file;
+    ebpo_mesh mesh;      /* if an attribute is one of vertices; else empty */
+    uint32_t *file_face; /* [numbers] of a face of the source, UINT32_MAX: none; NULL: the same */
+    uint64_t numbers;
+    unsigned count, columns;
+    sampled item[EBPO_SAMPLER_MOST];
+};
+
+/* --- which attributes --- */
+
+typedef struct wanted {
+    const char *text, *element, *name;
+    size_t bytes, element_bytes, name_bytes;
+} wanted;
+
+/* The text up to the next comma: a name, or `element:name`. */
+static wanted next_wanted(const char *text)
+{
+    wanted w = { .text = text, .bytes = strcspn(text, ",") };
+    const char *colon = memchr(text, ':', w.bytes);
+    w.element = text;
+    w.element_bytes = colon ? (size_t)(colon - text) : 0;
+    w.name = colon ? colon + 1 : text;
+    w.name_bytes = w.bytes - (size_t)(w.name - text);
+    return w;
+}
+
+/* The column of this name, or -1. */
+static int column_named(const char *names, const wanted *w)
+{
+    for (int column = 0; *names; column++) {
+        size_t bytes = strcspn(names, " ");
+        if (bytes == w->name_bytes && memcmp(names, w->name, bytes) == 0)
+            return column;
+        names += bytes + (names[bytes] == ' ');
+    }
+    return -1;
+}
+
+static bool of_element(const ebpo_attribute *head, const wanted *w, const char *element)
+{
+    return ebpo_attribute_is_of(head, element) &&
+           (!w->element_bytes || (strlen(element) == w->element_bytes &&
+                                  memcmp(element, w->element, w->element_bytes) == 0));
+}
+
+static bool find(const ebpo_file *file, const wanted *w, const char *element, sampled *out)
+{
+    for (unsigned n = 0; n < file->attributes.count; n++) {
+        const ebpo_attribute_in *in = &file->attributes.head[n];
+        bool list = in->head.list != EBPO_ATTRIBUTE_NO_LIST;
+        int column = of_element(&in->head, w, element) ? column_named(in->head.names, w) : -1;
+        if (column < 0 || in->different)
+            continue;
+        *out = (sampled){ .head = &in->head,
+                          .array = n,
+                          .first = list ? 0 : (unsigned)column,
+                          .columns = list ? in->head.columns : 1,
+                          .of_vertices = strcmp(element, "vertex") == 0 };
+        return true;
+    }
+    return false;
+}
+
+static ebpo_status choose(ebpo_sampler *s, const char *names, ebpo_error *error)
+{
+    const char *shown = s->file->in.shown, *at = names;
+    for (bool more = true; more;) {
+        wanted w = next_wanted(at);
+        sampled item;
+        if (!find(s->file, &w, "vertex", &item) && !find(s->file, &w, "face", &item))
+            return ebpo_fail_file(error, EBPO_E_ABSENT, shown,
+                                  "vertices and faces have no attribute '%.*s' of one length; "
+                                  "'ebpo info' lists what the file has",
+                                  (int)(w.bytes < 100 ? w.bytes : 100), w.text);
+        if (s->columns + item.columns > EBPO_SAMPLER_MOST)
+            return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
+                                  "at most %d values of attributes can be asked for at a time",
+                                  EBPO_SAMPLER_MOST);
+        s->item[s->count++] = item;
+        s->columns += item.columns;
+        more = at[w.bytes] == ',';
+        at += w.bytes + 1;
+    }
+    return EBPO_OK;
+}
+
+/* --- what is read --- */
+
+static ebpo_status read_values(ebpo_sampler *s, const ebpo_read_options *read, ebpo_error *error)
+{
+    for (unsigned i = 0; i < s->count; i++) {
+        sampled *item = &s->item[i];
+        unsigned k = 0;
+        while (s->item[k].array != item->array)
+            k++;
+        item->values = s->item[k].values;
+        if (k < i)
+            continue;
+        ebpo_status status =
+            ebpo_file_read_attribute(s->file, item->array, read, &item->values, error);
+        if (status != EBPO_OK)
+            return status;
+        item->owner = true;
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status read_mesh(ebpo_sampler *s, const ebpo_read_options *read, ebpo_error *error)
+{
+    bool needed = false;
+    for (unsigned i = 0; i < s->count; i++)
+        needed = needed || s->item[i].of_vertices;
+    return needed ? ebpo_file_read_mesh(s->file, read, &s->mesh, error) : EBPO_OK;
+}
+
+/* Callers are told the source's numbers of faces. */
+static ebpo_status invert_map(ebpo_sampler *s, const ebpo_read_options *read, ebpo_error *error)
+{
+    uint64_t faces = s->file->info.face_count;
+    ebpo_maps maps;
+    s->numbers = faces;
+    if (!(s->file->info.parts & EBPO_PART_MAPS))
+        return EBPO_OK;
+    ebpo_status status = ebpo_file_read_maps(s->file, read, &maps, error);
+    if (status != EBPO_OK)
+        return status;
+    for (uint64_t f = 0; f < faces; f++)
+        if (maps.face_source[f] >= s->numbers)
+            s->numbers = maps.face_source[f] + UINT64_C(1);
+    s->file_face = ebpo_alloc(s->numbers, sizeof *s->file_face);
+    if (s->file_face) {
+        memset(s->file_face, 0xff, s->numbers * sizeof *s->file_face);
+        for (uint64_t f = 0; f < faces; f++)
+            s->file_face[maps.face_source[f]] = (uint32_t)f;
+    } else {
+        status = ebpo_fail_memory(error, s->numbers * sizeof *s->file_face);
+    }
+    ebpo_maps_free(&maps);
+    return status;
+}
+
+ebpo_status ebpo_sampler_new(const ebpo_file *file, const char *names, unsigned threads,
+                             ebpo_sampler **out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_sampler *s = *out = ebpo_alloc_zero(1, sizeof *s);
+    if (!s)
+        return ebpo_fail_memory(error, sizeof *s);
+    read.threads = threads;
+    s->file = file;
+    ebpo_status status = choose(s, names, error);
+    if (status == EBPO_OK)
+        status = read_values(s, &read, error);
+    if (status == EBPO_OK)
+        status = read_mesh(s, &read, error);
+    if (status == EBPO_OK)
+        status = invert_map(s, &read, error);
+    if (status != EBPO_OK) {
+        ebpo_sampler_free(s);
+        *out = NULL;
+    }
+    return status;
+}
+
+void ebpo_sampler_free(ebpo_sampler *s)
+{
+    if (!s)
+        return;
+    for (unsigned i = 0; i < s->count; i++)
+        if (s->item[i].owner)
+            ebpo_attribute_values_free(&s->item[i].values);
+    ebpo_mesh_free(&s->mesh);
+    free(s->file_face);
+    free(s);
+}
+
+unsigned ebpo_sampler_columns(const ebpo_sampler *s) { return s->columns; }
+
+/* --- weights --- */
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static double clamp(double v, double least, double most)
+{
+    return v < least ? least : v > most ? most : v;
+}
+
+/* Exponent of the greatest of `count` numbers, by their absolute values; 0 if all are 0. */
+static int exponent(const double *v, int count)
+{
+    double most = 0;
+    for (int i = 0; i < count; i++)
+        most = fabs(v[i]) > most ? fabs(v[i]) : most;
+    return most > 0 ? ilogb(most) : 0;
+}
+
+static void scale(double *v, int count, int by)
+{
+    for (int i = 0; i < count; i++)
+        v[i] = scalbn(v[i], by);
+}
+
+/* e[0]: b - a, e[1]: c - a, e[2]: p - a, at a scale where the greatest of the first two is 1 to 2.
+ */
+static void edges_of(const double corner[3][3], const double p[3], double e[3][3])
+{
+    double at[4][3];
+    memcpy(at, corner, 3 * sizeof *at);
+    memcpy(at[3], p, sizeof *at);
+    scale(at[0], 12, -exponent(at[0], 9));
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            e[i][k] = at[i + 1][k] - at[0][k];
+    scale(e[0], 9, -exponent(e[0], 6));
+}
+
+/* Where a face has no area: along its longest edge. */
+static void weigh_edge(const double e[3][3], double weight[3])
+{
+    static const int from[3] = { 0, 0, 1 }, to[3] = { 1, 2, 2 };
+    double third[3], beyond[3];
+    for (int k = 0; k < 3; k++) {
+        third[k] = e[1][k] - e[0][k];
+        beyond[k] = e[2][k] - e[0][k];
+    }
+    const double *edges[3] = { e[0], e[1], third };
+    int longest = 0;
+    for (int i = 1; i < 3; i++)
+        if (dot(edges[i], edges[i]) > dot(edges[longest], edges[longest]))
+            longest = i;
+    double length2 = dot(edges[longest], edges[longest]);
+    double along = dot(longest == 2 ? beyond : e[2], edges[longest]);
+    double t = length2 > 0 ? clamp(along / length2, 0, 1) : 0;
+    weight[0] = weight[1] = weight[2] = 0;
+    weight[from[longest]] = 1 - t;
+    weight[to[longest]] = t;
+}
+
+static void weigh(const double corner[3][3], const double p[3], double weight[3])
+{
+    double e[3][3];
+    edges_of(corner, p, e);
+    double bb = dot(e[0], e[0]), bc = dot(e[0], e[1]), cc = dot(e[1], e[1]), pb = dot(e[2], e[0]),
+           pc = dot(e[2], e[1]), det = bb * cc - bc * bc;
+    if (!(det > 0x1p-900)) {
+        weigh_edge((const double(*)[3])e, weight);
+        return;
+    }
+    double b = clamp((cc * pb - bc * pc) / det, 0, INFINITY),
+           c = clamp((bb * pc - bc * pb) / det, 0, INFINITY), a = clamp(1 - b - c, 0, 1),
+           sum = a + b + c;
+    weight[0] = a / sum;
+    weight[1] = b / sum;
+    weight[2] = c / sum;
+}
+
+/* Between the values that take part, also when it is rounded. */
+static double blend(const double weight[3], const double value[3])
+{
+    double sum = 0, least = INFINITY, most = -INFINITY;
+    for (int k = 0; k < 3; k++) {
+        if (!(weight[k] > 0))
+            continue;
+        sum += weight[k] * value[k];
+        least = value[k] < least ? value[k] : least;
+        most = value[k] > most ? value[k] : most;
+    }
+    return clamp(sum, least, most);
+}
+
+/* --- answers --- */
+
+static void corners_of(const ebpo_mesh *mesh, const uint32_t *face, double corner[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            uint64_t at = 3 * (uint64_t)face[i] + (uint64_t)k;
+            corner[i][k] = mesh->xyz32 ? (double)mesh->xyz32[at] : mesh->xyz64[at];
+        }
+}
+
+static double value_of(const sampled *item, uint64_t row, unsigned column)
+{
+    const uint8_t *values = item->values.values;
+    uint64_t index = row * item->head->columns + item->first + column;
+    return ebpo_attribute_number(values + index * ebpo_attribute_bytes(item->head->type),
+                                 item->head->type);
+}
+
+static void sample(const ebpo_sampler *s, uint64_t f, const double point[3], double *out)
+{
+    const uint32_t *face = s->mesh.faces ? s->mesh.faces + 3 * f : NULL;
+    double corner[3][3], weight[3] = { 1, 0, 0 };
+    if (face) {
+        corners_of(&s->mesh, face, corner);
+        weigh((const double(*)[3])corner, point, weight);
+    }
+    for (unsigned i = 0; i < s->count; i++)
+        for (unsigned column = 0; column < s->item[i].columns; column++) {
+            const sampled *item = &s->item[i];
+            double value[3] = { 0, 0, 0 };
+            for (int k = 0; k < 3 && item->of_vertices; k++)
+                value[k] = value_of(item, face[k], column);
+            *out++ = item->of_vertices ? blend(weight, value) : value_of(item, f, column);
+        }
+}
+
+/* The file's number of a face; UINT64_MAX: it has no such face. */
+static uint64_t face_in_file(const ebpo_sampler *s, uint64_t number)
+{
+    if (number >= s->numbers)
+        return UINT64_MAX;
+    return !s->file_face                        ? number
+           : s->file_face[number] == UINT32_MAX ? UINT64_MAX
+                                                : s->file_face[number];
+}
+
+ebpo_status ebpo_sample(const ebpo_sampler *s, const double *points, const uint64_t *faces,
+                        uint64_t count, double *values, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    for (uint64_t i = 0; i < count; i++, points += 3, values += s->columns) {
+        uint64_t f = face_in_file(s, faces[i]);
+        if (faces[i] == EBPO_NO_FACE) {
+            for (unsigned k = 0; k < s->columns; k++)
+                values[k] = NAN;
+            continue;
+        }
+        if (f == UINT64_MAX)
+            return ebpo_fail_file(error, EBPO_E_ARGUMENT, s->file->in.shown,
+                                  "point %llu: the file has no face %llu", (unsigned long long)i,
+                                  (unsigned long long)faces[i]);
+        if (!isfinite(points[0]) || !isfinite(points[1]) || !isfinite(points[2]))
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "point %llu is not finite",
+                             (unsigned long long)i);
+        sample(s, f, points, values);
+    }
+    return EBPO_OK;
+}
