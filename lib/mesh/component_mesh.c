@@ -73,6 +73,7 @@ ebpo_status ebpo_components_mesh(const ebpo_components *c, uint64_t number, ebpo
     out->xyz64 = NULL;
     out->faces = NULL;
     out->arrangement = NULL;
+    out->attributes = NULL; /* the whole has them */
     out->vertex_count = facts.vertex_count;
     out->face_count = facts.face_count;
     if (!make_arrangement(c->mesh, out) || !make_arrays(c->mesh, out)) {

@@ -14,10 +14,10 @@
 #include "base/fp_env.h"
 #include "container/file_in.h"
 
-/* A part of an array: one of its columns, or all of a list's. */
+/* A column of an array. */
 typedef struct sampled {
     const ebpo_attribute *head; /* the file's */
-    unsigned array, first, columns;
+    unsigned array, column;
     bool of_vertices, owner; /* owner: the first one with these values */
     ebpo_attribute_values values;
 } sampled;
@@ -27,7 +27,7 @@ struct ebpo_sampler {
     ebpo_mesh mesh;      /* if an attribute is one of vertices; else empty */
     uint32_t *file_face; /* [numbers] of a face of the source, UINT32_MAX: none; NULL: the same */
     uint64_t numbers;
-    unsigned count, columns;
+    unsigned count;
     sampled item[EBPO_SAMPLER_MOST];
 };
 
@@ -72,16 +72,12 @@ static bool of_element(const ebpo_attribute *head, const wanted *w, const char *
 static bool find(const ebpo_file *file, const wanted *w, const char *element, sampled *out)
 {
     for (unsigned n = 0; n < file->attributes.count; n++) {
-        const ebpo_attribute_in *in = &file->attributes.head[n];
-        bool list = in->head.list != EBPO_ATTRIBUTE_NO_LIST;
-        int column = of_element(&in->head, w, element) ? column_named(in->head.names, w) : -1;
-        if (column < 0 || in->different)
+        const ebpo_attribute *head = &file->attributes.head[n].head;
+        int column = of_element(head, w, element) ? column_named(head->names, w) : -1;
+        if (column < 0 || head->list != EBPO_ATTRIBUTE_NO_LIST)
             continue;
-        *out = (sampled){ .head = &in->head,
-                          .array = n,
-                          .first = list ? 0 : (unsigned)column,
-                          .columns = list ? in->head.columns : 1,
-                          .of_vertices = strcmp(element, "vertex") == 0 };
+        *out = (sampled){ .head = head, .array = n, .column = (unsigned)column };
+        out->of_vertices = strcmp(element, "vertex") == 0;
         return true;
     }
     return false;
@@ -95,15 +91,14 @@ static ebpo_status choose(ebpo_sampler *s, const char *names, ebpo_error *error)
         sampled item;
         if (!find(s->file, &w, "vertex", &item) && !find(s->file, &w, "face", &item))
             return ebpo_fail_file(error, EBPO_E_ABSENT, shown,
-                                  "vertices and faces have no attribute '%.*s' of one length; "
-                                  "'ebpo info' lists what the file has",
+                                  "vertices and faces have no attribute '%.*s', or it is a list; "
+                                  "'ebpo info' tells what the file has",
                                   (int)(w.bytes < 100 ? w.bytes : 100), w.text);
-        if (s->columns + item.columns > EBPO_SAMPLER_MOST)
+        if (s->count == EBPO_SAMPLER_MOST)
             return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
-                                  "at most %d values of attributes can be asked for at a time",
+                                  "at most %d attributes can be asked for at a time",
                                   EBPO_SAMPLER_MOST);
         s->item[s->count++] = item;
-        s->columns += item.columns;
         more = at[w.bytes] == ',';
         at += w.bytes + 1;
     }
@@ -201,7 +196,7 @@ void ebpo_sampler_free(ebpo_sampler *s)
     free(s);
 }
 
-unsigned ebpo_sampler_columns(const ebpo_sampler *s) { return s->columns; }
+unsigned ebpo_sampler_columns(const ebpo_sampler *s) { return s->count; }
 
 /* --- weights --- */
 
@@ -309,10 +304,10 @@ static void corners_of(const ebpo_mesh *mesh, const uint32_t *face, double corne
         }
 }
 
-static double value_of(const sampled *item, uint64_t row, unsigned column)
+static double value_of(const sampled *item, uint64_t row)
 {
     const uint8_t *values = item->values.values;
-    uint64_t index = row * item->head->columns + item->first + column;
+    uint64_t index = row * item->head->columns + item->column;
     return ebpo_attribute_number(values + index * ebpo_attribute_bytes(item->head->type),
                                  item->head->type);
 }
@@ -325,14 +320,13 @@ static void sample(const ebpo_sampler *s, uint64_t f, const double point[3], dou
         corners_of(&s->mesh, face, corner);
         weigh((const double(*)[3])corner, point, weight);
     }
-    for (unsigned i = 0; i < s->count; i++)
-        for (unsigned column = 0; column < s->item[i].columns; column++) {
-            const sampled *item = &s->item[i];
-            double value[3] = { 0, 0, 0 };
-            for (int k = 0; k < 3 && item->of_vertices; k++)
-                value[k] = value_of(item, face[k], column);
-            *out++ = item->of_vertices ? blend(weight, value) : value_of(item, f, column);
-        }
+    for (unsigned i = 0; i < s->count; i++) {
+        const sampled *item = &s->item[i];
+        double value[3] = { 0, 0, 0 };
+        for (int k = 0; k < 3 && item->of_vertices; k++)
+            value[k] = value_of(item, face[k]);
+        out[i] = item->of_vertices ? blend(weight, value) : value_of(item, f);
+    }
 }
 
 /* The file's number of a face; UINT64_MAX: it has no such face. */
@@ -349,10 +343,10 @@ ebpo_status ebpo_sample(const ebpo_sampler *s, const double *points, const uint6
                         uint64_t count, double *values, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    for (uint64_t i = 0; i < count; i++, points += 3, values += s->columns) {
+    for (uint64_t i = 0; i < count; i++, points += 3, values += s->count) {
         uint64_t f = face_in_file(s, faces[i]);
         if (faces[i] == EBPO_NO_FACE) {
-            for (unsigned k = 0; k < s->columns; k++)
+            for (unsigned k = 0; k < s->count; k++)
                 values[k] = NAN;
             continue;
         }

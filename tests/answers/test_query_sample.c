@@ -98,22 +98,21 @@ static void random_point(uint64_t *state, double point[3])
 }
 
 /* Of a file with maps `face` is the source's number, which is what `red` of faces says. */
-static void expect_values(const double values[6], uint64_t face, const double point[3], bool maps)
+static void expect_values(const double values[3], uint64_t face, const double point[3], bool maps)
 {
     ck_assert_double_eq_tol(values[0], linear(point), 1e-13);
     ck_assert_double_eq(values[1], (double)0.1f); /* all three are the same */
     if (maps)
         ck_assert_double_eq(values[2], (double)face);
-    ck_assert(values[3] == 0.5 && values[4] == 1.5 && values[5] == 2.5);
 }
 
 static void ask_points(bool maps)
 {
     uint64_t state = 7;
-    asked a = ask(scratch("a.ebpo.h5"), "linear,same,face:red,corner");
-    ck_assert_uint_eq(ebpo_sampler_columns(a.sampler), 6);
+    asked a = ask(scratch("a.ebpo.h5"), "linear,same,face:red");
+    ck_assert_uint_eq(ebpo_sampler_columns(a.sampler), 3);
     for (uint64_t i = 0; i < ebpo_test_scaled(400); i++) {
-        double point[3], towards[3], values[6];
+        double point[3], towards[3], values[3];
         ebpo_distance_result near;
         ebpo_ray_hit hit;
         bool met;
@@ -213,7 +212,7 @@ static double at(const asked *a, uint64_t face, double x, double y, double z)
 
 START_TEST(size_and_slivers_do_not_matter)
 {
-    static const double sizes[] = { 1, 0x1p-1000, 0x1p-1060, 0x1p1000, 0x1p1022 };
+    static const double sizes[] = { 1, 0x1p-1000, 0x1p1000 };
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         double s = sizes[i];
         write_hard(s);
@@ -250,8 +249,11 @@ START_TEST(what_is_not_there_is_said)
     expect_refused(a.file, "", EBPO_E_ABSENT);
     expect_refused(a.file, "red,", EBPO_E_ABSENT);
     expect_refused(a.file, "different", EBPO_E_ABSENT);
-    expect_refused(a.file, "vertex:corner", EBPO_E_ABSENT);
-    expect_refused(a.file, "corner,corner,corner,corner,corner,corner", EBPO_E_ARGUMENT);
+    expect_refused(a.file, "corner", EBPO_E_ABSENT);
+    expect_refused(a.file, "vertex:different", EBPO_E_ABSENT);
+    expect_refused(a.file, "vertices:red", EBPO_E_ABSENT);
+    expect_refused(a.file, "red,red,red,red,red,red,red,red,red,red,red,red,red,red,red,red,red",
+                   EBPO_E_ARGUMENT);
     ck_assert_int_eq(ebpo_sample(a.sampler, point, &beyond, 1, &value, &error), EBPO_E_ARGUMENT);
     ck_assert_int_eq(ebpo_sample(a.sampler, point, &first, 1, &value, &error), EBPO_E_ARGUMENT);
     fine(ebpo_sample(a.sampler, point, &none, 1, &value, &error));

@@ -22,7 +22,7 @@ struct answer_text {
 };
 
 /* Longest answer, but for lists of hits and faces, whose items are shorter. */
-enum { ANSWER_MOST = 512 };
+enum { ANSWER_MOST = 768 };
 
 /* False: not enough memory. answer_text_free in any case. */
 bool answer_text_init(answer_text *t);

@@ -1,5 +1,6 @@
 #include "cli/answers.h"
 
+#include <float.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -72,6 +73,32 @@ void raw_double(FILE *out, double v)
     fwrite(b, 1, sizeof b, out);
 }
 
+/* --- attributes: behind the face that has them --- */
+
+/* `face` may be none. The file that was asked has what is told of it, so that nothing can fail. */
+static char *put_attributes(char *at, answer_form form, const ebpo_sampler *sampler,
+                            const double point[3], uint64_t face)
+{
+    double values[EBPO_SAMPLER_MOST];
+    ebpo_error error = EBPO_ERROR_INIT;
+    unsigned count = sampler ? ebpo_sampler_columns(sampler) : 0;
+    bool none = face == EBPO_NO_FACE;
+    if (count && ebpo_sample(sampler, point, &face, 1, values, &error) != EBPO_OK)
+        none = true;
+    if (count && form == ANSWERS_JSON)
+        at = put_text(at, none ? ", \"attributes\": null" : ", \"attributes\": [");
+    for (unsigned k = 0; k < count; k++)
+        if (form == ANSWERS_RAW)
+            at = put_double(at, none ? (double)NAN : values[k]);
+        else if (form == ANSWERS_JSON)
+            at = none ? at : put_json_real(at, k ? ", " : "", values[k]);
+        else {
+            *at++ = between(form);
+            at = none ? put_text(at, "-") : number_write(at, values[k]);
+        }
+    return count && form == ANSWERS_JSON && !none ? put_text(at, "]") : at;
+}
+
 /* --- inside --- */
 
 static char *inside_json(char *at, const ebpo_inside_result *r)
@@ -121,8 +148,7 @@ static char *distance_json(char *at, const ebpo_distance_result *r)
         at = put_text(at, ", \"point\": null, \"normal\": null");
     }
     at = put_text(at, ", \"face\": ");
-    at = r->face == EBPO_NO_FACE ? put_text(at, "null") : number_write_uint(at, r->face);
-    return put_text(at, "}");
+    return r->face == EBPO_NO_FACE ? put_text(at, "null") : number_write_uint(at, r->face);
 }
 
 static char *distance_line(char *at, char between, const ebpo_distance_result *r)
@@ -142,8 +168,10 @@ static char *distance_line(char *at, char between, const ebpo_distance_result *r
 static char *distance_raw(char *at, const ebpo_distance_result *r)
 {
     at = put_double(at, r->distance);
-    for (int k = 0; k < 6; k++)
-        at = put_double(at, k < 3 ? r->point[k] : r->normal[k - 3]);
+    for (int k = 0; k < 3; k++)
+        at = put_double(at, r->point[k]);
+    for (int k = 0; k < 3; k++)
+        at = put_double(at, r->normal[k]);
     return put_u64(at, r->face);
 }
 
@@ -159,26 +187,32 @@ static char *put_limited(char *at, answer_form form, const ebpo_distance_result 
     return number_write(at, r->hi);
 }
 
-static char *put_distance(char *at, answer_form form, const ebpo_distance_result *r)
+static char *put_distance(char *at, answer_form form, const ebpo_distance_result *r,
+                          const ebpo_sampler *sampler)
 {
-    return form == ANSWERS_RAW    ? distance_raw(at, r)
-           : form == ANSWERS_JSON ? distance_json(at, r)
-                                  : distance_line(at, between(form), r);
+    at = form == ANSWERS_RAW    ? distance_raw(at, r)
+         : form == ANSWERS_JSON ? distance_json(at, r)
+                                : distance_line(at, between(form), r);
+    at = put_attributes(at, form, sampler, r->point, r->face);
+    return form == ANSWERS_JSON ? put_text(at, "}") : at;
 }
 
 void answers_distance(answer_text *t, answer_form form, bool limited,
-                      const ebpo_distance_result *results, uint64_t count)
+                      const ebpo_distance_result *results, uint64_t count,
+                      const ebpo_sampler *sampler)
 {
     for (uint64_t i = 0; i < count; i++) {
         char *at = answer_text_room(t);
-        at = limited ? put_limited(at, form, &results[i]) : put_distance(at, form, &results[i]);
+        at = limited ? put_limited(at, form, &results[i])
+                     : put_distance(at, form, &results[i], sampler);
         end(t, form, at);
     }
 }
 
 /* --- the nearest faces: their number is known at the end only --- */
 
-void answers_near(answer_text *t, answer_form form, const ebpo_near_face *face, bool first)
+void answers_near(answer_text *t, answer_form form, const ebpo_near_face *face, bool first,
+                  const ebpo_sampler *sampler)
 {
     ebpo_distance_result r = { .distance = face->distance, .face = face->face };
     char *at = answer_text_room(t);
@@ -186,21 +220,21 @@ void answers_near(answer_text *t, answer_form form, const ebpo_near_face *face, 
     memcpy(r.normal, face->normal, sizeof r.normal);
     if (form == ANSWERS_JSON)
         at = put_text(at, first ? "[" : ", ");
-    at = put_distance(at, form, &r);
+    at = put_distance(at, form, &r, sampler);
     if (form == ANSWERS_TEXT || form == ANSWERS_CSV)
         end(t, form, at);
     else
         answer_text_end(t, at); /* such lists leave when they are whole, or too long for that */
 }
 
-void answers_near_end(answer_text *t, answer_form form, bool none)
+void answers_near_end(answer_text *t, answer_form form, bool none, const ebpo_sampler *sampler)
 {
     static const ebpo_distance_result nothing = { .distance = INFINITY,
                                                   .point = { NAN, NAN, NAN },
                                                   .face = EBPO_NO_FACE };
     char *at = answer_text_room(t);
     if (form == ANSWERS_RAW)
-        at = distance_raw(at, &nothing);
+        at = put_distance(at, form, &nothing, sampler);
     else if (form == ANSWERS_JSON)
         at = put_text(at, none ? "[]" : "]");
     end(t, form, at);
@@ -216,17 +250,34 @@ static char *put_hit(char *at, answer_form form, const ebpo_ray_hit *hit)
     char lead[2] = { json ? 0 : between(form), 0 };
     at = number_write(put_text(at, json ? "{\"t\": " : ""), hit->t);
     at = number_write_uint(put_text(at, json ? ", \"face\": " : lead), hit->face);
-    at = number_write_int(put_text(at, json ? ", \"side\": " : lead), hit->side);
-    return put_text(at, json ? "}" : "");
+    return number_write_int(put_text(at, json ? ", \"side\": " : lead), hit->side);
 }
 
-void answers_ray_first(answer_text *t, answer_form form, const ebpo_ray_hit *hits, uint64_t count)
+/* A hit with its attributes, where it is as far as doubles tell, and within them. */
+static char *put_met(char *at, answer_form form, const ebpo_ray *ray, const ebpo_ray_hit *hit,
+                     const ebpo_sampler *sampler)
+{
+    double point[3];
+    for (int k = 0; k < 3; k++)
+        point[k] = fmax(-DBL_MAX, fmin(ray->origin[k] + hit->t * ray->direction[k], DBL_MAX));
+    at = put_attributes(put_hit(at, form, hit), form, sampler, point, hit->face);
+    return put_text(at, form == ANSWERS_JSON ? "}" : "");
+}
+
+void answers_ray_first(answer_text *t, answer_form form, const ebpo_ray *rays,
+                       const ebpo_ray_hit *hits, uint64_t count, const ebpo_sampler *sampler)
 {
     static const char *const nothing[] = { "-", "null", "", "-,-,-" };
     for (uint64_t i = 0; i < count; i++) {
         bool none = hits[i].face == EBPO_NO_FACE && form != ANSWERS_RAW;
         char *at = answer_text_room(t);
-        end(t, form, none ? put_text(at, nothing[form]) : put_hit(at, form, &hits[i]));
+        if (!none)
+            at = put_met(at, form, &rays[i], &hits[i], sampler);
+        else
+            at = put_text(at, nothing[form]);
+        if (none && form == ANSWERS_CSV)
+            at = put_attributes(at, form, sampler, rays[i].origin, EBPO_NO_FACE);
+        end(t, form, at);
     }
 }
 
@@ -266,11 +317,12 @@ static char *next_item(answer_text *t, answer_form form, bool first)
     return at;
 }
 
-void answers_ray_all(answer_text *t, answer_form form, const ebpo_ray_hit *hits, uint64_t count)
+void answers_ray_all(answer_text *t, answer_form form, const ebpo_ray *ray,
+                     const ebpo_ray_hit *hits, uint64_t count, const ebpo_sampler *sampler)
 {
     begin_list(t, form, count);
     for (uint64_t i = 0; i < count; i++)
-        answer_text_end(t, put_hit(next_item(t, form, i == 0), form, &hits[i]));
+        answer_text_end(t, put_met(next_item(t, form, i == 0), form, ray, &hits[i], sampler));
     end_list(t, form);
 }
 
@@ -287,10 +339,19 @@ void answers_box(answer_text *t, answer_form form, const uint64_t *faces, uint64
 
 /* --- names of columns --- */
 
-void answers_header(answer_text *t, answer_form form, const char *names)
+static char *put_names(char *at, answer_form form, const char *names)
 {
-    char *at = answer_text_room(t);
-    for (const char *c = names; *c; c++)
-        *at++ = *c == ',' ? between(form) : *c;
+    for (; *names; names++)
+        *at++ = *names == ',' ? between(form) : *names;
+    return at;
+}
+
+void answers_header(answer_text *t, answer_form form, const char *names, const char *attributes)
+{
+    char *at = put_names(answer_text_room(t), form, names);
+    if (attributes) {
+        *at++ = between(form);
+        at = put_names(at, form, attributes);
+    }
     end(t, form, at);
 }

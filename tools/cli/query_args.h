@@ -10,7 +10,7 @@
 #include "cli/remote_args.h"
 
 typedef struct query_values {
-    const char *memory, *deadline;
+    const char *memory, *deadline, *attribute;
     int64_t cut_level, threads, level, nearest;
     double max_distance, tmax, within;
     int inside_mode, distance_mode, ray_sides; /* indices into the words below */
@@ -43,6 +43,11 @@ typedef struct query_values {
                    "default: " cut_default),                                          \
         OPTION_INT("threads", 0, query_values, threads, "N", 0, 256,                  \
                    "threads for " work "; 0, the default: all cores")
+
+#define QUERY_ATTRIBUTE_OPTION                                                                    \
+    OPTION_TEXT("attribute", 0, query_values, attribute, "NAMES",                                 \
+                "also print these attributes where the face is met, separated by commas: red or " \
+                "face:red; those of vertices are interpolated")
 
 /* Rays and boxes look at many subtrees anyway: nothing is loaded ahead of them. */
 #define QUERY_PREFETCH_OPTION                          \

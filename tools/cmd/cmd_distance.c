@@ -24,6 +24,7 @@ static const arg_option options[] = {
         "look only at levels 0 to L and print lo and hi, between which the distance lies"),
     QUERY_ASKING_OPTIONS,
     QUERY_PREFETCH_OPTION,
+    QUERY_ATTRIBUTE_OPTION,
     QUERY_FORM_OPTIONS("each point is three doubles, each answer seven doubles and a uint64, or lo "
                        "and hi; lists end with a face of 2^64 - 1 (little-endian)"),
     { 0 },
@@ -47,6 +48,7 @@ static bool limited(const ebpo_distance_options *o)
 }
 
 typedef struct listing {
+    const ebpo_sampler *sampler;
     answer_text *text;
     answer_form form;
     bool begun;
@@ -55,7 +57,7 @@ typedef struct listing {
 static bool list(void *user, const ebpo_near_face *face)
 {
     listing *l = user;
-    answers_near(l->text, l->form, face, !l->begun);
+    answers_near(l->text, l->form, face, !l->begun, l->sampler);
     l->begun = true;
     return !l->text->failed && !l->text->refused;
 }
@@ -68,10 +70,10 @@ static ebpo_status answer_lists(const query_job *job, query_worker *w, const dou
     o.radius = job->values->within;
     o.most = (uint64_t)job->values->nearest;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        listing l = { w->text, job->form, false };
+        listing l = { job->sampler, w->text, job->form, false };
         status = ebpo_distance_within(w->context, rows + 3 * i, &o, list, &l, error);
         if (status == EBPO_OK)
-            answers_near_end(w->text, job->form, !l.begun);
+            answers_near_end(w->text, job->form, !l.begun, job->sampler);
     }
     return status;
 }
@@ -84,7 +86,8 @@ static ebpo_status answer(const query_job *job, query_worker *w, const double *r
     ebpo_status status =
         ebpo_distance_many(w->context, rows, count, &job->distance, w->results, error);
     if (status == EBPO_OK)
-        answers_distance(w->text, job->form, limited(&job->distance), w->results, count);
+        answers_distance(w->text, job->form, limited(&job->distance), w->results, count,
+                         job->sampler);
     return status;
 }
 
@@ -112,6 +115,11 @@ static int run(void *given, const char **operand)
     query_values *v = given;
     if (!query_distance_fits("distance", v) ||
         (v->level >= 0 && !query_accepts("distance", v, QUERY_MAX_DISTANCE, "--level")))
+        return EXIT_USAGE;
+    if (v->attribute && v->distance_mode == EBPO_DISTANCE_ENVELOPE)
+        return command_usage("distance", "--attribute has no effect with --mode envelope; leave "
+                                         "out one of them");
+    if (v->attribute && !query_accepts("distance", v, QUERY_LEVEL | QUERY_DEADLINE, "--attribute"))
         return EXIT_USAGE;
     query_job job = { .command = "distance",
                       .values = v,

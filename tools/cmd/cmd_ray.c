@@ -15,6 +15,7 @@ static const arg_option options[] = {
     OPTION_REAL("tmax", 0, query_values, tmax, "T", 0, DBL_MAX,
                 "for rays without their own tmax: they end at origin + T direction"),
     QUERY_ASKING_OPTIONS,
+    QUERY_ATTRIBUTE_OPTION,
     QUERY_FORM_OPTIONS(
         "each ray is six doubles, each answer a double, a uint64 and an int64, or with --any a "
         "uint64 (little-endian)"),
@@ -43,7 +44,8 @@ static ebpo_status answer_all(const query_job *job, query_worker *w, const ebpo_
     const uint64_t *begin;
     ebpo_status status = ebpo_ray_all_many(w->context, rays, count, how, &hits, &begin, error);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        answers_ray_all(w->text, job->form, hits + begin[i], begin[i + 1] - begin[i]);
+        answers_ray_all(w->text, job->form, &rays[i], hits + begin[i], begin[i + 1] - begin[i],
+                        job->sampler);
     return status;
 }
 
@@ -65,7 +67,7 @@ static ebpo_status answer(const query_job *job, query_worker *w, const double *r
     }
     status = ebpo_ray_first_many(w->context, rays, count, &how, w->results, error);
     if (status == EBPO_OK)
-        answers_ray_first(w->text, job->form, w->results, count);
+        answers_ray_first(w->text, job->form, rays, w->results, count, job->sampler);
     return status;
 }
 
@@ -89,6 +91,8 @@ static int run(void *given, const char **operand)
     query_values *v = given;
     if (v->any && v->all)
         return command_usage("ray", "--any has no effect with --all; leave out one of them");
+    if (v->any && v->attribute)
+        return command_usage("ray", "--attribute has no effect with --any; leave out one of them");
     query_job job = { .command = "ray",
                       .values = v,
                       .kind = POINTS_RAYS,

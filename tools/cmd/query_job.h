@@ -31,6 +31,7 @@ struct query_job {
     ebpo_inside_options inside; /* these are set by query_run */
     ebpo_distance_options distance;
     answer_form form;
+    const ebpo_sampler *sampler; /* of --attribute; NULL: none */
 };
 
 #endif

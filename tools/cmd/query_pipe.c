@@ -303,7 +303,7 @@ static int ask_nothing(pipe_line *p, query_worker *w)
     if (status != EBPO_OK)
         return command_failed(p->job->command, &error);
     if (p->job->values->header && p->job->form != ANSWERS_JSON && p->job->form != ANSWERS_RAW)
-        answers_header(w->text, p->job->form, p->job->columns(p->job));
+        answers_header(w->text, p->job->form, p->job->columns(p->job), p->job->values->attribute);
     return EXIT_FINE;
 }
 

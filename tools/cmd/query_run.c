@@ -2,6 +2,7 @@
 
 #include <sched.h>
 #include <stdio.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "cli/command.h"
@@ -29,6 +30,19 @@ static unsigned threads_for(const query_values *v, const ebpo_model_options *hol
     unsigned wanted = v->threads ? (unsigned)v->threads : (unsigned)cores;
     wanted = wanted < QUERY_THREADS_MOST ? wanted : QUERY_THREADS_MOST;
     return holding->loading == EBPO_LOAD_CACHE && wanted ? wanted : 1;
+}
+
+/* The attributes that are asked for. */
+static int open_sampler(query_job *job, const query_holding *holding, ebpo_sampler **out)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    const query_values *v = job->values;
+    *out = NULL;
+    if (v->attribute && ebpo_sampler_new(holding->session.file, v->attribute, (unsigned)v->threads,
+                                         out, &error) != EBPO_OK)
+        return command_failed(job->command, &error);
+    job->sampler = *out;
+    return EXIT_FINE;
 }
 
 static int ask(query_job *job, query_holding *holding, points *in,
@@ -61,6 +75,12 @@ static bool fits(const query_job *job)
                             other);
     else if (v->npy && !job->dtype(job, &bytes))
         (void)command_usage(job->command, "--npy takes answers of one size each, not lists");
+    else if (v->npy && v->attribute)
+        (void)command_usage(job->command,
+                            "--attribute has no effect with --npy; leave out one of them");
+    else if (v->attribute && strlen(v->attribute) > ANSWER_NAMES)
+        (void)command_usage(job->command, "--attribute: names of at most %d bytes in all",
+                            ANSWER_NAMES);
     else
         return true;
     return false;
@@ -71,6 +91,7 @@ int query_run(query_job *job, const char *model, const char *path)
     const query_values *v = job->values;
     ebpo_model_options options;
     query_holding holding;
+    ebpo_sampler *sampler = NULL;
     points in;
     if (!query_options_from(job->command, v, &options, &job->inside, &job->distance))
         return EXIT_USAGE;
@@ -85,7 +106,10 @@ int query_run(query_job *job, const char *model, const char *path)
     if (points_open(&in, job->command, path, job->kind, v->raw, v->tmax)) {
         code = query_holding_open(&holding, job->command, model, v, &options, job->parts_share);
         if (code == EXIT_FINE)
+            code = open_sampler(job, &holding, &sampler);
+        if (code == EXIT_FINE)
             code = ask(job, &holding, &in, &options);
+        ebpo_sampler_free(sampler);
         if (holding.session.model && v->remote.stats)
             tell_stats(job, &holding);
         query_holding_close(&holding);

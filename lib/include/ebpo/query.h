@@ -717,7 +717,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all_many(ebpo_context *context, cons
 
 /* ---- attributes at hits ---- */
 
-/* So many values for a point, at most. */
+/* So many attributes at a time, at most. */
 enum { EBPO_SAMPLER_MOST = 16 };
 
 /* Attributes of a file (ebpo_file_attribute), ready to be told at points on faces. Threads share
@@ -731,11 +731,11 @@ typedef struct ebpo_sampler ebpo_sampler;
  *
  * names     separated by commas: "quality", "red,green,blue", or with the element, "face:red".
  *           Without that, vertices come before faces; of equal names the first in the file is
- *           taken. A list of one length for all rows gives all its items; others are not found
+ *           taken. Lists are not found
  * threads   for reading. 0: all cores
  *
  * EBPO_E_ABSENT: no such attribute, or the file has no mesh. EBPO_E_ARGUMENT: more than
- * EBPO_SAMPLER_MOST values. EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_SAMPLER_MOST names. EBPO_E_MEMORY, and the errors of reading.
  *
  * Threads: any.
  */
@@ -751,7 +751,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_sampler_new(const ebpo_file *file, const
 EBPO_API void ebpo_sampler_free(ebpo_sampler *sampler);
 
 /*
- * Values for each point: 1 to EBPO_SAMPLER_MOST.
+ * How many attributes it has: so many values for each point.
  *
  * Threads: any.
  */
@@ -760,7 +760,7 @@ EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
 /*
  * Attributes at points on faces, as distances (`point` and `face`) and rays (origin + t direction)
  * give them: of faces the face's own; of vertices A, B and C, those of the corners a, b and c,
- * weighed by where the point p is. Labels and lists of numbers are weighed as well.
+ * weighed by where the point p is. Labels are weighed as well.
  *
  * In doubles without fused operations: e = b - a, f = c - a, d = p - a, scaled by powers of two;
  * D = (e.e)(f.f) - (e.f)(e.f); w_b = ((f.f)(d.e) - (e.f)(d.f)) / D and

@@ -1,0 +1,143 @@
+#!/usr/bin/env python3
+"""Remakes docs/measured/attributes.md: whether every PLY of a folder comes back property for property, also of subsets
+and over HTTP, and what its attributes take.
+
+    tests/bench/attributes.py EBPO MODELS_DIR... > docs/measured/attributes.md
+
+EBPO: the tool; MODELS_DIR: folders of PLY files. tests/cli/same_ply.py compares: it reads PLY
+with code of its own. Ends with 1 if anything differs.
+"""
+import functools
+import http.server
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import threading
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "cli"))
+import same_ply  # noqa: E402
+
+EBPO, FOLDERS = sys.argv[1], sys.argv[2:]
+WIDTHS = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}
+wrong = []
+
+
+class Ranges(http.server.SimpleHTTPRequestHandler):
+    """Files of a folder by byte ranges; `sent`: bytes of bodies."""
+    protocol_version = "HTTP/1.1"
+    sent = 0
+
+    def log_message(self, *arguments):
+        pass
+
+    def do_GET(self):
+        data = pathlib.Path(self.translate_path(self.path)).read_bytes()
+        begin, end = map(int, re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers["Range"]).groups())
+        body = data[begin:end + 1]
+        self.send_response_only(206)
+        self.send_header("ETag", '"1"')
+        self.send_header("Content-Length", str(len(body)))
+        self.send_header("Content-Range", f"bytes {begin}-{begin + len(body) - 1}/{len(data)}")
+        self.end_headers()
+        self.wfile.write(body)
+        Ranges.sent += len(body)
+
+
+def ebpo(*arguments):
+    done = subprocess.run([EBPO, *map(str, arguments)], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    if done.returncode:
+        raise RuntimeError(done.stderr.strip().splitlines()[-1])
+    return done.stdout
+
+
+def back(file, folder):
+    ebpo("extract", "-q", "--mesh", file, folder / "back.ply")
+    return same_ply.Ply(folder / "back.ply")
+
+
+def verdict(name, what, compare, source, other):
+    try:
+        compare(source, other)
+    except SystemExit as e:
+        wrong.append(f"{name}, {what}: {e}")
+        return "**differs**"
+    return "same"
+
+
+def half(info):
+    """A box that cuts the model: half of it along each axis."""
+    low, size = info["box_origin"], info["box_size"]
+    return ",".join(repr(v) for v in (*low, *(a + b / 2 for a, b in zip(low, size))))
+
+
+def raw_bytes(info, file):
+    """What the values are of without coding: bytes of the PLY's rows."""
+    total = 0
+    for a in info.get("attributes", []):
+        total += WIDTHS[a["type"]] * a["columns"] * a["rows"]
+    return total
+
+
+def check_model(path, folder, url):
+    name = path.stem
+    full, bare = folder / "m.ebpo.h5", folder / "bare.ebpo.h5"
+    ebpo("convert", "-q", path, full)
+    ebpo("convert", "-q", "--without", "attributes", path, bare)
+    info, plain = (json.loads(ebpo("info", "--json", f)) for f in (full, bare))
+    source = same_ply.Ply(path)
+    whole = verdict(name, "whole", same_ply.compare, source, back(full, folder))
+    box = "--box=" + half(info)
+    ebpo("subset", "-q", box, full, folder / "part.ebpo.h5")
+    part = verdict(name, "subset", same_ply.compare_subset, source, back(folder / "part.ebpo.h5", folder))
+    ebpo("fetch", "-q", url + "/m.ebpo.h5", folder / "fetched.ebpo.h5")
+    fetched = verdict(name, "fetch", same_ply.compare, source, back(folder / "fetched.ebpo.h5", folder))
+    ebpo("fetch", "-q", box, url + "/m.ebpo.h5", folder / "far.ebpo.h5")
+    far = verdict(name, "fetch of a box", same_ply.compare_subset, source, back(folder / "far.ebpo.h5", folder))
+    kept = sorted({f"{a['element']}: {a['names']}" for a in info.get("attributes", [])})
+    raw, more = raw_bytes(info, full), info["bytes"]["file"] - plain["bytes"]["file"]
+    return (name, info["vertices"], info["faces"], "; ".join(kept) or "-", path.stat().st_size, plain["bytes"]["file"],
+            info["bytes"]["file"], raw, more, f"{more / raw:.2f}" if raw else "-", whole, part, fetched, far)
+
+
+def main():
+    names = " ".join(pathlib.Path(f).name for f in FOLDERS)
+    print(f"""# Attributes: every PLY comes back
+
+Made by `tests/bench/attributes.py EBPO {names} > docs/measured/attributes.md`; nothing here was typed in by hand.
+
+*Same*: elements, comments, properties, their order and types, and all values bit for bit and in the source's order, as
+`tests/cli/same_ply.py` finds, which reads PLY by code of its own; of polygons and strips, each triangle has the corners
+and values of what it was cut from. *Subset*: of the box from the least corner of the model's box to its centre, each
+vertex and face is one of the source, with its values, in the source's order. *Fetch*: the same over HTTP, of the whole
+file and of that box. *Raw*: the values as a binary PLY has them; *more*: what the file is larger by with attributes,
+that is values, their description and the source's header.
+""")
+    cells = ("model", "vertices", "faces", "attributes", "PLY", "without", "with", "raw", "more", "of raw", "whole",
+             "subset", "fetch", "fetch, box")
+    print("| " + " | ".join(cells) + " |\n" + "|---" * len(cells) + "|")
+    refused = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Ranges, directory=name))
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        for path in (p for f in FOLDERS for p in sorted(pathlib.Path(f).glob("*.ply"))):
+            try:
+                row = check_model(path, folder, f"http://127.0.0.1:{server.server_address[1]}")
+            except RuntimeError as e:
+                refused.append(f"{path.stem}: {str(e).replace(str(path), path.name)}")
+                continue
+            print("| " + " | ".join(map(str, row)) + " |", flush=True)
+        server.shutdown()
+    for line in refused:
+        print(f"\nRefused: `{line}`")
+    for line in wrong:
+        print(line, file=sys.stderr)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
