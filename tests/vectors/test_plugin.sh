@@ -22,6 +22,9 @@ h5dump -p -d /mesh/faces "$work/packed.h5" | grep -q 'FILTER_ID 32015' ||
 h5repack -f SHUF -f GZIP=6 -f FLET "$vector" "$work/deflate.h5" &&
     "$3" verify --quiet "$work/deflate.h5" || fail "h5repack makes the pipeline deflate"
 
+# Programs that load HDF5 for themselves alone, as h5py does, have none of its symbols to give.
+nm -D --undefined-only "$1/libebpo_h5zstd.so" | grep ' H5' && fail "the plugin needs symbols of HDF5"
+
 # What the specification says of tools without the plugin.
 HDF5_PLUGIN_PATH=/nowhere h5dump -d /mesh/faces "$vector" >"$work/dump" 2>&1 ; [ $? = 1 ] ||
     fail "h5dump without the plugin fails"
