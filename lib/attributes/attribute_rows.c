@@ -61,6 +61,7 @@ static bool pick(picking *p)
     const ebpo_attribute *from = p->from;
     p->made = *from;
     p->made.ends = NULL;
+    p->made.borrowed = false;
     p->made.rows = p->made.row_capacity = p->count;
     if (!from->ends) {
         p->made.values = ebpo_array_alloc(p->workspace, p->count, ebpo_attribute_row_bytes(from));
@@ -95,8 +96,10 @@ ebpo_status ebpo_attributes_pick(ebpo_attributes *attributes, const char *elemen
                                        count * (ebpo_attribute_row_bytes(a) + sizeof *a->ends),
                                        error);
         }
-        ebpo_array_free(attributes->workspace, a->values);
-        ebpo_array_free(attributes->workspace, a->ends);
+        if (!a->borrowed) {
+            ebpo_array_free(attributes->workspace, a->values);
+            ebpo_array_free(attributes->workspace, a->ends);
+        }
         *a = p.made;
     }
     return EBPO_OK;

@@ -50,8 +50,10 @@ ebpo_attributes *ebpo_attributes_make(ebpo_workspace *workspace)
 
 static void clear(ebpo_workspace *workspace, ebpo_attribute *a)
 {
-    ebpo_array_free(workspace, a->values);
-    ebpo_array_free(workspace, a->ends);
+    if (!a->borrowed) {
+        ebpo_array_free(workspace, a->values);
+        ebpo_array_free(workspace, a->ends);
+    }
     a->values = NULL;
     a->ends = NULL;
 }
@@ -77,6 +79,7 @@ ebpo_attribute *ebpo_attributes_add(ebpo_attributes *to, const ebpo_attribute *l
     a->values = NULL;
     a->ends = NULL;
     a->row_capacity = a->item_capacity = 0;
+    a->borrowed = false;
     return a;
 }
 
@@ -120,6 +123,17 @@ void ebpo_attributes_lose(ebpo_attributes *attributes, const char *format, ...)
         memcpy(lost + used, more, sizeof more);
 }
 
+static ebpo_status borrow_array(ebpo_attributes *to, const ebpo_attribute *from, ebpo_error *error)
+{
+    ebpo_attribute *a = ebpo_attributes_add(to, from);
+    if (!a)
+        return ebpo_fail_memory(error, sizeof *a);
+    a->values = from->values;
+    a->ends = from->ends;
+    a->borrowed = true;
+    return EBPO_OK;
+}
+
 static ebpo_status copy_array(ebpo_attributes *to, const ebpo_attribute *from, ebpo_error *error)
 {
     ebpo_attribute *a = ebpo_attributes_add(to, from);
@@ -136,8 +150,11 @@ static ebpo_status copy_array(ebpo_attributes *to, const ebpo_attribute *from, e
     return EBPO_OK;
 }
 
-ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *from,
-                                 ebpo_workspace *workspace, ebpo_error *error)
+static ebpo_status make_of(ebpo_attributes **out, const ebpo_attributes *from,
+                           ebpo_workspace *workspace,
+                           ebpo_status (*array)(ebpo_attributes *to, const ebpo_attribute *from,
+                                                ebpo_error *error),
+                           ebpo_error *error)
 {
     *out = NULL;
     if (!from)
@@ -152,10 +169,22 @@ ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *f
     else if (from->header)
         memcpy(made->header, from->header, made->header_bytes = from->header_bytes);
     for (uint64_t i = 0; i < from->count && status == EBPO_OK; i++)
-        status = copy_array(made, &from->array[i], error);
+        status = array(made, &from->array[i], error);
     if (status == EBPO_OK)
         *out = made;
     else
         ebpo_attributes_free(made);
     return status;
+}
+
+ebpo_status ebpo_attributes_borrow(ebpo_attributes **out, const ebpo_attributes *from,
+                                   ebpo_error *error)
+{
+    return make_of(out, from, from ? from->workspace : NULL, borrow_array, error);
+}
+
+ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *from,
+                                 ebpo_workspace *workspace, ebpo_error *error)
+{
+    return make_of(out, from, workspace, copy_array, error);
 }

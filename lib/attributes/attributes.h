@@ -25,6 +25,7 @@ typedef struct ebpo_attribute {
     uint8_t *values; /* [rows][columns], of the machine's byte order; or [ends[rows - 1]] */
     uint64_t *ends;  /* [rows] items of the lists up to here; NULL: all as long as `columns` */
     uint64_t row_capacity, item_capacity;
+    bool borrowed; /* values and ends are another mesh's, which frees them */
 } ebpo_attribute;
 
 /* The struct and its arrays, which the workspace owns. */
@@ -120,6 +121,10 @@ double ebpo_attribute_number(const uint8_t *at, ebpo_attribute_type type);
 
 /* Least and greatest value, NaN aside; false: there is none. */
 bool ebpo_attribute_range(const ebpo_attribute *a, ebpo_workspace *workspace, double range[2]);
+
+/* The same values, borrowed from `from` until they are picked; NULL of NULL. EBPO_E_MEMORY. */
+EBPO_MUST_USE ebpo_status ebpo_attributes_borrow(ebpo_attributes **out, const ebpo_attributes *from,
+                                                 ebpo_error *error);
 
 /* A copy in another workspace; NULL of NULL. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *from,

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "attributes/attributes.h"
 #include "base/alloc.h"
 #include "base/arrays.h"
 #include "base/error.h"
@@ -73,12 +74,16 @@ ebpo_status ebpo_components_mesh(const ebpo_components *c, uint64_t number, ebpo
     out->xyz64 = NULL;
     out->faces = NULL;
     out->arrangement = NULL;
-    out->attributes = NULL; /* the whole has them */
+    out->attributes = NULL;
     out->vertex_count = facts.vertex_count;
     out->face_count = facts.face_count;
     if (!make_arrangement(c->mesh, out) || !make_arrays(c->mesh, out)) {
         status = ebpo_workspace_fail(out->workspace,
                                      28 * facts.vertex_count + 16 * facts.face_count, error);
+    }
+    if (status == EBPO_OK) /* by numbers of the source, as building picks them */
+        status = ebpo_attributes_borrow(&out->attributes, c->mesh->attributes, error);
+    if (status != EBPO_OK) {
         ebpo_mesh_free(out);
         return status;
     }

@@ -270,6 +270,12 @@ static ebpo_status compare(ebpo_tally *tally, const ebpo_mesh *mended, const ebp
     return status;
 }
 
+/* A component: its file says itself that there is more in the source. */
+static bool is_part(const ebpo_info *info)
+{
+    return info->source_face_count + info->mend.added_faces > info->face_count;
+}
+
 ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const ebpo_mesh *stored,
                               bool ordered, const ebpo_mesh *source, const ebpo_read_options *read,
                               ebpo_error *error)
@@ -296,11 +302,13 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
     const ebpo_mesh *made = as_it_is ? source : &mended;
     if (status == EBPO_OK)
         check_record(tally, &info->mend, &did);
-    if (status == EBPO_OK && stored)
+    bool mapped = info->parts & EBPO_PART_MAPS; /* else nothing says which faces these are */
+    if (status == EBPO_OK && stored && !is_part(info))
         status = compare(tally, made, stored, ordered, error);
-    else if (status == EBPO_OK &&
-             info->parts & EBPO_PART_MAPS) /* without maps, nothing says which faces these are */
+    else if (status == EBPO_OK && mapped)
         status = compare_some(tally, file, made, read, error);
+    else if (status == EBPO_OK && stored)
+        CHECK(mapped, "the file has a part of the source, and no maps that say which");
     ebpo_mesh_free(&mended);
     return status;
 }

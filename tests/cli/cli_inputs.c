@@ -68,6 +68,14 @@ static const struct {
       "1 2 3 0.5 0.5 1 -inf\n"
       "-3 4 0 3 2 1 2 0 0.5 0\n1 3 0 1 4 2 1 2 1 -7\n2 3 1 2 4 2 3 4 2 8 9\n"
       "3 3 2 3 4 2 5 6 0\n4 3 3 0 4 2 7 8 3 1 2 3\n0 1\n3 4\n" },
+    { "coloured_parts.ply",
+      "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\n"
+      "property float z\nproperty uchar red\nelement face 8\n"
+      "property list uchar uint vertex_index\nproperty short label\nelement edge 1\n"
+      "property int vertex1\nproperty int vertex2\nend_header\n"
+      "0 0 0 11\n1 0 0 12\n0 1 0 13\n0 0 1 14\n5 0 0 21\n6 0 0 22\n5 1 0 23\n5 0 1 24\n"
+      "3 0 2 1 100\n3 0 1 3 101\n3 0 3 2 102\n3 1 2 3 103\n"
+      "3 4 6 5 104\n3 4 5 7 105\n3 4 7 6 106\n3 5 6 7 107\n0 4\n" },
     { "tetrahedron.stl", "solid t\n"
                          "facet normal 0 0 -1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 "
                          "0\nendloop\nendfacet\n"
