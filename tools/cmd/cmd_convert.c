@@ -238,11 +238,11 @@ static ebpo_status print_result(const values *v, const mesh_input *p, const char
 /* --- work --- */
 
 /* Said before the hours of building that judging afterwards would be too much. */
-static ebpo_status room_to_judge(const values *v, const mesh_input *p, const char *in,
+static ebpo_status room_to_judge(const values *v, uint64_t faces, const char *in,
                                  const ebpo_workspace *workspace, ebpo_error *error)
 {
     ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
-    uint64_t needed = ebpo_subset_memory(p->mesh.face_count, (uint32_t)v->leaf_faces);
+    uint64_t needed = ebpo_subset_memory(faces, (uint32_t)v->leaf_faces);
     char bytes[32], budget[32];
     ebpo_workspace_get_stats(workspace, &figures);
     if (needed <= figures.memory)
@@ -317,7 +317,15 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
 typedef struct part_build {
     const values *v;
     const ebpo_subset_options *need;
+    const char *in;
+    const ebpo_workspace *workspace;
 } part_build;
+
+static ebpo_status part_fits(void *user, uint64_t faces, ebpo_error *error)
+{
+    const part_build *b = user;
+    return judges(b->v) ? room_to_judge(b->v, faces, b->in, b->workspace, error) : EBPO_OK;
+}
 
 static ebpo_status build_part(void *user, mesh_input *part, const char *path,
                               ebpo_progress progress, ebpo_error *error)
@@ -327,13 +335,13 @@ static ebpo_status build_part(void *user, mesh_input *part, const char *path,
     return build_and_write(b->v, part, path, b->need, progress, &times, error);
 }
 
-static ebpo_status build_parts(const values *v, mesh_input *p, const char *folder,
-                               const ebpo_subset_options *need, ebpo_progress progress,
-                               double begun, ebpo_error *error)
+static ebpo_status build_parts(part_build *build, mesh_input *p, const char *folder,
+                               ebpo_progress progress, double begun, ebpo_error *error)
 {
-    part_build build = { v, need };
+    const values *v = build->v;
     parts_run run = { .build = build_part,
-                      .user = &build,
+                      .fits = part_fits,
+                      .user = build,
                       .folder = folder,
                       .unit = v->unit,
                       .json = v->json,
@@ -374,7 +382,9 @@ static ebpo_status refuse(const values *v, const mesh_input *p, const char *in,
                  "%s: is not a solid, and --require-solid was given; nothing was written", in);
         return error->status = EBPO_E_NOT_SOLID;
     }
-    return judges(v) ? room_to_judge(v, p, in, workspace, error) : EBPO_OK;
+    return judges(v) && !v->split_components
+               ? room_to_judge(v, p->mesh.face_count, in, workspace, error)
+               : EBPO_OK;
 }
 
 static ebpo_status convert(const values *v, const char *in, const char *out,
@@ -397,7 +407,8 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
     print_reports(v, &p, in);
     status = refuse(v, &p, in, workspace, error);
     if (status == EBPO_OK && v->split_components) {
-        status = build_parts(v, &p, out, need, progress, begun, error);
+        part_build build = { v, need, in, workspace };
+        status = build_parts(&build, &p, out, progress, begun, error);
         progress_wipe(&line);
         return status;
     }

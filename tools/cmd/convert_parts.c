@@ -112,7 +112,7 @@ static ebpo_status too_many(const writing *w, ebpo_error *error)
 /* Names, with as many digits as the last one has, so that they sort. */
 static ebpo_status name_parts(writing *w, ebpo_error *error)
 {
-    uint64_t count = ebpo_components_count(w->components);
+    uint64_t count = ebpo_components_count(w->components), most = 0;
     if (count > PARTS_MOST)
         return too_many(w, error);
     w->parts = calloc(count, sizeof *w->parts);
@@ -127,11 +127,12 @@ static ebpo_status name_parts(writing *w, ebpo_error *error)
                  (unsigned long long)i);
         p->facts = (ebpo_component)EBPO_COMPONENT_INIT;
         status = ebpo_components_get(w->components, i, &p->facts, error);
+        most = p->facts.face_count > most ? p->facts.face_count : most;
     }
     w->count = count;
     made = w->parts;
     made_count = count;
-    return status;
+    return status == EBPO_OK ? w->run->fits(w->run->user, most, error) : status;
 }
 
 static bool report(void *user, const char *stage, uint64_t done, uint64_t total)

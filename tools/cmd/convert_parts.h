@@ -8,6 +8,8 @@ typedef struct parts_run {
     /* Builds a file; the mesh is freed in any case. */
     ebpo_status (*build)(void *user, mesh_input *part, const char *path, ebpo_progress progress,
                          ebpo_error *error);
+    /* Whether there is room for the largest one. */
+    ebpo_status (*fits)(void *user, uint64_t faces, ebpo_error *error);
     void *user;
     const char *folder, *unit; /* unit: NULL: none */
     bool json, quiet;
