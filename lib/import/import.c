@@ -2,18 +2,20 @@
 
 #include "base/error.h"
 #include "ebpo_config.h"
+#include "import/obj_runs.h"
 #include "io/file_source.h"
 
 #if !EBPO_HAVE_ASSIMP
 
-ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
-                               uint64_t size, const char *name, ebpo_workspace *workspace,
-                               ebpo_error *error)
+ebpo_status ebpo_import_runs(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
+                             uint64_t size, const char *name, ebpo_workspace *workspace,
+                             ebpo_obj_runs *runs, ebpo_error *error)
 {
     (void)format;
     (void)data;
     (void)size;
     (void)workspace;
+    (void)runs;
     *out = (ebpo_mesh){ 0 };
     return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, ebpo_path_name(name),
                           "this build reads PLY only; build it with libassimp-dev installed, or "
@@ -319,8 +321,38 @@ done:
     return status;
 }
 
-static ebpo_status import_locked(ebpo_mesh *mesh, memory_file *file, const char *name,
-                                 ebpo_error *error)
+static uint64_t triangles_of(const struct aiMesh *m)
+{
+    uint64_t sum = 0;
+    for (unsigned i = 0; i < m->mNumFaces; i++)
+        sum += m->mFaces[i].mNumIndices >= 3 ? m->mFaces[i].mNumIndices - 2 : 0;
+    return sum;
+}
+
+/* False where assimp's objects are not the runs, in their order. */
+static bool count_runs(ebpo_obj_runs *runs, const struct aiScene *scene)
+{
+    const struct aiNode *root = scene->mRootNode;
+    uint64_t run, last = 0;
+    unsigned next = 0;
+    for (unsigned i = 0; i < root->mNumChildren; i++) {
+        const struct aiNode *object = root->mChildren[i];
+        if (object->mNumMeshes == 0)
+            continue;
+        if (!ebpo_obj_run_number(runs, object->mName.data, &run) || run < last)
+            return false;
+        for (unsigned k = 0; k < object->mNumMeshes; k++, next++) {
+            if (object->mMeshes[k] != next)
+                return false;
+            runs->of[run].faces += triangles_of(scene->mMeshes[next]);
+        }
+        last = run;
+    }
+    return next == scene->mNumMeshes;
+}
+
+static ebpo_status import_locked(ebpo_mesh *mesh, memory_file *file, ebpo_obj_runs *runs,
+                                 const char *name, ebpo_error *error)
 {
     struct aiFileIO io = { open_memory, close_memory, (aiUserData)(void *)file };
     /* No post-processing: nothing may move, join or reorder. */
@@ -338,13 +370,15 @@ static ebpo_status import_locked(ebpo_mesh *mesh, memory_file *file, const char 
                               reason);
     }
     ebpo_status status = convert(mesh, scene, name, error);
+    if (status == EBPO_OK && runs && !count_runs(runs, scene))
+        status = ebpo_fail_no_runs(name, error);
     aiReleaseImport(scene);
     return status;
 }
 
-ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
-                               uint64_t size, const char *name, ebpo_workspace *workspace,
-                               ebpo_error *error)
+ebpo_status ebpo_import_runs(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
+                             uint64_t size, const char *name, ebpo_workspace *workspace,
+                             ebpo_obj_runs *runs, ebpo_error *error)
 {
     memory_file file = { data, (size_t)size, pseudo_names[format], false };
     ebpo_mesh mesh = { .workspace = workspace };
@@ -361,7 +395,7 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
         status = ebpo_import_check_off(data, size, name, error);
     if (status == EBPO_OK) {
         ebpo_assimp_lock();
-        status = import_locked(&mesh, &file, name, error);
+        status = import_locked(&mesh, &file, runs, name, error);
         ebpo_assimp_unlock();
         give_back();
     }

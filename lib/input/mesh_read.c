@@ -1,4 +1,4 @@
-/* ebpo_mesh_read: one file of any known format. */
+/* ebpo_mesh_read: one file of any known format; with its groups. */
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,9 +10,10 @@
 #include "base/arrays.h"
 #include "base/workspace_extents.h"
 #include "base/sized.h"
-#include "import/import.h"
+#include "import/obj_runs.h"
 #include "io/file_source.h"
 #include "mesh/mesh_parts.h"
+#include "mesh/named_groups.h"
 #include "ply/ply.h"
 
 enum { HASH_STEP = 1 << 22 };
@@ -58,16 +59,34 @@ static ebpo_status parse_ply(ebpo_mesh *out, const ebpo_whole_file *file, const 
                               wanted->attributes != 0, wanted->threads, &wanted->progress, error);
 }
 
+/* With its groups, if it names any. */
+static ebpo_status import_groups(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
+                                 ebpo_workspace *workspace, ebpo_mesh_groups **groups,
+                                 ebpo_error *error)
+{
+    ebpo_obj_runs runs;
+    ebpo_status status =
+        ebpo_import_groups(out, file->data, file->size, path, workspace, &runs, error);
+    if (status != EBPO_OK)
+        return status;
+    if (runs.count > 1)
+        status = ebpo_mesh_groups_new(runs.of, runs.count, groups, error);
+    ebpo_obj_runs_free(&runs);
+    return status;
+}
+
 static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
-                         const ebpo_mesh_read_options *wanted, ebpo_error *error)
+                         const ebpo_mesh_read_options *wanted, ebpo_mesh_groups **groups,
+                         ebpo_error *error)
 {
     const char *dot = strrchr(ebpo_path_name(path), '.');
     ebpo_import_format format;
     if (ebpo_ply_recognise(file->data, file->size))
         return parse_ply(out, file, path, wanted, error);
     if (ebpo_import_recognise(&format, file->data, file->size, path))
-        return !ebpo_progress_stage(&wanted->progress, "reading", error)
-                   ? EBPO_E_CANCELLED
+        return !ebpo_progress_stage(&wanted->progress, "reading", error) ? EBPO_E_CANCELLED
+               : groups && format == EBPO_IMPORT_OBJ
+                   ? import_groups(out, file, path, wanted->workspace, groups, error)
                    : ebpo_import_memory(out, format, file->data, file->size, path,
                                         wanted->workspace, error);
     if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
@@ -76,8 +95,8 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char
                           "neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file");
 }
 
-ebpo_status ebpo_mesh_read(const char *path, const ebpo_mesh_read_options *options, ebpo_mesh *out,
-                           ebpo_error *error)
+static ebpo_status read_mesh(const char *path, const ebpo_mesh_read_options *options,
+                             ebpo_mesh *out, ebpo_mesh_groups **groups, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_mesh_read_options wanted = EBPO_MESH_READ_OPTIONS_INIT;
@@ -92,7 +111,7 @@ ebpo_status ebpo_mesh_read(const char *path, const ebpo_mesh_read_options *optio
         return status;
     ebpo_workspace_watch(workspace, file.mapped, (size_t)file.size);
     hash_begin(&hash);
-    status = parse(out, &file, path, &wanted, error);
+    status = parse(out, &file, path, &wanted, groups, error);
     hash_end(&hash);
     out->workspace = workspace;
     if (status == EBPO_OK)
@@ -103,5 +122,23 @@ ebpo_status ebpo_mesh_read(const char *path, const ebpo_mesh_read_options *optio
         ebpo_mesh_free(out);
     ebpo_workspace_unwatch(workspace, file.mapped);
     ebpo_whole_file_close(&file);
+    return status;
+}
+
+ebpo_status ebpo_mesh_read(const char *path, const ebpo_mesh_read_options *options, ebpo_mesh *out,
+                           ebpo_error *error)
+{
+    return read_mesh(path, options, out, NULL, error);
+}
+
+ebpo_status ebpo_mesh_read_groups(const char *path, const ebpo_mesh_read_options *options,
+                                  ebpo_mesh *out, ebpo_mesh_groups **groups, ebpo_error *error)
+{
+    *groups = NULL;
+    ebpo_status status = read_mesh(path, options, out, groups, error);
+    if (status != EBPO_OK) {
+        ebpo_mesh_groups_free(*groups);
+        *groups = NULL;
+    }
     return status;
 }

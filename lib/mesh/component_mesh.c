@@ -23,13 +23,30 @@ static void copy_vertices(const ebpo_components *c, uint64_t number, ebpo_mesh *
     }
 }
 
+/* Where vertex v is among those of the part. */
+static uint32_t place_of(const ebpo_components *c, uint64_t number, uint32_t v)
+{
+    if (c->place)
+        return c->place[v];
+    const uint32_t *of = c->vertices.of + c->vertices.begin[number];
+    uint64_t low = 0, high = c->vertices.begin[number + 1] - c->vertices.begin[number];
+    while (high - low > 1) {
+        uint64_t middle = low + (high - low) / 2;
+        if (of[middle] <= v)
+            low = middle;
+        else
+            high = middle;
+    }
+    return (uint32_t)low;
+}
+
 static void copy_faces(const ebpo_components *c, uint64_t number, ebpo_mesh *out)
 {
     const ebpo_mesh *mesh = c->mesh;
     const uint32_t *from = c->faces.of + c->faces.begin[number];
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, out->face_count) {
         for (uint64_t k = 0; k < 3; k++)
-            out->faces[3 * i + k] = c->place[mesh->faces[3 * (uint64_t)from[i] + k]];
+            out->faces[3 * i + k] = place_of(c, number, mesh->faces[3 * (uint64_t)from[i] + k]);
         out->arrangement->face_source[i] = (uint32_t)ebpo_mesh_source_face(mesh, from[i]);
     }
 }

@@ -3,6 +3,7 @@
 #define EBPO_MESH_COMPONENT_PARTS_H
 
 #include "mesh/mesh_parts.h"
+#include "mesh/named_groups.h"
 
 /* Faces that share vertices. */
 typedef struct mesh_component {
@@ -22,13 +23,21 @@ typedef struct mesh_groups {
 
 struct ebpo_components {
     const ebpo_mesh *mesh;
-    uint64_t count;        /* first all, then those that are no cavity of another one */
-    mesh_component *list;  /* [all] */
-    ebpo_component *facts; /* [count] */
+    const ebpo_mesh_groups *named; /* NULL: components; else neither list, number nor place */
+    uint64_t count;                /* first all, then those that are no cavity of another one */
+    mesh_component *list;          /* [all] */
+    ebpo_component *facts;         /* [count] */
     uint32_t *number; /* [vertex_count] the component; EBPO_NO_INDEX: no face names the vertex */
     uint32_t *place;  /* [vertex_count] among its component's vertices */
     mesh_groups faces, vertices;
 };
+
+/* EBPO_E_FORMAT: no faces, or one names a vertex that is not there. EBPO_E_ARGUMENT. */
+EBPO_MUST_USE ebpo_status ebpo_components_check(const ebpo_mesh *mesh, ebpo_error *error);
+
+/* Of faces (else vertices) by their components or named groups. */
+EBPO_MUST_USE ebpo_status ebpo_components_group(const ebpo_components *c, bool faces,
+                                                mesh_groups *g, ebpo_error *error);
 
 /* Edges and volumes; needs the groups of faces. */
 EBPO_MUST_USE ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,

@@ -28,8 +28,11 @@ static void join(uint32_t *above, uint32_t a, uint32_t b)
     above[a < b ? b : a] = a < b ? a : b;
 }
 
-static ebpo_status check_corners(const ebpo_mesh *mesh, ebpo_error *error)
+ebpo_status ebpo_components_check(const ebpo_mesh *mesh, ebpo_error *error)
 {
+    ebpo_status status = ebpo_mesh_check_shape(mesh, error);
+    if (status != EBPO_OK)
+        return status;
     if (mesh->face_count == 0)
         return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
                               "has no faces; give a triangle mesh, not a point cloud");
@@ -100,6 +103,8 @@ static ebpo_status list_components(ebpo_components *c, const uint32_t *above, eb
 /* The component of face or vertex i. */
 static uint32_t component_of(const ebpo_components *c, bool faces, uint64_t i)
 {
+    if (c->named) /* only asked of faces */
+        return ebpo_mesh_group_of(c->named, ebpo_mesh_source_face(c->mesh, i));
     return c->number[faces ? c->mesh->faces[3 * i] : i];
 }
 
@@ -127,8 +132,8 @@ static void fill_groups(const ebpo_components *c, bool faces, mesh_groups *g)
     g->begin[0] = 0;
 }
 
-static ebpo_status make_groups(const ebpo_components *c, bool faces, mesh_groups *g,
-                               ebpo_error *error)
+ebpo_status ebpo_components_group(const ebpo_components *c, bool faces, mesh_groups *g,
+                                  ebpo_error *error)
 {
     uint64_t items = faces ? c->mesh->face_count : c->mesh->vertex_count;
     g->begin = ebpo_array_alloc(c->mesh->workspace, c->count + 1, sizeof *g->begin);
@@ -195,14 +200,14 @@ static ebpo_status find(ebpo_components *c, ebpo_error *error)
         status = list_components(c, above, error);
     }
     ebpo_array_free(mesh->workspace, above);
-    return status == EBPO_OK ? make_groups(c, true, &c->faces, error) : status;
+    return status == EBPO_OK ? ebpo_components_group(c, true, &c->faces, error) : status;
 }
 
 /* Where each vertex is among its component's. */
 static ebpo_status number_vertices(ebpo_components *c, ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->mesh;
-    ebpo_status status = make_groups(c, false, &c->vertices, error);
+    ebpo_status status = ebpo_components_group(c, false, &c->vertices, error);
     if (status != EBPO_OK)
         return status;
     c->place = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *c->place);
@@ -241,9 +246,7 @@ ebpo_status ebpo_components_new(const ebpo_mesh *mesh, unsigned threads, ebpo_pr
 {
     EBPO_DEFAULT_FP;
     *out = NULL;
-    ebpo_status status = ebpo_mesh_check_shape(mesh, error);
-    if (status == EBPO_OK)
-        status = check_corners(mesh, error);
+    ebpo_status status = ebpo_components_check(mesh, error);
     if (status != EBPO_OK)
         return status;
     ebpo_components *c = ebpo_alloc_zero(1, sizeof *c);

@@ -76,6 +76,18 @@ static const struct {
       "0 0 0 11\n1 0 0 12\n0 1 0 13\n0 0 1 14\n5 0 0 21\n6 0 0 22\n5 1 0 23\n5 0 1 24\n"
       "3 0 2 1 100\n3 0 1 3 101\n3 0 3 2 102\n3 1 2 3 103\n"
       "3 4 6 5 104\n3 4 5 7 105\n3 4 7 6 106\n3 5 6 7 107\n0 4\n" },
+    { "groups.obj", "# two tetrahedra; C:\\parts\n# and a triangle\nmtllib a/b.mtl\n"
+                    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 5 0 0\nv 6 0 0\nv 5 1 0\nv 5 0 1\n"
+                    "f 1 3 2\nf 1 2 4\ng\nf 1 4 3\ng default\nf 2 3 4\n"
+                    "g  a/../b \nusemtl red\nf 5 7 6\nusemtl blue\nf 5 6 8\n"
+                    "o empty one\ng \"x\r\nf 5 8 7\ng a/../b\nusemtl green\nf 6 7 8\n"
+                    "o caf\xe9\x01\nf 1 5 3 7\no *\nf 4 8 3\ng layer:\nf 4 8 2\n" },
+    { "one_group.obj", "g all of it\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\n"
+                       "f 1 4 3\nf 2 3 4\n" },
+    { "no_group.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n" },
+    { "again.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\no a\nusemtl x\nf 1 2 3\no b\nf 1 3 2\no a\n"
+                   "usemtl y\nf 2 1 3\n" },
+    { "backslash.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\ng a\\b\nf 1 2 3\nf 1 3 2\n" },
     { "tetrahedron.stl", "solid t\n"
                          "facet normal 0 0 -1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 "
                          "0\nendloop\nendfacet\n"

@@ -116,6 +116,30 @@ static ebpo_status call_weld(every_call_env *e) { return mend(e, EVERY_CALL_SPLI
 static ebpo_status call_orient(every_call_env *e) { return mend(e, EVERY_CALL_TURNED, orient); }
 static ebpo_status call_fill_holes(every_call_env *e) { return mend(e, EVERY_CALL_HOLED, fill); }
 
+/* Of a file that has no names. */
+static ebpo_status call_groups(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_mesh_groups *groups = NULL;
+    ebpo_mesh_group group = EBPO_MESH_GROUP_INIT;
+    ebpo_components *components = NULL;
+    ebpo_mesh_read_options how = EBPO_MESH_READ_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    how.threads = 1;
+    how.workspace = e->workspace;
+    ebpo_status status =
+        ebpo_mesh_read_groups(scratch(EVERY_CALL_CROSSING), &how, &mesh, &groups, e->error);
+    if (status != EBPO_OK)
+        return status;
+    if (groups || ebpo_mesh_groups_count(groups) ||
+        ebpo_mesh_groups_get(groups, 0, &group, &error) != EBPO_E_ARGUMENT ||
+        ebpo_components_of_groups(&mesh, groups, &components, &error) != EBPO_E_ARGUMENT)
+        status = EBPO_E_FORMAT;
+    ebpo_mesh_groups_free(groups);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
 static ebpo_status call_components(every_call_env *e)
 {
     ebpo_mesh mesh, part = { 0 };
@@ -237,6 +261,7 @@ const every_call every_call_meshes[] = {
     { "orient", call_orient },
     { "fill_holes", call_fill_holes },
     { "components", call_components },
+    { "groups", call_groups },
     { "prepare", call_prepare },
     { "crossings", call_crossings },
     { "build", call_build },

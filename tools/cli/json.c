@@ -11,10 +11,9 @@ static void newline(json *j)
         fputs("  ", j->out);
 }
 
-/* Length of the UTF-8 sequence at `s` (no surrogates, nothing overlong, up to U+10FFFF), 0 if there
- * is none. */
-static int sequence(const unsigned char *s)
+int json_utf8_length(const char *text)
 {
+    const unsigned char *s = (const unsigned char *)text;
     unsigned char a = s[0];
     if (a < 0x80)
         return 1;
@@ -33,7 +32,7 @@ static void quoted(json *j, const char *text)
 {
     fputc('"', j->out);
     for (const unsigned char *s = (const unsigned char *)text; *s;) {
-        int length = sequence(s);
+        int length = json_utf8_length((const char *)s);
         if (length == 0)
             fputs("\\ufffd", j->out);
         else if (*s == '"' || *s == '\\')

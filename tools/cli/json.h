@@ -22,6 +22,10 @@ void json_object(json *j, const char *key);
 void json_array(json *j, const char *key);
 void json_end(json *j);    /* of the innermost object or array */
 void json_finish(json *j); /* closes what is open, and the last line */
+/* Length of the UTF-8 sequence at `text` (no surrogates, nothing overlong, up to U+10FFFF), 0 if
+ * there is none. */
+int json_utf8_length(const char *text);
+
 /* Bytes that are not UTF-8 become U+FFFD. */
 void json_text(json *j, const char *key, const char *text);
 void json_uint(json *j, const char *key, uint64_t v);

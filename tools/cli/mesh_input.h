@@ -2,7 +2,7 @@
 #ifndef EBPO_TOOLS_MESH_INPUT_H
 #define EBPO_TOOLS_MESH_INPUT_H
 
-#include <ebpo/mesh.h>
+#include <ebpo/groups.h>
 
 #include "cli/args.h"
 
@@ -29,5 +29,11 @@ EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path, men
                                           bool attributes, ebpo_workspace *workspace,
                                           unsigned threads, ebpo_progress progress,
                                           ebpo_error *error);
+
+/* With the file's groups: see ebpo_mesh_read_groups. */
+EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending asked,
+                                                 bool attributes, ebpo_mesh_groups **groups,
+                                                 ebpo_workspace *workspace, unsigned threads,
+                                                 ebpo_progress progress, ebpo_error *error);
 
 #endif

@@ -29,7 +29,7 @@ typedef struct values {
     uint32_t with, without;
     int codec, rule, profile;
     mending mend;
-    bool require_solid, split_components, json, quiet;
+    bool require_solid, split_components, split_groups, json, quiet;
     const char *unit, *crs, *date;
 } values;
 
@@ -84,6 +84,9 @@ static const arg_option options[] = {
     OPTION_FLAG("split-components", 0, values, split_components,
                 "OUT is a new folder: a file for each component (faces that share vertices, with "
                 "the cavities in it), and a scene of them; the other options hold for each file"),
+    OPTION_FLAG("split-groups", 0, values, split_groups,
+                "the same for the named groups of an OBJ file (its lines g and o): a file for each "
+                "name"),
     OPTION_TEXT("unit", 0, values, unit, "U", "unit of length to record, such as mm"),
     OPTION_TEXT("crs", 0, values, crs, "C",
                 "coordinate reference system to record, such as EPSG:25832"),
@@ -121,6 +124,11 @@ static int check_values(const values *v, const char *in, const char *out)
     if (v->profile >= 0 && (v->with || v->without))
         return command_usage(
             "convert", "--profile says which parts are stored; leave out --with and --without");
+    if (v->split_components && v->split_groups)
+        return command_usage("convert", "--split-components and --split-groups: choose one");
+    if (v->split_groups && v->mend.fill_holes)
+        return command_usage("convert", "--fill-holes does not go with --split-groups: what it "
+                                        "adds is in no group");
     uint64_t subtree_faces;
     if (!subtree_faces_read("convert", v->subtree_faces, &subtree_faces) ||
         command_overwrites("convert", in, out))
@@ -175,7 +183,8 @@ static void print_reports(const values *v, const mesh_input *p, const char *in)
     const char *lost = ebpo_mesh_attributes_lost(&p->mesh);
     if (lost)
         fprintf(stderr, "ebpo convert: %s: note: not kept: %s\n", in, lost);
-    findings_warn(stderr, "convert", in, &p->prepared.report, &p->prepared.record);
+    if (!v->split_groups) /* else of each group */
+        findings_warn(stderr, "convert", in, &p->prepared.report, &p->prepared.record);
 }
 
 static void print_summary(const values *v, const ebpo_info *info, const char *out, double seconds)
@@ -335,18 +344,23 @@ static ebpo_status build_part(void *user, mesh_input *part, const char *path,
     return build_and_write(b->v, part, path, b->need, progress, &times, error);
 }
 
+static bool splits(const values *v) { return v->split_components || v->split_groups; }
+
 static ebpo_status build_parts(part_build *build, mesh_input *p, const char *folder,
+                               const ebpo_mesh_groups *groups, progress_line *line,
                                ebpo_progress progress, double begun, ebpo_error *error)
 {
     const values *v = build->v;
     parts_run run = { .build = build_part,
                       .fits = part_fits,
                       .user = build,
+                      .groups = groups,
                       .folder = folder,
                       .unit = v->unit,
                       .json = v->json,
                       .quiet = v->quiet,
                       .threads = (unsigned)v->threads,
+                      .line = line,
                       .progress = progress };
     return parts_write(&run, p, begun, error);
 }
@@ -377,14 +391,23 @@ static const values usual = { .max_level = -1,
 static ebpo_status refuse(const values *v, const mesh_input *p, const char *in,
                           const ebpo_workspace *workspace, ebpo_error *error)
 {
-    if (v->require_solid && !p->prepared.report.balanced) {
+    if (v->require_solid && !v->split_groups && !p->prepared.report.balanced) {
         snprintf(error->message, sizeof error->message,
                  "%s: is not a solid, and --require-solid was given; nothing was written", in);
         return error->status = EBPO_E_NOT_SOLID;
     }
-    return judges(v) && !v->split_components
-               ? room_to_judge(v, p->mesh.face_count, in, workspace, error)
-               : EBPO_OK;
+    return judges(v) && !splits(v) ? room_to_judge(v, p->mesh.face_count, in, workspace, error)
+                                   : EBPO_OK;
+}
+
+static ebpo_status no_groups(const char *in, ebpo_error *error)
+{
+    error->status = EBPO_E_FORMAT;
+    snprintf(error->message, sizeof error->message,
+             "%s: names no groups, which are lines g or o of an OBJ file; --split-components makes "
+             "parts of what shares no vertices",
+             in);
+    return error->status;
 }
 
 static ebpo_status convert(const values *v, const char *in, const char *out,
@@ -396,22 +419,28 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
     stage_facts stages = plan_stages(v, in);
     int plan[STAGE_PLAN_MAX];
     mesh_input p = { .mesh = { 0 } };
-    if (!v->split_components)
+    ebpo_mesh_groups *groups = NULL;
+    if (!splits(v))
         progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
     double begun = progress_now();
-    ebpo_status status = mesh_input_read(&p, in, v->mend, parts_of(v) & EBPO_PART_ATTRIBUTES,
-                                         workspace, (unsigned)v->threads, progress, error);
+    ebpo_status status = mesh_input_read_groups(&p, in, v->mend, parts_of(v) & EBPO_PART_ATTRIBUTES,
+                                                v->split_groups ? &groups : NULL, workspace,
+                                                (unsigned)v->threads, progress, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;
     print_reports(v, &p, in);
     status = refuse(v, &p, in, workspace, error);
-    if (status == EBPO_OK && v->split_components) {
+    if (status == EBPO_OK && v->split_groups && !groups)
+        status = no_groups(in, error);
+    if (status == EBPO_OK && splits(v)) {
         part_build build = { v, need, in, workspace };
-        status = build_parts(&build, &p, out, progress, begun, error);
+        status = build_parts(&build, &p, out, groups, &line, progress, begun, error);
+        ebpo_mesh_groups_free(groups);
         progress_wipe(&line);
         return status;
     }
+    ebpo_mesh_groups_free(groups);
     if (status == EBPO_OK)
         status = build_and_write(v, &p, out, need, progress, &stages.times, error);
     else
@@ -439,8 +468,8 @@ static int run(void *given, const char **operand)
         code = check_need(v, &need);
     if (code != EXIT_FINE)
         return code;
-    ebpo_status status = v->split_components ? parts_begin(operand[1], &error)
-                                             : ebpo_check_output(operand[1], &error);
+    ebpo_status status = splits(v) ? parts_begin(operand[1], v->split_groups, &error)
+                                   : ebpo_check_output(operand[1], &error);
     if (status == EBPO_OK)
         status = memory_make(&workspace, &v->memory, &error);
     if (status == EBPO_OK)

@@ -14,14 +14,24 @@
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/words.h"
+#include "cmd/part_names.h"
 
-static const char scene_name[] = "components.scene.json";
+/* How it is called. */
+typedef struct part_kind {
+    const char *one, *many, *scene, *building, *too_many;
+} part_kind;
 
-enum { PARTS_MOST = 100000, NAME_SIZE = 48 };
+static const part_kind components = { "component", "components", "components.scene.json",
+                                      "building components",
+                                      "; merge vertices at the same position with --weld" },
+                       groups = { "group", "groups", "groups.scene.json", "building groups", "" };
+
+enum { PARTS_MOST = 100000, ENDING_SIZE = 16 };
 
 /* Of a part, as it is on the disk. */
 typedef struct part {
-    char name[NAME_SIZE], file[NAME_SIZE];
+    char name[PART_NAME_SIZE], file[PART_NAME_SIZE + ENDING_SIZE];
+    char *shown; /* in the scene: the group's own name; NULL: `name` */
     ebpo_component facts;
     bool solid;
     int levels;
@@ -31,6 +41,7 @@ typedef struct part {
 
 typedef struct writing {
     const parts_run *run;
+    const part_kind *kind;
     mesh_input *whole;
     ebpo_components *components;
     part *parts;
@@ -44,6 +55,7 @@ static char *making;
 static int making_fd = -1;
 static part *volatile made;
 static volatile uint64_t made_count;
+static const char *scene_name; /* of what is being made */
 
 /* Only what a signal handler may call. Once it has its name, the folder stays. */
 static void remove_all(void)
@@ -56,8 +68,9 @@ static void remove_all(void)
     rmdir(making);
 }
 
-ebpo_status parts_begin(const char *folder, ebpo_error *error)
+ebpo_status parts_begin(const char *folder, bool of_groups, ebpo_error *error)
 {
+    scene_name = (of_groups ? &groups : &components)->scene;
     ebpo_status status = ebpo_folder_begin(folder, &making, error);
     if (status != EBPO_OK)
         return status;
@@ -78,6 +91,12 @@ void parts_end(void)
     free(made);
     made = NULL;
     made_count = 0;
+}
+
+static void free_names(const writing *w)
+{
+    for (uint64_t i = 0; i < w->count; i++)
+        free(w->parts[i].shown);
 }
 
 static ebpo_status no_memory(ebpo_error *error)
@@ -101,15 +120,53 @@ static char *path_of(const char *name)
 static ebpo_status too_many(const writing *w, ebpo_error *error)
 {
     error->status = EBPO_E_LIMIT;
-    snprintf(error->message, sizeof error->message,
-             "%s: has %llu components, and at most %d are written; merge vertices at the same "
-             "position with --weld",
+    snprintf(error->message, sizeof error->message, "%s: has %llu %s, and at most %d are written%s",
              w->whole->as_read.source_name,
-             (unsigned long long)ebpo_components_count(w->components), PARTS_MOST);
+             (unsigned long long)ebpo_components_count(w->components), w->kind->many, PARTS_MOST,
+             w->kind->too_many);
     return EBPO_E_LIMIT;
 }
 
-/* Names, with as many digits as the last one has, so that they sort. */
+/* Numbers have as many digits as the last one, so that names sort. */
+static ebpo_status name_part(const writing *w, uint64_t i, int digits, ebpo_error *error)
+{
+    part *p = &w->parts[i];
+    ebpo_mesh_group group = EBPO_MESH_GROUP_INIT;
+    ebpo_status status = EBPO_OK;
+    if (w->run->groups)
+        status = ebpo_mesh_groups_get(w->run->groups, i, &group, error);
+    part_file_name(p->name, w->kind->one, digits, i, group.name);
+    snprintf(p->file, sizeof p->file, "%s.ebpo.h5", p->name);
+    p->facts = (ebpo_component)EBPO_COMPONENT_INIT;
+    return status == EBPO_OK ? ebpo_components_get(w->components, i, &p->facts, error) : status;
+}
+
+/* What groups are called in the scene. */
+static ebpo_status show_names(const writing *w, ebpo_error *error)
+{
+    const char **own = calloc(w->count, sizeof *own), **taken = calloc(w->count, sizeof *taken);
+    uint64_t count = 0;
+    ebpo_status status = own && taken ? EBPO_OK : no_memory(error);
+    for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++) {
+        ebpo_mesh_group group = EBPO_MESH_GROUP_INIT;
+        status = ebpo_mesh_groups_get(w->run->groups, i, &group, error);
+        own[i] = group.name;
+        if (status == EBPO_OK && part_name_fits(own[i]))
+            taken[count++] = own[i];
+    }
+    if (status == EBPO_OK)
+        qsort(taken, count, sizeof *taken, part_compare_names);
+    for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++) {
+        char name[PART_SHOWN_SIZE];
+        part_shown_name(name, own[i], i, taken, count);
+        w->parts[i].shown = strdup(name);
+        status = w->parts[i].shown ? EBPO_OK : no_memory(error);
+    }
+    free(own);
+    free(taken);
+    return status;
+}
+
 static ebpo_status name_parts(writing *w, ebpo_error *error)
 {
     uint64_t count = ebpo_components_count(w->components), most = 0;
@@ -121,27 +178,28 @@ static ebpo_status name_parts(writing *w, ebpo_error *error)
     int digits = snprintf(NULL, 0, "%llu", (unsigned long long)count - 1);
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        part *p = &w->parts[i];
-        snprintf(p->name, sizeof p->name, "component-%0*llu", digits, (unsigned long long)i);
-        snprintf(p->file, sizeof p->file, "component-%0*llu.ebpo.h5", digits,
-                 (unsigned long long)i);
-        p->facts = (ebpo_component)EBPO_COMPONENT_INIT;
-        status = ebpo_components_get(w->components, i, &p->facts, error);
-        most = p->facts.face_count > most ? p->facts.face_count : most;
+        status = name_part(w, i, digits, error);
+        most = w->parts[i].facts.face_count > most ? w->parts[i].facts.face_count : most;
     }
     w->count = count;
     made = w->parts;
     made_count = count;
+    if (status == EBPO_OK && w->run->groups)
+        status = show_names(w, error);
     return status == EBPO_OK ? w->run->fits(w->run->user, most, error) : status;
 }
+
+static const char *shown_name(const part *p) { return p->shown ? p->shown : p->name; }
+
+/* ---- files ---- */
 
 static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     const writing *w = user;
     const ebpo_progress *outer = &w->run->progress;
     (void)stage, (void)done, (void)total;
-    return !outer->report || outer->report(outer->user, "building components", w->faces_done,
-                                           w->whole->mesh.face_count);
+    return !outer->report ||
+           outer->report(outer->user, w->kind->building, w->faces_done, w->whole->mesh.face_count);
 }
 
 static ebpo_status look_at(part *p, const char *path, ebpo_error *error)
@@ -184,6 +242,11 @@ static ebpo_status write_part(writing *w, uint64_t number, ebpo_error *error)
     if (!path)
         return no_memory(error);
     ebpo_status status = take_mesh(w, number, &one, error);
+    if (status == EBPO_OK && w->run->groups) { /* the whole says little of them */
+        progress_wipe(w->run->line);
+        findings_warn(stderr, "convert", shown_name(&w->parts[number]), &one.prepared.report,
+                      &one.prepared.record);
+    }
     if (status == EBPO_OK)
         status = w->run->build(w->run->user, &one, path, progress, error);
     if (status == EBPO_OK)
@@ -214,7 +277,7 @@ static void print_scene(const writing *w, FILE *out)
     json_array(&j, "instances");
     for (uint64_t i = 0; i < w->count; i++) {
         json_object(&j, NULL);
-        json_text(&j, "name", w->parts[i].name);
+        json_text(&j, "name", shown_name(&w->parts[i]));
         json_text(&j, "model", w->parts[i].name);
         json_end(&j);
     }
@@ -248,7 +311,10 @@ static void print_words(const writing *w, double seconds)
     for (uint64_t i = 0; i < w->count; i++) {
         const part *p = &w->parts[i];
         sum += p->bytes;
-        printf("%s: %s, %llu faces", p->name, p->solid ? "a solid" : "a surface",
+        printf("%s: ", p->name);
+        if (p->shown)
+            printf("'%s', ", p->shown);
+        printf("%s, %llu faces", p->solid ? "a solid" : "a surface",
                (unsigned long long)p->facts.face_count);
         if (p->facts.cavities)
             printf(" with %llu %s", (unsigned long long)p->facts.cavities,
@@ -256,8 +322,8 @@ static void print_words(const writing *w, double seconds)
         printf(", from face %llu on, levels 0 to %d, %s\n", (unsigned long long)p->facts.first_face,
                p->levels - 1, words_bytes(bytes, sizeof bytes, p->bytes));
     }
-    printf("%s: %llu components, %s, in %.1f s\n", w->run->folder, (unsigned long long)w->count,
-           words_bytes(bytes, sizeof bytes, sum), seconds);
+    printf("%s: %llu %s, %s, in %.1f s\n", w->run->folder, (unsigned long long)w->count,
+           w->kind->many, words_bytes(bytes, sizeof bytes, sum), seconds);
 }
 
 static void print_json(const writing *w, double seconds)
@@ -267,11 +333,13 @@ static void print_json(const writing *w, double seconds)
     json_object(&j, NULL);
     json_text(&j, "folder", w->run->folder);
     json_text(&j, "scene", scene_name);
-    json_array(&j, "components");
+    json_array(&j, w->kind->many);
     for (uint64_t i = 0; i < w->count; i++) {
         const part *p = &w->parts[i];
         json_object(&j, NULL);
         json_text(&j, "name", p->name);
+        if (p->shown)
+            json_text(&j, "group", p->shown);
         json_text(&j, "file", p->file);
         json_text(&j, "content_sha256", p->digest);
         json_bool(&j, "solid", p->solid);
@@ -294,13 +362,43 @@ static void print_json(const writing *w, double seconds)
 
 /* ---- all of it ---- */
 
+/* Names without faces have no model, which is said. */
+static ebpo_status tell_empty(const writing *w, ebpo_error *error)
+{
+    uint64_t count = ebpo_mesh_groups_count(w->run->groups);
+    if (count <= w->count)
+        return EBPO_OK;
+    ebpo_mesh_group group = EBPO_MESH_GROUP_INIT;
+    char first[PART_SHOWN_SIZE];
+    ebpo_status status = ebpo_mesh_groups_get(w->run->groups, w->count, &group, error);
+    if (status != EBPO_OK)
+        return status;
+    part_shown_name(first, group.name, w->count, NULL, 0);
+    progress_wipe(w->run->line);
+    fprintf(stderr,
+            "ebpo convert: %s: note: %llu of %llu groups have no faces, and no model: '%s'%s\n",
+            w->whole->as_read.source_name, (unsigned long long)(count - w->count),
+            (unsigned long long)count, first, count - w->count > 1 ? " and others" : "");
+    return EBPO_OK;
+}
+
+static ebpo_status find_parts(writing *w, ebpo_error *error)
+{
+    const parts_run *run = w->run;
+    return run->groups
+               ? ebpo_components_of_groups(&w->whole->mesh, run->groups, &w->components, error)
+               : ebpo_components_new(&w->whole->mesh, run->threads, run->progress, &w->components,
+                                     error);
+}
+
 static ebpo_status write_all(writing *w, ebpo_error *error)
 {
     const parts_run *run = w->run;
-    ebpo_status status =
-        ebpo_components_new(&w->whole->mesh, run->threads, run->progress, &w->components, error);
+    ebpo_status status = find_parts(w, error);
     if (status == EBPO_OK)
         status = name_parts(w, error);
+    if (status == EBPO_OK)
+        status = tell_empty(w, error);
     for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++)
         status = write_part(w, i, error);
     if (status == EBPO_OK)
@@ -312,18 +410,20 @@ static ebpo_status write_all(writing *w, ebpo_error *error)
 
 ebpo_status parts_write(const parts_run *run, mesh_input *whole, double begun, ebpo_error *error)
 {
-    writing w = { .run = run, .whole = whole };
+    writing w = { .run = run, .kind = run->groups ? &groups : &components, .whole = whole };
     ebpo_status status = write_all(&w, error);
     ebpo_components_free(w.components);
     ebpo_mesh_free(&whole->mesh);
-    if (status != EBPO_OK)
-        return status;
-    made_count = 0; /* it is there, and stays */
-    free(making);
-    making = NULL;
-    if (run->json)
-        print_json(&w, progress_now() - begun);
-    else if (!run->quiet)
-        print_words(&w, progress_now() - begun);
-    return EBPO_OK;
+    if (status == EBPO_OK) {
+        made_count = 0; /* it is there, and stays */
+        free(making);
+        making = NULL;
+        progress_wipe(run->line);
+        if (run->json)
+            print_json(&w, progress_now() - begun);
+        else if (!run->quiet)
+            print_words(&w, progress_now() - begun);
+    }
+    free_names(&w);
+    return status;
 }

@@ -1,8 +1,10 @@
-/* `ebpo convert --split-components`: a folder with a file for each component, and a scene. */
+/* `ebpo convert --split-components` and `--split-groups`: a folder with a file for each part, and a
+ * scene. */
 #ifndef EBPO_TOOLS_CONVERT_PARTS_H
 #define EBPO_TOOLS_CONVERT_PARTS_H
 
 #include "cli/mesh_input.h"
+#include "cli/progress.h"
 
 typedef struct parts_run {
     /* Builds a file; the mesh is freed in any case. */
@@ -11,14 +13,16 @@ typedef struct parts_run {
     /* Whether there is room for the largest one. */
     ebpo_status (*fits)(void *user, uint64_t faces, ebpo_error *error);
     void *user;
-    const char *folder, *unit; /* unit: NULL: none */
+    const ebpo_mesh_groups *groups; /* NULL: components are the parts */
+    const char *folder, *unit;      /* unit: NULL: none */
     bool json, quiet;
     unsigned threads;
+    progress_line *line; /* wiped before a warning */
     ebpo_progress progress;
 } parts_run;
 
 /* Makes the folder beside its place, before anything is read; the exit's clean-up is set. */
-EBPO_MUST_USE ebpo_status parts_begin(const char *folder, ebpo_error *error);
+EBPO_MUST_USE ebpo_status parts_begin(const char *folder, bool groups, ebpo_error *error);
 
 /* Of the mesh, mended: frees it. Then the folder is in its place, and what it holds is told. */
 EBPO_MUST_USE ebpo_status parts_write(const parts_run *run, mesh_input *whole, double begun,

@@ -5,6 +5,7 @@
  *   workspace.h   how much memory the work may use
  *   memory.h      how much there is
  *   mesh.h        triangle meshes: reading, checking, mending
+ *   groups.h      groups of faces that a file has names for
  *   rows.h        numbers from any HDF5 file
  *   build.h       from a mesh to a tree
  *   file.h        files: writing, opening, reading
@@ -33,6 +34,7 @@
 #include <ebpo/workspace.h>
 #include <ebpo/memory.h>
 #include <ebpo/mesh.h>
+#include <ebpo/groups.h>
 #include <ebpo/rows.h>
 #include <ebpo/build.h>
 #include <ebpo/file.h>
