@@ -51,6 +51,21 @@ echo 1 2 3 | "$query" "$work/cube.ebpo.h5" >/dev/full 2>"$work/out" &&
     fail "query does not see a full disk"
 grep -q 'No space left' "$work/out" || fail "query says that the disk is full"
 
+# A file's components, and its named groups where it can be read, as instances.
+python3 "$samples/furnished_room.py" "$work/room" >"$work/out" 2>&1 || fail furnished_room.py
+"$ebpo" convert -q --split-components "$work/room/room.ply" "$work/bodies" >"$work/out" 2>&1 ||
+    fail "split components"
+"$ebpo" scene report -q "$work/bodies/components.scene.json" >"$work/out" 2>&1 || fail bodies
+[ "$(cut -f 2-4 "$work/out")" = "crossing	component-0	component-5
+crossing	component-0	component-7" ] || fail "bodies meet"
+if "$ebpo" check -q "$work/room/room.obj" >/dev/null 2>&1; then
+    "$ebpo" convert -q --split-groups "$work/room/room.obj" "$work/pieces" >"$work/out" 2>&1 ||
+        fail "split groups"
+    "$ebpo" scene report -q "$work/pieces/groups.scene.json" >"$work/out" 2>&1 || fail pieces
+    [ "$(cut -f 2-4 "$work/out")" = "crossing	table/top	lamp
+crossing	table/top	chair back" ] || fail "pieces meet"
+fi
+
 # Scenes: of many parts, and of a robot, which packed is answered the same.
 PATH=$(dirname "$ebpo"):$(dirname "$generate"):$PATH
 python3 "$samples/many_parts.py" "$work/plant" 300 >"$work/out" 2>&1 || fail many_parts.py
