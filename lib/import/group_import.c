@@ -3,7 +3,7 @@
 
 #include "base/arrays.h"
 #include "base/error.h"
-#include "import/obj_runs.h"
+#include "import/import.h"
 #include "io/file_source.h"
 
 ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,

@@ -12,6 +12,8 @@
 
 #include <ebpo/mesh.h>
 
+#include "import/obj_runs.h"
+
 typedef enum ebpo_import_format {
     EBPO_IMPORT_OBJ,
     EBPO_IMPORT_STL,
@@ -33,5 +35,20 @@ bool ebpo_import_recognise(ebpo_import_format *format, const uint8_t *data, uint
 EBPO_MUST_USE ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format,
                                              const uint8_t *data, uint64_t size, const char *name,
                                              ebpo_workspace *workspace, ebpo_error *error);
+
+/* As ebpo_import_memory. `runs`: NULL, or those that `data` is the text of, whose faces are
+ * counted.
+ */
+EBPO_MUST_USE ebpo_status ebpo_import_runs(ebpo_mesh *out, ebpo_import_format format,
+                                           const uint8_t *data, uint64_t size, const char *name,
+                                           ebpo_workspace *workspace, ebpo_obj_runs *runs,
+                                           ebpo_error *error);
+
+/* An OBJ file with its runs and their faces; their names point into `data`. One run: the file has
+ * no names. Assimp reads it twice, so that the mesh is what ebpo_import_memory gives, and
+ * EBPO_E_UNSUPPORTED where that would not be so. */
+EBPO_MUST_USE ebpo_status ebpo_import_groups(ebpo_mesh *out, const uint8_t *data, uint64_t size,
+                                             const char *name, ebpo_workspace *workspace,
+                                             ebpo_obj_runs *runs, ebpo_error *error);
 
 #endif

@@ -10,7 +10,7 @@
 #include "base/arrays.h"
 #include "base/workspace_extents.h"
 #include "base/sized.h"
-#include "import/obj_runs.h"
+#include "import/import.h"
 #include "io/file_source.h"
 #include "mesh/mesh_parts.h"
 #include "mesh/named_groups.h"

@@ -589,7 +589,8 @@ typedef struct ebpo_attribute_facts {
  */
 EBPO_API bool ebpo_file_attribute(const ebpo_file *file, unsigned n, ebpo_attribute_facts *out);
 
-/* The name of an ebpo_attribute_type: "int8" to "float64"; NULL: no such type. Static. */
+/* The name of an ebpo_attribute_type: "int8" to "float64"; NULL: no such type. Static. Threads:
+ * any. */
 EBPO_API const char *ebpo_attribute_type_text(uint64_t type);
 
 /* Bytes that parts take in the file, compressed. */
