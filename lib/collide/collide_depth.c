@@ -17,27 +17,40 @@ static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance
     ebpo_collider *c = q->collider;
     ebpo_posed_solid posed;
     const ebpo_pose *pose = solid ? &q->options.pose_b : &q->options.pose_a;
-    const ebpo_posing *posing = &q->posing[solid == q->turned].posing;
     ebpo_status status = ebpo_check_solid(c->model[solid], error);
     if (status == EBPO_OK)
         status = ebpo_posed_solid_make(&posed, c->model[solid], pose, error);
-    if (status == EBPO_OK && !c->context[solid])
-        status = ebpo_context_new(c->model[solid], &c->context[solid], error);
     if (status != EBPO_OK)
         return status;
-    ebpo_depth_search s = { .surface = c->model[!solid]->whole,
-                            .posing = posing,
+    ebpo_depth_search s = { .from = c->context[!solid],
+                            .posing = &q->posing[solid == q->turned].posing,
                             .reach = q->reach,
                             .solid = &posed,
                             .context = c->context[solid],
                             .tolerance = tolerance,
                             .late = q->late,
                             .progress = &q->options.progress };
-    if (s.surface->bound_count > 0)
-        status = ebpo_depth_search_run(&s, error);
+    status = ebpo_depth_search_run(&s, error);
     if (status == EBPO_OK)
         *out = ebpo_certain_of(s.lo, s.hi);
     return status;
+}
+
+static ebpo_status make_contexts(ebpo_collider *c, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < 2 && status == EBPO_OK; i++)
+        if (!c->context[i])
+            status = ebpo_context_new(c->model[i], &c->context[i], error);
+    return status;
+}
+
+static uint64_t loads(const ebpo_collider *c)
+{
+    uint64_t sum = 0;
+    for (int i = 0; i < 2; i++)
+        sum += c->context[i] ? c->context[i]->loaded : 0;
+    return sum;
 }
 
 ebpo_status ebpo_collide_depth(ebpo_collider *c, const ebpo_collide_options *options,
@@ -49,10 +62,18 @@ ebpo_status ebpo_collide_depth(ebpo_collider *c, const ebpo_collide_options *opt
     if (!(tolerance > 0 && tolerance < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the depth's tolerance has to be greater than 0 and finite");
-    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t loaded = loads(c), read = ebpo_collision_bytes_read(&q);
+    status = make_contexts(c, error);
     if (status == EBPO_OK && a_in_b)
         status = depth_in(&q, 1, tolerance, a_in_b, error);
     if (status == EBPO_OK && b_in_a)
         status = depth_in(&q, 0, tolerance, b_in_a, error);
+    for (int i = 0; i < 2; i++)
+        ebpo_context_let_go(c->context[i]);
+    c->loads += loads(c) - loaded;
+    c->bytes_read += ebpo_collision_bytes_read(&q) - read;
     return status;
 }

@@ -149,53 +149,82 @@ static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_pu
 
 /* --- PLY --- */
 
+/* Of a model in parts a chunk at a time; the mesh of a whole one is read once more. */
+typedef struct painted {
+    ebpo_mesh mesh;
+    ebpo_faces_by_number parts;
+    ebpo_red_source source;
+    uint64_t *met; /* a bit for each face */
+} painted;
+
 typedef struct painting {
-    const ebpo_collision *question;
-    ebpo_mesh mesh[2]; /* of the caller's A and B */
-    uint64_t *met[2];  /* a bit for each face */
+    painted side[2]; /* of the caller's A and B */
 } painting;
 
 static bool take_met(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     const painting *p = user;
+    uint64_t *a = p->side[0].met, *b = p->side[1].met;
     for (uint64_t i = 0; i < count; i++) {
-        p->met[0][pairs[i].file_face_a / 64] |= UINT64_C(1) << pairs[i].file_face_a % 64;
-        p->met[1][pairs[i].file_face_b / 64] |= UINT64_C(1) << pairs[i].file_face_b % 64;
+        a[pairs[i].file_face_a / 64] |= UINT64_C(1) << pairs[i].file_face_a % 64;
+        b[pairs[i].file_face_b / 64] |= UINT64_C(1) << pairs[i].file_face_b % 64;
     }
     return true;
 }
 
-static ebpo_status read_meshes(painting *p, ebpo_error *error)
+static ebpo_status part_vertex(void *user, uint64_t number, double out[3], ebpo_error *error)
 {
-    for (int m = 0; m < 2; m++) {
-        const ebpo_model *model = p->question->collider->model[m];
-        ebpo_status status = ebpo_file_read_mesh(model->file, NULL, &p->mesh[m], error);
-        if (status != EBPO_OK)
-            return status;
-        p->met[m] = ebpo_alloc_zero(p->mesh[m].face_count / 64 + 1, 8);
-        if (!p->met[m])
-            return ebpo_fail_memory(error, p->mesh[m].face_count / 8);
+    return ebpo_faces_by_number_vertex(user, number, out, error);
+}
+
+static ebpo_status part_face(void *user, uint64_t number, uint32_t out[3], ebpo_error *error)
+{
+    return ebpo_faces_by_number_corners(user, number, out, error);
+}
+
+static ebpo_status begin_painted(painted *p, const ebpo_model *model, ebpo_error *error)
+{
+    const ebpo_info *info = model->info;
+    p->met = ebpo_alloc_zero(info->face_count / 64 + 1, 8);
+    if (!p->met)
+        return ebpo_fail_memory(error, info->face_count / 8);
+    if (model->whole) {
+        ebpo_status status = ebpo_file_read_mesh(model->file, NULL, &p->mesh, error);
+        p->source = ebpo_red_source_of(&p->mesh);
+        return status;
     }
+    ebpo_faces_by_number_begin(&p->parts, model, NULL);
+    p->source = (ebpo_red_source){ info->vertex_count, info->face_count, &p->parts, part_vertex,
+                                   part_face };
     return EBPO_OK;
+}
+
+static void end_painted(painted *p)
+{
+    ebpo_faces_by_number_end(&p->parts);
+    ebpo_mesh_free(&p->mesh);
+    free(p->met);
 }
 
 static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo_error *error)
 {
     static const char *const colour[2] = { "200 200 200", "150 150 160" };
-    painting p = { .question = q };
+    painting p = { 0 };
     ebpo_red_mesh red[2];
-    ebpo_status status = read_meshes(&p, error);
+    ebpo_status status = EBPO_OK;
+    for (int m = 0; m < 2 && status == EBPO_OK; m++)
+        status = begin_painted(&p.side[m], q->collider->model[m], error);
     if (status == EBPO_OK)
         status = ebpo_collide_all(q->collider, &q->options, take_met, &p, error);
+    uint64_t before = ebpo_collision_bytes_read(q);
     for (int m = 0; m < 2; m++)
-        red[m] = (ebpo_red_mesh){ &p.mesh[m], &q->posing[(int)q->turned ^ m].posing, p.met[m],
-                                  colour[m] };
+        red[m] = (ebpo_red_mesh){ p.side[m].source, &q->posing[(int)q->turned ^ m].posing,
+                                  p.side[m].met, colour[m] };
     if (status == EBPO_OK)
         status = ebpo_red_meshes_print(red, 2, target, error);
-    for (int m = 0; m < 2; m++) {
-        ebpo_mesh_free(&p.mesh[m]);
-        free(p.met[m]);
-    }
+    q->collider->bytes_read += ebpo_collision_bytes_read(q) - before;
+    for (int m = 0; m < 2; m++)
+        end_painted(&p.side[m]);
     return status;
 }
 

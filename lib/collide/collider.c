@@ -147,18 +147,6 @@ bool ebpo_collision_is_in_parts(const ebpo_collision *q)
     return !(q->model[0]->whole && q->model[1]->whole);
 }
 
-ebpo_status ebpo_collision_begin_whole(ebpo_collision *out, ebpo_collider *c,
-                                       const ebpo_collide_options *options, ebpo_error *error)
-{
-    ebpo_status status = ebpo_collision_begin(out, c, options, error);
-    if (status == EBPO_OK && ebpo_collision_is_in_parts(out))
-        status =
-            ebpo_fail(error, EBPO_E_LIMIT,
-                      "a model is not all in memory, as depths need it: give a larger budget, or "
-                      "fetch a file that is far away");
-    return status;
-}
-
 bool ebpo_collision_is_late(const ebpo_collision *q)
 {
     return q->late != UINT64_MAX && ebpo_clock() >= q->late;

@@ -39,11 +39,6 @@ EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collide
                                                const ebpo_collide_options *options,
                                                ebpo_error *error);
 
-/* The same of a question that models in parts cannot be asked yet: EBPO_E_LIMIT. */
-EBPO_MUST_USE ebpo_status ebpo_collision_begin_whole(ebpo_collision *out, ebpo_collider *collider,
-                                                     const ebpo_collide_options *options,
-                                                     ebpo_error *error);
-
 bool ebpo_collision_is_late(const ebpo_collision *collision);
 
 /* The first contact of two accels of the question's models: the collider's walk has it as met[0]

@@ -22,35 +22,43 @@ void ebpo_faces_by_number_end(ebpo_faces_by_number *f)
     ebpo_held_chunk_release(f->model->chunks, &f->vertices);
 }
 
-static void read_point(const ebpo_faces_by_number *f, uint32_t vertex, double out[3])
+ebpo_status ebpo_faces_by_number_vertex(ebpo_faces_by_number *f, uint64_t vertex, double out[3],
+                                        ebpo_error *error)
 {
+    ebpo_status status = ebpo_held_chunk_move(f->model->chunks, &f->vertices, vertex, error);
+    if (status != EBPO_OK)
+        return status;
     uint64_t row = vertex - f->vertices.begin;
     if (f->model->info->double_coordinates) {
         memcpy(out, f->vertices.rows + row * 3 * sizeof(double), 3 * sizeof(double));
-        return;
+        return EBPO_OK;
     }
     float x[3];
     memcpy(x, f->vertices.rows + row * sizeof x, sizeof x);
     for (int k = 0; k < 3; k++)
         out[k] = (double)x[k];
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_faces_by_number_corners(ebpo_faces_by_number *f, uint64_t face, uint32_t out[3],
+                                         ebpo_error *error)
+{
+    ebpo_status status = ebpo_held_chunk_move(f->model->chunks, &f->faces, face, error);
+    if (status == EBPO_OK)
+        memcpy(out, f->faces.rows + (face - f->faces.begin) * 3 * sizeof *out, 3 * sizeof *out);
+    return status;
 }
 
 ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face, double out[3][3],
                                      ebpo_error *error)
 {
-    ebpo_chunks *chunks = f->model->chunks;
     uint32_t corner[3];
     if (f->model->whole) {
         ebpo_accel_triangle(f->model->whole, f->slots[face], out);
         return EBPO_OK;
     }
-    ebpo_status status = ebpo_held_chunk_move(chunks, &f->faces, face, error);
-    if (status == EBPO_OK)
-        memcpy(corner, f->faces.rows + (face - f->faces.begin) * sizeof corner, sizeof corner);
-    for (int i = 0; i < 3 && status == EBPO_OK; i++) {
-        status = ebpo_held_chunk_move(chunks, &f->vertices, corner[i], error);
-        if (status == EBPO_OK)
-            read_point(f, corner[i], out[i]);
-    }
+    ebpo_status status = ebpo_faces_by_number_corners(f, face, corner, error);
+    for (int i = 0; i < 3 && status == EBPO_OK; i++)
+        status = ebpo_faces_by_number_vertex(f, corner[i], out[i], error);
     return status;
 }

@@ -16,6 +16,11 @@ void ebpo_faces_by_number_begin(ebpo_faces_by_number *f, const ebpo_model *model
 /* As in the file, exactly. The errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face,
                                                    double out[3][3], ebpo_error *error);
+/* Of a model in parts: a face's vertices, and a vertex, as in the file. */
+EBPO_MUST_USE ebpo_status ebpo_faces_by_number_corners(ebpo_faces_by_number *f, uint64_t face,
+                                                       uint32_t out[3], ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_faces_by_number_vertex(ebpo_faces_by_number *f, uint64_t vertex,
+                                                      double out[3], ebpo_error *error);
 /* Lets go of what it holds; zero is fine. */
 void ebpo_faces_by_number_end(ebpo_faces_by_number *f);
 

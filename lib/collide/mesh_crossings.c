@@ -166,7 +166,7 @@ static ebpo_status paint(crossings *c, ebpo_workspace *workspace, ebpo_error *er
     ebpo_status status = ebpo_file_read_source_mesh(c->file, &how, &mesh, &source_order, error);
     if (status != EBPO_OK)
         return status;
-    const ebpo_red_mesh red = { &mesh, NULL, c->met, "200 200 200" };
+    const ebpo_red_mesh red = { ebpo_red_source_of(&mesh), NULL, c->met, "200 200 200" };
     status = ebpo_red_meshes_print(&red, 1, &c->target, error);
     ebpo_mesh_free(&mesh);
     return status == EBPO_OK ? ebpo_publish_commit(&c->target, error) : status;

@@ -327,6 +327,43 @@ static void check_way_out(const two_models *t, const ebpo_pose pose[2], uint64_t
     ck_assert_msg(late.t.lo <= want.t.lo && want.t.lo <= late.t.hi, "%s: late way out", what);
 }
 
+/* --- how deep --- */
+
+/* Of surfaces none is told: bytes 0. */
+static void depths(ebpo_collider *c, const two_models *t, const ebpo_pose pose[2], bool back,
+                   uint64_t deadline, ebpo_certain out[2])
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    bool solid[2] = { t->model[back].info.solid, t->model[!back].info.solid };
+    options.pose_a = pose[back];
+    options.pose_b = pose[!back];
+    options.deadline_ns = deadline;
+    memset(out, 0, 2 * sizeof *out);
+    ASSERT_OK(ebpo_collide_depth(c, &options, 0.01 * t->model[0].size + 1e-6,
+                                 solid[1] ? &out[back] : NULL, solid[0] ? &out[!back] : NULL,
+                                 error));
+}
+
+static void check_depths(const two_models *t, const ebpo_pose pose[2], const char *what)
+{
+    ebpo_certain want[2], both[2], one[2], swapped[2], late[2];
+    depths(t->whole, t, pose, false, 0, want);
+    depths(t->parts, t, pose, false, 0, both);
+    depths(t->one, t, pose, false, 0, one);
+    depths(t->swapped, t, pose, true, 0, swapped);
+    depths(t->parts, t, pose, false, 1, late);
+    for (int i = 0; i < 2; i++) {
+        ck_assert_msg(memcmp(&want[i], &both[i], sizeof *want) == 0 &&
+                          memcmp(&want[i], &one[i], sizeof *want) == 0 &&
+                          memcmp(&want[i], &swapped[i], sizeof *want) == 0,
+                      "%s: %.17g .. %.17g deep, of parts %.17g .. %.17g, %.17g .. %.17g, %.17g .. "
+                      "%.17g",
+                      what, want[i].lo, want[i].hi, both[i].lo, both[i].hi, one[i].lo, one[i].hi,
+                      swapped[i].lo, swapped[i].hi);
+        ck_assert_msg(late[i].lo <= want[i].hi && want[i].lo <= late[i].hi, "%s: late depth", what);
+    }
+}
+
 START_TEST(parts_give_what_whole_models_do)
 {
     two_models t;
@@ -345,6 +382,7 @@ START_TEST(parts_give_what_whole_models_do)
         check_contacts(&t, pose, kind % 2 == 0, what);
         check_relation(&t, pose, what);
         check_way_out(&t, pose, &state, what);
+        check_depths(&t, pose, what);
     }
     free_two(&t);
 }
@@ -404,12 +442,26 @@ static void check_far_way_out(ebpo_collider *whole, ebpo_collider *parts, const 
     ck_assert_uint_gt(stats_of(parts).bytes_read, before.bytes_read);
 }
 
+static void check_far_depth(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose pose[2])
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_certain want[2], got[2];
+    options.pose_a = pose[0];
+    options.pose_b = pose[1];
+    ebpo_collider_stats before = stats_of(parts);
+    ASSERT_OK(ebpo_collide_depth(whole, &options, 1e-3, &want[0], &want[1], error));
+    ASSERT_OK(ebpo_collide_depth(parts, &options, 1e-3, &got[0], &got[1], error));
+    ck_assert(memcmp(want, got, sizeof want) == 0);
+    ck_assert_uint_gt(stats_of(parts).loads, before.loads);
+}
+
 static void check_far(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose *b,
                       int32_t relation)
 {
     const ebpo_pose pose[2] = { EBPO_POSE_INIT, *b };
     check_far_relation(whole, parts, pose, relation);
     check_far_way_out(whole, parts, pose);
+    check_far_depth(whole, parts, pose);
 }
 
 /* Two models, each of which would take more than all of it. */

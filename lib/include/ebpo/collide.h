@@ -15,9 +15,9 @@
  *
  * Poses are those of pose.h: decisions are exact on posed coordinates. Swapping the models, threads
  * and processors change nothing; nor do budgets, but for the one pair of faces that meet which
- * ebpo_collide_first and ebpo_collide_distance tell. Of models in parts (ebpo/query.h: a budget, a
- * cut level) ebpo_collide_depth cannot be asked. What the kinds of pairs mean:
- * docs/develop/collision.md.
+ * ebpo_collide_first and ebpo_collide_distance tell, and for distances within a tolerance. Models
+ * may be in parts (ebpo/query.h: a budget, a cut level) for every question. What the kinds of pairs
+ * mean: docs/develop/collision.md.
  */
 #ifndef EBPO_COLLIDE_H
 #define EBPO_COLLIDE_H
@@ -290,8 +290,8 @@ typedef enum ebpo_pairs_format {
     EBPO_PAIRS_HDF5 = 0,
 
     /* Both meshes at their poses, first A's, in the order of the files; faces have a colour: red
-     * (255, 0, 0) where they meet one of the other model, else a grey. Both meshes are in memory
-     * meanwhile, beside all budgets. */
+     * (255, 0, 0) where they meet one of the other model, else a grey. The mesh of a model that
+     * is all in memory is read once more, beside all budgets. */
     EBPO_PAIRS_PLY = 1
 } ebpo_pairs_format;
 
@@ -402,7 +402,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_distance(ebpo_collider *collider
  * a_in_b, b_in_a   NULL: not asked
  *
  * EBPO_E_NOT_SOLID: what the depth in it is asked of is a surface. EBPO_E_ARGUMENT: also the
- * tolerance. EBPO_E_LIMIT: a model is in parts. Others as for ebpo_collide_first.
+ * tolerance. What may be deepest waits beside the budgets. Others as for ebpo_collide_first.
  *
  * Threads: one per collider.
  */

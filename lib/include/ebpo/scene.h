@@ -516,8 +516,8 @@ typedef struct ebpo_scene_ask_options {
  *
  * EBPO_E_ARGUMENT: not loaded, no such time, a pose (ebpo_pose_check), or options.depth is no such
  * length. EBPO_E_ABSENT: a model has no mesh, or is a subset without faces that may matter: of
- * those that are related all may. EBPO_E_LIMIT: too little memory (ebpo_load_options), or
- * options.depth and a model that is in parts.
+ * those that are related all may. EBPO_E_LIMIT: too little memory
+ * (ebpo_load_options).
  * EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
  *
  * Threads: one per scene; further ones live for the call.
