@@ -4,6 +4,7 @@
 
 #include <inttypes.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
@@ -16,9 +17,14 @@
 
 /* --- making --- */
 
-static ebpo_status fail_operand(uint32_t number, const ebpo_error *cause, ebpo_error *error)
+ebpo_status ebpo_fail_operand(const ebpo_model *model, uint32_t number, const ebpo_error *cause,
+                              ebpo_error *error)
 {
-    return ebpo_fail(error, cause->status, "operand %" PRIu32 ": %s", number, cause->message);
+    const char *file = model->file->in.shown, *said = cause->message;
+    size_t named = strlen(file);
+    if (strncmp(said, file, named) == 0 && strncmp(said + named, ": ", 2) == 0)
+        said += named + 2;
+    return ebpo_fail_file(error, cause->status, file, "operand %" PRIu32 ": %s", number + 1, said);
 }
 
 static ebpo_status make_solids(ebpo_boolean *b, const ebpo_boolean_operand *operands,
@@ -29,7 +35,8 @@ static ebpo_status make_solids(ebpo_boolean *b, const ebpo_boolean_operand *oper
         if (ebpo_check_solid(operands[i].model, &cause) != EBPO_OK ||
             ebpo_posed_solid_make(&b->solid[i], operands[i].model, &operands[i].pose, &cause) !=
                 EBPO_OK)
-            return fail_operand(i, &cause, error);
+            return ebpo_fail_operand(operands[i].model, i, &cause, error);
+        b->pose[i] = operands[i].pose;
     }
     return EBPO_OK;
 }
@@ -45,8 +52,9 @@ static ebpo_status make_contexts(ebpo_boolean *b, ebpo_error *error)
 static ebpo_status fill(ebpo_boolean *b, const ebpo_boolean_operand *operands, ebpo_error *error)
 {
     b->solid = ebpo_alloc_zero(b->count, sizeof *b->solid);
+    b->pose = ebpo_alloc_zero(b->count, sizeof *b->pose);
     b->context = ebpo_alloc_zero((uint64_t)b->threads * b->count, sizeof(ebpo_context *));
-    if (!b->solid || !b->context)
+    if (!b->solid || !b->pose || !b->context)
         return ebpo_fail_memory(error, b->count * (sizeof *b->solid + b->threads * sizeof(void *)));
     ebpo_status status = make_solids(b, operands, error);
     return status == EBPO_OK ? make_contexts(b, error) : status;
@@ -89,6 +97,7 @@ void ebpo_boolean_free(ebpo_boolean *b)
         ebpo_context_free(b->context[i]);
     free(b->context);
     free(b->solid);
+    free(b->pose);
     free(b);
 }
 
@@ -153,7 +162,7 @@ ebpo_status ebpo_boolean_ask(const ebpo_boolean *b, unsigned worker, const doubl
         ebpo_error cause = EBPO_ERROR_INIT;
         if (ebpo_posed_solid_sides(&b->solid[i], ebpo_boolean_context(b, worker, i), w, &sides,
                                    &cause) != EBPO_OK)
-            return fail_operand(i, &cause, error);
+            return ebpo_fail_operand(b->solid[i].model, i, &cause, error);
         add_opinion(&o, i, b->solid[i].model->info->rule, &sides);
         may = ebpo_expression_value(&b->expression, o.known, o.above);
     }

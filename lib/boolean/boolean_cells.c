@@ -13,6 +13,7 @@
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/sized.h"
+#include "collide/collider.h"
 
 enum { PARENTS = 1 << 14, GRAIN = 64 };
 
@@ -207,5 +208,6 @@ ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells, ebpo_bool
                               .by_box = cells->ways[EBPO_CUBE_BY_BOX],
                               .by_nodes = cells->ways[EBPO_CUBE_BY_NODES],
                               .by_faces = cells->ways[EBPO_CUBE_BY_FACES] };
+    v.figure = ebpo_certain_of(v.lo, v.hi).figure;
     return EBPO_GIVE(ebpo_boolean_volume, out, &v);
 }

@@ -18,8 +18,9 @@ static ebpo_status check_node(const ebpo_boolean_node *node, uint32_t number, ui
                          number, node->operation);
     if (operand && node->left >= operands)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "node %" PRIu32 " of the expression: there is no operand %" PRIu32, number,
-                         node->left);
+                         "node %" PRIu32 " of the expression: left is %" PRIu32
+                         ", but operands are numbered from 0 and there are %" PRIu32,
+                         number, node->left, operands);
     if (!operand && (node->left >= number || node->right >= number))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "node %" PRIu32 " of the expression names node %" PRIu32
@@ -81,6 +82,21 @@ unsigned ebpo_expression_value(const ebpo_expression *e, uint64_t known, uint64_
                                              : EBPO_MAY_OUT;
     }
     return may[e->count - 1];
+}
+
+uint64_t ebpo_expression_operands(const ebpo_expression *e)
+{
+    bool used[EBPO_BOOLEAN_NODES_MAX] = { false };
+    uint64_t operands = 0;
+    used[e->count - 1] = true;
+    for (uint32_t i = e->count; i-- > 0;) {
+        const ebpo_boolean_node *n = &e->node[i];
+        if (used[i] && n->operation == EBPO_BOOLEAN_OPERAND)
+            operands |= UINT64_C(1) << n->left;
+        else if (used[i])
+            used[n->left] = used[n->right] = true;
+    }
+    return operands;
 }
 
 static void combine_boxes(int32_t operation, const double a[6], const double b[6], double out[6])

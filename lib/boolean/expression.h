@@ -22,6 +22,9 @@ EBPO_MUST_USE ebpo_status ebpo_expression_make(ebpo_expression *out, const ebpo_
  * MAY_BOTH may be more than what is possible where an operand is used twice. */
 unsigned ebpo_expression_value(const ebpo_expression *e, uint64_t known, uint64_t in);
 
+/* Operands that the result depends on, a bit for each. */
+uint64_t ebpo_expression_operands(const ebpo_expression *e);
+
 /* A box that holds the result, low[3] and high[3] in turn; box: those of the operands. Empty: a low
  * above its high. */
 void ebpo_expression_box(const ebpo_expression *e, const double (*box)[6], double out[6]);

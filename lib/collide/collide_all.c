@@ -95,6 +95,13 @@ ebpo_status ebpo_collide_self(ebpo_collider *c, const ebpo_collide_options *opti
         return status;
     here.deadline_ns = q.options.deadline_ns;
     here.progress = q.options.progress;
-    status = ebpo_collision_begin(&q, c, &here, error);
+    return ebpo_collide_self_posed(c, &here, take, user, error);
+}
+
+ebpo_status ebpo_collide_self_posed(ebpo_collider *c, const ebpo_collide_options *options,
+                                    ebpo_pairs_fn take, void *user, ebpo_error *error)
+{
+    ebpo_collision q;
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     return status == EBPO_OK ? all_pairs(&q, true, take, user, error) : status;
 }

@@ -60,6 +60,12 @@ void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
                                    const ebpo_accel *second, const ebpo_met_pair *met);
 
+/* ebpo_collide_self at a pose: options have it twice. */
+EBPO_MUST_USE ebpo_status ebpo_collide_self_posed(ebpo_collider *collider,
+                                                  const ebpo_collide_options *options,
+                                                  ebpo_pairs_fn take, void *user,
+                                                  ebpo_error *error);
+
 /* What is certain of a figure. */
 static inline ebpo_certain ebpo_certain_of(double lo, double hi)
 {

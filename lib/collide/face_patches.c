@@ -7,23 +7,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "collide/corner_ids.h"
-
-/* Of the faces joined so far; paths get shorter. */
-static uint32_t first_of(uint32_t *patch, uint32_t face)
-{
-    while (patch[face] != face) {
-        patch[face] = patch[patch[face]];
-        face = patch[face];
-    }
-    return face;
-}
-
-static void join(uint32_t *patch, uint32_t a, uint32_t b)
-{
-    a = first_of(patch, a);
-    b = first_of(patch, b);
-    patch[a > b ? a : b] = a > b ? b : a;
-}
+#include "collide/joined_faces.h"
 
 typedef struct joining {
     ebpo_corner_ids corners;
@@ -40,7 +24,7 @@ static bool join_face(joining *j, uint32_t *patch, uint32_t face, const double t
             !ebpo_grow(&j->user, &j->users, j->corners.count, sizeof *j->user))
             return false;
         if (id < known)
-            join(patch, j->user[id], face);
+            ebpo_join_faces(patch, j->user[id], face);
         else
             j->user[id] = face;
     }
@@ -65,7 +49,7 @@ ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
         fine = join_face(&j, patch, f, (const double(*)[3])t);
     }
     for (uint32_t f = 0; f < count && fine; f++)
-        patch[f] = first_of(patch, f);
+        patch[f] = ebpo_joined_first(patch, f);
     ebpo_corner_ids_free(&j.corners);
     free(j.user);
     if (!fine) {

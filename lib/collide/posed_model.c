@@ -3,6 +3,7 @@
 #include "collide/posed_model.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "base/fp_env.h"
 
@@ -33,4 +34,11 @@ ebpo_status ebpo_pose_check(const ebpo_model *model, const ebpo_pose *pose, ebpo
     double reach[3];
     ebpo_model_reach(model, reach);
     return ebpo_posing_make(&posing, pose, reach, error);
+}
+
+bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b)
+{
+    const ebpo_info *x = a->info, *y = b->info;
+    return memcmp(x->content_sha256, y->content_sha256, sizeof x->content_sha256) == 0 &&
+           x->solid == y->solid && x->rule == y->rule;
 }

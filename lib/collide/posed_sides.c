@@ -27,13 +27,9 @@ typedef struct looking {
  * -1: no area. */
 static int side_axis(const double t[3][3])
 {
-    for (int k = 0; k < 3; k++) {
-        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        const double a[2] = { t[0][u], t[0][v] }, b[2] = { t[1][u], t[1][v] },
-                     c[2] = { t[2][u], t[2][v] };
-        if (ebpo_orient2d(a, b, c) != 0)
+    for (int k = 0; k < 3; k++)
+        if (ebpo_normal_sign(k, t[0], t[1], t[2]) != 0)
             return k;
-    }
     return -1;
 }
 

@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "collide/around_face.h"
 #include "collide/contacts.h"
+#include "collide/posed_model.h"
 #include "collide/unmet_patches.h"
 #include "geom/predicates.h"
 
@@ -311,9 +312,7 @@ static bool has_unmet_area(relating *r, int m)
 /* One file twice, at one pose. */
 static bool is_same(const ebpo_collision *q)
 {
-    const ebpo_info *a = q->model[0]->info, *b = q->model[1]->info;
-    return memcmp(a->content_sha256, b->content_sha256, sizeof a->content_sha256) == 0 &&
-           a->solid == b->solid && a->rule == b->rule &&
+    return ebpo_same_model(q->model[0], q->model[1]) &&
            memcmp(&q->options.pose_a, &q->options.pose_b, sizeof q->options.pose_a) == 0;
 }
 

@@ -7,8 +7,7 @@
 
 static inline int compare(double a, double b) { return (a > b) - (a < b); }
 
-/* Sign of component k of the normal (b - a) x (c - a). */
-static int normal_sign(int k, const double a[3], const double b[3], const double c[3])
+int ebpo_normal_sign(int k, const double a[3], const double b[3], const double c[3])
 {
     int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
     return ebpo_orient2d((double[]){ a[u], a[v] }, (double[]){ b[u], b[v] },
@@ -17,8 +16,8 @@ static int normal_sign(int k, const double a[3], const double b[3], const double
 
 bool ebpo_zero_area(const double a[3], const double b[3], const double c[3])
 {
-    return normal_sign(2, a, b, c) == 0 && normal_sign(0, a, b, c) == 0 &&
-           normal_sign(1, a, b, c) == 0;
+    return ebpo_normal_sign(2, a, b, c) == 0 && ebpo_normal_sign(0, a, b, c) == 0 &&
+           ebpo_normal_sign(1, a, b, c) == 0;
 }
 
 /* Side of the shifted point p of the line a-b, all seen along `axis`, positive to the left; 0 only
@@ -26,7 +25,7 @@ bool ebpo_zero_area(const double a[3], const double b[3], const double c[3])
  * of u and v the lower axis has the larger shift. */
 static int shifted_side2d(int axis, const double a[3], const double b[3], const double p[3])
 {
-    int sign = normal_sign(axis, a, b, p);
+    int sign = ebpo_normal_sign(axis, a, b, p);
     if (sign != 0)
         return sign;
     int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
@@ -43,7 +42,7 @@ static int shifted_side3d(const double a[3], const double b[3], const double c[3
 {
     int sign = ebpo_orient3d(a, b, c, p);
     for (int k = 0; k < 3 && sign == 0; k++)
-        sign = normal_sign(k, a, b, c);
+        sign = ebpo_normal_sign(k, a, b, c);
     return sign;
 }
 
@@ -99,10 +98,10 @@ bool ebpo_point_on_triangle(const double p[3], const double a[3], const double b
     if (ebpo_orient3d(a, b, c, p) != 0)
         return false;
     for (int k = 0; k < 3; k++) {
-        int turn = normal_sign(k, a, b, c);
+        int turn = ebpo_normal_sign(k, a, b, c);
         if (turn != 0)
-            return normal_sign(k, a, b, p) != -turn && normal_sign(k, b, c, p) != -turn &&
-                   normal_sign(k, c, a, p) != -turn;
+            return ebpo_normal_sign(k, a, b, p) != -turn && ebpo_normal_sign(k, b, c, p) != -turn &&
+                   ebpo_normal_sign(k, c, a, p) != -turn;
     }
     return point_on_segment(p, a, b) || point_on_segment(p, b, c) || point_on_segment(p, c, a);
 }

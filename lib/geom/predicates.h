@@ -17,6 +17,9 @@ int ebpo_orient2d(const double a[2], const double b[2], const double c[2]);
  * counter-clockwise a, b, c points to. */
 int ebpo_orient3d(const double a[3], const double b[3], const double c[3], const double d[3]);
 
+/* Sign of component `axis` of the normal (b - a) x (c - a). */
+int ebpo_normal_sign(int axis, const double a[3], const double b[3], const double c[3]);
+
 /* True when a, b, c are collinear or coincide: a face without area. */
 bool ebpo_zero_area(const double a[3], const double b[3], const double c[3]);
 

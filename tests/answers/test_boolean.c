@@ -347,7 +347,7 @@ START_TEST(what_is_no_expression_is_refused)
     ck_assert_int_eq(try_nodes(&o, later, EBPO_BOOLEAN_NODES_MAX + 1, &error), EBPO_E_LIMIT);
     o.pose.rotation[0][0] = 2;
     ck_assert_int_eq(try_nodes(&o, formulas[0].node, 1, &error), EBPO_E_ARGUMENT);
-    ck_assert_msg(strstr(error.message, "operand 0") != NULL, "%s", error.message);
+    ck_assert_msg(strstr(error.message, "operand 1: pose: ") != NULL, "%s", error.message);
     operand_free(&o);
 }
 END_TEST

@@ -148,6 +148,7 @@ static ebpo_status ask_boolean(ebpo_model *model, ebpo_error *error)
     double points[POINTS][3];
     ebpo_boolean_result results[POINTS];
     ebpo_boundary_distance distance;
+    ebpo_exact_volume exact = EBPO_EXACT_VOLUME_INIT;
     ebpo_boolean_options options = EBPO_BOOLEAN_OPTIONS_INIT;
     ebpo_boolean *boolean = NULL;
     options.threads = 1;
@@ -159,6 +160,8 @@ static ebpo_status ask_boolean(ebpo_model *model, ebpo_error *error)
         status = ebpo_boolean_inside_many(boolean, points[0], POINTS, results, error);
     if (status == EBPO_OK)
         status = ebpo_boolean_distance(boolean, points[0], NULL, &distance, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_exact_volume(boolean, NULL, &exact, error);
     if (status == EBPO_OK)
         status = ask_boolean_cells(boolean, error);
     ebpo_boolean_free(boolean);

@@ -13,6 +13,7 @@
 #include "cli/pose_args.h"
 #include "cli/progress.h"
 #include "cli/query_args.h"
+#include "cli/remote_args.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 
@@ -33,8 +34,10 @@ static const arg_option options[] = {
                 "be on the boundary or not: ON?"),
     OPTION_TEXT("distance", 0, values, distance, "POINTS",
                 "print two bounds of each point's distance to the boundary, and where it is"),
-    OPTION_FLAG("volume", 0, values, volume,
-                "print two bounds of the volume; the default unless something else is asked for"),
+    OPTION_FLAG(
+        "volume", 0, values, volume,
+        "print the volume, exact where no faces of two models meet, and two bounds by cells; the "
+        "default unless something else is asked for"),
     OPTION_TEXT("output", 'o', values, out, "OUT",
                 "write the cells that hold the result, as OUT.ply or OUT.ebpo.h5"),
     OPTION_FLAG("inner", 0, values, inner,
@@ -98,29 +101,126 @@ static void print_distance(const values *v, const ebpo_boundary_distance *d)
                where_of(&d->inside), d->inside.certain ? "true" : "false", d->cells);
 }
 
-static void print_volume(const values *v, const ebpo_boolean_volume *b)
+/* --- volumes --- */
+
+/* What is asked about volumes and cells, and what comes out. */
+typedef struct cell_answer {
+    const values *v;
+    const char **models; /* as they were given */
+    ebpo_exact_volume exact;
+    ebpo_boolean_volume cells;
+    bool volume; /* is asked for */
+    uint64_t faces_written;
+} cell_answer;
+
+static bool is_exact(const cell_answer *a) { return a->exact.volume.figure == EBPO_FIGURE_EXACT; }
+
+static int32_t figure_of(const cell_answer *a)
+{
+    return is_exact(a) ? (int32_t)EBPO_FIGURE_EXACT : a->cells.figure;
+}
+
+/* Why the volume is not exact. */
+static void say_why(const cell_answer *a, char *out, size_t capacity)
+{
+    const ebpo_exact_volume *e = &a->exact;
+    uint32_t i = e->operand[0], k = e->operand[1];
+    const char *first = remote_shown(a->models[i]), *second = remote_shown(a->models[k]);
+    switch ((ebpo_volume_doubt)e->doubt) {
+    case EBPO_VOLUME_OPERANDS_MEET:
+        snprintf(out, capacity, "face %" PRIu64 " of %c (%s) meets face %" PRIu64 " of %c (%s)",
+                 e->file_face[0], 'A' + (int)i, first, e->file_face[1], 'A' + (int)k, second);
+        break;
+    case EBPO_VOLUME_FACES_MEET:
+        snprintf(out, capacity,
+                 "faces %" PRIu64 " and %" PRIu64 " of %c (%s) meet otherwise than as neighbours",
+                 e->file_face[0], e->file_face[1], 'A' + (int)i, first);
+        break;
+    case EBPO_VOLUME_IN_PARTS:
+        snprintf(out, capacity, "%c (%s) is not all in memory", 'A' + (int)i, first);
+        break;
+    case EBPO_VOLUME_SUBSET:
+        snprintf(out, capacity, "%c (%s) is a part of another file", 'A' + (int)i, first);
+        break;
+    case EBPO_VOLUME_CERTAIN: snprintf(out, capacity, "%s", ""); break;
+    }
+}
+
+static const char *const figure_words[] = { "exact", "interval", "bound" };
+
+static void print_volume(const cell_answer *a)
+{
+    const ebpo_boolean_volume *b = &a->cells;
+    char why[1024];
+    say_why(a, why, sizeof why);
+    if (is_exact(a))
+        printf("volume    %.17g, exact but for one rounding\nby cells  %.17g to %.17g\n",
+               a->exact.volume.lo, b->lo, b->hi);
+    else
+        printf("volume    %.17g to %.17g, %s: %s\n", b->lo, b->hi,
+               b->figure == EBPO_FIGURE_BOUND ? "a bound" : "an interval", why);
+    printf("cells     %" PRIu64 " in, %" PRIu64 " mixed of level %" PRId64
+           ", edge %g\ndecided   %" PRIu64 " by boxes, %" PRIu64 " by nodes, %" PRIu64
+           " by faces\n",
+           b->in_cells, b->mixed_cells, a->v->level, ldexp(b->edge, (int)-a->v->level), b->by_box,
+           b->by_nodes, b->by_faces);
+}
+
+static void volume_to_json(json *j, const cell_answer *a)
+{
+    const ebpo_boolean_volume *b = &a->cells;
+    char why[1024];
+    say_why(a, why, sizeof why);
+    json_real(j, "volume_lo", is_exact(a) ? a->exact.volume.lo : b->lo);
+    json_real(j, "volume_hi", is_exact(a) ? a->exact.volume.hi : b->hi);
+    json_text(j, "volume_figure", figure_words[figure_of(a)]);
+    if (is_exact(a))
+        json_null(j, "not_exact");
+    else
+        json_text(j, "not_exact", why);
+    json_real(j, "cells_lo", b->lo);
+    json_real(j, "cells_hi", b->hi);
+    json_int(j, "level", a->v->level);
+    json_reals(j, "root_origin", b->origin, 3);
+    json_real(j, "root_edge", b->edge);
+    json_uint(j, "in_cells", b->in_cells);
+    json_uint(j, "mixed_cells", b->mixed_cells);
+    json_uint(j, "by_box", b->by_box);
+    json_uint(j, "by_nodes", b->by_nodes);
+    json_uint(j, "by_faces", b->by_faces);
+}
+
+static void print_written(const cell_answer *a)
+{
+    char faces[40], in[40], mixed[40];
+    words_plural(faces, sizeof faces, a->faces_written, "face", "faces");
+    words_plural(in, sizeof in, a->cells.in_cells, "cell", "cells");
+    words_plural(mixed, sizeof mixed, a->cells.mixed_cells, "mixed cell", "mixed cells");
+    if (a->v->inner)
+        printf("%s: %s around %s that the result holds\n", a->v->out, faces, in);
+    else
+        printf("%s: %s around %s and %s that hold the result\n", a->v->out, faces, in, mixed);
+}
+
+static void print_cells(const cell_answer *a)
 {
     json j;
-    if (!v->query.json) {
-        printf("volume    %.17g to %.17g\ncells     %" PRIu64 " in, %" PRIu64
-               " mixed of level %" PRId64 ", edge %g\ndecided   %" PRIu64 " by boxes, %" PRIu64
-               " by nodes, %" PRIu64 " by faces\n",
-               b->lo, b->hi, b->in_cells, b->mixed_cells, v->level, ldexp(b->edge, (int)-v->level),
-               b->by_box, b->by_nodes, b->by_faces);
+    if (!a->v->query.json) {
+        if (a->v->out)
+            print_written(a);
+        if (a->volume)
+            print_volume(a);
         return;
     }
     json_begin(&j, stdout);
     json_object(&j, NULL);
-    json_real(&j, "volume_lo", b->lo);
-    json_real(&j, "volume_hi", b->hi);
-    json_int(&j, "level", v->level);
-    json_reals(&j, "root_origin", b->origin, 3);
-    json_real(&j, "root_edge", b->edge);
-    json_uint(&j, "in_cells", b->in_cells);
-    json_uint(&j, "mixed_cells", b->mixed_cells);
-    json_uint(&j, "by_box", b->by_box);
-    json_uint(&j, "by_nodes", b->by_nodes);
-    json_uint(&j, "by_faces", b->by_faces);
+    if (a->v->out) {
+        json_text(&j, "output", a->v->out);
+        json_text(&j, "side", a->v->inner ? "inner" : "outer");
+        json_uint(&j, "faces", a->faces_written);
+    }
+    if (a->volume)
+        volume_to_json(&j, a);
     json_finish(&j);
 }
 
@@ -192,14 +292,16 @@ static ebpo_status convert(ebpo_mesh *mesh, const values *v, ebpo_progress progr
     return status;
 }
 
-static ebpo_status write_cells(const ebpo_boolean_cells *cells, const values *v,
+static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_answer *a,
                                ebpo_progress progress, ebpo_error *error)
 {
     ebpo_mesh mesh;
+    const values *v = a->v;
     ebpo_boolean_side side = v->inner ? EBPO_BOOLEAN_INNER : EBPO_BOOLEAN_OUTER;
     ebpo_status status = ebpo_boolean_cells_mesh(cells, side, &mesh, error);
     if (status != EBPO_OK)
         return status;
+    a->faces_written = mesh.face_count;
     if (mesh.face_count == 0) {
         error->status = status = EBPO_E_ABSENT;
         snprintf(error->message, sizeof error->message,
@@ -214,26 +316,42 @@ static ebpo_status write_cells(const ebpo_boolean_cells *cells, const values *v,
     return status;
 }
 
-static int make_cells(const values *v, ebpo_boolean *b)
+static ebpo_status answer_cells(cell_answer *a, ebpo_boolean *b, ebpo_progress progress,
+                                ebpo_error *error)
+{
+    ebpo_boolean_cells *cells = NULL;
+    ebpo_volume_options measuring = EBPO_VOLUME_OPTIONS_INIT;
+    ebpo_cells_options how = EBPO_CELLS_OPTIONS_INIT;
+    how.level = (int)a->v->level;
+    how.progress = measuring.progress = progress;
+    ebpo_status status = EBPO_OK;
+    if (a->volume)
+        status = ebpo_boolean_exact_volume(b, &measuring, &a->exact, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_cells_new(b, &how, &cells, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_cells_volume(cells, &a->cells);
+    if (status == EBPO_OK && a->v->out)
+        status = write_cells(cells, a, progress, error);
+    ebpo_boolean_cells_free(cells);
+    return status;
+}
+
+static int make_cells(const values *v, const char **models, ebpo_boolean *b)
 {
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_boolean_cells *cells = NULL;
-    ebpo_boolean_volume volume = EBPO_BOOLEAN_VOLUME_INIT;
-    ebpo_cells_options how = EBPO_CELLS_OPTIONS_INIT;
-    how.level = (int)v->level;
-    how.progress = progress_start(&line, "boolean", v->query.json);
-    ebpo_status status = ebpo_boolean_cells_new(b, &how, &cells, &error);
-    if (status == EBPO_OK)
-        status = ebpo_boolean_cells_volume(cells, &volume);
-    if (status == EBPO_OK && v->out)
-        status = write_cells(cells, v, how.progress, &error);
+    cell_answer a = { .v = v,
+                      .models = models,
+                      .exact = EBPO_EXACT_VOLUME_INIT,
+                      .cells = EBPO_BOOLEAN_VOLUME_INIT,
+                      .volume = v->volume || !v->out };
+    ebpo_progress progress = progress_start(&line, "boolean", v->query.json);
+    ebpo_status status = answer_cells(&a, b, progress, &error);
     progress_wipe(&line);
-    if (status == EBPO_OK && (v->volume || !v->out))
-        print_volume(v, &volume);
-    ebpo_boolean_cells_free(cells);
     if (status != EBPO_OK)
         return command_failed("boolean", &error);
+    print_cells(&a);
     return command_flush("boolean") ? EXIT_FINE : EXIT_FAILED;
 }
 
@@ -263,7 +381,7 @@ static int check_values(const values *v, const char **models, uint32_t count)
 }
 
 static int answer(const values *v, const boolean_nodes *nodes, const query_session *sessions,
-                  const ebpo_pose *poses, uint32_t count)
+                  const ebpo_pose *poses, const char **models, uint32_t count)
 {
     ebpo_boolean_operand operands[MODELS];
     ebpo_boolean *b;
@@ -274,7 +392,7 @@ static int answer(const values *v, const boolean_nodes *nodes, const query_sessi
         operands[i] = (ebpo_boolean_operand){ sessions[i].model, poses[i] };
     if (ebpo_boolean_new(operands, count, nodes->node, nodes->count, &how, &b, &error) != EBPO_OK)
         return command_failed("boolean", &error);
-    int code = v->inside || v->distance ? ask_points(v, b) : make_cells(v, b);
+    int code = v->inside || v->distance ? ask_points(v, b) : make_cells(v, models, b);
     ebpo_boolean_free(b);
     return code;
 }
@@ -304,7 +422,7 @@ static int run(void *given, const char **operand)
     for (uint32_t i = 0; i < count && code == EXIT_FINE; i++)
         code = query_open(&sessions[i], "boolean", models[i], &holding, -1, &v->query.remote);
     if (code == EXIT_FINE)
-        code = answer(v, &nodes, sessions, poses, count);
+        code = answer(v, &nodes, sessions, poses, models, count);
     for (uint32_t i = 0; i < count; i++)
         query_close(&sessions[i]);
     return code;

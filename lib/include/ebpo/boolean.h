@@ -4,6 +4,7 @@
  *   Expressions     ebpo_boolean_new
  *   Point in solid  ebpo_boolean_inside, ebpo_boolean_inside_many
  *   Distance        ebpo_boolean_distance
+ *   Exact volume    ebpo_boolean_exact_volume
  *   Cells           ebpo_boolean_cells_new, ebpo_boolean_cells_volume, ebpo_boolean_cells_mesh
  *
  * Nothing is cut: there is no mesh of the result. Questions about it are answered by questions to
@@ -16,6 +17,7 @@
 #ifndef EBPO_BOOLEAN_H
 #define EBPO_BOOLEAN_H
 
+#include <ebpo/collide.h>
 #include <ebpo/pose.h>
 
 #ifdef __cplusplus
@@ -71,7 +73,8 @@ typedef struct ebpo_boolean ebpo_boolean;
  * EBPO_E_ARGUMENT: a node names one that does not stand before it, or an operand that is not there;
  * an unknown operation; a pose (ebpo_pose_check). EBPO_E_LIMIT: none, or too many, of operands or
  * of nodes. EBPO_E_NOT_SOLID: an operand is a surface. EBPO_E_ABSENT: an operand's file has no
- * mesh. EBPO_E_MEMORY. Each names the operand or the node, from 0.
+ * mesh. EBPO_E_MEMORY. Each names the node, from 0, or the operand: its file, and its place
+ * from 1 on.
  *
  * Threads: any.
  */
@@ -176,6 +179,71 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_distance(ebpo_boolean *boolean,
                                                          ebpo_boundary_distance *out,
                                                          ebpo_error *error);
 
+/* ---- exact volume ---- */
+
+typedef struct ebpo_volume_options {
+    size_t struct_size; /* EBPO_VOLUME_OPTIONS_INIT sets it */
+    ebpo_progress progress;
+} ebpo_volume_options;
+
+#define EBPO_VOLUME_OPTIONS_INIT EBPO_SIZED(ebpo_volume_options)
+
+/* Why a volume is not exact. */
+typedef enum ebpo_volume_doubt {
+    EBPO_VOLUME_CERTAIN = 0,       /* it is */
+    EBPO_VOLUME_OPERANDS_MEET = 1, /* a face of operand[0] meets one of operand[1] */
+    EBPO_VOLUME_FACES_MEET = 2,    /* two of operand[0] meet otherwise than as neighbours */
+    EBPO_VOLUME_IN_PARTS = 3,      /* the model of operand[0] is not all in memory */
+    EBPO_VOLUME_SUBSET = 4         /* its file is a part of another */
+} ebpo_volume_doubt;
+
+typedef struct ebpo_exact_volume {
+    size_t struct_size; /* EBPO_EXACT_VOLUME_INIT sets it */
+
+    /*
+     * The result's volume, in the unit of the world, cubed. EBPO_FIGURE_EXACT: lo and hi are the
+     * double nearest to that of posed coordinates, ties to even (INFINITY beyond doubles); 0: the
+     * result is empty. EBPO_FIGURE_BOUND: from 0 to a box around the result; cells tell more.
+     */
+    ebpo_certain volume;
+
+    /* An ebpo_volume_doubt: the first one that was found; of which operands, from 0. */
+    int32_t doubt;
+    uint32_t operand[2];
+
+    uint32_t reserved;
+
+    /* Of EBPO_VOLUME_OPERANDS_MEET a face of each, of EBPO_VOLUME_FACES_MEET two faces that meet,
+     * by their numbers in the files; else EBPO_NO_FACE. */
+    uint64_t file_face[2];
+
+    /* Parts of the operands' surfaces that were looked at, and those of them that bound the result;
+     * of an exact volume. */
+    uint64_t patches, bounding;
+} ebpo_exact_volume;
+
+#define EBPO_EXACT_VOLUME_INIT EBPO_SIZED(ebpo_exact_volume)
+
+/*
+ * The exact volume of the result, where the operands' faces allow it: none meets one of another
+ * operand, not even in a point, and those with an area of one operand meet as neighbours only (as
+ * ebpo_collide_self has it, at their poses). So shells may be apart, in each other, and turned
+ * inside out, with any winding numbers. Equal operands, models of the same content at poses that
+ * are bit by bit the same, are taken for one, and of operands that the expression does not use
+ * nothing is asked. Where that does not hold the call succeeds, and `doubt` says why.
+ *
+ * Takes some 80 bytes for each face of one operand at a time.
+ *
+ * EBPO_E_ARGUMENT: `out` was not begun with its macro. EBPO_E_CANCELLED: by `progress`.
+ * EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading. On failure `out` is unspecified.
+ *
+ * Threads: one per expression; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_exact_volume(ebpo_boolean *boolean,
+                                                             const ebpo_volume_options *options,
+                                                             ebpo_exact_volume *out,
+                                                             ebpo_error *error);
+
 /* ---- cells ---- */
 
 typedef struct ebpo_cells_options {
@@ -249,6 +317,12 @@ typedef struct ebpo_boolean_volume {
     /* Questions whether an operand is in or out of a cell: decided by the operand's box, by its
      * white and black nodes, and those that took its faces. */
     uint64_t by_box, by_nodes, by_faces;
+
+    /* How lo and hi are meant, an ebpo_figure: EBPO_FIGURE_INTERVAL; EBPO_FIGURE_BOUND as long as
+     * no cell is in; EBPO_FIGURE_EXACT of an empty result. */
+    int32_t figure;
+
+    int32_t reserved;
 } ebpo_boolean_volume;
 
 #define EBPO_BOOLEAN_VOLUME_INIT EBPO_SIZED(ebpo_boolean_volume)
