@@ -1,5 +1,6 @@
-"""picture_shows.py FILE.png WIDTH HEIGHT [red]: a PNG of that size with a light border and
-something darker inside; or with something red. Filters 0 to 4 of 8-bit RGB."""
+"""picture_shows.py FILE.png WIDTH HEIGHT [COLOUR..]: a PNG of that size with a light border and
+something darker inside; or with something of each colour: red, green, blue, purple; of -COLOUR
+nothing. Filters 0 to 4 of 8-bit RGB."""
 import struct
 import sys
 import zlib
@@ -44,10 +45,17 @@ width, height, raw = rows_of(data)
 assert (width, height) == (int(sys.argv[2]), int(sys.argv[3])), (width, height)
 rows = unfilter(width, height, raw)
 assert min(rows[0]) > 200 and all(row[0] > 200 for row in rows), "the border is not light"
+IS = {
+    "red": lambda r, g, b: r > 100 and max(g, b) < 70,
+    "green": lambda r, g, b: g > 100 and max(r, b) < 70,
+    "blue": lambda r, g, b: b > 100 and max(r, g) < 70,
+    "purple": lambda r, g, b: min(r, b) > 70 and g < 50,
+}
+for colour in sys.argv[4:]:
+    count = sum(IS[colour.lstrip("-")](*row[i:i + 3]) for row in rows for i in range(0, 3 * width, 3))
+    right = count == 0 if colour[0] == "-" else count > width * height // 2000
+    assert right, f"{colour}: {count} pixels"
 if len(sys.argv) > 4:
-    red = sum(row[i] > 100 and max(row[i + 1:i + 3]) < 70 for row in rows
-              for i in range(0, 3 * width, 3))
-    assert red > width * height // 2000, f"red: {red} pixels"
     print("fine")
     sys.exit()
 dark = sum(row[i] < 200 for row in rows for i in range(0, 3 * width, 3))

@@ -63,6 +63,18 @@ static ebpo_status call_write_ply(every_call_env *e)
     return status;
 }
 
+static ebpo_status call_colours(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_colours colours = { 0 };
+    ebpo_status status = read_mesh(e, EVERY_CALL_PLY, &mesh);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_colours(&mesh, &colours, e->error);
+    ebpo_colours_free(&colours);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
 static ebpo_status call_check(every_call_env *e)
 {
     ebpo_mesh mesh;
@@ -255,6 +267,7 @@ const every_call every_call_meshes[] = {
     { "parse_points", call_parse_points },
     { "rows", call_rows },
     { "write_ply", call_write_ply },
+    { "colours", call_colours },
     { "check", call_check },
     { "arrange", call_arrange },
     { "weld", call_weld },

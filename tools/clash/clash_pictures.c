@@ -38,7 +38,7 @@ static void look_at(camera *view, const double min[3], const double max[3], int 
 static ebpo_status draw(picture *out, int x, int y, int height, const camera *view,
                         const painted_mesh *p, unsigned threads, ebpo_error *error)
 {
-    raster_style style = { { 0.66, 0.54, 0.40 }, false, false, p->paint };
+    raster_style style = { .colour = { 0.66, 0.54, 0.40 }, .paint = p->paint };
     unsigned count = threads && threads < THREADS_MOST ? threads : 4;
     return p->mesh.face_count
                ? raster_draw(out, x, y, WIDTH, height, view, &p->mesh, &style, count, error)

@@ -7,6 +7,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include <ebpo/colours.h>
+
 #include "cli/command.h"
 #include "cli/file_facts.h"
 #include "cli/progress.h"
@@ -22,7 +24,7 @@ typedef struct values {
     int64_t level, threads;
     const char *levels, *view, *size;
     int up;
-    bool mesh, edges, quiet;
+    bool mesh, edges, no_colours, quiet;
     remote_values remote;
 } values;
 
@@ -39,6 +41,8 @@ static const arg_option options[] = {
                 "the axis that points upwards: x, y (the default) or z"),
     OPTION_TEXT("size", 0, values, size, "WxH", "pixels, 16 to 8192 each; default 1200x900"),
     OPTION_FLAG("edges", 0, values, edges, "draw the outlines of the polygons"),
+    OPTION_FLAG("no-colours", 0, values, no_colours,
+                "the model without the colours of its vertices or faces"),
     OPTION_THREADS(values, threads),
     OPTION_FLAG("quiet", 'q', values, quiet, "no progress: errors and warnings only"),
     REMOTE_OPTIONS(values, remote),
@@ -60,6 +64,7 @@ static const arg_spec spec = {
 typedef struct tile {
     int level; /* or MESH */
     ebpo_mesh mesh;
+    ebpo_colours colours; /* of the model, as far as it has any */
     bool closed;
     char caption[64];
 } tile;
@@ -137,7 +142,9 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
         snprintf(t->caption, sizeof t->caption, "mesh, %llu faces",
                  (unsigned long long)info->face_count);
         t->closed = info->solid && info->report.manifold;
-        return ebpo_file_read_mesh(file, &read, &t->mesh, error);
+        read.attributes = !j->v.no_colours;
+        ebpo_status read_well = ebpo_file_read_mesh(file, &read, &t->mesh, error);
+        return read_well == EBPO_OK ? ebpo_mesh_colours(&t->mesh, &t->colours, error) : read_well;
     }
     ebpo_lod_options lod =
         /* walls too: they close the envelopes, and inner ones cannot be seen */
@@ -171,6 +178,7 @@ static ebpo_status load_mesh(job *j, ebpo_progress progress, ebpo_error *error)
 {
     ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
     read.progress = progress;
+    read.attributes = !j->v.no_colours;
     ebpo_mesh_report report;
     tile *t = &j->tiles[0];
     if (t->level != MESH || j->tile_count > 1) {
@@ -182,6 +190,8 @@ static ebpo_status load_mesh(job *j, ebpo_progress progress, ebpo_error *error)
     /* The check makes sure that every index and coordinate can be drawn. */
     if (status == EBPO_OK)
         status = ebpo_mesh_check(&t->mesh, (unsigned)j->v.threads, progress, &report, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_colours(&t->mesh, &t->colours, error);
     return status;
 }
 
@@ -223,7 +233,11 @@ static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const came
                              const int at[4], ebpo_error *error)
 {
     static const uint8_t ink[3] = { 60, 66, 76 };
-    raster_style style = { { 0.30, 0.48, 0.66 }, t->closed, j->v.edges, NULL };
+    raster_style style = { .colour = { 0.30, 0.48, 0.66 },
+                           .closed = t->closed,
+                           .edges = j->v.edges,
+                           .face_colours = t->colours.by_face ? t->colours.face : NULL,
+                           .vertex_colours = t->colours.by_face ? NULL : t->colours.vertex };
     if (t->level == MESH)
         memcpy(style.colour, (const double[3]){ 0.66, 0.54, 0.40 }, sizeof style.colour);
     int caption = caption_height(j, at[2]), drawn = at[3] - caption;
@@ -277,8 +291,10 @@ static ebpo_status render(job *j, bool is_file, ebpo_progress progress, ebpo_err
     if (status == EBPO_OK)
         status = picture_write_png(&p, j->out, error);
     picture_free(&p);
-    for (int i = 0; i < j->tile_count; i++)
+    for (int i = 0; i < j->tile_count; i++) {
         ebpo_mesh_free(&j->tiles[i].mesh);
+        ebpo_colours_free(&j->tiles[i].colours);
+    }
     return status;
 }
 

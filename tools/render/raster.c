@@ -222,16 +222,59 @@ static double occlusion(const raster *r, int x, int y, const sample *at, const f
     return hidden > 1 ? 1 : hidden;
 }
 
-/* Key light from the upper left, a weak fill from the right, the sky above, a gloss. Linear light.
- */
-static void light(const raster *r, uint32_t face, double hidden, double out[3])
+/* Shares of a face's corners at a point of its plane, in the camera's axes. */
+static void corner_shares(const raster *r, uint32_t face, const double p[3], double out[3])
+{
+    double c[3][3], from[3][3], n[3], part[3], sum = 0;
+    for (int i = 0; i < 3; i++) {
+        to_camera(r, r->mesh->faces[3 * (uint64_t)face + (uint64_t)i], c[i]);
+        for (int k = 0; k < 3; k++)
+            from[i][k] = c[i][k] - p[k];
+    }
+    for (int k = 0; k < 3; k++)
+        n[k] = (double)r->normal[face][k];
+    for (int i = 0; i < 3; i++) {
+        cross(from[(i + 1) % 3], from[(i + 2) % 3], part);
+        sum += out[i] = fabs(dot(part, n));
+    }
+    for (int i = 0; i < 3; i++)
+        out[i] = sum > 0 ? out[i] / sum : 1.0 / 3;
+}
+
+/* A face's colour at a sample, linear. */
+static void colour_at(const raster *r, int x, int y, const sample *at, double out[3])
 {
     static const double other[3] = { 0.30, 0.48, 0.66 }, red[3] = { 0.85, 0.04, 0.03 };
-    int paint = r->style->paint ? r->style->paint[face] : RASTER_PLAIN;
-    const double *colour = paint & RASTER_RED     ? red
-                           : paint & RASTER_OTHER ? other
-                                                  : r->style->colour;
-    const float *n = r->normal[face];
+    const raster_style *style = r->style;
+    uint32_t face = at->what & ~EDGE;
+    int paint = style->paint ? style->paint[face] : RASTER_PLAIN;
+    memcpy(out,
+           paint & RASTER_RED     ? red
+           : paint & RASTER_OTHER ? other
+                                  : style->colour,
+           sizeof red);
+    for (int k = 0; k < 3 && style->face_colours; k++)
+        out[k] = r->linear[style->face_colours[4 * (uint64_t)face + (uint64_t)k]];
+    if (!style->vertex_colours)
+        return;
+    double p[3], shares[3];
+    const uint32_t *corner = r->mesh->faces + 3 * (uint64_t)face;
+    position(r, x, y, (double)at->inverse, p);
+    corner_shares(r, face, p, shares);
+    for (unsigned k = 0; k < 3; k++) {
+        out[k] = 0;
+        for (int i = 0; i < 3; i++)
+            out[k] += shares[i] * r->linear[style->vertex_colours[4 * (uint64_t)corner[i] + k]];
+    }
+}
+
+/* Key light from the upper left, a weak fill from the right, the sky above, a gloss. Linear light.
+ */
+static void light(const raster *r, int x, int y, const sample *at, double hidden, double out[3])
+{
+    double colour[3];
+    colour_at(r, x, y, at, colour);
+    const float *n = r->normal[at->what & ~EDGE];
     static const double key[3] = { -0.46, 0.62, 0.635 }, fill[3] = { 0.86, 0.10, 0.50 },
                         half[3] = { -0.254, 0.343, 0.904 };
     double m[3] = { (double)n[0], (double)n[1], (double)n[2] };
@@ -285,7 +328,7 @@ static void resolve_pixel(const raster *r, int x, int y, double reach, uint8_t *
             double c[3] = { r->linear[rgb[0]], r->linear[rgb[1]], r->linear[rgb[2]] };
             if (at->inverse > 0) {
                 uint32_t face = at->what & ~EDGE;
-                light(r, face, occlusion(r, i, j, at, r->normal[face], reach), c);
+                light(r, i, j, at, occlusion(r, i, j, at, r->normal[face], reach), c);
                 for (int k = 0; k < 3 && at->what & EDGE; k++)
                     c[k] = 0.45 * c[k] + 0.55 * ink[k];
             }

@@ -27,6 +27,9 @@ typedef struct raster_style {
     bool closed;          /* back faces are never seen: leave them out */
     bool edges;           /* draw the outlines of polygons */
     const uint8_t *paint; /* of each face; NULL: RASTER_PLAIN, which is `colour` */
+    /* Instead of `colour`, sRGB and a fourth byte each: of faces, or of vertices and interpolated
+     * on faces; NULL: none. */
+    const uint8_t *face_colours, *vertex_colours;
 } raster_style;
 
 /* Draws the mesh into the rectangle (x, y, width, height) of the picture, over what is there.

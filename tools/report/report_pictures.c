@@ -115,7 +115,7 @@ static ebpo_status fit(const comparison *c, ebpo_file *const *file, camera *view
 static ebpo_status one_method(comparison *c, method *m, ebpo_file *file, const camera *view,
                               ebpo_error *error)
 {
-    static const raster_style style = { { 0.30, 0.48, 0.66 }, true, false, NULL };
+    static const raster_style style = { .colour = { 0.30, 0.48, 0.66 }, .closed = true };
     ebpo_status status = EBPO_OK;
     for (int i = c->first;
          i <= method_last(c, m) && i < c->first + LEVELS_DRAWN && status == EBPO_OK; i++) {
@@ -130,9 +130,8 @@ static ebpo_status one_method(comparison *c, method *m, ebpo_file *file, const c
 
 static ebpo_status portrait(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
-    raster_style style = {
-        { 0.66, 0.54, 0.40 }, m->info.solid && m->info.report.manifold, false, NULL
-    };
+    raster_style style = { .colour = { 0.66, 0.54, 0.40 },
+                           .closed = m->info.solid && m->info.report.manifold };
     ebpo_mesh mesh = { 0 };
     camera view;
     ebpo_read_options read = reading(c->v->threads, NULL);

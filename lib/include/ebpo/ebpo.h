@@ -7,6 +7,7 @@
  *   mesh.h        triangle meshes: reading, checking, mending
  *   groups.h      groups of faces that a file has names for
  *   rows.h        numbers from any HDF5 file
+ *   colours.h     colours of vertices and faces
  *   build.h       from a mesh to a tree
  *   file.h        files: writing, opening, reading
  *   http.h        files on web servers
@@ -53,5 +54,6 @@
 #include <ebpo/deviation.h>
 #include <ebpo/limit.h>
 #include <ebpo/scene.h>
+#include <ebpo/colours.h>
 
 #endif
