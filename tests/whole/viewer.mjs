@@ -33,6 +33,10 @@ function makeModels() {
   run(ebpo, ['convert', '-q', '--with', 'leaf-planes', join(work, 'ring.ply'), model]);
   run(generate, ['--base', 'torus', '--faces', '10000', join(work, 'other.ply')]);
   copyFileSync(model, join(models, 'small.ebpo.h5'));
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((v) => `${v & 1} ${v >> 1 & 1} ${v >> 2}`), sides = ['0 2 3 1', '4 5 7 6', '0 1 5 4', '2 6 7 3', '0 4 6 2', '1 3 7 5'];
+  writeFileSync(join(work, 'red.ply'), `ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nelement face 6\n` +
+    `property list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n${corners.join('\n')}\n${sides.map((s) => `4 ${s} 255 0 0\n`).join('')}`);
+  run(ebpo, ['convert', '-q', join(work, 'red.ply'), join(models, 'red.ebpo.h5')]);
   const damaged = Buffer.from(readFileSync(model));
   damaged[damaged.length >> 1] ^= 1;
   writeFileSync(join(models, 'damaged.ebpo.h5'), damaged);
@@ -231,6 +235,19 @@ async function point(page) {
     assert.ok(Math.abs(probe.distance - distance) <= 1e-12 && probe.lo <= distance && distance <= probe.hi, `${probe.distance} ${distance}`);
   }
   assert.match(await page.textContent('#where'), /Inside|Outside/);
+}
+
+// A box of red faces: red while the switch is on; a file without colours has no switch.
+async function modelColours(browser, address, plainPage) {
+  const page = await show(browser, `${address}?file=models/red.ebpo.h5&detail=0`), colour = async () => (await look(page)).colour;
+  await settled(page);
+  const [r, g, b] = await colour();
+  assert.ok(r > 60 && r > 2 * Math.max(g, b), `${[r, g, b]} is not red`);
+  await page.keyboard.press('m');
+  const [red, green, blue] = await colour();
+  assert.ok(Math.abs(red - green) < 25 && Math.abs(red - blue) < 40, `${[red, green, blue]} is not gray`);
+  assert.ok(await page.isVisible('#ownRow') && !await plainPage.isVisible('#ownRow'));
+  await page.close();
 }
 
 async function click(page) {
@@ -465,6 +482,7 @@ async function main() {
   await step('the clipping plane cuts', () => clipping(page));
   await step('a point gets the library\'s answers', () => point(page));
   await step('a click asks about the point that is seen', () => click(page));
+  await step('faces have the model\'s colours, and there is a switch', () => modelColours(browser, address, page));
   requests();
   await step('a file from disk is shown without a server', () => fromDisk(page));
   await page.close();

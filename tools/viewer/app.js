@@ -85,6 +85,7 @@ const handlers = {
     levelChanged();
   },
   opened(m) {
+    $('ownRow').hidden = !m.coloured;
     Object.assign(state, { info: m.info, scene: m.scene, bytesTo: m.bytesTo, size: m.size, traffic: m.traffic });
     const i = m.info, name = state.shownName ?? m.name;
     $('openingText').textContent = `${count(i.face_count)} faces`;
@@ -379,6 +380,7 @@ $('walls').onchange = () => {
   scene.setWalls($('walls').checked);
   showStats();
 };
+$('own').onchange = () => scene.setOwnColours($('own').checked);
 $('wire').onchange = ask;
 $('cells').onchange = ask;
 $('colouring').onchange = colouringChanged;
@@ -443,7 +445,7 @@ const slide = (id, step, then) => () => {
   then();
 };
 const KEYS = {
-  arrowleft: slide('level', -1, levelChanged), arrowright: slide('level', 1, levelChanged), g: click('walls'), w: click('wire'), c: click('cells'),
+  arrowleft: slide('level', -1, levelChanged), arrowright: slide('level', 1, levelChanged), g: click('walls'), w: click('wire'), c: click('cells'), m: click('own'),
   k: () => choose('colouring', 1), x: () => choose('clip', 1), '[': slide('clipAt', -15, clipChanged), ']': slide('clipAt', 15, clipChanged), '/': click('clipFlip'),
   f: click('toolHome'), t: click('toolTheme'), p: click('toolPanel'), '?': click('toolHelp'), o: close,
   escape: () => {

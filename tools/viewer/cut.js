@@ -334,7 +334,7 @@ export class Cut {
   /** Takes a leaf's faces (nine numbers each, the model's coordinates, and `numbers`: those of the faces). */
   addMesh(leaf, faces) {
     const { center, scale } = this.scene;
-    this.mesh.add(leaf, Float32Array.from(faces, (x, i) => (x - center[i % 3]) * scale), faces.numbers);
+    this.mesh.add(leaf, Float32Array.from(faces, (x, i) => (x - center[i % 3]) * scale), faces.numbers, faces.colours);
   }
 
   // Nodes that were not refined for long lose what is below them; polytopes and faces of others than the cut's go when they are too many.

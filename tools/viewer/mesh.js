@@ -26,28 +26,33 @@ export class MeshStore {
     this.normal = new Float32Array(0);    // of faces, of length 1 or 0
     this.angle = new Float32Array(0);     // of corners
     this.owner = new Int32Array(0);       // the id of the leaf that draws the face
+    this.colour = new Uint8Array(0);      // red, green, blue of corners, if `coloured`
+    this.coloured = false;
     this.leafOf = [];                     // by face: a leaf that lists it, to be told that its normals changed
     this.position = new Float32Array(0);  // of vertices
     this.last = EMPTY;                    // of vertices: their newest corner
     this.table = new Uint32Array(4096).fill(NONE);
   }
 
-  /** Takes a leaf's faces, nine numbers each in the scene's coordinates. The leaf gets their places, and the sum of their areas as vectors. */
-  add(leaf, positions, numbers) {
+  /** Takes a leaf's faces, nine numbers each in the scene's coordinates, and their colours, if any, nine bytes each. The leaf gets their places, and the sum of their areas as vectors. */
+  add(leaf, positions, numbers, colours) {
+    this.coloured ||= colours !== undefined;
     const sum = [0, 0, 0, 0];
-    leaf.mesh = Uint32Array.from(numbers, (number, i) => this.byNumber.get(number) ?? this.#addFace(leaf, positions, 9 * i, number));
+    leaf.mesh = Uint32Array.from(numbers, (number, i) => this.byNumber.get(number) ?? this.#addFace(leaf, positions, 9 * i, number, colours));
     for (const face of leaf.mesh)
       this.#addArea(face, sum);
     leaf.vector = sum;
     leaf.stamp = (leaf.stamp ?? 0) + 1;
   }
 
-  #addFace(leaf, x, at, number) {
+  #addFace(leaf, x, at, number, colours) {
     const face = this.faces++, c = 3 * face;
     this.#makeRoom();
     this.byNumber.set(number, face);
     this.number[face] = number;
     this.leafOf[face] = leaf;
+    if (colours)
+      this.colour.set(colours.subarray(at, at + 9), 9 * face);
     for (let k = 0; k < 3; k++) {
       const v = this.corner[c + k] = this.#vertex(x[at + 3 * k], x[at + 3 * k + 1], x[at + 3 * k + 2]);
       for (let other = this.last[v]; other !== NONE; other = this.next[other]) { // normals there are others now
@@ -67,6 +72,8 @@ export class MeshStore {
       this[name] = grown(this[name], n);
     for (const name of ['corner', 'next', 'normal', 'angle'])
       this[name] = grown(this[name], 3 * n);
+    if (this.coloured)
+      this.colour = grown(this.colour, 9 * n);
     this.position = grown(this.position, 3 * this.vertices + 9);
     this.last = grown(this.last, this.vertices + 3);
   }
@@ -169,13 +176,15 @@ export class MeshStore {
   keep(leaves) {
     const old = leaves.map((leaf) => {
       const numbers = Array.from(leaf.mesh, (face) => this.number[face]), positions = new Float32Array(9 * numbers.length);
+      const colours = this.coloured ? new Uint8Array(9 * numbers.length) : undefined;
       leaf.mesh.forEach((face, i) => {
+        colours?.set(this.colour.subarray(9 * face, 9 * face + 9), 9 * i);
         for (let k = 0; k < 9; k++)
           positions[9 * i + k] = this.position[3 * this.corner[3 * face + Math.floor(k / 3)] + k % 3];
       });
-      return [leaf, positions, numbers];
+      return [leaf, positions, numbers, colours];
     });
     this.clear();
-    old.forEach(([leaf, positions, numbers]) => this.add(leaf, positions, numbers));
+    old.forEach((leaf) => this.add(...leaf));
   }
 }

@@ -11,6 +11,7 @@ export const LEVEL_COLOURS = ['#3d2c6b', '#473f8c', '#4257a0', '#3a6fa8', '#3387
 const VERTEX = `
   attribute vec4 tag;
   attribute vec2 bend;
+  attribute vec4 hue; // of the model, sRGB; the last one is 1 where there is none
   varying vec3 eyeSpace;
   varying vec3 scenePlace;
   varying vec3 colour;
@@ -18,6 +19,7 @@ const VERTEX = `
   varying float turned;
   flat varying int kind;
   uniform int colouring;
+  uniform bool own; // the model's colours rather than the plain one
   uniform vec3 plain, mesh, types[4], levels[21];
   void main() {
     vec4 at = modelViewMatrix * vec4(position, 1.0);
@@ -30,6 +32,8 @@ const VERTEX = `
     lent = normalMatrix * normalize(n) * (tag.z / 255.0);
     turned = face ? 1.0 : 0.0;
     colour = colouring == 0 ? plain : colouring == 1 ? levels[int(tag.x + 0.5)] : face ? mesh : types[kind];
+    if (own && colouring == 0 && hue.w < 0.5)
+      colour = mix(hue.rgb / 12.92, pow((hue.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, hue.rgb)); // as light
     gl_Position = projectionMatrix * at;
   }`;
 
@@ -108,13 +112,14 @@ export class Scene {
       changed();
     });
     this.uniforms = {
-      colouring: { value: 0 }, plain: { value: colour('#c9cdd6') }, mesh: { value: colour(MESH_COLOUR) },
+      colouring: { value: 0 }, own: { value: true }, plain: { value: colour('#c9cdd6') }, mesh: { value: colour(MESH_COLOUR) },
       types: { value: TYPE_COLOURS.map(colour) }, levels: { value: LEVEL_COLOURS.map(colour) },
       clip: { value: new THREE.Vector4(1, 0, 0, 0) }, clipping: { value: false }, section: { value: colour('#d97757') },
       sky: { value: colour('#59616f') }, ground: { value: colour('#23252b') },
     };
     this.faces = new THREE.ShaderMaterial({ uniforms: this.uniforms, vertexShader: VERTEX, fragmentShader: FRAGMENT, side: THREE.DoubleSide,
       polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
+    this.faces.defaultAttributeValues = { ...this.faces.defaultAttributeValues, hue: [0, 0, 0, 1] }; // of tiles without
     this.wire = this.#lineMaterial('#0b0d12', 0.55);
     this.cellLines = this.#lineMaterial('#4cc2ff', 0.35);
     this.tiles = new Map();
@@ -255,6 +260,8 @@ export class Scene {
       geometry.setAttribute('position', position);
       geometry.setAttribute('tag', new THREE.BufferAttribute(t.tag, 4));
       geometry.setAttribute('bend', new THREE.BufferAttribute(t.normal, 2, true));
+      if (t.hue)
+        geometry.setAttribute('hue', new THREE.BufferAttribute(t.hue, 4, true));
       geometry.setIndex(new THREE.BufferAttribute(t.index, 1));
       geometry.computeBoundingSphere();
       tile.mesh = new THREE.Mesh(geometry, this.faces);
@@ -293,6 +300,12 @@ export class Scene {
 
   setColouring(mode) {
     this.uniforms.colouring.value = { plain: 0, level: 1, type: 2 }[mode];
+    this.redraw();
+  }
+
+  /** Whether real faces show the model's colours in plain colouring. */
+  setOwnColours(own) {
+    this.uniforms.own.value = own;
     this.redraw();
   }
 

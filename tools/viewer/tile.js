@@ -1,5 +1,6 @@
 // Geometry of some nodes of a cut, as typed arrays for the picture: envelopes with the walls that are seen, real faces, lines.
-// A vertex has a place, a tag [level, type, weight of its normal, 0] and a normal, octahedral in two numbers of 16 bits.
+// A vertex has a place, a tag [level, type, weight of its normal, 0] and a normal, octahedral in two numbers of 16 bits. In tiles with coloured faces it
+// has a hue, too: [red, green, blue, 0], or 255 last where there is no colour.
 export const REAL_FACE = 4;  // in a tag's type, beside the node's
 const SURE = [0.25, 0.6];    // lengths of the field between which its weight goes from nothing to all: thin parts and edges are lit flat
 
@@ -18,6 +19,7 @@ export class TileMaker {
     this.position = new Float32Array(3 << 12);
     this.tag = new Uint8Array(4 << 12);
     this.normal = new Int16Array(2 << 12);
+    this.hue = new Uint8Array(4 << 12);
     this.inner = new Uint32Array(3 << 12);
     this.outer = new Uint32Array(3 << 12);
     this.line = new Uint32Array(2 << 12);
@@ -30,6 +32,7 @@ export class TileMaker {
   make(key, nodes, want, walls) {
     this.vertices = this.inners = this.outers = this.lines = 0;
     this.wanted = want.lines;
+    const coloured = this.mesh.coloured && nodes.some((node) => node.useMesh);
     let meshTriangles = 0;
     for (const node of nodes)
       if (node.useMesh)
@@ -42,7 +45,8 @@ export class TileMaker {
     const index = new Uint32Array(this.inners + this.outers);
     index.set(this.inner.subarray(0, this.inners));
     index.set(this.outer.subarray(0, this.outers), this.inners);
-    return { key, position: this.position.slice(0, 3 * this.vertices), tag: this.tag.slice(0, 4 * this.vertices), normal: this.normal.slice(0, 2 * this.vertices), index, inner: this.inners / 3,
+    return { key, position: this.position.slice(0, 3 * this.vertices), tag: this.tag.slice(0, 4 * this.vertices), normal: this.normal.slice(0, 2 * this.vertices),
+      hue: coloured ? this.hue.slice(0, 4 * this.vertices) : undefined, index, inner: this.inners / 3,
       lines: want.lines ? this.line.slice(0, this.lines) : undefined, cells: want.cells ? this.#cells(nodes) : undefined,
       triangles: index.length / 3, meshTriangles, wallTriangles: this.outers / 3 };
   }
@@ -61,6 +65,8 @@ export class TileMaker {
     this.tag[4 * i + 1] = type;
     this.tag[4 * i + 2] = sum > 0 ? Math.round(255 * weight) : 0;
     this.tag[4 * i + 3] = 0;
+    this.hue = grown(this.hue, 4 * i + 4);
+    this.hue.fill(255, 4 * i, 4 * i + 4);
     const u = sum > 0 ? n[0] / sum : 0, v = sum > 0 ? n[1] / sum : 0, below = n[2] < 0;
     this.normal[2 * i] = Math.round(32767 * (below ? (1 - Math.abs(v)) * (u < 0 ? -1 : 1) : u));
     this.normal[2 * i + 1] = Math.round(32767 * (below ? (1 - Math.abs(u)) * (v < 0 ? -1 : 1) : v));
@@ -146,8 +152,13 @@ export class TileMaker {
     for (let k = 0; k < 3; k++)
       n[k] = length > 0 ? n[k] / length : 0;
     const made = this.#vertex(mesh.position[3 * v], mesh.position[3 * v + 1], mesh.position[3 * v + 2], level, type);
+    if (mesh.coloured) {
+      this.hue.set(mesh.colour.subarray(3 * c, 3 * c + 3), 4 * made);
+      this.hue[4 * made + 3] = 0;
+    }
     for (let other = this.chain[v] - 1; other >= 0; other = older[other] - 1)
-      if (this.normal[2 * other] === this.normal[2 * made] && this.normal[2 * other + 1] === this.normal[2 * made + 1] && this.tag[4 * other] === level) {
+      if (this.normal[2 * other] === this.normal[2 * made] && this.normal[2 * other + 1] === this.normal[2 * made + 1] && this.tag[4 * other] === level &&
+          this.#sameHue(other, made)) {
         this.vertices--;
         return other;
       }
@@ -155,6 +166,10 @@ export class TileMaker {
     this.older[made] = this.chain[v];
     this.chain[v] = made + 1;
     return made;
+  }
+
+  #sameHue(a, b) {
+    return [0, 1, 2, 3].every((k) => this.hue[4 * a + k] === this.hue[4 * b + k]);
   }
 
   #forget(leaf) {

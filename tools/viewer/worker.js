@@ -44,7 +44,7 @@ class OpenFile {
     this.tree = new Tree(info);
     const meshBytes = ['/mesh/vertices', '/mesh/faces'].reduce((sum, path) => sum + (this.file.arrays.has(path) ? this.file.arrays.get(path).bytes ?? Infinity : 0), 0);
     this.cut = new Cut(this.tree, { small: Math.min(meshBytes, source.size) < SMALL_MESH });
-    post({ type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene,
+    post({ type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene, coloured: this.file.colours !== undefined,
       bytesTo: this.#bytesTo(), traffic: this.file.traffic, ms: performance.now() - this.began });
     await this.load(Math.min(FIRST_LEVELS, info.level_count) - 1);
     if (!this.file.located) {
@@ -145,7 +145,7 @@ class OpenFile {
   }
 
   #send({ set, removed, stats }) {
-    const transfer = set.flatMap((t) => [t.position.buffer, t.tag.buffer, t.normal.buffer, t.index.buffer, t.lines?.buffer, t.cells?.buffer]).filter(Boolean);
+    const transfer = set.flatMap((t) => [t.position.buffer, t.tag.buffer, t.normal.buffer, t.hue?.buffer, t.index.buffer, t.lines?.buffer, t.cells?.buffer]).filter(Boolean);
     post({ type: 'tiles', opening: this.number, set, removed, stats, traffic: this.file.traffic, ms: performance.now() - this.began, want: want.number }, transfer);
   }
 

@@ -314,8 +314,14 @@ const ROOT_ARRAYS = {
 /** Throws unless an array's attribute names the coding that the format has for it. In older files `delta` stands at leaf_skip. */
 export function checkCoding(attributes, path) {
   const word = new Facts(attributes, path).text('coding', 15), name = path.startsWith('/levels/') ? path.slice(path.lastIndexOf('/') + 1) : path;
-  if (!(CODINGS[name] ?? ['plain']).includes(word))
+  if (!(path.startsWith('/attributes/') ? ['plain', 'columns'] : CODINGS[name] ?? ['plain']).includes(word))
     throw formatError(path, "the array's coding is none that the format has for it");
+}
+
+/** What the arrays of a group of attributes say of themselves: `count` of the group, `text` and `range` of an array. */
+export function attributesFacts(attributes, path) {
+  const facts = new Facts(attributes, path);
+  return { count: () => facts.count('arrays'), text: (name) => facts.text(name, 255), isList: facts.has('list'), range: facts.has('range') ? facts.reals('range', 2) : undefined };
 }
 
 /** Columns of /subtrees/counts. */

@@ -1,7 +1,8 @@
 // An open EBP-Octree file: its facts, its levels, its mesh. Bytes are fetched when they are asked for, neighbours in one request.
 import { CHUNK_BYTES_MAX, chunkBound, pipelineOf } from './chunk.js';
 import { EbpoError, formatError } from './error.js';
-import { INDEX_ROWS, arraysOf, checkCoding, checkFacts, chunkRows, chunkRowsFit, readFacts, readLevelFacts } from './facts.js';
+import { chooseColours, columnPaths, describeColumns } from './colours.js';
+import { INDEX_ROWS, arraysOf, attributesFacts, checkCoding, checkFacts, chunkRows, chunkRowsFit, readFacts, readLevelFacts } from './facts.js';
 import { Hdf5, NeedBytes } from './hdf5.js';
 import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeaves, decodeMap, decodeVertices, recode } from './decode.js';
 import { Parts } from './parts.js';
@@ -45,6 +46,7 @@ export class EbpoFile {
     this.source = source;
     this.options = options;
     this.info = undefined;   // facts.js: attributes by name, `levels`, `parts`, `solid`
+    this.colours = undefined; // colours.js: where the mesh's colours are
     this.arrays = new Map(); // path: { path, rows, cols, elementSize, signed, chunkRows, chunkCount, pipeline, chunks, bytes }; chunks and bytes are undefined until located
   }
 
@@ -107,6 +109,8 @@ export class EbpoFile {
         continue;
       arrays.set(wanted.path, describe(hdf5, wanted, links.has(name), links.get(name), info));
     }
+    if (info.parts.has('attributes'))
+      this.colours = this.#findColours(hdf5, group('/attributes', root.links.get('attributes')), info, arrays);
     for (const array of arrays.values())
       if (array.pipeline !== arrays.get('/levels/00/types').pipeline)
         throw formatError(array.path, "the array's filters are other ones than the file's first array has");
@@ -125,6 +129,24 @@ export class EbpoFile {
       if (!(error instanceof NeedBytes)) // else the index has not come with the head
         throw error;
     }
+  }
+
+  // Of the attributes only colours are read.
+  #findColours(hdf5, group, info, arrays) {
+    const described = columnPaths(attributesFacts(group.attributes, '/attributes').count()).map((path) => {
+      const address = group.links.get(path.slice(-3)), o = address === undefined ? undefined : hdf5.object(address, path);
+      if (o?.kind !== 'array')
+        throw formatError(path, 'this is not an array');
+      const { text, isList, range } = attributesFacts(o.attributes, path), columns = describeColumns(path, text, isList);
+      return columns && { ...columns, address, range };
+    }).filter(Boolean);
+    const colours = chooseColours(described);
+    for (const path of new Set(colours?.channels.map((c) => c.path))) {
+      const columns = described.find((d) => d.path === path), { names, element, elementSize } = columns;
+      const wanted = { path, name: path, cols: names.length > 1 ? names.length : 0, sizes: [elementSize], signed: false, rows: element === 'face' ? info.face_count : info.vertex_count };
+      arrays.set(path, { ...describe(hdf5, wanted, true, columns.address, info), columns });
+    }
+    return colours;
   }
 
   #placeArrays(which) {
@@ -346,9 +368,29 @@ export class EbpoFile {
       await this.#findChunks(['/mesh/faces', '/mesh/vertices', '/mesh/faces_index']);
       const corners = new Uint32Array(numbers.length * 3), out = new Float64Array(numbers.length * 9);
       await this.store.triples('/mesh/faces', numbers, corners);
+      const colours = this.#coloursOf(numbers, corners);
       await this.store.triples('/mesh/vertices', corners, out);
+      out.colours = await colours;
       return out;
     });
+  }
+
+  // Red, green, blue of each corner, nine bytes a face.
+  async #coloursOf(numbers, corners) {
+    if (!this.colours)
+      return undefined;
+    const { element, channels } = this.colours, rows = element === 'vertex' ? corners : numbers, out = new Uint8Array(9 * numbers.length);
+    const values = await Promise.all(channels.map(({ path, column }) => this.store.column(path, column, rows)));
+    for (let corner = 0; corner < corners.length; corner++)
+      for (let k = 0; k < 3; k++)
+        out[3 * corner + k] = values[k][element === 'vertex' ? corner : Math.floor(corner / 3)];
+    return out;
+  }
+
+  // The rows of colours that subtrees have as their own.
+  #colourRanges(rows) {
+    const own = this.colours?.element === 'vertex' ? (r) => [r.firstVertex, r.vertices] : (r) => [r.firstFace, r.faces];
+    return (this.colours?.channels ?? []).flatMap(({ path }) => rows.map((r) => ({ path, from: own(r)[0], to: own(r)[0] + own(r)[1] })));
   }
 
   /**
@@ -367,7 +409,7 @@ export class EbpoFile {
 
   /**
    * The faces of leaves (nodes of tree.js), nine numbers each: [Float64Array], and their numbers as `.numbers` of each. Of a subtree everything is
-   * fetched in one batch: lists, faces, vertices.
+   * fetched in one batch: lists, faces, vertices. `.colours`, where the file has any: red, green, blue of each corner, 0 to 255.
    */
   async leafFaces(leaves) {
     this.#needMesh();
@@ -380,14 +422,17 @@ export class EbpoFile {
       const subtrees = [...new Set(described.filter((d) => parts.bySubtree(d.level)).map((d) => d.part))];
       if (subtrees.length) {
         const rows = [...(await parts.subtrees.rows(subtrees)).values()];
-        await store.cache.get([...store.chunksOf(described.flatMap((d) => parts.listRanges(d))), ...await parts.subtrees.blocks(rows)]);
+        await store.cache.get([...store.chunksOf([...described.flatMap((d) => parts.listRanges(d)), ...this.#colourRanges(rows)]), ...await parts.subtrees.blocks(rows)]);
       }
       const decoded = await parts.decodeLists(described), lists = new Map([...wanted.keys()].map((key, i) => [key, decoded[i]]));
       const numbers = leaves.map((leaf) => numbersOf(lists.get(keyOf(leaf)), leaf.rank)), all = new Uint32Array(numbers.reduce((sum, n) => sum + n.length, 0));
       numbers.reduce((at, n) => (all.set(n, at), at + n.length), 0);
       const faces = await this.facesByNumber(all);
       let at = 0;
-      return numbers.map((n) => Object.assign(faces.subarray(at * 9, (at += n.length) * 9), { numbers: n }));
+      return numbers.map((n) => {
+        const from = at * 9, to = (at += n.length) * 9;
+        return Object.assign(faces.subarray(from, to), { numbers: n, colours: faces.colours?.subarray(from, to) });
+      });
     });
   }
 
@@ -418,7 +463,7 @@ export class EbpoFile {
   /** Compares content_sha256 (format-spec, section 8). Reads the whole file. In a page: only over https and from localhost. */
   async verifyContent() {
     const digest = await sha256(), parts = [];
-    for (const path of [...this.arrays.keys()].filter((p) => !p.startsWith('/subtrees/')).sort()) {
+    for (const path of [...this.arrays.keys()].filter((p) => !/^\/(subtrees|attributes)\//.test(p)).sort()) {
       const bytes = this.#digested(path, (await this.#raw([path])).get(path));
       if (bytes)
         parts.push(new TextEncoder().encode(path + '\0'), await digest(bytes));

@@ -4,7 +4,8 @@ import { LEVELS_MAX, LEVEL_ARRAY_COUNT } from './facts.js';
 
 /** The number of an array in that list. `order`: of the arrays of a level. */
 export function placeNumber(path, level, order) {
-  return level === undefined ? ROOT_NUMBERS[path] : 64 * level + order;
+  const [, attribute] = /^\/attributes\/(\d{3})$/.exec(path) ?? [];
+  return attribute ? 8192 + 2 * Number(attribute) : level === undefined ? ROOT_NUMBERS[path] : 64 * level + order;
 }
 
 const ROOT_NUMBERS = { '/mesh/vertices': 4096, '/mesh/faces': 4097, '/mesh/faces_index': 4098, '/maps/vertex_source': 4099, '/maps/face_source': 4100,

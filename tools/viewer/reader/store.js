@@ -1,5 +1,6 @@
 // Arrays of an open file, by rows: which chunks hold them, and their values.
 import { ChunkCache } from './cache.js';
+import { decodeColours } from './colours.js';
 import { decodeFaces, decodeVertices } from './decode.js';
 import { formatError } from './error.js';
 
@@ -15,6 +16,8 @@ export class Store {
   async #values(array, chunk, bytes) {
     if (array.path === '/mesh/faces')
       return decodeFaces(bytes, array, chunk, await this.facesIndex(), this.info.vertex_count);
+    if (array.columns)
+      return decodeColours(bytes, array, Math.min(array.chunkRows, array.rows - chunk * array.chunkRows));
     return array.path === '/mesh/vertices' ? decodeVertices(bytes, array, chunk) : typed(array, bytes);
   }
 
@@ -73,6 +76,20 @@ export class Store {
       out[3 * i + 1] = from[at + 1];
       out[3 * i + 2] = from[at + 2];
     }
+  }
+
+  /** One column's value of each of some rows, as bytes (colours.js). */
+  async column(path, column, rows) {
+    const array = this.arrays.get(path), width = Math.max(array.cols, 1), chunks = new Map(), out = new Uint8Array(rows.length);
+    for (const row of rows)
+      chunks.set(Math.floor(row / array.chunkRows), undefined);
+    const wanted = [...chunks.keys()], values = await this.cache.get(wanted.map((chunk) => ({ array, chunk })));
+    wanted.forEach((chunk, i) => chunks.set(chunk, values[i]));
+    for (let i = 0; i < rows.length; i++) {
+      const chunk = Math.floor(rows[i] / array.chunkRows);
+      out[i] = chunks.get(chunk)[width * (rows[i] - chunk * array.chunkRows) + column];
+    }
+    return out;
   }
 
   /** Whole arrays as stored before filters, not kept; absent ones are undefined. -> Map(path, bytes) */
