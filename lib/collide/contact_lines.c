@@ -250,14 +250,18 @@ static void free_lines(lines *l)
 
 enum { SEGMENT_BYTES = 256, SEGMENTS_MOST = 1 << 30 };
 
+uint64_t ebpo_contact_lines_most(const ebpo_collider *c)
+{
+    uint64_t most = c->options.memory / SEGMENT_BYTES;
+    return most < SEGMENTS_MOST ? most : SEGMENTS_MOST;
+}
+
 ebpo_status ebpo_collide_polylines(ebpo_collider *c, const ebpo_collide_options *options,
                                    ebpo_polylines_fn take, void *user, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    lines l = { .error = error, .most = c->options.memory / SEGMENT_BYTES };
-    if (l.most > SEGMENTS_MOST)
-        l.most = SEGMENTS_MOST;
+    lines l = { .error = error, .most = ebpo_contact_lines_most(c) };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&l.places, &q, error);

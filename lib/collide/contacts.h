@@ -28,6 +28,9 @@ void ebpo_pair_faces_end(ebpo_pair_faces *f);
 EBPO_MUST_USE ebpo_status ebpo_pose_pair(ebpo_pair_faces *f, const ebpo_face_pair *pair,
                                          ebpo_posed_pair *out, ebpo_error *error);
 
+/* Segments that ebpo_collide_polylines has room for: one for each crossing pair. */
+uint64_t ebpo_contact_lines_most(const ebpo_collider *collider);
+
 /* The pair is EBPO_PAIR_CROSSING. */
 void ebpo_contact_of(const ebpo_posed_pair *faces, const ebpo_face_pair *pair,
                      ebpo_contact_segment *out);

@@ -21,11 +21,11 @@ typedef struct travel {
 } travel;
 
 /* The next time to look: until then the way is shorter than `gap`; w->time where there is none. */
-static ebpo_status next_look(const travel *t, const ebpo_scene_pair *pair, const ebpo_scene_way *w,
+static ebpo_status next_look(const travel *t, const scene_looks *looks, const ebpo_scene_way *w,
                              double gap, double *next, ebpo_error *error)
 {
     double low = w->time, high = t->to, at = high, length = 0;
-    ebpo_status status = scene_pair_motion(t->scene, pair, low, at, &length, error);
+    ebpo_status status = scene_looks_motion(looks, low, at, &length, error);
     if (status != EBPO_OK || length < gap) {
         *next = at;
         return status;
@@ -33,7 +33,7 @@ static ebpo_status next_look(const travel *t, const ebpo_scene_pair *pair, const
     /* halved until it fits, then a little longer again */
     for (int n = 0; n < 70 && status == EBPO_OK && (low == w->time || n < 8); n++) {
         at = low + (high - low) / 2;
-        status = scene_pair_motion(t->scene, pair, w->time, at, &length, error);
+        status = scene_looks_motion(looks, w->time, at, &length, error);
         if (length < gap)
             low = at;
         else
@@ -43,9 +43,21 @@ static ebpo_status next_look(const travel *t, const ebpo_scene_pair *pair, const
     return status;
 }
 
+/* Past a jump. *next stays where nothing jumps: there rounding alone may be longer than the gap,
+ * however short the time. */
+static ebpo_status jump(const scene_looks *looks, const ebpo_scene_way *w, double *next,
+                        ebpo_error *error)
+{
+    double length, at = nextafter(w->time, INFINITY);
+    ebpo_status status = scene_looks_motion(looks, w->time, at, &length, error);
+    if (status == EBPO_OK && length == INFINITY)
+        *next = at;
+    return status;
+}
+
 static bool is_reached(const travel *t, const ebpo_scene_way *w)
 {
-    return w->hi <= w->clearance + t->how.tolerance;
+    return scene_is_within(w->hi, w->clearance, t->how.tolerance);
 }
 
 static ebpo_status look(const travel *t, scene_looks *looks, ebpo_scene_way *w, ebpo_error *error)
@@ -54,7 +66,7 @@ static ebpo_status look(const travel *t, scene_looks *looks, ebpo_scene_way *w, 
     w->looks++;
     if (status != EBPO_OK || is_reached(t, w) || looks->gap > w->clearance)
         return status;
-    return scene_lacks(t->scene, looks->pair, looks->lacking, w->time, error);
+    return scene_lacks(t->scene, looks->pair, looks->lacking, w->time, false, error);
 }
 
 static ebpo_status go(const travel *t, scene_looks *looks, ebpo_scene_way *w, ebpo_error *error)
@@ -67,14 +79,16 @@ static ebpo_status go(const travel *t, scene_looks *looks, ebpo_scene_way *w, eb
         w->reached = is_reached(t, w);
         if (w->reached || w->time >= t->to)
             return EBPO_OK;
-        if (w->looks >= t->how.most_looks) {
+        status = next_look(t, looks, w, w->lo - w->clearance, &next, error);
+        if (status == EBPO_OK && !(next > w->time))
+            status = jump(looks, w, &next, error);
+        if (status != EBPO_OK)
+            return status;
+        if (w->looks >= t->how.most_looks || !(next > w->time)) {
             w->reached = -1;
             return EBPO_OK;
         }
-        status = next_look(t, looks->pair, w, w->lo - w->clearance, &next, error);
-        if (status != EBPO_OK)
-            return status;
-        w->time = next > w->time ? next : nextafter(w->time, INFINITY); /* a jump */
+        w->time = next;
     }
 }
 
@@ -86,11 +100,11 @@ static ebpo_status go_pairs(void *context, uint64_t begin, uint64_t end, unsigne
     (void)worker;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         const ebpo_scene_pair *pair = &t->list.pairs[i];
-        scene_looks looks = { .scene = t->scene, .pair = pair, .tolerance = t->how.tolerance / 4 };
+        scene_looks looks;
         t->ways[i] = (ebpo_scene_way){
             .a = pair->a, .b = pair->b, .time = t->from, .clearance = pair->clearance
         };
-        status = scene_collider(t->scene, pair, 1, &looks.collider, error);
+        status = scene_looks_begin(&looks, t->scene, pair, t->how.tolerance, error);
         if (status == EBPO_OK)
             status = go(t, &looks, &t->ways[i], error);
         ebpo_collider_free(looks.collider);

@@ -131,8 +131,11 @@ static ebpo_status read_csv(json_reader *r, const json_t *value)
     if (refused)
         return json_bad_at(r, "csv", refused);
     char *joined = scene_join_path(r->scene->folder, path);
-    status = joined ? scene_read_csv(last_route(r), joined, &r->pose_bytes, r->error)
-                    : ebpo_fail_memory(r->error, strlen(path));
+    status = joined ? EBPO_OK : ebpo_fail_memory(r->error, strlen(path));
+    if (status == EBPO_OK && !here.outside)
+        status = scene_stays_within(r->scene->folder, joined, r->error);
+    if (status == EBPO_OK)
+        status = scene_read_csv(last_route(r), joined, &r->pose_bytes, r->error);
     free(joined);
     return status;
 }

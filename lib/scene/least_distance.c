@@ -87,8 +87,7 @@ static ebpo_status look(search *s, double time, double *lo, ebpo_error *error)
 /* Between its ends it can be nearer by half of what is left of the way. */
 static ebpo_status add_part(search *s, part p, ebpo_error *error)
 {
-    ebpo_status status =
-        scene_pair_motion(s->looks.scene, s->looks.pair, p.from, p.to, &p.motion, error);
+    ebpo_status status = scene_looks_motion(&s->looks, p.from, p.to, &p.motion, error);
     if (status != EBPO_OK)
         return status;
     p.least = fmin(fmin(p.at_from, p.at_to), (p.at_from + p.at_to - p.motion) / 2);
@@ -107,13 +106,18 @@ static ebpo_status halve(search *s, const part *p, double middle, ebpo_error *er
                : status;
 }
 
+/* Routes may jump at keys; what rides together does not. */
+static double next_jump(const search *s, double from, double to)
+{
+    return s->looks.rides ? to : scene_pair_next(s->looks.scene, s->looks.pair, from, to);
+}
+
 /* From key to key, so that routes jump between parts only. */
 static ebpo_status begin_parts(search *s, double from, double to, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (double at = from; status == EBPO_OK;) {
-        double next = scene_pair_next(s->looks.scene, s->looks.pair, at, to);
-        double end = next > at ? nextafter(next, -INFINITY) : at;
+        double next = next_jump(s, at, to), end = next > at ? nextafter(next, -INFINITY) : at;
         part p = { .from = at, .to = end };
         status = look(s, at, &p.at_from, error);
         p.at_to = p.at_from;
@@ -129,13 +133,22 @@ static ebpo_status begin_parts(search *s, double from, double to, ebpo_error *er
 }
 
 /* Whether the least part tells enough, or all that can be found out. */
-static bool is_done(const search *s, const part *p, double middle, double tolerance,
-                    uint64_t most_looks)
+static bool is_done(const search *s, const part *p, double middle, const least_search *how)
 {
     double hi = s->out->hi, open = hi - s->limit; /* below 0: nothing that is lacking matters */
-    return hi - p->least <= tolerance || s->limit - p->least <= open / 8 ||
-           s->out->looks >= most_looks || p->motion <= tolerance / 8 ||
+    return scene_is_within(hi, p->least, how->tolerance) || s->limit - p->least <= open / 8 ||
+           s->out->looks >= how->most_looks || p->motion <= how->tolerance / 8 ||
            !(middle > p->from && middle < p->to);
+}
+
+/* What rounding may do stays, however short the part is: nearly all of its motion then. */
+static ebpo_status is_rounding(const search *s, const part *p, bool *out, ebpo_error *error)
+{
+    double least = 0;
+    ebpo_status status =
+        scene_looks_motion(&s->looks, p->from, nextafter(p->from, INFINITY), &least, error);
+    *out = p->motion <= 2 * least;
+    return status;
 }
 
 static ebpo_status narrow(search *s, const least_search *how, ebpo_error *error)
@@ -145,9 +158,13 @@ static ebpo_status narrow(search *s, const least_search *how, ebpo_error *error)
         part p = take_part(s);
         double middle = p.from + (p.to - p.from) / 2;
         s->out->lo = fmin(p.least, s->out->hi);
-        if (is_done(s, &p, middle, how->tolerance, how->most_looks))
+        bool done = is_done(s, &p, middle, how);
+        if (!done)
+            status = is_rounding(s, &p, &done, error);
+        if (done)
             break;
-        status = halve(s, &p, middle, error);
+        if (status == EBPO_OK)
+            status = halve(s, &p, middle, error);
     }
     return status;
 }
@@ -155,13 +172,11 @@ static ebpo_status narrow(search *s, const least_search *how, ebpo_error *error)
 static ebpo_status find_least(const least_search *how, const ebpo_scene_pair *pair,
                               ebpo_scene_least *out, ebpo_error *error)
 {
-    search s = { .limit = INFINITY,
-                 .looks = { .scene = how->scene, .pair = pair, .tolerance = how->tolerance / 4 },
-                 .out = out };
+    search s = { .limit = INFINITY, .out = out };
     *out = (ebpo_scene_least){
         .a = pair->a, .b = pair->b, .time = how->from, .hi = INFINITY, .clearance = pair->clearance
     };
-    ebpo_status status = scene_collider(how->scene, pair, 1, &s.looks.collider, error);
+    ebpo_status status = scene_looks_begin(&s.looks, how->scene, pair, how->tolerance, error);
     if (status == EBPO_OK)
         status = begin_parts(&s, how->from, how->to, error);
     if (status == EBPO_OK)

@@ -51,7 +51,7 @@ static void pose_box(const ebpo_posing *p, const scene_model *m, posed_box *out)
 }
 
 ebpo_status scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
-                            scene_space *out, double *unit, ebpo_error *error)
+                            scene_seen *out, ebpo_error *error)
 {
     const scene_model *m = model_of(scene, of);
     ebpo_posing from, at;
@@ -69,6 +69,7 @@ ebpo_status scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other
     }
     /* the transposed matrix is the inverse but for the deviation, of points of the model's box */
     double off = (sizes + reach * scale) * slack / scale + 3 * from.deviation * reach;
+    out->rounding = off;
     for (int k = 0; k < 3; k++) {
         double middle = 0, half = off;
         for (int i = 0; i < 3; i++)
@@ -79,10 +80,10 @@ ebpo_status scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other
                 sum += from.matrix[i][k] / scale * (b.half[j][i] / scale);
             half += fabs(sum);
         }
-        out->min[k] = middle - half;
-        out->max[k] = middle + half;
+        out->box.min[k] = middle - half;
+        out->box.max[k] = middle + half;
     }
-    *unit = scale * (1 - 2 * from.deviation);
+    out->unit = scale * (1 - 2 * from.deviation);
     return EBPO_OK;
 }
 
@@ -131,16 +132,16 @@ static ebpo_status left_out_of(const ebpo_scene *scene, uint64_t of, uint64_t ot
                                double *gap, ebpo_error *error)
 {
     const scene_model *m = model_of(scene, of);
-    scene_space held, all, seen;
-    double unit;
+    scene_space held, all;
+    scene_seen seen;
     *gap = INFINITY;
     if (!held_box(scene, of, &held))
         return EBPO_OK;
     memcpy(all.min, m->min, sizeof all.min);
     memcpy(all.max, m->max, sizeof all.max);
-    ebpo_status status = scene_seen_from(scene, of, other, time, &seen, &unit, error);
+    ebpo_status status = scene_seen_from(scene, of, other, time, &seen, error);
     if (status == EBPO_OK)
-        *gap = gap_around(&all, &held, &seen) * unit;
+        *gap = gap_around(&all, &held, &seen.box) * seen.unit;
     return status;
 }
 
@@ -159,13 +160,14 @@ ebpo_status scene_left_out(const ebpo_scene *scene, const ebpo_scene_pair *pair,
 }
 
 ebpo_status scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
-                        double time, ebpo_error *error)
+                        double time, bool solids, ebpo_error *error)
 {
     const scene_model *m = model_of(scene, lacking);
     return ebpo_fail(
         error, EBPO_E_ABSENT,
         "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a "
         "part of another or has no mesh, and what is not in it may matter; ask a scene "
-        "with more of it",
-        scene->instances[pair->a].as.name, scene->instances[pair->b].as.name, time, m->name);
+        "with more of it%s",
+        scene->instances[pair->a].as.name, scene->instances[pair->b].as.name, time, m->name,
+        solids ? ", such as ebpo scene pack --solids makes" : "");
 }

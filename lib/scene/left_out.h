@@ -9,11 +9,17 @@ typedef struct scene_space {
     double min[3], max[3];
 } scene_space;
 
-/* A box in the coordinates of the instance `of` that holds the box of `other` at a time, and how
- * long a unit of these is in the world at least. EBPO_E_ARGUMENT: a pose. */
+/* One instance in another's coordinates. */
+typedef struct scene_seen {
+    scene_space box;
+    double rounding; /* how far the box was widened for it */
+    double unit;     /* how long one of these coordinates is in the world, at least */
+} scene_seen;
+
+/* A box in the coordinates of the instance `of` that holds the box of `other` at a time.
+ * EBPO_E_ARGUMENT: a pose. */
 EBPO_MUST_USE ebpo_status scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other,
-                                          double time, scene_space *out, double *unit,
-                                          ebpo_error *error);
+                                          double time, scene_seen *out, ebpo_error *error);
 
 /* The distance of two boxes, rounded down. */
 double scene_space_gap(const scene_space *a, const scene_space *b);
@@ -24,8 +30,9 @@ EBPO_MUST_USE ebpo_status scene_left_out(const ebpo_scene *scene, const ebpo_sce
                                          double time, double *gap, uint64_t *lacking,
                                          ebpo_error *error);
 
-/* EBPO_E_ABSENT: what this instance's file lacks may come nearer than the question allows. */
+/* EBPO_E_ABSENT: what this instance's file lacks may come nearer than the question allows; or be
+ * around the other one, where solids are asked about. */
 ebpo_status scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
-                        double time, ebpo_error *error);
+                        double time, bool solids, ebpo_error *error);
 
 #endif

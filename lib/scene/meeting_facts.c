@@ -90,17 +90,14 @@ static bool count_lines(void *user, const ebpo_polyline *line)
     return true;
 }
 
-/* More segments than the collider's memory holds are no failure of a report. */
+/* More segments than the collider's memory holds are no failure of a report; what else fails is. */
 static ebpo_status tell_lines(const scene_two *two, ebpo_scene_meeting *m, ebpo_error *error)
 {
-    ebpo_error why = EBPO_ERROR_INIT;
-    ebpo_status status =
-        ebpo_collide_polylines(two->collider, two->options, count_lines, &m->contacts, &why);
-    if (status == EBPO_E_LIMIT) {
+    if (m->crossing > ebpo_contact_lines_most(two->collider)) {
         m->contacts = UINT64_MAX;
         return EBPO_OK;
     }
-    return status == EBPO_OK ? status : ebpo_fail_with(error, &why);
+    return ebpo_collide_polylines(two->collider, two->options, count_lines, &m->contacts, error);
 }
 
 /* --- where --- */

@@ -99,7 +99,7 @@ static ebpo_status check_left_out(const asking *a, const ebpo_scene_pair *pair, 
     uint64_t lacking = 0;
     ebpo_status status = scene_left_out(a->scene, pair, a->time, &gap, &lacking, error);
     if (status == EBPO_OK && (!(gap > pair->clearance) || (a->how.relate && gap < INFINITY)))
-        status = scene_lacks(a->scene, pair, lacking, a->time, error);
+        status = scene_lacks(a->scene, pair, lacking, a->time, a->how.relate, error);
     return status;
 }
 

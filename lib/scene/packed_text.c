@@ -61,8 +61,11 @@ static ebpo_status copy_poses(const ebpo_scene *scene, const char *csv, const ch
 {
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     char *path = scene_join_path(scene->folder, csv);
-    ebpo_status status =
-        path ? ebpo_whole_file_open(&file, path, error) : ebpo_fail_memory(error, strlen(csv));
+    ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(csv));
+    if (status == EBPO_OK && !scene->outside)
+        status = scene_stays_within(scene->folder, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_open(&file, path, error);
     if (status == EBPO_OK)
         status = write_in(folder, name, file.data, file.size, error);
     ebpo_whole_file_close(&file);

@@ -35,27 +35,25 @@ ebpo_status scene_look(scene_looks *l, double time, double *lo, double *hi, ebpo
     return status;
 }
 
-ebpo_status scene_pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
-                              double to, double *out, ebpo_error *error)
+ebpo_status scene_looks_begin(scene_looks *l, const ebpo_scene *scene, const ebpo_scene_pair *pair,
+                              double tolerance, ebpo_error *error)
 {
-    double a, b;
-    ebpo_status status = ebpo_scene_motion(scene, pair->a, from, to, &a, error);
-    if (status == EBPO_OK)
-        status = ebpo_scene_motion(scene, pair->b, from, to, &b, error);
-    if (status == EBPO_OK)
-        *out = (a + b) * (1 + 0x1p-50);
-    return status;
+    *l = (scene_looks){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
+    /* finer ones would take long, for digits that the next pose has otherwise */
+    l->tolerance = fmax(l->tolerance, scene_pair_rounding(scene, pair) / 16);
+    l->rides = scene_pair_rides(scene, pair);
+    return scene_collider(scene, pair, 1, &l->collider, error);
 }
 
-double scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from, double to)
+ebpo_status scene_looks_motion(const scene_looks *l, double from, double to, double *out,
+                               ebpo_error *error)
 {
-    double next = to;
-    for (int i = 0; i < 2; i++) {
-        uint64_t route = scene->instances[i ? pair->b : pair->a].as.route;
-        if (route != EBPO_SCENE_NONE)
-            next = fmin(next, scene_route_next(&scene->routes[route], from, to));
-    }
-    return next;
+    return scene_pair_motion(l->scene, l->pair, l->rides, from, to, out, error);
+}
+
+bool scene_is_within(double hi, double lo, double tolerance)
+{
+    return hi <= lo || (hi - lo) * (1 + 0x1p-52) <= tolerance;
 }
 
 ebpo_status scene_take_way_options(ebpo_scene_way_options *own,

@@ -19,7 +19,7 @@ ebpo_status scene_plan_check(scene_needs *needs, const ebpo_plan_options *option
     ebpo_status status = EBPO_TAKE(ebpo_plan_options, &needs->how, options, error);
     if (status != EBPO_OK)
         return status;
-    if (needs->how.purpose < EBPO_SCENE_FOR_COLLIDE || needs->how.purpose > EBPO_SCENE_FOR_INSIDE)
+    if (needs->how.purpose < EBPO_SCENE_FOR_COLLIDE || needs->how.purpose > EBPO_SCENE_FOR_SOLIDS)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no purpose %d", (int)needs->how.purpose);
     if (!(needs->how.margin >= 0 && needs->how.margin < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the margin %g is below 0 or no length",

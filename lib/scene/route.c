@@ -175,7 +175,7 @@ double scene_length_above(const double way[3])
     return sqrt(sum) * (1 + slack) * most;
 }
 
-scene_step scene_route_step(const scene_route *route, double from, double to, double reach)
+scene_step scene_route_step(const scene_route *route, double from, double to, scene_reach reach)
 {
     uint64_t n = key_at(route, from);
     const scene_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
@@ -191,10 +191,51 @@ scene_step scene_route_step(const scene_route *route, double from, double to, do
     double angle = angle_between(a->turn, b->turn), scale = fmax(a->scale, b->scale);
     double grows = fabs(b->scale - a->scale);
     double turned = angle * part, grown = grows * part;
-    double rounding = slack * (size + reach * scale);
+    double rounding = slack * (size + (reach.length + reach.size) * scale);
     return (scene_step){
-        (scene_length_above(way) * part + reach * (scale * turned + grown)) * (1 + slack) +
+        (scene_length_above(way) * part + reach.length * (scale * turned + grown)) * (1 + slack) +
             rounding,
-        reach / 8 * (scale * turned * turned + 2 * grown * turned) * (1 + slack) + rounding,
+        reach.length / 8 * (scale * turned * turned + 2 * grown * turned) * (1 + slack) + rounding,
     };
+}
+
+/* A pose on the way from one time to another. */
+typedef struct growing {
+    double scale, grown, most, size;
+} growing;
+
+static void grow_to(growing *g, double scale, const double translation[3])
+{
+    double size = 0;
+    for (int k = 0; k < 3; k++)
+        size += fabs(translation[k]);
+    g->grown += fabs(scale - g->scale);
+    g->scale = scale;
+    g->most = fmax(g->most, scale);
+    g->size = fmax(g->size, size);
+}
+
+double scene_route_growth(const scene_route *route, double from, double to, scene_reach reach)
+{
+    ebpo_pose at;
+    scene_route_at(route, from, &at);
+    growing g = { .scale = at.scale };
+    grow_to(&g, at.scale, at.translation);
+    for (uint64_t n = key_at(route, from) + 1; n < route->count; n++) {
+        if (!(route->keys[n].time < to))
+            break;
+        grow_to(&g, route->keys[n].scale, route->keys[n].translation);
+    }
+    scene_route_at(route, to, &at);
+    grow_to(&g, at.scale, at.translation);
+    return reach.length * g.grown * (1 + slack) +
+           slack * (2 * g.size + (reach.length + reach.size) * g.most);
+}
+
+double scene_route_rounding(const scene_route *route, scene_reach reach)
+{
+    growing g = { .scale = 0 };
+    for (uint64_t n = 0; n < route->count; n++)
+        grow_to(&g, route->keys[n].scale, route->keys[n].translation);
+    return slack * (g.size + (reach.length + reach.size) * g.most);
 }

@@ -98,14 +98,19 @@ static void empty_box(double min[3], double max[3])
     }
 }
 
-/* How far the instance's points are from the origin of what moves along its route, at most. */
-static double reach_of(const scene_instance *i, const scene_model *m)
+scene_reach scene_reach_of(const ebpo_scene *scene, const scene_instance *i)
 {
+    const scene_model *m = &scene->models[i->as.model];
     double min[3], max[3], far[3];
+    scene_reach reach = { 0, 0 };
     posed_box(&i->as.pose, m, min, max);
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 3; k++) {
         far[k] = fmax(fabs(min[k]), fabs(max[k]));
-    return scene_length_above(far);
+        reach.size += fabs(i->as.pose.translation[k]) +
+                      i->as.pose.scale * fmax(fabs(m->min[k]), fabs(m->max[k]));
+    }
+    reach.length = scene_length_above(far);
+    return reach;
 }
 
 static void box_at(const ebpo_scene *scene, const scene_instance *i, double time, double by,
@@ -119,12 +124,12 @@ static void box_at(const ebpo_scene *scene, const scene_instance *i, double time
 }
 
 /* Between two times that no key is between, in steps of little turning. */
-static void box_between(const ebpo_scene *scene, const scene_instance *i, double reach, double from,
-                        double to, double min[3], double max[3])
+static void box_between(const ebpo_scene *scene, const scene_instance *i, scene_reach reach,
+                        double from, double to, double min[3], double max[3])
 {
     const scene_route *route = route_of(scene, i);
     scene_step all = scene_route_step(route, from, to, reach);
-    double turned = reach > 0 ? sqrt(8 * all.sag / reach) : 0;
+    double turned = reach.length > 0 ? sqrt(8 * all.sag / reach.length) : 0;
     int steps = turned < 32 * step_turn ? 1 + (int)(turned / step_turn) : 32;
     for (int n = 0; n < steps; n++) {
         double begin = n == 0 ? from : from + (to - from) * n / steps;
@@ -139,7 +144,7 @@ static void swept_box(const ebpo_scene *scene, const scene_instance *i, double f
                       double min[3], double max[3])
 {
     const scene_route *route = route_of(scene, i);
-    double reach = reach_of(i, &scene->models[i->as.model]);
+    scene_reach reach = scene_reach_of(scene, i);
     if (!route || from == to) {
         box_at(scene, i, from, 0, min, max);
         return;
@@ -160,7 +165,8 @@ ebpo_status ebpo_scene_motion(const ebpo_scene *scene, uint64_t instance, double
         return status;
     const scene_instance *i = &scene->instances[instance];
     const scene_route *route = route_of(scene, i);
-    double reach = reach_of(i, &scene->models[i->as.model]), sum = 0;
+    scene_reach reach = scene_reach_of(scene, i);
+    double sum = 0;
     for (double at = from; route && at < to;) {
         double next = scene_route_next(route, at, to);
         sum += scene_route_step(route, at, next, reach).length;

@@ -146,9 +146,13 @@ ebpo_status scene_read_csv(scene_route *route, const char *path, uint64_t *left,
                 { 0 },
                 0,
                 newlocale(LC_ALL_MASK, "C", (locale_t)0) };
+    l.at += scene_text_mark(l.at, file.size);
     if (file.size > *left)
         status = ebpo_fail_file(error, EBPO_E_LIMIT, path,
                                 "files of poses have more bytes than the limit that was given");
+    else if (scene_text_is_wide(l.at, file.size))
+        status = ebpo_fail_file(error, EBPO_E_FORMAT, path,
+                                "begins with a byte order mark (BOM) of UTF-16; save it as UTF-8");
     else if (!l.c_locale)
         status = ebpo_fail_memory(error, 1);
     else

@@ -30,7 +30,7 @@ ebpo_status ebpo_scene_get_counts(const ebpo_scene *scene, ebpo_scene_counts *ou
     c.models = scene->models_count;
     c.instances = scene->instances_count;
     c.layers = scene->layers_count;
-    c.groups = scene->groups;
+    c.groups = scene->groups_count;
     c.routes = scene->routes_count;
     c.cameras = scene->cameras_count;
     c.ignored = scene->ignored;
@@ -69,6 +69,39 @@ ebpo_status ebpo_scene_get_instance(const ebpo_scene *scene, uint64_t instance,
 const char *ebpo_scene_get_layer(const ebpo_scene *scene, uint64_t layer)
 {
     return layer < scene->layers_count ? scene->sets[scene->layers[layer]] : NULL;
+}
+
+const char *ebpo_scene_get_group(const ebpo_scene *scene, uint64_t group)
+{
+    return group < scene->groups_count ? scene->sets[scene->groups[group]] : NULL;
+}
+
+/* EBPO_SCENE_NONE: the set is no group's. */
+static uint64_t group_with(const ebpo_scene *scene, uint64_t set)
+{
+    uint64_t low = 0, high = scene->groups_count;
+    while (low < high) {
+        uint64_t middle = low + (high - low) / 2;
+        if (scene->groups[middle] < set)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < scene->groups_count && scene->groups[low] == set ? low : EBPO_SCENE_NONE;
+}
+
+uint64_t ebpo_scene_group_of(const ebpo_scene *scene, uint64_t instance, uint64_t nth)
+{
+    uint64_t group = EBPO_SCENE_NONE;
+    if (instance >= scene->instances_count)
+        return group;
+    const scene_instance *i = &scene->instances[instance];
+    for (uint32_t n = 0; n < i->set_count; n++) {
+        group = group_with(scene, i->sets[n]);
+        if (group != EBPO_SCENE_NONE && nth-- == 0)
+            return group;
+    }
+    return EBPO_SCENE_NONE;
 }
 
 ebpo_status ebpo_scene_get_camera(const ebpo_scene *scene, uint64_t camera, ebpo_scene_camera *out)

@@ -306,6 +306,9 @@ ebpo_status scene_read_json(ebpo_scene *scene, const char *text, size_t size, co
     if (size > options->most_bytes)
         return ebpo_fail_file(error, EBPO_E_LIMIT, name, "has more than %llu bytes",
                               (unsigned long long)options->most_bytes);
+    if (scene_text_is_wide(text, size))
+        return ebpo_fail_file(error, EBPO_E_FORMAT, name,
+                              "begins with a byte order mark (BOM) of UTF-16; save it as UTF-8");
     if (scene_text_fits(text, size, options->most_values, &why) != EBPO_OK)
         return ebpo_fail_file(error, EBPO_E_LIMIT, name, "%s", why.message);
     json_t *root =

@@ -76,6 +76,7 @@ void ebpo_scene_free(ebpo_scene *scene)
     free(scene->rules);
     free(scene->sets);
     free(scene->layers);
+    free(scene->groups);
     free(scene->files);
     free(scene->folder);
     free(scene->text);
@@ -199,11 +200,17 @@ ebpo_status scene_add_layer(ebpo_scene *scene, const char *name, ebpo_error *err
 
 ebpo_status scene_add_group(ebpo_scene *scene, const char *name, ebpo_error *error)
 {
+    uint64_t n, set;
     ebpo_status status = scene_check_name(name, "a group", error);
     if (status == EBPO_OK)
-        status = scene_add_set(scene, "group:", name, NULL, error);
-    scene->groups += status == EBPO_OK;
-    return status;
+        status = ROOM(scene, groups, &n, error);
+    if (status == EBPO_OK)
+        status = scene_add_set(scene, "group:", name, &set, error);
+    if (status != EBPO_OK)
+        return status;
+    scene->groups[n] = set;
+    scene->groups_count++;
+    return EBPO_OK;
 }
 
 ebpo_status scene_add_route(ebpo_scene *scene, const char *name, uint64_t *number,

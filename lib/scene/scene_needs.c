@@ -9,7 +9,8 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "scene/pair_looks.h"
+#include "scene/asked_pairs.h"
+#include "scene/pair_motion.h"
 #include "scene/scene_needs.h"
 #include "subset/subset_reads.h"
 
@@ -64,7 +65,7 @@ static ebpo_status motion_seen(const nearing *n, double from, double to, double 
     ebpo_status status = ebpo_scene_motion(n->scene, n->other, from, to, out, n->needs->error);
     if (status == EBPO_OK && route && from < to) {
         status = reach_of_other(n, route, from, to, &reach);
-        own = scene_route_step(route, from, to, reach).length;
+        own = scene_route_step(route, from, to, (scene_reach){ reach, reach }).length;
     }
     *out = (*out + own) * (1 + 0x1p-40);
     return status;
@@ -74,19 +75,18 @@ static ebpo_status motion_seen(const nearing *n, double from, double to, double 
 static ebpo_status near_box(const nearing *n, double from, double to, double motion,
                             scene_space *out, bool *any)
 {
-    scene_space later;
-    double unit, unit_later;
-    ebpo_status status =
-        scene_seen_from(n->scene, n->of, n->other, from, out, &unit, n->needs->error);
+    scene_seen at, later;
+    ebpo_status status = scene_seen_from(n->scene, n->of, n->other, from, &at, n->needs->error);
     if (status == EBPO_OK)
-        status =
-            scene_seen_from(n->scene, n->of, n->other, to, &later, &unit_later, n->needs->error);
+        status = scene_seen_from(n->scene, n->of, n->other, to, &later, n->needs->error);
     if (status != EBPO_OK)
         return status;
-    double grow = (n->clearance + n->margin + motion) / fmin(unit, unit_later) * (1 + 0x1p-40);
+    /* beyond what rounding may do between these times: also where nothing else is added */
+    double grow = (n->clearance + n->margin + motion) / fmin(at.unit, later.unit) * (1 + 0x1p-40) +
+                  2 * fmax(at.rounding, later.rounding);
     *any = true;
     for (int k = 0; k < 3; k++) {
-        double low = out->min[k] - grow, high = out->max[k] + grow;
+        double low = at.box.min[k] - grow, high = at.box.max[k] + grow;
         /* what overflowed may be anywhere */
         out->min[k] = low > n->need->whole.min[k] ? low : n->need->whole.min[k];
         out->max[k] = high < n->need->whole.max[k] ? high : n->need->whole.max[k];
@@ -159,12 +159,33 @@ static double size_of(const ebpo_scene *scene, uint64_t instance, double time)
     return size * pose.scale;
 }
 
+/* Usual for a pair; a point has no size of its own. */
+static double usual_margin(const scene_needs *needs, const ebpo_scene_pair *pair)
+{
+    double a = size_of(needs->scene, pair->a, needs->from);
+    double b = size_of(needs->scene, pair->b, needs->from);
+    return (fmin(a, b) > 0 ? fmin(a, b) : fmax(a, b)) / 32;
+}
+
+/* A face anywhere may be around the other one. */
+static void add_whole(scene_needs *needs, const ebpo_scene_pair *pair)
+{
+    for (int i = 0; i < 2; i++) {
+        scene_file_need *need = need_of(needs, i ? pair->b : pair->a);
+        need->askers++;
+        need->any = true;
+        need->box = need->whole;
+    }
+}
+
 static ebpo_status add_pair(scene_needs *needs, const ebpo_scene_pair *pair)
 {
+    if (needs->how.purpose == EBPO_SCENE_FOR_SOLIDS) {
+        add_whole(needs, pair);
+        return EBPO_OK;
+    }
     bool inside = needs->how.purpose == EBPO_SCENE_FOR_INSIDE;
-    double size = fmin(size_of(needs->scene, pair->a, needs->from),
-                       size_of(needs->scene, pair->b, needs->from));
-    double margin = needs->how.margin > 0 ? needs->how.margin : size / 32;
+    double margin = needs->how.margin > 0 ? needs->how.margin : usual_margin(needs, pair);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
         nearing n = { .needs = needs,
@@ -206,7 +227,8 @@ static void begin_files(scene_needs *needs)
         need->box = need->whole;
         need->last_level = -1;
         need->parts = EBPO_PART_PLANES | EBPO_PART_MESH;
-        if (needs->how.purpose == EBPO_SCENE_FOR_COLLIDE)
+        if (needs->how.purpose == EBPO_SCENE_FOR_COLLIDE ||
+            needs->how.purpose == EBPO_SCENE_FOR_SOLIDS)
             need->parts |= EBPO_PART_MAPS;
         if (needs->how.purpose == EBPO_SCENE_FOR_VIEW)
             need->parts = ebpo_profile_parts(EBPO_PROFILE_LOD);

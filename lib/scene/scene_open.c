@@ -48,6 +48,9 @@ static ebpo_status parse(const char *text, size_t size, const char *name, char *
                          const ebpo_scene_options *options, ebpo_scene **out, ebpo_error *error)
 {
     ebpo_scene *scene = NULL;
+    size_t mark = scene_text_mark(text, size);
+    text += mark;
+    size -= mark;
     ebpo_status status = folder ? ebpo_scene_new(&scene, error) : ebpo_fail_memory(error, 1);
     if (status == EBPO_OK) {
         free(scene->folder);
@@ -56,8 +59,10 @@ static ebpo_status parse(const char *text, size_t size, const char *name, char *
     } else {
         free(folder);
     }
-    if (status == EBPO_OK)
+    if (status == EBPO_OK) {
+        scene->outside = options->outside;
         status = keep_text(scene, text, size, error);
+    }
     if (status == EBPO_OK)
         *out = scene;
     else
@@ -159,8 +164,12 @@ static ebpo_status load_model(ebpo_scene *scene, scene_model *m, ebpo_error *err
 {
     char *path = scene_join_path(scene->folder, m->path);
     uint64_t number = 0;
-    ebpo_status status =
-        path ? open_file(scene, path, &number, error) : ebpo_fail_memory(error, strlen(m->path));
+    bool of_text = (uint64_t)(m - scene->models) < scene->text_models;
+    ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(m->path));
+    if (status == EBPO_OK && of_text && !scene->outside)
+        status = scene_stays_within(scene->folder, path, error);
+    if (status == EBPO_OK)
+        status = open_file(scene, path, &number, error);
     free(path);
     if (status != EBPO_OK)
         return status;

@@ -59,13 +59,15 @@ struct ebpo_scene {
     SCENE_LIST(scene_rule, rules); /* sorted, once a file is read */
     SCENE_LIST(char *, sets);      /* names: "*", those of layers, groups and instances */
     SCENE_LIST(uint64_t, layers);  /* their sets */
+    SCENE_LIST(uint64_t, groups);  /* the same, ascending */
     SCENE_LIST(scene_file, files);
     json_t *names; /* of each kind and of sets, with their numbers */
-    uint64_t groups, ignored, clearances;
+    uint64_t ignored, clearances;
     char *folder; /* where relative paths begin, "" or with a closing "/" */
     char *text;   /* that it was read from; NULL: none */
     size_t text_size;
     uint64_t text_models, text_instances; /* that are in it */
+    bool outside;                         /* what it names may lie outside the folder */
     ebpo_model_options how;               /* of ebpo_scene_model */
 };
 
@@ -135,13 +137,32 @@ double scene_route_next(const scene_route *route, double from, double to);
 /* At least the length, however small or large. */
 double scene_length_above(const double way[3]);
 
-/* How points at most `reach` from the route's origin move between two times that no key is between:
+/* Of points that follow a route: how far from its origin, at most; and how large the coordinates
+ * are that this is made of, which rounding goes by. */
+typedef struct scene_reach {
+    double length, size;
+} scene_reach;
+
+/* How points within `reach` of the route's origin move between two times that no key is between:
  * at most `length` from where they were; and at most `sag` off the straight line from the first to
  * the last place, passed evenly. */
 typedef struct scene_step {
     double length, sag;
 } scene_step;
-scene_step scene_route_step(const scene_route *route, double from, double to, double reach);
+scene_step scene_route_step(const scene_route *route, double from, double to, scene_reach reach);
+
+/* Of points that follow the route, anywhere on it: the part of their steps that does not become
+ * shorter with them. */
+double scene_route_rounding(const scene_route *route, scene_reach reach);
+
+/* How far the distance of two things that ride on what moves along the route changes on its way
+ * from .. to, at most, by rounding too. reach: the sum of both. from < to. */
+double scene_route_growth(const scene_route *route, double from, double to, scene_reach reach);
+
+/* ---- scene_boxes.c ---- */
+
+/* Of the instance's points, from the origin of what moves along its route. */
+scene_reach scene_reach_of(const ebpo_scene *scene, const scene_instance *instance);
 
 /* ---- scene_csv.c ---- */
 
@@ -156,10 +177,19 @@ const char *scene_path_refused(const char *path, const ebpo_scene_options *optio
                                bool has_digest);
 /* `path` as it is opened: malloc's, NULL without memory. */
 char *scene_join_path(const char *folder, const char *path);
+/* Of a path as it is opened, of a scene with this folder that may not name others: EBPO_E_FORMAT
+ * where links lead it out of the folder. EBPO_E_IO, EBPO_E_MEMORY. */
+EBPO_MUST_USE ebpo_status scene_stays_within(const char *folder, const char *path,
+                                             ebpo_error *error);
 /* The part of a path up to its last "/", or "": malloc's. */
 char *scene_folder_of(const char *path);
 
 /* ---- json_text.c ---- */
+
+/* Bytes of a byte order mark of UTF-8 that a text begins with: 0 or 3. */
+size_t scene_text_mark(const char *text, size_t size);
+/* It begins with a byte order mark of UTF-16. */
+bool scene_text_is_wide(const char *text, size_t size);
 
 /* EBPO_E_LIMIT: more than so many values or 32 levels of them, seen without parsing. */
 EBPO_MUST_USE ebpo_status scene_text_fits(const char *text, size_t size, uint64_t most_values,

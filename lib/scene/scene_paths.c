@@ -1,9 +1,11 @@
 /* Files that a scene names, and which of them a stranger's scene may name. */
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <ebpo/http.h>
 
+#include "base/error.h"
 #include "scene/scene_parts.h"
 
 static bool goes_up(const char *path)
@@ -39,6 +41,42 @@ char *scene_join_path(const char *folder, const char *path)
         memcpy(joined + begin, path, size + 1);
     }
     return joined;
+}
+
+static bool is_below(const char *folder, const char *path)
+{
+    size_t size = strlen(folder);
+    size -= size && folder[size - 1] == '/'; /* the root only */
+    return strncmp(folder, path, size) == 0 && path[size] == '/';
+}
+
+/* Names of files without links. */
+static ebpo_status check_real(const char *folder, const char *real, const char *path,
+                              ebpo_error *error)
+{
+    if (is_below(folder, real))
+        return EBPO_OK;
+    return ebpo_fail_file(error, EBPO_E_FORMAT, path,
+                          "is by a link the file %.160s, outside the scene's folder %.160s, which "
+                          "has to be allowed (ebpo scene --outside)",
+                          real, folder);
+}
+
+ebpo_status scene_stays_within(const char *folder, const char *path, ebpo_error *error)
+{
+    if (ebpo_is_url(path))
+        return EBPO_OK;
+    char *top = realpath(*folder ? folder : ".", NULL), *real = realpath(path, NULL);
+    ebpo_status status = EBPO_OK;
+    if (top && real)
+        status = check_real(top, real, path, error);
+    else if (errno == ENOMEM)
+        status = ebpo_fail_memory(error, strlen(path));
+    else
+        status = ebpo_fail_errno(error, path, "cannot be opened");
+    free(top);
+    free(real);
+    return status;
 }
 
 char *scene_folder_of(const char *path)

@@ -116,8 +116,14 @@ static ebpo_status put_models(ebpo_scene_record *r, ebpo_error *error)
         return ebpo_fail_memory(error, count * sizeof *model);
     for (uint64_t i = 0; i < count; i++)
         model[i] = (int64_t)r->scene->instances[i].as.model;
+    ebpo_h5_table table;
     ebpo_status status =
-        ebpo_h5_put_table(&r->out, "/instances/model", EBPO_H5_I64, 0, model, count, error);
+        ebpo_h5_make_table(&r->out, "/instances/model", EBPO_H5_I64, 0, &table, error);
+    if (status == EBPO_OK)
+        status = put_meaning(r, table.id, "its model's number in /models", error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_append(&r->out, &table, model, count, error);
+    ebpo_h5_close_table(&table);
     free(model);
     return status;
 }

@@ -24,8 +24,9 @@ static void eye_box(const seeing *s, double from, double to, scene_space *out)
     memcpy(out->min, c->eye, sizeof out->min);
     if (c->route != EBPO_SCENE_NONE) {
         const scene_route *route = &s->needs->scene->routes[c->route];
+        scene_reach reach = { scene_length_above(c->eye), scene_length_above(c->eye) };
         scene_route_at(route, from, &at);
-        length = scene_route_step(route, from, to, scene_length_above(c->eye)).length;
+        length = scene_route_step(route, from, to, reach).length;
         for (int i = 0; i < 3; i++)
             out->min[i] =
                 at.scale * ((at.rotation[i][0] * c->eye[0] + at.rotation[i][1] * c->eye[1]) +

@@ -533,8 +533,10 @@ static ebpo_status look_at_scene(const ebpo_scene *scene)
                 ebpo_scene_get_model(scene, 0, &model) == EBPO_OK && model.loaded &&
                 ebpo_scene_get_instance(scene, 1, &instance) == EBPO_OK &&
                 ebpo_scene_get_camera(scene, 0, &camera) == EBPO_OK &&
-                !ebpo_scene_get_layer(scene, 0) && ebpo_scene_pair_rule(scene, 0, 1, &clearance) &&
-                ebpo_scene_file(scene, 0) && !ebpo_scene_file(scene, 1);
+                !ebpo_scene_get_layer(scene, 0) && !ebpo_scene_get_group(scene, 0) &&
+                ebpo_scene_group_of(scene, 0, 0) == EBPO_SCENE_NONE &&
+                ebpo_scene_pair_rule(scene, 0, 1, &clearance) && ebpo_scene_file(scene, 0) &&
+                !ebpo_scene_file(scene, 1);
     return fine ? EBPO_OK : EBPO_E_ARGUMENT;
 }
 

@@ -36,6 +36,8 @@ static const struct {
 } bad[] = {
     { "", "line 1: is not JSON" },
     { "[]", "line 1: a scene is an object" },
+    { "\xef\xbb\xbf[]", "line 1: a scene is an object" },
+    { "\xfe\xff\0[", "begins with a byte order mark (BOM) of UTF-16; save it as UTF-8" },
     { "{}", "line 1: has no member ebpo_scene" },
     { "{\"ebpo_scene\": \"2.0\"}", "version 2.0" },
     { "{\"ebpo_scene\": \"1.0\",\n\"instances\": 3}", "line 2: instances: is not an array" },
@@ -173,6 +175,17 @@ START_TEST(rules)
         }
     ck_assert_str_eq(ebpo_scene_get_layer(s, 0), "l");
     ck_assert_ptr_null(ebpo_scene_get_layer(s, 1));
+    ck_assert_str_eq(ebpo_scene_get_group(s, 1), "h");
+    ck_assert_ptr_null(ebpo_scene_get_group(s, 2));
+    static const uint64_t groups[5][2] = { { EBPO_SCENE_NONE, EBPO_SCENE_NONE },
+                                           { 0, EBPO_SCENE_NONE },
+                                           { EBPO_SCENE_NONE, EBPO_SCENE_NONE },
+                                           { 0, 1 },
+                                           { EBPO_SCENE_NONE, EBPO_SCENE_NONE } };
+    for (uint64_t i = 0; i < 5; i++)
+        for (uint64_t n = 0; n < 2; n++)
+            ck_assert_uint_eq(ebpo_scene_group_of(s, i, n), groups[i][n]);
+    ck_assert_uint_eq(ebpo_scene_group_of(s, 3, 2), EBPO_SCENE_NONE);
     ebpo_scene_free(s);
 }
 END_TEST
@@ -183,6 +196,8 @@ START_TEST(csv)
         const char *text, *says;
     } cases[] = {
         { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n\n2;2;3;5;0;0;0;-1\r\n", NULL },
+        { "\xef\xbb\xbftime,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n2,2,3,5,0,0,0,-1\n", NULL },
+        { "\xff\xfet\0i\0", "byte order mark (BOM) of UTF-16" },
         { "scale, qw ,qz,qy,qx,z,y,x,time\n 1 , 1,0,0,0,4,3,2,1\n1,1,0,0,0,5,3,2,2", NULL },
         { "time,x,y,z\n", "line 1: the first line names" },
         { "time,x,y,z,qx,qy,qz,qw,qw\n", "line 1: each column is one of" },

@@ -5,6 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "clash/clash_groups.h"
+#include "clash/html_text.h"
+
 static const char style[] =
     "body{font:15px/1.45 system-ui,sans-serif;color:#222;max-width:78em;margin:2em auto;"
     "padding:0 1em}h1{font-size:1.5em}table{border-collapse:collapse;width:100%}"
@@ -12,7 +15,8 @@ static const char style[] =
     "th{color:#556;font-weight:600}td.n{font-variant-numeric:tabular-nums;white-space:nowrap}"
     "img{width:240px;height:180px;display:block;border-radius:4px}.k{font-weight:600}"
     ".protruding,.duplicate,.enclosed{color:#b00d0d}.crossing{color:#b4530a}.near{color:#665500}"
-    ".q{color:#667;font-size:.9em}@media print{tr{break-inside:avoid}}";
+    "input{margin:0 .3em 0 0}label{margin-right:1em}.q{color:#667;font-size:.9em}@media "
+    "print{tr{break-inside:avoid}}";
 
 /* What an ebpo_meeting_kind means on a site. */
 static const char *const meanings[] = {
@@ -26,18 +30,6 @@ static const char *const meanings[] = {
     "the same part twice in one place",
 };
 enum { KINDS = sizeof meanings / sizeof *meanings };
-
-static void put_text(FILE *f, const char *text)
-{
-    for (; *text; text++) {
-        if (*text == '<')
-            fputs("&lt;", f);
-        else if (*text == '&')
-            fputs("&amp;", f);
-        else
-            fputc(*text, f);
-    }
-}
 
 /* --- the head --- */
 
@@ -58,9 +50,9 @@ static void put_head(FILE *f, const clash_list *list, const char *title, double 
                      uint64_t frames)
 {
     fputs("<!DOCTYPE html>\n<html lang=en><meta charset=utf-8>\n<title>Clashes: ", f);
-    put_text(f, title);
+    html_put_text(f, title);
     fprintf(f, "</title>\n<style>%s</style>\n<h1>Clashes in ", style);
-    put_text(f, title);
+    html_put_text(f, title);
     fprintf(f, "</h1>\n<p>%llu pairs of parts", (unsigned long long)list->count);
     if (frames > 1)
         fprintf(f, ", looked at %llu times from %.9g to %.9g; between these times nothing is said",
@@ -83,12 +75,18 @@ static void put_part(FILE *f, const ebpo_scene *scene, const char *letter, uint6
     (void)ebpo_scene_get_model(scene, at.model, &model);
     const char *layer = ebpo_scene_get_layer(scene, at.layer);
     fprintf(f, "%s <b>", letter);
-    put_text(f, at.name);
+    html_put_text(f, at.name);
     fputs("</b><div class=q>", f);
-    put_text(f, model.name);
+    html_put_text(f, model.name);
     if (layer) {
         fputs(", layer ", f);
-        put_text(f, layer);
+        html_put_text(f, layer);
+    }
+    const char *before = ", of ";
+    for (uint64_t n = 0, g; (g = ebpo_scene_group_of(scene, instance, n)) != EBPO_SCENE_NONE; n++) {
+        fputs(before, f);
+        html_put_text(f, ebpo_scene_get_group(scene, g));
+        before = ", ";
     }
     fputs("</div>", f);
 }
@@ -116,7 +114,9 @@ static void put_row(FILE *f, const ebpo_scene *scene, const clash *c, uint64_t n
                     uint64_t frames)
 {
     const ebpo_scene_meeting *m = &c->worst;
-    fprintf(f, "<tr><td class=n>%llu<td>", (unsigned long long)number);
+    fputs("<tr", f);
+    clash_put_classes(f, c, scene);
+    fprintf(f, "><td class=n>%llu<td>", (unsigned long long)number);
     if (c->picture)
         fprintf(f, "<img alt=\"clash %llu\" src=\"%s\">", (unsigned long long)number, c->picture);
     fputs("<td>", f);
@@ -133,18 +133,22 @@ static void put_row(FILE *f, const ebpo_scene *scene, const clash *c, uint64_t n
     fputc('\n', f);
 }
 
-static void put_page(FILE *f, const clash_list *list, const ebpo_scene *scene, const char *title,
+/* False: no memory. */
+static bool put_page(FILE *f, const clash_list *list, const ebpo_scene *scene, const char *title,
                      double from, double to, uint64_t frames)
 {
     put_head(f, list, title, from, to, frames);
     put_sums(f, list);
+    fputs("<h2>The worst first</h2>\n", f);
+    bool fine = clash_put_choice(f, list, scene);
     fprintf(f,
-            "<h2>The worst first</h2>\n<table><tr><th>#<th>Picture<th>Parts<th>Kind<th>How much"
+            "<table class=c><tr class=h><th>#<th>Picture<th>Parts<th>Kind<th>How much"
             "<th>Where%s\n",
             frames > 1 ? "<th>When" : "");
     for (uint64_t i = 0; i < list->count; i++)
         put_row(f, scene, &list->clash[i], i + 1, frames);
     fputs("</table>\n</html>\n", f);
+    return fine;
 }
 
 ebpo_status clash_page(const clash_list *list, const ebpo_scene *scene, const char *title,
@@ -153,10 +157,9 @@ ebpo_status clash_page(const clash_list *list, const ebpo_scene *scene, const ch
     char *text = NULL;
     size_t size = 0;
     FILE *f = open_memstream(&text, &size);
-    if (f)
-        put_page(f, list, scene, title, from, to, frames);
+    bool fine = f && put_page(f, list, scene, title, from, to, frames);
     ebpo_status status = EBPO_OK;
-    if (!f || fclose(f) != 0) {
+    if ((f && fclose(f) != 0) || !fine) {
         snprintf(error->message, sizeof error->message, "%s: no memory for the page", path);
         status = error->status = EBPO_E_MEMORY;
     }

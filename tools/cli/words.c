@@ -34,6 +34,16 @@ static char *scaled(char *out, size_t capacity, double v, const char *unit)
 
 char *words_count(char *out, size_t capacity, double v) { return scaled(out, capacity, v, ""); }
 
+char *words_real(double x, char out[32])
+{
+    for (int digits = 1; digits <= 17; digits++) {
+        snprintf(out, 32, "%.*g", digits, x);
+        if (strtod(out, NULL) == x)
+            break;
+    }
+    return out;
+}
+
 char *words_bytes(char *out, size_t capacity, uint64_t bytes)
 {
     return scaled(out, capacity, (double)bytes, "B");

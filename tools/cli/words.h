@@ -14,6 +14,8 @@ void words_init(void);
 char *words_count(char *out, size_t capacity, double v);
 /* 999 B, 12.3 KB, 4.56 MB: powers of 1000. */
 char *words_bytes(char *out, size_t capacity, uint64_t bytes);
+/* The fewest digits that read as the same double. */
+char *words_real(double x, char out[32]);
 /* "1 hole", "3 holes". */
 char *words_plural(char *out, size_t capacity, uint64_t count, const char *one, const char *many);
 /* Names of the ebpo_part bits with commas: "planes, mesh, maps". */

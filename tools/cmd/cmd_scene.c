@@ -13,7 +13,7 @@
 #include "cmd/scene_report.h"
 #include "cmd/scene_run.h"
 
-static const char *const purpose_words[] = { "collide", "view", "inside", NULL };
+static const char *const purpose_words[] = { "collide", "view", "inside", "solids", NULL };
 
 static const arg_option options[] = {
     OPTION_REAL("time", 't', scene_values, time, "T", -1e300, 1e300,
@@ -29,7 +29,7 @@ static const arg_option options[] = {
     OPTION_WORD(
         "for", 0, scene_values, purpose, "WHAT", purpose_words,
         "plan, pack: what will be asked: collide (report, approach; the usual), view (pictures "
-        "from the cameras) or inside"),
+        "from the cameras), inside, or solids (collide, and report --solids, --depth)"),
     OPTION_REAL("margin", 0, scene_values, margin, "D", 1e-300, 1e300,
                 "plan, pack: what comes so near, beyond the clearance, is needed too"),
     OPTION_TEXT("output", 'o', scene_values, out, "PATH",
@@ -42,8 +42,10 @@ static const arg_option options[] = {
     OPTION_FLAG("count", 0, scene_values, count,
                 "report: count all pairs of faces that meet, and lines of contact"),
     OPTION_FLAG("places", 0, scene_values, places, "report: also where"),
-    OPTION_FLAG("solids", 0, scene_values, solids,
-                "report: how solids lie to each other: protruding, enclosed, duplicate"),
+    OPTION_FLAG(
+        "solids", 0, scene_values, solids,
+        "report: how solids lie to each other: protruding, enclosed, duplicate; plan, pack: "
+        "as --for solids"),
     OPTION_REAL("depth", 0, scene_values, depth, "D", 1e-300, 1e300,
                 "report: how deep one is in the other, within D"),
     OPTION_FLAG("least", 0, scene_values, least,
@@ -128,6 +130,34 @@ static bool is_for_all(int deed)
            deeds[deed].run == scene_pack;
 }
 
+/* NULL, or what is wrong with the options of a plan: those of a report say what it is for. */
+static const char *settle_purpose(scene_values *v)
+{
+    if (!v->solids && !(v->depth > 0))
+        return NULL;
+    if (v->purpose != EBPO_SCENE_FOR_COLLIDE && v->purpose != EBPO_SCENE_FOR_SOLIDS)
+        return "--solids and --depth are for collide and solids, not for view or inside";
+    v->purpose = EBPO_SCENE_FOR_SOLIDS;
+    return NULL;
+}
+
+/* NULL, or what is wrong with the options of this deed. */
+static const char *wrong_options(int deed, scene_values *v, ebpo_load_options *load)
+{
+    uint64_t target;
+    if (deeds[deed].run == scene_approach && !(v->tolerance > 0))
+        return "approach needs --tolerance";
+    if (deeds[deed].run == scene_pack && !v->out)
+        return "pack needs -o DIR";
+    if (v->target_size && (!words_read_size(v->target_size, &target) || !target))
+        return "--target-size is a number of bytes such as 500K or 20M";
+    if (v->memory && !words_read_size(v->memory, &load->memory))
+        return "--memory is a number of bytes such as 64M or 1G";
+    if (deeds[deed].run == scene_plan || deeds[deed].run == scene_pack)
+        return settle_purpose(v);
+    return deeds[deed].run == scene_report ? wrong_report(v) : NULL;
+}
+
 static int run(void *given, const char **operand)
 {
     scene_values *v = given;
@@ -144,25 +174,12 @@ static int run(void *given, const char **operand)
     ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
     how.outside = v->outside;
     how.remote = v->remote;
+    const char *wrong = NULL;
     ebpo_status status = ebpo_scene_open(operand[1], &how, &scene, &error);
-    if (status == EBPO_OK && !settle_times(v, is_for_all(deed), scene)) {
-        ebpo_scene_free(scene);
-        return command_usage("scene", "--time stands alone; --from is not after --to");
-    }
-    if (status == EBPO_OK && deeds[deed].run == scene_approach && !(v->tolerance > 0)) {
-        ebpo_scene_free(scene);
-        return command_usage("scene", "approach needs --tolerance");
-    }
-    const char *wrong =
-        status == EBPO_OK && deeds[deed].run == scene_report ? wrong_report(v) : NULL;
-    if (status == EBPO_OK && deeds[deed].run == scene_pack && !v->out)
-        wrong = "pack needs -o DIR";
-    uint64_t target;
-    if (status == EBPO_OK && v->target_size &&
-        (!words_read_size(v->target_size, &target) || !target))
-        wrong = "--target-size is a number of bytes such as 500K or 20M";
-    if (status == EBPO_OK && v->memory && !words_read_size(v->memory, &load.memory))
-        wrong = "--memory is a number of bytes such as 64M or 1G";
+    if (status == EBPO_OK && !settle_times(v, is_for_all(deed), scene))
+        wrong = "--time stands alone; --from is not after --to";
+    else if (status == EBPO_OK)
+        wrong = wrong_options(deed, v, &load);
     if (wrong) {
         ebpo_scene_free(scene);
         return command_usage("scene", "%s", wrong);

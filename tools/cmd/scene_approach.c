@@ -3,6 +3,7 @@
 
 #include "cli/json.h"
 #include "cli/progress.h"
+#include "cli/words.h"
 #include "cmd/scene_report.h"
 
 typedef struct listing {
@@ -39,6 +40,17 @@ static void way_json(listing *l, const ebpo_scene_way *w)
     json_end(j);
 }
 
+/* Bounds are bounds to their last digit. */
+static void print_way(const listing *l, const ebpo_scene_way *w)
+{
+    char time[32], lo[32], hi[32];
+    printf("%s\t%s\t%s\t%s\t", words_real(w->time, time), word_of(w), name_of(l, w->a),
+           name_of(l, w->b));
+    if (w->reached < 0)
+        printf("%s to ", words_real(w->lo, lo));
+    printf("%s\n", words_real(w->hi, hi));
+}
+
 static bool print_ways(void *user, const ebpo_scene_way *ways, uint64_t count)
 {
     listing *l = user;
@@ -51,8 +63,7 @@ static bool print_ways(void *user, const ebpo_scene_way *ways, uint64_t count)
         if (l->v->json)
             way_json(l, w);
         else
-            printf("%.9g\t%s\t%s\t%s\t%.9g\n", w->time, word_of(w), name_of(l, w->a),
-                   name_of(l, w->b), w->hi);
+            print_way(l, w);
     }
     return true;
 }
@@ -60,7 +71,7 @@ static bool print_ways(void *user, const ebpo_scene_way *ways, uint64_t count)
 /* So many looks as are allowed, or what files lack, left more in doubt than was asked for. */
 static bool is_open(const listing *l, const ebpo_scene_least *w)
 {
-    return w->hi - w->lo > l->v->tolerance * (1 + 0x1p-20);
+    return w->hi - w->lo > l->v->tolerance;
 }
 
 static void least_json(listing *l, const ebpo_scene_least *w)
@@ -78,6 +89,13 @@ static void least_json(listing *l, const ebpo_scene_least *w)
     json_end(j);
 }
 
+static void print_least(const listing *l, const ebpo_scene_least *w, bool open)
+{
+    char time[32], lo[32], hi[32];
+    printf("%s\tleast\t%s\t%s\t%s to %s%s\n", words_real(w->time, time), name_of(l, w->a),
+           name_of(l, w->b), words_real(w->lo, lo), words_real(w->hi, hi), open ? "\topen" : "");
+}
+
 static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t count)
 {
     listing *l = user;
@@ -91,8 +109,7 @@ static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t coun
         if (l->v->json)
             least_json(l, w);
         else
-            printf("%.9g\tleast\t%s\t%s\t%.9g to %.9g%s\n", w->time, name_of(l, w->a),
-                   name_of(l, w->b), w->lo, w->hi, open ? "\topen" : "");
+            print_least(l, w, open);
     }
     return true;
 }

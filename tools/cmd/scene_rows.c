@@ -2,8 +2,10 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "clash/clash_list.h"
+#include "cli/words.h"
 
 const char *scene_instance_name(const ebpo_scene *scene, uint64_t instance)
 {
@@ -78,10 +80,13 @@ void scene_head_csv(const scene_values *v)
            v->depth > 0 ? ",a_in_b_lo,a_in_b_hi,b_in_a_lo,b_in_a_hi" : "");
 }
 
-/* Quotes are doubled. */
+/* Quotes are doubled. Tables take what begins so for a formula: then there is a ' before it, and
+ * before another one, so that taking the first one away gives the text. */
 static void csv_text(const char *text)
 {
     putchar('"');
+    if (*text && strchr("=+-@'", *text))
+        putchar('\'');
     for (; *text; text++) {
         if (*text == '"')
             putchar('"');
@@ -93,9 +98,10 @@ static void csv_text(const char *text)
 /* What is not known stays empty. */
 static void csv_real(double x)
 {
+    char text[32];
     putchar(',');
     if (isfinite(x))
-        printf("%.17g", x);
+        fputs(words_real(x, text), stdout);
 }
 
 static void csv_count(uint64_t n)
@@ -109,11 +115,12 @@ void scene_row_csv(const scene_values *v, const ebpo_scene *scene, double time,
                    const ebpo_scene_meeting *m)
 {
     const uint64_t counts[] = { m->touching, m->coplanar, m->crossing, m->contacts };
-    printf("%.17g,", time);
+    char text[32];
+    printf("%s,", words_real(time, text));
     csv_text(scene_instance_name(scene, m->a));
     putchar(',');
     csv_text(scene_instance_name(scene, m->b));
-    printf(",%s,%.17g,%llu,%llu", clash_kind_word(m->kind), m->distance,
+    printf(",%s,%s,%llu,%llu", clash_kind_word(m->kind), words_real(m->distance, text),
            (unsigned long long)m->face_a, (unsigned long long)m->face_b);
     for (int i = 0; i < 4 && v->count; i++)
         csv_count(counts[i]);

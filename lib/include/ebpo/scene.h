@@ -4,6 +4,7 @@
  *   Making      ebpo_scene_open (a file: format-spec/scene.md), ebpo_scene_new,
  *               ebpo_scene_add_model, ebpo_scene_add_instance
  *   What it is  ebpo_scene_get_counts, ebpo_scene_get_model, ebpo_scene_get_instance,
+ *               ebpo_scene_get_layer, ebpo_scene_get_group, ebpo_scene_group_of,
  *               ebpo_scene_get_camera, ebpo_scene_get_stats, ebpo_scene_pair_rule
  *   Models      ebpo_scene_load, ebpo_scene_file, ebpo_scene_model
  *   In time     ebpo_scene_pose, ebpo_scene_motion, ebpo_scene_instance_box, ebpo_scene_box
@@ -51,7 +52,7 @@ typedef struct ebpo_scene_options {
 
     /*
      * Files that the scene names may lie anywhere. Else they lie in the scene's folder or below
-     * it: their paths are relative and have no part "..".
+     * it: their paths are relative, have no part "..", and no link leads out of the folder.
      */
     bool outside;
 
@@ -254,6 +255,21 @@ EBPO_API ebpo_status ebpo_scene_get_instance(const ebpo_scene *scene, uint64_t i
  */
 EBPO_API const char *ebpo_scene_get_layer(const ebpo_scene *scene, uint64_t layer);
 
+/*
+ * The name of a group, until the scene is freed; NULL: there is no such group.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API const char *ebpo_scene_get_group(const ebpo_scene *scene, uint64_t group);
+
+/*
+ * The number of the nth group, from 0, that an instance belongs to. EBPO_SCENE_NONE: it has not so
+ * many, or there is no such instance.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API uint64_t ebpo_scene_group_of(const ebpo_scene *scene, uint64_t instance, uint64_t nth);
+
 typedef struct ebpo_scene_camera {
     size_t struct_size; /* EBPO_SCENE_CAMERA_INIT sets it */
     const char *name;
@@ -310,9 +326,9 @@ typedef struct ebpo_load_options {
  * Opens the files of models that are not open yet (heads only, one for each path), compares
  * digests, and makes boxes. Files of models without instances are opened as well.
  *
- * EBPO_E_FORMAT: a file is none of this format or not the one that the scene means.
- * EBPO_E_ARGUMENT: a model cannot be where an instance of it is, which the message names.
- * EBPO_E_CANCELLED, EBPO_E_IO, EBPO_E_MEMORY.
+ * EBPO_E_FORMAT: a file is none of this format or not the one that the scene means, or links lead
+ * to it out of the scene's folder (ebpo_scene_options.outside). EBPO_E_ARGUMENT: a model cannot be
+ * where an instance of it is, which the message names. EBPO_E_CANCELLED, EBPO_E_IO, EBPO_E_MEMORY.
  *
  * Threads: one per scene.
  */
@@ -563,7 +579,7 @@ typedef struct ebpo_scene_frame {
  * Arrays have an attribute `meaning`, in words.
  *
  *   /instances/names       uint8 [bytes]  names, each ended by a 0, by number
- *   /instances/model       int64 [i]      numbers of models
+ *   /instances/model       int64 [i]      its model's number in /models
  *   /models/names          uint8 [bytes]
  *   /frames/time           double [n]     in the scene's seconds
  *   /frames/first_meeting  int64 [n]      the frame's meetings begin there in /meetings
@@ -633,7 +649,8 @@ typedef struct ebpo_scene_way {
 
     /*
      * 1: at `time` they are at most clearance + tolerance apart. 0: `time` is the last time, at
-     * which they are farther apart, too. -1: after options.most_looks it was still open.
+     * which they are farther apart, too. -1: it is open: lo and hi are what is known at `time`,
+     * after options.most_looks, or because the tolerance is finer than the rounding of coordinates.
      */
     int32_t reached;
 
@@ -686,8 +703,8 @@ typedef struct ebpo_scene_least {
 
     /*
      * Bounds of the least distance of their faces, certain for all times: their difference is at
-     * most the tolerance, unless options.most_looks did not suffice, or what a file lacks leaves it
-     * open.
+     * most the tolerance, unless options.most_looks did not suffice, or what a file lacks or the
+     * rounding of coordinates leaves it open.
      */
     double lo, hi;
 
@@ -723,7 +740,13 @@ typedef enum ebpo_scene_purpose {
     EBPO_SCENE_FOR_VIEW = 1,
 
     /* Whether points of instances are inside those that they may meet. */
-    EBPO_SCENE_FOR_INSIDE = 2
+    EBPO_SCENE_FOR_INSIDE = 2,
+
+    /*
+     * As EBPO_SCENE_FOR_COLLIDE, with options.relate and options.depth of ebpo_scene_meet: all
+     * faces of what comes near anything, as a face anywhere may be around the other one.
+     */
+    EBPO_SCENE_FOR_SOLIDS = 3
 } ebpo_scene_purpose;
 
 typedef struct ebpo_plan_options {
