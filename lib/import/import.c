@@ -1,20 +1,31 @@
 #include "import/import.h"
 
+#include "attributes/attributes.h"
+#include "base/arrays.h"
 #include "base/error.h"
 #include "ebpo_config.h"
 #include "import/obj_runs.h"
 #include "io/file_source.h"
 
+void ebpo_import_clear(ebpo_mesh *mesh)
+{
+    ebpo_array_free(mesh->workspace, mesh->xyz32);
+    ebpo_array_free(mesh->workspace, mesh->faces);
+    ebpo_attributes_free(mesh->attributes);
+    *mesh = (ebpo_mesh){ 0 };
+}
+
 #if !EBPO_HAVE_ASSIMP
 
 ebpo_status ebpo_import_runs(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
                              uint64_t size, const char *name, ebpo_workspace *workspace,
-                             ebpo_obj_runs *runs, ebpo_error *error)
+                             bool attributes, ebpo_obj_runs *runs, ebpo_error *error)
 {
     (void)format;
     (void)data;
     (void)size;
     (void)workspace;
+    (void)attributes;
     (void)runs;
     *out = (ebpo_mesh){ 0 };
     return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, ebpo_path_name(name),
@@ -37,9 +48,11 @@ ebpo_status ebpo_import_runs(ebpo_mesh *out, ebpo_import_format format, const ui
 #include <string.h>
 
 #include "base/alloc.h"
-#include "base/arrays.h"
 #include "geom/polygon.h"
 #include "import/assimp_lock.h"
+#include "import/import_attributes.h"
+#include "import/obj_losses.h"
+#include "import/stl_colours.h"
 #include "import/off_check.h"
 #include "import/corner_weld.h"
 
@@ -168,6 +181,16 @@ static void close_memory(struct aiFileIO *io, struct aiFile *file)
     free(file);
 }
 
+/* What is read, and how. */
+typedef struct reading {
+    memory_file file;
+    ebpo_import_format format;
+    ebpo_obj_runs *runs; /* NULL: not asked for */
+    const char *name;
+    ebpo_error *error;
+    bool more; /* of OFF: there is more than positions and corners */
+} reading;
+
 /* Sums over the scene's meshes, with every index checked. */
 typedef struct totals {
     uint64_t vertices, triangles, most_corners;
@@ -240,10 +263,32 @@ static void polygon_buffers_free(polygon_capacity *capacity)
     free(capacity->scratch);
 }
 
-/* `map`: from this assimp mesh's vertices to ours. */
-static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const uint32_t *map,
-                            const polygon_capacity *capacity, const char *name, ebpo_error *error)
+/* From the scene's faces to the mesh's. */
+typedef struct filling {
+    ebpo_mesh *mesh;
+    const uint32_t *map; /* from this assimp mesh's vertices to ours */
+    uint32_t first;      /* number among all of the scene of this one's first vertex */
+    uint32_t *corner;    /* NULL, or [triangles][3] which of those each corner is */
+    polygon_capacity polygon;
+    const char *name;
+    ebpo_error *error;
+} filling;
+
+static void add_triangle(const filling *f, const struct aiFace *face, const uint32_t corner[3])
 {
+    uint64_t at = 3 * f->mesh->face_count++;
+    for (int k = 0; k < 3; k++) {
+        uint32_t vertex = face->mIndices[corner[k]];
+        f->mesh->faces[at + (uint64_t)k] = f->map[vertex];
+        if (f->corner)
+            f->corner[at + (uint64_t)k] = f->first + vertex;
+    }
+}
+
+static ebpo_status add_face(const filling *f, const struct aiFace *face)
+{
+    ebpo_mesh *mesh = f->mesh;
+    const polygon_capacity *capacity = &f->polygon;
     uint32_t n = face->mNumIndices;
     if (n < 3) {
         mesh->polygons_dropped++;
@@ -252,35 +297,32 @@ static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const ui
     for (uint32_t i = 0; i < n; i++)
         for (int k = 0; k < 3; k++)
             capacity->position[i][k] =
-                (double)mesh->xyz32[3 * (uint64_t)map[face->mIndices[i]] + (uint64_t)k];
+                (double)mesh->xyz32[3 * (uint64_t)f->map[face->mIndices[i]] + (uint64_t)k];
     ebpo_polygon_kind kind =
         ebpo_polygon_triangulate(capacity->triangle, (const double(*)[3])capacity->position, n,
                                  capacity->scratch);
     if (kind == EBPO_POLYGON_TOO_LARGE)
         return ebpo_fail_file(
-            error, EBPO_E_LIMIT, name,
+            f->error, EBPO_E_LIMIT, f->name,
             "a concave polygon of %" PRIu32
             " corners is too intricate to be cut into triangles here; triangulate it in the source",
             n);
     mesh->polygons_triangulated += n > 3;
     mesh->polygons_concave += kind == EBPO_POLYGON_CONCAVE;
     for (uint32_t i = 0; i < n - 2; i++)
-        for (int k = 0; k < 3; k++)
-            mesh->faces[3 * (mesh->face_count + i) + (uint64_t)k] =
-                map[face->mIndices[capacity->triangle[i][k]]];
-    mesh->face_count += n - 2;
+        add_triangle(f, face, capacity->triangle[i]);
     return EBPO_OK;
 }
 
-static ebpo_status add_faces(ebpo_mesh *mesh, const struct aiScene *scene, const uint32_t *map,
-                             const polygon_capacity *capacity, const char *name, ebpo_error *error)
+static ebpo_status add_faces(filling *f, const struct aiScene *scene)
 {
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < scene->mNumMeshes; i++) {
         const struct aiMesh *m = scene->mMeshes[i];
         for (unsigned k = 0; k < m->mNumFaces && status == EBPO_OK; k++)
-            status = add_face(mesh, &m->mFaces[k], map, capacity, name, error);
-        map += m->mNumVertices;
+            status = add_face(f, &m->mFaces[k]);
+        f->map += m->mNumVertices;
+        f->first += m->mNumVertices;
     }
     return status;
 }
@@ -288,35 +330,47 @@ static ebpo_status add_faces(ebpo_mesh *mesh, const struct aiScene *scene, const
 /* assimp gives OBJ vertices once for each corner that uses them and STL has no shared vertices at
  * all, so shared edges exist only after welding. OFF keeps its vertices apart in the file; welding
  * it too makes the three formats agree on what a shared vertex is. */
-static ebpo_status convert(ebpo_mesh *mesh, const struct aiScene *scene, const char *name,
-                           ebpo_error *error)
+static ebpo_status weld_and_fill(filling *f, const struct aiScene *scene, uint32_t *map,
+                                 uint64_t vertices)
 {
-    totals t = { 0, 0, 3 };
-    polygon_capacity capacity = { NULL, NULL, NULL };
-    uint32_t *map = NULL;
-    float *smaller;
-    ebpo_status status = scene_totals(&t, scene, name, error);
-    if (status != EBPO_OK)
-        return status;
-    mesh->xyz32 = ebpo_array_alloc(mesh->workspace, t.vertices, 3 * sizeof *mesh->xyz32);
-    mesh->faces = ebpo_array_alloc(mesh->workspace, t.triangles, 3 * sizeof *mesh->faces);
-    map = ebpo_alloc(t.vertices, sizeof *map);
-    if (!mesh->xyz32 || !mesh->faces || !map || !polygon_buffers_get(&capacity, t.most_corners)) {
-        status = ebpo_workspace_fail(mesh->workspace, t.vertices * 16 + t.triangles * 12, error);
-        goto done;
-    }
+    ebpo_mesh *mesh = f->mesh;
     copy_positions(mesh->xyz32, scene);
-    status = ebpo_import_weld(mesh->xyz32, t.vertices, map, &mesh->vertex_count, error);
-    if (status != EBPO_OK)
-        goto done;
-    status = add_faces(mesh, scene, map, &capacity, name, error);
-    smaller = mesh->workspace
-                  ? NULL
-                  : ebpo_realloc(mesh->xyz32, mesh->vertex_count, 3 * sizeof *mesh->xyz32);
+    ebpo_status status =
+        ebpo_import_weld(mesh->xyz32, vertices, map, &mesh->vertex_count, f->error);
+    if (status == EBPO_OK)
+        status = add_faces(f, scene);
+    float *smaller = mesh->workspace || status != EBPO_OK
+                         ? NULL
+                         : ebpo_realloc(mesh->xyz32, mesh->vertex_count, 3 * sizeof *mesh->xyz32);
     if (smaller)
         mesh->xyz32 = smaller;
-done:
-    polygon_buffers_free(&capacity);
+    return status;
+}
+
+static ebpo_status convert(ebpo_mesh *mesh, const struct aiScene *scene, const reading *r)
+{
+    totals t = { 0, 0, 3 };
+    ebpo_workspace *workspace = mesh->workspace;
+    bool corners =
+        mesh->attributes && r->format == EBPO_IMPORT_OBJ && ebpo_import_has_attributes(scene);
+    ebpo_status status = scene_totals(&t, scene, r->name, r->error);
+    if (status != EBPO_OK)
+        return status;
+    mesh->xyz32 = ebpo_array_alloc(workspace, t.vertices, 3 * sizeof *mesh->xyz32);
+    mesh->faces = ebpo_array_alloc(workspace, t.triangles, 3 * sizeof *mesh->faces);
+    uint32_t *map = ebpo_alloc(t.vertices, sizeof *map);
+    filling f = { .mesh = mesh, .map = map, .name = r->name, .error = r->error };
+    f.corner = corners ? ebpo_array_alloc(workspace, t.triangles, 3 * sizeof *f.corner) : NULL;
+    if (!mesh->xyz32 || !mesh->faces || !map || (corners && !f.corner) ||
+        !polygon_buffers_get(&f.polygon, t.most_corners))
+        status = ebpo_workspace_fail(workspace, t.vertices * 16 + t.triangles * 24, r->error);
+    else
+        status = weld_and_fill(&f, scene, map, t.vertices);
+    if (status == EBPO_OK && corners)
+        status = ebpo_import_attributes(mesh, scene, &(ebpo_imported){ t.vertices, map, f.corner },
+                                        r->error);
+    polygon_buffers_free(&f.polygon);
+    ebpo_array_free(workspace, f.corner);
     free(map);
     return status;
 }
@@ -351,62 +405,93 @@ static bool count_runs(ebpo_obj_runs *runs, const struct aiScene *scene)
     return next == scene->mNumMeshes;
 }
 
-static ebpo_status import_locked(ebpo_mesh *mesh, memory_file *file, ebpo_obj_runs *runs,
-                                 const char *name, ebpo_error *error)
+static ebpo_status fail_assimp(const reading *r)
 {
-    struct aiFileIO io = { open_memory, close_memory, (aiUserData)(void *)file };
+    char reason[200];
+    if (r->file.no_memory)
+        return ebpo_fail_memory(r->error, sizeof(struct aiFile));
+    snprintf(reason, sizeof reason, "%s", aiGetErrorString());
+    for (char *s = reason; *s; s++)
+        if (*s < ' ' || *s > '~')
+            *s = ' ';
+    return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
+                          "assimp cannot read it (%s); repair the file or convert it to PLY",
+                          reason);
+}
+
+static ebpo_status import_locked(ebpo_mesh *mesh, reading *r)
+{
+    struct aiFileIO io = { open_memory, close_memory, (aiUserData)(void *)&r->file };
     /* No post-processing: nothing may move, join or reorder. */
-    const struct aiScene *scene = aiImportFileEx(file->name, 0, &io);
-    if (!scene && file->no_memory)
-        return ebpo_fail_memory(error, sizeof(struct aiFile));
-    if (!scene) {
-        char reason[200];
-        snprintf(reason, sizeof reason, "%s", aiGetErrorString());
-        for (char *s = reason; *s; s++)
-            if (*s < ' ' || *s > '~')
-                *s = ' ';
-        return ebpo_fail_file(error, EBPO_E_FORMAT, name,
-                              "assimp cannot read it (%s); repair the file or convert it to PLY",
-                              reason);
-    }
-    ebpo_status status = convert(mesh, scene, name, error);
-    if (status == EBPO_OK && runs && !count_runs(runs, scene))
-        status = ebpo_fail_no_runs(name, error);
+    const struct aiScene *scene = aiImportFileEx(r->file.name, 0, &io);
+    if (!scene)
+        return fail_assimp(r);
+    ebpo_status status = convert(mesh, scene, r);
+    if (status == EBPO_OK && r->runs && !count_runs(r->runs, scene))
+        status = ebpo_fail_no_runs(r->name, r->error);
     aiReleaseImport(scene);
+    return status;
+}
+
+static ebpo_status check(reading *r, const ebpo_workspace *workspace)
+{
+    uint64_t size = r->file.size;
+    ebpo_status status = check_budget(r->format, size, workspace, r->name, r->error);
+    if (status == EBPO_OK &&
+        size > UINT32_MAX) /* assimp keeps sizes, and counts of corners, in 32 bits */
+        status = ebpo_fail_file(
+            r->error, EBPO_E_LIMIT, r->name,
+            "has %" PRIu64
+            " bytes, and files other than PLY are read up to 4 GiB; convert it to PLY",
+            size);
+    if (status == EBPO_OK && r->format == EBPO_IMPORT_OFF)
+        status = ebpo_import_check_off(r->file.data, size, r->name, &r->more, r->error);
+    return status;
+}
+
+/* What the scene does not say of the file's attributes. */
+static ebpo_status complete_attributes(ebpo_mesh *mesh, const reading *r)
+{
+    ebpo_status status = EBPO_OK;
+    if (mesh->attributes && r->format == EBPO_IMPORT_STL)
+        status = ebpo_import_stl_colours(mesh, r->file.data, r->file.size, r->error);
+    if (mesh->attributes && r->format == EBPO_IMPORT_OBJ)
+        ebpo_obj_note_losses(mesh->attributes, r->file.data, r->file.size);
+    if (mesh->attributes && r->more)
+        ebpo_attributes_lose(mesh->attributes, "colours, normals or others of OFF");
+    if (!mesh->attributes || ebpo_attributes_hold(mesh->attributes) || mesh->attributes->lost[0])
+        return status;
+    ebpo_attributes_free(mesh->attributes);
+    mesh->attributes = NULL;
     return status;
 }
 
 ebpo_status ebpo_import_runs(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
                              uint64_t size, const char *name, ebpo_workspace *workspace,
-                             ebpo_obj_runs *runs, ebpo_error *error)
+                             bool attributes, ebpo_obj_runs *runs, ebpo_error *error)
 {
-    memory_file file = { data, (size_t)size, pseudo_names[format], false };
-    ebpo_mesh mesh = { .workspace = workspace };
     name = ebpo_path_name(name);
-    ebpo_status status = check_budget(format, size, workspace, name, error);
-    if (status == EBPO_OK &&
-        size > UINT32_MAX) /* assimp keeps sizes, and counts of corners, in 32 bits */
-        status = ebpo_fail_file(
-            error, EBPO_E_LIMIT, name,
-            "has %" PRIu64
-            " bytes, and files other than PLY are read up to 4 GiB; convert it to PLY",
-            size);
-    if (status == EBPO_OK && format == EBPO_IMPORT_OFF)
-        status = ebpo_import_check_off(data, size, name, error);
+    reading r = {
+        { data, (size_t)size, pseudo_names[format], false }, format, runs, name, error, false
+    };
+    ebpo_mesh mesh = { .workspace = workspace };
+    ebpo_status status = check(&r, workspace);
+    if (status == EBPO_OK && attributes && !(mesh.attributes = ebpo_attributes_make(workspace)))
+        status = ebpo_fail_memory(error, sizeof *mesh.attributes);
     if (status == EBPO_OK) {
         ebpo_assimp_lock();
-        status = import_locked(&mesh, &file, runs, name, error);
+        status = import_locked(&mesh, &r);
         ebpo_assimp_unlock();
         give_back();
     }
+    if (status == EBPO_OK)
+        status = complete_attributes(&mesh, &r);
     if (status == EBPO_OK) {
         snprintf(mesh.source_name, sizeof mesh.source_name, "%s", name);
         snprintf(mesh.source_format, sizeof mesh.source_format, "%s", format_names[format]);
         mesh.source_size = size;
     } else {
-        ebpo_array_free(workspace, mesh.xyz32);
-        ebpo_array_free(workspace, mesh.faces);
-        mesh = (ebpo_mesh){ 0 };
+        ebpo_import_clear(&mesh);
     }
     *out = mesh;
     return status;

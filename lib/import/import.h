@@ -26,29 +26,34 @@ bool ebpo_import_recognise(ebpo_import_format *format, const uint8_t *data, uint
                            const char *name);
 
 /* Parses a file that is in memory. Positions are float32. source_size, source_name and
- * source_format are set. The arrays are in the workspace, but assimp itself has all of the file in
- * memory, several times over: EBPO_E_LIMIT when that is likely more than `workspace` (which may be
- * NULL) allows. EBPO_E_UNSUPPORTED in a build without assimp, EBPO_E_FORMAT when assimp refuses the
- * file. No other file is opened (material libraries are not read). Runs one at a time in a process,
- * since assimp's error text is global. On failure `out` is cleared. Faces keep the file's order
- * within each object or group of an OBJ file; vertices are numbered by first use. */
+ * source_format are set; `attributes`: and the mesh's attributes, if the file has any. The arrays
+ * are in the workspace, but assimp itself has all of the file in memory, several times over:
+ * EBPO_E_LIMIT when that is likely more than `workspace` (which may be NULL) allows.
+ * EBPO_E_UNSUPPORTED in a build without assimp, EBPO_E_FORMAT when assimp refuses the file. No
+ * other file is opened (material libraries are not read). Runs one at a time in a process, since
+ * assimp's error text is global. On failure `out` is cleared. Faces keep the file's order within
+ * each object or group of an OBJ file; vertices are numbered by first use. */
 EBPO_MUST_USE ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format,
                                              const uint8_t *data, uint64_t size, const char *name,
-                                             ebpo_workspace *workspace, ebpo_error *error);
+                                             ebpo_workspace *workspace, bool attributes,
+                                             ebpo_error *error);
 
-/* As ebpo_import_memory. `runs`: NULL, or those that `data` is the text of, whose faces are
- * counted.
- */
+/* As ebpo_import_memory, but that names of groups are left out is not noted. `runs`: NULL, or those
+ * that `data` is the text of, whose faces are counted. */
 EBPO_MUST_USE ebpo_status ebpo_import_runs(ebpo_mesh *out, ebpo_import_format format,
                                            const uint8_t *data, uint64_t size, const char *name,
-                                           ebpo_workspace *workspace, ebpo_obj_runs *runs,
-                                           ebpo_error *error);
+                                           ebpo_workspace *workspace, bool attributes,
+                                           ebpo_obj_runs *runs, ebpo_error *error);
 
 /* An OBJ file with its runs and their faces; their names point into `data`. One run: the file has
  * no names. Assimp reads it twice, so that the mesh is what ebpo_import_memory gives, and
  * EBPO_E_UNSUPPORTED where that would not be so. */
 EBPO_MUST_USE ebpo_status ebpo_import_groups(ebpo_mesh *out, const uint8_t *data, uint64_t size,
                                              const char *name, ebpo_workspace *workspace,
-                                             ebpo_obj_runs *runs, ebpo_error *error);
+                                             bool attributes, ebpo_obj_runs *runs,
+                                             ebpo_error *error);
+
+/* Frees what reading has made. */
+void ebpo_import_clear(ebpo_mesh *mesh);
 
 #endif

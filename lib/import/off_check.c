@@ -11,6 +11,7 @@ typedef struct lines {
     const char *at, *end;        /* what is left of the file */
     const char *word, *line_end; /* what is left of the line */
     uint64_t number;
+    bool more; /* some line has more than positions or corners */
 } lines;
 
 /* To the next line that is neither blank nor a comment. */
@@ -52,6 +53,12 @@ static bool next_count(lines *l, uint64_t *value)
         *value = *value * 10 + (uint64_t)(word[i] - '0');
     }
     return n > 0 && n < 11;
+}
+
+static void look_for_more(lines *l)
+{
+    const char *word;
+    l->more = l->more || (next_word(l, &word) && *word != '#');
 }
 
 /* A decimal number, judged by its characters; assimp parses it. */
@@ -106,6 +113,7 @@ static ebpo_status check_vertex(lines *l, uint64_t row, const char *name, ebpo_e
                               "line %" PRIu64 ": vertex %" PRIu64
                               " has no three coordinates; repair the file",
                               l->number, row);
+    look_for_more(l);
     return EBPO_OK;
 }
 
@@ -142,10 +150,11 @@ static ebpo_status check_face(lines *l, uint64_t row, uint64_t vertices, const c
                                   " vertices; repair the file or drop the face",
                                   l->number, row, index, vertices);
     }
+    look_for_more(l);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_import_check_off(const uint8_t *data, uint64_t size, const char *name,
+ebpo_status ebpo_import_check_off(const uint8_t *data, uint64_t size, const char *name, bool *more,
                                   ebpo_error *error)
 {
     lines l = { .at = (const char *)data, .end = (const char *)data + size };
@@ -155,5 +164,6 @@ ebpo_status ebpo_import_check_off(const uint8_t *data, uint64_t size, const char
         status = check_vertex(&l, i, name, error);
     for (uint64_t i = 0; status == EBPO_OK && i < count[1]; i++)
         status = check_face(&l, i, count[0], name, error);
+    *more = l.more;
     return status;
 }

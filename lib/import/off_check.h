@@ -8,8 +8,8 @@
  * numbers that are out of range onto the last vertex, and leaves out faces of more than nine
  * corners, all without a message. So rows are counted and vertex numbers checked here first.
  * EBPO_E_FORMAT with the line; EBPO_E_UNSUPPORTED for faces of more than nine corners. `name` is
- * for messages. */
+ * for messages. *more: lines have more than positions and corners, such as colours and normals. */
 EBPO_MUST_USE ebpo_status ebpo_import_check_off(const uint8_t *data, uint64_t size,
-                                                const char *name, ebpo_error *error);
+                                                const char *name, bool *more, ebpo_error *error);
 
 #endif

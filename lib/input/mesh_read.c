@@ -61,12 +61,12 @@ static ebpo_status parse_ply(ebpo_mesh *out, const ebpo_whole_file *file, const 
 
 /* With its groups, if it names any. */
 static ebpo_status import_groups(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
-                                 ebpo_workspace *workspace, ebpo_mesh_groups **groups,
+                                 const ebpo_mesh_read_options *wanted, ebpo_mesh_groups **groups,
                                  ebpo_error *error)
 {
     ebpo_obj_runs runs;
-    ebpo_status status =
-        ebpo_import_groups(out, file->data, file->size, path, workspace, &runs, error);
+    ebpo_status status = ebpo_import_groups(out, file->data, file->size, path, wanted->workspace,
+                                            wanted->attributes != 0, &runs, error);
     if (status != EBPO_OK)
         return status;
     if (runs.count > 1)
@@ -86,9 +86,9 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char
     if (ebpo_import_recognise(&format, file->data, file->size, path))
         return !ebpo_progress_stage(&wanted->progress, "reading", error) ? EBPO_E_CANCELLED
                : groups && format == EBPO_IMPORT_OBJ
-                   ? import_groups(out, file, path, wanted->workspace, groups, error)
+                   ? import_groups(out, file, path, wanted, groups, error)
                    : ebpo_import_memory(out, format, file->data, file->size, path,
-                                        wanted->workspace, error);
+                                        wanted->workspace, wanted->attributes != 0, error);
     if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
         return parse_ply(out, file, path, wanted, error);
     return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(path),

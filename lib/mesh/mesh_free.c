@@ -31,3 +31,8 @@ const char *ebpo_mesh_attributes_lost(const ebpo_mesh *mesh)
 {
     return mesh->attributes && mesh->attributes->lost[0] ? mesh->attributes->lost : NULL;
 }
+
+int ebpo_mesh_has_attributes(const ebpo_mesh *mesh)
+{
+    return ebpo_attributes_hold(mesh->attributes);
+}

@@ -88,6 +88,22 @@ static const struct {
     { "again.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\no a\nusemtl x\nf 1 2 3\no b\nf 1 3 2\no a\n"
                    "usemtl y\nf 2 1 3\n" },
     { "backslash.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\ng a\\b\nf 1 2 3\nf 1 3 2\n" },
+    { "painted.obj", "mtllib p.mtl\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\n"
+                     "v 0 0 1 0.5 0.25 0\nvn 0 0 -1\nvn 0 -1 0\nvn -1 0 0\nvn 1 1 1\n"
+                     "vt 0 0\nvt 0.5 0\nvt 0 0.5\nusemtl red paint\ns 1\n"
+                     "f 1/1/1 3/2/1 2/3/1\nf 1/1/2 2/2/2 4/3/2\nusemtl blue\n"
+                     "f 1/1/3 4/3/3 3/2/3\nf 2/1/4 3/2/4 4/3/4\n" },
+    /* what the one before is as a PLY */
+    { "painted.ply",
+      "ply\nformat ascii 1.0\ncomment material 0 DefaultMaterial\n"
+      "comment material 1 red paint\ncomment material 2 blue\nelement vertex 4\n"
+      "property float x\nproperty float y\nproperty float z\nproperty float red\n"
+      "property float green\nproperty float blue\nelement face 4\n"
+      "property list uchar int vertex_indices\nproperty float nx\nproperty float ny\n"
+      "property float nz\nproperty list uchar float texcoord\nproperty uint material\n"
+      "end_header\n0 0 0 1 0 0\n0 1 0 0 0 1\n1 0 0 0 1 0\n0 0 1 0.5 0.25 0\n"
+      "3 0 1 2 0 0 -1 6 0 0 0.5 0 0 0.5 1\n3 0 2 3 0 -1 0 6 0 0 0.5 0 0 0.5 1\n"
+      "3 0 3 1 -1 0 0 6 0 0 0 0.5 0.5 0 2\n3 2 1 3 1 1 1 6 0 0 0.5 0 0 0.5 2\n" },
     { "tetrahedron.stl", "solid t\n"
                          "facet normal 0 0 -1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 "
                          "0\nendloop\nendfacet\n"

@@ -19,6 +19,7 @@ static ebpo_status call_read(every_call_env *e)
     ebpo_mesh mesh;
     ebpo_status status = read_mesh(e, EVERY_CALL_PLY, &mesh);
     (void)ebpo_mesh_attributes_lost(&mesh);
+    (void)ebpo_mesh_has_attributes(&mesh);
     ebpo_mesh_free(&mesh);
     return status;
 }

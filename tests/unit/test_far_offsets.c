@@ -157,7 +157,7 @@ START_TEST(other_formats_end_at_4_gib)
         return;
     /* A binary STL of 1,431,655,766 faces: three times that is 2 in 32 bits. */
     ebpo_status status =
-        ebpo_import_memory(&mesh, EBPO_IMPORT_STL, data, FAR, "a.stl", NULL, &error);
+        ebpo_import_memory(&mesh, EBPO_IMPORT_STL, data, FAR, "a.stl", NULL, true, &error);
     ck_assert_int_eq(status, status == EBPO_E_UNSUPPORTED ? EBPO_E_UNSUPPORTED : EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "PLY") != NULL, "%s", error.message);
     munmap(data, FAR + 4096);

@@ -21,7 +21,7 @@ static ebpo_status import(ebpo_mesh *mesh, const char *name, const void *data, s
     memcpy(exact, data, size);
     ebpo_status status = EBPO_E_ARGUMENT;
     if (ebpo_import_recognise(&format, exact, size, name))
-        status = ebpo_import_memory(mesh, format, exact, size, name, NULL, error);
+        status = ebpo_import_memory(mesh, format, exact, size, name, NULL, true, error);
     free(exact);
     return status;
 }
@@ -181,13 +181,13 @@ START_TEST(what_assimp_would_take_too_much_memory_for_is_refused)
     static char text[300000] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     memset(text + strlen(text), '\n', sizeof text - strlen(text));
     ck_assert_int_eq(ebpo_import_memory(&mesh, EBPO_IMPORT_OBJ, (const uint8_t *)text, sizeof text,
-                                        "a.obj", w, &error),
+                                        "a.obj", w, true, &error),
                      EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "a.obj: reading it takes some 3 MiB") &&
                       strstr(error.message, "1 MiB are allowed"),
                   "%s", error.message);
     ck_assert_msg(ebpo_import_memory(&mesh, EBPO_IMPORT_OBJ, (const uint8_t *)text, 100000, "a.obj",
-                                     w, &error) == EBPO_OK,
+                                     w, true, &error) == EBPO_OK,
                   "%s", error.message);
     ck_assert_uint_eq(mesh.face_count, 1);
     ebpo_mesh_free(&mesh);

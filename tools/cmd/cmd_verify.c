@@ -74,10 +74,11 @@ static unseen unseen_of(const ebpo_file *file, const ebpo_mesh *source)
     uint64_t parts = ebpo_file_info(file)->parts;
     unseen u = { "" };
     const char *lost = ebpo_mesh_attributes_lost(source);
-    if (source->attributes && !(parts & EBPO_PART_ATTRIBUTES))
+    bool has = ebpo_mesh_has_attributes(source);
+    if (has && !(parts & EBPO_PART_ATTRIBUTES))
         snprintf(u.words, sizeof u.words,
                  "its attributes, such as colours and normals: the file keeps none");
-    else if (source->attributes && !(parts & EBPO_PART_MAPS))
+    else if (has && !(parts & EBPO_PART_MAPS))
         snprintf(u.words, sizeof u.words,
                  "its attributes, such as colours and normals: the file has no maps");
     else if (lost)

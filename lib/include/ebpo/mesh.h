@@ -109,6 +109,14 @@ EBPO_API void ebpo_mesh_free(ebpo_mesh *mesh);
  */
 EBPO_API const char *ebpo_mesh_attributes_lost(const ebpo_mesh *mesh);
 
+/*
+ * 1: the mesh has attributes, or comments of a PLY; 0: it has none, though some may
+ * have been lost.
+ *
+ * Threads: any, while nobody changes the mesh.
+ */
+EBPO_API int ebpo_mesh_has_attributes(const ebpo_mesh *mesh);
+
 /* ---- reading and writing ---- */
 
 typedef struct ebpo_mesh_read_options {
@@ -127,7 +135,8 @@ typedef struct ebpo_mesh_read_options {
 
     /*
      * 1: also reads what a PLY says of vertices, faces and other elements beyond
-     * positions and corners, and its comments; ebpo_build takes it over. 0: not.
+     * positions and corners, and its comments; of other formats colours, normals,
+     * texture coordinates and names of materials; ebpo_build takes it over. 0: not.
      */
     uint64_t attributes;
 } ebpo_mesh_read_options;

@@ -1,0 +1,259 @@
+/* What OBJ, STL and OFF files say beyond positions and corners, as attributes of the mesh. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/mesh.h>
+
+#include "attributes/attributes.h"
+#include "base/endian.h"
+#include "check_main.h"
+#include "ebpo_config.h"
+#include "import/import.h"
+
+#if !EBPO_HAVE_ASSIMP
+
+Suite *test_suite(void) { exit(TEST_SKIPPED); }
+
+#else
+
+static ebpo_mesh mesh;
+
+static void import(ebpo_import_format format, const void *data, size_t size)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint8_t *exact = malloc(size);
+    memcpy(exact, data, size);
+    ebpo_status status =
+        ebpo_import_memory(&mesh, format, exact, size, "model", NULL, true, &error);
+    free(exact);
+    ck_assert_msg(status == EBPO_OK, "%s", error.message);
+}
+
+static void import_text(ebpo_import_format format, const char *text)
+{
+    import(format, text, strlen(text));
+}
+
+/* The array of these names; its rows are those of the element. */
+static const ebpo_attribute *find(const char *element, const char *names)
+{
+    for (uint64_t i = 0; mesh.attributes && i < mesh.attributes->count; i++) {
+        const ebpo_attribute *a = &mesh.attributes->array[i];
+        bool face = strcmp(element, "face") == 0;
+        if (strcmp(a->names, names) != 0 || !ebpo_attribute_is_of(a, element))
+            continue;
+        ck_assert_uint_eq(a->rows, face ? mesh.face_count : mesh.vertex_count);
+        return a;
+    }
+    return NULL;
+}
+
+static void expect_floats(const ebpo_attribute *a, bool list, const float *values, uint64_t count)
+{
+    ck_assert_ptr_nonnull(a);
+    ck_assert(a->type == EBPO_ATTRIBUTE_FLOAT32 && (a->list != EBPO_ATTRIBUTE_NO_LIST) == list);
+    ck_assert_uint_eq(ebpo_attribute_value_count(a), count);
+    ck_assert_mem_eq(a->values, values, count * sizeof *values);
+}
+
+/* Vertices are numbered by first use: 1, 3, 2, 4. */
+#define POSITIONS "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+#define FACES     "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+START_TEST(what_agrees_at_a_vertex_is_the_vertex_s)
+{
+    static const float colours[] = { 1, 0, 0, 0, 0, 1, 0, 1, 0, 0.5f, 0.25f, 0 };
+    static const float normals[] = { 0, 0, -1, 0, 1, 0, 1, 0, 0, 0, 0, 1 };
+    static const float texture[] = { 0, 0, 0, 0.5f, 0.5f, 0, 1, 1 };
+    import_text(EBPO_IMPORT_OBJ,
+                "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 0.5 0.25 0\n"
+                "vn 0 0 -1\nvn 1 0 0\nvn 0 1 0\nvn 0 0 1\nvt 0 0\nvt 0.5 0\nvt 0 0.5\nvt 1 1\n"
+                "f 1/1/1 3/3/3 2/2/2\nf 1/1/1 2/2/2 4/4/4\nf 1/1/1 4/4/4 3/3/3\n"
+                "f 2/2/2 3/3/3 4/4/4\n");
+    ck_assert_uint_eq(mesh.attributes->count, 3);
+    expect_floats(find("vertex", "red green blue"), false, colours, 12);
+    expect_floats(find("vertex", "nx ny nz"), false, normals, 12);
+    expect_floats(find("vertex", "s t"), false, texture, 8);
+    ck_assert(!mesh.attributes->header && !mesh.attributes->lost[0]);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+START_TEST(what_agrees_on_a_face_is_the_face_s_and_else_in_lists)
+{
+    static const float normals[] = { 0, 0, -1, 0, -1, 0, -1, 0, 0, 1, 1, 1 };
+    static const float texture[] = { 0, 0, 0, 0.5f, 0.5f, 0,    0.5f, 0, 0,    0, 0, 0.5f,
+                                     0, 0, 0, 0.5f, 0.5f, 0.5f, 0,    0, 0.5f, 0, 0, 0.5f };
+    import_text(EBPO_IMPORT_OBJ,
+                POSITIONS "vn 0 0 -1\nvn 0 -1 0\nvn -1 0 0\nvn 1 1 1\nvt 0 0\nvt 0.5 0\nvt 0 "
+                          "0.5\nvt 0.5 0.5\n"
+                          "f 1/1/1 3/3/1 2/2/1\nf 1/2/2 2/1/2 4/3/2\nf 1/1/3 4/3/3 3/4/3\n"
+                          "f 2/1/4 3/2/4 4/3/4\n");
+    ck_assert_uint_eq(mesh.attributes->count, 2);
+    expect_floats(find("face", "nx ny nz"), false, normals, 12);
+    expect_floats(find("face", "texcoord"), true, texture, 24);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+/* A quadrilateral that is cut into triangles: each corner keeps what is its own. */
+START_TEST(corners_of_polygons_keep_their_values)
+{
+    import_text(EBPO_IMPORT_OBJ,
+                "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+                "f 1/1 2/2 3/3 4/4\nf 1/2 2/3 5/4\n");
+    const ebpo_attribute *a = find("face", "texcoord");
+    ck_assert(a && mesh.face_count == 3);
+    for (uint64_t i = 0; i < 6; i++) {
+        const float *position = mesh.xyz32 + 3 * (uint64_t)mesh.faces[i];
+        ck_assert_mem_eq(a->values + i * 2 * sizeof(float), position, 2 * sizeof(float));
+    }
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+START_TEST(materials_are_numbers_of_faces_and_names_in_the_header)
+{
+    static const uint32_t numbers[] = { 1, 1, 1, 2 };
+    import_text(EBPO_IMPORT_OBJ, "mtllib a.mtl\ns 1\nusemtl red paint\n" POSITIONS
+                                 "f 1 3 2\nf 1 2 4\no here\nf 1 4 3\nusemtl b\nf 2 3 4\n");
+    const ebpo_attribute *a = find("face", "material");
+    ck_assert(a && a->type == EBPO_ATTRIBUTE_UINT32 && mesh.attributes->count == 1);
+    ck_assert_mem_eq(a->values, numbers, sizeof numbers);
+    const char *header = mesh.attributes->header;
+    ck_assert_ptr_nonnull(header);
+    ck_assert_ptr_nonnull(strstr(header, "comment material 1 red paint\ncomment material 2 b\n"));
+    ck_assert_str_eq(mesh.attributes->lost,
+                     "smoothing groups; what the material library says (colours, textures); names "
+                     "of groups and objects");
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+START_TEST(faces_before_the_first_material_are_noted)
+{
+    import_text(EBPO_IMPORT_OBJ, POSITIONS "f 1 3 2\nusemtl a\nf 1 2 4\n");
+    ck_assert_str_eq(mesh.attributes->lost, "that faces before the first material have none");
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+START_TEST(nothing_is_made_of_nothing)
+{
+    import_text(EBPO_IMPORT_OBJ, "# only a mesh\ns off\n" POSITIONS FACES);
+    ck_assert(!mesh.attributes && !ebpo_mesh_has_attributes(&mesh));
+    ebpo_mesh_free(&mesh);
+    import_text(EBPO_IMPORT_OBJ, "o name\ns 0\n" POSITIONS FACES);
+    ck_assert(mesh.attributes && !ebpo_mesh_has_attributes(&mesh));
+    ck_assert_str_eq(ebpo_mesh_attributes_lost(&mesh), "names of groups and objects");
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+static void import_off(const char *head, const char *vertex, const char *last)
+{
+    char text[300];
+    sprintf(text,
+            "%sOFF\n4 4 6\n0 0 0 %s\n1 0 0 %s\n0 1 0 %s\n0 0 1 %s\n"
+            "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2 %s\n",
+            head, vertex, vertex, vertex, vertex, last);
+    import_text(EBPO_IMPORT_OFF, text);
+}
+
+/* assimp mixes up what stands behind positions. */
+START_TEST(what_off_says_beyond_positions_is_noted)
+{
+    import_off("", "# a comment", "");
+    ck_assert_ptr_null(mesh.attributes);
+    ebpo_mesh_free(&mesh);
+    import_off("", "", "255 0 0");
+    ck_assert_str_eq(mesh.attributes->lost, "colours, normals or others of OFF");
+    ebpo_mesh_free(&mesh);
+    import_off("C", "255 0 0 255", "");
+    ck_assert_str_eq(mesh.attributes->lost, "colours, normals or others of OFF");
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+START_TEST(a_third_texture_coordinate_is_noted)
+{
+    import_text(EBPO_IMPORT_OBJ, POSITIONS "vt 0 0 0.5\nf 1/1 3/1 2/1\nf 1/1 2/1 4/1\n");
+    ck_assert_str_eq(mesh.attributes->lost, "the third texture coordinate");
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+/* --- STL --- */
+
+enum { STL_FACES = 4, STL_BYTES = 84 + 50 * STL_FACES };
+
+static void import_stl(const char *head, const uint16_t words[STL_FACES])
+{
+    static const float position[4][3] = { { 0, 0, 0 }, { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
+    static const int face[4][3] = { { 0, 2, 1 }, { 0, 1, 3 }, { 0, 3, 2 }, { 1, 2, 3 } };
+    uint8_t data[STL_BYTES] = { 0 };
+    memcpy(data, head, strlen(head));
+    ebpo_store32(data + 80, STL_FACES);
+    for (int i = 0; i < STL_FACES; i++) {
+        for (int k = 0; k < 3; k++)
+            memcpy(data + 84 + 50 * i + 12 + 12 * k, position[face[i][k]], 12);
+        data[84 + 50 * i + 48] = (uint8_t)words[i];
+        data[84 + 50 * i + 49] = (uint8_t)(words[i] >> 8);
+    }
+    import(EBPO_IMPORT_STL, data, sizeof data);
+}
+
+static void expect_stl(const uint16_t words[STL_FACES], const uint8_t rgb[3 * STL_FACES])
+{
+    const ebpo_attribute *a = find("face", "attribute"), *c = find("face", "red green blue");
+    ck_assert(a && a->type == EBPO_ATTRIBUTE_UINT16);
+    ck_assert_mem_eq(a->values, words, STL_FACES * sizeof *words);
+    ck_assert(rgb ? c && c->type == EBPO_ATTRIBUTE_UINT8 : !c);
+    if (rgb)
+        ck_assert_mem_eq(c->values, rgb, 3 * STL_FACES);
+    ebpo_mesh_free(&mesh);
+}
+
+START_TEST(colours_of_stl_are_read_as_their_header_says)
+{
+    static const uint16_t words[STL_FACES] = { 0x801f, 0xfc00, 0x03e0, 0x8210 };
+    static const uint8_t viscam[] = { 0, 0, 255, 255, 0, 0, 255, 255, 255, 0, 132, 132 };
+    static const uint8_t magics[] = { 7, 8, 9, 7, 8, 9, 0, 255, 0, 7, 8, 9 };
+    import_stl("", words);
+    expect_stl(words, viscam);
+    import_stl("COLOR=\7\10\11\377", words);
+    expect_stl(words, magics);
+}
+END_TEST
+
+START_TEST(words_of_stl_that_are_no_colours_are_kept)
+{
+    static const uint16_t words[STL_FACES] = { 0, 0x7fff, 3, 0 }, zeros[STL_FACES] = { 0 };
+    import_stl("by a scanner", words);
+    expect_stl(words, NULL);
+    import_stl("by a scanner", zeros);
+    ck_assert_ptr_null(mesh.attributes);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    TCase *tests = tcase_create("import attributes");
+    tcase_add_test(tests, what_agrees_at_a_vertex_is_the_vertex_s);
+    tcase_add_test(tests, what_agrees_on_a_face_is_the_face_s_and_else_in_lists);
+    tcase_add_test(tests, corners_of_polygons_keep_their_values);
+    tcase_add_test(tests, materials_are_numbers_of_faces_and_names_in_the_header);
+    tcase_add_test(tests, faces_before_the_first_material_are_noted);
+    tcase_add_test(tests, nothing_is_made_of_nothing);
+    tcase_add_test(tests, what_off_says_beyond_positions_is_noted);
+    tcase_add_test(tests, a_third_texture_coordinate_is_noted);
+    tcase_add_test(tests, colours_of_stl_are_read_as_their_header_says);
+    tcase_add_test(tests, words_of_stl_that_are_no_colours_are_kept);
+    Suite *suite = suite_create("import attributes");
+    suite_add_tcase(suite, tests);
+    return suite;
+}
+
+#endif
