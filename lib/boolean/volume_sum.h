@@ -13,8 +13,8 @@ typedef struct ebpo_volume_sum {
     mpz_t other;    /* of all others, in units of 2^EBPO_VOLUME_UNIT */
 } ebpo_volume_sum;
 
-/* Of products of three doubles. */
-enum { EBPO_VOLUME_UNIT = -3 * 1074 };
+/* Of products of three doubles; of each all 53 bits count, also of the least one, 2^-1074. */
+enum { EBPO_VOLUME_UNIT = -3 * (1074 + 52) };
 
 void ebpo_volume_sum_begin(ebpo_volume_sum *sum);
 void ebpo_volume_sum_end(ebpo_volume_sum *sum);

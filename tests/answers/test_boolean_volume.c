@@ -494,6 +494,22 @@ START_TEST(very_large_and_very_small)
 }
 END_TEST
 
+/* Products of what has fewer than 53 bits. */
+START_TEST(coordinates_that_are_subnormal)
+{
+    const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 }, least[] = { 0x1p-1074, 0x1.8p-1030 };
+    query_model cube;
+    query_model_make(&cube, "cube", ebpo_test_box(low, high, 2), &query_variants[0]);
+    for (int i = 0; i < 4; i++) {
+        const double scale = i < 2 ? 1 : 0x1p-290;
+        ebpo_pose outer = pose_of(0, scale, least[i % 2], -least[i % 2], 0);
+        check_nested(&cube, outer, &cube,
+                     pose_of(0, 0.5 * scale, 0.25 * scale, 0.25 * scale, 0.25 * scale));
+    }
+    query_model_free(&cube);
+}
+END_TEST
+
 /* Nearly touching, then touching: one unit in the last place decides. */
 START_TEST(contact_ends_exactness)
 {
@@ -704,6 +720,7 @@ Suite *test_suite(void)
     tcase_add_test(c, boxes_that_may_meet);
     tcase_add_test(c, balls_in_balls);
     tcase_add_test(c, very_large_and_very_small);
+    tcase_add_test(c, coordinates_that_are_subnormal);
     tcase_add_test(c, contact_ends_exactness);
     tcase_add_test(c, equal_operands_are_one);
     tcase_add_test(c, equal_operands_are_in_together);
