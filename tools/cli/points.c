@@ -111,6 +111,17 @@ static void take_lines(points *p, points_block *b)
     }
 }
 
+/* A copy that broke off between two rows, or bytes behind the last one. */
+static void check_rows(points *p, points_block *b, uint64_t more)
+{
+    p->rows_taken += more;
+    if (!b->failed &&
+        (p->rows_taken > p->rows_total || (p->ended && p->rows_taken < p->rows_total)))
+        points_fault(b, 0, "holds %s rows than the %" PRIu64 " of its shape; the input is %s",
+                     p->rows_taken > p->rows_total ? "more" : "fewer", p->rows_total,
+                     p->rows_taken > p->rows_total ? "something else" : "cut short");
+}
+
 /* Whole rows, as many as are there. */
 static void take_numbers(points *p, points_block *b)
 {
@@ -128,6 +139,8 @@ static void take_numbers(points *p, points_block *b)
                      "cut short or is something else",
                      left, each);
     b->count -= p->ended ? left : 0;
+    if (p->rows_told)
+        check_rows(p, b, b->count / each);
 }
 
 static void take_held(points *p, points_block *b)

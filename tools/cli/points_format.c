@@ -65,7 +65,7 @@ static bool npy_shape(points *p, const char *shape)
         return false;
     p->layout.per_row = columns;
     p->rows_total = rows;
-    p->rows_known = true;
+    p->rows_known = p->rows_told = true;
     return true;
 }
 

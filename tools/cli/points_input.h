@@ -58,6 +58,8 @@ typedef struct points {
     points_layout layout;
     bool rows_known;          /* how many there are in all: */
     uint64_t rows_total;      /* may be cut short */
+    bool rows_told;           /* by the head of an array, whose numbers must be as many */
+    uint64_t rows_taken;      /* of such an array */
     bool from_zero;           /* rows are told as "vertex 0" */
     double *held;             /* all rows, of what is read as a whole; or NULL */
     uint64_t held_at;         /* those that have been taken */
