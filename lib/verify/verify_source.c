@@ -124,6 +124,14 @@ static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
           differ, stored->names, stored->element);
 }
 
+/* Elements that are neither vertices nor faces are in each part as a whole. */
+static const uint32_t *source_numbers(const ebpo_attribute *array, const ebpo_maps *maps)
+{
+    if (maps && ebpo_attribute_is_of(array, "vertex"))
+        return maps->vertex_source;
+    return maps && ebpo_attribute_is_of(array, "face") ? maps->face_source : NULL;
+}
+
 /* The file's arrays are the source's, in their order, but for those of elements that were left
  * out. */
 static void compare_attributes(ebpo_tally *tally, const ebpo_mesh *source, const ebpo_mesh *stored,
@@ -133,12 +141,9 @@ static void compare_attributes(ebpo_tally *tally, const ebpo_mesh *source, const
     uint64_t k = 0;
     for (uint64_t i = 0; a && b && i < a->count; i++) {
         bool here = k < b->count && same_head(&a->array[i], &b->array[k]);
-        const uint32_t *number = !maps ? NULL
-                                 : ebpo_attribute_is_of(&a->array[i], "vertex")
-                                     ? maps->vertex_source
-                                     : maps->face_source;
         if (here)
-            compare_rows(tally, &a->array[i], &b->array[k++], number, stored->workspace);
+            compare_rows(tally, &a->array[i], &b->array[k++], source_numbers(&a->array[i], maps),
+                         stored->workspace);
         else if (ebpo_attribute_is_of_mesh(&a->array[i]))
             CHECK(false, "the attribute %s of %s is not where the source has it", a->array[i].names,
                   a->array[i].element);

@@ -71,11 +71,11 @@ static const struct {
     { "coloured_parts.ply",
       "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\n"
       "property float z\nproperty uchar red\nelement face 8\n"
-      "property list uchar uint vertex_index\nproperty short label\nelement edge 1\n"
+      "property list uchar uint vertex_index\nproperty short label\nelement edge 6\n"
       "property int vertex1\nproperty int vertex2\nend_header\n"
       "0 0 0 11\n1 0 0 12\n0 1 0 13\n0 0 1 14\n5 0 0 21\n6 0 0 22\n5 1 0 23\n5 0 1 24\n"
       "3 0 2 1 100\n3 0 1 3 101\n3 0 3 2 102\n3 1 2 3 103\n"
-      "3 4 6 5 104\n3 4 5 7 105\n3 4 7 6 106\n3 5 6 7 107\n0 4\n" },
+      "3 4 6 5 104\n3 4 5 7 105\n3 4 7 6 106\n3 5 6 7 107\n0 4\n1 5\n2 6\n3 7\n0 1\n4 5\n" },
     { "groups.obj", "# two tetrahedra; C:\\parts\n# and a triangle\nmtllib a/b.mtl\n"
                     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 5 0 0\nv 6 0 0\nv 5 1 0\nv 5 0 1\n"
                     "f 1 3 2\nf 1 2 4\ng\nf 1 4 3\ng default\nf 2 3 4\n"
