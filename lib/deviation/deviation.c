@@ -198,6 +198,7 @@ static ebpo_status bound_level(survey *s, const ebpo_deviation_options *o, ebpo_
     free(s->order);
     s->order = NULL;
     s->count = 0;
+    s->first = 0; /* where the search of a finer level ended */
     ebpo_status status = list_nodes(s, &tree, &root);
     if (status == EBPO_OK && !(s->order = ebpo_alloc(s->count, sizeof *s->order)))
         status = ebpo_fail_memory(s->error, s->count * sizeof *s->order);
