@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "attributes/attributes.h"
 #include "base/alloc.h"
 #include "base/error.h"
 #include "octree/octcode.h"
@@ -37,11 +38,17 @@ static ebpo_status read_mesh(ebpo_block *out, const ebpo_file *file, ebpo_block_
 {
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     read.threads = threads;
+    read.attributes = 1;
     snprintf(out->name, sizeof out->name, "mesh");
-    if (order == EBPO_SOURCE_ORDER)
-        return ebpo_file_read_source_mesh(file, &read, &out->mesh, NULL, error);
-    ebpo_status status = ebpo_file_read_mesh(file, &read, &out->mesh, error);
-    if (status == EBPO_OK && ebpo_file_info(file)->parts & EBPO_PART_MAPS)
+    ebpo_status status = order == EBPO_SOURCE_ORDER
+                             ? ebpo_file_read_source_mesh(file, &read, &out->mesh, NULL, error)
+                             : ebpo_file_read_mesh(file, &read, &out->mesh, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_colours(&out->mesh, &out->colours, error);
+    ebpo_attributes_free(out->mesh.attributes); /* other ones are not exported */
+    out->mesh.attributes = NULL;
+    if (status == EBPO_OK && order == EBPO_FILE_ORDER &&
+        ebpo_file_info(file)->parts & EBPO_PART_MAPS)
         status = ebpo_file_read_maps(file, &read, &out->maps, error);
     return status;
 }
@@ -65,6 +72,7 @@ void ebpo_block_free(ebpo_block *block)
     ebpo_mesh_free(&block->mesh);
     ebpo_lod_nodes_free(&block->nodes);
     ebpo_maps_free(&block->maps);
+    ebpo_colours_free(&block->colours);
     memset(block, 0, sizeof *block);
 }
 

@@ -1,7 +1,9 @@
-/* What is exported: a level's envelopes with their nodes, or the mesh with its source's numbers. */
+/* What is exported: a level's envelopes with their nodes, or the mesh with its colours and its
+ * source's numbers. */
 #ifndef EBPO_EXPORT_BLOCK_H
 #define EBPO_EXPORT_BLOCK_H
 
+#include <ebpo/colours.h>
 #include <ebpo/export.h>
 
 #include "h5/tables.h"
@@ -12,6 +14,7 @@ typedef struct ebpo_block {
     ebpo_mesh mesh;
     ebpo_lod_nodes nodes; /* levels */
     ebpo_maps maps;       /* the mesh of a file with maps */
+    ebpo_colours colours; /* of the mesh, if it has any */
     double volume;
 } ebpo_block;
 

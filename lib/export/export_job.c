@@ -5,6 +5,22 @@
 #include "base/error.h"
 #include "base/parallel.h"
 
+static bool holds_colours(ebpo_export_format format, bool of_faces)
+{
+    return format == EBPO_EXPORT_XDMF || format == EBPO_EXPORT_VTKHDF ||
+           (!of_faces && format != EBPO_EXPORT_STL);
+}
+
+static void report_colours(const ebpo_export_job *job, const ebpo_colours *colours)
+{
+    if (colours->vertex)
+        job->report->vertex_colours =
+            holds_colours(job->format, false) ? EBPO_EXPORT_WRITTEN : EBPO_EXPORT_LEFT_OUT;
+    if (colours->face)
+        job->report->face_colours =
+            holds_colours(job->format, true) ? EBPO_EXPORT_WRITTEN : EBPO_EXPORT_LEFT_OUT;
+}
+
 ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i, ebpo_block_order order,
                                    ebpo_block *out, ebpo_error *error)
 {
@@ -16,6 +32,8 @@ ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i, ebpo_block
                                          job->options, error);
     if (status == EBPO_OK)
         ebpo_block_report(out, job->report);
+    if (status == EBPO_OK && out->level < 0)
+        report_colours(job, &out->colours);
     return status;
 }
 

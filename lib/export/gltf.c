@@ -22,6 +22,7 @@ enum {
     PARTS_MAX = EBPO_LEVELS_MAX + 1,
     FLOAT32 = 5126,
     UINT32 = 5125,
+    UINT16 = 5123,
     VERTICES = 34962,
     INDICES = 34963,
     BUFFER = 1 << 14
@@ -68,11 +69,33 @@ static void find_bounds(part *p)
     }
 }
 
+/* Views of a part, in this order; each its own accessor. */
+enum { VIEW_POSITIONS, VIEW_CORNERS, VIEW_COLOURS, VIEWS };
+
+static uint64_t view_bytes(const part *p, int view)
+{
+    const ebpo_block *block = &p->block;
+    return view == VIEW_POSITIONS  ? 12 * block->mesh.vertex_count
+           : view == VIEW_CORNERS  ? 12 * block->mesh.face_count
+           : block->colours.vertex ? 8 * block->mesh.vertex_count
+                                   : 0;
+}
+
+/* The number of a part's first accessor, and of its first view. */
+static int first_view(const model *m, int number)
+{
+    int n = 0;
+    for (int i = 0; i < number; i++)
+        n += m->parts[i].block.colours.vertex ? VIEWS : VIEW_COLOURS;
+    return n;
+}
+
 static uint64_t bin_bytes(const model *m)
 {
     uint64_t sum = 0;
     for (int i = 0; i < m->count; i++)
-        sum += 12 * (m->parts[i].block.mesh.vertex_count + m->parts[i].block.mesh.face_count);
+        for (int v = 0; v < VIEWS; v++)
+            sum += view_bytes(&m->parts[i], v);
     return sum;
 }
 
@@ -143,6 +166,18 @@ static void print_three(FILE *f, const char *before, const double x[3])
     fputc(']', f);
 }
 
+static void print_mesh(FILE *f, const model *m, int i)
+{
+    const ebpo_block *block = &m->parts[i].block;
+    int first = first_view(m, i);
+    bool coloured = block->colours.vertex != NULL;
+    fprintf(f, "%s{\"name\":\"%s\",\"primitives\":[{\"attributes\":{\"POSITION\":%d",
+            i ? ",\n" : "", block->name, first);
+    if (coloured)
+        fprintf(f, ",\"COLOR_0\":%d", first + VIEW_COLOURS);
+    fprintf(f, "},\"indices\":%d,\"material\":%d}]}", first + VIEW_CORNERS, coloured);
+}
+
 static void print_nodes(FILE *f, const model *m)
 {
     const double *o = m->origin;
@@ -158,43 +193,54 @@ static void print_nodes(FILE *f, const model *m)
     }
     fprintf(f, "],\n\"meshes\":[");
     for (int i = 0; i < m->count; i++)
-        fprintf(f,
-                "%s{\"name\":\"%s\",\"primitives\":[{\"attributes\":{\"POSITION\":%d},\"indices\":%"
-                "d,\"material\":0}]}",
-                i ? ",\n" : "", m->parts[i].block.name, 2 * i, 2 * i + 1);
+        print_mesh(f, m, i);
     fprintf(f,
             "],\n\"materials\":[{\"name\":\"plain\",\"pbrMetallicRoughness\":{\"baseColorFactor\":["
-            "0.6,0.7,0.8,1],\"metallicFactor\":0,\"roughnessFactor\":0.8}}],\n");
+            "0.6,0.7,0.8,1],\"metallicFactor\":0,\"roughnessFactor\":0.8}}");
+    if (m->count && m->parts[m->count - 1].block.colours.vertex) /* factors multiply colours */
+        fprintf(f, ",\n{\"name\":\"coloured\",\"pbrMetallicRoughness\":{\"metallicFactor\":0,"
+                   "\"roughnessFactor\":0.8}}");
+    fprintf(f, "],\n");
+}
+
+static void print_accessors(FILE *f, const model *m, int i)
+{
+    const part *p = &m->parts[i];
+    int first = first_view(m, i);
+    const double low[3] = { (double)p->low[0], (double)p->low[1], (double)p->low[2] },
+                 high[3] = { (double)p->high[0], (double)p->high[1], (double)p->high[2] };
+    fprintf(f, "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"VEC3\"",
+            i ? ",\n" : "", first, FLOAT32, p->block.mesh.vertex_count);
+    print_three(f, ",\"min\":", low);
+    print_three(f, ",\"max\":", high);
+    fprintf(f,
+            "},\n{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64
+            ",\"type\":\"SCALAR\"}",
+            first + VIEW_CORNERS, UINT32, 3 * p->block.mesh.face_count);
+    if (p->block.colours.vertex)
+        fprintf(f,
+                ",\n{\"bufferView\":%d,\"componentType\":%d,\"normalized\":true,\"count\":%" PRIu64
+                ",\"type\":\"VEC4\"}",
+                first + VIEW_COLOURS, UINT16, p->block.mesh.vertex_count);
 }
 
 static void print_data(FILE *f, const model *m)
 {
     uint64_t at = 0;
     fprintf(f, "\"accessors\":[");
-    for (int i = 0; i < m->count; i++) {
-        const part *p = &m->parts[i];
-        const double low[3] = { (double)p->low[0], (double)p->low[1], (double)p->low[2] },
-                     high[3] = { (double)p->high[0], (double)p->high[1], (double)p->high[2] };
-        fprintf(f,
-                "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"VEC3\"",
-                i ? ",\n" : "", 2 * i, FLOAT32, p->block.mesh.vertex_count);
-        print_three(f, ",\"min\":", low);
-        print_three(f, ",\"max\":", high);
-        fputs("},\n", f);
-        fprintf(f,
-                "{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64
-                ",\"type\":\"SCALAR\"}",
-                2 * i + 1, UINT32, 3 * p->block.mesh.face_count);
-    }
+    for (int i = 0; i < m->count; i++)
+        print_accessors(f, m, i);
     fprintf(f, "],\n\"bufferViews\":[");
     for (int i = 0; i < m->count; i++) {
-        uint64_t size[2] = { 12 * m->parts[i].block.mesh.vertex_count,
-                             12 * m->parts[i].block.mesh.face_count };
-        for (int k = 0; k < 2; k++, at += size[k - 1])
-            fprintf(f,
-                    "%s{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64
-                    ",\"target\":%d}",
-                    i || k ? ",\n" : "", at, size[k], k ? INDICES : VERTICES);
+        for (int k = 0; k < VIEWS; k++) {
+            uint64_t size = view_bytes(&m->parts[i], k);
+            if (size)
+                fprintf(f,
+                        "%s{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64
+                        ",\"target\":%d}",
+                        at ? ",\n" : "", at, size, k == VIEW_CORNERS ? INDICES : VERTICES);
+            at += size;
+        }
     }
     fprintf(f, "],\n\"buffers\":[{\"byteLength\":%" PRIu64, at);
     if (m->bin_name) {
@@ -231,11 +277,30 @@ static void write_words(FILE *f, const void *words, uint64_t count)
     }
 }
 
+/* COLOR_0 is linear, where a mesh's colours are sRGB; 16 bits keep all of these apart. */
+static void write_colours(FILE *f, const uint8_t *rgba, uint64_t count)
+{
+    uint16_t linear[256];
+    for (int i = 0; i < 256; i++) {
+        double c = i / 255.0;
+        linear[i] =
+            (uint16_t)(65535 * (c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4)) + 0.5);
+    }
+    for (uint64_t i = 0; i < count; i++, rgba += 4) {
+        uint8_t row[8];
+        for (int k = 0; k < 4; k++)
+            ebpo_store16(row + 2 * k, k < 3 ? linear[rgba[k]] : (uint16_t)(257 * rgba[k]));
+        fwrite(row, 1, sizeof row, f);
+    }
+}
+
 static void write_bin(FILE *f, const model *m)
 {
     for (int i = 0; i < m->count; i++) {
         write_words(f, m->parts[i].xyz, 3 * m->parts[i].block.mesh.vertex_count);
         write_words(f, m->parts[i].block.mesh.faces, 3 * m->parts[i].block.mesh.face_count);
+        if (m->parts[i].block.colours.vertex)
+            write_colours(f, m->parts[i].block.colours.vertex, m->parts[i].block.mesh.vertex_count);
     }
 }
 

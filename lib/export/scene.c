@@ -69,6 +69,21 @@ static ebpo_status add_vertices(scene *s, struct aiMesh *to, const ebpo_mesh *fr
     return status;
 }
 
+/* assimp writes them behind the positions. */
+static ebpo_status add_colours(struct aiMesh *to, const ebpo_block *block, ebpo_error *error)
+{
+    const uint8_t *rgba = block->colours.vertex;
+    uint64_t count = block->mesh.vertex_count;
+    struct aiColor4D *colours = rgba ? ebpo_alloc(count, sizeof *colours) : NULL;
+    if (rgba && !colours)
+        return ebpo_fail_memory(error, count * sizeof *colours);
+    for (uint64_t i = 0; colours && i < count; i++, rgba += 4)
+        colours[i] = (struct aiColor4D){ (float)rgba[0] / 255, (float)rgba[1] / 255,
+                                         (float)rgba[2] / 255, (float)rgba[3] / 255 };
+    to->mColors[0] = colours;
+    return EBPO_OK;
+}
+
 /* Takes the triangles over from the block. */
 static ebpo_status add_faces(struct aiMesh *to, ebpo_mesh *from, ebpo_error *error)
 {
@@ -97,6 +112,8 @@ static ebpo_status add_block(scene *s, ebpo_block *block, ebpo_error *error)
     s->children[s->count] = node;
     s->meshes[s->count++] = mesh;
     ebpo_status status = add_vertices(s, mesh, &block->mesh, error);
+    if (status == EBPO_OK)
+        status = add_colours(mesh, block, error);
     return status == EBPO_OK ? add_faces(mesh, &block->mesh, error) : status;
 }
 
@@ -121,6 +138,7 @@ static void scene_free(scene *s)
             free(s->mesh[i].mFaces[0].mIndices);
         free(s->mesh[i].mFaces);
         free(s->mesh[i].mVertices);
+        free(s->mesh[i].mColors[0]);
     }
     free(s);
 }

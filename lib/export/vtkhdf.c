@@ -22,6 +22,8 @@ enum {
     CELL_COUNT,
     CORNER_COUNT,
     SOURCE_VERTEX,
+    VERTEX_COLOURS, /* these are made when a block has some */
+    FACE_COLOURS,
     FIRST_COLUMN,
     TABLES = FIRST_COLUMN + EBPO_COLUMNS
 };
@@ -39,6 +41,8 @@ static const struct {
     { "/VTKHDF/NumberOfCells", EBPO_H5_I64, 0 },
     { "/VTKHDF/NumberOfConnectivityIds", EBPO_H5_I64, 0 },
     { "/VTKHDF/PointData/source_vertex", EBPO_H5_I64, 0 },
+    { "/VTKHDF/PointData/rgba", EBPO_H5_U8, 4 },
+    { "/VTKHDF/CellData/rgba", EBPO_H5_U8, 4 },
 };
 
 typedef struct writer {
@@ -67,6 +71,8 @@ static ebpo_status make_tables(writer *w, bool floats, ebpo_error *error)
         status = make_group(w, groups[i], error);
     for (int i = 0; i < TABLES && status == EBPO_OK; i++) {
         char path[64];
+        if (i == VERTEX_COLOURS || i == FACE_COLOURS)
+            continue;
         const ebpo_column *column = i < FIRST_COLUMN ? NULL : &ebpo_columns[i - FIRST_COLUMN];
         snprintf(path, sizeof path, "/VTKHDF/CellData/%s", column ? column->name : "");
         ebpo_h5_number number = column                  ? column->number
@@ -130,6 +136,36 @@ static ebpo_status append_cells(writer *w, const ebpo_block *block, uint64_t cel
     return status;
 }
 
+/* Blocks before the first with colours are white. */
+static ebpo_status begin_colours(writer *w, int table, uint64_t rows_before, ebpo_error *error)
+{
+    uint8_t white[4 * 1024];
+    memset(white, 255, sizeof white);
+    ebpo_status status = ebpo_h5_make_table(&w->out, layout[table].path, layout[table].number,
+                                            layout[table].cols, &w->table[table], error);
+    for (uint64_t done = 0; status == EBPO_OK && done < rows_before; done += 1024)
+        status = ebpo_h5_append(&w->out, &w->table[table], white,
+                                rows_before - done < 1024 ? rows_before - done : 1024, error);
+    return status;
+}
+
+/* The mesh is the last block, and no other has colours. */
+static ebpo_status append_colours(writer *w, const ebpo_block *block, ebpo_error *error)
+{
+    const ebpo_colours *c = &block->colours;
+    uint64_t vertices = block->mesh.vertex_count, faces = block->mesh.face_count;
+    ebpo_status status = EBPO_OK;
+    if (c->vertex)
+        status = begin_colours(w, VERTEX_COLOURS, w->table[POINTS].rows - vertices, error);
+    if (c->vertex && status == EBPO_OK)
+        status = ebpo_h5_append(&w->out, &w->table[VERTEX_COLOURS], c->vertex, vertices, error);
+    if (c->face && status == EBPO_OK)
+        status = begin_colours(w, FACE_COLOURS, w->table[TYPES].rows - faces, error);
+    if (c->face && status == EBPO_OK)
+        status = ebpo_h5_append(&w->out, &w->table[FACE_COLOURS], c->face, faces, error);
+    return status;
+}
+
 static ebpo_status append_block(writer *w, const ebpo_block *block, ebpo_error *error)
 {
     bool mesh = block->level < 0;
@@ -147,7 +183,7 @@ static ebpo_status append_block(writer *w, const ebpo_block *block, ebpo_error *
                         error);
     for (int i = 0; i < EBPO_COLUMNS && status == EBPO_OK; i++)
         status = append(w, FIRST_COLUMN + i, ebpo_column_make(block, i, true), cells, error);
-    return status;
+    return status == EBPO_OK ? append_colours(w, block, error) : status;
 }
 
 static ebpo_status write_blocks(writer *w, const ebpo_export_job *job, ebpo_error *error)

@@ -37,10 +37,12 @@ static ebpo_status put(writer *w, const ebpo_block *block, const char *name, ebp
     ebpo_status status = values
                              ? ebpo_h5_put_table(&w->out, path, number, cols, values, rows, error)
                              : ebpo_fail_memory(error, rows * 8);
-    bool real = number == EBPO_H5_F32 || number == EBPO_H5_F64;
+    const char *kind = number == EBPO_H5_U8                             ? "UChar"
+                       : number == EBPO_H5_F32 || number == EBPO_H5_F64 ? "Float"
+                                                                        : "Int";
     fprintf(w->text,
             "<DataItem Format=\"HDF\" NumberType=\"%s\" Precision=\"%zu\" Dimensions=\"%" PRIu64,
-            real ? "Float" : "Int", ebpo_h5_number_bytes(number), rows);
+            kind, ebpo_h5_number_bytes(number), rows);
     if (cols)
         fprintf(w->text, " %" PRIu32, cols);
     fprintf(w->text, "\">");
@@ -107,6 +109,31 @@ static ebpo_status put_triangles(writer *w, const ebpo_block *block, ebpo_error 
     return status;
 }
 
+static ebpo_status put_colours(writer *w, const ebpo_block *block, const char *name,
+                               const char *centre, const uint8_t *rgba, uint64_t rows,
+                               ebpo_error *error)
+{
+    if (!rgba)
+        return EBPO_OK;
+    fprintf(w->text,
+            "        <Attribute Name=\"rgba\" AttributeType=\"Matrix\" Center=\"%s\">\n"
+            "          ",
+            centre);
+    ebpo_status status = put(w, block, name, EBPO_H5_U8, 4, rgba, rows, error);
+    fprintf(w->text, "        </Attribute>\n");
+    return status;
+}
+
+static ebpo_status put_colours_of(writer *w, const ebpo_block *block, ebpo_error *error)
+{
+    const ebpo_colours *c = &block->colours;
+    ebpo_status status = put_colours(w, block, "rgba_of_vertices", "Node", c->vertex,
+                                     block->mesh.vertex_count, error);
+    return status == EBPO_OK ? put_colours(w, block, "rgba_of_faces", "Cell", c->face,
+                                           block->mesh.face_count, error)
+                             : status;
+}
+
 static ebpo_status put_data(writer *w, const ebpo_block *block, ebpo_error *error)
 {
     bool mesh = block->level < 0;
@@ -146,6 +173,8 @@ static ebpo_status put_block(writer *w, const ebpo_block *block, ebpo_error *err
     fprintf(w->text, "        </Geometry>\n");
     if (status == EBPO_OK)
         status = put_data(w, block, error);
+    if (status == EBPO_OK)
+        status = put_colours_of(w, block, error);
     fprintf(w->text, "      </Grid>\n");
     return status;
 }

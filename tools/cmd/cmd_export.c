@@ -101,6 +101,17 @@ static int check_names(const char *in, const char *out, const char *second)
 
 /* --- what was written --- */
 
+static void print_colours(const ebpo_export_report *r)
+{
+    const uint64_t of[2] = { r->vertex_colours, r->face_colours };
+    for (int i = 0; i < 2; i++)
+        if (of[i] != EBPO_EXPORT_NO_COLOURS)
+            printf("colours of %s: %s\n", i ? "faces" : "vertices",
+                   of[i] == EBPO_EXPORT_WRITTEN ? "written"
+                   : i ? "left out, as this format has none; xdmf and vtkhdf do"
+                       : "left out, as this format has none; the other formats do");
+}
+
 static void print_report(const char *out, const char *second, const ebpo_export_report *r)
 {
     char count[2][40];
@@ -120,6 +131,7 @@ static void print_report(const char *out, const char *second, const ebpo_export_
                r->origin[1], r->origin[2]);
     if (r->largest_change > 0)
         printf("float32: coordinates are rounded by up to %.3g\n", r->largest_change);
+    print_colours(r);
 }
 
 static void json_block(json *j, const ebpo_export_block *b)
@@ -139,6 +151,8 @@ static void json_block(json *j, const ebpo_export_block *b)
     json_end(j);
 }
 
+static const char *const colour_words[] = { "none", "written", "left out" };
+
 static void print_json(const values *v, const char *out, const char *second,
                        const ebpo_export_report *r, const traffic *t)
 {
@@ -157,6 +171,8 @@ static void print_json(const values *v, const char *out, const char *second,
     json_end(&j);
     json_reals(&j, "origin", r->origin, 3);
     json_real(&j, "largest_change", r->largest_change);
+    json_text(&j, "vertex_colours", colour_words[r->vertex_colours]);
+    json_text(&j, "face_colours", colour_words[r->face_colours]);
     remote_json(&j, t, &v->remote);
     json_finish(&j);
 }

@@ -55,6 +55,12 @@ typedef struct ebpo_export_options {
     /*
      * The model as well. XDMF and VTKHDF hold it in the file's order with the
      * source's numbers, the others in the source's order if the file has maps.
+     *
+     * With its colours (colours.h), if it has any. XDMF and VTKHDF: arrays `rgba` of
+     * 4 bytes, of vertices and of faces; levels are white there. glTF: COLOR_0, which
+     * is linear, alpha too, though the material is opaque. OBJ: red, green and blue
+     * behind a vertex, 0 to 1, as many programs read them. STL holds none, and glTF
+     * and OBJ none of faces.
      */
     bool mesh;
 
@@ -78,6 +84,13 @@ typedef struct ebpo_export_block {
     double volume;                /* of the envelopes; of the mesh: 0 */
 } ebpo_export_block;
 
+/* What became of colours. */
+typedef enum ebpo_export_colours {
+    EBPO_EXPORT_NO_COLOURS, /* the mesh has none, or was not wanted */
+    EBPO_EXPORT_WRITTEN,
+    EBPO_EXPORT_LEFT_OUT /* the format has no place for them */
+} ebpo_export_colours;
+
 typedef struct ebpo_export_report {
     size_t struct_size; /* EBPO_EXPORT_REPORT_INIT sets it */
 
@@ -96,6 +109,9 @@ typedef struct ebpo_export_report {
      * bit was kept.
      */
     double largest_change;
+
+    /* Of the mesh's vertices and faces: ebpo_export_colours. */
+    uint64_t vertex_colours, face_colours;
 } ebpo_export_report;
 
 #define EBPO_EXPORT_REPORT_INIT EBPO_SIZED(ebpo_export_report)
