@@ -1,4 +1,4 @@
-/*
+/* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: colours of vertices and faces.
  */
 #ifndef EBPO_COLOURS_H
