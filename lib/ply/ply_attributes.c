@@ -270,6 +270,24 @@ ebpo_status ebpo_ply_repeat_face(ply_parser *p, uint64_t row)
     return status;
 }
 
+/* --- strips --- */
+
+void ebpo_ply_blank_faces(ply_parser *p, uint64_t first)
+{
+    uint64_t end = p->mesh->face_count;
+    for (uint64_t i = 0; p->lost && i < p->mesh->attributes->count; i++) {
+        ebpo_attribute *a = &p->mesh->attributes->array[i];
+        size_t bytes = a->columns * (size_t)ebpo_attribute_bytes(a->type);
+        if (!ebpo_attribute_is_of(a, "face"))
+            continue;
+        if (a->list == EBPO_ATTRIBUTE_NO_LIST)
+            ebpo_array_fill(p->mesh->workspace, a->values + first * bytes, 0,
+                            (end - first) * bytes);
+        for (uint64_t k = first; k < end && a->list != EBPO_ATTRIBUTE_NO_LIST; k++)
+            a->ends[k] = k ? a->ends[k - 1] : 0;
+    }
+}
+
 /* --- the end --- */
 
 /* The header says no more than the mesh. */

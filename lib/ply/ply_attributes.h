@@ -37,4 +37,8 @@ void ebpo_ply_store_bits(uint8_t *at, unsigned bytes, uint64_t bits);
 /* Face `row` was one of a polygon: the faces up to the last have the same values. */
 EBPO_MUST_USE ebpo_status ebpo_ply_repeat_face(ply_parser *p, uint64_t row);
 
+/* Faces from `first` on are no rows of the element of faces: they have zeros and empty lists. There
+ * is room for them. */
+void ebpo_ply_blank_faces(ply_parser *p, uint64_t first);
+
 #endif

@@ -138,6 +138,7 @@ ebpo_status ebpo_ply_add_strip(ply_parser *p, uint64_t row)
 {
     (void)row;
     uint64_t n = p->corner_count;
+    uint64_t first = p->mesh->face_count;
     ebpo_status status = n < 3 ? EBPO_OK : face_capacity(p, n - 2);
     for (uint64_t begin = 0; begin < n && status == EBPO_OK;) {
         uint64_t end = begin;
@@ -147,5 +148,7 @@ ebpo_status ebpo_ply_add_strip(ply_parser *p, uint64_t row)
             unroll(p->mesh, p->corners + begin, end - begin);
         begin = end + 1;
     }
+    if (status == EBPO_OK)
+        ebpo_ply_blank_faces(p, first);
     return status;
 }

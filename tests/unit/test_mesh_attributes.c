@@ -453,6 +453,43 @@ START_TEST(triangles_have_what_their_polygon_has)
 }
 END_TEST
 
+static const char strip_vertices[] =
+    "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
+    "property float z\n";
+static const char strip_faces[] =
+    "element face 2\nproperty list uchar int vertex_indices\nproperty short label\n"
+    "property list uchar uchar words\n";
+static const char strip_strips[] = "element tristrips 1\nproperty list int int vertex_indices\n";
+static const char strip_points[] = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n";
+static const char strip_rows[] = "3 0 1 2 7 2 8 9\n3 0 2 3 -2 1 4\n";
+
+static ebpo_mesh parse_strips(bool first)
+{
+    char text[1024];
+    snprintf(text, sizeof text, "%s%s%send_header\n%s%s%s", strip_vertices,
+             first ? strip_strips : strip_faces, first ? strip_faces : strip_strips, strip_points,
+             first ? "4 0 1 4 3\n" : strip_rows, first ? strip_rows : "4 0 1 4 3\n");
+    return parse_text(text);
+}
+
+START_TEST(triangles_of_strips_have_zeros_and_empty_lists)
+{
+    ebpo_mesh mesh = parse_strips(false);
+    const ebpo_attribute *label = &mesh.attributes->array[0], *words = &mesh.attributes->array[1];
+    ck_assert(mesh.face_count == 4 && label->rows == 4 && words->rows == 4);
+    ck_assert(memcmp(label->values, (int16_t[]){ 7, -2, 0, 0 }, 8) == 0);
+    ck_assert(memcmp(words->ends, (uint64_t[]){ 2, 3, 3, 3 }, 32) == 0);
+    ebpo_mesh_free(&mesh);
+    mesh = parse_strips(true);
+    label = &mesh.attributes->array[0];
+    words = &mesh.attributes->array[1];
+    ck_assert(memcmp(label->values, (int16_t[]){ 0, 0, 7, -2 }, 8) == 0);
+    ck_assert(memcmp(words->ends, (uint64_t[]){ 0, 0, 2, 3 }, 32) == 0);
+    ck_assert(memcmp(words->values, (uint8_t[]){ 8, 9, 4 }, 3) == 0);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
 START_TEST(what_cannot_be_kept_is_said)
 {
     ebpo_mesh mesh =
@@ -518,6 +555,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, a_subset_has_the_rows_of_its_mesh);
     tcase_add_test(tests, joined_vertices_keep_what_the_first_has);
     tcase_add_test(tests, triangles_have_what_their_polygon_has);
+    tcase_add_test(tests, triangles_of_strips_have_zeros_and_empty_lists);
     tcase_add_test(tests, what_cannot_be_kept_is_said);
     tcase_add_test(tests, a_file_tells_its_attributes);
     suite_add_tcase(suite, tests);
