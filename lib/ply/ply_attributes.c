@@ -70,6 +70,15 @@ static void lose(const ply_parser *p, const ply_element *element, const ply_prop
     ebpo_attributes_lose(p->mesh->attributes, "property '%s' of '%s' (%s)", name, of, why);
 }
 
+/* Another element of its name has other rows: arrays are found by names. */
+static bool is_second(const ebpo_attributes *to, const ebpo_attribute *a, uint64_t rows)
+{
+    for (uint64_t i = 0; i < to->count; i++)
+        if (ebpo_attribute_is_of(&to->array[i], a->element) && to->array[i].rows != rows)
+            return true;
+    return false;
+}
+
 static ebpo_status plan_array(ply_parser *p, const ply_element *element, ply_property *property,
                               unsigned columns)
 {
@@ -84,6 +93,12 @@ static ebpo_status plan_array(ply_parser *p, const ply_element *element, ply_pro
         lose(p, element, property, "its name is too long or no text, or there are too many");
         return EBPO_OK;
     }
+    bool face = element->kind == PLY_KIND_FACE;
+    a.rows = face ? 0 : element->count;
+    if (is_second(to, &a, a.rows)) {
+        lose(p, element, property, "a second element of this name, of another length");
+        return EBPO_OK;
+    }
     ebpo_attribute *made = ebpo_attributes_add(to, &a);
     if (!made)
         return ebpo_fail_memory(p->error, sizeof a);
@@ -91,8 +106,6 @@ static ebpo_status plan_array(ply_parser *p, const ply_element *element, ply_pro
         property[i].attribute = (int)(to->count - 1);
         property[i].column = i;
     }
-    bool face = element->kind == PLY_KIND_FACE;
-    made->rows = face ? 0 : element->count;
     uint64_t rows = face ? p->face_capacity : element->count;
     return ebpo_attribute_reserve(to->workspace, made, rows, 0) ? EBPO_OK
                                                                 : fail_rows(p, rows * columns * 8);

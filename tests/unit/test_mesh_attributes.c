@@ -511,6 +511,22 @@ START_TEST(what_cannot_be_kept_is_said)
 }
 END_TEST
 
+START_TEST(of_elements_of_one_name_those_of_one_length_are_kept)
+{
+    ebpo_mesh mesh =
+        parse_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                   "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+                   "element note 2\nproperty int a\nelement note 3\nproperty int b\n"
+                   "element note 2\nproperty int c\nend_header\n"
+                   "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n1\n2\n3\n4\n5\n6\n7\n");
+    ck_assert_uint_eq(mesh.attributes->count, 2);
+    ck_assert_str_eq(mesh.attributes->array[1].names, "c");
+    ck_assert_str_eq(ebpo_mesh_attributes_lost(&mesh),
+                     "property 'b' of 'note' (a second element of this name, of another length)");
+    write_file(&mesh, scratch("a.ebpo.h5"), 0);
+}
+END_TEST
+
 /* Colours of 28 vertices a byte each, what else they are called, and other files' values. */
 START_TEST(a_file_tells_its_attributes)
 {
@@ -557,6 +573,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, triangles_have_what_their_polygon_has);
     tcase_add_test(tests, triangles_of_strips_have_zeros_and_empty_lists);
     tcase_add_test(tests, what_cannot_be_kept_is_said);
+    tcase_add_test(tests, of_elements_of_one_name_those_of_one_length_are_kept);
     tcase_add_test(tests, a_file_tells_its_attributes);
     suite_add_tcase(suite, tests);
     return suite;
