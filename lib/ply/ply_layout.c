@@ -238,7 +238,8 @@ typedef struct following {
     ply_header header;
     uint64_t element, property; /* statements met so far */
     ply_kind kind;              /* of the element that is open, as it is written */
-    bool skipped;               /* the element that is open is left out */
+    uint64_t rows;              /* of that element */
+    bool skipped;               /* it is left out */
 } following;
 
 static void close_element(following *f)
@@ -253,10 +254,10 @@ static void follow_element(following *f)
     close_element(f);
     const ply_element *e = &f->header.element[f->element++];
     f->kind = e->kind == PLY_KIND_STRIPS ? PLY_KIND_FACE : e->kind;
-    uint64_t rows = e->kind == PLY_KIND_VERTEX  ? m->mesh->vertex_count
-                    : e->kind == PLY_KIND_OTHER ? rows_of(m, e->name)
-                                                : m->mesh->face_count;
-    f->skipped = f->kind == PLY_KIND_FACE ? m->faces : rows == 0 && e->count != 0;
+    f->rows = e->kind == PLY_KIND_VERTEX  ? m->mesh->vertex_count
+              : e->kind == PLY_KIND_OTHER ? rows_of(m, e->name)
+                                          : m->mesh->face_count;
+    f->skipped = f->kind == PLY_KIND_FACE ? m->faces : f->rows == 0 && e->count != 0;
     if (e->kind == PLY_KIND_STRIPS && f->header.face >= 0)
         f->skipped = true;
     if (f->skipped)
@@ -265,8 +266,8 @@ static void follow_element(following *f)
         begin_faces(m);
         return;
     }
-    fprintf(m->text, "element %.*s %" PRIu64 "\n", (int)e->name.n, e->name.s, rows);
-    add_element(m, f->kind, rows);
+    fprintf(m->text, "element %.*s %" PRIu64 "\n", (int)e->name.n, e->name.s, f->rows);
+    add_element(m, f->kind, f->rows);
 }
 
 /* An element without rows has its properties all the same. */
@@ -283,7 +284,7 @@ static void follow_property(following *f, ply_word line)
         add_corners(m, property->count_type, property->type, property->name, line);
     else if (property->role != PLY_ROLE_NONE)
         add_position(m, property->role, property->type, line);
-    else if (add_named(m, e->name, property) || e->count == 0)
+    else if (add_named(m, e->name, property) || f->rows == 0)
         put_line(m, line);
 }
 

@@ -490,6 +490,24 @@ START_TEST(triangles_of_strips_have_zeros_and_empty_lists)
 }
 END_TEST
 
+/* An element of faces without rows says what its rows would have; the triangles are strips'. */
+START_TEST(a_written_ply_has_a_value_for_each_property_it_names)
+{
+    ebpo_mesh back,
+        mesh = parse_text(
+            "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+            "property float z\nelement face 0\nproperty list uchar int vertex_indices\n"
+            "property uchar flag\nelement tristrips 1\nproperty list int int vertex_indices\n"
+            "end_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n4 0 1 2 3\n");
+    fine(ebpo_mesh_write_ply(&mesh, scratch("a.ply"), &error));
+    fine(ebpo_mesh_read(&back, scratch("a.ply"), NULL, &error));
+    ck_assert_uint_eq(back.face_count, 2);
+    ck_assert(memcmp(back.faces, mesh.faces, 6 * sizeof *back.faces) == 0);
+    ebpo_mesh_free(&mesh);
+    ebpo_mesh_free(&back);
+}
+END_TEST
+
 START_TEST(what_cannot_be_kept_is_said)
 {
     ebpo_mesh mesh =
@@ -572,6 +590,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, joined_vertices_keep_what_the_first_has);
     tcase_add_test(tests, triangles_have_what_their_polygon_has);
     tcase_add_test(tests, triangles_of_strips_have_zeros_and_empty_lists);
+    tcase_add_test(tests, a_written_ply_has_a_value_for_each_property_it_names);
     tcase_add_test(tests, what_cannot_be_kept_is_said);
     tcase_add_test(tests, of_elements_of_one_name_those_of_one_length_are_kept);
     tcase_add_test(tests, a_file_tells_its_attributes);
