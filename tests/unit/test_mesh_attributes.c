@@ -500,7 +500,7 @@ START_TEST(a_written_ply_has_a_value_for_each_property_it_names)
             "property uchar flag\nelement tristrips 1\nproperty list int int vertex_indices\n"
             "end_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n4 0 1 2 3\n");
     fine(ebpo_mesh_write_ply(&mesh, scratch("a.ply"), &error));
-    fine(ebpo_mesh_read(&back, scratch("a.ply"), NULL, &error));
+    fine(ebpo_mesh_read(scratch("a.ply"), NULL, &back, &error));
     ck_assert_uint_eq(back.face_count, 2);
     ck_assert(memcmp(back.faces, mesh.faces, 6 * sizeof *back.faces) == 0);
     ebpo_mesh_free(&mesh);
