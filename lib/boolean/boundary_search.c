@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/heap.h"
 
 typedef struct waiting {
     double near; /* no point of the cell is nearer */
@@ -18,30 +19,16 @@ typedef struct queue {
     uint64_t count, capacity;
 } queue;
 
+static bool is_nearer(const waiting *a, const waiting *b) { return a->near < b->near; }
+
+EBPO_HEAP(heap, waiting, is_nearer)
+
 static ebpo_status push(queue *q, waiting w, ebpo_error *error)
 {
     if (!ebpo_grow(&q->list, &q->capacity, q->count + 1, sizeof *q->list))
         return ebpo_fail_memory(error, (q->count + 1) * sizeof *q->list);
-    uint64_t at = q->count++;
-    for (; at && q->list[(at - 1) / 2].near > w.near; at = (at - 1) / 2)
-        q->list[at] = q->list[(at - 1) / 2];
-    q->list[at] = w;
+    heap_add(q->list, q->count++, &w);
     return EBPO_OK;
-}
-
-static waiting pop(queue *q)
-{
-    waiting first = q->list[0], last = q->list[--q->count];
-    uint64_t at = 0;
-    for (uint64_t child; (child = 2 * at + 1) < q->count; at = child) {
-        if (child + 1 < q->count && q->list[child + 1].near < q->list[child].near)
-            child++;
-        if (last.near <= q->list[child].near)
-            break;
-        q->list[at] = q->list[child];
-    }
-    q->list[at] = last;
-    return first;
 }
 
 /* From the point to the nearest one of the closed cell, right to some ulp. */
@@ -106,7 +93,7 @@ static ebpo_status search(ebpo_boundary_search *s, const ebpo_world *w, queue *q
         bool enough = s->hi < INFINITY && s->hi - least <= s->tolerance * s->hi;
         if (q->list[0].near >= s->hi || enough || s->cells - begun >= s->most)
             break;
-        waiting at = pop(q);
+        waiting at = heap_take(q->list, q->count--);
         s->cells++;
         status = settle(s, w, q, &at, &unclear, error);
     }

@@ -9,6 +9,7 @@
 #include "base/alloc.h"
 #include "base/clock.h"
 #include "base/error.h"
+#include "base/heap.h"
 #include "geom/distance.h"
 #include "geom/length.h"
 
@@ -55,29 +56,19 @@ static double most_at_corners(const ebpo_depth_search *s, const double corner[3]
 
 /* --- the heap --- */
 
+static bool is_deeper(const ebpo_depth_part *a, const ebpo_depth_part *b)
+{
+    return a->most > b->most;
+}
+
+EBPO_HEAP(heap, ebpo_depth_part, is_deeper)
+
 static bool push(ebpo_depth_search *s, const ebpo_depth_part *part)
 {
     if (!ebpo_grow(&s->part, &s->capacity, s->count + 1, sizeof *s->part))
         return false;
-    uint64_t at = s->count++;
-    for (uint64_t up; at > 0 && s->part[up = (at - 1) / 2].most < part->most; at = up)
-        s->part[at] = s->part[up];
-    s->part[at] = *part;
+    heap_add(s->part, s->count++, part);
     return true;
-}
-
-static ebpo_depth_part pop(ebpo_depth_search *s)
-{
-    ebpo_depth_part out = s->part[0], last = s->part[--s->count];
-    uint64_t at = 0;
-    for (uint64_t next; (next = 2 * at + 1) < s->count; at = next) {
-        next += next + 1 < s->count && s->part[next + 1].most > s->part[next].most;
-        if (!(s->part[next].most > last.most))
-            break;
-        s->part[at] = s->part[next];
-    }
-    s->part[at] = last;
-    return out;
 }
 
 /* --- parts --- */
@@ -210,6 +201,6 @@ bool ebpo_depth_is_done(const ebpo_depth_search *s)
 
 ebpo_status ebpo_depth_divide_next(ebpo_depth_search *s, ebpo_error *error)
 {
-    ebpo_depth_part part = pop(s);
+    ebpo_depth_part part = heap_take(s->part, s->count--);
     return divide_triangle(s, &part, error);
 }

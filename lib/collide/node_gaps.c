@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/heap.h"
 
 ebpo_status ebpo_node_gaps_begin(ebpo_node_gaps *g, const ebpo_collision *q, ebpo_error *error)
 {
@@ -36,37 +37,19 @@ static double slack_of(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
            ebpo_posed_slack(&g->side[1], node[1].cell, g->reach);
 }
 
-static void swap(ebpo_node_gap *a, ebpo_node_gap *b)
-{
-    ebpo_node_gap c = *a;
-    *a = *b;
-    *b = c;
-}
+static bool is_nearer(const ebpo_node_gap *a, const ebpo_node_gap *b) { return a->gap < b->gap; }
+
+EBPO_HEAP(heap, ebpo_node_gap, is_nearer)
 
 ebpo_status ebpo_node_gaps_push(ebpo_node_gaps *g, const ebpo_node_gap *pair, ebpo_error *error)
 {
     if (!ebpo_grow(&g->heap, &g->capacity, g->count + 1, sizeof *g->heap))
         return ebpo_fail_memory(error, (g->count + 1) * sizeof *g->heap);
-    uint64_t at = g->count++;
-    g->heap[at] = *pair;
-    for (; at > 0 && g->heap[at].gap < g->heap[(at - 1) / 2].gap; at = (at - 1) / 2)
-        swap(&g->heap[at], &g->heap[(at - 1) / 2]);
+    heap_add(g->heap, g->count++, pair);
     return EBPO_OK;
 }
 
-ebpo_node_gap ebpo_node_gaps_pop(ebpo_node_gaps *g)
-{
-    ebpo_node_gap least = g->heap[0];
-    g->heap[0] = g->heap[--g->count];
-    for (uint64_t at = 0, child; (child = 2 * at + 1) < g->count; at = child) {
-        if (child + 1 < g->count && g->heap[child + 1].gap < g->heap[child].gap)
-            child++;
-        if (!(g->heap[child].gap < g->heap[at].gap))
-            break;
-        swap(&g->heap[at], &g->heap[child]);
-    }
-    return least;
-}
+ebpo_node_gap ebpo_node_gaps_pop(ebpo_node_gaps *g) { return heap_take(g->heap, g->count--); }
 
 double ebpo_node_far_bound(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
 {

@@ -7,33 +7,21 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/heap.h"
 #include "base/parallel.h"
 
 /* --- the heap --- */
+
+static bool is_later(const ebpo_way_pair *a, const ebpo_way_pair *b) { return a->most > b->most; }
+
+EBPO_HEAP(heap, ebpo_way_pair, is_later)
 
 static bool push(ebpo_way_search *s, const ebpo_way_pair *pair)
 {
     if (!ebpo_grow(&s->pairs, &s->capacity, s->count + 1, sizeof *s->pairs))
         return false;
-    uint64_t at = s->count++;
-    for (uint64_t up; at > 0 && s->pairs[up = (at - 1) / 2].most < pair->most; at = up)
-        s->pairs[at] = s->pairs[up];
-    s->pairs[at] = *pair;
+    heap_add(s->pairs, s->count++, pair);
     return true;
-}
-
-static ebpo_way_pair pop(ebpo_way_search *s)
-{
-    ebpo_way_pair out = s->pairs[0], last = s->pairs[--s->count];
-    uint64_t at = 0;
-    for (uint64_t next; (next = 2 * at + 1) < s->count; at = next) {
-        next += next + 1 < s->count && s->pairs[next + 1].most > s->pairs[next].most;
-        if (!(s->pairs[next].most > last.most))
-            break;
-        s->pairs[at] = s->pairs[next];
-    }
-    s->pairs[at] = last;
-    return out;
 }
 
 /* --- extents along the three axes --- */
@@ -245,7 +233,7 @@ ebpo_status ebpo_way_search_run(ebpo_way_search *s, const ebpo_accel *const acce
             status = EBPO_E_CANCELLED;
             break;
         }
-        ebpo_way_pair pair = pop(s);
+        ebpo_way_pair pair = heap_take(s->pairs, s->count--);
         status = divide(s, &pair, error);
     }
     if (s->count > 0 && s->pairs[0].most >= s->sure)

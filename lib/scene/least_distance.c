@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/heap.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "scene/pair_looks.h"
@@ -36,36 +37,17 @@ typedef struct search {
 
 /* ---- parts ---- */
 
-static void swap_parts(search *s, uint64_t a, uint64_t b)
-{
-    part kept = s->parts[a];
-    s->parts[a] = s->parts[b];
-    s->parts[b] = kept;
-}
+static bool is_less(const part *a, const part *b) { return a->least < b->least; }
+
+EBPO_HEAP(heap, part, is_less)
 
 static ebpo_status put_part(search *s, const part *p, ebpo_error *error)
 {
-    uint64_t at = s->parts_count;
-    if (!ebpo_grow(&s->parts, &s->parts_capacity, at + 1, sizeof *s->parts))
-        return ebpo_fail_memory(error, (at + 1) * sizeof *s->parts);
-    s->parts[s->parts_count++] = *p;
-    for (; at && s->parts[at].least < s->parts[(at - 1) / 2].least; at = (at - 1) / 2)
-        swap_parts(s, at, (at - 1) / 2);
+    uint64_t count = s->parts_count;
+    if (!ebpo_grow(&s->parts, &s->parts_capacity, count + 1, sizeof *s->parts))
+        return ebpo_fail_memory(error, (count + 1) * sizeof *s->parts);
+    heap_add(s->parts, s->parts_count++, p);
     return EBPO_OK;
-}
-
-static part take_part(search *s)
-{
-    part first = s->parts[0];
-    s->parts[0] = s->parts[--s->parts_count];
-    for (uint64_t at = 0, child; (child = 2 * at + 1) < s->parts_count; at = child) {
-        if (child + 1 < s->parts_count && s->parts[child + 1].least < s->parts[child].least)
-            child++;
-        if (!(s->parts[child].least < s->parts[at].least))
-            break;
-        swap_parts(s, at, child);
-    }
-    return first;
 }
 
 /* ---- looking ---- */
@@ -155,7 +137,7 @@ static ebpo_status narrow(search *s, const least_search *how, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK) {
-        part p = take_part(s);
+        part p = heap_take(s->parts, s->parts_count--);
         double middle = p.from + (p.to - p.from) / 2;
         s->out->lo = fmin(p.least, s->out->hi);
         bool done = is_done(s, &p, middle, how);
