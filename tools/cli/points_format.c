@@ -49,6 +49,8 @@ static const char *npy_value(const char *head, const char *name)
 
 static bool npy_type(points *p, const char *descr)
 {
+    if (strnlen(descr, 5) < 5)
+        return false; /* the head ends in it */
     p->layout.big_endian = descr[1] == '>';
     p->layout.bytes = descr[3] == '4' ? 4 : 8;
     return strchr("<>", descr[1]) && descr[2] == 'f' && strchr("48", descr[3]) && descr[4] == '\'';
