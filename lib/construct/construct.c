@@ -182,13 +182,14 @@ static ebpo_status prepare(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_rep
     b->threads = ebpo_thread_count(options->threads);
     b->solid = report->balanced;
     if (!b->solid && options->require_solid)
-        return ebpo_fail(error, EBPO_E_NOT_SOLID,
-                         "%s does not balance (%llu edges are not used as often one way as the "
-                         "other), so it does not bound a solid; "
-                         "try --fill-holes, --orient or --weld, or leave out --require-solid for a "
-                         "surface model",
-                         mesh->source_name[0] ? mesh->source_name : "the mesh",
-                         (unsigned long long)report->unbalanced_edges.count);
+        return ebpo_fail(
+            error, EBPO_E_NOT_SOLID,
+            "%s does not balance (%llu edges are not used as often one way as the "
+            "other), so it does not bound a solid; "
+            "'ebpo check' tells which repairs leave one; leave out --require-solid for a "
+            "surface model",
+            mesh->source_name[0] ? mesh->source_name : "the mesh",
+            (unsigned long long)report->unbalanced_edges.count);
     b->max_level = options->max_level >= 0 ? options->max_level : level_limit(report);
     return arrange(b, mesh, error);
 }

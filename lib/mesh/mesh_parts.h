@@ -28,6 +28,10 @@ struct ebpo_arrangement {
     uint64_t whole_vertices, whole_faces;
 };
 
+/* Its geometry and order, without attributes, in its workspace; freed by ebpo_mesh_free. On failure
+ * cleared. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_copy(const ebpo_mesh *mesh, ebpo_mesh *out, ebpo_error *error);
+
 /* NULL: nothing. */
 void ebpo_arrangement_free(struct ebpo_arrangement *arrangement);
 

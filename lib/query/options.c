@@ -54,8 +54,8 @@ ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
     if (model->info->solid)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_NOT_SOLID,
-                     "the model is a surface: it has no inside; close it (convert --fill-holes) "
-                     "and build it again");
+                     "the model is a surface: it has no inside; 'ebpo check' on its source tells "
+                     "which repairs leave a solid, and 'ebpo convert --repair' does them");
 }
 
 ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64_t count,

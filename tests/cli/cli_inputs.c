@@ -180,6 +180,9 @@ int main(int argc, char **argv)
     ebpo_mesh split = ebpo_test_make("cube");
     ebpo_test_split_vertices(&split);
     write_mesh(&split, in_folder(argv[1], "split_cube.ply"));
+    ebpo_mesh split_box = ebpo_test_make("open_box");
+    ebpo_test_split_vertices(&split_box);
+    write_mesh(&split_box, in_folder(argv[1], "split_open_box.ply"));
     ebpo_mesh parts = several_parts();
     write_mesh(&parts, in_folder(argv[1], "parts.ply"));
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)

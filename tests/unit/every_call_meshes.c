@@ -192,6 +192,23 @@ static ebpo_status call_prepare(every_call_env *e)
     return status;
 }
 
+static ebpo_status call_repairs(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_mesh_report report;
+    ebpo_repairs repairs = EBPO_REPAIRS_INIT;
+    ebpo_progress silent = { NULL, NULL };
+    ebpo_status status = read_mesh(e, EVERY_CALL_HOLED, &mesh);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_check(&mesh, 1, silent, &report, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_try_repairs(&mesh, &report, 1, silent, &repairs, e->error);
+    if (status == EBPO_OK && (repairs.chosen < 0 || ebpo_mesh_doubts(0, &report, NULL) == 0))
+        status = EBPO_E_FORMAT;
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
 /* ebpo_build takes the mesh, whether it succeeds or not. */
 static ebpo_status build(every_call_env *e, const char *name, ebpo_selection selection,
                          unsigned threads)
@@ -277,6 +294,7 @@ const every_call every_call_meshes[] = {
     { "components", call_components },
     { "groups", call_groups },
     { "prepare", call_prepare },
+    { "repairs", call_repairs },
     { "crossings", call_crossings },
     { "build", call_build },
     { "build_crossing", call_build_crossing },

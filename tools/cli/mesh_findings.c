@@ -154,49 +154,6 @@ void findings_print_mending(FILE *out, const ebpo_mend_record *r)
     }
 }
 
-/* --- the warning --- */
-
-static void advise(FILE *out, bool *any, uint64_t count, const char *what, const char *remedy)
-{
-    fprintf(out, "%s %llu %s: %s", *any ? ";" : "", (unsigned long long)count, what, remedy);
-    *any = true;
-}
-
-static void advise_boundary(FILE *out, bool *any, const ebpo_mesh_report *report,
-                            const ebpo_mend_record *record)
-{
-    uint64_t edges = report->boundary_edges.count;
-    if (!edges)
-        return;
-    if (report->repeated_positions.count && !record->weld)
-        advise(out, any, report->repeated_positions.count, "repeated positions",
-               "try --weld first");
-    advise(out, any, edges, "boundary edges",
-           record->fill_holes ? "holes that are not simple loops need a mesh editor"
-                              : "try --fill-holes");
-}
-
-void findings_warn(FILE *out, const char *command, const char *path, const ebpo_mesh_report *report,
-                   const ebpo_mend_record *record)
-{
-    if (report->balanced)
-        return;
-    bool any = false;
-    fprintf(out, "ebpo %s: %s: warning: this is a surface, not a solid, so it has no inside;",
-            command, path);
-    advise_boundary(out, &any, report, record);
-    if (report->misoriented_edges.count)
-        advise(out, &any, report->misoriented_edges.count, "misoriented edges",
-               record->orient ? "cannot be oriented; use a mesh editor" : "try --orient");
-    if (report->nonmanifold_edges.count)
-        advise(out, &any, report->nonmanifold_edges.count, "edges shared by more than two faces",
-               record->orient ? "remove the extra faces"
-                              : "try --orient, or remove the extra faces");
-    if (!any)
-        advise(out, &any, report->unbalanced_edges.count, "unbalanced edges", "see 'ebpo check'");
-    fputc('\n', out);
-}
-
 /* --- JSON --- */
 
 static void json_finding(json *j, const char *key, const ebpo_finding *f)

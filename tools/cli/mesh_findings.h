@@ -13,11 +13,6 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                     const ebpo_mesh_report *report, bool crossings_follow);
 /* What mending did; nothing when nothing was asked for. */
 void findings_print_mending(FILE *out, const ebpo_mend_record *record);
-/* For a mesh that does not balance: which finding to mend with which option. `record`: what was
- * tried already. */
-void findings_warn(FILE *out, const char *command, const char *path, const ebpo_mesh_report *report,
-                   const ebpo_mend_record *record);
-
 void findings_json(json *j, const char *key, const ebpo_mesh_report *report);
 void findings_json_mending(json *j, const char *key, const ebpo_mend_record *record);
 void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh);

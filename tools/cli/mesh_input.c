@@ -2,6 +2,60 @@
 
 #include <string.h>
 
+#include "cli/command.h"
+
+int mending_check(const char *command, mending asked)
+{
+    if (asked.repair && (asked.weld || asked.orient || asked.fill_holes))
+        return command_usage(command, "--repair chooses from --weld, --orient and --fill-holes; "
+                                      "leave these out");
+    return EXIT_FINE;
+}
+
+static bool steps_given(mending asked) { return asked.weld || asked.orient || asked.fill_holes; }
+
+/* What the first of two preparations did has been done as well. */
+static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
+{
+    ebpo_mend_record *a = &first->record;
+    const ebpo_mend_record *b = &second->record;
+    first->mended = true;
+    first->report = second->report;
+    a->weld |= b->weld;
+    a->orient |= b->orient;
+    a->fill_holes |= b->fill_holes;
+    a->welded_vertices += b->welded_vertices;
+    a->flipped_faces += b->flipped_faces;
+    a->unorientable_components += b->unorientable_components;
+    a->filled_holes += b->filled_holes;
+    a->added_faces += b->added_faces;
+    a->unfilled_holes += b->unfilled_holes;
+}
+
+static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_error *error)
+{
+    const ebpo_mend_record *steps = &p->repairs.tries[p->repairs.chosen].record;
+    ebpo_prepared again = EBPO_PREPARED_INIT;
+    how->weld = steps->weld;
+    how->orient = steps->orient;
+    how->fill_holes = steps->fill_holes;
+    ebpo_status status = ebpo_mesh_prepare(&p->mesh, how, &again, error);
+    if (status == EBPO_OK)
+        join_preparations(&p->prepared, &again);
+    return status;
+}
+
+static ebpo_status try_and_repair(mesh_input *p, mending asked, ebpo_prepare_options *how,
+                                  ebpo_error *error)
+{
+    if (steps_given(asked) || !(asked.repair || asked.advise))
+        return EBPO_OK;
+    ebpo_status status = ebpo_mesh_try_repairs(&p->mesh, &p->prepared.report, how->threads,
+                                               how->progress, &p->repairs, error);
+    p->tried = status == EBPO_OK && p->repairs.count > 0;
+    return p->tried && asked.repair && p->repairs.chosen >= 0 ? do_chosen(p, how, error) : status;
+}
+
 ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending asked,
                                    bool attributes, ebpo_mesh_groups **groups,
                                    ebpo_workspace *workspace, unsigned threads,
@@ -18,6 +72,7 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     wanted.fill_holes = asked.fill_holes;
     memset(out, 0, sizeof *out);
     out->prepared = (ebpo_prepared)EBPO_PREPARED_INIT;
+    out->repairs = (ebpo_repairs)EBPO_REPAIRS_INIT;
     ebpo_status status = groups ? ebpo_mesh_read_groups(path, &how, &out->mesh, groups, error)
                                 : ebpo_mesh_read(path, &how, &out->mesh, error);
     if (status != EBPO_OK)
@@ -26,6 +81,10 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     out->as_read.faces = NULL;
     out->as_read.attributes = NULL;
     status = ebpo_mesh_prepare(&out->mesh, &wanted, &out->prepared, error);
+    if (status == EBPO_OK)
+        status = try_and_repair(out, asked, &wanted, error);
+    out->doubts =
+        ebpo_mesh_doubts(out->prepared.before.area, &out->prepared.report, &out->prepared.record);
     if (status == EBPO_OK)
         return EBPO_OK;
     ebpo_mesh_free(&out->mesh);

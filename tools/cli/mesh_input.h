@@ -3,25 +3,36 @@
 #define EBPO_TOOLS_MESH_INPUT_H
 
 #include <ebpo/groups.h>
+#include <ebpo/repair.h>
 
 #include "cli/args.h"
 
 typedef struct mending {
     bool weld, orient, fill_holes;
+    bool repair; /* the shortest sequence of these that leaves a plausible solid */
+    bool advise; /* no option: without any of these, find out which one that is */
 } mending;
 
-#define MENDING_OPTIONS(type, member)                                               \
-    OPTION_FLAG("weld", 0, type, member.weld,                                       \
-                "first merge vertices at the same position (always done for STL)"), \
-        OPTION_FLAG("orient", 0, type, member.orient,                               \
-                    "then make neighbouring faces agree in orientation"),           \
-        OPTION_FLAG("fill-holes", 0, type, member.fill_holes, "then close simple boundary loops")
+#define MENDING_OPTIONS(type, member)                                                              \
+    OPTION_FLAG("weld", 0, type, member.weld,                                                      \
+                "first merge vertices at the same position (always done for STL)"),                \
+        OPTION_FLAG("orient", 0, type, member.orient,                                              \
+                    "then make neighbouring faces agree in orientation"),                          \
+        OPTION_FLAG("fill-holes", 0, type, member.fill_holes, "then close simple boundary loops"), \
+        OPTION_FLAG("repair", 0, type, member.repair,                                              \
+                    "instead of these: try them, and do the fewest that leave a plausible solid")
 
 typedef struct mesh_input {
     ebpo_mesh mesh;         /* as mended */
     ebpo_mesh as_read;      /* facts only; its array pointers tell which there were, no more */
     ebpo_prepared prepared; /* what was found and mended */
+    bool tried;             /* repairs, which `repairs` tells of */
+    ebpo_repairs repairs;
+    uint32_t doubts; /* ebpo_doubt, of the mesh as mended */
 } mesh_input;
+
+/* EXIT_USAGE with a message when --repair is given with what it chooses from. */
+int mending_check(const char *command, mending asked);
 
 /* `attributes`: properties beyond positions and corners are read as well. On failure nothing is
  * left to free; else ebpo_mesh_free(&out->mesh). */

@@ -4,7 +4,7 @@
 
 const stage_name stage_names[STAGE_ROWS] = {
     [STAGE_READING] = { "reading", 0, { "reading" } },
-    [STAGE_MENDING] = { "mending", 0, { "mending" } },
+    [STAGE_MENDING] = { "mending", 0, { "mending", "trying repairs" } },
     [STAGE_ORDERING] = { "ordering",
                          THESIS_LEAVES,
                          { "looking at faces", "measuring the box", "ordering vertices",

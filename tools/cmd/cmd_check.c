@@ -4,6 +4,7 @@
 
 #include "cli/command.h"
 #include "cli/memory_args.h"
+#include "cli/mesh_advice.h"
 #include "cli/mesh_findings.h"
 #include "cli/mesh_input.h"
 #include "cli/progress.h"
@@ -21,7 +22,8 @@ typedef struct values {
 static const arg_option options[] = {
     MENDING_OPTIONS(values, mend),
     OPTION_FLAG("require-solid", 0, values, require_solid,
-                "exit with code 3 if the mesh is not a solid"),
+                "exit with code 3 if the mesh is not a solid, or probably not the one that was "
+                "meant"),
     OPTION_FLAG("crossings", 0, values, crossings,
                 "also look for faces that cross, touch or lie on each other otherwise than as "
                 "neighbours (after mending, if asked for)"),
@@ -41,7 +43,8 @@ static const arg_spec spec = {
     .most = 1,
     .summary = "checks a mesh: solid or surface, and what is wrong with it and where",
     .text = "With mending options, also shows what the mesh would be after mending. Nothing is "
-            "written.",
+            "written. Without them, repairs are tried on a mesh that is no solid, and the fewest "
+            "that leave one are told.",
     .options = options,
 };
 
@@ -57,11 +60,13 @@ static void print_json(json *j, const mesh_input *p, const char *path)
         findings_json_mending(j, "mend", &p->prepared.record);
         findings_json(j, "report_after_mending", &p->prepared.report);
     }
+    advice_json(j, p);
 }
 
 static void print_words(const values *v, const mesh_input *p, const char *path)
 {
     findings_print(stdout, path, &p->as_read, &p->prepared.before, v->crossings);
+    advice_print(stdout, p);
     if (!p->prepared.mended)
         return;
     findings_print_mending(stdout, &p->prepared.record);
@@ -82,7 +87,7 @@ static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo
     else if (!v->quiet)
         print_words(v, p, path);
     command_flush("check");
-    findings_warn(stderr, "check", path, &p->prepared.report, &p->prepared.record);
+    advice_warn(stderr, "check", path, p);
     if (v->crossings)
         status = check_crossings(&p->mesh, &p->prepared.report, &how, v->json ? &j : NULL, v->quiet,
                                  line, error);
@@ -99,8 +104,10 @@ static ebpo_status check(const values *v, const char *path, mesh_input *p,
 {
     progress_line line;
     ebpo_progress progress = progress_start(&line, "check", v->quiet);
+    mending mend = v->mend;
+    mend.advise = true;
     ebpo_status status =
-        mesh_input_read(p, path, v->mend, false, workspace, (unsigned)v->threads, progress, error);
+        mesh_input_read(p, path, mend, false, workspace, (unsigned)v->threads, progress, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;
@@ -114,7 +121,7 @@ static const values usual = { 0 };
 static int run(void *given, const char **operand)
 {
     values *v = given;
-    if (!memory_good("check", &v->memory))
+    if (!memory_good("check", &v->memory) || mending_check("check", v->mend) != EXIT_FINE)
         return EXIT_USAGE;
     if (v->out && !v->crossings)
         return command_usage("check", "--output shows what --crossings finds; give both");
@@ -131,7 +138,7 @@ static int run(void *given, const char **operand)
     ebpo_workspace_free(workspace);
     if (status != EBPO_OK)
         return command_failed("check", &error);
-    return v->require_solid && !p.prepared.report.balanced ? EXIT_NOT_SOLID : EXIT_FINE;
+    return v->require_solid && p.doubts ? EXIT_NOT_SOLID : EXIT_FINE;
 }
 
 const command command_check = { &spec, sizeof usual, &usual, run };

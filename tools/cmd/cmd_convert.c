@@ -8,6 +8,7 @@
 #include "cli/command.h"
 #include "cli/file_facts.h"
 #include "cli/memory_args.h"
+#include "cli/mesh_advice.h"
 #include "cli/mesh_findings.h"
 #include "cli/mesh_input.h"
 #include "cli/progress.h"
@@ -80,7 +81,8 @@ static const arg_option options[] = {
                 "a point is inside where the winding number is nonzero (the default), odd "
                 "(evenodd) or positive"),
     OPTION_FLAG("require-solid", 0, values, require_solid,
-                "exit with code 3 if the mesh is not a solid"),
+                "exit with code 3 if the mesh is not a solid, or probably not the one that was "
+                "meant"),
     OPTION_FLAG("split-components", 0, values, split_components,
                 "OUT is a new folder: a file for each component (faces that share vertices, with "
                 "the cavities in it), and a scene of them; the other options hold for each file"),
@@ -117,7 +119,7 @@ static int check_values(const values *v, const char *in, const char *out)
     int code = selection_check("convert", &chosen);
     if (code != EXIT_FINE)
         return code;
-    if (!memory_good("convert", &v->memory))
+    if (!memory_good("convert", &v->memory) || mending_check("convert", v->mend) != EXIT_FINE)
         return EXIT_USAGE;
     if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
         return command_usage("convert", "--zstd-level does not apply to --codec deflate or none");
@@ -126,9 +128,9 @@ static int check_values(const values *v, const char *in, const char *out)
             "convert", "--profile says which parts are stored; leave out --with and --without");
     if (v->split_components && v->split_groups)
         return command_usage("convert", "--split-components and --split-groups: choose one");
-    if (v->split_groups && v->mend.fill_holes)
-        return command_usage("convert", "--fill-holes does not go with --split-groups: what it "
-                                        "adds is in no group");
+    if (v->split_groups && (v->mend.fill_holes || v->mend.repair))
+        return command_usage("convert", "--fill-holes and --repair do not go with --split-groups: "
+                                        "what they add is in no group");
     uint64_t subtree_faces;
     if (!subtree_faces_read("convert", v->subtree_faces, &subtree_faces) ||
         command_overwrites("convert", in, out))
@@ -175,6 +177,7 @@ static void print_reports(const values *v, const mesh_input *p, const char *in)
 {
     if (!v->json && !v->quiet) {
         findings_print(stdout, in, &p->as_read, &p->prepared.before, false);
+        advice_print(stdout, p);
         findings_print_mending(stdout, &p->prepared.record);
         if (p->prepared.mended)
             findings_print(stdout, "after mending", &p->mesh, &p->prepared.report, false);
@@ -184,7 +187,7 @@ static void print_reports(const values *v, const mesh_input *p, const char *in)
     if (lost)
         fprintf(stderr, "ebpo convert: %s: note: not kept: %s\n", in, lost);
     if (!v->split_groups) /* else of each group */
-        findings_warn(stderr, "convert", in, &p->prepared.report, &p->prepared.record);
+        advice_warn(stderr, "convert", in, p);
 }
 
 static void print_summary(const values *v, const ebpo_info *info, const char *out, double seconds)
@@ -212,6 +215,7 @@ static void print_json(const mesh_input *p, const ebpo_info *info, const ebpo_st
     json_object(&j, "input");
     findings_json_source(&j, "mesh", &p->as_read);
     findings_json(&j, "report", &p->prepared.before);
+    advice_json(&j, p);
     json_end(&j);
     json_real(&j, "seconds", seconds);
     stages_json(&j, line, stages);
@@ -370,7 +374,7 @@ static stage_facts plan_stages(const values *v, const char *in)
 {
     const char *dot = strrchr(in, '.');
     return (stage_facts){ .mended = v->mend.weld || v->mend.orient || v->mend.fill_holes ||
-                                    (dot && strcasecmp(dot, ".stl") == 0),
+                                    v->mend.repair || (dot && strcasecmp(dot, ".stl") == 0),
                           .solid = true,
                           .from_leaves =
                               ebpo_selection_describe((ebpo_selection)v->select)->from_leaves,
@@ -391,9 +395,11 @@ static const values usual = { .max_level = -1,
 static ebpo_status refuse(const values *v, const mesh_input *p, const char *in,
                           const ebpo_workspace *workspace, ebpo_error *error)
 {
-    if (v->require_solid && !v->split_groups && !p->prepared.report.balanced) {
+    if (v->require_solid && !v->split_groups && p->doubts) {
         snprintf(error->message, sizeof error->message,
-                 "%s: is not a solid, and --require-solid was given; nothing was written", in);
+                 "%s: is %s, and --require-solid was given; nothing was written", in,
+                 p->doubts & EBPO_DOUBT_OPEN ? "not a solid"
+                                             : "probably not the solid that was meant");
         return error->status = EBPO_E_NOT_SOLID;
     }
     return judges(v) && !splits(v) ? room_to_judge(v, p->mesh.face_count, in, workspace, error)

@@ -10,6 +10,7 @@
 
 #include "cli/command.h"
 #include "cli/json.h"
+#include "cli/mesh_advice.h"
 #include "cli/mesh_findings.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
@@ -229,6 +230,7 @@ static ebpo_status take_mesh(const writing *w, uint64_t number, mesh_input *out,
     if (status == EBPO_OK)
         status =
             ebpo_mesh_check(&out->mesh, w->run->threads, progress, &out->prepared.report, error);
+    out->doubts = status == EBPO_OK ? ebpo_mesh_doubts(0, &out->prepared.report, NULL) : 0;
     if (status != EBPO_OK)
         ebpo_mesh_free(&out->mesh);
     return status;
@@ -244,8 +246,7 @@ static ebpo_status write_part(writing *w, uint64_t number, ebpo_error *error)
     ebpo_status status = take_mesh(w, number, &one, error);
     if (status == EBPO_OK && w->run->groups) { /* the whole says little of them */
         progress_wipe(w->run->line);
-        findings_warn(stderr, "convert", shown_name(&w->parts[number]), &one.prepared.report,
-                      &one.prepared.record);
+        advice_warn(stderr, "convert", shown_name(&w->parts[number]), &one);
     }
     if (status == EBPO_OK)
         status = w->run->build(w->run->user, &one, path, progress, error);

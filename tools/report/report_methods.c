@@ -5,7 +5,7 @@
 
 #include "cli/command.h"
 #include "cli/mesh_input.h"
-#include "cli/mesh_findings.h"
+#include "cli/mesh_advice.h"
 #include "report/report_data.h"
 #include "cli/selection_args.h"
 #include "cli/words.h"
@@ -110,14 +110,14 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection,
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
     mesh_input p;
-    ebpo_status status = mesh_input_read(&p, mesh, (mending){ false, false, false }, false, NULL,
+    ebpo_status status = mesh_input_read(&p, mesh, (mending){ 0 }, false, NULL,
                                          (unsigned)c->v->threads, c->progress, error);
     if (status != EBPO_OK)
         return status;
     if (c->count == 0) {
         if (c->progress.user)
             progress_wipe(c->progress.user);
-        findings_warn(stderr, "report", mesh, &p.prepared.report, &p.prepared.record);
+        advice_warn(stderr, "report", mesh, &p);
     }
     build_options(c, selection, setting, &build);
     status = selection_k_root(setting->k_root[0] ? setting->k_root : NULL, p.mesh.face_count,

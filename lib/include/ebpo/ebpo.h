@@ -5,6 +5,7 @@
  *   workspace.h   how much memory the work may use
  *   memory.h      how much there is
  *   mesh.h        triangle meshes: reading, checking, mending
+ *   repair.h      which repairs make a solid of a mesh
  *   groups.h      groups of faces that a file has names for
  *   rows.h        numbers from any HDF5 file
  *   colours.h     colours of vertices and faces
@@ -35,6 +36,7 @@
 #include <ebpo/workspace.h>
 #include <ebpo/memory.h>
 #include <ebpo/mesh.h>
+#include <ebpo/repair.h>
 #include <ebpo/groups.h>
 #include <ebpo/rows.h>
 #include <ebpo/build.h>

@@ -1,0 +1,153 @@
+/* Which repairs make a solid of a mesh: they are tried. */
+#include "geom/strict_fp.h"
+
+#include <ebpo/repair.h>
+#include <math.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/parallel.h"
+#include "base/sized.h"
+#include "mesh/mesh_parts.h"
+
+enum { WELD = 1, ORIENT = 2, FILL = 4 };
+
+/* The root of the area is a length; sheets are thinner than this share of it. */
+static const double THIN = 0.01;
+
+typedef struct trying {
+    const ebpo_mesh *mesh;
+    const ebpo_mesh_report *given;
+    unsigned threads;
+    const ebpo_progress *progress;
+    ebpo_repairs *out;
+} trying;
+
+/* ---- doubts ---- */
+
+/* A loop of n edges was filled with n - 2 faces, which have n - 3 edges of their own. */
+static bool mostly_open(const ebpo_mesh_report *report, const ebpo_mend_record *record)
+{
+    uint64_t boundary = record->added_faces + 2 * record->filled_holes;
+    uint64_t before = report->edges - (record->added_faces - record->filled_holes);
+    return 2 * boundary > before;
+}
+
+static uint32_t doubts_of_filling(double area, const ebpo_mesh_report *report,
+                                  const ebpo_mend_record *record)
+{
+    uint32_t doubts = 0;
+    if (!record || !record->filled_holes)
+        return 0;
+    if (!record->weld && report->repeated_positions.count)
+        doubts |= EBPO_DOUBT_UNWELDED;
+    if (mostly_open(report, record))
+        doubts |= EBPO_DOUBT_MOSTLY_OPEN;
+    if (area > 0 && report->area - area >= area * 0.999999)
+        doubts |= EBPO_DOUBT_MOSTLY_FILLED;
+    return doubts;
+}
+
+uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
+                          const ebpo_mend_record *record)
+{
+    EBPO_DEFAULT_FP;
+    uint32_t doubts = doubts_of_filling(area, report, record);
+    if (!report->balanced)
+        return doubts | EBPO_DOUBT_OPEN;
+    if (cbrt(fabs(report->volume)) <= THIN * sqrt(report->area) && isfinite(report->area))
+        doubts |= EBPO_DOUBT_NO_VOLUME;
+    else if (report->volume < 0)
+        doubts |= EBPO_DOUBT_INSIDE_OUT;
+    return doubts;
+}
+
+/* ---- sequences ---- */
+
+static ebpo_status mend(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *record,
+                        ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    if (steps & WELD)
+        status = ebpo_mesh_weld(mesh, record, error);
+    if (status == EBPO_OK && steps & ORIENT)
+        status = ebpo_mesh_orient(mesh, record, error);
+    if (status == EBPO_OK && steps & FILL)
+        status = ebpo_mesh_fill_holes(mesh, record, error);
+    return status;
+}
+
+static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
+{
+    static const ebpo_progress silent;
+    ebpo_repair_try *one = &t->out->tries[t->out->count];
+    ebpo_mesh copy;
+    if (!ebpo_progress_stage(t->progress, "trying repairs", error))
+        return EBPO_E_CANCELLED;
+    ebpo_status status = ebpo_mesh_copy(t->mesh, &copy, error);
+    if (status != EBPO_OK)
+        return status;
+    one->steps = steps;
+    status = mend(&copy, steps, &one->record, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_check(&copy, t->threads, silent, &one->report, error);
+    ebpo_mesh_free(&copy);
+    if (status != EBPO_OK)
+        return status;
+    one->doubts = ebpo_mesh_doubts(t->given->area, &one->report, &one->record);
+    if (one->doubts == 0)
+        t->out->chosen = (int64_t)t->out->count;
+    t->out->count++;
+    return EBPO_OK;
+}
+
+/* Whether steps that begin where `base` was found may leave a solid. */
+static bool may_help(const ebpo_mesh_report *base, unsigned steps)
+{
+    bool open = base->boundary_edges.count > 0;
+    bool turned = base->misoriented_edges.count || base->nonmanifold_edges.count ||
+                  (ebpo_mesh_doubts(0, base, NULL) & ~(uint32_t)EBPO_DOUBT_OPEN);
+    if (open != !!(steps & FILL))
+        return false;
+    return !(steps & ORIENT) || turned || open;
+}
+
+/* Merging comes first where there is something to merge, unless nothing is open. */
+static ebpo_status try_all(trying *t, ebpo_error *error)
+{
+    static const unsigned without_weld[] = { ORIENT, FILL, ORIENT | FILL };
+    const ebpo_mesh_report *base = t->given;
+    unsigned weld = 0;
+    ebpo_status status = EBPO_OK;
+    if (base->repeated_positions.count) {
+        if (may_help(base, ORIENT))
+            status = try_steps(t, ORIENT, error);
+        if (status == EBPO_OK && t->out->chosen < 0) {
+            weld = WELD;
+            base = &t->out->tries[t->out->count].report;
+            status = try_steps(t, WELD, error);
+        }
+    }
+    for (int i = 0; i < 3 && status == EBPO_OK && t->out->chosen < 0; i++)
+        if (may_help(base, without_weld[i]))
+            status = try_steps(t, weld | without_weld[i], error);
+    return status;
+}
+
+ebpo_status ebpo_mesh_try_repairs(const ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                                  unsigned threads, ebpo_progress progress, ebpo_repairs *out,
+                                  ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    static const ebpo_repairs nothing = { .struct_size = sizeof nothing, .chosen = -1 };
+    ebpo_repairs made = nothing;
+    trying t = { mesh, report, threads, &progress, &made };
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_repairs, out, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_check_shape(mesh, error);
+    if (status == EBPO_OK && ebpo_mesh_doubts(0, report, NULL))
+        status = try_all(&t, error);
+    EBPO_GIVE(ebpo_repairs, out, status == EBPO_OK ? &made : &nothing);
+    return status;
+}

@@ -1,0 +1,180 @@
+#include "cli/mesh_advice.h"
+
+#include <string.h>
+
+#include "cli/words.h"
+
+static const struct doubt_text {
+    ebpo_doubt doubt;
+    const char *key, *words;
+} doubts[] = {
+    { EBPO_DOUBT_OPEN, "open", "its edges do not balance" },
+    { EBPO_DOUBT_UNWELDED, "unwelded",
+      "holes were filled between vertices at one position, which --weld merges first" },
+    { EBPO_DOUBT_MOSTLY_OPEN, "mostly_open",
+      "more than half of all edges were edges of holes that were filled" },
+    { EBPO_DOUBT_MOSTLY_FILLED, "mostly_filled", "filling holes added as much area as was given" },
+    { EBPO_DOUBT_NO_VOLUME, "no_volume", "it has hardly any volume" },
+    { EBPO_DOUBT_INSIDE_OUT, "inside_out",
+      "it is turned inside out: normals look inwards, the volume is negative, and a point within "
+      "has winding number -1, which is inside by the rules nonzero and evenodd but outside by "
+      "positive" },
+};
+enum { DOUBTS = sizeof doubts / sizeof *doubts };
+
+const char *advice_doubts(char *out, size_t size, const mesh_input *p)
+{
+    size_t used = 0;
+    out[0] = 0;
+    for (int i = 0; i < DOUBTS && used < size; i++)
+        if (p->doubts & doubts[i].doubt)
+            used += (size_t)snprintf(out + used, size - used, "%s%s", used ? "; " : "",
+                                     doubts[i].words);
+    return out;
+}
+
+static const char *steps_text(char *out, size_t size, const ebpo_mend_record *r)
+{
+    snprintf(out, size, "%s%s%s", r->weld ? " --weld" : "", r->orient ? " --orient" : "",
+             r->fill_holes ? " --fill-holes" : "");
+    return out + 1;
+}
+
+/* ---- warnings ---- */
+
+static void name_finding(FILE *out, bool *any, const ebpo_finding *f, const char *what)
+{
+    if (f->count)
+        fprintf(out, "%s %llu %s", *any ? "," : ":", (unsigned long long)f->count, what);
+    *any |= f->count > 0;
+}
+
+static void warn_of_surface(FILE *out, const ebpo_mesh_report *r)
+{
+    bool any = false;
+    fputs("warning: this is a surface, not a solid, so it has no inside", out);
+    name_finding(out, &any, &r->boundary_edges, "boundary edges");
+    name_finding(out, &any, &r->misoriented_edges, "misoriented edges");
+    name_finding(out, &any, &r->nonmanifold_edges, "edges shared by more than two faces");
+    if (!any)
+        name_finding(out, &any, &r->unbalanced_edges, "unbalanced edges");
+}
+
+/* What was tried; else where that is done. */
+static void say_remedy(FILE *out, const mesh_input *p)
+{
+    char steps[64];
+    if (p->tried && p->repairs.chosen >= 0) {
+        const ebpo_repair_try *best = &p->repairs.tries[p->repairs.chosen];
+        fprintf(out, "; %s, which --repair does, leaves a solid of volume %.6g",
+                steps_text(steps, sizeof steps, &best->record), best->report.volume);
+    } else if (p->tried)
+        fputs("; no repair of ours leaves a plausible solid: use a mesh editor", out);
+    else
+        fputs(
+            "; 'ebpo check' without options tries which repairs leave a solid, --repair does them",
+            out);
+}
+
+void advice_warn(FILE *out, const char *command, const char *path, const mesh_input *p)
+{
+    char text[1024];
+    if (!p->doubts)
+        return;
+    fprintf(out, "ebpo %s: %s: ", command, path);
+    if (p->doubts & EBPO_DOUBT_OPEN)
+        warn_of_surface(out, &p->prepared.report);
+    else
+        fprintf(out, "WARNING: probably not the solid that was meant: %s",
+                advice_doubts(text, sizeof text, p));
+    if (p->doubts != EBPO_DOUBT_INSIDE_OUT || p->tried)
+        say_remedy(out, p);
+    fputc('\n', out);
+}
+
+/* ---- what was tried ---- */
+
+static void print_try(FILE *out, const ebpo_repair_try *t)
+{
+    char steps[64], text[80];
+    const ebpo_mesh_report *r = &t->report;
+    fprintf(out, "    %s: %s, ", steps_text(steps, sizeof steps, &t->record),
+            words_plural(text, sizeof text, r->components, "component", "components"));
+    if (r->balanced)
+        fprintf(out, "volume %.6g", r->volume);
+    else
+        fprintf(out, "%llu edges do not balance", (unsigned long long)r->unbalanced_edges.count);
+    if (t->record.filled_holes) {
+        fprintf(out, ", %s filled",
+                words_plural(text, sizeof text, t->record.filled_holes, "hole", "holes"));
+        fprintf(out, " with %s",
+                words_plural(text, sizeof text, t->record.added_faces, "face", "faces"));
+    }
+    fputs(t->doubts == 0                        ? ": a plausible solid\n"
+          : (t->doubts & EBPO_DOUBT_OPEN)       ? ": still a surface\n"
+          : (t->doubts & EBPO_DOUBT_INSIDE_OUT) ? ": turned inside out\n"
+          : (t->doubts & EBPO_DOUBT_NO_VOLUME)  ? ": hardly any volume\n"
+                                                : ": more filled than is plausible\n",
+          out);
+}
+
+void advice_print(FILE *out, const mesh_input *p)
+{
+    if (!p->tried)
+        return;
+    fputs("  repairs tried, of each what it would leave:\n", out);
+    for (uint64_t i = 0; i < p->repairs.count; i++)
+        print_try(out, &p->repairs.tries[i]);
+}
+
+/* ---- JSON ---- */
+
+static void json_doubts(json *j, uint32_t set)
+{
+    json_array(j, "doubts");
+    for (int i = 0; i < DOUBTS; i++)
+        if (set & doubts[i].doubt)
+            json_text(j, NULL, doubts[i].key);
+    json_end(j);
+}
+
+static void json_try(json *j, const ebpo_repair_try *t)
+{
+    json_object(j, NULL);
+    json_array(j, "steps");
+    if (t->record.weld)
+        json_text(j, NULL, "weld");
+    if (t->record.orient)
+        json_text(j, NULL, "orient");
+    if (t->record.fill_holes)
+        json_text(j, NULL, "fill-holes");
+    json_end(j);
+    json_bool(j, "balanced", t->report.balanced);
+    json_uint(j, "components", t->report.components);
+    json_uint(j, "unbalanced_edges", t->report.unbalanced_edges.count);
+    json_uint(j, "filled_holes", t->record.filled_holes);
+    json_uint(j, "added_faces", t->record.added_faces);
+    json_real(j, "area", t->report.area);
+    json_real(j, "volume", t->report.volume);
+    json_doubts(j, t->doubts);
+    json_end(j);
+}
+
+void advice_json(json *j, const mesh_input *p)
+{
+    json_doubts(j, p->doubts);
+    if (!p->tried) {
+        json_null(j, "repairs");
+        return;
+    }
+    json_object(j, "repairs");
+    json_array(j, "tried");
+    for (uint64_t i = 0; i < p->repairs.count; i++)
+        json_try(j, &p->repairs.tries[i]);
+    json_end(j);
+    if (p->repairs.chosen >= 0)
+        json_int(j, "chosen", p->repairs.chosen);
+    else
+        json_null(j, "chosen");
+    json_end(j);
+}
