@@ -5,7 +5,7 @@
 
 Points are uniform in the model's box (`ebpo bench --save-points`). In turns: the library alone
 (`ebpo bench`, all questions at once on one thread), then the command with raw and with text input,
-with one and with two threads, each time with as much memory as it wants (--memory 64G). The
+with one and with two threads, each time with as much memory as it wants (--memory 64GiB). The
 library's time is that of the clock, so the machine should do nothing else. Other times are the
 processors', user and system, without those of one question, in ns a point: the least of the turns.
 Wall clocks are those of the same runs.

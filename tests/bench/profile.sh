@@ -1,7 +1,7 @@
 #!/bin/sh
 # Where the time of a build goes: by stage, by source file, by function.
 #
-#     tests/bench/profile.sh BUILD_DIR MODEL.ply [CONVERT_OPTIONS...]       e.g. --memory 1G
+#     tests/bench/profile.sh BUILD_DIR MODEL.ply [CONVERT_OPTIONS...]       e.g. --memory 1GiB
 #
 # BUILD_DIR: a release build with symbols and frame pointers; made, if it is not there. perf samples
 # 199 times a second of processor time, the threads and the kernel included (the kernel: as root).

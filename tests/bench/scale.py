@@ -2,7 +2,7 @@
 """Remakes docs/measured/scale.md: generated scan-like models of growing size, built, verified,
 decoded, opened and asked within a budget of memory, beside Embree and CGAL.
 
-    tests/bench/scale.py BUILD_DIR [--sizes 0.1,1,8,28] [--memory 1G] [--rounds N] -o
+    tests/bench/scale.py BUILD_DIR [--sizes 0.1,1,8,28] [--memory 1GiB] [--rounds N] -o
     docs/measured/scale.md [--json FILE]
 
 BUILD_DIR: a release build configured with -Dtests=enabled -Dpeers=enabled (tools/install-deps.sh

@@ -152,8 +152,8 @@ async function closeUp(page) {
   await page.waitForTimeout(200);
   const view = traffic(), stats = await page.evaluate(() => window.ebpoViewer.state.stats);
   const memory = await page.evaluate(() => performance.measureUserAgentSpecificMemory?.().then((m) => m.bytes).catch(() => 0));
-  console.log(`  click: ${seconds(clicked)} s, ${click.requests} requests, ${kilo(click.bytes)} KB; ` +
-    `close-up from ${options.near}: ${seconds(settled)} s, ${view.requests} requests, ${kilo(view.bytes)} KB, `
+  console.log(`  click: ${seconds(clicked)} s, ${click.requests} requests, ${kilo(click.bytes)} kB; ` +
+    `close-up from ${options.near}: ${seconds(settled)} s, ${view.requests} requests, ${kilo(view.bytes)} kB, `
     + `${stats.triangles} triangles, ${stats.meshTriangles} of them real faces${memory ? `, ${kilo(memory / 1000)} MB` : ''}`);
 }
 
@@ -202,7 +202,7 @@ try {
   const browser = await chromium.launch({ executablePath, args: process.getuid() === 0 ? ['--no-sandbox', ...flags] : flags });
   cleanup.push(() => browser.close());
   console.log(`${options.kbits} kbit/s, ${options.ms} ms, ${options.rounds} rounds${options.query && ', ' + options.query}${options.sources ? ', not bundled' : ''}; ` +
-    'page and model in KB, times in s\n');
+    'page and model in kB, times in s\n');
   console.log('| model | page | first picture | settled | requests | model | triangles | on walls | real faces | again: requests | model | first picture |\n' +
     '|---|---|---|---|---|---|---|---|---|---|---|---|');
   for (const model of models)

@@ -157,7 +157,7 @@ def same_bytes_and_bounded_memory(root, model):
     code, said, peak, filed = run(place.command(model, "-q", "--memory", "128M", "--threads", "16"),
                                   place.temp_dir)
     check(code == 0 and slurp(place.out) == expected and peak <= SMALL,
-          f"--memory 128M --threads 16: the same bytes, {peak / MIB:.0f} MiB resident at most")
+          f"--memory 128MiB --threads 16: the same bytes, {peak / MIB:.0f} MiB resident at most")
     proving_and_extracting(place, model)
 
 
@@ -171,15 +171,15 @@ def proving_and_extracting(place, model):
         _, _, free_peak, _ = run([TOOL, *command, "-q", *little, "16G"], place.temp_dir)
         code, said, peak, _ = run([TOOL, *command, "-q", *little, "128M"], place.temp_dir)
         check(code == 0 and peak <= SMALL,
-              f"{what} --memory 128M: {peak / MIB:.0f} MiB resident at most ({said.strip()})")
+              f"{what} --memory 128MiB: {peak / MIB:.0f} MiB resident at most ({said.strip()})")
         check(free_peak > SMALL,
               f"{what}: without a budget {free_peak / MIB:.0f} MiB, so the budget is put to the "
               f"test")
     code, _, peak, _ = run([TOOL, "extract", "--mesh", "-q", *little, "128M", place.out, back],
                            place.temp_dir)
     check(code == 0 and peak <= SMALL,
-          f"extract --mesh --memory 128M: {peak / MIB:.0f} MiB resident at most")
-    check(slurp(back) == slurp(model), "extract --mesh --memory 128M: the model, bit for bit")
+          f"extract --mesh --memory 128MiB: {peak / MIB:.0f} MiB resident at most")
+    check(slurp(back) == slurp(model), "extract --mesh --memory 128MiB: the model, bit for bit")
 
 
 def same_bytes_as_usual(root, model):

@@ -75,7 +75,7 @@ def check(tool, folder, path, ply, asked, rays, site):
         more = ("--http-retries", "20") if "random" in name else ()
         equal(tool, f"inside {name}", path, url, "inside", asked, "--raw", *more)
         equal(tool, f"distance {name}", path, url, "distance", asked, "--raw", *more)
-    for mode in ("--memory=12M", "--cut-level=3"):
+    for mode in ("--memory=12MiB", "--cut-level=3"):
         equal(tool, f"inside {mode}", path, good, "inside", asked, "--raw", mode)
         equal(tool, f"distance {mode}", path, good, "distance", asked, "--raw", mode)
     equal(tool, "inside nodes", path, good, "inside", asked, "--raw", "--cut-level", "4", "--mode",
@@ -109,7 +109,7 @@ def check(tool, folder, path, ply, asked, rays, site):
     # Requests and bytes.
     size = os.path.getsize(path)
     t = traffic(tool, "levels", good, "--to", "4")
-    expect("levels 0 to 4 take two requests and 150 KB",
+    expect("levels 0 to 4 take two requests and 150 kB",
            t["requests"] <= 2 and t["bytes"] <= 150000, t)
     t = traffic(tool, "levels", good)
     expect("no byte comes twice", t["bytes"] <= size, t)

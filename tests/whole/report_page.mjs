@@ -38,9 +38,9 @@ const ODD = "<long> & 'odd'";
 
 // --- what figures should look like ---
 
-const UNITS = { '': 1, '%': 1, '×': 1, B: 1, KB: 1e3, MB: 1e6, s: 1, ms: 1e-3, 'µs': 1e-6, ns: 1e-9 };
+const UNITS = { '': 1, '%': 1, '×': 1, B: 1, kB: 1e3, MB: 1e6, s: 1, ms: 1e-3, 'µs': 1e-6, ns: 1e-9 };
 
-// The number in a text such as "12.3 KB", null for a dash.
+// The number in a text such as "12.3 kB", null for a dash.
 function valueOf(text) {
   if (text === '–')
     return null;

@@ -378,7 +378,7 @@ async function stalls(browser, { address, line }) {
     const page = await show(browser, `${address}?file=models/ring.ebpo.h5`);
     await page.waitForSelector('#stall:not([hidden])', { timeout: 15000 });
     assert.match(await page.textContent('#stallWhat'), /Nothing has come for \d+ s/);
-    assert.match(await page.textContent('#stallNext'), most ? /Waiting for .*, \d+ KB of \d+ KB\./ : /Waiting for the first levels, 1\.05 MB of 1\.05 MB\./);
+    assert.match(await page.textContent('#stallNext'), most ? /Waiting for .*, \d+ kB of \d+ kB\./ : /Waiting for the first levels, 1\.05 MB of 1\.05 MB\./);
     assert.equal(await page.isVisible('#opening'), most === 0); // with so much there is a picture already
     assert.equal(await page.textContent('#openingName'), 'ring.ebpo.h5');
     const percent = Number(await page.getAttribute('#progress', 'aria-valuenow'));
@@ -475,7 +475,7 @@ async function main() {
     });
     console.log(`ok ${name}`);
   };
-  await step('levels 0 to 4 come in at most two requests and 150 KB', () => levelFour(page));
+  await step('levels 0 to 4 come in at most two requests and 150 kB', () => levelFour(page));
   await step('level 5 has the nodes and triangles of the library\'s, and is seen where the model is', () => levelFive(page));
   await step('colours tell levels and types', () => colours(page));
   await step('leaves show the real faces, in their place', () => mesh(page));

@@ -13,11 +13,11 @@ bool memory_good(const char *command, const memory_values *v)
     if (!v->memory)
         return true;
     if (!words_read_size(v->memory, &bytes)) {
-        command_usage(command, "--memory: '%s' is not a size such as 2G", v->memory);
+        command_usage(command, "--memory: '%s' is not " WORDS_SIZE_EXPECTED, v->memory);
         return false;
     }
     if (bytes < EBPO_WORKSPACE_MIN)
-        fprintf(stderr, "ebpo %s: --memory %s is too little for any mesh; allow at least %dM\n",
+        fprintf(stderr, "ebpo %s: --memory %s is too little for any mesh; allow at least %dMiB\n",
                 command, v->memory, EBPO_WORKSPACE_MIN >> 20);
     return bytes >= EBPO_WORKSPACE_MIN;
 }

@@ -80,7 +80,7 @@ static bool read_size(const char *name, const char *text, uint64_t *out)
 {
     if (words_read_size(text, out))
         return true;
-    command_usage(name, "--memory: '%s' is not a size such as 64M, 1G, 512K or 1000000", text);
+    command_usage(name, "--memory: '%s' is not " WORDS_SIZE_EXPECTED, text);
     return false;
 }
 

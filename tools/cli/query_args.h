@@ -26,15 +26,15 @@ typedef struct query_values {
 /* Rows for the tables of options. In other structs query_values comes first. */
 #define QUERY_MODEL_OPTIONS QUERY_MODEL_OPTIONS_FOR("opening")
 /* `work`: what takes threads. */
-#define QUERY_MODEL_OPTIONS_FOR(work)                                                        \
-    QUERY_MODEL_ROWS("bytes that the model may use: 64M, 1G, 512K (powers of 1024); 0, the " \
-                     "default: as many as it needs",                                         \
+#define QUERY_MODEL_OPTIONS_FOR(work)                                          \
+    QUERY_MODEL_ROWS("bytes that the model may use: 512M, 0.5G, 1GiB; 0, the " \
+                     "default: as many as it needs",                           \
                      "everything at once if --memory allows", work)
 /* Of commands that decide as they go how much of the model they hold. */
-#define QUERY_ASKING_OPTIONS                                                                     \
-    QUERY_MODEL_ROWS("bytes that the model may use: 64M, 1G, 512K (powers of 1024); 0: as many " \
-                     "as it needs; default: as many as the questions need, at most half of "     \
-                     "what is free",                                                             \
+#define QUERY_ASKING_OPTIONS                                                                 \
+    QUERY_MODEL_ROWS("bytes that the model may use: 512M, 0.5G, 1GiB; 0: as many "           \
+                     "as it needs; default: as many as the questions need, at most half of " \
+                     "what is free",                                                         \
                      "by --memory", "opening and for questions")
 #define QUERY_MODEL_ROWS(memory_text, cut_default, work)                              \
     OPTION_TEXT("memory", 0, query_values, memory, "SIZE", memory_text),              \

@@ -13,7 +13,7 @@ static bool options_from(const remote_values *v, ebpo_http_options *o, ebpo_erro
     if (v->cache_size && !words_read_size(v->cache_size, &o->cache_bytes)) {
         error->status = EBPO_E_ARGUMENT;
         snprintf(error->message, sizeof error->message,
-                 "--http-cache-size: '%s' is not a size such as 512M or 4G", v->cache_size);
+                 "--http-cache-size: '%s' is not " WORDS_SIZE_EXPECTED, v->cache_size);
         return false;
     }
     o->time_limit = v->timeout > 0 ? v->timeout : o->time_limit;

@@ -19,7 +19,7 @@ void words_init(void)
 
 static char *scaled(char *out, size_t capacity, double v, const char *unit)
 {
-    static const char prefix[] = " KMGTPE";
+    static const char prefix[] = " kMGTPE";
     int i = 0;
     while (v >= 999.5 && prefix[i + 1]) {
         v /= 1000;
@@ -111,11 +111,91 @@ bool words_read_unit(const char *text, const char *const *units, const uint64_t 
     return false;
 }
 
+/* Digits, also with a fraction. */
+static bool read_amount(const char *text, const char **end, uint64_t *whole, double *fraction)
+{
+    char *stop;
+    errno = 0;
+    *fraction = 0;
+    *whole = strtoull(text, &stop, 10);
+    if (stop == text || errno || *text < '0' || *text > '9')
+        return false;
+    *end = stop;
+    if (*stop != '.')
+        return true;
+    double unit = 1;
+    for (*end = stop + 1; **end >= '0' && **end <= '9'; ++*end)
+        *fraction += (**end - '0') * (unit /= 10);
+    return *end > stop + 1;
+}
+
+/* What "", "K", "MB", "GiB" and the like multiply by; 0: no unit. */
+static uint64_t size_factor(const char *unit)
+{
+    static const char letters[] = "KMGT", small[] = "kmgt";
+    uint64_t factor = 1;
+    const char *at = *unit ? strchr(letters, *unit) : NULL;
+    long power = at ? at - letters + 1 : 0;
+    if (*unit && !at && (at = strchr(small, *unit)) != NULL)
+        power = at - small + 1;
+    unit += power > 0;
+    bool binary = power > 0 && *unit == 'i';
+    unit += binary;
+    for (long i = 0; i < power; i++)
+        factor *= binary ? 1024 : 1000;
+    return *unit == 0 || strcmp(unit, "B") == 0 ? factor : 0;
+}
+
 bool words_read_size(const char *text, uint64_t *out)
 {
-    static const char *const units[] = { "", "K", "M", "G", "T", "k", "m", "g", "t", NULL };
-    static const uint64_t factors[] = { 1,        1u << 10,          1u << 20,
-                                        1u << 30, UINT64_C(1) << 40, 1u << 10,
-                                        1u << 20, 1u << 30,          UINT64_C(1) << 40 };
-    return words_read_unit(text, units, factors, out);
+    uint64_t whole, bytes;
+    double fraction;
+    if (!read_amount(text, &text, &whole, &fraction))
+        return false;
+    uint64_t factor = size_factor(text);
+    return factor > 0 && !__builtin_mul_overflow(whole, factor, &bytes) &&
+           !__builtin_add_overflow(bytes, (uint64_t)(fraction * (double)factor), out);
+}
+
+/* "3" or "3-" or "0-5". */
+static const char *read_run(const char *text, int *first, int *last, bool *to_end)
+{
+    char *end;
+    if (*text < '0' || *text > '9')
+        return NULL;
+    long from = strtol(text, &end, 10), to = from;
+    *to_end = *end == '-' && (end[1] < '0' || end[1] > '9');
+    if (*to_end)
+        to = EBPO_LEVELS_MAX - 1;
+    else if (*end == '-')
+        to = strtol(end + 1, &end, 10);
+    if (from > to || to >= EBPO_LEVELS_MAX)
+        return NULL;
+    *first = (int)from;
+    *last = (int)to;
+    return end + *to_end;
+}
+
+bool words_read_levels(const char *text, word_levels *out)
+{
+    *out = (word_levels){ 0 };
+    for (;; text++) {
+        int first, last;
+        bool to_end;
+        text = read_run(text, &first, &last, &to_end);
+        if (!text || (*text && *text != ','))
+            return false;
+        for (int i = first; i <= last; i++)
+            out->set |= 1u << i;
+        out->to_end |= to_end;
+        if (!*text)
+            break;
+    }
+    for (out->first = 0; !(out->set >> out->first & 1); out->first++)
+        ;
+    for (out->last = EBPO_LEVELS_MAX - 1; !(out->set >> out->last & 1); out->last--)
+        ;
+    uint32_t run = out->set >> out->first;
+    out->is_run = (run & (run + 1)) == 0;
+    return true;
 }

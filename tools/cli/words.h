@@ -10,9 +10,9 @@
 /* Before all else in main: words that the library tells. */
 void words_init(void);
 
-/* 999, 12.3 K, 4.56 M. */
+/* 999, 12.3 k, 4.56 M. */
 char *words_count(char *out, size_t capacity, double v);
-/* 999 B, 12.3 KB, 4.56 MB: powers of 1000. */
+/* 999 B, 12.3 kB, 4.56 MB: powers of 1000. */
 char *words_bytes(char *out, size_t capacity, uint64_t bytes);
 /* The fewest digits that read as the same double. */
 char *words_real(double x, char out[32]);
@@ -28,8 +28,22 @@ const char *words_codec(ebpo_codec codec);
 /* Digits, then nothing or one of the units (NULL-terminated); the number times its factor. */
 bool words_read_unit(const char *text, const char *const *units, const uint64_t *factors,
                      uint64_t *out);
-/* 64M, 1G, 512K, 1000000: powers of 1024. */
+/* 64M, 1GB, 0.5G, 512k, 1000000: powers of 1000; 64MiB, 1Gi: of 1024. */
 bool words_read_size(const char *text, uint64_t *out);
+
+/* Levels as "3", "0-5", "3-" (to the deepest) and lists of such with commas name them. */
+typedef struct word_levels {
+    uint32_t set; /* a bit for each */
+    int first, last;
+    bool to_end; /* those beyond the deepest were not asked for by number */
+    bool is_run; /* none is missing between the first and the last */
+} word_levels;
+
+bool words_read_levels(const char *text, word_levels *out);
+
+/* What is said of texts that the two refuse. */
+#define WORDS_SIZE_EXPECTED   "a size such as 512M, 0.5G or 1GiB"
+#define WORDS_LEVELS_EXPECTED "levels such as 3, 0-5, 3- or 0,2,4; the deepest possible is 20"
 bool words_end_with(const char *text, const char *end);
 void words_hex(const uint8_t digest[32], char out[65]);
 

@@ -16,7 +16,7 @@ typedef struct values {
     int format;
     int64_t level, threads;
     const char *levels;
-    bool mesh, json, quiet;
+    bool mesh, json, quiet, to_deepest;
     remote_values remote;
 } values;
 
@@ -30,7 +30,7 @@ static const arg_option options[] = {
                 "with a second file OUT.h5, gltf with one that ends in .bin"),
     OPTION_INT("level", 0, values, level, "N", 0, 20,
                "the envelopes of level N, and leaves and black nodes above it"),
-    OPTION_TEXT("levels", 0, values, levels, "A-B",
+    OPTION_TEXT("levels", 0, values, levels, "LEVELS",
                 "levels A to B, each as a block of its own; not for stl"),
     OPTION_FLAG("mesh", 0, values, mesh,
                 "the model itself; with levels, as a block of its own. xdmf and vtkhdf give the "
@@ -67,26 +67,28 @@ static int choose_format(values *v, const char *out)
                                "the output's extension does not say which format; give --format");
 }
 
-static int choose_levels(const values *v, ebpo_export_options *o)
+static int choose_levels(values *v, ebpo_export_options *o)
 {
-    int first, last;
-    char rest;
+    word_levels levels;
     *o = (ebpo_export_options)EBPO_EXPORT_OPTIONS_INIT;
     o->mesh = v->mesh;
     if (v->level < 0 && !v->levels && !v->mesh)
-        return command_usage("export", "nothing to export; give --level N, --levels A-B or --mesh");
+        return command_usage("export", "nothing to export; give --level, --levels or --mesh");
     if (v->level >= 0 && v->levels)
         return command_usage("export", "--level and --levels cannot be used together");
     if (v->level >= 0)
         o->first_level = o->last_level = (int)v->level;
     if (!v->levels)
         return EXIT_FINE;
-    if (sscanf(v->levels, "%2d-%2d%c", &first, &last, &rest) != 2 || first < 0 || last < first ||
-        last >= EBPO_LEVELS_MAX)
-        return command_usage(
-            "export", "--levels expects the first level, a hyphen and the last one, such as 0-6");
-    o->first_level = first;
-    o->last_level = last;
+    if (!words_read_levels(v->levels, &levels))
+        return command_usage("export", "--levels: '%s' is not " WORDS_LEVELS_EXPECTED, v->levels);
+    if (!levels.is_run)
+        return command_usage("export",
+                             "--levels: '%s' leaves out levels; give a first and a last one",
+                             v->levels);
+    o->first_level = levels.first;
+    o->last_level = levels.last;
+    v->to_deepest = levels.to_end;
     return EXIT_FINE;
 }
 
@@ -189,6 +191,8 @@ static int write_out(const values *v, const char *in, const char *out, const cha
     ebpo_export_report report = EBPO_EXPORT_REPORT_INIT;
     ebpo_file *file = NULL;
     ebpo_status status = remote_open(&file, in, &v->remote, &error);
+    if (status == EBPO_OK && v->to_deepest && o->first_level < ebpo_file_info(file)->level_count)
+        o->last_level = ebpo_file_info(file)->level_count - 1;
     if (status == EBPO_OK)
         status = ebpo_export(file, out, (ebpo_export_format)v->format, o, &report, &error);
     progress_wipe(&line);

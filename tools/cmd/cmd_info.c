@@ -84,9 +84,7 @@ static int run(void *given, const char **operand)
     values *v = given;
     uint64_t bytes;
     if (v->memory && !words_read_size(v->memory, &bytes))
-        return command_usage("info",
-                             "--memory: '%s' is not a size such as 64M, 1G, 512K or 1000000",
-                             v->memory);
+        return command_usage("info", "--memory: '%s' is not " WORDS_SIZE_EXPECTED, v->memory);
     if (!command_wants_hdf5("info", operand[0]))
         return EXIT_FAILED;
     ebpo_error error = EBPO_ERROR_INIT;

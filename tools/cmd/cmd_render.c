@@ -14,6 +14,7 @@
 #include "cli/progress.h"
 #include "cli/reading.h"
 #include "cli/remote_args.h"
+#include "cli/words.h"
 #include "cmd/commands.h"
 #include "render/picture.h"
 #include "render/raster.h"
@@ -33,8 +34,8 @@ static const char *const up_words[] = { "x", "y", "z", NULL };
 static const arg_option options[] = {
     OPTION_INT("level", 0, values, level, "N", 0, 20, "the envelopes of level N"),
     OPTION_FLAG("mesh", 0, values, mesh, "the model itself; the default"),
-    OPTION_TEXT("levels", 0, values, levels, "LIST",
-                "several side by side, with captions: levels and 'mesh', for example 0,2,4,mesh"),
+    OPTION_TEXT("levels", 0, values, levels, "LEVELS",
+                "several side by side, with captions: levels and 'mesh', for example 0-3,6,mesh"),
     OPTION_TEXT("view", 0, values, view, "AZ,EL",
                 "where to look from: azimuth and elevation in degrees; default 30,20"),
     OPTION_WORD("up", 0, values, up, "AXIS", up_words,
@@ -63,6 +64,7 @@ static const arg_spec spec = {
 
 typedef struct tile {
     int level; /* or MESH */
+    bool if_there;
     ebpo_mesh mesh;
     ebpo_colours colours; /* of the model, as far as it has any */
     bool closed;
@@ -85,27 +87,42 @@ static int usage_error(const char *what, const char *value, const char *expected
     return command_usage("render", "%s: '%s' is not %s", what, value, expected);
 }
 
+static bool add_tile(job *j, int level, bool if_there)
+{
+    if (j->tile_count < TILES_MAX) {
+        j->tiles[j->tile_count].level = level;
+        j->tiles[j->tile_count].if_there = if_there;
+    }
+    return j->tile_count++ < TILES_MAX;
+}
+
+/* Those of "3-" that the file does not have are left out. */
+static bool add_levels(job *j, const char *text)
+{
+    word_levels levels;
+    if (!words_read_levels(text, &levels))
+        return false;
+    for (int i = levels.first; i <= levels.last; i++)
+        if (!add_tile(j, i, levels.to_end && i > levels.first))
+            return false;
+    return true;
+}
+
+/* In the order in which they were given. */
 static bool parse_levels(job *j)
 {
     for (const char *at = j->v.levels;; at++) {
-        char *end;
-        if (j->tile_count == TILES_MAX)
+        char item[16];
+        size_t length = strcspn(at, ",");
+        if (length >= sizeof item)
             return false;
-        tile *t = &j->tiles[j->tile_count++];
-        if (strncmp(at, "mesh", 4) == 0) {
-            t->level = MESH;
-            end = (char *)(uintptr_t)at + 4;
-        } else {
-            long level = *at >= '0' && *at <= '9' ? strtol(at, &end, 10) : -1;
-            if (level < 0 || level >= EBPO_LEVELS_MAX)
-                return false;
-            t->level = (int)level;
-        }
-        if (!*end)
+        memcpy(item, at, length);
+        item[length] = 0;
+        if (!(strcmp(item, "mesh") == 0 ? add_tile(j, MESH, false) : add_levels(j, item)))
+            return false;
+        at += length;
+        if (!*at)
             return true;
-        if (*end != ',')
-            return false;
-        at = end;
     }
 }
 
@@ -123,8 +140,9 @@ static int parse(job *j)
         j->width > SIDE_MAX || j->height < 16 || j->height > SIDE_MAX)
         return usage_error("--size", v->size, "a width, an x, and a height, each from 16 to 8192");
     if (v->levels && !parse_levels(j))
-        return usage_error("--levels", v->levels,
-                           "a list of at most 24 levels (0 to 20) and 'mesh' separated by commas");
+        return usage_error(
+            "--levels", v->levels,
+            "at most 24 of 'mesh' and levels, such as 0-3,mesh; the deepest possible is 20");
     if (!v->levels)
         j->tiles[j->tile_count++].level = v->level >= 0 ? (int)v->level : MESH;
     return EXIT_FINE;
@@ -160,10 +178,21 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
     return status;
 }
 
+static void leave_out_tiles(job *j, int level_count)
+{
+    int count = 0;
+    for (int i = 0; i < j->tile_count; i++)
+        if (!j->tiles[i].if_there || j->tiles[i].level < level_count)
+            j->tiles[count++] = j->tiles[i];
+    j->tile_count = count;
+}
+
 static ebpo_status load_file(job *j, ebpo_progress progress, ebpo_error *error)
 {
     ebpo_file *file = NULL;
     ebpo_status status = remote_open(&file, j->in, &j->v.remote, error);
+    if (status == EBPO_OK)
+        leave_out_tiles(j, ebpo_file_info(file)->level_count);
     for (int i = 0; i < j->tile_count && status == EBPO_OK; i++)
         status = load_tile(j, &j->tiles[i], file, progress, error);
     if (status == EBPO_OK) {

@@ -37,7 +37,7 @@ static const arg_option options[] = {
     OPTION_REAL("epsilon", 0, report_values, epsilon, "E", 0, 1,
                 "for a mesh: as for 'ebpo convert'"),
     OPTION_FLAG("keep", 0, report_values, keep, "keep the files made from a mesh in DIR"),
-    OPTION_TEXT("levels", 0, report_values, levels, "A-B", "measure only these levels"),
+    OPTION_TEXT("levels", 0, report_values, levels, "LEVELS", "measure only these levels"),
     OPTION_INT("points", 0, report_values, points, "N", 1, 1e8,
                "questions of each kind; default 5000"),
     OPTION_INT("seed", 0, report_values, seed, "S", 0, 1e15,
@@ -137,12 +137,12 @@ static int read_settings(comparison *c, const report_values *v)
 static int read_options(comparison *c, report_values *v, bool mesh)
 {
     char rest;
-    c->first = 0;
-    c->last = EBPO_LEVELS_MAX - 1;
-    if (v->levels && (sscanf(v->levels, "%2d-%2d%c", &c->first, &c->last, &rest) != 2 ||
-                      c->first < 0 || c->last < c->first || c->last >= EBPO_LEVELS_MAX))
+    word_levels levels = { .last = EBPO_LEVELS_MAX - 1, .is_run = true };
+    if (v->levels && (!words_read_levels(v->levels, &levels) || !levels.is_run))
         return wrong("--levels", v->levels,
-                     "the first level, a hyphen and the last one, such as 0-6");
+                     "one level or a first and a last one, such as 0-6 or 3-");
+    c->first = levels.first;
+    c->last = levels.last;
     if (sscanf(v->view, "%lf,%lf%c", &c->azimuth, &c->elevation, &rest) != 2 ||
         !(fabs(c->azimuth) <= 360) || !(fabs(c->elevation) <= 90))
         return wrong("--view", v->view,

@@ -50,9 +50,10 @@ static const arg_option options[] = {
                 "report: how deep one is in the other, within D"),
     OPTION_FLAG("least", 0, scene_values, least,
                 "approach: how near they come at all times, and when"),
-    OPTION_TEXT("memory", 0, scene_values, memory, "SIZE",
-                "report, approach: bytes that all models may use together (64M, 1G); default: as "
-                "many as they need"),
+    OPTION_TEXT(
+        "memory", 0, scene_values, memory, "SIZE",
+        "report, approach: bytes that all models may use together (512M, 1GiB); default: as "
+        "many as they need"),
     OPTION_THREADS(scene_values, threads),
     OPTION_FLAG("outside", 0, scene_values, outside,
                 "files that the scene names may lie outside its folder"),
@@ -150,9 +151,9 @@ static const char *wrong_options(int deed, scene_values *v, ebpo_load_options *l
     if (deeds[deed].run == scene_pack && !v->out)
         return "pack needs -o DIR";
     if (v->target_size && (!words_read_size(v->target_size, &target) || !target))
-        return "--target-size is a number of bytes such as 500K or 20M";
+        return "--target-size expects " WORDS_SIZE_EXPECTED;
     if (v->memory && !words_read_size(v->memory, &load->memory))
-        return "--memory is a number of bytes such as 64M or 1G";
+        return "--memory expects " WORDS_SIZE_EXPECTED;
     if (deeds[deed].run == scene_plan || deeds[deed].run == scene_pack)
         return settle_purpose(v);
     return deeds[deed].run == scene_report ? wrong_report(v) : NULL;

@@ -106,7 +106,7 @@ static bool read_budget(const char *name, const char *text, uint64_t *out)
 {
     if (!text || (words_read_size(text, out) && *out))
         return true;
-    command_usage("view", "--%s: '%s' is not a size such as 512K or 4M", name, text);
+    command_usage("view", "--%s: '%s' is not " WORDS_SIZE_EXPECTED, name, text);
     return false;
 }
 

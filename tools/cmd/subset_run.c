@@ -12,16 +12,12 @@
 
 const char *const profile_words[] = { "full", "lod", "collision", NULL }; /* by ebpo_profile */
 
-/* "0-N" or "N". */
 static bool read_levels(const char *text, int *last)
 {
-    if (strncmp(text, "0-", 2) == 0)
-        text += 2;
-    char *end;
-    long level = strtol(text, &end, 10);
-    if (text[0] < '0' || text[0] > '9' || *end || level < 0 || level >= EBPO_LEVELS_MAX)
+    word_levels levels;
+    if (!words_read_levels(text, &levels) || levels.first != 0 || !levels.is_run)
         return false;
-    *last = (int)level;
+    *last = levels.last;
     return true;
 }
 
@@ -86,9 +82,7 @@ int subset_need(const char *name, double max_error, const char *target_size,
                 ebpo_subset_options *out)
 {
     if (target_size && (!words_read_size(target_size, &out->target_bytes) || !out->target_bytes))
-        return command_usage(name,
-                             "--target-size: '%s' is not a number of bytes such as 500K or 20M",
-                             target_size);
+        return command_usage(name, "--target-size: '%s' is not " WORDS_SIZE_EXPECTED, target_size);
     if (target_size && max_error > 0)
         return command_usage(name, "--max-error and --target-size cannot be used together");
     out->max_error = max_error;
@@ -111,8 +105,8 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
     *out = (ebpo_subset_options)EBPO_SUBSET_OPTIONS_INIT;
     if (v->levels && !read_levels(v->levels, &out->last_level))
         return command_usage(name,
-                             "--levels: '%s' is not 0-N with N up to 20; levels begin at 0, as "
-                             "each one builds on those above",
+                             "--levels: '%s' is not 0-N with N up to 20; without 0 and all up to "
+                             "N there is none, as each level builds on those above",
                              v->levels);
     if (v->box && !read_box(v->box, out))
         return command_usage(

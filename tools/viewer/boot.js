@@ -54,7 +54,7 @@
     if (!text)
       return;
     document.getElementById('openingName').textContent = name;
-    text.textContent = quiet > 2 ? `Nothing has come for ${quiet} s; waiting for ${got >= HEAD_BYTES ? "the page's code" : 'the model'}` : got ? `${Math.round(got / 1000)} KB` : 'Asked for';
+    text.textContent = quiet > 2 ? `Nothing has come for ${quiet} s; waiting for ${got >= HEAD_BYTES ? "the page's code" : 'the model'}` : got ? `${Math.round(got / 1000)} kB` : 'Asked for';
   };
   const telling = setInterval(say, 200);
   document.documentElement.classList.add('opening');

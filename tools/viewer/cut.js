@@ -11,7 +11,7 @@ import { Walls } from './walls.js';
 
 const TILE_NODES = 300;        // a tile's most: fewer tiles are fewer draw calls, smaller ones are made again faster
 const NODES_A_PASS = 2400;     // newly made in one pass, so that a picture comes early and improves; the first passes make fewer yet
-const POLYTOPES_KEPT = 40000;  // of about 1.3 KB, besides those of the cut itself
+const POLYTOPES_KEPT = 40000;  // of about 1.3 kB, besides those of the cut itself
 const PRUNE_PASSES = 64;
 const MESH_LEAVES = 1000;      // whose faces are asked for at once, about
 const MESH_SUBTREES = 16;      // the same where the file has subtrees
@@ -316,7 +316,7 @@ export class Cut {
     return { nodes, more: false, missing, leaves, levels: Array.from(levels, (n) => n ?? 0) };
   }
 
-  // Neighbours together, the groups that are seen most first; scattered leaves would cost a chunk of 64 KB each, or the faces of a subtree. Of a group that is
+  // Neighbours together, the groups that are seen most first; scattered leaves would cost a chunk of 64 kB each, or the faces of a subtree. Of a group that is
   // fetched all leaves are taken, for an envelope among faces would stick out.
   #leavesToFetch(groups, want) {
     const out = [], { info } = this.tree, C = info.subtree_level;

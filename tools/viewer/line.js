@@ -2,7 +2,7 @@
 const $ = (id) => document.getElementById(id);
 const STALL_MS = 3000; // without a byte: it is said
 
-export const bytes = (n) => (n < 1000 ? `${n} B` : n < 1e6 ? `${(n / 1e3).toFixed(n < 1e4 ? 1 : 0)} KB` : n < 1e9 ? `${(n / 1e6).toFixed(n < 1e7 ? 2 : 1)} MB` : `${(n / 1e9).toFixed(2)} GB`);
+export const bytes = (n) => (n < 1000 ? `${n} B` : n < 1e6 ? `${(n / 1e3).toFixed(n < 1e4 ? 1 : 0)} kB` : n < 1e9 ? `${(n / 1e6).toFixed(n < 1e7 ? 2 : 1)} MB` : `${(n / 1e9).toFixed(2)} GB`);
 
 /** Whether something is being fetched or made; how much of it is not known yet. */
 export function busy(on) {

@@ -174,7 +174,7 @@ def local_table(page, found):
 
 def size_table(page, found):
     page.text("## Size and building", "",
-              "Files as they are on the disk; CPU seconds of `ebpo convert -q --memory 4G` of the "
+              "Files as they are on the disk; CPU seconds of `ebpo convert -q --memory 4GiB` of the "
               "small model, two runs of each side in turns a row.")
     page.table(["", "large, bytes", "small, bytes"],
                [[side, f"{size['large']:,}", f"{size['small']:,}"]

@@ -18,7 +18,7 @@ function inUnits(v, units) {
   return `${threeDigits(v / factor)} ${name}`;
 }
 
-const BYTES = [['TB', 1e12], ['GB', 1e9], ['MB', 1e6], ['KB', 1e3], ['B', 1]];
+const BYTES = [['TB', 1e12], ['GB', 1e9], ['MB', 1e6], ['kB', 1e3], ['B', 1]];
 const SECONDS = [['s', 1], ['ms', 1e-3], ['µs', 1e-6], ['ns', 1e-9]];
 
 const known = (write) => (v) => (v === null || v === undefined ? NONE : write(v));
