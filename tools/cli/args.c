@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "cli/command.h"
 
@@ -200,6 +201,45 @@ static arg_result take_letters(parser *p)
     return ARGS_RUN;
 }
 
+char args_dash(const arg_spec *spec, int operand)
+{
+    return spec->dash && operand < (int)strlen(spec->dash) ? spec->dash[operand] : ' ';
+}
+
+static bool is_among(const char *words, const char *word)
+{
+    size_t length = strlen(word);
+    for (const char *at = words; *at; at += strspn(at, " ")) {
+        size_t n = strcspn(at, " ");
+        if (n == length && strncasecmp(at, word, n) == 0)
+            return true;
+        at += n;
+    }
+    return false;
+}
+
+/* A name that ends as another format's files do would mislead whoever gets the file. */
+static arg_result check_ending(const arg_spec *spec, const char *path)
+{
+    static const char known[] = "ply obj stl off glb gltf vtk vtkhdf xdmf png jpg jpeg gif svg pdf "
+                                "html json csv npy h5 hdf5 zip";
+    const char *name = strrchr(path, '/'), *dot = strrchr(name ? name : path, '.');
+    if (!spec->writes || !dot || !is_among(known, dot + 1) || is_among(spec->writes, dot + 1))
+        return ARGS_RUN;
+    return wrong(spec, "'%s': the name ends as another format's do; what is written is %s", path,
+                 spec->operands + strcspn(spec->operands, " ") + 1);
+}
+
+static arg_result check_operand(const arg_spec *spec, const char *text, int i)
+{
+    if (strcmp(text, "-") == 0)
+        return args_dash(spec, i) != ' '
+                   ? ARGS_RUN
+                   : wrong(spec, "'-': a file's name is needed here, as it is "
+                                 "not read or written from end to end");
+    return i == 1 ? check_ending(spec, text) : ARGS_RUN;
+}
+
 arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
                       const char *operands[ARGS_OPERANDS_MAX])
 {
@@ -218,7 +258,7 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
             result = take_letters(&p);
         else if (count == spec->most)
             result = wrong(spec, "unexpected operand '%s'; expected: %s", a, spec->operands);
-        else
+        else if ((result = check_operand(spec, a, count)) == ARGS_RUN)
             operands[count++] = a;
         if (result != ARGS_RUN)
             return result;

@@ -67,7 +67,15 @@ typedef struct arg_spec {
     const char *summary;  /* one line */
     const char *text;     /* more for --help, or NULL */
     const arg_option *options;
+    /* What "-" is, a letter for each operand: 'i' standard input and 'o' output, by way of a file
+     * (standard_files.h); 'p' what the command makes of it; a blank, the end or NULL: refused. */
+    const char *dash;
+    /* Endings that fit the second operand, "h5 hdf5"; those of other formats are refused. */
+    const char *writes;
 } arg_spec;
+
+/* The letter of an operand, or a blank. */
+char args_dash(const arg_spec *spec, int operand);
 
 typedef enum arg_result { ARGS_RUN, ARGS_HELPED, ARGS_WRONG } arg_result;
 

@@ -5,14 +5,19 @@
 #include <string.h>
 
 static void (*volatile also)(void);
+static void (*volatile scratch)(void);
 
 void signals_also(void (*clean_up)(void)) { also = clean_up; }
+
+void signals_scratch(void (*clean_up)(void)) { scratch = clean_up; }
 
 static void give_up(int number)
 {
     ebpo_abandon_outputs();
     if (also)
         also();
+    if (scratch)
+        scratch();
     /* SA_RESETHAND brought the default back: the parent sees which signal it was. At once, and not
      * when this handler returns: another thread may be about to open the output by its name again.
      */

@@ -68,6 +68,7 @@ static const arg_spec spec = {
             "intersection, A - B the difference, A ^ B what is in one of both only; & comes first, "
             "parentheses are heeded. Models are .ebpo.h5 files of solids. Nothing is cut: for a "
             "mesh of the result use Manifold or CGAL.",
+    .dash = "pppppppppppp",
     .options = options,
 };
 

@@ -20,6 +20,7 @@ static const arg_spec spec = {
     .summary = "tells which faces meet boxes: how many, and their numbers",
     .text = "MODEL is an .ebpo.h5 file. BOXES holds lines 'x0 y0 z0 x1 y1 z1', the lower corner "
             "first; if absent or '-', standard input. Faces and boxes are closed: touching counts.",
+    .dash = " p",
     .options = options,
 };
 

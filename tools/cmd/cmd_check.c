@@ -45,6 +45,7 @@ static const arg_spec spec = {
     .text = "With mending options, also shows what the mesh would be after mending. Nothing is "
             "written. Without them, repairs are tried on a mesh that is no solid, and the fewest "
             "that leave one are told.",
+    .dash = "i",
     .options = options,
 };
 

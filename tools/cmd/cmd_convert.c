@@ -109,6 +109,8 @@ static const arg_spec spec = {
     .text = "IN is a PLY file; OBJ, STL and OFF files can be read too if the library was built "
             "with assimp. OUT appears complete or not at all; an existing OUT is replaced. Mending "
             "is done in the order weld, orient, fill holes.",
+    .dash = "i",
+    .writes = "h5 hdf5",
     .options = options,
 };
 

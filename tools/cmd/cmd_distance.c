@@ -38,6 +38,7 @@ static const arg_spec spec = {
     .summary = "tells how far points are from the model: distance, nearest point, normal, face",
     .text = "MODEL is an .ebpo.h5 file. POINTS holds lines 'x y z', or is a PLY file; if absent or "
             "'-', standard input. Distances are correctly rounded, and negative inside a solid.",
+    .dash = " p",
     .options = options,
 };
 

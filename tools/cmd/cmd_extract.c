@@ -52,6 +52,8 @@ static const arg_spec spec = {
     .summary = "writes a level's envelopes, the model, or a part of it, as PLY",
     .text = "FILE is an .ebpo.h5 file or its URL. One of --level, --mesh and --subtree is needed. "
             "A level's polygons are held in memory whatever --memory says.",
+    .dash = " o",
+    .writes = "ply",
     .options = options,
 };
 

@@ -28,6 +28,7 @@ static const arg_spec spec = {
     .text = "Only what is kept is fetched. OUT appears complete or not at all; until then what has "
             "been fetched is in the folder OUT.part, from which the same command resumes. Without "
             "options everything is fetched.",
+    .writes = "h5 hdf5",
     .options = options,
 };
 

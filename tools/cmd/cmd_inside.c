@@ -26,6 +26,7 @@ static const arg_spec spec = {
     .text =
         "MODEL is an .ebpo.h5 file of a solid. POINTS holds lines 'x y z', or is a PLY, "
         ".npy or HDF5 file (FILE.h5:/path); if absent or '-', standard input. Answers are exact.",
+    .dash = " p",
     .options = options,
 };
 

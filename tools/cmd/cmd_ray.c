@@ -31,6 +31,7 @@ static const arg_spec spec = {
     .text =
         "MODEL is an .ebpo.h5 file. RAYS holds lines 'ox oy oz dx dy dz [tmax]'; if absent or '-', "
         "standard input. What is hit, and in which order, is exact; '-' means nothing is hit.",
+    .dash = " p",
     .options = options,
 };
 

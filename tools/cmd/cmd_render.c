@@ -57,6 +57,8 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "draws a shaded picture of a level or of the model, without a display",
     .text = "FILE is an .ebpo.h5 file or its URL, or a mesh.",
+    .dash = "io",
+    .writes = "png",
     .options = options,
 };
 

@@ -44,6 +44,7 @@ static const arg_spec spec = {
     .summary = "writes a file anew: today's layout, another codec; content compared",
     .text = "IN is an .ebpo.h5 file or its URL; OUT may be IN. OUT appears complete or not at "
             "all, and not before its content is found to be that of IN.",
+    .writes = "h5 hdf5",
     .options = options,
 };
 

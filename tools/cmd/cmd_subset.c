@@ -19,6 +19,7 @@ static const arg_spec spec = {
     .text = "FILE is an .ebpo.h5 file or its URL (an interrupted transfer starts again; 'ebpo "
             "fetch' resumes). OUT appears complete or not at all. It answers questions as FILE "
             "does, or refuses those for which something was left out.",
+    .writes = "h5 hdf5",
     .options = options,
 };
 

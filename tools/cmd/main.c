@@ -7,6 +7,7 @@
 
 #include "cli/command.h"
 #include "cli/signals.h"
+#include "cli/standard_files.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 #include "cmd/version_facts.h"
@@ -76,9 +77,9 @@ static int run(const command *c, int argc, char **argv)
         return command_no_memory(c->spec->command);
     memcpy(values, c->usual, c->size);
     arg_result parsed = args_parse(c->spec, argc, argv, values, operand);
-    int code = parsed == ARGS_RUN      ? c->run(values, operand)
-               : parsed == ARGS_HELPED ? EXIT_FINE
-                                       : EXIT_USAGE;
+    int code = parsed == ARGS_WRONG ? EXIT_USAGE : EXIT_FINE;
+    if (parsed == ARGS_RUN && (code = standard_files_begin(c->spec, operand)) == EXIT_FINE)
+        code = standard_files_end(c->spec, c->run(values, operand));
     free(values);
     return code;
 }

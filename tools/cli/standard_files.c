@@ -1,0 +1,131 @@
+#include "cli/standard_files.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/signals.h"
+
+enum { PATH_MOST = 4096, PIECE = 1 << 16 };
+
+/* A handler of signals looks here as well: what is not there has an empty name. */
+static char folder[PATH_MOST], input[PATH_MOST], output[PATH_MOST];
+static int printed_to = -1; /* standard output, while it stands aside */
+
+static void clean_up(void)
+{
+    if (*input)
+        unlink(input);
+    if (*output)
+        unlink(output);
+    if (*folder)
+        rmdir(folder);
+}
+
+static int failed(const char *command, const char *what)
+{
+    fprintf(stderr, "ebpo %s: %s: %s\n", command, what, strerror(errno));
+    return EXIT_FAILED;
+}
+
+static bool copy(int from, int to)
+{
+    static char piece[PIECE];
+    for (;;) {
+        ssize_t got = read(from, piece, sizeof piece);
+        if (got == 0)
+            return true;
+        if (got < 0 && errno == EINTR)
+            continue;
+        for (ssize_t at = 0, put; got < 0 || at < got; at += put) {
+            put = got < 0 ? -1 : write(to, piece + at, (size_t)(got - at));
+            if (put < 0 && (got < 0 || errno != EINTR))
+                return false;
+            put = put < 0 ? 0 : put;
+        }
+    }
+}
+
+static int make_folder(const char *command)
+{
+    const char *where = getenv("TMPDIR");
+    if (*folder)
+        return EXIT_FINE;
+    char made[PATH_MOST - 32];
+    int length =
+        snprintf(made, sizeof made, "%s/ebpo-XXXXXX", where && *where ? where : "/var/tmp");
+    if (length >= (int)sizeof made || !mkdtemp(made))
+        return failed(command, "no temporary folder; set TMPDIR to one that can be written");
+    snprintf(folder, sizeof folder, "%s", made);
+    signals_scratch(clean_up);
+    return EXIT_FINE;
+}
+
+static int take_input(const char *command, const char **operand)
+{
+    if (*input)
+        return command_usage(command, "standard input can be read once only");
+    int code = make_folder(command);
+    if (code != EXIT_FINE)
+        return code;
+    snprintf(input, sizeof input, "%.*s/standard-input", PATH_MOST - 32, folder);
+    int to = open(input, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    bool fine = to >= 0 && copy(STDIN_FILENO, to);
+    if (to >= 0 && close(to) != 0)
+        fine = false;
+    *operand = input;
+    return fine ? EXIT_FINE : failed(command, "standard input, copied to a temporary file");
+}
+
+static int take_output(const char *command, const char **operand)
+{
+    if (isatty(STDOUT_FILENO))
+        return command_usage(command, "standard output is a terminal; give a file's name");
+    int code = make_folder(command);
+    if (code != EXIT_FINE)
+        return code;
+    snprintf(output, sizeof output, "%.*s/standard-output", PATH_MOST - 32, folder);
+    fflush(stdout);
+    printed_to = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
+    if (printed_to < 0 || dup2(STDERR_FILENO, STDOUT_FILENO) < 0)
+        return failed(command, "standard output");
+    *operand = output;
+    return EXIT_FINE;
+}
+
+int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS_MAX])
+{
+    int code = EXIT_FINE;
+    for (int i = 0; i < ARGS_OPERANDS_MAX && operand[i] && code == EXIT_FINE; i++) {
+        if (strcmp(operand[i], "-") != 0)
+            continue;
+        char how = args_dash(spec, i);
+        if (how == 'i')
+            code = take_input(spec->command, &operand[i]);
+        else if (how == 'o')
+            code = take_output(spec->command, &operand[i]);
+    }
+    if (code != EXIT_FINE)
+        clean_up();
+    return code;
+}
+
+int standard_files_end(const arg_spec *spec, int code)
+{
+    if (printed_to >= 0) {
+        fflush(stdout);
+        int from = code == EXIT_FINE ? open(output, O_RDONLY | O_CLOEXEC) : -1;
+        if (code == EXIT_FINE && (from < 0 || !copy(from, printed_to)))
+            code = failed(spec->command, "standard output");
+        if (from >= 0)
+            close(from);
+        dup2(printed_to, STDOUT_FILENO);
+        close(printed_to);
+    }
+    clean_up();
+    return code;
+}

@@ -1,0 +1,16 @@
+/* "-" among the operands: standard input read into a temporary file, standard output written from
+ * one, as meshes are not read once through and outputs appear whole or not at all. */
+#ifndef EBPO_TOOLS_STANDARD_FILES_H
+#define EBPO_TOOLS_STANDARD_FILES_H
+
+#include "cli/args.h"
+
+/* Puts temporary files in place of operands that are "-", as spec->dash says of each. Where one is
+ * an output, what the command prints goes to standard error. An exit code; EXIT_FINE also where
+ * there is nothing to do. What is wrong was said. */
+int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS_MAX]);
+
+/* After the command: if its exit code is EXIT_FINE, its output is copied. The exit code. */
+int standard_files_end(const arg_spec *spec, int code);
+
+#endif
