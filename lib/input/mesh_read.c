@@ -92,7 +92,7 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char
     if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
         return parse_ply(out, file, path, wanted, error);
     return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(path),
-                          "neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file");
+                          "unrecognised format; expected PLY, OBJ, STL or OFF");
 }
 
 static ebpo_status read_mesh(const char *path, const ebpo_mesh_read_options *options,

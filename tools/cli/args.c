@@ -257,7 +257,7 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
         else if (options && a[0] == '-' && a[1])
             result = take_letters(&p);
         else if (count == spec->most)
-            result = wrong(spec, "unexpected operand '%s'; expected: %s", a, spec->operands);
+            result = wrong(spec, "unexpected argument '%s'; expected: %s", a, spec->operands);
         else if ((result = check_operand(spec, a, count)) == ARGS_RUN)
             operands[count++] = a;
         if (result != ARGS_RUN)

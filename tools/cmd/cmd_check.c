@@ -26,7 +26,7 @@ static const arg_option options[] = {
                 "meant"),
     OPTION_FLAG("crossings", 0, values, crossings,
                 "also look for faces that cross, touch or lie on each other otherwise than as "
-                "neighbours (after mending, if asked for)"),
+                "neighbours (after repair, if asked for)"),
     OPTION_TEXT("output", 'o', values, out, "OUT.ply",
                 "with --crossings: write the mesh with these faces red"),
     OPTION_THREADS(values, threads),
@@ -42,7 +42,7 @@ static const arg_spec spec = {
     .least = 1,
     .most = 1,
     .summary = "checks a mesh: solid or surface, and what is wrong with it and where",
-    .text = "With mending options, also shows what the mesh would be after mending. Nothing is "
+    .text = "With mending options, also shows what the mesh would be after repair. Nothing is "
             "written. Without them, repairs are tried on a mesh that is no solid, and the fewest "
             "that leave one are told.",
     .dash = "i",
@@ -71,7 +71,7 @@ static void print_words(const values *v, const mesh_input *p, const char *path)
     if (!p->prepared.mended)
         return;
     findings_print_mending(stdout, &p->prepared.record);
-    findings_print(stdout, "after mending", &p->mesh, &p->prepared.report, v->crossings);
+    findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, v->crossings);
 }
 
 static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo_progress progress,

@@ -182,7 +182,7 @@ static void print_reports(const values *v, const mesh_input *p, const char *in)
         advice_print(stdout, p);
         findings_print_mending(stdout, &p->prepared.record);
         if (p->prepared.mended)
-            findings_print(stdout, "after mending", &p->mesh, &p->prepared.report, false);
+            findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, false);
     }
     command_flush("convert");
     const char *lost = ebpo_mesh_attributes_lost(&p->mesh);

@@ -61,8 +61,7 @@ static int check_values(const values *v, const char *in, const char *out)
 {
     int asked = (v->level >= 0) + v->mesh + (v->subtree > 0);
     if (asked == 0)
-        return command_usage("extract",
-                             "nothing to extract; give --level N, --mesh or --subtree OCTCODE");
+        return command_usage("extract", "specify --level N, --mesh or --subtree OCTCODE");
     if (asked > 1)
         return command_usage("extract", "--level, --mesh and --subtree cannot be used together");
     if (v->level < 0 && v->no_walls)

@@ -54,7 +54,7 @@ static int help(int argc, char **argv)
 {
     if (argc > 3) {
         fprintf(stderr,
-                "ebpo help: unexpected operand '%s'; expected: [COMMAND]; try 'ebpo help'\n",
+                "ebpo help: unexpected argument '%s'; expected: [COMMAND]; try 'ebpo help'\n",
                 argv[3]);
         return EXIT_USAGE;
     }
