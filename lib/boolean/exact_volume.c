@@ -116,6 +116,14 @@ static bool boxes_apart(const double a[6], const double b[6])
     return false;
 }
 
+static void name_faces(ebpo_exact_volume *out, const ebpo_face_pair *pair)
+{
+    out->file_face[0] = pair->file_face_a;
+    out->file_face[1] = pair->file_face_b;
+    out->face[0] = pair->face_a;
+    out->face[1] = pair->face_b;
+}
+
 static ebpo_status check_pair(measuring *m, uint32_t i, uint32_t k, ebpo_error *error)
 {
     ebpo_collider *collider;
@@ -130,8 +138,7 @@ static ebpo_status check_pair(measuring *m, uint32_t i, uint32_t k, ebpo_error *
     status = ebpo_collide_first(collider, &options, &pair, &found, error);
     if (status == EBPO_OK && found) {
         doubt(m, EBPO_VOLUME_OPERANDS_MEET, i, k);
-        m->out->file_face[0] = pair.file_face_a;
-        m->out->file_face[1] = pair.file_face_b;
+        name_faces(m->out, &pair);
     }
     ebpo_collider_free(collider);
     return status;
@@ -178,8 +185,7 @@ static bool take_self(void *user, const ebpo_face_pair *pairs, uint64_t count)
         if (!has_area(o, pairs[i].file_face_a) || !has_area(o, pairs[i].file_face_b))
             continue; /* bounds nothing */
         doubt(o->m, EBPO_VOLUME_FACES_MEET, o->number, o->number);
-        o->m->out->file_face[0] = pairs[i].file_face_a;
-        o->m->out->file_face[1] = pairs[i].file_face_b;
+        name_faces(o->m->out, &pairs[i]);
     }
     return !o->m->out->doubt;
 }
@@ -374,7 +380,8 @@ ebpo_status ebpo_boolean_exact_volume(ebpo_boolean *boolean, const ebpo_volume_o
                                       ebpo_exact_volume *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_exact_volume found = { .file_face = { EBPO_NO_FACE, EBPO_NO_FACE } };
+    ebpo_exact_volume found = { .file_face = { EBPO_NO_FACE, EBPO_NO_FACE },
+                                .face = { EBPO_NO_FACE, EBPO_NO_FACE } };
     measuring m = { .b = boolean, .options = EBPO_VOLUME_OPTIONS_INIT, .out = &found };
     ebpo_status status = EBPO_TAKE(ebpo_volume_options, &m.options, options, error);
     if (status == EBPO_OK)

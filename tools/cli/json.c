@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "cli/words.h"
+
 static void newline(json *j)
 {
     fputc('\n', j->out);
@@ -141,15 +143,11 @@ void json_reals(json *j, const char *key, const double *v, int count)
     lead(j, key);
     fputc('[', j->out);
     for (int i = 0; i < count; i++)
-        if (isfinite(v[i]))
-            fprintf(j->out, "%s%.17g", i ? ", " : "", v[i]);
-        else
-            fprintf(j->out, "%snull", i ? ", " : "");
+        fprintf(j->out, "%s%s", i ? ", " : "", json_number(v[i], (char[32]){ 0 }));
     fputc(']', j->out);
 }
 
 const char *json_number(double x, char text[32])
 {
-    snprintf(text, 32, isfinite(x) ? "%.17g" : "null", x);
-    return text;
+    return isfinite(x) ? words_real(x, text) : strcpy(text, "null");
 }

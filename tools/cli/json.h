@@ -36,7 +36,8 @@ void json_bool(json *j, const char *key, bool v);
 void json_null(json *j, const char *key);
 void json_reals(json *j, const char *key, const double *v, int count);
 
-/* A number as JSON has it, for a line that printf writes: null where it is not finite. */
+/* A number as JSON has it, with the fewest digits that are its own, for a line that printf writes:
+ * null where it is not finite. */
 const char *json_number(double x, char text[32]);
 
 #endif

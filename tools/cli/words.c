@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cli/numbers.h"
+
 const char *const rule_words[] = { "nonzero", "evenodd", "positive", NULL };
 const char *selection_words[EBPO_SELECTION_COUNT + 1];
 const char *const normals_words[] = { "spherical", "angle", NULL };
@@ -36,12 +38,14 @@ char *words_count(char *out, size_t capacity, double v) { return scaled(out, cap
 
 char *words_real(double x, char out[32])
 {
-    for (int digits = 1; digits <= 17; digits++) {
-        snprintf(out, 32, "%.*g", digits, x);
-        if (strtod(out, NULL) == x)
-            break;
-    }
+    *number_write(out, x) = 0;
     return out;
+}
+
+void words_print_reals(const double *v, int count, const char *between)
+{
+    for (int i = 0; i < count; i++)
+        printf("%s%s", i ? between : "", words_real(v[i], (char[32]){ 0 }));
 }
 
 char *words_bytes(char *out, size_t capacity, uint64_t bytes)

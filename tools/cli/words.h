@@ -14,8 +14,10 @@ void words_init(void);
 char *words_count(char *out, size_t capacity, double v);
 /* 999 B, 12.3 kB, 4.56 MB: powers of 1000. */
 char *words_bytes(char *out, size_t capacity, uint64_t bytes);
-/* The fewest digits that read as the same double. */
+/* The fewest digits that read as the same double, as number_write prints them. */
 char *words_real(double x, char out[32]);
+/* To standard output. */
+void words_print_reals(const double *v, int count, const char *between);
 /* "1 hole", "3 holes". */
 char *words_plural(char *out, size_t capacity, uint64_t count, const char *one, const char *many);
 /* Names of the ebpo_part bits with commas: "planes, mesh, maps". */

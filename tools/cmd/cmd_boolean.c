@@ -93,13 +93,15 @@ static void print_inside(const values *v, const ebpo_boolean_result *r)
 
 static void print_distance(const values *v, const ebpo_boundary_distance *d)
 {
+    char lo[32], hi[32];
     if (!v->query.json)
-        printf("%.17g %.17g %s%s\n", d->lo, d->hi, where_of(&d->inside), doubt_of(&d->inside));
+        printf("%s %s %s%s\n", words_real(d->lo, lo), words_real(d->hi, hi), where_of(&d->inside),
+               doubt_of(&d->inside));
     else
         printf("{\"lo\": %s, \"hi\": %s, \"where\": \"%s\", \"certain\": %s, \"cells\": %" PRIu64
                "}\n",
-               json_number(d->lo, (char[32]){ 0 }), json_number(d->hi, (char[32]){ 0 }),
-               where_of(&d->inside), d->inside.certain ? "true" : "false", d->cells);
+               json_number(d->lo, lo), json_number(d->hi, hi), where_of(&d->inside),
+               d->inside.certain ? "true" : "false", d->cells);
 }
 
 /* --- volumes --- */
@@ -130,12 +132,12 @@ static void say_why(const cell_answer *a, char *out, size_t capacity)
     switch ((ebpo_volume_doubt)e->doubt) {
     case EBPO_VOLUME_OPERANDS_MEET:
         snprintf(out, capacity, "face %" PRIu64 " of %c (%s) meets face %" PRIu64 " of %c (%s)",
-                 e->file_face[0], 'A' + (int)i, first, e->file_face[1], 'A' + (int)k, second);
+                 e->face[0], 'A' + (int)i, first, e->face[1], 'A' + (int)k, second);
         break;
     case EBPO_VOLUME_FACES_MEET:
         snprintf(out, capacity,
                  "faces %" PRIu64 " and %" PRIu64 " of %c (%s) meet otherwise than as neighbours",
-                 e->file_face[0], e->file_face[1], 'A' + (int)i, first);
+                 e->face[0], e->face[1], 'A' + (int)i, first);
         break;
     case EBPO_VOLUME_IN_PARTS:
         snprintf(out, capacity, "%c (%s) is not all in memory", 'A' + (int)i, first);
@@ -152,13 +154,13 @@ static const char *const figure_words[] = { "exact", "interval", "bound" };
 static void print_volume(const cell_answer *a)
 {
     const ebpo_boolean_volume *b = &a->cells;
-    char why[1024];
+    char why[1024], exact[32], lo[32], hi[32];
     say_why(a, why, sizeof why);
     if (is_exact(a))
-        printf("volume    %.17g, exact but for one rounding\nby cells  %.17g to %.17g\n",
-               a->exact.volume.lo, b->lo, b->hi);
+        printf("volume    %s, exact but for one rounding\nby cells  %s to %s\n",
+               words_real(a->exact.volume.lo, exact), words_real(b->lo, lo), words_real(b->hi, hi));
     else
-        printf("volume    %.17g to %.17g, %s: %s\n", b->lo, b->hi,
+        printf("volume    %s to %s, %s: %s\n", words_real(b->lo, lo), words_real(b->hi, hi),
                b->figure == EBPO_FIGURE_BOUND ? "a bound" : "an interval", why);
     printf("cells     %" PRIu64 " in, %" PRIu64 " mixed of level %" PRId64
            ", edge %g\ndecided   %" PRIu64 " by boxes, %" PRIu64 " by nodes, %" PRIu64

@@ -146,8 +146,8 @@ static void print_levels(bool as_json, const ebpo_level_result *r)
                truths[r->common + 1], truths[r->contact + 1], (unsigned long long)r->open_pairs,
                json_number(r->distance.lo, lo), json_number(r->distance.hi, hi));
     else
-        printf("%s %llu %.17g %.17g\n", words[r->common + 1], (unsigned long long)r->open_pairs,
-               r->distance.lo, r->distance.hi);
+        printf("%s %llu %s %s\n", words[r->common + 1], (unsigned long long)r->open_pairs,
+               words_real(r->distance.lo, lo), words_real(r->distance.hi, hi));
 }
 
 static ebpo_status ask_levels(const collide_values *v, ebpo_collider *c,

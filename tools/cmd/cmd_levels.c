@@ -87,12 +87,15 @@ static void begin_json_level(printer *p, const ebpo_stream_level *level, double 
 
 static void print_node(const ebpo_stream_node *n)
 {
-    printf("%" PRIu64 " %s %.17g %.17g %.17g %.17g %.17g %.17g %d %" PRIu32, n->octcode,
-           words_node_type(n->type), n->min[0], n->min[1], n->min[2], n->max[0], n->max[1],
-           n->max[2], (int)n->winding, n->plane_count);
-    for (uint32_t i = 0; i < n->plane_count; i++)
-        printf(" %.17g %.17g %.17g %.17g", n->planes[i][0], n->planes[i][1], n->planes[i][2],
-               n->planes[i][3]);
+    printf("%" PRIu64 " %s ", n->octcode, words_node_type(n->type));
+    words_print_reals(n->min, 3, " ");
+    putchar(' ');
+    words_print_reals(n->max, 3, " ");
+    printf(" %d %" PRIu32, (int)n->winding, n->plane_count);
+    for (uint32_t i = 0; i < n->plane_count; i++) {
+        putchar(' ');
+        words_print_reals(n->planes[i], 4, " ");
+    }
     putchar('\n');
 }
 

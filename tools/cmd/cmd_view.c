@@ -179,18 +179,28 @@ static void print_row(printer *p, const ebpo_view_stream *stream, const char *ke
     json_end(&p->j);
 }
 
+static void print_line(const ebpo_view_node *v)
+{
+    const ebpo_stream_node *n = &v->node;
+    printf("%" PRIu64 " %s ", n->octcode, words_node_type(n->type));
+    words_print_reals(n->min, 3, " ");
+    putchar(' ');
+    words_print_reals(n->max, 3, " ");
+    printf(" %d ", (int)n->winding);
+    words_print_reals((const double[]){ v->distance, v->pixels }, 2, " ");
+    printf(" %d %d %" PRIu32, v->seen, v->complete, n->plane_count);
+    for (uint32_t i = 0; i < n->plane_count; i++) {
+        putchar(' ');
+        words_print_reals(n->planes[i], 4, " ");
+    }
+    putchar('\n');
+}
+
 static void print_node(printer *p, const ebpo_view_node *v)
 {
     const ebpo_stream_node *n = &v->node;
     if (!p->v->json) {
-        printf("%" PRIu64 " %s %.17g %.17g %.17g %.17g %.17g %.17g %d %.17g %.17g %d %d %" PRIu32,
-               n->octcode, words_node_type(n->type), n->min[0], n->min[1], n->min[2], n->max[0],
-               n->max[1], n->max[2], (int)n->winding, v->distance, v->pixels, v->seen, v->complete,
-               n->plane_count);
-        for (uint32_t i = 0; i < n->plane_count; i++)
-            printf(" %.17g %.17g %.17g %.17g", n->planes[i][0], n->planes[i][1], n->planes[i][2],
-                   n->planes[i][3]);
-        putchar('\n');
+        print_line(v);
         return;
     }
     json_object(&p->j, NULL);

@@ -7,6 +7,7 @@
 
 #include "cli/command.h"
 #include "cli/json.h"
+#include "cli/words.h"
 
 /* Three numbers with blanks or commas between. */
 static bool read_direction(const char *text, double out[3])
@@ -49,21 +50,28 @@ static void print_bounds(bool as_json, const ebpo_certain *d)
     if (as_json)
         printf("\"lo\": %s, \"hi\": %s", json_number(d->lo, lo), json_number(d->hi, hi));
     else
-        printf("%.17g %.17g", d->lo, d->hi);
+        printf("%s %s", words_real(d->lo, lo), words_real(d->hi, hi));
 }
 
 /* --- distance --- */
 
+static void pair_to_json(const ebpo_clearance *c)
+{
+    printf(", \"face_a\": %" PRIu64 ", \"face_b\": %" PRIu64 ", \"point_a\": [", c->pair.face_a,
+           c->pair.face_b);
+    words_print_reals(c->point_a, 3, ", ");
+    printf("], \"point_b\": [");
+    words_print_reals(c->point_b, 3, ", ");
+    putchar(']');
+}
+
 /* The faces, if some have been found. */
 static void print_pair(bool as_json, const ebpo_clearance *c)
 {
-    const double *p = c->point_a, *q = c->point_b;
     if (c->pair.face_a == EBPO_NO_FACE)
         return;
     if (as_json)
-        printf(", \"face_a\": %" PRIu64 ", \"face_b\": %" PRIu64
-               ", \"point_a\": [%.17g, %.17g, %.17g], \"point_b\": [%.17g, %.17g, %.17g]",
-               c->pair.face_a, c->pair.face_b, p[0], p[1], p[2], q[0], q[1], q[2]);
+        pair_to_json(c);
     else
         printf(" %" PRIu64 " %" PRIu64, c->pair.face_a, c->pair.face_b);
 }

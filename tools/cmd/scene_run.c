@@ -146,8 +146,9 @@ ebpo_status scene_boxes(const scene_values *v, const char *path, ebpo_scene *sce
             json_reals(&j, "max", max, 3);
             json_end(&j);
         } else {
-            printf("%.17g %.17g %.17g %.17g %.17g %.17g\t%s\n", min[0], min[1], min[2], max[0],
-                   max[1], max[2], instance.name);
+            const double box[] = { min[0], min[1], min[2], max[0], max[1], max[2] };
+            words_print_reals(box, 6, " ");
+            printf("\t%s\n", instance.name);
         }
     }
     if (v->json)
@@ -175,7 +176,7 @@ static bool print_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count
             json_real(&p->j, "clearance", pairs[i].clearance);
             json_end(&p->j);
         } else {
-            printf("%s\t%s\t%.17g\n", a.name, b.name, pairs[i].clearance);
+            printf("%s\t%s\t%s\n", a.name, b.name, words_real(pairs[i].clearance, (char[32]){ 0 }));
         }
     }
     return true;

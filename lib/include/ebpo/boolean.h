@@ -220,6 +220,9 @@ typedef struct ebpo_exact_volume {
     /* Parts of the operands' surfaces that were looked at, and those of them that bound the result;
      * of an exact volume. */
     uint64_t patches, bounding;
+
+    /* The same faces by their numbers in the sources, as ebpo_face_pair has them. */
+    uint64_t face[2];
 } ebpo_exact_volume;
 
 #define EBPO_EXACT_VOLUME_INIT EBPO_SIZED(ebpo_exact_volume)
