@@ -94,7 +94,12 @@ def main():
                         ("tool", pipe(0.3, 1.5, 96, 48))):
         mesh, out = (os.path.join(folder, name + end) for end in (".ply", ".ebpo.h5"))
         ply(mesh, *shape)
-        subprocess.run(["ebpo", "convert", "--quiet", mesh, out], check=True)
+        try:
+            subprocess.run(["ebpo", "convert", "--quiet", mesh, out], check=True)
+        except FileNotFoundError:
+            sys.exit("many_parts.py: ebpo is not in PATH; it is in tools/ of the folder that was built in")
+        except subprocess.CalledProcessError:
+            sys.exit(1)
     with open(os.path.join(folder, "plant.scene.json"), "w", encoding="utf-8") as f:
         json.dump(scene(count), f, indent=1)
         f.write("\n")

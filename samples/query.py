@@ -4,14 +4,15 @@ to build.
 
     samples/query.py MODEL.ebpo.h5 <points.txt
 
-Reads lines "x y z", with blanks or commas between, and answers each. The library is found where the
-system looks, or at EBPO_LIBRARY=/path/to/libebpo.so. As a module:  model = Model("bunny.ebpo.h5");
-model.inside([(0, 0, 0)]); model.distance([(0, 0, 0)])
+Reads lines "x y z", with blanks or commas between, and answers each. The library is that of
+EBPO_LIBRARY=/path/to/libebpo.so, else the one that the ebpo of PATH uses, else the system's. As a
+module:  model = Model("bunny.ebpo.h5"); model.inside([(0, 0, 0)]); model.distance([(0, 0, 0)])
 """
 import ctypes
 import ctypes.util
 import os
 import re
+import subprocess
 import sys
 
 NOT_SOLID = -7  # ebpo/base.h
@@ -35,11 +36,23 @@ class Distance(ctypes.Structure):
                 ("normal", ctypes.c_double * 3), ("face", ctypes.c_uint64)]
 
 
+def library_path():
+    """None: there is none."""
+    if os.environ.get("EBPO_LIBRARY"):
+        return os.environ["EBPO_LIBRARY"]
+    try:
+        told = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)
+        found = re.search(r"^library: (/.*) \([0-9.]+\)$", told.stdout, re.MULTILINE)
+    except OSError:
+        found = None
+    return found[1] if found else ctypes.util.find_library("ebpo")
+
+
 class Model:
     """Answers raise RuntimeError with the library's message."""
 
     def __init__(self, path):
-        name = os.environ.get("EBPO_LIBRARY") or ctypes.util.find_library("ebpo")
+        name = library_path()
         if not name:
             raise RuntimeError("libebpo is not found; install it, or name it in EBPO_LIBRARY")
         self.library = ctypes.CDLL(name)

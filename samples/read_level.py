@@ -76,3 +76,6 @@ try:
     main()
 except BrokenPipeError:
     sys.exit(0)
+except OSError as error:
+    sys.exit(f"read_level.py: {error}; where HDF5 has no plugin for zstd, set HDF5_PLUGIN_PATH to the "
+             "folder that `ebpo --version --verbose` names, or convert with --codec deflate")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """robot_among_scans.py FOLDER [FACES]: a robot with two arms among scans of FACES faces each (50,000
-if not given) that ebpo-generate makes. Needs ebpo and ebpo-generate in PATH. Equal arguments give
-equal scenes.
+if not given) that ebpo-generate makes. Needs ebpo and ebpo-generate in PATH; the latter is not installed, but lies
+in samples/ of the folder that was built in. Equal arguments give equal scenes.
 
     python3 samples/robot_among_scans.py /tmp/robot
     ebpo scene report --csv --from 0 --to 12 --step 0.5 /tmp/robot/robot.scene.json
@@ -71,15 +71,24 @@ def scene():
         "clearance": [{"between": ["group:hands", "layer:scans"], "distance": 0.02}]}
 
 
+def run(*command, **how):
+    try:
+        subprocess.run(command, check=True, **how)
+    except FileNotFoundError:
+        sys.exit(f"robot_among_scans.py: {command[0]} is not in PATH; ebpo-generate is in samples/ and "
+                 "ebpo in tools/ of the folder that was built in (build-quick, build)")
+    except subprocess.CalledProcessError:
+        sys.exit(1)
+
+
 def main():
     folder = sys.argv[1]
     faces = sys.argv[2] if len(sys.argv) > 2 else "50000"
     os.makedirs(folder, exist_ok=True)
     for name, how in SCANS.items():
         mesh, out = (os.path.join(folder, name + end) for end in (".ply", ".ebpo.h5"))
-        subprocess.run(["ebpo-generate", "--faces", faces, *how, mesh], check=True,
-                       stdout=subprocess.DEVNULL)
-        subprocess.run(["ebpo", "convert", "--quiet", mesh, out], check=True)
+        run("ebpo-generate", "--faces", faces, *how, mesh, stdout=subprocess.DEVNULL)
+        run("ebpo", "convert", "--quiet", mesh, out)
     with open(os.path.join(folder, "robot.scene.json"), "w", encoding="utf-8") as f:
         json.dump(scene(), f, indent=1)
         f.write("\n")

@@ -41,9 +41,13 @@ fi
 # The viewer's packages, as package-lock.json pins them.
 if [ $modules != no ] && ! cmp -s "$here/viewer/package-lock.json" \
     "$here/viewer/node_modules/.installed"; then
-    (cd "$here/viewer" && npm ci --silent --no-audit --no-fund &&
-        cp package-lock.json node_modules/.installed) || {
-        echo "install-deps.sh: npm could not install the viewer's packages (npm ci in tools/viewer says why)" >&2
+    limit=${EBPO_NPM_SECONDS:-600}
+    echo "install-deps.sh: npm fetches the viewer's packages, for at most $limit s" >&2
+    # npm alone waits for a silent server for many minutes, and says nothing
+    (cd "$here/viewer" && timeout --foreground "$limit" npm ci --silent --no-audit --no-fund \
+        --fetch-timeout=60000 --fetch-retries=1 && cp package-lock.json node_modules/.installed) || {
+        echo "install-deps.sh: npm could not install the viewer's packages within $limit s" \
+            "(npm ci in tools/viewer says why; more seconds: EBPO_NPM_SECONDS)" >&2
         [ $modules = tests ] || exit 1
         echo "install-deps.sh: the viewer's tests will be skipped" >&2
     }

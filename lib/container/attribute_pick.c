@@ -84,7 +84,7 @@ static ebpo_status pick_lists(const picking *p, uint64_t n, ebpo_attribute *a)
         status = pick_before(p, n, before);
     if (status == EBPO_OK)
         status = number_items(p, a, before, &items);
-    uint64_t count = status == EBPO_OK ? a->ends[p->count - 1] : 0;
+    uint64_t count = status == EBPO_OK && p->count ? a->ends[p->count - 1] : 0;
     if (status == EBPO_OK) {
         a->values = ebpo_alloc(count, bytes);
         status = a->values ? EBPO_OK : ebpo_fail_memory(p->error, count * bytes);

@@ -22,6 +22,11 @@ EBPO_LIBRARY="$library" python3 "$samples/query.py" "$work/cube.ebpo.h5" <"$work
 sed 's/\.0\b//g' "$work/out.py" | cmp - "$work/out" >/dev/null ||
     fail "query.py answers as query does"
 
+# Where none is named, query.py takes the library of the ebpo in PATH, not another of the system's.
+PATH=$(cd "$(dirname "$ebpo")" && pwd):$PATH PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=$samples \
+    python3 -c 'import query; print(query.library_path())' >"$work/out" 2>&1 || fail "query.py imports"
+[ "$(readlink -f "$(cat "$work/out")")" = "$(readlink -f "$library")" ] || fail "which library query.py takes"
+
 # A surface has distances only; a line that is not understood ends both, after the answers before
 # it.
 "$ebpo" convert -q "$work/open_box.ply" "$work/box.ebpo.h5" >"$work/out" 2>&1 ||
@@ -66,6 +71,16 @@ if "$ebpo" check -q "$work/room/room.obj" >/dev/null 2>&1; then
 crossing	table/top	chair back" ] || fail "pieces meet"
 fi
 
+# What is not in PATH is named, in a line.
+python=$(python3 -c 'import sys; print(sys.executable)')
+mkdir "$work/few"
+for sample in many_parts robot_among_scans; do
+    PATH="$work/few" "$python" "$samples/$sample.py" "$work/none" >"$work/out" 2>&1 &&
+        fail "$sample.py without programs"
+    [ "$(wc -l <"$work/out")" = 1 ] && grep -q "^$sample.py: ebpo.* is not in PATH; " "$work/out" ||
+        fail "$sample.py says what it lacks"
+done
+
 # Scenes: of many parts, and of a robot, which packed is answered the same.
 PATH=$(dirname "$ebpo"):$(dirname "$generate"):$PATH
 python3 "$samples/many_parts.py" "$work/plant" 300 >"$work/out" 2>&1 || fail many_parts.py
@@ -106,3 +121,9 @@ planes=$("$ebpo" info --json "$work/a.ebpo.h5" |
     /usr/bin/python3 -c 'import json, sys; print(json.load(sys.stdin)["levels"][1]["planes"])')
 [ "$(grep -c '^1[0-7] ' "$work/out")" = "$planes" ] ||
     fail "read_level.py prints each plane of level 1 ($planes)"
+
+# Without the plugin it says what next, in a line.
+HDF5_PLUGIN_PATH=/nowhere /usr/bin/python3 "$samples/read_level.py" "$work/a.ebpo.h5" 1 \
+    >"$work/out" 2>&1 && exit 0 # HDF5 finds one by itself
+[ "$(wc -l <"$work/out")" = 1 ] && grep -q '^read_level.py: .*HDF5_PLUGIN_PATH' "$work/out" ||
+    fail "read_level.py without plugin"

@@ -142,7 +142,9 @@ int bench_points_make(bench_points *out, points_kind kind, const char *model,
     points in;
     out->count = 0;
     int code = EXIT_FAILED;
-    if (points_open(&in, "bench", what, kind, raw, tmax))
+    bool opened = points_open(&in, "bench", what, kind, raw, tmax);
+    in.headless = true;
+    if (opened)
         code = read_all(out, &in, count ? count : UINT64_MAX);
     points_close(&in);
     return code;

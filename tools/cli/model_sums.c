@@ -31,36 +31,27 @@ static const struct sum {
 };
 enum { SUMS = sizeof sums / sizeof *sums };
 
-void stats_print(FILE *out, bool as_json, const ebpo_model_stats *stats)
+void stats_print(FILE *out, const ebpo_model_stats *stats)
 {
     for (int i = 0; i < SUMS; i++) {
         const char *field = (const char *)stats + sums[i].offset;
         const uint64_t *u = (const void *)field;
-        if (as_json)
-            fprintf(out, "%s\"%s\": ", i ? ", " : "{", sums[i].name);
-        else
-            fprintf(out, "%s%s ", i ? ", " : "", sums[i].name);
+        fprintf(out, "%s%s ", i ? ", " : "", sums[i].name);
         switch (sums[i].kind) {
-        case SUM_BOOL:
-            fputs(*(const bool *)field ? (as_json ? "true" : "yes") : (as_json ? "false" : "no"),
-                  out);
-            break;
+        case SUM_BOOL: fputs(*(const bool *)field ? "yes" : "no", out); break;
         case SUM_INT: fprintf(out, "%d", *(const int *)(const void *)field); break;
         case SUM_UINT: fprintf(out, "%" PRIu64, *u); break;
         case SUM_REAL: fprintf(out, "%.6f", *(const double *)(const void *)field); break;
         case SUM_FIVE:
-            fprintf(out,
-                    as_json ? "[%" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %" PRIu64 "]"
-                            : "%" PRIu64 "/%" PRIu64 "/%" PRIu64 "/%" PRIu64 "/%" PRIu64,
-                    u[0], u[1], u[2], u[3], u[4]);
+            fprintf(out, "%" PRIu64 "/%" PRIu64 "/%" PRIu64 "/%" PRIu64 "/%" PRIu64, u[0], u[1],
+                    u[2], u[3], u[4]);
         }
     }
-    fputs(as_json ? "}\n" : "\n", out);
+    fputc('\n', out);
 }
 
-void stats_json(json *j, const char *key, const ebpo_model_stats *stats)
+void stats_json(json *j, const ebpo_model_stats *stats)
 {
-    json_object(j, key);
     for (int i = 0; i < SUMS; i++) {
         const char *field = (const char *)stats + sums[i].offset;
         switch (sums[i].kind) {
@@ -75,5 +66,4 @@ void stats_json(json *j, const char *key, const ebpo_model_stats *stats)
             json_end(j);
         }
     }
-    json_end(j);
 }

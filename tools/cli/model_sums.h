@@ -7,8 +7,9 @@
 
 #include "cli/json.h"
 
-/* One line: words, or a JSON object. */
-void stats_print(FILE *out, bool as_json, const ebpo_model_stats *stats);
-void stats_json(json *j, const char *key, const ebpo_model_stats *stats);
+/* A line of words. */
+void stats_print(FILE *out, const ebpo_model_stats *stats);
+/* Members of the object that has been begun. */
+void stats_json(json *j, const ebpo_model_stats *stats);
 
 #endif

@@ -170,6 +170,8 @@ bool points_take(points *p, points_block *b)
     b->lines = b->row_count = b->fault_at = 0;
     b->rows = NULL;
     b->failed = false;
+    b->first = !p->taken;
+    p->taken = true;
     begin(p, b);
     if (b->failed || p->failed)
         return b->failed;

@@ -56,14 +56,18 @@ static bool npy_type(points *p, const char *descr)
     return strchr("<>", descr[1]) && descr[2] == 'f' && strchr("48", descr[3]) && descr[4] == '\'';
 }
 
-/* "(N, 3)" */
+/* "(N, 3)"; "(3,)" is one row. Blanks may be anywhere, a comma behind the last number. */
 static bool npy_shape(points *p, const char *shape)
 {
-    uint64_t rows;
-    int columns, length = 0;
+    uint64_t rows = 1;
+    int columns = 0, length = 0;
     int least = points_raw_width(p->kind), most = points_width(p->kind);
-    if (sscanf(shape, "(%" SCNu64 ", %d%n", &rows, &columns, &length) != 2 ||
-        shape[length] != ')' || columns < least || columns > most)
+    if (sscanf(shape, "( %" SCNu64 " , %d %n", &rows, &columns, &length) == 2)
+        length += shape[length] == ',' ? 1 : 0;
+    else if (sscanf(shape, "( %d , %n", &columns, &length) == 1)
+        rows = 1;
+    length += (int)strspn(shape + length, " ");
+    if (!length || shape[length] != ')' || columns < least || columns > most)
         return false;
     p->layout.per_row = columns;
     p->rows_total = rows;
@@ -75,7 +79,13 @@ static bool npy_head(points *p, points_block *b, const char *head)
 {
     const char *descr = npy_value(head, "'descr'"), *order = npy_value(head, "'fortran_order'"),
                *shape = npy_value(head, "'shape'");
-    if (!descr || !order || !shape || *descr != '\'')
+    if (!descr || !order || !shape)
+        return points_fault(b, 0, "has a head that is no NumPy array's");
+    if (*descr == '[')
+        return points_fault(b, 0,
+                            "holds numbers with names; save "
+                            "numpy.lib.recfunctions.structured_to_unstructured of it");
+    if (*descr != '\'')
         return points_fault(b, 0, "has a head that is no NumPy array's");
     if (!npy_type(p, descr))
         return points_fault(b, 0, "holds numbers of type %.*s; give float64 or float32 (astype)",
@@ -107,10 +117,15 @@ static bool read_npy(points *p, points_block *b)
         ;
     if (b->failed)
         return false;
-    if (p->rest_count < before + length || length >= sizeof head || u[6] < 1 || u[6] > 3)
+    if (u[6] < 1 || u[6] > 3)
+        return points_fault(b, 0, "is a NumPy array of version %d.%d; 1.0 to 3.0 are known", u[6],
+                            u[7]);
+    if (p->rest_count < before + length || length >= sizeof head)
         return points_fault(b, 0, "has a head that is no NumPy array's");
     memcpy(head, p->rest + before, length);
     head[length] = 0;
+    for (char *quote = head; (quote = strchr(quote, '"'));)
+        *quote = '\''; /* Python has both */
     points_drop(p, before + length);
     p->raw = true;
     return npy_head(p, b, head);

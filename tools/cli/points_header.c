@@ -3,6 +3,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "cli/numbers.h"
 #include "cli/points_header.h"
 
 static bool is_blank(char c)
@@ -67,6 +68,17 @@ static int find_name(char **field, int fields, const char *name)
     return -1;
 }
 
+static bool all_numbers(char **field, int fields)
+{
+    for (int i = 0; i < fields; i++) {
+        const char *after;
+        (void)number_read(field[i], field[i] + strlen(field[i]), &after);
+        if (after == field[i] || *after)
+            return false;
+    }
+    return fields > 0;
+}
+
 /* By name; or the first ones, where there are not more than needed. */
 static bool choose(points *p, char **field, int fields)
 {
@@ -107,6 +119,12 @@ bool points_take_header(points *p, points_block *b)
                           : memchr(s, '\t', (size_t)(end - s)) ? '\t'
                                                                : 0);
     int fields = points_split(p->separator, s, end, field);
+    if (all_numbers(field, fields)) {
+        b->count = b->begin;
+        return points_fault(b, b->lines--,
+                            "holds numbers, which --header would take for names; leave --header "
+                            "out, or put a line of names first");
+    }
     if (choose(p, field, fields)) {
         p->fields = fields;
         return true;

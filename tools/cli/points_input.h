@@ -36,6 +36,7 @@ typedef struct points_block {
     double *room; /* rows that are not those of the bytes */
     uint64_t room_rows;
     uint64_t lines;    /* of text, those before `begin` included */
+    bool first;        /* of the input */
     bool failed;       /* behind its last row: */
     uint64_t fault_at; /* line or row from 1 in this block, 0: the input as a whole */
     char fault[200];
@@ -44,15 +45,16 @@ typedef struct points_block {
 typedef struct points {
     const char *command, *name; /* for messages */
     points_kind kind;
-    bool raw;    /* doubles, or what `layout` tells */
-    bool header; /* the first line of text names columns; may be set after points_open */
-    double tmax; /* of rays that tell none */
+    bool raw;      /* doubles, or what `layout` tells */
+    bool header;   /* the first line of text names columns; may be set after points_open */
+    bool headless; /* the command takes no such line */
+    double tmax;   /* of rays that tell none */
     int fd;
     int wake; /* when this can be read, waiting ends, as at the end of the input; -1: nothing */
     uint64_t bytes_total, bytes_taken; /* of a file; 0: not known how many */
     char *rest;                        /* [rest_capacity] what was read and is not taken */
     size_t rest_count, rest_capacity;
-    bool begun, ended;
+    bool begun, taken, ended;
     _Atomic bool failed; /* said on stderr, the command shall end with EXIT_FAILED */
     uint64_t line, row;  /* that have passed */
     points_layout layout;

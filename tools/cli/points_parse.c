@@ -2,6 +2,7 @@
 #include "cli/points_header.h"
 #include "cli/points_parse.h"
 
+#include <ctype.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -115,13 +116,16 @@ static char *skip_blanks(char *s)
     return s;
 }
 
-static bool wrong_count(const points *p, points_block *b)
+/* `at`: what is no number. */
+static bool wrong_count(const points *p, points_block *b, const char *at)
 {
     static const char *const expected[] = {
         "expected three numbers", "expected six or seven numbers: origin, direction and tmax",
         "expected six numbers: the lower and the upper corner"
     };
-    return points_fault(b, b->lines, "%s", expected[p->kind]);
+    bool names = b->first && !b->row_count && !p->headless && (isalpha((uint8_t)*at) || *at == '"');
+    return points_fault(b, b->lines, "%s%s", expected[p->kind],
+                        names ? "; --header takes the first line for names of columns" : "");
 }
 
 static bool parse_blanks(const points *p, points_block *b, char *s, char *end, double *row,
@@ -130,10 +134,10 @@ static bool parse_blanks(const points *p, points_block *b, char *s, char *end, d
     while (*s && *s != '#') {
         const char *after;
         if (*count == points_width(p->kind))
-            return wrong_count(p, b);
+            return wrong_count(p, b, s);
         row[*count] = number_read(s, end, &after);
         if (after == s || !(is_blank(*after) || *after == ',' || *after == '#' || !*after))
-            return wrong_count(p, b);
+            return wrong_count(p, b, s);
         if (!isfinite(row[(*count)++]))
             return points_fault(b, b->lines, "number %d is not finite", *count);
         s = skip_blanks((char *)after);
@@ -176,7 +180,7 @@ static bool parse_line(const points *p, points_block *b, char *s, char *end)
     if (!(p->fields ? parse_fields : parse_blanks)(p, b, s, end, row, &count))
         return false;
     if (count < points_raw_width(p->kind))
-        return wrong_count(p, b);
+        return wrong_count(p, b, s);
     if (count < points_width(p->kind))
         row[count] = p->tmax;
     b->row_count++;

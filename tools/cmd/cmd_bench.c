@@ -325,7 +325,7 @@ static void print_results(const values *v, const char *path, uint64_t count, con
            words_bytes(memory, sizeof memory, r->model_end.memory_peak));
     print_answers(v, r);
     printf("model          ");
-    stats_print(stdout, false, &r->model);
+    stats_print(stdout, &r->model);
     remote_tell(&r->traffic, &v->q.remote, false);
 }
 
@@ -392,8 +392,12 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
         json_real(&j, "rate", v->rate);
     json_figures(&j, r);
     json_answers(&j, v, r);
-    stats_json(&j, "model", &r->model);
-    stats_json(&j, "model_at_end", &r->model_end);
+    json_object(&j, "model");
+    stats_json(&j, &r->model);
+    json_end(&j);
+    json_object(&j, "model_at_end");
+    stats_json(&j, &r->model_end);
+    json_end(&j);
     remote_json(&j, &r->traffic, &v->q.remote);
     json_finish(&j);
 }

@@ -52,6 +52,8 @@ static const arg_option options[] = {
                 "'B " POSE_FORM
                 "': where model B is: scaled, turned by a quaternion, moved; may be "
                 "repeated"),
+    OPTION_FLAG("header", 0, query_values, header,
+                "the first line of POINTS names columns: x, y and z in any order"),
     QUERY_MODEL_OPTIONS_FOR("opening, and for answers"),
     OPTION_FLAG("json", 0, query_values, json, "print JSON: an object, or one for each point"),
     REMOTE_HTTP_OPTIONS(query_values, remote),
@@ -258,6 +260,7 @@ static int ask_points(const values *v, ebpo_boolean *b)
         points_open(&in, "boolean", v->inside ? v->inside : v->distance, POINTS, false, INFINITY);
     int code = !rows || !results ? command_no_memory("boolean") : opened ? EXIT_FINE : EXIT_FAILED;
     uint64_t count = 0;
+    in.header = v->query.header;
     while (code == EXIT_FINE && (count = points_next(&in, rows)) > 0) {
         if (answer_points(v, b, rows, count, results, &error) != EBPO_OK)
             code = command_failed("boolean", &error);

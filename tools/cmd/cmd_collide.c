@@ -171,6 +171,20 @@ static ebpo_status ask_pairs(collide_values *v, ebpo_collider *c, const ebpo_col
     return status;
 }
 
+/* Said on standard error, as answers are on the other. */
+static ebpo_status write_pairs(const collide_values *v, ebpo_collider *c,
+                               const ebpo_collide_options *how, ebpo_error *error)
+{
+    bool ply = words_end_with(v->out, ".ply");
+    ebpo_status status =
+        ebpo_collide_write(c, how, ply ? EBPO_PAIRS_PLY : EBPO_PAIRS_HDF5, v->out, error);
+    if (status == EBPO_OK && !v->quiet)
+        fprintf(stderr, "%s: %s\n", v->out,
+                ply ? "both models, in which the faces that meet are red"
+                    : "all pairs of faces that meet, and where they cross");
+    return status;
+}
+
 /* What is asked on the command line, one after the other. */
 static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
                            ebpo_error *error)
@@ -181,10 +195,7 @@ static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_colli
     if (v->relation)
         status = ask_relation(v, c, how, error);
     if (status == EBPO_OK && v->out)
-        status =
-            ebpo_collide_write(c, how,
-                               words_end_with(v->out, ".ply") ? EBPO_PAIRS_PLY : EBPO_PAIRS_HDF5,
-                               v->out, error);
+        status = write_pairs(v, c, how, error);
     if (status == EBPO_OK && collide_far_asked(&v->far))
         return collide_far_ask(&v->far, v->query.json, c, how, error);
     if (status == EBPO_OK && (v->query.all || v->self))

@@ -222,9 +222,11 @@ void query_holding_leave(query_holding *h, uint64_t questions, double seconds)
 
 /* --- what was decided --- */
 
-static void tell_words(const query_holding *h)
+void query_holding_tell(const query_holding *h)
 {
     char half[32];
+    if (!h->automatic)
+        return;
     words_bytes(half, sizeof half, h->options.memory);
     fprintf(stderr, "memory: at most %s, half of what was free; ", half);
     if (!h->subtrees)
@@ -241,25 +243,18 @@ static void tell_words(const query_holding *h)
                 h->plan.resident ? "" : ", as all of the model would not fit");
 }
 
-void query_holding_tell(const query_holding *h, bool as_json)
+void query_holding_json(const query_holding *h, json *j)
 {
     if (!h->automatic)
         return;
-    if (!as_json) {
-        tell_words(h);
-        return;
-    }
-    json j;
-    json_begin(&j, stderr);
-    json_object(&j, NULL);
-    json_object(&j, "automatic_memory");
-    json_uint(&j, "free", h->free_memory);
-    json_uint(&j, "most", h->options.memory);
-    json_text(&j, "held", !h->subtrees ? "whole" : h->whole_later ? "whole later" : "parts");
-    json_bool(&j, "fits", h->plan.resident);
-    json_uint(&j, "questions_before", h->whole_later ? h->questions_before : 0);
-    json_uint(&j, "loads_before", h->whole_later ? h->loads_before : 0);
-    json_real(&j, "extra_seconds_before", h->whole_later ? h->extra_seconds : 0);
-    json_real(&j, "whole_seconds_estimated", h->whole_later ? h->whole_seconds : 0);
-    json_finish(&j);
+    json_object(j, "automatic_memory");
+    json_uint(j, "free", h->free_memory);
+    json_uint(j, "most", h->options.memory);
+    json_text(j, "held", !h->subtrees ? "whole" : h->whole_later ? "whole later" : "parts");
+    json_bool(j, "fits", h->plan.resident);
+    json_uint(j, "questions_before", h->whole_later ? h->questions_before : 0);
+    json_uint(j, "loads_before", h->whole_later ? h->loads_before : 0);
+    json_real(j, "extra_seconds_before", h->whole_later ? h->extra_seconds : 0);
+    json_real(j, "whole_seconds_estimated", h->whole_later ? h->whole_seconds : 0);
+    json_end(j);
 }

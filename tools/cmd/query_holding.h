@@ -7,6 +7,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
+#include "cli/json.h"
 #include "cli/query_args.h"
 
 enum { QUERY_THREADS_MOST = 256 };
@@ -52,8 +53,9 @@ bool query_holding_enter_alone(query_holding *h, ebpo_context **context);
 void query_holding_leave(query_holding *h, uint64_t questions, double seconds);
 void query_holding_forget(query_holding *h, ebpo_context **context);
 
-/* With --stats: what was decided, a line of words or of JSON on stderr. Nothing where a wish was
- * given. */
-void query_holding_tell(const query_holding *h, bool as_json);
+/* With --stats: what was decided, a line of words on stderr or a member of JSON. Nothing where a
+ * wish was given. */
+void query_holding_tell(const query_holding *h);
+void query_holding_json(const query_holding *h, json *j);
 
 #endif

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "cli/command.h"
+#include "cli/json.h"
 #include "cli/model_sums.h"
 #include "cli/npy_answers.h"
 #include "cmd/query_holding.h"
@@ -16,9 +17,19 @@ static void tell_stats(const query_job *job, const query_holding *holding)
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     traffic t = traffic_of(holding->session.file);
     ebpo_model_get_stats(holding->session.model, &stats);
-    stats_print(stderr, job->values->json, &stats);
-    query_holding_tell(holding, job->values->json);
-    remote_tell(&t, &job->values->remote, job->values->json);
+    if (!job->values->json) {
+        stats_print(stderr, &stats);
+        query_holding_tell(holding);
+        remote_tell(&t, &job->values->remote, false);
+        return;
+    }
+    json j;
+    json_begin(&j, stderr);
+    json_object(&j, NULL);
+    stats_json(&j, &stats);
+    query_holding_json(holding, &j);
+    remote_json(&j, &t, &job->values->remote);
+    json_finish(&j);
 }
 
 /* Cores that this process may use, unless a number was given. Ways of loading that keep nothing

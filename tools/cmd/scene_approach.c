@@ -137,8 +137,9 @@ ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_scene *
     if (v->json)
         json_finish(&l.j);
     else if (!v->quiet)
-        fprintf(stderr, "%llu pairs: %llu come near, %llu open; %llu looks; %.3g s\n",
-                (unsigned long long)l.ways, (unsigned long long)l.reached,
-                (unsigned long long)l.open, (unsigned long long)l.looks, progress_now() - begun);
+        fprintf(stderr, "%s: %llu come near, %llu open; %llu looks; %.3g s\n",
+                words_plural((char[40]){ 0 }, 40, l.ways, "pair", "pairs"),
+                (unsigned long long)l.reached, (unsigned long long)l.open,
+                (unsigned long long)l.looks, progress_now() - begun);
     return status;
 }

@@ -185,10 +185,11 @@ static void finish(report *r, double seconds)
         json_real(&r->j, "seconds", seconds);
         json_finish(&r->j);
     } else if (!r->v->quiet) {
-        fprintf(stderr,
-                "%llu times, %llu of them with meetings; %llu pairs asked, %llu meet; %.3g s\n",
-                (unsigned long long)r->frames, (unsigned long long)r->frames_met,
-                (unsigned long long)r->asked, (unsigned long long)r->meetings, seconds);
+        char times[40], asked[40];
+        words_plural(times, sizeof times, r->frames, "time", "times");
+        words_plural(asked, sizeof asked, r->asked, "pair", "pairs");
+        fprintf(stderr, "%s, %llu with meetings; %s asked, %llu meet; %.3g s\n", times,
+                (unsigned long long)r->frames_met, asked, (unsigned long long)r->meetings, seconds);
     }
 }
 
