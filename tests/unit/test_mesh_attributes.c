@@ -10,6 +10,9 @@
 
 #include "attributes/attributes.h"
 #include "check_main.h"
+#include "container/attribute_read.h"
+#include "container/chunks.h"
+#include "container/pick.h"
 #include "ply/ply.h"
 #include "scratch.h"
 #include "solids.h"
@@ -403,6 +406,32 @@ START_TEST(a_subset_has_the_rows_of_its_mesh)
 }
 END_TEST
 
+START_TEST(no_rows_are_picked_as_none)
+{
+    ebpo_mesh solid = small_mesh(), mesh = parse_seed(&solid, 41, LITTLE);
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_attributes *to;
+    ebpo_chunks *chunks;
+    ebpo_file *file;
+    write_file(&mesh, scratch("a.ebpo.h5"), 40);
+    fine(ebpo_open(scratch("a.ebpo.h5"), &file, &error));
+    fine(ebpo_chunks_make(&chunks, file, 0, &error));
+    fine(ebpo_attributes_read_head(file, &read, &to, &error));
+    uint64_t lists = 0;
+    for (uint64_t i = 0; i < to->count; i++)
+        lists += file->attributes.head[i].different && ebpo_attribute_is_of(&to->array[i], "face");
+    ck_assert_uint_gt(lists, 0);
+    fine(ebpo_pick_attributes(chunks, to, "face", NULL, 0, 1, &error));
+    for (uint64_t i = 0; i < to->count; i++)
+        ck_assert(!ebpo_attribute_is_of(&to->array[i], "face") || to->array[i].rows == 0);
+    ebpo_attributes_free(to);
+    ebpo_chunks_free(chunks);
+    ebpo_close(file);
+    ebpo_mesh_free(&mesh);
+    ebpo_mesh_free(&solid);
+}
+END_TEST
+
 /* --- what happens on the way --- */
 
 static ebpo_mesh parse_text(const char *text) { return parse((const uint8_t *)text, strlen(text)); }
@@ -587,6 +616,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, a_file_gives_everything_back);
     tcase_add_test(tests, a_written_ply_is_read_as_what_it_was);
     tcase_add_test(tests, a_subset_has_the_rows_of_its_mesh);
+    tcase_add_test(tests, no_rows_are_picked_as_none);
     tcase_add_test(tests, joined_vertices_keep_what_the_first_has);
     tcase_add_test(tests, triangles_have_what_their_polygon_has);
     tcase_add_test(tests, triangles_of_strips_have_zeros_and_empty_lists);
