@@ -11,6 +11,7 @@ sudo=
 [ "$(id -u)" = 0 ] || sudo=sudo
 $sudo ninja -C build-quick install >/dev/null
 $sudo ldconfig
+PATH=/usr/local/bin:$PATH # not everyone's has it
 mkdir -p samples/out
 out=samples/out/bunny.ebpo.h5
 set -x
@@ -21,3 +22,4 @@ ebpo render $out samples/out/bunny.png --levels 0,1,2,3,4,6 --size 1200x840
 h5dump -A 0 -d /levels/01/plane_counts $out
 set +x
 echo "Results: $out, samples/out/bunny.png"
+echo "Where 'ebpo' or 'man ebpo' is not found: export PATH=/usr/local/bin:\$PATH MANPATH=/usr/local/share/man:"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""robot_among_scans.py FOLDER [FACES]: a robot with two arms among scans of FACES faces each (50,000
+"""robot_among_scans.py FOLDER [FACES]: a robot with two arms among scans of FACES faces each (320,000
 if not given) that ebpo-generate makes. Needs ebpo and ebpo-generate in PATH; the latter is not installed, but lies
 in samples/ of the folder that was built in. Equal arguments give equal scenes.
 
@@ -83,7 +83,7 @@ def run(*command, **how):
 
 def main():
     folder = sys.argv[1]
-    faces = sys.argv[2] if len(sys.argv) > 2 else "50000"
+    faces = sys.argv[2] if len(sys.argv) > 2 else "320000"
     os.makedirs(folder, exist_ok=True)
     for name, how in SCANS.items():
         mesh, out = (os.path.join(folder, name + end) for end in (".ply", ".ebpo.h5"))
