@@ -51,9 +51,10 @@ grep -q "^ebpo: the library that runs is not the one .*$library; $work/old/.* lo
 # Programs of others find the library by pkg-config, as it is installed.
 grep -qx 'libdir=${prefix}/lib.*' "$own"/lib*/pkgconfig/ebpo.pc 2>"$work/out" ||
     grep -rqx 'libdir=${prefix}/lib.*' "$own"/lib/*/pkgconfig/ebpo.pc 2>>"$work/out" || fail "ebpo.pc"
-# And where it has been moved to.
+# And where it has been moved to; folders that were set up before that was the default stay as they are.
 pc=$(find "$own" -name ebpo.pc)
-if command -v pkg-config >/dev/null; then
+if command -v pkg-config >/dev/null &&
+    "$meson" configure "$build" 2>/dev/null | grep -q 'pkgconfig.relocatable *true'; then
     PKG_CONFIG_PATH=$(dirname "$pc") pkg-config --variable=prefix ebpo >"$work/out" 2>&1 || fail pkg-config
     there=$(cd "$(sed 's/\\//g' "$work/out")" && pwd -P) && [ "$there" = "$own" ] || fail "ebpo.pc moves along"
 fi
