@@ -1,6 +1,7 @@
 #include "cli/json.h"
 
 #include <assert.h>
+#include <ebpo/base.h>
 #include <math.h>
 #include <string.h>
 
@@ -79,7 +80,13 @@ void json_begin(json *j, FILE *out)
     j->out = out;
 }
 
-void json_object(json *j, const char *key) { open_level(j, key, '{', '}'); }
+void json_object(json *j, const char *key)
+{
+    bool outermost = j->depth == 0;
+    open_level(j, key, '{', '}');
+    if (outermost && j->out == stdout)
+        json_text(j, "ebpo", ebpo_version());
+}
 
 void json_array(json *j, const char *key) { open_level(j, key, '[', ']'); }
 

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cli/command.h"
+#include "cli/json.h"
 #include "cli/memory_args.h"
 #include "cli/progress.h"
 #include "cli/reading.h"
@@ -21,7 +22,7 @@ typedef struct extracted {
 typedef struct values {
     int64_t level, subtree, threads;
     memory_values memory;
-    bool mesh, no_walls, quiet;
+    bool mesh, no_walls, json, quiet;
     remote_values remote;
 } values;
 
@@ -39,6 +40,7 @@ static const arg_option options[] = {
                 "with --level: leave out polygons that lie on cell walls"),
     OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
+    OPTION_FLAG("json", 0, values, json, "the summary as JSON"),
     OPTION_QUIET(values, quiet),
     REMOTE_OPTIONS(values, remote),
     { 0 },
@@ -170,6 +172,21 @@ static void summarise(const values *v, const char *path, const extracted *out)
     putchar('\n');
 }
 
+static void summarise_json(const values *v, const char *path, const extracted *out,
+                           const traffic *t)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "file", path);
+    json_uint(&j, "vertices", out->mesh.vertex_count);
+    json_uint(&j, "faces", out->mesh.face_count);
+    if (v->level >= 0)
+        json_real(&j, "envelope_volume", out->volume);
+    remote_json(&j, t, &v->remote);
+    json_finish(&j);
+}
+
 static const values usual = { .level = -1, .subtree = -1, .remote = REMOTE_VALUES_INIT };
 
 static int run(void *given, const char **operand)
@@ -196,11 +213,14 @@ static int run(void *given, const char **operand)
     if (status == EBPO_OK)
         status = ebpo_mesh_write_ply(&out.mesh, operand[1], &error);
     progress_wipe(&line);
-    if (status == EBPO_OK && !v->quiet)
-        summarise(v, operand[1], &out);
     if (status == EBPO_OK) {
         traffic t = traffic_of(file);
-        remote_tell(&t, &v->remote, false);
+        if (v->json)
+            summarise_json(v, operand[1], &out, &t);
+        else if (!v->quiet)
+            summarise(v, operand[1], &out);
+        if (!v->json)
+            remote_tell(&t, &v->remote, false);
     }
     if (!out.lender)
         ebpo_mesh_free(&out.mesh);

@@ -11,6 +11,7 @@
 
 #include "cli/command.h"
 #include "cli/file_facts.h"
+#include "cli/json.h"
 #include "cli/progress.h"
 #include "cli/reading.h"
 #include "cli/remote_args.h"
@@ -25,7 +26,7 @@ typedef struct values {
     int64_t level, threads;
     const char *levels, *view, *size;
     int up;
-    bool mesh, edges, no_colours, quiet;
+    bool mesh, edges, no_colours, json, quiet;
     remote_values remote;
 } values;
 
@@ -45,6 +46,7 @@ static const arg_option options[] = {
     OPTION_FLAG("no-colours", 0, values, no_colours,
                 "the model without the colours of its vertices or faces"),
     OPTION_THREADS(values, threads),
+    OPTION_FLAG("json", 0, values, json, "what was drawn, as JSON"),
     OPTION_FLAG("quiet", 'q', values, quiet, "no progress: errors and warnings only"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
@@ -67,6 +69,7 @@ static const arg_spec spec = {
 typedef struct tile {
     int level; /* or MESH */
     bool if_there;
+    uint64_t face_count;
     ebpo_mesh mesh;
     ebpo_colours colours; /* of the model, as far as it has any */
     bool closed;
@@ -323,10 +326,35 @@ static ebpo_status render(job *j, bool is_file, ebpo_progress progress, ebpo_err
         status = picture_write_png(&p, j->out, error);
     picture_free(&p);
     for (int i = 0; i < j->tile_count; i++) {
+        j->tiles[i].face_count = j->tiles[i].mesh.face_count;
         ebpo_mesh_free(&j->tiles[i].mesh);
         ebpo_colours_free(&j->tiles[i].colours);
     }
     return status;
+}
+
+static void tell_json(const job *j)
+{
+    json out;
+    json_begin(&out, stdout);
+    json_object(&out, NULL);
+    json_text(&out, "file", j->out);
+    json_uint(&out, "width", (uint64_t)j->width);
+    json_uint(&out, "height", (uint64_t)j->height);
+    json_real(&out, "azimuth", j->azimuth);
+    json_real(&out, "elevation", j->elevation);
+    json_array(&out, "drawn");
+    for (int i = 0; i < j->tile_count; i++) {
+        const tile *t = &j->tiles[i];
+        json_object(&out, NULL);
+        if (t->level == MESH)
+            json_null(&out, "level");
+        else
+            json_int(&out, "level", t->level);
+        json_uint(&out, "faces", t->face_count);
+        json_end(&out);
+    }
+    json_finish(&out);
 }
 
 static int run_job(job *j)
@@ -344,6 +372,8 @@ static int run_job(job *j)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status = render(j, is_file, progress, &error);
     progress_wipe(&line);
+    if (status == EBPO_OK && j->v.json)
+        tell_json(j);
     return status == EBPO_OK ? EXIT_FINE : command_failed("render", &error);
 }
 
