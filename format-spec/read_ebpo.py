@@ -72,7 +72,7 @@ def leaf_refs(level, first):
 def arrays(file):
     """README.md, "Arrays": {path: dataset}, of those that the head calls for; what else stands there is ignored."""
     listed_parts = parts_of(file)
-    mesh, planes, leaf_planes = (part in listed_parts for part in ("mesh", "planes", "leaf-planes"))
+    mesh, planes, leaf_planes, colours = (part in listed_parts for part in ("mesh", "planes", "leaf-planes", "colours"))
     out, groups, attrs = {}, 1, file.attrs
     for number in range(one(attrs["level_count"])):
         path = f"/levels/{number:02d}"
@@ -84,7 +84,8 @@ def arrays(file):
                 "leaf_skip": mesh * s["leaf"], "leaf_new": mesh * s["leaf"], "leaf_ref_count": mesh * s["leaf"],
                 "leaf_refs": mesh * s["faces_referenced"], "types_index": groups > 4096, "gray_index": planes and s["gray"] > 4096,
                 "leaf_index": (mesh or leaf_planes) and s["leaf"] > 4096,
-                "leaf_plane_counts": leaf_planes * s["leaf"], "leaf_planes": leaf_planes * s["leaf_planes"]}
+                "leaf_plane_counts": leaf_planes * s["leaf"], "leaf_planes": leaf_planes * s["leaf_planes"],
+                "gray_colours": colours * s["gray"]}
         out.update({f"{path}/{name}": level[name] for name, count in rows.items()
                     if count and (name not in ("black_winding", "white_winding") or name in level)})
         groups = s["gray"]
@@ -137,11 +138,11 @@ def as_without_subtrees(name, dataset):
     return values
 
 
-def content_sha256(file):
-    """README.md, "Content checksum"."""
+def content_sha256(file, of_colours=False):
+    """README.md, "Content checksum". `of_colours`: colours_sha256."""
     total, subtrees = hashlib.sha256(), "subtrees" in parts_of(file)
     for name, dataset in sorted(arrays(file).items()):
-        if name.startswith("/subtrees/"):
+        if name.startswith("/subtrees/") or name.endswith("/gray_colours") != of_colours:
             continue
         values = as_without_subtrees(name, dataset) if subtrees else dataset[...]
         if values is not None:
@@ -223,7 +224,7 @@ def check_places(file):
         return
     names = ["types", "plane_counts", "planes", "leaf_winding", "black_winding", "white_winding",
              "leaf_skip", "leaf_new", "leaf_ref_count", "leaf_refs", "types_index", "gray_index",
-             "leaf_index", "leaf_plane_counts", "leaf_planes"]
+             "leaf_index", "leaf_plane_counts", "leaf_planes", "gray_colours"]
     roots = {4096: "/mesh/vertices", 4097: "/mesh/faces", 4098: "/mesh/faces_index",
              4099: "/maps/vertex_source", 4100: "/maps/face_source", 4112: "/subtrees/index",
              4113: "/subtrees/counts", 4114: "/subtrees/outer"}
@@ -299,6 +300,70 @@ def read_attributes(file):
     return {"header": None if header is None else header.tobytes().decode("latin-1"), "arrays": out}
 
 
+def colours_of(file, element):
+    """README.md, "Names": red, green and blue of vertices or faces as bytes; None: they have none."""
+    found = {}
+    for number in range(int(file["/attributes"].attrs["arrays"])):
+        array = file[f"/attributes/{number:03d}"]
+        if text(array.attrs["element"]) == element and "list" not in array.attrs:
+            kind = text(array.attrs["type"])
+            values = attribute_values(array, ATTRIBUTE_TYPES[kind]).reshape(len(array), -1)
+            for column, name in enumerate(text(array.attrs["names"]).split(" ")):
+                full = {"uint16": 65535, "float32": 1, "float64": 1}.get(kind, 255)
+                found.setdefault(name, values[:, column].astype("f8") / full * 255)
+    for names in (["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"]):
+        if all(name in found for name in names):
+            scaled = np.stack([found[name] for name in names], axis=1)
+            return np.where(scaled >= 255, 255, np.where(scaled > 0, scaled + 0.5, 0)).astype("i8")
+    return None
+
+
+def face_sums(file):
+    """README.md, "Colours of envelopes": of each face weight times thrice the colour, and thrice the weight; None: no colours."""
+    of_vertex, of_face = colours_of(file, "vertex"), colours_of(file, "face")
+    if of_vertex is None and of_face is None:
+        return None
+    at, corners = vertices(file["/mesh/vertices"]).astype("f8").reshape(-1, 3), faces(file["/mesh/faces"]).reshape(-1, 3)
+    by_face = of_face is not None and (of_vertex is None or (of_vertex == of_vertex[0]).all())
+    thrice = 3 * of_face if by_face else of_vertex[corners].sum(axis=1)
+    size = np.asarray(file.attrs["box_size"]).max()
+    u, v = (at[corners[:, 1]] - at[corners[:, 0]]) / size, (at[corners[:, 2]] - at[corners[:, 0]]) / size
+    x = u[:, 1] * v[:, 2] - u[:, 2] * v[:, 1]
+    y = u[:, 2] * v[:, 0] - u[:, 0] * v[:, 2]
+    z = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    weight = 1 + (np.sqrt(x * x + y * y + z * z) * 2**32).astype("i8")
+    return np.concatenate([weight[:, None] * thrice, 3 * weight[:, None]], 1).astype(object)
+
+
+def leaf_sums(level, of_faces):
+    """The same of each leaf, over all faces that it lists."""
+    first, before = leaf_first(level).astype("i8"), np.zeros((len(of_faces) + 1, 4), object)
+    before[1:] = np.cumsum(of_faces, axis=0)
+    out = before[first + level["leaf_new"][...].astype("i8")] - before[first]
+    if "leaf_refs" in level:
+        leaf = np.repeat(np.arange(len(first)), level["leaf_ref_count"][...].astype("i8"))
+        np.add.at(out, leaf, of_faces[leaf_refs(level, first)])
+    return out
+
+
+def check_colours(file):
+    """Colours of gray nodes, where the file has what they are of."""
+    parts = parts_of(file)
+    of_faces = face_sums(file) if {"colours", "mesh", "attributes"} <= set(parts) and "pruned" not in parts else None
+    below = None
+    for number in reversed(range(one(file.attrs["level_count"]) if of_faces is not None else 0)):
+        level = level_arrays(file, number)
+        kinds = level["types"][...][:, None] >> 2 * np.arange(8 if number else 1) & 3
+        sums = np.zeros(kinds.shape + (4,), object)
+        if (kinds == 2).any():
+            sums[kinds == 2] = leaf_sums(level, of_faces)
+        if (kinds == 3).any():
+            sums[kinds == 3] = below
+            channel = [(2 * below[:, k] + below[:, 3]) // (2 * below[:, 3]) for k in range(3)]
+            assert (level["gray_colours"][...] == channel[0] + 256 * channel[1] + 65536 * channel[2]).all(), f"level {number}: colours"
+        below = sums.sum(axis=1)
+
+
 def listed(values):
     if values is None:
         return None
@@ -343,6 +408,9 @@ def read_level(file, number, parts):
     out["leaf_refs"] = listed(leaf_refs(level, first)) if "leaf_refs" in level else None
     out["leaf_plane_counts"] = plain("leaf_plane_counts", "u1")
     out["leaf_planes"] = plain("leaf_planes", "u4")
+    if "gray_colours" in level:
+        out["gray_colours"] = plain("gray_colours", "u4")
+        assert level["gray_colours"][...].max() < 1 << 24, f"level {number}: a colour"
     return out
 
 
@@ -470,8 +538,11 @@ def read(path):
         assert not unknown, f"needs {unknown}"
         parts = set(parts_of(file))
         assert content_sha256(file) == text(file.attrs["content_sha256"]), "content_sha256 differs"
+        if "colours" in parts:
+            assert content_sha256(file, of_colours=True) == text(file.attrs["colours_sha256"]), "colours_sha256 differs"
         check_pruned(file, "pruned" in parts)
         check_codings(file)
+        check_colours(file)
         if "subtrees" in parts:
             check_subtrees(file)
         out = {name: text(file.attrs[name]) for name in ("kind", "winding_rule", "coordinate_type")}

@@ -6,87 +6,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "attributes/attributes.h"
+#include "attributes/colour_columns.h"
 #include "base/alloc.h"
 #include "base/error.h"
 
-enum { CHANNELS = 4 };
-
-/* A column of an array of numbers; `of` NULL: there is none. */
-typedef struct channel {
-    const ebpo_attribute *of;
-    uint32_t column;
-} channel;
-
-static channel find(const ebpo_attributes *in, const char *element, const char *name)
-{
-    size_t length = strlen(name);
-    for (uint64_t i = 0; i < in->count; i++) {
-        const ebpo_attribute *a = &in->array[i];
-        if (a->list != EBPO_ATTRIBUTE_NO_LIST || !a->values || !ebpo_attribute_is_of(a, element))
-            continue;
-        uint32_t column = 0;
-        for (const char *at = a->names; *at; column++) {
-            size_t n = strcspn(at, " ");
-            if (n == length && memcmp(at, name, n) == 0)
-                return (channel){ a, column };
-            at += n + (at[n] == ' ');
-        }
-    }
-    return (channel){ NULL, 0 };
-}
-
-static bool find_all(const ebpo_attributes *in, const char *element, channel out[CHANNELS])
-{
-    static const char *const names[][CHANNELS] = {
-        { "red", "green", "blue", "alpha" },
-        { "diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha" },
-    };
-    for (unsigned set = 0; in && set < sizeof names / sizeof *names; set++) {
-        for (int k = 0; k < CHANNELS; k++)
-            out[k] = find(in, element, names[set][k]);
-        if (out[0].of && out[1].of && out[2].of)
-            return true;
-    }
-    return false;
-}
-
-static uint8_t byte_of(double value, double full)
-{
-    double scaled = value / full * 255;
-    return scaled >= 255 ? 255 : scaled > 0 ? (uint8_t)(scaled + 0.5) : 0; /* NaN: 0 */
-}
-
-#define VALUE_AS(type, full)                 \
-    {                                        \
-        type value;                          \
-        memcpy(&value, from, sizeof value);  \
-        return byte_of((double)value, full); \
-    }
-
-static uint8_t byte_at(const channel *c, uint64_t row)
-{
-    const uint8_t *from = c->of->values + row * ebpo_attribute_row_bytes(c->of) +
-                          (uint64_t)c->column * ebpo_attribute_bytes(c->of->type);
-    switch (c->of->type) {
-    case EBPO_ATTRIBUTE_INT8: VALUE_AS(int8_t, 255)
-    case EBPO_ATTRIBUTE_UINT8: return *from;
-    case EBPO_ATTRIBUTE_INT16: VALUE_AS(int16_t, 255)
-    case EBPO_ATTRIBUTE_UINT16: VALUE_AS(uint16_t, 65535)
-    case EBPO_ATTRIBUTE_INT32: VALUE_AS(int32_t, 255)
-    case EBPO_ATTRIBUTE_UINT32: VALUE_AS(uint32_t, 255)
-    case EBPO_ATTRIBUTE_FLOAT32: VALUE_AS(float, 1)
-    case EBPO_ATTRIBUTE_FLOAT64: VALUE_AS(double, 1)
-    }
-    return 0;
-}
+enum { CHANNELS = EBPO_COLOUR_CHANNELS };
 
 static ebpo_status make(uint8_t **out, const ebpo_attributes *from, const char *element,
                         uint64_t count, ebpo_error *error)
 {
-    channel channels[CHANNELS];
+    ebpo_colour_column channels[CHANNELS];
     *out = NULL;
-    if (!find_all(from, element, channels))
+    if (!ebpo_colour_columns(from, element, channels))
         return EBPO_OK;
     uint8_t *rgba = ebpo_alloc(count ? count : 1, CHANNELS);
     if (!rgba)
@@ -94,7 +25,7 @@ static ebpo_status make(uint8_t **out, const ebpo_attributes *from, const char *
     memset(rgba, 255, count * CHANNELS);
     for (int k = 0; k < CHANNELS; k++)
         for (uint64_t i = 0; channels[k].of && i < count && i < channels[k].of->rows; i++)
-            rgba[CHANNELS * i + (unsigned)k] = byte_at(&channels[k], i);
+            rgba[CHANNELS * i + (unsigned)k] = ebpo_colour_byte(&channels[k], i);
     *out = rgba;
     return EBPO_OK;
 }

@@ -7,6 +7,7 @@
 
 #include "arrange/arrange.h"
 #include "attributes/attributes.h"
+#include "attributes/colour_columns.h"
 #include "base/alloc.h"
 #include "base/clock.h"
 #include "base/error.h"
@@ -18,6 +19,7 @@
 #include "construct/corner_windings.h"
 #include "construct/emit.h"
 #include "construct/face_numbers.h"
+#include "construct/gray_colours.h"
 #include "construct/join_levels.h"
 #include "construct/pack.h"
 #include "construct/partition.h"
@@ -151,6 +153,8 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     info->parts = o->parts;
     if (!ebpo_attributes_hold(mesh->attributes) || !(o->parts & EBPO_PART_MESH))
         info->parts &= ~(uint32_t)EBPO_PART_ATTRIBUTES;
+    if (!ebpo_attributes_coloured(mesh->attributes) || !(o->parts & EBPO_PART_MESH))
+        info->parts &= ~(uint32_t)EBPO_PART_COLOURS;
 }
 
 /* A tree that is deeper than the order is good for needs another one. */
@@ -282,6 +286,10 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
         status = EBPO_E_CANCELLED;
     if (status == EBPO_OK && b->options->parts & EBPO_PART_MESH)
         status = ebpo_build_mesh(b, mesh, out, error);
+    if (out->info.level_count == 1) /* no gray node */
+        out->info.parts &= ~(uint32_t)EBPO_PART_COLOURS;
+    if (status == EBPO_OK && out->info.parts & EBPO_PART_COLOURS)
+        status = ebpo_build_gray_colours(b, out, error);
     return status;
 }
 
@@ -302,7 +310,7 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     ebpo_status status = EBPO_TAKE(ebpo_build_options, &wanted, options, error);
     /* other bits stand for other needs of arrays */
     wanted.parts &= EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES |
-                    EBPO_PART_ATTRIBUTES;
+                    EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS;
     if (status == EBPO_OK && wanted.times)
         status = EBPO_CHECK_SIZED(ebpo_build_times, wanted.times, error);
     if (status == EBPO_OK) {

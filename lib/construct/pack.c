@@ -71,7 +71,7 @@ void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes)
 
 static size_t capacity_of(const ebpo_level *level, int id)
 {
-    return ebpo_schema_is_held(id)
+    return ebpo_schema_is_held(id) && ebpo_level_array(level, id)
                ? reserve_for(ebpo_level_rows(level, id), ebpo_schema[id].held_size)
                : 0;
 }

@@ -97,6 +97,16 @@ static ebpo_status check_planes(const ebpo_check *check, int level, const char *
     return EBPO_OK;
 }
 
+static ebpo_status check_colours(const ebpo_check *check, int level, const ebpo_level *arrays,
+                                 ebpo_error *error)
+{
+    EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->gray_count)
+        if (arrays->gray_colours[i] >> 24)
+            return ebpo_check_fail(check, level, "gray_colours", "a colour is above 2^24 - 1",
+                                   error);
+    return EBPO_OK;
+}
+
 static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info, int level,
                                   const ebpo_level *arrays, ebpo_error *error)
 {
@@ -169,6 +179,8 @@ ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info, int
         status = check_planes(check, level, "leaf_plane_counts", arrays->leaf_plane_counts,
                               arrays->leaf_count, "leaf_planes", arrays->leaf_planes,
                               arrays->leaf_plane_count, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
+        status = check_colours(check, level, arrays, error);
     if (status == EBPO_OK)
         status = check_windings(check, info, level, arrays, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_MESH)

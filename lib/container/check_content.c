@@ -1,4 +1,4 @@
-/* Recomputing a file's content checksum. */
+/* Recomputing a file's checksums. */
 #include <string.h>
 
 #include "base/error.h"
@@ -6,6 +6,7 @@
 #include "base/sized.h"
 #include "container/attribute_read.h"
 #include "container/content.h"
+#include "container/head_facts_table.h"
 #include "container/reader.h"
 
 /* Arrays are independent, so threads take whole ones; chunks within one must come in order. */
@@ -47,19 +48,21 @@ static ebpo_status digest_arrays(void *context, uint64_t begin, uint64_t end, un
     return status;
 }
 
-static ebpo_status compare(content_job *j, ebpo_error *error)
+static ebpo_status compare(content_job *j, int which, const uint8_t stated[32], const char *name,
+                           ebpo_error *error)
 {
     ebpo_content content = { .entries = NULL };
     uint8_t digest[32];
     for (unsigned i = 0; i < j->count; i++)
-        ebpo_content_put(&content, j->array[i]->path, j->digest[i]);
+        if (ebpo_content_of(j->array[i]->id) == which)
+            ebpo_content_put(&content, j->array[i]->path, j->digest[i]);
     ebpo_status status = ebpo_content_end(&content, digest, error);
     ebpo_content_free(&content);
-    if (status == EBPO_OK && memcmp(digest, j->file->info.content_sha256, 32) != 0)
-        status =
-            ebpo_fail_file(error, EBPO_E_FORMAT, j->file->in.shown,
-                           "the content is not what content_sha256 says: the file was changed; "
-                           "get a fresh copy");
+    if (status == EBPO_OK && memcmp(digest, stated, 32) != 0)
+        status = ebpo_fail_file(error, EBPO_E_FORMAT, j->file->in.shown,
+                                "the content is not what %s says: the file was changed; "
+                                "get a fresh copy",
+                                name);
     return status;
 }
 
@@ -90,6 +93,10 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
     status =
         ebpo_parallel_for(read.threads, NULL, j.count, 1, digest_arrays, &j, NULL, "check", error);
     if (status == EBPO_OK)
-        status = compare(&j, error);
+        status =
+            compare(&j, EBPO_DIGEST_CONTENT, file->info.content_sha256, "content_sha256", error);
+    if (status == EBPO_OK && file->info.parts & EBPO_PART_COLOURS)
+        status = compare(&j, EBPO_DIGEST_COLOURS, file->info.colours_sha256, ebpo_colours_fact.name,
+                         error);
     return status == EBPO_OK ? ebpo_attributes_check(file, &read, error) : status;
 }

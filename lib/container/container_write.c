@@ -39,7 +39,7 @@ typedef struct writer {
     ebpo_chunk_coder *coders; /* one for each thread */
     ebpo_chunk_order order;
     ebpo_array_digest *digest; /* [arrays of the plan] */
-    ebpo_content content;
+    ebpo_content content[EBPO_DIGESTS];
     uint64_t chunk_bytes, chunks_done;
     uint64_t *place; /* [rows of places] */
     uint64_t place_count, top_bytes;
@@ -83,7 +83,7 @@ static void digest_slots(writer *w)
         if (left > shape->chunk_rows)
             continue;
         ebpo_array_digest_end(state, digest);
-        ebpo_content_put(&w->content, s->array->path, digest);
+        ebpo_content_put(&w->content[ebpo_content_of(s->array->id)], s->array->path, digest);
     }
 }
 
@@ -226,9 +226,23 @@ static ebpo_status encode_first(writer *w, uint8_t *stored, size_t *bytes, ebpo_
     return status;
 }
 
+static ebpo_status put_digests(writer *w, ebpo_error *error)
+{
+    uint8_t digest[32];
+    ebpo_status status = ebpo_content_end(&w->content[EBPO_DIGEST_CONTENT], digest, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_put_digest(&w->head.out, w->head.root, digest, error);
+    if (status != EBPO_OK || !(w->plan.info.parts & EBPO_PART_COLOURS))
+        return status;
+    status = ebpo_content_end(&w->content[EBPO_DIGEST_COLOURS], digest, error);
+    return status == EBPO_OK
+               ? ebpo_facts_put_colours_digest(&w->head.out, w->head.root, digest, error)
+               : status;
+}
+
 static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
 {
-    uint8_t first[256], digest[32]; /* the chunk is of two bytes */
+    uint8_t first[256]; /* the chunk is of two bytes */
     size_t first_bytes = 0;
     ebpo_status status = encode_first(w, first, &first_bytes, error);
     if (status == EBPO_OK)
@@ -243,9 +257,7 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
     if (status == EBPO_OK && w->head.places.shape.rows)
         status = write_places(w, error);
     if (status == EBPO_OK)
-        status = ebpo_content_end(&w->content, digest, error);
-    if (status == EBPO_OK)
-        status = ebpo_facts_put_digest(&w->head.out, w->head.root, digest, error);
+        status = put_digests(w, error);
     if (status == EBPO_OK)
         status = ebpo_facts_put_index(&w->head.out, w->head.root, w->index_at, w->head.index_bytes,
                                       error);
@@ -311,7 +323,8 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
     free(w->place);
     ebpo_chunk_order_free(&w->order);
     ebpo_plan_free(&w->plan);
-    ebpo_content_free(&w->content);
+    for (int i = 0; i < EBPO_DIGESTS; i++)
+        ebpo_content_free(&w->content[i]);
     free(w);
     return status;
 }

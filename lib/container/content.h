@@ -15,8 +15,17 @@ typedef struct ebpo_content_entry {
     uint8_t digest[32];
 } ebpo_content_entry;
 
-/* Whether an array counts. How a file is laid out does not: tables of subtrees are left out. */
+/* Whether an array counts, in one of the checksums. How a file is laid out does not: tables of
+ * subtrees are left out. */
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id);
+
+/* Which checksum counts an array: a file has the same content with and without colours. */
+enum { EBPO_DIGEST_CONTENT, EBPO_DIGEST_COLOURS, EBPO_DIGESTS };
+static inline int ebpo_content_of(ebpo_array_id id)
+{
+    return id == EBPO_A_GRAY_COLOURS ? EBPO_DIGEST_COLOURS : EBPO_DIGEST_CONTENT;
+}
+
 /* One array, chunk after chunk. Chunks of fewer rows than without subtrees count as if they were
  * parts of larger ones: codes that start anew with them are made to go on. */
 typedef struct ebpo_array_digest {

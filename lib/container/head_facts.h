@@ -7,12 +7,15 @@
 
 #include "h5/h5.h"
 
-/* Writes the root's attributes; content_sha256 and chunk_index_* as they stand (put them again
+/* Writes the root's attributes; checksums and chunk_index_* as they stand (put them again
  * later). */
 EBPO_MUST_USE ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
                                          ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root,
                                                 const uint8_t digest[32], ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_put_colours_digest(ebpo_h5_out *out, ebpo_h5_id root,
+                                                        const uint8_t digest[32],
+                                                        ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset,
                                                uint64_t bytes, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_put_top(ebpo_h5_out *out, ebpo_h5_id root, uint64_t bytes,

@@ -290,6 +290,8 @@ ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebp
         status = get_fact(in, root, "/", &ebpo_facts[i], info, error);
     if (status == EBPO_OK)
         status = get_selection(in, root, info, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
+        status = get_fact(in, root, "/", &ebpo_colours_fact, info, error);
     if (status == EBPO_OK && info->subtree_level)
         status = get_subtrees(in, root, info, error);
     return status == EBPO_OK && info->pruned ? get_subset(in, root, info, error) : status;

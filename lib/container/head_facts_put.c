@@ -128,6 +128,8 @@ ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *i
         status = put_fact(out, root, &ebpo_facts[i], info, error);
     if (status == EBPO_OK)
         status = put_selection(out, root, info, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
+        status = put_fact(out, root, &ebpo_colours_fact, info, error);
     if (status == EBPO_OK && info->subtree_level)
         status = put_subtrees(out, root, info, error);
     if (status == EBPO_OK && info->pruned)
@@ -139,6 +141,12 @@ ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root, const uint8
                                   ebpo_error *error)
 {
     return put_digest(out, root, "content_sha256", digest, error);
+}
+
+ebpo_status ebpo_facts_put_colours_digest(ebpo_h5_out *out, ebpo_h5_id root,
+                                          const uint8_t digest[32], ebpo_error *error)
+{
+    return put_digest(out, root, ebpo_colours_fact.name, digest, error);
 }
 
 ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset, uint64_t bytes,

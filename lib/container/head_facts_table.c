@@ -87,6 +87,7 @@ const ebpo_part_word ebpo_part_words[] = {
     { "maps", EBPO_PART_MAPS, false },
     { "leaf-planes", EBPO_PART_LEAF_PLANES, false },
     { "attributes", EBPO_PART_ATTRIBUTES, false },
+    { "colours", EBPO_PART_COLOURS, false },
     { "subtrees", EBPO_WORD_SUBTREES, true },
     { "pruned", EBPO_WORD_PRUNED, true },
 };
@@ -102,4 +103,6 @@ const int ebpo_selection_fact_count = sizeof ebpo_selection_facts / sizeof ebpo_
 
 const ebpo_fact ebpo_subtree_level_fact = { "subtree_level", EBPO_FACT_NUMBER,
                                             EBPO_FACT_AT(subtree_level) },
+                ebpo_colours_fact = { "colours_sha256", EBPO_FACT_DIGEST,
+                                      EBPO_FACT_AT(colours_sha256) },
                 ebpo_top_bytes_fact = { "top_bytes", EBPO_FACT_HINT, EBPO_FACT_AT(top_bytes) };

@@ -48,8 +48,8 @@ extern const ebpo_fact ebpo_selection_facts[];
 extern const int ebpo_selection_fact_count;
 extern const char *const ebpo_normals_words[]; /* ends with NULL */
 
-/* Of files with subtrees. */
-extern const ebpo_fact ebpo_subtree_level_fact, ebpo_top_bytes_fact;
+/* Of files with subtrees; with colours. */
+extern const ebpo_fact ebpo_subtree_level_fact, ebpo_top_bytes_fact, ebpo_colours_fact;
 
 /* A reader that does not know an optional part is none the wiser, but right; without a required one
  * it would be wrong. */

@@ -205,6 +205,15 @@ static ebpo_status check_codes(const reading *r, ebpo_array_id id)
     return EBPO_OK;
 }
 
+static ebpo_status check_colours(const reading *r)
+{
+    const uint32_t *colour = r->out->gray_colours;
+    for (uint64_t i = 0; colour && i < r->out->gray_count; i++)
+        if (colour[i] >> 24)
+            return fail(r, EBPO_A_GRAY_COLOURS, "a colour is above 2^24 - 1");
+    return EBPO_OK;
+}
+
 static ebpo_status check_windings(const reading *r, ebpo_array_id id, bool inside)
 {
     const int32_t *winding = ebpo_level_array(r->out, id);
@@ -258,6 +267,7 @@ static ebpo_status finish_array(const reading *r, int id)
     switch (id) {
     case EBPO_A_PLANES:
     case EBPO_A_LEAF_PLANES: return check_codes(r, (ebpo_array_id)id);
+    case EBPO_A_GRAY_COLOURS: return check_colours(r);
     case EBPO_A_BLACK_WINDING: return check_windings(r, EBPO_A_BLACK_WINDING, true);
     case EBPO_A_WHITE_WINDING: return check_windings(r, EBPO_A_WHITE_WINDING, false);
     case EBPO_A_LEAF_REFS: return decode_faces(r);

@@ -10,7 +10,7 @@
 enum { LEVEL_NUMBERS = 64, MESH_NUMBERS = 4096, TABLE_NUMBERS = 4112, ATTRIBUTE_NUMBERS = 8191 };
 _Static_assert(EBPO_A_TYPES == 0 && EBPO_A_PLANES == 2 && EBPO_A_LEAF_REFS == 9 &&
                    EBPO_A_LEAF_INDEX == 12 && EBPO_A_LEAF_PLANES == 14 &&
-                   EBPO_A_FACE_SOURCE - EBPO_A_VERTICES == 4 &&
+                   EBPO_A_GRAY_COLOURS == 15 && EBPO_A_FACE_SOURCE - EBPO_A_VERTICES == 4 &&
                    EBPO_A_SUBTREE_OUTER - EBPO_A_SUBTREE_INDEX == 2,
                "arrays in files have these numbers: a new row of array_table.inc goes behind them");
 

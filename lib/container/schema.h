@@ -48,6 +48,7 @@ enum {
     EBPO_NEEDS_MAPS = EBPO_PART_MAPS,
     EBPO_NEEDS_LEAF_PLANES = EBPO_PART_LEAF_PLANES,
     EBPO_NEEDS_ATTRIBUTES = EBPO_PART_ATTRIBUTES,
+    EBPO_NEEDS_COLOURS = EBPO_PART_COLOURS,
     EBPO_NEEDS_MESH_OR_LEAF_PLANES = EBPO_PART_MESH | EBPO_PART_LEAF_PLANES,
     EBPO_NEEDS_SUBTREES = 1 << 28,
     EBPO_NEEDS_SOLID = 1 << 29,
@@ -55,7 +56,8 @@ enum {
 };
 
 enum {
-    EBPO_INDEX_ROWS = 4096, /* items between two rows of an index array */
+    EBPO_INDEX_ROWS = 4096,            /* items between two rows of an index array */
+    EBPO_COLOUR_OF_NOTHING = 0x808080, /* of gray nodes of which nothing is known */
     EBPO_PATH_BYTES = 48,
     /* with the part `subtrees` (format-spec/README.md, section 9) */
     EBPO_FACE_BLOCK = 2048, /* rows of a chunk */

@@ -64,7 +64,11 @@ ebpo_status ebpo_block_read(ebpo_block *out, const ebpo_file *file, int level,
     lod.threads = options->threads;
     lod.progress = options->progress;
     snprintf(out->name, sizeof out->name, "level_%02d", level);
-    return ebpo_lod_level_nodes(file, level, &lod, &out->mesh, &out->nodes, &out->volume, error);
+    ebpo_status status =
+        ebpo_lod_level_nodes(file, level, &lod, &out->mesh, &out->nodes, &out->volume, error);
+    return status == EBPO_OK
+               ? ebpo_lod_colours(&out->nodes, out->mesh.vertex_count, &out->colours, error)
+               : status;
 }
 
 void ebpo_block_free(ebpo_block *block)

@@ -1,5 +1,5 @@
-/* What is exported: a level's envelopes with their nodes, or the mesh with its colours and its
- * source's numbers. */
+/* What is exported: a level's envelopes with their nodes, or the mesh with its source's numbers;
+ * and colours. */
 #ifndef EBPO_EXPORT_BLOCK_H
 #define EBPO_EXPORT_BLOCK_H
 
@@ -14,7 +14,7 @@ typedef struct ebpo_block {
     ebpo_mesh mesh;
     ebpo_lod_nodes nodes; /* levels */
     ebpo_maps maps;       /* the mesh of a file with maps */
-    ebpo_colours colours; /* of the mesh, if it has any */
+    ebpo_colours colours; /* if it has any; levels: of vertices */
     double volume;
 } ebpo_block;
 

@@ -32,7 +32,7 @@ ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i, ebpo_block
                                          job->options, error);
     if (status == EBPO_OK)
         ebpo_block_report(out, job->report);
-    if (status == EBPO_OK && out->level < 0)
+    if (status == EBPO_OK)
         report_colours(job, &out->colours);
     return status;
 }

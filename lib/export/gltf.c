@@ -197,7 +197,7 @@ static void print_nodes(FILE *f, const model *m)
     fprintf(f,
             "],\n\"materials\":[{\"name\":\"plain\",\"pbrMetallicRoughness\":{\"baseColorFactor\":["
             "0.6,0.7,0.8,1],\"metallicFactor\":0,\"roughnessFactor\":0.8}}");
-    if (m->count && m->parts[m->count - 1].block.colours.vertex) /* factors multiply colours */
+    if (first_view(m, m->count) > VIEW_COLOURS * m->count) /* factors multiply colours */
         fprintf(f, ",\n{\"name\":\"coloured\",\"pbrMetallicRoughness\":{\"metallicFactor\":0,"
                    "\"roughnessFactor\":0.8}}");
     fprintf(f, "],\n");

@@ -22,7 +22,7 @@ enum {
     CELL_COUNT,
     CORNER_COUNT,
     SOURCE_VERTEX,
-    VERTEX_COLOURS, /* these are made when a block has some */
+    VERTEX_COLOURS, /* these two are made when a block has some */
     FACE_COLOURS,
     FIRST_COLUMN,
     TABLES = FIRST_COLUMN + EBPO_COLUMNS
@@ -48,6 +48,7 @@ static const struct {
 typedef struct writer {
     ebpo_h5_out out;
     ebpo_h5_table table[TABLES];
+    bool begun[2]; /* tables of colours */
 } writer;
 
 static ebpo_status make_group(writer *w, const char *path, ebpo_error *error)
@@ -136,34 +137,45 @@ static ebpo_status append_cells(writer *w, const ebpo_block *block, uint64_t cel
     return status;
 }
 
-/* Blocks before the first with colours are white. */
-static ebpo_status begin_colours(writer *w, int table, uint64_t rows_before, ebpo_error *error)
+/* White up to so many rows: of blocks without colours. */
+static ebpo_status pad(writer *w, int table, uint64_t rows, ebpo_error *error)
 {
     uint8_t white[4 * 1024];
     memset(white, 255, sizeof white);
-    ebpo_status status = ebpo_h5_make_table(&w->out, layout[table].path, layout[table].number,
-                                            layout[table].cols, &w->table[table], error);
-    for (uint64_t done = 0; status == EBPO_OK && done < rows_before; done += 1024)
-        status = ebpo_h5_append(&w->out, &w->table[table], white,
-                                rows_before - done < 1024 ? rows_before - done : 1024, error);
+    ebpo_status status = EBPO_OK;
+    while (status == EBPO_OK && w->table[table].rows < rows) {
+        uint64_t left = rows - w->table[table].rows;
+        status = ebpo_h5_append(&w->out, &w->table[table], white, left < 1024 ? left : 1024, error);
+    }
     return status;
 }
 
-/* The mesh is the last block, and no other has colours. */
+/* `all`: rows with this block. The table begins with the first block that has colours. */
+static ebpo_status append_rgba(writer *w, int table, const uint8_t *rgba, uint64_t rows,
+                               uint64_t all, ebpo_error *error)
+{
+    bool *begun = &w->begun[table - VERTEX_COLOURS];
+    ebpo_status status = EBPO_OK;
+    if (!rgba && !*begun)
+        return EBPO_OK;
+    if (!*begun)
+        status = ebpo_h5_make_table(&w->out, layout[table].path, layout[table].number,
+                                    layout[table].cols, &w->table[table], error);
+    *begun = true;
+    if (status == EBPO_OK)
+        status = pad(w, table, rgba ? all - rows : all, error);
+    return status == EBPO_OK && rgba ? ebpo_h5_append(&w->out, &w->table[table], rgba, rows, error)
+                                     : status;
+}
+
 static ebpo_status append_colours(writer *w, const ebpo_block *block, ebpo_error *error)
 {
     const ebpo_colours *c = &block->colours;
-    uint64_t vertices = block->mesh.vertex_count, faces = block->mesh.face_count;
-    ebpo_status status = EBPO_OK;
-    if (c->vertex)
-        status = begin_colours(w, VERTEX_COLOURS, w->table[POINTS].rows - vertices, error);
-    if (c->vertex && status == EBPO_OK)
-        status = ebpo_h5_append(&w->out, &w->table[VERTEX_COLOURS], c->vertex, vertices, error);
-    if (c->face && status == EBPO_OK)
-        status = begin_colours(w, FACE_COLOURS, w->table[TYPES].rows - faces, error);
-    if (c->face && status == EBPO_OK)
-        status = ebpo_h5_append(&w->out, &w->table[FACE_COLOURS], c->face, faces, error);
-    return status;
+    ebpo_status status = append_rgba(w, VERTEX_COLOURS, c->vertex, block->mesh.vertex_count,
+                                     w->table[POINTS].rows, error);
+    return status == EBPO_OK ? append_rgba(w, FACE_COLOURS, c->face, block->mesh.face_count,
+                                           w->table[TYPES].rows, error)
+                             : status;
 }
 
 static ebpo_status append_block(writer *w, const ebpo_block *block, ebpo_error *error)

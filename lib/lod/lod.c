@@ -14,6 +14,7 @@
 #include "base/parallel.h"
 #include "base/sized.h"
 #include "geom/plane_clip.h"
+#include "lod/lod_colours.h"
 #include "lod/lod_model.h"
 #include "lod/polyhedra.h"
 #include "octree/cells.h"
@@ -300,8 +301,10 @@ ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, int level, const ebpo_lo
         status = walk(&j, threads, &wanted.progress, error);
     if (status == EBPO_OK)
         status = join(&j, out, nodes, volume, error);
-    if (status == EBPO_OK && nodes)
+    if (status == EBPO_OK && nodes) {
         add_windings(nodes, &model);
+        ebpo_lod_add_colours(nodes, &model);
+    }
     if (status != EBPO_OK)
         ebpo_lod_nodes_free(nodes);
     job_free(&j, threads);

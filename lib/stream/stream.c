@@ -76,7 +76,8 @@ void ebpo_stream_free(ebpo_stream *s)
 
 static void drop_passed(ebpo_level *level, bool planes)
 {
-    ebpo_level_drop(level, ~(uint32_t)(EBPO_NEEDS_ALWAYS | (planes ? EBPO_NEEDS_PLANES : 0)));
+    ebpo_level_drop(level, ~(uint32_t)(EBPO_NEEDS_ALWAYS | EBPO_NEEDS_COLOURS |
+                                       (planes ? EBPO_NEEDS_PLANES : 0)));
 }
 
 static uint64_t sum_counts(const uint8_t *counts, uint64_t count)
@@ -260,6 +261,18 @@ static int32_t winding_of(const ebpo_level *level, const ebpo_level_walk_node *n
     }
 }
 
+/* Of a node that is not gray: its parent's, which was passed before it. */
+static void add_colour(const ebpo_stream *s, const ebpo_level_walk_node *node,
+                       ebpo_stream_node *out)
+{
+    bool gray = node->type == EBPO_GRAY;
+    int level = s->level - !gray;
+    const uint32_t *colours = level < 0 ? NULL : s->kept[level].gray_colours;
+    out->coloured = colours != NULL;
+    if (colours)
+        out->colour = colours[gray ? node->rank : s->walk.at[level].node.rank];
+}
+
 ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *more,
                                   ebpo_error *error)
 {
@@ -273,6 +286,7 @@ ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *m
         return EBPO_OK;
     ebpo_node_begin(out, &s->box, node.octcode, node.type);
     out->winding = winding_of(&s->kept[s->level], &node);
+    add_colour(s, &node, out);
     if (s->options.planes || s->options.polygons)
         ebpo_node_add_planes(out, &s->box, node.codes, node.code_count, &s->capacity);
     if (s->options.polygons && node.type != EBPO_WHITE)

@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "container/schema.h"
 #include "octree/cells.h"
 #include "octree/octcode.h"
 #include "stream/cell_to_model.h"
@@ -12,7 +13,7 @@ void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcod
                      ebpo_node_type type)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(octcode);
-    *out = (ebpo_stream_node){ .octcode = octcode, .type = type };
+    *out = (ebpo_stream_node){ .octcode = octcode, .type = type, .colour = EBPO_COLOUR_OF_NOTHING };
     ebpo_cell_bounds(box, cell, out->min, out->max);
     if (type == EBPO_BLACK)
         out->volume = ebpo_cell_volume(box, cell.level);

@@ -13,12 +13,12 @@ enum { CHUNK_BUDGET = 64 << 20 };
 uint32_t ebpo_profile_parts(ebpo_profile profile)
 {
     switch (profile) {
-    case EBPO_PROFILE_LOD: return EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES;
+    case EBPO_PROFILE_LOD: return EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES | EBPO_PART_COLOURS;
     case EBPO_PROFILE_COLLISION: return EBPO_PART_PLANES | EBPO_PART_MESH;
     case EBPO_PROFILE_FULL: break;
     }
     return EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES |
-           EBPO_PART_ATTRIBUTES;
+           EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS;
 }
 
 /* The box against the root cell and against one that was kept before: then nothing but their common

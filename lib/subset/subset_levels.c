@@ -30,6 +30,7 @@ typedef struct descent {
     ebpo_tolerance_node *judged; /* gray nodes and leaves as they come, with max_error; else NULL */
     uint64_t next_judged;
     uint64_t parent_count, child_count;
+    uint64_t group;  /* of the result, in hand: the number of its parent among gray nodes */
     uint64_t filled; /* groups of the result that are not empty */
     bool goes_on;    /* some child has children */
 } descent;
@@ -154,6 +155,15 @@ static void add_leaf_planes(descent *d)
     t->plane_count += count;
 }
 
+/* The last gray node of the result was a leaf, which is shown in its parent's colour. */
+static void add_colour(descent *d)
+{
+    ebpo_level *t = d->to;
+    if (t->gray_colours)
+        t->gray_colours[t->gray_count - 1] =
+            d->level ? t[-1].gray_colours[d->group] : EBPO_COLOUR_OF_NOTHING;
+}
+
 /* Outside the box a leaf becomes a pruned node; its own planes bound what is in its cell as well as
  * a gray node's do. Where its parent's do well enough, it needs none. */
 static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
@@ -166,6 +176,7 @@ static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
     ebpo_kept_add(&d->kept, EBPO_GRAY);
     if (!enough)
         add_leaf_planes(d);
+    add_colour(d);
     ebpo_kept_pass(&d->kept, EBPO_LEAF);
     add_child(d, cell, NOTHING);
     return EBPO_GRAY;
@@ -191,6 +202,7 @@ static ebpo_cell child_cell(const descent *d, uint64_t number, unsigned octant)
 
 static void take_group(descent *d, uint64_t number, uint16_t types)
 {
+    d->group = number;
     for (unsigned octant = 0; octant < ebpo_group_octants(d->level); octant++) {
         ebpo_node_type type =
             take_node(d, ebpo_group_type(types, octant), child_cell(d, number, octant));

@@ -149,6 +149,14 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
     return CHECK(infinite == 0, "%" PRIu64 " vertices are not finite", infinite) && corners_fine;
 }
 
+static bool colours_shape(ebpo_tally *tally, const ebpo_level *level, int l)
+{
+    uint32_t all = 0;
+    EBPO_FOR_ITEMS(level->workspace, i, 0, level->gray_colours ? level->gray_count : 0)
+        all |= level->gray_colours[i];
+    return CHECK(all < 1 << 24, "level %d: a colour is above 2^24 - 1", l);
+}
+
 /* What the checks above do not look for by name. Counted only when it fails. */
 static bool arrays_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
@@ -180,7 +188,8 @@ bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
              !counted_shape(tally, level, l, "leaf planes", level->leaf_count,
                             level->leaf_plane_counts, level->leaf_plane_count,
                             level->leaf_planes)) ||
-            !arrays_shape(tally, tree, l))
+            !arrays_shape(tally, tree, l) ||
+            ((parts & EBPO_PART_COLOURS) && !colours_shape(tally, level, l)))
             return false;
     }
     return true;

@@ -7,6 +7,7 @@
 #include "base/sized.h"
 #include "mesh/mesh_parts.h"
 #include "verify/nesting.h"
+#include "verify/verify_colours.h"
 #include "verify/verify_source.h"
 #include "verify/verify_subtrees.h"
 #include "verify/structure.h"
@@ -24,7 +25,9 @@ static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, cons
         return status;
     ebpo_check_structure(tally, &view);
     ebpo_check_nesting(tally, &view);
-    status = ebpo_verify_walk(tally, &view, options, error);
+    status = ebpo_check_colours(tally, &view, error);
+    if (status == EBPO_OK)
+        status = ebpo_verify_walk(tally, &view, options, error);
     if (status == EBPO_OK && file)
         status = ebpo_check_subtrees(tally, file, &view, options, error);
     ebpo_twin_free(&view);

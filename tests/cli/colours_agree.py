@@ -1,7 +1,7 @@
 """colours_agree.py paint SOURCE.ply PAINTED.ply: a binary PLY with colours of vertices and faces.
 colours_agree.py OUT SOURCE.ply: what ebpo export wrote of the painted mesh has them: XDMF and
 VTKHDF bytes for vertices and faces (read with h5py), glTF linear u16 and OBJ fractions of 1 for
-vertices. Vertices are found again by their positions, the first two formats' by source numbers."""
+vertices; levels have colours of vertices. Vertices are found again by their positions, the first two formats' by source numbers."""
 import json
 import os
 import struct
@@ -46,8 +46,7 @@ def check_gltf(path, points):
     by_name = {m["name"]: m["primitives"][0] for m in text["meshes"]}
     for name, primitive in by_name.items():
         factor = text["materials"][primitive["material"]]["pbrMetallicRoughness"]
-        assert ("COLOR_0" in primitive["attributes"]) == (name == "mesh"), name
-        assert ("baseColorFactor" in factor) == (name != "mesh"), name
+        assert "COLOR_0" in primitive["attributes"] and "baseColorFactor" not in factor, name
     accessor = text["accessors"][by_name["mesh"]["attributes"]["COLOR_0"]]
     assert (accessor["componentType"], accessor["type"], accessor["normalized"]) == (5123, "VEC4", True)
     view = text["bufferViews"][accessor["bufferView"]]
@@ -73,9 +72,10 @@ def check_obj(path, points):
 
 
 def check_numbers(numbers, rows, wanted, others):
-    """Rows of the mesh stand behind those of levels, which are white."""
+    """Rows of the mesh stand behind those of levels: in colours of envelopes, their polygons white."""
     assert rows.shape == (others + len(numbers), 4) and rows.dtype == "uint8", rows.shape
-    assert (rows[:others] == 255).all()
+    assert (rows[:others, 3] == 255).all()
+    assert not others or (rows[:others] == 255).all() == (wanted is face)
     for number, row in zip(numbers, rows[others:]):
         assert tuple(row) == wanted(int(number)), (number, row)
 
@@ -96,7 +96,8 @@ def check_xdmf(path):
     grids = xml.etree.ElementTree.parse(path).getroot().findall("Domain/Grid/Grid")
     for grid in grids:
         data = {(a.get("Name"), a.get("Center")): a for a in grid.findall("Attribute")}
-        assert (("rgba", "Node") in data) == (grid.get("Name") == "mesh")
+        assert ("rgba", "Node") in data
+        assert (("rgba", "Cell") in data) == (grid.get("Name") == "mesh")
     for centre, source, wanted in (("Node", "source_vertex", vertex), ("Cell", "source_face", face)):
         arrays = []
         for name in (source, "rgba"):

@@ -230,4 +230,17 @@ static void random_tree_make(ebpo_tree *tree, const random_tree_options *options
     rt_facts(&m);
 }
 
+/* Adds colours of gray nodes. */
+static inline void random_tree_paint(ebpo_tree *tree)
+{
+    random_tree_maker m = { .state = tree->mesh.face_count };
+    for (int i = 0; i < tree->info.level_count; i++) {
+        ebpo_level *l = &tree->level[i];
+        l->gray_colours = l->gray_count ? ebpo_alloc(l->gray_count, sizeof *l->gray_colours) : NULL;
+        for (uint64_t k = 0; k < l->gray_count; k++)
+            l->gray_colours[k] = rt_random(&m, 1 << 24);
+    }
+    tree->info.parts |= EBPO_PART_COLOURS;
+}
+
 #endif

@@ -56,6 +56,8 @@ static void tj_level(FILE *out, const ebpo_level *l, int number)
     TJ_ARRAY(out, "leaf_refs", l->leaf_refs, l->ref_count, "%" PRIu32);
     TJ_ARRAY(out, "leaf_plane_counts", l->leaf_plane_counts, l->leaf_count, "%" PRIu8);
     TJ_ARRAY(out, "leaf_planes", l->leaf_planes, l->leaf_plane_count, "%" PRIu32);
+    if (l->gray_colours)
+        TJ_ARRAY(out, "gray_colours", l->gray_colours, l->gray_count, "%" PRIu32);
     fprintf(out, "}");
 }
 

@@ -8,10 +8,10 @@ import re
 import sys
 
 ADDED = {
-    "file.h": (r"    uint32_t \*leaf_planes;[^\n]*\n",
+    "file.h": (r"    uint32_t \*gray_colours;[^\n]*\n",
                "    uint8_t *leaf_mark;    /* [leaf_count], NULL: all 0 */\n"
                "    uint32_t *plane_share; /* [leaf_plane_count] */\n"),
-    "array_table.inc": (r"LEVEL_ARRAY\(LEAF_PLANES,[^)]*\)\n",
+    "array_table.inc": (r"LEVEL_ARRAY\(GRAY_COLOURS,[^)]*\)\n",
                         'LEVEL_ARRAY(LEAF_MARK, leaf_mark, leaf_mark, uint8_t, 1, LEAF, ALWAYS, '
                         '"plain", USUALLY(0), 1, "a mark")\n'
                         'LEVEL_ARRAY(PLANE_SHARE, plane_share, plane_share, uint32_t, 1 + 2 + 4, '

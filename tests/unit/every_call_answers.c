@@ -406,6 +406,9 @@ static ebpo_status call_lod_nodes(every_call_env *e)
     ebpo_status status =
         ebpo_lod_level_nodes(e->file, last_level(e), &options, &mesh, &nodes, &volume, e->error);
     if (status == EBPO_OK) {
+        ebpo_colours colours;
+        status = ebpo_lod_colours(&nodes, mesh.vertex_count, &colours, e->error);
+        ebpo_colours_free(&colours);
         ebpo_mesh_free(&mesh);
         ebpo_lod_nodes_free(&nodes);
     }

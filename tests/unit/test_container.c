@@ -73,6 +73,7 @@ static void same_level(const ebpo_level *a, const ebpo_level *b)
     same(a->types, b->types, a->group_count, 2, "types");
     same(a->plane_counts, b->plane_counts, a->gray_count, 1, "plane_counts");
     same(a->planes, b->planes, a->plane_count, 4, "planes");
+    same(a->gray_colours, b->gray_colours, a->gray_count, 4, "gray_colours");
     same(a->leaf_winding, b->leaf_winding, a->leaf_count, 4, "leaf_winding");
     same(a->black_winding, b->black_winding, a->black_count, 4, "black_winding");
     same(a->white_winding, b->white_winding, a->white_count, 4, "white_winding");
@@ -123,6 +124,8 @@ START_TEST(trees_come_back_bit_for_bit)
     if (options.new_faces > 1000)
         options.levels = 3;
     random_tree_make(&tree, &options);
+    if (_i % 2)
+        random_tree_paint(&tree);
     for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++)
         for (unsigned threads = 1; threads <= 3; threads += 2) {
             write_ok(&tree, scratch("t.ebpo.h5"), (ebpo_codec)codec, threads, ~0u);
@@ -304,7 +307,9 @@ START_TEST(parts_that_are_left_out_are_absent)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_maps maps;
     random_tree_make(&tree, &shapes[3]);
-    for (uint32_t parts = 0; parts < 16; parts++) {
+    random_tree_paint(&tree);
+    for (uint32_t some = 0; some < 16; some++) {
+        uint32_t parts = some | (some % 3 == 1 ? EBPO_PART_COLOURS : 0);
         write_ok(&tree, scratch("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, parts);
         ebpo_file *file = open_ok(scratch("a.ebpo.h5"));
         uint32_t there = parts & EBPO_PART_MESH ? parts : parts & ~(uint32_t)EBPO_PART_MAPS;
@@ -313,6 +318,7 @@ START_TEST(parts_that_are_left_out_are_absent)
                       error.message);
         ck_assert_int_eq(back.level[5].leaf_planes != NULL, (there & EBPO_PART_LEAF_PLANES) != 0);
         ck_assert_int_eq(back.level[4].planes != NULL, (there & EBPO_PART_PLANES) != 0);
+        ck_assert_int_eq(back.level[4].gray_colours != NULL, (there & EBPO_PART_COLOURS) != 0);
         ck_assert_int_eq(back.level[5].leaf_first != NULL, (there & EBPO_PART_MESH) != 0);
         ck_assert_int_eq(ebpo_file_read_mesh(file, READ_BY(1), &mesh, NULL),
                          there & EBPO_PART_MESH ? EBPO_OK : EBPO_E_ABSENT);

@@ -468,29 +468,66 @@ static const char coloured[] =
     "-32768 3 0 3 2 6 0.25 0 1 0 0 1 1 2147483647\n0 3 1 2 3 6 0 0 1 0 0 1 3 1 2 3\n"
     "0 1 7\n2 3 65535\n";
 
-static ebpo_mesh read_coloured(void)
+static ebpo_mesh read_text(const char *text, const char *name)
 {
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
-    if (ebpo_ply_parse_all(&mesh, (const uint8_t *)coloured, sizeof coloured - 1, "coloured.ply",
-                           NULL, true, 1, NULL, &error) != EBPO_OK)
-        die("coloured", error.message);
+    if (ebpo_ply_parse_all(&mesh, (const uint8_t *)text, strlen(text), name, NULL, true, 1, NULL,
+                           &error) != EBPO_OK)
+        die(name, error.message);
     return mesh;
 }
+
+static ebpo_mesh read_coloured(void) { return read_text(coloured, "coloured.ply"); }
 
 static void make_attributes(void)
 {
     ebpo_tree tree;
     ebpo_subset_options box = EBPO_SUBSET_OPTIONS_INIT;
     build_mesh(&tree, read_coloured(), (how){ 2, 1, 0, 0, 0 });
-    write_vector("39_attributes", &tree, EBPO_CODEC_ZSTD, ~0u);
+    write_vector("39_attributes", &tree, EBPO_CODEC_ZSTD, ~(uint32_t)EBPO_PART_COLOURS);
     build_mesh(&tree, read_coloured(), (how){ 3, 1, EBPO_PART_LEAF_PLANES, 0, 0 });
-    write_laid_out("40_attributes_subtrees_unfiltered", &tree, EBPO_CODEC_NONE, ~0u, 1);
+    write_laid_out("40_attributes_subtrees_unfiltered", &tree, EBPO_CODEC_NONE,
+                   ~(uint32_t)EBPO_PART_COLOURS, 1);
     box.boxed = true;
     for (int k = 0; k < 3; k++)
         box.max[k] = 0.2;
     subset(&tree, "40_attributes_subtrees_unfiltered", &box);
     write_vector("41_attributes_of_a_subset", &tree, EBPO_CODEC_NONE, ~0u);
+}
+
+/* --- colours of envelopes --- */
+
+/* Faces' colours of 16 bits under other names, beside vertices that have all the same red, green
+ * and blue, and not the same alpha; one of a face is NaN. */
+static const char faces_coloured[] =
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+    "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+    "property uchar alpha\nelement face 4\nproperty list uchar uint vertex_indices\n"
+    "property float diffuse_red\nproperty ushort diffuse_green\nproperty short diffuse_blue\n"
+    "end_header\n"
+    "0 0 0 9 9 9 0\n1 0 0 9 9 9 1\n0 1 0 9 9 9 2\n0 0 1 9 9 9 3\n"
+    "3 0 2 1 0.5 65535 300\n3 0 1 3 nan 1000 -7\n3 0 3 2 1 128 128\n3 1 2 3 2 0 255\n";
+
+static void make_colours(void)
+{
+    ebpo_tree tree;
+    ebpo_subset_options box = EBPO_SUBSET_OPTIONS_INIT, levels = EBPO_SUBSET_OPTIONS_INIT;
+    build_mesh(&tree, read_coloured(), (how){ 2, 1, 0, 0, 0 });
+    write_vector("42_colours_of_vertices", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build_mesh(&tree, read_text(faces_coloured, "faces.ply"), (how){ 3, 1, 0, 0, 0 });
+    write_vector("43_colours_of_faces", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build_mesh(&tree, read_coloured(), (how){ 3, 1, EBPO_PART_LEAF_PLANES, 0, 0 });
+    write_laid_out("44_colours_subtrees_unfiltered", &tree, EBPO_CODEC_NONE, ~0u, 1);
+    box.boxed = true;
+    for (int k = 0; k < 3; k++)
+        box.max[k] = 0.2;
+    subset(&tree, "44_colours_subtrees_unfiltered", &box);
+    write_vector("45_colours_of_a_subset", &tree, EBPO_CODEC_NONE, ~0u);
+    levels.last_level = 2;
+    levels.parts = EBPO_PART_PLANES | EBPO_PART_COLOURS;
+    subset(&tree, "44_colours_subtrees_unfiltered", &levels);
+    write_vector("46_colours_without_mesh", &tree, EBPO_CODEC_ZSTD, ~0u);
 }
 
 void make_passed(const char *to)
@@ -503,4 +540,5 @@ void make_passed(const char *to)
     make_meshes();
     make_large();
     make_attributes();
+    make_colours();
 }

@@ -11,7 +11,8 @@ const char *const rule_words[] = { "nonzero", "evenodd", "positive", NULL };
 const char *selection_words[EBPO_SELECTION_COUNT + 1];
 const char *const normals_words[] = { "spherical", "angle", NULL };
 const char *const codec_words[] = { "zstd", "deflate", "none", NULL };
-const char *const part_words[] = { "planes", "mesh", "maps", "leaf-planes", "attributes", NULL };
+const char *const part_words[] = { "planes",     "mesh",    "maps", "leaf-planes",
+                                   "attributes", "colours", NULL };
 
 void words_init(void)
 {
@@ -73,6 +74,12 @@ char *words_parts(char *out, size_t capacity, uint32_t parts)
 char *words_format(char *out, size_t capacity, int major, int minor)
 {
     snprintf(out, capacity, "%d.%d", major, minor);
+    return out;
+}
+
+char *words_colour(char out[8], uint32_t colour)
+{
+    snprintf(out, 8, "#%02x%02x%02x", colour & 255, colour >> 8 & 255, colour >> 16 & 255);
     return out;
 }
 

@@ -24,6 +24,8 @@ char *words_plural(char *out, size_t capacity, uint64_t count, const char *one, 
 char *words_parts(char *out, size_t capacity, uint32_t parts);
 /* "1.0" */
 char *words_format(char *out, size_t capacity, int major, int minor);
+/* "#ff8000" of red + 256 green + 65,536 blue. */
+char *words_colour(char out[8], uint32_t colour);
 const char *words_node_type(ebpo_node_type type);
 const char *words_rule(ebpo_rule rule);
 const char *words_codec(ebpo_codec codec);

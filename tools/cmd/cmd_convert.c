@@ -35,9 +35,12 @@ typedef struct values {
 } values;
 
 static const char *const with_words[] = { "leaf-planes", NULL };
-/* word i is ebpo_part bit i, but for the last: leaf planes are not made unless asked for */
-static const char *const without_words[] = { "planes", "mesh", "maps", "attributes", NULL };
-enum { WITHOUT_ATTRIBUTES = 1 << 3 };
+static const char *const without_words[] = {
+    "planes", "mesh", "maps", "attributes", "colours", NULL
+};
+/* of each word */
+static const uint32_t without_parts[] = { EBPO_PART_PLANES, EBPO_PART_MESH, EBPO_PART_MAPS,
+                                          EBPO_PART_ATTRIBUTES, EBPO_PART_COLOURS };
 
 static const arg_option options[] = {
     OPTION_INT("max-level", 0, values, max_level, "N", 0, 20,
@@ -62,8 +65,9 @@ static const arg_option options[] = {
                "seed for kmedoids and random; default 1"),
     OPTION_SET("with", 0, values, with, "LIST", with_words, "also store: leaf-planes"),
     OPTION_SET("without", 0, values, without, "LIST", without_words,
-               "leave out: attributes (colours and the like), maps, mesh (and with it the maps and "
-               "attributes), planes; separated by commas, may be repeated"),
+               "leave out: attributes (colours and the like, of envelopes too), colours (of "
+               "envelopes), maps, mesh (and with it all but planes), planes; separated by commas, "
+               "may be repeated"),
     OPTION_WORD("profile", 0, values, profile, "NAME", profile_words,
                 "instead of --with and --without: full (all parts), lod (for viewers: no mesh), "
                 "collision (for exact questions: mesh, no maps); the same file as 'ebpo subset "
@@ -159,17 +163,18 @@ static bool chooses_parts(const values *v)
 
 static uint32_t parts_of(const values *v)
 {
-    uint32_t without = v->without & WITHOUT_ATTRIBUTES
-                           ? (v->without & ~(uint32_t)WITHOUT_ATTRIBUTES) | EBPO_PART_ATTRIBUTES
-                           : v->without;
+    uint32_t without = 0;
+    for (int i = 0; without_words[i]; i++)
+        without |= v->without >> i & 1 ? without_parts[i] : 0;
     if (v->profile >= 0 ||
         chooses_parts(
             v)) /* all are built, so that the file is the one that a subset of the full one is */
         return ebpo_profile_parts(EBPO_PROFILE_FULL);
     if (without & EBPO_PART_MESH)
-        without |= EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES;
-    uint32_t parts =
-        (EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES) & ~without;
+        without |= EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS;
+    uint32_t parts = (EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES |
+                      EBPO_PART_COLOURS) &
+                     ~without;
     return v->with ? parts | EBPO_PART_LEAF_PLANES : parts;
 }
 

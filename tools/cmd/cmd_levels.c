@@ -87,6 +87,7 @@ static void begin_json_level(printer *p, const ebpo_stream_level *level, double 
 
 static void print_node(const ebpo_stream_node *n)
 {
+    char colour[8];
     printf("%" PRIu64 " %s ", n->octcode, words_node_type(n->type));
     words_print_reals(n->min, 3, " ");
     putchar(' ');
@@ -96,17 +97,22 @@ static void print_node(const ebpo_stream_node *n)
         putchar(' ');
         words_print_reals(n->planes[i], 4, " ");
     }
+    if (n->coloured)
+        printf(" %s", words_colour(colour, n->colour));
     putchar('\n');
 }
 
 static void json_node(json *j, const ebpo_stream_node *n)
 {
+    char colour[8];
     json_object(j, NULL);
     json_uint(j, "octcode", n->octcode);
     json_text(j, "type", words_node_type(n->type));
     json_reals(j, "min", n->min, 3);
     json_reals(j, "max", n->max, 3);
     json_int(j, "winding", n->winding);
+    if (n->coloured)
+        json_text(j, "colour", words_colour(colour, n->colour));
     json_array(j, "planes");
     for (uint32_t i = 0; i < n->plane_count; i++)
         json_reals(j, NULL, n->planes[i], 4);

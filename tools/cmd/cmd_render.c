@@ -44,7 +44,7 @@ static const arg_option options[] = {
     OPTION_TEXT("size", 0, values, size, "WxH", "pixels, 16 to 8192 each; default 1200x900"),
     OPTION_FLAG("edges", 0, values, edges, "draw the outlines of the polygons"),
     OPTION_FLAG("no-colours", 0, values, no_colours,
-                "the model without the colours of its vertices or faces"),
+                "the model without the colours of its vertices, faces or envelopes"),
     OPTION_THREADS(values, threads),
     OPTION_FLAG("json", 0, values, json, "what was drawn, as JSON"),
     OPTION_FLAG("quiet", 'q', values, quiet, "no progress: errors and warnings only"),
@@ -175,7 +175,11 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
     lod.threads = threads;
     lod.progress = progress;
     t->closed = true;
-    ebpo_status status = ebpo_lod_level(file, t->level, &lod, &t->mesh, NULL, error);
+    ebpo_lod_nodes nodes;
+    ebpo_status status = ebpo_lod_level_nodes(file, t->level, &lod, &t->mesh, &nodes, NULL, error);
+    if (status == EBPO_OK && !j->v.no_colours)
+        status = ebpo_lod_colours(&nodes, t->mesh.vertex_count, &t->colours, error);
+    ebpo_lod_nodes_free(&nodes);
     if (status == EBPO_OK)
         snprintf(t->caption, sizeof t->caption,
                  info->solid ? "level %d: %.1f %%" : "level %d: %.1f %% of box", t->level,

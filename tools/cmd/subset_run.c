@@ -50,7 +50,8 @@ static uint32_t part_named(const char *word, size_t length)
                   { "envelopes", EBPO_PART_PLANES },
                   { "planes", EBPO_PART_PLANES },
                   { "leaf-planes", EBPO_PART_LEAF_PLANES },
-                  { "attributes", EBPO_PART_ATTRIBUTES } };
+                  { "attributes", EBPO_PART_ATTRIBUTES },
+                  { "colours", EBPO_PART_COLOURS } };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (strlen(names[i].word) == length && memcmp(names[i].word, word, length) == 0)
             return names[i].part;
@@ -115,7 +116,7 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
     if (v->parts && !read_parts(v->parts, &out->parts))
         return command_usage(name,
                              "--parts: '%s' is not a list of mesh, maps, attributes, envelopes, "
-                             "leaf-planes, or of these with a minus sign before each",
+                             "leaf-planes, colours, or of these with a minus sign before each",
                              v->parts);
     if (v->parts && v->profile >= 0)
         return command_usage(name, "--parts and --profile cannot be used together");

@@ -79,7 +79,8 @@ export class Cut {
     this.made = 0; // polytopes kept with their nodes, about
     this.half = Array.from({ length: 21 }, (_, l) => tree.info.box_size.map((s) => s / 2 ** l / 2 * this.scene.scale));
     this.low = tree.info.box_size.map((s) => -s / 2 * this.scene.scale);
-    this.maker = new TileMaker({ place: (node) => this.#place(node), polytope: (node) => tree.polytope(node), field: this.field, mesh: this.mesh });
+    const colour = tree.info.parts.has('colours') ? (node) => tree.colour(node) : undefined;
+    this.maker = new TileMaker({ place: (node) => this.#place(node), polytope: (node) => tree.polytope(node), colour, field: this.field, mesh: this.mesh });
     this.walls = new Walls(tree, (node) => node.drawn === this.pass, (node) => (node.useMesh ? undefined : tree.polytope(node)));
   }
 

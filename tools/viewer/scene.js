@@ -303,7 +303,7 @@ export class Scene {
     this.redraw();
   }
 
-  /** Whether real faces show the model's colours in plain colouring. */
+  /** Whether faces and envelopes show the model's colours in plain colouring. */
   setOwnColours(own) {
     this.uniforms.own.value = own;
     this.redraw();

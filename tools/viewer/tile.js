@@ -1,5 +1,5 @@
 // Geometry of some nodes of a cut, as typed arrays for the picture: envelopes with the walls that are seen, real faces, lines.
-// A vertex has a place, a tag [level, type, weight of its normal, 0] and a normal, octahedral in two numbers of 16 bits. In tiles with coloured faces it
+// A vertex has a place, a tag [level, type, weight of its normal, 0] and a normal, octahedral in two numbers of 16 bits. In coloured tiles it
 // has a hue, too: [red, green, blue, 0], or 255 last where there is no colour.
 export const REAL_FACE = 4;  // in a tag's type, beside the node's
 const SURE = [0.25, 0.6];    // lengths of the field between which its weight goes from nothing to all: thin parts and edges are lit flat
@@ -13,9 +13,9 @@ function grown(array, count) {
 }
 
 export class TileMaker {
-  /** `place(node)`: { low, size } of its cell in the scene; `walls` (walls.js) may be undefined in a call of make(): then all of them are drawn. */
-  constructor({ place, polytope, field, mesh }) {
-    Object.assign(this, { place, polytope, field, mesh });
+  /** `place(node)`: { low, size } of its cell in the scene; `colour(node)`: as tree.js, if envelopes have any; `walls` (walls.js) may be undefined in a call of make(): then all of them are drawn. */
+  constructor({ place, polytope, colour, field, mesh }) {
+    Object.assign(this, { place, polytope, colour, field, mesh });
     this.position = new Float32Array(3 << 12);
     this.tag = new Uint8Array(4 << 12);
     this.normal = new Int16Array(2 << 12);
@@ -32,7 +32,7 @@ export class TileMaker {
   make(key, nodes, want, walls) {
     this.vertices = this.inners = this.outers = this.lines = 0;
     this.wanted = want.lines;
-    const coloured = this.mesh.coloured && nodes.some((node) => node.useMesh);
+    const coloured = this.colour || (this.mesh.coloured && nodes.some((node) => node.useMesh));
     let meshTriangles = 0;
     for (const node of nodes)
       if (node.useMesh)
@@ -94,9 +94,13 @@ export class TileMaker {
     numbers.fill(-1, 0, p.vertices);
     for (let f = 0; f < p.faces; f++)
       seen[f] = p.wall[f] && walls ? walls.seen(node, p, f) : undefined;
+    const colour = this.colour && this.colour(node);
     const make = (x, y, z) => {
       this.field.at(x, y, z, this.n);
-      return this.#vertex(low[0] + x * size[0], low[1] + y * size[1], low[2] + z * size[2], node.level, node.type);
+      const made = this.#vertex(low[0] + x * size[0], low[1] + y * size[1], low[2] + z * size[2], node.level, node.type);
+      if (colour !== undefined)
+        this.hue.set([colour & 255, colour >> 8 & 255, colour >> 16, 0], 4 * made);
+      return made;
     };
     const own = (v) => (numbers[v] < 0 ? numbers[v] = make(p.x[3 * v], p.x[3 * v + 1], p.x[3 * v + 2]) : numbers[v]);
     for (let f = 0; f < p.faces; f++)

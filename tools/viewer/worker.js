@@ -44,7 +44,7 @@ class OpenFile {
     this.tree = new Tree(info);
     const meshBytes = ['/mesh/vertices', '/mesh/faces'].reduce((sum, path) => sum + (this.file.arrays.has(path) ? this.file.arrays.get(path).bytes ?? Infinity : 0), 0);
     this.cut = new Cut(this.tree, { small: Math.min(meshBytes, source.size) < SMALL_MESH });
-    post({ type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene, coloured: this.file.colours !== undefined,
+    post({ type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene, coloured: this.file.colours !== undefined || info.parts.has('colours'),
       bytesTo: this.#bytesTo(), traffic: this.file.traffic, ms: performance.now() - this.began });
     await this.load(Math.min(FIRST_LEVELS, info.level_count) - 1);
     if (!this.file.located) {

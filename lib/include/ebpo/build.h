@@ -115,7 +115,10 @@ typedef struct ebpo_build_options {
      */
     double epsilon;
 
-    /* Bits of ebpo_part. Leaf planes are made on request only. */
+    /*
+     * Bits of ebpo_part. Leaf planes are made on request only. Colours are made
+     * where the mesh has colours, and with EBPO_PART_MESH only.
+     */
     uint32_t parts;
 
     /* Which points the solid is made of. */
@@ -161,7 +164,8 @@ typedef struct ebpo_build_options {
 #define EBPO_BUILD_OPTIONS_INIT                                                                 \
     {                                                                                           \
         sizeof(ebpo_build_options), -1, 16, 0.003,                                              \
-            EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES,          \
+            EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES |         \
+                EBPO_PART_COLOURS,                                                              \
             EBPO_RULE_NONZERO, false, 0, EBPO_SELECT_INHERIT, 40, 0, EBPO_NORMALS_SPHERICAL, 1, \
             NULL, NULL, NULL, { NULL, NULL }, NULL                                              \
     }

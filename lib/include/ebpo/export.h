@@ -57,10 +57,12 @@ typedef struct ebpo_export_options {
      * source's numbers, the others in the source's order if the file has maps.
      *
      * With its colours (colours.h), if it has any. XDMF and VTKHDF: arrays `rgba` of
-     * 4 bytes, of vertices and of faces; levels are white there. glTF: COLOR_0, which
-     * is linear, alpha too, though the material is opaque. OBJ: red, green and blue
-     * behind a vertex, 0 to 1, as many programs read them. STL holds none, and glTF
-     * and OBJ none of faces.
+     * 4 bytes, of vertices and of faces. glTF: COLOR_0, which is linear, alpha too,
+     * though the material is opaque. OBJ: red, green and blue behind a vertex, 0 to
+     * 1, as many programs read them. STL holds none, and glTF and OBJ none of faces.
+     *
+     * Levels likewise, if the file has colours of them: each vertex has that of its
+     * node. In VTKHDF's arrays what has no colours is white.
      */
     bool mesh;
 
@@ -86,7 +88,7 @@ typedef struct ebpo_export_block {
 
 /* What became of colours. */
 typedef enum ebpo_export_colours {
-    EBPO_EXPORT_NO_COLOURS, /* the mesh has none, or was not wanted */
+    EBPO_EXPORT_NO_COLOURS, /* there are none in what was wanted */
     EBPO_EXPORT_WRITTEN,
     EBPO_EXPORT_LEFT_OUT /* the format has no place for them */
 } ebpo_export_colours;
@@ -110,7 +112,7 @@ typedef struct ebpo_export_report {
      */
     double largest_change;
 
-    /* Of the mesh's vertices and faces: ebpo_export_colours. */
+    /* Of vertices, of the mesh and of levels, and of faces: ebpo_export_colours. */
     uint64_t vertex_colours, face_colours;
 } ebpo_export_report;
 

@@ -62,7 +62,8 @@ typedef enum ebpo_part {
     EBPO_PART_MESH = 2,        /* vertices, faces, and the leaves' lists of faces */
     EBPO_PART_MAPS = 4,        /* numbers in the source, of vertices and faces */
     EBPO_PART_LEAF_PLANES = 8, /* stored envelope planes of leaves */
-    EBPO_PART_ATTRIBUTES = 16  /* what the source says of vertices and faces beyond these */
+    EBPO_PART_ATTRIBUTES = 16, /* what the source says of vertices and faces beyond these */
+    EBPO_PART_COLOURS = 32     /* means of the faces' colours, of gray nodes */
 } ebpo_part;
 
 typedef enum ebpo_codec {
@@ -161,6 +162,12 @@ typedef struct ebpo_level {
 
     /* Owns all its arrays; NULL: malloc's. */
     ebpo_workspace *workspace;
+
+    /*
+     * [gray_count], part EBPO_PART_COLOURS: red + 256 green + 65,536 blue, sRGB;
+     * the mean of what is below the node
+     */
+    uint32_t *gray_colours;
 } ebpo_level;
 
 /*
@@ -314,6 +321,9 @@ typedef struct ebpo_info {
      * well; level_count: none does.
      */
     int index_level;
+
+    /* Checksum of the colours, with EBPO_PART_COLOURS. */
+    uint8_t colours_sha256[32];
 } ebpo_info;
 
 /*

@@ -4,6 +4,7 @@
 #ifndef EBPO_LOD_H
 #define EBPO_LOD_H
 
+#include <ebpo/colours.h>
 #include <ebpo/file.h>
 
 #ifdef __cplusplus
@@ -68,6 +69,15 @@ typedef struct ebpo_lod_node {
 
     /* Of the polyhedron, without what `walls` left out. */
     uint32_t vertex_count, polygon_count;
+
+    /*
+     * Red + 256 green + 65,536 blue, sRGB: of gray nodes their own, of leaves and
+     * black nodes their parent's. Gray (0x808080) where `coloured` is 0.
+     */
+    uint32_t colour;
+
+    /* 1: the file has colours of this node. */
+    uint32_t coloured;
 } ebpo_lod_node;
 
 /*
@@ -105,6 +115,21 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, i
                                                         const ebpo_lod_options *options,
                                                         ebpo_mesh *out, ebpo_lod_nodes *nodes,
                                                         double *volume, ebpo_error *error);
+
+/*
+ * Colours of a level's vertices, each in its node's; none if the file has no
+ * colours. Faces have none.
+ *
+ * vertex_count  of the mesh that came with the nodes
+ * out           freed by ebpo_colours_free; cleared on failure
+ *
+ * EBPO_E_ARGUMENT: the nodes have another number of vertices. EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes,
+                                                    uint64_t vertex_count, ebpo_colours *out,
+                                                    ebpo_error *error);
 
 #ifdef __cplusplus
 }

@@ -85,6 +85,15 @@ typedef struct ebpo_stream_node {
 
     /* Numbers of vertices, counter-clockwise seen from outside. */
     const uint32_t *corners;
+
+    /*
+     * Red + 256 green + 65,536 blue, sRGB: of gray nodes their own, of other ones
+     * their parent's. Gray (0x808080) where `coloured` is 0.
+     */
+    uint32_t colour;
+
+    /* 1: the file has colours of this node. Views (view.h) do not read them. */
+    uint32_t coloured;
 } ebpo_stream_node;
 
 typedef struct ebpo_stream_level {

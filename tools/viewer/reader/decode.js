@@ -50,12 +50,19 @@ function checkPlanes(level, countsName, counts, planesName, planes, total) {
       throw formatError(levelPath(level.level, planesName), 'a code stands for no plane');
 }
 
-/** A level's tree and planes, against the head's counts. */
+/** Colours of gray nodes, if there are any. */
+export function checkColours(level, colours) {
+  if (colours?.some((colour) => colour >= 2 ** 24))
+    throw formatError(levelPath(level, 'gray_colours'), 'a colour is above 2^24 - 1');
+}
+
+/** A level's tree, planes and colours, against the head's counts. */
 export function checkLevel(info, level) {
   checkTypes(info, level);
   checkPlanes(level, 'plane_counts', level.planeCounts, 'planes', level.planes, level.summary.planes);
   checkPlanes(level, 'leaf_plane_counts', level.leafPlaneCounts, 'leaf_planes', level.leafPlanes, level.summary.leaf_planes);
   checkWindings(info, level.level, level.blackWinding, level.whiteWinding);
+  checkColours(level.level, level.grayColours);
 }
 
 /** types_index and gray_index against the sums that they state. */

@@ -5,7 +5,7 @@ import { text } from './hdf5.js';
 
 export const LEVELS_MAX = 21, INDEX_ROWS = 4096;
 const MESH_MAX = 2 ** 32 - 2, NODES_MAX = 2 ** 40;
-const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'attributes', 'subtrees', 'pruned'];
+const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'attributes', 'colours', 'subtrees', 'pruned'];
 
 const WORDS = { kind: ['surface', 'solid'], winding_rule: ['nonzero', 'evenodd', 'positive'], coordinate_type: ['float32', 'float64'] };
 const TEXTS = ['source_name', 'source_format', 'unit', 'crs', 'date'];
@@ -150,7 +150,7 @@ export function readFacts(attributes) {
     out[name] = facts.reals(name, 1)[0];
   for (const name of TRIPLES)
     out[name] = facts.reals(name, 3);
-  for (const name of DIGESTS) {
+  for (const name of [...DIGESTS, ...(out.parts.has('colours') ? ['colours_sha256'] : [])]) {
     out[name] = facts.text(name);
     if (!/^[0-9a-f]{64}$/.test(out[name]))
       throw facts.fail(name, 'it has a value that the format does not allow');
@@ -293,6 +293,7 @@ const LEVEL_ARRAYS = {
   leaf_index: [3, [8], false, (info, s) => (info.parts.has('mesh') || info.parts.has('leaf-planes') ? indexRows(s.leaf) : 0)],
   leaf_plane_counts: [0, [1], false, (info, s) => has(info, 'leaf-planes', s.leaf)],
   leaf_planes: [0, [4], false, (info, s) => has(info, 'leaf-planes', s.leaf_planes)],
+  gray_colours: [0, [4], false, (info, s) => has(info, 'colours', s.gray)],
 };
 export const LEVEL_ARRAY_COUNT = Object.keys(LEVEL_ARRAYS).length;
 const CODINGS = { // others: plain

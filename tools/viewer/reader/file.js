@@ -282,6 +282,7 @@ export class EbpoFile {
       types: get('types', Uint16Array), planeCounts: get('plane_counts', Uint8Array), planes: get('planes', Uint32Array),
       leafWinding: get('leaf_winding', Int32Array), blackWinding: get('black_winding', Int32Array), whiteWinding: get('white_winding', Int32Array),
       leafPlaneCounts: get('leaf_plane_counts', Uint8Array), leafPlanes: get('leaf_planes', Uint32Array),
+      grayColours: get('gray_colours', Uint32Array),
     };
     checkLevel(this.info, level);
     checkIndexes(level, { types: get('types_index', Float64Array), gray: get('gray_index', Float64Array) });
@@ -460,18 +461,26 @@ export class EbpoFile {
     }
   }
 
-  /** Compares content_sha256 (format-spec, section 8). Reads the whole file. In a page: only over https and from localhost. */
+  /** Compares content_sha256 and colours_sha256 (format-spec, section 8). Reads the whole file. In a page: only over https and from localhost. */
   async verifyContent() {
+    const of = (path) => (path.endsWith('/gray_colours') ? 'colours_sha256' : 'content_sha256');
+    const paths = [...this.arrays.keys()].filter((p) => !/^\/(subtrees|attributes)\//.test(p)).sort();
+    for (const name of ['content_sha256', 'colours_sha256'].filter((n) => this.info[n])) {
+      if (await this.#checksum(paths.filter((p) => of(p) === name)) !== this.info[name])
+        throw named(this.source, formatError('', `the content is not what ${name} says: the file was changed`, 'get a fresh copy'));
+    }
+  }
+
+  async #checksum(paths) {
     const digest = await sha256(), parts = [];
-    for (const path of [...this.arrays.keys()].filter((p) => !/^\/(subtrees|attributes)\//.test(p)).sort()) {
+    for (const path of paths) {
       const bytes = this.#digested(path, (await this.#raw([path])).get(path));
       if (bytes)
         parts.push(new TextEncoder().encode(path + '\0'), await digest(bytes));
     }
     const all = new Uint8Array(parts.reduce((sum, p) => sum + p.length, 0));
     parts.reduce((at, p) => (all.set(p, at), at + p.length), 0);
-    if ([...await digest(all)].map((b) => b.toString(16).padStart(2, '0')).join('') !== this.info.content_sha256)
-      throw named(this.source, formatError('', 'the content is not what content_sha256 says: the file was changed', 'get a fresh copy'));
+    return [...await digest(all)].map((b) => b.toString(16).padStart(2, '0')).join('');
   }
 
   // What counts of an array: what it would hold without subtrees, which have smaller chunks.

@@ -11,7 +11,7 @@ export function isSmall(info, level) {
 }
 
 function fits(tree, level) {
-  const bytes = (s) => s.gray * 6 + s.planes * 4 + s.leaf * 6 + s.leaf_planes * 4;
+  const bytes = (s) => s.gray * (tree.info.parts.has('colours') ? 10 : 6) + s.planes * 4 + s.leaf * 6 + s.leaf_planes * 4;
   return [...tree.levels.filter(Boolean).map((_, l) => tree.info.levels[l]), tree.info.levels[level]].reduce((sum, s) => sum + bytes(s), 0) < WHOLE_BYTES_MOST;
 }
 

@@ -1,6 +1,6 @@
 // Parts of levels: the nodes, and the face lists, of one subtree in one level (files with the part subtrees, below its level), else of 4,096 groups
 // or leaves, at which the index arrays begin. All chunks that a batch of parts needs are asked for at once.
-import { LEAF, GRAY, WHITE, BLACK, checkWindings, countTypes, decodeLeafBlock } from './decode.js';
+import { LEAF, GRAY, WHITE, BLACK, checkColours, checkWindings, countTypes, decodeLeafBlock } from './decode.js';
 import { formatError } from './error.js';
 import { INDEX_ROWS } from './facts.js';
 import { Segment } from './segment.js';
@@ -61,13 +61,14 @@ export class Parts {
       leafPlanes: store.arrays.has(at + 'leaf_plane_counts') ? span(leaf, 'leaf_index', 3, 2, s.leaf_planes, LEAF) : undefined };
   }
 
-  /** The rows of arrays that hold a part's nodes: [{ path, from, to }]. With `planes` for drawing, else for exact questions, which need leaves' winding numbers. */
+  /** The rows of arrays that hold a part's nodes: [{ path, from, to }]. With `planes` for drawing, in colours, else for exact questions, which need leaves' winding numbers. */
   nodeRanges(d, planes) {
     const at = folder(d.level), of = (name, type) => ({ path: at + name, from: d.first[type], to: d.first[type] + d.count[type] });
     const out = [{ path: at + 'types', from: d.group, to: d.group + d.groups }, of('black_winding', BLACK), of('white_winding', WHITE)];
     const add = (name, type, p, counts) => p && out.push({ path: at + counts, from: p.row, to: d.first[type] + d.count[type] }, { path: at + name, from: p.from, to: p.to });
     if (!planes)
       return [...out, of('leaf_winding', LEAF)];
+    out.push(of('gray_colours', GRAY));
     add('planes', GRAY, d.planes, 'plane_counts');
     add('leaf_planes', LEAF, d.leafPlanes, 'leaf_plane_counts');
     return out;
@@ -82,14 +83,15 @@ export class Parts {
   }
 
   #segment(d, [types, blackWinding, whiteWinding, ...rest], planes) {
-    const leafWinding = planes ? undefined : rest.shift(), at = folder(d.level), found = countTypes(types, d.level);
+    const [leafWinding, grayColours] = planes ? [undefined, rest.shift()] : [rest.shift()], at = folder(d.level), found = countTypes(types, d.level);
     if (found.some((n, t) => n !== d.count[t]))
       throw formatError(at + 'types', d.exact ? 'the types do not add up to what /subtrees/counts says' : 'the types do not add up to what types_index says');
     checkWindings(this.info, d.level, blackWinding, whiteWinding);
+    checkColours(d.level, grayColours);
     const gray = planes && d.planes ? this.#planes(d, GRAY, d.planes, at + 'plane_counts', ...rest.splice(0, 2)) : {};
     const leaf = planes && d.leafPlanes ? this.#planes(d, LEAF, d.leafPlanes, at + 'leaf_plane_counts', ...rest) : {};
     return new Segment({ level: d.level, group: d.group, first: d.first, types, leafWinding, blackWinding, whiteWinding,
-      planeCounts: gray.counts, planes: gray.planes, leafPlaneCounts: leaf.counts, leafPlanes: leaf.planes });
+      planeCounts: gray.counts, planes: gray.planes, leafPlaneCounts: leaf.counts, leafPlanes: leaf.planes, grayColours });
   }
 
   // A level without nodes of the type has no such arrays.

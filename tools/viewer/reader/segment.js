@@ -26,10 +26,10 @@ const NONE = new Uint32Array(0);
 export class Segment {
   /**
    * Groups from `group` on, with the arrays of format-spec, section 4, from there on. `first`: ranks of the first white, black, leaf, gray node.
-   * Planes are undefined where they were not read.
+   * Planes and colours are undefined where they were not read.
    */
-  constructor({ level, group = 0, first = [0, 0, 0, 0], types, planeCounts, planes, leafPlaneCounts, leafPlanes, leafWinding, blackWinding, whiteWinding }) {
-    Object.assign(this, { level, group, first, types, planeCounts, planes, leafPlaneCounts, leafPlanes });
+  constructor({ level, group = 0, first = [0, 0, 0, 0], types, planeCounts, planes, leafPlaneCounts, leafPlanes, leafWinding, blackWinding, whiteWinding, grayColours }) {
+    Object.assign(this, { level, group, first, types, planeCounts, planes, leafPlaneCounts, leafPlanes, grayColours });
     this.windings = [whiteWinding, blackWinding, leafWinding];
     this.before = new Uint32Array(4 * Math.ceil(types.length / STEP));
     for (let g = 0, sum = 0, at = 0; g < types.length; g++) {
@@ -44,7 +44,7 @@ export class Segment {
     this.planeBegin = begins(planeCounts);
     this.leafPlaneBegin = begins(leafPlaneCounts);
     this.byteLength = 2 * types.length + this.before.length * 4
-      + [planeCounts, planes, leafPlaneCounts, leafPlanes, this.planeBegin, this.leafPlaneBegin, ...this.windings].reduce((sum, a) => sum + (a?.byteLength ?? 0), 0);
+      + [planeCounts, planes, leafPlaneCounts, leafPlanes, grayColours, this.planeBegin, this.leafPlaneBegin, ...this.windings].reduce((sum, a) => sum + (a?.byteLength ?? 0), 0);
   }
 
   /** Ranks (white, black, leaf, gray) at which a group begins. */
@@ -66,6 +66,11 @@ export class Segment {
 
   leafPlanesOf(rank) {
     return this.leafPlanes && this.leafPlaneCounts ? slice(this.leafPlanes, this.leafPlaneCounts, this.leafPlaneBegin, rank - this.first[2]) : NONE;
+  }
+
+  /** Red + 256 green + 65,536 blue of a gray node; undefined where none is. */
+  colour(rank) {
+    return this.grayColours?.[rank - this.first[3]];
   }
 
   /** The winding number of a white, black or leaf node as stored; undefined where none is. */

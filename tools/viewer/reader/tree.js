@@ -122,6 +122,12 @@ export class Tree {
     return node.type === GRAY ? node.segment.grayPlanes(node.rank) : node.type === LEAF ? node.segment.leafPlanesOf(node.rank) : [];
   }
 
+  /** Red + 256 green + 65,536 blue: a gray node's, else its parent's; undefined where none is. */
+  colour(node) {
+    const gray = node.type === GRAY ? node : node.parent;
+    return gray?.segment.colour(gray.rank);
+  }
+
   winding(node) {
     return node.type === GRAY ? 0 : node.segment.winding(node.type, node.rank) ?? (node.type === BLACK ? 1 : 0);
   }

@@ -21,6 +21,7 @@ function asJson(info, levels, mesh, maps) {
     leaf_first: listed(l.leafFirst && l.summary.leaf ? l.leafFirst : undefined, BigUint64Array), leaf_new: listed(l.leafNew, Uint32Array),
     leaf_ref_count: listed(l.leafRefCount, Uint32Array), leaf_refs: listed(l.leafRefs, Uint32Array),
     leaf_plane_counts: listed(l.leafPlaneCounts, Uint8Array), leaf_planes: listed(l.leafPlanes, Uint32Array),
+    ...(l.grayColours && { gray_colours: listed(l.grayColours, Uint32Array) }),
   });
   return {
     kind: info.kind, winding_rule: info.winding_rule, coordinate_type: info.coordinate_type, levels: levels.map(level),

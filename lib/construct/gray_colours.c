@@ -1,0 +1,200 @@
+/* From the deepest level up: a group of eight gives the sums of the gray node above it. Nothing is
+ * kept of faces; what they give is computed for each leaf that lists them, as leaves list few more
+ * than there are. */
+#include "geom/strict_fp.h"
+
+#include "construct/gray_colours.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "attributes/colour_columns.h"
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "mesh/sum.h"
+#include "octree/node_types.h"
+
+enum { GROUP_GRAIN = 1 << 12, GROUPS_A_TIME = 16 };
+
+/* Over the faces below a node, as often as leaves list them. */
+typedef struct colour_sums {
+    ebpo_wide colour[3], weight; /* weight times three times the colour; three times the weight */
+} colour_sums;
+
+/* What comes before a block of groups in its level. */
+typedef struct block_start {
+    uint64_t leaf, gray, ref;
+} block_start;
+
+typedef struct colouring {
+    ebpo_tree *tree;
+    double size; /* greatest of the box */
+    bool by_face;
+    ebpo_colour_column column[EBPO_COLOUR_CHANNELS];
+    const ebpo_level *level; /* whose groups are added up */
+    const block_start *start;
+    const colour_sums *below; /* of the level's gray nodes */
+    colour_sums *above;       /* of its groups */
+    uint32_t *colours;        /* of its groups */
+} colouring;
+
+static uint64_t weight_of(const colouring *c, uint64_t face)
+{
+    const uint32_t *corner = c->tree->mesh.faces + 3 * face;
+    double p[3][3], u[3], v[3];
+    for (int k = 0; k < 3; k++)
+        ebpo_mesh_position(&c->tree->mesh, corner[k], p[k]);
+    for (int k = 0; k < 3; k++) {
+        u[k] = (p[1][k] - p[0][k]) / c->size;
+        v[k] = (p[2][k] - p[0][k]) / c->size;
+    }
+    double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2],
+           z = u[0] * v[1] - u[1] * v[0];
+    return 1 + (uint64_t)(sqrt(x * x + y * y + z * z) * 0x1p32);
+}
+
+static void add_face(const colouring *c, uint64_t face, colour_sums *sums)
+{
+    uint64_t weight = weight_of(c, face);
+    const uint32_t *corner = c->tree->mesh.faces + 3 * face;
+    for (int k = 0; k < 3; k++) {
+        unsigned thrice = c->by_face ? 3u * ebpo_colour_byte(&c->column[k], face) : 0;
+        for (int i = 0; i < 3 && !c->by_face; i++)
+            thrice += ebpo_colour_byte(&c->column[k], corner[i]);
+        sums->colour[k] += (ebpo_wide)weight * thrice;
+    }
+    sums->weight += (ebpo_wide)weight * 3;
+}
+
+static void add_sums(colour_sums *to, const colour_sums *more)
+{
+    for (int k = 0; k < 3; k++)
+        to->colour[k] += more->colour[k];
+    to->weight += more->weight;
+}
+
+static void add_leaf(const colouring *c, uint64_t leaf, uint64_t ref, colour_sums *sums)
+{
+    const ebpo_level *l = c->level;
+    for (uint32_t i = 0; i < l->leaf_new[leaf]; i++)
+        add_face(c, l->leaf_first[leaf] + i, sums);
+    for (uint32_t i = 0; i < l->leaf_ref_count[leaf]; i++)
+        add_face(c, l->leaf_refs[ref + i], sums);
+}
+
+static uint32_t mean_of(const colour_sums *sums)
+{
+    uint32_t colour = 0;
+    for (int k = 0; k < 3; k++)
+        colour |= (uint32_t)((2 * sums->colour[k] + sums->weight) / (2 * sums->weight)) << 8 * k;
+    return colour;
+}
+
+static ebpo_status add_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
+{
+    const colouring *c = context;
+    block_start at = c->start[begin / GROUP_GRAIN];
+    (void)worker, (void)error;
+    EBPO_FOR_ITEMS_EVERY(c->tree->workspace, GROUPS_A_TIME, group, begin, end) {
+        colour_sums sums = { .weight = 0 };
+        for (unsigned octant = 0; octant < 8; octant++) {
+            ebpo_node_type type = ebpo_group_type(c->level->types[group], octant);
+            if (type == EBPO_GRAY)
+                add_sums(&sums, &c->below[at.gray++]);
+            if (type != EBPO_LEAF)
+                continue;
+            add_leaf(c, at.leaf, at.ref, &sums);
+            at.ref += c->level->leaf_ref_count[at.leaf++];
+        }
+        c->above[group] = sums;
+        c->colours[group] = mean_of(&sums);
+    }
+    return EBPO_OK;
+}
+
+static block_start *find_starts(const colouring *c)
+{
+    const ebpo_level *l = c->level;
+    block_start at = { 0, 0, 0 },
+                *start = ebpo_alloc(l->group_count / GROUP_GRAIN + 1, sizeof *start);
+    EBPO_FOR_ITEMS(c->tree->workspace, group, 0, start ? l->group_count : 0) {
+        if (group % GROUP_GRAIN == 0)
+            start[group / GROUP_GRAIN] = at;
+        unsigned leaves = ebpo_group_count(l->types[group], EBPO_LEAF, 8);
+        at.gray += ebpo_group_count(l->types[group], EBPO_GRAY, 8);
+        for (; leaves; leaves--)
+            at.ref += l->leaf_ref_count[at.leaf++];
+    }
+    return start;
+}
+
+/* The gray nodes of the level above `level`. */
+static ebpo_status colour_level(const ebpo_builder *b, colouring *c, int level,
+                                const ebpo_progress *progress, ebpo_error *error)
+{
+    ebpo_workspace *workspace = c->tree->workspace;
+    uint64_t groups = c->tree->level[level].group_count;
+    c->level = &c->tree->level[level];
+    block_start *start = find_starts(c);
+    c->start = start;
+    c->above = ebpo_array_alloc(workspace, groups, sizeof *c->above);
+    c->colours = ebpo_array_alloc(workspace, groups, sizeof *c->colours);
+    c->tree->level[level - 1].gray_colours = c->colours;
+    ebpo_status status = start && c->above && c->colours
+                             ? EBPO_OK
+                             : ebpo_workspace_fail(workspace, groups * sizeof *c->above, error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(b->threads, workspace, groups, GROUP_GRAIN, add_groups, c,
+                                   progress, "colours of envelopes", error);
+    free(start);
+    return status;
+}
+
+static bool all_the_same(const colouring *c)
+{
+    uint8_t first[3];
+    for (int k = 0; k < 3; k++)
+        first[k] = ebpo_colour_byte(&c->column[k], 0);
+    EBPO_FOR_ITEMS(c->tree->workspace, i, 1, c->tree->mesh.vertex_count)
+        for (int k = 0; k < 3; k++)
+            if (ebpo_colour_byte(&c->column[k], i) != first[k])
+                return false;
+    return true;
+}
+
+static void choose_columns(colouring *c)
+{
+    const ebpo_attributes *attributes = c->tree->mesh.attributes;
+    ebpo_colour_column of_face[EBPO_COLOUR_CHANNELS];
+    bool faces = ebpo_colour_columns(attributes, "face", of_face),
+         vertices = ebpo_colour_columns(attributes, "vertex", c->column);
+    c->by_face = faces && (!vertices || all_the_same(c));
+    for (int k = 0; k < EBPO_COLOUR_CHANNELS && c->by_face; k++)
+        c->column[k] = of_face[k];
+}
+
+ebpo_status ebpo_build_gray_colours(const ebpo_builder *b, ebpo_tree *out, ebpo_error *error)
+{
+    const double *size = b->box.size;
+    colouring c = { .tree = out, .size = fmax(size[0], fmax(size[1], size[2])) };
+    colour_sums *below = NULL;
+    uint64_t groups = 0, done = 0;
+    ebpo_status status = EBPO_OK;
+    choose_columns(&c);
+    for (int level = 1; level < out->info.level_count; level++)
+        groups += out->level[level].group_count;
+    for (int level = out->info.level_count - 1; level > 0 && status == EBPO_OK; level--) {
+        uint64_t count = out->level[level].group_count;
+        ebpo_pass pass = { &b->options->progress, done, done + count, groups };
+        ebpo_progress progress = ebpo_pass_progress(&pass);
+        c.below = below;
+        status = colour_level(b, &c, level, &progress, error);
+        ebpo_array_free(out->workspace, below);
+        below = c.above;
+        done += count;
+    }
+    ebpo_array_free(out->workspace, below);
+    return status;
+}
