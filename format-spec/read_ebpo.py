@@ -40,8 +40,111 @@ def vertices(dataset):
     return bits.view("f4" if bits.itemsize == 4 else "f8")
 
 
+def gates_of_chunk(data, seen):
+    """coding "gates": the corners of a chunk's faces, and how many vertices were seen then."""
+    n = len(data) // 13
+    if data[0] == 1:
+        codes = np.frombuffer(data[1:1 + 12 * n], "u1").reshape(4, 3 * n).T.copy().view("<u4").ravel()
+        assert not any(data[1 + 12 * n:]) and len(codes) == 3 * n
+        out = []
+        for code in codes.tolist():
+            assert code <= seen, "a code above seen"
+            out.append(seen - code)
+            seen += code == 0
+        return out, seen
+    gates = data[:n]
+    thirds = data[n:n + sum(gate != 0 for gate in gates)]
+    low = n + len(thirds)
+    more = low + 3 * (n - len(thirds)) + sum(third // 3 == 3 for third in thirds)
+    third, edges, out = iter(thirds), [], []
+
+    def number():
+        nonlocal low, more, seen
+        value = data[low]
+        low += 1
+        assert value <= 240, "a byte of no number"
+        if value >= 224:
+            size = 4 if value == 240 else 1
+            assert more + size <= len(data), "streams too long"
+            rest = int.from_bytes(data[more:more + size], "little")
+            more, value = more + size, rest if value == 240 else 224 + 256 * (value - 224) + rest
+        assert value <= seen, "a number above seen"
+        vertex = seen - value
+        seen += value == 0
+        return vertex
+
+    def push(edge):
+        edges.append(edge)
+        if len(edges) > 64:
+            del edges[0]
+
+    def pass_(a, b):
+        for i in range(len(edges) - 1, max(len(edges) - 33, -1), -1):
+            if edges[i] == (a, b):
+                del edges[i]
+                return
+        push((b, a))
+
+    def newest(end, vertex):
+        return next(i for i in range(len(edges) - 1, -1, -1) if edges[i][end] == vertex)
+
+    for gate in gates:
+        if gate == 0:
+            f = [number(), number(), number()]
+            for k in range(3):
+                push((f[(k + 1) % 3], f[k]))
+            out += f
+            continue
+        assert gate <= len(edges), "a gate beyond the list"
+        a, b = edges.pop(-gate)
+        t, k = divmod(next(third), 3)
+        assert t < 4 + len(edges), "a corner beyond the list"
+        if t == 0:
+            c, seen = seen, seen + 1
+            push((c, b))
+            push((a, c))
+        elif t == 1:
+            c = edges.pop(newest(0, b))[1]
+            pass_(c, a)
+        elif t == 2:
+            c = edges.pop(newest(1, a))[0]
+            pass_(b, c)
+        else:
+            c = number() if t == 3 else edges[-1 - (t - 4)][0]
+            pass_(b, c)
+            pass_(c, a)
+        f = [a, b, c]
+        out += f[-k:] + f[:-k]
+    assert not any(data[more:]), "bytes behind the streams"
+    return out, seen
+
+
+def from_gates(dataset):
+    """Corners, in one row. A chunk begins by itself, but for the vertices seen before it."""
+    out, seen = [], 0
+    for part in in_chunks(dataset):
+        corners, seen = gates_of_chunk(part.tobytes(), seen)
+        out += corners
+    return np.array(out, "i8")
+
+
+def is_gates(dataset):
+    return text(dataset.attrs["coding"]) == "gates"
+
+
+def high_water(dataset):
+    """The codes that faces have, or would have without gates."""
+    if not is_gates(dataset):
+        return dataset[...]
+    corners = from_gates(dataset)
+    before = np.maximum.accumulate(np.concatenate([[-1], corners[:-1]])) + 1
+    return (before - corners).astype("u4").reshape(-1, 3)
+
+
 def faces(dataset):
     """coding "high-water": 0 is the next vertex never seen before, k the k-th before that one."""
+    if is_gates(dataset):
+        return from_gates(dataset).astype("u4")
     codes = dataset[...].ravel().astype("i8")
     new = codes == 0
     seen = np.cumsum(new) - new
@@ -110,9 +213,11 @@ CODINGS = {"leaf_skip": ("skips", "delta"), "leaf_refs": ("gap",), "mesh/vertice
 
 def check_codings(file):
     """README.md, "Codings": each array names the one that it has. `delta` at leaf_skip is of older files."""
+    gates = "gates" in parts_of(file)
     for path, item in arrays(file).items():
         wanted = path.split("/")[-1] if path.startswith("/levels/") else path[1:]
-        assert text(item.attrs["coding"]) in CODINGS.get(wanted, ("plain",)), f"{path}: its coding"
+        known = ("gates",) if gates and path == "/mesh/faces" else CODINGS.get(wanted, ("plain",))
+        assert text(item.attrs["coding"]) in known, f"{path}: its coding"
 
 
 def full_rows(dataset):
@@ -125,7 +230,7 @@ def full_rows(dataset):
 
 def as_without_subtrees(name, dataset):
     """What counts of an array in a file with subtrees; None: nothing."""
-    values = dataset[...]
+    values = high_water(dataset) if name == "/mesh/faces" else dataset[...]
     if name == "/mesh/faces_index":
         return values[::2] if len(values) > 2 else None
     if name == "/mesh/vertices" or name.startswith("/maps/"):
@@ -144,7 +249,8 @@ def content_sha256(file, of_colours=False):
     for name, dataset in sorted(arrays(file).items()):
         if name.startswith("/subtrees/") or name.endswith("/gray_colours") != of_colours:
             continue
-        values = as_without_subtrees(name, dataset) if subtrees else dataset[...]
+        plain = high_water if name == "/mesh/faces" else np.asarray
+        values = as_without_subtrees(name, dataset) if subtrees else plain(dataset)
         if values is not None:
             total.update(name.encode() + b"\0" + hashlib.sha256(values.tobytes()).digest())
     return total.hexdigest()
@@ -534,7 +640,7 @@ def read(path):
         assert text(file.attrs["format"]) == "EBP-Octree in HDF5" and one(file.attrs["format_version_major"]) == 1
         assert text(file.attrs.get("format_version", "")) != "1.0-draft"
         required = text(file.attrs["required_parts"]).split()
-        unknown = set(required) - {"levels", "mesh", "planes", "maps", "leaf-planes", "subtrees", "pruned"}
+        unknown = set(required) - {"levels", "mesh", "planes", "maps", "leaf-planes", "subtrees", "gates", "pruned"}
         assert not unknown, f"needs {unknown}"
         parts = set(parts_of(file))
         assert content_sha256(file) == text(file.attrs["content_sha256"]), "content_sha256 differs"

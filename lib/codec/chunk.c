@@ -101,35 +101,59 @@ static bool zstd_begin(ZSTD_CCtx *out, int level, size_t raw_bytes)
            (!effort || !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_minMatch, MATCH_LEAST)));
 }
 
-static size_t zstd_planes(ZSTD_CCtx *zstd, const uint8_t *raw, size_t raw_bytes, size_t plane,
+/* Where blocks end before the chunk does: at most one for each byte of the widest element. */
+typedef struct blocks {
+    size_t end[8];
+    int count;
+} blocks;
+
+static blocks blocks_of_planes(size_t raw_bytes, size_t element_size)
+{
+    enum { PLANE_LEAST = 1024 }; /* a table of codes takes some 100 bytes */
+    blocks b = { .count = 0 };
+    size_t plane = raw_bytes / element_size;
+    for (size_t at = plane; at < raw_bytes && plane >= PLANE_LEAST; at += plane)
+        b.end[b.count++] = at;
+    return b;
+}
+
+/* Those of streams that are neither empty nor all of the chunk. */
+static blocks blocks_of_streams(size_t raw_bytes, const size_t *ends, int count)
+{
+    blocks b = { .count = 0 };
+    size_t last = 0;
+    for (int i = 0; i < count; last = ends[i++])
+        if (ends[i] > last && ends[i] < raw_bytes)
+            b.end[b.count++] = ends[i];
+    return b;
+}
+
+static size_t zstd_blocks(ZSTD_CCtx *zstd, const uint8_t *raw, size_t raw_bytes, const blocks *b,
                           uint8_t *out)
 {
     ZSTD_outBuffer to = { out, ebpo_chunk_bound(raw_bytes), 0 };
-    size_t left = ZSTD_CCtx_setPledgedSrcSize(zstd, raw_bytes);
-    for (size_t at = 0; at < raw_bytes && left == 0; at += plane) {
-        ZSTD_inBuffer from = { raw + at, plane, 0 };
-        left = ZSTD_compressStream2(zstd, &to, &from,
-                                    at + plane == raw_bytes ? ZSTD_e_end : ZSTD_e_flush);
+    size_t left = ZSTD_CCtx_setPledgedSrcSize(zstd, raw_bytes), at = 0;
+    for (int i = 0; i <= b->count && left == 0; i++) {
+        size_t end = i < b->count ? b->end[i] : raw_bytes;
+        ZSTD_inBuffer from = { raw + at, end - at, 0 };
+        left = ZSTD_compressStream2(zstd, &to, &from, i == b->count ? ZSTD_e_end : ZSTD_e_flush);
+        at = end;
     }
     return left ? (size_t)-1 : to.pos; /* an error, as ZSTD_isError has it */
 }
 
-static ebpo_status zstd_encode(ebpo_chunk_coder *coder, int level, size_t element_size,
-                               const uint8_t *raw, size_t raw_bytes, uint8_t *out,
-                               size_t *out_bytes)
+static ebpo_status zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw,
+                               size_t raw_bytes, const blocks *b, uint8_t *out, size_t *out_bytes)
 {
-    enum { PLANE_LEAST = 1024 }; /* a table of codes takes some 100 bytes */
-    size_t plane = raw_bytes / element_size;
     if (!coder->zstd_out)
         coder->zstd_out = ZSTD_createCCtx();
     if (!coder->zstd_out)
         return EBPO_E_MEMORY;
     if (!zstd_begin(coder->zstd_out, level, raw_bytes))
         return EBPO_E_ARGUMENT;
-    size_t size =
-        element_size > 1 && plane >= PLANE_LEAST
-            ? zstd_planes(coder->zstd_out, raw, raw_bytes, plane, out)
-            : ZSTD_compress2(coder->zstd_out, out, ebpo_chunk_bound(raw_bytes), raw, raw_bytes);
+    size_t size = b->count ? zstd_blocks(coder->zstd_out, raw, raw_bytes, b, out)
+                           : ZSTD_compress2(coder->zstd_out, out, ebpo_chunk_bound(raw_bytes), raw,
+                                            raw_bytes);
     *out_bytes = size;
     return ZSTD_isError(size) ? EBPO_E_MEMORY : EBPO_OK; /* the bound leaves no other cause */
 }
@@ -143,18 +167,13 @@ static ebpo_status deflate_encode(int level, const uint8_t *raw, size_t raw_byte
     return code == Z_OK ? EBPO_OK : code == Z_MEM_ERROR ? EBPO_E_MEMORY : EBPO_E_ARGUMENT;
 }
 
-ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, int level,
-                              size_t element_size, const uint8_t *raw, size_t raw_bytes,
-                              uint8_t *out, size_t *out_bytes)
+static ebpo_status encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, int level,
+                          const uint8_t *raw, size_t raw_bytes, const blocks *b, uint8_t *out,
+                          size_t *out_bytes)
 {
     ebpo_status status = EBPO_OK;
-    bool compressed = pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE;
-    if (compressed && element_size > 1) {
-        ebpo_shuffle(raw, raw_bytes, element_size, coder->scratch);
-        raw = coder->scratch;
-    }
     if (pipeline == EBPO_PIPELINE_ZSTD)
-        return zstd_encode(coder, level, element_size, raw, raw_bytes, out, out_bytes);
+        return zstd_encode(coder, level, raw, raw_bytes, b, out, out_bytes);
     if (pipeline == EBPO_PIPELINE_DEFLATE) {
         status = deflate_encode(level, raw, raw_bytes, out, out_bytes);
     } else {
@@ -166,6 +185,27 @@ ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, i
         *out_bytes += 4;
     }
     return status;
+}
+
+ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, int level,
+                              size_t element_size, const uint8_t *raw, size_t raw_bytes,
+                              uint8_t *out, size_t *out_bytes)
+{
+    blocks b = blocks_of_planes(raw_bytes, element_size);
+    bool compressed = pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE;
+    if (compressed && element_size > 1) {
+        ebpo_shuffle(raw, raw_bytes, element_size, coder->scratch);
+        raw = coder->scratch;
+    }
+    return encode(coder, pipeline, level, raw, raw_bytes, &b, out, out_bytes);
+}
+
+ebpo_status ebpo_chunk_encode_streams(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, int level,
+                                      const uint8_t *raw, size_t raw_bytes, const size_t *ends,
+                                      int count, uint8_t *out, size_t *out_bytes)
+{
+    blocks b = blocks_of_streams(raw_bytes, ends, count);
+    return encode(coder, pipeline, level, raw, raw_bytes, &b, out, out_bytes);
 }
 
 static ebpo_status broken(const char **why, const char *what)

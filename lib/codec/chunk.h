@@ -38,6 +38,13 @@ EBPO_MUST_USE ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeli
                                             int level, size_t element_size, const uint8_t *raw,
                                             size_t raw_bytes, uint8_t *out, size_t *out_bytes);
 
+/* The same of single bytes that are `count` streams, one behind the other up to ends[i] (ascending,
+ * some may be empty), and a rest: zstd tells each by itself. */
+EBPO_MUST_USE ebpo_status ebpo_chunk_encode_streams(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
+                                                    int level, const uint8_t *raw, size_t raw_bytes,
+                                                    const size_t *ends, int count, uint8_t *out,
+                                                    size_t *out_bytes);
+
 /* Decodes into exactly raw_bytes. On EBPO_E_FORMAT *why is a static string that says what is wrong.
  * Safe on any bytes. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,

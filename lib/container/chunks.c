@@ -173,8 +173,7 @@ static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64
     uint64_t index = index_end <= prefetched                 ? 0
                      : info->chunk_index_offset < prefetched ? index_end - prefetched
                                                              : info->chunk_index_bytes;
-    return again + index +
-           ebpo_chunk_bound(array->shape.chunk_rows * ebpo_h5_row_bytes(&array->shape));
+    return again + index + ebpo_reader_chunk_bound(array);
 }
 
 static bool fits(const ebpo_chunks *c, uint64_t more)

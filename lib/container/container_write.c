@@ -10,6 +10,7 @@
 #include "base/sha256.h"
 #include "base/arrays.h"
 #include "base/sized.h"
+#include "codec/face_gates.h"
 #include "container/chunk_order.h"
 #include "container/content.h"
 #include "container/head_facts.h"
@@ -87,6 +88,27 @@ static void digest_slots(writer *w)
     }
 }
 
+/* The filling of the last chunk is no face. */
+static ebpo_status compress_gates(slot *s, ebpo_chunk_coder *coder, int level)
+{
+    ebpo_h5_shape stored = ebpo_stored_shape(&s->array->shape, true);
+    uint64_t left = stored.rows - s->chunk * stored.chunk_rows,
+             rows = left < stored.chunk_rows ? left : stored.chunk_rows;
+    size_t ends[EBPO_GATES_ENDS], bytes = stored.chunk_rows * ebpo_h5_row_bytes(&stored);
+    ebpo_gates_encode(s->raw, (uint32_t)rows, coder->scratch, ends);
+    memset(coder->scratch + rows * EBPO_GATES_COLS, 0, bytes - rows * EBPO_GATES_COLS);
+    return ebpo_chunk_encode_streams(coder, stored.pipeline, level, coder->scratch, bytes, ends,
+                                     EBPO_GATES_ENDS, s->stored, &s->stored_bytes);
+}
+
+static ebpo_status compress(slot *s, ebpo_chunk_coder *coder, int level)
+{
+    const ebpo_h5_shape *shape = &s->array->shape;
+    return s->array->gates ? compress_gates(s, coder, level)
+                           : ebpo_chunk_encode(coder, shape->pipeline, level, shape->element_size,
+                                               s->raw, s->raw_bytes, s->stored, &s->stored_bytes);
+}
+
 /* Item 0 digests the whole window, the others compress one slot each. */
 static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
@@ -98,10 +120,7 @@ static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, un
             continue;
         }
         slot *s = &w->slots[i - 1];
-        ebpo_status status =
-            ebpo_chunk_encode(&w->coders[worker], s->array->shape.pipeline, w->options->codec_level,
-                              s->array->shape.element_size, s->raw, s->raw_bytes, s->stored,
-                              &s->stored_bytes);
+        ebpo_status status = compress(s, &w->coders[worker], w->options->codec_level);
         if (status != EBPO_OK)
             return ebpo_fail_at(error, status, w->head.out.shown, s->array->path, -1,
                                 "a chunk could not be compressed");

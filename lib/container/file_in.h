@@ -18,13 +18,21 @@ typedef struct ebpo_array_in {
     ebpo_array_id id;
     int level;
     char path[EBPO_PATH_BYTES];
-    ebpo_h5_shape shape;
+    ebpo_h5_shape shape; /* of what ebpo_reader_chunk gives */
+    bool gates;          /* it makes that of another coding: ebpo_stored_shape */
     uint64_t stored_bytes;
     /* [ebpo_h5_chunk_count(&shape)] where each is; NULL when the array is absent. After
      * ebpo_reader_locate, unless it has one chunk only */
     ebpo_h5_chunk *chunks;
     const char *coding; /* of attributes; the others' stand in ebpo_schema */
 } ebpo_array_in;
+
+/* Bytes that a stored chunk of it can have at most. */
+static inline size_t ebpo_reader_chunk_bound(const ebpo_array_in *array)
+{
+    ebpo_h5_shape stored = ebpo_stored_shape(&array->shape, array->gates);
+    return ebpo_chunk_bound(stored.chunk_rows * ebpo_h5_row_bytes(&stored));
+}
 
 /* What the head says of an array of attributes. */
 typedef struct ebpo_attribute_in {

@@ -24,6 +24,8 @@ static const char *check_mesh_counts(const ebpo_info *info)
         return "there are maps but no mesh";
     if (info->parts & EBPO_PART_ATTRIBUTES && !(info->parts & EBPO_PART_MESH))
         return "there are attributes but no mesh";
+    if (info->gates && !(info->parts & EBPO_PART_MESH))
+        return "there is a coding of faces but no mesh";
     return NULL;
 }
 

@@ -205,7 +205,8 @@ static ebpo_status get_parts(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, e
             info->parts |= ebpo_part_words[i].part;
     info->pruned = info->parts & EBPO_WORD_PRUNED;
     info->subtree_level = info->parts & EBPO_WORD_SUBTREES ? 1 : 0; /* until get_subtrees */
-    info->parts &= ~(uint32_t)(EBPO_WORD_PRUNED | EBPO_WORD_SUBTREES);
+    info->gates = info->parts & EBPO_WORD_GATES;
+    info->parts &= ~(uint32_t)(EBPO_WORD_PRUNED | EBPO_WORD_SUBTREES | EBPO_WORD_GATES);
     return seen & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
 }
 

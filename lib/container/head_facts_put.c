@@ -60,7 +60,8 @@ static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info 
 {
     char words[128] = "";
     uint32_t has = info->parts | (info->pruned ? EBPO_WORD_PRUNED : 0) |
-                   (info->subtree_level ? EBPO_WORD_SUBTREES : 0);
+                   (info->subtree_level ? EBPO_WORD_SUBTREES : 0) |
+                   (info->gates ? EBPO_WORD_GATES : 0);
     for (int i = 0; i < ebpo_part_word_count; i++)
         if (ebpo_part_words[i].required == required &&
             (!ebpo_part_words[i].part || has & ebpo_part_words[i].part)) {

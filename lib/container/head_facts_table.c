@@ -89,6 +89,7 @@ const ebpo_part_word ebpo_part_words[] = {
     { "attributes", EBPO_PART_ATTRIBUTES, false },
     { "colours", EBPO_PART_COLOURS, false },
     { "subtrees", EBPO_WORD_SUBTREES, true },
+    { "gates", EBPO_WORD_GATES, true },
     { "pruned", EBPO_WORD_PRUNED, true },
 };
 const int ebpo_part_word_count = sizeof ebpo_part_words / sizeof ebpo_part_words[0];

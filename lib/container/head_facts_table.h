@@ -59,9 +59,10 @@ typedef struct ebpo_part_word {
     bool required;
 } ebpo_part_word;
 
-/* info.pruned and subtree_level: words in the list of parts, but nothing that one could leave out.
+/* info.pruned, subtree_level and gates: words in the list of parts, but nothing that one could
+ * leave out.
  */
-enum { EBPO_WORD_PRUNED = 1 << 30, EBPO_WORD_SUBTREES = 1 << 29 };
+enum { EBPO_WORD_PRUNED = 1 << 30, EBPO_WORD_SUBTREES = 1 << 29, EBPO_WORD_GATES = 1 << 28 };
 extern const ebpo_part_word ebpo_part_words[];
 extern const int ebpo_part_word_count;
 

@@ -80,14 +80,16 @@ ebpo_status ebpo_headers_put_holds(ebpo_headers *h, uint64_t file_bytes, uint64_
 static ebpo_status make_array(ebpo_headers *h, ebpo_array_out *a, const ebpo_first_chunk *first,
                               ebpo_error *error)
 {
-    ebpo_status status = ebpo_h5_make_array(&h->out, a->path, &a->shape, &a->handle, error);
+    ebpo_h5_shape shape = ebpo_stored_shape(&a->shape, a->gates);
+    ebpo_status status = ebpo_h5_make_array(&h->out, a->path, &shape, &a->handle, error);
     if (status == EBPO_OK && first)
         status = ebpo_h5_put_chunk(&h->out, a->path, a->handle, &a->shape, 0, first->data,
                                    first->bytes, error);
     if (status == EBPO_OK && a->id == EBPO_A_ATTRIBUTE)
         return ebpo_attributes_put_array(&h->out, h->plan, a, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_put_text(&h->out, a->handle, "coding", ebpo_schema[a->id].coding, error);
+        status = ebpo_h5_put_text(&h->out, a->handle, "coding",
+                                  a->gates ? EBPO_GATES_CODING : ebpo_schema[a->id].coding, error);
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(&h->out, a->handle, "about", ebpo_schema[a->id].about, error);
     return status;

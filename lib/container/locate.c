@@ -97,8 +97,7 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_h5_chunk chunk, 
     uint64_t *seen = seen_of(l, id, level);
     if (!a->present || *seen == ebpo_h5_chunk_count(&a->shape))
         return list_fails(l->file, "the list has more chunks than", a->path, error);
-    if (chunk.bytes == 0 ||
-        chunk.bytes > ebpo_chunk_bound(a->shape.chunk_rows * ebpo_h5_row_bytes(&a->shape)))
+    if (chunk.bytes == 0 || chunk.bytes > ebpo_reader_chunk_bound(a))
         return list_fails(l->file, "the list has a chunk of a size that it cannot have of", a->path,
                           error);
     if (ebpo_h5_chunk_count(&a->shape) == 1 &&

@@ -15,10 +15,28 @@
 
 /* The word says how the numbers are to be read: with another one they would be read wrong. In files
  * of 1.0, and in the first ones of 1.1, `delta` stands at leaf_skip, too. */
-static bool coding_known(const ebpo_array_spec *spec, const char *word)
+static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gates)
 {
+    if (gates)
+        return strcmp(word, EBPO_GATES_CODING) == 0;
     return strcmp(word, spec->coding) == 0 ||
            (spec == &ebpo_schema[EBPO_A_LEAF_SKIP] && strcmp(word, "delta") == 0);
+}
+
+/* Also whether it is stored as it is. */
+static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
+{
+    const ebpo_array_spec *spec = &ebpo_schema[a->id];
+    ebpo_h5_shape values = a->shape;
+    values.cols = ebpo_schema_cols(info, a->id);
+    if (gates)
+        values.element_size = spec->sizes;
+    ebpo_h5_shape stored = ebpo_stored_shape(&values, gates);
+    bool fits = a->shape.cols == stored.cols && a->shape.element_size == stored.element_size &&
+                spec->sizes & values.element_size && a->shape.is_signed == spec->is_signed;
+    a->shape = values;
+    a->gates = gates;
+    return fits;
 }
 
 static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id, int level,
@@ -28,6 +46,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id,
     ebpo_array_in *a =
         id < EBPO_LEVEL_ARRAYS ? &file->level_array[level][id] : &file->root_array[id];
     uint64_t rows = ebpo_schema_rows(&file->info, id, level);
+    bool gates = id == EBPO_A_FACES && file->info.gates;
     *a = (ebpo_array_in){ .id = id, .level = level };
     ebpo_schema_path(id, level, a->path);
     if (rows == 0 || (spec->if_needed && ebpo_h5_look(h5, a->path) == EBPO_H5_ABSENT))
@@ -40,14 +59,13 @@ static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id,
     if (status != EBPO_OK)
         return status;
     ebpo_check check = ebpo_reader_check(file, NULL);
-    if (!coding_known(spec, coding))
+    if (!coding_known(spec, coding, gates))
         return ebpo_check_fail(&check, -1, a->path,
                                "the array's coding is none that the format has for it", error);
     if (a->shape.rows != rows && rows != EBPO_ROWS_STATED)
         return ebpo_check_fail(&check, -1, a->path,
                                "the array's length contradicts the counts in the head", error);
-    if (a->shape.cols != ebpo_schema_cols(&file->info, id) ||
-        !(spec->sizes & a->shape.element_size) || a->shape.is_signed != spec->is_signed)
+    if (!type_fits(&file->info, a, gates))
         return ebpo_check_fail(&check, -1, a->path,
                                "the array has the wrong type or the wrong number of columns",
                                error);

@@ -58,6 +58,14 @@ static bool texts_ok(const ebpo_info *info)
     return true;
 }
 
+/* Readers of 1.0 do not know subtrees either; without compression bytes of zeros count. */
+static bool gates_wanted(const ebpo_info *info, ebpo_face_coding coding)
+{
+    bool usual = info->subtree_level && info->codec != EBPO_CODEC_NONE;
+    return info->parts & EBPO_PART_MESH &&
+           (coding == EBPO_FACES_USUAL ? usual : coding == EBPO_FACES_GATES);
+}
+
 /* The facts as the file will state them: parts that are wanted and there, counts of what is
  * written. */
 static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *options,
@@ -71,6 +79,7 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
     info->codec = options->codec;
     info->subtree_level = 0;
     info->top_bytes = 0;
+    info->gates = false;
     info->parts &= options->parts;
     if (!(info->parts & EBPO_PART_MESH))
         info->parts &= ~(uint32_t)(EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
@@ -100,6 +109,7 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
                                error);
     summarise(info, tree);
     info->subtree_level = ebpo_subtree_level_for(info, options->subtree_faces);
+    info->gates = gates_wanted(info, options->face_coding);
     return ebpo_facts_check(info, check->shown, check->as, error);
 }
 
@@ -242,6 +252,7 @@ static void add_array(ebpo_plan *plan, ebpo_array_id id, int level)
     a->shape.chunk_rows =
         ebpo_rows_of_chunk(&plan->info, id, level, rows, a->shape.cols, a->shape.element_size);
     a->shape.pipeline = pipeline_of(plan->info.codec);
+    a->gates = id == EBPO_A_FACES && plan->info.gates;
 }
 
 ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,

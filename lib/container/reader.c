@@ -9,6 +9,7 @@
 #include "base/parallel.h"
 #include "base/arrays.h"
 #include "codec/coding.h"
+#include "codec/face_gates.h"
 
 enum {
     RUN_BYTES = 1 << 20, /* of one read, at most */
@@ -41,35 +42,81 @@ static ebpo_status fetch(const ebpo_file *file, ebpo_chunk_reader *reader, uint6
     return ebpo_input_read(&ebpo_reader_own(file)->in, address, bytes, reader->stored, error);
 }
 
-static ebpo_status decode(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
-                          ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw_out,
-                          ebpo_error *error)
+static ebpo_status damaged(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                           const char *why, ebpo_error *error)
 {
-    const ebpo_h5_shape *shape = &array->shape;
-    size_t raw = shape->chunk_rows * ebpo_h5_row_bytes(shape);
-    const char *why;
-    ebpo_status status = ebpo_chunk_decode(coder, shape->pipeline, shape->element_size, stored,
-                                           array->chunks[chunk].bytes, raw_out, raw, &why);
-    if (status == EBPO_E_MEMORY)
-        return ebpo_fail_memory(error, raw);
-    if (status != EBPO_OK)
-        return ebpo_fail_at(error, status, file->in.shown, array->path, -1,
-                            "chunk %" PRIu64 " is damaged: %s; get a fresh copy of the file", chunk,
-                            why);
-    return EBPO_OK;
+    return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, array->path, -1,
+                        "chunk %" PRIu64 " is damaged: %s; get a fresh copy of the file", chunk,
+                        why);
 }
 
-ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
-                              ebpo_chunk_reader *reader, uint8_t *raw, ebpo_error *error)
+/* As HDF5 would give it. */
+static ebpo_status unpack(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                          ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
+                          ebpo_error *error)
+{
+    ebpo_h5_shape shape = ebpo_stored_shape(&array->shape, array->gates);
+    size_t bytes = shape.chunk_rows * ebpo_h5_row_bytes(&shape);
+    const char *why;
+    ebpo_status status = ebpo_chunk_decode(coder, shape.pipeline, shape.element_size, stored,
+                                           array->chunks[chunk].bytes, raw, bytes, &why);
+    if (status == EBPO_E_MEMORY)
+        return ebpo_fail_memory(error, bytes);
+    return status == EBPO_OK ? EBPO_OK : damaged(file, array, chunk, why, error);
+}
+
+/* From gates to codes of high-water, with filling. Single bytes are not shuffled: the coder's room
+ * for that is free. */
+static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                                ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *codes,
+                                ebpo_error *error)
+{
+    uint64_t left = array->shape.rows - chunk * array->shape.chunk_rows,
+             rows = left < array->shape.chunk_rows ? left : array->shape.chunk_rows;
+    size_t row = ebpo_h5_row_bytes(&array->shape);
+    ebpo_status status = unpack(file, array, chunk, coder, stored, coder->scratch, error);
+    if (status != EBPO_OK)
+        return status;
+    memset(codes + rows * row, 0, (array->shape.chunk_rows - rows) * row);
+    return ebpo_gates_decode(coder->scratch, (uint32_t)rows, codes)
+               ? EBPO_OK
+               : damaged(file, array, chunk, "its streams are those of no faces", error);
+}
+
+static ebpo_status decode(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                          ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
+                          ebpo_error *error)
+{
+    return array->gates ? unpack_gates(file, array, chunk, coder, stored, raw, error)
+                        : unpack(file, array, chunk, coder, stored, raw, error);
+}
+
+static ebpo_status fetch_chunk(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                               ebpo_chunk_reader *reader, ebpo_error *error)
 {
     ebpo_status status = ebpo_reader_locate(file, array, error);
     if (status != EBPO_OK)
         return status;
     const ebpo_h5_chunk *at = &array->chunks[chunk];
-    size_t bound = ebpo_chunk_bound(array->shape.chunk_rows * ebpo_h5_row_bytes(&array->shape));
-    status = fetch(file, reader, at->address, at->bytes, bound, error);
+    return fetch(file, reader, at->address, at->bytes, ebpo_reader_chunk_bound(array), error);
+}
+
+ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                              ebpo_chunk_reader *reader, uint8_t *raw, ebpo_error *error)
+{
+    ebpo_status status = fetch_chunk(file, array, chunk, reader, error);
     return status == EBPO_OK
                ? decode(file, array, chunk, &reader->coder, reader->stored, raw, error)
+               : status;
+}
+
+ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk, ebpo_chunk_reader *reader,
+                              uint8_t *raw, ebpo_error *error)
+{
+    const ebpo_array_in *array = ebpo_reader_array(file, EBPO_A_FACES, 0);
+    ebpo_status status = fetch_chunk(file, array, chunk, reader, error);
+    return status == EBPO_OK
+               ? unpack(file, array, chunk, &reader->coder, reader->stored, raw, error)
                : status;
 }
 

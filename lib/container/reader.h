@@ -60,6 +60,11 @@ EBPO_MUST_USE ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_ar
                                             uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw,
                                             ebpo_error *error);
 
+/* The same of faces that are stored as gates, as these: EBPO_GATES_COLS bytes for each row. */
+EBPO_MUST_USE ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk,
+                                            ebpo_chunk_reader *reader, uint8_t *raw,
+                                            ebpo_error *error);
+
 /* Takes rows [row, row + rows) of chunk number `chunk`, decoded to the bytes that the specification
  * describes. Called from several threads. */
 typedef ebpo_status (*ebpo_rows_fn)(void *context, const ebpo_array_in *array, uint64_t chunk,

@@ -4,7 +4,7 @@
 #include <stdio.h>
 
 #include "base/arrays.h"
-#include "h5/h5.h"
+#include "codec/face_gates.h"
 
 #define REQUIRED       .if_needed = false
 #define USUALLY(value) .if_needed = true, .usual = (value)
@@ -103,6 +103,16 @@ void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES])
         snprintf(path, EBPO_PATH_BYTES, "/levels/%02d/%s", level, ebpo_schema[id].name);
     else
         snprintf(path, EBPO_PATH_BYTES, "%s", ebpo_schema[id].name);
+}
+
+ebpo_h5_shape ebpo_stored_shape(const ebpo_h5_shape *given, bool gates)
+{
+    ebpo_h5_shape stored = *given;
+    if (gates) {
+        stored.element_size = 1;
+        stored.cols = EBPO_GATES_COLS;
+    }
+    return stored;
 }
 
 uint64_t ebpo_schema_index_rows(uint64_t count)

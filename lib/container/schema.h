@@ -7,6 +7,8 @@
 
 #include <ebpo/file.h>
 
+#include "h5/h5.h"
+
 /* In the order in which they lie in the file. Up to EBPO_LEVEL_ARRAYS once for each level. */
 typedef enum ebpo_array_id {
 #define LEVEL_ARRAY(ID, ...) EBPO_A_##ID,
@@ -130,6 +132,10 @@ typedef struct ebpo_count_spec {
 } ebpo_count_spec;
 
 extern const ebpo_count_spec ebpo_counts[EBPO_COUNTS];
+
+/* How an array is stored whose values are of the shape `given`: as that, or as gates. */
+#define EBPO_GATES_CODING "gates"
+ebpo_h5_shape ebpo_stored_shape(const ebpo_h5_shape *given, bool gates);
 
 /* Absolute path of an array; `level` matters for level arrays only. */
 void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES]);

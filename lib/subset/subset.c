@@ -174,5 +174,6 @@ ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options)
     write.threads = options->threads;
     write.progress = options->progress;
     write.subtree_faces = options->subtree_faces;
+    write.face_coding = options->face_coding;
     return write;
 }

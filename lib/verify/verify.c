@@ -30,6 +30,8 @@ static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, cons
         status = ebpo_verify_walk(tally, &view, options, error);
     if (status == EBPO_OK && file)
         status = ebpo_check_subtrees(tally, file, &view, options, error);
+    if (status == EBPO_OK && file)
+        status = ebpo_check_gates(tally, file, tree, error);
     ebpo_twin_free(&view);
     return status;
 }

@@ -10,8 +10,9 @@
 
 #include <ebpo/file.h>
 
+#include "base/endian.h"
 #include "codec/coding.h"
-#include "gates.h"
+#include "codec/face_gates.h"
 
 enum { ROOM = 1 << 20, STREAMS_MOST = 32, TURNS = 3, DICTIONARY = 16384 };
 
@@ -288,22 +289,21 @@ static void vertices(const origin *origins)
 
 /* ---- faces ---- */
 
+enum { GATES_BYTES = 4096 * EBPO_GATES_COLS };
+
 /* Seconds for a chunk back from `stored`. */
-static double gates_back(const gates *s, size_t bytes, uint32_t rows, uint64_t seen,
-                         const uint32_t *expected)
+static double gates_back(size_t bytes, uint32_t rows, uint64_t seen, const uint32_t *expected)
 {
-    static uint32_t back[3 * GATES_ROWS_MOST];
-    static gates from;
+    static uint32_t back[3 * 4096];
+    static uint8_t codes[sizeof back];
     double best = 1e9;
     for (int turn = 0; turn < TURNS; turn++) {
+        uint64_t then = seen;
         double begin = now();
-        size_t size = ZSTD_decompressDCtx(reader, room, sizeof room, stored, bytes), at = 0;
+        size_t size = ZSTD_decompressDCtx(reader, room, sizeof room, stored, bytes);
         check(!ZSTD_isError(size), "zstd");
-        for (int i = 0; i < GATES_STREAMS; i++) {
-            from.stream[i] = room + at;
-            at += from.bytes[i] = s->bytes[i];
-        }
-        bool fine = gates_decode(&from, rows, seen, back);
+        bool fine =
+            ebpo_gates_decode(room, rows, codes) && ebpo_corners_decode(codes, rows, &then, back);
         double took = now() - begin;
         check(fine && memcmp(back, expected, 12 * (size_t)rows) == 0, "faces came back otherwise");
         best = took < best ? took : best;
@@ -311,28 +311,31 @@ static double gates_back(const gates *s, size_t bytes, uint32_t rows, uint64_t s
     return best;
 }
 
-static void faces_by_gates(void)
+static void faces_by_gates(const uint32_t *codes)
 {
-    static gates s;
-    enum { SIZES = 8 }; /* of the streams, so that a reader knows where they begin */
+    static uint8_t raw[GATES_BYTES], file[GATES_BYTES];
     uint64_t seen = 0, sum = 0, rows = tree.mesh.face_count;
     double seconds = 0;
     for (uint64_t r = 0; r < rows; r += faces_rows) {
         uint32_t n = (uint32_t)(rows - r < faces_rows ? rows - r : faces_rows);
-        const uint32_t *f = tree.mesh.faces + 3 * r;
-        gates_encode(f, n, seen, &s);
-        streams all = { .count = GATES_STREAMS };
-        for (int i = 0; i < GATES_STREAMS; i++) {
-            all.bytes[i] = s.stream[i];
-            all.size[i] = s.bytes[i];
+        size_t ends[EBPO_GATES_ENDS], begin = 0;
+        for (uint32_t i = 0; i < 3 * n; i++)
+            ebpo_store32(file + 4 * (size_t)i, codes[3 * r + i]);
+        ebpo_gates_encode(file, n, raw, ends);
+        streams all = { .count = EBPO_GATES_ENDS + 1 };
+        for (int i = 0; i < all.count; i++) {
+            size_t end = i < EBPO_GATES_ENDS ? ends[i] : EBPO_GATES_COLS * (size_t)n;
+            all.bytes[i] = raw + begin;
+            all.size[i] = end - begin;
+            begin = end;
         }
         size_t bytes = frame(&all, &today);
-        sum += bytes + SIZES;
-        seconds += gates_back(&s, bytes, n, seen, f);
+        sum += bytes;
+        seconds += gates_back(bytes, n, seen, tree.mesh.faces + 3 * r);
         for (uint32_t i = 0; i < 3 * n; i++)
-            seen += f[i] == seen;
+            seen += codes[3 * r + i] == 0;
     }
-    say("faces", "across edges (`gates.c`)", sum, 12.0 * (double)rows / seconds);
+    say("faces", "across edges (`gates`)", sum, 12.0 * (double)rows / seconds);
 }
 
 static void faces(void)
@@ -345,7 +348,7 @@ static void faces(void)
         seen += codes[i] == 0;
     }
     usual("faces", codes, rows, 3, faces_rows);
-    faces_by_gates();
+    faces_by_gates(codes);
     free(codes);
 }
 

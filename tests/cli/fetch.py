@@ -289,7 +289,7 @@ def main():
         change(tool, folder, path, url)
         interrupt(tool, folder, path, url)
         small = os.path.join(folder, "small.ply")
-        subprocess.run([generate, "--base", "torus", "--faces", "20000", small], check=True, capture_output=True)
+        subprocess.run([generate, "--base", "torus", "--faces", "40000", small], check=True, capture_output=True)
         attributes(tool, small, url)
         done = run(tool, "fetch", url + "/nothing", "/proc/nowhere/x.ebpo.h5")
         expect("no folder", done.returncode in (1, 2)

@@ -185,6 +185,17 @@ START_TEST(a_view_from_afar_takes_few_waves)
 }
 END_TEST
 
+/* The same file with faces by number: the fifth of it below is that of other bytes, too. */
+static const char *by_number(const ebpo_file *file)
+{
+    ebpo_subset_options all = EBPO_SUBSET_OPTIONS_INIT;
+    const char *path = scratch("by_number.ebpo.h5");
+    all.subtree_faces = 400;
+    all.face_coding = EBPO_FACES_HIGH_WATER;
+    EXPECT(ebpo_subset(file, path, &all, NULL) == EBPO_OK);
+    return path;
+}
+
 /* How deep it comes is not known before: what is announced is what its turn is near, neither the
  * deepest levels, for which there is no room, nor one node after the other. */
 START_TEST(a_view_that_ends_from_afar_takes_few_waves)
@@ -200,11 +211,12 @@ START_TEST(a_view_that_ends_from_afar_takes_few_waves)
     counted_source c;
     ebpo_observer observer = EBPO_OBSERVER_INIT;
     two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+    const char *path = by_number(l.with);
     for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
         ebpo_view_options view = look(&observer, ends[i].order);
         view.bytes = ends[i].bytes;
         view.nodes = ends[i].nodes;
-        ebpo_file *far = counted_open(&c, l.packed, true);
+        ebpo_file *far = counted_open(&c, path, true);
         uint64_t opened = c.batches + c.alone, nodes = count_nodes(far, &view),
                  waves = c.batches + c.alone - opened;
         ck_assert_msg(waves <= ends[i].waves, "%d waves of view %d", (int)waves, (int)i);

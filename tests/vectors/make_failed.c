@@ -28,6 +28,7 @@ static const char *folder;
 #define INDEXED   "29_types_and_gray_index"
 #define COLOURED  "39_attributes"
 #define PAINTED   "42_colours_of_vertices"
+#define GATES     "47_gates_unfiltered"
 
 /* As the library writes it; elements of one byte are not shuffled. */
 static void zstd(hid_t dcpl)
@@ -309,6 +310,27 @@ static void v_attributes_no_mesh(void)
     }
     set_text("/", "optional_parts", "planes attributes");
 }
+
+/* Of four faces, the first of them alone: gates from 0 on, three bytes that tell third corners,
+ * numbers from 7 on, zeros from 10 on. */
+static void v_gates_alone(void) { set_text("/", "required_parts", "levels gates"); }
+static void v_gates_unsaid(void) { set_text("/", "required_parts", "levels mesh"); }
+static void v_gates_word(void) { set_text("/mesh/faces", "coding", "high-water"); }
+static void v_gate(void) { poke("/mesh/faces", 1, 4); }
+static void v_third(void) { poke("/mesh/faces", 4, 3 * (4 + 2)); }
+static void v_gate_number(void) { poke("/mesh/faces", 7, 1); }
+static void v_gate_low(void) { poke("/mesh/faces", 7, 241); }
+static void v_gates_behind(void) { poke("/mesh/faces", 51, 1); }
+/* All alone, in numbers of five bytes: 64 in place of 52. */
+static void v_gates_long(void)
+{
+    for (unsigned i = 0; i < 4; i++)
+        poke("/mesh/faces", i, 0);
+    for (unsigned i = 0; i < 12; i++)
+        poke("/mesh/faces", 4 + i, 240);
+    for (unsigned i = 4; i < 9; i++)
+        poke("/mesh/faces", 16 + 4 * i, 1 + i % 3);
+}
 static void v_content(void) { poke("/mesh/vertices", 0, 2); }
 
 typedef enum late_change { NONE, CUT, FLIP_CHUNK, FLIP_HEAD, SWAP_CHUNK, NOT_HDF5 } late_change;
@@ -336,6 +358,20 @@ static const failed_vector failed[] = {
     { "required_part_levels_missing", LEAVES, v_no_levels_part, NONE, "3", "`levels` is missing" },
     { "part_listed_twice", LEAVES, v_part_twice, NONE, "3", "a known word stands twice" },
     { "maps_without_mesh", NO_MESH, v_maps_alone, NONE, "3", "Refuse `maps` without `mesh`" },
+    { "gates_without_mesh", NO_MESH, v_gates_alone, NONE, "3", "and `gates` without it" },
+    { "gates_without_their_word", GATES, v_gates_unsaid, NONE, "7",
+      "`high-water` | `/mesh/faces`; not with the part `gates`" },
+    { "gates_by_another_word", GATES, v_gates_word, NONE, "7",
+      "`gates` | `/mesh/faces`; with that part" },
+    { "gates_beyond_the_list", GATES, v_gate, NONE, "7",
+      "a gate or a t names an open edge that is not there" },
+    { "gates_third_beyond_the_list", GATES, v_third, NONE, "7",
+      "a gate or a t names an open edge that is not there" },
+    { "gates_number_above_seen", GATES, v_gate_number, NONE, "7", "a number is above `seen`" },
+    { "gates_byte_of_no_number", GATES, v_gate_low, NONE, "7", "a byte of *low* is above 240" },
+    { "gates_streams_too_long", GATES, v_gates_long, NONE, "7",
+      "streams need more than 13 n bytes" },
+    { "gates_bytes_behind", GATES, v_gates_behind, NONE, "7", "a byte behind them is not 0" },
     { "subset_without_its_word", BOXED, v_subset_word, NONE, "3",
       "The word `pruned` is there if and only if a node is pruned" },
     { "subset_of_missing", BOXED, v_subset_of, NONE, "3", "a subset without it" },

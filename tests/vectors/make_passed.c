@@ -10,6 +10,8 @@
 
 #include "attributes_json.h"
 #include "change_file.h"
+#include "codec/chunk.h"
+#include "codec/face_gates.h"
 #include "nodes_json.h"
 #include "ply/ply.h"
 #include "solids.h"
@@ -122,24 +124,30 @@ static void write_json(const char *name, const ebpo_tree *tree)
     free(text);
 }
 
-static void write_laid_out(const char *name, ebpo_tree *tree, ebpo_codec codec, uint32_t parts,
-                           uint64_t subtree_faces)
+static void write_file(const char *name, ebpo_tree *tree, const ebpo_write_options *options)
 {
     char path[512];
     ebpo_tree back;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
-    options.codec = codec;
-    options.parts = parts;
-    options.subtree_faces = subtree_faces;
     snprintf(tree->info.generator, sizeof tree->info.generator, "make_vectors");
     snprintf(path, sizeof path, "%s/passed/%s.ebpo.h5", folder, name);
-    if (ebpo_tree_write(tree, path, &options, &error) != EBPO_OK ||
+    if (ebpo_tree_write(tree, path, options, &error) != EBPO_OK ||
         vector_read(path, &back, &error) != EBPO_OK)
         die(name, error.message);
     write_json(name, &back);
     ebpo_tree_free(&back);
     ebpo_tree_free(tree);
+}
+
+static void write_laid_out(const char *name, ebpo_tree *tree, ebpo_codec codec, uint32_t parts,
+                           uint64_t subtree_faces)
+{
+    ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
+    options.codec = codec;
+    options.parts = parts;
+    options.subtree_faces = subtree_faces;
+    options.face_coding = EBPO_FACES_HIGH_WATER;
+    write_file(name, tree, &options);
 }
 
 static void write_vector(const char *name, ebpo_tree *tree, ebpo_codec codec, uint32_t parts)
@@ -530,6 +538,47 @@ static void make_colours(void)
     write_vector("46_colours_without_mesh", &tree, EBPO_CODEC_ZSTD, ~0u);
 }
 
+/* --- faces across edges --- */
+
+/* The same four faces as 47, as a chunk without streams. */
+static void as_codes(void)
+{
+    enum { FACES = 4 };
+    uint8_t gates[FACES * EBPO_GATES_COLS], codes[12 * FACES], planes[12 * FACES];
+    hid_t id = H5Dopen2(changed, "/mesh/faces", H5P_DEFAULT);
+    need(H5Dread(id, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, gates) >= 0 &&
+             ebpo_gates_decode(gates, FACES, codes),
+         "faces");
+    ebpo_shuffle(codes, sizeof codes, 4, planes);
+    memset(gates, 0, sizeof gates);
+    gates[0] = 1;
+    memcpy(gates + 1, planes, sizeof planes);
+    need(H5Dwrite(id, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, gates) >= 0, "faces");
+    H5Dclose(id);
+}
+
+static void write_gates(const char *name, ebpo_tree *tree, ebpo_codec codec, uint64_t subtree_faces)
+{
+    ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
+    options.codec = codec;
+    options.parts = EBPO_PART_MESH | EBPO_PART_MAPS;
+    options.subtree_faces = subtree_faces;
+    options.face_coding = EBPO_FACES_GATES;
+    write_file(name, tree, &options);
+}
+
+static void make_gates(void)
+{
+    ebpo_tree tree;
+    build(&tree, 4, false, 1, 1, 0);
+    write_gates("47_gates_unfiltered", &tree, EBPO_CODEC_NONE, 0);
+    derive("48_gates_as_codes", "47_gates_unfiltered", as_codes);
+    build_float(&tree, ebpo_test_sheet(64, 64), (how){ 3, 256, 0, 0, 0 });
+    write_gates("49_gates", &tree, EBPO_CODEC_ZSTD, 0);
+    build_float(&tree, ebpo_test_torus(1, 0.375, 80, 32), (how){ 5, 6, 0, 0, 0 });
+    write_gates("50_gates_of_subtrees", &tree, EBPO_CODEC_DEFLATE, 10);
+}
+
 void make_passed(const char *to)
 {
     folder = to;
@@ -541,4 +590,5 @@ void make_passed(const char *to)
     make_large();
     make_attributes();
     make_colours();
+    make_gates();
 }

@@ -185,8 +185,8 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info,
         print_subset(out, info);
     findings_print_mending(out, &info->mend);
     print_model(out, info);
-    fprintf(out, "  holds     %s; codec %s\n", words_parts(parts, sizeof parts, info->parts),
-            words_codec(info->codec));
+    fprintf(out, "  holds     %s; codec %s%s\n", words_parts(parts, sizeof parts, info->parts),
+            words_codec(info->codec), info->gates ? "; faces across edges (gates)" : "");
     if (info->subtree_level)
         fprintf(out, "  subtrees  %llu below level %d, each to be read at once\n",
                 (unsigned long long)info->level[info->subtree_level].gray_count,
@@ -386,6 +386,8 @@ static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes
             json_text(j, NULL, part_words[i]);
     json_end(j);
     json_text(j, "codec", words_codec(info->codec));
+    if (info->parts & EBPO_PART_MESH)
+        json_text(j, "face_coding", info->gates ? "gates" : "high-water");
     json_subset(j, info);
     json_text(j, "content_sha256", hex);
     json_object(j, "bytes");

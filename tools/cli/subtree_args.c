@@ -7,6 +7,8 @@
 #include "cli/command.h"
 #include "cli/words.h"
 
+const char *const face_coding_words[] = { "usual", "gates", "high-water", NULL };
+
 bool subtree_faces_read(const char *command, const char *text, uint64_t *out)
 {
     *out = 0;

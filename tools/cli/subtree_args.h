@@ -1,4 +1,4 @@
-/* --subtree-faces, as commands that write files have it. */
+/* --subtree-faces and --face-coding, as commands that write files have it. */
 #ifndef EBPO_TOOLS_SUBTREE_ARGS_H
 #define EBPO_TOOLS_SUBTREE_ARGS_H
 
@@ -13,6 +13,15 @@
                 "what lies below nodes with at least N faces each on average lies "       \
                 "together, to be read at once; none: as in format 1.0; default: 1024 in " \
                 "files of 131072 faces and more")
+
+/* The same; `member` is an int, 0 unless given: a number of ebpo_face_coding. */
+#define FACE_CODING_OPTION(type, member)                                                       \
+    OPTION_WORD("face-coding", 0, type, member, "NAME", face_coding_words,                     \
+                "of the corners of faces: high-water (as in format 1.0), gates (across edges " \
+                "of other faces: fewer bytes) or usual (the default: gates in compressed "     \
+                "files with subtrees, else high-water)")
+
+extern const char *const face_coding_words[];
 
 /* The member of the same name of ebpo_write_options; `text` may be NULL. False, with the usage
  * message printed, when it is no such number. */

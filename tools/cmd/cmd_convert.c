@@ -28,7 +28,7 @@ typedef struct values {
     const char *k_root, *target_size, *subtree_faces;
     memory_values memory;
     uint32_t with, without;
-    int codec, rule, profile;
+    int codec, face_coding, rule, profile;
     mending mend;
     bool require_solid, split_components, split_groups, json, quiet;
     const char *unit, *crs, *date;
@@ -78,6 +78,7 @@ static const arg_option options[] = {
     OPTION_INT("zstd-level", 0, values, zstd_level, "N", 1, 22,
                "effort of zstd, 1 to 22; default 3, 5 where it pays"),
     SUBTREE_OPTION(values, subtree_faces),
+    FACE_CODING_OPTION(values, face_coding),
     OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
     MENDING_OPTIONS(values, mend),
@@ -312,6 +313,7 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
     write.codec = (ebpo_codec)v->codec;
     write.codec_level = (int)v->zstd_level;
     write.threads = (unsigned)v->threads;
+    write.face_coding = (ebpo_face_coding)v->face_coding;
     write.progress = progress;
     (void)subtree_faces_read("convert", v->subtree_faces, &write.subtree_faces);
     if (need->max_error > 0 || need->target_bytes) {
@@ -321,6 +323,7 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
         subset.threads = write.threads;
         subset.progress = progress;
         subset.subtree_faces = write.subtree_faces;
+        subset.face_coding = write.face_coding;
         subset.choose_parts = chooses_parts(v);
         if (v->profile >= 0)
             subset.parts = ebpo_profile_parts((ebpo_profile)v->profile);

@@ -16,6 +16,7 @@
 typedef struct values {
     const char *subtree_faces;
     int codec; /* -1: none given */
+    int face_coding;
     int64_t zstd_level, threads;
     memory_values memory;
     bool json, quiet;
@@ -24,6 +25,7 @@ typedef struct values {
 
 static const arg_option options[] = {
     SUBTREE_OPTION(values, subtree_faces),
+    FACE_CODING_OPTION(values, face_coding),
     OPTION_WORD("codec", 0, values, codec, "NAME", codec_words,
                 "zstd, deflate or none; default: that of the input"),
     OPTION_INT("zstd-level", 0, values, zstd_level, "N", 1, 22,
@@ -56,6 +58,7 @@ static int check_values(const values *v, ebpo_write_options *write)
     if (v->zstd_level && v->codec > EBPO_CODEC_ZSTD)
         return command_usage("repack", "--zstd-level does not apply to --codec deflate or none");
     write->threads = (unsigned)v->threads;
+    write->face_coding = (ebpo_face_coding)v->face_coding;
     write->codec_level = (int)v->zstd_level;
     return EXIT_FINE;
 }

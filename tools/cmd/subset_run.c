@@ -128,6 +128,7 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
     if (v->profile >= 0)
         out->parts = ebpo_profile_parts((ebpo_profile)v->profile);
     out->threads = (unsigned)v->threads;
+    out->face_coding = (ebpo_face_coding)v->face_coding;
     out->choose_parts = v->target_size && !v->parts && v->profile < 0 && !v->levels;
     return subset_need(name, v->max_error, v->target_size, out);
 }

@@ -12,6 +12,7 @@ typedef struct subset_values {
     const char *levels, *box, *parts, *target_size, *subtree_faces;
     double max_error;   /* 0: none given */
     int profile, codec; /* -1: none given */
+    int face_coding;
     int64_t zstd_level, threads;
     bool json, quiet;
     remote_values remote;
@@ -39,7 +40,8 @@ extern const char *const profile_words[];
                     "zstd, deflate or none; default: that of the input"),                          \
         OPTION_INT("zstd-level", 0, subset_values, zstd_level, "N", 1, 22,                         \
                    "effort of zstd, 1 to 22; default 3, 5 where it pays"),                         \
-        SUBTREE_OPTION(subset_values, subtree_faces), OPTION_THREADS(subset_values, threads),      \
+        SUBTREE_OPTION(subset_values, subtree_faces),                                              \
+        FACE_CODING_OPTION(subset_values, face_coding), OPTION_THREADS(subset_values, threads),    \
         OPTION_FLAG("json", 0, subset_values, json, "print the facts of the result as JSON"),      \
         OPTION_QUIET(subset_values, quiet), REMOTE_OPTIONS(subset_values, remote)
 

@@ -72,6 +72,18 @@ typedef enum ebpo_codec {
     EBPO_CODEC_NONE = 2
 } ebpo_codec;
 
+/* How the corners of faces are written (format-spec/README.md, section 7). */
+typedef enum ebpo_face_coding {
+    /* `gates` in files with subtrees, but for EBPO_CODEC_NONE; else `high-water`. */
+    EBPO_FACES_USUAL = 0,
+
+    /* Across edges of faces before them: 7 to 11 % off whole files. Since format 1.1. */
+    EBPO_FACES_GATES = 1,
+
+    /* By number, as in format 1.0. */
+    EBPO_FACES_HIGH_WATER = 2
+} ebpo_face_coding;
+
 /*
  * One level: all nodes in the order of their octcodes.
  *
@@ -324,6 +336,9 @@ typedef struct ebpo_info {
 
     /* Checksum of the colours, with EBPO_PART_COLOURS. */
     uint8_t colours_sha256[32];
+
+    /* Corners of faces are stored as `gates`, across edges of other faces. */
+    bool gates;
 } ebpo_info;
 
 /*
@@ -383,13 +398,18 @@ typedef struct ebpo_write_options {
      * than three levels have none.
      */
     uint64_t subtree_faces;
+
+    /* Of the mesh, if it is written. */
+    ebpo_face_coding face_coding;
+    int32_t reserved; /* 0 */
 } ebpo_write_options;
 
 #define EBPO_NO_SUBTREES UINT64_MAX
 
-#define EBPO_WRITE_OPTIONS_INIT                                                   \
-    {                                                                             \
-        sizeof(ebpo_write_options), EBPO_CODEC_ZSTD, 0, 0, ~0u, { NULL, NULL }, 0 \
+#define EBPO_WRITE_OPTIONS_INIT                                                    \
+    {                                                                              \
+        sizeof(ebpo_write_options), EBPO_CODEC_ZSTD, 0, 0, ~0u, { NULL, NULL }, 0, \
+            EBPO_FACES_USUAL, 0                                                    \
     }
 
 /*

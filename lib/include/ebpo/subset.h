@@ -96,12 +96,16 @@ typedef struct ebpo_subset_options {
 
     /* As in ebpo_write_options; of the subset's faces. */
     uint64_t subtree_faces;
+
+    /* As in ebpo_write_options. */
+    ebpo_face_coding face_coding;
+    int32_t reserved; /* 0 */
 } ebpo_subset_options;
 
 #define EBPO_SUBSET_OPTIONS_INIT                                                      \
     {                                                                                 \
         sizeof(ebpo_subset_options), -1, false, false, { 0, 0, 0 }, { 0, 0, 0 }, ~0u, \
-            EBPO_CODEC_ZSTD, 0, 0, 0, 0, { NULL, NULL }, 0                            \
+            EBPO_CODEC_ZSTD, 0, 0, 0, 0, { NULL, NULL }, 0, EBPO_FACES_USUAL, 0       \
     }
 
 /*

@@ -2,6 +2,7 @@
 // kept under a budget of memory.
 import { decodeChunk } from './chunk.js';
 import { formatError } from './error.js';
+import { decodeGates } from './gates.js';
 
 const GAP_BYTES = 16 * 1024;            // rather read this much for nothing than ask twice
 const REQUEST_BYTES = 4 * 1024 * 1024;  // a request's most
@@ -47,6 +48,11 @@ function fewer(runs) {
 }
 
 const keyOf = ({ array, chunk }) => array.number * 2 ** 32 + chunk;
+
+function withoutGates(bytes, array, chunk) {
+  const codes = decodeGates(bytes, Math.min(array.chunkRows, array.rows - chunk * array.chunkRows));
+  return codes ? { bytes: new Uint8Array(codes.buffer) } : { fault: 'its streams are those of no faces' };
+}
 
 export class ChunkCache {
   /**
@@ -108,7 +114,8 @@ export class ChunkCache {
   decoded(wanted) {
     return this.fetch(wanted.map(({ array, chunk }) => array.chunks[chunk])).map(async (promise, i) => {
       const { array, chunk } = wanted[i];
-      const { bytes, fault } = await decodeChunk(await promise, array.pipeline, array.elementSize, array.chunkRows * array.rowBytes, await this.zstd);
+      const { elementSize, rowBytes } = array.stored, got = await decodeChunk(await promise, array.pipeline, elementSize, array.chunkRows * rowBytes, await this.zstd);
+      const { bytes, fault } = got.bytes && array.gates ? withoutGates(got.bytes, array, chunk) : got;
       if (fault)
         throw formatError(`${array.path}: chunk ${chunk}`, `the chunk is damaged: ${fault}`);
       return bytes;

@@ -5,7 +5,7 @@ import { text } from './hdf5.js';
 
 export const LEVELS_MAX = 21, INDEX_ROWS = 4096;
 const MESH_MAX = 2 ** 32 - 2, NODES_MAX = 2 ** 40;
-const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'attributes', 'colours', 'subtrees', 'pruned'];
+const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'attributes', 'colours', 'subtrees', 'gates', 'pruned'];
 
 const WORDS = { kind: ['surface', 'solid'], winding_rule: ['nonzero', 'evenodd', 'positive'], coordinate_type: ['float32', 'float64'] };
 const TEXTS = ['source_name', 'source_format', 'unit', 'crs', 'date'];
@@ -242,6 +242,8 @@ function checkLevelCounts(info, level) {
 /** Whether the facts can be true together, before anything is sized by them. */
 export function checkFacts(info) {
   const mesh = (what) => formatError('/', what);
+  if (info.parts.has('gates') && !info.parts.has('mesh'))
+    throw mesh('there is a coding of faces but no mesh');
   if ([info.face_count, info.vertex_count].some((n) => n < 1 || n > MESH_MAX))
     throw mesh('face_count or vertex_count is 0 or beyond 2^32 - 2');
   if ([info.source_vertex_count, info.source_face_count, info.mend_added_faces].some((n) => n > MESH_MAX))
@@ -313,9 +315,9 @@ const ROOT_ARRAYS = {
 };
 
 /** Throws unless an array's attribute names the coding that the format has for it. In older files `delta` stands at leaf_skip. */
-export function checkCoding(attributes, path) {
+export function checkCoding(attributes, path, gates) {
   const word = new Facts(attributes, path).text('coding', 15), name = path.startsWith('/levels/') ? path.slice(path.lastIndexOf('/') + 1) : path;
-  if (!(path.startsWith('/attributes/') ? ['plain', 'columns'] : CODINGS[name] ?? ['plain']).includes(word))
+  if (!(path.startsWith('/attributes/') ? ['plain', 'columns'] : gates ? ['gates'] : CODINGS[name] ?? ['plain']).includes(word))
     throw formatError(path, "the array's coding is none that the format has for it");
 }
 
@@ -345,7 +347,7 @@ export function arraysOf(info) {
       out.push({ path: `${folder}/${name}`, level, order, name, cols, sizes, signed, rows: rows(info, summary, groups), mayBeAbsent }));
   });
   for (const [path, [cols, sizes, signed, rows]] of Object.entries(ROOT_ARRAYS))
-    out.push({ path, level: undefined, name: path, cols, sizes, signed, rows: rows(info) });
+    out.push({ path, level: undefined, name: path, cols, sizes, signed, rows: rows(info), gates: path === '/mesh/faces' && info.parts.has('gates') });
   out.push(...subtreeArrays(info).map((a) => ({ ...a, level: undefined, name: a.path, signed: false })));
   return out.filter((a) => a.rows !== 0);
 }

@@ -3,6 +3,7 @@ import { CHUNK_BYTES_MAX, chunkBound, pipelineOf } from './chunk.js';
 import { EbpoError, formatError } from './error.js';
 import { chooseColours, columnPaths, describeColumns } from './colours.js';
 import { INDEX_ROWS, arraysOf, attributesFacts, checkCoding, checkFacts, chunkRows, chunkRowsFit, readFacts, readLevelFacts } from './facts.js';
+import { GATES_COLS } from './gates.js';
 import { Hdf5, NeedBytes } from './hdf5.js';
 import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeaves, decodeMap, decodeVertices, recode } from './decode.js';
 import { Parts } from './parts.js';
@@ -152,7 +153,7 @@ export class EbpoFile {
   #placeArrays(which) {
     for (const array of this.arrays.values())
       if (!array.chunks && which(array))
-        place(array, this.hdf5.chunks(array.object, array.path, array.chunkCount, array.chunkRows * array.rowBytes, array.chunkMost));
+        place(array, this.hdf5.chunks(array.object, array.path, array.chunkCount, array.chunkRows * array.stored.rowBytes, array.chunkMost));
     this.#checkRoom();
   }
 
@@ -517,7 +518,7 @@ function place(array, chunks) {
 
 // An array's object against what the facts call for.
 function describe(hdf5, wanted, linked, address, info) {
-  const { path, cols } = wanted;
+  const { path, cols, gates } = wanted;
   if (!linked)
     throw formatError(path, 'the array is missing');
   const o = address === undefined ? undefined : hdf5.object(address, path);
@@ -538,15 +539,16 @@ function describe(hdf5, wanted, linked, address, info) {
     throw formatError(path, "the array's filters are none of the format's");
   if (o.space.dims[0] !== rows)
     throw formatError(path, "the array's length contradicts the counts in the head");
-  if ((o.space.dims[1] ?? 0) !== cols || !wanted.sizes.includes(elementSize) || o.type.signed !== wanted.signed)
+  if ((o.space.dims[1] ?? 0) !== (gates ? GATES_COLS : cols) || !(gates ? [1] : wanted.sizes).includes(elementSize) || o.type.signed !== wanted.signed)
     throw formatError(path, 'the array has the wrong type or the wrong number of columns');
   if (path === '/mesh/vertices' && elementSize !== (info.coordinate_type === 'float64' ? 8 : 4))
     throw formatError(path, "the array's type contradicts coordinate_type");
-  checkCoding(o.attributes, path);
-  const rowBytes = elementSize * Math.max(cols, 1), whole = fit * rowBytes;
+  checkCoding(o.attributes, path, gates);
+  const storedRow = elementSize * Math.max(gates ? GATES_COLS : cols, 1), whole = fit * storedRow;
   if (whole > (path === PLACES ? Math.min(PLACES_BYTES_MOST, 2 * hdf5.size) : CHUNK_BYTES_MAX))
     throw formatError(path, "the array's chunks do not have the size that the format fixes");
-  return { path, number: placeNumber(path, wanted.level, wanted.order), level: wanted.level, name: wanted.name, rows, cols, elementSize,
-    signed: o.type.signed, chunkRows: fit, chunkCount: Math.ceil(rows / fit), chunkMost: chunkBound(whole), rowBytes, pipeline,
+  return { path, number: placeNumber(path, wanted.level, wanted.order), level: wanted.level, name: wanted.name, rows, cols,
+    elementSize: gates ? 4 : elementSize, signed: o.type.signed, chunkRows: fit, chunkCount: Math.ceil(rows / fit), chunkMost: chunkBound(whole), gates,
+    stored: { elementSize, rowBytes: storedRow }, rowBytes: gates ? 4 * cols : storedRow, pipeline,
     object: o, indexed: o.layout.index !== 1, chunks: undefined, bytes: undefined };
 }
