@@ -371,7 +371,7 @@ ATTRIBUTE_TYPES = {"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "
 
 def read_attributes(file):
     """README.md, "Attributes": the part as vectors' .attributes.json have it, if its checksum is right."""
-    group, digests, out = file["/attributes"], {}, []
+    group, digests, out, images = file["/attributes"], {}, [], {}
 
     def digest(path, values):
         digests[path] = hashlib.sha256(np.ascontiguousarray(values).tobytes()).digest()
@@ -393,6 +393,8 @@ def read_attributes(file):
             values = digest(items, attribute_values(file[items], kind)) if items in file else np.zeros(0, kind)
             assert ends[-1] == len(values), f"{path}: items"
         assert one["element"] not in ("vertex", "face") or one["rows"] == file.attrs[one["element"] + "_count"], path
+        if one["element"] == "ebpo:texture" and different:
+            images[one["names"]] = [part.tobytes() for part in np.split(values, ends[:-1])]
         columns = len(one["names"].split(" "))
         assert values.ndim == 1 or columns == values.shape[1] or one["list"] is not None, path
         bits = values.view("u%d" % values.dtype.itemsize)
@@ -403,6 +405,8 @@ def read_attributes(file):
     for path in sorted(digests):
         total.update(path.encode() + b"\0" + digests[path])
     assert total.hexdigest() == text(group.attrs["sha256"]), "attributes: sha256 differs"
+    for image, sha256 in zip(images.get("bytes", []), images.get("sha256", [])):
+        assert not image or hashlib.sha256(image).digest() == sha256, "attributes: an image's sha256 differs"
     return {"header": None if header is None else header.tobytes().decode("latin-1"), "arrays": out}
 
 

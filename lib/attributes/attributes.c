@@ -40,6 +40,11 @@ bool ebpo_attribute_is_of_mesh(const ebpo_attribute *a)
     return ebpo_attribute_is_of(a, "vertex") || ebpo_attribute_is_of(a, "face");
 }
 
+bool ebpo_attribute_is_of_textures(const ebpo_attribute *a)
+{
+    return ebpo_attribute_is_of(a, EBPO_TEXTURE_ELEMENT);
+}
+
 ebpo_attributes *ebpo_attributes_make(ebpo_workspace *workspace)
 {
     ebpo_attributes *made = ebpo_alloc_zero(1, sizeof *made);
@@ -94,7 +99,8 @@ void ebpo_attributes_remove(ebpo_attributes *from, uint64_t index)
 void ebpo_attributes_drop_others(ebpo_attributes *from)
 {
     for (uint64_t i = from ? from->count : 0; i-- > 0;)
-        if (!ebpo_attribute_is_of_mesh(&from->array[i]))
+        if (!ebpo_attribute_is_of_mesh(&from->array[i]) &&
+            !ebpo_attribute_is_of_textures(&from->array[i]))
             ebpo_attributes_remove(from, i);
 }
 

@@ -61,6 +61,9 @@ static inline bool ebpo_attribute_is_float(ebpo_attribute_type type)
 bool ebpo_attribute_is_of(const ebpo_attribute *a, const char *element);
 /* Of a mesh's vertices or faces: what is cut and sorted with them. */
 bool ebpo_attribute_is_of_mesh(const ebpo_attribute *a);
+/* Of images that the source names: attributes/textures.h. */
+#define EBPO_TEXTURE_ELEMENT "ebpo:texture"
+bool ebpo_attribute_is_of_textures(const ebpo_attribute *a);
 
 /* Bytes of a row of values; 0: lists of different lengths. */
 static inline uint64_t ebpo_attribute_row_bytes(const ebpo_attribute *a)
@@ -77,7 +80,7 @@ static inline uint64_t ebpo_attribute_value_count(const ebpo_attribute *a)
 ebpo_attribute *ebpo_attributes_add(ebpo_attributes *to, const ebpo_attribute *like);
 void ebpo_attributes_remove(ebpo_attributes *from, uint64_t index);
 
-/* Removes those of other elements than vertices and faces; NULL: nothing. */
+/* Removes those of other elements than vertices, faces and textures; NULL: nothing. */
 void ebpo_attributes_drop_others(ebpo_attributes *from);
 
 /* Room for more rows, and for more items of lists. */

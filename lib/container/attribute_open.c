@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "attributes/textures.h"
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/sized.h"
@@ -149,6 +150,30 @@ static const char *check_element(const ebpo_file *file, uint64_t n)
     return NULL;
 }
 
+/* Texts of textures are read for a look at the file, so they are small. */
+static const char *check_textures(const ebpo_attribute_in *of, const ebpo_array_in *items)
+{
+    bool texts = strcmp(of->head.names, ebpo_texture_array_name(EBPO_TEXTURE_BYTES)) != 0;
+    if (!ebpo_attribute_is_of_textures(&of->head))
+        return NULL;
+    if (of->head.rows > EBPO_TEXTURES)
+        return "there are more textures than a file can have";
+    return texts && items->present && items->shape.rows > EBPO_TEXTURE_TEXTS
+               ? "the texts of textures are longer than they can be"
+               : NULL;
+}
+
+static ebpo_status open_items(ebpo_file *file, ebpo_h5_in *h5, uint64_t n, ebpo_error *error)
+{
+    const ebpo_array_in *items = &file->attributes.array[ebpo_items_number(n)];
+    ebpo_status status = open_array(file, h5, ebpo_items_number(n), error);
+    if (status == EBPO_OK &&
+        (items->shape.cols ||
+         items->shape.element_size != ebpo_attribute_bytes(file->attributes.head[n].head.type)))
+        status = wrong(file, items->path, "the array is not as wide as its type", error);
+    return status;
+}
+
 static ebpo_status open_one(ebpo_file *file, ebpo_h5_in *h5, uint64_t n, ebpo_error *error)
 {
     ebpo_attribute_in *to = &file->attributes.head[n];
@@ -166,13 +191,10 @@ static ebpo_status open_one(ebpo_file *file, ebpo_h5_in *h5, uint64_t n, ebpo_er
     if (what)
         return wrong(file, values->path, what, error);
     ebpo_attribute_path(ebpo_items_number(n), path);
-    if (status != EBPO_OK || !to->different || ebpo_h5_look(h5, path) == EBPO_H5_ABSENT)
-        return status;
-    status = open_array(file, h5, ebpo_items_number(n), error);
-    if (status == EBPO_OK &&
-        (items->shape.cols || items->shape.element_size != ebpo_attribute_bytes(to->head.type)))
-        status = wrong(file, items->path, "the array is not as wide as its type", error);
-    return status;
+    if (status == EBPO_OK && to->different && ebpo_h5_look(h5, path) != EBPO_H5_ABSENT)
+        status = open_items(file, h5, n, error);
+    what = status == EBPO_OK ? check_textures(to, items) : NULL;
+    return what ? wrong(file, values->path, what, error) : status;
 }
 
 static ebpo_status open_header(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)

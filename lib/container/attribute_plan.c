@@ -102,7 +102,8 @@ ebpo_status ebpo_attributes_plan(ebpo_plan *plan, const char *shown, ebpo_error 
         if (wrong)
             break;
         choose_codings(to, &all->array[i], coder);
-        to->has_range = ebpo_attribute_range(&all->array[i], all->workspace, to->range);
+        to->has_range = !ebpo_attribute_is_of_textures(&all->array[i]) &&
+                        ebpo_attribute_range(&all->array[i], all->workspace, to->range);
     }
     bool made = plan->attribute && coder;
     if (coder)

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "attributes/textures.h"
 #include "base/alloc.h"
 #include "base/arrays.h"
 #include "base/error.h"
@@ -145,6 +146,22 @@ ebpo_status ebpo_attributes_read(const ebpo_file *file, const ebpo_read_options 
     return status;
 }
 
+static ebpo_status fail_images(const ebpo_file *file, ebpo_error *error)
+{
+    return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, "/attributes", -1,
+                        "an image is not what its digest says; get a fresh copy");
+}
+
+ebpo_status ebpo_attributes_read_textures(const ebpo_file *file, const ebpo_read_options *read,
+                                          ebpo_attributes *to, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t n = 0; to && n < to->count && status == EBPO_OK; n++)
+        if (ebpo_attribute_is_of_textures(&to->array[n]))
+            status = read_one(file, n, read, &to->array[n], error);
+    return status;
+}
+
 void ebpo_attribute_values_free(ebpo_attribute_values *values)
 {
     if (!values)
@@ -152,6 +169,19 @@ void ebpo_attribute_values_free(ebpo_attribute_values *values)
     ebpo_array_free(values->workspace, values->values);
     ebpo_array_free(values->workspace, values->ends);
     memset(values, 0, sizeof *values);
+}
+
+static ebpo_status check_images(const ebpo_file *file, const ebpo_read_options *read,
+                                ebpo_error *error)
+{
+    ebpo_attributes *all;
+    ebpo_status status = ebpo_attributes_read_head(file, read, &all, error);
+    if (status == EBPO_OK)
+        status = ebpo_attributes_read_textures(file, read, all, error);
+    if (status == EBPO_OK && !ebpo_textures_good(all))
+        status = fail_images(file, error);
+    ebpo_attributes_free(all);
+    return status;
 }
 
 ebpo_status ebpo_file_read_attribute(const ebpo_file *file, unsigned n,
@@ -167,7 +197,11 @@ ebpo_status ebpo_file_read_attribute(const ebpo_file *file, unsigned n,
     if (status != EBPO_OK)
         return status;
     ebpo_attribute a = file->attributes.head[n].head;
-    status = read_one(file, n, &read, &a, error);
+    if (ebpo_attribute_is_of_textures(&a) &&
+        strcmp(a.names, ebpo_texture_array_name(EBPO_TEXTURE_BYTES)) == 0)
+        status = check_images(file, &read, error);
+    if (status == EBPO_OK)
+        status = read_one(file, n, &read, &a, error);
     *out = (ebpo_attribute_values){ a.values, a.ends, 0, read.workspace };
     if (status == EBPO_OK)
         out->count = ebpo_attribute_value_count(&a);
@@ -186,10 +220,13 @@ ebpo_status ebpo_attributes_check(const ebpo_file *file, const ebpo_read_options
     if (status != EBPO_OK || !all)
         return status;
     status = ebpo_attributes_digest(all, digest, error);
+    bool textures = ebpo_textures_good(all);
     ebpo_attributes_free(all);
     if (status == EBPO_OK && memcmp(digest, file->attributes.sha256, sizeof digest) != 0)
         status = ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, "/attributes", -1,
                               "the attributes are not what sha256 says: the file was changed; get "
                               "a fresh copy");
+    if (status == EBPO_OK && !textures)
+        status = fail_images(file, error);
     return status;
 }

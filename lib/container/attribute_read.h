@@ -11,10 +11,15 @@ EBPO_MUST_USE ebpo_status ebpo_attributes_read(const ebpo_file *file, const ebpo
 EBPO_MUST_USE ebpo_status ebpo_attributes_read_head(const ebpo_file *file,
                                                     const ebpo_read_options *read,
                                                     ebpo_attributes **out, ebpo_error *error);
+/* Fills in the arrays of textures. */
+EBPO_MUST_USE ebpo_status ebpo_attributes_read_textures(const ebpo_file *file,
+                                                        const ebpo_read_options *read,
+                                                        ebpo_attributes *to, ebpo_error *error);
 /* A chunk's `rows` rows to values of the machine's byte order. */
 void ebpo_attribute_decode(const ebpo_file *file, const ebpo_array_in *array, uint64_t rows,
                            const uint8_t *raw, void *values);
-/* Checks the part's checksum; says nothing, if the file does not have it. */
+/* Checks the part's checksum, and images against theirs; says nothing, if the file does not have
+ * it. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_check(const ebpo_file *file,
                                                 const ebpo_read_options *read, ebpo_error *error);
 

@@ -58,10 +58,10 @@ static bool texts_ok(const ebpo_info *info)
     return true;
 }
 
-/* Readers of 1.0 do not know subtrees either; without compression bytes of zeros count. */
-static bool gates_wanted(const ebpo_info *info, ebpo_face_coding coding)
+/* Without compression bytes of zeros count, so they are not kept there. */
+static bool gates_wanted(const ebpo_info *info, bool had, ebpo_face_coding coding)
 {
-    bool usual = info->subtree_level && info->codec != EBPO_CODEC_NONE;
+    bool usual = had && info->codec != EBPO_CODEC_NONE;
     return info->parts & EBPO_PART_MESH &&
            (coding == EBPO_FACES_USUAL ? usual : coding == EBPO_FACES_GATES);
 }
@@ -109,7 +109,7 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
                                error);
     summarise(info, tree);
     info->subtree_level = ebpo_subtree_level_for(info, options->subtree_faces);
-    info->gates = gates_wanted(info, options->face_coding);
+    info->gates = gates_wanted(info, tree->info.gates, options->face_coding);
     return ebpo_facts_check(info, check->shown, check->as, error);
 }
 

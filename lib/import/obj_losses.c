@@ -58,7 +58,7 @@ void ebpo_obj_note_losses(ebpo_attributes *attributes, const uint8_t *data, uint
     if (f.early) /* assimp gives them the first one */
         ebpo_attributes_lose(attributes, "that faces before the first material have none");
     if (f.library)
-        ebpo_attributes_lose(attributes, "what the material library says (colours, textures)");
+        ebpo_attributes_lose(attributes, "what the material library says (colours and the like)");
 }
 
 bool ebpo_obj_names(const uint8_t *data, uint64_t size) { return find(data, size).names; }

@@ -11,6 +11,7 @@
 #include "base/workspace_extents.h"
 #include "base/sized.h"
 #include "import/import.h"
+#include "input/texture_files.h"
 #include "io/file_source.h"
 #include "mesh/mesh_parts.h"
 #include "mesh/named_groups.h"
@@ -114,6 +115,9 @@ static ebpo_status read_mesh(const char *path, const ebpo_mesh_read_options *opt
     status = parse(out, &file, path, &wanted, groups, error);
     hash_end(&hash);
     out->workspace = workspace;
+    if (status == EBPO_OK && wanted.attributes)
+        status =
+            ebpo_textures_find(out, path, file.data, file.size, wanted.embed_textures != 0, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_unchanged(&file, path, error);
     if (status == EBPO_OK)

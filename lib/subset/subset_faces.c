@@ -124,14 +124,16 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
 }
 
 /* Of a subset, what other elements have is left out: its numbers are of things that may be gone.
- * Where nothing was pruned, all is as it was. */
+ * Textures stay. Where nothing was pruned, all is as it was. */
 static ebpo_status begin_attributes(ebpo_cutting *c)
 {
     ebpo_read_options read = ebpo_read_threads(c->options->threads);
     ebpo_attributes **to = &c->out->mesh.attributes;
     if (!c->out->info.pruned)
         return ebpo_attributes_read(c->file, &read, to, c->error);
-    return ebpo_attributes_read_head(c->file, &read, to, c->error);
+    ebpo_status status = ebpo_attributes_read_head(c->file, &read, to, c->error);
+    return status == EBPO_OK ? ebpo_attributes_read_textures(c->file, &read, *to, c->error)
+                             : status;
 }
 
 static ebpo_status take_attributes(ebpo_cutting *c, const char *element, const uint32_t *rows,

@@ -124,9 +124,10 @@ START_TEST(materials_are_numbers_of_faces_and_names_in_the_header)
     const char *header = mesh.attributes->header;
     ck_assert_ptr_nonnull(header);
     ck_assert_ptr_nonnull(strstr(header, "comment material 1 red paint\ncomment material 2 b\n"));
-    ck_assert_str_eq(mesh.attributes->lost,
-                     "smoothing groups; what the material library says (colours, textures); names "
-                     "of groups and objects");
+    ck_assert_str_eq(
+        mesh.attributes->lost,
+        "smoothing groups; what the material library says (colours and the like); names "
+        "of groups and objects");
     ebpo_mesh_free(&mesh);
 }
 END_TEST

@@ -29,6 +29,7 @@ static const char *folder;
 #define COLOURED  "39_attributes"
 #define PAINTED   "42_colours_of_vertices"
 #define GATES     "47_gates_unfiltered"
+#define TEXTURED  "51_textures"
 
 /* As the library writes it; elements of one byte are not shuffled. */
 static void zstd(hid_t dcpl)
@@ -331,6 +332,7 @@ static void v_gates_long(void)
     for (unsigned i = 4; i < 9; i++)
         poke("/mesh/faces", 16 + 4 * i, 1 + i % 3);
 }
+static void v_attributes_image(void) { set_text("/attributes/001", "names", "sha256"); }
 static void v_content(void) { poke("/mesh/vertices", 0, 2); }
 
 typedef enum late_change { NONE, CUT, FLIP_CHUNK, FLIP_HEAD, SWAP_CHUNK, NOT_HDF5 } late_change;
@@ -523,6 +525,8 @@ static const failed_vector failed[] = {
       "A required attribute that is missing" },
     { "colours_changed", PAINTED, v_colours_changed, NONE, "3", "it does not match" },
     { "attributes_without_mesh", COLOURED, v_attributes_no_mesh, NONE, "18", "only with `mesh`" },
+    { "attributes_image_of_another_digest", TEXTURED, v_attributes_image, NONE, "18",
+      "are not those whose SHA-256 stands there" },
 };
 
 static void change_bytes(const char *path, late_change late)

@@ -9,6 +9,8 @@
 #include <ebpo/build.h>
 
 #include "attributes_json.h"
+#include "attributes/textures.h"
+#include "base/sha256.h"
 #include "change_file.h"
 #include "codec/chunk.h"
 #include "codec/face_gates.h"
@@ -579,6 +581,45 @@ static void make_gates(void)
     write_gates("50_gates_of_subtrees", &tree, EBPO_CODEC_DEFLATE, 10);
 }
 
+/* --- textures --- */
+
+static void add_texture(ebpo_attributes *to, const char *name, const char *use, const char *image)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint8_t digest[32];
+    ebpo_sha256 state;
+    ebpo_texture_bytes list[EBPO_TEXTURE_ARRAYS] = {
+        [EBPO_TEXTURE_NAME] = { name, strlen(name) }, [EBPO_TEXTURE_USE] = { use, strlen(use) }
+    };
+    ebpo_sha256_begin(&state);
+    if (image) {
+        ebpo_sha256_add(&state, image, strlen(image));
+        ebpo_sha256_end(&state, digest);
+        list[EBPO_TEXTURE_SHA256] = (ebpo_texture_bytes){ digest, sizeof digest };
+        list[EBPO_TEXTURE_BYTES] = (ebpo_texture_bytes){ image, strlen(image) };
+    }
+    if (ebpo_textures_add(to, true, list, &error) != EBPO_OK)
+        die(name, error.message);
+}
+
+/* One in a folder, one that was not there; and one whose name leads out of any folder. */
+static void make_textures(void)
+{
+    ebpo_tree tree;
+    for (int upwards = 0; upwards < 2; upwards++) {
+        ebpo_mesh mesh = make_mesh(4, false);
+        mesh.attributes = ebpo_attributes_make(NULL);
+        if (!mesh.attributes)
+            die("textures", "no memory");
+        add_texture(mesh.attributes, upwards ? "../up.png" : "folder\\red.png",
+                    "map_Kd red paint\nmap_Bump blue", "not really an image");
+        if (!upwards)
+            add_texture(mesh.attributes, "gone.png", "TextureFile", NULL);
+        build_mesh(&tree, mesh, (how){ 0, 16, 0, 0, 0 });
+        write_vector(upwards ? "52_texture_upwards" : "51_textures", &tree, EBPO_CODEC_ZSTD, ~0u);
+    }
+}
+
 void make_passed(const char *to)
 {
     folder = to;
@@ -591,4 +632,5 @@ void make_passed(const char *to)
     make_attributes();
     make_colours();
     make_gates();
+    make_textures();
 }

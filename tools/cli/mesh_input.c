@@ -57,7 +57,7 @@ static ebpo_status try_and_repair(mesh_input *p, mending asked, ebpo_prepare_opt
 }
 
 ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending asked,
-                                   bool attributes, ebpo_mesh_groups **groups,
+                                   mesh_reading more, ebpo_mesh_groups **groups,
                                    ebpo_workspace *workspace, unsigned threads,
                                    ebpo_progress progress, ebpo_error *error)
 {
@@ -66,7 +66,8 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     how.progress = wanted.progress = progress;
     how.threads = wanted.threads = threads;
     how.workspace = workspace;
-    how.attributes = attributes;
+    how.attributes = more != READ_MESH;
+    how.embed_textures = more == READ_TEXTURES;
     wanted.weld = asked.weld;
     wanted.orient = asked.orient;
     wanted.fill_holes = asked.fill_holes;
@@ -95,10 +96,10 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     return status;
 }
 
-ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked, bool attributes,
+ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked, mesh_reading more,
                             ebpo_workspace *workspace, unsigned threads, ebpo_progress progress,
                             ebpo_error *error)
 {
-    return mesh_input_read_groups(out, path, asked, attributes, NULL, workspace, threads, progress,
+    return mesh_input_read_groups(out, path, asked, more, NULL, workspace, threads, progress,
                                   error);
 }

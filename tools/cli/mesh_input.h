@@ -34,16 +34,22 @@ typedef struct mesh_input {
 /* EXIT_USAGE with a message when --repair is given with what it chooses from. */
 int mending_check(const char *command, mending asked);
 
-/* `attributes`: properties beyond positions and corners are read as well. On failure nothing is
- * left to free; else ebpo_mesh_free(&out->mesh). */
+/* What is read beside positions and corners. */
+typedef enum mesh_reading {
+    READ_MESH,
+    READ_ATTRIBUTES,
+    READ_TEXTURES /* and the bytes of images that it names */
+} mesh_reading;
+
+/* On failure nothing is left to free; else ebpo_mesh_free(&out->mesh). */
 EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked,
-                                          bool attributes, ebpo_workspace *workspace,
+                                          mesh_reading more, ebpo_workspace *workspace,
                                           unsigned threads, ebpo_progress progress,
                                           ebpo_error *error);
 
 /* With the file's groups: see ebpo_mesh_read_groups. */
 EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending asked,
-                                                 bool attributes, ebpo_mesh_groups **groups,
+                                                 mesh_reading more, ebpo_mesh_groups **groups,
                                                  ebpo_workspace *workspace, unsigned threads,
                                                  ebpo_progress progress, ebpo_error *error);
 

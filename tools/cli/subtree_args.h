@@ -15,11 +15,11 @@
                 "files of 131072 faces and more")
 
 /* The same; `member` is an int, 0 unless given: a number of ebpo_face_coding. */
-#define FACE_CODING_OPTION(type, member)                                                       \
-    OPTION_WORD("face-coding", 0, type, member, "NAME", face_coding_words,                     \
-                "of the corners of faces: high-water (as in format 1.0), gates (across edges " \
-                "of other faces: fewer bytes) or usual (the default: gates in compressed "     \
-                "files with subtrees, else high-water)")
+#define FACE_CODING_OPTION(type, member)                                                        \
+    OPTION_WORD("face-coding", 0, type, member, "NAME", face_coding_words,                      \
+                "of the corners of faces: high-water (as in format 1.0), gates (across edges "  \
+                "of other faces: fewer bytes) or usual (the default: high-water, in copies as " \
+                "in the source)")
 
 extern const char *const face_coding_words[];
 

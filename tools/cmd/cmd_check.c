@@ -108,7 +108,7 @@ static ebpo_status check(const values *v, const char *path, mesh_input *p,
     mending mend = v->mend;
     mend.advise = true;
     ebpo_status status =
-        mesh_input_read(p, path, mend, false, workspace, (unsigned)v->threads, progress, error);
+        mesh_input_read(p, path, mend, READ_MESH, workspace, (unsigned)v->threads, progress, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;

@@ -30,7 +30,7 @@ typedef struct values {
     uint32_t with, without;
     int codec, face_coding, rule, profile;
     mending mend;
-    bool require_solid, split_components, split_groups, json, quiet;
+    bool require_solid, split_components, split_groups, embed_textures, json, quiet;
     const char *unit, *crs, *date;
 } values;
 
@@ -41,6 +41,8 @@ static const char *const without_words[] = {
 /* of each word */
 static const uint32_t without_parts[] = { EBPO_PART_PLANES, EBPO_PART_MESH, EBPO_PART_MAPS,
                                           EBPO_PART_ATTRIBUTES, EBPO_PART_COLOURS };
+
+enum { WITHOUT_MESH = 1 << 1, WITHOUT_ATTRIBUTES = 1 << 3 };
 
 static const arg_option options[] = {
     OPTION_INT("max-level", 0, values, max_level, "N", 0, 20,
@@ -68,6 +70,9 @@ static const arg_option options[] = {
                "leave out: attributes (colours and the like, of envelopes too), colours (of "
                "envelopes), maps, mesh (and with it all but planes), planes; separated by commas, "
                "may be repeated"),
+    OPTION_FLAG("embed-textures", 0, values, embed_textures,
+                "also store the bytes of images that the source's materials or comments name; "
+                "without it their names and digests are stored"),
     OPTION_WORD("profile", 0, values, profile, "NAME", profile_words,
                 "instead of --with and --without: full (all parts), lod (for viewers: no mesh), "
                 "collision (for exact questions: mesh, no maps); the same file as 'ebpo subset "
@@ -133,6 +138,10 @@ static int check_values(const values *v, const char *in, const char *out)
     if (v->profile >= 0 && (v->with || v->without))
         return command_usage(
             "convert", "--profile says which parts are stored; leave out --with and --without");
+    if (v->embed_textures && v->without & (WITHOUT_ATTRIBUTES | WITHOUT_MESH))
+        return command_usage("convert",
+                             "--embed-textures does not go with --without attributes or mesh: "
+                             "textures are among the attributes");
     if (v->split_components && v->split_groups)
         return command_usage("convert", "--split-components and --split-groups: choose one");
     if (v->split_groups && (v->mend.fill_holes || v->mend.repair))
@@ -177,6 +186,13 @@ static uint32_t parts_of(const values *v)
                       EBPO_PART_COLOURS) &
                      ~without;
     return v->with ? parts | EBPO_PART_LEAF_PLANES : parts;
+}
+
+static mesh_reading reading_of(const values *v)
+{
+    return !(parts_of(v) & EBPO_PART_ATTRIBUTES) ? READ_MESH
+           : v->embed_textures                   ? READ_TEXTURES
+                                                 : READ_ATTRIBUTES;
 }
 
 /* --- output --- */
@@ -439,9 +455,9 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
     if (!splits(v))
         progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
     double begun = progress_now();
-    ebpo_status status = mesh_input_read_groups(&p, in, v->mend, parts_of(v) & EBPO_PART_ATTRIBUTES,
-                                                v->split_groups ? &groups : NULL, workspace,
-                                                (unsigned)v->threads, progress, error);
+    ebpo_status status =
+        mesh_input_read_groups(&p, in, v->mend, reading_of(v), v->split_groups ? &groups : NULL,
+                               workspace, (unsigned)v->threads, progress, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;

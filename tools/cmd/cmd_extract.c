@@ -9,6 +9,7 @@
 #include "cli/progress.h"
 #include "cli/reading.h"
 #include "cli/remote_args.h"
+#include "cli/textures.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 
@@ -23,6 +24,7 @@ typedef struct values {
     int64_t level, subtree, threads;
     memory_values memory;
     bool mesh, no_walls, json, quiet;
+    const char *textures;
     remote_values remote;
 } values;
 
@@ -36,6 +38,9 @@ static const arg_option options[] = {
                 "the model itself, bit for bit; in the order of the source if the maps are stored"),
     OPTION_INT("subtree", 0, values, subtree, "OCTCODE", 1, OCTCODE_MOST,
                "the faces that the leaves of this node list: those that touch its cell"),
+    OPTION_TEXT("textures", 0, values, textures, "DIR",
+                "the images whose bytes the file has, into DIR under their names; alone, or "
+                "besides one of the others"),
     OPTION_FLAG("no-walls", 0, values, no_walls,
                 "with --level: leave out polygons that lie on cell walls"),
     OPTION_THREADS(values, threads),
@@ -49,11 +54,13 @@ static const arg_option options[] = {
 static const arg_spec spec = {
     .command = "extract",
     .operands = "FILE OUT.ply",
-    .least = 2,
+    .least = 1,
     .most = 2,
     .summary = "writes a level's envelopes, the model, or a part of it, as PLY",
-    .text = "FILE is an .ebpo.h5 file or its URL. One of --level, --mesh and --subtree is needed. "
-            "A level's polygons are held in memory whatever --memory says.",
+    .text =
+        "FILE is an .ebpo.h5 file or its URL. One of --level, --mesh and --subtree is needed, and "
+        "OUT.ply, unless it is for --textures alone. "
+        "A level's polygons are held in memory whatever --memory says.",
     .dash = " o",
     .writes = "ply",
     .options = options,
@@ -62,8 +69,13 @@ static const arg_spec spec = {
 static int check_values(const values *v, const char *in, const char *out)
 {
     int asked = (v->level >= 0) + v->mesh + (v->subtree > 0);
+    if (asked == 0 && v->textures && !out)
+        return v->json ? command_usage("extract", "--json does not go with --textures alone")
+                       : EXIT_FINE;
     if (asked == 0)
         return command_usage("extract", "specify --level N, --mesh or --subtree OCTCODE");
+    if (!out)
+        return command_usage("extract", "missing operand; expected: FILE OUT.ply");
     if (asked > 1)
         return command_usage("extract", "--level, --mesh and --subtree cannot be used together");
     if (v->level < 0 && v->no_walls)
@@ -121,7 +133,8 @@ static void warn_of_elements(const ebpo_file *file, bool source_order, const cha
     ebpo_attribute_facts a = EBPO_ATTRIBUTE_FACTS_INIT;
     bool others = false;
     for (unsigned n = 0; ebpo_file_attribute(file, n, &a); n++)
-        others = others || (strcmp(a.element, "vertex") != 0 && strcmp(a.element, "face") != 0);
+        others = others || (strcmp(a.element, "vertex") != 0 && strcmp(a.element, "face") != 0 &&
+                            strcmp(a.element, "ebpo:texture") != 0);
     if (others && (!source_order || ebpo_file_info(file)->mend.welded_vertices))
         fprintf(stderr,
                 "ebpo extract: %s: note: other elements are left out, as their numbers of vertices "
@@ -158,6 +171,22 @@ static ebpo_status take(ebpo_file *file, const values *v, const char *path,
         fprintf(stderr,
                 "ebpo extract: %s: note: is a subset, so its mesh is only part of the model's\n",
                 remote_shown(path));
+    return status;
+}
+
+static ebpo_status take_textures(const ebpo_file *file, const values *v, ebpo_error *error)
+{
+    textures t;
+    uint64_t written;
+    ebpo_status status = textures_read(&t, file, true, error);
+    if (status != EBPO_OK)
+        return status;
+    status = textures_write(&t, v->textures, &written, error);
+    textures_free(&t);
+    char images[40];
+    words_plural(images, sizeof images, written, "image", "images");
+    if (status == EBPO_OK && !v->quiet && !v->json)
+        printf("%s: %s\n", v->textures, images);
     return status;
 }
 
@@ -208,16 +237,18 @@ static int run(void *given, const char **operand)
     ebpo_status status = memory_make(&workspace, &v->memory, &error);
     if (status == EBPO_OK)
         status = remote_open(&file, operand[0], &v->remote, &error);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK && v->textures)
+        status = take_textures(file, v, &error);
+    if (status == EBPO_OK && operand[1])
         status = take(file, v, operand[0], workspace, progress, &out, &error);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK && operand[1])
         status = ebpo_mesh_write_ply(&out.mesh, operand[1], &error);
     progress_wipe(&line);
     if (status == EBPO_OK) {
         traffic t = traffic_of(file);
         if (v->json)
             summarise_json(v, operand[1], &out, &t);
-        else if (!v->quiet)
+        else if (operand[1] && !v->quiet)
             summarise(v, operand[1], &out);
         if (!v->json)
             remote_tell(&t, &v->remote, false);

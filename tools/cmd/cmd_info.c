@@ -6,6 +6,7 @@
 #include "cli/file_facts.h"
 #include "cli/memory_facts.h"
 #include "cli/remote_args.h"
+#include "cli/textures.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 
@@ -31,7 +32,8 @@ static const arg_spec spec = {
     .least = 1,
     .most = 1,
     .summary = "describes a file: its contents, bytes by part, and a table of levels",
-    .text = "Only the head of the file is read. FILE is an .ebpo.h5 file or its URL; for meshes "
+    .text = "Only the head of the file is read, and names of images. FILE is an .ebpo.h5 file or "
+            "its URL; for meshes "
             "use 'ebpo check'.",
     .options = options,
 };
@@ -49,13 +51,15 @@ static ebpo_status plan_memory(const ebpo_file *file, const values *v, ebpo_mode
 }
 
 static void print_words(const values *v, const char *path, const ebpo_file *file,
-                        const ebpo_stored_sizes *stored, const ebpo_model_plan *plan)
+                        const ebpo_stored_sizes *stored, const ebpo_model_plan *plan,
+                        const textures *images)
 {
     const ebpo_info *info = ebpo_file_info(file);
     facts_print(stdout, path, info, stored);
     if (v->memory)
         memory_facts(stdout, plan);
     facts_attributes(stdout, file);
+    textures_print(stdout, images);
     putchar('\n');
     facts_table(stdout, info, stored);
     if (v->arrays)
@@ -64,7 +68,7 @@ static void print_words(const values *v, const char *path, const ebpo_file *file
 
 static void print_json(const values *v, const char *path, const ebpo_file *file,
                        const ebpo_stored_sizes *stored, const ebpo_model_plan *plan,
-                       const traffic *t)
+                       const textures *images, const traffic *t)
 {
     json j;
     json_begin(&j, stdout);
@@ -73,6 +77,7 @@ static void print_json(const values *v, const char *path, const ebpo_file *file,
     if (v->memory)
         memory_facts_json(&j, "memory", plan);
     facts_attributes_json(&j, file);
+    textures_json(&j, images);
     if (v->arrays)
         facts_arrays_json(&j, file);
     remote_json(&j, t, &v->remote);
@@ -96,17 +101,21 @@ static int run(void *given, const char **operand)
         status = ebpo_file_locate(file, &stored, &error);
     if (status == EBPO_OK)
         status = plan_memory(file, v, &plan, &error);
+    textures images = { .count = 0 };
+    if (status == EBPO_OK)
+        status = textures_read(&images, file, false, &error);
     if (status != EBPO_OK) {
         ebpo_close(file);
         return command_failed("info", &error);
     }
     traffic t = traffic_of(file);
     if (v->json) {
-        print_json(v, remote_shown(operand[0]), file, &stored, &plan, &t);
+        print_json(v, remote_shown(operand[0]), file, &stored, &plan, &images, &t);
     } else {
-        print_words(v, remote_shown(operand[0]), file, &stored, &plan);
+        print_words(v, remote_shown(operand[0]), file, &stored, &plan, &images);
         remote_tell(&t, &v->remote, false);
     }
+    textures_free(&images);
     ebpo_close(file);
     return EXIT_FINE;
 }

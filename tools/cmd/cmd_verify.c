@@ -154,6 +154,7 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
     read.workspace = workspace;
     read.threads = (unsigned)v->threads;
     read.attributes = 1;
+    read.embed_textures = 1;
     if (status == EBPO_OK)
         status = remote_open(&file, path, &v->remote, error);
     if (status == EBPO_OK && v->against)

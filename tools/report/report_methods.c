@@ -110,7 +110,7 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection,
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
     mesh_input p;
-    ebpo_status status = mesh_input_read(&p, mesh, (mending){ 0 }, false, NULL,
+    ebpo_status status = mesh_input_read(&p, mesh, (mending){ 0 }, READ_MESH, NULL,
                                          (unsigned)c->v->threads, c->progress, error);
     if (status != EBPO_OK)
         return status;

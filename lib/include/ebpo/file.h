@@ -74,10 +74,13 @@ typedef enum ebpo_codec {
 
 /* How the corners of faces are written (format-spec/README.md, section 7). */
 typedef enum ebpo_face_coding {
-    /* `gates` in files with subtrees, but for EBPO_CODEC_NONE; else `high-water`. */
+    /* As the source of a copy has them, but for EBPO_CODEC_NONE; else `high-water`. */
     EBPO_FACES_USUAL = 0,
 
-    /* Across edges of faces before them: 7 to 11 % off whole files. Since format 1.1. */
+    /*
+     * Across edges of faces before them: 7 to 11 % off whole files, and more work for
+     * readers (docs/develop/codings.md). Since format 1.1.
+     */
     EBPO_FACES_GATES = 1,
 
     /* By number, as in format 1.0. */

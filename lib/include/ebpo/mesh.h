@@ -136,14 +136,19 @@ typedef struct ebpo_mesh_read_options {
     /*
      * 1: also reads what a PLY says of vertices, faces and other elements beyond
      * positions and corners, and its comments; of other formats colours, normals,
-     * texture coordinates and names of materials; ebpo_build takes it over. 0: not.
+     * texture coordinates and names of materials; ebpo_build takes it over. Of images
+     * that a PLY or the material libraries of an OBJ file name, the names, and digests
+     * of those that are in the file's folder or below. 0: not.
      */
     uint64_t attributes;
+
+    /* 1, with `attributes`: also the bytes of these images. 0: not. */
+    uint64_t embed_textures;
 } ebpo_mesh_read_options;
 
-#define EBPO_MESH_READ_OPTIONS_INIT                                \
-    {                                                              \
-        sizeof(ebpo_mesh_read_options), 0, { NULL, NULL }, NULL, 0 \
+#define EBPO_MESH_READ_OPTIONS_INIT                                   \
+    {                                                                 \
+        sizeof(ebpo_mesh_read_options), 0, { NULL, NULL }, NULL, 0, 0 \
     }
 
 /*

@@ -1,0 +1,223 @@
+#include "input/texture_files.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "attributes/textures.h"
+#include "base/error.h"
+#include "base/sha256.h"
+#include "input/texture_names.h"
+#include "io/file_source.h"
+
+enum { LIBRARY_BYTES = 1 << 24, LIBRARIES = 100, DIGEST = 32, STEP = 1 << 20 };
+#define IMAGE_BYTES ((uint64_t)1 << 30)
+
+typedef struct finding {
+    const char *path; /* of the source */
+    ebpo_texture_names names;
+    uint64_t absent, outside, large; /* not found; forbidden; too large */
+    uint64_t tried, libraries;       /* names of libraries; not read */
+    bool keep, no_memory;
+    ebpo_error *error;
+} finding;
+
+/* --- files beside the source --- */
+
+/* Below the folder, by its words: no root, no drive, nothing upwards. */
+static bool stays_below(const char *name)
+{
+    if (*name == '/' || (*name && name[1] == ':'))
+        return false;
+    for (const char *s = name; *s;) {
+        size_t n = strcspn(s, "/");
+        if (n == 2 && s[0] == '.' && s[1] == '.')
+            return false;
+        s += n + (s[n] == '/');
+    }
+    return true;
+}
+
+/* Whether links lead elsewhere; false also where there is no such file. */
+static bool really_below(const char *folder, const char *path)
+{
+    char *top = realpath(folder, NULL), *real = realpath(path, NULL);
+    size_t n = top ? strlen(top) : 0;
+    bool below = top && real && strncmp(top, real, n) == 0 && (n == 1 || real[n] == '/');
+    free(top);
+    free(real);
+    return below;
+}
+
+typedef enum found { FOUND, ABSENT, OUTSIDE, NO_MEMORY } found;
+
+/* Opens a file that the source names. Other systems' names have backslashes. */
+static found open_beside(const char *source, const char *name, ebpo_whole_file *out)
+{
+    size_t folder = (size_t)(ebpo_path_name(source) - source), n = strlen(name);
+    char *path = malloc(folder + n + 3), *top = strndup(folder ? source : ".", folder ? folder : 1);
+    found how = path && top ? FOUND : NO_MEMORY;
+    if (how == FOUND) {
+        memcpy(path, source, folder);
+        memcpy(path + folder, name, n + 1);
+        for (char *s = path + folder; *s; s++)
+            if (*s == '\\')
+                *s = '/';
+        how = !stays_below(path + folder)                        ? OUTSIDE
+              : ebpo_whole_file_open(out, path, NULL) != EBPO_OK ? ABSENT
+                                                                 : FOUND;
+    }
+    if (how == FOUND && !really_below(top, path)) {
+        ebpo_whole_file_close(out);
+        how = OUTSIDE;
+    }
+    free(path);
+    free(top);
+    return how;
+}
+
+/* --- names --- */
+
+static bool read_library(finding *f, const char *name)
+{
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
+    found how = f->tried++ < LIBRARIES ? open_beside(f->path, name, &file) : ABSENT;
+    f->no_memory |= how == NO_MEMORY;
+    bool good = how == FOUND && file.size <= LIBRARY_BYTES;
+    if (good)
+        ebpo_texture_names_of_mtl(&f->names, file.data, file.size);
+    ebpo_whole_file_close(&file);
+    return good;
+}
+
+/* A library's name with spaces, or several names. */
+static void read_libraries(void *context, const char *rest, size_t size)
+{
+    finding *f = context;
+    char *names = strndup(rest, size);
+    if (!names || read_library(f, names)) {
+        f->no_memory |= !names;
+        free(names);
+        return;
+    }
+    char *left = NULL, *name = strtok_r(names, " \t", &left);
+    for (; name; name = strtok_r(NULL, " \t", &left))
+        f->libraries += !read_library(f, name);
+    free(names);
+}
+
+static void find_names(finding *f, const ebpo_mesh *mesh, const uint8_t *data, uint64_t size)
+{
+    if (strcmp(mesh->source_format, "obj") == 0)
+        ebpo_obj_libraries(data, size, read_libraries, f);
+    else if (mesh->attributes && mesh->attributes->header)
+        ebpo_texture_names_of_ply(&f->names, mesh->attributes->header,
+                                  mesh->attributes->header_bytes);
+    f->no_memory |= f->names.no_memory;
+}
+
+/* --- images --- */
+
+static void make_digest(const ebpo_whole_file *file, uint8_t digest[DIGEST])
+{
+    ebpo_sha256 state;
+    ebpo_sha256_begin(&state);
+    for (uint64_t at = 0; at < file->size; at += STEP)
+        ebpo_sha256_add(&state, file->data + at,
+                        file->size - at < STEP ? (size_t)(file->size - at) : STEP);
+    ebpo_sha256_end(&state, digest);
+}
+
+static ebpo_status add_image(finding *f, ebpo_attributes *to, const ebpo_texture_name *named)
+{
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
+    uint8_t digest[DIGEST];
+    ebpo_texture_bytes list[EBPO_TEXTURE_ARRAYS] = {
+        [EBPO_TEXTURE_NAME] = { named->name, strlen(named->name) },
+        [EBPO_TEXTURE_USE] = { named->use, named->use_bytes },
+    };
+    found how = open_beside(f->path, named->name, &file);
+    f->absent += how == ABSENT;
+    f->outside += how == OUTSIDE;
+    if (how == NO_MEMORY)
+        return ebpo_fail_memory(f->error, strlen(f->path));
+    if (how == FOUND && file.size > IMAGE_BYTES) {
+        f->large++;
+    } else if (how == FOUND) {
+        make_digest(&file, digest);
+        list[EBPO_TEXTURE_SHA256] = (ebpo_texture_bytes){ digest, DIGEST };
+        if (f->keep)
+            list[EBPO_TEXTURE_BYTES] = (ebpo_texture_bytes){ file.data, file.size };
+    }
+    ebpo_status status = ebpo_textures_add(to, f->keep, list, f->error);
+    if (status == EBPO_OK && how == FOUND)
+        status = ebpo_whole_file_unchanged(&file, named->name, f->error);
+    ebpo_whole_file_close(&file);
+    return status;
+}
+
+/* --- notes --- */
+
+static void lose(ebpo_attributes *to, uint64_t count, const char *one, const char *several)
+{
+    if (count == 1)
+        ebpo_attributes_lose(to, "%s", one);
+    else if (count)
+        ebpo_attributes_lose(to, several, count);
+}
+
+static void note_losses(const finding *f, ebpo_attributes *to)
+{
+    uint64_t known = f->names.count - f->absent - f->outside - f->large;
+    lose(to, f->names.left_out, "a name or a use of an image (there is no room for more)",
+         "%" PRIu64 " names and uses of images (there is no room for more)");
+    lose(to, f->libraries, "names of images (a material library cannot be read)",
+         "names of images (%" PRIu64 " material libraries cannot be read)");
+    lose(to, f->absent, "the digest of an image (there is no such file beside the source)",
+         "the digests of %" PRIu64 " images (there are no such files beside the source)");
+    lose(to, f->outside, "the digest of an image (its name leads out of the source's folder)",
+         "the digests of %" PRIu64 " images (their names lead out of the source's folder)");
+    lose(to, f->large, "an image of more than 1 GiB", "%" PRIu64 " images of more than 1 GiB");
+    lose(to, f->keep ? 0 : known, "the bytes of an image (--embed-textures keeps them)",
+         "the bytes of %" PRIu64 " images (--embed-textures keeps them)");
+}
+
+/* The element is ours, whatever a PLY says of one of that name. */
+static void drop_own(ebpo_attributes *from)
+{
+    bool any = false;
+    for (uint64_t i = from ? from->count : 0; i-- > 0;)
+        if (ebpo_attribute_is_of_textures(&from->array[i])) {
+            ebpo_attributes_remove(from, i);
+            any = true;
+        }
+    if (any)
+        ebpo_attributes_lose(from, "the element " EBPO_TEXTURE_ELEMENT);
+}
+
+static ebpo_status add_images(finding *f, ebpo_mesh *mesh)
+{
+    ebpo_status status = EBPO_OK;
+    if (f->no_memory)
+        return ebpo_fail_memory(f->error, sizeof *f->names.of);
+    if (!f->names.count && !f->names.left_out && !f->libraries)
+        return EBPO_OK;
+    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
+        return ebpo_fail_memory(f->error, sizeof *mesh->attributes);
+    for (uint64_t i = 0; i < f->names.count && status == EBPO_OK; i++)
+        status = add_image(f, mesh->attributes, &f->names.of[i]);
+    note_losses(f, mesh->attributes);
+    return status;
+}
+
+ebpo_status ebpo_textures_find(ebpo_mesh *mesh, const char *path, const uint8_t *data,
+                               uint64_t size, bool keep, ebpo_error *error)
+{
+    finding f = { .path = path, .keep = keep, .error = error };
+    drop_own(mesh->attributes);
+    find_names(&f, mesh, data, size);
+    ebpo_status status = add_images(&f, mesh);
+    ebpo_texture_names_free(&f.names);
+    return status;
+}

@@ -1,0 +1,279 @@
+#include "cli/textures.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { NAME, USE, SHA256, BYTES, DIGEST = 32 };
+
+typedef struct span {
+    const char *s;
+    uint64_t n;
+} span;
+
+static span list_of(const textures *t, int which, uint64_t row)
+{
+    const ebpo_attribute_values *v = &t->list[which];
+    uint64_t from = row * t->columns[which], to = from + t->columns[which];
+    if (v->ends) {
+        from = row ? v->ends[row - 1] : 0;
+        to = v->ends[row];
+    }
+    return v->values && to <= v->count ? (span){ (const char *)v->values + from, to - from }
+                                       : (span){ "", 0 };
+}
+
+/* Which of the arrays it is; -1: none of them. */
+static int which_of(const ebpo_attribute_facts *a)
+{
+    static const char *const names[TEXTURE_ARRAYS] = { "name", "use", "sha256", "bytes" };
+    if (strcmp(a->element, "ebpo:texture") != 0 || a->type != EBPO_ATTRIBUTE_UINT8 || !a->list)
+        return -1;
+    for (int i = 0; i < TEXTURE_ARRAYS; i++)
+        if (strcmp(a->names, names[i]) == 0)
+            return i;
+    return -1;
+}
+
+ebpo_status textures_read(textures *out, const ebpo_file *file, bool bytes, ebpo_error *error)
+{
+    ebpo_attribute_facts a = EBPO_ATTRIBUTE_FACTS_INIT;
+    ebpo_status status = EBPO_OK;
+    memset(out, 0, sizeof *out);
+    for (unsigned n = 0; status == EBPO_OK && ebpo_file_attribute(file, n, &a); n++) {
+        int i = which_of(&a);
+        if (i < 0 || out->list[i].values)
+            continue;
+        out->count = a.rows;
+        out->columns[i] = a.columns;
+        out->embedded = out->embedded || i == BYTES;
+        if (i != BYTES || bytes)
+            status = ebpo_file_read_attribute(file, n, NULL, &out->list[i], error);
+    }
+    if (status != EBPO_OK)
+        textures_free(out);
+    return status;
+}
+
+void textures_free(textures *t)
+{
+    for (int i = 0; i < TEXTURE_ARRAYS; i++)
+        ebpo_attribute_values_free(&t->list[i]);
+    memset(t, 0, sizeof *t);
+}
+
+/* --- facts --- */
+
+/* A copy that ends with a zero, without control characters; NULL when memory is short. */
+static char *text_of(span s)
+{
+    char *text = strndup(s.s, s.n);
+    for (char *c = text; c && *c; c++)
+        if ((unsigned char)*c < ' ' || *c == 127)
+            *c = *c == '\n' ? ';' : '?';
+    return text;
+}
+
+/* "": there is none. */
+static void digest_of(const textures *t, uint64_t row, char hex[2 * DIGEST + 1])
+{
+    span s = list_of(t, SHA256, row);
+    hex[0] = 0;
+    for (int i = 0; s.n == DIGEST && i < DIGEST; i++)
+        sprintf(hex + 2 * i, "%02x", (unsigned char)s.s[i]);
+}
+
+void textures_print(FILE *out, const textures *t)
+{
+    for (uint64_t i = 0; i < t->count; i++) {
+        char hex[2 * DIGEST + 1], *name = text_of(list_of(t, NAME, i)),
+                                  *use = text_of(list_of(t, USE, i));
+        digest_of(t, i, hex);
+        fprintf(out, "  %s %s, %s%s%s%s%s\n", i ? "          " : "textures  ", name ? name : "?",
+                hex[0] ? "sha256 " : "was not found", hex, use && *use ? ", " : "", use ? use : "",
+                t->embedded && hex[0] ? ", kept" : "");
+        free(name);
+        free(use);
+    }
+}
+
+void textures_json(json *j, const textures *t)
+{
+    json_array(j, "textures");
+    for (uint64_t i = 0; i < t->count; i++) {
+        char hex[2 * DIGEST + 1], *name = text_of(list_of(t, NAME, i)),
+                                  *use = text_of(list_of(t, USE, i));
+        digest_of(t, i, hex);
+        json_object(j, NULL);
+        json_text(j, "name", name ? name : "");
+        json_text(j, "use", use ? use : "");
+        json_text(j, "sha256", hex);
+        json_bool(j, "kept", t->embedded && hex[0]);
+        json_end(j);
+        free(name);
+        free(use);
+    }
+    json_end(j);
+}
+
+/* --- files --- */
+
+static ebpo_status fail(ebpo_error *error, ebpo_status status, const char *path, const char *what)
+{
+    error->status = status;
+    snprintf(error->message, sizeof error->message, "%s: %s", path, what);
+    return status;
+}
+
+static ebpo_status fail_system(ebpo_error *error, const char *path)
+{
+    return fail(error, EBPO_E_IO, path, strerror(errno));
+}
+
+/* A name of this kind: words between slashes, none of which leads upwards. */
+static bool leads_below(const char *name)
+{
+    size_t n = 0;
+    if (*name && name[1] == ':')
+        return false;
+    for (const char *c = name;; c += n + 1) {
+        n = strcspn(c, "/");
+        if (n == 0 || (n == 2 && c[0] == '.' && c[1] == '.') || (n == 1 && *c == '.' && !c[n]))
+            return false;
+        if (!c[n])
+            return true;
+    }
+}
+
+/* Some names come with backslashes. NULL: memory is short, or it is no name of a file below. */
+static char *safe_name(span s)
+{
+    char *name = strndup(s.s, s.n);
+    bool good = name && strlen(name) == s.n;
+    for (char *c = name; good && *c; c++) {
+        if (*c == '\\')
+            *c = '/';
+        good = (unsigned char)*c >= ' ' && *c != 127;
+    }
+    if (good && leads_below(name))
+        return name;
+    free(name);
+    return NULL;
+}
+
+/* The folder that a file is to be in, made if need be; links are not followed. -1: as errno says.
+ */
+static int open_folder(int top, char *name, char **last)
+{
+    int folder = dup(top);
+    char *left = NULL, *word = strtok_r(name, "/", &left), *next;
+    for (; folder >= 0 && (next = strtok_r(NULL, "/", &left)); word = next) {
+        int below = mkdirat(folder, word, 0777) == 0 || errno == EEXIST
+                        ? openat(folder, word, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC)
+                        : -1;
+        int why = errno;
+        close(folder);
+        errno = why;
+        folder = below;
+    }
+    *last = word;
+    return folder;
+}
+
+static bool write_all(int fd, span bytes)
+{
+    while (bytes.n) {
+        ssize_t n = write(fd, bytes.s, bytes.n < 1 << 30 ? (size_t)bytes.n : 1 << 30);
+        if (n < 0 && errno != EINTR)
+            return false;
+        if (n > 0)
+            bytes = (span){ bytes.s + n, bytes.n - (uint64_t)n };
+    }
+    return true;
+}
+
+/* What is there already is left as it is. */
+static bool write_file(int top, char *name, span bytes)
+{
+    char *last;
+    int folder = open_folder(top, name, &last);
+    if (folder < 0)
+        return false;
+    int fd = openat(folder, last, O_CREAT | O_EXCL | O_WRONLY | O_NOFOLLOW | O_CLOEXEC, 0666);
+    bool good = fd >= 0 && write_all(fd, bytes);
+    int why = errno;
+    if (fd >= 0 && close(fd) != 0 && good) {
+        good = false;
+        why = errno;
+    }
+    if (fd >= 0 && !good)
+        unlinkat(folder, last, 0);
+    close(folder);
+    errno = why;
+    return good;
+}
+
+static bool is_kept(const textures *t, uint64_t row)
+{
+    return t->list[BYTES].values && list_of(t, SHA256, row).n == DIGEST;
+}
+
+static ebpo_status check_names(const textures *t, ebpo_error *error)
+{
+    uint64_t kept = 0;
+    for (uint64_t i = 0; i < t->count; i++) {
+        if (!is_kept(t, i))
+            continue;
+        kept++;
+        char *name = safe_name(list_of(t, NAME, i)), *shown = text_of(list_of(t, NAME, i));
+        ebpo_status status =
+            name ? EBPO_OK
+                 : fail(error, EBPO_E_FORMAT, shown ? shown : "?",
+                        "an image's name that leads out of the folder; nothing was written");
+        free(name);
+        free(shown);
+        if (status != EBPO_OK)
+            return status;
+    }
+    return kept ? EBPO_OK
+                : fail(error, EBPO_E_ABSENT, "no images",
+                       "the file has the bytes of none; ebpo convert --embed-textures keeps them");
+}
+
+static ebpo_status write_one(const textures *t, uint64_t row, int top, ebpo_error *error)
+{
+    char *name = safe_name(list_of(t, NAME, row)), *shown = text_of(list_of(t, NAME, row));
+    ebpo_status status = EBPO_OK;
+    if (!name || !shown)
+        status = fail(error, EBPO_E_MEMORY, "no memory", "an image's name");
+    else if (!write_file(top, name, list_of(t, BYTES, row)))
+        status = fail_system(error, shown);
+    free(name);
+    free(shown);
+    return status;
+}
+
+ebpo_status textures_write(const textures *t, const char *folder, uint64_t *written,
+                           ebpo_error *error)
+{
+    *written = 0;
+    ebpo_status status = check_names(t, error);
+    if (status != EBPO_OK)
+        return status;
+    if (mkdir(folder, 0777) != 0 && errno != EEXIST)
+        return fail_system(error, folder);
+    int top = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (top < 0)
+        return fail_system(error, folder);
+    for (uint64_t i = 0; i < t->count && status == EBPO_OK; i++)
+        if (is_kept(t, i)) {
+            status = write_one(t, i, top, error);
+            *written += status == EBPO_OK;
+        }
+    close(top);
+    return status;
+}
