@@ -5,6 +5,7 @@
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/sized.h"
+#include "mesh/mesh_parts.h"
 
 typedef struct preparation {
     ebpo_mesh *mesh;
@@ -25,16 +26,11 @@ static ebpo_status unless_too_large(ebpo_status status, const ebpo_error *local,
 static ebpo_status mend(const preparation *p, bool weld, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
-    ebpo_status status = EBPO_OK;
+    unsigned steps = (weld ? EBPO_MEND_WELD : 0) | (o->orient ? EBPO_MEND_ORIENT : 0) |
+                     (o->flip ? EBPO_MEND_FLIP : 0) | (o->fill_holes ? EBPO_MEND_FILL : 0);
     if (!ebpo_progress_stage(&o->progress, "mending", error))
         return EBPO_E_CANCELLED;
-    if (weld)
-        status = ebpo_mesh_weld(p->mesh, &p->out->record, error);
-    if (status == EBPO_OK && o->orient)
-        status = ebpo_mesh_orient(p->mesh, &p->out->record, error);
-    if (status == EBPO_OK && o->fill_holes)
-        status = ebpo_mesh_fill_holes(p->mesh, &p->out->record, error);
-    return status;
+    return ebpo_mesh_mend(p->mesh, steps, &p->out->record, error);
 }
 
 /* In the order of the curve before anything else, so that each step goes through memory in order,
@@ -56,7 +52,7 @@ static ebpo_status prepare(const preparation *p, ebpo_error *error)
     /* STL has no shared vertices */
     bool weld = o->weld || strncmp(p->mesh->source_format, "stl", 3) == 0;
     ebpo_status status = EBPO_OK;
-    p->out->mended = weld || o->orient || o->fill_holes;
+    p->out->mended = weld || o->orient || o->flip || o->fill_holes;
     if (p->out->mended)
         status = arrange_and_mend(p, weld, error);
     if (status == EBPO_OK) {

@@ -11,7 +11,7 @@
 #include "base/sized.h"
 #include "mesh/mesh_parts.h"
 
-enum { WELD = 1, ORIENT = 2, FILL = 4 };
+enum { WELD = EBPO_MEND_WELD, ORIENT = EBPO_MEND_ORIENT, FILL = EBPO_MEND_FILL };
 
 /* The root of the area is a length; sheets are thinner than this share of it. */
 static const double THIN = 0.01;
@@ -65,19 +65,6 @@ uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
 
 /* ---- sequences ---- */
 
-static ebpo_status mend(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *record,
-                        ebpo_error *error)
-{
-    ebpo_status status = EBPO_OK;
-    if (steps & WELD)
-        status = ebpo_mesh_weld(mesh, record, error);
-    if (status == EBPO_OK && steps & ORIENT)
-        status = ebpo_mesh_orient(mesh, record, error);
-    if (status == EBPO_OK && steps & FILL)
-        status = ebpo_mesh_fill_holes(mesh, record, error);
-    return status;
-}
-
 static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
 {
     static const ebpo_progress silent;
@@ -89,7 +76,7 @@ static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     one->steps = steps;
-    status = mend(&copy, steps, &one->record, error);
+    status = ebpo_mesh_mend(&copy, steps, &one->record, error);
     if (status == EBPO_OK)
         status = ebpo_mesh_check(&copy, t->threads, silent, &one->report, error);
     ebpo_mesh_free(&copy);

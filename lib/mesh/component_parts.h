@@ -39,6 +39,12 @@ EBPO_MUST_USE ebpo_status ebpo_components_check(const ebpo_mesh *mesh, ebpo_erro
 EBPO_MUST_USE ebpo_status ebpo_components_group(const ebpo_components *c, bool faces,
                                                 mesh_groups *g, ebpo_error *error);
 
+/* Components, each with its faces, edges and volume, but no cavity joined to another one; freed by
+ * ebpo_components_free. On failure as well. */
+EBPO_MUST_USE ebpo_status ebpo_components_find(const ebpo_mesh *mesh, unsigned threads,
+                                               const ebpo_progress *progress, ebpo_components **out,
+                                               ebpo_error *error);
+
 /* Edges and volumes; needs the groups of faces. */
 EBPO_MUST_USE ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
                                                   const ebpo_progress *progress, ebpo_error *error);

@@ -223,16 +223,27 @@ static ebpo_status number_vertices(ebpo_components *c, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status make(ebpo_components *c, unsigned threads, const ebpo_progress *progress,
-                        ebpo_error *error)
+ebpo_status ebpo_components_find(const ebpo_mesh *mesh, unsigned threads,
+                                 const ebpo_progress *progress, ebpo_components **out,
+                                 ebpo_error *error)
 {
-    if (!ebpo_progress_stage(progress, "components", error))
+    *out = NULL;
+    ebpo_status status = ebpo_components_check(mesh, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_components *c = *out = ebpo_alloc_zero(1, sizeof *c);
+    if (!c)
+        return ebpo_fail_memory(error, sizeof *c);
+    c->mesh = mesh;
+    if (progress && !ebpo_progress_stage(progress, "components", error))
         return EBPO_E_CANCELLED;
-    ebpo_status status = find(c, error);
-    if (status == EBPO_OK)
-        status = ebpo_components_measure(c, threads, progress, error);
-    if (status == EBPO_OK)
-        status = ebpo_cavities_place(c, error);
+    status = find(c, error);
+    return status == EBPO_OK ? ebpo_components_measure(c, threads, progress, error) : status;
+}
+
+static ebpo_status group_all(ebpo_components *c, ebpo_error *error)
+{
+    ebpo_status status = ebpo_cavities_place(c, error);
     if (status == EBPO_OK)
         status = join_cavities(c, error);
     if (status != EBPO_OK)
@@ -245,19 +256,13 @@ ebpo_status ebpo_components_new(const ebpo_mesh *mesh, unsigned threads, ebpo_pr
                                 ebpo_components **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    *out = NULL;
-    ebpo_status status = ebpo_components_check(mesh, error);
-    if (status != EBPO_OK)
-        return status;
-    ebpo_components *c = ebpo_alloc_zero(1, sizeof *c);
-    if (!c)
-        return ebpo_fail_memory(error, sizeof *c);
-    c->mesh = mesh;
-    status = make(c, threads, &progress, error);
+    ebpo_status status = ebpo_components_find(mesh, threads, &progress, out, error);
     if (status == EBPO_OK)
-        *out = c;
-    else
-        ebpo_components_free(c);
+        status = group_all(*out, error);
+    if (status == EBPO_OK)
+        return EBPO_OK;
+    ebpo_components_free(*out);
+    *out = NULL;
     return status;
 }
 

@@ -89,6 +89,35 @@ static inline void ebpo_face_cross(const double a[3], const double b[3], const d
     out[2] = p[0] * q[1] - p[1] * q[0];
 }
 
+/* Makes the face look the other way. */
+static inline void ebpo_face_turn(uint32_t face[3])
+{
+    uint32_t v = face[1];
+    face[1] = face[2];
+    face[2] = v;
+}
+
+/* Steps of mending. EARLIER: orienting as earlier builds did it, which left consistent components
+ * as they were. */
+enum {
+    EBPO_MEND_WELD = 1,
+    EBPO_MEND_ORIENT = 2,
+    EBPO_MEND_FILL = 4,
+    EBPO_MEND_FLIP = 8,
+    EBPO_MEND_EARLIER = 16
+};
+
+/* Merges, orients, flips, fills holes, and turns what these closed: as asked for. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *record,
+                                         ebpo_error *error);
+
+/* The parts of ebpo_mesh_orient: neighbouring faces agree; closed components look outwards, or
+ * inwards where they are within an odd number of others. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record,
+                                                    ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_mesh_turn_closed(ebpo_mesh *mesh, ebpo_mend_record *record,
+                                                ebpo_error *error);
+
 /* What messages call the mesh: its source's name, or "mesh". */
 const char *ebpo_mesh_label(const ebpo_mesh *mesh);
 

@@ -273,9 +273,7 @@ static ebpo_status flip(void *context, uint64_t begin, uint64_t end, unsigned wo
         p = patch_of(o, f, p);
         if (!p || ((o->above[f] & 1) != p->seed_turned) == p->turn_others)
             continue;
-        uint32_t *v = o->mesh->faces + 3 * f, t = v[1];
-        v[1] = v[2];
-        v[2] = t;
+        ebpo_face_turn(o->mesh->faces + 3 * f);
         flipped++;
     }
     __atomic_fetch_add(&o->flipped, flipped, __ATOMIC_RELAXED);
@@ -307,9 +305,8 @@ static ebpo_status run(orienting *o, ebpo_error *error)
                : status;
 }
 
-ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
 {
-    EBPO_DEFAULT_FP;
     orienting o = { .mesh = mesh, .lock = PTHREAD_MUTEX_INITIALIZER };
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)
@@ -325,4 +322,11 @@ ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_err
     ebpo_array_free(mesh->workspace, o.flags);
     ebpo_array_free(mesh->workspace, o.patches);
     return status;
+}
+
+ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_status status = ebpo_mesh_make_consistent(mesh, record, error);
+    return status == EBPO_OK ? ebpo_mesh_turn_closed(mesh, record, error) : status;
 }

@@ -55,18 +55,31 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspa
     return status;
 }
 
-/* In the order of preparing a mesh: weld, orient, fill. */
-static ebpo_status mend_again(ebpo_mesh *mesh, const ebpo_mend_record *asked, ebpo_mend_record *did,
-                              ebpo_error *error)
+/* As it was prepared. Faces that were turned without having been asked to agree were all flipped.
+ */
+static unsigned steps_of(const ebpo_mend_record *asked)
 {
-    ebpo_status status = EBPO_OK;
-    if (asked->weld)
-        status = ebpo_mesh_weld(mesh, did, error);
-    if (asked->orient && status == EBPO_OK)
-        status = ebpo_mesh_orient(mesh, did, error);
-    if (asked->fill_holes && status == EBPO_OK)
-        status = ebpo_mesh_fill_holes(mesh, did, error);
-    return status;
+    return (asked->weld ? EBPO_MEND_WELD : 0) | (asked->orient ? EBPO_MEND_ORIENT : 0) |
+           (!asked->orient && asked->flipped_faces ? EBPO_MEND_FLIP : 0) |
+           (asked->fill_holes ? EBPO_MEND_FILL : 0);
+}
+
+/* Earlier builds turned less, which their record tells. */
+static ebpo_status mend_again(ebpo_mesh *mesh, const ebpo_mesh *source,
+                              const ebpo_mend_record *asked, ebpo_mend_record *did,
+                              ebpo_workspace *workspace, ebpo_error *error)
+{
+    const ebpo_mend_record fresh = *did;
+    ebpo_status status = copy_mesh(mesh, source, workspace, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_mend(mesh, steps_of(asked), did, error);
+    if (status != EBPO_OK || !asked->orient || did->flipped_faces == asked->flipped_faces)
+        return status;
+    *did = fresh;
+    ebpo_mesh_free(mesh);
+    status = copy_mesh(mesh, source, workspace, error);
+    return status == EBPO_OK ? ebpo_mesh_mend(mesh, steps_of(asked) | EBPO_MEND_EARLIER, did, error)
+                             : status;
 }
 
 static void check_record(ebpo_tally *tally, const ebpo_mend_record *stored,
@@ -305,15 +318,12 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
           info->source_face_count);
     ebpo_mesh mended = { 0 };
     const ebpo_mend_record *asked = &info->mend;
-    bool as_it_is = !asked->weld && !asked->orient && !asked->fill_holes;
+    bool as_it_is = steps_of(asked) == 0;
     ebpo_mend_record did = { .weld = info->mend.weld,
                              .orient = info->mend.orient,
                              .fill_holes = info->mend.fill_holes };
-    ebpo_status status = as_it_is ? EBPO_OK : copy_mesh(&mended, source, read->workspace, error);
-    if (status != EBPO_OK)
-        return status;
-    if (!as_it_is)
-        status = mend_again(&mended, asked, &did, error);
+    ebpo_status status =
+        as_it_is ? EBPO_OK : mend_again(&mended, source, asked, &did, read->workspace, error);
     const ebpo_mesh *made = as_it_is ? source : &mended;
     if (status == EBPO_OK)
         check_record(tally, &info->mend, &did);

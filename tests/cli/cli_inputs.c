@@ -180,6 +180,14 @@ int main(int argc, char **argv)
     ebpo_mesh split = ebpo_test_make("cube");
     ebpo_test_split_vertices(&split);
     write_mesh(&split, in_folder(argv[1], "split_cube.ply"));
+    ebpo_mesh shells = box(0, 4, 2), inner = box(1, 3, 2); /* both outwards */
+    add(&shells, inner);
+    write_mesh(&shells, in_folder(argv[1], "box_in_box.ply"));
+    ebpo_mesh one_turned = box(0, 4, 2);
+    inner = box(5, 7, 2);
+    ebpo_test_reverse(&inner);
+    add(&one_turned, inner);
+    write_mesh(&one_turned, in_folder(argv[1], "one_inside_out.ply"));
     ebpo_mesh split_box = ebpo_test_make("open_box");
     ebpo_test_split_vertices(&split_box);
     write_mesh(&split_box, in_folder(argv[1], "split_open_box.ply"));

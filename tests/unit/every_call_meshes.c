@@ -125,9 +125,27 @@ static ebpo_status fill(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *e
     return ebpo_mesh_fill_holes(mesh, record, error);
 }
 
+static ebpo_status flip(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    return ebpo_mesh_flip(mesh, record, error);
+}
+
 static ebpo_status call_weld(every_call_env *e) { return mend(e, EVERY_CALL_SPLIT, weld); }
 static ebpo_status call_orient(every_call_env *e) { return mend(e, EVERY_CALL_TURNED, orient); }
 static ebpo_status call_fill_holes(every_call_env *e) { return mend(e, EVERY_CALL_HOLED, fill); }
+
+static ebpo_status call_flip(every_call_env *e) { return mend(e, EVERY_CALL_TURNED, flip); }
+
+static ebpo_status call_shells(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_shells shells = EBPO_SHELLS_INIT;
+    ebpo_status status = read_mesh(e, EVERY_CALL_CROSSING, &mesh);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_count_shells(&mesh, 1, (ebpo_progress){ NULL, NULL }, &shells, e->error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
 
 /* Of a file that has no names. */
 static ebpo_status call_groups(every_call_env *e)
@@ -290,7 +308,9 @@ const every_call every_call_meshes[] = {
     { "arrange", call_arrange },
     { "weld", call_weld },
     { "orient", call_orient },
+    { "flip", call_flip },
     { "fill_holes", call_fill_holes },
+    { "shells", call_shells },
     { "components", call_components },
     { "groups", call_groups },
     { "prepare", call_prepare },

@@ -26,6 +26,8 @@ static void mend(ebpo_mesh *m, int steps, ebpo_mend_record *record)
         ck_assert_msg(ebpo_mesh_orient(m, record, &error) == EBPO_OK, "%s", error.message);
     if (steps & FILL)
         ck_assert_msg(ebpo_mesh_fill_holes(m, record, &error) == EBPO_OK, "%s", error.message);
+    if (steps & ORIENT && record->filled_holes)
+        ck_assert_msg(ebpo_mesh_orient(m, record, &error) == EBPO_OK, "%s", error.message);
 }
 
 static ebpo_mesh copy_of(const ebpo_mesh *m)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include <ebpo/mesh.h>
+#include <ebpo/repair.h>
 
 #include "check_main.h"
 #include "solids.h"
@@ -329,6 +330,61 @@ START_TEST(orient_gives_a_closed_component_positive_volume_against_the_majority)
 }
 END_TEST
 
+START_TEST(orient_turns_a_consistent_component_that_is_inside_out)
+{
+    ebpo_mesh mesh = ebpo_test_make("inside_out_cube");
+    ebpo_mend_record record = mend(&mesh, ebpo_mesh_orient);
+    ck_assert_uint_eq(record.flipped_faces, mesh.face_count);
+    ck_assert_double_eq_tol(check(&mesh).volume, 1, 1e-15);
+    record = mend(&mesh, ebpo_mesh_flip);
+    ck_assert(!record.orient && record.flipped_faces == mesh.face_count);
+    ck_assert_double_eq_tol(check(&mesh).volume, -1, 1e-15);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+/* Boxes in boxes, two side by side in the second, in any order and each turned or not; and one that
+ * reaches through the outermost, which is in none. */
+START_TEST(orient_turns_outermost_shells_outwards_and_cavities_inwards)
+{
+    static const double low[6][3] = { { 0, 0, 0 }, { 1, 1, 1 }, { 2, 2, 2 },
+                                      { 6, 2, 2 }, { 3, 3, 3 }, { 9, 4.5, 4.5 } };
+    static const double high[6][3] = { { 10, 10, 10 }, { 9, 9, 9 }, { 5, 5, 5 },
+                                       { 8, 8, 8 },    { 4, 4, 4 }, { 12, 5.5, 5.5 } };
+    uint64_t state = 8;
+    double right = 1000 - 512 + 27 + 72 - 1 + 3;
+    for (int round = 0; round < 64; round++) {
+        ebpo_mesh mesh = { 0 };
+        for (int i = 0; i < 6; i++) {
+            ebpo_mesh box = ebpo_test_box(low[i], high[i], 2);
+            if (round >> i & 1)
+                ebpo_test_reverse(&box);
+            if (i)
+                ebpo_test_append(&mesh, &box);
+            else
+                mesh = box;
+            if (i)
+                ebpo_mesh_free(&box);
+        }
+        if (round % 3)
+            ebpo_test_shuffle(&mesh, ebpo_test_random(&state));
+        mend(&mesh, ebpo_mesh_orient);
+        ck_assert_double_eq_tol(check(&mesh).volume, right, 1e-9);
+        ck_assert_uint_eq(mend(&mesh, ebpo_mesh_orient).flipped_faces, 0);
+        ebpo_shells s = EBPO_SHELLS_INIT;
+        ebpo_error error = EBPO_ERROR_INIT;
+        ck_assert(ebpo_mesh_count_shells(&mesh, 2, (ebpo_progress){ NULL, NULL }, &s, &error) ==
+                  EBPO_OK);
+        ck_assert(s.closed == 6 && s.cavities == 2 && s.inside_out == 0 && s.nested == 0);
+        mend(&mesh, ebpo_mesh_flip);
+        ck_assert(ebpo_mesh_count_shells(&mesh, 0, (ebpo_progress){ NULL, NULL }, &s, &error) ==
+                  EBPO_OK);
+        ck_assert(s.closed == 6 && s.cavities == 0 && s.inside_out == 4 && s.nested == 2);
+        ebpo_mesh_free(&mesh);
+    }
+}
+END_TEST
+
 START_TEST(orient_leaves_consistent_components_alone)
 {
     ebpo_mesh mesh = ebpo_test_make("cavity");
@@ -595,6 +651,8 @@ Suite *test_suite(void)
     tcase_add_test(mending, weld_keeps_the_first_and_takes_minus_zero_for_zero);
     tcase_add_test(mending, orient_turns_flipped_faces_back);
     tcase_add_test(mending, orient_gives_a_closed_component_positive_volume_against_the_majority);
+    tcase_add_test(mending, orient_turns_a_consistent_component_that_is_inside_out);
+    tcase_add_test(mending, orient_turns_outermost_shells_outwards_and_cavities_inwards);
     tcase_add_test(mending, orient_leaves_consistent_components_alone);
     tcase_add_test(mending, orient_lets_the_majority_of_an_open_surface_win);
     tcase_add_test(mending, orient_leaves_a_mobius_strip_untouched);

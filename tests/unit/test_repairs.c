@@ -36,6 +36,8 @@ static uint32_t left_after(const ebpo_mesh *mesh, int steps, ebpo_mesh_report *a
         ck_assert(ebpo_mesh_orient(&copy, &record, &error) == EBPO_OK);
     if (steps & FILL)
         ck_assert(ebpo_mesh_fill_holes(&copy, &record, &error) == EBPO_OK);
+    if (steps & ORIENT && record.filled_holes)
+        ck_assert(ebpo_mesh_orient(&copy, &record, &error) == EBPO_OK);
     *after = check(&copy);
     ebpo_mesh_free(&copy);
     return ebpo_mesh_doubts(area, after, &record);

@@ -57,6 +57,18 @@ double facts_excess_ratio(const ebpo_info *info, double volume, double limit)
     return least > 1e-7 ? facts_excess(info, volume) / least : NAN;
 }
 
+const char *facts_inside_out(const ebpo_info *info)
+{
+    if (!info->solid || !(info->report.volume < 0))
+        return NULL;
+    return info->rule == EBPO_RULE_POSITIVE
+               ? "turned inside out: normals look inwards, and points within have winding number "
+                 "-1, which by this file's rule is outside; convert again with --orient"
+               : "turned inside out: normals look inwards, and points within have winding number "
+                 "-1, which is inside by this file's rule but not by the rule positive; convert "
+                 "again with --orient";
+}
+
 uint64_t facts_cumulative(const ebpo_info *info, const ebpo_stored_sizes *stored, int level)
 {
     uint64_t sum = info->head_bytes;
@@ -90,6 +102,8 @@ static void print_model(FILE *out, const ebpo_info *info)
     if (info->solid)
         fprintf(out, "\n  solid     volume %.6g, by winding number, rule %s", info->report.volume,
                 words_rule(info->rule));
+    if (facts_inside_out(info))
+        fprintf(out, "\n  warning   %s", facts_inside_out(info));
     fprintf(out, "\n  box       %.6g %.6g %.6g, size %.6g %.6g %.6g%s%s\n", info->box_origin[0],
             info->box_origin[1], info->box_origin[2], info->box_size[0], info->box_size[1],
             info->box_size[2], info->unit[0] ? " " : "", info->unit);
@@ -336,6 +350,7 @@ static void json_source(json *j, const ebpo_info *info)
 static void json_model(json *j, const ebpo_info *info)
 {
     json_text(j, "kind", info->solid ? "solid" : "surface");
+    json_bool(j, "inside_out", facts_inside_out(info) != NULL);
     json_text(j, "rule", words_rule(info->rule));
     json_uint(j, "vertices", info->vertex_count);
     json_uint(j, "faces", info->face_count);

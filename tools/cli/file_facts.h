@@ -25,6 +25,8 @@ double facts_excess(const ebpo_info *info, double volume);
 /* Excess of `volume` / excess of `limit`, the volume of the convex hulls; NAN where either has
  * none, or the hulls are the solid but for rounding. */
 double facts_excess_ratio(const ebpo_info *info, double volume, double limit);
+/* What it means that the solid's volume is negative; NULL: it is not. */
+const char *facts_inside_out(const ebpo_info *info);
 /* White nodes of a level without the places of pruned nodes' children. */
 uint64_t facts_white(const ebpo_info *info, int level);
 /* Bytes of the head and of levels 0 .. level. */

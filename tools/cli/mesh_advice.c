@@ -18,7 +18,7 @@ static const struct doubt_text {
     { EBPO_DOUBT_INSIDE_OUT, "inside_out",
       "it is turned inside out: normals look inwards, the volume is negative, and a point within "
       "has winding number -1, which is inside by the rules nonzero and evenodd but outside by "
-      "positive" },
+      "positive; --orient turns it" },
 };
 enum { DOUBTS = sizeof doubts / sizeof *doubts };
 
@@ -76,9 +76,22 @@ static void say_remedy(FILE *out, const mesh_input *p)
             out);
 }
 
+static void warn_of_inside_out(FILE *out, const char *command, const char *path,
+                               const ebpo_shells *s)
+{
+    fprintf(out,
+            "ebpo %s: %s: warning: %llu of %llu closed components %s turned inside out: normals "
+            "look inwards, and winding numbers there are less by 1 and not greater, which the "
+            "rule positive takes for outside; --orient turns them\n",
+            command, path, (unsigned long long)s->inside_out, (unsigned long long)s->closed,
+            s->inside_out == 1 ? "is" : "are");
+}
+
 void advice_warn(FILE *out, const char *command, const char *path, const mesh_input *p)
 {
     char text[1024];
+    if (p->counted && p->shells.inside_out && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
+        warn_of_inside_out(out, command, path, &p->shells);
     if (!p->doubts)
         return;
     fprintf(out, "ebpo %s: %s: ", command, path);
@@ -116,6 +129,24 @@ static void print_try(FILE *out, const ebpo_repair_try *t)
           : (t->doubts & EBPO_DOUBT_NO_VOLUME)  ? ": hardly any volume\n"
                                                 : ": more filled than is plausible\n",
           out);
+}
+
+void advice_print_shells(FILE *out, const mesh_input *p)
+{
+    char text[80];
+    const ebpo_shells *s = &p->shells;
+    if (!p->counted || !(s->inside_out || s->nested || s->cavities))
+        return;
+    fprintf(out, "  %s",
+            words_plural(text, sizeof text, s->closed, "closed component", "closed components"));
+    fprintf(out, ": %s",
+            words_plural(text, sizeof text, s->cavities, "is a cavity", "are cavities"));
+    fprintf(out, ", %s",
+            words_plural(text, sizeof text, s->inside_out, "is inside out", "are inside out"));
+    if (s->nested)
+        fprintf(out, ", %llu within another and outwards like it (--orient makes a cavity of it)",
+                (unsigned long long)s->nested);
+    fputc('\n', out);
 }
 
 void advice_print(FILE *out, const mesh_input *p)
@@ -160,9 +191,24 @@ static void json_try(json *j, const ebpo_repair_try *t)
     json_end(j);
 }
 
+static void json_shells(json *j, const mesh_input *p)
+{
+    if (!p->counted) {
+        json_null(j, "shells");
+        return;
+    }
+    json_object(j, "shells");
+    json_uint(j, "closed", p->shells.closed);
+    json_uint(j, "inside_out", p->shells.inside_out);
+    json_uint(j, "cavities", p->shells.cavities);
+    json_uint(j, "nested", p->shells.nested);
+    json_end(j);
+}
+
 void advice_json(json *j, const mesh_input *p)
 {
     json_doubts(j, p->doubts);
+    json_shells(j, p);
     if (!p->tried) {
         json_null(j, "repairs");
         return;

@@ -13,6 +13,9 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
 /* What each sequence of repairs would leave; nothing when none were tried. */
 void advice_print(FILE *out, const mesh_input *p);
 
+/* Closed components that are cavities, inside out or in others, as mended; nothing without such. */
+void advice_print_shells(FILE *out, const mesh_input *p);
+
 /* Members "doubts" and "repairs". */
 void advice_json(json *j, const mesh_input *p);
 

@@ -143,6 +143,9 @@ void findings_print_mending(FILE *out, const ebpo_mend_record *r)
                                  "components"));
         fputc('\n', out);
     }
+    if (!r->orient && r->flipped_faces)
+        fprintf(out, "  flipped: %s turned\n",
+                words_plural(text, sizeof text, r->flipped_faces, "face", "faces"));
     if (r->fill_holes) {
         fprintf(out, "  filled: %s",
                 words_plural(text, sizeof text, r->filled_holes, "hole", "holes"));

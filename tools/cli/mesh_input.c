@@ -4,15 +4,20 @@
 
 #include "cli/command.h"
 
-int mending_check(const char *command, mending asked)
+static bool steps_given(mending asked)
 {
-    if (asked.repair && (asked.weld || asked.orient || asked.fill_holes))
-        return command_usage(command, "--repair chooses from --weld, --orient and --fill-holes; "
-                                      "leave these out");
-    return EXIT_FINE;
+    return asked.weld || asked.orient || asked.flip || asked.fill_holes;
 }
 
-static bool steps_given(mending asked) { return asked.weld || asked.orient || asked.fill_holes; }
+int mending_check(const char *command, mending asked)
+{
+    if (asked.repair && steps_given(asked))
+        return command_usage(command, "--repair chooses from --weld, --orient and --fill-holes; "
+                                      "leave these and --flip out");
+    if (asked.orient && asked.flip)
+        return command_usage(command, "--orient says which way faces look; leave out --flip");
+    return EXIT_FINE;
+}
 
 /* What the first of two preparations did has been done as well. */
 static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
@@ -56,6 +61,16 @@ static ebpo_status try_and_repair(mesh_input *p, mending asked, ebpo_prepare_opt
     return p->tried && asked.repair && p->repairs.chosen >= 0 ? do_chosen(p, how, error) : status;
 }
 
+/* Of a single component the volume's sign tells which way it looks. */
+static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *how, ebpo_error *error)
+{
+    if (!p->prepared.report.balanced || p->prepared.report.components < 2)
+        return EBPO_OK;
+    p->shells = (ebpo_shells)EBPO_SHELLS_INIT;
+    p->counted = true;
+    return ebpo_mesh_count_shells(&p->mesh, how->threads, how->progress, &p->shells, error);
+}
+
 ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending asked,
                                    mesh_reading more, ebpo_mesh_groups **groups,
                                    ebpo_workspace *workspace, unsigned threads,
@@ -70,6 +85,7 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     how.embed_textures = more == READ_TEXTURES;
     wanted.weld = asked.weld;
     wanted.orient = asked.orient;
+    wanted.flip = asked.flip;
     wanted.fill_holes = asked.fill_holes;
     memset(out, 0, sizeof *out);
     out->prepared = (ebpo_prepared)EBPO_PREPARED_INIT;
@@ -84,6 +100,8 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     status = ebpo_mesh_prepare(&out->mesh, &wanted, &out->prepared, error);
     if (status == EBPO_OK)
         status = try_and_repair(out, asked, &wanted, error);
+    if (status == EBPO_OK)
+        status = count_shells(out, &wanted, error);
     out->doubts =
         ebpo_mesh_doubts(out->prepared.before.area, &out->prepared.report, &out->prepared.record);
     if (status == EBPO_OK)

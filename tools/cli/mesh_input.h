@@ -8,7 +8,7 @@
 #include "cli/args.h"
 
 typedef struct mending {
-    bool weld, orient, fill_holes;
+    bool weld, orient, flip, fill_holes;
     bool repair; /* the shortest sequence of these that leaves a plausible solid */
     bool advise; /* no option: without any of these, find out which one that is */
 } mending;
@@ -17,7 +17,8 @@ typedef struct mending {
     OPTION_FLAG("weld", 0, type, member.weld,                                                      \
                 "first merge vertices at the same position (always done for STL)"),                \
         OPTION_FLAG("orient", 0, type, member.orient,                                              \
-                    "then make neighbouring faces agree in orientation"),                          \
+                    "then make neighbouring faces agree, and closed components look outwards"),    \
+        OPTION_FLAG("flip", 0, type, member.flip, "instead of --orient: turn every face"),         \
         OPTION_FLAG("fill-holes", 0, type, member.fill_holes, "then close simple boundary loops"), \
         OPTION_FLAG("repair", 0, type, member.repair,                                              \
                     "instead of these: try them, and do the fewest that leave a plausible solid")
@@ -28,6 +29,8 @@ typedef struct mesh_input {
     ebpo_prepared prepared; /* what was found and mended */
     bool tried;             /* repairs, which `repairs` tells of */
     ebpo_repairs repairs;
+    bool counted; /* closed components, which `shells` tells of */
+    ebpo_shells shells;
     uint32_t doubts; /* ebpo_doubt, of the mesh as mended */
 } mesh_input;
 

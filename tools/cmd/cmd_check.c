@@ -64,7 +64,7 @@ static void print_json(json *j, const mesh_input *p, const char *path)
     advice_json(j, p);
 }
 
-static void print_words(const values *v, const mesh_input *p, const char *path)
+static void print_reports(const values *v, const mesh_input *p, const char *path)
 {
     findings_print(stdout, path, &p->as_read, &p->prepared.before, v->crossings);
     advice_print(stdout, p);
@@ -72,6 +72,12 @@ static void print_words(const values *v, const mesh_input *p, const char *path)
         return;
     findings_print_mending(stdout, &p->prepared.record);
     findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, v->crossings);
+}
+
+static void print_words(const values *v, const mesh_input *p, const char *path)
+{
+    print_reports(v, p, path);
+    advice_print_shells(stdout, p);
 }
 
 static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo_progress progress,

@@ -205,6 +205,7 @@ static void print_reports(const values *v, const mesh_input *p, const char *in)
         findings_print_mending(stdout, &p->prepared.record);
         if (p->prepared.mended)
             findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, false);
+        advice_print_shells(stdout, p);
     }
     command_flush("convert");
     const char *lost = ebpo_mesh_attributes_lost(&p->mesh);
@@ -399,8 +400,9 @@ static ebpo_status build_parts(part_build *build, mesh_input *p, const char *fol
 static stage_facts plan_stages(const values *v, const char *in)
 {
     const char *dot = strrchr(in, '.');
-    return (stage_facts){ .mended = v->mend.weld || v->mend.orient || v->mend.fill_holes ||
-                                    v->mend.repair || (dot && strcasecmp(dot, ".stl") == 0),
+    return (stage_facts){ .mended = v->mend.weld || v->mend.orient || v->mend.flip ||
+                                    v->mend.fill_holes || v->mend.repair ||
+                                    (dot && strcasecmp(dot, ".stl") == 0),
                           .solid = true,
                           .from_leaves =
                               ebpo_selection_describe((ebpo_selection)v->select)->from_leaves,

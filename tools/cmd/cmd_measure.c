@@ -99,6 +99,8 @@ static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass 
 {
     printf("%s: %s%s%s\n", path, info->solid ? "a solid" : "a surface",
            info->unit[0] ? ", unit " : "", info->unit);
+    if (facts_inside_out(info))
+        printf("  warning   %s\n", facts_inside_out(info));
     printf("  area      %.16g\n", mass->area);
     if (info->solid) {
         const double *c = mass->centroid;
@@ -141,6 +143,7 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
 {
     json_text(j, "file", path);
     json_text(j, "kind", info->solid ? "solid" : "surface");
+    json_bool(j, "inside_out", facts_inside_out(info) != NULL);
     json_text(j, "unit", info->unit);
     json_real(j, "area", mass->area);
     if (info->solid) {

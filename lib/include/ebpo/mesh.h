@@ -7,7 +7,8 @@
  *   build
  *   Checking   ebpo_mesh_check
  *   Order      ebpo_mesh_arrange
- *   Mending    ebpo_mesh_weld, ebpo_mesh_orient, ebpo_mesh_fill_holes
+ *   Mending    ebpo_mesh_weld, ebpo_mesh_orient, ebpo_mesh_flip,
+ *              ebpo_mesh_fill_holes
  *   Parts      ebpo_components_new, ebpo_components_count, ebpo_components_get,
  *              ebpo_components_mesh, ebpo_components_free
  */
@@ -354,7 +355,7 @@ typedef struct ebpo_mend_record {
 } ebpo_mend_record;
 
 /*
- * The three functions below add their counts to `record`, which begins with zeros
+ * The four functions below add their counts to `record`, which begins with zeros
  * and may be NULL. They use all cores, and the result does not depend on how many.
  *
  * EBPO_E_FORMAT: a face names a vertex that is not there. EBPO_E_LIMIT: more than
@@ -373,17 +374,30 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_rec
 
 /*
  * Makes neighbouring faces agree, component by component, across edges that are
- * used twice.
+ * used twice, and closed components look outwards, or inwards where they bound a
+ * cavity.
  *
- * A component that is consistent is left alone, also if its volume is negative,
- * as it may be a cavity. Another one that is closed (each edge used twice) is
- * turned to have a positive volume; an open one so that most of its faces stay as
- * they were. A component that cannot be oriented is left alone and counted.
+ * A component that is closed (each edge is used as often in one direction as in
+ * the other) is turned to have a positive volume, or a negative one if it is
+ * within an odd number of other closed ones. It is within one if its least and
+ * greatest vertices along each axis are, where the winding number is not zero,
+ * which is decided exactly. An open component is turned so that most of its faces
+ * stay as they were. A component that cannot be oriented is left alone and
+ * counted. So do not orient a mesh in which solids are meant to be within others.
  *
  * Threads: one per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record,
                                                     ebpo_error *error);
+
+/*
+ * Turns every face. Adds to `flipped_faces` of the record, and says nothing of
+ * having been asked for.
+ *
+ * Threads: one per mesh.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_mend_record *record,
+                                                  ebpo_error *error);
 
 /*
  * Closes each boundary loop, as counted in boundary_loops, by triangles over its
@@ -405,8 +419,9 @@ typedef struct ebpo_prepare_options {
     size_t struct_size; /* EBPO_PREPARE_OPTIONS_INIT sets it */
 
     /*
-     * ebpo_mesh_weld, ebpo_mesh_orient, ebpo_mesh_fill_holes, in this order. STL is
-     * always welded, as its faces share no vertices.
+     * ebpo_mesh_weld, ebpo_mesh_orient, ebpo_mesh_flip, ebpo_mesh_fill_holes, in
+     * this order; where holes were filled, closed components are oriented once more.
+     * STL is always welded, as its faces share no vertices.
      */
     bool weld;
     bool orient;
@@ -416,11 +431,14 @@ typedef struct ebpo_prepare_options {
     unsigned threads;
 
     ebpo_progress progress;
+
+    /* 1: ebpo_mesh_flip too. */
+    uint64_t flip;
 } ebpo_prepare_options;
 
-#define EBPO_PREPARE_OPTIONS_INIT                                            \
-    {                                                                        \
-        sizeof(ebpo_prepare_options), false, false, false, 0, { NULL, NULL } \
+#define EBPO_PREPARE_OPTIONS_INIT                                               \
+    {                                                                           \
+        sizeof(ebpo_prepare_options), false, false, false, 0, { NULL, NULL }, 0 \
     }
 
 typedef struct ebpo_prepared {

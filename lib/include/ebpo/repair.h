@@ -2,6 +2,7 @@
  * EBP-Octree in HDF5: which repairs make a solid of a mesh.
  *
  *   ebpo_mesh_try_repairs   tries them, and chooses the shortest sequence that does
+ *   ebpo_mesh_count_shells  which of its closed components are turned inside out
  *   ebpo_mesh_doubts        why a solid is probably not the one that was meant
  */
 #ifndef EBPO_REPAIR_H
@@ -53,7 +54,11 @@ EBPO_API uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
 typedef struct ebpo_repair_try {
     ebpo_mend_record record;
     ebpo_mesh_report report;
+
+    /* ebpo_doubt. */
     uint32_t doubts;
+
+    /* Bits: 1 welded, 2 oriented, 4 holes filled. */
     uint32_t steps;
 } ebpo_repair_try;
 
@@ -87,6 +92,38 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_try_repairs(const ebpo_mesh *mesh,
                                                          const ebpo_mesh_report *report,
                                                          unsigned threads, ebpo_progress progress,
                                                          ebpo_repairs *out, ebpo_error *error);
+
+/* Closed components by what they bound; see ebpo_mesh_orient. */
+typedef struct ebpo_shells {
+    size_t struct_size; /* EBPO_SHELLS_INIT sets it */
+
+    /* With a volume that is not 0. */
+    uint64_t closed;
+
+    /* Of these, within an even number of others, and look inwards. */
+    uint64_t inside_out;
+
+    /* Within an odd number of others, and look inwards. */
+    uint64_t cavities;
+
+    /* Within an odd number of others, and look outwards: a solid within another. */
+    uint64_t nested;
+} ebpo_shells;
+
+#define EBPO_SHELLS_INIT EBPO_SIZED(ebpo_shells)
+
+/*
+ * Counts them.
+ *
+ * threads   0: all cores. The result does not depend on it.
+ *
+ * Errors are those of ebpo_components_new. On failure `out` is cleared.
+ *
+ * Threads: any, while nobody changes the mesh.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_shells(const ebpo_mesh *mesh, unsigned threads,
+                                                          ebpo_progress progress, ebpo_shells *out,
+                                                          ebpo_error *error);
 
 #ifdef __cplusplus
 }
