@@ -43,8 +43,8 @@ ebpo_status ebpo_workspace_new(const ebpo_workspace_options *options, ebpo_works
     uint64_t memory = wanted.memory ? wanted.memory : ebpo_machine_memory() / 2;
     if (memory < EBPO_WORKSPACE_MIN && wanted.memory)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%llu bytes of memory are too few; %d MiB are the least",
-                         (unsigned long long)memory, EBPO_WORKSPACE_MIN >> 20);
+                         "%llu bytes of memory are too few; %d MB are the least",
+                         (unsigned long long)memory, EBPO_WORKSPACE_MIN / 1000000);
     if (memory < EBPO_WORKSPACE_MIN)
         memory = EBPO_WORKSPACE_MIN;
     return ebpo_workspace_make_any(out, memory, wanted.temp_dir, error);

@@ -181,7 +181,7 @@ START_TEST(bad_wishes_are_refused)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace_options o = { sizeof(ebpo_workspace_options), 1000000, NULL };
     ck_assert_int_eq(ebpo_workspace_new(&o, &w, &error), EBPO_E_ARGUMENT);
-    ck_assert(w == NULL && strstr(error.message, "128 MiB") != NULL);
+    ck_assert(w == NULL && strstr(error.message, "128 MB") != NULL);
     o = (ebpo_workspace_options){ sizeof(ebpo_workspace_options), 0, "/no/such/folder" };
     ck_assert_int_eq(ebpo_workspace_new(&o, &w, &error), EBPO_E_IO);
     ck_assert(strstr(error.message, "/no/such/folder") != NULL);

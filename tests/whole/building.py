@@ -137,7 +137,7 @@ def same_bytes_and_bounded_memory(root, model):
         return
     check(not filed, "a large budget: without files")
     expected = slurp(place.out)
-    for memory, threads in (("16G", 3), ("256M", 2), ("128M", 1), ("128M", 2), ("128M", 3)):
+    for memory, threads in (("16G", 3), ("256M", 2), ("128MiB", 1), ("128MiB", 2), ("128MiB", 3)):
         os.unlink(place.out)
         code, said, peak, filed = run(place.command(model, "-q", "--memory", memory, "--threads",
                                                     str(threads)), place.temp_dir)
@@ -154,7 +154,7 @@ def same_bytes_and_bounded_memory(root, model):
                   f"{name}: without a budget {free_peak / MIB:.0f} MiB, so the budget is put to "
                   f"the test")
     os.unlink(place.out)
-    code, said, peak, filed = run(place.command(model, "-q", "--memory", "128M", "--threads", "16"),
+    code, said, peak, filed = run(place.command(model, "-q", "--memory", "128MiB", "--threads", "16"),
                                   place.temp_dir)
     check(code == 0 and slurp(place.out) == expected and peak <= SMALL,
           f"--memory 128MiB --threads 16: the same bytes, {peak / MIB:.0f} MiB resident at most")
@@ -169,13 +169,13 @@ def proving_and_extracting(place, model):
                           ("check --weld --orient --fill-holes",
                            ["check", "--weld", "--orient", "--fill-holes", model])):
         _, _, free_peak, _ = run([TOOL, *command, "-q", *little, "16G"], place.temp_dir)
-        code, said, peak, _ = run([TOOL, *command, "-q", *little, "128M"], place.temp_dir)
+        code, said, peak, _ = run([TOOL, *command, "-q", *little, "128MiB"], place.temp_dir)
         check(code == 0 and peak <= SMALL,
               f"{what} --memory 128MiB: {peak / MIB:.0f} MiB resident at most ({said.strip()})")
         check(free_peak > SMALL,
               f"{what}: without a budget {free_peak / MIB:.0f} MiB, so the budget is put to the "
               f"test")
-    code, _, peak, _ = run([TOOL, "extract", "--mesh", "-q", *little, "128M", place.out, back],
+    code, _, peak, _ = run([TOOL, "extract", "--mesh", "-q", *little, "128MiB", place.out, back],
                            place.temp_dir)
     check(code == 0 and peak <= SMALL,
           f"extract --mesh --memory 128MiB: {peak / MIB:.0f} MiB resident at most")
@@ -185,7 +185,7 @@ def proving_and_extracting(place, model):
 def same_bytes_as_usual(root, model):
     """With envelopes as fine as they are by default."""
     place, seen = Place(root, "usual"), []
-    for memory, threads in (("16G", 1), ("128M", 3)):
+    for memory, threads in (("16G", 1), ("128MiB", 3)):
         code, said, _, _ = run(place.command(model, "-q", "--memory", memory, "--threads",
                                              str(threads), options=[]), place.temp_dir)
         seen.append(slurp(place.out) if code == 0 else said)
@@ -220,7 +220,7 @@ def run_until(command, stage, number):
 def one_cell(root, model):
     """Cells that may not be cut are worked on in memory: half of the budget must do."""
     place = Place(root, "one cell")
-    code, said, _, _ = run(place.command(model, "-q", "--memory", "128M",
+    code, said, _, _ = run(place.command(model, "-q", "--memory", "128MiB",
                                          options=["--max-level", "0"]), place.temp_dir)
     check(code == 1 and "a cell of level 0, the deepest that was allowed, lists " in said
           and "allow more levels or more memory" in said and not place.left(),
@@ -232,7 +232,7 @@ def unlike_scans(root):
     place, model = Place(root, "unlike scans"), os.path.join(root, "unlike.ply")
     write_box(model)
     for threads in "1", "3":
-        code, said, peak, _ = run(place.command(model, "-q", "--memory", "128M", "--threads",
+        code, said, peak, _ = run(place.command(model, "-q", "--memory", "128MiB", "--threads",
                                                 threads,
                                                 options=["--leaf-faces", "0", "--max-level",
                                                          "9"]), place.temp_dir)
@@ -259,7 +259,7 @@ def interrupted(root, model):
     for stage, number in cases + [("ordering faces", signal.SIGKILL), ("envelopes", signal.SIGKILL),
                                   ("writing", signal.SIGKILL)]:
         place = Place(root, f"{stage} {number}")
-        code, seen = run_until(place.command(model, "--memory", "128M"), stage, number)
+        code, seen = run_until(place.command(model, "--memory", "128MiB"), stage, number)
         name = f"{signal.Signals(number).name} while {stage}"
         check(seen and code == -number, f"{name}: ends by it ({code})")
         check(not os.listdir(place.temp_dir),
@@ -274,7 +274,7 @@ def files_with_names(root, model):
     that moment finds it."""
     strange = {"LD_PRELOAD": FULL_DISK, "EBPO_TEST_NAMED": "1"}
     place = Place(root, "named")
-    code, said, _, filed = run(place.command(model, "-q", "--memory", "128M"), place.temp_dir,
+    code, said, _, filed = run(place.command(model, "-q", "--memory", "128MiB"), place.temp_dir,
                                strange)
     check(code == 0 and filed and place.left() == ["x.ebpo.h5"],
           f"without O_TMPFILE: builds, and leaves nothing but the output ({said.strip()} "
@@ -299,7 +299,7 @@ def full_disk(root, model):
     while n < 1 << 16:
         place = Place(root, f"full {n}")
         n = 2 * n if n else 1
-        code, said, _, _ = run(place.command(model, "-q", "--memory", "128M"), place.temp_dir,
+        code, said, _, _ = run(place.command(model, "-q", "--memory", "128MiB"), place.temp_dir,
                                {"LD_PRELOAD": FULL_DISK, "EBPO_TEST_FULL_AT": str(n)})
         if code == 0:
             break
@@ -310,7 +310,7 @@ def full_disk(root, model):
         check(not place.left(), f"disk full at file {n}: leaves nothing ({place.left()})")
     check(failed > 3, f"disk full: looked at {failed} moments")
     place = Place(root, "limit")
-    code, said, _, _ = run(place.command(model, "-q", "--memory", "128M"), place.temp_dir,
+    code, said, _, _ = run(place.command(model, "-q", "--memory", "128MiB"), place.temp_dir,
                            file_bytes=256 << 10)
     check(code == 1 and place.temp_dir in said and "File too large" in said and not place.left(),
           f"limit on the size of files: {said.strip()} ({code}, {place.left()})")
@@ -325,7 +325,7 @@ def really_full(root, model):
         if shutil.which("unshare"):
             code, said, _, _ = run([*unshare, "sh", "-c", mount, "sh", place.temp_dir,
                                     *place.command(model, "-q", "--memory",
-                                                   "128M")], place.temp_dir)
+                                                   "128MiB")], place.temp_dir)
             if code == 1 and "ebpo convert" in said or code not in (1, 77):
                 check(code == 1 and place.temp_dir in said and "No space left on device" in said
                       and said.count("\n") == 1 and not place.left(),

@@ -17,8 +17,8 @@ bool memory_good(const char *command, const memory_values *v)
         return false;
     }
     if (bytes < EBPO_WORKSPACE_MIN)
-        fprintf(stderr, "ebpo %s: --memory %s is too little for any mesh; allow at least %dMiB\n",
-                command, v->memory, EBPO_WORKSPACE_MIN >> 20);
+        fprintf(stderr, "ebpo %s: --memory %s is too little for any mesh; allow at least %dM\n",
+                command, v->memory, EBPO_WORKSPACE_MIN / 1000000);
     return bytes >= EBPO_WORKSPACE_MIN;
 }
 

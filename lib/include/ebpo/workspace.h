@@ -28,7 +28,7 @@ extern "C" {
 typedef struct ebpo_workspace ebpo_workspace;
 
 /* Fewer bytes of memory are refused. */
-enum { EBPO_WORKSPACE_MIN = 128 << 20 };
+enum { EBPO_WORKSPACE_MIN = 128000000 };
 
 typedef struct ebpo_workspace_options {
     size_t struct_size; /* EBPO_WORKSPACE_OPTIONS_INIT sets it */
