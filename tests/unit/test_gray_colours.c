@@ -187,6 +187,7 @@ START_TEST(levels_and_streams_show_them)
         different += i && n->colour != n[-1].colour;
     }
     ck_assert(vertex == mesh.vertex_count && different > 4);
+    ebpo_colours_free(&colours);
     ck_assert_int_eq(ebpo_lod_colours(&nodes, vertex + 1, &colours, &error), EBPO_E_ARGUMENT);
     ebpo_lod_nodes_free(&nodes);
     ebpo_mesh_free(&mesh);
