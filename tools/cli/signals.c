@@ -33,7 +33,8 @@ void signals_install(void)
 {
     /* A limit on file size is an error like a full disk, not the end. */
     signal(SIGXFSZ, SIG_IGN);
-    static const int numbers[] = { SIGINT, SIGTERM, SIGHUP };
+    /* SIGPIPE: who reads what we print has enough of it, as head has. */
+    static const int numbers[] = { SIGINT, SIGTERM, SIGHUP, SIGPIPE };
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
         struct sigaction action, before;
         memset(&action, 0, sizeof action);
