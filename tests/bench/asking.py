@@ -57,7 +57,7 @@ def main():
         for _ in range(a.turns):
             for query in "inside", "distance":
                 for program in filter(None, (a.ebpo, a.before)):
-                    plain = [program, query, "--memory", "64G", a.model]
+                    plain = [program, query, "--memory", "64GiB", a.model]
                     for name, command in (
                             ("one question", [*plain, one]),
                             ("raw, 1 thread", [*plain, raw, "--raw", "--threads", "1"]),

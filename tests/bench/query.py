@@ -253,8 +253,8 @@ def section_budget(page, model, rows):
               "just been opened: nothing but its upper levels is in memory, the file is in the "
               "system's. *touched*: subtrees a question has looked into, found in memory or "
               "loaded. us by the clock; what works beside the questions may use all cores.")
-    page.table(["question", "points", "questions", "touched", "loaded", "KB read", "mean", "p50",
-                "p99", "p99.9", "max", "peak MB"],
+    page.table(["question", "points", "questions", "touched", "loaded", "KiB read", "mean", "p50",
+                "p99", "p99.9", "max", "peak MiB"],
                [[query, points, f"{r['count']:,}", figure((r["hits"] + r["loads"]) / r["count"]),
                  figure(r["loads"] / r["count"]), figure(r["bytes_read"] / r["count"] / 1024)]
                 + [us(r[n]) for n in ("clocked_mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")]

@@ -97,7 +97,7 @@ def build_in_turns(sides, ply, work):
     for _ in range(ROUNDS):
         taken = [0, 0]
         for which in (0, 1, 1, 0):
-            taken[which] += measured.run(sides[which].ebpo, "convert", "-q", "--memory", "4G",
+            taken[which] += measured.run(sides[which].ebpo, "convert", "-q", "--memory", "4GiB",
                                          "--temp-dir", work, ply, out)["cpu"]
         rounds.append(taken)
     return rounds

@@ -15,6 +15,7 @@ import argparse
 import json
 import os
 import pathlib
+import re
 import shlex
 import statistics
 import sys
@@ -383,8 +384,8 @@ def section_questions(page, results, options):
 
 def bytes_of(size):
     """Of a size as `ebpo convert --memory` takes it."""
-    return int(size.rstrip("KMGTkmgt")) << 10 * " KMGT".index(size[-1].upper() if size[-1].isalpha()
-                                                              else " ")
+    number, power, binary = re.fullmatch("([0-9.]+)([KMGTkmgt]?)(i?)B?", size).groups()
+    return int(float(number) * (1024 if binary else 1000)**" KMGT".index(power.upper() or " "))
 
 
 def section_goals(page, scale, results):
@@ -477,7 +478,7 @@ def parse():
     parser.add_argument("--base", default="torus", choices=["torus", "sphere"],
                         help="what ebpo-generate begins with; a sphere has 20 times a power of "
                              "four faces (default torus)")
-    parser.add_argument("--memory", default="1G", help="budget of convert and verify (default 1G)")
+    parser.add_argument("--memory", default="1GiB", help="budget of convert and verify (1GiB)")
     parser.add_argument("--rounds", type=int, default=3,
                         help="of models below two million faces; larger ones: a third (default 3)")
     parser.add_argument("--count", type=int, default=1000000,

@@ -100,7 +100,7 @@ def main():
     print("\nLargest visible node, in pixels, after so many bytes (nodes in parentheses):\n")
     head("view", "bytes", *ORDERS)
     for name, view in views().items():
-        for size in ("512K", "1M", "2M", "4M"):
+        for size in ("512KiB", "1MiB", "2MiB", "4MiB"):
             lasts = [run("view", FILE, *view, "--order", order, "--bytes", size)["last"]
                      for order in ORDERS]
             row(name, size, *(f"{last['pixels']:.3g} ({last['nodes']:,})" for last in lasts))

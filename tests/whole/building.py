@@ -137,7 +137,7 @@ def same_bytes_and_bounded_memory(root, model):
         return
     check(not filed, "a large budget: without files")
     expected = slurp(place.out)
-    for memory, threads in (("16G", 3), ("256M", 2), ("128MiB", 1), ("128MiB", 2), ("128MiB", 3)):
+    for memory, threads in (("16G", 3), ("256MiB", 2), ("128MiB", 1), ("128MiB", 2), ("128MiB", 3)):
         os.unlink(place.out)
         code, said, peak, filed = run(place.command(model, "-q", "--memory", memory, "--threads",
                                                     str(threads)), place.temp_dir)
@@ -147,15 +147,15 @@ def same_bytes_and_bounded_memory(root, model):
         check(place.left() == ["x.ebpo.h5"],
               f"{name}: leaves nothing but the output ({place.left()})")
         if memory != "16G":
-            budget = int(memory[:-1]) * MIB
+            budget = int(memory[:-3]) * MIB
             check(filed, f"{name}: uses temporary files")
             check(peak <= budget, f"{name}: {peak / MIB:.0f} MiB resident at most")
             check(free_peak > budget,
                   f"{name}: without a budget {free_peak / MIB:.0f} MiB, so the budget is put to "
                   f"the test")
     os.unlink(place.out)
-    code, said, peak, filed = run(place.command(model, "-q", "--memory", "128MiB", "--threads", "16"),
-                                  place.temp_dir)
+    code, said, peak, filed = run(place.command(model, "-q", "--memory", "128MiB", "--threads",
+                                                "16"), place.temp_dir)
     check(code == 0 and slurp(place.out) == expected and peak <= SMALL,
           f"--memory 128MiB --threads 16: the same bytes, {peak / MIB:.0f} MiB resident at most")
     proving_and_extracting(place, model)
@@ -190,7 +190,7 @@ def same_bytes_as_usual(root, model):
                                              str(threads), options=[]), place.temp_dir)
         seen.append(slurp(place.out) if code == 0 else said)
     check(isinstance(seen[0], bytes) and seen[0] == seen[1],
-          "usual envelopes: the bytes are the same for 16G, 1 thread and 128M, 3 threads")
+          "usual envelopes: the bytes are the same for 16G, 1 thread and 128MiB, 3 threads")
 
 
 def run_until(command, stage, number):
@@ -241,7 +241,7 @@ def unlike_scans(root):
               f"at most ({said.strip()})")
     write_fan(model, 1_000_000)
     for threads in "1", "3":
-        code, said, peak, _ = run(place.command(model, "-q", "--memory", "192M", "--threads",
+        code, said, peak, _ = run(place.command(model, "-q", "--memory", "192MiB", "--threads",
                                                 threads, options=[]), place.temp_dir)
         check(code == 0 and peak <= 192 * MIB,
               f"half a million faces at a vertex, {threads} threads: {peak / MIB:.0f} MiB "
