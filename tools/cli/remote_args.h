@@ -35,7 +35,7 @@ typedef struct remote_values {
     OPTION_TEXT("http-cache", 0, type, member.cache, "DIR",                              \
                 "keep what is fetched from a URL in this folder"),                       \
         OPTION_TEXT("http-cache-size", 0, type, member.cache_size, "SIZE",               \
-                    "how much the folder may hold: 512M, 4G; default: 1G"),              \
+                    "how much the folder may hold: 512M, 4G; default: 1GiB"),            \
         OPTION_REAL("http-timeout", 0, type, member.timeout, "SECONDS", 0.001, 1e6,      \
                     "time limit for one request with its retries; default: 120"),        \
         OPTION_REAL("http-stall", 0, type, member.stall, "SECONDS", 1, 1e6,              \

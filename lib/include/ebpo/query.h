@@ -68,7 +68,7 @@ typedef struct ebpo_model_options {
      * than 2 MiB and is not cut by `cut_level`, 256 MiB. Such a file, if it has subtrees
      * (ebpo_info.subtree_level), is read in parts however much is allowed. Beside it
      * there are the file's table of chunks (24 bytes a chunk), what decodes chunks (some
-     * 250 KB for each thread that loads), and contexts: what they gather of answers and,
+     * 250 kB for each thread that loads), and contexts: what they gather of answers and,
      * for distances, 4 bytes for each subtree below the cut level and a queue of nodes.
      */
     uint64_t memory;
