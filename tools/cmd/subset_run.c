@@ -17,7 +17,7 @@ static bool read_levels(const char *text, int *last)
     word_levels levels;
     if (!words_read_levels(text, &levels) || levels.first != 0 || !levels.is_run)
         return false;
-    *last = levels.last;
+    *last = levels.to_end ? -1 : levels.last; /* -1: all */
     return true;
 }
 
