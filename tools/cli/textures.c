@@ -149,6 +149,23 @@ static bool leads_below(const char *name)
     }
 }
 
+/* Slashes between words once only: materials double their backslashes. Nor words ".". */
+static void tidy(char *name)
+{
+    char *to = name;
+    for (const char *c = name; *c; c++) {
+        bool begins = to > name && to[-1] == '/';
+        if (begins && *c == '/')
+            continue;
+        if ((begins || to == name) && c[0] == '.' && c[1] == '/' && c[2] && c[2] != '/') {
+            c++;
+            continue;
+        }
+        *to++ = *c;
+    }
+    *to = 0;
+}
+
 /* Some names come with backslashes. NULL: memory is short, or it is no name of a file below. */
 static char *safe_name(span s)
 {
@@ -159,6 +176,8 @@ static char *safe_name(span s)
             *c = '/';
         good = (unsigned char)*c >= ' ' && *c != 127;
     }
+    if (good)
+        tidy(name);
     if (good && leads_below(name))
         return name;
     free(name);
@@ -244,13 +263,35 @@ static ebpo_status check_names(const textures *t, ebpo_error *error)
                        "the file has the bytes of none; ebpo convert --embed-textures keeps them");
 }
 
-static ebpo_status write_one(const textures *t, uint64_t row, int top, ebpo_error *error)
+static bool same(span a, span b) { return a.n == b.n && (!a.n || memcmp(a.s, b.s, a.n) == 0); }
+
+/* Whether a row before this one is the same image under the same name, written otherwise. */
+static bool is_again(const textures *t, uint64_t row)
+{
+    char *name = safe_name(list_of(t, NAME, row));
+    bool again = false;
+    for (uint64_t i = 0; i < row && name && !again; i++) {
+        if (!is_kept(t, i) || !same(list_of(t, BYTES, i), list_of(t, BYTES, row)))
+            continue;
+        char *before = safe_name(list_of(t, NAME, i));
+        again = before && strcmp(before, name) == 0;
+        free(before);
+    }
+    free(name);
+    return again;
+}
+
+/* Counts the image if it is a new file. */
+static ebpo_status write_one(const textures *t, uint64_t row, int top, uint64_t *written,
+                             ebpo_error *error)
 {
     char *name = safe_name(list_of(t, NAME, row)), *shown = text_of(list_of(t, NAME, row));
     ebpo_status status = EBPO_OK;
     if (!name || !shown)
         status = fail(error, EBPO_E_MEMORY, "no memory", "an image's name");
-    else if (!write_file(top, name, list_of(t, BYTES, row)))
+    else if (write_file(top, name, list_of(t, BYTES, row)))
+        ++*written;
+    else if (errno != EEXIST || !is_again(t, row))
         status = fail_system(error, shown);
     free(name);
     free(shown);
@@ -270,10 +311,8 @@ ebpo_status textures_write(const textures *t, const char *folder, uint64_t *writ
     if (top < 0)
         return fail_system(error, folder);
     for (uint64_t i = 0; i < t->count && status == EBPO_OK; i++)
-        if (is_kept(t, i)) {
-            status = write_one(t, i, top, error);
-            *written += status == EBPO_OK;
-        }
+        if (is_kept(t, i))
+            status = write_one(t, i, top, written, error);
     close(top);
     return status;
 }
