@@ -114,6 +114,11 @@ int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS
     return code;
 }
 
+const char *standard_files_shown(const char *path)
+{
+    return path == output ? "standard-output" : path;
+}
+
 int standard_files_end(const arg_spec *spec, int code)
 {
     if (printed_to >= 0) {

@@ -9,6 +9,7 @@
 #include "cli/progress.h"
 #include "cli/reading.h"
 #include "cli/remote_args.h"
+#include "cli/standard_files.h"
 #include "cli/textures.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
@@ -195,7 +196,7 @@ static void summarise(const values *v, const char *path, const extracted *out)
     char vertices[40], faces[40];
     words_plural(vertices, sizeof vertices, out->mesh.vertex_count, "vertex", "vertices");
     words_plural(faces, sizeof faces, out->mesh.face_count, "face", "faces");
-    printf("%s: %s, %s", path, vertices, faces);
+    printf("%s: %s, %s", standard_files_shown(path), vertices, faces);
     if (v->level >= 0)
         printf(", envelope volume %.9g", out->volume);
     putchar('\n');
@@ -207,7 +208,7 @@ static void summarise_json(const values *v, const char *path, const extracted *o
     json j;
     json_begin(&j, stdout);
     json_object(&j, NULL);
-    json_text(&j, "file", path);
+    json_text(&j, "file", standard_files_shown(path));
     json_uint(&j, "vertices", out->mesh.vertex_count);
     json_uint(&j, "faces", out->mesh.face_count);
     if (v->level >= 0)

@@ -15,6 +15,7 @@
 #include "cli/progress.h"
 #include "cli/reading.h"
 #include "cli/remote_args.h"
+#include "cli/standard_files.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 #include "render/picture.h"
@@ -342,7 +343,7 @@ static void tell_json(const job *j)
     json out;
     json_begin(&out, stdout);
     json_object(&out, NULL);
-    json_text(&out, "file", j->out);
+    json_text(&out, "file", standard_files_shown(j->out));
     json_uint(&out, "width", (uint64_t)j->width);
     json_uint(&out, "height", (uint64_t)j->height);
     json_real(&out, "azimuth", j->azimuth);

@@ -37,7 +37,7 @@ static const arg_option options[] = {
                 "clashes) or .png "
                 "(pictures)"),
     OPTION_TEXT("target-size", 0, scene_values, target_size, "S",
-                "pack: models of at most this many bytes (K, M, G: powers of 1024) together, with "
+                "pack: models of at most this many bytes (5M, 512KiB) together, with "
                 "the least error"),
     OPTION_FLAG("count", 0, scene_values, count,
                 "report: count all pairs of faces that meet, and lines of contact"),

@@ -46,14 +46,13 @@ extern const char *const profile_words[];
         OPTION_QUIET(subset_values, quiet), REMOTE_OPTIONS(subset_values, remote)
 
 /* The same for choosing by need, which takes the whole model: `ebpo subset` only. */
-#define NEED_OPTIONS(type)                                                                      \
-    OPTION_REAL("max-error", 0, type, max_error, "E", 0, 1.7976931348623157e308,                \
-                "refine only where envelopes may reach more than E beyond the model (in its "   \
-                "unit); what is left out is certainly closer"),                                 \
-        OPTION_TEXT(                                                                            \
-            "target-size", 0, type, target_size, "S",                                           \
-            "at most this many bytes (K, M, G: powers of 1024), with the smallest --max-error " \
-            "for which they suffice; which parts are kept is chosen too, unless given")
+#define NEED_OPTIONS(type)                                                                    \
+    OPTION_REAL("max-error", 0, type, max_error, "E", 0, 1.7976931348623157e308,              \
+                "refine only where envelopes may reach more than E beyond the model (in its " \
+                "unit); what is left out is certainly closer"),                               \
+        OPTION_TEXT("target-size", 0, type, target_size, "S",                                 \
+                    "at most this many bytes (5M, 512KiB), with the smallest --max-error "    \
+                    "for which they suffice; which parts are kept is chosen too, unless given")
 
 /* The two, read; the exit code. */
 int subset_need(const char *name, double max_error, const char *target_size,
