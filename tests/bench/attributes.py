@@ -92,11 +92,14 @@ def check_model(path, folder, url):
     whole = verdict(name, "whole", same_ply.compare, source, back(full, folder))
     box = "--box=" + half(info)
     ebpo("subset", "-q", box, full, folder / "part.ebpo.h5")
-    part = verdict(name, "subset", same_ply.compare_subset, source, back(folder / "part.ebpo.h5", folder))
+    empty = "mesh" not in json.loads(ebpo("info", "--json", folder / "part.ebpo.h5"))["parts"]
+    part = "empty" if empty else verdict(name, "subset", same_ply.compare_subset, source,
+                                         back(folder / "part.ebpo.h5", folder))
     ebpo("fetch", "-q", url + "/m.ebpo.h5", folder / "fetched.ebpo.h5")
     fetched = verdict(name, "fetch", same_ply.compare, source, back(folder / "fetched.ebpo.h5", folder))
     ebpo("fetch", "-q", box, url + "/m.ebpo.h5", folder / "far.ebpo.h5")
-    far = verdict(name, "fetch of a box", same_ply.compare_subset, source, back(folder / "far.ebpo.h5", folder))
+    far = "empty" if empty else verdict(name, "fetch of a box", same_ply.compare_subset, source,
+                                        back(folder / "far.ebpo.h5", folder))
     kept = sorted({f"{a['element']}: {a['names']}" for a in info.get("attributes", [])})
     raw, more = raw_bytes(info, full), info["bytes"]["file"] - plain["bytes"]["file"]
     return (name, info["vertices"], info["faces"], "; ".join(kept) or "-", path.stat().st_size, plain["bytes"]["file"],
@@ -113,8 +116,8 @@ Made by `tests/bench/attributes.py EBPO {names} > docs/measured/attributes.md`; 
 `tests/cli/same_ply.py` finds, which reads PLY by code of its own; of polygons and strips, each triangle has the corners
 and values of what it was cut from. *Subset*: of the box from the least corner of the model's box to its centre, each
 vertex and face is one of the source, with its values, in the source's order. *Fetch*: the same over HTTP, of the whole
-file and of that box. *Raw*: the values as a binary PLY has them; *more*: what the file is larger by with attributes,
-that is values, their description and the source's header.
+file and of that box; *empty*: no face is in it. *Raw*: the values as a binary PLY has them; *more*: what the file is
+larger by with attributes: values, their description, the source's header, and the colours of envelopes.
 """)
     cells = ("model", "vertices", "faces", "attributes", "PLY", "without", "with", "raw", "more", "of raw", "whole",
              "subset", "fetch", "fetch, box")
