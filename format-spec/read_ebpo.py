@@ -647,6 +647,10 @@ def read(path):
         unknown = set(required) - {"levels", "mesh", "planes", "maps", "leaf-planes", "subtrees", "gates", "pruned"}
         assert not unknown, f"needs {unknown}"
         parts = set(parts_of(file))
+        given, added, dropped = (one(file.attrs.get(name, 0)) for name in
+                                 ("source_face_count", "mend_added_faces", "mend_dropped_faces"))
+        assert dropped <= given, "more faces were dropped than the source has"
+        assert one(file.attrs["face_count"]) <= given + added - dropped, "more faces than the source's"
         assert content_sha256(file) == text(file.attrs["content_sha256"]), "content_sha256 differs"
         if "colours" in parts:
             assert content_sha256(file, of_colours=True) == text(file.attrs["colours_sha256"]), "colours_sha256 differs"

@@ -1,86 +1,21 @@
 #!/usr/bin/env python3
-"""Which points are inside, and how far away is the surface? The C library through ctypes: nothing
-to build.
+"""Which points are inside, and how far away is the surface? With the package for Python.
 
-    samples/query.py MODEL.ebpo.h5 <points.txt
+    PYTHONPATH=/usr/local/lib/ebpo/python samples/query.py MODEL.ebpo.h5 <points.txt
 
-Reads lines "x y z", with blanks or commas between, and answers each. The library is that of
-EBPO_LIBRARY=/path/to/libebpo.so, else the one that the ebpo of PATH uses, else the system's. As a
-module:  model = Model("bunny.ebpo.h5"); model.inside([(0, 0, 0)]); model.distance([(0, 0, 0)])
+Reads lines "x y z", with blanks or commas between, and answers all of them at once: arrays go in and
+come out. docs/guide/python.md says where the package is.
 """
-import ctypes
-import ctypes.util
-import os
 import re
-import subprocess
 import sys
 
-NOT_SOLID = -7  # ebpo/base.h
+import numpy as np
 
-
-class Error(ctypes.Structure):  # ebpo/base.h
-    _fields_ = [("status", ctypes.c_int), ("message", ctypes.c_char * 480),
-                ("file", ctypes.c_char * 256),
-                ("object", ctypes.c_char * 64), ("offset", ctypes.c_int64),
-                ("reserved", ctypes.c_uint64 * 4)]
-
-
-class Inside(ctypes.Structure):  # ebpo/query.h, as all below
-    _fields_ = [("where", ctypes.c_int32), ("winding", ctypes.c_int32), ("doubt", ctypes.c_double)]
-    word = property(lambda self: ("OUT", "IN", "ON", "MAYBE")[self.where])
-
-
-class Distance(ctypes.Structure):
-    _fields_ = [("distance", ctypes.c_double), ("lo", ctypes.c_double), ("hi", ctypes.c_double),
-                ("point", ctypes.c_double * 3),
-                ("normal", ctypes.c_double * 3), ("face", ctypes.c_uint64)]
-
-
-def library_path():
-    """None: there is none."""
-    if os.environ.get("EBPO_LIBRARY"):
-        return os.environ["EBPO_LIBRARY"]
-    try:
-        told = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)
-        found = re.search(r"^library: (/.*) \([0-9.]+\)$", told.stdout, re.MULTILINE)
-    except OSError:
-        found = None
-    return found[1] if found else ctypes.util.find_library("ebpo")
-
-
-class Model:
-    """Answers raise RuntimeError with the library's message."""
-
-    def __init__(self, path):
-        name = library_path()
-        if not name:
-            raise RuntimeError("libebpo is not found; install it, or name it in EBPO_LIBRARY")
-        self.library = ctypes.CDLL(name)
-        self.file, self.model, self.context = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_void_p()
-        self.call("ebpo_open", os.fsencode(path), ctypes.byref(self.file))
-        self.call("ebpo_model_new", self.file, None, ctypes.byref(self.model))
-        self.call("ebpo_context_new", self.model, ctypes.byref(self.context))
-
-        error = Error()  # a question about no points tells whether there is an inside
-        self.solid = self.library.ebpo_inside_many(self.context, None, ctypes.c_uint64(0), None,
-                                                   None, ctypes.byref(error)) != NOT_SOLID
-
-    def call(self, function, *arguments):
-        error = Error()
-        if getattr(self.library, function)(*arguments, ctypes.byref(error)) != 0:
-            raise RuntimeError(error.message.decode("utf-8", "replace"))
-
-    def ask(self, function, answer, points):
-        flat = (ctypes.c_double * (3 * len(points)))(*[c for x, y, z in points for c in (x, y, z)])
-        answers = (answer * len(points))()
-        self.call(function, self.context, flat, ctypes.c_uint64(len(points)), None, answers)
-        return answers
-
-    def inside(self, points):
-        return self.ask("ebpo_inside_many", Inside, points)
-
-    def distance(self, points):
-        return self.ask("ebpo_distance_many", Distance, points)
+try:
+    import ebpo
+except ImportError as error:
+    sys.exit(f"query.py: {error}; PYTHONPATH names the folder of the package: after an installation "
+             "PREFIX/lib/ebpo/python, in a build folder tools/python")
 
 
 def parse(line, number):
@@ -91,25 +26,39 @@ def parse(line, number):
     try:
         x, y, z = map(float, re.split(r"\s*,\s*|\s+", line))
     except ValueError:
-        raise RuntimeError(f"line {number}: three numbers are expected") from None
+        raise ValueError(f"line {number}: three numbers are expected") from None
     return x, y, z
+
+
+def answer(model, points):
+    words = [place.name for place in ebpo.Where]
+    where = ["surface"] * len(points)
+    if model.info.solid:
+        where = [words[place] for place in model.locate(points).where]
+    nearest = model.distance(points)
+    for word, *told in zip(where, nearest.distance.tolist(), nearest.face.tolist(), nearest.point.tolist()):
+        print(f"{word}, {told[0]!r} from face {told[1]} at", *map(repr, told[2]))
 
 
 def main():
     if len(sys.argv) != 2:
         sys.exit("usage: query.py MODEL.ebpo.h5 <points.txt")
+    points, wrong = [], None
     try:
-        model = Model(sys.argv[1])
+        model = ebpo.open(sys.argv[1])
         for number, line in enumerate(sys.stdin, 1):
-            point = parse(line, number)
-            if point is None:
-                continue
-            where = model.inside([point])[0].word if model.solid else "surface"
-            nearest = model.distance([point])[0]
-            print(f"{where}, {nearest.distance!r} from face {nearest.face} at",
-                  *map(repr, nearest.point))
-    except (RuntimeError, OSError) as error:
+            try:
+                point = parse(line, number)
+            except ValueError as error:
+                wrong = error  # after what comes before it
+                break
+            if point is not None:
+                points.append(point)
+        answer(model, np.array(points).reshape(-1, 3))
+    except (ebpo.Error, OSError) as error:
         sys.exit(f"query.py: {error}")
+    if wrong:
+        sys.exit(f"query.py: {wrong}")
 
 
 if __name__ == "__main__":

@@ -193,7 +193,11 @@ static int round_down(double x)
     int whole = (int)x;
     return whole - (whole > x);
 }
-static int round_up(double x) { return -round_down(-x); }
+static int round_up(double x)
+{
+    int whole = (int)x;
+    return whole + (whole < x);
+}
 
 static double to_byte(double x) { return x < 0 ? 0 : x > 255 ? 255 : x; }
 

@@ -63,7 +63,7 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
     if (!make_list_room(w, refs + (fresh > EBPO_BLOCK ? 2 * fresh / 9 : 1)))
         return;
     listing l = { .list = w->s->list + w->s->list_count, .block = UINT32_MAX };
-    const uint32_t *ref = level->leaf_refs + w->refs[depth];
+    const uint32_t *ref = refs ? level->leaf_refs + w->refs[depth] : NULL;
     for (uint64_t i = 0; i < refs; i++)
         list_face(w, ref[i], &l);
     for (uint64_t i = level->leaf_first[rank], end = i + fresh; i < end; i++)

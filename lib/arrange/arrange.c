@@ -457,6 +457,7 @@ static ebpo_status run(arranging a, int level, ebpo_error *error)
     if (a.to && mesh->arrangement) {
         a.to->whole_vertices = mesh->arrangement->whole_vertices;
         a.to->whole_faces = mesh->arrangement->whole_faces;
+        a.to->dropped_faces = mesh->arrangement->dropped_faces;
     }
     status = a.to ? measure_all(&a, level, error) : ebpo_fail_memory(error, sizeof *a.to);
     if (status == EBPO_OK)

@@ -27,7 +27,8 @@ static ebpo_status mend(const preparation *p, bool weld, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
     unsigned steps = (weld ? EBPO_MEND_WELD : 0) | (o->orient ? EBPO_MEND_ORIENT : 0) |
-                     (o->flip ? EBPO_MEND_FLIP : 0) | (o->fill_holes ? EBPO_MEND_FILL : 0);
+                     (o->flip ? EBPO_MEND_FLIP : 0) | (o->fill_holes ? EBPO_MEND_FILL : 0) |
+                     (o->drop_duplicates ? EBPO_MEND_DROP : 0);
     if (!ebpo_progress_stage(&o->progress, "mending", error))
         return EBPO_E_CANCELLED;
     return ebpo_mesh_mend(p->mesh, steps, &p->out->record, error);
@@ -52,7 +53,7 @@ static ebpo_status prepare(const preparation *p, ebpo_error *error)
     /* STL has no shared vertices */
     bool weld = o->weld || strncmp(p->mesh->source_format, "stl", 3) == 0;
     ebpo_status status = EBPO_OK;
-    p->out->mended = weld || o->orient || o->flip || o->fill_holes;
+    p->out->mended = weld || o->orient || o->flip || o->fill_holes || o->drop_duplicates;
     if (p->out->mended)
         status = arrange_and_mend(p, weld, error);
     if (status == EBPO_OK) {

@@ -11,7 +11,12 @@
 #include "base/sized.h"
 #include "mesh/mesh_parts.h"
 
-enum { WELD = EBPO_MEND_WELD, ORIENT = EBPO_MEND_ORIENT, FILL = EBPO_MEND_FILL };
+enum {
+    WELD = EBPO_MEND_WELD,
+    ORIENT = EBPO_MEND_ORIENT,
+    FILL = EBPO_MEND_FILL,
+    DROP = EBPO_MEND_DROP
+};
 
 /* The root of the area is a length; sheets are thinner than this share of it. */
 static const double THIN = 0.01;
@@ -100,25 +105,72 @@ static bool may_help(const ebpo_mesh_report *base, unsigned steps)
     return !(steps & ORIENT) || turned || open;
 }
 
+/* What was done before, and what the mesh is then. */
+typedef struct start {
+    unsigned steps;
+    const ebpo_mesh_report *report; /* NULL: that was not done */
+} start;
+
+static ebpo_status try_more(trying *t, start from, unsigned more, ebpo_error *error)
+{
+    if (t->out->chosen >= 0 || !from.report || !may_help(from.report, more))
+        return EBPO_OK;
+    return try_steps(t, from.steps | more, error);
+}
+
+/* Tries what the step leaves by itself; *then is where others may begin. */
+static ebpo_status begin_with(trying *t, start from, unsigned step, start *then, ebpo_error *error)
+{
+    if (t->out->chosen >= 0)
+        return EBPO_OK;
+    *then = (start){ from.steps | step, &t->out->tries[t->out->count].report };
+    return try_steps(t, then->steps, error);
+}
+
+static ebpo_status drop(trying *t, start from, start *then, ebpo_error *error)
+{
+    return from.report->repeated_faces.count ? begin_with(t, from, DROP, then, error) : EBPO_OK;
+}
+
 /* Merging comes first where there is something to merge, unless nothing is open. */
+static ebpo_status weld_first(trying *t, start *from, ebpo_error *error)
+{
+    start bare = *from, dropped = { 0, NULL };
+    if (!bare.report->repeated_positions.count)
+        return EBPO_OK;
+    ebpo_status status = try_more(t, bare, ORIENT, error);
+    if (status == EBPO_OK)
+        status = drop(t, bare, &dropped, error);
+    if (status == EBPO_OK)
+        status = begin_with(t, bare, WELD, from, error);
+    return status == EBPO_OK ? try_more(t, dropped, ORIENT, error) : status;
+}
+
+/* Fewer steps first. */
 static ebpo_status try_all(trying *t, ebpo_error *error)
 {
-    static const unsigned without_weld[] = { ORIENT, FILL, ORIENT | FILL };
-    const ebpo_mesh_report *base = t->given;
-    unsigned weld = 0;
-    ebpo_status status = EBPO_OK;
-    if (base->repeated_positions.count) {
-        if (may_help(base, ORIENT))
-            status = try_steps(t, ORIENT, error);
-        if (status == EBPO_OK && t->out->chosen < 0) {
-            weld = WELD;
-            base = &t->out->tries[t->out->count].report;
-            status = try_steps(t, WELD, error);
-        }
-    }
-    for (int i = 0; i < 3 && status == EBPO_OK && t->out->chosen < 0; i++)
-        if (may_help(base, without_weld[i]))
-            status = try_steps(t, weld | without_weld[i], error);
+    start plain = { 0, t->given }, dropped = { 0, NULL };
+    ebpo_status status = weld_first(t, &plain, error);
+    if (status == EBPO_OK)
+        status = try_more(t, plain, ORIENT, error);
+    if (status == EBPO_OK)
+        status = try_more(t, plain, FILL, error);
+    if (status == EBPO_OK)
+        status = drop(t, plain, &dropped, error);
+    if (status == EBPO_OK)
+        status = try_more(t, dropped, ORIENT, error);
+    if (status == EBPO_OK)
+        status = try_more(t, dropped, FILL, error);
+    if (status == EBPO_OK)
+        status = try_more(t, plain, ORIENT | FILL, error);
+    return status == EBPO_OK ? try_more(t, dropped, ORIENT | FILL, error) : status;
+}
+
+/* A plausible solid stays what it is; but one may want to know. */
+static ebpo_status try_dropping(trying *t, ebpo_error *error)
+{
+    ebpo_status status = try_steps(t, DROP, error);
+    t->out->chosen = -1;
     return status;
 }
 
@@ -135,6 +187,8 @@ ebpo_status ebpo_mesh_try_repairs(const ebpo_mesh *mesh, const ebpo_mesh_report 
         status = ebpo_mesh_check_shape(mesh, error);
     if (status == EBPO_OK && ebpo_mesh_doubts(0, report, NULL))
         status = try_all(&t, error);
+    else if (status == EBPO_OK && report->repeated_faces.count)
+        status = try_dropping(&t, error);
     EBPO_GIVE(ebpo_repairs, out, status == EBPO_OK ? &made : &nothing);
     return status;
 }

@@ -1,6 +1,7 @@
 /* Arrays of attributes: making, naming and freeing them. */
 #include "attributes/attributes.h"
 
+#include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -114,19 +115,41 @@ bool ebpo_attribute_reserve(ebpo_workspace *workspace, ebpo_attribute *a, uint64
            ebpo_array_grow(workspace, &a->values, &a->item_capacity, items, bytes);
 }
 
-void ebpo_attributes_lose(ebpo_attributes *attributes, const char *format, ...)
+/* Into a text of `size` bytes, which says "and more" when it is full. */
+static void append(char *to, size_t size, const char *format, va_list args) EBPO_PRINTF(3, 0);
+
+static void append(char *to, size_t size, const char *format, va_list args)
 {
     static const char more[] = "; and more";
-    char *lost = attributes->lost, text[200];
-    size_t used = strlen(lost);
+    char text[200];
+    size_t used = strlen(to);
+    vsnprintf(text, sizeof text, format, args);
+    if (used + strlen(text) + sizeof more + 2 <= size)
+        snprintf(to + used, size - used, "%s%s", used ? "; " : "", text);
+    else if (used < sizeof more || strcmp(to + used - (sizeof more - 1), more) != 0)
+        memcpy(to + used, more, sizeof more);
+}
+
+void ebpo_attributes_lose(ebpo_attributes *attributes, const char *format, ...)
+{
     va_list args;
     va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
+    append(attributes->lost, sizeof attributes->lost, format, args);
     va_end(args);
-    if (used + strlen(text) + sizeof more + 2 <= sizeof attributes->lost)
-        snprintf(lost + used, sizeof attributes->lost - used, "%s%s", used ? "; " : "", text);
-    else if (used < sizeof more || strcmp(lost + used - (sizeof more - 1), more) != 0)
-        memcpy(lost + used, more, sizeof more);
+}
+
+void ebpo_attributes_note_unread(ebpo_attributes *attributes, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    append(attributes->unread, sizeof attributes->unread, format, args);
+    va_end(args);
+}
+
+void ebpo_attributes_count_unread(ebpo_attributes *attributes, const char *what, uint64_t count)
+{
+    if (count)
+        ebpo_attributes_note_unread(attributes, "%s: %" PRIu64, what, count);
 }
 
 static ebpo_status borrow_array(ebpo_attributes *to, const ebpo_attribute *from, ebpo_error *error)

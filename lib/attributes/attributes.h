@@ -36,6 +36,9 @@ typedef struct ebpo_attributes {
     char *header; /* malloc's; NULL: none */
     uint64_t header_bytes;
     char lost[400]; /* what the source has and this has not, in words; "": nothing */
+    /* what reading the mesh itself left out, or did not find; told also where no attributes were
+     * asked for */
+    char unread[400];
 } ebpo_attributes;
 
 /* NULL when memory is short. */
@@ -89,6 +92,11 @@ bool ebpo_attribute_reserve(ebpo_workspace *workspace, ebpo_attribute *a, uint64
 
 /* Notes that something cannot be kept: a sentence's part, such as "property x of vertex". */
 void ebpo_attributes_lose(ebpo_attributes *attributes, const char *format, ...) EBPO_PRINTF(2, 3);
+/* Notes what reading left out: a sentence, without a full stop. */
+void ebpo_attributes_note_unread(ebpo_attributes *attributes, const char *format, ...)
+    EBPO_PRINTF(2, 3);
+/* "what: count", unless that is 0. */
+void ebpo_attributes_count_unread(ebpo_attributes *attributes, const char *what, uint64_t count);
 
 /* The arrays of an element are made anew of `count` rows: row i is what row rows[i] was; zeros and
  * empty lists where there was no such row. EBPO_E_MEMORY, EBPO_E_IO. */

@@ -6,6 +6,7 @@
 #include "base/arrays.h"
 #include "base/error.h"
 #include "base/sha256.h"
+#include "base/sums.h"
 
 enum { DIGEST = 32, STEP = 1 << 20 };
 
@@ -88,7 +89,7 @@ static bool is_digest(ebpo_texture_bytes bytes, ebpo_texture_bytes sha256,
         ebpo_sha256_add(&state, (const uint8_t *)bytes.at + at,
                         bytes.count - at < STEP ? (size_t)(bytes.count - at) : STEP);
     ebpo_sha256_end(&state, digest);
-    return sha256.count == DIGEST && memcmp(digest, sha256.at, DIGEST) == 0;
+    return sha256.count == DIGEST && !ebpo_digest_differs(sha256.at, digest);
 }
 
 bool ebpo_textures_good(const ebpo_attributes *all)

@@ -5,8 +5,9 @@
 
 #include "base/error.h"
 
-/* No struct has been smaller than its size and one member, and none will be larger than a page. */
-enum { SMALLEST = 2 * sizeof(size_t), LARGEST = 4096 };
+/* No struct has been smaller than its size and one member, and none will be larger than two
+ * pages. */
+enum { SMALLEST = 2 * sizeof(size_t), LARGEST = 8192 };
 
 static bool plausible(size_t size)
 {

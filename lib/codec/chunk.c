@@ -5,6 +5,7 @@
 #include <zstd.h>
 
 #include "base/endian.h"
+#include "base/sums.h"
 
 void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder)
 {
@@ -222,17 +223,29 @@ static bool has_checksum(const uint8_t *frame, size_t bytes)
            frame[DESCRIPTOR] & CONTENT_CHECKSUM;
 }
 
+static ZSTD_DCtx *zstd_reader(void)
+{
+    ZSTD_DCtx *in = ZSTD_createDCtx();
+#ifdef EBPO_FUZZING
+    if (in) /* ZSTD_d_forceIgnoreChecksum, see base/sums.h */
+        (void)ZSTD_DCtx_setParameter(in, ZSTD_d_experimentalParam3, 1);
+#endif
+    return in;
+}
+
 static ebpo_status zstd_decode(ebpo_chunk_coder *coder, const uint8_t *stored, size_t stored_bytes,
                                uint8_t *raw, size_t raw_bytes, const char **why)
 {
     if (!coder->zstd_in)
-        coder->zstd_in = ZSTD_createDCtx();
+        coder->zstd_in = zstd_reader();
     if (!coder->zstd_in)
         return EBPO_E_MEMORY;
     if (ZSTD_getFrameContentSize(stored, stored_bytes) != raw_bytes)
         return broken(why, "the zstd frame does not state the chunk's size");
     if (!has_checksum(stored, stored_bytes))
         return broken(why, "the zstd frame has no checksum");
+    if (stored[4] & 1 << 4) /* which zstd does not look at, and no checksum covers */
+        return broken(why, "the unused bit of the zstd frame's descriptor is set");
     if (ZSTD_findFrameCompressedSize(stored, stored_bytes) != stored_bytes)
         return broken(why, "the zstd frame does not fill the chunk");
     size_t size = ZSTD_decompressDCtx(coder->zstd_in, raw, raw_bytes, stored, stored_bytes);
@@ -262,8 +275,8 @@ ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, s
 {
     *why = "";
     if (pipeline == EBPO_PIPELINE_DEFLATE || pipeline == EBPO_PIPELINE_CHECKSUM) {
-        if (stored_bytes < 4 ||
-            ebpo_load32(stored + stored_bytes - 4) != ebpo_fletcher32(stored, stored_bytes - 4))
+        if (stored_bytes < 4 || ebpo_sum_differs(ebpo_load32(stored + stored_bytes - 4),
+                                                 ebpo_fletcher32(stored, stored_bytes - 4)))
             return broken(why, "the fletcher32 checksum does not match");
         stored_bytes -= 4;
     }

@@ -52,7 +52,7 @@ static ebpo_status make_tables(writing *w, ebpo_error *error)
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
         ebpo_h5_id id;
         status = ebpo_h5_make_plain_group(&w->out, groups[i], &id, error);
-        ebpo_h5_close_id(id);
+        ebpo_h5_close_id(&w->out, id);
     }
     for (int i = 0; i < TABLES && status == EBPO_OK; i++)
         status = ebpo_h5_make_table(&w->out, layout[i].path, layout[i].number, layout[i].cols,
@@ -121,7 +121,7 @@ static ebpo_status write_tables(writing *w, const char *path, ebpo_publish *targ
     if (status == EBPO_OK && !flush(w))
         status = w->status;
     for (int i = 0; i < TABLES; i++)
-        ebpo_h5_close_table(&w->table[i]);
+        ebpo_h5_close_table(&w->out, &w->table[i]);
     if (status == EBPO_OK)
         status = ebpo_h5_finish(&w->out, w->error);
     ebpo_h5_discard(&w->out);

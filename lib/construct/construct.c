@@ -134,7 +134,8 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     info->vertex_count = mesh->vertex_count;
     info->face_count = mesh->face_count;
     info->source_vertex_count = ebpo_mesh_whole_vertices(mesh) + (mend ? mend->welded_vertices : 0);
-    info->source_face_count = ebpo_mesh_whole_faces(mesh) - (mend ? mend->added_faces : 0);
+    info->source_face_count =
+        ebpo_mesh_whole_faces(mesh) + (mend ? mend->dropped_faces - mend->added_faces : 0);
     memcpy(info->box_origin, b->box.origin, sizeof info->box_origin);
     memcpy(info->box_size, b->box.size, sizeof info->box_size);
     info->grid_level = b->box.grid_level;

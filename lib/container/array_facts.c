@@ -23,7 +23,7 @@ static const ebpo_array_in *find(const ebpo_file *file, unsigned n)
 uint64_t ebpo_reader_stored_bytes(const ebpo_file *file, const ebpo_array_in *array)
 {
     bool known =
-        !array->present || ebpo_h5_chunk_count(&array->shape) == 1 || atomic_load(&file->located);
+        !array->present || ebpo_shape_chunks(&array->shape) == 1 || atomic_load(&file->located);
     return known ? array->stored_bytes : 0;
 }
 

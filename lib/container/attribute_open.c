@@ -29,11 +29,11 @@ static ebpo_status required(const ebpo_file *file, const char *path, ebpo_status
     return wrong(file, path, what, error);
 }
 
-static ebpo_status get_type(ebpo_file *file, ebpo_h5_in *h5, ebpo_h5_id id, const char *path,
+static ebpo_status get_type(ebpo_file *file, ebpo_head *head, ebpo_head_object id, const char *path,
                             const char *name, int *type, ebpo_error *error)
 {
     char word[16];
-    ebpo_status status = ebpo_h5_get_text(h5, id, path, name, word, sizeof word, error);
+    ebpo_status status = ebpo_head_get_text(head, id, path, name, word, sizeof word, error);
     if (status != EBPO_OK)
         return status;
     *type = ebpo_attribute_type_of(word);
@@ -41,64 +41,65 @@ static ebpo_status get_type(ebpo_file *file, ebpo_h5_in *h5, ebpo_h5_id id, cons
                       : wrong(file, path, "a type of numbers is none that the format has", error);
 }
 
-static ebpo_status get_list(ebpo_file *file, ebpo_h5_in *h5, ebpo_h5_id id, const char *path,
+static ebpo_status get_list(ebpo_file *file, ebpo_head *head, ebpo_head_object id, const char *path,
                             ebpo_attribute *a, bool *different, ebpo_error *error)
 {
     uint64_t differ = 0;
     a->list = EBPO_ATTRIBUTE_NO_LIST;
     *different = false;
-    ebpo_status status = get_type(file, h5, id, path, "list", &a->list, error);
+    ebpo_status status = get_type(file, head, id, path, "list", &a->list, error);
     if (status == EBPO_E_ABSENT)
         return EBPO_OK;
     if (status == EBPO_OK && a->list >= EBPO_ATTRIBUTE_FLOAT32)
         status = wrong(file, path, "a list's length is no whole number", error);
     if (status == EBPO_OK)
-        status = required(file, path, ebpo_h5_get_count(h5, id, path, "different", &differ, error),
-                          "different", error);
+        status =
+            required(file, path, ebpo_head_get_count(head, id, path, "different", &differ, error),
+                     "different", error);
     if (status == EBPO_OK && differ > 1)
         status = wrong(file, path, "attribute different is neither 0 nor 1", error);
     *different = differ;
     return status;
 }
 
-static ebpo_status get_head(ebpo_file *file, ebpo_h5_in *h5, const char *path,
+static ebpo_status get_head(ebpo_file *file, ebpo_head *head, const char *path,
                             ebpo_attribute_in *to, ebpo_error *error)
 {
     ebpo_attribute *a = &to->head;
-    ebpo_h5_id id;
+    ebpo_head_object id;
     int type = 0;
-    ebpo_status status = ebpo_h5_look_at_array(h5, path, &id, error);
+    ebpo_status status = ebpo_head_open_array(head, path, &id, error);
     if (status == EBPO_OK)
         status = required(file, path,
-                          ebpo_h5_get_text(h5, id, path, "element", a->element, sizeof a->element,
-                                           error),
+                          ebpo_head_get_text(head, id, path, "element", a->element,
+                                             sizeof a->element, error),
                           "element", error);
     if (status == EBPO_OK)
-        status = required(file, path,
-                          ebpo_h5_get_text(h5, id, path, "names", a->names, sizeof a->names, error),
-                          "names", error);
-    if (status == EBPO_OK)
         status =
-            required(file, path, get_type(file, h5, id, path, "type", &type, error), "type", error);
+            required(file, path,
+                     ebpo_head_get_text(head, id, path, "names", a->names, sizeof a->names, error),
+                     "names", error);
+    if (status == EBPO_OK)
+        status = required(file, path, get_type(file, head, id, path, "type", &type, error), "type",
+                          error);
     a->type = (ebpo_attribute_type)type;
     if (status == EBPO_OK)
-        status = get_list(file, h5, id, path, a, &to->different, error);
+        status = get_list(file, head, id, path, a, &to->different, error);
     if (status == EBPO_OK)
-        to->has_range = ebpo_h5_get_real(h5, id, path, "range", to->range, 2, NULL) == EBPO_OK;
-    ebpo_h5_close_id(id);
+        to->has_range = ebpo_head_get_real(head, id, path, "range", to->range, 2, NULL) == EBPO_OK;
     return status;
 }
 
-static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, int number, ebpo_error *error)
+static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo_error *error)
 {
     ebpo_array_in *a = &file->attributes.array[number];
-    char coding[EBPO_H5_CODING_BYTES];
+    char coding[EBPO_HEAD_CODING_BYTES];
     *a = (ebpo_array_in){ .id = EBPO_A_ATTRIBUTE, .level = number };
     ebpo_attribute_path(number, a->path);
     uint64_t most = ebpo_input_is_far(&file->in) || file->has_places ? 1 : UINT64_MAX;
     ebpo_status status =
-        ebpo_h5_read_array(h5, a->path, most, ebpo_reader_rows_of_chunk(file, EBPO_A_ATTRIBUTE),
-                           &a->shape, coding, &a->chunks, &a->stored_bytes, error);
+        ebpo_head_read_array(head, a->path, most, ebpo_reader_rows_of_chunk(file, EBPO_A_ATTRIBUTE),
+                             &a->shape, coding, &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
     a->coding = strcmp(coding, ebpo_coding_columns) == 0 ? ebpo_coding_columns : ebpo_coding_plain;
@@ -163,10 +164,10 @@ static const char *check_textures(const ebpo_attribute_in *of, const ebpo_array_
                : NULL;
 }
 
-static ebpo_status open_items(ebpo_file *file, ebpo_h5_in *h5, uint64_t n, ebpo_error *error)
+static ebpo_status open_items(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo_error *error)
 {
     const ebpo_array_in *items = &file->attributes.array[ebpo_items_number(n)];
-    ebpo_status status = open_array(file, h5, ebpo_items_number(n), error);
+    ebpo_status status = open_array(file, head, ebpo_items_number(n), error);
     if (status == EBPO_OK &&
         (items->shape.cols ||
          items->shape.element_size != ebpo_attribute_bytes(file->attributes.head[n].head.type)))
@@ -174,15 +175,15 @@ static ebpo_status open_items(ebpo_file *file, ebpo_h5_in *h5, uint64_t n, ebpo_
     return status;
 }
 
-static ebpo_status open_one(ebpo_file *file, ebpo_h5_in *h5, uint64_t n, ebpo_error *error)
+static ebpo_status open_one(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo_error *error)
 {
     ebpo_attribute_in *to = &file->attributes.head[n];
     const ebpo_array_in *values = &file->attributes.array[ebpo_values_number(n)],
                         *items = &file->attributes.array[ebpo_items_number(n)];
     char path[EBPO_PATH_BYTES];
-    ebpo_status status = open_array(file, h5, ebpo_values_number(n), error);
+    ebpo_status status = open_array(file, head, ebpo_values_number(n), error);
     if (status == EBPO_OK)
-        status = get_head(file, h5, values->path, to, error);
+        status = get_head(file, head, values->path, to, error);
     const char *what = status == EBPO_OK ? check_shape(file, values, to) : NULL;
     to->head.rows = values->shape.rows;
     to->head.columns = values->shape.cols ? values->shape.cols : 1;
@@ -191,20 +192,20 @@ static ebpo_status open_one(ebpo_file *file, ebpo_h5_in *h5, uint64_t n, ebpo_er
     if (what)
         return wrong(file, values->path, what, error);
     ebpo_attribute_path(ebpo_items_number(n), path);
-    if (status == EBPO_OK && to->different && ebpo_h5_look(h5, path) != EBPO_H5_ABSENT)
-        status = open_items(file, h5, n, error);
+    if (status == EBPO_OK && to->different && ebpo_head_look(head, path) != EBPO_HEAD_ABSENT)
+        status = open_items(file, head, n, error);
     what = status == EBPO_OK ? check_textures(to, items) : NULL;
     return what ? wrong(file, values->path, what, error) : status;
 }
 
-static ebpo_status open_header(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
+static ebpo_status open_header(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     const ebpo_array_in *header = &file->attributes.array[0];
     char path[EBPO_PATH_BYTES];
     ebpo_attribute_path(0, path);
-    if (ebpo_h5_look(h5, path) == EBPO_H5_ABSENT)
+    if (ebpo_head_look(head, path) == EBPO_HEAD_ABSENT)
         return EBPO_OK;
-    ebpo_status status = open_array(file, h5, 0, error);
+    ebpo_status status = open_array(file, head, 0, error);
     if (status == EBPO_OK &&
         (header->shape.cols || header->shape.element_size != 1 ||
          header->coding != ebpo_coding_plain || header->shape.rows > EBPO_ATTRIBUTE_HEADER))
@@ -212,19 +213,18 @@ static ebpo_status open_header(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
     return status;
 }
 
-static ebpo_status open_group(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
+static ebpo_status open_group(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     static const char path[] = "/attributes";
     ebpo_attributes_in *all = &file->attributes;
-    ebpo_h5_id id;
-    ebpo_status status = ebpo_h5_open_group(h5, path, &id, error);
+    ebpo_head_object id;
+    ebpo_status status = ebpo_head_open_group(head, path, &id, error);
     if (status != EBPO_OK)
         return status;
-    status = required(file, path, ebpo_h5_get_count(h5, id, path, "arrays", &all->count, error),
+    status = required(file, path, ebpo_head_get_count(head, id, path, "arrays", &all->count, error),
                       "arrays", error);
     if (status == EBPO_OK)
-        status = ebpo_facts_get_digest(h5, id, path, "sha256", all->sha256, error);
-    ebpo_h5_close_id(id);
+        status = ebpo_facts_get_digest(head, id, path, "sha256", all->sha256, error);
     if (status == EBPO_OK && all->count > EBPO_ATTRIBUTE_ARRAYS)
         status = wrong(file, path, "there are more arrays than there can be", error);
     if (status != EBPO_OK)
@@ -237,15 +237,15 @@ static ebpo_status open_group(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error
     return EBPO_OK;
 }
 
-ebpo_status ebpo_attributes_open(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
+ebpo_status ebpo_attributes_open(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     if (!(file->info.parts & EBPO_PART_ATTRIBUTES))
         return EBPO_OK;
-    ebpo_status status = open_group(file, h5, error);
+    ebpo_status status = open_group(file, head, error);
     if (status == EBPO_OK)
-        status = open_header(file, h5, error);
+        status = open_header(file, head, error);
     for (uint64_t n = 0; n < file->attributes.count && status == EBPO_OK; n++)
-        status = open_one(file, h5, n, error);
+        status = open_one(file, head, n, error);
     return status;
 }
 

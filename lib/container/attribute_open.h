@@ -5,7 +5,7 @@
 #include "container/file_in.h"
 
 /* The part's arrays, with their head; nothing, if the file does not have the part. */
-EBPO_MUST_USE ebpo_status ebpo_attributes_open(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_attributes_open(ebpo_file *file, ebpo_head *head, ebpo_error *error);
 void ebpo_attributes_close(ebpo_file *file);
 
 #endif

@@ -135,7 +135,7 @@ static void add(ebpo_plan *plan, int number, const void *values, uint64_t rows, 
                            .value_size = (uint8_t)size,
                            .rows_of = EBPO_A_ATTRIBUTE };
     ebpo_attribute_path(number, a->path);
-    a->shape = (ebpo_h5_shape){
+    a->shape = (ebpo_shape){
         .rows = rows, .cols = cols, .element_size = (uint8_t)size, .pipeline = pipeline
     };
     a->shape.chunk_rows = ebpo_rows_of_chunk(&plan->info, EBPO_A_ATTRIBUTE, 0, rows, cols, size);
@@ -209,7 +209,7 @@ ebpo_status ebpo_attributes_put_group(ebpo_h5_out *out, const ebpo_plan *plan, e
         status = ebpo_h5_put_count(out, id, "arrays", plan->attributes->count, error);
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(out, id, "sha256", hex, error);
-    ebpo_h5_close_id(id);
+    ebpo_h5_close_id(out, id);
     return status;
 }
 

@@ -7,6 +7,7 @@
 #include "base/arrays.h"
 #include "base/error.h"
 #include "base/sized.h"
+#include "base/sums.h"
 #include "codec/coding.h"
 #include "container/attribute_digest.h"
 #include "container/attribute_paths.h"
@@ -44,7 +45,7 @@ static ebpo_status take(void *context, const ebpo_array_in *array, uint64_t chun
     const target *t = context;
     (void)chunk, (void)error;
     ebpo_attribute_decode(t->file, array, rows, bytes,
-                          t->values + row * ebpo_h5_row_bytes(&array->shape));
+                          t->values + row * ebpo_shape_row_bytes(&array->shape));
     return EBPO_OK;
 }
 
@@ -56,7 +57,7 @@ static ebpo_status read_array(const ebpo_file *file, int number, const ebpo_read
     *values = NULL;
     if (!array->present)
         return EBPO_OK;
-    uint64_t bytes = array->shape.rows * ebpo_h5_row_bytes(&array->shape);
+    uint64_t bytes = array->shape.rows * ebpo_shape_row_bytes(&array->shape);
     *values = ebpo_array_alloc(read->workspace, bytes, 1);
     if (!*values)
         return ebpo_workspace_fail(read->workspace, bytes, error);
@@ -222,7 +223,7 @@ ebpo_status ebpo_attributes_check(const ebpo_file *file, const ebpo_read_options
     status = ebpo_attributes_digest(all, digest, error);
     bool textures = ebpo_textures_good(all);
     ebpo_attributes_free(all);
-    if (status == EBPO_OK && memcmp(digest, file->attributes.sha256, sizeof digest) != 0)
+    if (status == EBPO_OK && ebpo_digest_differs(file->attributes.sha256, digest))
         status = ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, "/attributes", -1,
                               "the attributes are not what sha256 says: the file was changed; get "
                               "a fresh copy");

@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/sized.h"
+#include "base/sums.h"
 #include "container/attribute_read.h"
 #include "container/content.h"
 #include "container/head_facts_table.h"
@@ -58,7 +59,7 @@ static ebpo_status compare(content_job *j, int which, const uint8_t stated[32], 
             ebpo_content_put(&content, j->array[i]->path, j->digest[i]);
     ebpo_status status = ebpo_content_end(&content, digest, error);
     ebpo_content_free(&content);
-    if (status == EBPO_OK && memcmp(digest, stated, 32) != 0)
+    if (status == EBPO_OK && ebpo_digest_differs(stated, digest))
         status = ebpo_fail_file(error, EBPO_E_FORMAT, j->file->in.shown,
                                 "the content is not what %s says: the file was changed; "
                                 "get a fresh copy",

@@ -9,8 +9,8 @@
 #include "codec/coding.h"
 #include "container/chunks.h"
 
-static void widen(const ebpo_h5_shape *shape, const uint8_t *rows, uint64_t numbers,
-                  uint8_t *values, size_t size)
+static void widen(const ebpo_shape *shape, const uint8_t *rows, uint64_t numbers, uint8_t *values,
+                  size_t size)
 {
     if (shape->element_size == size && __BYTE_ORDER == __LITTLE_ENDIAN)
         memcpy(values, rows, numbers * size);
@@ -55,7 +55,7 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
         if (status != EBPO_OK)
             break;
         uint64_t here = view.end - row < rows ? view.end - row : rows;
-        widen(&array->shape, view.rows + (row - view.begin) * ebpo_h5_row_bytes(&array->shape),
+        widen(&array->shape, view.rows + (row - view.begin) * ebpo_shape_row_bytes(&array->shape),
               here * cols, out, size);
         out += here * cols * size;
         row += here;

@@ -14,7 +14,7 @@ typedef struct ordering {
 static void add_array(ordering *o, unsigned array)
 {
     const ebpo_array_out *a = &o->plan->array[array];
-    uint64_t chunks = ebpo_h5_chunk_count(&a->shape);
+    uint64_t chunks = ebpo_shape_chunks(&a->shape);
     for (uint64_t k = 0; k < chunks; k++)
         o->out->chunk[o->out->count++] = (ebpo_ordered_chunk){ array, (uint32_t)k, 0 };
 }
@@ -113,7 +113,7 @@ ebpo_status ebpo_chunk_order_make(ebpo_chunk_order *out, const ebpo_plan *plan, 
     uint64_t chunks = 0;
     *out = (ebpo_chunk_order){ NULL, 0, 0 };
     for (unsigned i = 0; i < plan->count; i++)
-        chunks += ebpo_h5_chunk_count(&plan->array[i].shape);
+        chunks += ebpo_shape_chunks(&plan->array[i].shape);
     out->chunk = ebpo_alloc(chunks, sizeof *out->chunk);
     if (!out->chunk)
         return ebpo_fail_memory(error, chunks * sizeof *out->chunk);

@@ -1,6 +1,6 @@
 #include "container/chunk_rows.h"
 
-#include "h5/h5.h"
+#include "codec/shape.h"
 
 enum {
     FIRST_LEVELS = 5,    /* these lie together, whatever the subtrees */
@@ -67,7 +67,7 @@ static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, 
 uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
                             uint32_t cols, uint32_t element_size)
 {
-    uint32_t most = ebpo_h5_chunk_rows(rows, cols, element_size);
+    uint32_t most = ebpo_full_chunk_rows(rows, cols, element_size);
     if (!info->subtree_level)
         return most;
     uint64_t wanted = wanted_rows(info, id, level, rows, element_size * (cols ? cols : 1));

@@ -50,7 +50,7 @@ static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *
 {
     const ebpo_array_in *array = array_of(user, key);
     (void)error;
-    *peak = *keep = chunk_rows(array, chunk_of(key)) * ebpo_h5_row_bytes(&array->shape);
+    *peak = *keep = chunk_rows(array, chunk_of(key)) * ebpo_shape_row_bytes(&array->shape);
     return EBPO_OK;
 }
 
@@ -65,7 +65,7 @@ static ebpo_status decode_faces(const ebpo_chunks *c, uint64_t chunk, uint64_t r
     if (!ebpo_corners_decode(raw, rows, &seen, corners) || seen > vertices)
         return ebpo_chunks_fail(c, -1, EBPO_A_FACES, "a face names a vertex that does not exist",
                                 error);
-    if (chunk + 1 < ebpo_h5_chunk_count(&array->shape) && seen != c->seen[chunk + 1])
+    if (chunk + 1 < ebpo_shape_chunks(&array->shape) && seen != c->seen[chunk + 1])
         return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX, "the index contradicts the faces",
                                 error);
     return EBPO_OK;
@@ -118,7 +118,7 @@ static ebpo_status decode(const ebpo_chunks *c, const ebpo_array_in *array, uint
     case EBPO_A_VERTEX_SOURCE:
     case EBPO_A_FACE_SOURCE: return decode_map(c, array->id, rows, raw, item, error);
     case EBPO_A_ATTRIBUTE: ebpo_attribute_decode(c->file, array, rows, raw, item); return EBPO_OK;
-    default: memcpy(item, raw, rows * ebpo_h5_row_bytes(&array->shape)); return EBPO_OK;
+    default: memcpy(item, raw, rows * ebpo_shape_row_bytes(&array->shape)); return EBPO_OK;
     }
 }
 
@@ -148,7 +148,7 @@ void ebpo_chunks_expect(ebpo_chunks *c, ebpo_expected *e, ebpo_array_id id, int 
  * the next. */
 static void expect_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
 {
-    uint64_t begin = chunk / AROUND * AROUND, count = ebpo_h5_chunk_count(&array->shape);
+    uint64_t begin = chunk / AROUND * AROUND, count = ebpo_shape_chunks(&array->shape);
     ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
     /* with subtrees its neighbours in the file are other arrays' */
     if (!ebpo_input_expects(&c->file->in) || c->file->info.subtree_level)
@@ -163,7 +163,7 @@ static void expect_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t c
  * as well. */
 static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
 {
-    if (ebpo_h5_chunk_count(&array->shape) == 1 || atomic_load(&c->file->located))
+    if (ebpo_shape_chunks(&array->shape) == 1 || atomic_load(&c->file->located))
         return array->chunks[chunk].bytes;
     const ebpo_info *info = &c->file->info;
     uint64_t prefetched = c->file->in.source.prefetched,
@@ -231,7 +231,7 @@ void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, un
     uint64_t room = ebpo_chunks_room(c);
     for (unsigned i = 0; i < count; i++) {
         const ebpo_array_in *array = array_of(c, keys[i]);
-        if (ebpo_h5_chunk_count(&array->shape) > 1 && !atomic_load(&c->file->located))
+        if (ebpo_shape_chunks(&array->shape) > 1 && !atomic_load(&c->file->located))
             continue; /* where it lies is not known yet */
         uint64_t cost = cost_of(c, array, chunk_of(keys[i]));
         if (is_ahead(c, keys[i]) || !fits(c, cost) || (i >= now && cost > room) ||
@@ -341,8 +341,7 @@ static ebpo_status read_seen(ebpo_chunks *c, ebpo_error *error)
     const ebpo_array_in *index = ebpo_reader_array(c->file, EBPO_A_FACES_INDEX, 0);
     uint64_t cost = 0;
     ebpo_read_options read = ebpo_read_threads(1);
-    for (uint64_t i = 0; c->counted && index->present && i < ebpo_h5_chunk_count(&index->shape);
-         i++)
+    for (uint64_t i = 0; c->counted && index->present && i < ebpo_shape_chunks(&index->shape); i++)
         cost += cost_of(c, index, i);
     if (c->counted && !fits(c, cost))
         return refuse(c, index, error);
@@ -371,7 +370,7 @@ static ebpo_status load(void *user, uint64_t key, uint64_t most, void **item, ui
     if (allowed != EBPO_OK)
         return allowed;
     uint64_t rows = chunk_rows(array, chunk_of(key));
-    size_t row_bytes = ebpo_h5_row_bytes(&array->shape);
+    size_t row_bytes = ebpo_shape_row_bytes(&array->shape);
     ebpo_idle_readers *idle = &ebpo_reader_own(c->file)->idle;
     ebpo_idle_reader *reader = ebpo_idle_readers_take(idle);
     void *made = reader ? ebpo_alloc(rows, row_bytes) : NULL;

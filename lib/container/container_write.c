@@ -55,12 +55,12 @@ static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsign
     (void)error;
     for (uint64_t i = begin; i < end; i++) {
         slot *s = &w->slots[i];
-        const ebpo_h5_shape *shape = &s->array->shape;
+        const ebpo_shape *shape = &s->array->shape;
         uint64_t row = s->chunk * shape->chunk_rows, rows = shape->rows - row < shape->chunk_rows
                                                                 ? shape->rows - row
                                                                 : shape->chunk_rows;
-        size_t bytes = rows * ebpo_h5_row_bytes(shape);
-        s->raw_bytes = shape->chunk_rows * ebpo_h5_row_bytes(shape);
+        size_t bytes = rows * ebpo_shape_row_bytes(shape);
+        s->raw_bytes = shape->chunk_rows * ebpo_shape_row_bytes(shape);
         ebpo_plan_encode(&w->plan, s->array, row, rows, s->raw);
         memset(s->raw + bytes, 0, s->raw_bytes - bytes);
     }
@@ -71,7 +71,7 @@ static void digest_slots(writer *w)
 {
     for (unsigned i = 0; i < w->used; i++) {
         const slot *s = &w->slots[i];
-        const ebpo_h5_shape *shape = &s->array->shape;
+        const ebpo_shape *shape = &s->array->shape;
         uint64_t row = s->chunk * shape->chunk_rows, left = shape->rows - row;
         ebpo_array_digest *state = &w->digest[s->array - w->plan.array];
         uint8_t digest[32];
@@ -91,10 +91,10 @@ static void digest_slots(writer *w)
 /* The filling of the last chunk is no face. */
 static ebpo_status compress_gates(slot *s, ebpo_chunk_coder *coder, int level)
 {
-    ebpo_h5_shape stored = ebpo_stored_shape(&s->array->shape, true);
+    ebpo_shape stored = ebpo_stored_shape(&s->array->shape, true);
     uint64_t left = stored.rows - s->chunk * stored.chunk_rows,
              rows = left < stored.chunk_rows ? left : stored.chunk_rows;
-    size_t ends[EBPO_GATES_ENDS], bytes = stored.chunk_rows * ebpo_h5_row_bytes(&stored);
+    size_t ends[EBPO_GATES_ENDS], bytes = stored.chunk_rows * ebpo_shape_row_bytes(&stored);
     ebpo_gates_encode(s->raw, (uint32_t)rows, coder->scratch, ends);
     memset(coder->scratch + rows * EBPO_GATES_COLS, 0, bytes - rows * EBPO_GATES_COLS);
     return ebpo_chunk_encode_streams(coder, stored.pipeline, level, coder->scratch, bytes, ends,
@@ -103,7 +103,7 @@ static ebpo_status compress_gates(slot *s, ebpo_chunk_coder *coder, int level)
 
 static ebpo_status compress(slot *s, ebpo_chunk_coder *coder, int level)
 {
-    const ebpo_h5_shape *shape = &s->array->shape;
+    const ebpo_shape *shape = &s->array->shape;
     return s->array->gates ? compress_gates(s, coder, level)
                            : ebpo_chunk_encode(coder, shape->pipeline, level, shape->element_size,
                                                s->raw, s->raw_bytes, s->stored, &s->stored_bytes);
@@ -149,7 +149,7 @@ static void note_place(writer *w, uint32_t number, uint64_t bytes)
 /* Called for each chunk, in the order of the file, before it is written. */
 static void place_chunk(writer *w, const slot *s)
 {
-    if (w->index_at == 0 && ebpo_h5_chunk_count(&s->array->shape) > 1) {
+    if (w->index_at == 0 && ebpo_shape_chunks(&s->array->shape) > 1) {
         w->index_at = w->head.head_bytes + w->chunk_bytes;
         note_place(w, EBPO_PLACE_GAP, w->head.index_bytes);
     }
@@ -270,7 +270,7 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
         status = ebpo_headers_lay_out(&w->head, path, shown,
                                       (ebpo_first_chunk){ first, first_bytes }, error);
     if (status == EBPO_OK && w->head.index_bytes)
-        status = ebpo_headers_begin_index(&w->head, path, error);
+        status = ebpo_headers_begin_index(&w->head, error);
     if (status == EBPO_OK)
         status = write_chunks(w, error);
     if (status == EBPO_OK && w->head.places.shape.rows)

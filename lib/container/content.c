@@ -40,7 +40,7 @@ static uint64_t zigzag(uint64_t value, unsigned size)
 }
 
 /* The first row as it is where it goes on from the chunk before; keeps the last one's values. */
-static void join_deltas(ebpo_array_digest *digest, const ebpo_h5_shape *shape, bool goes_on,
+static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool goes_on,
                         uint64_t rows, const uint8_t *bytes, uint8_t *joined)
 {
     unsigned size = shape->element_size, cols = shape->cols ? shape->cols : 1;
@@ -67,11 +67,11 @@ static void add_faces_index(ebpo_array_digest *digest, uint64_t row, uint64_t ro
 }
 
 void ebpo_array_digest_add(ebpo_array_digest *digest, const ebpo_info *info, ebpo_array_id id,
-                           const ebpo_h5_shape *shape, uint64_t row, uint64_t rows,
+                           const ebpo_shape *shape, uint64_t row, uint64_t rows,
                            const uint8_t *bytes)
 {
-    size_t row_bytes = ebpo_h5_row_bytes(shape);
-    uint32_t full = ebpo_h5_chunk_rows(shape->rows, shape->cols, shape->element_size);
+    size_t row_bytes = ebpo_shape_row_bytes(shape);
+    uint32_t full = ebpo_full_chunk_rows(shape->rows, shape->cols, shape->element_size);
     uint8_t joined[3 * sizeof(uint64_t)];
     bool deltas = id == EBPO_A_VERTICES || id == EBPO_A_VERTEX_SOURCE || id == EBPO_A_FACE_SOURCE;
     if (info->subtree_level && id == EBPO_A_FACES_INDEX) {

@@ -8,7 +8,7 @@
 
 #include "base/sha256.h"
 #include "container/schema.h"
-#include "h5/h5.h"
+#include "codec/shape.h"
 
 typedef struct ebpo_content_entry {
     char path[EBPO_PATH_BYTES];
@@ -36,7 +36,7 @@ typedef struct ebpo_array_digest {
 void ebpo_array_digest_begin(ebpo_array_digest *digest);
 /* The chunk that begins with `row` of an array of this shape, without its filling. */
 void ebpo_array_digest_add(ebpo_array_digest *digest, const ebpo_info *info, ebpo_array_id id,
-                           const ebpo_h5_shape *shape, uint64_t row, uint64_t rows,
+                           const ebpo_shape *shape, uint64_t row, uint64_t rows,
                            const uint8_t *bytes);
 void ebpo_array_digest_end(ebpo_array_digest *digest, uint8_t out[32]);
 

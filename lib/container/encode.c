@@ -4,7 +4,7 @@
 #include "container/attribute_plan.h"
 #include "container/plan.h"
 
-static void encode_skips(const ebpo_level *level, const ebpo_h5_shape *shape, uint64_t row,
+static void encode_skips(const ebpo_level *level, const ebpo_shape *shape, uint64_t row,
                          uint64_t rows, uint8_t *file)
 {
     for (uint64_t i = row; i < row + rows; i++) {

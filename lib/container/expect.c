@@ -35,7 +35,7 @@ void ebpo_expect_chunks(ebpo_expected *e, const ebpo_array_in *array, uint64_t b
 
 void ebpo_expect_array(ebpo_expected *e, const ebpo_array_in *array)
 {
-    ebpo_expect_chunks(e, array, 0, array->present ? ebpo_h5_chunk_count(&array->shape) : 0);
+    ebpo_expect_chunks(e, array, 0, array->present ? ebpo_shape_chunks(&array->shape) : 0);
 }
 
 void ebpo_expect_level(ebpo_expected *e, int level, uint32_t without)
@@ -127,7 +127,7 @@ void ebpo_expect_top(const ebpo_file *file)
     if (!ebpo_input_expects(&file->in) || !file->has_places || atomic_load(&file->located) ||
         !is_top(info))
         return;
-    const ebpo_h5_chunk *places = file->root_array[EBPO_A_PLACES].chunks;
+    const ebpo_chunk_place *places = file->root_array[EBPO_A_PLACES].chunks;
     ebpo_range range[3] = { { places->address, places->bytes } };
     size_t count = 1;
     from = file->in.source.prefetched;

@@ -10,7 +10,7 @@
 #include "container/array_check.h"
 #include "container/idle_readers.h"
 #include "container/schema.h"
-#include "h5/h5.h"
+#include "head/head.h"
 #include "io/byte_source.h"
 
 typedef struct ebpo_array_in {
@@ -18,20 +18,20 @@ typedef struct ebpo_array_in {
     ebpo_array_id id;
     int level;
     char path[EBPO_PATH_BYTES];
-    ebpo_h5_shape shape; /* of what ebpo_reader_chunk gives */
-    bool gates;          /* it makes that of another coding: ebpo_stored_shape */
+    ebpo_shape shape; /* of what ebpo_reader_chunk gives */
+    bool gates;       /* it makes that of another coding: ebpo_stored_shape */
     uint64_t stored_bytes;
-    /* [ebpo_h5_chunk_count(&shape)] where each is; NULL when the array is absent. After
+    /* [ebpo_shape_chunks(&shape)] where each is; NULL when the array is absent. After
      * ebpo_reader_locate, unless it has one chunk only */
-    ebpo_h5_chunk *chunks;
+    ebpo_chunk_place *chunks;
     const char *coding; /* of attributes; the others' stand in ebpo_schema */
 } ebpo_array_in;
 
 /* Bytes that a stored chunk of it can have at most. */
 static inline size_t ebpo_reader_chunk_bound(const ebpo_array_in *array)
 {
-    ebpo_h5_shape stored = ebpo_stored_shape(&array->shape, array->gates);
-    return ebpo_chunk_bound(stored.chunk_rows * ebpo_h5_row_bytes(&stored));
+    ebpo_shape stored = ebpo_stored_shape(&array->shape, array->gates);
+    return ebpo_chunk_bound(stored.chunk_rows * ebpo_shape_row_bytes(&stored));
 }
 
 /* What the head says of an array of attributes. */
@@ -89,11 +89,11 @@ static inline ebpo_file *ebpo_reader_own(const ebpo_file *file)
 }
 
 /* How many rows the file's chunks may have. */
-static inline ebpo_h5_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, ebpo_array_id id)
+static inline ebpo_head_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, ebpo_array_id id)
 {
-    return id == EBPO_A_PLACES        ? EBPO_H5_ROWS_ALL
-           : file->info.subtree_level ? EBPO_H5_ROWS_POWER
-                                      : EBPO_H5_ROWS_FULL;
+    return id == EBPO_A_PLACES        ? EBPO_HEAD_ROWS_ALL
+           : file->info.subtree_level ? EBPO_HEAD_ROWS_POWER
+                                      : EBPO_HEAD_ROWS_FULL;
 }
 
 /* Of an array: 0 while another thread may be finding out where its chunks are. */

@@ -198,7 +198,7 @@ static bool missing_codes(ebpo_chunks *chunks, ebpo_array_id counts, ebpo_array_
 
 static uint64_t chunks_of(const ebpo_array_in *array)
 {
-    return array->present ? ebpo_h5_chunk_count(&array->shape) : 0;
+    return array->present ? ebpo_shape_chunks(&array->shape) : 0;
 }
 
 /* Of a level, the arrays of a single chunk: they will be needed, whichever group is read. Returns

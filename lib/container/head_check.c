@@ -17,8 +17,11 @@ static const char *check_mesh_counts(const ebpo_info *info)
     if (info->source_vertex_count > MESH_MAX || info->source_face_count > MESH_MAX ||
         info->mend.added_faces > MESH_MAX)
         return "a count of the source is beyond 2^32 - 2";
+    if (info->mend.dropped_faces > info->source_face_count)
+        return "more faces were dropped than the source has";
     if (info->vertex_count > info->source_vertex_count ||
-        info->face_count > info->source_face_count + info->mend.added_faces)
+        info->face_count >
+            info->source_face_count + info->mend.added_faces - info->mend.dropped_faces)
         return "the mesh has more vertices or faces than its source and the mending account for";
     if (info->parts & EBPO_PART_MAPS && !(info->parts & EBPO_PART_MESH))
         return "there are maps but no mesh";

@@ -6,6 +6,7 @@
 #include <ebpo/file.h>
 
 #include "h5/h5.h"
+#include "head/head.h"
 
 /* Writes the root's attributes; checksums and chunk_index_* as they stand (put them again
  * later). */
@@ -25,15 +26,16 @@ EBPO_MUST_USE ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id grou
 
 /* Reads the root's attributes: version and required parts first, so that a newer file is refused by
  * name and not for its details. */
-EBPO_MUST_USE ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
+EBPO_MUST_USE ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                          ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_facts_get_level(ebpo_h5_in *in, ebpo_h5_id group, const char *path,
-                                               ebpo_level_summary *level, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_get_level(ebpo_head *in, ebpo_head_object group,
+                                               const char *path, ebpo_level_summary *level,
+                                               ebpo_error *error);
 
 /* One digest, of any object. */
-EBPO_MUST_USE ebpo_status ebpo_facts_get_digest(ebpo_h5_in *in, ebpo_h5_id id, const char *object,
-                                                const char *name, uint8_t digest[32],
-                                                ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_get_digest(ebpo_head *in, ebpo_head_object id,
+                                                const char *object, const char *name,
+                                                uint8_t digest[32], ebpo_error *error);
 
 /* Checks that the facts agree with each other: ranges, and sums over the levels. For files
  * (EBPO_E_FORMAT) and for callers' trees (EBPO_E_ARGUMENT). */

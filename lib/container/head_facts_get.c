@@ -7,7 +7,7 @@
 #include "container/head_facts.h"
 #include "container/head_facts_table.h"
 
-static ebpo_status wrong_value(ebpo_h5_in *in, const char *object, const char *name,
+static ebpo_status wrong_value(ebpo_head *in, const char *object, const char *name,
                                ebpo_error *error)
 {
     return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, object, -1,
@@ -16,11 +16,11 @@ static ebpo_status wrong_value(ebpo_h5_in *in, const char *object, const char *n
                         name);
 }
 
-static ebpo_status get_word(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const ebpo_fact *f,
-                            void *field, ebpo_error *error)
+static ebpo_status get_word(ebpo_head *in, ebpo_head_object id, const char *object,
+                            const ebpo_fact *f, void *field, ebpo_error *error)
 {
     char word[32];
-    ebpo_status status = ebpo_h5_get_text(in, id, object, f->name, word, sizeof word, error);
+    ebpo_status status = ebpo_head_get_text(in, id, object, f->name, word, sizeof word, error);
     if (status != EBPO_OK)
         return status;
     for (int i = 0; f->words[i]; i++) {
@@ -40,11 +40,11 @@ static int hex_digit(char c)
     return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
 }
 
-static ebpo_status get_digest(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name,
-                              uint8_t *digest, ebpo_error *error)
+static ebpo_status get_digest(ebpo_head *in, ebpo_head_object id, const char *object,
+                              const char *name, uint8_t *digest, ebpo_error *error)
 {
     char hex[66];
-    ebpo_status status = ebpo_h5_get_text(in, id, object, name, hex, sizeof hex, error);
+    ebpo_status status = ebpo_head_get_text(in, id, object, name, hex, sizeof hex, error);
     if (status != EBPO_OK)
         return status;
     if (strlen(hex) != 64)
@@ -58,7 +58,7 @@ static ebpo_status get_digest(ebpo_h5_in *in, ebpo_h5_id id, const char *object,
     return EBPO_OK;
 }
 
-ebpo_status ebpo_facts_get_digest(ebpo_h5_in *in, ebpo_h5_id id, const char *object,
+ebpo_status ebpo_facts_get_digest(ebpo_head *in, ebpo_head_object id, const char *object,
                                   const char *name, uint8_t digest[32], ebpo_error *error)
 {
     ebpo_status status = get_digest(in, id, object, name, digest, error);
@@ -68,14 +68,14 @@ ebpo_status ebpo_facts_get_digest(ebpo_h5_in *in, ebpo_h5_id id, const char *obj
                : status;
 }
 
-static ebpo_status get_limited(ebpo_h5_in *in, ebpo_h5_id id, const char *object,
+static ebpo_status get_limited(ebpo_head *in, ebpo_head_object id, const char *object,
                                const ebpo_fact *f, void *field, ebpo_error *error)
 {
     int64_t number = 0;
     uint64_t count = 0;
     bool is_int = f->kind == EBPO_FACT_NUMBER;
-    ebpo_status status = is_int ? ebpo_h5_get_int(in, id, object, f->name, &number, error)
-                                : ebpo_h5_get_count(in, id, object, f->name, &count, error);
+    ebpo_status status = is_int ? ebpo_head_get_int(in, id, object, f->name, &number, error)
+                                : ebpo_head_get_count(in, id, object, f->name, &count, error);
     if (status != EBPO_OK)
         return status;
     if ((f->kind == EBPO_FACT_YES_NO && count > 1) ||
@@ -91,29 +91,35 @@ static ebpo_status get_limited(ebpo_h5_in *in, ebpo_h5_id id, const char *object
     return EBPO_OK;
 }
 
-static ebpo_status get_fact(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const ebpo_fact *f,
-                            void *record, ebpo_error *error)
+static ebpo_status get_fact(ebpo_head *in, ebpo_head_object id, const char *object,
+                            const ebpo_fact *f, void *record, ebpo_error *error)
 {
     void *field = (char *)record + f->offset;
     ebpo_status status = EBPO_E_ARGUMENT;
     switch (f->kind) {
     case EBPO_FACT_TEXT:
     case EBPO_FACT_NOTE:
-        status = ebpo_h5_get_text(in, id, object, f->name, field, f->size, error);
+        status = ebpo_head_get_text(in, id, object, f->name, field, f->size, error);
         break;
     case EBPO_FACT_DIGEST: status = get_digest(in, id, object, f->name, field, error); break;
     case EBPO_FACT_NUMBER:
     case EBPO_FACT_COUNT32:
     case EBPO_FACT_YES_NO: status = get_limited(in, id, object, f, field, error); break;
-    case EBPO_FACT_INTEGER: status = ebpo_h5_get_int(in, id, object, f->name, field, error); break;
+    case EBPO_FACT_INTEGER:
+        status = ebpo_head_get_int(in, id, object, f->name, field, error);
+        break;
     case EBPO_FACT_HINT:
-        if (ebpo_h5_get_count(in, id, object, f->name, field, NULL) != EBPO_OK)
+        if (ebpo_head_get_count(in, id, object, f->name, field, NULL) != EBPO_OK)
             *(uint64_t *)field = 0; /* absent, or of another program's type: no hint */
         return EBPO_OK;
-    case EBPO_FACT_COUNT: status = ebpo_h5_get_count(in, id, object, f->name, field, error); break;
-    case EBPO_FACT_REAL: status = ebpo_h5_get_real(in, id, object, f->name, field, 0, error); break;
+    case EBPO_FACT_COUNT:
+        status = ebpo_head_get_count(in, id, object, f->name, field, error);
+        break;
+    case EBPO_FACT_REAL:
+        status = ebpo_head_get_real(in, id, object, f->name, field, 0, error);
+        break;
     case EBPO_FACT_REAL3:
-        status = ebpo_h5_get_real(in, id, object, f->name, field, 3, error);
+        status = ebpo_head_get_real(in, id, object, f->name, field, 3, error);
         break;
     case EBPO_FACT_WORD: status = get_word(in, id, object, f, field, error); break;
     }
@@ -125,14 +131,15 @@ static ebpo_status get_fact(ebpo_h5_in *in, ebpo_h5_id id, const char *object, c
                         "attribute %s is missing; get a fresh copy of the file", f->name);
 }
 
-static ebpo_status get_version(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
+static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
+                               ebpo_error *error)
 {
     static const ebpo_fact major = { "format_version_major", EBPO_FACT_NUMBER,
                                      EBPO_FACT_AT(version_major) };
     static const ebpo_fact minor = { "format_version_minor", EBPO_FACT_NUMBER,
                                      EBPO_FACT_AT(version_minor) };
     char format[32];
-    ebpo_status status = ebpo_h5_get_text(in, root, "/", "format", format, sizeof format, error);
+    ebpo_status status = ebpo_head_get_text(in, root, "/", "format", format, sizeof format, error);
     if (status == EBPO_E_MEMORY)
         return status;
     if (status != EBPO_OK || strcmp(format, EBPO_FORMAT_NAME) != 0)
@@ -151,7 +158,7 @@ static ebpo_status get_version(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
             info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
     char words[32] = ""; /* for people, but files of the draft have the same numbers */
     if (status == EBPO_OK)
-        status = ebpo_h5_get_text(in, root, "/", "format_version", words, sizeof words, error);
+        status = ebpo_head_get_text(in, root, "/", "format_version", words, sizeof words, error);
     if (status == EBPO_E_ABSENT)
         return EBPO_OK;
     if (status == EBPO_OK && strcmp(words, "1.0-draft") == 0)
@@ -162,7 +169,7 @@ static ebpo_status get_version(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
 }
 
 /* A part may stand in either list; one that we know counts as present. */
-static ebpo_status take_part(ebpo_h5_in *in, const char *word, bool required, unsigned *seen,
+static ebpo_status take_part(ebpo_head *in, const char *word, bool required, unsigned *seen,
                              ebpo_error *error)
 {
     for (int i = 0; i < ebpo_part_word_count; i++) {
@@ -182,13 +189,14 @@ static ebpo_status take_part(ebpo_h5_in *in, const char *word, bool required, un
         "the file needs part \"%s\", which this library does not know; use a newer one", word);
 }
 
-static ebpo_status get_parts(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
+static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
+                             ebpo_error *error)
 {
     unsigned seen = 0;
     for (int required = 1; required >= 0; required--) {
         const char *name = required ? "required_parts" : "optional_parts";
         char words[1024], *rest = words, *word;
-        ebpo_status status = ebpo_h5_get_text(in, root, "/", name, words, sizeof words, error);
+        ebpo_status status = ebpo_head_get_text(in, root, "/", name, words, sizeof words, error);
         if (status == EBPO_E_ABSENT)
             return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, "/", -1,
                                 "attribute %s is missing; get a fresh copy of the file", name);
@@ -210,7 +218,8 @@ static ebpo_status get_parts(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, e
     return seen & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
 }
 
-static ebpo_status get_subtrees(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
+static ebpo_status get_subtrees(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
+                                ebpo_error *error)
 {
     ebpo_status status = get_fact(in, root, "/", &ebpo_subtree_level_fact, info, error);
     if (status == EBPO_OK)
@@ -221,7 +230,8 @@ static ebpo_status get_subtrees(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info
     return status;
 }
 
-static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
+static ebpo_status get_subset(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
+                              ebpo_error *error)
 {
     int64_t levels = 0;
     ebpo_status status = get_digest(in, root, "/", "subset_of", info->subset_of, error);
@@ -229,19 +239,19 @@ static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, 
         return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, "/", -1,
                             "attribute subset_of is missing; get a fresh copy of the file");
     if (status == EBPO_OK)
-        status = ebpo_h5_get_int(in, root, "/", "subset_levels", &levels, error);
+        status = ebpo_head_get_int(in, root, "/", "subset_levels", &levels, error);
     if (status == EBPO_OK && (levels < 1 || levels > EBPO_LEVELS_MAX))
         return wrong_value(in, "/", "subset_levels", error);
     info->cut_levels = (int)levels;
     if (status == EBPO_OK || status == EBPO_E_ABSENT)
-        status = ebpo_h5_get_real(in, root, "/", "subset_box", info->kept_box, 6, error);
+        status = ebpo_head_get_real(in, root, "/", "subset_box", info->kept_box, 6, error);
     info->boxed = status == EBPO_OK;
     for (int k = 0; k < 3 && info->boxed; k++)
         if (!(isfinite(info->kept_box[k]) && isfinite(info->kept_box[3 + k]) &&
               info->kept_box[k] <= info->kept_box[3 + k]))
             return wrong_value(in, "/", "subset_box", error);
     if (status == EBPO_OK || status == EBPO_E_ABSENT)
-        status = ebpo_h5_get_real(in, root, "/", "subset_error", &info->kept_error, 0, error);
+        status = ebpo_head_get_real(in, root, "/", "subset_error", &info->kept_error, 0, error);
     if (status == EBPO_OK && !(isfinite(info->kept_error) && info->kept_error > 0))
         return wrong_value(in, "/", "subset_error", error);
     return status == EBPO_E_ABSENT ? EBPO_OK : status;
@@ -249,11 +259,11 @@ static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, 
 
 /* Place of the attribute's word in `words`; -1: another one, of a newer library. Without the
  * attribute *out stays. */
-static ebpo_status get_known(ebpo_h5_in *in, ebpo_h5_id root, const char *name,
+static ebpo_status get_known(ebpo_head *in, ebpo_head_object root, const char *name,
                              const char *(*word_of)(int value), int *out, ebpo_error *error)
 {
     char word[64];
-    ebpo_status status = ebpo_h5_get_text(in, root, "/", name, word, sizeof word, error);
+    ebpo_status status = ebpo_head_get_text(in, root, "/", name, word, sizeof word, error);
     if (status == EBPO_E_ABSENT || (status == EBPO_OK && !*word))
         return EBPO_OK;
     *out = -1;
@@ -271,7 +281,7 @@ static const char *selection_word(int selection)
 
 static const char *normals_word(int normals) { return ebpo_normals_words[normals]; }
 
-static ebpo_status get_selection(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
+static ebpo_status get_selection(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                  ebpo_error *error)
 {
     ebpo_status status = get_known(in, root, "selection", selection_word, &info->selection, error);
@@ -282,7 +292,21 @@ static ebpo_status get_selection(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *inf
     return status;
 }
 
-ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
+/* Dropping is known to have been asked for where it did something. */
+static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
+                               ebpo_error *error)
+{
+    uint64_t count = 0;
+    ebpo_status status =
+        ebpo_head_get_count(in, root, "/", ebpo_dropped_faces_fact.name, &count, error);
+    if (status == EBPO_E_ABSENT)
+        return EBPO_OK;
+    info->mend.dropped_faces = count;
+    info->mend.drop_duplicates = count > 0;
+    return status;
+}
+
+ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info, ebpo_error *error)
 {
     ebpo_status status = get_version(in, root, info, error);
     if (status == EBPO_OK)
@@ -291,6 +315,8 @@ ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebp
         status = get_fact(in, root, "/", &ebpo_facts[i], info, error);
     if (status == EBPO_OK)
         status = get_selection(in, root, info, error);
+    if (status == EBPO_OK)
+        status = get_dropped(in, root, info, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
         status = get_fact(in, root, "/", &ebpo_colours_fact, info, error);
     if (status == EBPO_OK && info->subtree_level)
@@ -298,14 +324,14 @@ ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebp
     return status == EBPO_OK && info->pruned ? get_subset(in, root, info, error) : status;
 }
 
-ebpo_status ebpo_facts_get_level(ebpo_h5_in *in, ebpo_h5_id group, const char *path,
+ebpo_status ebpo_facts_get_level(ebpo_head *in, ebpo_head_object group, const char *path,
                                  ebpo_level_summary *level, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < ebpo_level_fact_count && status == EBPO_OK; i++)
         status = get_fact(in, group, path, &ebpo_level_facts[i], level, error);
     if (status == EBPO_OK)
-        status =
-            ebpo_h5_get_count(in, group, path, ebpo_pruned_fact.name, &level->pruned_count, error);
+        status = ebpo_head_get_count(in, group, path, ebpo_pruned_fact.name, &level->pruned_count,
+                                     error);
     return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }

@@ -102,6 +102,9 @@ const ebpo_fact ebpo_selection_facts[] = {
 };
 const int ebpo_selection_fact_count = sizeof ebpo_selection_facts / sizeof ebpo_selection_facts[0];
 
+const ebpo_fact ebpo_dropped_faces_fact = { "mend_dropped_faces", EBPO_FACT_COUNT,
+                                            EBPO_FACT_AT(mend.dropped_faces) };
+
 const ebpo_fact ebpo_subtree_level_fact = { "subtree_level", EBPO_FACT_NUMBER,
                                             EBPO_FACT_AT(subtree_level) },
                 ebpo_colours_fact = { "colours_sha256", EBPO_FACT_DIGEST,

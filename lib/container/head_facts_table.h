@@ -43,6 +43,9 @@ extern const ebpo_fact ebpo_level_facts[];
 extern const int ebpo_level_fact_count;
 extern const ebpo_fact ebpo_pruned_fact; /* left out when 0 */
 
+/* Of ebpo_info, left out when 0. */
+extern const ebpo_fact ebpo_dropped_faces_fact;
+
 /* How planes were chosen, where that was not the usual way: told, and needed by no reader. */
 extern const ebpo_fact ebpo_selection_facts[];
 extern const int ebpo_selection_fact_count;

@@ -12,7 +12,7 @@ enum { ALONE_BYTES = 4096 };
 static bool has_index(const ebpo_plan *plan)
 {
     for (unsigned i = 0; i < plan->count; i++)
-        if (ebpo_h5_chunk_count(&plan->array[i].shape) > 1)
+        if (ebpo_shape_chunks(&plan->array[i].shape) > 1)
             return true;
     return false;
 }
@@ -26,10 +26,10 @@ void ebpo_headers_plan(ebpo_headers *h, ebpo_plan *plan, uint64_t chunks, int co
     if (!plan->info.subtree_level)
         return;
     uint64_t rows = chunks + has_index(plan);
-    h->places.shape = (ebpo_h5_shape){ .rows = rows,
-                                       .chunk_rows = (uint32_t)rows,
-                                       .element_size = 8,
-                                       .pipeline = plan->array[0].shape.pipeline };
+    h->places.shape = (ebpo_shape){ .rows = rows,
+                                    .chunk_rows = (uint32_t)rows,
+                                    .element_size = 8,
+                                    .pipeline = plan->array[0].shape.pipeline };
 }
 
 static ebpo_status make_level_groups(ebpo_headers *h, ebpo_error *error)
@@ -38,7 +38,7 @@ static ebpo_status make_level_groups(ebpo_headers *h, ebpo_error *error)
     ebpo_h5_id id;
     ebpo_status status =
         ebpo_h5_make_group(&h->out, "/levels", (unsigned)info->level_count, &id, error);
-    ebpo_h5_close_id(status == EBPO_OK ? id : -1);
+    ebpo_h5_close_id(&h->out, status == EBPO_OK ? id : -1);
     for (int level = 0; level < info->level_count && status == EBPO_OK; level++) {
         char path[EBPO_PATH_BYTES];
         unsigned links = 0;
@@ -48,7 +48,7 @@ static ebpo_status make_level_groups(ebpo_headers *h, ebpo_error *error)
         status = ebpo_h5_make_group(&h->out, path, links, &id, error);
         if (status == EBPO_OK)
             status = ebpo_facts_put_level(&h->out, id, &info->level[level], error);
-        ebpo_h5_close_id(id);
+        ebpo_h5_close_id(&h->out, id);
     }
     return status;
 }
@@ -64,7 +64,7 @@ static ebpo_status make_root_group(ebpo_headers *h, const char *path, uint32_t n
     for (int k = EBPO_LEVEL_ARRAYS; k < EBPO_ARRAYS; k++)
         links += (ebpo_schema[k].needs & need) != 0;
     ebpo_status status = ebpo_h5_make_group(&h->out, path, links, &id, error);
-    ebpo_h5_close_id(id);
+    ebpo_h5_close_id(&h->out, id);
     return status;
 }
 
@@ -80,7 +80,7 @@ ebpo_status ebpo_headers_put_holds(ebpo_headers *h, uint64_t file_bytes, uint64_
 static ebpo_status make_array(ebpo_headers *h, ebpo_array_out *a, const ebpo_first_chunk *first,
                               ebpo_error *error)
 {
-    ebpo_h5_shape shape = ebpo_stored_shape(&a->shape, a->gates);
+    ebpo_shape shape = ebpo_stored_shape(&a->shape, a->gates);
     ebpo_status status = ebpo_h5_make_array(&h->out, a->path, &shape, &a->handle, error);
     if (status == EBPO_OK && first)
         status = ebpo_h5_put_chunk(&h->out, a->path, a->handle, &a->shape, 0, first->data,
@@ -131,11 +131,11 @@ static ebpo_status lay_out(ebpo_headers *h, const char *path, const char *shown,
 void ebpo_headers_close(ebpo_headers *h)
 {
     for (unsigned i = 0; i < h->plan->count; i++) {
-        ebpo_h5_close_id(h->plan->array[i].handle);
+        ebpo_h5_close_id(&h->out, h->plan->array[i].handle);
         h->plan->array[i].handle = -1;
     }
-    ebpo_h5_close_id(h->places.handle);
-    ebpo_h5_close_id(h->root);
+    ebpo_h5_close_id(&h->out, h->places.handle);
+    ebpo_h5_close_id(&h->out, h->root);
     h->places.handle = h->root = -1;
 }
 
@@ -155,7 +155,7 @@ ebpo_status ebpo_headers_measure(ebpo_headers *h, const char *shown, ebpo_error 
         status = ebpo_h5_head_used(&h->out, capacity, &headers, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++) {
         const ebpo_array_out *a = &plan->array[i];
-        for (uint64_t k = i == 0; k < ebpo_h5_chunk_count(&a->shape) && status == EBPO_OK; k++)
+        for (uint64_t k = i == 0; k < ebpo_shape_chunks(&a->shape) && status == EBPO_OK; k++)
             status = ebpo_h5_put_chunk(&h->out, a->path, a->handle, &a->shape, k, "", 1, error);
     }
     ebpo_headers_close(h);
@@ -170,10 +170,10 @@ ebpo_status ebpo_headers_measure(ebpo_headers *h, const char *shown, ebpo_error 
     return status;
 }
 
-ebpo_status ebpo_headers_begin_index(ebpo_headers *h, const char *path, ebpo_error *error)
+ebpo_status ebpo_headers_begin_index(ebpo_headers *h, ebpo_error *error)
 {
     ebpo_headers_close(h);
-    ebpo_status status = ebpo_h5_reopen(&h->out, path, h->index_bytes, error);
+    ebpo_status status = ebpo_h5_reopen(&h->out, h->index_bytes, error);
     if (status == EBPO_OK)
         status = ebpo_h5_root(&h->out, &h->root, error);
     for (unsigned i = 0; i < h->plan->count && status == EBPO_OK; i++)

@@ -36,8 +36,7 @@ EBPO_MUST_USE ebpo_status ebpo_headers_lay_out(ebpo_headers *h, const char *path
 
 /* With index_bytes: what comes now is in a piece of its own, once the first array of several chunks
  * calls for it. */
-EBPO_MUST_USE ebpo_status ebpo_headers_begin_index(ebpo_headers *h, const char *path,
-                                                   ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_headers_begin_index(ebpo_headers *h, ebpo_error *error);
 
 /* Of the list of chunks: its own place and the file's size, which tell readers whether it still
  * holds. */

@@ -4,7 +4,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/sized.h"
-#include "container/open.h"
+#include "container/stored_sizes.h"
 #include "container/places.h"
 
 enum {
@@ -23,17 +23,17 @@ static int all_arrays(const ebpo_file *file) { return OF_FORMAT + file->attribut
 
 /* --- by HDF5's index --- */
 
-static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *a,
+static ebpo_status locate_array(ebpo_file *file, ebpo_head *head, ebpo_array_in *a,
                                 ebpo_error *error)
 {
-    ebpo_h5_shape shape;
-    ebpo_h5_chunk *chunks;
+    ebpo_shape shape;
+    ebpo_chunk_place *chunks;
     uint64_t stored;
     if (!a->present || a->chunks)
         return EBPO_OK;
     ebpo_status status =
-        ebpo_h5_read_array(h5, a->path, UINT64_MAX, ebpo_reader_rows_of_chunk(file, a->id), &shape,
-                           NULL, &chunks, &stored, error);
+        ebpo_head_read_array(head, a->path, UINT64_MAX, ebpo_reader_rows_of_chunk(file, a->id),
+                             &shape, NULL, &chunks, &stored, error);
     if (status != EBPO_OK)
         return status;
     if (shape.rows != a->shape.rows || shape.cols != a->shape.cols ||
@@ -49,16 +49,16 @@ static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *
 
 static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
 {
-    ebpo_h5_in h5 = EBPO_H5_IN_INIT;
+    ebpo_head head = EBPO_HEAD_INIT;
     ebpo_range index = { file->info.chunk_index_offset, file->info.chunk_index_bytes };
     if (index.size && index.offset + index.size > file->in.source.prefetched)
         ebpo_input_expect(&file->in, &index, 1);
-    ebpo_status status = ebpo_h5_open(&h5, &file->in, error);
+    ebpo_status status = ebpo_head_open(&head, &file->in, error);
     if (status == EBPO_OK)
-        ebpo_h5_expect_index(&h5, index);
+        ebpo_head_expect_index(&head, index);
     for (int i = 0; i < all_arrays(file) && status == EBPO_OK; i++)
-        status = locate_array(file, &h5, array_number(file, i), error);
-    status = ebpo_h5_close(&h5, status, error);
+        status = locate_array(file, &head, array_number(file, i), error);
+    status = ebpo_head_close(&head, status, error);
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 
@@ -85,7 +85,8 @@ static ebpo_status list_fails(const ebpo_file *file, const char *what, const cha
                         -1, "%s %s; get a fresh copy of the file", what, path);
 }
 
-static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_h5_chunk chunk, ebpo_error *error)
+static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_place chunk,
+                              ebpo_error *error)
 {
     int level;
     ebpo_array_id id = ebpo_place_array(number, &level);
@@ -95,15 +96,15 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_h5_chunk chunk, 
                        : id == EBPO_A_ATTRIBUTE ? &l->file->attributes.array[level]
                                                 : &l->file->root_array[id];
     uint64_t *seen = seen_of(l, id, level);
-    if (!a->present || *seen == ebpo_h5_chunk_count(&a->shape))
+    if (!a->present || *seen == ebpo_shape_chunks(&a->shape))
         return list_fails(l->file, "the list has more chunks than", a->path, error);
     if (chunk.bytes == 0 || chunk.bytes > ebpo_reader_chunk_bound(a))
         return list_fails(l->file, "the list has a chunk of a size that it cannot have of", a->path,
                           error);
-    if (ebpo_h5_chunk_count(&a->shape) == 1 &&
+    if (ebpo_shape_chunks(&a->shape) == 1 &&
         (a->chunks[0].address != chunk.address || a->chunks[0].bytes != chunk.bytes))
         return list_fails(l->file, "the list contradicts the header of", a->path, error);
-    if (ebpo_h5_chunk_count(&a->shape) > 1) {
+    if (ebpo_shape_chunks(&a->shape) > 1) {
         a->chunks[*seen] = chunk;
         a->stored_bytes += chunk.bytes;
     }
@@ -117,18 +118,18 @@ static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chun
 {
     if (!a->present || a->chunks)
         return EBPO_OK;
-    *chunks += ebpo_h5_chunk_count(&a->shape);
+    *chunks += ebpo_shape_chunks(&a->shape);
     if (*chunks > file->root_array[EBPO_A_PLACES].shape.rows)
         return list_fails(file, "the list has fewer chunks than", a->path, error);
     a->stored_bytes = 0;
-    a->chunks = ebpo_alloc_zero(ebpo_h5_chunk_count(&a->shape), sizeof *a->chunks);
+    a->chunks = ebpo_alloc_zero(ebpo_shape_chunks(&a->shape), sizeof *a->chunks);
     return a->chunks ? EBPO_OK : ebpo_fail_memory(error, *chunks * sizeof *a->chunks);
 }
 
 static ebpo_status end_array(listing *l, const ebpo_array_in *a, ebpo_error *error)
 {
     uint64_t seen = *seen_of(l, a->id, a->level);
-    return !a->present || a->id == EBPO_A_PLACES || seen == ebpo_h5_chunk_count(&a->shape)
+    return !a->present || a->id == EBPO_A_PLACES || seen == ebpo_shape_chunks(&a->shape)
                ? EBPO_OK
                : list_fails(l->file, "the list has fewer chunks than", a->path, error);
 }
@@ -149,7 +150,7 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
                 list_fails(file, "a chunk lies beyond the end of the file in", "the list", error);
         else
             status = list_chunk(l, ebpo_place_number_of(places[i]),
-                                (ebpo_h5_chunk){ at, ebpo_place_bytes_of(places[i]) }, error);
+                                (ebpo_chunk_place){ at, ebpo_place_bytes_of(places[i]) }, error);
         at += ebpo_place_bytes_of(places[i]);
     }
     for (int i = 0; i < all_arrays(file) && status == EBPO_OK; i++)
@@ -163,7 +164,7 @@ static void forget(ebpo_file *file)
 {
     for (int i = 0; i < all_arrays(file); i++) {
         ebpo_array_in *a = array_number(file, i);
-        if (a->present && ebpo_h5_chunk_count(&a->shape) > 1) {
+        if (a->present && ebpo_shape_chunks(&a->shape) > 1) {
             free(a->chunks);
             a->chunks = NULL;
         }
@@ -173,7 +174,7 @@ static void forget(ebpo_file *file)
 static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
 {
     const ebpo_array_in *a = &file->root_array[EBPO_A_PLACES];
-    ebpo_h5_chunk chunk = a->chunks[0];
+    ebpo_chunk_place chunk = a->chunks[0];
     uint64_t *places = NULL;
     const char *why = "";
     if (a->shape.rows > file->info.file_bytes)
@@ -228,5 +229,5 @@ ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out, ebpo
 ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array, ebpo_error *error)
 {
     /* A single chunk's place stands in the array's header: known since the opening. */
-    return ebpo_h5_chunk_count(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, NULL, error);
+    return ebpo_shape_chunks(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, NULL, error);
 }

@@ -10,7 +10,7 @@
 #include "base/sized.h"
 #include "container/attribute_open.h"
 #include "container/head_facts.h"
-#include "container/open.h"
+#include "container/stored_sizes.h"
 #include "http/http_source.h"
 
 /* The word says how the numbers are to be read: with another one they would be read wrong. In files
@@ -27,11 +27,11 @@ static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gat
 static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
-    ebpo_h5_shape values = a->shape;
+    ebpo_shape values = a->shape;
     values.cols = ebpo_schema_cols(info, a->id);
     if (gates)
         values.element_size = spec->sizes;
-    ebpo_h5_shape stored = ebpo_stored_shape(&values, gates);
+    ebpo_shape stored = ebpo_stored_shape(&values, gates);
     bool fits = a->shape.cols == stored.cols && a->shape.element_size == stored.element_size &&
                 spec->sizes & values.element_size && a->shape.is_signed == spec->is_signed;
     a->shape = values;
@@ -39,7 +39,7 @@ static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
     return fits;
 }
 
-static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id, int level,
+static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id, int level,
                               ebpo_error *error)
 {
     const ebpo_array_spec *spec = &ebpo_schema[id];
@@ -49,13 +49,14 @@ static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id,
     bool gates = id == EBPO_A_FACES && file->info.gates;
     *a = (ebpo_array_in){ .id = id, .level = level };
     ebpo_schema_path(id, level, a->path);
-    if (rows == 0 || (spec->if_needed && ebpo_h5_look(h5, a->path) == EBPO_H5_ABSENT))
+    if (rows == 0 || (spec->if_needed && ebpo_head_look(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
     /* places of more are in the index, or in a list */
     uint64_t most = ebpo_input_is_far(&file->in) || file->has_places ? 1 : UINT64_MAX;
-    char coding[EBPO_H5_CODING_BYTES];
-    ebpo_status status = ebpo_h5_read_array(h5, a->path, most, ebpo_reader_rows_of_chunk(file, id),
-                                            &a->shape, coding, &a->chunks, &a->stored_bytes, error);
+    char coding[EBPO_HEAD_CODING_BYTES];
+    ebpo_status status =
+        ebpo_head_read_array(head, a->path, most, ebpo_reader_rows_of_chunk(file, id), &a->shape,
+                             coding, &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
     ebpo_check check = ebpo_reader_check(file, NULL);
@@ -84,78 +85,29 @@ static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id,
     if (!a->chunks)
         atomic_store(&file->located, false);
     if (id < EBPO_LEVEL_ARRAYS && level < file->info.index_level &&
-        ebpo_h5_chunk_count(&a->shape) > 1)
+        ebpo_shape_chunks(&a->shape) > 1)
         file->info.index_level = level;
     return EBPO_OK;
 }
 
-static ebpo_status open_levels(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
+static ebpo_status open_levels(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
-    ebpo_h5_id id;
+    ebpo_head_object id;
     char path[EBPO_PATH_BYTES];
-    ebpo_status status = ebpo_h5_open_group(h5, "/levels", &id, error);
-    ebpo_h5_close_id(id);
+    ebpo_status status = ebpo_head_open_group(head, "/levels", &id, error);
     for (int level = 0; level < file->info.level_count && status == EBPO_OK; level++) {
         snprintf(path, sizeof path, "/levels/%02d", level);
-        status = ebpo_h5_open_group(h5, path, &id, error);
+        status = ebpo_head_open_group(head, path, &id, error);
         if (status == EBPO_OK)
-            status = ebpo_facts_get_level(h5, id, path, &file->info.level[level], error);
-        ebpo_h5_close_id(id);
+            status = ebpo_facts_get_level(head, id, path, &file->info.level[level], error);
     }
     return status;
 }
 
-static ebpo_status open_group(ebpo_h5_in *h5, const char *path, bool wanted, ebpo_error *error)
+static ebpo_status open_group(ebpo_head *head, const char *path, bool wanted, ebpo_error *error)
 {
-    ebpo_h5_id id = -1;
-    ebpo_status status = wanted ? ebpo_h5_open_group(h5, path, &id, error) : EBPO_OK;
-    ebpo_h5_close_id(id);
-    return status;
-}
-
-static uint64_t level_bytes(const ebpo_file *file, int level, bool located)
-{
-    uint64_t bytes = 0;
-    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
-        const ebpo_array_in *a = &file->level_array[level][id];
-        if (located || (a->present && ebpo_h5_chunk_count(&a->shape) == 1))
-            bytes += a->stored_bytes;
-    }
-    return bytes;
-}
-
-/* Another thread may be locating the chunks: until then only those count that opening tells. */
-uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
-{
-    return level_bytes(file, level, atomic_load(&file->located));
-}
-
-/* Of the arrays whose chunks are known. */
-ebpo_stored_sizes ebpo_reader_sizes(const ebpo_file *file)
-{
-    ebpo_stored_sizes sizes = { .map_bytes = 0 };
-    for (int level = 0; level < file->info.level_count; level++)
-        sizes.level_bytes[level] = level_bytes(file, level, true);
-    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
-        *(uint64_t *)(void *)((char *)&sizes + ebpo_schema[id].bytes) +=
-            file->root_array[id].stored_bytes;
-    for (int i = 0; i < file->attributes.arrays; i++)
-        sizes.attribute_bytes += file->attributes.array[i].stored_bytes;
-    return sizes;
-}
-
-ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
-{
-    ebpo_stored_sizes sizes = ebpo_reader_sizes(file);
-    uint64_t stored = sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes +
-                      sizes.subtree_bytes + sizes.attribute_bytes;
-    for (int level = 0; level < file->info.level_count; level++)
-        stored += sizes.level_bytes[level];
-    if (stored > file->info.file_bytes)
-        return ebpo_fail_file(
-            error, EBPO_E_FORMAT, file->in.shown,
-            "the arrays' chunks take more room than the file has; get a fresh copy of the file");
-    return EBPO_OK;
+    ebpo_head_object id;
+    return wanted ? ebpo_head_open_group(head, path, &id, error) : EBPO_OK;
 }
 
 static ebpo_status check_pipeline(const ebpo_file *file, const ebpo_array_in *a, ebpo_error *error)
@@ -182,51 +134,49 @@ static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
 }
 
 /* The list of all chunks, which holds unless another program has rewritten the file. */
-static ebpo_status open_places(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
+static ebpo_status open_places(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     const ebpo_array_in *a = &file->root_array[EBPO_A_PLACES];
-    ebpo_h5_id id, group;
+    ebpo_head_object id, group;
     uint64_t bytes = 0, offset = 0;
-    ebpo_status status = ebpo_h5_open_group(h5, "/subtrees", &group, error);
-    ebpo_h5_close_id(group);
+    ebpo_status status = ebpo_head_open_group(head, "/subtrees", &group, error);
     if (status == EBPO_OK)
-        status = open_array(file, h5, EBPO_A_PLACES, 0, error);
+        status = open_array(file, head, EBPO_A_PLACES, 0, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_look_at_array(h5, a->path, &id, error);
+        status = ebpo_head_open_array(head, a->path, &id, error);
     if (status != EBPO_OK)
         return status;
-    bool stated = ebpo_h5_get_count(h5, id, a->path, "file_bytes", &bytes, NULL) == EBPO_OK &&
-                  ebpo_h5_get_count(h5, id, a->path, "offset", &offset, NULL) == EBPO_OK;
-    ebpo_h5_close_id(id);
+    bool stated = ebpo_head_get_count(head, id, a->path, "file_bytes", &bytes, NULL) == EBPO_OK &&
+                  ebpo_head_get_count(head, id, a->path, "offset", &offset, NULL) == EBPO_OK;
     file->has_places =
         stated && bytes == file->info.file_bytes && a->chunks && offset == a->chunks[0].address;
     return EBPO_OK;
 }
 
-static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
+static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
     ebpo_info *info = &file->info;
     info->index_level = info->level_count;
     info->file_bytes = file->in.source.size;
     if (info->subtree_level) {
-        ebpo_status places = open_places(file, h5, error);
+        ebpo_status places = open_places(file, head, error);
         if (places != EBPO_OK)
             return places;
     }
-    ebpo_status status = open_group(h5, "/mesh", info->parts & EBPO_PART_MESH, error);
+    ebpo_status status = open_group(head, "/mesh", info->parts & EBPO_PART_MESH, error);
     if (status == EBPO_OK)
-        status = open_group(h5, "/maps", info->parts & EBPO_PART_MAPS, error);
+        status = open_group(head, "/maps", info->parts & EBPO_PART_MAPS, error);
     for (int level = 0; level < info->level_count; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
             const ebpo_array_in *a = &file->level_array[level][id];
-            status = open_array(file, h5, (ebpo_array_id)id, level, error);
+            status = open_array(file, head, (ebpo_array_id)id, level, error);
             if (level == 0 && id == EBPO_A_TYPES && a->chunks)
                 info->head_bytes = a->chunks[0].address; /* the first array in the file */
         }
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES && status == EBPO_OK; id++)
-        status = open_array(file, h5, (ebpo_array_id)id, 0, error);
+        status = open_array(file, head, (ebpo_array_id)id, 0, error);
     if (status == EBPO_OK)
-        status = ebpo_attributes_open(file, h5, error);
+        status = ebpo_attributes_open(file, head, error);
     ebpo_pipeline pipeline = file->level_array[0][EBPO_A_TYPES].shape.pipeline;
     info->codec = pipeline == EBPO_PIPELINE_ZSTD      ? EBPO_CODEC_ZSTD
                   : pipeline == EBPO_PIPELINE_DEFLATE ? EBPO_CODEC_DEFLATE
@@ -246,26 +196,34 @@ static void judge_index(ebpo_info *info, uint64_t size)
         info->chunk_index_offset = info->chunk_index_bytes = 0;
 }
 
-static ebpo_status read_head(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
+static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error)
 {
-    ebpo_h5_id root = -1;
-    ebpo_status status = ebpo_h5_open_group(h5, "/", &root, error);
+    ebpo_head_object root;
+    ebpo_status status = ebpo_head_open_group(head, "/", &root, error);
     if (status == EBPO_OK)
-        status = ebpo_facts_get(h5, root, &file->info, error);
-    ebpo_h5_close_id(root);
+        status = ebpo_facts_get(head, root, &file->info, error);
     judge_index(&file->info, file->in.source.size);
-    ebpo_h5_expect_index(h5, (ebpo_range){ file->info.chunk_index_offset,
-                                           file->info.chunk_index_bytes });
+    ebpo_head_expect_index(head, (ebpo_range){ file->info.chunk_index_offset,
+                                               file->info.chunk_index_bytes });
     if (status == EBPO_OK &&
         (file->info.level_count < 1 || file->info.level_count > EBPO_LEVELS_MAX))
         status = ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, "/", -1,
                               "level_count is not 1 to %d; get a fresh copy of the file",
                               EBPO_LEVELS_MAX);
     if (status == EBPO_OK)
-        status = open_levels(file, h5, error);
+        status = open_levels(file, head, error);
     if (status == EBPO_OK)
         status = ebpo_facts_check(&file->info, file->in.shown, EBPO_E_FORMAT, error);
-    return status == EBPO_OK ? open_arrays(file, h5, error) : status;
+    return status == EBPO_OK ? open_arrays(file, head, error) : status;
+}
+
+/* Chunks without checksums, as `h5repack -f NONE` leaves them: only the sum of the content tells
+ * whether one was changed, so it is compared before anything is answered. */
+static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
+{
+    return file->level_array[0][EBPO_A_TYPES].shape.pipeline == EBPO_PIPELINE_BARE
+               ? ebpo_file_check_content(file, NULL, error)
+               : EBPO_OK;
 }
 
 /* Takes the source over, whatever happens. */
@@ -278,16 +236,18 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
             source->close(source->user);
         return ebpo_fail_memory(error, sizeof *file);
     }
-    ebpo_h5_in h5 = EBPO_H5_IN_INIT;
+    ebpo_head head = EBPO_HEAD_INIT;
     pthread_mutex_init(&file->lock, NULL);
     ebpo_idle_readers_make(&file->idle);
     atomic_init(&file->located, true);
     ebpo_status status = ebpo_input_open(&file->in, source, name, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_open(&h5, &file->in, error);
+        status = ebpo_head_open(&head, &file->in, error);
     if (status == EBPO_OK)
-        status = read_head(file, &h5, error);
-    status = ebpo_h5_close(&h5, status, error);
+        status = read_head(file, &head, error);
+    status = ebpo_head_close(&head, status, error);
+    if (status == EBPO_OK)
+        status = check_bare(file, error);
     if (status == EBPO_OK)
         *out = file;
     else

@@ -13,7 +13,7 @@
 /* Which chunks of the array these rows lie in; NULL: not known. The caller frees it. */
 static bool *chunks_of(const ebpo_array_in *array, const uint32_t *rows, uint64_t count)
 {
-    bool *has = ebpo_alloc_zero(ebpo_h5_chunk_count(&array->shape), sizeof *has);
+    bool *has = ebpo_alloc_zero(ebpo_shape_chunks(&array->shape), sizeof *has);
     for (uint64_t i = 0; has && i < count; i++)
         if (rows[i] < array->shape.rows)
             has[rows[i] / array->shape.chunk_rows] = true;
@@ -31,7 +31,7 @@ static void expect_vertices(ebpo_chunks *chunks, ebpo_expected *e, uint64_t row,
 void ebpo_faces_expect(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count, uint32_t parts)
 {
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0);
-    uint64_t number = ebpo_h5_chunk_count(&array->shape), rows = array->shape.chunk_rows;
+    uint64_t number = ebpo_shape_chunks(&array->shape), rows = array->shape.chunk_rows;
     ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
     bool *has = ebpo_input_expects(&chunks->file->in) ? chunks_of(array, faces, count) : NULL;
     for (uint64_t i = 0; has && i < number; i++) {
@@ -57,7 +57,7 @@ void ebpo_vertices_expect(ebpo_chunks *chunks, const uint32_t *vertices, uint64_
     uint64_t rows = array->shape.chunk_rows;
     ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
     bool *has = ebpo_input_expects(&chunks->file->in) ? chunks_of(array, vertices, count) : NULL;
-    for (uint64_t i = 0; has && i < ebpo_h5_chunk_count(&array->shape); i++)
+    for (uint64_t i = 0; has && i < ebpo_shape_chunks(&array->shape); i++)
         if (has[i])
             expect_vertices(chunks, &e, i * rows, rows, parts);
     ebpo_expect_all(&e);
@@ -123,11 +123,11 @@ static ebpo_status pick_rows(ebpo_chunks *chunks, const ebpo_array_in *array, co
                              uint64_t count, unsigned threads, void *out, ebpo_error *error)
 {
     gathering g = { .chunks = chunks, .array = array, .rows = rows, .out = out };
-    g.row_bytes = ebpo_h5_row_bytes(&array->shape); /* decoding changes no array's width */
+    g.row_bytes = ebpo_shape_row_bytes(&array->shape); /* decoding changes no array's width */
     if (!array->present)
         return ebpo_fail_at(error, EBPO_E_ABSENT, chunks->file->in.shown, array->path, -1,
                             "the file does not hold this array");
-    uint64_t number = ebpo_h5_chunk_count(&array->shape);
+    uint64_t number = ebpo_shape_chunks(&array->shape);
     uint64_t *begin = ebpo_alloc(number + 2, sizeof *begin);
     uint32_t *order = ebpo_alloc(count, sizeof *order);
     ebpo_status status = begin && order ? sort_rows(&g, count, begin, order, number, error)

@@ -19,8 +19,6 @@
 
 void ebpo_plan_free(ebpo_plan *plan)
 {
-    for (unsigned i = 0; i < plan->count; i++)
-        ebpo_h5_close_id(plan->array[i].handle);
     free(plan->array);
     for (int level = 0; level < EBPO_LEVELS_MAX; level++)
         for (int i = 0; i < EBPO_INDEXES; i++)
@@ -73,6 +71,9 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
 {
     const ebpo_tree *tree = plan->tree;
     ebpo_info *info = &plan->info;
+    if ((unsigned)options->face_coding > EBPO_FACES_HIGH_WATER)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "face_coding: there is no coding number %u",
+                         (unsigned)options->face_coding);
     *info = tree->info;
     info->version_major = EBPO_FORMAT_MAJOR;
     info->version_minor = EBPO_FORMAT_MINOR;

@@ -13,8 +13,8 @@ typedef struct ebpo_array_out {
     ebpo_array_id id;
     int level;
     char path[EBPO_PATH_BYTES];
-    ebpo_h5_shape shape; /* before ebpo_stored_shape */
-    bool gates;          /* faces, stored across edges */
+    ebpo_shape shape; /* before ebpo_stored_shape */
+    bool gates;       /* faces, stored across edges */
     /* native integers, row after row; NULL for arrays with a coding of their own */
     const void *values;
     uint8_t value_size;

@@ -58,7 +58,7 @@ static ebpo_status take_faces(void *context, const ebpo_array_in *array, uint64_
 {
     mesh_job *j = context;
     ebpo_check check = ebpo_reader_check(j->file, j->mesh->workspace);
-    uint64_t last = ebpo_h5_chunk_count(&array->shape) - 1;
+    uint64_t last = ebpo_shape_chunks(&array->shape) - 1;
     uint64_t seen = j->faces_index ? j->faces_index[chunk] : 0;
     if (seen > j->mesh->vertex_count || (chunk == 0 && seen))
         return ebpo_check_fail(&check, -1, "/mesh/faces_index",

@@ -55,8 +55,8 @@ static ebpo_status unpack(const ebpo_file *file, const ebpo_array_in *array, uin
                           ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
                           ebpo_error *error)
 {
-    ebpo_h5_shape shape = ebpo_stored_shape(&array->shape, array->gates);
-    size_t bytes = shape.chunk_rows * ebpo_h5_row_bytes(&shape);
+    ebpo_shape shape = ebpo_stored_shape(&array->shape, array->gates);
+    size_t bytes = shape.chunk_rows * ebpo_shape_row_bytes(&shape);
     const char *why;
     ebpo_status status = ebpo_chunk_decode(coder, shape.pipeline, shape.element_size, stored,
                                            array->chunks[chunk].bytes, raw, bytes, &why);
@@ -73,7 +73,7 @@ static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *arra
 {
     uint64_t left = array->shape.rows - chunk * array->shape.chunk_rows,
              rows = left < array->shape.chunk_rows ? left : array->shape.chunk_rows;
-    size_t row = ebpo_h5_row_bytes(&array->shape);
+    size_t row = ebpo_shape_row_bytes(&array->shape);
     ebpo_status status = unpack(file, array, chunk, coder, stored, coder->scratch, error);
     if (status != EBPO_OK)
         return status;
@@ -97,7 +97,7 @@ static ebpo_status fetch_chunk(const ebpo_file *file, const ebpo_array_in *array
     ebpo_status status = ebpo_reader_locate(file, array, error);
     if (status != EBPO_OK)
         return status;
-    const ebpo_h5_chunk *at = &array->chunks[chunk];
+    const ebpo_chunk_place *at = &array->chunks[chunk];
     return fetch(file, reader, at->address, at->bytes, ebpo_reader_chunk_bound(array), error);
 }
 
@@ -124,7 +124,7 @@ ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk, ebpo_chunk_
  * file, up to RUN_BYTES: one read brings them all. */
 static uint64_t find_run(const ebpo_array_in *array, uint64_t begin, uint64_t end, size_t *bytes)
 {
-    const ebpo_h5_chunk *c = array->chunks;
+    const ebpo_chunk_place *c = array->chunks;
     uint64_t next = begin + 1;
     *bytes = c[begin].bytes;
     while (next < end && c[next].address == c[begin].address + *bytes &&
@@ -174,7 +174,7 @@ ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
                              const ebpo_read_options *options, ebpo_rows_fn take, void *context,
                              ebpo_error *error)
 {
-    uint64_t chunks = ebpo_h5_chunk_count(&array->shape);
+    uint64_t chunks = ebpo_shape_chunks(&array->shape);
     ebpo_status status = ebpo_reader_locate(file, array, error);
     if (status != EBPO_OK)
         return status;

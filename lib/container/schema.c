@@ -105,9 +105,9 @@ void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES])
         snprintf(path, EBPO_PATH_BYTES, "%s", ebpo_schema[id].name);
 }
 
-ebpo_h5_shape ebpo_stored_shape(const ebpo_h5_shape *given, bool gates)
+ebpo_shape ebpo_stored_shape(const ebpo_shape *given, bool gates)
 {
-    ebpo_h5_shape stored = *given;
+    ebpo_shape stored = *given;
     if (gates) {
         stored.element_size = 1;
         stored.cols = EBPO_GATES_COLS;
@@ -123,7 +123,7 @@ uint64_t ebpo_schema_index_rows(uint64_t count)
 static uint64_t face_chunks(const ebpo_info *info)
 {
     uint64_t faces = info->face_count,
-             rows = info->subtree_level ? EBPO_FACE_BLOCK : ebpo_h5_chunk_rows(faces, 3, 4);
+             rows = info->subtree_level ? EBPO_FACE_BLOCK : ebpo_full_chunk_rows(faces, 3, 4);
     return faces > rows ? (faces - 1) / rows + 1 : 0;
 }
 

@@ -7,7 +7,7 @@
 
 #include <ebpo/file.h>
 
-#include "h5/h5.h"
+#include "codec/shape.h"
 
 /* In the order in which they lie in the file. Up to EBPO_LEVEL_ARRAYS once for each level. */
 typedef enum ebpo_array_id {
@@ -135,7 +135,7 @@ extern const ebpo_count_spec ebpo_counts[EBPO_COUNTS];
 
 /* How an array is stored whose values are of the shape `given`: as that, or as gates. */
 #define EBPO_GATES_CODING "gates"
-ebpo_h5_shape ebpo_stored_shape(const ebpo_h5_shape *given, bool gates);
+ebpo_shape ebpo_stored_shape(const ebpo_shape *given, bool gates);
 
 /* Absolute path of an array; `level` matters for level arrays only. */
 void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES]);

@@ -302,7 +302,7 @@ bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, ui
 /* A chunk of the table, and what of `outer` goes with it. */
 static void expect_rows_at(ebpo_chunks *chunks, ebpo_expected *e, uint64_t chunk)
 {
-    const ebpo_h5_shape *shape = &ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape;
+    const ebpo_shape *shape = &ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape;
     uint64_t sums[EBPO_SUBTREE_COLS], outer[2];
     for (int k = 0; k < 2; k++) {
         if (!ebpo_input_expects(&chunks->file->in) ||

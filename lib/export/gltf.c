@@ -354,9 +354,9 @@ static ebpo_status write_files(const model *m, const ebpo_export_job *job, ebpo_
         status = ebpo_fail_errno(error, job->second, "could not be written");
     if (status == EBPO_OK && (ferror(f) || fflush(f) != 0))
         status = ebpo_fail_errno(error, job->path, "could not be written");
-    if (status == EBPO_OK && b)
-        status = ebpo_publish_commit(heavy, error);
-    return status == EBPO_OK ? ebpo_publish_commit(light, error) : status;
+    if (status != EBPO_OK)
+        return status;
+    return b ? ebpo_publish_commit_pair(heavy, light, error) : ebpo_publish_commit(light, error);
 }
 
 ebpo_status ebpo_export_gltf(const ebpo_export_job *job, ebpo_error *error)

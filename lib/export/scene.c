@@ -24,15 +24,18 @@ ebpo_status ebpo_export_scene(const ebpo_export_job *job, ebpo_error *error)
 #include <assimp/material.h>
 #include <assimp/mesh.h>
 #include <assimp/scene.h>
+#include <pthread.h>
 #include <stdlib.h>
 
 #include "base/alloc.h"
 #include "export/floats.h"
 #include "export/scene_file.h"
-#include "import/assimp_lock.h"
 #include "io/file_source.h"
 
 enum { PARTS_MAX = EBPO_LEVELS_MAX + 1 };
+
+/* assimp has one error text for the whole process. */
+static pthread_mutex_t assimp_mutex = PTHREAD_MUTEX_INITIALIZER;
 
 /* All that assimp is lent. It copies before it changes anything. */
 typedef struct scene {
@@ -176,13 +179,13 @@ static ebpo_status write_scene(const scene *s, const ebpo_export_job *job, ebpo_
     struct aiFileIO io;
     ebpo_status status = EBPO_OK;
     ebpo_scene_file_offer(file, &io);
-    ebpo_assimp_lock();
+    pthread_mutex_lock(&assimp_mutex);
     if (aiExportSceneEx(&s->root, id, ebpo_path_name(job->path), &io, 0) != aiReturn_SUCCESS &&
         !file->failed)
         status = ebpo_fail_file(error, EBPO_E_UNSUPPORTED, job->path,
                                 "assimp cannot write it (%.200s); take another format",
                                 aiGetErrorString());
-    ebpo_assimp_unlock();
+    pthread_mutex_unlock(&assimp_mutex);
     return status;
 }
 

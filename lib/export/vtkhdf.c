@@ -60,7 +60,7 @@ static ebpo_status make_group(writer *w, const char *path, ebpo_error *error)
         status = ebpo_h5_put_ints(&w->out, id, "Version", version, 2, error);
     if (status == EBPO_OK && strcmp(path, "/VTKHDF") == 0)
         status = ebpo_h5_put_ascii(&w->out, id, "Type", "UnstructuredGrid", error);
-    ebpo_h5_close_id(id);
+    ebpo_h5_close_id(&w->out, id);
     return status;
 }
 
@@ -225,7 +225,7 @@ ebpo_status ebpo_export_vtkhdf(const ebpo_export_job *job, ebpo_error *error)
     if (status == EBPO_OK)
         status = write_blocks(&w, job, error);
     for (int i = 0; i < TABLES; i++)
-        ebpo_h5_close_table(&w.table[i]);
+        ebpo_h5_close_table(&w.out, &w.table[i]);
     if (status == EBPO_OK)
         status = ebpo_h5_finish(&w.out, error);
     ebpo_h5_discard(&w.out);

@@ -160,7 +160,7 @@ static ebpo_status put_block(writer *w, const ebpo_block *block, ebpo_error *err
     ebpo_h5_id group;
     snprintf(path, sizeof path, "/%s", block->name);
     ebpo_status status = ebpo_h5_make_plain_group(&w->out, path, &group, error);
-    ebpo_h5_close_id(group);
+    ebpo_h5_close_id(&w->out, group);
     if (status != EBPO_OK)
         return status;
     fprintf(w->text, "      <Grid Name=\"%s\" GridType=\"Uniform\">\n", block->name);
@@ -216,9 +216,7 @@ ebpo_status ebpo_export_xdmf(const ebpo_export_job *job, ebpo_error *error)
         status = ebpo_h5_finish(&w.out, error);
     ebpo_h5_discard(&w.out);
     if (status == EBPO_OK)
-        status = ebpo_publish_commit(&heavy, error);
-    if (status == EBPO_OK)
-        status = ebpo_publish_commit(&light, error);
+        status = ebpo_publish_commit_pair(&heavy, &light, error);
     ebpo_publish_abort(&heavy);
     ebpo_publish_abort(&light);
     return status;

@@ -19,9 +19,13 @@
 #include <math.h>
 #include <string.h>
 
+#include "geom/distance_far.h"
 #include "geom/distance_parts.h"
 
 static const double huge_reach = 0x1p200, tiny_reach = 0x1p-200;
+/* From so many times the triangle's size on, errors that are relative to the greatest product tell
+ * little: distance_far.h. */
+static const double far_ratio = 0x1p20;
 
 static inline double dot(const double a[3], const double b[3])
 {
@@ -164,12 +168,13 @@ static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_di
         *out = (ebpo_distance_bounds){
             0, ldexp(r.reach + 0x1p-1000, exponent) * (1 + 0x1p-50) + 0x1p-1074, EBPO_NEAR_UNKNOWN
         };
+        out->feature = ebpo_far_feature(p, triangle, out);
         return;
     }
     multiply(&r);
     bound(&r, out);
     /* Scaling up is exact, scaling down may have lost what lies below 2^-1074. */
-    out->feature = EBPO_NEAR_UNKNOWN;
+    out->feature = ebpo_far_feature(p, triangle, NULL);
     out->lo = nextafter(ldexp(out->lo - 0x1p-1000, exponent), -INFINITY);
     out->lo = out->lo > 0 ? out->lo : 0;
     out->hi = nextafter(ldexp(out->hi + 0x1p-1000, exponent), INFINITY);
@@ -186,6 +191,8 @@ void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3
     }
     multiply(&r);
     bound(&r, out);
+    if (out->feature == EBPO_NEAR_UNKNOWN && r.reach > far_ratio * r.size)
+        out->feature = ebpo_far_feature(p, triangle, NULL);
 }
 
 int ebpo_distance_scale(const double p[3], const double triangle[3][3], double q[3], double t[3][3])

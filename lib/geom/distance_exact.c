@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "geom/distance_far.h"
 #include "geom/distance_pairs.h"
 #include "geom/distance_parts.h"
 
@@ -25,6 +26,37 @@ static bool ordinary(const double p[3], const double triangle[3][3])
     return reach < most_reach && size > least_size;
 }
 
+/* Ziv's test. */
+static bool rounds(const ebpo_measured *m, double *distance)
+{
+    double error = m->error * m->distance.head;
+    double least = m->distance.head + (m->distance.tail - error),
+           most = m->distance.head + (m->distance.tail + error);
+    *distance = least;
+    return m->error < 0x1p-56 && least == most;
+}
+
+/* A corner of a triangle that is far away: scaled, so that nothing overflows. What gets lost of
+ * small coordinates is below 2^-1000 of the distance. */
+static bool corner_by_pairs(const double p[3], const double triangle[3][3],
+                            const ebpo_distance_bounds *bounds, ebpo_triangle_nearest *out)
+{
+    double q[3], t[3][3];
+    ebpo_measured m;
+    if (bounds->feature > EBPO_NEAR_CORNER2 || !(bounds->lo > 0x1p-900))
+        return false;
+    int exponent = ebpo_distance_scale(p, triangle, q, t);
+    if (ldexp(bounds->lo, -exponent) < 0x1p-10)
+        return false;
+    ebpo_distance_pairs_best()->measure(q, (const double(*)[3])t, bounds->feature, NULL, &m);
+    if (!rounds(&m, &out->distance))
+        return false;
+    out->distance = ldexp(out->distance, exponent);
+    out->feature = bounds->feature;
+    memcpy(out->point, triangle[out->feature], sizeof out->point);
+    return true;
+}
+
 /* False: the arithmetic does not decide. *known: the normal (if it is wanted) is there. */
 static bool nearest_by_pairs(const double p[3], const double triangle[3][3],
                              const ebpo_distance_bounds *bounds, double *normal, bool *known,
@@ -32,16 +64,13 @@ static bool nearest_by_pairs(const double p[3], const double triangle[3][3],
 {
     ebpo_measured m;
     *known = false;
-    if (bounds->feature == EBPO_NEAR_UNKNOWN || !(bounds->lo > least_size) ||
-        !ordinary(p, triangle))
+    if (bounds->feature == EBPO_NEAR_UNKNOWN || !(bounds->lo > least_size))
         return false;
+    if (!ordinary(p, triangle))
+        return corner_by_pairs(p, triangle, bounds, out);
     *known = ebpo_distance_pairs_best()->measure(p, triangle, bounds->feature, normal, &m);
-    double error = m.error * m.distance.head;
-    double least = m.distance.head + (m.distance.tail - error),
-           most = m.distance.head + (m.distance.tail + error);
-    if (!(m.error < 0x1p-56) || least != most)
+    if (!rounds(&m, &out->distance))
         return false;
-    out->distance = least;
     out->feature = bounds->feature;
     memcpy(out->point, m.point, sizeof out->point);
     return true;
@@ -72,11 +101,16 @@ int ebpo_triangle_distance_compare(const double p[3], const double a[3][3], cons
         return -1;
     if (x.lo > y.hi)
         return 1;
-    if (x.feature <= EBPO_NEAR_CORNER2 && y.feature <= EBPO_NEAR_CORNER2) {
-        const double *c = a[x.feature], *d = b[y.feature];
-        if (c[0] == d[0] && c[1] == d[1] && c[2] == d[2])
-            return 0;
-    }
+    int sign;
+    if (x.feature <= EBPO_NEAR_CORNER2 && y.feature <= EBPO_NEAR_CORNER2 &&
+        ebpo_far_corners_compare(p, a[x.feature], b[y.feature], &sign))
+        return sign;
+    double foot[3], c[3][3], d[3][3];
+    memcpy(foot, p, sizeof foot);
+    memcpy(c, a, sizeof c);
+    memcpy(d, b, sizeof d);
+    if (ebpo_far_flatten(foot, c, x.feature, d, y.feature))
+        return ebpo_triangle_distance_compare(foot, (const double(*)[3])c, (const double(*)[3])d);
     return ebpo_triangle_distance_compare_gmp(p, a, b);
 }
 

@@ -1,10 +1,31 @@
 #include "h5/h5_objects.h"
 
+#include "base/error.h"
+#include "h5/sink.h"
+
+static ebpo_status told(const ebpo_h5_out *out, const char *object, bool good, const char *what,
+                        ebpo_error *error)
+{
+    ebpo_error cause = EBPO_ERROR_INIT;
+    if (out->sink && ebpo_h5_sink_status(out->sink, error) != EBPO_OK)
+        return out->sink->status;
+    if (good)
+        return EBPO_OK;
+    (void)ebpo_h5_fail(&cause, ebpo_h5_short_of_memory() ? EBPO_E_MEMORY : EBPO_E_IO, out->shown,
+                       object, what);
+    if (out->sink)
+        ebpo_h5_sink_fail(out->sink, &cause);
+    return ebpo_fail_with(error, &cause);
+}
+
+ebpo_status ebpo_h5_created(const ebpo_h5_out *out, ebpo_error *error)
+{
+    return told(out, "", out->file >= 0, "libhdf5 could not create the file", error);
+}
+
 ebpo_status ebpo_h5_written(const ebpo_h5_out *out, const char *what, bool good, ebpo_error *error)
 {
-    return good ? EBPO_OK
-                : ebpo_h5_fail(error, EBPO_E_IO, out->shown, what,
-                               "libhdf5 could not write; is the disk full?");
+    return told(out, what, good, "libhdf5 could not write", error);
 }
 
 void ebpo_h5_close_list(hid_t list)
@@ -51,8 +72,8 @@ ebpo_status ebpo_h5_put_attribute(const ebpo_h5_out *out, hid_t object, const ch
     }
     bool good = attribute >= 0 && H5Awrite(attribute, memory < 0 ? type : memory, value) >= 0;
     ebpo_status status = ebpo_h5_written(out, name, good, error);
-    if (attribute >= 0)
-        H5Aclose(attribute);
+    if (attribute >= 0 && H5Aclose(attribute) < 0 && status == EBPO_OK)
+        status = ebpo_h5_written(out, name, false, error);
     ebpo_h5_close_space(space);
     return status;
 }

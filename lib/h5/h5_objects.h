@@ -6,7 +6,14 @@
 #include "h5/h5.h"
 #include "h5/scope.h"
 
-/* EBPO_E_IO unless it went well; right after the call, as others wipe libhdf5's reason. */
+/* Properties of a file that is written through the sink; -1 when libhdf5 refuses. */
+struct ebpo_h5_sink;
+hid_t ebpo_h5_write_access(struct ebpo_h5_sink *sink, H5F_libver_t version);
+/* Whether libhdf5 has created out->file. */
+ebpo_status ebpo_h5_created(const ebpo_h5_out *out, ebpo_error *error);
+
+/* EBPO_OK if it went well, and no write has failed so far: else the first such failure, or what
+ * libhdf5 says. Right after the call, as others wipe libhdf5's reason. */
 ebpo_status ebpo_h5_written(const ebpo_h5_out *out, const char *what, bool good, ebpo_error *error);
 
 /* Takes over the list of properties; `good`: it has them all. */

@@ -1,46 +1,61 @@
 /* Creating files, see h5.h. */
-#include <fcntl.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
+#include "base/error.h"
 #include "h5/h5.h"
 #include "h5/h5_objects.h"
+#include "h5/sink.h"
 #include "h5/zstd_filter.h"
 
 /* Everything stays in object headers, wherever HDF5 would otherwise switch to B-trees and heaps. */
 enum { COMPACT = 65535 };
 
-uint32_t ebpo_h5_chunk_rows(uint64_t rows, uint32_t cols, uint32_t element_size)
-{
-    uint32_t row = element_size * (cols ? cols : 1), full = 1;
-    while (2 * full * row <= EBPO_CHUNK_BYTES_MAX)
-        full *= 2;
-    return rows < full ? (uint32_t)rows : full;
-}
-
-void ebpo_h5_close_id(ebpo_h5_id id)
+void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id)
 {
     if (id < 0)
         return;
     ebpo_h5_scope scope;
+    ebpo_error error = EBPO_ERROR_INIT;
     ebpo_h5_enter(&scope);
-    H5Idec_ref(id);
+    if (ebpo_h5_written(out, "", H5Idec_ref(id) >= 0, &error) != EBPO_OK && out->sink)
+        ebpo_h5_sink_fail(out->sink, &error);
     ebpo_h5_leave(&scope);
 }
 
-static hid_t file_access(bool memory, uint64_t head_bytes)
+/* No metadata is dropped to make room, so none has to be read back: reading may fail, and then
+ * libhdf5 cannot close the file. */
+static bool keep_metadata(hid_t fapl)
+{
+    H5AC_cache_config_t config = { .version = H5AC__CURR_CACHE_CONFIG_VERSION };
+    if (H5Pget_mdc_config(fapl, &config) < 0)
+        return false;
+    config.evictions_enabled = false;
+    config.incr_mode = H5C_incr__off;
+    config.decr_mode = H5C_decr__off;
+    config.flash_incr_mode = H5C_flash_incr__off;
+    return H5Pset_mdc_config(fapl, &config) >= 0;
+}
+
+hid_t ebpo_h5_write_access(ebpo_h5_sink *sink, H5F_libver_t version)
 {
     hid_t fapl = H5Pcreate(H5P_FILE_ACCESS);
-    bool ok = fapl >= 0 && H5Pset_libver_bounds(fapl, H5F_LIBVER_V110, H5F_LIBVER_V110) >= 0 &&
+    bool ok = fapl >= 0 && H5Pset_libver_bounds(fapl, version, version) >= 0 &&
               H5Pset_fclose_degree(fapl, H5F_CLOSE_STRONG) >= 0 &&
-              H5Pset_file_locking(fapl, false, true) >= 0 &&
-              H5Pset_meta_block_size(fapl, head_bytes) >= 0 &&
+              H5Pset_file_locking(fapl, false, true) >= 0 && keep_metadata(fapl) &&
+              ebpo_h5_sink_use(sink, fapl);
+    if (!ok)
+        ebpo_h5_close_list(fapl);
+    return ok ? fapl : -1;
+}
+
+static hid_t file_access(ebpo_h5_sink *sink, uint64_t head_bytes)
+{
+    hid_t fapl = ebpo_h5_write_access(sink, H5F_LIBVER_V110);
+    bool ok = fapl >= 0 && H5Pset_meta_block_size(fapl, head_bytes) >= 0 &&
               H5Pset_small_data_block_size(fapl, 0) >= 0 && H5Pset_sieve_buf_size(fapl, 0) >= 0 &&
-              H5Pset_cache(fapl, 0, 1, 0, 1.0) >= 0 &&
-              (!memory || H5Pset_fapl_core(fapl, 1 << 20, false) >= 0);
-    if (!ok && fapl >= 0)
-        H5Pclose(fapl);
+              H5Pset_cache(fapl, 0, 1, 0, 1.0) >= 0;
+    if (!ok)
+        ebpo_h5_close_list(fapl);
     return ok ? fapl : -1;
 }
 
@@ -55,35 +70,49 @@ static bool set_group(hid_t plist, unsigned links)
 ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown,
                            uint64_t head_bytes, unsigned links, ebpo_error *error)
 {
+    ebpo_status status = ebpo_h5_sink_open(&out->sink, path, shown, error);
+    if (status != EBPO_OK)
+        return status;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status = EBPO_OK;
     out->shown = shown;
-    hid_t fapl = file_access(!path, head_bytes), fcpl = H5Pcreate(H5P_FILE_CREATE);
+    hid_t fapl = file_access(out->sink, head_bytes), fcpl = H5Pcreate(H5P_FILE_CREATE);
     if (fapl >= 0 && set_group(fcpl, links) && H5Zregister(&ebpo_zstd_filter) >= 0)
-        out->file = H5Fcreate(path ? path : "head", H5F_ACC_TRUNC, fcpl, fapl);
-    if (out->file < 0)
-        status = ebpo_h5_fail(error, EBPO_E_IO, shown, "", "libhdf5 could not create the file");
+        out->file = H5Fcreate(shown, H5F_ACC_TRUNC, fcpl, fapl);
+    status = ebpo_h5_created(out, error);
     ebpo_h5_close_list(fapl);
     ebpo_h5_close_list(fcpl);
     ebpo_h5_leave(&scope);
     return status;
 }
 
-ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, const char *path, uint64_t metadata_bytes,
-                           ebpo_error *error)
+/* libhdf5 does not try twice to close a file: it has let go of it even if it failed. */
+static ebpo_status close_file(ebpo_h5_out *out, ebpo_error *error)
 {
-    ebpo_status status = ebpo_h5_finish(out, error);
+    bool flushed = H5Fflush(out->file, H5F_SCOPE_LOCAL) >= 0;
+    ebpo_status status = ebpo_h5_written(out, "", flushed, error);
     if (status != EBPO_OK)
         return status;
+    bool closed = H5Fclose(out->file) >= 0;
+    out->file = -1;
+    status = ebpo_h5_written(out, "", closed, error);
+    if (!closed) {
+        ebpo_h5_sink_abandon(out->sink);
+        out->sink = NULL;
+    }
+    return status;
+}
+
+ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, uint64_t metadata_bytes, ebpo_error *error)
+{
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    hid_t fapl = file_access(false, metadata_bytes);
+    ebpo_status status = close_file(out, error);
+    hid_t fapl = status == EBPO_OK ? file_access(out->sink, metadata_bytes) : -1;
     if (fapl >= 0)
-        out->file = H5Fopen(path, H5F_ACC_RDWR, fapl);
-    if (out->file < 0)
-        status = ebpo_h5_fail(error, EBPO_E_IO, out->shown, "",
-                              "libhdf5 could not open again what it had written");
+        out->file = H5Fopen(out->shown, H5F_ACC_RDWR, fapl);
+    if (status == EBPO_OK && out->file < 0)
+        status = ebpo_h5_written(out, "", false, error);
     ebpo_h5_close_list(fapl);
     ebpo_h5_leave(&scope);
     return status;
@@ -165,7 +194,7 @@ ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
     return status;
 }
 
-static bool set_filters(hid_t dcpl, const ebpo_h5_shape *shape, int level)
+static bool set_filters(hid_t dcpl, const ebpo_shape *shape, int level)
 {
     bool compressed =
         shape->pipeline == EBPO_PIPELINE_ZSTD || shape->pipeline == EBPO_PIPELINE_DEFLATE;
@@ -181,7 +210,7 @@ static bool set_filters(hid_t dcpl, const ebpo_h5_shape *shape, int level)
     return shape->pipeline == EBPO_PIPELINE_BARE || H5Pset_fletcher32(dcpl) >= 0;
 }
 
-ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_h5_shape *shape,
+ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_shape *shape,
                                ebpo_h5_id *id, ebpo_error *error)
 {
     ebpo_h5_scope scope;
@@ -213,7 +242,7 @@ ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *i
 }
 
 ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
-                              const ebpo_h5_shape *shape, uint64_t chunk, const void *data,
+                              const ebpo_shape *shape, uint64_t chunk, const void *data,
                               size_t bytes, ebpo_error *error)
 {
     ebpo_h5_scope scope;
@@ -232,19 +261,14 @@ ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *by
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status = EBPO_OK;
-    void *image = NULL;
-    hsize_t size = 0;
-    if (H5Fflush(out->file, H5F_SCOPE_LOCAL) < 0 ||
-        H5Fget_vfd_handle(out->file, H5P_DEFAULT, &image) < 0 ||
-        H5Fget_filesize(out->file, &size) < 0 || first_raw > size) {
-        status =
-            ebpo_h5_fail(error, EBPO_E_IO, out->shown, "", "libhdf5 could not lay out the head");
-    } else {
-        const uint8_t *data = *(uint8_t **)image;
-        while (first_raw && data[first_raw - 1] == 0)
-            first_raw--;
-        *bytes = first_raw;
+    bool flushed = H5Fflush(out->file, H5F_SCOPE_LOCAL) >= 0;
+    ebpo_status status = ebpo_h5_written(out, "", flushed, error);
+    const ebpo_h5_sink *sink = out->sink;
+    if (status == EBPO_OK) {
+        uint64_t end = first_raw < sink->size ? first_raw : sink->size;
+        while (end && sink->memory[end - 1] == 0)
+            end--;
+        *bytes = end;
     }
     ebpo_h5_leave(&scope);
     return status;
@@ -268,34 +292,30 @@ ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error)
         return EBPO_OK;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    bool good = H5Fflush(out->file, H5F_SCOPE_LOCAL) >= 0 && H5Fclose(out->file) >= 0;
-    ebpo_status status = ebpo_h5_written(out, "", good, error);
-    if (good)
-        out->file = -1;
+    ebpo_status status = close_file(out, error);
+    if (status == EBPO_OK) {
+        status = ebpo_h5_sink_close(out->sink, error);
+        out->sink = NULL;
+    }
     ebpo_h5_leave(&scope);
     return status;
 }
 
-/* When the disk is full, closing fails as well, and libhdf5 then keeps an id without a file and
- * crashes at exit. Nobody wants these bytes any more: what is still to be written (a few kilobytes
- * of metadata) goes to memory. */
-static void swallow_writes(hid_t file)
-{
-    void *handle = NULL;
-    int sink = memfd_create("ebpo", MFD_CLOEXEC);
-    ebpo_h5_scope scope;
-    ebpo_h5_enter(&scope);
-    if (sink >= 0 && H5Fget_vfd_handle(file, H5P_DEFAULT, &handle) >= 0 && handle)
-        dup3(sink, *(const int *)handle, O_CLOEXEC);
-    ebpo_h5_leave(&scope);
-    if (sink >= 0)
-        close(sink);
-}
-
 void ebpo_h5_discard(ebpo_h5_out *out)
 {
-    if (out->file >= 0)
-        swallow_writes(out->file);
-    ebpo_h5_close_id(out->file);
+    ebpo_error unwanted;
+    if (!out->sink)
+        return;
+    ebpo_h5_scope scope;
+    ebpo_h5_enter(&scope);
+    /* nobody wants these bytes any more */
+    (void)ebpo_fail(&unwanted, EBPO_E_CANCELLED, "given up");
+    ebpo_h5_sink_fail(out->sink, &unwanted);
+    if (out->file >= 0 && H5Fclose(out->file) < 0)
+        ebpo_h5_sink_abandon(out->sink);
+    else
+        (void)!ebpo_h5_sink_close(out->sink, NULL);
+    out->sink = NULL;
     out->file = -1;
+    ebpo_h5_leave(&scope);
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "h5/h5_objects.h"
+#include "h5/sink.h"
 
 /* Deflate's fastest: these files are read once or twice, and numbers of nodes and corners shrink
  * well even so. */
@@ -36,18 +37,16 @@ static hid_t memory_type(ebpo_h5_number number)
 ebpo_status ebpo_h5_create_plain(ebpo_h5_out *out, const char *path, const char *shown,
                                  ebpo_error *error)
 {
+    ebpo_status status = ebpo_h5_sink_open(&out->sink, path, shown, error);
+    if (status != EBPO_OK)
+        return status;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status = EBPO_OK;
     out->shown = shown;
-    hid_t fapl = H5Pcreate(H5P_FILE_ACCESS), fcpl = H5Pcreate(H5P_FILE_CREATE);
-    if (fapl >= 0 && fcpl >= 0 && H5Pset_obj_track_times(fcpl, false) >= 0 &&
-        H5Pset_libver_bounds(fapl, H5F_LIBVER_V18, H5F_LIBVER_V18) >= 0 &&
-        H5Pset_fclose_degree(fapl, H5F_CLOSE_STRONG) >= 0 &&
-        H5Pset_file_locking(fapl, false, true) >= 0)
-        out->file = H5Fcreate(path, H5F_ACC_TRUNC, fcpl, fapl);
-    if (out->file < 0)
-        status = ebpo_h5_fail(error, EBPO_E_IO, shown, "", "libhdf5 could not create the file");
+    hid_t fapl = ebpo_h5_write_access(out->sink, H5F_LIBVER_V18), fcpl = H5Pcreate(H5P_FILE_CREATE);
+    if (fapl >= 0 && fcpl >= 0 && H5Pset_obj_track_times(fcpl, false) >= 0)
+        out->file = H5Fcreate(shown, H5F_ACC_TRUNC, fcpl, fapl);
+    status = ebpo_h5_created(out, error);
     ebpo_h5_close_list(fapl);
     ebpo_h5_close_list(fcpl);
     ebpo_h5_leave(&scope);
@@ -145,9 +144,9 @@ ebpo_status ebpo_h5_append(ebpo_h5_out *out, ebpo_h5_table *table, const void *d
     return status;
 }
 
-void ebpo_h5_close_table(ebpo_h5_table *table)
+void ebpo_h5_close_table(const ebpo_h5_out *out, ebpo_h5_table *table)
 {
-    ebpo_h5_close_id(table->id);
+    ebpo_h5_close_id(out, table->id);
     table->id = -1;
 }
 
@@ -158,6 +157,6 @@ ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path, ebpo_h5_number
     ebpo_status status = ebpo_h5_make_table(out, path, number, cols, &table, error);
     if (status == EBPO_OK)
         status = ebpo_h5_append(out, &table, data, rows, error);
-    ebpo_h5_close_table(&table);
+    ebpo_h5_close_table(out, &table);
     return status;
 }

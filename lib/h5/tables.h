@@ -52,7 +52,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path,
 /* Appends rows, in the machine's byte order; stored little-endian. */
 EBPO_MUST_USE ebpo_status ebpo_h5_append(ebpo_h5_out *out, ebpo_h5_table *table, const void *data,
                                          uint64_t rows, ebpo_error *error);
-void ebpo_h5_close_table(ebpo_h5_table *table);
+/* A failure, as what is still to be compressed is written now, is told by the next call. */
+void ebpo_h5_close_table(const ebpo_h5_out *out, ebpo_h5_table *table);
 
 /* All three: an array that is written at once. */
 EBPO_MUST_USE ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path,

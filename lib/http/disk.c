@@ -187,11 +187,14 @@ ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, 
     *out = NULL;
     int fd = make_folder(folder) ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
     if (fd < 0 || !writable(fd)) {
-        ebpo_fail_file(error, EBPO_E_ARGUMENT, folder,
-                       "cannot be used as a cache folder: %s; give another one", strerror(errno));
+        /* another folder does not help a process that has too many files open */
+        bool folders = errno != EMFILE && errno != ENFILE && errno != ENOMEM;
+        ebpo_status status = ebpo_fail_file(error, folders ? EBPO_E_ARGUMENT : EBPO_E_IO, folder,
+                                            "cannot be used as a cache folder: %s%s",
+                                            strerror(errno), folders ? "; give another one" : "");
         if (fd >= 0)
             close(fd);
-        return EBPO_E_ARGUMENT;
+        return status;
     }
     ebpo_disk *d = ebpo_alloc_zero(1, sizeof *d);
     if (!d) {

@@ -43,6 +43,9 @@ static size_t take_header(char *line, size_t size, size_t count, void *user)
     ebpo_slot *s = user;
     s->moved = ebpo_seconds();
     ebpo_answer_line(&s->answer, line, size * count);
+    /* what was given for one server is not for others: libcurl would send it along */
+    if (ebpo_redirect_line(&s->redirect, s->owner->url, s->answer.code, line, size * count))
+        curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, s->owner->bare_headers);
     if (s->answer.header_bytes <= EBPO_HTTP_HEADERS_MAX)
         return size * count;
     s->judged = true;

@@ -6,6 +6,7 @@
 
 #include <pthread.h>
 
+#include "http/redirect.h"
 #include "http/request.h"
 
 enum { EBPO_SLOTS_MAX = 32 };
@@ -20,6 +21,7 @@ typedef struct ebpo_slot {
     ebpo_http_version pinned; /* a copy for this attempt */
     bool is_pinned;
     ebpo_answer answer;
+    ebpo_redirect redirect;
     bool judged, stopped, stalled; /* stopped, stalled: we ended the transfer ourselves */
     bool sent;                     /* connected, and the request is out */
     double moved;                  /* time of the last bytes */
@@ -37,7 +39,7 @@ struct ebpo_transfers {
     pthread_mutex_t *lock;
     pthread_cond_t *done;
     CURLM *multi;
-    struct curl_slist *headers;
+    struct curl_slist *headers, *bare_headers; /* with the caller's, and without */
     pthread_t thread;
     bool running;
     ebpo_slot slots[EBPO_SLOTS_MAX];

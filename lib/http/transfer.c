@@ -35,7 +35,8 @@ static void *drive(void *transfers);
 
 static bool set_up(ebpo_transfers *t)
 {
-    bool good = add_header(&t->headers, "Accept-Encoding: identity");
+    bool good = add_header(&t->headers, "Accept-Encoding: identity") &&
+                add_header(&t->bare_headers, "Accept-Encoding: identity");
     for (const char *const *h = t->options->headers; h && *h; h++)
         good = good && add_header(&t->headers, *h);
     t->multi = curl_multi_init();
@@ -97,10 +98,12 @@ void ebpo_transfers_free(ebpo_transfers *t)
         if (t->slots[i].request)
             curl_multi_remove_handle(t->multi, t->slots[i].easy);
         curl_easy_cleanup(t->slots[i].easy);
+        ebpo_redirect_clear(&t->slots[i].redirect);
     }
     if (t->multi)
         curl_multi_cleanup(t->multi);
     curl_slist_free_all(t->headers);
+    curl_slist_free_all(t->bare_headers);
     free(t);
 }
 
@@ -207,6 +210,9 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
     double left = (r->deadline - now) * 1000;
     snprintf(range, sizeof range, "%" PRIu64 "-%" PRIu64, s->begin, s->end - 1);
     curl_easy_setopt(s->easy, CURLOPT_RANGE, range);
+    if (s->redirect.at || s->redirect.elsewhere) /* the one before was led somewhere */
+        curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, t->headers);
+    ebpo_redirect_clear(&s->redirect);
     curl_easy_setopt(s->easy, CURLOPT_TIMEOUT_MS, (long)(left > 1 ? left : 1));
     t->stats.requests++;
     t->stats.retries += r->failures > 0;

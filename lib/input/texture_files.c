@@ -1,5 +1,6 @@
 #include "input/texture_files.h"
 
+#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,8 +11,10 @@
 #include "base/sha256.h"
 #include "input/texture_names.h"
 #include "io/file_source.h"
+#include "io/open_below.h"
 
-enum { LIBRARY_BYTES = 1 << 24, LIBRARIES = 100, DIGEST = 32, STEP = 1 << 20 };
+/* Of material libraries: bytes of all, and names that are tried. */
+enum { LIBRARY_BYTES = 1 << 25, LIBRARIES = 100, DIGEST = 32, STEP = 1 << 20 };
 #define IMAGE_BYTES ((uint64_t)1 << 30)
 
 typedef struct finding {
@@ -19,6 +22,7 @@ typedef struct finding {
     ebpo_texture_names names;
     uint64_t absent, outside, large; /* not found; forbidden; too large */
     uint64_t tried, libraries;       /* names of libraries; not read */
+    uint64_t library_bytes;          /* read */
     bool keep, no_memory;
     ebpo_error *error;
 } finding;
@@ -39,41 +43,34 @@ static bool stays_below(const char *name)
     return true;
 }
 
-/* Whether links lead elsewhere; false also where there is no such file. */
-static bool really_below(const char *folder, const char *path)
-{
-    char *top = realpath(folder, NULL), *real = realpath(path, NULL);
-    size_t n = top ? strlen(top) : 0;
-    bool below = top && real && strncmp(top, real, n) == 0 && (n == 1 || real[n] == '/');
-    free(top);
-    free(real);
-    return below;
-}
-
 typedef enum found { FOUND, ABSENT, OUTSIDE, NO_MEMORY } found;
 
-/* Opens a file that the source names. Other systems' names have backslashes. */
+/* Other systems' names have backslashes. */
+static char *path_of(const char *name)
+{
+    char *path = strdup(name);
+    for (char *s = path; path && *s; s++)
+        if (*s == '\\')
+            *s = '/';
+    return path;
+}
+
+/* Opens a file that the source names. */
 static found open_beside(const char *source, const char *name, ebpo_whole_file *out)
 {
-    size_t folder = (size_t)(ebpo_path_name(source) - source), n = strlen(name);
-    char *path = malloc(folder + n + 3), *top = strndup(folder ? source : ".", folder ? folder : 1);
-    found how = path && top ? FOUND : NO_MEMORY;
-    if (how == FOUND) {
-        memcpy(path, source, folder);
-        memcpy(path + folder, name, n + 1);
-        for (char *s = path + folder; *s; s++)
-            if (*s == '\\')
-                *s = '/';
-        how = !stays_below(path + folder)                        ? OUTSIDE
-              : ebpo_whole_file_open(out, path, NULL) != EBPO_OK ? ABSENT
-                                                                 : FOUND;
-    }
-    if (how == FOUND && !really_below(top, path)) {
-        ebpo_whole_file_close(out);
+    size_t length = (size_t)(ebpo_path_name(source) - source);
+    char *path = path_of(name), *folder = strndup(length ? source : ".", length ? length : 1);
+    found how = path && folder ? FOUND : NO_MEMORY;
+    if (how == FOUND && !stays_below(path))
         how = OUTSIDE;
+    if (how == FOUND) {
+        int fd = ebpo_open_below(folder, path);
+        how = fd >= 0 ? FOUND : errno == EXDEV ? OUTSIDE : ABSENT;
+        if (fd >= 0 && ebpo_whole_file_take(out, fd, path, NULL) != EBPO_OK)
+            how = ABSENT;
     }
     free(path);
-    free(top);
+    free(folder);
     return how;
 }
 
@@ -84,7 +81,9 @@ static bool read_library(finding *f, const char *name)
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     found how = f->tried++ < LIBRARIES ? open_beside(f->path, name, &file) : ABSENT;
     f->no_memory |= how == NO_MEMORY;
-    bool good = how == FOUND && file.size <= LIBRARY_BYTES;
+    bool good = how == FOUND && file.size <= LIBRARY_BYTES - f->library_bytes;
+    if (good)
+        f->library_bytes += file.size;
     if (good)
         ebpo_texture_names_of_mtl(&f->names, file.data, file.size);
     ebpo_whole_file_close(&file);

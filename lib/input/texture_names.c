@@ -5,6 +5,7 @@
 
 #include "attributes/textures.h"
 #include "base/alloc.h"
+#include "base/hash.h"
 
 /* Text that does not end with a zero. */
 typedef struct span {
@@ -65,11 +66,21 @@ static bool is_name(span name)
     return good;
 }
 
+static uint64_t hash_of(span name)
+{
+    uint64_t hash = name.n;
+    for (size_t i = 0; i < name.n; i++)
+        hash = hash * 31 + (uint8_t)name.s[i];
+    return ebpo_hash_number(hash);
+}
+
 static ebpo_texture_name *place_of(ebpo_texture_names *names, span name)
 {
-    for (uint64_t i = 0; i < names->count; i++)
-        if (is(name, names->of[i].name))
-            return &names->of[i];
+    uint64_t at;
+    EBPO_HASH_FIND(at, hash_of(name), EBPO_TEXTURE_SLOTS - 1,
+                   !names->slot[at] || is(name, names->of[names->slot[at] - 1].name));
+    if (names->slot[at])
+        return &names->of[names->slot[at] - 1];
     if (!is_name(name) || names->count == EBPO_TEXTURES) {
         names->left_out++;
         return NULL;
@@ -81,6 +92,7 @@ static ebpo_texture_name *place_of(ebpo_texture_names *names, span name)
         return NULL;
     }
     names->of[names->count] = (ebpo_texture_name){ .name = copy };
+    names->slot[at] = (uint16_t)(names->count + 1);
     return &names->of[names->count++];
 }
 

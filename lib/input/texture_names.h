@@ -10,11 +10,14 @@ typedef struct ebpo_texture_name {
     uint64_t use_bytes, use_capacity;
 } ebpo_texture_name;
 
+enum { EBPO_TEXTURE_SLOTS = 4096 }; /* more than there are names */
+
 typedef struct ebpo_texture_names {
     ebpo_texture_name *of;
     uint64_t count, capacity;
-    uint64_t left_out; /* too long or too many, or with control characters */
-    bool no_memory;    /* some are missing */
+    uint16_t slot[EBPO_TEXTURE_SLOTS]; /* a table of numbers from 1; 0: free */
+    uint64_t left_out;                 /* too long or too many, or with control characters */
+    bool no_memory;                    /* some are missing */
 } ebpo_texture_names;
 
 /* Adds what a header says: `comment TextureFile NAME`. */

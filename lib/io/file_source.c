@@ -52,14 +52,20 @@ static ebpo_status map_or_read(ebpo_whole_file *file, const char *path, ebpo_err
 
 ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path, ebpo_error *error)
 {
+    *out = (ebpo_whole_file)EBPO_WHOLE_FILE_INIT;
+    /* non-blocking: a pipe must not hang us */
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    if (fd < 0)
+        return ebpo_fail_errno(error, path, "cannot be opened for reading");
+    return ebpo_whole_file_take(out, fd, path, error);
+}
+
+ebpo_status ebpo_whole_file_take(ebpo_whole_file *out, int fd, const char *path, ebpo_error *error)
+{
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
-    *out = file;
     ebpo_status status;
     struct stat st;
-    /* non-blocking: a pipe must not hang us */
-    file.fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-    if (file.fd < 0)
-        return ebpo_fail_errno(error, path, "cannot be opened for reading");
+    file.fd = fd;
     if (fstat(file.fd, &st) != 0) {
         status = ebpo_fail_errno(error, path, "cannot be examined");
         goto done;

@@ -28,6 +28,10 @@ typedef struct ebpo_whole_file {
 EBPO_MUST_USE ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path,
                                                ebpo_error *error);
 
+/* The same of a descriptor, which is closed with the file, or on failure; `path` for messages. */
+EBPO_MUST_USE ebpo_status ebpo_whole_file_take(ebpo_whole_file *out, int fd, const char *path,
+                                               ebpo_error *error);
+
 /* EBPO_E_IO when size or time of change are not what they were at opening: what was read then
  * belongs to no one version. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *path,

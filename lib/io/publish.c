@@ -6,12 +6,15 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
 #include "io/file_source.h"
+#include "io/replaced_facts.h"
+#include "io/stale_files.h"
 
 /* Names of the temporary files in the making. Fixed storage and lock-free states, because a signal
  * handler reads them. */
@@ -49,15 +52,17 @@ void ebpo_publish_abandon_all(void)
     errno = saved;
 }
 
-static ebpo_status check_target(const char *path, ebpo_error *error)
+static ebpo_status check_target(ebpo_publish *publish, const char *path, ebpo_error *error)
 {
     if (!*ebpo_path_name(path))
         return ebpo_fail_file(error, EBPO_E_IO, path, "names no file; give the output a file name");
     struct stat st;
     if (lstat(path, &st) != 0)
         return errno == ENOENT ? EBPO_OK : ebpo_fail_errno(error, path, "cannot be written");
-    if (S_ISREG(st.st_mode))
+    if (S_ISREG(st.st_mode)) {
+        publish->mode = st.st_mode & 07777;
         return EBPO_OK;
+    }
     const char *what = S_ISDIR(st.st_mode)   ? "is a folder"
                        : S_ISLNK(st.st_mode) ? "is a symbolic link"
                                              : "is a pipe or device";
@@ -86,14 +91,12 @@ static ebpo_status resolve(ebpo_publish *publish, const char *path, ebpo_error *
     return EBPO_OK;
 }
 
-/* 200 bytes of the target's name are enough to recognise it, and keep the sum below the usual limit
- * of 255. */
 static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
 {
     for (int attempt = 0; attempt < 100; attempt++) {
         free(publish->temporary);
-        if (asprintf(&publish->temporary, "%s/.%.200s.%ld-%u.tmp", publish->folder,
-                     ebpo_path_name(publish->target), (long)getpid(),
+        if (asprintf(&publish->temporary, "%s/.%.*s.%ld-%u.tmp", publish->folder,
+                     EBPO_TARGET_NAME_KEPT, ebpo_path_name(publish->target), (long)getpid(),
                      atomic_fetch_add(&name_counter, 1)) < 0) {
             publish->temporary = NULL;
             return ebpo_fail_memory(error, PATH_MAX);
@@ -105,10 +108,13 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
          * would be left behind. */
         strcpy(slots[publish->slot].path, publish->temporary);
         atomic_store(&slots[publish->slot].state, SLOT_LIVE);
-        publish->fd =
-            open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
-        if (publish->fd >= 0)
+        /* What nobody else may read is not shown to others meanwhile. */
+        publish->fd = open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW,
+                           publish->mode < 0 ? 0666 : 0600);
+        if (publish->fd >= 0) {
+            (void)flock(publish->fd, LOCK_EX | LOCK_NB); /* for who looks for stale files */
             return EBPO_OK;
+        }
         atomic_store(&slots[publish->slot].state, SLOT_TAKEN);
         if (errno != EEXIST)
             break;
@@ -124,15 +130,17 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
 {
     *out = (ebpo_publish)EBPO_PUBLISH_INIT;
     ebpo_publish publish = EBPO_PUBLISH_INIT;
-    ebpo_status status = check_target(path, error);
+    ebpo_status status = check_target(&publish, path, error);
     if (status == EBPO_OK)
         status = resolve(&publish, path, error);
     if (status == EBPO_OK && (publish.slot = take_slot()) < 0)
         status =
             ebpo_fail_file(error, EBPO_E_LIMIT, path,
                            "more than %d files are being written at a time", EBPO_PUBLISH_SLOTS);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK) {
+        ebpo_remove_stale_files(publish.folder, ebpo_path_name(publish.target));
         status = create_temporary(&publish, error);
+    }
     if (status != EBPO_OK) {
         ebpo_publish_abort(&publish);
         return status;
@@ -143,13 +151,19 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
 
 const char *ebpo_publish_path(const ebpo_publish *publish) { return publish->temporary; }
 
+/* With a buffer of its own: want of memory for it is then told, and writes are few. */
 FILE *ebpo_publish_stream(ebpo_publish *publish)
 {
-    if (!publish->stream) {
-        publish->stream = fdopen(publish->fd, "w+b");
-        if (publish->stream)
-            publish->fd = -1; /* the stream owns it now */
-    }
+    enum { BUFFER = 1 << 16 };
+    if (publish->stream)
+        return publish->stream;
+    if (!publish->buffer)
+        publish->buffer = ebpo_alloc(BUFFER, 1);
+    publish->stream = publish->buffer ? fdopen(publish->fd, "w+b") : NULL;
+    if (!publish->stream)
+        return NULL;
+    publish->fd = -1;                                                 /* the stream owns it now */
+    (void)!setvbuf(publish->stream, publish->buffer, _IOFBF, BUFFER); /* cannot fail */
     return publish->stream;
 }
 
@@ -162,17 +176,15 @@ static bool close_writer(ebpo_publish *publish)
     } else if (publish->fd >= 0) {
         good = close(publish->fd) == 0;
     }
+    free(publish->buffer);
+    publish->buffer = NULL;
     publish->stream = NULL;
     publish->fd = -1;
     return good;
 }
 
-/* By name, since a library may have written through a descriptor of its own. */
-static bool sync_path(const char *path, int flags)
+static bool sync_and_close(int fd)
 {
-    int fd = open(path, O_RDONLY | O_CLOEXEC | flags);
-    if (fd < 0)
-        return false;
     /* EINVAL: a file system without sync of folders */
     bool good = fsync(fd) == 0 || errno == EINVAL;
     int saved = errno;
@@ -181,26 +193,96 @@ static bool sync_path(const char *path, int flags)
     return good;
 }
 
-ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
+static bool sync_folder(const char *path)
 {
-    ebpo_status status = EBPO_OK;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_DIRECTORY);
+    return fd >= 0 && sync_and_close(fd);
+}
+
+/* Closes and syncs. By name, since a library may have written through a descriptor of its own. */
+static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
+{
     errno = 0;
     if (!close_writer(publish))
-        status = ebpo_fail_errno(error, publish->shown,
-                                 errno ? "could not be written" : "could not be written whole");
-    else if (!sync_path(publish->temporary, O_NOFOLLOW))
-        status = ebpo_fail_errno(error, publish->shown, "could not be synced to the disk");
-    else if (rename(publish->temporary, publish->target) != 0)
-        status = ebpo_fail_errno(error, publish->shown,
-                                 "the finished temporary file could not be renamed to it");
-    if (status == EBPO_OK) {
-        free(publish->temporary);
-        publish->temporary = NULL;
-        if (!sync_path(publish->folder, O_DIRECTORY))
-            status = ebpo_fail_errno(error, publish->shown,
-                                     "is in place, but its folder could not be synced to the disk");
+        return ebpo_fail_errno(error, publish->shown,
+                               errno ? "could not be written" : "could not be written whole");
+    int fd = open(publish->temporary, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    if (fd >= 0 && !ebpo_take_over_facts(fd, publish->target, publish->mode)) {
+        int saved = errno;
+        close(fd);
+        errno = saved;
+        return ebpo_fail_errno(error, publish->shown,
+                               "the mode of the file that was there could "
+                               "not be given to the new one");
     }
+    if (fd < 0 || !sync_and_close(fd))
+        return ebpo_fail_errno(error, publish->shown, "could not be synced to the disk");
+    return EBPO_OK;
+}
+
+static ebpo_status put_in_place(ebpo_publish *publish, ebpo_error *error)
+{
+    if (rename(publish->temporary, publish->target) != 0)
+        return ebpo_fail_errno(error, publish->shown,
+                               "the finished temporary file could not be renamed to it");
+    free(publish->temporary);
+    publish->temporary = NULL;
+    return EBPO_OK;
+}
+
+static ebpo_status sync_name(const ebpo_publish *publish, ebpo_error *error)
+{
+    return sync_folder(publish->folder)
+               ? EBPO_OK
+               : ebpo_fail_errno(error, publish->shown,
+                                 "is in place, but its folder could not be synced to the disk");
+}
+
+ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
+{
+    ebpo_status status = make_ready(publish, error);
+    if (status == EBPO_OK)
+        status = put_in_place(publish, error);
+    if (status == EBPO_OK)
+        status = sync_name(publish, error);
     ebpo_publish_abort(publish);
+    return status;
+}
+
+/* Exchanges it for what was there, which is then the temporary file. */
+static bool exchange(const ebpo_publish *publish)
+{
+    return renameat2(AT_FDCWD, publish->temporary, AT_FDCWD, publish->target, RENAME_EXCHANGE) == 0;
+}
+
+/* The second could not be put in its place: the first gives way to what was there. */
+static ebpo_status take_back(ebpo_publish *first, bool exchanged, bool fresh, ebpo_error *cause,
+                             ebpo_error *error)
+{
+    if (exchanged ? exchange(first) : fresh && unlink(first->target) == 0)
+        return ebpo_fail_with(error, cause);
+    return ebpo_fail_file(error, cause->status, cause->file,
+                          "%s; of the two files only %s is in place: write both anew",
+                          strerror(errno), first->shown);
+}
+
+ebpo_status ebpo_publish_commit_pair(ebpo_publish *first, ebpo_publish *second, ebpo_error *error)
+{
+    ebpo_error cause = EBPO_ERROR_INIT;
+    ebpo_status status = make_ready(first, error);
+    if (status == EBPO_OK)
+        status = make_ready(second, error);
+    bool exchanged = status == EBPO_OK && exchange(first), fresh = !exchanged && errno == ENOENT;
+    if (status == EBPO_OK && !exchanged)
+        status = put_in_place(first, error);
+    if (status == EBPO_OK && put_in_place(second, &cause) != EBPO_OK)
+        status = take_back(first, exchanged, fresh, &cause, error);
+    if (status == EBPO_OK)
+        status = sync_name(first, error);
+    if (status == EBPO_OK && strcmp(first->folder, second->folder) != 0)
+        status = sync_name(second, error);
+    ebpo_publish_abort(first);
+    ebpo_publish_abort(second);
     return status;
 }
 

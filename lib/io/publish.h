@@ -19,19 +19,24 @@ typedef struct ebpo_publish {
     char *target;
     char *temporary;
     FILE *stream; /* NULL until asked for */
+    char *buffer; /* of the stream */
     int fd;       /* of the temporary file */
     int slot;     /* in the registry of temporary files */
+    int mode;     /* of the file that was there at the beginning; -1: there was none */
 } ebpo_publish;
 
-#define EBPO_PUBLISH_INIT                    \
-    {                                        \
-        NULL, NULL, NULL, NULL, NULL, -1, -1 \
+#define EBPO_PUBLISH_INIT                              \
+    {                                                  \
+        NULL, NULL, NULL, NULL, NULL, NULL, -1, -1, -1 \
     }
 
-/* Creates the temporary file (mode 0666 less the umask, exclusive). An existing regular file at
- * `path` is replaced on commit; a folder, device or symbolic link there is EBPO_E_IO, so is a
- * folder that cannot be written. On failure nothing is left behind. More than EBPO_PUBLISH_SLOTS at
- * a time in one process: EBPO_E_LIMIT. */
+/* Creates the temporary file, exclusively. An existing regular file at `path` is replaced on
+ * commit; the new one takes over its mode and, where the system allows, its owner, its extended
+ * attributes and with these its access control list; other names that it has (hard links) keep the
+ * old file. Where there is none, the mode is 0666 less the umask. A folder, device or symbolic link
+ * at `path` is EBPO_E_IO, so is a folder that cannot be written. On failure nothing is left behind.
+ * Temporary files for the same target that killed processes have left are removed.
+ * More than EBPO_PUBLISH_SLOTS at a time in one process: EBPO_E_LIMIT. */
 EBPO_MUST_USE ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path,
                                              ebpo_error *error);
 enum { EBPO_PUBLISH_SLOTS = 32 };
@@ -48,6 +53,12 @@ FILE *ebpo_publish_stream(ebpo_publish *publish);
  * the temporary file is removed and the target is as it was (but when only the last step failed,
  * the sync of the folder: then the new file is in place). */
 EBPO_MUST_USE ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error);
+
+/* The same for two files that belong together: both, or, on failure, neither (but when only the
+ * sync of the folder failed). Where one cannot be exchanged for the other at once, as on some file
+ * systems, the first may be in place when the second cannot be. */
+EBPO_MUST_USE ebpo_status ebpo_publish_commit_pair(ebpo_publish *first, ebpo_publish *second,
+                                                   ebpo_error *error);
 
 /* Closes and removes the temporary file. Harmless on EBPO_PUBLISH_INIT and after a commit. */
 void ebpo_publish_abort(ebpo_publish *publish);

@@ -8,8 +8,9 @@
 #include "base/parallel.h"
 #include "base/arrays.h"
 #include "mesh/mesh_check_parts.h"
+#include "mesh/same_faces.h"
 
-enum { STAR_GRAIN = 1 << 13, INSERTION_LIMIT = 32 };
+enum { STAR_GRAIN = 1 << 13 };
 
 typedef struct star_block {
     ebpo_finding boundary, nonmanifold, misoriented, unbalanced, bowtie, repeated_face;
@@ -17,18 +18,11 @@ typedef struct star_block {
     uint64_t edges, components;
 } star_block;
 
-/* The two other corners of a face that has this vertex as its lowest. */
-typedef struct opposite {
-    uint64_t corners; /* lower << 32 | higher */
-    uint32_t face;
-} opposite;
-
 typedef struct scratch {
     ebpo_star star;
     uint32_t *fans; /* union-find over the star's faces */
     uint64_t fan_capacity;
-    opposite *opposites;
-    uint64_t opposite_capacity;
+    ebpo_same_faces same;
     ebpo_boundary *boundary;
 } scratch;
 
@@ -116,49 +110,13 @@ static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, 
     return true;
 }
 
-static int compare_opposites(const void *a, const void *b)
-{
-    const opposite *x = a, *y = b;
-    if (x->corners != y->corners)
-        return x->corners < y->corners ? -1 : 1;
-    return x->face < y->face ? -1 : x->face > y->face;
-}
-
-static void sort_opposites(opposite *o, uint64_t count)
-{
-    if (count > INSERTION_LIMIT) {
-        qsort(o, count, sizeof *o, compare_opposites);
-        return;
-    }
-    for (uint64_t i = 1; i < count; i++) {
-        opposite x = o[i];
-        uint64_t j = i;
-        for (; j > 0 && compare_opposites(&o[j - 1], &x) > 0; j--)
-            o[j] = o[j - 1];
-        o[j] = x;
-    }
-}
-
-/* Equal faces meet at their lowest vertex. */
 static bool check_repeated(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
 {
-    uint64_t begin = check->stars.first[v], end = check->stars.first[v + (uint64_t)1], count = 0;
-    if (!ebpo_array_grow_late(check->mesh->workspace, &s->opposites, &s->opposite_capacity,
-                              end - begin, sizeof *s->opposites))
+    if (!ebpo_same_faces_gather(&s->same, &check->stars, check->mesh, v))
         return false;
-    for (uint64_t i = begin; i < end; i++) {
-        uint32_t f = check->stars.face[i];
-        const uint32_t *c = check->mesh->faces + 3 * (uint64_t)f;
-        if (c[0] < v || c[1] < v || c[2] < v || ebpo_face_repeats_index(c))
-            continue;
-        uint32_t p = c[0] == v ? c[1] : c[0], q = c[2] == v ? c[1] : c[2];
-        s->opposites[count++] = (opposite){ p < q ? (uint64_t)p << 32 | q : (uint64_t)q << 32 | p,
-                                            (uint32_t)ebpo_mesh_source_face(check->mesh, f) };
-    }
-    sort_opposites(s->opposites, count);
-    for (uint64_t i = 1; i < count; i++)
-        if (s->opposites[i].corners == s->opposites[i - 1].corners)
-            ebpo_finding_add(&block->repeated_face, s->opposites[i].face);
+    for (uint64_t i = 1; i < s->same.count; i++)
+        if (ebpo_same_faces_repeats(&s->same, i))
+            ebpo_finding_add(&block->repeated_face, s->same.item[i].source);
     return true;
 }
 
@@ -208,7 +166,7 @@ static void free_scratch(scratch *s, ebpo_workspace *workspace)
 {
     ebpo_star_free(&s->star);
     ebpo_array_free(workspace, s->fans);
-    ebpo_array_free(workspace, s->opposites);
+    ebpo_same_faces_free(&s->same);
 }
 
 ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)

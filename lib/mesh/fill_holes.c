@@ -160,7 +160,7 @@ static ebpo_status make_room(filling *f, ebpo_error *error)
     ebpo_mesh *mesh = f->mesh;
     struct ebpo_arrangement *order = mesh->arrangement;
     uint64_t count = mesh->face_count + f->added, capacity = mesh->face_count;
-    if (count > UINT32_MAX - 1)
+    if (count + (order ? order->dropped_faces : 0) > UINT32_MAX - 1)
         return ebpo_fail_file(error, EBPO_E_LIMIT, ebpo_mesh_label(mesh),
                               "%llu faces with the filled holes, but 2^32 - 2 is the limit; "
                               "split the mesh",
@@ -172,7 +172,7 @@ static ebpo_status make_room(filling *f, ebpo_error *error)
                                   sizeof *order->face_source))
         return ebpo_workspace_fail(mesh->workspace, count * sizeof *order->face_source, error);
     EBPO_FOR_ITEMS(mesh->workspace, i, mesh->face_count, order ? count : 0)
-        order->face_source[i] = (uint32_t)i;
+        order->face_source[i] = (uint32_t)(i + order->dropped_faces);
     return EBPO_OK;
 }
 

@@ -41,6 +41,8 @@ ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *re
     ebpo_status status = EBPO_OK;
     if (steps & EBPO_MEND_WELD)
         status = ebpo_mesh_weld(mesh, record, error);
+    if (status == EBPO_OK && steps & EBPO_MEND_DROP)
+        status = ebpo_mesh_drop_duplicates(mesh, record, error);
     if (status == EBPO_OK && steps & EBPO_MEND_ORIENT)
         status = orient(mesh, steps, record, error);
     if (status == EBPO_OK && steps & EBPO_MEND_FLIP)

@@ -32,6 +32,11 @@ const char *ebpo_mesh_attributes_lost(const ebpo_mesh *mesh)
     return mesh->attributes && mesh->attributes->lost[0] ? mesh->attributes->lost : NULL;
 }
 
+const char *ebpo_mesh_unread(const ebpo_mesh *mesh)
+{
+    return mesh->attributes && mesh->attributes->unread[0] ? mesh->attributes->unread : NULL;
+}
+
 int ebpo_mesh_has_attributes(const ebpo_mesh *mesh)
 {
     return ebpo_attributes_hold(mesh->attributes);

@@ -9,7 +9,8 @@
 
 #define EBPO_NO_INDEX UINT32_MAX
 
-/* Of a mesh whose vertices and faces are in the order of a Morton curve (ebpo_mesh_arrange). */
+/* Of a mesh whose vertices and faces are in the order of a Morton curve (ebpo_mesh_arrange), or of
+ * which faces were dropped. */
 struct ebpo_arrangement {
     /* around the referenced vertices, with exact walls down to box.grid_level */
     ebpo_box box;
@@ -26,6 +27,7 @@ struct ebpo_arrangement {
     ebpo_workspace *workspace; /* the mesh's, of all arrays */
     /* of a component: what the mesh has of which it is one, mended; else 0 */
     uint64_t whole_vertices, whole_faces;
+    uint64_t dropped_faces; /* of the source, since: their numbers are nobody's */
 };
 
 /* Its geometry and order, without attributes, in its workspace; freed by ebpo_mesh_free. On failure
@@ -104,10 +106,11 @@ enum {
     EBPO_MEND_ORIENT = 2,
     EBPO_MEND_FILL = 4,
     EBPO_MEND_FLIP = 8,
-    EBPO_MEND_EARLIER = 16
+    EBPO_MEND_EARLIER = 16,
+    EBPO_MEND_DROP = 32
 };
 
-/* Merges, orients, flips, fills holes, and turns what these closed: as asked for. */
+/* Merges, drops, orients, flips, fills holes, and turns what these closed: as asked for. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *record,
                                          ebpo_error *error);
 

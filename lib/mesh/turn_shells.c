@@ -2,6 +2,7 @@
 #include "geom/strict_fp.h"
 
 #include <ebpo/repair.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,6 +14,7 @@
 #include "base/sized.h"
 #include "geom/predicates.h"
 #include "mesh/component_parts.h"
+#include "mesh/point_tree.h"
 
 /* A component is within another one if these vertices are: the least and the greatest along each
  * axis. */
@@ -25,17 +27,20 @@ typedef struct shell {
     uint32_t depth; /* closed components that it is within */
 } shell;
 
-typedef struct probe {
-    double at[3];
-    uint32_t shell; /* among those that may be within the host */
-    int32_t winding;
-} probe;
+/* Of one thread: what may be within the host that it looks at. */
+typedef struct seeker {
+    point_tree probes; /* SAMPLES of each of these shells; values are winding numbers */
+    struct nesting *n;
+    const shell *host;
+    const double (*face)[3];
+} seeker;
 
 typedef struct nesting {
     ebpo_components *components;
-    shell *shells; /* closed, with a volume; by the least coordinate along `axis` */
+    shell *shells; /* closed, with a volume */
     uint64_t count;
-    int axis;
+    point_tree tree; /* a vertex of each shell */
+    seeker *seeker;  /* one for each worker */
     unsigned threads;
 } nesting;
 
@@ -83,53 +88,6 @@ static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, un
 
 /* ---- which are within which ---- */
 
-static int compare_shells(const void *x, const void *y, void *axis)
-{
-    const shell *a = x, *b = y;
-    int k = *(const int *)axis;
-    if (a->min[k] != b->min[k])
-        return a->min[k] < b->min[k] ? -1 : 1;
-    return a->component < b->component ? -1 : 1;
-}
-
-static int compare_probes(const void *x, const void *y)
-{
-    const probe *a = x, *b = y;
-    return (a->at[1] > b->at[1]) - (a->at[1] < b->at[1]);
-}
-
-/* Along it boxes overlap least, as a share of all of it. */
-static int best_axis(const nesting *n)
-{
-    double least = 0;
-    int best = 0;
-    for (int k = 0; k < 3; k++) {
-        double low = n->shells[0].min[k], high = n->shells[0].max[k], sum = 0;
-        for (uint64_t i = 0; i < n->count; i++) {
-            low = n->shells[i].min[k] < low ? n->shells[i].min[k] : low;
-            high = n->shells[i].max[k] > high ? n->shells[i].max[k] : high;
-            sum += n->shells[i].max[k] / 2 - n->shells[i].min[k] / 2;
-        }
-        double share = high > low ? sum / (high / 2 - low / 2) : (double)n->count;
-        if (k == 0 || share < least)
-            best = k, least = share;
-    }
-    return best;
-}
-
-static uint64_t first_from(const nesting *n, double x)
-{
-    uint64_t low = 0, high = n->count;
-    while (low < high) {
-        uint64_t middle = low + (high - low) / 2;
-        if (n->shells[middle].min[n->axis] < x)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 static bool box_within(const shell *inner, const shell *outer)
 {
     for (int k = 0; k < 3; k++)
@@ -138,91 +96,144 @@ static bool box_within(const shell *inner, const shell *outer)
     return true;
 }
 
-/* Probes of all that may be within the host; NULL with a count of 0: nothing is. */
-static bool make_probes(const nesting *n, uint64_t host, probe **probes, uint64_t *count)
+static bool near_host(void *user, const point_box *box)
 {
-    const shell *h = &n->shells[host];
-    uint64_t capacity = 0;
-    for (uint64_t i = first_from(n, h->min[n->axis]);
-         i < n->count && n->shells[i].min[n->axis] <= h->max[n->axis]; i++) {
-        if (i == host || !box_within(&n->shells[i], h))
-            continue;
-        if (!ebpo_grow(probes, &capacity, *count + SAMPLES, sizeof **probes))
+    const shell *h = ((const seeker *)user)->host;
+    for (int k = 0; k < 3; k++)
+        if (box->min[k] > h->max[k] || box->max[k] < h->min[k])
             return false;
-        for (int d = 0; d < SAMPLES; d++) {
-            probe *p = &(*probes)[(*count)++];
-            *p = (probe){ .shell = (uint32_t)i };
-            memcpy(p->at, n->shells[i].sample[d], sizeof p->at);
-        }
-    }
-    if (*count)
-        qsort(*probes, *count, sizeof **probes, compare_probes);
     return true;
 }
 
-static uint64_t first_probe(const probe *probes, uint64_t count, double y)
+static bool add_probes(seeker *w, uint32_t number)
 {
-    uint64_t low = 0, high = count;
-    while (low < high) {
-        uint64_t middle = low + (high - low) / 2;
-        if (probes[middle].at[1] < y)
-            low = middle + 1;
-        else
-            high = middle;
+    const shell *one = &w->n->shells[number];
+    for (int d = 0; d < SAMPLES; d++) {
+        mesh_point *p = ebpo_point_tree_add(&w->probes);
+        if (!p)
+            return false;
+        *p = (mesh_point){ .number = number };
+        memcpy(p->at, one->sample[d], sizeof p->at);
     }
-    return low;
+    return true;
+}
+
+static bool list_inner(void *user, mesh_point *points, uint64_t count)
+{
+    seeker *w = user;
+    for (uint64_t i = 0; i < count; i++) {
+        const shell *one = &w->n->shells[points[i].number];
+        if (one != w->host && box_within(one, w->host) && !add_probes(w, points[i].number))
+            return false;
+    }
+    return true;
+}
+
+/* Whether a line along the edge from t[0] to t[1], in the plane of y and z, separates the box from
+ * the triangle. Certain: errors of rounding are bounded, and what is not a number separates
+ * nothing. */
+static bool separates(const double *const t[3], const point_box *box)
+{
+    static const double ROUNDING = 0x1p-49, TINY = 0x1p-1000;
+    const double *a = t[0], e[2] = { a[2] - t[1][2], t[1][1] - a[1] };
+    double low = 0, high = 0, size = 0, least = 0, most = 0;
+    for (int k = 0; k < 2; k++) {
+        double x = e[k] * (box->min[k + 1] - a[k + 1]), y = e[k] * (box->max[k + 1] - a[k + 1]);
+        low += x < y ? x : y;
+        high += x < y ? y : x;
+        size += fabs(x) + fabs(y);
+    }
+    for (int i = 1; i < 3; i++) {
+        double x = e[0] * (t[i][1] - a[1]), y = e[1] * (t[i][2] - a[2]);
+        least = x + y < least ? x + y : least;
+        most = x + y > most ? x + y : most;
+        size += fabs(x) + fabs(y);
+    }
+    double error = size * ROUNDING + TINY;
+    return low > most + error || high < least - error;
+}
+
+/* Probes that a line along x may lead through the face from. */
+static bool near_face(void *user, const point_box *box)
+{
+    const double(*t)[3] = ((const seeker *)user)->face;
+    bool before = false;
+    for (int i = 0; i < 3; i++)
+        before |= t[i][0] >= box->min[0];
+    if (!before)
+        return false;
+    for (int k = 1; k < 3; k++) {
+        double low = fmin(fmin(t[0][k], t[1][k]), t[2][k]),
+               high = fmax(fmax(t[0][k], t[1][k]), t[2][k]);
+        if (low > box->max[k] || high < box->min[k])
+            return false;
+    }
+    for (int i = 0; i < 3; i++) {
+        const double *const turned[3] = { t[i], t[(i + 1) % 3], t[(i + 2) % 3] };
+        if (separates(turned, box))
+            return false;
+    }
+    return true;
 }
 
 /* What segments from the probes along x to the host's end cross. */
-static void cross_host(const nesting *n, const shell *host, probe *probes, uint64_t count)
+static bool cross_face(void *user, mesh_point *points, uint64_t count)
 {
-    const ebpo_components *c = n->components;
-    EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[host->component],
-                             c->faces.begin[host->component + (uint64_t)1]) {
+    seeker *w = user;
+    for (uint64_t i = 0; i < count; i++)
+        points[i].value += ebpo_axis_crossing(points[i].at, w->host->max[0], 0, w->face[0],
+                                              w->face[1], w->face[2]);
+    return true;
+}
+
+static void cross_host(seeker *w)
+{
+    const ebpo_components *c = w->n->components;
+    EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[w->host->component],
+                             c->faces.begin[w->host->component + (uint64_t)1]) {
         double t[3][3];
         for (uint64_t k = 0; k < 3; k++)
             ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)c->faces.of[i] + k], t[k]);
-        double low = t[0][1] < t[1][1] ? t[0][1] : t[1][1];
-        double high = t[0][1] > t[1][1] ? t[0][1] : t[1][1];
-        low = t[2][1] < low ? t[2][1] : low;
-        high = t[2][1] > high ? t[2][1] : high;
-        for (uint64_t p = first_probe(probes, count, low); p < count && probes[p].at[1] <= high;
-             p++)
-            probes[p].winding +=
-                ebpo_axis_crossing(probes[p].at, host->max[0], 0, t[0], t[1], t[2]);
+        w->face = (const double(*)[3])t;
+        (void)ebpo_point_tree_walk(&w->probes, near_face, cross_face, w);
     }
 }
 
-static int by_shell(const void *x, const void *y)
+static int by_number(const void *x, const void *y)
 {
-    const probe *a = x, *b = y;
-    return (a->shell > b->shell) - (a->shell < b->shell);
+    const mesh_point *a = x, *b = y;
+    return (a->number > b->number) - (a->number < b->number);
+}
+
+static void count_inner(const seeker *w)
+{
+    const mesh_point *p = w->probes.point;
+    qsort(w->probes.point, w->probes.count, sizeof *p, by_number);
+    for (uint64_t i = 0; i < w->probes.count; i += SAMPLES) {
+        bool within = true;
+        for (uint64_t d = 0; d < SAMPLES; d++)
+            within &= p[i + d].value != 0;
+        if (within)
+            __atomic_fetch_add(&w->n->shells[p[i].number].depth, 1, __ATOMIC_RELAXED);
+    }
 }
 
 static ebpo_status find_inner(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
     nesting *n = context;
-    (void)worker;
+    seeker *w = &n->seeker[worker];
     for (uint64_t host = begin; host < end; host++) {
-        probe *probes = NULL;
-        uint64_t count = 0;
-        if (!make_probes(n, host, &probes, &count)) {
-            free(probes);
-            return ebpo_fail_memory(error, (count + SAMPLES) * sizeof *probes);
-        }
-        if (count) {
-            cross_host(n, &n->shells[host], probes, count);
-            qsort(probes, count, sizeof *probes, by_shell);
-        }
-        for (uint64_t i = 0; i < count; i += SAMPLES) {
-            bool within = true;
-            for (uint64_t d = 0; d < SAMPLES; d++)
-                within &= probes[i + d].winding != 0;
-            if (within)
-                __atomic_fetch_add(&n->shells[probes[i].shell].depth, 1, __ATOMIC_RELAXED);
-        }
-        free(probes);
+        w->host = &n->shells[host];
+        w->probes.count = 0;
+        if (!ebpo_point_tree_walk(&n->tree, near_host, list_inner, w) ||
+            !ebpo_point_tree_build(&w->probes))
+            return ebpo_workspace_fail(w->probes.workspace,
+                                       (w->probes.count + SAMPLES) * sizeof(mesh_point), error);
+        if (w->probes.count == 0)
+            continue;
+        cross_host(w);
+        count_inner(w);
     }
     return EBPO_OK;
 }
@@ -256,6 +267,27 @@ static ebpo_status list_shells(nesting *n, ebpo_error *error)
     return EBPO_OK;
 }
 
+static ebpo_status make_tree(nesting *n, ebpo_error *error)
+{
+    ebpo_workspace *workspace = n->components->mesh->workspace;
+    n->tree.workspace = workspace;
+    n->seeker = ebpo_alloc_zero(n->threads, sizeof *n->seeker);
+    if (!n->seeker)
+        return ebpo_fail_memory(error, n->threads * sizeof *n->seeker);
+    for (unsigned t = 0; t < n->threads; t++)
+        n->seeker[t] = (seeker){ .probes = { .workspace = workspace }, .n = n };
+    for (uint64_t i = 0; i < n->count; i++) {
+        mesh_point *p = ebpo_point_tree_add(&n->tree);
+        if (!p)
+            return ebpo_workspace_fail(workspace, n->count * sizeof *p, error);
+        *p = (mesh_point){ .number = (uint32_t)i };
+        memcpy(p->at, n->shells[i].sample[0], sizeof p->at);
+    }
+    return ebpo_point_tree_build(&n->tree)
+               ? EBPO_OK
+               : ebpo_workspace_fail(workspace, n->count * sizeof(point_box), error);
+}
+
 static ebpo_status nest(nesting *n, ebpo_error *error)
 {
     ebpo_status status = list_shells(n, error);
@@ -265,9 +297,10 @@ static ebpo_status nest(nesting *n, ebpo_error *error)
         ebpo_parallel_for(n->threads, NULL, n->count, GRAIN, sample_shells, n, NULL, "", error);
     if (status != EBPO_OK)
         return status;
-    n->axis = best_axis(n);
-    qsort_r(n->shells, n->count, sizeof *n->shells, compare_shells, &n->axis);
-    return ebpo_parallel_for(n->threads, NULL, n->count, 1, find_inner, n, NULL, "", error);
+    status = make_tree(n, error);
+    return status == EBPO_OK ? ebpo_parallel_for(n->threads, n->components->mesh->workspace,
+                                                 n->count, 1, find_inner, n, NULL, "", error)
+                             : status;
 }
 
 static ebpo_status find_nesting(nesting *n, const ebpo_mesh *mesh, unsigned threads,
@@ -280,6 +313,10 @@ static ebpo_status find_nesting(nesting *n, const ebpo_mesh *mesh, unsigned thre
 
 static void free_nesting(nesting *n, const ebpo_mesh *mesh)
 {
+    for (unsigned t = 0; n->seeker && t < n->threads; t++)
+        ebpo_point_tree_free(&n->seeker[t].probes);
+    free(n->seeker);
+    ebpo_point_tree_free(&n->tree);
     ebpo_array_free(mesh->workspace, n->shells);
     ebpo_components_free(n->components);
 }

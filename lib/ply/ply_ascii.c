@@ -1,12 +1,12 @@
 /* The body of an ascii PLY file. Values are separated by white space, so a long list may span
- * several lines; but each row must end its line, or one value too many would shift all that follow.
- */
+ * several lines. Each row ends its line: what a line has beyond that, as MeshLab has written, is
+ * left out and counted, or it would shift all that follows. */
 #include "geom/strict_fp.h"
 
 #include <inttypes.h>
 
 #include "base/error.h"
-#include "ply/decimal.h"
+#include "geom/decimal.h"
 #include "ply/ply_ascii.h"
 #include "ply/ply_attributes.h"
 #include "ply/ply_faces.h"
@@ -17,6 +17,8 @@ typedef struct rows {
     uint64_t row;
     uint64_t to; /* of attributes: of a face that of its first triangle */
     bool store;
+    bool once;     /* elements before the vertices are read twice: what is counted, is once */
+    uint64_t line; /* where the row began */
 } rows;
 
 static bool is_blank(uint8_t c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
@@ -156,23 +158,51 @@ static ebpo_status read_property(rows *r, const ply_property *property)
     return EBPO_OK;
 }
 
+static bool ends_line(uint8_t c) { return c == '\n' || c == '\r'; }
+
+/* Whether the line goes on. */
+static bool more_here(ply_parser *p)
+{
+    while (p->at < p->size && is_blank(p->data[p->at]) && !ends_line(p->data[p->at]))
+        p->at++;
+    return p->at < p->size && !ends_line(p->data[p->at]);
+}
+
+/* A row that has gone on to another line has no values too many: an earlier one has too few. */
 static ebpo_status end_row(rows *r)
 {
     ply_parser *p = r->p;
-    while (p->at < p->size && is_blank(p->data[p->at]) && p->data[p->at] != '\n' &&
-           p->data[p->at] != '\r')
-        p->at++;
-    if (p->at == p->size || is_blank(p->data[p->at]))
-        return EBPO_OK;
     ply_word token;
-    next_token(p, &token);
-    return fail_token(r, "a value more than the header describes:", token);
+    uint64_t before = p->surplus_values;
+    while (more_here(p)) {
+        next_token(p, &token);
+        if (p->strict)
+            return fail_token(r, "a value more than the header describes:", token);
+        if (p->line != r->line)
+            return ebpo_ply_fail(p,
+                                 "%s %" PRIu64 " began in line %" PRIu64 " and ends within this "
+                                 "one: a row has fewer values than the header describes, or more; "
+                                 "repair the file",
+                                 ebpo_ply_row_name(r->element), r->row, r->line);
+        p->surplus_values += r->once;
+    }
+    p->surplus_rows += p->surplus_values > before;
+    return EBPO_OK;
+}
+
+static void begin_row(rows *r)
+{
+    ply_parser *p = r->p;
+    for (; p->at < p->size && is_blank(p->data[p->at]); p->at++)
+        p->line += p->data[p->at] == (uint8_t)p->header.line_end;
+    r->line = p->line;
 }
 
 static ebpo_status read_row(rows *r)
 {
     const ply_property *property = r->p->header.property + r->element->first;
     bool face = r->element->kind == PLY_KIND_FACE;
+    begin_row(r);
     r->to = face ? r->p->mesh->face_count : r->row;
     ebpo_status status = face && r->store ? ebpo_ply_attributes_reserve(r->p, r->to + 1) : EBPO_OK;
     for (uint64_t i = 0; i < r->element->properties && status == EBPO_OK; i++)
@@ -190,6 +220,7 @@ ebpo_status ebpo_ply_ascii_element(ply_parser *p, const ply_element *element, bo
 {
     rows r = { .p = p,
                .element = element,
+               .once = store,
                .store = store && (element->kind != PLY_KIND_OTHER || p->lost) };
     ebpo_status status = EBPO_OK;
     if (!element->properties) /* rows without values: nothing is written for them that we need to

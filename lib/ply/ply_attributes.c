@@ -9,7 +9,7 @@
 #include "base/arrays.h"
 #include "base/error.h"
 #include "base/text.h"
-#include "ply/decimal.h"
+#include "geom/decimal.h"
 #include "ply/ply_attributes.h"
 
 _Static_assert((int)PLY_INT8 == (int)EBPO_ATTRIBUTE_INT8 &&

@@ -179,6 +179,20 @@ static void describe(ply_parser *p)
     p->mesh->source_size = p->size;
 }
 
+static ebpo_status note_surplus(ply_parser *p)
+{
+    ebpo_mesh *mesh = p->mesh;
+    if (!p->surplus_values)
+        return EBPO_OK;
+    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
+        return ebpo_fail_memory(p->error, sizeof *mesh->attributes);
+    ebpo_attributes_note_unread(mesh->attributes,
+                                "values that the header does not describe: %" PRIu64
+                                ", at the ends of %" PRIu64 " rows",
+                                p->surplus_values, p->surplus_rows);
+    return EBPO_OK;
+}
+
 /* All but the mesh. */
 static void release(ply_parser *p)
 {
@@ -215,6 +229,8 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
         status = read_body(&p);
     if (status == EBPO_OK)
         status = ebpo_ply_attributes_end(&p);
+    if (status == EBPO_OK)
+        status = note_surplus(&p);
     if (status == EBPO_OK) {
         trim(&p);
         describe(&p);
@@ -255,6 +271,7 @@ ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *n
     ply_parser p = {
         .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .error = error
     };
+    p.strict = true; /* nobody could be told of what is left out */
     *xyz = NULL;
     *count = 0;
     ebpo_status status = ebpo_ply_header_parse(&p.header, p.data, size, p.name, error);

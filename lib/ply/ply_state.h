@@ -27,7 +27,10 @@ typedef struct ply_parser {
     locale_t c_locale; /* ascii only */
     const ebpo_progress *progress;
     uint64_t next_report; /* offset */
-    bool *lost; /* [arrays of attributes] a value does not fit its type; NULL: none are read */
+    /* ascii: values that the header does not describe, at the ends of how many rows */
+    uint64_t surplus_values, surplus_rows;
+    bool strict; /* ascii: such are an error */
+    bool *lost;  /* [arrays of attributes] a value does not fit its type; NULL: none are read */
     uint64_t faces_reserved; /* rows that faces' attributes have room for */
     ebpo_error *error;
 } ply_parser;

@@ -164,7 +164,7 @@ static void search_around(ebpo_batch *b, uint64_t end)
         fails = ebpo_context_subtree(c, (uint32_t)home, &accel, NULL) != EBPO_OK;
         if (fails)
             continue;
-        ebpo_nearest_begin(&n, p, INFINITY);
+        ebpo_nearest_begin(&n, c->model, p, INFINITY);
         ebpo_nearest_search(&n, c, accel);
         unsigned count = ebpo_subtrees_near(c->model, p, fmin(n.upper, n.limit), keys);
         for (unsigned k = 0; k < count; k++)

@@ -5,7 +5,6 @@
 #include <math.h>
 
 #include "container/reader.h"
-#include "query/node_bounds.h"
 
 /* Each level takes four times the one above it; the third would save a tenth of the loads that two
  * leave: docs/develop/design.md. */
@@ -53,8 +52,7 @@ void ebpo_deep_bounds_tell(ebpo_model *m, unsigned loaded)
 
 typedef struct deep_search {
     const ebpo_top *top;
-    const ebpo_box *box;
-    const double *p;
+    const ebpo_ranking *ranking;
     double best; /* so far */
 } deep_search;
 
@@ -81,8 +79,8 @@ static int rank(const deep_search *g, uint32_t gray, ebpo_cell cell, double pare
         if (ebpo_entry_kind_of(c.entry) == EBPO_ENTRY_UNIFORM)
             continue;
         ebpo_top_planes planes = planes_of(g->top, c.entry);
-        c.lower = fmax(parent, ebpo_envelope_distance(g->box, c.cell, g->top->planes + planes.first,
-                                                      planes.count, g->p, g->best));
+        c.lower = fmax(parent, ebpo_rank_cell(g->ranking, c.cell, g->top->planes + planes.first,
+                                              planes.count, g->best));
         if (c.lower >= g->best)
             continue;
         int at = count++;
@@ -104,9 +102,10 @@ static void search(deep_search *g, uint32_t gray, ebpo_cell cell, double parent)
             g->best = child[i].lower;
 }
 
-double ebpo_deep_bound(const ebpo_model *m, const ebpo_box *box, const ebpo_node *node,
-                       double lower, const double p[3], double limit)
+double ebpo_deep_bound(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
+                       double limit)
 {
+    const ebpo_model *m = ranking->model;
     const ebpo_top *top = atomic_load_explicit(&m->deep, memory_order_acquire);
     int level = node->cell.level;
     if (!top || !m->skeletons || node->type != EBPO_GRAY)
@@ -116,7 +115,7 @@ double ebpo_deep_bound(const ebpo_model *m, const ebpo_box *box, const ebpo_node
         ;
     if (d.level < level || ebpo_entry_kind_of(d.entry) != EBPO_ENTRY_GRAY)
         return lower;
-    deep_search g = { top, box, p, nextafter(limit, INFINITY) };
+    deep_search g = { top, ranking, nextafter(limit, INFINITY) };
     search(&g, d.entry, node->cell, lower);
     return fmax(lower, g.best);
 }

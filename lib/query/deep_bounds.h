@@ -7,7 +7,7 @@
 #ifndef EBPO_QUERY_DEEP_BOUNDS_H
 #define EBPO_QUERY_DEEP_BOUNDS_H
 
-#include "query/query_model.h"
+#include "query/query_node.h"
 
 /* Reads them, unless there is no room, or nothing below the cut. Once; what cannot be read will
  * be told by the questions that come to it. */
@@ -17,10 +17,9 @@ void ebpo_deep_bounds_make(ebpo_model *model);
  * Any thread. */
 void ebpo_deep_bounds_tell(ebpo_model *model, unsigned loaded);
 
-/* A certain lower bound, not less than `lower`, of the distance of p to what is of the solid's
- * surface in the cell of a node of the cut level; what is beyond `limit` is not told apart. Any
- * thread. */
-double ebpo_deep_bound(const ebpo_model *model, const ebpo_box *box, const ebpo_node *node,
-                       double lower, const double p[3], double limit);
+/* A certain lower bound, not less than `lower`, for what is of the solid's surface in the cell of a
+ * node of the cut level; what is beyond `limit` is not told apart. Any thread. */
+double ebpo_deep_bound(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
+                       double limit);
 
 #endif

@@ -22,12 +22,14 @@
 
 /* --- subsets: when a face that was left out may be nearer than what was found --- */
 
-static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const ebpo_box *box,
-                                 ebpo_node node, double lower, double *nearest, ebpo_error *error)
+static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n,
+                                 const ebpo_ranking *ranking, ebpo_node node, double lower,
+                                 double *nearest, ebpo_error *error)
 {
     const ebpo_model *m = c->model;
     ebpo_status status = EBPO_OK;
-    if (lower > n->limit || ebpo_node_is_uniform(&node) || node.type != EBPO_GRAY)
+    double limit = ebpo_nearest_limit(n);
+    if (lower > limit || ebpo_node_is_uniform(&node) || node.type != EBPO_GRAY)
         return EBPO_OK;
     if (node.pruned || (ebpo_node_is_below(&node) && n->late)) {
         *nearest = fmin(*nearest, lower);
@@ -38,9 +40,9 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const e
     if (status != EBPO_OK)
         return status;
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(m, box, &node, lower, n->p, n->limit, child);
+    int count = ebpo_rank_children(ranking, &node, lower, limit, child);
     for (int i = 0; i < count && status == EBPO_OK; i++)
-        status = pruned_within(c, n, box, child[i].node, child[i].lower, nearest, error);
+        status = pruned_within(c, n, ranking, child[i].node, child[i].lower, nearest, error);
     return status;
 }
 
@@ -48,15 +50,14 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const e
  * certain. */
 static ebpo_status look_at_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
-    ebpo_box box = ebpo_model_box(c->model);
-    ebpo_node root = ebpo_model_root(c->model);
+    ebpo_ranking ranking = ebpo_ranking_of(c->model, n->p, &n->far);
     double nearest = INFINITY;
     if (!c->model->info->pruned)
         return EBPO_OK;
-    ebpo_status status =
-        pruned_within(c, n, &box, root, ebpo_model_lower_bound(c->model, &box, &root, 0, n->p),
-                      &nearest, error);
-    n->passed_over = fmin(n->passed_over, nearest);
+    ebpo_status status = pruned_within(c, n, &ranking, ebpo_model_root(c->model),
+                                       ebpo_rank_root(&ranking), &nearest, error);
+    if (nearest < INFINITY)
+        ebpo_nearest_pass_over(n, nearest);
     return status;
 }
 
@@ -70,7 +71,7 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_distance
                          ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_nearest n;
-    ebpo_nearest_begin(&n, p, o->max_distance);
+    ebpo_nearest_begin(&n, c->model, p, o->max_distance);
     if (o->deadline_ns)
         n.deadline = ebpo_clock() + o->deadline_ns;
     if (o->warm && c->warm && c->model->whole)
@@ -110,18 +111,17 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_distance
 typedef struct interval {
     ebpo_context *c;
     const ebpo_distance_options *o;
-    ebpo_box box;
-    const double *p;
+    ebpo_ranking ranking;
+    ebpo_far far;
     uint64_t deadline;
-    double lo, hi;
+    double lo, hi; /* distances, or a far point's keys */
 } interval;
 
 static ebpo_status narrow(interval *v, ebpo_node node, double lower, ebpo_error *error)
 {
-    const ebpo_model *m = v->c->model;
     if (lower > v->hi || ebpo_node_is_uniform(&node))
         return EBPO_OK;
-    v->hi = fmin(v->hi, ebpo_cell_far(&v->box, node.cell, v->p));
+    v->hi = fmin(v->hi, ebpo_rank_cell_end(&v->ranking, node.cell));
     if (node.cell.level >= v->o->level || node.type != EBPO_GRAY || node.pruned ||
         (v->deadline && ebpo_clock() > v->deadline)) {
         v->lo = fmin(v->lo, lower);
@@ -133,7 +133,7 @@ static ebpo_status narrow(interval *v, ebpo_node node, double lower, ebpo_error 
             return status;
     }
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(m, &v->box, &node, lower, v->p, v->hi, child);
+    int count = ebpo_rank_children(&v->ranking, &node, lower, v->hi, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
         status = narrow(v, child[i].node, child[i].lower, error);
@@ -144,19 +144,20 @@ ebpo_status ebpo_distance_interval(ebpo_context *context, const double p[3],
                                    const ebpo_distance_options *options, double *lo, double *hi,
                                    ebpo_error *error)
 {
-    interval v = { .c = context,
-                   .o = options,
-                   .box = ebpo_model_box(context->model),
-                   .p = p,
-                   .lo = INFINITY,
-                   .hi = INFINITY };
+    interval v = { .c = context, .o = options, .lo = INFINITY, .hi = INFINITY };
     if (options->deadline_ns)
         v.deadline = ebpo_clock() + options->deadline_ns;
-    ebpo_node root = ebpo_model_root(context->model);
+    ebpo_box box = ebpo_model_box(context->model);
+    ebpo_far_make(&v.far, &box, p);
+    v.ranking = ebpo_ranking_of(context->model, p, &v.far);
     ebpo_status status =
-        narrow(&v, root, ebpo_model_lower_bound(context->model, &v.box, &root, 0, p), error);
+        narrow(&v, ebpo_model_root(context->model), ebpo_rank_root(&v.ranking), error);
     *lo = fmin(v.lo, v.hi);
     *hi = v.hi;
+    if (v.far.far) {
+        *lo = ebpo_far_lower(&v.far, *lo);
+        *hi = ebpo_far_upper(&v.far, *hi);
+    }
     return status;
 }
 

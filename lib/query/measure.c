@@ -175,22 +175,28 @@ static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, u
 /* --- from moments to mass --- */
 
 /* Inertia from central second moments: the trace less the matrix. */
-static void inertia_of(double out[3][3], const ebpo_pair central[6], int exponent)
+static void inertia_of(ebpo_mass *out, const ebpo_pair central[6], int exponent)
 {
     for (int k = 0; k < 3; k++) {
         int u = (k + 1) % 3, v = (k + 2) % 3;
-        out[k][k] = ldexp(ebpo_pair_add(central[u], central[v]).head, 5 * exponent);
-        out[u][v] = out[v][u] = 0 - ldexp(central[3 + k].head, 5 * exponent);
+        out->scaled_inertia[k][k] = ebpo_pair_add(central[u], central[v]).head;
+        out->scaled_inertia[u][v] = out->scaled_inertia[v][u] = 0 - central[3 + k].head;
     }
+    for (int u = 0; u < 3; u++)
+        for (int v = 0; v < 3; v++)
+            out->inertia[u][v] = ldexp(out->scaled_inertia[u][v], 5 * exponent);
 }
 
 static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid)
 {
     memset(out, 0, sizeof *out);
-    out->area = ldexp(m->area2.head, 2 * f->exponent - 1);
+    out->exponent = f->exponent;
+    out->scaled_area = .5 * m->area2.head;
+    out->area = ldexp(out->scaled_area, 2 * f->exponent);
     if (!solid || fabs(m->volume6.head) <= nothing * m->absolute6)
         return;
     ebpo_pair volume = ebpo_pair_divide(m->volume6, ebpo_pair_of(6)), centre[3], central[6];
+    out->scaled_volume = volume.head;
     out->volume = ldexp(volume.head, 3 * f->exponent);
     for (int k = 0; k < 3; k++) {
         centre[k] =
@@ -204,7 +210,7 @@ static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid
         central[k] =
             ebpo_pair_subtract(ebpo_pair_divide(m->second120[k], ebpo_pair_of(120)), shift);
     }
-    inertia_of(out->inertia, central, f->exponent);
+    inertia_of(out, central, f->exponent);
 }
 
 ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo_error *error)

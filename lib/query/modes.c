@@ -57,7 +57,7 @@ ebpo_status ebpo_distance_around(ebpo_context *c, const double p[3], const ebpo_
         node = ebpo_model_child(c->model, &node, ebpo_octant_at(at, fine - node.cell.level - 1));
     }
     ebpo_nearest n;
-    ebpo_nearest_begin(&n, p, o->max_distance);
+    ebpo_nearest_begin(&n, c->model, p, o->max_distance);
     if (status == EBPO_OK && !ebpo_node_is_uniform(&node))
         ebpo_nearest_leaf(&n, node.subtree, &node.subtree->leaf[ebpo_entry_value(node.entry)]);
     else if (status == EBPO_OK && o->mode == EBPO_DISTANCE_RECURSIVE)

@@ -19,10 +19,14 @@
 /* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
 #define FAR 32.0
 
-void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
+void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p[3],
+                        double max_distance)
 {
+    ebpo_box box = ebpo_model_box(model);
     memset(n, 0, sizeof *n);
     memcpy(n->p, p, sizeof n->p);
+    ebpo_far_make(&n->far, &box, p);
+    n->key_limit = n->far.far ? ebpo_far_limit(&n->far, max_distance) : INFINITY;
     n->limit = max_distance;
     n->upper = INFINITY;
     n->passed_over = INFINITY;
@@ -30,10 +34,12 @@ void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
 }
 
 static void take(ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *bounds,
-                 uint64_t file_face, uint64_t source_face)
+                 const ebpo_far_keys *keys, uint64_t file_face, uint64_t source_face)
 {
     n->found = true;
     n->bounds = *bounds;
+    n->keys = *keys;
+    n->key_limit = fmin(n->key_limit, keys->hi);
     n->file_face = file_face;
     n->source_face = source_face;
     memcpy(n->triangle, triangle, sizeof n->triangle);
@@ -41,13 +47,30 @@ static void take(ebpo_nearest *n, const double triangle[3][3], const ebpo_distan
     n->limit = fmin(n->limit, bounds->hi);
 }
 
+static ebpo_far_keys keys_of(const ebpo_nearest *n, const double triangle[3][3])
+{
+    return n->far.far ? ebpo_far_face(&n->far, triangle) : (ebpo_far_keys){ -INFINITY, INFINITY };
+}
+
+/* Sign of what the face is farther than the nearest one so far; exact. */
+static int compare(const ebpo_nearest *n, const double triangle[3][3],
+                   const ebpo_distance_bounds *b, const ebpo_far_keys *keys)
+{
+    if (keys->hi < n->keys.lo)
+        return -1;
+    if (keys->lo > n->keys.hi)
+        return 1;
+    return ebpo_near_compare(n->p, triangle, b, (const double(*)[3])n->triangle, &n->bounds);
+}
+
 void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face,
                              uint64_t source_face)
 {
     ebpo_distance_bounds b;
+    ebpo_far_keys keys = keys_of(n, triangle);
     ebpo_triangle_distance_bounds(n->p, (const double(*)[3])triangle, &b);
-    if (b.lo <= n->limit)
-        take(n, triangle, &b, file_face, source_face);
+    if (b.lo <= n->limit && keys.lo <= n->key_limit)
+        take(n, triangle, &b, &keys, file_face, source_face);
 }
 
 /* True: it is the nearest so far. */
@@ -62,16 +85,18 @@ static bool try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
     double triangle[3][3];
     ebpo_distance_bounds b;
     ebpo_accel_triangle(s, slot, triangle);
+    ebpo_far_keys keys = keys_of(n, (const double(*)[3])triangle);
+    if (keys.lo > n->key_limit)
+        return false;
     ebpo_triangle_distance_bounds(n->p, (const double(*)[3])triangle, &b);
     if (b.lo > n->limit)
         return false;
     if (n->found) {
-        int sign = ebpo_near_compare(n->p, (const double(*)[3])triangle, &b,
-                                     (const double(*)[3])n->triangle, &n->bounds);
+        int sign = compare(n, (const double(*)[3])triangle, &b, &keys);
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return false;
     }
-    take(n, (const double(*)[3])triangle, &b, file_face, ebpo_accel_source_face(s, local));
+    take(n, (const double(*)[3])triangle, &b, &keys, file_face, ebpo_accel_source_face(s, local));
     return true;
 }
 
@@ -177,7 +202,56 @@ static void search_near(ebpo_nearest *n, const ebpo_kernels *kernels, ebpo_near_
     judge(g);
 }
 
-/* --- far: double precision, boxes only --- */
+/* --- far from the model: by keys --- */
+
+typedef struct far_search {
+    ebpo_nearest *n;
+    const ebpo_accel *s;
+    ebpo_far_frame frame;
+} far_search;
+
+/* The same with slabs, which cost more: only of those that boxes leave. */
+static unsigned far_children(const far_search *g, uint32_t node, double lower[8])
+{
+    const ebpo_nearest *n = g->n;
+    const ebpo_bound *b = &g->s->bound[node];
+    unsigned left = 0;
+    ebpo_far_boxes(&n->far, &g->frame, b, lower);
+    for (int lane = 0; lane < b->count; lane++) {
+        if (lower[lane] <= n->key_limit)
+            lower[lane] =
+                fmax(lower[lane], ebpo_far_slab(&n->far, &g->frame, b, &g->s->slab[node], lane));
+        left |= (unsigned)(lower[lane] <= n->key_limit) << lane;
+    }
+    return left;
+}
+
+static void search_by_keys(const far_search *g, uint32_t child)
+{
+    ebpo_nearest *n = g->n;
+    if (child & EBPO_IS_BLOCK) {
+        for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
+            try_face(n, g->s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
+        return;
+    }
+    double lower[8];
+    unsigned left = far_children(g, child, lower);
+    while (left) {
+        int best = __builtin_ctz(left);
+        for (int lane = best + 1; lane < 8; lane++)
+            if (left >> lane & 1 && lower[lane] < lower[best])
+                best = lane;
+        left &= ~(1u << best);
+        if (n->late || (n->deadline && ebpo_clock() > n->deadline)) {
+            n->late = true;
+            ebpo_nearest_pass_over(n, lower[best]);
+        } else if (lower[best] <= n->key_limit) {
+            search_by_keys(g, g->s->bound[child].child[best]);
+        }
+    }
+}
+
+/* --- far from a subtree: double precision, boxes only --- */
 
 /* Lower bound of the distance to a child's box, in the model's unit. */
 static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, const double p[3])
@@ -234,7 +308,10 @@ void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebp
     g.s = s;
     if (s->bound_count == 0)
         return;
-    if (make_probe(s, n->p, &g.probe))
+    if (n->far.far) {
+        far_search far = { n, s, ebpo_far_frame_of(&n->far, s->centre, s->scale, s->reach) };
+        search_by_keys(&far, s->top);
+    } else if (make_probe(s, n->p, &g.probe))
         search_near(n, context->model->kernels, &g);
     else
         search_far(n, s, s->top);

@@ -3,14 +3,17 @@
 #define EBPO_QUERY_NEAREST_H
 
 #include "geom/distance.h"
-#include "query/query_model.h"
+#include "query/query_node.h"
 
 typedef struct ebpo_nearest {
     double p[3];
-    double limit; /* what is farther does not matter; certain */
-    double upper; /* some face of the model is at most so far away, or INFINITY */
+    ebpo_far far;
+    double key_limit; /* of a far point: what has a greater key does not matter; certain */
+    double limit;     /* what is farther does not matter; certain */
+    double upper;     /* some face of the model is at most so far away, or INFINITY */
     bool found;
     ebpo_distance_bounds bounds; /* of the winner */
+    ebpo_far_keys keys;          /* likewise, where the point is far */
     double triangle[3][3];
     uint64_t file_face, source_face;
     uint32_t block, node;             /* of the winner; EBPO_NO_BLOCK: it was known from before */
@@ -21,7 +24,20 @@ typedef struct ebpo_nearest {
 } ebpo_nearest;
 
 /* Nothing found yet. */
-void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance);
+void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p[3],
+                        double max_distance);
+
+/* Bounds of nodes are compared with this. */
+static inline double ebpo_nearest_limit(const ebpo_nearest *n)
+{
+    return n->far.far ? n->key_limit : n->limit;
+}
+/* A bound that is not gone into for want of time. */
+static inline void ebpo_nearest_pass_over(ebpo_nearest *n, double lower)
+{
+    double distance = n->far.far ? ebpo_far_lower(&n->far, lower) : lower;
+    n->passed_over = distance < n->passed_over ? distance : n->passed_over;
+}
 
 /* Begins with a face of the model that is known from before. */
 void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face,

@@ -23,29 +23,31 @@ enum { NODE = 0, OWN, OUTER };
 typedef struct searching {
     ebpo_context *c;
     ebpo_nearest *n;
-    ebpo_box box;
+    ebpo_ranking ranking;
     unsigned new_loads; /* of subtrees of which nothing was known */
 } searching;
 
 static ebpo_status add(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_nearest *n = g->n;
-    if (r->lower > n->limit || ebpo_node_is_uniform(&r->node) ||
+    if (r->lower > ebpo_nearest_limit(n) || ebpo_node_is_uniform(&r->node) ||
         r->node.pruned) /* pruned: see look_at_pruned */
         return EBPO_OK;
     if (ebpo_node_is_below(&r->node)) {
         /* it holds some face */
-        n->upper = fmin(n->upper, ebpo_cell_far(&g->box, r->node.cell, n->p));
+        double end = ebpo_rank_cell_end(&g->ranking, r->node.cell);
+        n->upper = fmin(n->upper, n->far.far ? ebpo_far_upper(&n->far, end) : end);
         n->limit = fmin(n->limit, n->upper);
+        n->key_limit = n->far.far ? fmin(n->key_limit, end) : n->key_limit;
     }
-    return r->lower <= n->limit ? ebpo_queue_push(g->c, r, error) : EBPO_OK;
+    return r->lower <= ebpo_nearest_limit(n) ? ebpo_queue_push(g->c, r, error) : EBPO_OK;
 }
 
 static ebpo_status add_children(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_ranked child[8];
     int count =
-        ebpo_rank_children(g->c->model, &g->box, &r->node, r->lower, g->n->p, g->n->limit, child);
+        ebpo_rank_children(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n), child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
         status = add(g, &child[i], error);
@@ -94,7 +96,8 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
     ebpo_nearest_search(g->n, g->c, node.subtree);
     g->new_loads += g->c->loaded > loaded && is_new;
     /* for nothing, or as one of many that are about as far away */
-    bool again = g->n->limit == limit || g->n->limit > ebpo_cell_diagonal(&g->box, node.cell);
+    bool again =
+        g->n->limit == limit || g->n->limit > ebpo_cell_diagonal(&g->ranking.box, node.cell);
     if (g->c->loaded > loaded && again)
         ebpo_skeletons_grow(g->c->model->skeletons, below, node.subtree, g->n->p, g->n->limit);
     return EBPO_OK;
@@ -111,6 +114,12 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
  * bound on the way there is greater than the face's distance. Which of these two the order of the
  * queue brings first does not matter. */
 
+static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skeleton *k)
+{
+    return g->ranking.far ? ebpo_skeleton_far_bounds(k, g->ranking.far, g->n->key_limit)
+                          : ebpo_skeleton_lower_bounds(k, g->n->p, g->n->limit);
+}
+
 static ebpo_node node_below(const ebpo_model *m, uint32_t below)
 {
     ebpo_node node = m->top->below[below];
@@ -126,9 +135,9 @@ static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo
         return EBPO_OK;
     c->seen[below] = 2 * c->question;
     const ebpo_skeleton *k = ebpo_skeletons_find(c->model->skeletons, below);
-    double own = ebpo_skeleton_lower_bounds(k, g->n->p, g->n->limit).own;
+    double own = skeleton_bounds(g, k).own;
     ebpo_ranked r = { node_below(c->model, below), fmax(lower, own), OWN };
-    return r.lower <= g->n->limit ? ebpo_queue_push(c, &r, error) : EBPO_OK;
+    return r.lower <= ebpo_nearest_limit(g->n) ? ebpo_queue_push(c, &r, error) : EBPO_OK;
 }
 
 /* A walk to the subtrees that may have outer faces of another one as their own: whose cells meet
@@ -147,7 +156,7 @@ typedef struct owners {
 static bool cell_meets(const owners *o, ebpo_cell cell)
 {
     double low[3], high[3];
-    ebpo_cell_bounds(&o->g->box, cell, low, high);
+    ebpo_cell_bounds(&o->g->ranking.box, cell, low, high);
     for (int k = 0; k < 3; k++) {
         double near = (high[k] - low[k]) / 128 + (fabs(low[k]) + fabs(high[k])) * 0x1p-50;
         if (o->outer->low[k] > high[k] + near || o->outer->high[k] < low[k] - near)
@@ -223,14 +232,14 @@ static bool consider_owners(searching *g, const ebpo_skeleton *k, const ebpo_ran
 
 static double deep_bound(const searching *g, const ebpo_ranked *r)
 {
-    return ebpo_deep_bound(g->c->model, &g->box, &r->node, r->lower, g->n->p, g->n->limit);
+    return ebpo_deep_bound(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n));
 }
 
 /* Nothing has been kept of it: it is searched, but after what is nearer than it can be. */
 static ebpo_status look_at_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_ranked all = { r->node, deep_bound(g, r), OWN };
-    if (all.lower > g->n->limit)
+    if (all.lower > ebpo_nearest_limit(g->n))
         return EBPO_OK;
     return all.lower > r->lower ? ebpo_queue_push(g->c, &all, error)
                                 : search_below(g, r->node, error);
@@ -244,16 +253,17 @@ static ebpo_status look(searching *g, const ebpo_ranked *r, ebpo_error *error)
         return search_below(g, r->node, error);
     if (!k)
         return look_at_new(g, r, error);
-    ebpo_skeleton_bounds bounds = ebpo_skeleton_lower_bounds(k, g->n->p, g->n->limit);
+    ebpo_skeleton_bounds bounds = skeleton_bounds(g, k);
     double least = fmax(r->lower, fmin(bounds.own, bounds.outer));
-    if (least > g->n->limit)
+    if (least > ebpo_nearest_limit(g->n))
         return EBPO_OK;
     bool there = is_there(g->c, below); /* then both at once */
     double lower = there ? r->lower : deep_bound(g, r);
     ebpo_ranked own = { r->node, there ? least : fmax(lower, bounds.own), OWN },
                 outer = { r->node, there ? INFINITY : fmax(lower, bounds.outer), OUTER };
-    ebpo_status status = own.lower <= g->n->limit ? ebpo_queue_push(g->c, &own, error) : EBPO_OK;
-    if (status == EBPO_OK && outer.lower <= g->n->limit)
+    double limit = ebpo_nearest_limit(g->n);
+    ebpo_status status = own.lower <= limit ? ebpo_queue_push(g->c, &own, error) : EBPO_OK;
+    if (status == EBPO_OK && outer.lower <= limit)
         status = ebpo_queue_push(g->c, &outer, error);
     return status;
 }
@@ -278,16 +288,16 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
 {
     ebpo_nearest *n = g->n;
     const ebpo_model *m = g->c->model;
-    ebpo_ranked root = { ebpo_model_root(m), 0, NODE };
+    ebpo_ranked root = { ebpo_model_root(m), n->far.far ? -INFINITY : 0, NODE };
     ebpo_status status = begin_question(g->c, error);
     if (status == EBPO_OK)
         status = add(g, &root, error);
     while (status == EBPO_OK && g->c->queue_count) {
         ebpo_ranked next = ebpo_queue_pop(g->c);
-        if (next.lower > n->limit)
+        if (next.lower > ebpo_nearest_limit(n))
             break;
         if (is_late(n)) {
-            n->passed_over = fmin(n->passed_over, next.lower);
+            ebpo_nearest_pass_over(n, next.lower);
             break;
         }
         status = !ebpo_node_is_below(&next.node) ? add_children(g, &next, error)
@@ -301,7 +311,7 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
 
 ebpo_status ebpo_nearest_first(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
-    searching g = { c, n, ebpo_model_box(c->model), 0 };
+    searching g = { c, n, ebpo_ranking_of(c->model, n->p, &n->far), 0 };
     if (!c->model->whole)
         return search_parts(&g, error);
     ebpo_nearest_search(n, c, c->model->whole);

@@ -20,9 +20,7 @@ typedef struct wanted {
 
 /* The nearest subtrees within `limit` of p. */
 typedef struct looking {
-    const ebpo_model *model;
-    ebpo_box box;
-    const double *p;
+    ebpo_ranking ranking;
     double limit;
     unsigned count;
     wanted list[EBPO_CACHE_AHEAD]; /* the nearest first */
@@ -47,7 +45,7 @@ static void look(looking *l, ebpo_node node, double lower)
         return;
     }
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(l->model, &l->box, &node, lower, l->p, l->limit, child);
+    int count = ebpo_rank_children(&l->ranking, &node, lower, l->limit, child);
     for (int i = 0; i < count; i++)
         look(l, child[i].node, child[i].lower);
 }
@@ -55,9 +53,8 @@ static void look(looking *l, ebpo_node node, double lower)
 unsigned ebpo_subtrees_near(const ebpo_model *m, const double p[3], double limit,
                             uint64_t keys[EBPO_CACHE_AHEAD])
 {
-    looking l = { .model = m, .box = ebpo_model_box(m), .p = p, .limit = limit };
-    ebpo_node root = ebpo_model_root(m);
-    look(&l, root, ebpo_model_lower_bound(m, &l.box, &root, 0, p));
+    looking l = { .ranking = ebpo_ranking_of(m, p, NULL), .limit = limit };
+    look(&l, ebpo_model_root(m), ebpo_rank_root(&l.ranking));
     for (unsigned i = 0; i < l.count; i++)
         keys[i] = l.list[i].key;
     return l.count;

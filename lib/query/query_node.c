@@ -62,23 +62,41 @@ const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node
     return model->top->planes + planes.first;
 }
 
-static double bound_until(const ebpo_model *m, const ebpo_box *box, const ebpo_node *node,
-                          double parent, const double p[3], double enough)
+double ebpo_rank_cell(const ebpo_ranking *r, ebpo_cell cell, const uint32_t *codes, uint32_t count,
+                      double enough)
+{
+    return r->far ? ebpo_far_envelope(r->far, &r->box, cell, codes, count, enough)
+                  : ebpo_envelope_distance(&r->box, cell, codes, count, r->p, enough);
+}
+
+double ebpo_rank_cell_end(const ebpo_ranking *r, ebpo_cell cell)
+{
+    return r->far ? ebpo_far_cell_end(r->far, &r->box, cell) : ebpo_cell_far(&r->box, cell, r->p);
+}
+
+static double bound_until(const ebpo_ranking *r, const ebpo_node *node, double parent,
+                          double enough)
 {
     uint32_t count;
-    const uint32_t *codes = ebpo_model_planes(m, node, &count);
-    return fmax(parent, ebpo_envelope_distance(box, node->cell, codes, count, p, enough));
+    const uint32_t *codes = ebpo_model_planes(r->model, node, &count);
+    return fmax(parent, ebpo_rank_cell(r, node->cell, codes, count, enough));
 }
 
-double ebpo_model_lower_bound(const ebpo_model *m, const ebpo_box *box, const ebpo_node *node,
-                              double parent, const double p[3])
+double ebpo_rank_node(const ebpo_ranking *r, const ebpo_node *node, double parent)
 {
-    return bound_until(m, box, node, parent, p, INFINITY);
+    return bound_until(r, node, parent, INFINITY);
 }
 
-int ebpo_rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_node *gray,
-                       double parent, const double p[3], double limit, ebpo_ranked out[8])
+double ebpo_rank_root(const ebpo_ranking *r)
 {
+    ebpo_node root = ebpo_model_root(r->model);
+    return ebpo_rank_node(r, &root, r->far ? -INFINITY : 0);
+}
+
+int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, double parent,
+                       double limit, ebpo_ranked out[8])
+{
+    const ebpo_model *m = ranking->model;
     const ebpo_node_table *table = gray->subtree ? &gray->subtree->nodes : &m->top->nodes;
     int count = 0;
     for (unsigned octant = 0; octant < 8; octant++) {
@@ -86,7 +104,7 @@ int ebpo_rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_node
         if (ebpo_entry_kind_of(ebpo_table_child(table, gray->entry, octant)) == EBPO_ENTRY_UNIFORM)
             continue;
         ebpo_ranked r = { ebpo_model_child(m, gray, octant), 0, 0 };
-        r.lower = bound_until(m, box, &r.node, parent, p, limit);
+        r.lower = bound_until(ranking, &r.node, parent, limit);
         if (r.lower > limit)
             continue;
         int at = count++;

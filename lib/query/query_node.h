@@ -3,6 +3,7 @@
 #ifndef EBPO_QUERY_QUERY_NODE_H
 #define EBPO_QUERY_QUERY_NODE_H
 
+#include "query/far_point.h"
 #include "query/node_bounds.h"
 #include "query/query_model.h"
 
@@ -30,10 +31,28 @@ extern const ebpo_node_source ebpo_context_source;
 /* Plane codes that the node itself has. */
 const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node, uint32_t *count);
 
-/* Lower bound of the distance of p to what is in the node, by its envelope and those of its
- * ancestors: `parent` is its parent's bound, 0 for the root. */
-double ebpo_model_lower_bound(const ebpo_model *model, const ebpo_box *box, const ebpo_node *node,
-                              double parent, const double p[3]);
+/* A point that nodes are ranked for. */
+typedef struct ebpo_ranking {
+    const ebpo_model *model;
+    ebpo_box box; /* the model's */
+    const double *p;
+    const ebpo_far *far; /* bounds and limits are its keys; NULL: they are distances */
+} ebpo_ranking;
+static inline ebpo_ranking ebpo_ranking_of(const ebpo_model *model, const double p[3],
+                                           const ebpo_far *far)
+{
+    return (ebpo_ranking){ model, ebpo_model_box(model), p, far && far->far ? far : NULL };
+}
+
+/* Lower bound for what is in the node, by its envelope and those of its ancestors: `parent` is its
+ * parent's bound; and of the root. */
+double ebpo_rank_node(const ebpo_ranking *ranking, const ebpo_node *node, double parent);
+double ebpo_rank_root(const ebpo_ranking *ranking);
+/* The same for cells of which only the planes are known: some bound is enough that is beyond
+ * `enough`. And an upper bound for the farthest point of a cell. */
+double ebpo_rank_cell(const ebpo_ranking *ranking, ebpo_cell cell, const uint32_t *codes,
+                      uint32_t count, double enough);
+double ebpo_rank_cell_end(const ebpo_ranking *ranking, ebpo_cell cell);
 
 /* Children of a gray node that are neither white nor black nor beyond `limit`, nearest first;
  * returns how many. */
@@ -43,7 +62,7 @@ struct ebpo_ranked {
     uint8_t what; /* of a subtree: nearest_first.c */
 };
 
-int ebpo_rank_children(const ebpo_model *model, const ebpo_box *box, const ebpo_node *gray,
-                       double parent, const double p[3], double limit, ebpo_ranked out[8]);
+int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, double parent,
+                       double limit, ebpo_ranked out[8]);
 
 #endif

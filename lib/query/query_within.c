@@ -101,8 +101,8 @@ static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranke
                                 ebpo_error *error)
 {
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(w->context->model, box, &r->node, r->lower, w->band.p,
-                                   w->band.limit, child);
+    ebpo_ranking ranking = ebpo_ranking_of(w->context->model, w->band.p, NULL);
+    int count = ebpo_rank_children(&ranking, &r->node, r->lower, w->band.limit, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
         status = put(w, box, &child[i], error);
@@ -131,7 +131,9 @@ static ebpo_status search_parts(within *w, ebpo_error *error)
 static bool node_matters(void *user, const ebpo_box *box, const ebpo_node *node)
 {
     const within *w = user;
-    return ebpo_model_lower_bound(w->context->model, box, node, 0, w->band.p) <= w->band.limit;
+    ebpo_ranking ranking = ebpo_ranking_of(w->context->model, w->band.p, NULL);
+    (void)box;
+    return ebpo_rank_node(&ranking, node, 0) <= w->band.limit;
 }
 
 static ebpo_status search_band(within *w, uint64_t most, ebpo_error *error)

@@ -278,6 +278,48 @@ ebpo_skeleton_bounds ebpo_skeleton_lower_bounds(const ebpo_skeleton *k, const do
                                    lower_bound(k, k->outer, p, limit2) };
 }
 
+/* --- for a far point --- */
+
+typedef struct far_search {
+    const ebpo_skeleton *skeleton;
+    const ebpo_far *far;
+    ebpo_far_frame frame;
+    double best;
+} far_search;
+
+static void look_from_afar(far_search *g, uint32_t number, unsigned lanes)
+{
+    const kept_node *n = node_at(g->skeleton, number);
+    double lower[8];
+    ebpo_far_boxes(g->far, &g->frame, &n->bound, lower);
+    for (int lane = 0; lane < n->bound.count; lane++) {
+        if (!(lanes >> lane & 1) || lower[lane] >= g->best)
+            continue;
+        uint32_t child = child_of(n, lane);
+        double slab = ebpo_far_slab(g->far, &g->frame, &n->bound, &n->slab, lane);
+        if (fmax(lower[lane], slab) >= g->best)
+            continue;
+        if (is_kept(child))
+            look_from_afar(g, child & ~IS_KEPT, 255);
+        else
+            g->best = fmax(lower[lane], slab);
+    }
+}
+
+ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *k, const ebpo_far *far,
+                                              double limit)
+{
+    const ebpo_bound *top = &node_at(k, 0)->bound;
+    double reach = 1, beyond = nextafter(limit, INFINITY);
+    for (int i = 0; i < 3; i++)
+        reach = fmax(reach, fabs((double)top->origin[i]) + 255 * (double)top->step[i]);
+    far_search own = { k, far, ebpo_far_frame_of(far, k->centre, k->scale, reach), beyond },
+               outer = own;
+    look_from_afar(&own, 0, k->own);
+    look_from_afar(&outer, 0, k->outer);
+    return (ebpo_skeleton_bounds){ k->own ? own.best : INFINITY, k->outer ? outer.best : INFINITY };
+}
+
 /* Where its nodes are asked for; NULL: it is as large as it may be, or no memory. */
 static bool has_place(ebpo_skeleton *k, bool (*take)(void *user, uint64_t bytes), void *user)
 {

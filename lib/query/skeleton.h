@@ -13,6 +13,7 @@
 
 #include "accel/accel.h"
 #include "cache/cache.h"
+#include "query/far_point.h"
 
 /* Any thread; one at a time where it is not const. */
 typedef struct ebpo_skeleton ebpo_skeleton;
@@ -33,6 +34,9 @@ uint64_t ebpo_skeleton_bytes(unsigned nodes);
 /* What is beyond `limit` may be INFINITY, too. */
 ebpo_skeleton_bounds ebpo_skeleton_lower_bounds(const ebpo_skeleton *skeleton, const double p[3],
                                                 double limit);
+/* The same of keys, for a far point. */
+ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *skeleton, const ebpo_far *far,
+                                              double limit);
 
 /* As many as there may be after growing. */
 enum { EBPO_SKELETON_NODES = 64 };

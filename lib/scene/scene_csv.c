@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "io/file_source.h"
-#include "ply/decimal.h"
+#include "geom/decimal.h"
 #include "scene/scene_parts.h"
 
 enum { COLUMNS = 9, NEEDED = 8, FIELDS_MOST = 64 };

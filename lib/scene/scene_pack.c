@@ -2,6 +2,7 @@
 #include "geom/strict_fp.h"
 
 #include <fcntl.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -35,23 +36,26 @@ static char *path_in(const char *folder, const char *name)
     return path;
 }
 
-/* With all that may have been written, without asking for memory. */
+static void remove_in(const char *folder, const char *name)
+{
+    char path[PATH_MAX];
+    if (snprintf(path, sizeof path, "%s/%s", folder, name) < (int)sizeof path)
+        unlink(path);
+}
+
+/* With all that may have been written, without asking for memory or opening anything. */
 static void remove_folder(const ebpo_scene *scene, const char *folder)
 {
     char name[40];
-    int d = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    for (uint64_t i = 0; i < scene->files_count && d >= 0; i++) {
+    for (uint64_t i = 0; i < scene->files_count; i++) {
         scene_packed_name(i, name);
-        unlinkat(d, name, 0);
+        remove_in(folder, name);
     }
-    for (uint64_t i = 0; i < scene->routes_count && d >= 0; i++) {
+    for (uint64_t i = 0; i < scene->routes_count; i++) {
         scene_packed_route(i, name);
-        unlinkat(d, name, 0);
+        remove_in(folder, name);
     }
-    if (d >= 0) {
-        unlinkat(d, SCENE_PACKED, 0);
-        close(d);
-    }
+    remove_in(folder, SCENE_PACKED);
     rmdir(folder);
 }
 

@@ -104,7 +104,7 @@ static ebpo_status put_names(ebpo_scene_record *r, const char *path,
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         status = ebpo_h5_append(&r->out, &table, name(r->scene, i), strlen(name(r->scene, i)) + 1,
                                 error);
-    ebpo_h5_close_table(&table);
+    ebpo_h5_close_table(&r->out, &table);
     return status;
 }
 
@@ -123,7 +123,7 @@ static ebpo_status put_models(ebpo_scene_record *r, ebpo_error *error)
         status = put_meaning(r, table.id, "its model's number in /models", error);
     if (status == EBPO_OK)
         status = ebpo_h5_append(&r->out, &table, model, count, error);
-    ebpo_h5_close_table(&table);
+    ebpo_h5_close_table(&r->out, &table);
     free(model);
     return status;
 }
@@ -157,7 +157,7 @@ static ebpo_status make_groups(ebpo_scene_record *r, ebpo_error *error)
         status = ebpo_h5_make_plain_group(&r->out, groups[i].path, &id, error);
         if (status == EBPO_OK)
             status = put_meaning(r, id, groups[i].meaning, error);
-        ebpo_h5_close_id(id);
+        ebpo_h5_close_id(&r->out, id);
     }
     return status;
 }
@@ -215,7 +215,7 @@ ebpo_status ebpo_scene_record_new(const ebpo_scene *scene, const char *path,
 static void close_tables(ebpo_scene_record *r)
 {
     for (int i = 0; i < TABLES; i++)
-        ebpo_h5_close_table(&r->table[i]);
+        ebpo_h5_close_table(&r->out, &r->table[i]);
 }
 
 ebpo_status ebpo_scene_record_finish(ebpo_scene_record *r, ebpo_error *error)

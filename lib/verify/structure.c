@@ -81,7 +81,7 @@ static bool leaf_faces_in_range(const ebpo_level *level, uint64_t leaf, uint64_t
     uint64_t first = level->leaf_first[leaf];
     if (first > face_count || level->leaf_new[leaf] > face_count - first)
         return false;
-    const uint32_t *refs = level->leaf_refs + first_ref;
+    const uint32_t *refs = level->leaf_refs ? level->leaf_refs + first_ref : NULL;
     for (uint32_t i = 0; i < level->leaf_ref_count[leaf]; i++)
         if (refs[i] >= first || (i > 0 && refs[i] <= refs[i - 1]))
             return false;

@@ -15,7 +15,7 @@
 typedef struct indexed {
     const ebpo_array_in *array;
     uint32_t number;
-    ebpo_h5_chunk *chunks;
+    ebpo_chunk_place *chunks;
     uint64_t count, listed;
 } indexed;
 
@@ -24,7 +24,7 @@ enum { MOST = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS };
 typedef struct comparison {
     ebpo_tally *tally;
     const ebpo_file *file;
-    ebpo_h5_in h5;
+    ebpo_head head;
     indexed array[MOST];
     unsigned arrays;
     uint64_t *list, rows;
@@ -35,15 +35,16 @@ typedef struct comparison {
 static ebpo_status index_array(comparison *c, const ebpo_array_in *array, uint32_t number,
                                ebpo_error *error)
 {
-    ebpo_h5_shape shape;
+    ebpo_shape shape;
     uint64_t stored;
     if (!array->present)
         return EBPO_OK;
     indexed *to = &c->array[c->arrays++];
     *to = (indexed){ .array = array, .number = number };
-    ebpo_status status = ebpo_h5_read_array(&c->h5, array->path, UINT64_MAX, EBPO_H5_ROWS_POWER,
-                                            &shape, NULL, &to->chunks, &stored, error);
-    to->count = status == EBPO_OK ? ebpo_h5_chunk_count(&shape) : 0;
+    ebpo_status status =
+        ebpo_head_read_array(&c->head, array->path, UINT64_MAX, EBPO_HEAD_ROWS_POWER, &shape, NULL,
+                             &to->chunks, &stored, error);
+    to->count = status == EBPO_OK ? ebpo_shape_chunks(&shape) : 0;
     return status;
 }
 
@@ -115,7 +116,7 @@ static void compare_row(comparison *c, uint64_t row, uint64_t at, uint32_t bytes
                "/subtrees/places, row %" PRIu64 ": %s has only %" PRIu64 " chunks", row,
                of->array->path, of->count))
         return;
-    const ebpo_h5_chunk *chunk = &of->chunks[of->listed++];
+    const ebpo_chunk_place *chunk = &of->chunks[of->listed++];
     CHECK(chunk->address == at && chunk->bytes == bytes,
           "/subtrees/places, row %" PRIu64 ": %" PRIu32 " bytes at %" PRIu64 " as chunk %" PRIu64
           " of %s, but HDF5 has %" PRIu32 " at %" PRIu64,
@@ -155,11 +156,11 @@ ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
         return ebpo_fail_memory(error, sizeof *c);
     c->tally = tally;
     c->file = file;
-    c->h5 = (ebpo_h5_in)EBPO_H5_IN_INIT;
-    ebpo_status status = ebpo_h5_open(&c->h5, &ebpo_reader_own(file)->in, &own);
+    c->head = (ebpo_head)EBPO_HEAD_INIT;
+    ebpo_status status = ebpo_head_open(&c->head, &ebpo_reader_own(file)->in, &own);
     if (status == EBPO_OK)
         status = index_all(c, &own);
-    status = ebpo_h5_close(&c->h5, status, &own);
+    status = ebpo_head_close(&c->head, status, &own);
     if (status == EBPO_OK)
         status = read_list(c, &own);
     if (status == EBPO_OK)

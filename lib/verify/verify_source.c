@@ -60,6 +60,7 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspa
 static unsigned steps_of(const ebpo_mend_record *asked)
 {
     return (asked->weld ? EBPO_MEND_WELD : 0) | (asked->orient ? EBPO_MEND_ORIENT : 0) |
+           (asked->dropped_faces ? EBPO_MEND_DROP : 0) |
            (!asked->orient && asked->flipped_faces ? EBPO_MEND_FLIP : 0) |
            (asked->fill_holes ? EBPO_MEND_FILL : 0);
 }
@@ -88,6 +89,9 @@ static void check_record(ebpo_tally *tally, const ebpo_mend_record *stored,
     CHECK(stored->welded_vertices == did->welded_vertices,
           "%" PRIu64 " welded vertices are recorded, doing it again welds %" PRIu64,
           stored->welded_vertices, did->welded_vertices);
+    CHECK(stored->dropped_faces == did->dropped_faces,
+          "%" PRIu64 " dropped faces are recorded, doing it again drops %" PRIu64,
+          stored->dropped_faces, did->dropped_faces);
     CHECK(stored->flipped_faces == did->flipped_faces &&
               stored->unorientable_components == did->unorientable_components,
           "%" PRIu64 " flipped faces are recorded, doing it again flips %" PRIu64,
@@ -226,15 +230,51 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
     return EBPO_OK;
 }
 
-/* A subset's mesh: each of its faces and vertices at its number in the source. */
+/* Of each number in the source the face that has it now, or EBPO_NO_INDEX; NULL in *out: its own.
+ */
+static ebpo_status list_places(const ebpo_mesh *whole, uint32_t **out, uint64_t *numbers,
+                               ebpo_error *error)
+{
+    const struct ebpo_arrangement *order = whole->arrangement;
+    *numbers = whole->face_count + (order ? order->dropped_faces : 0);
+    if (!order)
+        return EBPO_OK;
+    uint32_t *places = *out = ebpo_array_alloc(whole->workspace, *numbers, sizeof *places);
+    if (!places)
+        return ebpo_workspace_fail(whole->workspace, *numbers * sizeof *places, error);
+    ebpo_array_fill(whole->workspace, places, 0xff, *numbers * sizeof *places);
+    EBPO_FOR_ITEMS_SCATTERED(whole->workspace, i, 0, whole->face_count)
+        places[order->face_source[i]] = (uint32_t)i;
+    return EBPO_OK;
+}
+
+static bool same_corners(const ebpo_mesh *whole, const uint32_t *places, uint64_t numbers,
+                         const ebpo_mesh *part, const ebpo_maps *maps, uint64_t i)
+{
+    uint64_t number = maps->face_source[i];
+    if (number >= numbers || (places && places[number] == EBPO_NO_INDEX))
+        return false;
+    const uint32_t *corners = whole->faces + 3 * (places ? places[number] : number);
+    for (uint64_t c = 0; c < 3; c++)
+        if (corners[c] != maps->vertex_source[part->faces[3 * i + c]])
+            return false;
+    return true;
+}
+
+/* A subset's mesh, or one from which faces were dropped: each of its faces and vertices at its
+ * number in the source. */
 static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const ebpo_mesh *whole,
                                 const ebpo_read_options *read, ebpo_error *error)
 {
     ebpo_mesh part = { 0 };
     ebpo_maps maps = { .vertex_source = NULL };
+    uint32_t *places = NULL;
+    uint64_t numbers = 0;
     ebpo_status status = ebpo_file_read_mesh(file, read, &part, error);
     if (status == EBPO_OK)
         status = ebpo_file_read_maps(file, read, &maps, error);
+    if (status == EBPO_OK)
+        status = list_places(whole, &places, &numbers, error);
     if (status == EBPO_OK && CHECK(!whole->xyz32 == !part.xyz32,
                                    "the source and the file hold different kinds of coordinates")) {
         tally->checks[EBPO_VERIFY_SOURCE] += part.vertex_count + part.face_count;
@@ -247,19 +287,15 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
                                      "vertex %" PRIu32
                                      " of the source has another position in the file",
                                      maps.vertex_source[i]);
-        EBPO_FOR_ITEMS_SCATTERED(part.workspace, i, 0, part.face_count) {
-            bool equal = maps.face_source[i] < whole->face_count;
-            for (uint64_t c = 0; c < 3 && equal; c++)
-                equal = whole->faces[3 * (uint64_t)maps.face_source[i] + c] ==
-                        maps.vertex_source[part.faces[3 * i + c]];
-            if (!equal)
+        EBPO_FOR_ITEMS_SCATTERED(part.workspace, i, 0, part.face_count)
+            if (!same_corners(whole, places, numbers, &part, &maps, i))
                 ebpo_tally_violation(
                     tally, EBPO_VERIFY_SOURCE,
                     &(ebpo_verify_place){ 0, maps.face_source[i], EBPO_NO_PLANE },
                     "the face (by its source number) has other corners in the file");
-        }
         compare_attributes(tally, whole, &part, &maps);
     }
+    ebpo_array_free(whole->workspace, places);
     ebpo_maps_free(&maps);
     ebpo_mesh_free(&part);
     return status;
@@ -301,7 +337,8 @@ static ebpo_status compare(ebpo_tally *tally, const ebpo_mesh *mended, const ebp
 /* A component: its file says itself that there is more in the source. */
 static bool is_part(const ebpo_info *info)
 {
-    return info->source_face_count + info->mend.added_faces > info->face_count;
+    return info->source_face_count + info->mend.added_faces - info->mend.dropped_faces >
+           info->face_count;
 }
 
 ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const ebpo_mesh *stored,
@@ -328,7 +365,13 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
     if (status == EBPO_OK)
         check_record(tally, &info->mend, &did);
     bool mapped = info->parts & EBPO_PART_MAPS; /* else nothing says which faces these are */
-    if (status == EBPO_OK && stored && !is_part(info))
+    bool by_number = is_part(info) || (info->mend.dropped_faces && mapped);
+    if (status == EBPO_OK && stored && info->mend.dropped_faces && !is_part(info))
+        CHECK(made->vertex_count == stored->vertex_count && made->face_count == stored->face_count,
+              "the mended source has %" PRIu64 " vertices and %" PRIu64 " faces, the file %" PRIu64
+              " and %" PRIu64,
+              made->vertex_count, made->face_count, stored->vertex_count, stored->face_count);
+    if (status == EBPO_OK && stored && !by_number)
         status = compare(tally, made, stored, ordered, error);
     else if (status == EBPO_OK && mapped)
         status = compare_some(tally, file, made, read, error);

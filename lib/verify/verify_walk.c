@@ -210,12 +210,12 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_twin_node *
 {
     face_stack *s = &self->stack;
     if (node->type != EBPO_GRAY || ebpo_twin_is_pruned(w->view, node)) {
-        if (!walk_terminal(w, self, node, s->faces + first, count, corners))
+        if (!walk_terminal(w, self, node, count ? s->faces + first : NULL, count, corners))
             return ebpo_workspace_fail(w->options->workspace,
                                        self->points.count * sizeof *self->points.point, error);
         return EBPO_OK;
     }
-    if (!stack_reserve(s, first + 2 * count))
+    if (!stack_reserve(s, first + 2 * count + 1)) /* never NULL */
         return ebpo_fail_memory(error, (first + 2 * count) * 5);
     family f;
     family_make(&f, &w->view->box, node);

@@ -2,13 +2,15 @@
 """What the command adds to the library: asking many questions by `ebpo inside` and `ebpo distance`.
 
     tests/bench/asking.py EBPO MODEL.ebpo.h5 [--count N] [--turns T] [--before EBPO]
+                          [--large LARGE.ebpo.h5]
 
 Points are uniform in the model's box (`ebpo bench --save-points`). In turns: the library alone
-(`ebpo bench`, all questions at once on one thread), then the command with raw and with text input,
-with one and with two threads, each time with as much memory as it wants (--memory 64GiB). The
-library's time is that of the clock, so the machine should do nothing else. Other times are the
-processors', user and system, without those of one question, in ns a point: the least of the turns.
-Wall clocks are those of the same runs.
+(`ebpo bench`, all questions at once on one thread; on two: two of them at once, each with half of
+the points to answer), then the command with raw and with text input, with one and with two threads,
+each time with as much memory as it wants (--memory 64GiB). Times of the command are without those
+of one question, in ns a point: the least of the turns. The library's are those of the clock, so the
+machine should do nothing else; where it does, processor times say more than the clock's. With
+--large, one point of that model is asked, in a process of its own, with what memory is chosen.
 """
 import argparse
 import array
@@ -31,9 +33,38 @@ def run(command, out):
 
 
 def library(ebpo, model, query, raw):
-    done = subprocess.run([ebpo, "bench", "--json", "--query", query, "--points", raw, "--raw",
-                           model], capture_output=True, check=True, text=True)
-    return json.loads(done.stdout)
+    """The library's ns a point on one thread, and on two."""
+    command = [ebpo, "bench", "--json", "--query", query, "--points", raw, "--raw", model]
+
+    def of(processes):
+        return max(json.loads(p.communicate()[0])["batch_ns"] for p in processes)
+
+    def begin():
+        return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+    return of([begin()]), of([begin(), begin()]) / 2
+
+
+def ask_large(ebpo, model, folder, turns):
+    """One point after the other, each in a process of its own."""
+    raw, out = f"{folder}/large.raw", f"{folder}/out"
+    subprocess.run([ebpo, "bench", "--count", "20", "--save-points", raw, model],
+                   stdout=subprocess.DEVNULL, check=True)
+    xyz = array.array("d", pathlib.Path(raw).read_bytes())
+    print(f"\nOne point of {pathlib.Path(model).name} "
+          f"({pathlib.Path(model).stat().st_size / 1e6:.0f} MB), in ms:\n\n"
+          "| question | least of the clock | median of the clock | median of the processors |\n"
+          "|---|---|---|---|")
+    for query in "inside", "distance":
+        times = []
+        for i in range(20 * turns):
+            point = f"{folder}/point.txt"
+            pathlib.Path(point).write_text(" ".join(map(repr, xyz[3 * (i % 20):3 * (i % 20) + 3])),
+                                           encoding="ascii")
+            times.append(run([ebpo, query, model, point], out))
+        cpu, wall = ([1000 * t[k] for t in times] for k in (0, 1))
+        print(f"| {query} | {min(wall):.0f} | {statistics.median(wall):.0f} | "
+              f"{statistics.median(cpu):.0f} |")
 
 
 def main():
@@ -43,6 +74,7 @@ def main():
     parser.add_argument("--count", type=int, default=1000000)
     parser.add_argument("--turns", type=int, default=9)
     parser.add_argument("--before", help="an older ebpo, for comparison")
+    parser.add_argument("--large", help="a large model, of which one point is asked")
     a = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         raw, text, one = (str(pathlib.Path(folder, n)) for n in ("p.raw", "p.txt", "one.txt"))
@@ -67,22 +99,25 @@ def main():
                         found.setdefault((query, program, name), []).append(
                             run(command, f"{folder}/out"))
                 found.setdefault((query, "library"), []).append(
-                    library(a.ebpo, a.model, query, raw)["batch_ns"])
-        print("| question | program | how | CPU, ns a point | wall, ns a point | CPU / library |\n"
-              "|---|---|---|---|---|---|")
+                    library(a.ebpo, a.model, query, raw))
+        print("| question | program | how | processors, ns a point | clock, ns a point | "
+              "processors / library on one thread | clock / library on as many |\n"
+              "|---|---|---|---|---|---|---|")
         for key, values in found.items():
             if len(key) == 2 or key[2] == "one question":
                 continue
             opened = found[key[0], key[1], "one question"]
-            alone = min(found[key[0], "library"])
+            alone = [min(v[i] for v in found[key[0], "library"]) for i in (0, 1)]
             cpu, wall = ((min(v[i] for v in values) - min(v[i] for v in opened)) / a.count * 1e9
                          for i in (0, 1))
             print(f"| {key[0]} | {'before' if key[1] == a.before else 'now'} | {key[2]} | "
-                  f"{cpu:.0f} | {wall:.0f} | {cpu / alone:.2f} |")
+                  f"{cpu:.0f} | {wall:.0f} | {cpu / alone[0]:.2f} | "
+                  f"{wall / alone['2' in key[2]]:.2f} |")
         for query in "inside", "distance":
-            print(f"\n{query}, the library alone, one thread: "
-                  f"{min(found[query, 'library']):.0f} ns a point, median "
-                  f"{statistics.median(found[query, 'library']):.0f}")
+            one, two = (min(v[i] for v in found[query, "library"]) for i in (0, 1))
+            print(f"\n{query}, the library alone: {one:.0f} ns a point on one thread, {two:.0f} on two")
+        if a.large:
+            ask_large(a.ebpo, a.large, folder, a.turns)
 
 
 main()

@@ -1,11 +1,18 @@
 #!/usr/bin/env python3
-"""man.py TOOL FOLDER: --help and the man page of each command name the same options, --help fits on
-80 columns, and mandoc finds no error."""
+"""man.py TOOL PAGES COMMANDS: what tools/options makes, and the tool itself, say the same.
+
+COMMANDS is tools/options, PAGES where the build has put what is made of it. The options of --help,
+of the manual and of bash's completion are the same; so are the words that options take and those
+that are completed; defaults that --help names are in the manual; --help fits on 80 columns; mandoc
+finds no error, and shells that are there none in their completions.
+"""
 import os
 import re
 import shutil
 import subprocess
 import sys
+
+sys.dont_write_bytecode = True
 
 
 def help_of(tool, *arguments):
@@ -16,44 +23,111 @@ def options_in_help(text):
     return set(re.findall(r"^  (?:-\w, )?--([a-z][a-z-]*)", text, re.MULTILINE))
 
 
-def options_in_page(text):
-    items = "\n".join(line for line in text.splitlines() if line.startswith(".It Fl"))
-    return set(re.findall(r"Fl -([a-z][a-z-]*)", items))
+def items_in_page(text):
+    """The mdoc of each option."""
+    parts = re.split(r"^\.It ((?:Fl \w .*, )?Fl -[a-z-]+.*)$", text, flags=re.MULTILINE)
+    return {re.search(r"Fl -([a-z-]+)", head)[1]: body for head, body in zip(parts[1::2],
+                                                                              parts[2::2])}
+
+
+def numbers(text):
+    return set(re.findall(r"\d+(?:\.\d+)?", re.sub(r"(?<=\d),(?=\d{3}\b)", "", text)))
+
+
+def lost_defaults(command):
+    """Defaults of --help that the manual does not have."""
+    for option in command.options():
+        told = re.search(r"default:? (\d[\d.]*\d|\d)\b", option.help)
+        if told and option.man and told[1] not in numbers("\n".join(option.man)):
+            yield f"--{option.name}: the default {told[1]} is not in the manual"
+
+
+def other_words(tool, command):
+    """Options whose words the tool does not have so."""
+    for option in command.options():
+        if not option.words:
+            continue
+        said = subprocess.run([tool, command.name, f"--{option.name}", "?"], capture_output=True,
+                              text=True).stderr
+        known = re.search(r"is not one of: ([^;\n]*)", said)
+        if not known or known[1].split(", ") != option.words:
+            yield f"--{option.name}: {option.words} in its table; {said.strip()}"
+
+
+def completed(script, *words):
+    """What bash offers for the last of the words."""
+    program = ('. "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _ebpo; '
+               'printf "%s\\n" "${COMPREPLY[@]}"')
+    done = subprocess.run(["bash", "-c", program, "bash", script, "ebpo", *words], check=True,
+                          capture_output=True, text=True)
+    return done.stdout.split()
+
+
+def bash_offers(tool, script, commands):
+    names = sorted([c.name for c in commands] + ["help", "--version", "--help"])
+    if sorted(completed(script, "")) != names:
+        yield f"ebpo: bash offers {completed(script, '')}"
+    for command in commands:
+        offered = completed(script, command.name, "--")
+        told = options_in_help(help_of(tool, command.name, "--help"))
+        if sorted(offered) != sorted("--" + name for name in told):
+            yield f"{command.name}: bash offers {offered}"
+        for option in command.options():
+            if option.words:
+                for words in ([f"--{option.name}", ""], [f"--{option.name}", "=", ""]):
+                    if completed(script, command.name, *words) != option.words:
+                        yield f"{command.name} --{option.name}: other words"
+
+
+def check_command(tool, command, page):
+    told = help_of(tool, command.name, "--help")
+    items = items_in_page(page)
+    if options_in_help(told) != set(items) or "help" not in items:
+        yield f"options of --help and of the manual: {sorted(options_in_help(told) ^ set(items))}"
+    yield from (f"wider than 80 columns: {line}" for line in told.splitlines()[1:]
+                if len(line) > 80)
+    if help_of(tool, "help", command.name) != told:
+        yield "'ebpo help' and '--help' differ"
+    if f".Nd {command.summary}\n" not in page:
+        yield "the summary is not the manual's"
+    yield from lost_defaults(command)
+    yield from other_words(tool, command)
+
+
+def lint(program, arguments, files):
+    """What a program finds, if it is there."""
+    if shutil.which(program):
+        for file in files:
+            done = subprocess.run([program, *arguments, file], capture_output=True, text=True)
+            if done.returncode or done.stdout:
+                yield f"{file}: {done.stdout}{done.stderr}"
 
 
 def main():
-    tool, folder = sys.argv[1:]
-    bad = 0
-    commands = [c for c in re.findall(r"^  ([a-z]+) ", help_of(tool, "help"), re.MULTILINE)
-                if c != "help"]
+    tool, made, tables = sys.argv[1:]
+    sys.path.insert(0, tables)
+    import option_tables
+    names = [c for c in re.findall(r"^  ([a-z]+) ", help_of(tool, "help"), re.MULTILINE)
+             if c != "help"]
+    wrong = []
+    there = {f[:-8] for f in os.listdir(tables) if f.endswith(".options")} - {"shared"}
+    if there != set(names):
+        wrong.append(f"commands without table, or tables without command: {there ^ set(names)}")
+    _, commands = option_tables.read_all(tables, names)
     pages = ["ebpo.1", "ebpo-remote.7"]
     for command in commands:
-        page = f"ebpo-{command}.1"
-        pages.append(page)
-        with open(os.path.join(folder, page), encoding="utf-8") as f:
-            in_page = options_in_page(f.read())
-        in_help = options_in_help(help_of(tool, command, "--help"))
-        if in_help != in_page or "help" not in in_help:
-            bad += 1
-            print(f"{page}: missing {sorted(in_help - in_page)}, too many "
-                  f"{sorted(in_page - in_help)}")
-        wide = [line for line in help_of(tool, command, "--help").splitlines()[1:]
-                if len(line) > 80]
-        if wide:
-            bad += 1
-            print(f"ebpo {command} --help: wider than 80 columns: {wide[0]}")
-        if help_of(tool, "help", command) != help_of(tool, command, "--help"):
-            bad += 1
-            print(f"ebpo help {command} and ebpo {command} --help differ")
-    if shutil.which("mandoc"):
-        for page in pages:
-            lint = subprocess.run(["mandoc", "-Tlint", "-Wwarning", os.path.join(folder, page)],
-                                  capture_output=True, text=True)
-            if lint.returncode or lint.stdout:
-                bad += 1
-                print(lint.stdout)
-    print(f"{len(commands)} commands, {bad} failed")
-    return 1 if bad or len(commands) < 6 else 0
+        pages.append(f"ebpo-{command.name}.1")
+        with open(os.path.join(made, pages[-1]), encoding="utf-8") as file:
+            wrong += [f"{command.name}: {what}" for what in check_command(tool, command,
+                                                                          file.read())]
+    wrong += lint("mandoc", ["-Tlint", "-Wwarning"], [os.path.join(made, p) for p in pages])
+    if shutil.which("bash"):
+        wrong += bash_offers(tool, os.path.join(made, "ebpo.bash"), commands)
+    wrong += lint("zsh", ["-n"], [os.path.join(made, "_ebpo")])
+    wrong += lint("fish", ["-n"], [os.path.join(made, "ebpo.fish")])
+    print("\n".join(wrong + [f"{len(names)} commands, {len(wrong)} failed"]))
+    return 1 if wrong or len(names) < 20 else 0
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())

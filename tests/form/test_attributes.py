@@ -10,7 +10,8 @@ KINDS = {"TEXT": ("text", "yes"), "NOTE": ("text", "no"), "DIGEST": ("text", "ye
          "YES_NO": ("u64", "yes"), "HINT": ("u64", "no"), "NUMBER": ("i64", "yes"),
          "INTEGER": ("i64", "yes"), "REAL": ("f64", "yes"), "REAL3": ("f64[3]", "yes")}
 # of some files only: the table says in words when
-SOME = ("selection_percent", "selection_k_root", "selection_seed", "subtree_level", "colours_sha256")
+SOME = ("selection_percent", "selection_k_root", "selection_seed", "subtree_level", "colours_sha256",
+        "mend_dropped_faces")
 
 root = pathlib.Path(sys.argv[1])
 section = re.search(r"^## 3\. .*?^## 4\. ", (root / "format-spec/README.md").read_text(),

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Each selection of the library's table is in the specification, man pages and help texts."""
+"""Each selection of the library's table is in the specification, and in the manual and the help of
+--select."""
 import pathlib
 import re
 import sys
@@ -9,16 +10,26 @@ table = (root / "lib/planes/selections.c").read_text(encoding="utf-8")
 names = re.findall(r'\.name = "(\w+)"', table)
 spec = next(line for line in (root / "format-spec/README.md").read_text(encoding="utf-8").splitlines()
             if line.startswith("| `selection`"))
-pages = {name: set(re.findall(r"^\.Cm (\w+)", (root / name).read_text(encoding="utf-8"), re.MULTILINE))
-         for name in ("tools/man/ebpo-convert.1", "tools/man/ebpo-report.1")}
-helps = {name: (root / name).read_text(encoding="utf-8")
-         for name in ("tools/cmd/cmd_convert.c", "tools/cmd/cmd_report.c")}
+
+
+def record(name):
+    """What tools/options says of the option --select of a command."""
+    text = (root / f"tools/options/{name}.options").read_text(encoding="utf-8")
+    return re.search(r"^option select .*?(?:\n\n|\Z)", text, re.MULTILINE | re.DOTALL).group()
+
+
+texts = {name: record(name) for name in ("convert", "report")}
 missing = []
 for name in names:
     if name != "inherit" and f"`{name}`" not in spec:
         missing.append(f"format-spec/README.md, section 3, selection: `{name}` is missing")
-    missing += [f"{page}: .Cm {name} is missing" for page, words in pages.items() if name not in words]
-    missing += [f"{source}: the help of --select does not name {name}" for source, text in helps.items()
-                if not re.search(rf"\b{name}\b", text)]
+    for command, text in texts.items():
+        words, told, manual = (set(re.findall(r"\w+", part)) for part in (
+            re.search(r"^  (?:word|set) (.*)", text, re.MULTILINE).group(1),
+            re.search(r"^  help (.*(?:\n    .*)*)", text, re.MULTILINE).group(1),
+            " ".join(re.findall(r"^\.Cm (\w+)", text, re.MULTILINE))))
+        missing += [f"tools/options/{command}.options, select: {name} is missing in {place}"
+                    for place, found in (("its words", words), ("its help", told),
+                                         ("the manual", manual)) if name not in found]
 print("\n".join(missing) or f"{len(names)} selections are documented")
 sys.exit(1 if missing or len(names) < 4 else 0)

@@ -1,14 +1,19 @@
 /* Any bytes as a file: opening, reading everything and asking ends in a status, nothing else. */
+#include "fuzz_kit.h"
+
+#include <ebpo/export.h>
 #include <ebpo/lod.h>
 #include <ebpo/query.h>
+#include <ebpo/stream.h>
 #include <ebpo/subtree.h>
+#include <ebpo/verify.h>
 #include <ebpo/view.h>
+#include <stdio.h>
+#include <unistd.h>
 
 #include "known_leaks.h"
 #include "read_by.h"
 #include "subset/subset_parts.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static bool take_triangles(void *user, const ebpo_triangles *triangles)
 {
@@ -102,6 +107,66 @@ static void cut_level(ebpo_file *file)
     ebpo_mesh_free(&mesh);
 }
 
+static void stream(ebpo_file *file)
+{
+    ebpo_stream_options options = EBPO_STREAM_OPTIONS_INIT;
+    ebpo_stream *of;
+    ebpo_stream_level level;
+    ebpo_stream_node node;
+    bool more = true, more_nodes = true;
+    options.polygons = true;
+    options.threads = 1;
+    if (ebpo_stream_new(file, &options, &of, NULL) != EBPO_OK)
+        return;
+    while (ebpo_stream_next_level(of, &level, &more, NULL) == EBPO_OK && more)
+        for (int nodes = 0; nodes < 500 && more_nodes; nodes++)
+            if (ebpo_stream_next_node(of, &node, &more_nodes, NULL) != EBPO_OK)
+                break;
+    ebpo_stream_free(of);
+}
+
+/* Whatever it finds; it must not do more than the file's size calls for. */
+static void verify(ebpo_file *file)
+{
+    ebpo_workspace_options limited = EBPO_WORKSPACE_OPTIONS_INIT;
+    ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
+    limited.memory = 512 << 20;
+    if (ebpo_workspace_new(&limited, &options.workspace, NULL) != EBPO_OK)
+        return;
+    options.threads = 1;
+    options.label_samples = 64;
+    (void)!ebpo_verify(file, &options, &report, NULL);
+    ebpo_workspace_free(options.workspace);
+}
+
+static void read_attributes(ebpo_file *file)
+{
+    ebpo_attribute_facts facts = EBPO_ATTRIBUTE_FACTS_INIT;
+    ebpo_array_facts array = EBPO_ARRAY_FACTS_INIT;
+    ebpo_attribute_values values;
+    for (unsigned n = 0; ebpo_file_attribute(file, n, &facts); n++)
+        if (ebpo_file_read_attribute(file, n, READ_BY(1), &values, NULL) == EBPO_OK)
+            ebpo_attribute_values_free(&values);
+    for (unsigned n = 0; ebpo_file_array(file, n, &array); n++)
+        ;
+}
+
+/* Files are written, so of some inputs only. */
+static void export(ebpo_file *file, ebpo_export_format format)
+{
+    char path[64], second[80];
+    ebpo_export_options options = EBPO_EXPORT_OPTIONS_INIT;
+    options.last_level = ebpo_file_info(file)->level_count - 1;
+    options.threads = 1;
+    snprintf(path, sizeof path, "/dev/shm/fuzz_%ld.%s", (long)getpid(),
+             ebpo_export_format_name(format));
+    (void)!ebpo_export(file, path, format, &options, NULL, NULL);
+    (void)!unlink(path);
+    if (ebpo_export_second_file(format, path, second, sizeof second) && *second)
+        (void)!unlink(second);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     ebpo_file *file;
@@ -128,6 +193,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         load(file, octcode);
     view(file, EBPO_PRIORITY_LEVEL);
     view(file, EBPO_PRIORITY_FRONT_TO_BACK);
+    stream(file);
+    verify(file);
+    read_attributes(file);
+    if (size % 8 == 0)
+        export(file, (ebpo_export_format)(data[size - 1] % 4));
     ebpo_close(file);
     return 0;
 }

@@ -1,22 +1,10 @@
 /* Any bytes as a chunk of faces with the coding `gates`: read as the verifier's plain reader does,
  * or refused by both. The first byte stands for how many vertices were seen before. */
-#include <stdlib.h>
-#include <string.h>
+#include "fuzz_kit.h"
 
 #include "codec/coding.h"
 #include "codec/face_gates.h"
 #include "verify/plain_gates.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-/* Of its very size, so that an access behind its end is seen. */
-static void *room(size_t bytes)
-{
-    void *p = malloc(bytes);
-    if (!p)
-        exit(2);
-    return p;
-}
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
@@ -25,9 +13,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         return 0;
     size_t corners = 12 * (size_t)rows, bytes = EBPO_GATES_COLS * (size_t)rows;
     uint64_t seen = (uint64_t)data[0] * data[0] * 3, plainly_seen = seen;
-    uint8_t *in = room(bytes), *codes = room(corners);
-    uint32_t *faces = room(corners), *plainly = room(corners);
-    memcpy(in, data + 1, bytes);
+    uint8_t *in = fuzz_copy(data + 1, bytes), *codes = fuzz_room(corners);
+    uint32_t *faces = fuzz_room(corners), *plainly = fuzz_room(corners);
     bool fine =
         ebpo_gates_decode(in, rows, codes) && ebpo_corners_decode(codes, rows, &seen, faces);
     if (fine != ebpo_plain_gates_read(in, rows, &plainly_seen, plainly) ||

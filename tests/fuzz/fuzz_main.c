@@ -14,7 +14,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "mutate.h"
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+/* Of a target that has one; it may call the other, which an engine would have. */
+size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned seed)
+    __attribute__((weak));
+size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t most);
 
 enum { LARGEST_SEED = 1 << 22 };
 
@@ -25,15 +32,6 @@ static struct {
     long mutation;
     uint64_t runs;
 } now = { .seed = 1 };
-
-static uint64_t next(uint64_t *state)
-{
-    *state += UINT64_C(0x9e3779b97f4a7c15);
-    uint64_t z = *state;
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return z ^ (z >> 31);
-}
 
 static void last_words(void)
 {
@@ -69,8 +67,8 @@ static void run(const uint8_t *data, size_t size)
 /* Damage is likelier to be interesting in the first kilobyte, where formats keep their counts. */
 static size_t place(uint64_t *state, size_t size)
 {
-    size_t within = next(state) % 2 && size > 1024 ? 1024 : size;
-    return within ? next(state) % within : 0;
+    size_t within = fuzz_next(state) % 2 && size > 1024 ? 1024 : size;
+    return within ? fuzz_next(state) % within : 0;
 }
 
 static void overwrite(uint8_t *data, size_t size, size_t at, const void *bytes, size_t n)
@@ -86,12 +84,12 @@ static size_t mutate_once(uint8_t *data, size_t size, uint64_t *state)
     static const char letters[] = "0123456789-+.eE \t\r\n,nifx\0";
     if (!size)
         return 0;
-    size_t at = place(state, size), n = 1 + next(state) % 16, from = place(state, size);
-    uint32_t value = extremes[next(state) % (sizeof extremes / sizeof *extremes)];
-    switch (next(state) % 7) {
-    case 0: data[at] ^= (uint8_t)(1u << next(state) % 8); return size;
-    case 1: data[at] = (uint8_t)next(state); return size;
-    case 2: data[at] = (uint8_t)letters[next(state) % (sizeof letters - 1)]; return size;
+    size_t at = place(state, size), n = 1 + fuzz_next(state) % 16, from = place(state, size);
+    uint32_t value = extremes[fuzz_next(state) % (sizeof extremes / sizeof *extremes)];
+    switch (fuzz_next(state) % 7) {
+    case 0: data[at] ^= (uint8_t)(1u << fuzz_next(state) % 8); return size;
+    case 1: data[at] = (uint8_t)fuzz_next(state); return size;
+    case 2: data[at] = (uint8_t)letters[fuzz_next(state) % (sizeof letters - 1)]; return size;
     case 3: overwrite(data, size, at, &value, 4); return size;
     case 4: return at; /* cut */
     case 5:            /* drop some bytes */
@@ -104,6 +102,23 @@ static size_t mutate_once(uint8_t *data, size_t size, uint64_t *state)
         memmove(data + at, data + from, n);
         return size;
     }
+}
+
+size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t most)
+{
+    static uint64_t state;
+    (void)most; /* it never gets longer */
+    state += now.seed + (uint64_t)now.mutation;
+    return mutate_once(data, size, &state);
+}
+
+static size_t mutate(uint8_t *data, size_t size, uint64_t *state)
+{
+    if (LLVMFuzzerCustomMutator && fuzz_next(state) % 2)
+        return LLVMFuzzerCustomMutator(data, size, LARGEST_SEED, (unsigned)fuzz_next(state));
+    for (uint64_t times = 1 + fuzz_next(state) % 4; times > 0; times--)
+        size = mutate_once(data, size, state);
+    return size;
 }
 
 static int run_file(const char *path)
@@ -121,11 +136,8 @@ static int run_file(const char *path)
     run(seed, size);
     for (now.mutation = 0; now.mutation < now.mutations; now.mutation++) {
         uint64_t state = now.seed * UINT64_C(1000003) + (uint64_t)now.mutation;
-        size_t length = size;
         memcpy(changed, seed, size);
-        for (uint64_t times = 1 + next(&state) % 4; times > 0; times--)
-            length = mutate_once(changed, length, &state);
-        run(changed, length);
+        run(changed, mutate(changed, size, &state));
     }
     free(seed);
     free(changed);

@@ -1,19 +1,11 @@
 /* Fuzz target: any bytes as a scene file. A scene that comes out must be whole: names, numbers that
  * exist, cameras, and at any time poses that are rotations. */
+#include "fuzz_kit.h"
+
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include <ebpo/scene.h>
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-static void must(bool holds)
-{
-    if (!holds)
-        abort();
-}
 
 /* Of the scene's bytes alone: the limits are what a small machine would set. */
 static ebpo_scene *parse(const uint8_t *data, size_t size)
@@ -25,20 +17,20 @@ static ebpo_scene *parse(const uint8_t *data, size_t size)
     options.most_pose_bytes = 1 << 20;
     ebpo_status status = ebpo_scene_parse((const char *)data, size, "fuzz.scene.json",
                                           "/nonexistent", &options, &scene, &error);
-    must((status == EBPO_OK) == (scene != NULL));
-    must(status == EBPO_OK || (error.status == status && error.message[0]));
+    fuzz_must((status == EBPO_OK) == (scene != NULL));
+    fuzz_must(status == EBPO_OK || (error.status == status && error.message[0]));
     return scene;
 }
 
 static void check_pose(const ebpo_pose *pose)
 {
-    must(pose->scale > 0 && pose->scale <= DBL_MAX);
+    fuzz_must(pose->scale > 0 && pose->scale <= DBL_MAX);
     for (int i = 0; i < 3; i++) {
         double length = 0;
-        must(isfinite(pose->translation[i]));
+        fuzz_must(isfinite(pose->translation[i]));
         for (int k = 0; k < 3; k++)
             length += pose->rotation[i][k] * pose->rotation[i][k];
-        must(fabs(length - 1) < 1e-5);
+        fuzz_must(fabs(length - 1) < 1e-5);
     }
 }
 
@@ -46,10 +38,10 @@ static void check_instance(const ebpo_scene *scene, const ebpo_scene_counts *cou
 {
     ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
     double clearance;
-    must(ebpo_scene_get_instance(scene, i, &at) == EBPO_OK);
-    must(at.name && at.name[0] && strlen(at.name) <= 255 && at.model < counts->models);
-    must(at.route == EBPO_SCENE_NONE || (at.route < counts->routes && !at.fixed));
-    must(at.layer == EBPO_SCENE_NONE || ebpo_scene_get_layer(scene, at.layer));
+    fuzz_must(ebpo_scene_get_instance(scene, i, &at) == EBPO_OK);
+    fuzz_must(at.name && at.name[0] && strlen(at.name) <= 255 && at.model < counts->models);
+    fuzz_must(at.route == EBPO_SCENE_NONE || (at.route < counts->routes && !at.fixed));
+    fuzz_must(at.layer == EBPO_SCENE_NONE || ebpo_scene_get_layer(scene, at.layer));
     for (int k = 0; k <= 4; k++) {
         ebpo_pose pose;
         ebpo_error error = EBPO_ERROR_INIT;
@@ -57,10 +49,10 @@ static void check_instance(const ebpo_scene *scene, const ebpo_scene_counts *cou
         if (isfinite(time) && ebpo_scene_pose(scene, i, time, &pose, &error) == EBPO_OK)
             check_pose(&pose);
     }
-    must(!ebpo_scene_pair_rule(scene, i, i, &clearance));
-    must(!ebpo_scene_pair_rule(scene, i, counts->instances, &clearance));
+    fuzz_must(!ebpo_scene_pair_rule(scene, i, i, &clearance));
+    fuzz_must(!ebpo_scene_pair_rule(scene, i, counts->instances, &clearance));
     for (uint64_t j = 0; j < i && j < 8; j++)
-        must(!ebpo_scene_pair_rule(scene, i, j, &clearance) || clearance >= 0);
+        fuzz_must(!ebpo_scene_pair_rule(scene, i, j, &clearance) || clearance >= 0);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -69,18 +61,19 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     ebpo_scene *scene = parse(data, size);
     if (!scene)
         return 0;
-    must(ebpo_scene_get_counts(scene, &counts) == EBPO_OK && counts.begin <= counts.end);
+    fuzz_must(ebpo_scene_get_counts(scene, &counts) == EBPO_OK && counts.begin <= counts.end);
     for (uint64_t i = 0; i < counts.models; i++) {
         ebpo_scene_model_facts facts = EBPO_SCENE_MODEL_FACTS_INIT;
-        must(ebpo_scene_get_model(scene, i, &facts) == EBPO_OK);
-        must(facts.name && facts.path && !facts.loaded);
+        fuzz_must(ebpo_scene_get_model(scene, i, &facts) == EBPO_OK);
+        fuzz_must(facts.name && facts.path && !facts.loaded);
     }
     for (uint64_t i = 0; i < counts.instances; i++)
         check_instance(scene, &counts, i);
     for (uint64_t i = 0; i < counts.cameras; i++) {
         ebpo_scene_camera camera = EBPO_SCENE_CAMERA_INIT;
-        must(ebpo_scene_get_camera(scene, i, &camera) == EBPO_OK);
-        must(camera.name && camera.fov > 0 && camera.fov < 180 && camera.width && camera.height);
+        fuzz_must(ebpo_scene_get_camera(scene, i, &camera) == EBPO_OK);
+        fuzz_must(camera.name && camera.fov > 0 && camera.fov < 180 && camera.width &&
+                  camera.height);
     }
     ebpo_scene_free(scene);
     return 0;

@@ -41,7 +41,7 @@ uint64_t changeable_count(const changeable *c, ebpo_array_id id)
 }
 
 static uint8_t *item_at(const changeable *c, const ebpo_array_in *a, uint64_t item,
-                        const ebpo_h5_chunk **chunk)
+                        const ebpo_chunk_place **chunk)
 {
     uint64_t of_chunk = (uint64_t)a->shape.chunk_rows * columns(a);
     *chunk = &a->chunks[item / of_chunk];
@@ -50,7 +50,7 @@ static uint8_t *item_at(const changeable *c, const ebpo_array_in *a, uint64_t it
 
 uint64_t changeable_get(const changeable *c, ebpo_array_id id, uint64_t item)
 {
-    const ebpo_h5_chunk *chunk;
+    const ebpo_chunk_place *chunk;
     uint64_t value = 0;
     memcpy(&value, item_at(c, array_of(c, id), item, &chunk), array_of(c, id)->shape.element_size);
     return value;
@@ -59,7 +59,7 @@ uint64_t changeable_get(const changeable *c, ebpo_array_id id, uint64_t item)
 uint64_t changeable_put(changeable *c, ebpo_array_id id, uint64_t item, uint64_t value)
 {
     const ebpo_array_in *a = array_of(c, id);
-    const ebpo_h5_chunk *chunk;
+    const ebpo_chunk_place *chunk;
     uint8_t *at = item_at(c, a, item, &chunk);
     uint64_t before = changeable_get(c, id, item);
     ebpo_chunk_coder *coder = calloc(1, sizeof *coder);

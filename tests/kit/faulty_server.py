@@ -30,6 +30,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
     disable_nagle_algorithm = True
     data = b""
     counts = collections.Counter()
+    other_port = 0
     lock = threading.Lock()
 
     def log_message(self, *arguments):
@@ -318,6 +319,31 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def fault_redirect_file(self):
         self.redirect("file:///etc/passwd")
 
+    def here(self):
+        return int(self.server.server_address[1])
+
+    def fault_away(self, where=0):
+        """To this machine by another name; to another port; to this server, and from there away;
+        away, and from there back; to this server alone, by a whole address and by a part of one."""
+        rest = "/".join(self.path.split("/")[2:])
+        self.redirect([f"http://localhost:{self.here()}/stranger/{rest}",
+                       f"http://127.0.0.1:{Handler.other_port}/stranger/{rest}",
+                       f"/away-0/{rest}",
+                       f"http://localhost:{self.here()}/back/{rest}",
+                       f"http://127.0.0.1:{self.here()}/private/{rest}",
+                       f"../private/{rest}"][where])
+
+    def fault_back(self):
+        rest = "/".join(self.path.split("/")[2:])
+        self.redirect(f"http://127.0.0.1:{self.here()}/stranger/{rest}")
+
+    def fault_stranger(self):
+        """Fails where it is told a secret."""
+        if self.headers.get("X-Key") or self.headers.get("Authorization"):
+            self.fail(403)
+        else:
+            self.part()
+
     def fault_change_etag(self, good=1):
         if self.number <= good:
             self.part()
@@ -419,7 +445,10 @@ def main():
     with open(sys.argv[1], "rb") as f:
         Handler.data = f.read()
     server = Server(("127.0.0.1", 0), Handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
+    other = Server(("127.0.0.1", 0), Handler)
+    Handler.other_port = other.server_address[1]
+    for each in (server, other):
+        threading.Thread(target=each.serve_forever, daemon=True).start()
     print(server.server_address[1], flush=True)
     sys.stdin.read()
     os._exit(0)

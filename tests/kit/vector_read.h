@@ -1,5 +1,5 @@
-/* Reading a vector file whole, and its outcome as two lines: status, message. Words of libhdf5's
- * own and the folder are left out. */
+/* Reading a vector file whole, and its outcome as two lines: status, message. The folder is left
+ * out. */
 #ifndef VECTOR_READ_H
 #define VECTOR_READ_H
 #include "read_by.h"
@@ -32,9 +32,6 @@ static inline void vector_outcome(const char *path, const ebpo_error *error, cha
                            ? error->message + strlen(path)
                            : error->message;
     snprintf(text, size, "%s\n%s%s\n", ebpo_status_name(error->status), name, rest);
-    char *cause = strstr(text, " (libhdf5: ");
-    if (cause)
-        snprintf(cause, 2, "\n");
 }
 
 #endif

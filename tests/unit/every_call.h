@@ -25,6 +25,7 @@ extern const every_call every_call_meshes[], every_call_files[], every_call_answ
 #define EVERY_CALL_PLY      "torus.ply"
 #define EVERY_CALL_SPLIT    "split.ply"    /* without shared vertices */
 #define EVERY_CALL_TURNED   "turned.ply"   /* some faces point the other way */
+#define EVERY_CALL_DOUBLE   "double.ply"   /* some faces are there twice */
 #define EVERY_CALL_HOLED    "holed.ply"    /* some faces are missing */
 #define EVERY_CALL_CROSSING "crossing.ply" /* faces pierce each other */
 #define EVERY_CALL_OBJ      "torus.obj"

@@ -347,6 +347,80 @@ static ebpo_status call_budget(every_call_env *e)
     return status;
 }
 
+static ebpo_status take_layers(void *user, const double *values, uint64_t first, uint64_t layers,
+                               ebpo_error *error)
+{
+    (void)user;
+    (void)values;
+    (void)first;
+    (void)layers;
+    (void)error;
+    return EBPO_OK;
+}
+
+static ebpo_status map_lattice(ebpo_model *model, ebpo_error *error)
+{
+    static const double low[3] = { -1, -1, -1 }, high[3] = { 1, 1, 1 };
+    static const uint64_t count[3] = { 3, 2, 2 };
+    ebpo_map_options options = EBPO_MAP_OPTIONS_INIT;
+    ebpo_map_stats stats = EBPO_MAP_STATS_INIT;
+    ebpo_lattice lattice;
+    options.threads = 1;
+    ebpo_status status = ebpo_lattice_of_box(low, high, count, &lattice, error);
+    if (status == EBPO_OK)
+        status = ebpo_map_lattice(model, &lattice, &options, take_layers, NULL, error);
+    for (int format = 0; format < 2 && status == EBPO_OK; format++)
+        status = ebpo_map_write(model, &lattice, scratch("map"), (ebpo_map_format)format, &options,
+                                &stats, error);
+    every_call_pause();
+    unlink(scratch("map"));
+    every_call_resume();
+    return status;
+}
+
+static ebpo_status map_mesh(ebpo_model *model, ebpo_error *error)
+{
+    double xyz[9] = { 0, 0, 0, 1, 0, 0, 0, 1, 0 }, away[3];
+    uint32_t face[3] = { 0, 1, 2 };
+    ebpo_mesh mesh = { .vertex_count = 3, .face_count = 1 };
+    ebpo_map_options options = EBPO_MAP_OPTIONS_INIT;
+    ebpo_map_stats stats = EBPO_MAP_STATS_INIT;
+    ebpo_map_reach reach = EBPO_MAP_REACH_INIT;
+    ebpo_map_reach_options reaching = EBPO_MAP_REACH_OPTIONS_INIT;
+    options.threads = reaching.threads = 1;
+    ebpo_status status = ebpo_map_points(model, xyz, 3, &options, away, error);
+    if (status == EBPO_OK)
+        status = ebpo_map_describe(away, 3, &stats, error);
+    mesh.xyz64 = xyz;
+    mesh.faces = face;
+    if (status == EBPO_OK)
+        status = ebpo_map_find_reach(model, &mesh, away, &reaching, &reach, error);
+    mesh.xyz64 = NULL; /* what painting adds is the mesh's */
+    mesh.faces = NULL;
+    if (status == EBPO_OK)
+        status = ebpo_map_paint(&mesh, away, EBPO_MAP_THESIS, 1, error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status call_map(every_call_env *e)
+{
+    uint8_t rgb[3];
+    ebpo_model *model;
+    ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
+    opening.threads = 1;
+    ebpo_map_colour(EBPO_MAP_DIVERGING, ebpo_map_percent(0), 2, rgb);
+    if (!ebpo_map_palette_name(EBPO_MAP_DIVERGING))
+        return EBPO_E_ARGUMENT;
+    ebpo_status status = ebpo_model_new(e->file, &opening, &model, e->error);
+    if (status == EBPO_OK)
+        status = map_lattice(model, e->error);
+    if (status == EBPO_OK)
+        status = map_mesh(model, e->error);
+    ebpo_model_free(model);
+    return status;
+}
+
 static ebpo_status call_measure(every_call_env *e)
 {
     ebpo_mass mass = EBPO_MASS_INIT;
@@ -732,6 +806,7 @@ const every_call every_call_answers[] = {
     { "ask_subtree", call_ask_subtree },
     { "ask_nodes", call_ask_nodes },
     { "budget", call_budget },
+    { "map", call_map },
     { "measure", call_measure },
     { "deviation", call_deviation },
     { "limit", call_limit },

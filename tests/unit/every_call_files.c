@@ -89,6 +89,14 @@ static ebpo_status call_open(every_call_env *e)
     return end_open(file, status, e->error);
 }
 
+static ebpo_status call_open_compat(every_call_env *e)
+{
+    ebpo_file *file;
+    ebpo_compat_options options = EBPO_COMPAT_OPTIONS_INIT;
+    ebpo_status status = ebpo_open_compat(scratch(EVERY_CALL_MODEL), &options, &file, e->error);
+    return end_open(file, status, e->error);
+}
+
 /* A model in memory, which is the test's own. */
 typedef struct bytes {
     char *data;
@@ -342,6 +350,7 @@ const every_call every_call_files[] = {
     { "filters", call_filters },
     { "open", call_open },
     { "open_memory", call_open_memory },
+    { "open_compat", call_open_compat },
     { "open_source", call_open_source },
     { "source_of_url", call_source_of_url },
     { "open_url", call_open_url },

@@ -19,6 +19,7 @@ static ebpo_status call_read(every_call_env *e)
     ebpo_mesh mesh;
     ebpo_status status = read_mesh(e, EVERY_CALL_PLY, &mesh);
     (void)ebpo_mesh_attributes_lost(&mesh);
+    (void)ebpo_mesh_unread(&mesh);
     (void)ebpo_mesh_has_attributes(&mesh);
     ebpo_mesh_free(&mesh);
     return status;
@@ -125,6 +126,11 @@ static ebpo_status fill(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *e
     return ebpo_mesh_fill_holes(mesh, record, error);
 }
 
+static ebpo_status drop(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    return ebpo_mesh_drop_duplicates(mesh, record, error);
+}
+
 static ebpo_status flip(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
 {
     return ebpo_mesh_flip(mesh, record, error);
@@ -133,6 +139,8 @@ static ebpo_status flip(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *e
 static ebpo_status call_weld(every_call_env *e) { return mend(e, EVERY_CALL_SPLIT, weld); }
 static ebpo_status call_orient(every_call_env *e) { return mend(e, EVERY_CALL_TURNED, orient); }
 static ebpo_status call_fill_holes(every_call_env *e) { return mend(e, EVERY_CALL_HOLED, fill); }
+
+static ebpo_status call_drop(every_call_env *e) { return mend(e, EVERY_CALL_DOUBLE, drop); }
 
 static ebpo_status call_flip(every_call_env *e) { return mend(e, EVERY_CALL_TURNED, flip); }
 
@@ -308,6 +316,7 @@ const every_call every_call_meshes[] = {
     { "arrange", call_arrange },
     { "weld", call_weld },
     { "orient", call_orient },
+    { "drop duplicates", call_drop },
     { "flip", call_flip },
     { "fill_holes", call_fill_holes },
     { "shells", call_shells },

@@ -749,7 +749,7 @@ START_TEST(a_get_waits_for_the_background_and_does_not_load_again)
     ebpo_cache_prefetch(cache, &key, 1);
     await_loading(1);
     start(&g, 1);
-    usleep(20000);
+    usleep(200000); /* on a busy machine it is a while until the other thread waits */
     set_gate(1, false);
     pthread_join(g.thread, NULL);
     ck_assert_int_eq(g.status, EBPO_OK);

@@ -589,6 +589,9 @@ START_TEST(codec_and_level_are_checked)
         ck_assert_int_eq(ebpo_tree_write(&tree, scratch("a.ebpo.h5"), &options, NULL),
                          cases[i].status);
     }
+    ebpo_write_options unknown = EBPO_WRITE_OPTIONS_INIT;
+    unknown.face_coding = (ebpo_face_coding)3;
+    ck_assert_int_eq(ebpo_tree_write(&tree, scratch("b.ebpo.h5"), &unknown, NULL), EBPO_E_ARGUMENT);
     ebpo_tree_free(&tree);
 }
 END_TEST
@@ -601,8 +604,12 @@ START_TEST(what_is_no_file_of_ours_is_named)
     ck_assert_int_eq(ebpo_open(scratch(NULL), &file, &error), EBPO_E_IO);
     spill(scratch("text"), (const uint8_t *)"hello", 5);
     ck_assert_int_eq(ebpo_open(scratch("text"), &file, &error), EBPO_E_FORMAT);
-    hid_t fid = H5Fcreate(scratch("other.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-    H5Fclose(fid);
+    hid_t fapl = H5Pcreate(H5P_FILE_ACCESS);
+    H5Fclose(H5Fcreate(scratch("other.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, fapl));
+    ck_assert_int_eq(ebpo_open(scratch("other.h5"), &file, &error), EBPO_E_UNSUPPORTED);
+    H5Pset_libver_bounds(fapl, H5F_LIBVER_V110, H5F_LIBVER_V110);
+    H5Fclose(H5Fcreate(scratch("other.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, fapl));
+    H5Pclose(fapl);
     ck_assert_int_eq(ebpo_open(scratch("other.h5"), &file, &error), EBPO_E_FORMAT);
     ck_assert_ptr_nonnull(strstr(error.message, "not an EBP-Octree"));
     ck_assert_ptr_null(file);

@@ -161,9 +161,29 @@ static bool rounded_correctly(double d, const mpq_t square)
            compare_square(d, nextafter(d, INFINITY), square) >= 0;
 }
 
-/* Twelve kinds of trouble. */
+/* Far away on some axes, as far as doubles go, and among the triangle's coordinates on others. */
+static void make_far_case(int kind, double p[3], double t[3][3])
+{
+    double scale = kind == 13 ? 0x1p-1070 : 1;
+    for (int i = 0; i < 9; i++)
+        t[i / 3][i % 3] = kind == 14 ? random_unit() : floor(random_unit() * 4) * scale;
+    for (int k = 0; k < 3; k++) {
+        p[k] = kind == 14 ? random_unit() : floor(random_unit() * 8) / 2 * scale;
+        if (random_unit() < 0.6)
+            p[k] = ldexp(random_unit() - 0.5, (int)(random_unit() * 1020));
+    }
+    if (random_unit() < 0.3) /* all of it across an axis */
+        t[0][1] = t[1][1] = t[2][1] = scale;
+}
+
+/* Fifteen kinds of trouble. */
+enum { KINDS = 15 };
 static void make_case(int kind, double p[3], double t[3][3])
 {
+    if (kind >= 12) {
+        make_far_case(kind, p, t);
+        return;
+    }
     double scale = kind == 9 ? 0x1p990 : kind == 10 ? 0x1p-1000 : 1;
     for (int i = 0; i < 12; i++) {
         double r = random_unit();
@@ -196,7 +216,7 @@ START_TEST(distances_are_rounded_correctly_and_lie_within_their_bounds)
     state = 77;
     for (int i = 0; i < CASES; i++) {
         double p[3], t[3][3];
-        make_case(i % 12, p, t);
+        make_case(i % KINDS, p, t);
         exact_square(square, p, (const double(*)[3])t);
         ebpo_triangle_nearest n;
         ebpo_distance_bounds b;
@@ -228,10 +248,10 @@ START_TEST(comparisons_are_exact_also_of_equal_distances)
     int ties = 0;
     for (int i = 0; i < CASES; i++) {
         double p[3], q[3], a[3][3], b[3][3];
-        make_case(i % 12, p, a);
-        make_case(i % 12, q, b);
-        if (i % 2) /* neighbours share an edge */
-            memcpy(b, a, 2 * sizeof a[0]);
+        make_case(i % KINDS, p, a);
+        make_case(i % KINDS, q, b);
+        if (i / KINDS % 2) /* neighbours share an edge, or a corner */
+            memcpy(b, a, (size_t)(1 + i / KINDS % 4 / 2) * sizeof a[0]);
         exact_square(x, p, (const double(*)[3])a);
         exact_square(y, p, (const double(*)[3])b);
         int right = mpq_cmp(x, y);
@@ -255,7 +275,7 @@ START_TEST(unit_normals_are_right_also_of_slivers)
     for (int i = 0; i < CASES; i++) {
         double p[3], t[3][3], normal[3];
         point e, f, n;
-        make_case(i % 12, p, t);
+        make_case(i % KINDS, p, t);
         ebpo_triangle_unit_normal((const double(*)[3])t, normal);
         init(&e);
         init(&f);
@@ -304,7 +324,7 @@ START_TEST(processors_with_fma_give_the_same_bits)
     state = 80;
     for (int i = 0; i < 4 * CASES; i++) {
         double p[3], t[3][3], n[3] = { 0, 0, 0 }, m[3] = { 0, 0, 0 };
-        make_case(i % 12, p, t);
+        make_case(i % KINDS, p, t);
         ebpo_distance_bounds b;
         ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
         bool base = ebpo_distance_pairs_base.unit_normal((const double(*)[3])t, n);

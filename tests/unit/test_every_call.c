@@ -1,7 +1,9 @@
-/* Every public function, with and without a small workspace, and with each allocation failing once:
- * a call ends with a status, holds nothing after it, leaves no file behind and succeeds when it is
- * made again. Meant for AddressSanitizer and LeakSanitizer, which see each call by itself: Check
- * forks. test_every_call [FAULTY_SERVER] */
+/* Every public function, with and without a small workspace, and with each allocation and each call
+ * of the file system failing once: a call ends with a status, holds nothing after it, leaves no
+ * file behind and succeeds when it is made again. Meant for AddressSanitizer and LeakSanitizer,
+ * which see each call by itself: Check forks. test_every_call [FAULTY_SERVER], with faults.so
+ * preloaded */
+#include <errno.h>
 #include <dirent.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +13,7 @@
 #include "base/workspace.h"
 #include "check_main.h"
 #include "every_call.h"
-#include "failing_allocations.h"
+#include "faults.h"
 #include "scratch.h"
 #include "solids.h"
 #include "web.h"
@@ -29,8 +31,8 @@ const char *every_call_url(void)
     return url;
 }
 
-void every_call_pause(void) { failing_allocations_pause(); }
-void every_call_resume(void) { failing_allocations_resume(); }
+void every_call_pause(void) { faults_pause(); }
+void every_call_resume(void) { faults_resume(); }
 
 /* --- what is read --- */
 
@@ -72,6 +74,12 @@ static void write_faulty_meshes(uint32_t n)
     for (uint64_t face = 0; face < other.face_count; face += 9)
         ebpo_test_turn_face(&other, face);
     write_mesh(&other, EVERY_CALL_TURNED);
+    mesh = ebpo_test_torus(3, 1, n, n);
+    for (uint64_t face = 0; face < 20; face++) {
+        const uint32_t *c = mesh.faces + 3 * face;
+        ebpo_test_append_face(&mesh, c[1], c[2], c[0]);
+    }
+    write_mesh(&mesh, EVERY_CALL_DOUBLE);
     mesh = ebpo_test_torus(3, 1, n, n);
     mesh.face_count -= 5;
     write_mesh(&mesh, EVERY_CALL_HOLED);
@@ -207,40 +215,54 @@ START_TEST(a_call_leaves_nothing)
 }
 END_TEST
 
-/* What fails: the n-th allocation, or all from it on. True: there are more allocations than that.
- */
-static bool call_with_failure(const every_call *c, every_call_env *e, uint64_t n, bool onward)
+enum { MEMORY = FAULT_MALLOC | FAULT_MMAP | FAULT_THREAD };
+
+/* What fails: the n-th call of these kinds, or all from it on. True: there are more than that. */
+static bool call_with_failure(const every_call *c, every_call_env *e, unsigned kinds, uint64_t n,
+                              bool onward)
 {
+    unsigned long long number = n;
     int files = open_files(), entries = scratch_entries();
     error = (ebpo_error)EBPO_ERROR_INIT;
-    failing_allocations_begin(n, onward);
+    faults_begin(kinds, n, onward, kinds == MEMORY ? ENOMEM : EIO);
     ebpo_status status = c->call(e);
-    bool more = failing_allocations_end() >= n;
+    bool more = faults_end() >= n;
     ck_assert_msg(more || status == EBPO_OK, "%s: %s", c->name, error.message);
-    ck_assert_msg(status == EBPO_OK || error.message[0], "%s: allocation %llu: no message", c->name,
-                  (unsigned long long)n);
-    ck_assert_msg(status != EBPO_E_FORMAT, "%s: allocation %llu: called damaged: %s", c->name,
-                  (unsigned long long)n, error.message);
+    ck_assert_msg(status == EBPO_OK || error.message[0], "%s: %#x, %llu: no message", c->name,
+                  kinds, number);
+    ck_assert_msg(status != EBPO_E_FORMAT, "%s: %#x, %llu: called damaged: %s", c->name, kinds,
+                  number, error.message);
     expect_workspace_empty(e, c->name);
-    ck_assert_msg(open_files() <= files, "%s: allocation %llu: a file stays open", c->name,
-                  (unsigned long long)n);
+    ck_assert_msg(open_files() <= files, "%s: %#x, %llu: a file stays open", c->name, kinds,
+                  number);
     ck_assert_msg(status == EBPO_OK || scratch_entries() <= entries,
-                  "%s: allocation %llu: leaves a file behind", c->name, (unsigned long long)n);
+                  "%s: %#x, %llu: leaves a file behind: %s", c->name, kinds, number, error.message);
     return more;
 }
 
-START_TEST(a_call_survives_any_allocation_that_fails)
+static void survive(int call, bool with_workspace, unsigned kinds)
 {
-    const every_call *c = call_number(_i / 2);
+    const every_call *c = call_number(call);
     const uint64_t dense = ebpo_test_scaled(200);
     every_call_env e;
-    begin(&e, _i % 2);
+    begin(&e, with_workspace);
     fine(c->call(&e));
     for (int onward = 0; onward < 2; onward++)
-        for (uint64_t n = 1; call_with_failure(c, &e, n, onward); n += 1 + n / dense)
+        for (uint64_t n = 1; call_with_failure(c, &e, kinds, n, onward); n += 1 + n / dense)
             ;
     fine(c->call(&e));
     finish(&e);
+}
+
+START_TEST(a_call_survives_any_allocation_that_fails) { survive(_i / 2, _i % 2, MEMORY); }
+END_TEST
+
+START_TEST(a_call_survives_any_file_that_fails)
+{
+    static const unsigned kinds[] = { FAULT_READ,   FAULT_WRITE,    FAULT_SYNC,
+                                      FAULT_RENAME, FAULT_TRUNCATE, FAULT_OPEN };
+    for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++)
+        survive(_i, false, kinds[k]);
 }
 END_TEST
 
@@ -295,9 +317,9 @@ START_TEST(a_weld_that_fails_changes_nothing)
     fine(ebpo_write_file(scratch("split.ply"), split_ply, sizeof split_ply - 1, &error));
     for (uint64_t n = 1; more; n++) {
         ebpo_mesh mesh = read_split(arranged, e.workspace);
-        failing_allocations_begin(n, false);
+        faults_begin(MEMORY, n, false, ENOMEM);
         ebpo_status status = ebpo_mesh_weld(&mesh, NULL, &error);
-        more = failing_allocations_end() >= n;
+        more = faults_end() >= n;
         if (status == EBPO_OK) {
             expect_rows(&mesh, 4, (const uint8_t *)"\1\2\3\5", kept, kept_words);
             ck_assert_ptr_nonnull(ebpo_mesh_attributes_lost(&mesh));
@@ -323,6 +345,7 @@ Suite *test_suite(void)
     tcase_set_timeout(failing, SECONDS);
     tcase_add_unchecked_fixture(failing, write_small, remove_all);
     tcase_add_loop_test(failing, a_call_survives_any_allocation_that_fails, 0, 2 * call_count());
+    tcase_add_loop_test(failing, a_call_survives_any_file_that_fails, 0, call_count());
     tcase_add_loop_test(failing, a_weld_that_fails_changes_nothing, 0, 4);
     suite_add_tcase(suite, failing);
     return suite;

@@ -491,6 +491,22 @@ START_TEST(name_password_and_headers_are_sent_and_not_shown)
 }
 END_TEST
 
+/* Also when it is led back: whoever leads it says where to. */
+START_TEST(headers_stay_with_the_server_that_they_were_given_for)
+{
+    static const char *const headers[] = { "X-Key: 7", NULL };
+    for (int i = 0; i < 6; i++) {
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_http_options o = quick();
+        char away[16];
+        o.headers = headers;
+        o.user = i < 4 ? NULL : "name:secret";
+        snprintf(away, sizeof away, "away-%d", i);
+        ck_assert_msg(visit(away, &o, NULL, &error) == EBPO_OK, "%s: %s", away, error.message);
+    }
+}
+END_TEST
+
 START_TEST(options_out_of_range_are_refused)
 {
     static const char *const smuggled[] = { "X: 1\r\nY: 2", NULL };
@@ -849,6 +865,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, a_read_is_stopped_on_request);
     tcase_add_test(tests, a_source_is_closed_while_it_reads_ahead);
     tcase_add_test(tests, name_password_and_headers_are_sent_and_not_shown);
+    tcase_add_test(tests, headers_stay_with_the_server_that_they_were_given_for);
     tcase_add_test(tests, options_out_of_range_are_refused);
     tcase_add_test(tests, a_server_that_is_not_there_is_an_error);
     tcase_add_test(tests, heads_are_judged_by_the_letter);

@@ -8,14 +8,7 @@
 #include "attributes/attributes.h"
 #include "base/endian.h"
 #include "check_main.h"
-#include "ebpo_config.h"
 #include "import/import.h"
-
-#if !EBPO_HAVE_ASSIMP
-
-Suite *test_suite(void) { exit(TEST_SKIPPED); }
-
-#else
 
 static ebpo_mesh mesh;
 
@@ -132,10 +125,14 @@ START_TEST(materials_are_numbers_of_faces_and_names_in_the_header)
 }
 END_TEST
 
-START_TEST(faces_before_the_first_material_are_noted)
+START_TEST(faces_before_the_first_material_have_none)
 {
+    static const uint32_t numbers[] = { 0, 1 };
     import_text(EBPO_IMPORT_OBJ, POSITIONS "f 1 3 2\nusemtl a\nf 1 2 4\n");
-    ck_assert_str_eq(mesh.attributes->lost, "that faces before the first material have none");
+    const ebpo_attribute *a = find("face", "material");
+    ck_assert(a != NULL);
+    ck_assert_mem_eq(a->values, numbers, sizeof numbers);
+    ck_assert_str_eq(mesh.attributes->lost, "");
     ebpo_mesh_free(&mesh);
 }
 END_TEST
@@ -162,17 +159,65 @@ static void import_off(const char *head, const char *vertex, const char *last)
     import_text(EBPO_IMPORT_OFF, text);
 }
 
-/* assimp mixes up what stands behind positions. */
-START_TEST(what_off_says_beyond_positions_is_noted)
+static void expect_bytes(const ebpo_attribute *a, const uint8_t *values, uint64_t count)
 {
+    ck_assert_ptr_nonnull(a);
+    ck_assert(a->type == EBPO_ATTRIBUTE_UINT8 && ebpo_attribute_value_count(a) == count);
+    ck_assert_mem_eq(a->values, values, count);
+}
+
+START_TEST(what_vertices_of_off_have_is_kept)
+{
+    static const uint8_t bytes[] = { 255, 0, 7, 255, 0, 7, 255, 0, 7, 255, 0, 7 };
+    static const float normal[] = { 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1 };
+    static const float st[] = { 0.25f, 4, 0.25f, 4, 0.25f, 4, 0.25f, 4 };
+    static const float part[] = { 0.5f, 0, 1, 0.5f, 0, 1, 0.5f, 0, 1, 0.5f, 0, 1 };
     import_off("", "# a comment", "");
     ck_assert_ptr_null(mesh.attributes);
     ebpo_mesh_free(&mesh);
-    import_off("", "", "255 0 0");
-    ck_assert_str_eq(mesh.attributes->lost, "colours, normals or others of OFF");
+    import_off("C", "255 0 7", "");
+    expect_bytes(find("vertex", "red green blue"), bytes, 12);
+    ck_assert(!mesh.attributes->lost[0] && !mesh.attributes->unread[0]);
     ebpo_mesh_free(&mesh);
-    import_off("C", "255 0 0 255", "");
-    ck_assert_str_eq(mesh.attributes->lost, "colours, normals or others of OFF");
+    import_off("STCN", "0 0 1 0.5 0 1 0.75 0.25 4", "");
+    expect_floats(find("vertex", "red green blue"), false, part, 12);
+    expect_floats(find("vertex", "nx ny nz"), false, normal, 12);
+    expect_floats(find("vertex", "s t"), false, st, 8);
+    ck_assert_str_eq(mesh.attributes->lost, "how opaque colours are");
+    ebpo_mesh_free(&mesh);
+    import_off("N", "0 0 1 5", "");
+    expect_floats(find("vertex", "nx ny nz"), false, normal, 12);
+    ck_assert_str_eq(ebpo_mesh_unread(&mesh),
+                     "vertices' values that the file's first word does not say: 4");
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+START_TEST(colours_of_faces_of_off_are_kept)
+{
+    static const uint8_t bytes[] = { 0, 0, 0, 0, 0, 0, 0, 0, 0, 255, 0, 9 };
+    import_off("", "", "255 0 9");
+    expect_bytes(find("face", "red green blue"), bytes, 12);
+    ebpo_mesh_free(&mesh);
+    import_off("", "", "7");
+    ck_assert_str_eq(mesh.attributes->lost, "colours of faces that are numbers in a table");
+    ck_assert_uint_eq(mesh.attributes->count, 0);
+    ebpo_mesh_free(&mesh);
+    import_off("C", "1 0 0", "255 0 9");
+    ck_assert_str_eq(mesh.attributes->lost, "colours of faces (vertices have some too)");
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+/* Faces without them have zeros; what is named and not there is told. */
+START_TEST(what_faces_name_and_is_not_there_is_told)
+{
+    static const float texture[] = { 0.5f, 0.25f, 0, 0, 0, 0, 0, 0, 0, 0, 0.5f, 0.25f };
+    import_text(EBPO_IMPORT_OBJ, POSITIONS "vt 0.5 0.25\nf 1/1 3/2 2/7\nf 1//1 2 4/1\n");
+    expect_floats(find("face", "texcoord"), true, texture, 12);
+    ck_assert_str_eq(ebpo_mesh_unread(&mesh),
+                     "texture coordinates that corners of faces name and that are not in the "
+                     "file: 2; normals that corners of faces name and that are not in the file: 1");
     ebpo_mesh_free(&mesh);
 }
 END_TEST
@@ -246,9 +291,11 @@ Suite *test_suite(void)
     tcase_add_test(tests, what_agrees_on_a_face_is_the_face_s_and_else_in_lists);
     tcase_add_test(tests, corners_of_polygons_keep_their_values);
     tcase_add_test(tests, materials_are_numbers_of_faces_and_names_in_the_header);
-    tcase_add_test(tests, faces_before_the_first_material_are_noted);
+    tcase_add_test(tests, faces_before_the_first_material_have_none);
     tcase_add_test(tests, nothing_is_made_of_nothing);
-    tcase_add_test(tests, what_off_says_beyond_positions_is_noted);
+    tcase_add_test(tests, what_vertices_of_off_have_is_kept);
+    tcase_add_test(tests, colours_of_faces_of_off_are_kept);
+    tcase_add_test(tests, what_faces_name_and_is_not_there_is_told);
     tcase_add_test(tests, a_third_texture_coordinate_is_noted);
     tcase_add_test(tests, colours_of_stl_are_read_as_their_header_says);
     tcase_add_test(tests, words_of_stl_that_are_no_colours_are_kept);
@@ -256,5 +303,3 @@ Suite *test_suite(void)
     suite_add_tcase(suite, tests);
     return suite;
 }
-
-#endif

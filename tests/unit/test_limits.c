@@ -105,14 +105,14 @@ START_TEST(chunks_are_counted_beyond_2_to_the_32_rows)
                                        (UINT64_C(1) << 32) + 1, (UINT64_C(1) << 33) + 5,
                                        UINT64_C(255) << 40,     UINT64_MAX };
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
-        ebpo_h5_shape faces = { .rows = counts[i], .cols = 3, .element_size = 4 },
-                      codes = { .rows = counts[i], .element_size = 4 };
-        faces.chunk_rows = ebpo_h5_chunk_rows(faces.rows, 3, 4);
-        codes.chunk_rows = ebpo_h5_chunk_rows(codes.rows, 0, 4);
+        ebpo_shape faces = { .rows = counts[i], .cols = 3, .element_size = 4 },
+                   codes = { .rows = counts[i], .element_size = 4 };
+        faces.chunk_rows = ebpo_full_chunk_rows(faces.rows, 3, 4);
+        codes.chunk_rows = ebpo_full_chunk_rows(codes.rows, 0, 4);
         ck_assert_uint_eq(faces.chunk_rows, 4096);
         ck_assert_uint_eq(codes.chunk_rows, 16384);
-        ck_assert_uint_eq(ebpo_h5_chunk_count(&faces), (counts[i] - 1) / 4096 + 1);
-        ck_assert_uint_eq(ebpo_h5_chunk_count(&codes), (counts[i] - 1) / 16384 + 1);
+        ck_assert_uint_eq(ebpo_shape_chunks(&faces), (counts[i] - 1) / 4096 + 1);
+        ck_assert_uint_eq(ebpo_shape_chunks(&codes), (counts[i] - 1) / 16384 + 1);
         ck_assert_uint_eq(ebpo_schema_index_rows(counts[i]), (counts[i] - 1) / EBPO_INDEX_ROWS + 1);
     }
 }

@@ -58,12 +58,20 @@ static ebpo_file *file_of(const ebpo_mesh *mesh, uint32_t parts)
     return file;
 }
 
+static bool same(double a, double b) { return memcmp(&a, &b, sizeof a) == 0; }
+
 static ebpo_mass mass_on(const ebpo_mesh *mesh, unsigned threads)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mass mass = EBPO_MASS_INIT;
     ebpo_file *file = file_of(mesh, EBPO_PART_PLANES | EBPO_PART_MESH);
     ck_assert_msg(ebpo_measure(file, threads, &mass, &error) == EBPO_OK, "%s", error.message);
+    ck_assert(same(mass.area, ldexp(mass.scaled_area, 2 * (int)mass.exponent)));
+    ck_assert(same(mass.volume, ldexp(mass.scaled_volume, 3 * (int)mass.exponent)));
+    for (int k = 0; k < 9; k++)
+        ck_assert(same(mass.inertia[k / 3][k % 3],
+                       ldexp(mass.scaled_inertia[k / 3][k % 3], 5 * (int)mass.exponent)));
+    ck_assert(isfinite(mass.scaled_area) && (mass.volume == 0 || mass.scaled_volume != 0));
     ebpo_close(file);
     return mass;
 }
@@ -313,11 +321,13 @@ START_TEST(a_tetrahedron_has_the_mass_of_a_tetrahedron)
     ebpo_test_append_face(&mesh, 0, 3, 2);
     ebpo_test_append_face(&mesh, 1, 2, 3);
     double v = 4.5, c = .75, xx = 243 / 60. - v * c * c, xy = 243 / 120. - v * c * c;
-    ebpo_mass expected = { sizeof(ebpo_mass),
-                           13.5 + 4.5 * sqrt(3),
-                           v,
-                           { c, c, c },
-                           { { 2 * xx, -xy, -xy }, { -xy, 2 * xx, -xy }, { -xy, -xy, 2 * xx } } },
+    ebpo_mass expected = { .struct_size = sizeof(ebpo_mass),
+                           .area = 13.5 + 4.5 * sqrt(3),
+                           .volume = v,
+                           .centroid = { c, c, c },
+                           .inertia = { { 2 * xx, -xy, -xy },
+                                        { -xy, 2 * xx, -xy },
+                                        { -xy, -xy, 2 * xx } } },
               m = mass_of(&mesh);
     assert_masses_near(&m, &expected, 3);
     ebpo_mesh_free(&mesh);
@@ -454,6 +464,8 @@ START_TEST(surfaces_have_an_area_only)
     ebpo_mass m = mass_of(&mesh), none = EBPO_MASS_INIT;
     assert_near(m.area, 9, 9, "area");
     none.area = m.area;
+    none.scaled_area = m.scaled_area;
+    none.exponent = m.exponent;
     ck_assert_mem_eq(&m, &none, sizeof m);
     ebpo_mesh_free(&mesh);
 }

@@ -14,7 +14,7 @@
 
 static const ebpo_progress silent = { NULL, NULL };
 
-enum { WELD = 1, ORIENT = 2, FILL = 4, ALL = 7 };
+enum { WELD = 1, ORIENT = 2, FILL = 4, DROP = 8, ALL = 15 };
 
 static void mend(ebpo_mesh *m, int steps, ebpo_mend_record *record)
 {
@@ -22,6 +22,8 @@ static void mend(ebpo_mesh *m, int steps, ebpo_mend_record *record)
     memset(record, 0, sizeof *record);
     if (steps & WELD)
         ck_assert_msg(ebpo_mesh_weld(m, record, &error) == EBPO_OK, "%s", error.message);
+    if (steps & DROP)
+        ck_assert_msg(ebpo_mesh_drop_duplicates(m, record, &error) == EBPO_OK, "%s", error.message);
     if (steps & ORIENT)
         ck_assert_msg(ebpo_mesh_orient(m, record, &error) == EBPO_OK, "%s", error.message);
     if (steps & FILL)
@@ -51,7 +53,15 @@ static void expect_same(const ebpo_mesh *arranged, const ebpo_mesh *plain)
     size_t width = 3 * (plain->xyz32 ? sizeof(float) : sizeof(double));
     ck_assert_uint_eq(arranged->vertex_count, plain->vertex_count);
     ck_assert_uint_eq(arranged->face_count, plain->face_count);
-    uint8_t *seen = calloc(1, plain->vertex_count + plain->face_count + 1);
+    uint64_t numbers = plain->face_count;
+    for (uint64_t f = 0; f < plain->face_count; f++) /* dropped ones have left gaps */
+        if (ebpo_mesh_source_face(plain, f) >= numbers)
+            numbers = ebpo_mesh_source_face(plain, f) + 1;
+    uint8_t *seen = calloc(1, plain->vertex_count + numbers + 1);
+    uint64_t *place = malloc((numbers + 1) * sizeof *place);
+    memset(place, 0xff, (numbers + 1) * sizeof *place);
+    for (uint64_t f = 0; f < plain->face_count; f++)
+        place[ebpo_mesh_source_face(plain, f)] = f;
     const char *here =
                    arranged->xyz32 ? (const char *)arranged->xyz32 : (const char *)arranged->xyz64,
                *there = plain->xyz32 ? (const char *)plain->xyz32 : (const char *)plain->xyz64;
@@ -63,14 +73,15 @@ static void expect_same(const ebpo_mesh *arranged, const ebpo_mesh *plain)
     }
     for (uint64_t f = 0; f < plain->face_count; f++) {
         uint64_t from = a->face_source[f];
-        if (from >= plain->face_count || seen[plain->vertex_count + from]++)
+        if (from >= numbers || place[from] == UINT64_MAX || seen[plain->vertex_count + from]++)
             ck_abort_msg("face %llu", (unsigned long long)f);
         for (uint64_t k = 0; k < 3; k++)
-            if (a->vertex_source[arranged->faces[3 * f + k]] != plain->faces[3 * from + k])
+            if (a->vertex_source[arranged->faces[3 * f + k]] != plain->faces[3 * place[from] + k])
                 ck_abort_msg("face %llu, corner %llu", (unsigned long long)f,
                              (unsigned long long)k);
     }
     free(seen);
+    free(place);
 }
 
 static void expect_equal_reports(ebpo_mesh_report a, ebpo_mesh_report b)
@@ -150,7 +161,66 @@ START_TEST(random_meshes_are_mended_alike_in_any_order)
         ebpo_mesh m = random_mesh(&state);
         if (i % 3 == 1)
             ebpo_test_to_float(&m);
-        mend_both(m, 1 + (int)(i % 7), NULL);
+        mend_both(m, 1 + (int)(i % ALL), NULL);
+    }
+}
+END_TEST
+
+/* 1: the same three distinct vertices in the same order, -1: in the other one. */
+static int repeats(const uint32_t *a, const uint32_t *b)
+{
+    for (int turn = 0; turn < 3 && a[0] != a[1] && a[1] != a[2] && a[2] != a[0]; turn++) {
+        const uint32_t t[3] = { b[turn], b[(turn + 1) % 3], b[(turn + 2) % 3] };
+        if (a[0] == t[0] && a[1] == t[1] && a[2] == t[2])
+            return 1;
+        if (a[0] == t[0] && a[1] == t[2] && a[2] == t[1])
+            return -1;
+    }
+    return 0;
+}
+
+/* Against the plain twin: each face is compared with all that stay before it. */
+static void expect_dropped(ebpo_mesh *m)
+{
+    ebpo_mesh twin = copy_of(m);
+    uint64_t kept = 0, opposite = 0, all = m->face_count;
+    uint32_t *number = malloc((size_t)all * sizeof *number);
+    for (uint64_t f = 0; f < all; f++) {
+        int same = 0;
+        for (uint64_t g = 0; g < kept && !same; g++)
+            same = repeats(twin.faces + 3 * f, twin.faces + 3 * g);
+        opposite += same < 0;
+        if (same)
+            continue;
+        memmove(twin.faces + 3 * kept, twin.faces + 3 * f, 12);
+        number[kept++] = (uint32_t)f;
+    }
+    ebpo_mend_record record;
+    mend(m, DROP, &record);
+    ck_assert_uint_eq(m->face_count, kept);
+    ck_assert(record.drop_duplicates && record.dropped_faces == all - kept);
+    ck_assert_uint_eq(record.dropped_opposite, opposite);
+    ck_assert(memcmp(m->faces, twin.faces, (size_t)kept * 12) == 0);
+    for (uint64_t f = 0; f < kept; f++)
+        ck_assert_uint_eq(ebpo_mesh_source_face(m, f), number[f]);
+    ebpo_mesh_report report;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert(ebpo_mesh_check(m, 1, silent, &report, &error) == EBPO_OK);
+    ck_assert_uint_eq(report.repeated_faces.count, 0);
+    mend(m, FILL, &record); /* what is added is numbered behind all that there was */
+    for (uint64_t f = kept; f < m->face_count; f++)
+        ck_assert_uint_eq(ebpo_mesh_source_face(m, f), f - kept + all);
+    free(number);
+    ebpo_mesh_free(&twin);
+}
+
+START_TEST(repeated_faces_are_dropped)
+{
+    uint64_t state = 31, rounds = ebpo_test_scaled(2000);
+    for (uint64_t i = 0; i < rounds; i++) {
+        ebpo_mesh m = random_mesh(&state);
+        expect_dropped(&m);
+        ebpo_mesh_free(&m);
     }
 }
 END_TEST
@@ -315,6 +385,7 @@ Suite *test_suite(void)
     TCase *tests = tcase_create("all");
     tcase_set_timeout(tests, 600);
     tcase_add_test(tests, random_meshes_are_mended_alike_in_any_order);
+    tcase_add_test(tests, repeated_faces_are_dropped);
     tcase_add_loop_test(tests, damaged_solids_are_mended_alike_in_any_order, 0,
                         ebpo_test_solid_count + 2);
     tcase_add_loop_test(tests, memory_does_not_change_what_mending_makes, 0, 2);

@@ -79,7 +79,7 @@ END_TEST
 
 START_TEST(sizes_that_no_version_has)
 {
-    static const size_t sizes[] = { 0, 1, sizeof(size_t), 17, 4104, SIZE_MAX };
+    static const size_t sizes[] = { 0, 1, sizeof(size_t), 17, 8200, SIZE_MAX };
     ebpo_workspace_options options = EBPO_WORKSPACE_OPTIONS_INIT;
     options.struct_size = sizes[_i];
     made_with(&options, EBPO_E_ARGUMENT);

@@ -580,7 +580,7 @@ static bool try_changed(whole *w, ebpo_array_id id, int level, uint64_t *state)
     ebpo_held_chunk view = { .array = ebpo_reader_array(w->file, id, level) };
     uint64_t row = ebpo_test_random(state) % view.array->shape.rows;
     ck_assert_int_eq(ebpo_held_chunk_move(w->chunks, &view, row, NULL), EBPO_OK);
-    size_t size = ebpo_h5_row_bytes(&view.array->shape);
+    size_t size = ebpo_shape_row_bytes(&view.array->shape);
     uint8_t *bytes = (uint8_t *)(uintptr_t)view.rows + (row - view.begin) * size, kept[64];
     memcpy(kept, bytes, size);
     switch (ebpo_test_random(state) % 3) {

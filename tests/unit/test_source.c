@@ -137,13 +137,19 @@ static ebpo_status open_probe(ebpo_file **file, probe *p, ebpo_error *error)
     return ebpo_open_source(&source, "afar", file, error);
 }
 
-/* The same content as libhdf5 arranges it by default: metadata here and there, chunks in B-trees.
- */
-static void rewrite_with_trees(void)
+/* The same content as libhdf5 arranges it by itself: metadata here and there. As it does by
+ * default, there are chunks in B-trees and no checksums; `kept`: with what files of this format
+ * have. */
+static void rewrite(bool kept)
 {
     static const char *const groups[] = { "levels", "mesh", "maps", "subtrees" };
+    hid_t fapl = H5Pcreate(H5P_FILE_ACCESS), fcpl = H5Pcreate(H5P_FILE_CREATE);
+    H5Pset_libver_bounds(fapl, kept ? H5F_LIBVER_V110 : H5F_LIBVER_EARLIEST, H5F_LIBVER_V110);
+    H5Pset_attr_phase_change(fcpl, kept ? 65535 : 8, kept ? 0 : 6);
     hid_t in = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT),
-          out = H5Fcreate(rewritten, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+          out = H5Fcreate(rewritten, H5F_ACC_TRUNC, fcpl, fapl);
+    H5Pclose(fapl);
+    H5Pclose(fcpl);
     for (int i = 0; i < 4; i++)
         if (H5Lexists(in, groups[i], H5P_DEFAULT) > 0)
             ck_assert_int_ge(H5Ocopy(in, groups[i], out, groups[i], H5P_DEFAULT, H5P_DEFAULT), 0);
@@ -286,7 +292,7 @@ START_TEST(one_read_opens_a_file_and_each_byte_of_an_array_is_read_once)
         const ebpo_array_in *a =
             i < EBPO_ARRAYS ? &file->root_array[i] : &file->level_array[0][0] + (i - EBPO_ARRAYS);
         arrays += a->present;
-        chunks += a->present ? ebpo_h5_chunk_count(&a->shape) : 0;
+        chunks += a->present ? ebpo_shape_chunks(&a->shape) : 0;
     }
     ck_assert_uint_gt(chunks, arrays + 20);
     ck_assert_uint_ge(later_reads - reads, arrays);
@@ -382,7 +388,7 @@ START_TEST(every_failing_read_is_told_as_such_where_metadata_is_scattered)
     probe p = { .fail_at = UINT32_MAX };
     ebpo_file *file;
     make_file(&large, EBPO_CODEC_NONE);
-    rewrite_with_trees();
+    rewrite(true);
     free(data);
     data = slurp(rewritten, &size);
     ck_assert_uint_gt(size, 1 << 20);
@@ -401,17 +407,57 @@ START_TEST(files_that_libhdf5_rearranged_give_equal_trees)
     if (_i % 2)
         rewrite_without_filters();
     else
-        rewrite_with_trees();
+        rewrite(true);
     ck_assert_msg(ebpo_open(rewritten, &file, &error) == EBPO_OK, "%s", error.message);
     expect_tree(file, 2);
     ebpo_close(file);
 }
 END_TEST
 
+START_TEST(files_without_checksums_are_refused_and_the_way_on_told)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file;
+    make_file(&small, EBPO_CODEC_ZSTD);
+    rewrite(false);
+    ck_assert_int_eq(ebpo_open(rewritten, &file, &error), EBPO_E_UNSUPPORTED);
+    ck_assert_ptr_nonnull(strstr(error.message, "superblock of version 0"));
+    ck_assert_ptr_nonnull(strstr(error.message, "--compat"));
+    ck_assert_msg(ebpo_open_compat(rewritten, NULL, &file, &error) == EBPO_OK, "%s", error.message);
+    expect_tree(file, 2);
+    ebpo_close(file);
+    ck_assert_int_eq(ebpo_open_compat(path, NULL, &file, &error), EBPO_OK); /* as every other */
+    ebpo_close(file);
+}
+END_TEST
+
+/* Whatever libhdf5 makes of them, in its own process: an error, or the same content. */
+START_TEST(damage_of_files_without_checksums_harms_nobody)
+{
+    make_file(&small, EBPO_CODEC_ZSTD);
+    rewrite(false);
+    free(data);
+    data = slurp(rewritten, &size);
+    for (size_t bit = 64; bit < 4096 * 8; bit += 331) {
+        ebpo_file *file;
+        ebpo_error error = EBPO_ERROR_INIT;
+        data[bit / 8] ^= (uint8_t)(1 << bit % 8);
+        FILE *f = fopen(rewritten, "wb");
+        ck_assert_uint_eq(fwrite(data, 1, size, f), size);
+        fclose(f);
+        data[bit / 8] ^= (uint8_t)(1 << bit % 8);
+        if (ebpo_open_compat(rewritten, NULL, &file, &error) == EBPO_OK)
+            ebpo_close(file);
+        else
+            ck_assert_ptr_nonnull(strstr(error.message, rewritten));
+    }
+}
+END_TEST
+
 static void compare_table(hid_t fid, const ebpo_array_in *array, uint64_t *chunks)
 {
     hid_t id = H5Dopen2(fid, array->path, H5P_DEFAULT);
-    uint64_t count = ebpo_h5_chunk_count(&array->shape), stored = 0;
+    uint64_t count = ebpo_shape_chunks(&array->shape), stored = 0;
     ck_assert_int_ge(id, 0);
     for (uint64_t i = 0; i < count; i++) {
         hsize_t at[2] = { i * array->shape.chunk_rows, 0 }, bytes;
@@ -435,7 +481,7 @@ START_TEST(chunk_tables_are_what_libhdf5_says)
     make_file(&large, EBPO_CODEC_ZSTD);
     const char *name = _i == 0 ? path : rewritten;
     if (_i == 1)
-        rewrite_with_trees();
+        rewrite(true);
     if (_i == 2)
         rewrite_without_filters();
     ck_assert_int_eq(ebpo_open(name, &file, NULL), EBPO_OK);
@@ -593,6 +639,8 @@ Suite *test_suite(void)
     tcase_add_test(tests, every_failing_read_is_told_as_such);
     tcase_add_test(tests, every_failing_read_is_told_as_such_where_metadata_is_scattered);
     tcase_add_loop_test(tests, files_that_libhdf5_rearranged_give_equal_trees, 0, 4);
+    tcase_add_test(tests, files_without_checksums_are_refused_and_the_way_on_told);
+    tcase_add_test(tests, damage_of_files_without_checksums_harms_nobody);
     tcase_add_loop_test(tests, chunk_tables_are_what_libhdf5_says, 0, 3);
     tcase_add_test(tests, nothing_of_libhdf5_is_open_once_a_file_is);
     tcase_add_test(tests, no_read_goes_beyond_bytes_in_memory);

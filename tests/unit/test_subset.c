@@ -558,7 +558,7 @@ static void lie(ebpo_file *file, uint8_t *bytes, uint64_t *state)
                                  : &file->level_array[(number - EBPO_ARRAYS) / EBPO_LEVEL_ARRAYS]
                                                      [(number - EBPO_ARRAYS) % EBPO_LEVEL_ARRAYS];
     } while (!a->present);
-    size_t size = a->shape.chunk_rows * ebpo_h5_row_bytes(&a->shape), made = 0;
+    size_t size = a->shape.chunk_rows * ebpo_shape_row_bytes(&a->shape), made = 0;
     ebpo_chunk_coder coder = { 0 };
     memcpy(raw, bytes + a->chunks[0].address, size);
     for (int i = 0; i < 3; i++)

@@ -267,7 +267,7 @@ static uint64_t list_chunks(const ebpo_file *file, placed *out)
             continue;
         const ebpo_array_in *a = i < of_levels ? &file->level_array[level][i % EBPO_LEVEL_ARRAYS]
                                                : &file->root_array[i - of_levels];
-        for (uint64_t k = 0; a->present && k < ebpo_h5_chunk_count(&a->shape); k++)
+        for (uint64_t k = 0; a->present && k < ebpo_shape_chunks(&a->shape); k++)
             out[count++] =
                 (placed){ a->chunks[k].address, a->id, a->level, k * a->shape.chunk_rows };
     }

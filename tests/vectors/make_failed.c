@@ -18,6 +18,7 @@ static const char *folder;
 #define ONE       "01_one_leaf_unfiltered"
 #define NO_MESH   "08_without_mesh"
 #define NO_MAPS   "09_without_maps"
+#define DROPPED   "53_dropped_faces"
 #define ODD       "10_windings_of_two_bytes"
 #define LONG      "11_two_chunks_of_faces"
 #define CUT_SHORT "12_subset_levels"
@@ -81,6 +82,8 @@ static void v_level_beyond(void)
 static void v_max_level(void) { set_int("/", "max_level", 0); }
 static void v_faces_huge(void) { set_count("/", "face_count", (int64_t)1 << 40); }
 static void v_faces_more(void) { set_count("/", "source_face_count", 3); }
+static void v_dropped(void) { set_count("/", "mend_dropped_faces", 7); }
+static void v_dropped_kept(void) { set_count("/", "mend_dropped_faces", 4); }
 static void v_source_less(void) { set_count("/", "source_vertex_count", 3); }
 /* In place of a leaf, so that there are eight nodes still. */
 static void v_gray_deep(void)
@@ -413,6 +416,9 @@ static const failed_vector failed[] = {
       "1 <= `level_count` <= `max_level` + 1 <= `grid_level` + 1 <= 21" },
     { "face_count_huge", LEAVES, v_faces_huge, NONE, "3", "not 1 .. 2^32 - 2" },
     { "face_count_beyond_source", NO_MAPS, v_faces_more, NONE, "3", "less than the mesh has" },
+    { "dropped_faces_beyond_source", DROPPED, v_dropped, NONE, "3", "above `source_face_count`" },
+    { "dropped_faces_still_there", DROPPED, v_dropped_kept, NONE, "3",
+      "more `mend_dropped_faces`" },
     { "vertex_count_beyond_source", NO_MAPS, v_source_less, NONE, "3", "less than the mesh has" },
     { "gray_at_deepest_level", LEAVES, v_gray_deep, NONE, "4",
       "`gray` is 0 at the deepest level and there only" },

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""building.py TOOL GENERATE FULL_DISK
+"""building.py TOOL GENERATE FAULTS
 
 What `ebpo convert` promises of memory, temporary files and bytes, on a model that does not fit into
 its budget:
@@ -8,7 +8,7 @@ its budget:
   - interrupted at any stage, also by SIGKILL, it leaves nothing in --temp-dir, and nothing beside
   OUT unless killed;
   - a full disk is an error that names the folder, and leaves nothing.
-FULL_DISK is preloaded to make a disk full without being root.
+FAULTS is preloaded to make a disk full without being root.
 """
 import contextlib
 import math
@@ -25,7 +25,7 @@ import sys
 import tempfile
 import time
 
-TOOL, GENERATE, FULL_DISK = (os.path.abspath(a) for a in sys.argv[1:4])
+TOOL, GENERATE, FAULTS = (os.path.abspath(a) for a in sys.argv[1:4])
 MIB = 1 << 20
 FACES, FEWER_FACES = 3_000_000, 1_200_000  # neither fits into 128 MiB
 SMALL = 128 * MIB  # the least that is allowed
@@ -272,7 +272,7 @@ def interrupted(root, model):
 def files_with_names(root, model):
     """Where files cannot be made without names, they have one for a moment only, and a signal in
     that moment finds it."""
-    strange = {"LD_PRELOAD": FULL_DISK, "EBPO_TEST_NAMED": "1"}
+    strange = {"LD_PRELOAD": FAULTS, "EBPO_TEST_NAMED": "1"}
     place = Place(root, "named")
     code, said, _, filed = run(place.command(model, "-q", "--memory", "128MiB"), place.temp_dir,
                                strange)
@@ -300,7 +300,7 @@ def full_disk(root, model):
         place = Place(root, f"full {n}")
         n = 2 * n if n else 1
         code, said, _, _ = run(place.command(model, "-q", "--memory", "128MiB"), place.temp_dir,
-                               {"LD_PRELOAD": FULL_DISK, "EBPO_TEST_FULL_AT": str(n)})
+                               {"LD_PRELOAD": FAULTS, "EBPO_TEST_FAULT": f"allocate:{n}+:28"})
         if code == 0:
             break
         failed += 1

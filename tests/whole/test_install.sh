@@ -40,6 +40,17 @@ if command -v h5dump >/dev/null; then
     HDF5_PLUGIN_PATH=$plugin h5dump -d /mesh/faces "$work/s.ebpo.h5" >"$work/out" 2>&1 || fail h5dump
 fi
 
+# The package for Python finds the library that it was installed with.
+for python in python3 /usr/bin/python3; do
+    "$python" -c 'import numpy' 2>/dev/null || continue
+    package=$(dirname "$(find "$own" -path '*/ebpo/_declared.py')")
+    (cd "$work" && EBPO_LIBRARY= PATH=/usr/bin:/bin PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=${package%/ebpo} "$python" -c '
+import ebpo
+print(ebpo.library(), ebpo.open("s.ebpo.h5").inside([0, 0, 0]))') >"$work/out" 2>&1 || fail "import ebpo"
+    grep -q "^$own/.* True$" "$work/out" || fail "which library the package takes"
+    break
+done
+
 # An older copy in the loader's way is told by name, and a newer program told apart from it.
 mkdir "$work/old" && cp "$library" "$work/old/$(basename "$(ls -d "${library%.so.*}".so.?)")" || exit 1
 LD_LIBRARY_PATH="$work/old" "$ebpo" --version --verbose >"$work/out" 2>&1 &&

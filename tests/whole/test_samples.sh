@@ -1,8 +1,8 @@
 #!/bin/sh
 # The samples do what they say: test_samples.sh EBPO SAMPLES PLUGIN_FOLDER INPUTS QUERY LIBEBPO
-# GENERATE
+# GENERATE PACKAGE_FOLDER PYTHON_WITH_NUMPY (or "")
 set -u
-ebpo=$1 samples=$2 inputs=$4 query=$5 library=$6 generate=$7
+ebpo=$1 samples=$2 inputs=$4 query=$5 library=$6 generate=$7 package=$8 numpy=$9
 export HDF5_PLUGIN_PATH="$3"
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
@@ -17,15 +17,23 @@ printf '0.5 0.25 0.5\n3 0.25 0.5\n1 1 1\n' >"$work/points"
 [ "$(sed 's/face [0-9]*/face N/' "$work/out")" = "IN, -0.25 from face N at 0.5 0 0.5
 OUT, 2 from face N at 1 0.25 0.5
 ON, 0 from face N at 1 1 1" ] || fail "query answers"
-EBPO_LIBRARY="$library" python3 "$samples/query.py" "$work/cube.ebpo.h5" <"$work/points" \
-    >"$work/out.py" 2>&1 || { cp "$work/out.py" "$work/out"; fail query.py; }
-sed 's/\.0\b//g' "$work/out.py" | cmp - "$work/out" >/dev/null ||
-    fail "query.py answers as query does"
+export EBPO_LIBRARY="$library" PYTHONDONTWRITEBYTECODE=1 PYTHONPATH="$package"
+if [ -n "$numpy" ]; then
+    "$numpy" "$samples/query.py" "$work/cube.ebpo.h5" <"$work/points" >"$work/out.py" 2>&1 ||
+        { cp "$work/out.py" "$work/out"; fail query.py; }
+    sed 's/\.0\b//g' "$work/out.py" | cmp - "$work/out" >/dev/null ||
+        fail "query.py answers as query does"
 
-# Where none is named, query.py takes the library of the ebpo in PATH, not another of the system's.
-PATH=$(cd "$(dirname "$ebpo")" && pwd):$PATH PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=$samples \
-    python3 -c 'import query; print(query.library_path())' >"$work/out" 2>&1 || fail "query.py imports"
-[ "$(readlink -f "$(cat "$work/out")")" = "$(readlink -f "$library")" ] || fail "which library query.py takes"
+    # Where none is named, the package takes the library that lies beside it; else that of the ebpo in
+    # PATH, not another of the system's.
+    mkdir "$work/elsewhere" && cp -R "$package/ebpo" "$work/elsewhere" || exit 1
+    for folder in "$package" "$work/elsewhere"; do
+        PATH=$(cd "$(dirname "$ebpo")" && pwd):$PATH PYTHONPATH=$folder EBPO_LIBRARY= \
+            "$numpy" -c 'import ebpo; print(ebpo.library())' >"$work/out" 2>&1 || fail "ebpo imports"
+        [ "$(readlink -f "$(cat "$work/out")")" = "$(readlink -f "$library")" ] ||
+            fail "which library the package takes in $folder"
+    done
+fi
 
 # A surface has distances only; a line that is not understood ends both, after the answers before
 # it.
@@ -38,8 +46,9 @@ for model in cube box; do
     [ "$(cat "$work/err")" = "query: line 5: three numbers are expected" ] ||
         fail "query says where: $(cat "$work/err")"
     [ "$(wc -l <"$work/out")" = 2 ] || fail "query answers what comes before a bad line"
-    EBPO_LIBRARY="$library" python3 "$samples/query.py" "$work/$model.ebpo.h5" <"$work/points" \
-        >"$work/out.py" 2>"$work/err" && fail "query.py takes a bad line"
+    [ -n "$numpy" ] || continue
+    "$numpy" "$samples/query.py" "$work/$model.ebpo.h5" <"$work/points" >"$work/out.py" 2>"$work/err" &&
+        fail "query.py takes a bad line"
     [ "$(cat "$work/err")" = "query.py: line 5: three numbers are expected" ] ||
         fail "query.py says where: $(cat "$work/err")"
     sed 's/\.0\b//g' "$work/out.py" | cmp - "$work/out" >/dev/null ||
@@ -49,9 +58,10 @@ done
 for line in '1 2 3 4' '1,,2,3' '1 2 3x' 'x'; do
     echo "$line" | "$query" "$work/cube.ebpo.h5" >"$work/out" 2>&1 && fail "query takes '$line'"
 done
-printf '# points\n3, 0.25 ,0.5 # far\n' | EBPO_LIBRARY="$library" python3 "$samples/query.py" \
-    "$work/cube.ebpo.h5" >"$work/out" 2>&1
-grep -q '^OUT, 2.0 from' "$work/out" || fail "query.py takes commas and comments"
+if [ -n "$numpy" ]; then
+    printf '# points\n3, 0.25 ,0.5 # far\n' | "$numpy" "$samples/query.py" "$work/cube.ebpo.h5" >"$work/out" 2>&1
+    grep -q '^OUT, 2.0 from' "$work/out" || fail "query.py takes commas and comments"
+fi
 echo 1 2 3 | "$query" "$work/cube.ebpo.h5" >/dev/full 2>"$work/out" &&
     fail "query does not see a full disk"
 grep -q 'No space left' "$work/out" || fail "query says that the disk is full"

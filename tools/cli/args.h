@@ -1,7 +1,9 @@
-/* Command-line arguments from a table: parsing, checking and --help. */
+/* Command-line arguments from a table: parsing, checking and --help. The tables are made of
+ * tools/options/NAME.options, as the manuals are: see tools/options/option_tables.py. */
 #ifndef EBPO_TOOLS_ARGS_H
 #define EBPO_TOOLS_ARGS_H
 
+#include <float.h> /* for the tables */
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -33,32 +35,6 @@ typedef struct arg_list {
     const char *item[ARG_LIST_MAX + 1];
     int count;
 } arg_list;
-
-/* Rows of option tables, which { 0 } ends; the field is one of the struct `type`. */
-#define OPTION_ROW(name, letter, kind, type, field, value, help, low, high, words) \
-    {                                                                              \
-        name, letter, kind, offsetof(type, field), value, help, low, high, words   \
-    }
-#define OPTION_FLAG(name, letter, type, field, help) \
-    OPTION_ROW(name, letter, ARG_FLAG, type, field, NULL, help, 0, 0, NULL)
-#define OPTION_INT(name, letter, type, field, value, low, high, help) \
-    OPTION_ROW(name, letter, ARG_INT, type, field, value, help, low, high, NULL)
-#define OPTION_REAL(name, letter, type, field, value, low, high, help) \
-    OPTION_ROW(name, letter, ARG_REAL, type, field, value, help, low, high, NULL)
-#define OPTION_TEXT(name, letter, type, field, value, help) \
-    OPTION_ROW(name, letter, ARG_TEXT, type, field, value, help, 0, 0, NULL)
-#define OPTION_LIST(name, letter, type, field, value, help) \
-    OPTION_ROW(name, letter, ARG_LIST, type, field, value, help, 0, 0, NULL)
-#define OPTION_WORD(name, letter, type, field, value, words, help) \
-    OPTION_ROW(name, letter, ARG_WORD, type, field, value, help, 0, 0, words)
-#define OPTION_SET(name, letter, type, field, value, words, help) \
-    OPTION_ROW(name, letter, ARG_SET, type, field, value, help, 0, 0, words)
-
-/* Those that many commands have. */
-#define OPTION_THREADS(type, field) \
-    OPTION_INT("threads", 0, type, field, "N", 0, 256, "threads; 0, the default: all cores")
-#define OPTION_QUIET(type, field) \
-    OPTION_FLAG("quiet", 'q', type, field, "no summary, no progress: errors and warnings only")
 
 typedef struct arg_spec {
     const char *command;  /* "convert" */

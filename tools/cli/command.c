@@ -1,6 +1,7 @@
 #include "cli/command.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -48,24 +49,48 @@ bool command_overwrites(const char *name, const char *in, const char *out)
     return true;
 }
 
+/* Of a regular file: nobody waits for what may come through a pipe. */
+static int open_regular(const char *name, const char *path)
+{
+    struct stat st;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    if (fd >= 0 && fstat(fd, &st) == 0) {
+        if (S_ISREG(st.st_mode))
+            return fd;
+        errno = S_ISDIR(st.st_mode) ? EISDIR : 0;
+    }
+    int number = errno;
+    if (fd >= 0)
+        close(fd);
+    if (number == 0 || number == ENXIO)
+        fprintf(stderr, "ebpo %s: %s: is a pipe or device; name a regular file\n", name, path);
+    else if (number != ENOENT)
+        fprintf(stderr, "ebpo %s: %s: cannot be opened: %s\n", name, path, strerror(number));
+    errno = number;
+    return -1;
+}
+
 int command_is_hdf5(const char *name, const char *path)
 {
-    if (ebpo_is_url(path))
-        return 1; /* opening it will tell */
     static const char signature[8] = "\211HDF\r\n\032\n";
     char head[8] = "";
-    struct stat st;
-    FILE *f =
-        stat(path, &st) == 0 && S_ISDIR(st.st_mode) ? (errno = EISDIR, NULL) : fopen(path, "rb");
-    if (!f && errno == ENOENT)
-        return 1; /* likewise */
-    if (!f) {
-        fprintf(stderr, "ebpo %s: %s: cannot be opened: %s\n", name, path, strerror(errno));
-        return -1;
+    size_t size = 0;
+    ssize_t got = 1;
+    if (ebpo_is_url(path))
+        return 1; /* opening it will tell */
+    int fd = open_regular(name, path);
+    if (fd < 0)
+        return errno == ENOENT ? 1 : -1; /* likewise */
+    while (size < sizeof head && got != 0) {
+        got = read(fd, head + size, sizeof head - size);
+        if (got < 0 && errno != EINTR)
+            break;
+        size += got > 0 ? (size_t)got : 0;
     }
-    size_t got = fread(head, 1, sizeof head, f);
-    fclose(f);
-    return got == sizeof head && memcmp(head, signature, sizeof head) == 0;
+    if (got < 0)
+        fprintf(stderr, "ebpo %s: %s: cannot be read: %s\n", name, path, strerror(errno));
+    close(fd);
+    return got < 0 ? -1 : size == sizeof head && memcmp(head, signature, sizeof head) == 0;
 }
 
 bool command_wants_hdf5(const char *name, const char *path)

@@ -7,6 +7,7 @@
 #include <ebpo/lod.h>
 
 #include "cli/mesh_findings.h"
+#include "cli/tables.h"
 #include "cli/words.h"
 
 static double cell_volume(const ebpo_info *info, int level)
@@ -18,8 +19,11 @@ double facts_volume(const ebpo_info *info, int level)
 {
     double sum = info->level[level].gray_volume;
     for (int i = 0; i <= level; i++)
+        /* a cell's volume may be infinite */
         sum +=
-            info->level[i].leaf_volume + (double)info->level[i].black_count * cell_volume(info, i);
+            info->level[i].leaf_volume +
+            (info->level[i].black_count ? (double)info->level[i].black_count * cell_volume(info, i)
+                                        : 0);
     return sum;
 }
 
@@ -36,7 +40,7 @@ double facts_share(const ebpo_info *info, double volume)
 {
     double whole = info->solid ? fabs(info->report.volume) : cell_volume(info, 0);
     double percent = 100 * volume / whole;
-    return isnan(percent) ? NAN : percent; /* without a sign that means nothing */
+    return isfinite(percent) ? percent : NAN; /* without a sign that means nothing */
 }
 
 double facts_percent(const ebpo_info *info, int level)
@@ -99,9 +103,12 @@ static void print_model(FILE *out, const ebpo_info *info)
             info->double_coordinates ? "double" : "float");
     if (!(info->parts & EBPO_PART_MESH))
         fputs(" (not in this file)", out);
+    char cell[TABLE_CELL], unit[TABLE_CELL];
     if (info->solid)
-        fprintf(out, "\n  solid     volume %.6g, by winding number, rule %s", info->report.volume,
-                words_rule(info->rule));
+        fprintf(out, "\n  solid     volume %s%s, by winding number, rule %s",
+                isfinite(info->report.volume) ? table_cell(cell, "%.6g", info->report.volume)
+                                              : "beyond 1.8e+308 (ebpo measure tells it)",
+                table_unit(unit, info->unit, 3), words_rule(info->rule));
     if (facts_inside_out(info))
         fprintf(out, "\n  warning   %s", facts_inside_out(info));
     fprintf(out, "\n  box       %.6g %.6g %.6g, size %.6g %.6g %.6g%s%s\n", info->box_origin[0],
@@ -224,16 +231,22 @@ void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stor
             info->solid ? "% solid" : "% box");
     for (int i = 0; i < info->level_count; i++) {
         const ebpo_level_summary *l = &info->level[i];
-        char taken[32], sum[32];
-        fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %12llu %9s %10s %9.2f\n", i,
+        char taken[32], sum[32], percent[TABLE_CELL];
+        fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %12llu %9s %10s %9s\n", i,
                 (unsigned long long)l->gray_count, (unsigned long long)l->leaf_count,
                 (unsigned long long)facts_white(info, i), (unsigned long long)l->black_count,
                 (unsigned long long)(l->plane_count + l->leaf_plane_count),
                 (unsigned long long)l->new_count, (unsigned long long)l->ref_count,
                 words_bytes(taken, sizeof taken, stored->level_bytes[i]),
                 words_bytes(sum, sizeof sum, facts_cumulative(info, stored, i)),
-                facts_percent(info, i));
+                table_cell(percent, "%.2f", facts_percent(info, i)));
     }
+    table_legend(out);
+    fputs(info->solid ? "% solid: volume of the level's envelopes, of the solid's\n"
+                      : "% box: volume of the level's envelopes, of the root's box\n",
+          out);
+    if (!isfinite(facts_percent(info, 0)))
+        table_beyond(out);
 }
 
 static const char *element_word(char word[8], const ebpo_array_facts *a)

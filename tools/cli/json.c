@@ -84,7 +84,7 @@ void json_object(json *j, const char *key)
 {
     bool outermost = j->depth == 0;
     open_level(j, key, '{', '}');
-    if (outermost && j->out == stdout)
+    if (outermost && (j->out == stdout || j->out == stderr))
         json_text(j, "ebpo", ebpo_version());
 }
 

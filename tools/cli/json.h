@@ -17,7 +17,7 @@ typedef struct json {
 } json;
 
 /* `key` is NULL inside arrays and for the outermost value. An outermost object on standard output
- * begins with "ebpo", the version of the library that answers. */
+ * or error begins with "ebpo", the version of the library that answers. */
 void json_begin(json *j, FILE *out);
 void json_object(json *j, const char *key);
 void json_array(json *j, const char *key);

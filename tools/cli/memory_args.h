@@ -10,13 +10,6 @@ typedef struct memory_values {
     const char *memory, *temp_dir;
 } memory_values;
 
-#define MEMORY_OPTIONS(type, member)                                                      \
-    OPTION_TEXT("memory", 0, type, member.memory, "SIZE",                                 \
-                "how much memory may be resident, such as 2G; what does not fit goes to " \
-                "temporary files; default: half of the machine's"),                       \
-        OPTION_TEXT("temp-dir", 0, type, member.temp_dir, "DIR",                          \
-                    "for temporary files; default: $TMPDIR, else /var/tmp")
-
 /* False, with the usage message printed, when the values are none. */
 bool memory_good(const char *command, const memory_values *v);
 

@@ -35,7 +35,8 @@ const char *advice_doubts(char *out, size_t size, const mesh_input *p)
 
 static const char *steps_text(char *out, size_t size, const ebpo_mend_record *r)
 {
-    snprintf(out, size, "%s%s%s", r->weld ? " --weld" : "", r->orient ? " --orient" : "",
+    snprintf(out, size, "%s%s%s%s", r->weld ? " --weld" : "",
+             r->drop_duplicates ? " --drop-duplicates" : "", r->orient ? " --orient" : "",
              r->fill_holes ? " --fill-holes" : "");
     return out + 1;
 }
@@ -87,11 +88,65 @@ static void warn_of_inside_out(FILE *out, const char *command, const char *path,
             s->inside_out == 1 ? "is" : "are");
 }
 
+/* What dropping them was found to leave, if it was tried. */
+static const ebpo_repair_try *dropping_alone(const mesh_input *p)
+{
+    for (uint64_t i = 0; p->tried && i < p->repairs.count; i++) {
+        const ebpo_mend_record *r = &p->repairs.tries[i].record;
+        if (r->drop_duplicates && !r->orient && !r->fill_holes)
+            return &p->repairs.tries[i];
+    }
+    return NULL;
+}
+
+static void warn_of_repeated(FILE *out, const char *command, const char *path, const mesh_input *p)
+{
+    const ebpo_finding *f = &p->prepared.report.repeated_faces;
+    const ebpo_repair_try *t = dropping_alone(p);
+    char text[80], steps[64];
+    fprintf(out, "ebpo %s: %s: warning: %s of the same three vertices as an earlier one (face %llu",
+            command, path, words_plural(text, sizeof text, f->count, "face is", "faces are"),
+            (unsigned long long)f->place[0]);
+    fputs(f->count > 1 ? ", ...): " : "): ", out);
+    if (!t) {
+        fprintf(out, "--drop-duplicates drops such%s\n",
+                p->tried ? "" : "; 'ebpo check' without options tells what that leaves");
+        return;
+    }
+    if (t->record.dropped_opposite)
+        fprintf(out, "%llu with the opposite orientation, as the sides of a sheet have; ",
+                (unsigned long long)t->record.dropped_opposite);
+    if (t->record.dropped_opposite < f->count)
+        fprintf(out, "%llu with the same orientation, which counts in winding numbers and volume; ",
+                (unsigned long long)(f->count - t->record.dropped_opposite));
+    fputs(steps_text(steps, sizeof steps, &t->record), out);
+    if (t->report.balanced)
+        fprintf(out, " leaves a solid of volume %.6g\n", t->report.volume);
+    else
+        fprintf(out, " alone leaves a surface, %llu edges of which do not balance\n",
+                (unsigned long long)t->report.unbalanced_edges.count);
+}
+
+static void warn_of_opened(FILE *out, const char *command, const char *path,
+                           const ebpo_mend_record *r)
+{
+    fprintf(
+        out,
+        "ebpo %s: %s: WARNING: it was a solid before repeated faces were dropped, %llu of which "
+        "looked the other way than the one that stays; leave --drop-duplicates out\n",
+        command, path, (unsigned long long)r->dropped_opposite);
+}
+
 void advice_warn(FILE *out, const char *command, const char *path, const mesh_input *p)
 {
     char text[1024];
     if (p->counted && p->shells.inside_out && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
         warn_of_inside_out(out, command, path, &p->shells);
+    if (p->prepared.report.repeated_faces.count)
+        warn_of_repeated(out, command, path, p);
+    if (p->prepared.record.dropped_faces && p->prepared.before.balanced &&
+        p->doubts & EBPO_DOUBT_OPEN)
+        warn_of_opened(out, command, path, &p->prepared.record);
     if (!p->doubts)
         return;
     fprintf(out, "ebpo %s: %s: ", command, path);
@@ -175,6 +230,8 @@ static void json_try(json *j, const ebpo_repair_try *t)
     json_array(j, "steps");
     if (t->record.weld)
         json_text(j, NULL, "weld");
+    if (t->record.drop_duplicates)
+        json_text(j, NULL, "drop-duplicates");
     if (t->record.orient)
         json_text(j, NULL, "orient");
     if (t->record.fill_holes)

@@ -134,6 +134,15 @@ void findings_print_mending(FILE *out, const ebpo_mend_record *r)
     if (r->weld)
         fprintf(out, "  welded: %s merged\n",
                 words_plural(text, sizeof text, r->welded_vertices, "vertex", "vertices"));
+    if (r->drop_duplicates) {
+        fprintf(out, "  dropped: %s",
+                words_plural(text, sizeof text, r->dropped_faces, "repeated face",
+                             "repeated faces"));
+        if (r->dropped_opposite)
+            fprintf(out, ", %llu of which looked the other way",
+                    (unsigned long long)r->dropped_opposite);
+        fputc('\n', out);
+    }
     if (r->orient) {
         fprintf(out, "  oriented: %s turned",
                 words_plural(text, sizeof text, r->flipped_faces, "face", "faces"));
@@ -197,6 +206,8 @@ void findings_json_mending(json *j, const char *key, const ebpo_mend_record *r)
     json_object(j, key);
     json_bool(j, "weld", r->weld);
     json_uint(j, "welded_vertices", r->welded_vertices);
+    json_bool(j, "drop_duplicates", r->drop_duplicates);
+    json_uint(j, "dropped_faces", r->dropped_faces);
     json_bool(j, "orient", r->orient);
     json_uint(j, "flipped_faces", r->flipped_faces);
     json_uint(j, "unorientable_components", r->unorientable_components);

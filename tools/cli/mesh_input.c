@@ -1,19 +1,21 @@
 #include "cli/mesh_input.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "cli/command.h"
 
 static bool steps_given(mending asked)
 {
-    return asked.weld || asked.orient || asked.flip || asked.fill_holes;
+    return asked.weld || asked.drop_duplicates || asked.orient || asked.flip || asked.fill_holes;
 }
 
 int mending_check(const char *command, mending asked)
 {
     if (asked.repair && steps_given(asked))
-        return command_usage(command, "--repair chooses from --weld, --orient and --fill-holes; "
-                                      "leave these and --flip out");
+        return command_usage(command,
+                             "--repair chooses from --weld, --drop-duplicates, --orient and "
+                             "--fill-holes; leave these and --flip out");
     if (asked.orient && asked.flip)
         return command_usage(command, "--orient says which way faces look; leave out --flip");
     return EXIT_FINE;
@@ -27,6 +29,7 @@ static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
     first->mended = true;
     first->report = second->report;
     a->weld |= b->weld;
+    a->drop_duplicates |= b->drop_duplicates;
     a->orient |= b->orient;
     a->fill_holes |= b->fill_holes;
     a->welded_vertices += b->welded_vertices;
@@ -35,6 +38,8 @@ static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
     a->filled_holes += b->filled_holes;
     a->added_faces += b->added_faces;
     a->unfilled_holes += b->unfilled_holes;
+    a->dropped_faces += b->dropped_faces;
+    a->dropped_opposite += b->dropped_opposite;
 }
 
 static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_error *error)
@@ -42,6 +47,7 @@ static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_erro
     const ebpo_mend_record *steps = &p->repairs.tries[p->repairs.chosen].record;
     ebpo_prepared again = EBPO_PREPARED_INIT;
     how->weld = steps->weld;
+    how->drop_duplicates = steps->drop_duplicates;
     how->orient = steps->orient;
     how->fill_holes = steps->fill_holes;
     ebpo_status status = ebpo_mesh_prepare(&p->mesh, how, &again, error);
@@ -84,6 +90,7 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     how.attributes = more != READ_MESH;
     how.embed_textures = more == READ_TEXTURES;
     wanted.weld = asked.weld;
+    wanted.drop_duplicates = asked.drop_duplicates;
     wanted.orient = asked.orient;
     wanted.flip = asked.flip;
     wanted.fill_holes = asked.fill_holes;
@@ -120,4 +127,11 @@ ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked, me
 {
     return mesh_input_read_groups(out, path, asked, more, NULL, workspace, threads, progress,
                                   error);
+}
+
+void mesh_input_warn(const char *command, const char *path, const ebpo_mesh *mesh)
+{
+    const char *unread = ebpo_mesh_unread(mesh);
+    if (unread)
+        fprintf(stderr, "ebpo %s: %s: warning: left out in reading: %s\n", command, path, unread);
 }

@@ -8,20 +8,10 @@
 #include "cli/args.h"
 
 typedef struct mending {
-    bool weld, orient, flip, fill_holes;
+    bool weld, drop_duplicates, orient, flip, fill_holes;
     bool repair; /* the shortest sequence of these that leaves a plausible solid */
     bool advise; /* no option: without any of these, find out which one that is */
 } mending;
-
-#define MENDING_OPTIONS(type, member)                                                              \
-    OPTION_FLAG("weld", 0, type, member.weld,                                                      \
-                "first merge vertices at the same position (always done for STL)"),                \
-        OPTION_FLAG("orient", 0, type, member.orient,                                              \
-                    "then make neighbouring faces agree, and closed components look outwards"),    \
-        OPTION_FLAG("flip", 0, type, member.flip, "instead of --orient: turn every face"),         \
-        OPTION_FLAG("fill-holes", 0, type, member.fill_holes, "then close simple boundary loops"), \
-        OPTION_FLAG("repair", 0, type, member.repair,                                              \
-                    "instead of these: try them, and do the fewest that leave a plausible solid")
 
 typedef struct mesh_input {
     ebpo_mesh mesh;         /* as mended */
@@ -55,5 +45,8 @@ EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *pa
                                                  mesh_reading more, ebpo_mesh_groups **groups,
                                                  ebpo_workspace *workspace, unsigned threads,
                                                  ebpo_progress progress, ebpo_error *error);
+
+/* A warning where the file holds or names what reading it left out. */
+void mesh_input_warn(const char *command, const char *path, const ebpo_mesh *mesh);
 
 #endif

@@ -14,7 +14,7 @@ static int read_numbers(const char *text, double number[MOST])
     for (text += strspn(text, between); *text; text += strspn(text, between)) {
         char *end;
         double x = strtod(text, &end);
-        if (end == text || count == MOST || !isfinite(x))
+        if (end == text || count == MOST || !isfinite(x) || (*end && !strchr(between, *end)))
             return -1;
         number[count++] = x;
         text = end;

@@ -23,54 +23,6 @@ typedef struct query_values {
         .within = INFINITY, .remote = REMOTE_VALUES_INIT                          \
     }
 
-/* Rows for the tables of options. In other structs query_values comes first. */
-#define QUERY_MODEL_OPTIONS QUERY_MODEL_OPTIONS_FOR("opening")
-/* `work`: what takes threads. */
-#define QUERY_MODEL_OPTIONS_FOR(work)                                          \
-    QUERY_MODEL_ROWS("bytes that the model may use: 512M, 0.5G, 1GiB; 0, the " \
-                     "default: as many as it needs",                           \
-                     "everything at once if --memory allows", work)
-/* Of commands that decide as they go how much of the model they hold. */
-#define QUERY_ASKING_OPTIONS                                                                 \
-    QUERY_MODEL_ROWS("bytes that the model may use: 512M, 0.5G, 1GiB; 0: as many "           \
-                     "as it needs; default: as many as the questions need, at most half of " \
-                     "what is free",                                                         \
-                     "by --memory", "opening and for questions")
-#define QUERY_MODEL_ROWS(memory_text, cut_default, work)                              \
-    OPTION_TEXT("memory", 0, query_values, memory, "SIZE", memory_text),              \
-        OPTION_INT("cut-level", 0, query_values, cut_level, "C", 0, 20,               \
-                   "keep levels 0 to C in memory and load subtrees below on demand; " \
-                   "default: " cut_default),                                          \
-        OPTION_INT("threads", 0, query_values, threads, "N", 0, 256,                  \
-                   "threads for " work "; 0, the default: all cores")
-
-#define QUERY_ATTRIBUTE_OPTION                                                                    \
-    OPTION_TEXT("attribute", 0, query_values, attribute, "NAMES",                                 \
-                "also print these attributes where the face is met, separated by commas: red or " \
-                "face:red; those of vertices are interpolated")
-
-/* Rays and boxes look at many subtrees anyway: nothing is loaded ahead of them. */
-#define QUERY_PREFETCH_OPTION                          \
-    OPTION_FLAG("prefetch", 0, query_values, prefetch, \
-                "load subtrees around the last one in the background")
-
-#define QUERY_FORM_OPTIONS(raw_text)                                                           \
-    OPTION_FLAG("raw", 0, query_values, raw, raw_text),                                        \
-        OPTION_FLAG("json", 0, query_values, json, "print a JSON object for each, on a line"), \
-        OPTION_FLAG("csv", 0, query_values, csv, "commas between the numbers of an answer"),   \
-        OPTION_FLAG("npy", 0, query_values, npy, "answers as a NumPy array, for numpy.load"),  \
-        OPTION_FLAG("header", 0, query_values, header,                                         \
-                    "the first line names columns, in the answers, too"),                      \
-        OPTION_FLAG("stats", 0, query_values, remote.stats,                                    \
-                    "print what it took on standard error at the end"),                        \
-        REMOTE_HTTP_OPTIONS(query_values, remote)
-
-#define QUERY_LIMIT_OPTIONS(level_text)                                                        \
-    OPTION_INT("level", 0, query_values, level, "L", 0, 20, level_text),                       \
-        OPTION_TEXT("deadline", 0, query_values, deadline, "TIME",                             \
-                    "stop after about this long for each point and print what is certain; in " \
-                    "microseconds, or with a unit: 500ns, 50us, 1ms")
-
 /* Words for --mode, NULL-terminated; EBP 2017, section 4.3. */
 extern const char *const inside_modes[];   /* fast, cache, nodes, ... */
 extern const char *const distance_modes[]; /* in the order of ebpo_distance_mode */

@@ -29,6 +29,46 @@ static bool options_from(const remote_values *v, ebpo_http_options *o, ebpo_erro
     return true;
 }
 
+static ebpo_status open_plain(const char *name, const ebpo_http_options *http, ebpo_file **out,
+                              ebpo_error *error)
+{
+    return ebpo_is_url(name) ? ebpo_open_url(name, http, out, error) : ebpo_open(name, out, error);
+}
+
+/* The checksum of the content does not count attributes, such as the root's box. Nothing guards
+ * them in such a file, so that everything is verified before the first answer. */
+static ebpo_status verify_all(const ebpo_file *file, const char *name, ebpo_error *error)
+{
+    ebpo_verify_report r = EBPO_VERIFY_REPORT_INIT;
+    ebpo_status status = ebpo_verify(file, NULL, &r, error);
+    const ebpo_verify_count *counts[] = { &r.structure, &r.content, &r.containment,
+                                          &r.nesting,   &r.labels,  &r.lists };
+    for (size_t i = 0; i < sizeof counts / sizeof counts[0] && status == EBPO_OK; i++)
+        if (counts[i]->violations) {
+            status = error->status = EBPO_E_FORMAT;
+            snprintf(error->message, sizeof error->message,
+                     "%s: is not whole, and has no checksums that say where: %s; get a fresh copy "
+                     "of the file",
+                     remote_shown(name), counts[i]->first);
+        }
+    return status;
+}
+
+static ebpo_status open_foreign(const char *name, const ebpo_http_options *http, ebpo_file **out,
+                                ebpo_error *error)
+{
+    ebpo_compat_options compat = EBPO_COMPAT_OPTIONS_INIT;
+    compat.http = http;
+    ebpo_status status = ebpo_open_compat(name, &compat, out, error);
+    if (status == EBPO_OK)
+        status = verify_all(*out, name, error);
+    if (status != EBPO_OK) {
+        ebpo_close(*out);
+        *out = NULL;
+    }
+    return status;
+}
+
 ebpo_status remote_open(ebpo_file **out, const char *name, const remote_values *values,
                         ebpo_error *error)
 {
@@ -36,8 +76,9 @@ ebpo_status remote_open(ebpo_file **out, const char *name, const remote_values *
     *out = NULL;
     if (!options_from(values, &options, error))
         return EBPO_E_ARGUMENT;
-    return ebpo_is_url(name) ? ebpo_open_url(name, &options, out, error)
-                             : ebpo_open(name, out, error);
+    ebpo_status status = open_plain(name, &options, out, error);
+    return status == EBPO_E_UNSUPPORTED && values->compat ? open_foreign(name, &options, out, error)
+                                                          : status;
 }
 
 const char *remote_shown(const char *name)

@@ -116,7 +116,7 @@ int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS
 
 const char *standard_files_shown(const char *path)
 {
-    return path == output ? "standard-output" : path;
+    return path == output ? "standard-output" : path == input ? "standard-input" : path;
 }
 
 int standard_files_end(const arg_spec *spec, int code)

@@ -10,7 +10,7 @@
  * there is nothing to do. What is wrong was said. */
 int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS_MAX]);
 
-/* An output's path as it is told of: the temporary one is nobody's. */
+/* A path as it is told of: the temporary ones are nobody's. */
 const char *standard_files_shown(const char *path);
 
 /* After the command: if its exit code is EXIT_FINE, its output is copied. The exit code. */

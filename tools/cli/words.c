@@ -122,22 +122,30 @@ bool words_read_unit(const char *text, const char *const *units, const uint64_t 
     return false;
 }
 
-/* Digits, also with a fraction. */
-static bool read_amount(const char *text, const char **end, uint64_t *whole, double *fraction)
+/* Digits, also with a fraction, whose digits are from *fraction to *end. */
+static bool read_amount(const char *text, const char **end, uint64_t *whole, const char **fraction)
 {
     char *stop;
     errno = 0;
-    *fraction = 0;
     *whole = strtoull(text, &stop, 10);
     if (stop == text || errno || *text < '0' || *text > '9')
         return false;
-    *end = stop;
+    *end = *fraction = stop;
     if (*stop != '.')
         return true;
-    double unit = 1;
-    for (*end = stop + 1; **end >= '0' && **end <= '9'; ++*end)
-        *fraction += (**end - '0') * (unit /= 10);
-    return *end > stop + 1;
+    *fraction = stop + 1;
+    *end = *fraction + strspn(*fraction, "0123456789");
+    return *end > *fraction;
+}
+
+/* That many tenths, hundredths and so on of the factor, rounded down: from the last digit on, what
+ * each leaves is exact. */
+static uint64_t fraction_of(const char *digits, const char *end, uint64_t factor)
+{
+    uint64_t sum = 0;
+    while (end-- > digits)
+        sum = ((uint64_t)(*end - '0') * factor + sum) / 10;
+    return sum;
 }
 
 /* What "", "K", "MB", "GiB" and the like multiply by; 0: no unit. */
@@ -160,12 +168,12 @@ static uint64_t size_factor(const char *unit)
 bool words_read_size(const char *text, uint64_t *out)
 {
     uint64_t whole, bytes;
-    double fraction;
-    if (!read_amount(text, &text, &whole, &fraction))
+    const char *fraction, *end;
+    if (!read_amount(text, &end, &whole, &fraction))
         return false;
-    uint64_t factor = size_factor(text);
+    uint64_t factor = size_factor(end);
     return factor > 0 && !__builtin_mul_overflow(whole, factor, &bytes) &&
-           !__builtin_add_overflow(bytes, (uint64_t)(fraction * (double)factor), out);
+           !__builtin_add_overflow(bytes, fraction_of(fraction, end, factor), out);
 }
 
 /* "3" or "3-" or "0-5". */

@@ -33,52 +33,7 @@ enum { REPEAT_MAX = 99 };
  */
 enum { NOTHING, FOUND, INTERVAL };
 
-static const arg_option options[] = {
-    OPTION_WORD("query", 0, values, query, "QUERY", query_words,
-                "inside (the default), distance, ray (the first hit), ray-any or ray-all"),
-    OPTION_TEXT(
-        "points", 0, values, points, "WHAT",
-        "uniform (the default): in the bounding box; path: a walk along the surface; camera, "
-        "segments or degenerate: rays; or a file of points or rays"),
-    OPTION_REAL("tmax", 0, query_values, tmax, "T", 0, DBL_MAX, "as for 'ebpo ray'"),
-    OPTION_FLAG("raw", 0, query_values, raw, "the file of points holds little-endian doubles"),
-    OPTION_INT("count", 0, values, count, "N", 1, 1e9,
-               "how many questions; default: 100000, or all of the file"),
-    OPTION_INT("seed", 0, values, seed, "S", 0, 1e15,
-               "seed of uniform points and paths; default: 1"),
-    OPTION_INT("repeat", 0, values, repeat, "R", 1, REPEAT_MAX,
-               "ask everything R times; the figures are those of the median mean"),
-    OPTION_REAL("rate", 0, values, rate, "HZ", 0, 1e9,
-                "ask this many single questions a second, and sleep in between"),
-    OPTION_TEXT("mode", 'm', values, mode, "MODE", "as for 'ebpo inside' or 'ebpo distance'"),
-    OPTION_REAL("max-distance", 0, query_values, max_distance, "D", 0, DBL_MAX,
-                "as for 'ebpo distance'"),
-    OPTION_FLAG("unsigned", 0, query_values, unsigned_distance, "as for 'ebpo distance'"),
-    OPTION_FLAG("no-warm", 0, query_values, no_warm, "as for 'ebpo distance'"),
-    QUERY_LIMIT_OPTIONS("look only at levels 0 to L"),
-    QUERY_MODEL_OPTIONS,
-    QUERY_PREFETCH_OPTION,
-    OPTION_TEXT("save-points", 0, values, save_points, "FILE",
-                "write what was asked about, as little-endian doubles"),
-    OPTION_TEXT("save-answers", 0, values, save_answers, "FILE",
-                "write the answers: for inside a byte each, as in 'where'; else a double (distance "
-                "or t) and an int64 (face or -1)"),
-    OPTION_FLAG("json", 0, query_values, json, "print all of it as JSON"),
-    REMOTE_OPTIONS(query_values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "bench",
-    .operands = "MODEL",
-    .least = 1,
-    .most = 1,
-    .summary = "measures how long questions to a file take",
-    .text = "MODEL is an .ebpo.h5 file or its URL. One thread asks: first after a cold start (the "
-            "system is asked to drop the file from memory), then each question by itself, then all "
-            "of them at once.",
-    .options = options,
-};
+#include "options/bench.inc"
 
 /* Everything measured. */
 typedef struct results {
@@ -284,56 +239,64 @@ static int save_answers(const bench_job *job, const char *path)
 
 /* --- telling --- */
 
+static const char *const inside_names[] = { "out", "in", "on", "maybe" }, *const other_names[] = {
+    "not_found", "found", "interval"
+};
+
+static int answer_kinds(const values *v)
+{
+    return v->query == BENCH_INSIDE ? 4 : v->query == BENCH_DISTANCE ? 3 : 2;
+}
+
 static void print_answers(const values *v, const results *r)
 {
-    if (v->query == BENCH_INSIDE)
-        printf("answers        %" PRIu64 " IN, %" PRIu64 " OUT, %" PRIu64 " ON, %" PRIu64
-               " MAYBE\n",
-               r->answered[EBPO_IN], r->answered[EBPO_OUT], r->answered[EBPO_ON],
-               r->answered[EBPO_MAYBE]);
-    else if (v->query == BENCH_DISTANCE)
-        printf("answers        %" PRIu64 " %s, %" PRIu64 " an interval, %" PRIu64
-               " nothing found\n",
-               r->answered[FOUND], v->q.distance_mode == EBPO_DISTANCE_EXACT ? "exact" : "found",
-               r->answered[INTERVAL], r->answered[NOTHING]);
-    else
-        printf("answers        %" PRIu64 " found, %" PRIu64 " nothing found\n", r->answered[FOUND],
-               r->answered[NOTHING]);
+    int count = answer_kinds(v);
+    printf("\n%-12s", "answers");
+    for (int i = 0; i < count; i++)
+        printf(" %11s", v->query == BENCH_INSIDE ? inside_names[i] : other_names[i]);
+    printf("\n%-12s", "");
+    for (int i = 0; i < count; i++)
+        printf(" %11" PRIu64, r->answered[i]);
+    putchar('\n');
+}
+
+static void print_opening(const results *r)
+{
+    char bytes[40];
+    printf("\n%-12s %11s %11s %11s %11s\n", "opening", "seconds", "to answer", "read", "reads");
+    printf("%-12s %11.6f %11.6f %11s %11" PRIu64 "\n", "cold", r->cold_open_seconds,
+           r->cold_seconds, words_bytes(bytes, sizeof bytes, r->cold_bytes), r->cold_reads);
+    printf("%-12s %11.6f %11s %11s %11" PRIu64 "\n", "again", r->open_seconds, "",
+           words_bytes(bytes, sizeof bytes, r->model.bytes_read), r->model.reads);
+    if (r->cold_pages >= 0)
+        printf("cold: the system still held %.0f %% of the file; ", 100 * r->cold_pages);
+    puts("to answer: seconds to the first one");
 }
 
 static void print_results(const values *v, const char *path, uint64_t count, const results *r)
 {
     const bench_figures *f = &r->figures;
-    char bytes[40], peak[40], memory[40];
-    printf("%s: %s, %s, %" PRIu64 " of them\n", path, query_words[v->query], v->points, count);
-    printf("single         mean %.1f ns, p50 %" PRIu64 ", p99 %" PRIu64 ", p99.9 %" PRIu64
-           ", max %" PRIu64 "\n",
+    char bytes[40];
+    printf("%s: %s, %s, %" PRIu64 " questions\n\n", path, query_words[v->query], v->points, count);
+    printf("%-12s %11s %11s %11s %11s %11s\n", "ns/question", "mean", "p50", "p99", "p99.9", "max");
+    printf("%-12s %11.1f %11" PRIu64 " %11" PRIu64 " %11" PRIu64 " %11" PRIu64 "\n", "single",
            f->mean, f->p50, f->p99, f->p999, f->max);
-    printf("               (the clock's %" PRIu64 " ns are subtracted)\n", r->clock_ns);
-    printf("batch          %.1f ns a query\n", f->batch);
-    printf("open           %.6f s\n", r->open_seconds);
-    printf("cold start     %.6f s to the first answer, of which %.6f s to open; %s in %" PRIu64
-           " reads",
-           r->cold_seconds, r->cold_open_seconds, words_bytes(bytes, sizeof bytes, r->cold_bytes),
-           r->cold_reads);
-    if (r->cold_pages >= 0)
-        printf("; the system still held %.0f %% of the file", 100 * r->cold_pages);
-    printf("\nread           %s in %" PRIu64 " reads\n",
-           words_bytes(bytes, sizeof bytes, r->model.bytes_read), r->model.reads);
-    printf("peak memory    %s of the process, %s of the model\n",
-           r->peak ? words_bytes(peak, sizeof peak, r->peak) : "unknown",
-           words_bytes(memory, sizeof memory, r->model_end.memory_peak));
+    printf("%-12s %11.1f\n", "batch", f->batch);
+    printf("single: each by itself, less the clock's %" PRIu64 " ns; batch: all at once; "
+           "one thread\n",
+           r->clock_ns);
+    print_opening(r);
     print_answers(v, r);
-    printf("model          ");
-    stats_print(stdout, &r->model);
+    printf("\n%-18s %15s %15s\n", "model", "after single", "at the end");
+    stats_table(stdout, &r->model, &r->model_end);
+    printf("%-18s %15s %15s\n", "process_peak", "",
+           r->peak ? words_bytes(bytes, sizeof bytes, r->peak) : "unknown");
     remote_tell(&r->traffic, &v->q.remote, false);
 }
 
 static void json_answers(json *j, const values *v, const results *r)
 {
-    static const char *const inside_names[] = { "out", "in", "on", "maybe" },
-                             *const other_names[] = { "not_found", "found", "interval" };
-    int count = v->query == BENCH_INSIDE ? 4 : v->query == BENCH_DISTANCE ? 3 : 2;
+    int count = answer_kinds(v);
     json_object(j, "answers");
     for (int i = 0; i < count; i++)
         json_uint(j, v->query == BENCH_INSIDE ? inside_names[i] : other_names[i], r->answered[i]);

@@ -28,51 +28,7 @@ typedef struct values {
     bool volume, inner;
 } values;
 
-static const arg_option options[] = {
-    OPTION_TEXT("inside", 0, values, inside, "POINTS",
-                "print whether each point is IN, OUT, ON the boundary, or on an edge where it may "
-                "be on the boundary or not: ON?"),
-    OPTION_TEXT("distance", 0, values, distance, "POINTS",
-                "print two bounds of each point's distance to the boundary, and where it is"),
-    OPTION_FLAG(
-        "volume", 0, values, volume,
-        "print the volume, exact where no faces of two models meet, and two bounds by cells; the "
-        "default unless something else is asked for"),
-    OPTION_TEXT("output", 'o', values, out, "OUT",
-                "write the cells that hold the result, as OUT.ply or OUT.ebpo.h5"),
-    OPTION_FLAG("inner", 0, values, inner,
-                "with --output: only the cells that are certainly in the result"),
-    OPTION_INT("level", 0, values, level, "L", 0, EBPO_BOOLEAN_LEVEL_MAX,
-               "of the cells for --volume and --output: 2^-L of a cube around the result; default "
-               "6"),
-    OPTION_REAL("tolerance", 0, values, tolerance, "T", 0, 1000,
-                "of --distance: bounds are close enough when they differ by T times the upper one; "
-                "default 0.01"),
-    OPTION_LIST("pose", 0, values, poses, "POSE",
-                "'B " POSE_FORM
-                "': where model B is: scaled, turned by a quaternion, moved; may be "
-                "repeated"),
-    OPTION_FLAG("header", 0, query_values, header,
-                "the first line of POINTS names columns: x, y and z in any order"),
-    QUERY_MODEL_OPTIONS_FOR("opening, and for answers"),
-    OPTION_FLAG("json", 0, query_values, json, "print JSON: an object, or one for each point"),
-    REMOTE_HTTP_OPTIONS(query_values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "boolean",
-    .operands = "EXPRESSION MODEL...",
-    .least = 2,
-    .most = ARGS_OPERANDS_MAX,
-    .summary = "answers for unions and differences of models: points, volume, distance",
-    .text = "EXPRESSION names the models A, B, ... in their order: A | B is the union, A & B the "
-            "intersection, A - B the difference, A ^ B what is in one of both only; & comes first, "
-            "parentheses are heeded. Models are .ebpo.h5 files of solids. Nothing is cut: for a "
-            "mesh of the result use Manifold or CGAL.",
-    .dash = "pppppppppppp",
-    .options = options,
-};
+#include "options/boolean.inc"
 
 /* --- answers --- */
 

@@ -5,24 +5,7 @@
 #include "cmd/commands.h"
 #include "cmd/query_run.h"
 
-static const arg_option options[] = {
-    QUERY_ASKING_OPTIONS,
-    QUERY_FORM_OPTIONS(
-        "each box is six doubles, each answer a uint64 count and that many uint64 (little-endian)"),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "box",
-    .operands = "MODEL [BOXES]",
-    .least = 1,
-    .most = 2,
-    .summary = "tells which faces meet boxes: how many, and their numbers",
-    .text = "MODEL is an .ebpo.h5 file. BOXES holds lines 'x0 y0 z0 x1 y1 z1', the lower corner "
-            "first; if absent or '-', standard input. Faces and boxes are closed: touching counts.",
-    .dash = " p",
-    .options = options,
-};
+#include "options/box.inc"
 
 static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
                           ebpo_error *error)

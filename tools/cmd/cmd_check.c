@@ -8,6 +8,7 @@
 #include "cli/mesh_findings.h"
 #include "cli/mesh_input.h"
 #include "cli/progress.h"
+#include "cli/standard_files.h"
 #include "cmd/check_crossings.h"
 #include "cmd/commands.h"
 
@@ -19,35 +20,7 @@ typedef struct values {
     memory_values memory;
 } values;
 
-static const arg_option options[] = {
-    MENDING_OPTIONS(values, mend),
-    OPTION_FLAG("require-solid", 0, values, require_solid,
-                "exit with code 3 if the mesh is not a solid, or probably not the one that was "
-                "meant"),
-    OPTION_FLAG("crossings", 0, values, crossings,
-                "also look for faces that cross, touch or lie on each other otherwise than as "
-                "neighbours (after repair, if asked for)"),
-    OPTION_TEXT("output", 'o', values, out, "OUT.ply",
-                "with --crossings: write the mesh with these faces red"),
-    OPTION_THREADS(values, threads),
-    MEMORY_OPTIONS(values, memory),
-    OPTION_FLAG("json", 0, values, json, "print the report as JSON"),
-    OPTION_FLAG("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "check",
-    .operands = "IN.ply",
-    .least = 1,
-    .most = 1,
-    .summary = "checks a mesh: solid or surface, and what is wrong with it and where",
-    .text = "With mending options, also shows what the mesh would be after repair. Nothing is "
-            "written. Without them, repairs are tried on a mesh that is no solid, and the fewest "
-            "that leave one are told.",
-    .dash = "i",
-    .options = options,
-};
+#include "options/check.inc"
 
 /* The outermost object is left open. */
 static void print_json(json *j, const mesh_input *p, const char *path)
@@ -94,6 +67,7 @@ static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo
     else if (!v->quiet)
         print_words(v, p, path);
     command_flush("check");
+    mesh_input_warn("check", path, &p->mesh);
     advice_warn(stderr, "check", path, p);
     if (v->crossings)
         status = check_crossings(&p->mesh, &p->prepared.report, &how, v->json ? &j : NULL, v->quiet,
@@ -118,7 +92,7 @@ static ebpo_status check(const values *v, const char *path, mesh_input *p,
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;
-    status = report(v, p, path, progress, &line, error);
+    status = report(v, p, standard_files_shown(path), progress, &line, error);
     ebpo_mesh_free(&p->mesh);
     return status;
 }

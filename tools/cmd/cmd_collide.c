@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "cli/command.h"
+#include "cli/json.h"
 #include "cli/pose_args.h"
 #include "cli/progress.h"
 #include "cli/query_args.h"
@@ -20,46 +21,7 @@ typedef struct collide_values {
     collide_far far;
 } collide_values;
 
-static const arg_option options[] = {
-    OPTION_TEXT("pose-a", 0, collide_values, pose_a, "POSE",
-                "'" POSE_FORM "': where A is: scaled, turned by a quaternion, moved"),
-    OPTION_TEXT("pose-b", 0, collide_values, pose_b, "POSE", "the same of B"),
-    OPTION_FLAG("first", 0, collide_values, first,
-                "print one pair of faces that meet; the default unless something else is asked"),
-    OPTION_FLAG("all", 0, query_values, all, "print every pair of faces that meet"),
-    OPTION_FLAG("self", 0, collide_values, self,
-                "faces of one model that meet otherwise than as neighbours"),
-    OPTION_FLAG("relation", 0, collide_values, relation,
-                "how they lie to each other: DISJOINT, TOUCHING, INTERSECTING, A_INSIDE_B, "
-                "B_INSIDE_A or EQUAL"),
-    OPTION_TEXT("output", 'o', collide_values, out, "OUT",
-                "write all pairs to OUT.h5, or both models with the faces that meet red to "
-                "OUT.ply"),
-    COLLIDE_FAR_OPTIONS(collide_values, far),
-    OPTION_INT("level", 0, query_values, level, "L", 0, 20,
-               "look at levels 0 to L only, and say what is certain by these"),
-    OPTION_TEXT("deadline", 0, query_values, deadline, "TIME",
-                "stop after about this long; in microseconds, or with a unit: 500us, 50ms, 2s"),
-    OPTION_FLAG("json", 0, query_values, json, "print JSON, an object a line"),
-    QUERY_MODEL_OPTIONS,
-    OPTION_QUIET(collide_values, quiet),
-    OPTION_FLAG("stats", 0, query_values, remote.stats,
-                "print on standard error at the end how much was looked at"),
-    REMOTE_HTTP_OPTIONS(query_values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "collide",
-    .operands = "A [B]",
-    .least = 1,
-    .most = 2,
-    .summary =
-        "tells whether the faces of two models meet, which do, how far apart or deep they are",
-    .text = "A and B are .ebpo.h5 files with their mesh. Prints one pair of faces that meet, or "
-            "'none'. A solid within another one does not meet it; --relation tells that it is.",
-    .options = options,
-};
+#include "options/collide.inc"
 
 static bool read_pose(const char *name, const char *text, ebpo_pose *out)
 {
@@ -204,11 +166,30 @@ static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_colli
     return status == EBPO_OK && (v->first || !other) ? ask_first(v, c, how, error) : status;
 }
 
-static void tell_stats(const ebpo_collider *c)
+static void json_stats(const ebpo_collider_stats *s)
+{
+    json j;
+    json_begin(&j, stderr);
+    json_object(&j, NULL);
+    json_uint(&j, "node_pairs", s->node_pairs);
+    json_uint(&j, "block_pairs", s->block_pairs);
+    json_uint(&j, "exact", s->exact);
+    json_uint(&j, "subtree_pairs", s->subtree_pairs);
+    json_uint(&j, "subtrees", s->subtrees);
+    json_uint(&j, "loads", s->loads);
+    json_uint(&j, "bytes_read", s->bytes_read);
+    json_finish(&j);
+}
+
+static void tell_stats(const ebpo_collider *c, bool as_json)
 {
     ebpo_collider_stats s = EBPO_COLLIDER_STATS_INIT;
     if (ebpo_collider_get_stats(c, &s) != EBPO_OK)
         return;
+    if (as_json) {
+        json_stats(&s);
+        return;
+    }
     fprintf(stderr, "%llu pairs of nodes, %llu of blocks; %llu of faces by the exact test\n",
             (unsigned long long)s.node_pairs, (unsigned long long)s.block_pairs,
             (unsigned long long)s.exact);
@@ -231,7 +212,7 @@ static int ask(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_collide_opt
         status = ask_all(v, c, how, &error);
     progress_wipe(&line);
     if (c && v->query.remote.stats)
-        tell_stats(c);
+        tell_stats(c, v->query.json);
     ebpo_collider_free(c);
     if (status != EBPO_OK)
         return command_failed("collide", &error);

@@ -6,18 +6,17 @@
 #include <strings.h>
 
 #include "cli/command.h"
-#include "cli/file_facts.h"
 #include "cli/memory_args.h"
-#include "cli/mesh_advice.h"
-#include "cli/mesh_findings.h"
 #include "cli/mesh_input.h"
 #include "cli/progress.h"
 #include "cli/selection_args.h"
 #include "cli/stages.h"
+#include "cli/standard_files.h"
 #include "cli/subtree_args.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 #include "cmd/convert_parts.h"
+#include "cmd/convert_tell.h"
 #include "cmd/subset_run.h"
 
 typedef struct values {
@@ -30,7 +29,7 @@ typedef struct values {
     uint32_t with, without;
     int codec, face_coding, rule, profile;
     mending mend;
-    bool require_solid, split_components, split_groups, embed_textures, json, quiet;
+    bool require_solid, split_components, split_groups, embed_textures, timings, json, quiet;
     const char *unit, *crs, *date;
 } values;
 
@@ -44,85 +43,7 @@ static const uint32_t without_parts[] = { EBPO_PART_PLANES, EBPO_PART_MESH, EBPO
 
 enum { WITHOUT_MESH = 1 << 1, WITHOUT_ATTRIBUTES = 1 << 3 };
 
-static const arg_option options[] = {
-    OPTION_INT("max-level", 0, values, max_level, "N", 0, 20,
-               "deepest level, 0 to 20; default: until cells are as short as the mean edge"),
-    OPTION_INT(
-        "leaf-faces", 0, values, leaf_faces, "N", 0, 4294967295.0,
-        "a node with at most N faces becomes a leaf; 0: only the deepest level stops; default 16"),
-    OPTION_REAL("epsilon", 0, values, epsilon, "E", 0, 1,
-                "a plane is kept while it removes at least this share of its cell; default 0.003"),
-    OPTION_WORD("select", 0, values, select, "NAME", selection_words,
-                "how planes are chosen: inherit (the default), or as in the theses: kmedoids, "
-                "offset (the least), random"),
-    OPTION_REAL("percent", 0, values, percent, "P", 0, 100,
-                "with the theses' selections: percentage of the candidates to take; default 40"),
-    OPTION_TEXT("k-root", 0, values, k_root, "K",
-                "instead of --percent: K planes at the root, or 'K%' of the faces, and half as "
-                "many at each further level (BP-Octree)"),
-    OPTION_WORD("normals", 0, values, normals, "NAME", normals_words,
-                "distance between normals for kmedoids: spherical (the default, as in the theses) "
-                "or angle (which has no poles)"),
-    OPTION_INT("seed", 0, values, seed, "N", 0, 9007199254740992.0,
-               "seed for kmedoids and random; default 1"),
-    OPTION_SET("with", 0, values, with, "LIST", with_words, "also store: leaf-planes"),
-    OPTION_SET("without", 0, values, without, "LIST", without_words,
-               "leave out: attributes (colours and the like, of envelopes too), colours (of "
-               "envelopes), maps, mesh (and with it all but planes), planes; separated by commas, "
-               "may be repeated"),
-    OPTION_FLAG("embed-textures", 0, values, embed_textures,
-                "also store the bytes of images that the source's materials or comments name; "
-                "without it their names and digests are stored"),
-    OPTION_WORD("profile", 0, values, profile, "NAME", profile_words,
-                "instead of --with and --without: full (all parts), lod (for viewers: no mesh), "
-                "collision (for exact questions: mesh, no maps); the same file as 'ebpo subset "
-                "--profile' makes from a full one"),
-    NEED_OPTIONS(values),
-    OPTION_WORD("codec", 0, values, codec, "NAME", codec_words,
-                "zstd (the default), deflate or none"),
-    OPTION_INT("zstd-level", 0, values, zstd_level, "N", 1, 22,
-               "effort of zstd, 1 to 22; default 3, 5 where it pays"),
-    SUBTREE_OPTION(values, subtree_faces),
-    FACE_CODING_OPTION(values, face_coding),
-    OPTION_THREADS(values, threads),
-    MEMORY_OPTIONS(values, memory),
-    MENDING_OPTIONS(values, mend),
-    OPTION_WORD("rule", 0, values, rule, "NAME", rule_words,
-                "a point is inside where the winding number is nonzero (the default), odd "
-                "(evenodd) or positive"),
-    OPTION_FLAG("require-solid", 0, values, require_solid,
-                "exit with code 3 if the mesh is not a solid, or probably not the one that was "
-                "meant"),
-    OPTION_FLAG("split-components", 0, values, split_components,
-                "OUT is a new folder: a file for each component (faces that share vertices, with "
-                "the cavities in it), and a scene of them; the other options hold for each file"),
-    OPTION_FLAG("split-groups", 0, values, split_groups,
-                "the same for the named groups of an OBJ file (its lines g and o): a file for each "
-                "name"),
-    OPTION_TEXT("unit", 0, values, unit, "U", "unit of length to record, such as mm"),
-    OPTION_TEXT("crs", 0, values, crs, "C",
-                "coordinate reference system to record, such as EPSG:25832"),
-    OPTION_TEXT("date", 0, values, date, "D",
-                "date to record, such as 2026-03-01; none by default, so that equal input gives an "
-                "equal file"),
-    OPTION_FLAG("json", 0, values, json, "print reports and facts as JSON"),
-    OPTION_FLAG("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "convert",
-    .operands = "IN.ply OUT.ebpo.h5",
-    .least = 2,
-    .most = 2,
-    .summary = "converts a closed triangle mesh to an .ebpo.h5 file",
-    .text = "IN is a PLY file; OBJ, STL and OFF files can be read too if the library was built "
-            "with assimp. OUT appears complete or not at all; an existing OUT is replaced. Mending "
-            "is done in the order weld, orient, fill holes.",
-    .dash = "i",
-    .writes = "h5 hdf5",
-    .options = options,
-};
+#include "options/convert.inc"
 
 static int check_values(const values *v, const char *in, const char *out)
 {
@@ -195,82 +116,18 @@ static mesh_reading reading_of(const values *v)
                                                  : READ_ATTRIBUTES;
 }
 
-/* --- output --- */
-
-static void print_reports(const values *v, const mesh_input *p, const char *in)
+static convert_told told_of(const values *v, const char *in, const char *out)
 {
-    if (!v->json && !v->quiet) {
-        findings_print(stdout, in, &p->as_read, &p->prepared.before, false);
-        advice_print(stdout, p);
-        findings_print_mending(stdout, &p->prepared.record);
-        if (p->prepared.mended)
-            findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, false);
-        advice_print_shells(stdout, p);
-    }
-    command_flush("convert");
-    const char *lost = ebpo_mesh_attributes_lost(&p->mesh);
-    if (lost)
-        fprintf(stderr, "ebpo convert: %s: note: not kept: %s\n", in, lost);
-    if (!v->split_groups) /* else of each group */
-        advice_warn(stderr, "convert", in, p);
-}
-
-static void print_summary(const values *v, const ebpo_info *info, const char *out, double seconds)
-{
-    char bytes[32];
-    int last = info->level_count - 1;
-    printf("%s: %s, levels 0 to %d, %s, %.2f B/face", out, info->solid ? "a solid" : "a surface",
-           last, words_bytes(bytes, sizeof bytes, info->file_bytes),
-           info->face_count ? (double)info->file_bytes / (double)info->face_count : 0);
-    if (info->source_size)
-        printf(", %.0f %% of the source",
-               100 * (double)info->file_bytes / (double)info->source_size);
-    subset_print_need(info, chooses_parts(v));
-    printf(", in %.1f s\n", seconds);
-}
-
-static void print_json(const mesh_input *p, const ebpo_info *info, const ebpo_stored_sizes *stored,
-                       const char *out, const progress_line *line, const stage_facts *stages,
-                       double seconds)
-{
-    json j;
-    json_begin(&j, stdout);
-    json_object(&j, NULL);
-    facts_json(&j, out, info, stored);
-    json_object(&j, "input");
-    findings_json_source(&j, "mesh", &p->as_read);
-    findings_json(&j, "report", &p->prepared.before);
-    advice_json(&j, p);
-    json_end(&j);
-    json_real(&j, "seconds", seconds);
-    stages_json(&j, line, stages);
-    json_finish(&j);
-}
-
-/* What is on the disk, as a reader sees it. */
-static ebpo_status print_result(const values *v, const mesh_input *p, const char *out,
-                                const progress_line *line, const stage_facts *stages,
-                                double seconds, ebpo_error *error)
-{
-    if (v->quiet && !v->json)
-        return EBPO_OK;
-    ebpo_file *file = NULL;
-    ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
-    ebpo_status status = ebpo_open(out, &file, error);
-    if (status == EBPO_OK)
-        status = ebpo_file_locate(file, &stored, error);
-    if (status != EBPO_OK) {
-        ebpo_close(file);
-        return status;
-    }
-    if (v->json)
-        print_json(p, ebpo_file_info(file), &stored, out, line, stages, seconds);
-    else {
-        print_summary(v, ebpo_file_info(file), out, seconds);
-        stages_print(stdout, line, stages, seconds);
-    }
-    ebpo_close(file);
-    return EBPO_OK;
+    const char *shown = standard_files_shown(in);
+    return (convert_told){ .in = shown,
+                           .piped = shown != in,
+                           .out = out,
+                           .json = v->json,
+                           .quiet = v->quiet,
+                           .timings = v->timings,
+                           .repaired = v->mend.repair,
+                           .chosen = chooses_parts(v),
+                           .by_groups = v->split_groups };
 }
 
 /* --- work --- */
@@ -400,8 +257,8 @@ static ebpo_status build_parts(part_build *build, mesh_input *p, const char *fol
 static stage_facts plan_stages(const values *v, const char *in)
 {
     const char *dot = strrchr(in, '.');
-    return (stage_facts){ .mended = v->mend.weld || v->mend.orient || v->mend.flip ||
-                                    v->mend.fill_holes || v->mend.repair ||
+    return (stage_facts){ .mended = v->mend.weld || v->mend.drop_duplicates || v->mend.orient ||
+                                    v->mend.flip || v->mend.fill_holes || v->mend.repair ||
                                     (dot && strcasecmp(dot, ".stl") == 0),
                           .solid = true,
                           .from_leaves =
@@ -463,7 +320,8 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;
-    print_reports(v, &p, in);
+    convert_told told = told_of(v, in, out);
+    convert_tell_mesh(&told, &p);
     status = refuse(v, &p, in, workspace, error);
     if (status == EBPO_OK && v->split_groups && !groups)
         status = no_groups(in, error);
@@ -484,7 +342,7 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
     stages_split(&line, &stages.times);
     stages.faces = p.as_read.face_count;
     return status == EBPO_OK
-               ? print_result(v, &p, out, &line, &stages, progress_now() - begun, error)
+               ? convert_tell_file(&told, &p, &line, &stages, progress_now() - begun, error)
                : status;
 }
 

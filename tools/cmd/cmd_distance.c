@@ -6,41 +6,7 @@
 #include "cmd/commands.h"
 #include "cmd/query_run.h"
 
-static const arg_option options[] = {
-    OPTION_WORD("mode", 'm', query_values, distance_mode, "MODE", distance_modes,
-                "exact, the default, or one of EBP 2017, which do not guarantee the minimum: "
-                "recursive, leaves, envelope"),
-    OPTION_REAL("max-distance", 0, query_values, max_distance, "D", 0, DBL_MAX,
-                "ignore what is farther than D: inf"),
-    OPTION_INT("nearest", 'k', query_values, nearest, "K", 1, 9007199254740992.0,
-               "the K nearest faces of each point, a line for each, then an empty line"),
-    OPTION_REAL("within", 0, query_values, within, "R", 0, DBL_MAX,
-                "all faces at most R away likewise; with --nearest at most K of them"),
-    OPTION_FLAG("unsigned", 0, query_values, unsigned_distance,
-                "no sign (surfaces have none anyway)"),
-    OPTION_FLAG("no-warm", 0, query_values, no_warm,
-                "do not start from the previous answer; the answers are the same"),
-    QUERY_LIMIT_OPTIONS(
-        "look only at levels 0 to L and print lo and hi, between which the distance lies"),
-    QUERY_ASKING_OPTIONS,
-    QUERY_PREFETCH_OPTION,
-    QUERY_ATTRIBUTE_OPTION,
-    QUERY_FORM_OPTIONS("each point is three doubles, each answer seven doubles and a uint64, or lo "
-                       "and hi; lists end with a face of 2^64 - 1 (little-endian)"),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "distance",
-    .operands = "MODEL [POINTS]",
-    .least = 1,
-    .most = 2,
-    .summary = "tells how far points are from the model: distance, nearest point, normal, face",
-    .text = "MODEL is an .ebpo.h5 file. POINTS holds lines 'x y z', or is a PLY file; if absent or "
-            "'-', standard input. Distances are correctly rounded, and negative inside a solid.",
-    .dash = " p",
-    .options = options,
-};
+#include "options/distance.inc"
 
 /* Then all that is certain is an interval. */
 static bool limited(const ebpo_distance_options *o)

@@ -24,34 +24,7 @@ static const char *const format_words[] = {
     "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl", NULL
 }; /* as in ebpo_export_format */
 
-static const arg_option options[] = {
-    OPTION_WORD("format", 0, values, format, "FORMAT", format_words,
-                "xdmf, vtkhdf, gltf, glb, obj or stl; default: by the extension of OUT. xdmf comes "
-                "with a second file OUT.h5, gltf with one that ends in .bin"),
-    OPTION_INT("level", 0, values, level, "N", 0, 20,
-               "the envelopes of level N, and leaves and black nodes above it"),
-    OPTION_TEXT("levels", 0, values, levels, "LEVELS",
-                "levels A to B, each as a block of its own; not for stl"),
-    OPTION_FLAG("mesh", 0, values, mesh,
-                "the model itself; with levels, as a block of its own. xdmf and vtkhdf give the "
-                "numbers in the source, the others keep its order"),
-    OPTION_THREADS(values, threads),
-    OPTION_FLAG("json", 0, values, json, "print what was written as JSON"),
-    OPTION_QUIET(values, quiet),
-    REMOTE_OPTIONS(values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "export",
-    .operands = "FILE OUT",
-    .least = 2,
-    .most = 2,
-    .summary = "writes levels and the model for ParaView (XDMF, VTKHDF), or as glTF, OBJ or STL",
-    .text = "FILE is an .ebpo.h5 file or its URL. --level, --levels or --mesh is needed. XDMF and "
-            "VTKHDF keep double coordinates and the nodes' data; glTF, OBJ and STL hold float32.",
-    .options = options,
-};
+#include "options/export.inc"
 
 static int choose_format(values *v, const char *out)
 {

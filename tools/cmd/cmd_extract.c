@@ -32,44 +32,13 @@ typedef struct values {
 /* All octcodes are below; limits of options are doubles, which hold this one. */
 #define OCTCODE_MOST (INT64_C(1) << 61)
 
-static const arg_option options[] = {
-    OPTION_INT("level", 0, values, level, "N", 0, 20,
-               "the envelopes of level N, and leaves and black nodes above it"),
-    OPTION_FLAG("mesh", 0, values, mesh,
-                "the model itself, bit for bit; in the order of the source if the maps are stored"),
-    OPTION_INT("subtree", 0, values, subtree, "OCTCODE", 1, OCTCODE_MOST,
-               "the faces that the leaves of this node list: those that touch its cell"),
-    OPTION_TEXT("textures", 0, values, textures, "DIR",
-                "the images whose bytes the file has, into DIR under their names; alone, or "
-                "besides one of the others"),
-    OPTION_FLAG("no-walls", 0, values, no_walls,
-                "with --level: leave out polygons that lie on cell walls"),
-    OPTION_THREADS(values, threads),
-    MEMORY_OPTIONS(values, memory),
-    OPTION_FLAG("json", 0, values, json, "the summary as JSON"),
-    OPTION_QUIET(values, quiet),
-    REMOTE_OPTIONS(values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "extract",
-    .operands = "FILE OUT.ply",
-    .least = 1,
-    .most = 2,
-    .summary = "writes a level's envelopes, the model, or a part of it, as PLY",
-    .text =
-        "FILE is an .ebpo.h5 file or its URL. One of --level, --mesh and --subtree is needed, and "
-        "OUT.ply, unless it is for --textures alone. "
-        "A level's polygons are held in memory whatever --memory says.",
-    .dash = " o",
-    .writes = "ply",
-    .options = options,
-};
+#include "options/extract.inc"
 
 static int check_values(const values *v, const char *in, const char *out)
 {
     int asked = (v->level >= 0) + v->mesh + (v->subtree > 0);
+    if (v->textures && strcmp(v->textures, "-") == 0)
+        return command_usage("extract", "--textures: '-': a folder's name is needed here");
     if (asked == 0 && v->textures && !out)
         return v->json ? command_usage("extract", "--json does not go with --textures alone")
                        : EXIT_FINE;

@@ -17,20 +17,7 @@
 #include "cmd/commands.h"
 #include "cmd/subset_run.h"
 
-static const arg_option options[] = { SUBSET_OPTIONS, { 0 } };
-
-static const arg_spec spec = {
-    .command = "fetch",
-    .operands = "URL OUT.ebpo.h5",
-    .least = 2,
-    .most = 2,
-    .summary = "downloads a file, or levels, a box or parts of it; resumes after interruptions",
-    .text = "Only what is kept is fetched. OUT appears complete or not at all; until then what has "
-            "been fetched is in the folder OUT.part, from which the same command resumes. Without "
-            "options everything is fetched.",
-    .writes = "h5 hdf5",
-    .options = options,
-};
+#include "options/fetch.inc"
 
 /* --- the folder OUT.part: blocks as the library keeps them (--http-cache) --- */
 

@@ -16,27 +16,7 @@ typedef struct values {
     remote_values remote;
 } values;
 
-static const arg_option options[] = {
-    OPTION_FLAG("json", 0, values, json, "print the facts as JSON"),
-    OPTION_FLAG("arrays", 0, values, arrays, "list the arrays of the file as well"),
-    OPTION_TEXT(
-        "memory", 0, values, memory, "SIZE",
-        "say as well what questions with this --memory keep in memory: 512M, 4G; 0: no budget"),
-    REMOTE_OPTIONS(values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "info",
-    .operands = "FILE",
-    .least = 1,
-    .most = 1,
-    .summary = "describes a file: its contents, bytes by part, and a table of levels",
-    .text = "Only the head of the file is read, and names of images. FILE is an .ebpo.h5 file or "
-            "its URL; for meshes "
-            "use 'ebpo check'.",
-    .options = options,
-};
+#include "options/info.inc"
 
 static const values usual = { .remote = REMOTE_VALUES_INIT };
 

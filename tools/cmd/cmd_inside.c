@@ -5,30 +5,7 @@
 #include "cmd/commands.h"
 #include "cmd/query_run.h"
 
-static const arg_option options[] = {
-    OPTION_WORD("mode", 'm', query_values, inside_mode, "MODE", inside_modes,
-                "how answers are found; they are the same. fast, the default, or one of EBP 2017: "
-                "cache, nodes, subtree, each also with -plain (without envelopes)"),
-    QUERY_LIMIT_OPTIONS(
-        "look only at levels 0 to L: IN and OUT are certain, anything else is MAYBE"),
-    QUERY_ASKING_OPTIONS,
-    QUERY_PREFETCH_OPTION,
-    QUERY_FORM_OPTIONS("each point is three doubles, each answer two int32 (little-endian)"),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "inside",
-    .operands = "MODEL [POINTS]",
-    .least = 1,
-    .most = 2,
-    .summary = "tells which points are in the solid: IN, OUT or ON, and the winding number",
-    .text =
-        "MODEL is an .ebpo.h5 file of a solid. POINTS holds lines 'x y z', or is a PLY, "
-        ".npy or HDF5 file (FILE.h5:/path); if absent or '-', standard input. Answers are exact.",
-    .dash = " p",
-    .options = options,
-};
+#include "options/inside.inc"
 
 static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
                           ebpo_error *error)

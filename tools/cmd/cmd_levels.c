@@ -1,5 +1,6 @@
 /* ebpo levels: the levels as they arrive, coarse to fine. */
 #include <inttypes.h>
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 
@@ -10,6 +11,7 @@
 #include "cli/json.h"
 #include "cli/progress.h"
 #include "cli/remote_args.h"
+#include "cli/tables.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 
@@ -19,26 +21,7 @@ typedef struct values {
     remote_values remote;
 } values;
 
-static const arg_option options[] = {
-    OPTION_INT("to", 0, values, to, "L", 0, 20, "stop after level L; deeper ones are not read"),
-    OPTION_FLAG("nodes", 0, values, nodes,
-                "also print a line for each node: octcode, type, cell, planes"),
-    OPTION_FLAG("json", 0, values, json, "print all of it as JSON"),
-    OPTION_THREADS(values, threads),
-    REMOTE_OPTIONS(values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "levels",
-    .operands = "FILE",
-    .least = 1,
-    .most = 1,
-    .summary = "reads a file level by level and describes each as it arrives",
-    .text = "FILE is an .ebpo.h5 file or its URL. Bytes are counted up to and including the level, "
-            "times from opening.",
-    .options = options,
-};
+#include "options/levels.inc"
 
 typedef struct printer {
     const values *v;
@@ -51,7 +34,7 @@ typedef struct printer {
 static double share(const printer *p, double volume)
 {
     double last = facts_volume(p->info, p->info->level_count - 1);
-    return last > 0 ? 100 * volume / last : 100;
+    return isinf(last) ? NAN : last > 0 ? 100 * volume / last : 100;
 }
 
 /* --- one level --- */
@@ -59,11 +42,13 @@ static double share(const printer *p, double volume)
 static void print_level(const printer *p, const ebpo_stream_level *level, double ms)
 {
     const ebpo_level_summary *s = &p->info->level[level->level];
+    char volume[TABLE_CELL], percent[TABLE_CELL];
     printf("%5d %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %10" PRIu64
-           " %16.10g %9.2f %12" PRIu64 " %9.2f\n",
+           " %16s %9s %12" PRIu64 " %9.2f\n",
            level->level, s->gray_count, s->leaf_count, facts_white(p->info, level->level),
-           s->black_count, s->plane_count + s->leaf_plane_count, level->volume,
-           share(p, level->volume), level->cumulative_bytes, ms);
+           s->black_count, s->plane_count + s->leaf_plane_count,
+           table_cell(volume, "%.10g", level->volume),
+           table_cell(percent, "%.2f", share(p, level->volume)), level->cumulative_bytes, ms);
 }
 
 static void begin_json_level(printer *p, const ebpo_stream_level *level, double ms)
@@ -168,9 +153,22 @@ static ebpo_status tell_levels(printer *p, ebpo_stream *stream, int last, bool *
 
 static void print_head(const char *path, const ebpo_info *info)
 {
-    printf("%s: %s, %d levels\n", path, info->solid ? "a solid" : "a surface", info->level_count);
+    char levels[32];
+    printf("%s: %s, %s\n", path, info->solid ? "a solid" : "a surface",
+           words_plural(levels, sizeof levels, (uint64_t)info->level_count, "level", "levels"));
     printf("%5s %9s %9s %9s %9s %10s %16s %9s %12s %9s\n", "level", "gray", "leaf", "white",
            "black", "planes", "volume", "% last", "bytes", "ms");
+}
+
+static void print_legend(const ebpo_info *info)
+{
+    table_legend(stdout);
+    printf(
+        "volume: of the envelopes, in the model's unit%s%s cubed; %% last: of the last level's;\n"
+        "bytes: read up to and with the level; ms: since opening\n",
+        info->unit[0] ? " " : "", info->unit);
+    if (!isfinite(facts_volume(info, 0)))
+        table_beyond(stdout);
 }
 
 static ebpo_status tell(printer *p, ebpo_file *file, const char *path, bool *arrived,
@@ -201,6 +199,8 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path, bool *arr
         remote_json(&p->j, &t, &p->v->remote);
         json_finish(&p->j);
     } else {
+        if (status == EBPO_OK && *arrived)
+            print_legend(p->info);
         remote_tell(&t, &p->v->remote, false);
     }
     ebpo_stream_free(stream);

@@ -9,6 +9,7 @@
 #include "cli/file_facts.h"
 #include "cli/progress.h"
 #include "cli/remote_args.h"
+#include "cli/tables.h"
 #include "cmd/commands.h"
 
 typedef struct values {
@@ -18,38 +19,7 @@ typedef struct values {
     remote_values remote;
 } values;
 
-static const arg_option options[] = {
-    OPTION_THREADS(values, threads),
-    OPTION_FLAG("deviation", 0, values, deviation,
-                "also print how far each level reaches beyond the model: certain bounds on the "
-                "farthest point, mean and rms over its surface"),
-    OPTION_REAL("tolerance", 0, values, tolerance, "T", 1e-6, 1000,
-                "with --deviation: refine the bounds until the upper one is at most 1 + T times "
-                "the lower one; default 0.05"),
-    OPTION_INT("questions", 0, values, questions, "N", 0, 9007199254740992.0,
-               "with --deviation: stop after about N distances for each level and print what is "
-               "certain by then; default 200000; 0: no limit"),
-    OPTION_FLAG("derived", 0, values, derived,
-                "also print the volume of each level with its leaves cut by planes derived from "
-                "their faces"),
-    OPTION_FLAG("limit", 0, values, limit,
-                "the same, and the sum of the volumes of the solid's convex hulls in the cells: no "
-                "convex envelopes of these cells are smaller"),
-    OPTION_FLAG("json", 0, values, json, "print the numbers as JSON"),
-    REMOTE_OPTIONS(values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "measure",
-    .operands = "FILE",
-    .least = 1,
-    .most = 1,
-    .summary = "measures area, volume, centroid, inertia, and the volume or reach of each level",
-    .text = "FILE is an .ebpo.h5 file with its mesh, or its URL. Volume, centroid and inertia are "
-            "those of the winding number's integral (density 1); a surface has only an area.",
-    .options = options,
-};
+#include "options/measure.inc"
 
 /* --- words --- */
 
@@ -62,12 +32,10 @@ typedef struct measures {
 
 static void print_limit(const ebpo_info *info, double volume, const ebpo_limit *limit)
 {
-    double ratio = facts_excess_ratio(info, volume, limit->volume);
-    printf(" %24.16g", limit->volume);
-    if (info->solid && isnan(ratio))
-        printf(" %17s", "-");
-    else if (info->solid)
-        printf(" %17.4f", ratio);
+    char cell[TABLE_CELL];
+    printf(" %24s", table_cell(cell, "%.16g", limit->volume));
+    if (info->solid)
+        printf(" %17s", table_cell(cell, "%.4f", facts_excess_ratio(info, volume, limit->volume)));
 }
 
 static void print_levels(const ebpo_info *info, const measures *m)
@@ -82,15 +50,44 @@ static void print_levels(const ebpo_info *info, const measures *m)
         printf(" %24s%s", "hulls' volume", info->solid ? "   excess to limit" : "");
     putchar('\n');
     for (int i = 0; i < info->level_count; i++) {
-        printf("%5d %24.16g %9.2f", i, facts_volume(info, i), facts_percent(info, i));
+        char volume[TABLE_CELL], percent[TABLE_CELL];
+        printf("%5d %24s %9s", i, table_cell(volume, "%.16g", facts_volume(info, i)),
+               table_cell(percent, "%.2f", facts_percent(info, i)));
         if (deviation)
             printf(" %13.6g %13.6g %13.6g %13.6g", deviation[i].lo, deviation[i].hi,
                    deviation[i].mean, deviation[i].rms);
         if (m->derived)
-            printf(" %24.16g %9.2f", m->derived[i], facts_share(info, m->derived[i]));
+            printf(" %24s %9s", table_cell(volume, "%.16g", m->derived[i]),
+                   table_cell(percent, "%.2f", facts_share(info, m->derived[i])));
         if (m->limit)
             print_limit(info, m->derived[i], &m->limit[i]);
         putchar('\n');
+    }
+}
+
+static void print_legend(const ebpo_info *info, const measures *m)
+{
+    printf("volumes in the model's unit%s%s cubed; %s\n", info->unit[0] ? " " : "", info->unit,
+           info->solid ? "% solid: of the solid's volume"
+                       : "% box: of the volume of the root's box");
+    if (m->deviation)
+        puts("reaches, at most: bounds of how far the farthest point is beyond the model;\n"
+             "mean, rms: over the envelopes' surface");
+    if (m->limit && info->solid)
+        puts("excess to limit: beyond the solid's volume, in that of the hulls; - where these are\n"
+             "the solid");
+    if (!isfinite(facts_volume(info, 0)))
+        table_beyond(stdout);
+}
+
+static void print_inertia(const ebpo_info *info, const ebpo_mass *mass)
+{
+    char cell[3][TABLE_CELL], unit[TABLE_CELL];
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < 3; i++)
+            table_scaled(cell[i], 16, mass->scaled_inertia[k][i], 5 * mass->exponent);
+        printf("  %-9s %s %s %s%s\n", k ? "" : "inertia", cell[0], cell[1], cell[2],
+               k ? "" : table_unit(unit, info->unit, 5));
     }
 }
 
@@ -101,20 +98,36 @@ static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass 
            info->unit[0] ? ", unit " : "", info->unit);
     if (facts_inside_out(info))
         printf("  warning   %s\n", facts_inside_out(info));
-    printf("  area      %.16g\n", mass->area);
+    char cell[TABLE_CELL], unit[TABLE_CELL];
+    printf("  area      %s%s\n", table_scaled(cell, 16, mass->scaled_area, 2 * mass->exponent),
+           table_unit(unit, info->unit, 2));
     if (info->solid) {
         const double *c = mass->centroid;
-        printf("  volume    %.16g\n  centroid  %.16g %.16g %.16g\n", mass->volume, c[0], c[1],
-               c[2]);
-        for (int k = 0; k < 3; k++)
-            printf("  %-9s %.16g %.16g %.16g\n", k ? "" : "inertia", mass->inertia[k][0],
-                   mass->inertia[k][1], mass->inertia[k][2]);
+        printf("  volume    %s%s\n",
+               table_scaled(cell, 16, mass->scaled_volume, 3 * mass->exponent),
+               table_unit(unit, info->unit, 3));
+        printf("  centroid  %.16g %.16g %.16g%s\n", c[0], c[1], c[2],
+               table_unit(unit, info->unit, 1));
+        print_inertia(info, mass);
     }
+    if (!info->unit[0])
+        puts("  (in the model's unit, which the file does not name, squared, cubed and so on)");
     putchar('\n');
     print_levels(info, m);
+    print_legend(info, m);
 }
 
 /* --- JSON --- */
+
+/* A number; beyond the range of a double a text. */
+static void json_scaled(json *j, const char *key, double x, int64_t exponent)
+{
+    char cell[TABLE_CELL];
+    if (table_in_range(x, exponent))
+        json_real(j, key, ldexp(x, (int)exponent));
+    else
+        json_text(j, key, table_scaled(cell, 9, x, exponent));
+}
 
 static void json_deviation(json *j, const ebpo_deviation *d)
 {
@@ -145,13 +158,17 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
     json_text(j, "kind", info->solid ? "solid" : "surface");
     json_bool(j, "inside_out", facts_inside_out(info) != NULL);
     json_text(j, "unit", info->unit);
-    json_real(j, "area", mass->area);
+    json_scaled(j, "area", mass->scaled_area, 2 * mass->exponent);
     if (info->solid) {
-        json_real(j, "volume", mass->volume);
+        json_scaled(j, "volume", mass->scaled_volume, 3 * mass->exponent);
         json_reals(j, "centroid", mass->centroid, 3);
         json_array(j, "inertia");
-        for (int k = 0; k < 3; k++)
-            json_reals(j, NULL, mass->inertia[k], 3);
+        for (int k = 0; k < 3; k++) {
+            json_array(j, NULL);
+            for (int i = 0; i < 3; i++)
+                json_scaled(j, NULL, mass->scaled_inertia[k][i], 5 * mass->exponent);
+            json_end(j);
+        }
         json_end(j);
     }
     json_array(j, "levels");

@@ -6,34 +6,7 @@
 #include "cmd/commands.h"
 #include "cmd/query_run.h"
 
-static const arg_option options[] = {
-    OPTION_FLAG("all", 'a', query_values, all,
-                "print all hits: their number, then t, face and side of each"),
-    OPTION_FLAG("any", 0, query_values, any, "print only whether anything is hit: yes or no"),
-    OPTION_WORD("sides", 0, query_values, ray_sides, "SIDES", ray_sides,
-                "which faces count: both, the default; front, met against their normal; back"),
-    OPTION_REAL("tmax", 0, query_values, tmax, "T", 0, DBL_MAX,
-                "for rays without their own tmax: they end at origin + T direction"),
-    QUERY_ASKING_OPTIONS,
-    QUERY_ATTRIBUTE_OPTION,
-    QUERY_FORM_OPTIONS(
-        "each ray is six doubles, each answer a double, a uint64 and an int64, or with --any a "
-        "uint64 (little-endian)"),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "ray",
-    .operands = "MODEL [RAYS]",
-    .least = 1,
-    .most = 2,
-    .summary = "tells what rays hit: t, face and side of the first face",
-    .text =
-        "MODEL is an .ebpo.h5 file. RAYS holds lines 'ox oy oz dx dy dz [tmax]'; if absent or '-', "
-        "standard input. What is hit, and in which order, is exact; '-' means nothing is hit.",
-    .dash = " p",
-    .options = options,
-};
+#include "options/ray.inc"
 
 /* Rows are rays. */
 _Static_assert(sizeof(ebpo_ray) == POINTS_WIDEST * sizeof(double), "as points_parse fills them");

@@ -33,37 +33,7 @@ typedef struct values {
 
 static const char *const up_words[] = { "x", "y", "z", NULL };
 
-static const arg_option options[] = {
-    OPTION_INT("level", 0, values, level, "N", 0, 20, "the envelopes of level N"),
-    OPTION_FLAG("mesh", 0, values, mesh, "the model itself; the default"),
-    OPTION_TEXT("levels", 0, values, levels, "LEVELS",
-                "several side by side, with captions: levels and 'mesh', for example 0-3,6,mesh"),
-    OPTION_TEXT("view", 0, values, view, "AZ,EL",
-                "where to look from: azimuth and elevation in degrees; default 30,20"),
-    OPTION_WORD("up", 0, values, up, "AXIS", up_words,
-                "the axis that points upwards: x, y (the default) or z"),
-    OPTION_TEXT("size", 0, values, size, "WxH", "pixels, 16 to 8192 each; default 1200x900"),
-    OPTION_FLAG("edges", 0, values, edges, "draw the outlines of the polygons"),
-    OPTION_FLAG("no-colours", 0, values, no_colours,
-                "the model without the colours of its vertices, faces or envelopes"),
-    OPTION_THREADS(values, threads),
-    OPTION_FLAG("json", 0, values, json, "what was drawn, as JSON"),
-    OPTION_FLAG("quiet", 'q', values, quiet, "no progress: errors and warnings only"),
-    REMOTE_OPTIONS(values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "render",
-    .operands = "FILE OUT.png",
-    .least = 2,
-    .most = 2,
-    .summary = "draws a shaded picture of a level or of the model, without a display",
-    .text = "FILE is an .ebpo.h5 file or its URL, or a mesh.",
-    .dash = "io",
-    .writes = "png",
-    .options = options,
-};
+#include "options/render.inc"
 
 #if EBPO_HAVE_PNG
 
@@ -84,6 +54,8 @@ typedef struct job {
     int width, height;
     tile tiles[TILES_MAX];
     int tile_count;
+    bool from_file; /* an .ebpo.h5 file, not a mesh */
+    traffic read;   /* of it */
 } job;
 
 /* --- arguments --- */
@@ -206,8 +178,10 @@ static ebpo_status load_file(job *j, ebpo_progress progress, ebpo_error *error)
     for (int i = 0; i < j->tile_count && status == EBPO_OK; i++)
         status = load_tile(j, &j->tiles[i], file, progress, error);
     if (status == EBPO_OK) {
-        traffic t = traffic_of(file);
-        remote_tell(&t, &j->v.remote, false);
+        j->read = traffic_of(file);
+        j->from_file = true;
+        if (!j->v.json)
+            remote_tell(&j->read, &j->v.remote, false);
     }
     ebpo_close(file);
     return status;
@@ -359,6 +333,9 @@ static void tell_json(const job *j)
         json_uint(&out, "faces", t->face_count);
         json_end(&out);
     }
+    json_end(&out);
+    if (j->from_file)
+        remote_json(&out, &j->read, &j->v.remote);
     json_finish(&out);
 }
 

@@ -23,32 +23,7 @@ typedef struct values {
     remote_values remote;
 } values;
 
-static const arg_option options[] = {
-    SUBTREE_OPTION(values, subtree_faces),
-    FACE_CODING_OPTION(values, face_coding),
-    OPTION_WORD("codec", 0, values, codec, "NAME", codec_words,
-                "zstd, deflate or none; default: that of the input"),
-    OPTION_INT("zstd-level", 0, values, zstd_level, "N", 1, 22,
-               "effort of zstd, 1 to 22; default 3, 5 where it pays"),
-    OPTION_THREADS(values, threads),
-    MEMORY_OPTIONS(values, memory),
-    OPTION_FLAG("json", 0, values, json, "print the facts of the result as JSON"),
-    OPTION_QUIET(values, quiet),
-    REMOTE_OPTIONS(values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "repack",
-    .operands = "IN.ebpo.h5 OUT.ebpo.h5",
-    .least = 2,
-    .most = 2,
-    .summary = "writes a file anew: today's layout, another codec; content compared",
-    .text = "IN is an .ebpo.h5 file or its URL; OUT may be IN. OUT appears complete or not at "
-            "all, and not before its content is found to be that of IN.",
-    .writes = "h5 hdf5",
-    .options = options,
-};
+#include "options/repack.inc"
 
 static int check_values(const values *v, ebpo_write_options *write)
 {

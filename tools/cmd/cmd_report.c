@@ -14,60 +14,7 @@
 
 static const char *const up_words[] = { "x", "y", "z", NULL };
 
-static const arg_option options[] = {
-    OPTION_TEXT("out", 'o', report_values, out, "DIR",
-                "the folder to make; default: report-NAME in the working directory"),
-    OPTION_LIST("name", 0, report_values, names, "NAME",
-                "name of a FILE's method; give one for each, in order; default: the file's name"),
-    OPTION_SET("select", 0, report_values, select, "LIST", selection_words,
-               "for a mesh: make a file with each of these selections of planes: inherit, "
-               "kmedoids, offset, random; default: inherit"),
-    OPTION_TEXT("percent", 0, report_values, percent, "LIST",
-                "for the theses' selections: percentage of the candidates; several, such as "
-                "10,20,40, make a method of each; default 40"),
-    OPTION_TEXT("k-root", 0, report_values, k_root, "LIST",
-                "instead of --percent: K planes at the root, or 'K%' of the faces, and half as "
-                "many at each further level (BP-Octree); several as with --percent"),
-    OPTION_WORD("normals", 0, report_values, normals, "NAME", normals_words,
-                "distance between normals for kmedoids: spherical (the default) or angle"),
-    OPTION_INT("max-level", 0, report_values, max_level, "N", 0, 20,
-               "for a mesh: as for 'ebpo convert'"),
-    OPTION_INT("leaf-faces", 0, report_values, leaf_faces, "N", 0, 4294967295.0,
-               "for a mesh: as for 'ebpo convert'"),
-    OPTION_REAL("epsilon", 0, report_values, epsilon, "E", 0, 1,
-                "for a mesh: as for 'ebpo convert'"),
-    OPTION_FLAG("keep", 0, report_values, keep, "keep the files made from a mesh in DIR"),
-    OPTION_TEXT("levels", 0, report_values, levels, "LEVELS", "measure only these levels"),
-    OPTION_INT("points", 0, report_values, points, "N", 1, 1e8,
-               "questions of each kind; default 5000"),
-    OPTION_INT("seed", 0, report_values, seed, "S", 0, 1e15,
-               "seed of everything drawn at random; default 1"),
-    OPTION_FLAG("need", 0, report_values, need,
-                "also make files for given errors and sizes, and see how well they keep to them"),
-    OPTION_FLAG("no-pictures", 0, report_values, no_pictures, "no pictures of the levels"),
-    OPTION_TEXT("view", 0, report_values, view, "AZ,EL",
-                "for the pictures: azimuth and elevation in degrees; default 30,20"),
-    OPTION_WORD("up", 0, report_values, up, "AXIS", up_words,
-                "for the pictures: the axis that points upwards, x, y (the default) or z"),
-    OPTION_INT("threads", 0, report_values, threads, "N", 0, 256,
-               "threads, although questions are timed on one; 0, the default: all cores"),
-    OPTION_FLAG("json", 0, report_values, json, "also print the JSON on standard output"),
-    OPTION_QUIET(report_values, quiet),
-    REMOTE_HTTP_OPTIONS(report_values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "report",
-    .operands = "FILE...",
-    .least = 1,
-    .most = ARGS_OPERANDS_MAX - 1,
-    .summary = "compares methods level by level: bytes, error, run time; a page with plots",
-    .text = "The FILEs are .ebpo.h5 files of one model (or their URLs), each a method; or one "
-            "mesh, from which a file is made with each selection. DIR appears complete, with "
-            "report.html, report.csv and report.json; an existing report is replaced.",
-    .options = options,
-};
+#include "options/report.inc"
 
 static int wrong(const char *option, const char *value, const char *expected)
 {

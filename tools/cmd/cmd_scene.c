@@ -15,70 +15,7 @@
 
 static const char *const purpose_words[] = { "collide", "view", "inside", "solids", NULL };
 
-static const arg_option options[] = {
-    OPTION_REAL("time", 't', scene_values, time, "T", -1e300, 1e300,
-                "at this time; default: the first of all routes"),
-    OPTION_REAL("from", 0, scene_values, from, "T", -1e300, 1e300,
-                "from this time on; default: the first"),
-    OPTION_REAL("to", 0, scene_values, to, "T", -1e300, 1e300,
-                "up to this time; default: the last"),
-    OPTION_REAL("step", 0, scene_values, step, "S", 1e-300, 1e300,
-                "report: between --from and --to look every S seconds"),
-    OPTION_REAL("tolerance", 0, scene_values, tolerance, "D", 1e-300, 1e300,
-                "approach: how near is near, beyond the clearance"),
-    OPTION_WORD(
-        "for", 0, scene_values, purpose, "WHAT", purpose_words,
-        "plan, pack: what will be asked: collide (report, approach; the usual), view (pictures "
-        "from the cameras), inside, or solids (collide, and report --solids, --depth)"),
-    OPTION_REAL("margin", 0, scene_values, margin, "D", 1e-300, 1e300,
-                "plan, pack: what comes so near, beyond the clearance, is needed too"),
-    OPTION_TEXT("output", 'o', scene_values, out, "PATH",
-                "pack: the folder to make; report: a file that ends in .h5, .html (a page of "
-                "clashes) or .png "
-                "(pictures)"),
-    OPTION_TEXT("target-size", 0, scene_values, target_size, "S",
-                "pack: models of at most this many bytes (5M, 512KiB) together, with "
-                "the least error"),
-    OPTION_FLAG("count", 0, scene_values, count,
-                "report: count all pairs of faces that meet, and lines of contact"),
-    OPTION_FLAG("places", 0, scene_values, places, "report: also where"),
-    OPTION_FLAG(
-        "solids", 0, scene_values, solids,
-        "report: how solids lie to each other: protruding, enclosed, duplicate; plan, pack: "
-        "as --for solids"),
-    OPTION_REAL("depth", 0, scene_values, depth, "D", 1e-300, 1e300,
-                "report: how deep one is in the other, within D"),
-    OPTION_FLAG("least", 0, scene_values, least,
-                "approach: how near they come at all times, and when"),
-    OPTION_TEXT(
-        "memory", 0, scene_values, memory, "SIZE",
-        "report, approach: bytes that all models may use together (512M, 1GiB); default: as "
-        "many as they need"),
-    OPTION_THREADS(scene_values, threads),
-    OPTION_FLAG("outside", 0, scene_values, outside,
-                "files that the scene names may lie outside its folder"),
-    OPTION_FLAG("remote", 0, scene_values, remote,
-                "models may be on web servers, if their digests are given"),
-    OPTION_FLAG("csv", 0, scene_values, csv, "report: print CSV"),
-    OPTION_FLAG("json", 0, scene_values, json, "print JSON"),
-    OPTION_QUIET(scene_values, quiet),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "scene",
-    .operands = "info|check|boxes|pairs|report|approach|plan|pack FILE",
-    .least = 2,
-    .most = 2,
-    .summary = "describes a scene: models at many places, that move, and which meet",
-    .text =
-        "FILE is a scene in JSON. 'info' tells what it holds and where that is, 'check' opens "
-        "every model and says whether all fits together, 'boxes' prints the box of each "
-        "instance, 'pairs' the instances whose boxes come close enough to each other, 'report' "
-        "those whose faces meet or are too near, exactly, 'approach' when pairs first come near, "
-        "'plan' what of each model the scene can ever call for, 'pack' writes that as a folder.",
-    .options = options,
-};
+#include "options/scene.inc"
 
 /* Which times are asked about: one, unless a span is given, or `spans` makes it the usual. */
 static bool settle_times(scene_values *v, bool spans, const ebpo_scene *scene)

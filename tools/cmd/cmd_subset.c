@@ -8,20 +8,7 @@
 #include "cmd/commands.h"
 #include "cmd/subset_run.h"
 
-static const arg_option options[] = { NEED_OPTIONS(subset_values), SUBSET_OPTIONS, { 0 } };
-
-static const arg_spec spec = {
-    .command = "subset",
-    .operands = "FILE OUT.ebpo.h5",
-    .least = 2,
-    .most = 2,
-    .summary = "makes a smaller file: some levels, a box, parts, an error or a size",
-    .text = "FILE is an .ebpo.h5 file or its URL (an interrupted transfer starts again; 'ebpo "
-            "fetch' resumes). OUT appears complete or not at all. It answers questions as FILE "
-            "does, or refuses those for which something was left out.",
-    .writes = "h5 hdf5",
-    .options = options,
-};
+#include "options/subset.inc"
 
 static const subset_values usual = SUBSET_VALUES_INIT;
 

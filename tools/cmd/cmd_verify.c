@@ -18,31 +18,7 @@ typedef struct values {
     remote_values remote;
 } values;
 
-static const arg_option options[] = {
-    OPTION_TEXT("against", 0, values, against, "IN.ply",
-                "also compare the model with its source, bit for bit: positions, corners, and the "
-                "attributes that the file keeps"),
-    OPTION_INT("samples", 0, values, samples, "N", 0, 9007199254740992.0,
-               "number of cells whose labels are checked by an independent winding number; 0, the "
-               "default: all if there are at most four million, else one million"),
-    OPTION_THREADS(values, threads),
-    MEMORY_OPTIONS(values, memory),
-    OPTION_FLAG("json", 0, values, json, "print the counts as JSON"),
-    OPTION_FLAG("quiet", 'q', values, quiet, "print violations and errors only"),
-    REMOTE_OPTIONS(values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "verify",
-    .operands = "FILE",
-    .least = 1,
-    .most = 1,
-    .summary = "checks every promise of a file; exits with code 1 if one is broken",
-    .text = "FILE is an .ebpo.h5 file or its URL. Containment is checked exactly, with the decoded "
-            "half-spaces, not with rounded polyhedra.",
-    .options = options,
-};
+#include "options/verify.inc"
 
 static const struct kind {
     size_t offset;
@@ -66,14 +42,14 @@ static const ebpo_verify_count *count_of(const ebpo_verify_report *report, int i
 
 /* What of the source could not be compared, as the file has it not. */
 typedef struct unseen {
-    char words[512]; /* "": nothing */
+    char words[900]; /* "": nothing */
 } unseen;
 
 static unseen unseen_of(const ebpo_file *file, const ebpo_mesh *source)
 {
     uint64_t parts = ebpo_file_info(file)->parts;
     unseen u = { "" };
-    const char *lost = ebpo_mesh_attributes_lost(source);
+    const char *lost = ebpo_mesh_attributes_lost(source), *unread = ebpo_mesh_unread(source);
     bool has = ebpo_mesh_has_attributes(source);
     if (has && !(parts & EBPO_PART_ATTRIBUTES))
         snprintf(u.words, sizeof u.words,
@@ -81,8 +57,9 @@ static unseen unseen_of(const ebpo_file *file, const ebpo_mesh *source)
     else if (has && !(parts & EBPO_PART_MAPS))
         snprintf(u.words, sizeof u.words,
                  "its attributes, such as colours and normals: the file has no maps");
-    else if (lost)
-        snprintf(u.words, sizeof u.words, "what is not kept: %s", lost);
+    else if (lost || unread)
+        snprintf(u.words, sizeof u.words, "what is not kept: %s%s%s", unread ? unread : "",
+                 lost && unread ? "; " : "", lost ? lost : "");
     return u;
 }
 

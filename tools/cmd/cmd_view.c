@@ -11,6 +11,7 @@
 #include "cli/json.h"
 #include "cli/progress.h"
 #include "cli/remote_args.h"
+#include "cli/tables.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 #include "render/cut_mesh.h"
@@ -26,48 +27,7 @@ typedef struct values {
 
 static const char *const order_words[] = { "level", "distance", "pixels", "front-to-back", NULL };
 
-static const arg_option options[] = {
-    OPTION_WORD("order", 0, values, order, "ORDER", order_words,
-                "what comes first: level, distance, pixels (the largest) or front-to-back; "
-                "default: pixels with --eye, else level"),
-    OPTION_TEXT("eye", 0, values, eye, "X,Y,Z", "where the observer is, in the model's unit"),
-    OPTION_TEXT("look", 0, values, look, "X,Y,Z", "the point looked at; default: all around"),
-    OPTION_TEXT("up", 0, values, up, "X,Y,Z", "the direction upwards; default: 0,1,0"),
-    OPTION_REAL("fov", 0, values, fov, "DEGREES", 0.001, 179.999,
-                "vertical angle of view; default: 45"),
-    OPTION_TEXT("size", 0, values, size, "WxH", "size of the picture in pixels; default: 1280x720"),
-    OPTION_REAL("pixels", 0, values, pixels, "P", 1e-9, 1e9,
-                "do not refine nodes that are at most this large in the picture"),
-    OPTION_REAL("distance", 0, values, distance, "D", 0, 1e300,
-                "do not refine nodes that are farther away than this"),
-    OPTION_INT("to", 0, values, to, "L", 0, 20, "stop after level L"),
-    OPTION_FLAG("seen-only", 0, values, seen_only,
-                "do not refine what is outside the picture; otherwise that comes last"),
-    OPTION_TEXT("bytes", 0, values, bytes, "SIZE",
-                "stop before more than this of the file is read: 512K, 4M"),
-    OPTION_INT("count", 0, values, count, "N", 1, 1e15,
-               "stop before more nodes than this have arrived"),
-    OPTION_TEXT("memory", 0, values, memory, "SIZE",
-                "memory for decoded chunks; default: no limit"),
-    OPTION_TEXT("out", 'o', values, out, "CUT.ply",
-                "write the envelopes of the cut as closed polygons"),
-    OPTION_FLAG("nodes", 0, values, nodes,
-                "also print a line for each node, in the order of arrival"),
-    OPTION_FLAG("json", 0, values, json, "print all of it as JSON"),
-    REMOTE_OPTIONS(values, remote),
-    { 0 },
-};
-
-static const arg_spec spec = {
-    .command = "view",
-    .operands = "FILE",
-    .least = 1,
-    .most = 1,
-    .summary = "reads those nodes first that matter most to an observer, within a budget",
-    .text = "FILE is an .ebpo.h5 file or its URL. A line is printed each time the number of nodes "
-            "has doubled, and at the end.",
-    .options = options,
-};
+#include "options/view.inc"
 
 static const char *const end_names[] = { "", "done", "bytes", "nodes" };
 
@@ -159,11 +119,12 @@ static void print_row(printer *p, const ebpo_view_stream *stream, const char *ke
     ebpo_view_stats s = EBPO_VIEW_STATS_INIT;
     ebpo_view_stream_get_stats(stream, &s);
     double ms = (progress_now() - p->begin) * 1e3;
+    char pixels[TABLE_CELL];
     if (!p->v->json) {
         printf("%12" PRIu64 " %10" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64
-               " %9" PRIu64 " %10.5g %9.2f\n",
+               " %9" PRIu64 " %10s %9.2f\n",
                s.bytes_read, s.nodes, s.cut[EBPO_GRAY], s.cut[EBPO_LEAF], s.cut[EBPO_WHITE],
-               s.cut[EBPO_BLACK], s.waiting, s.pixels, ms);
+               s.cut[EBPO_BLACK], s.waiting, table_cell(pixels, "%.5g", s.pixels), ms);
         return;
     }
     json_object(&p->j, key);
@@ -220,6 +181,14 @@ static void print_node(printer *p, const ebpo_view_node *v)
     json_end(&p->j);
 }
 
+static void print_legend(void)
+{
+    table_legend(stdout);
+    puts("waiting: gray, to be divided next; pixels: size of the largest of these, - without "
+         "--eye;\n"
+         "bytes: read of the file; ms: since opening");
+}
+
 /* --- streaming --- */
 
 static ebpo_status tell_nodes(printer *p, ebpo_view_stream *stream, ebpo_view_end *end,
@@ -272,6 +241,8 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path,
         remote_json(&p->j, &t, &p->v->remote);
         json_finish(&p->j);
     } else {
+        if (status == EBPO_OK && *arrived)
+            print_legend();
         if (status == EBPO_OK && *arrived)
             printf("%s\n", end == EBPO_VIEW_DONE    ? "everything that was asked for has arrived"
                            : end == EBPO_VIEW_BYTES ? "stopped by --bytes"

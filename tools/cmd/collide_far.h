@@ -17,19 +17,6 @@ typedef struct collide_far {
         false, false, 0.0, -1.0, NULL, { 0, 0, 0 } \
     }
 
-#define COLLIDE_FAR_OPTIONS(type, member)                                                       \
-    OPTION_FLAG("distance", 0, type, member.distance,                                           \
-                "print how far apart the faces are: two bounds, and the nearest faces"),        \
-        OPTION_FLAG("depth", 0, type, member.depth,                                             \
-                    "how deep A's faces are in B, a solid, and B's in A; needs --tolerance"),   \
-        OPTION_TEXT("way-out", 0, type, member.way_out, "'X Y Z'",                              \
-                    "how far A has to be moved along this direction to be clear of B, and the " \
-                    "faces that part last"),                                                    \
-        OPTION_REAL("tolerance", 0, type, member.tolerance, "T", 0, DBL_MAX,                    \
-                    "bounds may be so far apart; 0, the default of --distance: exact"),         \
-        OPTION_REAL("at-least", 0, type, member.at_least, "D", 0, DBL_MAX,                      \
-                    "with --distance: only whether it is at least D")
-
 /* False, and a message on standard error: they do not go together. others: --all or --self. */
 bool collide_far_fits(collide_far *far, bool others);
 

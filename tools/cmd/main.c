@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "cli/command.h"
 #include "cli/signals.h"
@@ -13,11 +12,11 @@
 #include "cmd/version_facts.h"
 
 static const command *const commands[] = {
-    &command_convert, &command_check,  &command_info,   &command_levels, &command_view,
-    &command_extract, &command_export, &command_subset, &command_repack, &command_fetch,
-    &command_measure, &command_render, &command_verify, &command_inside, &command_distance,
-    &command_ray,     &command_box,    &command_bench,  &command_report, &command_scene,
-    &command_boolean, &command_collide
+    &command_convert,  &command_check,   &command_info,    &command_levels, &command_view,
+    &command_extract,  &command_export,  &command_subset,  &command_repack, &command_repair,
+    &command_fetch,    &command_measure, &command_render,  &command_verify, &command_inside,
+    &command_distance, &command_ray,     &command_box,     &command_bench,  &command_report,
+    &command_scene,    &command_boolean, &command_collide, &command_map
 };
 enum { COMMANDS = sizeof commands / sizeof *commands };
 
@@ -41,7 +40,7 @@ static void usage(FILE *out)
             "library and the HDF5 plugin are\n\nexit codes: 0 success, 1 bad data "
             "or input/output, 2 wrong usage, 3 not a solid where one is required, 4 (repack) "
             "the content "
-            "would differ\n");
+            "would differ, (repair) it does\n");
 }
 
 static int unknown_command(const char *name)
@@ -109,9 +108,5 @@ int main(int argc, char **argv)
     const command *c = argc > 1 ? find(argv[1]) : NULL;
     if (!command_flush(c ? c->spec->command : NULL) && code == EXIT_FINE)
         code = EXIT_FAILED;
-    /* libhdf5 1.10 crashes in its exit handler after a file that could not be written; nothing is
-     * left for it to do. */
-    if (code == EXIT_FAILED)
-        _exit(code);
     return code;
 }

@@ -126,8 +126,10 @@ ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_scene *
     how.threads = (unsigned)v->threads;
     how.progress = progress_start(&line, "scene", v->quiet);
     json_begin(&l.j, stdout);
-    if (v->json)
-        json_array(&l.j, NULL);
+    if (v->json) {
+        json_object(&l.j, NULL);
+        json_array(&l.j, v->least ? "least" : "approaches");
+    }
     ebpo_status status =
         v->least ? ebpo_scene_least_distances(scene, v->from, v->to, &how, print_leasts, &l, error)
                  : ebpo_scene_approach(scene, v->from, v->to, &how, print_ways, &l, error);

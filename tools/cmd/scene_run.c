@@ -118,7 +118,14 @@ ebpo_status scene_check(const scene_values *v, const char *path, ebpo_scene *sce
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < c.models && status == EBPO_OK; i++)
         status = ebpo_file_check_content(ebpo_scene_file(scene, i), NULL, error);
-    if (status == EBPO_OK && !v->quiet)
+    if (status == EBPO_OK && v->json) {
+        json j;
+        json_begin(&j, stdout);
+        json_object(&j, NULL);
+        json_text(&j, "scene", path);
+        json_uint(&j, "models", c.models);
+        json_finish(&j);
+    } else if (status == EBPO_OK && !v->quiet)
         printf("%s: fine: %llu models, all contents as their checksums say\n", path,
                (unsigned long long)c.models);
     return status;
@@ -132,8 +139,10 @@ ebpo_status scene_boxes(const scene_values *v, const char *path, ebpo_scene *sce
     ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
     (void)path;
     json_begin(&j, stdout);
-    if (v->json)
-        json_array(&j, NULL);
+    if (v->json) {
+        json_object(&j, NULL);
+        json_array(&j, "boxes");
+    }
     for (uint64_t i = 0; ebpo_scene_get_instance(scene, i, &instance) == EBPO_OK; i++) {
         double min[3], max[3];
         status = ebpo_scene_instance_box(scene, i, v->from, v->to, min, max, error);
@@ -188,8 +197,10 @@ ebpo_status scene_pairs(const scene_values *v, const char *path, ebpo_scene *sce
     pair_print p = { .v = v, .scene = scene };
     (void)path;
     json_begin(&p.j, stdout);
-    if (v->json)
-        json_array(&p.j, NULL);
+    if (v->json) {
+        json_object(&p.j, NULL);
+        json_array(&p.j, "pairs");
+    }
     ebpo_status status = ebpo_scene_pairs(scene, v->from, v->to, print_pairs, &p, error);
     if (v->json)
         json_finish(&p.j);

@@ -24,36 +24,6 @@ typedef struct subset_values {
 
 extern const char *const profile_words[];
 
-/* Rows for the tables of options of a command whose values are a subset_values. */
-#define SUBSET_OPTIONS                                                                             \
-    OPTION_TEXT("levels", 0, subset_values, levels, "0-N",                                         \
-                "keep only levels 0 to N, and no mesh unless --parts or --profile asks for it"),   \
-        OPTION_TEXT("box", 0, subset_values, box, "X0,Y0,Z0,X1,Y1,Z1",                             \
-                    "keep only what meets this box"),                                              \
-        OPTION_TEXT("parts", 0, subset_values, parts, "LIST",                                      \
-                    "keep these parts: mesh, maps, envelopes, leaf-planes; with a minus sign "     \
-                    "before each: all but these"),                                                 \
-        OPTION_WORD("profile", 0, subset_values, profile, "NAME", profile_words,                   \
-                    "full: all parts; lod: envelopes, leaf-planes, for viewers; collision: mesh, " \
-                    "envelopes, for exact questions"),                                             \
-        OPTION_WORD("codec", 0, subset_values, codec, "NAME", codec_words,                         \
-                    "zstd, deflate or none; default: that of the input"),                          \
-        OPTION_INT("zstd-level", 0, subset_values, zstd_level, "N", 1, 22,                         \
-                   "effort of zstd, 1 to 22; default 3, 5 where it pays"),                         \
-        SUBTREE_OPTION(subset_values, subtree_faces),                                              \
-        FACE_CODING_OPTION(subset_values, face_coding), OPTION_THREADS(subset_values, threads),    \
-        OPTION_FLAG("json", 0, subset_values, json, "print the facts of the result as JSON"),      \
-        OPTION_QUIET(subset_values, quiet), REMOTE_OPTIONS(subset_values, remote)
-
-/* The same for choosing by need, which takes the whole model: `ebpo subset` only. */
-#define NEED_OPTIONS(type)                                                                    \
-    OPTION_REAL("max-error", 0, type, max_error, "E", 0, 1.7976931348623157e308,              \
-                "refine only where envelopes may reach more than E beyond the model (in its " \
-                "unit); what is left out is certainly closer"),                               \
-        OPTION_TEXT("target-size", 0, type, target_size, "S",                                 \
-                    "at most this many bytes (5M, 512KiB), with the smallest --max-error "    \
-                    "for which they suffice; which parts are kept is chosen too, unless given")
-
 /* The two, read; the exit code. */
 int subset_need(const char *name, double max_error, const char *target_size,
                 ebpo_subset_options *out);

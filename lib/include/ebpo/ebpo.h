@@ -20,6 +20,7 @@
  *   view.h        nodes in the order of an observer
  *   subtree.h     a part of a model as plain arrays: nodes, envelopes, faces
  *   lod.h         a level as closed polygons
+ *   map.h         maps of distance: planes, grids, two scans
  *   export.h      levels and the mesh in other programs' formats
  *   subset.h      a smaller file from a file
  *   verify.h      proving that a file keeps its promises
@@ -51,6 +52,7 @@
 #include <ebpo/subtree.h>
 #include <ebpo/lod.h>
 #include <ebpo/export.h>
+#include <ebpo/map.h>
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 #include <ebpo/deviation.h>

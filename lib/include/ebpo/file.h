@@ -453,8 +453,7 @@ typedef struct ebpo_source {
      * Fills `data` with `size` bytes from `offset` on, all of which lie within the
      * source, or fails.
      *
-     * While a file is being opened, libhdf5 calls it: it must then neither use
-     * libhdf5 nor open another file.
+     * It may be called from any thread that uses the file.
      */
     ebpo_status (*read)(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
 
@@ -488,19 +487,61 @@ typedef struct ebpo_file ebpo_file;
 
 /*
  * Opens a file by its path or URL (http.h), and reads its head only: the facts,
- * and where each chunk of each array lies. libhdf5 is used for that and for nothing
- * later: everything else is read straight from the source.
+ * and where each chunk of each array lies. libhdf5 has no part in it, nor in anything
+ * that is read later, and nothing that it could load has.
  *
  * Safe on untrusted files. A file that another program shortens or changes while it
- * is open gives EBPO_E_IO or EBPO_E_FORMAT, never wrong data (with the codecs, which
- * have checksums).
+ * is open gives EBPO_E_IO or EBPO_E_FORMAT, never wrong data. Where chunks have no
+ * checksums (`h5repack -f NONE`) all of the file is read, and content_sha256 compared,
+ * before it is open.
  *
  * EBPO_E_IO. EBPO_E_FORMAT: not such a file, or damaged. EBPO_E_VERSION: another
- * major version, or a part that this library does not know. EBPO_E_MEMORY.
+ * major version, or a part that this library does not know. EBPO_E_UNSUPPORTED: a
+ * file that another program, such as h5repack, has laid out in a way that this
+ * library does not write. EBPO_E_MEMORY.
  *
  * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error);
+
+/* How ebpo_open_compat goes about it; 0 and NULL: as usual. */
+typedef struct ebpo_compat_options {
+    size_t struct_size; /* EBPO_COMPAT_OPTIONS_INIT sets it */
+
+    /* Bytes that the other process may take, beyond those that this one has; 0: 1 GiB. */
+    uint64_t memory_bytes;
+
+    /* Seconds of processor time that it may take; 0: 60. */
+    unsigned seconds;
+
+    /* For checking the content; 0: all cores. */
+    unsigned threads;
+
+    /* Of a URL: http.h. NULL: as usual. */
+    const struct ebpo_http_options *http;
+} ebpo_compat_options;
+
+#define EBPO_COMPAT_OPTIONS_INIT EBPO_SIZED(ebpo_compat_options)
+
+/*
+ * ebpo_open, and what it refuses with EBPO_E_UNSUPPORTED is read through libhdf5: in
+ * a process of its own with limits on memory, time and what it writes, and without
+ * plugins. That process writes the chunks as they are into a file without a name in
+ * TMPDIR, as large as the original; a URL is fetched there as a whole before. The
+ * copy is opened as every other file, and its content checksum compared. That does
+ * not count attributes, such as the root's box, and such files have no checksums for
+ * their heads: ebpo_verify finds what is wrong there. ebpo_info tells the copy's bytes.
+ *
+ * The errors of ebpo_open. EBPO_E_FORMAT: libhdf5 refused the file or died of it, or
+ * its content is not what the head says. EBPO_E_IO: no process or no file could be
+ * made. EBPO_E_UNSUPPORTED: this library was built without libhdf5.
+ *
+ * Threads: any. The process is copied (fork) while it runs; handlers for SIGCHLD
+ * that take children which are not theirs make the result EBPO_E_FORMAT.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_compat(const char *path,
+                                                    const ebpo_compat_options *options,
+                                                    ebpo_file **out, ebpo_error *error);
 
 /*
  * The same from bytes in memory, which stay the caller's and must stay as long as

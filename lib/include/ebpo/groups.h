@@ -41,13 +41,12 @@ typedef struct ebpo_mesh_group {
 #define EBPO_MESH_GROUP_INIT EBPO_SIZED(ebpo_mesh_group)
 
 /*
- * Reads a mesh as ebpo_mesh_read does, and its groups. An OBJ file is read twice.
+ * Reads a mesh as ebpo_mesh_read does, and its groups.
  *
  * groups   freed by ebpo_mesh_groups_free; NULL where the file has no names or is
  *          no OBJ file, and on failure
  *
- * As ebpo_mesh_read; EBPO_E_UNSUPPORTED also where assimp does not say which faces
- * are in which group. On failure `out` is cleared.
+ * Errors are those of ebpo_mesh_read. On failure `out` is cleared.
  *
  * Threads: any.
  */

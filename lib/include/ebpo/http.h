@@ -90,7 +90,10 @@ typedef struct ebpo_http_options {
     /* NULL: libebpo/VERSION. */
     const char *user_agent;
 
-    /* "Name: value", NULL at the end, sent with every request; or NULL. */
+    /*
+     * "Name: value", NULL at the end, sent with every request; or NULL. Not to another
+     * host, port or scheme to which a redirect leads, nor to any behind it.
+     */
     const char *const *headers;
 
     /*

@@ -7,8 +7,8 @@
  *   build
  *   Checking   ebpo_mesh_check
  *   Order      ebpo_mesh_arrange
- *   Mending    ebpo_mesh_weld, ebpo_mesh_orient, ebpo_mesh_flip,
- *              ebpo_mesh_fill_holes
+ *   Mending    ebpo_mesh_weld, ebpo_mesh_drop_duplicates, ebpo_mesh_orient,
+ *              ebpo_mesh_flip, ebpo_mesh_fill_holes
  *   Parts      ebpo_components_new, ebpo_components_count, ebpo_components_get,
  *              ebpo_components_mesh, ebpo_components_free
  */
@@ -78,7 +78,10 @@ typedef struct ebpo_mesh {
     /* "ply-ascii", "ply-le", "ply-be", "obj", "stl", "off" or "". */
     char source_format[16];
 
-    /* Set by ebpo_mesh_arrange. NULL: in the source's order. */
+    /*
+     * Set by ebpo_mesh_arrange and ebpo_mesh_drop_duplicates: which vertices and faces
+     * of the source these are. NULL: they are those of the source, in its order.
+     */
     struct ebpo_arrangement *arrangement;
 
     /*
@@ -109,6 +112,16 @@ EBPO_API void ebpo_mesh_free(ebpo_mesh *mesh);
  * Threads: any, while nobody changes the mesh.
  */
 EBPO_API const char *ebpo_mesh_attributes_lost(const ebpo_mesh *mesh);
+
+/*
+ * What reading the mesh itself left out or did not find, in words: values that a
+ * PLY's header does not describe, texture coordinates that faces of an OBJ file name
+ * and that are not there. Also where no attributes were asked for. NULL: nothing.
+ * Lives as long as the mesh.
+ *
+ * Threads: any, while nobody changes the mesh.
+ */
+EBPO_API const char *ebpo_mesh_unread(const ebpo_mesh *mesh);
 
 /*
  * 1: the mesh has attributes, or comments of a PLY; 0: it has none, though some may
@@ -153,18 +166,20 @@ typedef struct ebpo_mesh_read_options {
     }
 
 /*
- * Reads a mesh: PLY always; OBJ, STL and OFF if the library was built with assimp.
- * The format is recognised by the file's first bytes, then by its name.
+ * Reads a mesh: PLY, OBJ, STL or OFF. The format is recognised by the file's first
+ * bytes, then by its name, then, as OBJ, by its first word.
  *
- * Polygons are triangulated, concave ones correctly. Strips are unrolled. PLY
- * positions keep every bit, and text is rounded correctly. assimp gives single
- * precision, and for text now and then a neighbour of the nearest float.
+ * Polygons are triangulated, concave ones correctly. Strips are unrolled. Positions
+ * keep every bit, and text is rounded correctly: of PLY to the type that its header
+ * says, of the other formats to float. In these, vertices of one position are one,
+ * and those that no face names are left out. ebpo_mesh_unread tells what could not
+ * be read.
  *
- * PLY is safe on untrusted files.
+ * Safe on untrusted files.
  *
  * EBPO_E_IO, EBPO_E_MEMORY, EBPO_E_CANCELLED. EBPO_E_FORMAT: no mesh, or a damaged
- * one. EBPO_E_LIMIT: too large. EBPO_E_UNSUPPORTED: it takes assimp, or assimp
- * cannot read it. On failure `out` is cleared.
+ * one. EBPO_E_LIMIT: too large. EBPO_E_UNSUPPORTED: a dialect that is not read, such
+ * as binary OFF. On failure `out` is cleared.
  *
  * Threads: any.
  */
@@ -335,7 +350,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned t
 /* What mending has done. It is recorded in the file. */
 typedef struct ebpo_mend_record {
     /* What was asked for. */
-    bool weld, orient, fill_holes;
+    bool weld, orient, fill_holes, drop_duplicates;
 
     /* Vertices removed because an earlier one has their position. */
     uint64_t welded_vertices;
@@ -352,10 +367,16 @@ typedef struct ebpo_mend_record {
 
     /* Chains of boundary edges that are no simple loops. */
     uint64_t unfilled_holes;
+
+    /* Faces removed because an earlier one has their vertices. */
+    uint64_t dropped_faces;
+
+    /* Of these, those that looked the other way than the one that stays. */
+    uint64_t dropped_opposite;
 } ebpo_mend_record;
 
 /*
- * The four functions below add their counts to `record`, which begins with zeros
+ * The five functions below add their counts to `record`, which begins with zeros
  * and may be NULL. They use all cores, and the result does not depend on how many.
  *
  * EBPO_E_FORMAT: a face names a vertex that is not there. EBPO_E_LIMIT: more than
@@ -371,6 +392,28 @@ typedef struct ebpo_mend_record {
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record,
                                                   ebpo_error *error);
+
+/*
+ * Removes faces that repeat another one: of all faces of the same three distinct
+ * vertices, in any rotation and orientation, the first of the source stays. Those
+ * are the ones that are counted in `repeated_faces`. The order is kept, and faces
+ * keep their numbers in the source.
+ *
+ * Of two faces of one orientation the second one counts winding numbers and volume
+ * twice; of two that look opposite ways, as the sides of a sheet and walls between
+ * solids do, they cancel, so that a mesh may balance with both and not with one.
+ * Whether it is better off is for ebpo_mesh_check to tell, and ebpo_mesh_try_repairs
+ * tries it; `dropped_opposite` counts such.
+ *
+ * Attributes of faces stay as they are: by numbers of the source.
+ *
+ * EBPO_E_ARGUMENT: a component (ebpo_components_mesh) with repeated faces.
+ *
+ * Threads: one per mesh.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh,
+                                                             ebpo_mend_record *record,
+                                                             ebpo_error *error);
 
 /*
  * Makes neighbouring faces agree, component by component, across edges that are
@@ -419,9 +462,9 @@ typedef struct ebpo_prepare_options {
     size_t struct_size; /* EBPO_PREPARE_OPTIONS_INIT sets it */
 
     /*
-     * ebpo_mesh_weld, ebpo_mesh_orient, ebpo_mesh_flip, ebpo_mesh_fill_holes, in
-     * this order; where holes were filled, closed components are oriented once more.
-     * STL is always welded, as its faces share no vertices.
+     * ebpo_mesh_weld, ebpo_mesh_drop_duplicates, ebpo_mesh_orient, ebpo_mesh_flip,
+     * ebpo_mesh_fill_holes, in this order; where holes were filled, closed components are oriented
+     * once more. STL is always welded, as its faces share no vertices.
      */
     bool weld;
     bool orient;
@@ -434,11 +477,14 @@ typedef struct ebpo_prepare_options {
 
     /* 1: ebpo_mesh_flip too. */
     uint64_t flip;
+
+    /* 1: ebpo_mesh_drop_duplicates too. */
+    uint64_t drop_duplicates;
 } ebpo_prepare_options;
 
-#define EBPO_PREPARE_OPTIONS_INIT                                               \
-    {                                                                           \
-        sizeof(ebpo_prepare_options), false, false, false, 0, { NULL, NULL }, 0 \
+#define EBPO_PREPARE_OPTIONS_INIT                                                  \
+    {                                                                              \
+        sizeof(ebpo_prepare_options), false, false, false, 0, { NULL, NULL }, 0, 0 \
     }
 
 typedef struct ebpo_prepared {
@@ -547,8 +593,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_components_get(const ebpo_components *co
 /*
  * One of them as a mesh, which keeps the numbers of the source: reports and files
  * made of it tell those of the whole. It is in the whole mesh's workspace. Mend
- * the whole mesh before: ebpo_mesh_weld and ebpo_mesh_fill_holes refuse a
- * component in which they have something to do.
+ * the whole mesh before: ebpo_mesh_weld, ebpo_mesh_drop_duplicates
+ * and ebpo_mesh_fill_holes refuse a component in which they have something to do.
  *
  * out   freed by ebpo_mesh_free. On failure it is cleared.
  *

@@ -857,6 +857,13 @@ typedef struct ebpo_mass {
 
     /* About the centroid, for density 1. */
     double inertia[3][3];
+
+    /*
+     * The same in a unit of 2^exponent of the model's, in which the model is about
+     * 1 long: for models so large or so small that what is above is infinite or 0.
+     */
+    double scaled_area, scaled_volume, scaled_inertia[3][3];
+    int64_t exponent;
 } ebpo_mass;
 
 #define EBPO_MASS_INIT EBPO_SIZED(ebpo_mass)

@@ -48,7 +48,7 @@ typedef enum ebpo_doubt {
 EBPO_API uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
                                    const ebpo_mend_record *record);
 
-#define EBPO_REPAIR_TRIES 6
+#define EBPO_REPAIR_TRIES 12
 
 /* One sequence of steps: which, is what `record` says was asked for. */
 typedef struct ebpo_repair_try {
@@ -58,7 +58,7 @@ typedef struct ebpo_repair_try {
     /* ebpo_doubt. */
     uint32_t doubts;
 
-    /* Bits: 1 welded, 2 oriented, 4 holes filled. */
+    /* Bits: 1 welded, 2 oriented, 4 holes filled, 32 repeated faces dropped. */
     uint32_t steps;
 } ebpo_repair_try;
 
@@ -69,7 +69,10 @@ typedef struct ebpo_repairs {
     uint64_t count;
     ebpo_repair_try tries[EBPO_REPAIR_TRIES];
 
-    /* The one after which no doubts were left, or -1. It is the last one then. */
+    /*
+     * The one after which no doubts were left, or -1. It is the last one then. -1 also
+     * where there were none before.
+     */
     int64_t chosen;
 } ebpo_repairs;
 
@@ -77,9 +80,10 @@ typedef struct ebpo_repairs {
 
 /*
  * Tries on a copy of the mesh, without its attributes and in its workspace, what
- * ebpo_mesh_weld, ebpo_mesh_orient and ebpo_mesh_fill_holes, in this order, would
- * leave; sequences that cannot help are left out. Where nothing is to be repaired
- * nothing is tried.
+ * ebpo_mesh_weld, ebpo_mesh_drop_duplicates, ebpo_mesh_orient and
+ * ebpo_mesh_fill_holes, in this order, would leave; sequences that cannot help are
+ * left out. Where nothing is to be repaired nothing is tried, but for what dropping
+ * repeated faces would leave.
  *
  * report    of the mesh as it is (ebpo_mesh_check, ebpo_mesh_prepare)
  * threads   0: all cores. The result does not depend on it.

@@ -20,8 +20,9 @@ extern "C" {
  * rows           [*count][most] doubles. Freed by free(). On failure NULL.
  *
  * EBPO_E_IO: the file cannot be read. EBPO_E_FORMAT: it is no HDF5 file, has no such dataset, or
- * one of another shape or type. EBPO_E_ARGUMENT, EBPO_E_MEMORY. libhdf5 reads the file: do not give
- * it files of strangers.
+ * one of another shape or type. EBPO_E_ARGUMENT, EBPO_E_MEMORY. EBPO_E_UNSUPPORTED: this library
+ * was built without libhdf5. That reads the file in a process of its own, with limits on memory and
+ * time and without plugins; rows come by a file without a name in TMPDIR.
  *
  * Threads: any.
  */

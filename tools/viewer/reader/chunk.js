@@ -72,6 +72,8 @@ export function zstdFrameFault(data, size) {
     return "the zstd frame does not state the chunk's size";
   if (!(descriptor & 4))
     return 'the zstd frame has no checksum';
+  if (descriptor & 16) // which zstd does not look at, and no checksum covers
+    return "the unused bit of the zstd frame's descriptor is set";
   at += contentBytes;
   for (let last = 0; !last;) {
     if (at + 3 > data.length)

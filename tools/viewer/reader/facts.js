@@ -141,6 +141,7 @@ export function readFacts(attributes) {
     out[name] = facts.count(name, 1) === 1;
   for (const name of COUNTS)
     out[name] = facts.count(name);
+  out.mend_dropped_faces = facts.has('mend_dropped_faces') ? facts.count('mend_dropped_faces') : 0;
   for (const name of HINTS)
     out[name] = facts.hint(name);
   for (const name of NUMBERS)
@@ -248,7 +249,10 @@ export function checkFacts(info) {
     throw mesh('face_count or vertex_count is 0 or beyond 2^32 - 2');
   if ([info.source_vertex_count, info.source_face_count, info.mend_added_faces].some((n) => n > MESH_MAX))
     throw mesh('a count of the source is beyond 2^32 - 2');
-  if (info.vertex_count > info.source_vertex_count || info.face_count > info.source_face_count + info.mend_added_faces)
+  if (info.mend_dropped_faces > info.source_face_count)
+    throw mesh('more faces were dropped than the source has');
+  if (info.vertex_count > info.source_vertex_count
+    || info.face_count > info.source_face_count + info.mend_added_faces - info.mend_dropped_faces)
     throw mesh('the mesh has more vertices or faces than its source and the mending account for');
   if (info.parts.has('maps') && !info.parts.has('mesh'))
     throw mesh('there are maps but no mesh');

@@ -30,6 +30,8 @@ export async function openEbpo(what, options = {}) {
   try {
     const file = new EbpoFile(source, options);
     await file.openHead(options.headBytes ?? HEAD_BYTES);
+    if (file.arrays.get('/levels/00/types').pipeline === 'bare') // chunks without checksums: only that of all content tells of damage
+      await file.verifyContent();
     return file;
   } catch (error) {
     throw named(source, error);
@@ -110,7 +112,7 @@ export class EbpoFile {
         continue;
       arrays.set(wanted.path, describe(hdf5, wanted, links.has(name), links.get(name), info));
     }
-    if (info.parts.has('attributes'))
+    if (info.parts.has('attributes') && arrays.get('/levels/00/types').pipeline !== 'bare') // else their checksum would have to be compared
       this.colours = this.#findColours(hdf5, group('/attributes', root.links.get('attributes')), info, arrays);
     for (const array of arrays.values())
       if (array.pipeline !== arrays.get('/levels/00/types').pipeline)

@@ -1,0 +1,49 @@
+/* How many bytes of a file its arrays take. */
+#include "container/stored_sizes.h"
+
+#include "base/error.h"
+
+static uint64_t level_bytes(const ebpo_file *file, int level, bool located)
+{
+    uint64_t bytes = 0;
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
+        const ebpo_array_in *a = &file->level_array[level][id];
+        if (located || (a->present && ebpo_shape_chunks(&a->shape) == 1))
+            bytes += a->stored_bytes;
+    }
+    return bytes;
+}
+
+/* Another thread may be locating the chunks: until then only those count that opening tells. */
+uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
+{
+    return level_bytes(file, level, atomic_load(&file->located));
+}
+
+/* Of the arrays whose chunks are known. */
+ebpo_stored_sizes ebpo_reader_sizes(const ebpo_file *file)
+{
+    ebpo_stored_sizes sizes = { .map_bytes = 0 };
+    for (int level = 0; level < file->info.level_count; level++)
+        sizes.level_bytes[level] = level_bytes(file, level, true);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        *(uint64_t *)(void *)((char *)&sizes + ebpo_schema[id].bytes) +=
+            file->root_array[id].stored_bytes;
+    for (int i = 0; i < file->attributes.arrays; i++)
+        sizes.attribute_bytes += file->attributes.array[i].stored_bytes;
+    return sizes;
+}
+
+ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_stored_sizes sizes = ebpo_reader_sizes(file);
+    uint64_t stored = sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes +
+                      sizes.subtree_bytes + sizes.attribute_bytes;
+    for (int level = 0; level < file->info.level_count; level++)
+        stored += sizes.level_bytes[level];
+    if (stored > file->info.file_bytes)
+        return ebpo_fail_file(
+            error, EBPO_E_FORMAT, file->in.shown,
+            "the arrays' chunks take more room than the file has; get a fresh copy of the file");
+    return EBPO_OK;
+}

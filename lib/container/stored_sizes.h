@@ -1,0 +1,11 @@
+/* How many bytes of a file its arrays take. */
+#ifndef EBPO_CONTAINER_STORED_SIZES_H
+#define EBPO_CONTAINER_STORED_SIZES_H
+
+#include "container/file_in.h"
+
+/* Of the arrays whose chunks are known; and whether these fit the file. */
+ebpo_stored_sizes ebpo_reader_sizes(const ebpo_file *file);
+EBPO_MUST_USE ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error);
+
+#endif

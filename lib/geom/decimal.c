@@ -1,0 +1,195 @@
+/* Three ways, each exact where it applies, tried in order of cost: 1. Digits below 2^53 times or
+ * over a power of ten up to 10^22: both are doubles, so one operation rounds once (Clinger, "How to
+ * read floating point numbers accurately", 1990). That double also decides the float, unless it
+ * lies exactly between two floats (then rounding twice may err). 2. Up to 19 digits over a power of
+ * ten up to 10^27: a 128-bit quotient with its remainder, rounded by hand. 3. The C library. */
+#include "geom/strict_fp.h"
+
+#include "geom/decimal.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+__extension__ typedef unsigned __int128 wide;
+
+typedef struct decimal {
+    uint64_t digits;
+    int32_t exponent; /* value = digits * 10^exponent */
+    bool negative;
+    bool short_form; /* no more than 19 digits: nothing was cut off */
+} decimal;
+
+static const double tens[] = { 1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                               1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                               1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22 };
+
+static bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+static bool scan_exponent(decimal *d, const char *s, const char *end)
+{
+    bool negative = s < end && *s == '-';
+    if (s < end && (*s == '-' || *s == '+'))
+        s++;
+    if (s == end)
+        return false;
+    int32_t e = 0;
+    for (; s < end && is_digit(*s); s++)
+        e = e < 100000 ? e * 10 + (*s - '0') : e;
+    d->exponent += negative ? -e : e;
+    return s == end;
+}
+
+static bool scan(decimal *d, const char *s, const char *end)
+{
+    *d = (decimal){ .short_form = true };
+    d->negative = s < end && *s == '-';
+    if (s < end && (*s == '-' || *s == '+'))
+        s++;
+    bool point = false;
+    int significant = 0;
+    size_t seen = 0;
+    for (; s < end && (is_digit(*s) || (*s == '.' && !point)); s++) {
+        if (*s == '.') {
+            point = true;
+            continue;
+        }
+        seen++;
+        d->exponent -= point;
+        if (significant == 19) {
+            d->short_form = false;
+            continue;
+        }
+        d->digits = d->digits * 10 + (uint64_t)(*s - '0');
+        significant += d->digits != 0;
+    }
+    if (!seen)
+        return false;
+    return s == end || ((*s == 'e' || *s == 'E') && scan_exponent(d, s + 1, end));
+}
+
+static bool scan_word(double *out, const char *s, size_t n)
+{
+    bool negative = n && *s == '-';
+    if (n && (*s == '-' || *s == '+')) {
+        s++;
+        n--;
+    }
+    double value;
+    if (n == 3 && strncasecmp(s, "nan", 3) == 0)
+        value = NAN;
+    else if ((n == 3 && strncasecmp(s, "inf", 3) == 0) ||
+             (n == 8 && strncasecmp(s, "infinity", 8) == 0))
+        value = INFINITY;
+    else
+        return false;
+    *out = negative ? -value : value;
+    return true;
+}
+
+static bool one_operation(double *out, const decimal *d)
+{
+    if (!d->short_form || d->digits > (UINT64_C(1) << 53) || d->exponent < -22 || d->exponent > 22)
+        return false;
+    *out = d->exponent < 0 ? (double)d->digits / tens[-d->exponent]
+                           : (double)d->digits * tens[d->exponent];
+    return true;
+}
+
+/* digits / 10^e to `bits` bits. The quotient has at least 65 bits, so what rounding needs to know
+ * is the bits below and the remainder. */
+static bool long_quotient(double *out, const decimal *d, int bits)
+{
+    if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)
+        return false;
+    int e = -d->exponent;
+    uint64_t five = 1;
+    for (int i = 0; i < e; i++)
+        five *= 5;
+    int lift = __builtin_clzll(d->digits);
+    wide n = (wide)(d->digits << lift) << 64;
+    wide q = n / five;
+    bool rest = q * five != n;
+    int length = 128 - __builtin_clzll((uint64_t)(q >> 64));
+    int shift = length - bits;
+    uint64_t kept = (uint64_t)(q >> shift);
+    wide below = q & (((wide)1 << shift) - 1), half = (wide)1 << (shift - 1);
+    if (below > half || (below == half && (rest || (kept & 1))))
+        kept++;
+    *out = ldexp((double)kept, shift - 64 - lift - e);
+    return true;
+}
+
+/* Between two floats, exactly: of the 29 bits that a float lacks, only the first is set. */
+static bool is_float_tie(double value)
+{
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return (bits & UINT64_C(0x1fffffff)) == UINT64_C(0x10000000);
+}
+
+static void copy_token(char buffer[EBPO_NUMBER_LONGEST + 1], const char *s, size_t n)
+{
+    memcpy(buffer, s, n);
+    buffer[n] = 0;
+}
+
+bool ebpo_number_float(float *out, const char *s, size_t n, locale_t c_locale)
+{
+    decimal d;
+    double value;
+    if (n > EBPO_NUMBER_LONGEST)
+        return false;
+    if (!scan(&d, s, s + n)) {
+        bool word = scan_word(&value, s, n);
+        *out = word ? (float)value : 0;
+        return word;
+    }
+    /* Both short ways stay between 1e-27 and 1e38, where floats have all their bits. */
+    if ((one_operation(&value, &d) && !is_float_tie(value)) || long_quotient(&value, &d, 24)) {
+        *out = (float)(d.negative ? -value : value);
+        return true;
+    }
+    char buffer[EBPO_NUMBER_LONGEST + 1];
+    copy_token(buffer, s, n);
+    *out = strtof_l(buffer, NULL, c_locale);
+    return true;
+}
+
+bool ebpo_number_double(double *out, const char *s, size_t n, locale_t c_locale)
+{
+    decimal d;
+    double value;
+    if (n > EBPO_NUMBER_LONGEST)
+        return false;
+    if (!scan(&d, s, s + n))
+        return scan_word(out, s, n);
+    if (one_operation(&value, &d) || long_quotient(&value, &d, 53)) {
+        *out = d.negative ? -value : value;
+        return true;
+    }
+    char buffer[EBPO_NUMBER_LONGEST + 1];
+    copy_token(buffer, s, n);
+    *out = strtod_l(buffer, NULL, c_locale);
+    return true;
+}
+
+bool ebpo_number_integer(int64_t *out, const char *s, size_t n)
+{
+    bool negative = n && *s == '-';
+    if (n && (*s == '-' || *s == '+')) {
+        s++;
+        n--;
+    }
+    if (n == 0 || n > 18)
+        return false;
+    int64_t value = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (!is_digit(s[i]))
+            return false;
+        value = value * 10 + (s[i] - '0');
+    }
+    *out = negative ? -value : value;
+    return true;
+}

@@ -1,0 +1,20 @@
+/* Decimal text to float and double, correctly rounded in any locale. */
+#ifndef EBPO_GEOM_DECIMAL_H
+#define EBPO_GEOM_DECIMAL_H
+
+#include <ebpo/base.h>
+#include <locale.h>
+
+/* s[0 .. n) must be one number and nothing else: [+-] digits [. digits] [e [+-] digits], or nan,
+ * inf, infinity in any case. Hexadecimal is refused. The result is the nearest float (double), ties
+ * to even; beyond the range it is infinite. False: not a number, or longer than
+ * EBPO_NUMBER_LONGEST. `c_locale`: from newlocale(LC_ALL_MASK, "C", 0); used for the few numbers
+ * that the exact short ways do not decide. */
+bool ebpo_number_float(float *out, const char *s, size_t n, locale_t c_locale);
+bool ebpo_number_double(double *out, const char *s, size_t n, locale_t c_locale);
+enum { EBPO_NUMBER_LONGEST = 1200 };
+
+/* [+-] digits, within int64. */
+bool ebpo_number_integer(int64_t *out, const char *s, size_t n);
+
+#endif

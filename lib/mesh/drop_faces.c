@@ -1,0 +1,154 @@
+/* Faces that repeat another one are removed. */
+#include "geom/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/arrays.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/parallel.h"
+#include "mesh/same_faces.h"
+
+enum { GRAIN = 1 << 13, WORD = 64 };
+
+typedef struct dropping {
+    ebpo_mesh *mesh;
+    ebpo_stars stars;
+    ebpo_same_faces *scratch; /* one for each worker */
+    unsigned threads;
+    uint64_t *gone; /* bit f: face f goes */
+    uint64_t count, opposite;
+} dropping;
+
+static bool goes(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
+
+/* From its lowest vertex the face runs to the lesser of the two others. */
+static bool runs_up(const uint32_t face[3])
+{
+    int low = face[0] < face[1] ? (face[0] < face[2] ? 0 : 2) : (face[1] < face[2] ? 1 : 2);
+    return face[(low + 1) % 3] < face[(low + 2) % 3];
+}
+
+static void note_repeated(dropping *d, const ebpo_same_faces *same)
+{
+    const uint32_t *faces = d->mesh->faces;
+    uint64_t count = 0, opposite = 0, first = 0;
+    for (uint64_t i = 1; i < same->count; i++) {
+        if (!ebpo_same_faces_repeats(same, i)) {
+            first = i;
+            continue;
+        }
+        uint64_t f = same->item[i].face, stays = same->item[first].face;
+        __atomic_fetch_or(&d->gone[f / WORD], UINT64_C(1) << f % WORD, __ATOMIC_RELAXED);
+        opposite += runs_up(faces + 3 * f) != runs_up(faces + 3 * stays);
+        count++;
+    }
+    if (count) {
+        __atomic_fetch_add(&d->count, count, __ATOMIC_RELAXED);
+        __atomic_fetch_add(&d->opposite, opposite, __ATOMIC_RELAXED);
+    }
+}
+
+static ebpo_status find_repeated(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
+{
+    dropping *d = context;
+    EBPO_FOR_ITEMS_SCATTERED(d->mesh->workspace, v, begin, end) {
+        uint64_t degree = ebpo_stars_degree(&d->stars, (uint32_t)v);
+        if (!ebpo_same_faces_gather(&d->scratch[worker], &d->stars, d->mesh, (uint32_t)v))
+            return ebpo_workspace_fail(d->mesh->workspace, degree * sizeof(ebpo_same_face), error);
+        note_repeated(d, &d->scratch[worker]);
+    }
+    return EBPO_OK;
+}
+
+/* A mesh in the source's order: its numbers, to be kept from now on. */
+static ebpo_status keep_numbers(ebpo_mesh *mesh, ebpo_error *error)
+{
+    if (mesh->arrangement)
+        return EBPO_OK;
+    ebpo_workspace *workspace = mesh->workspace;
+    struct ebpo_arrangement *a = ebpo_alloc_zero(1, sizeof *a);
+    if (!a)
+        return ebpo_fail_memory(error, sizeof *a);
+    a->workspace = workspace;
+    a->level = -1;
+    a->vertex_source = ebpo_array_alloc(workspace, mesh->vertex_count, sizeof *a->vertex_source);
+    a->face_source = ebpo_array_alloc(workspace, mesh->face_count, sizeof *a->face_source);
+    if (!a->vertex_source || !a->face_source) {
+        ebpo_arrangement_free(a);
+        return ebpo_workspace_fail(workspace, (mesh->vertex_count + mesh->face_count) * 4, error);
+    }
+    EBPO_FOR_ITEMS(workspace, i, 0, mesh->vertex_count)
+        a->vertex_source[i] = (uint32_t)i;
+    EBPO_FOR_ITEMS(workspace, i, 0, mesh->face_count)
+        a->face_source[i] = (uint32_t)i;
+    mesh->arrangement = a;
+    return EBPO_OK;
+}
+
+/* In the order in which they are: what is sorted stays so, and every vertex keeps a face. */
+static void close_ranks(const dropping *d)
+{
+    ebpo_mesh *mesh = d->mesh;
+    uint64_t to = 0;
+    EBPO_FOR_ITEMS(mesh->workspace, f, 0, mesh->face_count) {
+        if (goes(d, f))
+            continue;
+        if (to != f) {
+            memcpy(mesh->faces + 3 * to, mesh->faces + 3 * f, 3 * sizeof *mesh->faces);
+            mesh->arrangement->face_source[to] = mesh->arrangement->face_source[f];
+        }
+        to++;
+    }
+    mesh->arrangement->dropped_faces += d->count;
+    mesh->face_count = to;
+}
+
+static ebpo_status run(dropping *d, ebpo_error *error)
+{
+    ebpo_mesh *mesh = d->mesh;
+    uint64_t words = mesh->face_count / WORD + 1;
+    d->scratch = ebpo_alloc_zero(d->threads, sizeof *d->scratch);
+    if (!d->scratch)
+        return ebpo_fail_memory(error, d->threads * sizeof *d->scratch);
+    ebpo_status status = ebpo_stars_build(&d->stars, mesh, d->threads, NULL, error);
+    if (status != EBPO_OK)
+        return status;
+    d->gone = ebpo_array_zero(mesh->workspace, words, sizeof *d->gone);
+    if (!d->gone)
+        return ebpo_workspace_fail(mesh->workspace, words * sizeof *d->gone, error);
+    status = ebpo_parallel_for(d->threads, mesh->workspace, mesh->vertex_count, GRAIN,
+                               find_repeated, d, NULL, "", error);
+    if (status != EBPO_OK || d->count == 0)
+        return status;
+    status = ebpo_mesh_check_whole(mesh, error);
+    if (status == EBPO_OK)
+        status = keep_numbers(mesh, error);
+    if (status == EBPO_OK)
+        close_ranks(d);
+    return status;
+}
+
+ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    dropping d = { .mesh = mesh, .threads = ebpo_thread_count(0) };
+    ebpo_status status = ebpo_mesh_check_shape(mesh, error);
+    if (status != EBPO_OK)
+        return status;
+    status = run(&d, error);
+    if (status == EBPO_OK && record) {
+        record->drop_duplicates = true;
+        record->dropped_faces += d.count;
+        record->dropped_opposite += d.opposite;
+    }
+    ebpo_stars_free(&d.stars);
+    ebpo_array_free(mesh->workspace, d.gone);
+    for (unsigned t = 0; d.scratch && t < d.threads; t++)
+        ebpo_same_faces_free(&d.scratch[t]);
+    free(d.scratch);
+    return status;
+}

@@ -1,0 +1,124 @@
+#include "geom/strict_fp.h"
+
+#include "mesh/point_tree.h"
+
+#include "base/arrays.h"
+
+enum { LEAF = 8 };
+
+mesh_point *ebpo_point_tree_add(point_tree *tree)
+{
+    if (!ebpo_array_grow_late(tree->workspace, &tree->point, &tree->capacity, tree->count + 1,
+                              sizeof *tree->point))
+        return NULL;
+    return &tree->point[tree->count++];
+}
+
+void ebpo_point_tree_free(point_tree *tree)
+{
+    ebpo_array_free(tree->workspace, tree->point);
+    ebpo_array_free(tree->workspace, tree->node);
+}
+
+static point_box box_of(const mesh_point *p, uint64_t count)
+{
+    point_box box;
+    for (int k = 0; k < 3; k++)
+        box.min[k] = box.max[k] = p[0].at[k];
+    for (uint64_t i = 1; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            box.min[k] = p[i].at[k] < box.min[k] ? p[i].at[k] : box.min[k];
+            box.max[k] = p[i].at[k] > box.max[k] ? p[i].at[k] : box.max[k];
+        }
+    return box;
+}
+
+/* Halves, as their difference may be beyond the doubles. */
+static int longest_axis(const point_box *box)
+{
+    int best = 0;
+    double most = -1;
+    for (int k = 0; k < 3; k++) {
+        double length = box->max[k] / 2 - box->min[k] / 2;
+        if (length > most)
+            best = k, most = length;
+    }
+    return best;
+}
+
+static void swap(mesh_point *a, mesh_point *b)
+{
+    mesh_point t = *a;
+    *a = *b;
+    *b = t;
+}
+
+/* What is before p[middle] is not greater along the axis, what is behind it not less (Hoare). */
+static void split(mesh_point *p, uint64_t count, uint64_t middle, int axis)
+{
+    uint64_t low = 0, high = count - 1;
+    while (low < high) {
+        double pivot = p[low + (high - low) / 2].at[axis];
+        uint64_t i = low, j = high;
+        for (;;) {
+            while (p[i].at[axis] < pivot)
+                i++;
+            while (p[j].at[axis] > pivot)
+                j--;
+            if (i >= j)
+                break;
+            swap(&p[i++], &p[j--]);
+        }
+        if (middle <= j)
+            high = j;
+        else
+            low = j + 1;
+    }
+}
+
+static void build(const point_tree *tree, uint64_t node, mesh_point *p, uint64_t count)
+{
+    tree->node[node] = box_of(p, count);
+    if (count <= LEAF)
+        return;
+    split(p, count, count / 2, longest_axis(&tree->node[node]));
+    build(tree, 2 * node + 1, p, count / 2);
+    build(tree, 2 * node + 2, p + count / 2, count - count / 2);
+}
+
+bool ebpo_point_tree_build(point_tree *tree)
+{
+    uint64_t nodes = 1;
+    for (uint64_t most = tree->count; most > LEAF; most -= most / 2)
+        nodes = 2 * nodes + 1;
+    if (tree->count == 0)
+        return true;
+    if (!ebpo_array_grow_late(tree->workspace, &tree->node, &tree->node_capacity, nodes,
+                              sizeof *tree->node))
+        return false;
+    build(tree, 0, tree->point, tree->count);
+    return true;
+}
+
+typedef struct walking {
+    const point_tree *tree;
+    point_box_fn wanted;
+    points_fn visit;
+    void *user;
+} walking;
+
+static bool walk(const walking *w, uint64_t node, mesh_point *p, uint64_t count)
+{
+    if (!w->wanted(w->user, &w->tree->node[node]))
+        return true;
+    if (count <= LEAF)
+        return w->visit(w->user, p, count);
+    return walk(w, 2 * node + 1, p, count / 2) &&
+           walk(w, 2 * node + 2, p + count / 2, count - count / 2);
+}
+
+bool ebpo_point_tree_walk(const point_tree *tree, point_box_fn wanted, points_fn visit, void *user)
+{
+    walking w = { tree, wanted, visit, user };
+    return tree->count == 0 || walk(&w, 0, tree->point, tree->count);
+}

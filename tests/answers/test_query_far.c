@@ -1,0 +1,197 @@
+/* Points far from a model, in all directions and as far as doubles go, against brute force in
+ * rational arithmetic: the same exact answers, wherever the model is held. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "check_main.h"
+#include "query_kit.h"
+
+/* Curved ones; flat sides that face far points, of many faces; faces that are there twice; models
+ * of the least and of the greatest doubles. */
+static const struct {
+    const char *name;
+    int variant;
+} cases[] = {
+    { "sphere", 5 },
+    { "torus", 0 },
+    { "boxes_in_walls", 0 },
+    { "blob", 2 },
+    { "giant_and_dust", 0 },
+    { "tiny", 0 },
+    { "denormal", 0 },
+    { "least", 0 },
+    { "huge", 0 },
+    { "small", 3 },
+    { "far_away_float", 0 },
+    { "nested_windings", 1 },
+    { "tetrahedra_at_random", 3 },
+};
+enum { CASES = sizeof cases / sizeof *cases, KINDS = 7, POINTS = 200 };
+
+/* From 1.6 box sizes away, where the other search still answers, to the greatest doubles. */
+static double magnitude(const query_model *m, uint64_t *state)
+{
+    double least = log2(m->size) + 1, most = 1022;
+    if (ebpo_test_random(state) % 4 == 0) /* near the end of the other search */
+        most = fmin(least + 8, most);
+    least = fmin(least, 1021);
+    return exp2(least + (most - least) * ebpo_test_random_unit(state));
+}
+
+static double either(uint64_t *state) { return 2 * ebpo_test_random_unit(state) - 1; }
+
+static void middle_of(const query_model *m, double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = m->info.box_origin[k] + m->info.box_size[k] / 2;
+}
+
+static void far_point(const query_model *m, uint64_t *state, double p[3])
+{
+    uint64_t face = ebpo_test_random(state) % m->mesh.face_count;
+    double away = magnitude(m, state), to[3] = { 0, 0, 0 };
+    int axis = (int)(ebpo_test_random(state) % 3);
+    middle_of(m, p);
+    switch (ebpo_test_random(state) % KINDS) {
+    case 0: /* along an axis, above some place of the box */
+        to[axis] = either(state) < 0 ? -1 : 1;
+        for (int k = 0; k < 3; k++)
+            p[k] += k == axis ? 0 : m->info.box_size[k] * either(state) / 2;
+        break;
+    case 1: /* along an axis, above a vertex */
+        to[axis] = either(state) < 0 ? -1 : 1;
+        ebpo_test_point(&m->mesh, m->mesh.faces[3 * face], p);
+        break;
+    case 2: /* along a face's normal */
+        memcpy(to, m->normal[face], sizeof to);
+        ebpo_test_point(&m->mesh, m->mesh.faces[3 * face], p);
+        break;
+    case 3: /* along a diagonal of the space or of a side */
+        for (int k = 0; k < 3; k++)
+            to[k] = (double)(ebpo_test_random(state) % 3) - 1;
+        break;
+    case 4: /* coordinates of all sizes */
+        for (int k = 0; k < 3; k++)
+            to[k] = either(state) * magnitude(m, state) / away;
+        break;
+    default:
+        for (int k = 0; k < 3; k++)
+            to[k] = either(state);
+    }
+    for (int k = 0; k < 3; k++) {
+        p[k] += to[k] * away;
+        p[k] = p[k] > 0x1p1023 ? 0x1p1023 : p[k] < -0x1p1023 ? -0x1p1023 : p[k];
+    }
+}
+
+typedef struct asked {
+    query_model m;
+    uint64_t count;
+    double *points;
+    query_truth *truth;
+    ebpo_distance_result *got;
+} asked;
+
+static void begin(asked *a, int i)
+{
+    uint64_t state = (uint64_t)i + 7;
+    query_model_make(&a->m, cases[i].name, query_solid_by_name(cases[i].name),
+                     &query_variants[cases[i].variant]);
+    a->count = query_scaled(POINTS);
+    a->points = query_room(a->count, 3 * sizeof *a->points);
+    a->truth = query_room(a->count, sizeof *a->truth);
+    a->got = query_room(a->count, sizeof *a->got);
+    for (uint64_t k = 0; k < a->count; k++)
+        far_point(&a->m, &state, a->points + 3 * k);
+    query_find_truths(&a->m, a->points, a->count, a->truth);
+}
+
+static void end(asked *a)
+{
+    query_model_free(&a->m);
+    free(a->points);
+    free(a->truth);
+    free(a->got);
+}
+
+static void ask(asked *a, ebpo_context *c, const char *how)
+{
+    ASSERT_OK(ebpo_distance_many(c, a->points, a->count, NULL, a->got, error));
+    ck_assert_msg(query_wrong_distance(&a->m, a->points, a->truth, a->count, false, a->got) == 0,
+                  "%s, %s", a->m.name, how);
+}
+
+START_TEST(far_points_have_the_same_exact_answers_however_a_model_is_held)
+{
+    asked a;
+    begin(&a, _i);
+    ask(&a, a.m.context, "whole");
+    for (int cut = 0; cut < 3 && cut < a.m.info.level_count; cut++) {
+        ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+        ebpo_model *model = NULL;
+        ebpo_context *context = NULL;
+        how.loading = cut % 2 ? EBPO_LOAD_NODES : EBPO_LOAD_CACHE;
+        how.cut_level = cut;
+        ASSERT_OK(ebpo_model_new(a.m.file, &how, &model, error));
+        ASSERT_OK(ebpo_context_new(model, &context, error));
+        ask(&a, context, "in parts");
+        ask(&a, context, "in parts, once more"); /* with what was kept of subtrees */
+        ebpo_context_free(context);
+        ebpo_model_free(model);
+    }
+    end(&a);
+}
+END_TEST
+
+START_TEST(limits_of_far_points_are_exact)
+{
+    asked a;
+    begin(&a, _i);
+    for (uint64_t k = 0; k < a.count; k++) {
+        const double *p = a.points + 3 * k;
+        double d = a.truth[k].distance;
+        ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
+        ebpo_distance_result got;
+        if (isinf(d) || d == 0)
+            continue;
+        o.max_distance = nextafter(d, INFINITY);
+        ASSERT_OK(ebpo_distance(a.m.context, p, &o, &got, error));
+        ck_assert_msg(fabs(got.distance) == d, "%s: %a of %a", a.m.name, got.distance, d);
+        o.max_distance = nextafter(d, 0);
+        ASSERT_OK(ebpo_distance(a.m.context, p, &o, &got, error));
+        ck_assert_msg(isinf(got.distance), "%s: %a, beyond %a", a.m.name, got.distance,
+                      o.max_distance);
+    }
+    end(&a);
+}
+END_TEST
+
+START_TEST(levels_and_deadlines_bound_far_points)
+{
+    asked a;
+    begin(&a, _i);
+    for (int level = -1; level < a.m.info.level_count; level += 2) {
+        ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
+        o.level = level;
+        o.deadline_ns = level < 0 ? 1 : 0;
+        ASSERT_OK(ebpo_distance_many(a.m.context, a.points, a.count, &o, a.got, error));
+        ck_assert_msg(query_wrong_limited_distance(&a.m, a.points, a.truth, a.count, a.got) == 0,
+                      "%s, level %d", a.m.name, level);
+    }
+    end(&a);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("query_far");
+    TCase *tests = tcase_create("far");
+    tcase_set_timeout(tests, 600);
+    tcase_add_loop_test(tests, far_points_have_the_same_exact_answers_however_a_model_is_held, 0,
+                        CASES);
+    tcase_add_loop_test(tests, limits_of_far_points_are_exact, 0, CASES);
+    tcase_add_loop_test(tests, levels_and_deadlines_bound_far_points, 0, CASES);
+    suite_add_tcase(suite, tests);
+    return suite;
+}

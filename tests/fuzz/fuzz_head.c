@@ -1,0 +1,80 @@
+/* Any bytes as the head of a file: every object, attribute and array that the format has is asked
+ * for. Refused or read, and what is read keeps its promises. Tests build it twice: as it is, and
+ * with a reader that does not compare checksums (base/sums.h). */
+#include "fuzz_kit.h"
+
+#include "container/schema.h"
+#include "head/head.h"
+
+static void ask_attributes(ebpo_head *head, ebpo_head_object object)
+{
+    static const char *const names[] = { "format", "level_count", "box_min",   "coding",
+                                         "unit",   "epsilon",     "file_bytes" };
+    char text[64];
+    int64_t number;
+    uint64_t count;
+    double real[6];
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        if (ebpo_head_get_text(head, object, "/", names[i], text, sizeof text, NULL) == EBPO_OK)
+            fuzz_must(strlen(text) < sizeof text);
+        (void)!ebpo_head_get_int(head, object, "/", names[i], &number, NULL);
+        (void)!ebpo_head_get_count(head, object, "/", names[i], &count, NULL);
+        (void)!ebpo_head_get_real(head, object, "/", names[i], real, 0, NULL);
+        (void)!ebpo_head_get_real(head, object, "/", names[i], real, i % 2 ? 3 : 6, NULL);
+    }
+}
+
+static void ask_array(ebpo_head *head, const char *path, ebpo_head_rows rows)
+{
+    ebpo_shape shape;
+    ebpo_chunk_place *places;
+    uint64_t stored, sum = 0;
+    char coding[EBPO_HEAD_CODING_BYTES];
+    if (ebpo_head_read_array(head, path, UINT64_MAX, rows, &shape, coding, &places, &stored,
+                             NULL) != EBPO_OK)
+        return;
+    for (uint64_t i = 0; i < ebpo_shape_chunks(&shape); i++) {
+        sum += places[i].bytes;
+        fuzz_must(places[i].bytes > 0 && places[i].address <= head->file_bytes &&
+                  places[i].bytes <= head->file_bytes - places[i].address);
+    }
+    fuzz_must(sum == stored && stored <= head->file_bytes);
+    free(places);
+}
+
+static void ask_all(ebpo_head *head)
+{
+    char path[EBPO_PATH_BYTES];
+    static const char *const groups[] = { "/",     "/levels", "/levels/00", "/levels/01",
+                                          "/mesh", "/maps",   "/subtrees",  "/attributes" };
+    ebpo_head_object object;
+    for (size_t i = 0; i < sizeof groups / sizeof groups[0]; i++)
+        if (ebpo_head_open_group(head, groups[i], &object, NULL) == EBPO_OK)
+            ask_attributes(head, object);
+    for (int level = 0; level < 3; level++)
+        for (int id = level ? 0 : EBPO_LEVEL_ARRAYS; id < (level ? EBPO_LEVEL_ARRAYS : EBPO_ARRAYS);
+             id++) {
+            ebpo_schema_path((ebpo_array_id)id, level ? level - 1 : 0, path);
+            ask_array(head, path, (ebpo_head_rows)(id % 3));
+            if (ebpo_head_open_array(head, path, &object, NULL) == EBPO_OK)
+                ask_attributes(head, object);
+        }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    uint8_t *own = fuzz_copy(data, size);
+    ebpo_input input;
+    ebpo_head head = EBPO_HEAD_INIT;
+    ebpo_source source = ebpo_source_of_memory(own, size);
+    if (ebpo_input_open(&input, &source, "fuzz", NULL) != EBPO_OK)
+        exit(2);
+    ebpo_status status = ebpo_head_open(&head, &input, NULL);
+    if (status == EBPO_OK)
+        ask_all(&head);
+    fuzz_must(ebpo_head_close(&head, EBPO_OK, NULL) ==
+              EBPO_OK); /* memory does not fail to be read */
+    ebpo_input_close(&input);
+    free(own);
+    return 0;
+}

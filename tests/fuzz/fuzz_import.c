@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: MIT
+ * Any bytes as an OBJ, STL or OFF file, and as a material library. A mesh that comes out is whole.
+ *
+ * Input: a byte for the format, the file. */
+#include "fuzz_kit.h"
+
+#include <ebpo/mesh.h>
+
+#include "import/import.h"
+#include "input/texture_names.h"
+
+static void check(const ebpo_mesh *mesh)
+{
+    fuzz_must(mesh->face_count && !mesh->xyz32 != !mesh->xyz64);
+    for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
+        fuzz_must(mesh->faces[i] < mesh->vertex_count);
+}
+
+static void take_library(void *user, const char *rest, size_t size)
+{
+    *(size_t *)user += size && rest[size - 1];
+}
+
+static void names(const uint8_t *data, size_t size)
+{
+    ebpo_texture_names of = { .count = 0 };
+    size_t libraries = 0;
+    ebpo_texture_names_of_mtl(&of, data, size);
+    ebpo_texture_names_of_ply(&of, (const char *)data, size);
+    ebpo_obj_libraries(data, size, take_library, &libraries);
+    for (uint64_t i = 0; i < of.count; i++)
+        fuzz_must(of.of[i].name && *of.of[i].name);
+    ebpo_texture_names_free(&of);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static const char *const endings[] = { "fuzz.obj", "fuzz.stl", "fuzz.off" };
+    ebpo_import_format format;
+    ebpo_mesh mesh;
+    ebpo_obj_runs runs;
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (size < 1)
+        return 0;
+    uint8_t what = *data++;
+    const char *name = endings[what % 3];
+    uint8_t *file = fuzz_copy(data, --size);
+    if (what & 4)
+        names(file, size);
+    else if (what & 8) {
+        if (ebpo_import_groups(&mesh, file, size, name, NULL, true, &runs, &error) == EBPO_OK) {
+            check(&mesh);
+            ebpo_obj_runs_free(&runs);
+            ebpo_mesh_free(&mesh);
+        }
+    } else if (ebpo_import_recognise(&format, file, size, name)) {
+        ebpo_status status =
+            ebpo_import_memory(&mesh, format, file, size, name, NULL, what & 16, &error);
+        fuzz_must(status == EBPO_OK || (error.status == status && error.message[0]));
+        if (status == EBPO_OK) {
+            check(&mesh);
+            ebpo_mesh_free(&mesh);
+        }
+    }
+    free(file);
+    return 0;
+}

@@ -1,0 +1,142 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Seeds of the fuzz targets that are not files of others: make_seeds.py FOLDER.
+
+Each is small, and leads into a branch that random bytes do not find soon. The bytes before them are
+what the targets' first lines say."""
+import pathlib
+import struct
+import sys
+import zlib
+
+folder = pathlib.Path(sys.argv[1])
+
+
+def put(target, name, data):
+    (folder / target).mkdir(parents=True, exist_ok=True)
+    (folder / target / name).write_bytes(data)
+
+
+def fletcher32(data):
+    low = high = 0
+    for i in range(0, len(data), 2):
+        low = (low + (data[i] << 8 | (data[i + 1] if i + 1 < len(data) else 0))) % 65535 or 65535
+        high = (high + low) % 65535 or 65535
+    return struct.pack("<I", high << 16 | low)
+
+
+# --- chunks: pipeline, width, direction; rows; bytes ---
+raw = bytes(i * 7 % 251 for i in range(48))
+packed = zlib.compress(raw)
+frames = {  # of the 48 bytes; by the zstd command with --check and the content's size
+    "zstd_raw": bytes.fromhex("28b52ffd2430810100") + raw + bytes.fromhex("00000000"),
+    "zstd_rle": bytes.fromhex("28b52ffd2430830100") + b"\x07" + bytes.fromhex("00000000"),
+}
+for width in range(4):
+    rows = struct.pack("<H", 48 >> width)
+    for name, frame in frames.items():
+        put("chunk", f"{name}_{1 << width}", bytes([width << 2]) + rows + frame)
+    put("chunk", f"deflate_{1 << width}", bytes([1 | width << 2]) + rows + packed + fletcher32(packed))
+    put("chunk", f"checksum_{1 << width}", bytes([2 | width << 2]) + rows + raw + fletcher32(raw))
+    put("chunk", f"bare_{1 << width}", bytes([3 | width << 2]) + rows + raw)
+    put("chunk", f"made_{1 << width}", bytes([16 | width << 2]) + rows + raw)
+
+# --- codings: which, kind ---
+numbers = b"".join(struct.pack("<I", v) for v in (0, 1, 2, 2, 5, 0xfffffffe, 0x80000000, 3, 0, 4, 1, 6))
+for coding in range(7):
+    for kind in (0, 1, 5, 7, 0x13, 0x1f, 0x2e):
+        put("codings", f"{coding}_{kind:02x}", bytes([coding, kind]) + numbers)
+fan = b"".join(struct.pack("<III", *face) for face in
+               ((0, 0, 0), (3, 1, 0), (4, 1, 0), (5, 1, 0), (5, 1, 4), (2, 1, 0), (0, 0, 0)))
+put("codings", "corners_fan", bytes([4, 0]) + fan)
+put("codings", "gates_fan", bytes([5, 0]) + fan)
+put("codings", "gates_late_fan", bytes([5, 9]) + fan)
+
+# --- answers: flags, where from; lines ---
+lines = {
+    "part": b"HTTP/1.1 206 Partial Content\r\nContent-Range: bytes 0-99/100000\r\nContent-Length: 100\r\n"
+            b"ETag: \"tag\"\r\nLast-Modified: Mon, 23 Nov 2026 09:00:00 GMT\r\n\r\n",
+    "whole": b"HTTP/1.1 200 OK\r\nContent-Length: 100000\r\nETag: \"tag\"\r\n\r\n",
+    "chunked": b"HTTP/1.1 200 OK\r\nTransfer-Encoding: gzip, chunked\r\n\r\n",
+    "http2": b"HTTP/2 200 \r\netag: W/\"x\"\r\n\r\n",
+    "encoded": b"HTTP/1.1 200 OK\r\nContent-Encoding: gzip\r\nContent-Length: 9\r\n\r\n",
+    "identity": b"HTTP/1.1 206 \r\nContent-Encoding: identity\r\nContent-Range: bytes 0-0/1\r\n\r\n",
+    "gone": b"HTTP/1.1 416 Range Not Satisfiable\r\nContent-Range: bytes */1234\r\n\r\n",
+    "redirect": b"HTTP/1.1 301 Moved\r\nLocation: /x\r\n\r\nHTTP/1.1 206 Partial\r\n"
+                b"Content-Range: bytes 0-9/*\r\n\r\n",
+    "later": b"HTTP/1.1 503 Busy\r\nRetry-After: 1\r\n\r\n",
+    "absent": b"HTTP/1.1 404 Not Found\r\n\r\n",
+    "denied": b"HTTP/1.1 401 Unauthorized\r\n\r\n",
+    "two_ranges": b"HTTP/1.1 206 \r\nContent-Range: bytes 0-9/100\r\nContent-Range: bytes 0-8/100\r\n\r\n",
+    "long_tag": b"HTTP/1.1 206 \r\nETag: \"" + b"a" * 250 + b"\"\r\n\r\n",
+    "huge": b"HTTP/1.1 206 \r\nContent-Range: bytes 0-9/99999999999999999999\r\n\r\n",
+    "url": b"https://user:pass@word@example.org/a/b?key=1#x",
+}
+for name, text in lines.items():
+    put("answer", name, bytes([0, 0, 0]) + text)
+    put("answer", name + "_pinned", bytes([1, 0, 0]) + text)
+    put("answer", name + "_many", bytes([255, 0, 0]) + text)
+
+# --- points: kind and flags; the file ---
+doubles = struct.pack("<14d", 0, 1, 2, .5, -1, 1e300, 3, 4, 5, 6, 7, 8, 9, 10)
+head = b"{'descr': '<f8', 'fortran_order': False, 'shape': (2, 6), }"
+npy = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head) + 1) + head + b"\n" + doubles[:96]
+flat = b"{'descr': '>f4', 'fortran_order': False, 'shape': (3,), }\n"
+files = {
+    "text": b"0 1 2\n0.25 -3e-5 +7 # said\n\n1,2,3\n0x1p3 inf 1\n1e400 2 3\n1\t2\t3\r\n",
+    "six": b"0 0 0 1 0 0\n0 0 0 1 1 1 0.5\n",
+    "names": b"id,x,y,z\n1,2,3,4\n2,3,4,5\n",
+    "quoted": b"\"x\";\"y\";\"z\"\n1;2;3\n",
+    "direction": b"ox oy oz dx dy dz tmax\n0 0 0 1 0 0 9\n",
+    "corners": b"x0\ty0\tz0\tx1\ty1\tz1\n0\t0\t0\t1\t1\t1\n",
+    "npy": npy, "npy_flat": b"\x93NUMPY\x02\x00" + struct.pack("<I", len(flat)) + flat + doubles[:12],
+    "raw": doubles, "short": b"\x93NUMPY", "cut": doubles[:41],
+    "ply": b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+           b"property float z\nend_header\n0 0 0\n1 2 3\n",
+}
+for name, data in files.items():
+    for flags in (0, 1, 2, 4, 5, 6, 8, 9, 10, 16):
+        put("points", f"{name}_{flags:02x}", bytes([flags]) + data)
+
+# --- arguments: command or value; the text ---
+command_lines = [
+    b"in.ply\nout.ebpo.h5\n--max-level\n9\n--selection\nkmedoids\n-q", b"a.ply\n--json", b"a.h5\n--json\n-h",
+    b"a.h5", b"a.h5\nview.json\n--camera=1,2,3", b"a.h5\no.ply\n--level=3\n--no-walls",
+    b"a.h5\no.vtkhdf\n--levels\n0-3", b"a.h5\nb.h5\n--box\n0,0,0,1,1,1\n--levels\n0-3",
+    b"a.h5\nb.h5\n--codec\ndeflate", b"http://x/a.h5\nb.h5\n--box=0,0,0,1,1,1", b"a.h5\n--level\n2",
+    b"a.h5\no.png\n--width\n640", b"a.h5\n--source\na.ply\n--memory\n64M",
+    b"a.h5\n-\n--mode\nnodes-plain\n--deadline=5us", b"a.h5\np.npy\n--unsigned\n--nearest\n3",
+    b"a.h5\n--any\n--raw", b"a.h5\n--csv\n--header", b"a.h5\n--points\n1000", b"a.ply\no.html",
+    b"report\ns.scene.json", b"A-B\na.h5\nb.h5\n--pose\nB:1 2 3", b"a.h5\nb.h5\n--distance"]
+for i, text in enumerate(command_lines):
+    put("args", f"command_{i:02}", bytes([i]) + text)
+values = {
+    0: [b"64M", b"1GiB", b"0.5G", b"18446744073709551615", b"16Ei", b"1.5k"],
+    1: [b"3", b"0-5", b"3-", b"0,2,4", b"20", b"0-20,3"],
+    2: [b"1 2 3", b"1,2,3 0 0 0 1 2", b"1 0 0 5 0 1 0 6 0 0 1 7", b"1 0 0 5 0 1 0 6 0 0 1 7 0.5"],
+    3: [b"A", b"A - (B | C)", b"A&B*C^D+E", b"((((A))))", b"A - "],
+    4: [b"none", b"1024", b"0"], 5: [b"500ns", b"50us", b"1ms", b"2s"], 6: [b"2G", b"1"],
+    7: [b"500", b"1%", b"100%", b"1e9"],
+    8: [b"0.1", b"-1e-320", b"inf", b"nan", b"0x1.8p3", b"9007199254740993", b"1e400"]}
+for kind, texts in values.items():
+    for i, text in enumerate(texts):
+        put("args", f"value_{kind}_{i}", bytes([22 + kind + (9 * 9 if kind == 3 and i else 0)]) + text)
+
+# --- meshes of others: format and flags; the file ---
+obj = (b"mtllib a.mtl\no first\nv 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvn 0 0 1\nusemtl red\ns 1\n"
+       b"f 1 3 2\ng second\nf 1/1/1 2/1/1 4/1/1\nf -4//1 -1//1 -2//1\nf 2 3 4\n")
+mtl = b"newmtl red\nKd 1 0 0\nmap_Kd -s 1 1 1 folder/red.png\nmap_Bump -bm 0.3 b.jpg\n"
+off = b"OFF\n# a comment\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3 0.5 0.5 0.5\n"
+stl = b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid x\n"
+faces = ((0, 0, 0, 0, 1, 0, 1, 0, 0), (0, 0, 0, 1, 0, 0, 0, 0, 1), (0, 0, 0, 0, 0, 1, 0, 1, 0), (1, 0, 0, 0, 1, 0, 0, 0, 1))
+binary = b"COLOR=\x80\x40\x20\xff".ljust(80, b"\0") + struct.pack("<I", 4) + b"".join(
+    struct.pack("<12fH", 0, 0, 0, *face, 0x8000 | i * 99) for i, face in enumerate(faces))
+for flags in (0, 16):
+    put("import", f"obj_{flags}", bytes([flags]) + obj)
+    put("import", f"stl_{flags}", bytes([1 | flags]) + stl)
+    put("import", f"stl_binary_{flags}", bytes([1 | flags]) + binary)
+    put("import", f"off_{flags}", bytes([(18 if flags else 2)]) + off)
+    put("import", f"coff_{flags}", bytes([(18 if flags else 2)]) + b"C" + off.replace(b"0 0 0\n", b"0 0 0 9 9 9 255\n"))
+put("import", "groups", bytes([24]) + obj)
+put("import", "mtl", bytes([4]) + mtl)
+put("import", "ply_names", bytes([4]) + b"ply\ncomment TextureFile a b.png\ncomment TextureFile ../x.png\nend_header\n")

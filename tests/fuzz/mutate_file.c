@@ -1,0 +1,267 @@
+/* SPDX-License-Identifier: MIT
+ * The mutator of targets whose input is a whole file: numbers in an array's chunk, which is encoded
+ * again in its place; or the tree, which is read, changed and written anew, in another layout
+ * perhaps. What random bytes would only damage reaches the code behind the checks that way. */
+#include "fuzz_kit.h"
+#include "mutate.h"
+
+#include <ebpo/file.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#include "codec/chunk.h"
+#include "container/file_in.h"
+#include "read_by.h"
+
+size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned seed);
+size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t most);
+
+static ebpo_file *open_bytes(const uint8_t *data, size_t size)
+{
+    ebpo_file *file = NULL;
+    if (ebpo_open_memory(data, size, "mutated", &file, NULL) != EBPO_OK)
+        return NULL;
+    if (ebpo_file_locate(file, NULL, NULL) == EBPO_OK)
+        return file;
+    ebpo_close(file);
+    return NULL;
+}
+
+/* --- a chunk's numbers --- */
+
+static const ebpo_array_in *some_array(const ebpo_file *file, uint64_t *state)
+{
+    for (int tries = 0; tries < 40; tries++) {
+        const ebpo_array_in *a = NULL;
+        unsigned which = fuzz_below(state, 8);
+        if (which < 5)
+            a = &file->level_array[fuzz_below(state, (uint32_t)file->info.level_count)]
+                                  [fuzz_below(state, EBPO_LEVEL_ARRAYS)];
+        else if (which < 7)
+            a = &file->root_array[fuzz_below(state, EBPO_ARRAYS)];
+        else if (file->attributes.arrays > 0)
+            a = &file->attributes.array[fuzz_below(state, (uint32_t)file->attributes.arrays)];
+        if (a && a->present && a->chunks)
+            return a;
+    }
+    return NULL;
+}
+
+static void change_number(uint8_t *raw, size_t count, size_t width, uint64_t *state)
+{
+    uint64_t value = 0, other = 0;
+    uint8_t *at = raw + fuzz_below(state, (uint32_t)count) * width;
+    memcpy(&value, at, width);
+    memcpy(&other, raw + fuzz_below(state, (uint32_t)count) * width, width);
+    switch (fuzz_below(state, 8)) {
+    case 0: value++; break;
+    case 1: value--; break;
+    case 2: value = other; break;
+    case 3: value = 0; break;
+    case 4: value = ~UINT64_C(0) >> fuzz_below(state, 64); break;
+    case 5: value ^= UINT64_C(1) << fuzz_below(state, (uint32_t)(8 * width)); break;
+    case 6: value += other; break;
+    default: value = fuzz_next(state); break;
+    }
+    memcpy(at, &value, width);
+}
+
+/* Where chunks are not compressed, their bytes stay as many. */
+static bool change_chunk(uint8_t *data, size_t size, uint64_t *state)
+{
+    static ebpo_chunk_coder coder;
+    static uint8_t raw[EBPO_CHUNK_BYTES_MAX], again[2 * EBPO_CHUNK_BYTES_MAX];
+    const char *why;
+    size_t stored;
+    bool changed = false;
+    ebpo_file *file = open_bytes(data, size);
+    const ebpo_array_in *a = file ? some_array(file, state) : NULL;
+    if (a) {
+        uint64_t chunks =
+            a->shape.rows / a->shape.chunk_rows + (a->shape.rows % a->shape.chunk_rows != 0);
+        uint32_t chunk = fuzz_below(state, (uint32_t)chunks);
+        size_t at = (size_t)a->chunks[chunk].address, bytes = a->chunks[chunk].bytes,
+               width = a->shape.element_size,
+               plain = a->shape.pipeline == EBPO_PIPELINE_CHECKSUM ? bytes - 4 : bytes;
+        if (a->shape.pipeline >= EBPO_PIPELINE_CHECKSUM && plain <= sizeof raw && plain >= width &&
+            plain % width == 0 &&
+            ebpo_chunk_decode(&coder, a->shape.pipeline, width, data + at, bytes, raw, plain,
+                              &why) == EBPO_OK) {
+            for (uint32_t times = 1 + fuzz_below(state, 3); times > 0; times--)
+                change_number(raw, plain / width, width, state);
+            changed = ebpo_chunk_encode(&coder, a->shape.pipeline, 0, width, raw, plain, again,
+                                        &stored) == EBPO_OK &&
+                      stored == bytes;
+            if (changed)
+                memcpy(data + at, again, bytes);
+        }
+    }
+    ebpo_close(file);
+    return changed;
+}
+
+/* --- a tree --- */
+
+static void change_types(ebpo_level *l, uint64_t *state)
+{
+    uint16_t *types = &l->types[fuzz_below(state, (uint32_t)l->group_count)];
+    uint16_t *other = &l->types[fuzz_below(state, (uint32_t)l->group_count)];
+    unsigned a = 2 * fuzz_below(state, 8), b = 2 * fuzz_below(state, 8), x = *types >> a & 3,
+             y = *other >> b & 3;
+    if (l->group_count == 1 && !(*types >> 2))
+        return; /* the root */
+    *types = (uint16_t)((*types & ~(3u << a)) | y << a);
+    *other = (uint16_t)((*other & ~(3u << b)) | x << b);
+}
+
+static void move_count(uint8_t *counts, uint64_t count, uint64_t *state)
+{
+    uint8_t *a = &counts[fuzz_below(state, (uint32_t)count)],
+            *b = &counts[fuzz_below(state, (uint32_t)count)];
+    if (a != b && *a > 0 && *b < 255) {
+        --*a;
+        ++*b;
+    }
+}
+
+static void change_level(ebpo_level *l, uint64_t *state)
+{
+    uint32_t leaf = l->leaf_count ? fuzz_below(state, (uint32_t)l->leaf_count) : 0;
+    switch (fuzz_below(state, 9)) {
+    case 0:
+        if (l->group_count)
+            change_types(l, state);
+        break;
+    case 1:
+        if (l->planes)
+            change_number((uint8_t *)l->planes, (size_t)l->plane_count, 4, state);
+        break;
+    case 2:
+        if (l->plane_counts)
+            move_count(l->plane_counts, l->gray_count, state);
+        break;
+    case 3:
+        if (l->leaf_refs)
+            change_number((uint8_t *)l->leaf_refs, (size_t)l->ref_count, 4, state);
+        break;
+    case 4:
+        if (l->leaf_winding)
+            change_number((uint8_t *)l->leaf_winding, (size_t)l->leaf_count, 4, state);
+        break;
+    case 5:
+        if (l->leaf_ref_count && leaf && l->leaf_ref_count[leaf]) {
+            l->leaf_ref_count[leaf]--;
+            l->leaf_ref_count[leaf - 1]++;
+        }
+        break;
+    case 6:
+        if (l->leaf_new && leaf && l->leaf_new[leaf]) {
+            l->leaf_new[leaf]--;
+            l->leaf_new[leaf - 1]++;
+            l->leaf_first[leaf]++;
+        }
+        break;
+    case 7:
+        if (l->leaf_planes)
+            change_number((uint8_t *)l->leaf_planes, (size_t)l->leaf_plane_count, 4, state);
+        break;
+    default:
+        if (l->leaf_plane_counts)
+            move_count(l->leaf_plane_counts, l->leaf_count, state);
+    }
+}
+
+static void change_mesh(ebpo_tree *tree, uint64_t *state)
+{
+    ebpo_mesh *m = &tree->mesh;
+    if (m->faces && fuzz_below(state, 2)) {
+        uint32_t *f = m->faces + 3 * (size_t)fuzz_below(state, (uint32_t)m->face_count),
+                 corner = f[0];
+        f[0] = f[1];
+        f[1] = fuzz_below(state, 2) ? f[2] : corner;
+        f[2] = corner;
+    } else if (m->xyz32) {
+        change_number((uint8_t *)m->xyz32, (size_t)(3 * m->vertex_count), 4, state);
+    } else if (m->xyz64) {
+        change_number((uint8_t *)m->xyz64, (size_t)(3 * m->vertex_count), 8, state);
+    }
+}
+
+static void change_facts(ebpo_info *info, uint64_t *state)
+{
+    switch (fuzz_below(state, 5)) {
+    case 0: info->solid = !info->solid; break;
+    case 1: info->rule = (ebpo_rule)fuzz_below(state, 3); break;
+    case 2: info->leaf_faces = (uint32_t)fuzz_next(state); break;
+    case 3: info->box_origin[fuzz_below(state, 3)] *= 2; break;
+    default: info->source_face_count += fuzz_below(state, 3);
+    }
+}
+
+static size_t slurp(const char *path, uint8_t *data, size_t most)
+{
+    FILE *f = fopen(path, "rb");
+    size_t size = f ? fread(data, 1, most, f) : 0;
+    if (f && fgetc(f) != EOF)
+        size = 0; /* it is too long */
+    if (f)
+        fclose(f);
+    return size;
+}
+
+static size_t write_tree(const ebpo_tree *tree, uint8_t *data, size_t most, uint64_t *state)
+{
+    char path[64];
+    ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
+    snprintf(path, sizeof path, "/dev/shm/fuzz_%ld.ebpo.h5", (long)getpid());
+    options.codec = (ebpo_codec)fuzz_below(state, 3);
+    options.threads = 1;
+    options.parts = fuzz_below(state, 4) ? ~0u : (uint32_t)fuzz_next(state);
+    options.subtree_faces = fuzz_below(state, 2) ? EBPO_NO_SUBTREES : 1 + fuzz_below(state, 9);
+    options.face_coding = (ebpo_face_coding)fuzz_below(state, 3);
+    ebpo_status status = ebpo_tree_write(tree, path, &options, NULL);
+    size_t size = status == EBPO_OK ? slurp(path, data, most) : 0;
+    (void)!unlink(path);
+    return size;
+}
+
+/* 0: what came of it is no tree that can be written. */
+static size_t change_tree(uint8_t *data, size_t size, size_t most, uint64_t *state)
+{
+    ebpo_tree tree;
+    size_t made = 0;
+    if (size == 0)
+        return 0;
+    uint8_t *copy = fuzz_copy(data, size);
+    ebpo_file *file = open_bytes(copy, size);
+    if (file && ebpo_file_info(file)->face_count < 100000 &&
+        ebpo_file_read_tree(file, READ_BY(1), &tree, NULL) == EBPO_OK) {
+        for (uint32_t times = fuzz_below(state, 4); times > 0; times--) {
+            uint32_t what = fuzz_below(state, 8);
+            if (what < 5)
+                change_level(&tree.level[fuzz_below(state, (uint32_t)tree.info.level_count)],
+                             state);
+            else if (what < 7)
+                change_mesh(&tree, state);
+            else
+                change_facts(&tree.info, state);
+        }
+        made = write_tree(&tree, data, most, state);
+        ebpo_tree_free(&tree);
+    }
+    if (!made)
+        memcpy(data, copy, size);
+    ebpo_close(file);
+    free(copy);
+    return made;
+}
+
+size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned seed)
+{
+    uint64_t state = seed;
+    uint32_t way = fuzz_below(&state, 8);
+    if (way < 4 && change_chunk(data, size, &state))
+        return size;
+    size_t made = way == 4 ? change_tree(data, size, most, &state) : 0;
+    return made ? made : LLVMFuzzerMutate(data, size, most);
+}

@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+"""The wheel, in an environment with numpy and nothing else: test_wheel.py SOURCE_ROOT BUILD EBPO EBPO_INPUTS
+
+It is packed from the library of this build. Of what that library needs, only what the reading library of
+the real wheel needs goes in; the rest is the system's here. Exit code 77: pip or patchelf is missing.
+"""
+import base64
+import csv
+import hashlib
+import io
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+
+source, build, command, inputs = map(os.path.abspath, sys.argv[1:5])
+sys.path.insert(0, os.path.join(source, "tools/python/backend"))
+sys.dont_write_bytecode = True
+import ebpo_wheel  # noqa: E402
+
+OTHERS = re.compile(r"^(?!lib(zstd|z|gmp|nettle|jansson)\.so)")
+
+ASK = """
+import os, sys
+import numpy as np, ebpo
+here = os.path.dirname(ebpo.__file__)
+assert here.startswith(sys.prefix) and os.path.dirname(ebpo.library()) == here, (here, ebpo.library())
+m = ebpo.open("sphere.ebpo.h5")
+P = np.random.default_rng(1).uniform(-1.2, 1.2, (100000, 3))
+inside = m.inside(P)
+assert 0 < inside.sum() < len(P)
+assert (inside == (m.winding(P) != 0)).all() and (m.distance(P[:999]).distance < 0).tolist() == inside[:999].tolist()
+mapped = open("/proc/self/maps").read()
+for name in ("zstd", "z", "gmp", "nettle", "jansson"):
+    assert f"{here}/lib{name}-" in mapped, name
+print("asked")
+"""
+
+
+def run(*words, **options):
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, **options)
+    if done.returncode:
+        sys.exit(f"FAILED: {' '.join(map(str, words))}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def check_record(path):
+    """Every file is listed with its digest and size, as pip wants it."""
+    with zipfile.ZipFile(path) as archive:
+        names = archive.namelist()
+        record = next(name for name in names if name.endswith("/RECORD"))
+        rows = list(csv.reader(io.StringIO(archive.read(record).decode())))
+        assert [row[0] for row in rows] == names, "RECORD names what is there"
+        for name, digest, size in rows:
+            data = archive.read(name)
+            told = "sha256=" + base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
+            assert name == record or (digest, int(size)) == (told, len(data)), name
+        assert {"ebpo/__init__.py", "ebpo/_declared.py", "ebpo/py.typed", "ebpo/libebpo.so.0"} <= set(names)
+        licences = [name for name in names if "/licenses/" in name]
+        assert len(licences) >= 1 + (len([n for n in names if ".so" in n]) - 1) * bool(shutil.which("dpkg-query"))
+
+
+def main():
+    pip = subprocess.run([sys.executable, "-m", "pip", "--version"], capture_output=True).returncode == 0
+    if not pip or not shutil.which("patchelf"):
+        print("pip or patchelf is not installed (tools/install-deps.sh --tests)")
+        return 77
+    with tempfile.TemporaryDirectory() as name:
+        os.chdir(name)
+        wheel = ebpo_wheel.pack(build, "dist", OTHERS)
+        assert re.fullmatch(r"ebpo-[0-9.]+-py3-none-(manylinux|linux)_\w+\.whl", wheel), wheel
+        check_record(pathlib.Path("dist", wheel))
+        first = pathlib.Path("dist", wheel).read_bytes()
+        ebpo_wheel.pack(build, "again", OTHERS)
+        assert pathlib.Path("again", wheel).read_bytes() == first, "equal inputs give equal bytes"
+        run(sys.executable, "-m", "venv", "--without-pip", "--system-site-packages", "clean")
+        python = pathlib.Path(name, "clean/bin/python")
+        run(sys.executable, "-m", "pip", "--python", python, "install", "--no-index", "--no-deps", f"dist/{wheel}")
+        run(inputs, ".")
+        run(command, "convert", "-q", "sphere.ply", "sphere.ebpo.h5")
+        nothing = {name: value for name, value in os.environ.items() if not name.startswith(("EBPO", "PYTHON", "LD_"))}
+        print(run(python, "-c", ASK, env=dict(nothing, PATH="/usr/bin:/bin")), end="")
+        run(sys.executable, "-m", "pip", "--python", python, "uninstall", "-y", "ebpo")
+        assert not list(pathlib.Path(name).glob("clean/lib/python*/site-packages/ebpo*")), "uninstall leaves nothing"
+    return 0
+
+
+sys.exit(main())

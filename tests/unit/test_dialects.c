@@ -1,0 +1,278 @@
+/* Small files as other programs write them: what is read, with which warning, and what is refused
+ * with which sentence. docs/guide/formats.md says the same in words. */
+#include <stdio.h>
+#include <string.h>
+
+#include <ebpo/mesh.h>
+
+#include "check_main.h"
+#include "scratch.h"
+
+typedef struct dialect {
+    const char *name, *text;
+    size_t bytes;
+    uint64_t vertices, faces; /* 0: it is refused */
+    const char *words;        /* of the error, or of the warning; NULL: there is no warning */
+} dialect;
+
+#define FILE_OF(text) text, sizeof(text) - 1
+
+#define V4   "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+#define F4   "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+#define OFF4 "0 0 0\n1 0 0\n0 1 0\n0 0 1\n"
+#define OFFF "3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"
+#define PLY4                                                                                 \
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty " \
+    "float z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n"
+#define FACET(a, b, c)                                                                            \
+    "facet normal 0 0 0\nouter loop\nvertex " a "\nvertex " b "\nvertex " c "\nendloop\nendfacet" \
+    "\n"
+#define STL4                         \
+    FACET("0 0 0", "0 1 0", "1 0 0") \
+    FACET("0 0 0", "1 0 0", "0 0 1") \
+    FACET("0 0 0", "0 0 1", "0 1 0") FACET("1 0 0", "0 1 0", "0 0 1")
+
+static const dialect dialects[] = {
+    /* OBJ */
+    { "a.obj", FILE_OF(V4 F4), 4, 4, NULL },
+    { "crlf.obj", FILE_OF("v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n"), 3, 1, NULL },
+    { "cr.obj", FILE_OF("v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r"), 3, 1, NULL },
+    { "no_end.obj", FILE_OF("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3"), 3, 1, NULL },
+    { "tabs.obj", FILE_OF("\tv\t0 0\t 0  \n v 1 0 0\t\nv  0  1  0\n\n\nf\t1 2\t3 \t\n"), 3, 1,
+      NULL },
+    { "mark.obj", FILE_OF("\xef\xbb\xbfv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 3, 1, NULL },
+    { "utf16.obj", FILE_OF("\xff\xfev\0 \0"), 0, 0, "(UTF-16); save it as UTF-8" },
+    { "joined.obj", FILE_OF("v 0 \\\n0 0\nv 1 0 0\nv 0 1 0\nf 1 \\\r\n 2 \\ \n3\n"), 3, 1, NULL },
+    { "comments.obj", FILE_OF("# C:\\a\\\nv 0 0 0 # here\nv 1 0 0\nv 0 1 0#\nf 1 2 3 # f 1 2 3\n"),
+      0, 0, "line 4: no number: '0#'" },
+    { "comment.obj", FILE_OF("# C:\\a\\\nv 0 0 0 # here\nv 1 0 0\nv 0 1 0\nf 1 2 3 # f 1 2 3\n"), 3,
+      1, NULL },
+    { "relative.obj", FILE_OF("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 1\nf -4 -1 -3\n"), 4, 2,
+      NULL },
+    { "later.obj", FILE_OF("f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"), 3, 1, NULL },
+    { "back.obj", FILE_OF("v 0 0 0\nf -1 -2 -3\nv 1 0 0\nv 0 1 0\n"), 0, 0,
+      "line 2: a face names vertex -2, but only 1 stand before it" },
+    { "zero.obj", FILE_OF(V4 "f 0 1 2\n"), 0, 0, "line 5: a face names vertex 0" },
+    { "beyond.obj", FILE_OF(V4 "f 1 2 5\n"), 0, 0,
+      "line 5: a face names vertex 5, but there are 4 vertices" },
+    { "far.obj", FILE_OF(V4 "f 1 2 99999999999999999999\n"), 0, 0, "line 5: a face names vertex" },
+    { "word.obj", FILE_OF(V4 "f 1 2 three\n"), 0, 0, "line 5: a face has the corner 'three'" },
+    { "decimal.obj", FILE_OF(V4 "f 1 2 3.0\n"), 0, 0, "line 5: a face has the corner '3.0'" },
+    { "four.obj", FILE_OF(V4 "f 1/1/1/1 2 3\n"), 0, 0, "line 5: a face has the corner '1/1/1/1'" },
+    { "slashes.obj", FILE_OF(V4 "vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1\nf 1/ 2// 4/1/\n"), 4, 2,
+      NULL },
+    { "no_vt.obj", FILE_OF(V4 "f 1/1 2/2 3/3\n"), 3, 1,
+      "texture coordinates that corners of faces name and that are not in the file: 3" },
+    { "no_vn.obj", FILE_OF(V4 "f 1//1 2//-1 3//3\n"), 3, 1,
+      "normals that corners of faces name and that are not in the file: 3" },
+    { "quad.obj", FILE_OF(V4 "f 1 2 3 4\n"), 4, 2, NULL },
+    { "concave.obj", FILE_OF("v 0 0 0\nv 2 0 0\nv 0.5 0.5 0\nv 0 2 0\nf 1 2 3 4\n"), 4, 2, NULL },
+    { "two.obj", FILE_OF(V4 "f 1 2\nf 1 2 3\nf 4\n"), 3, 1, NULL },
+    { "old.obj", FILE_OF(V4 "fo 1 2 3\n"), 3, 1, NULL },
+    { "w.obj", FILE_OF("v 0 0 0 1\nv 2 0 0 2.0\nv 0 1 0 1.0\nf 1 2 3\n"), 3, 1,
+      "weights of vertices, by which coordinates were divided: 1" },
+    { "w0.obj", FILE_OF("v 0 0 0 0\nv 2 0 0 2.0\nv 0 1 0 1.0\nf 1 2 3\n"), 0, 0,
+      "line 1: no number: '0' in vertex 1" },
+    { "five.obj", FILE_OF("v 0 0 0 9 9\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 3, 1,
+      "vertices' values beyond coordinates and colours: 1" },
+    { "alpha.obj", FILE_OF("v 0 0 0 1 1 1 1\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 3, 1, NULL },
+    { "xy.obj", FILE_OF("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n"), 0, 0,
+      "line 1: vertex 1 has no three coordinates" },
+    { "comma.obj", FILE_OF("v 0,5 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 0, 0,
+      "line 1: no number: '0,5' in vertex 1" },
+    { "nan.obj", FILE_OF("v nan 0 -inf\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 3, 1, NULL },
+    { "ind.obj", FILE_OF("v -1.#IND 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 0, 0,
+      "line 1: no number: '-1.#IND' in vertex 1" },
+    { "vn_ind.obj", FILE_OF(V4 "vn -nan(ind) 0 0\nvn 0\nf 1//1 2//1 3//2\n"), 3, 1, NULL },
+    { "names.obj",
+      FILE_OF("mtllib gone.mtl \xc3\xa9.mtl\ng \xe4\xb8\x89\xe8\xa7\x92 \\\no \nusemtl\n" V4 F4), 4,
+      4, NULL },
+    { "one_line_more.obj", FILE_OF("s off\ns 1\ng a b c\n" V4 "l 1 2\np 1 2 3\n" F4), 4, 4,
+      "points, lines, curves and surfaces, which are no faces: 2" },
+    { "curves.obj", FILE_OF(V4 "vp 1 2\ncstype bezier\ndeg 3\ncurv 0 1 1 2 3 4\nend\n"), 0, 0,
+      "has no faces" },
+    { "unknown.obj", FILE_OF(V4 F4 "made by hand\n\x01\x02\n"), 4, 4,
+      "unknown statements: 2, the first in line 9" },
+    { "same.obj", FILE_OF("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 0 0 1\nf 1 2 3\nf 4 3 5\n"), 4, 2,
+      NULL },
+    { "unused.obj", FILE_OF("v 9 9 9\n" V4 "f -1 -2 -3\n"), 3, 1, NULL },
+    { "empty.obj", FILE_OF(""), 0, 0, "has no faces" },
+    { "points.obj", FILE_OF(V4), 0, 0, "has no faces" },
+    { "pairs.obj", FILE_OF(V4 "f 1 2\n"), 0, 0, "none of its faces has three corners" },
+    { "by_its_words", FILE_OF("# of a pipe\n\n" V4 F4), 4, 4, NULL },
+    { "by_no_words", FILE_OF("version 1\n"), 0, 0, "expected PLY, OBJ, STL or OFF" },
+    /* OFF */
+    { "a.off", FILE_OF("OFF\n4 4 6\n" OFF4 OFFF), 4, 4, NULL },
+    { "counts.off", FILE_OF("OFF 4 4 6\n" OFF4 OFFF), 4, 4, NULL },
+    { "lines.off", FILE_OF("OFF\n4\n4\n6\n" OFF4 OFFF), 4, 4, NULL },
+    { "no_edges.off", FILE_OF("OFF\n4 4\n" OFF4 OFFF), 4, 4, NULL },
+    { "no_word.off", FILE_OF("4 4 0\n" OFF4 OFFF), 4, 4, NULL },
+    { "crlf.off", FILE_OF("OFF\r\n3 1 0\r\n0 0 0\r\n1 0 0\r\n0 1 0\r\n3 0 1 2\r\n"), 3, 1, NULL },
+    { "cr.off", FILE_OF("OFF\r3 1 0\r0 0 0\r1 0 0\r0 1 0\r3 0 1 2\r"), 3, 1, NULL },
+    { "comments.off", FILE_OF("# a\nOFF # b\n\n# c\n4 4 6 # d\n" OFF4 "# e\n" OFFF "# f"), 4, 4,
+      NULL },
+    { "one_line.off", FILE_OF("OFF 3 1 0 0 0 0 1 0 0 0 1 0 3 0 1 2"), 3, 1, NULL },
+    { "split.off",
+      FILE_OF("OFF\n4 4 0\n0\n0 0\n1 0 0\n0 1 0\n0 0 1\n3 0\n 2 1\n3\n0\n1\n3\n3 0 3 "
+              "2\n3 1 2 3\n"),
+      4, 4, NULL },
+    { "blank.off", FILE_OF("OFF\n\n4 4 0\n\n0 0 0 \n1 0 0\t\n\n0 1 0\n0 0 1\n\n" OFFF "\n\n"), 4, 4,
+      NULL },
+    { "vertices.coff",
+      FILE_OF("COFF\n3 1 0\n0 0 0 255 0 0 255\n1 0 0 0 255 0 255\n0 1 0 0 0 255 "
+              "255\n3 0 1 2\n"),
+      3, 1, NULL },
+    { "floats.off", FILE_OF("COFF\n3 1 0\n0 0 0 1 0 0\n1 0 0 0 .5 0\n0 1 0 0 0 1\n3 0 1 2\n"), 3, 1,
+      NULL },
+    { "normals.off", FILE_OF("NOFF\n3 1 0\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n3 0 1 2\n"), 3, 1,
+      NULL },
+    { "st.off", FILE_OF("STOFF\n3 1 0\n0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n"), 3, 1, NULL },
+    { "four.off", FILE_OF("4OFF\n3 1 0\n0 0 0 1\n2 0 0 2\n0 1 0 1\n3 0 1 2\n"), 3, 1,
+      "weights of vertices" },
+    { "n.off", FILE_OF("nOFF\n5\n3 1 0\n"), 0, 0, "dimensions of their own (nOFF)" },
+    { "binary.off", FILE_OF("OFF BINARY\n\0\0\0\3"), 0, 0,
+      "is a binary OFF file; save it as text" },
+    { "faces.off", FILE_OF("OFF\n4 2 0\n" OFF4 "3 0 2 1 255 0 0\n3 0 1 3 0.5 0 0 1\n"), 4, 2,
+      NULL },
+    { "table.off", FILE_OF("OFF\n4 2 0\n" OFF4 "3 0 2 1 7\n3 0 1 3\n"), 4, 2, NULL },
+    { "odd.off", FILE_OF("OFF\n3 1 0\n0 0 0 9\n1 0 0 9\n0 1 0 9\n3 0 1 2 8 8\n"), 3, 1,
+      "vertices' values that the file's first word does not say: 3; faces' values that are no "
+      "colours: 1" },
+    { "polygon.off", FILE_OF("OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"), 4, 2, NULL },
+    { "long.off", FILE_OF("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n10 0 1 2 0 1 2 0 1 2 0\n"), 3, 8,
+      NULL },
+    { "more.off", FILE_OF("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 2\n"), 3, 1,
+      "what follows the last face" },
+    { "too_many.off", FILE_OF("OFF 3 1 0 0 0 0 1 0 0 0 1 0 3 0 1 2 3 0 1 2"), 0, 0,
+      "there is more behind the last face" },
+    { "fewer.off", FILE_OF("OFF\n3 1 0\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n"), 0, 0,
+      "line 4: vertex 1 has no three coordinates" },
+    { "short.off", FILE_OF("OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), 0, 0,
+      "the file ends before face 1" },
+    { "beyond.off", FILE_OF("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"), 0, 0,
+      "line 6: face 0 names vertex 3, but there are 3 vertices" },
+    { "minus.off", FILE_OF("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n"), 0, 0,
+      "line 6: face 0 names fewer than its 3 vertices" },
+    { "huge.off", FILE_OF("OFF\n4000000000 1 0\n0 0 0\n"), 0, 0,
+      "do not fit into a file of 25 bytes" },
+    { "not.off", FILE_OF("hello\n"), 0, 0, "neither the word OFF nor counts stand there" },
+    /* STL */
+    { "a.stl", FILE_OF("solid a\n" STL4 "endsolid a\n"), 4, 4, NULL },
+    { "crlf.stl",
+      FILE_OF("solid\r\nfacet normal 0 0 0\r\nouter loop\r\nvertex 0 0 0\r\nvertex 1 0 "
+              "0\r\nvertex 0 1 0\r\nendloop\r\nendfacet\r\nendsolid\r\n"),
+      3, 1, NULL },
+    { "name.stl", FILE_OF("solid a facet of \xc3\xa9 solid outer loop\n" STL4 "endsolid"), 4, 4,
+      NULL },
+    { "case.stl",
+      FILE_OF("SOLID A\nFACET NORMAL 0 0 0\nOUTER LOOP\nVERTEX 0 0 0\nVertex 1 0 "
+              "0\nVERTEX 0 1 0\nENDLOOP\nENDFACET\nENDSOLID\n"),
+      3, 1, NULL },
+    { "spaces.stl",
+      FILE_OF("  solid  a \n\n\tfacet  normal nan nan nan outer loop vertex 0 0 0 "
+              "vertex 1e0 0 0\tvertex\n0\n1 0 endloop endfacet endsolid"),
+      3, 1, NULL },
+    { "no_normal.stl",
+      FILE_OF("solid a\nfacet normal\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex "
+              "0 1 0\nendloop\nendfacet\nendsolid a\n"),
+      3, 1, NULL },
+    { "two.stl",
+      FILE_OF("solid a\n" STL4
+              "endsolid a\nsolid b\n" FACET("5 0 0", "6 0 0", "5 1 0") "endsolid b\n"),
+      7, 5, NULL },
+    { "unended.stl", FILE_OF("solid a\n" STL4), 4, 4, NULL },
+    { "cut.stl", FILE_OF("solid a\n" STL4 "facet normal 0 0 0\nouter loop\nvertex 0 0"), 0, 0,
+      "the file ends within facet 5; it is cut short" },
+    { "quad.stl",
+      FILE_OF("solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex "
+              "1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n"),
+      0, 0, "facet 1 has 4 vertices, not three" },
+    { "comma.stl", FILE_OF("solid a\n" FACET("0 0 0", "1,5 0 0", "0 1 0") "endsolid\n"), 0, 0,
+      "line 5: '1,5' where a coordinate should stand, in facet 1" },
+    { "word.stl", FILE_OF("solid a\n" STL4 "nonsense\nendsolid\n"), 0, 0,
+      "line 30: 'nonsense' where facet or endsolid should stand" },
+    { "empty.stl", FILE_OF("solid a\nendsolid a\n"), 0, 0, "has no faces" },
+    { "not.stl", FILE_OF("not an stl file at all"), 0, 0, "is no STL file" },
+    /* PLY in text */
+    { "a.ply", FILE_OF(PLY4 OFF4 OFFF), 4, 4, NULL },
+    { "more.ply",
+      FILE_OF(PLY4 "0 0 0 9\n1 0 0 9 \n0 1 0 9\n0 0 1 9\n3 0 2 1 8 8\n3 0 1 3\n3 0 3 2\n3 "
+                   "1 2 3\n"),
+      4, 4, "values that the header does not describe: 6, at the ends of 5 rows" },
+    { "fewer.ply", FILE_OF(PLY4 "0 0 0\n1 0\n0 1 0\n0 0 1\n" OFFF), 0, 0,
+      "line 12: vertex 1 began in line 11 and ends within this one" },
+    { "joined.ply",
+      FILE_OF(PLY4 "0\n0 0\n1 0 0\n0 1 0\n0 0 1\n3 0\n2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"), 4, 4,
+      NULL },
+};
+
+START_TEST(dialects_are_read_or_refused_with_a_sentence)
+{
+    const dialect *d = &dialects[_i];
+    const char *path = scratch(d->name);
+    ebpo_mesh mesh;
+    ebpo_error error = EBPO_ERROR_INIT;
+    FILE *file = fopen(path, "wb");
+    ck_assert(file && fwrite(d->text, 1, d->bytes, file) == d->bytes && fclose(file) == 0);
+    for (uint64_t attributes = 0; attributes < 2; attributes++) {
+        ebpo_mesh_read_options how = EBPO_MESH_READ_OPTIONS_INIT;
+        how.attributes = attributes;
+        ebpo_status status = ebpo_mesh_read(path, &how, &mesh, &error);
+        if (!d->faces) {
+            ck_assert_msg(status != EBPO_OK, "%s was read", d->name);
+            ck_assert_msg(strstr(error.message, d->words), "%s", error.message);
+            continue;
+        }
+        const char *unread = ebpo_mesh_unread(&mesh);
+        ck_assert_msg(status == EBPO_OK, "%s", error.message);
+        ck_assert_msg(mesh.vertex_count == d->vertices && mesh.face_count == d->faces,
+                      "%s: %d vertices, %d faces", d->name, (int)mesh.vertex_count,
+                      (int)mesh.face_count);
+        bool told = !unread == !d->words && (!unread || strstr(unread, d->words));
+        ck_assert_msg(told, "%s: '%s'", d->name, unread ? unread : "no warning");
+        ebpo_mesh_free(&mesh);
+    }
+    remove(path);
+}
+END_TEST
+
+/* With every byte changed, and every length cut: an error or a mesh that is whole. */
+START_TEST(damaged_dialects_are_whole_or_refused)
+{
+    const dialect *d = &dialects[_i];
+    const char *path = scratch(d->name);
+    char text[2048];
+    ck_assert(d->bytes <= sizeof text);
+    for (size_t i = 0; i < 2 * d->bytes; i += 1 + d->bytes / 40) {
+        ebpo_mesh_read_options how = EBPO_MESH_READ_OPTIONS_INIT;
+        ebpo_mesh mesh;
+        how.attributes = 1;
+        size_t n = i < d->bytes ? d->bytes : i - d->bytes;
+        memcpy(text, d->text, d->bytes);
+        if (i < d->bytes)
+            text[i] = "\n 9/-\\\0#"[i % 8];
+        FILE *file = fopen(path, "wb");
+        ck_assert(file && fwrite(text, 1, n, file) == n && fclose(file) == 0);
+        if (ebpo_mesh_read(path, &how, &mesh, NULL) != EBPO_OK)
+            continue;
+        ck_assert(mesh.face_count > 0);
+        for (uint64_t k = 0; k < 3 * mesh.face_count; k++)
+            ck_assert(mesh.faces[k] < mesh.vertex_count);
+        ebpo_mesh_free(&mesh);
+    }
+    remove(path);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    TCase *tests = tcase_create("dialects");
+    tcase_set_timeout(tests, 60);
+    tcase_add_loop_test(tests, dialects_are_read_or_refused_with_a_sentence, 0,
+                        (int)(sizeof dialects / sizeof *dialects));
+    tcase_add_loop_test(tests, damaged_dialects_are_whole_or_refused, 0,
+                        (int)(sizeof dialects / sizeof *dialects));
+    Suite *suite = suite_create("dialects");
+    suite_add_tcase(suite, tests);
+    return suite;
+}

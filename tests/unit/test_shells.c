@@ -1,0 +1,164 @@
+/* Which closed components are within which, found by trees, against a plain twin that compares all
+ * with all. */
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/ebpo.h>
+
+#include "check_main.h"
+#include "geom/predicates.h"
+#include "mesh/mesh_parts.h"
+#include "solids.h"
+
+enum { MOST = 60 };
+
+/* The faces of each component, which are neighbours in the list; its volume's sign. */
+typedef struct parts {
+    uint64_t begin[MOST + 1];
+    bool inwards[MOST];
+    int count;
+} parts;
+
+static void position(const ebpo_mesh *m, uint64_t corner, double out[3])
+{
+    ebpo_mesh_position(m, m->faces[corner], out);
+}
+
+/* Tells also apart what has one coordinate. */
+static bool before(const double a[3], const double b[3], int d)
+{
+    int axis = d / 2;
+    if (a[axis] != b[axis])
+        return d % 2 ? a[axis] > b[axis] : a[axis] < b[axis];
+    for (int k = 0; k < 3; k++)
+        if (a[k] != b[k])
+            return a[k] < b[k];
+    return false;
+}
+
+/* Winding number of the component at a point, by all of its faces. */
+static int winding(const ebpo_mesh *m, const parts *p, int part, const double at[3])
+{
+    int sum = 0;
+    for (uint64_t f = p->begin[part]; f < p->begin[part + 1]; f++) {
+        double t[3][3];
+        for (uint64_t k = 0; k < 3; k++)
+            position(m, 3 * f + k, t[k]);
+        sum += ebpo_axis_crossing(at, at[0] > 1e6 ? at[0] : 1e6, 0, t[0], t[1], t[2]);
+    }
+    return sum;
+}
+
+static bool within(const ebpo_mesh *m, const parts *p, int inner, int outer)
+{
+    for (int d = 0; d < 6; d++) {
+        double best[3], at[3];
+        position(m, 3 * p->begin[inner], best);
+        for (uint64_t c = 3 * p->begin[inner]; c < 3 * p->begin[inner + 1]; c++) {
+            position(m, c, at);
+            if (before(at, best, d))
+                memcpy(best, at, sizeof best);
+        }
+        if (winding(m, p, outer, best) == 0)
+            return false;
+    }
+    return true;
+}
+
+static ebpo_shells twin(const ebpo_mesh *m, const parts *p)
+{
+    ebpo_shells s = EBPO_SHELLS_INIT;
+    s.closed = (uint64_t)p->count;
+    for (int i = 0; i < p->count; i++) {
+        int depth = 0;
+        for (int host = 0; host < p->count; host++)
+            depth += host != i && within(m, p, i, host);
+        bool cavity = depth % 2;
+        s.inside_out += p->inwards[i] && !cavity;
+        s.cavities += p->inwards[i] && cavity;
+        s.nested += !p->inwards[i] && cavity;
+    }
+    return s;
+}
+
+/* Turned about x, so that long faces lie across the axes; by thirds, exactly as they come. */
+static void lean(ebpo_mesh *m)
+{
+    for (uint64_t v = 0; v < m->vertex_count; v++) {
+        double y = m->xyz64[3 * v + 1], z = m->xyz64[3 * v + 2];
+        m->xyz64[3 * v + 1] = y - z * 2 / 3;
+        m->xyz64[3 * v + 2] = z + y / 3;
+    }
+}
+
+static void add(ebpo_mesh *m, parts *p, ebpo_mesh *part, bool turn)
+{
+    if (turn)
+        ebpo_test_reverse(part);
+    if (m->face_count)
+        ebpo_test_append(m, part);
+    p->inwards[p->count++] = turn;
+    p->begin[p->count] = p->begin[p->count - 1] + part->face_count;
+    if (m->face_count)
+        ebpo_mesh_free(part);
+    else
+        *m = *part;
+}
+
+static double whole(uint64_t *state, uint64_t most)
+{
+    return (double)(ebpo_test_random(state) % most);
+}
+
+/* Boxes at whole coordinates, so that they touch and share walls; tetrahedra, tori with holes. */
+static ebpo_mesh many(uint64_t *state, parts *p)
+{
+    ebpo_mesh m = { 0 };
+    int count = 2 + (int)(ebpo_test_random(state) % (MOST - 2));
+    uint64_t range = 4 + ebpo_test_random(state) % 30;
+    memset(p, 0, sizeof *p);
+    for (int i = 0; i < count; i++) {
+        double low[3], high[3];
+        bool large = ebpo_test_random(state) % 4 == 0;
+        for (int k = 0; k < 3; k++) {
+            low[k] = large ? -1 - whole(state, 3) : whole(state, range);
+            high[k] = large ? (double)range + whole(state, 5) : low[k] + 1 + whole(state, 4);
+        }
+        ebpo_mesh part = i % 7 == 5 ? ebpo_test_torus(8, 3, 24, 8)
+                                    : ebpo_test_box(low, high, 1 + (uint32_t)(i % 2));
+        add(&m, p, &part, ebpo_test_random(state) % 2);
+    }
+    if (ebpo_test_random(state) % 2)
+        lean(&m);
+    return m;
+}
+
+START_TEST(shells_are_nested_as_the_plain_twin_has_it)
+{
+    uint64_t state = 4711, rounds = ebpo_test_scaled(120);
+    for (uint64_t i = 0; i < rounds; i++) {
+        parts p;
+        ebpo_mesh m = many(&state, &p);
+        ebpo_shells plain = twin(&m, &p), s = EBPO_SHELLS_INIT;
+        ebpo_error error = EBPO_ERROR_INIT;
+        ck_assert_msg(ebpo_mesh_count_shells(&m, 1 + (unsigned)(i % 3),
+                                             (ebpo_progress){ NULL, NULL }, &s, &error) == EBPO_OK,
+                      "%s", error.message);
+        ck_assert_uint_eq(s.closed, plain.closed);
+        ck_assert_uint_eq(s.inside_out, plain.inside_out);
+        ck_assert_uint_eq(s.cavities, plain.cavities);
+        ck_assert_uint_eq(s.nested, plain.nested);
+        ebpo_mesh_free(&m);
+    }
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("shells");
+    TCase *tests = tcase_create("all");
+    tcase_set_timeout(tests, 300);
+    tcase_add_test(tests, shells_are_nested_as_the_plain_twin_has_it);
+    suite_add_tcase(suite, tests);
+    return suite;
+}

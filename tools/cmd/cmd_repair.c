@@ -1,0 +1,394 @@
+/* ebpo repair: a new file of what is left of a damaged one. Whatever the tree holds is made anew of
+ * the mesh; the mesh is the file's own, or that of its source. */
+#include <inttypes.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/memory_args.h"
+#include "cli/mesh_input.h"
+#include "cli/progress.h"
+#include "cli/words.h"
+#include "cmd/commands.h"
+
+typedef struct values {
+    const char *out, *source;
+    int64_t threads;
+    memory_values memory;
+    bool json, quiet;
+} values;
+
+#include "options/repair.inc"
+
+/* --- what is left --- */
+
+typedef enum fate { NONE, KEPT, REBUILT, LOST } fate; /* NONE: the file has no such part */
+static const char *const fate_words[] = { "none", "kept", "rebuilt", "lost" };
+
+typedef enum piece { MESH, MAPS, ATTRIBUTES, LEVELS, PIECES } piece;
+static const char *const piece_words[] = { "mesh", "maps", "attributes", "levels" };
+
+typedef struct patient {
+    const values *v;
+    ebpo_file *file;
+    const ebpo_info *info;
+    ebpo_workspace *workspace;
+    ebpo_progress progress;
+    fate fate[PIECES];
+    char why[PIECES][sizeof((ebpo_error *)NULL)->message]; /* what is wrong; "": nothing */
+    bool same;                                             /* the new content is that of the file */
+} patient;
+
+static ebpo_read_options reading(const patient *p)
+{
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    read.threads = (unsigned)p->v->threads;
+    read.workspace = p->workspace;
+    return read;
+}
+
+/* A failure that says something about the file and not about this machine. */
+static bool is_damage(ebpo_status status)
+{
+    return status == EBPO_E_FORMAT || status == EBPO_E_VERSION || status == EBPO_E_LIMIT ||
+           status == EBPO_E_ABSENT;
+}
+
+/* What came of reading a part. */
+static ebpo_status take_down(patient *p, piece which, ebpo_status status, const ebpo_error *told,
+                             ebpo_error *error)
+{
+    if (status == EBPO_OK || is_damage(status)) {
+        p->fate[which] = status == EBPO_OK ? KEPT : LOST;
+        if (status != EBPO_OK && !p->why[which][0])
+            snprintf(p->why[which], sizeof p->why[which], "%s", told->message);
+        return EBPO_OK;
+    }
+    *error = *told;
+    return status;
+}
+
+static ebpo_status look_at_mesh(patient *p, ebpo_error *error)
+{
+    ebpo_error told = EBPO_ERROR_INIT;
+    ebpo_read_options read = reading(p);
+    ebpo_mesh mesh = { 0 };
+    ebpo_maps maps = { 0 };
+    if (!(p->info->parts & EBPO_PART_MESH))
+        return EBPO_OK;
+    ebpo_status status = ebpo_file_read_mesh(p->file, &read, &mesh, &told);
+    ebpo_mesh_free(&mesh);
+    status = take_down(p, MESH, status, &told, error);
+    if (status != EBPO_OK || !(p->info->parts & EBPO_PART_MAPS))
+        return status;
+    status = ebpo_file_read_maps(p->file, &read, &maps, &told);
+    ebpo_maps_free(&maps);
+    return take_down(p, MAPS, status, &told, error);
+}
+
+static ebpo_status look_at_attributes(patient *p, ebpo_error *error)
+{
+    ebpo_error told = EBPO_ERROR_INIT;
+    ebpo_read_options read = reading(p);
+    ebpo_status status = EBPO_OK;
+    if (!(p->info->parts & EBPO_PART_ATTRIBUTES))
+        return EBPO_OK;
+    p->fate[ATTRIBUTES] = KEPT;
+    for (unsigned n = 0; status == EBPO_OK && p->fate[ATTRIBUTES] == KEPT; n++) {
+        ebpo_attribute_values got;
+        status = ebpo_file_read_attribute(p->file, n, &read, &got, &told);
+        ebpo_attribute_values_free(&got);
+        if (status == EBPO_E_ABSENT) /* that was the last one */
+            return EBPO_OK;
+        status = take_down(p, ATTRIBUTES, status, &told, error);
+    }
+    return status;
+}
+
+static ebpo_status look_at_levels(patient *p, ebpo_error *error)
+{
+    ebpo_error told = EBPO_ERROR_INIT;
+    ebpo_read_options read = reading(p);
+    ebpo_status status = EBPO_OK;
+    p->fate[LEVELS] = KEPT;
+    for (int l = 0; l < p->info->level_count && status == EBPO_OK; l++) {
+        ebpo_level level;
+        status = ebpo_file_read_level(p->file, l, &read, &level, &told);
+        bool good = status == EBPO_OK;
+        if (good)
+            ebpo_level_free(&level);
+        status = good ? EBPO_OK : take_down(p, LEVELS, status, &told, error);
+    }
+    return status;
+}
+
+/* --- the mesh to build from --- */
+
+typedef struct remade {
+    ebpo_mesh mesh;
+    ebpo_mesh_report report;
+    ebpo_mend_record record;
+    uint32_t *vertex_source; /* of a vertex of the mesh, its number in the source; or NULL */
+} remade;
+
+static int in_order(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Welding leaves gaps in the source's numbers, which the mesh alone does not tell. */
+static ebpo_status numbers_of(const patient *p, remade *r, ebpo_error *error)
+{
+    ebpo_maps maps;
+    ebpo_read_options read = reading(p);
+    if (p->fate[MAPS] != KEPT || !p->info->mend.welded_vertices)
+        return EBPO_OK;
+    ebpo_status status = ebpo_file_read_maps(p->file, &read, &maps, error);
+    if (status != EBPO_OK)
+        return status;
+    r->vertex_source = malloc(p->info->vertex_count * sizeof *r->vertex_source);
+    if (r->vertex_source) {
+        memcpy(r->vertex_source, maps.vertex_source,
+               p->info->vertex_count * sizeof *r->vertex_source);
+        qsort(r->vertex_source, p->info->vertex_count, sizeof *r->vertex_source, in_order);
+    }
+    ebpo_maps_free(&maps);
+    if (r->vertex_source)
+        return EBPO_OK;
+    snprintf(error->message, sizeof error->message, "not enough memory");
+    return error->status = EBPO_E_MEMORY;
+}
+
+static ebpo_status from_file(patient *p, remade *r, ebpo_error *error)
+{
+    ebpo_read_options read = reading(p);
+    ebpo_prepare_options prepare = EBPO_PREPARE_OPTIONS_INIT;
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    bool ordered;
+    read.attributes = p->fate[ATTRIBUTES] == KEPT;
+    ebpo_status status = p->fate[MAPS] == KEPT
+                             ? ebpo_file_read_source_mesh(p->file, &read, &r->mesh, &ordered, error)
+                             : ebpo_file_read_mesh(p->file, &read, &r->mesh, error);
+    if (status != EBPO_OK)
+        return status;
+    r->mesh.workspace = p->workspace;
+    prepare.threads = (unsigned)p->v->threads;
+    prepare.progress = p->progress;
+    status = ebpo_mesh_prepare(&r->mesh, &prepare, &prepared, error);
+    r->report = prepared.report;
+    r->record = p->info->mend;
+    memcpy(r->mesh.source_name, p->info->source_name, sizeof r->mesh.source_name);
+    memcpy(r->mesh.source_sha256, p->info->source_sha256, sizeof r->mesh.source_sha256);
+    memcpy(r->mesh.source_format, p->info->source_format, sizeof r->mesh.source_format);
+    r->mesh.source_size = p->info->source_size;
+    return status == EBPO_OK ? numbers_of(p, r, error) : status;
+}
+
+static ebpo_status from_source(patient *p, remade *r, ebpo_error *error)
+{
+    const ebpo_mend_record *m = &p->info->mend;
+    mending steps = { .weld = m->weld,
+                      .orient = m->orient,
+                      .flip = !m->orient && m->flipped_faces,
+                      .fill_holes = m->fill_holes };
+    mesh_input in;
+    bool attributes = p->info->parts & EBPO_PART_ATTRIBUTES;
+    ebpo_status status =
+        mesh_input_read(&in, p->v->source, steps, attributes ? READ_ATTRIBUTES : READ_MESH,
+                        p->workspace, (unsigned)p->v->threads, p->progress, error);
+    if (status != EBPO_OK)
+        return status;
+    r->mesh = in.mesh;
+    r->report = in.prepared.report;
+    r->record = in.prepared.record;
+    if (memcmp(in.as_read.source_sha256, p->info->source_sha256, sizeof in.as_read.source_sha256) !=
+        0) {
+        snprintf(
+            error->message, sizeof error->message,
+            "%s: is not what the file was made from, %s: its SHA-256 is another one; find that "
+            "very file, or convert this one",
+            p->v->source, p->info->source_name);
+        return error->status = EBPO_E_ABSENT;
+    }
+    for (int i = 0; i < LEVELS; i++)
+        p->fate[i] = p->fate[i] == LOST ? REBUILT : p->fate[i];
+    return EBPO_OK;
+}
+
+/* --- making --- */
+
+static ebpo_build_options building(const patient *p)
+{
+    ebpo_build_options o = EBPO_BUILD_OPTIONS_INIT;
+    const ebpo_info *info = p->info;
+    o.max_level = info->max_level;
+    o.leaf_faces = info->leaf_faces;
+    o.epsilon = info->epsilon;
+    o.select = (ebpo_selection)info->selection;
+    o.percent = info->percent > 0 ? info->percent : o.percent;
+    o.k_root = info->k_root;
+    o.normals = (ebpo_normal_distance)info->normals;
+    o.seed = info->seed;
+    o.parts = info->parts;
+    if (p->fate[MAPS] == LOST)
+        o.parts &= ~(uint32_t)EBPO_PART_MAPS;
+    if (p->fate[ATTRIBUTES] == LOST)
+        o.parts &= ~(uint32_t)(EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS);
+    o.rule = info->rule;
+    o.require_solid = info->solid;
+    o.threads = (unsigned)p->v->threads;
+    o.unit = info->unit[0] ? info->unit : NULL;
+    o.crs = info->crs[0] ? info->crs : NULL;
+    o.date = info->date[0] ? info->date : NULL;
+    o.progress = p->progress;
+    return o;
+}
+
+/* The mesh is consumed. */
+static ebpo_status make(const patient *p, remade *r, ebpo_error *error)
+{
+    ebpo_build_options build = building(p);
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_tree tree;
+    ebpo_status status = ebpo_build(&r->mesh, &r->report, &r->record, &build, &tree, error);
+    if (status != EBPO_OK)
+        return status;
+    for (uint64_t i = 0; r->vertex_source && tree.vertex_source && i < tree.info.vertex_count; i++)
+        tree.vertex_source[i] = r->vertex_source[tree.vertex_source[i]];
+    write.codec = p->info->codec;
+    write.threads = (unsigned)p->v->threads;
+    write.face_coding = p->info->gates ? EBPO_FACES_GATES : EBPO_FACES_USUAL;
+    write.progress = p->progress;
+    status = ebpo_tree_write(&tree, p->v->out, &write, error);
+    ebpo_tree_free(&tree);
+    return status;
+}
+
+static ebpo_status compare(patient *p, ebpo_error *error)
+{
+    ebpo_file *made;
+    ebpo_status status = ebpo_open(p->v->out, &made, error);
+    if (status != EBPO_OK)
+        return status;
+    p->same = memcmp(ebpo_file_info(made)->content_sha256, p->info->content_sha256,
+                     sizeof p->info->content_sha256) == 0;
+    /* what was read without fault is kept only if it has become what it was */
+    if (p->fate[LEVELS] == LOST || !p->same)
+        p->fate[LEVELS] = REBUILT;
+    ebpo_close(made);
+    return EBPO_OK;
+}
+
+static ebpo_status refuse(const patient *p, const char *why, ebpo_error *error)
+{
+    snprintf(error->message, sizeof error->message, "%s", why);
+    (void)p;
+    return error->status = EBPO_E_ABSENT;
+}
+
+static ebpo_status repair(patient *p, ebpo_error *error)
+{
+    remade r = { .vertex_source = NULL };
+    if (p->info->pruned)
+        return refuse(p,
+                      "the file is a subset: of what was left out nothing can be made again; take "
+                      "another subset of the original",
+                      error);
+    ebpo_status status = look_at_mesh(p, error);
+    if (status == EBPO_OK)
+        status = look_at_attributes(p, error);
+    if (status == EBPO_OK)
+        status = look_at_levels(p, error);
+    if (status != EBPO_OK)
+        return status;
+    if (!p->v->source && p->fate[MESH] != KEPT)
+        return refuse(p,
+                      p->fate[MESH] == LOST
+                          ? "the file's mesh is damaged, and all else is made of it; give the mesh "
+                            "that the file was made from with --source"
+                          : "the file has no mesh, of which all else is made; give the mesh that "
+                            "the file was made from with --source",
+                      error);
+    status = p->v->source ? from_source(p, &r, error) : from_file(p, &r, error);
+    if (status == EBPO_OK)
+        status = make(p, &r, error);
+    else
+        ebpo_mesh_free(&r.mesh);
+    free(r.vertex_source);
+    return status == EBPO_OK ? compare(p, error) : status;
+}
+
+/* --- telling --- */
+
+static void print_words(const patient *p, const char *in)
+{
+    char hex[65];
+    for (int i = 0; i < PIECES; i++)
+        if (p->fate[i] != NONE)
+            printf("  %-11s %s%s%s\n", piece_words[i], fate_words[p->fate[i]],
+                   p->why[i][0] ? ": " : "", p->why[i]);
+    words_hex(p->info->content_sha256, hex);
+    printf("%s: %s of %s, SHA-256 %s\n", p->v->out, p->same ? "the content" : "not the content", in,
+           hex);
+}
+
+static void print_json(const patient *p, const char *in)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "file", in);
+    json_text(&j, "output", p->v->out);
+    json_bool(&j, "same_content", p->same);
+    json_object(&j, "parts");
+    for (int i = 0; i < PIECES; i++)
+        json_text(&j, piece_words[i], fate_words[p->fate[i]]);
+    json_end(&j);
+    json_finish(&j);
+}
+
+/* Where maps are lost the content has to be another one. */
+static int code_of(const patient *p)
+{
+    return p->same || p->fate[MAPS] == LOST ? EXIT_FINE : EXIT_DIFFERS;
+}
+
+static const values usual = { 0 };
+
+static int run(void *given, const char **operand)
+{
+    const values *v = given;
+    progress_line line;
+    patient p = { .v = v };
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (!v->out)
+        return command_usage("repair", "give the new file with --output");
+    if (!memory_good("repair", &v->memory) || command_overwrites("repair", operand[0], v->out))
+        return EXIT_USAGE;
+    if (!command_wants_hdf5("repair", operand[0]))
+        return EXIT_FAILED;
+    p.progress = progress_start(&line, "repair", v->quiet);
+    ebpo_status status = ebpo_check_output(v->out, &error);
+    if (status == EBPO_OK)
+        status = memory_make(&p.workspace, &v->memory, &error);
+    if (status == EBPO_OK)
+        status = ebpo_open(operand[0], &p.file, &error);
+    if (status == EBPO_OK) {
+        p.info = ebpo_file_info(p.file);
+        status = repair(&p, &error);
+    }
+    progress_wipe(&line);
+    if (status == EBPO_OK && v->json)
+        print_json(&p, operand[0]);
+    else if (status == EBPO_OK && !v->quiet)
+        print_words(&p, operand[0]);
+    ebpo_close(p.file);
+    ebpo_workspace_free(p.workspace);
+    return status == EBPO_OK ? code_of(&p) : command_failed("repair", &error);
+}
+
+const command command_repair = { &spec, sizeof usual, &usual, run };

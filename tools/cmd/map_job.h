@@ -1,0 +1,49 @@
+/* What `ebpo map` was asked for, as its files share it. */
+#ifndef EBPO_TOOLS_MAP_JOB_H
+#define EBPO_TOOLS_MAP_JOB_H
+
+#include <ebpo/ebpo.h>
+
+#include "cli/remote_args.h"
+
+typedef struct map_values {
+    const char *plane, *grid, *from, *out, *picture, *size, *box, *memory;
+    double margin, max_distance, range;
+    bool unsigned_distance, bounds, json, quiet;
+    int palette;
+    int64_t threads;
+    remote_values remote;
+} map_values;
+
+typedef struct map_job {
+    const map_values *v;
+    const char *path; /* FILE */
+    ebpo_file *file;
+    ebpo_model *model;
+    ebpo_map_options options;
+    /* of a plane or grid */
+    bool plane;
+    ebpo_lattice lattice;
+    /* of vertices */
+    int width, height; /* of their picture */
+    /* what came of it */
+    double range; /* of the colours */
+    ebpo_map_stats stats;
+    ebpo_map_reach reach;
+} map_job;
+
+/* From --plane, --grid, --box, --margin and --size. An exit code; what is wrong was said. */
+int map_find_lattice(map_job *job);
+/* "800x600" into two numbers of 2 to 8192 each. False, said. */
+bool map_read_size(const char *text, int *width, int *height);
+
+EBPO_MUST_USE ebpo_status map_plane_or_grid(map_job *job, ebpo_error *error);
+EBPO_MUST_USE ebpo_status map_vertices(map_job *job, ebpo_progress progress, ebpo_error *error);
+
+/* Draws values[height][width], row 0 at the bottom, or a painted mesh, with a legend. */
+EBPO_MUST_USE ebpo_status map_draw_plane(const map_job *job, const double *values, const char *path,
+                                         ebpo_error *error);
+EBPO_MUST_USE ebpo_status map_draw_mesh(const map_job *job, const ebpo_mesh *mesh, const char *path,
+                                        ebpo_error *error);
+
+#endif

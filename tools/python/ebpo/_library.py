@@ -1,0 +1,219 @@
+"""The shared library: where it is, its functions, their errors, and arrays that it owns."""
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import os
+import pathlib
+import re
+import subprocess
+import weakref
+
+import numpy as np
+
+from . import _declared as c
+from .errors import BY_STATUS, Error
+
+HERE = pathlib.Path(__file__).resolve().parent
+
+
+def candidates():
+    """Names of libraries, the first that is there is taken."""
+    if os.environ.get("EBPO_LIBRARY"):
+        yield os.environ["EBPO_LIBRARY"]
+        return
+    yield from map(str, sorted(HERE.glob("libebpo.so*")))  # of a wheel
+    for folder in (HERE.parents[2], HERE.parents[2] / "lib"):  # of a prefix, of a build folder
+        yield from map(str, sorted(folder.glob("libebpo.so.?")))
+    try:
+        told = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)
+        found = re.search(r"^library: (/.*) \([0-9.]+\)$", told.stdout, re.MULTILINE)
+        if found:
+            yield found[1]
+    except OSError:
+        pass
+    system = ctypes.util.find_library("ebpo")
+    if system:
+        yield system
+
+
+def load():
+    """The library, with arguments and results of its functions declared."""
+    name = next(candidates(), None)
+    if name is None:
+        raise ImportError("libebpo is not found; install it, or name it in EBPO_LIBRARY")
+    try:
+        library = ctypes.CDLL(name)
+        ours, its = (c.EBPO_VERSION_MAJOR, c.EBPO_VERSION_MINOR), library.ebpo_version_number()
+    except (OSError, AttributeError) as error:
+        raise ImportError(f"{name} cannot be loaded as libebpo: {error}") from None
+    its = (its // 1000000, its // 1000 % 1000)
+    if its[0] != ours[0] or (ours[0] == 0 and its[1] != ours[1]):
+        raise ImportError(f"{name} is of version {its[0]}.{its[1]}, this package of {ours[0]}.{ours[1]}; "
+                          "install both together, or name another library in EBPO_LIBRARY")
+    for function, (result, arguments, _) in c.FUNCTIONS.items():
+        entry = getattr(library, function, None)
+        if entry is not None:
+            entry.restype, entry.argtypes = result, arguments
+    library.path = name
+    return library
+
+
+lib = load()
+
+
+def fill(struct, values):
+    """Members in turn from the list that an INIT macro gives."""
+    for (name, kind), value in zip(struct._fields_, values):
+        if isinstance(value, list):
+            member = getattr(struct, name)
+            if isinstance(member, ctypes.Structure):
+                fill(member, value)
+            else:
+                set_items(member, value)
+        elif value is not None:
+            setattr(struct, name, value)
+
+
+def set_items(array, values):
+    for i, value in enumerate(values):
+        if isinstance(value, list):
+            set_items(array[i], value)
+        else:
+            array[i] = value
+
+
+def made(kind, **members):
+    """A struct as its INIT macro begins it, and then with these members."""
+    struct = kind()
+    fill(struct, c.INIT.get(kind, []))
+    for name, value in members.items():
+        setattr(struct, name, value)
+    return struct
+
+
+def text(raw):
+    return raw.decode("utf-8", "replace")
+
+
+def error_of(error):
+    """A Python exception of an ebpo_error."""
+    kind = BY_STATUS.get(error.status, Error)
+    name = text(lib.ebpo_status_name(error.status))
+    return kind(text(error.message), name, text(error.file), text(error.object),
+                None if error.offset < 0 else error.offset)
+
+
+def call(name, *arguments):
+    """Calls a function that can fail, and raises what it says."""
+    error = made(c.ebpo_error)
+    if getattr(lib, name)(*arguments, ctypes.byref(error)) != 0:
+        raise error_of(error)
+
+
+class Owned:
+    """Memory that something else owns, as numpy takes it: the array keeps its owner alive."""
+
+    def __init__(self, owner, address, shape, dtype, writable=False):
+        self.owner = owner
+        self.__array_interface__ = {"version": 3, "shape": shape, "typestr": np.dtype(dtype).str,
+                                    "data": (address, not writable)}
+
+
+def array(owner, address, shape, dtype):
+    """A read-only array over memory of `owner`; an empty one for NULL."""
+    if not address or 0 in shape:
+        return np.zeros(shape, dtype) if 0 in shape else None
+    return np.asarray(Owned(owner, address, shape, dtype))
+
+
+def copied(address, shape, dtype):
+    """An array of its own from memory that will go."""
+    dtype = np.dtype(dtype)
+    if not address or 0 in shape:
+        return np.zeros(shape, dtype)
+    if dtype.names:  # __array_interface__ alone does not tell members
+        return np.array(Owned(None, address, (*shape, dtype.itemsize), np.uint8)).view(dtype).reshape(shape)
+    return np.array(Owned(None, address, shape, dtype))
+
+
+class Handle:
+    """An object of the library, freed with the last Python object that uses it.
+
+    `keep` is what it is made of, which is freed after it.
+    """
+
+    def __init__(self, pointer, free, *keep):
+        self.pointer, self.keep = pointer, keep
+        self._end = weakref.finalize(self, Handle.end, getattr(lib, free), pointer, keep)
+        self._end.atexit = False  # the process ends anyway; threads may still be asking
+
+    @staticmethod
+    def end(free, pointer, keep):
+        free(pointer)
+        del keep
+
+    @classmethod
+    def made(cls, function, *arguments, free, keep=()):
+        """Of functions whose last arguments are the object that is made, and the error."""
+        pointer = ctypes.c_void_p()
+        call(function, *arguments, ctypes.byref(pointer))
+        return cls(pointer, free, *keep)
+
+    @property
+    def _as_parameter_(self):
+        return self.pointer
+
+
+class Struct:
+    """A struct whose arrays the library frees, before what it is made of (`keep`)."""
+
+    def __init__(self, kind, free, *keep, **members):
+        self.c = made(kind, **members)
+        self._end = weakref.finalize(self, Handle.end, getattr(lib, free), ctypes.byref(self.c), keep)
+        self._end.atexit = False
+
+    @property
+    def _as_parameter_(self):
+        return ctypes.byref(self.c)
+
+
+class Reporter:
+    """A progress callback of Python for the library.
+
+    The callback is called by the thread that asked. What it raises comes out of the call.
+    """
+
+    def __init__(self, progress):
+        self.progress, self.raised = progress, None
+        self.function = c.ebpo_progress_fn(self.report) if progress else c.ebpo_progress_fn()
+        self.struct = c.ebpo_progress(self.function, None)
+
+    def report(self, _user, stage, done, total):
+        try:
+            return self.progress(text(stage), done, total) is not False
+        except BaseException as error:
+            self.raised = error
+            return False
+
+    def __enter__(self):
+        return self.struct
+
+    def __exit__(self, _kind, _error, _trace):
+        if self.raised is not None:
+            raise self.raised
+
+
+def size_in_bytes(size):
+    """Bytes of 512000000, "512M", "4G", "64KiB" or None: 0."""
+    if size is None:
+        return 0
+    if isinstance(size, str):
+        found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([kKMGT]?)(i?)B?\s*", size)
+        if not found:
+            raise ValueError(f"{size!r} is no size; 500000000, '500M' and '2GiB' are")
+        power = " KMGT".index(found[2].upper() or " ")
+        return int(float(found[1]) * (1024 if found[3] else 1000) ** power)
+    if size < 0:
+        raise ValueError(f"a size of {size} bytes")
+    return int(size)

@@ -1,0 +1,165 @@
+"""Many questions on all cores: blocks of rows, a context for each thread."""
+from __future__ import annotations
+
+import itertools
+import os
+import threading
+from typing import Any, Callable, Iterator
+
+import numpy as np
+
+# Rows whose answers stay in a core's cache until they have been put where they belong; and so many that
+# Python's lock, which is taken after each block, does not matter.
+BLOCK = 1 << 15
+
+
+def cores() -> int:
+    """Processors that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1
+
+
+class Rows:
+    """Points, or anything of three columns, as contiguous doubles block by block.
+
+    What is that already is not copied. Anything with a shape and slices will do.
+    """
+
+    def __init__(self, values: Any, what: str = "points") -> None:
+        if not hasattr(values, "shape") or not hasattr(values, "dtype"):
+            values = np.asarray(values, dtype=np.float64)
+        shape = tuple(values.shape)
+        if shape == (0,):
+            values = np.zeros((0, 3))
+        self.single = shape == (3,)
+        if self.single:
+            values = np.asarray(values)[None, :]
+        elif tuple(values.shape)[1:] != (3,):
+            raise ValueError(f"{what} have the shape (n, 3), or (3,) for a single one, not {shape}")
+        if np.dtype(values.dtype).kind not in "fiuO":
+            raise TypeError(f"{what} are numbers, not {values.dtype}")
+        self.values, self.what, self.count = values, what, int(values.shape[0])
+
+    def __getitem__(self, part: slice) -> np.ndarray:
+        return np.ascontiguousarray(self.values[part], dtype=np.float64)
+
+    def check(self, begin: int, end: int) -> None:
+        """The library numbers the points of a block; here the one that is not finite has its own number."""
+        bad = ~np.isfinite(self[begin:end]).all(axis=1)
+        if bad.any():
+            number = begin + int(bad.argmax())
+            from .errors import ArgumentError
+            raise ArgumentError(f"{self.what}: number {number} has a coordinate that is not a finite number",
+                                "EBPO_E_ARGUMENT")
+
+
+class Told:
+    """Progress over all threads, told by the one that asks."""
+
+    def __init__(self, progress: Callable | None, stage: str, total: int) -> None:
+        self.progress, self.stage, self.total = progress, stage, total
+
+    def __call__(self, done: int) -> None:
+        if self.progress is not None and self.progress(self.stage, done, self.total) is False:
+            from .errors import Cancelled
+            raise Cancelled(f"{self.stage} was stopped by the progress callback", "EBPO_E_CANCELLED")
+
+
+def block_of(count: int, threads: int) -> int:
+    """A few blocks for each thread, none larger than BLOCK."""
+    return max(64, min(BLOCK, -(-count // (8 * threads))))
+
+
+def share(count: int, threads: int | None, worker: Callable[[], Any], progress: Callable | None = None,
+          stage: str = "asking") -> None:
+    """Has rows 0 to count - 1 worked off, block by block.
+
+    worker() is a context manager that gives a function work(begin, end); each thread has its own. The
+    calling thread is one of them. Of several failures the one of the first block is raised.
+    """
+    threads = threads or cores()
+    size = block_of(count, threads)
+    blocks = -(-count // size)
+    numbers: Iterator[int] = itertools.count()
+    lock, finished = threading.Lock(), [0]
+    failed: dict[int, Any] = {}
+    told = Told(progress, stage, count)
+
+    def run(tell: Callable[[int], None] | None) -> None:
+        number = -1
+        try:
+            with worker() as work:
+                while not failed:
+                    with lock:
+                        number = next(numbers)
+                    if number >= blocks:
+                        return
+                    begin = number * size
+                    end = min(count, begin + size)
+                    work(begin, end)
+                    with lock:
+                        finished[0] += end - begin
+                    if tell:
+                        tell(finished[0])
+        except BaseException as error:
+            failed[number] = error
+
+    others = [threading.Thread(target=run, args=(None,), daemon=True) for _ in range(min(threads, blocks) - 1)]
+    if count:
+        told(0)
+    for thread in others:
+        thread.start()
+    run(told if progress else None)
+    try:
+        for thread in others:
+            thread.join()
+    except BaseException:  # interrupted: the others end with their blocks
+        failed[-1] = None
+        raise
+    if failed:
+        raise failed[min(failed)]
+    if count:
+        told(count)
+
+
+def bar(make: Callable[..., Any], **options: Any) -> Callable[[str, int, int], bool]:
+    """A progress callback for bars as tqdm's: `progress=ebpo.bar(tqdm.tqdm)`.
+
+    make(total=, desc=, **options) gives a bar with update(n) and close(); each stage has its own.
+
+    >>> class Line:
+    ...     def __init__(self, total, desc): print(desc, total)
+    ...     def update(self, n): print("+", n)
+    ...     def close(self): print("done")
+    >>> tell = bar(Line)
+    >>> for done in (0, 3, 4):
+    ...     _ = tell("asking", done, 4)
+    asking 4
+    + 3
+    + 1
+    done
+    """
+    now: dict[str, Any] = {}
+
+    def close() -> None:
+        if now:
+            now.pop("bar").close()
+            now.clear()
+
+    def tell(stage: str, done: int, total: int) -> bool:
+        if now and now["stage"] != stage:
+            close()
+        if not now:
+            if total and done >= total:
+                return True  # told again when it has been closed
+            now.update(stage=stage, done=0, bar=make(total=total or None, desc=stage, **options))
+        if done > now["done"]:
+            now["bar"].update(done - now["done"])
+            now["done"] = done
+        if total and done >= total:
+            close()
+        return True
+
+    return tell

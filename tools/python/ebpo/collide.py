@@ -1,0 +1,248 @@
+"""Two models that meet."""
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import threading
+from typing import Any, Callable, Iterator, NamedTuple
+
+import numpy as np
+
+from . import _declared as c
+from ._library import Handle, Reporter, call, copied, made, size_in_bytes
+
+PAIR = np.dtype(c.ebpo_face_pair)
+SEGMENT = np.dtype(c.ebpo_contact_segment)
+
+
+class Pairs(NamedTuple):
+    """face_a, face_b: (k,) int64, of the sources. kind: (k,) int32, a PairKind."""
+
+    face_a: np.ndarray
+    face_b: np.ndarray
+    kind: np.ndarray
+
+
+class Contacts(NamedTuple):
+    """points: (k, 2, 3) float64, both ends of each segment. face_a, face_b: (k,) int64."""
+
+    points: np.ndarray
+    face_a: np.ndarray
+    face_b: np.ndarray
+
+
+class Clearance(NamedTuple):
+    """lo, hi: the distance is certainly within, exact where they are equal. face_a, face_b: -1: none was
+    found. point_a, point_b: (3,) the nearest points."""
+
+    lo: float
+    hi: float
+    face_a: int
+    face_b: int
+    point_a: np.ndarray
+    point_b: np.ndarray
+
+
+class WayOut(NamedTuple):
+    """lo, hi: so many times the direction, exact where they are equal. face_a, face_b: part last."""
+
+    lo: float
+    hi: float
+    face_a: int
+    face_b: int
+
+
+def number(face: int) -> int:
+    return -1 if face == c.EBPO_NO_FACE else face
+
+
+def pose(rotation: Any = None, translation: Any = None, scale: float = 1.0, quaternion: Any = None) -> Any:
+    """Where a model is: x becomes rotation (scale x) + translation.
+
+    rotation: (3, 3), or quaternion: (4,) x, y, z, w of any length, with the bits that scenes give it.
+    translation: (3,). What takes a pose takes this, a (4, 4) matrix, or None: as in the file.
+
+    >>> list(pose(translation=[1, 2, 3]).translation)
+    [1.0, 2.0, 3.0]
+    """
+    made_pose = made(c.ebpo_pose, scale=scale)
+    if rotation is not None and quaternion is not None:
+        raise ValueError("a pose has a rotation or a quaternion")
+    if rotation is not None:
+        np.ctypeslib.as_array(made_pose.rotation)[:] = np.asarray(rotation, dtype=np.float64).reshape(3, 3)
+    if translation is not None:
+        np.ctypeslib.as_array(made_pose.translation)[:] = np.asarray(translation, dtype=np.float64).reshape(3)
+    if quaternion is not None:
+        turn = np.ascontiguousarray(quaternion, dtype=np.float64).reshape(4)
+        call("ebpo_pose_turn", ctypes.byref(made_pose), turn.ctypes.data)
+    return made_pose
+
+
+def pose_of(value: Any) -> Any:
+    if value is None:
+        return made(c.ebpo_pose)
+    if isinstance(value, c.ebpo_pose):
+        return value
+    matrix = np.asarray(value, dtype=np.float64)
+    if matrix.shape != (4, 4) or not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        raise ValueError("a pose is what ebpo.pose gives, or a (4, 4) matrix whose last row is 0 0 0 1")
+    scale = float(np.linalg.norm(matrix[:3, 0]))
+    scale = 1.0 if abs(scale - 1) < 2**-30 else scale
+    if not scale > 0:
+        raise ValueError("the matrix of a pose has no inverse")
+    return pose(matrix[:3, :3] / scale, matrix[:3, 3], scale)
+
+
+def matrix_of(value: Any) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.ctypeslib.as_array(value.rotation) * value.scale
+    matrix[:3, 3] = np.ctypeslib.as_array(value.translation)
+    return matrix
+
+
+class Gathered:
+    """Items that the library lends to a callback, kept as an array."""
+
+    def __init__(self, function: Any, dtype: np.dtype) -> None:
+        self.dtype, self.parts = dtype, [np.empty(0, dtype)]
+        self.take = function(self.keep)
+
+    def keep(self, _user: int, items: int, count: int) -> bool:
+        self.parts.append(copied(items, (count,), self.dtype))
+        return True
+
+    @property
+    def array(self) -> np.ndarray:
+        return np.concatenate(self.parts)
+
+
+class Collider:
+    """Two models, or one twice, at poses. Decisions are exact on posed coordinates.
+
+    pose_a, pose_b: what `pose` gives, a (4, 4) matrix, or None: as in the file. Lengths are in the unit
+    of the world: the model's, times the pose's scale. One thread asks at a time; others wait.
+
+    memory: bytes for pairs that wait to be given in order. threads: for `pairs`; None: all cores.
+
+    >>> c = Collider(cube, cube)
+    >>> c.relation(pose_b=pose(translation=[.5, 0, 0])).name
+    'INTERSECTING'
+    >>> c.distance(pose_b=pose(translation=[3, 0, 0])).hi
+    2.0
+    """
+
+    def __init__(self, a: Any, b: Any, *, threads: int | None = None, memory: int | str | None = None) -> None:
+        options = made(c.ebpo_collider_options, threads=threads or 0, memory=size_in_bytes(memory))
+        models = a.model, b.model
+        self._handle = Handle.made("ebpo_collider_new", *models, ctypes.byref(options),
+                                   free="ebpo_collider_free", keep=models)
+        self._lock = threading.Lock()
+
+    @contextlib.contextmanager
+    def _options(self, poses: tuple, deadline: float | None = None, progress: Callable | None = None,
+                 level: int | None = None) -> Iterator[Any]:
+        with self._lock, Reporter(progress) as reported:
+            options = made(c.ebpo_collide_options, pose_a=pose_of(poses[0]), pose_b=pose_of(poses[1]),
+                           deadline_ns=int((deadline or 0) * 1e9), progress=reported)
+            if level is not None:
+                options.level = level
+            yield ctypes.byref(options)
+
+    def first(self, pose_a: Any = None, pose_b: Any = None) -> tuple[int, int, c.PairKind] | None:
+        """A pair of faces that meet: face of a, face of b, kind. None: none do, though a solid may be
+        within the other.
+
+        >>> Collider(cube, cube).first(pose_b=pose(translation=[3, 0, 0])) is None
+        True
+        """
+        pair, found = c.ebpo_face_pair(), ctypes.c_int32()
+        with self._options((pose_a, pose_b)) as options:
+            call("ebpo_collide_first", self._handle, options, ctypes.byref(pair), ctypes.byref(found))
+        return (pair.face_a, pair.face_b, c.PairKind(pair.kind)) if found.value == 1 else None
+
+    def relation(self, pose_a: Any = None, pose_b: Any = None, *, deadline: float | None = None) -> c.Relation:
+        """How they lie to each other: a Relation, exact. deadline: seconds, after which it may be OPEN."""
+        result = c.ebpo_relation_result()
+        with self._options((pose_a, pose_b), deadline) as options:
+            call("ebpo_collide_relation", self._handle, options, ctypes.byref(result))
+        return c.Relation(result.relation)
+
+    def _pairs(self, function: str, poses: tuple, progress: Callable | None) -> Pairs:
+        found = Gathered(c.ebpo_pairs_fn, PAIR)
+        with self._options(poses, None, progress) as options:
+            call(function, self._handle, options, found.take, None)
+        pairs = found.array
+        return Pairs(pairs["face_a"].astype(np.int64), pairs["face_b"].astype(np.int64), pairs["kind"].copy())
+
+    def pairs(self, pose_a: Any = None, pose_b: Any = None, *, progress: Callable | None = None) -> Pairs:
+        """Every pair of faces that meet, once."""
+        return self._pairs("ebpo_collide_all", (pose_a, pose_b), progress)
+
+    def self_pairs(self, *, progress: Callable | None = None) -> Pairs:
+        """Of a collider of one model, twice: pairs of its faces that meet otherwise than as neighbours do.
+
+        >>> len(Collider(cube, cube).self_pairs().kind)
+        0
+        """
+        return self._pairs("ebpo_collide_self", (None, None), progress)
+
+    def contacts(self, pose_a: Any = None, pose_b: Any = None, *, progress: Callable | None = None) -> Contacts:
+        """Where they cross: a segment for each pair of crossing faces."""
+        found = Gathered(c.ebpo_segments_fn, SEGMENT)
+        with self._options((pose_a, pose_b), None, progress) as options:
+            call("ebpo_collide_contacts", self._handle, options, found.take, None)
+        all_of_them = found.array
+        return Contacts(all_of_them["point"].copy(), all_of_them["face_a"].astype(np.int64),
+                        all_of_them["face_b"].astype(np.int64))
+
+    def polylines(self, pose_a: Any = None, pose_b: Any = None) -> list[np.ndarray]:
+        """Lines along which they cross: (k, 3) points each; of a closed one the last is the first.
+
+        >>> len(Collider(cube, cube).polylines(pose_b=pose(translation=[.5, .25, .25])))
+        1
+        """
+        lines = []
+
+        def take(_user: int, line: int) -> bool:
+            given = c.ebpo_polyline.from_address(line)
+            lines.append(copied(given.points, (given.count, 3), np.float64))
+            return True
+
+        with self._options((pose_a, pose_b)) as options:
+            call("ebpo_collide_polylines", self._handle, options, c.ebpo_polylines_fn(take), None)
+        return lines
+
+    def distance(self, pose_a: Any = None, pose_b: Any = None, *, tolerance: float = 0.0,
+                 deadline: float | None = None) -> Clearance:
+        """The least distance of their faces; 0 if any meet, not negative inside a solid.
+
+        tolerance: hi - lo may be so much. deadline: seconds, after which what is certain is said.
+        """
+        asked, out = made(c.ebpo_clearance_options, tolerance=tolerance), c.ebpo_clearance()
+        with self._options((pose_a, pose_b), deadline) as options:
+            call("ebpo_collide_distance", self._handle, options, ctypes.byref(asked), ctypes.byref(out))
+        return Clearance(out.distance.lo, out.distance.hi, number(out.pair.face_a), number(out.pair.face_b),
+                         np.array(out.point_a), np.array(out.point_b))
+
+    def depth(self, tolerance: float, pose_a: Any = None, pose_b: Any = None) -> tuple[tuple, tuple]:
+        """How deep a's surface is in b, and b's in a: (lo, hi) each, at most `tolerance` apart.
+
+        >>> (lo, hi), _ = Collider(cube, cube).depth(.01, pose_b=pose(translation=[.75, 0, 0]))
+        >>> lo <= .25 <= hi
+        True
+        """
+        a_in_b, b_in_a = c.ebpo_certain(), c.ebpo_certain()
+        with self._options((pose_a, pose_b)) as options:
+            call("ebpo_collide_depth", self._handle, options, tolerance, ctypes.byref(a_in_b), ctypes.byref(b_in_a))
+        return (a_in_b.lo, a_in_b.hi), (b_in_a.lo, b_in_a.hi)
+
+    def way_out(self, direction: Any, pose_a: Any = None, pose_b: Any = None) -> WayOut:
+        """How far a has to be moved along a direction to be clear of b, in lengths of it.
+
+        >>> Collider(cube, cube).way_out([1, 0, 0], pose_b=pose(translation=[-.25, 0, 0])).hi
+        0.75
+        """
+        along, out = np.ascontiguousarray(direction, dtype=np.float64).reshape(3), c.ebpo_way_out()
+        with self._options((pose_a, pose_b)) as options:
+            call("ebpo_collide_way_out", self._handle, options, along.ctypes.data, ctypes.byref(out))
+        return WayOut(out.t.lo, out.t.hi, number(out.pair.face_a), number(out.pair.face_b))

@@ -1,0 +1,110 @@
+"""From a mesh to a file. It takes a library with libhdf5, which writes."""
+from __future__ import annotations
+
+import ctypes
+import os
+from typing import Any, Callable
+
+import numpy as np
+
+from . import _declared as c
+from ._library import Handle, Reporter, Struct, call, made, size_in_bytes
+from .model import Model
+from .model import open as open_model
+
+PREPARE = ("weld", "orient", "fill_holes", "flip", "drop_duplicates")
+BUILD = ("max_level", "leaf_faces", "epsilon", "require_solid", "percent", "k_root", "seed", "unit", "crs", "date")
+WITHOUT = {"planes": c.EBPO_PART_PLANES, "mesh": c.EBPO_PART_MESH, "maps": c.EBPO_PART_MAPS,
+           "attributes": c.EBPO_PART_ATTRIBUTES | c.EBPO_PART_COLOURS, "colours": c.EBPO_PART_COLOURS}
+CODECS = {"zstd": c.EBPO_CODEC_ZSTD, "deflate": c.EBPO_CODEC_DEFLATE, "none": c.EBPO_CODEC_NONE}
+RULES = {rule.name.lower(): int(rule) for rule in c.Rule}
+
+
+def convert(mesh: Any, output: Any, *, without: Any = (), rule: str = "nonzero", codec: str = "zstd",
+            codec_level: int = 0, memory: int | str | None = None, temp_dir: Any = None,
+            threads: int | None = None, progress: Callable | None = None, **options: Any) -> Model:
+    """Converts a mesh to an .ebpo.h5 file, which appears whole or not at all, and opens it.
+
+    mesh: the path of a PLY (OBJ, STL, OFF where the library has assimp), or (vertices, faces): (v, 3) of
+        float32, which stay such, or anything that float64 takes, and (f, 3) integers.
+    without: names of "planes", "mesh", "maps", "attributes", "colours".
+    rule: "nonzero", "evenodd" or "positive": winding numbers that are inside.
+    codec: "zstd", "deflate" or "none".
+    memory: bytes that the process may take; the rest goes to temporary files in temp_dir. None: half
+        of the machine's.
+    options: weld, orient, fill_holes, flip, drop_duplicates: mend the mesh; max_level, leaf_faces, epsilon,
+        require_solid, seed, unit, crs, date as in ebpo_build_options, ebpo/build.h. Usual values are
+        those of the command `ebpo convert`, and so are the bytes of the file.
+
+    Raises NotSolidError with require_solid, UnsupportedError where the library is one without libhdf5,
+    FormatError, IOFailure.
+
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> m = convert((corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]), "corner.ebpo.h5")
+    >>> m.info.solid, m.info.face_count
+    (True, 4)
+    """
+    unknown = set(options) - {*PREPARE, *BUILD}
+    if unknown:
+        raise TypeError(f"convert() has no option {', '.join(sorted(unknown))}")
+    call("ebpo_register_filters")  # a library without libhdf5 says now, not after hours, that it cannot write
+    call("ebpo_check_output", os.fsencode(output))
+    space = made(c.ebpo_workspace_options, memory=size_in_bytes(memory),
+                 temp_dir=None if temp_dir is None else os.fsencode(temp_dir))
+    workspace = Handle.made("ebpo_workspace_new", ctypes.byref(space), free="ebpo_workspace_free")
+    with Reporter(progress) as reported:
+        common = {"threads": threads or 0, "progress": reported}
+        parts = c.EBPO_PART_PLANES | c.EBPO_PART_MESH | c.EBPO_PART_MAPS | c.EBPO_PART_ATTRIBUTES | c.EBPO_PART_COLOURS
+        for name in [without] if isinstance(without, str) else without:
+            parts &= ~WITHOUT[name]
+        read = read_mesh(mesh, workspace, bool(parts & c.EBPO_PART_ATTRIBUTES), common)
+        prepare = made(c.ebpo_prepare_options, **common, **{n: options[n] for n in PREPARE if n in options})
+        prepared = made(c.ebpo_prepared)
+        call("ebpo_mesh_prepare", read, ctypes.byref(prepare), ctypes.byref(prepared))
+        build = made(c.ebpo_build_options, parts=parts, rule=RULES[rule], **common,
+                     **{n: in_c(options[n]) for n in BUILD if options.get(n) is not None})
+        tree = Struct(c.ebpo_tree, "ebpo_tree_free", workspace)
+        call("ebpo_build", read, ctypes.byref(prepared.report), ctypes.byref(prepared.record),
+             ctypes.byref(build), tree)
+        write = made(c.ebpo_write_options, codec=CODECS[codec], codec_level=codec_level, **common)
+        call("ebpo_tree_write", tree, os.fsencode(output), ctypes.byref(write))
+    return open_model(output)
+
+
+def in_c(value: Any) -> Any:
+    return value.encode() if isinstance(value, str) else value
+
+
+def read_mesh(mesh: Any, workspace: Handle, attributes: bool, common: dict) -> Struct:
+    """An ebpo_mesh of a file, or of arrays."""
+    if isinstance(mesh, (str, os.PathLike)):
+        options = made(c.ebpo_mesh_read_options, attributes=attributes, workspace=workspace.pointer, **common)
+        read = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace)
+        call("ebpo_mesh_read", os.fsencode(mesh), ctypes.byref(options), read)
+        return read
+    vertices, faces = map(np.asarray, mesh)
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+        raise ValueError(f"vertices are (v, 3) and faces (f, 3), not {vertices.shape} and {faces.shape}")
+    if faces.dtype.kind not in "iu":
+        raise TypeError(f"faces are integers, not {faces.dtype}")
+    if faces.size and (faces.min() < 0 or faces.max() >= len(vertices)):
+        raise ValueError("a face names a vertex that is not there")
+    single = vertices.dtype == np.float32
+    read = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace, vertex_count=len(vertices), face_count=len(faces))
+    xyz = of_malloc(vertices, np.float32 if single else np.float64)
+    setattr(read.c, "xyz32" if single else "xyz64", xyz)
+    read.c.faces = of_malloc(faces, np.uint32)
+    read.c.workspace = workspace.pointer
+    return read
+
+
+def of_malloc(values: np.ndarray, dtype: Any) -> int:
+    """A copy that free() frees."""
+    values = np.ascontiguousarray(values, dtype=dtype)
+    malloc = ctypes.CDLL(None).malloc
+    malloc.restype, malloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t]
+    address = malloc(max(1, values.nbytes))
+    if not address:
+        raise MemoryError
+    ctypes.memmove(address, values.ctypes.data, values.nbytes)
+    return address

@@ -1,0 +1,75 @@
+"""What goes wrong. Each failure of the library is one of these, with its message.
+
+The message says what, where and what next. The classes are also those of Python that fit, so that
+`except OSError` catches what the system or a server said no to.
+"""
+from __future__ import annotations
+
+__all__ = ["Error", "ArgumentError", "IOFailure", "FormatError", "VersionError", "UnsupportedError",
+           "NotSolidError", "LimitError", "Cancelled", "AbsentError", "NoMemory"]
+
+
+class Error(Exception):
+    """A failure of the library.
+
+    status: the name of the C status, such as "EBPO_E_FORMAT".
+    file, object: the file at fault, and the path inside it, or "".
+    offset: the byte at fault, or None.
+    """
+
+    status: str = ""
+    file: str = ""
+    object: str = ""
+    offset: int | None = None
+
+    def __init__(self, message: str = "", status: str = "", file: str = "", object: str = "",
+                 offset: int | None = None) -> None:
+        super().__init__(message)
+        self.status, self.file, self.object, self.offset = status, file, object, offset
+
+    def __str__(self) -> str:
+        return str(self.args[0]) if self.args else ""
+
+
+class ArgumentError(Error, ValueError):
+    """A rule of the function was broken: a point that is not finite, a level that is not there."""
+
+
+class IOFailure(Error, OSError):
+    """The system, a server or a source of bytes said no."""
+
+
+class FormatError(Error, ValueError):
+    """A file is not what it says it is, or is damaged."""
+
+
+class VersionError(Error, ValueError):
+    """A file needs a newer reader."""
+
+
+class UnsupportedError(Error, NotImplementedError):
+    """Valid, but this build of the library cannot do it."""
+
+
+class NotSolidError(Error, ValueError):
+    """A solid is required, and the model is a surface."""
+
+
+class LimitError(Error, ValueError):
+    """A count or size is beyond a limit, or the budget is too small; the message names enough."""
+
+
+class Cancelled(Error):
+    """A progress callback asked to stop."""
+
+
+class AbsentError(Error, LookupError):
+    """The file was written without what is needed."""
+
+
+class NoMemory(Error, MemoryError):
+    """An allocation failed."""
+
+
+BY_STATUS = {-1: NoMemory, -2: ArgumentError, -3: IOFailure, -4: FormatError, -5: VersionError, -6: UnsupportedError,
+             -7: NotSolidError, -8: LimitError, -9: Cancelled, -10: AbsentError}

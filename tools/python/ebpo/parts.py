@@ -1,0 +1,335 @@
+"""What a file holds, as arrays: facts, mesh, attributes, levels, subtrees."""
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from typing import Any, Iterator, NamedTuple
+
+import numpy as np
+
+from . import _declared as c
+from ._library import Handle, Struct, array, call, copied, lib, made, text
+
+
+class Mesh(NamedTuple):
+    """A triangle mesh.
+
+    vertices: (v, 3) float32 or float64, as the source has them, in the model's unit.
+    faces: (f, 3) uint32 numbers of vertices, counter-clockwise seen from outside.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+
+
+class Maps(NamedTuple):
+    """Numbers in the source: vertex (v,) and face (f,), uint32, of those of the file.
+
+    Faces that were added by filling holes have numbers from `info.source_face_count` on.
+    """
+
+    vertex: np.ndarray
+    face: np.ndarray
+
+
+class Level(NamedTuple):
+    """The envelopes of a level: closed convex polyhedra that hold the solid, as triangles.
+
+    vertices: (v, 3) float64, in the model's unit; nodes share none.
+    faces: (f, 3) uint32.
+    node: (f,) int64, whose each face is: rows of what follows.
+    octcode: (n,) uint64.
+    type: (n,) int8, a NodeType.
+    winding: (n,) int32; black: in the cell; leaf: at the lowest corner; else 0.
+    volume: (n,) float64, of each envelope, in the model's unit cubed.
+    colour: (n, 3) uint8, sRGB, or None where the file has no colours of nodes.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    node: np.ndarray
+    octcode: np.ndarray
+    type: np.ndarray
+    winding: np.ndarray
+    volume: np.ndarray
+    colour: np.ndarray | None
+
+
+class Mass(NamedTuple):
+    """In the model's unit, squared, cubed and so on; of density 1.
+
+    area, volume: float; the volume of a surface is 0, and so is what follows.
+    centroid: (3,); inertia: (3, 3) about it.
+    """
+
+    area: float
+    volume: float
+    centroid: np.ndarray
+    inertia: np.ndarray
+
+
+class Info:
+    """The facts of a file. Names are those of `ebpo_info` in ebpo/file.h, which says more.
+
+    Texts are str, digests hexadecimal, arrays numpy's. In other form:
+
+    box: (2, 3) float64, lower and upper corner of the root cell.
+    rule: a Rule; parts: a set of names, such as {"planes", "mesh"}; codec, selection: int.
+    format: "1.1".
+    levels: a structured array, a row for each level: gray_count, leaf_count, ... of ebpo_level_summary.
+    source: the path, URL or object that was opened, as a text.
+    """
+
+    def __init__(self, struct: Any, source: str) -> None:
+        self._facts: dict[str, Any] = {"source": source}
+        for name, _ in struct._fields_:
+            self._facts[name] = self._plain(getattr(struct, name), name)
+        facts = self._facts
+        facts["format"] = f"{struct.version_major}.{struct.version_minor}"
+        facts["rule"] = c.Rule(struct.rule)
+        facts["parts"] = {part.name.lower() for part in c.Part if struct.parts & part}
+        facts["box"] = np.array([facts["box_origin"], facts["box_origin"] + facts["box_size"]])
+        facts["levels"] = facts.pop("level")[:struct.level_count]
+
+    @staticmethod
+    def _plain(value: Any, name: str) -> Any:
+        if isinstance(value, bytes):
+            return text(value)
+        if isinstance(value, ctypes.Array):
+            if name.endswith("sha256") or name == "subset_of":
+                return bytes(value).hex()
+            return np.array(np.ctypeslib.as_array(value))
+        if isinstance(value, ctypes.Structure):
+            return {n: Info._plain(getattr(value, n), n) for n, _ in value._fields_}
+        return value
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self.__dict__["_facts"][name]
+        except KeyError:
+            raise AttributeError(f"there is no fact {name!r}; dir(info) names them") from None
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._facts]
+
+    def __reduce__(self) -> Any:
+        return _info_again, (self._facts,)
+
+    def __repr__(self) -> str:
+        kind = "solid" if self.solid else "surface"
+        return f"<ebpo.Info of {self.source}: a {kind} of {self.face_count} faces, {self.level_count} levels>"
+
+
+def _info_again(facts: dict) -> Info:
+    info = Info.__new__(Info)
+    info._facts = facts
+    return info
+
+
+def mesh_of(struct: Struct) -> Mesh:
+    mesh = struct.c
+    if mesh.xyz64:
+        vertices = array(struct, mesh.xyz64, (mesh.vertex_count, 3), np.float64)
+    else:
+        vertices = array(struct, mesh.xyz32, (mesh.vertex_count, 3), np.float32)
+    return Mesh(vertices, array(struct, mesh.faces, (mesh.face_count, 3), np.uint32))
+
+
+def read_mesh(file: Handle, order: str, threads: int) -> Mesh:
+    if order not in ("file", "source"):
+        raise ValueError(f"order is 'file' or 'source', not {order!r}")
+    options = made(c.ebpo_read_options, threads=threads)
+    mesh = Struct(c.ebpo_mesh, "ebpo_mesh_free")
+    if order == "file":
+        call("ebpo_file_read_mesh", file, ctypes.byref(options), mesh)
+    else:
+        is_source = ctypes.c_bool()
+        call("ebpo_file_read_source_mesh", file, ctypes.byref(options), mesh, ctypes.byref(is_source))
+        if not is_source:
+            raise LookupError("the file has no maps: it does not say which order the source had")
+    return mesh_of(mesh)
+
+
+def read_maps(file: Handle, info: Info, threads: int) -> Maps:
+    options = made(c.ebpo_read_options, threads=threads)
+    maps = Struct(c.ebpo_maps, "ebpo_maps_free")
+    call("ebpo_file_read_maps", file, ctypes.byref(options), maps)
+    return Maps(array(maps, maps.c.vertex_source, (info.vertex_count,), np.uint32),
+                array(maps, maps.c.face_source, (info.face_count,), np.uint32))
+
+
+def read_level(file: Handle, level: int, walls: bool, threads: int, progress: Any) -> Level:
+    options = made(c.ebpo_lod_options, walls=walls, threads=threads, progress=progress)
+    mesh = Struct(c.ebpo_mesh, "ebpo_mesh_free")
+    nodes = Struct(c.ebpo_lod_nodes, "ebpo_lod_nodes_free")
+    call("ebpo_lod_level_nodes", file, level, ctypes.byref(options), mesh, nodes, None)
+    vertices, faces = mesh_of(mesh)
+    rows = copied(nodes.c.nodes, (nodes.c.node_count,), np.dtype(c.ebpo_lod_node))
+    corners = array(nodes, nodes.c.corners, (nodes.c.polygon_count,), np.uint8)
+    whose = np.repeat(np.arange(len(rows)), rows["polygon_count"])
+    colour = None
+    if rows["coloured"].any():
+        colour = np.stack([rows["colour"] >> shift & 255 for shift in (0, 8, 16)], axis=1).astype(np.uint8)
+    return Level(vertices, faces, np.repeat(whose, corners - 2), rows["octcode"].copy(),
+                 rows["type"].astype(np.int8), rows["winding"].copy(), rows["volume"].copy(), colour)
+
+
+TYPES = [np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.float32, np.float64]
+
+
+class Attributes(Mapping):
+    """What the source says of vertices, faces and other elements beyond positions and corners.
+
+    A mapping from "element:name", such as "vertex:red", to arrays, which are read when they are asked
+    for: a row for each vertex or face in the order of the file (`Model.maps` has the source's). Without
+    the element the first of that name is meant, vertices first. Lists of one length have a row each;
+    of others there is a list of arrays.
+
+    >>> sorted(cube.attributes)
+    []
+    """
+
+    def __init__(self, file: Handle, threads: int) -> None:
+        self._file, self._threads = file, threads
+        self._places: dict[str, tuple[int, int]] = {}
+        number, facts = 0, made(c.ebpo_attribute_facts)
+        while lib.ebpo_file_attribute(file, number, ctypes.byref(facts)):
+            for column, name in enumerate(text(facts.names).split(" ")):
+                self._places.setdefault(f"{text(facts.element)}:{name}", (number, column))
+            number += 1
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def _find(self, name: str) -> tuple[int, int]:
+        found = [key for key in self._places if key == name or key.partition(":")[2] == name]
+        if not found:
+            raise KeyError(name)
+        found.sort(key=lambda key: (not key.startswith("vertex:"), not key.startswith("face:")))
+        return self._places[name if name in self._places else found[0]]
+
+    def facts(self, name: str) -> dict[str, Any]:
+        """Of the array that a name is in: its element, names, type, rows and range, unread."""
+        facts = made(c.ebpo_attribute_facts)
+        lib.ebpo_file_attribute(self._file, self._find(name)[0], ctypes.byref(facts))
+        return {"element": text(facts.element), "names": text(facts.names).split(" "),
+                "dtype": np.dtype(TYPES[facts.type]), "rows": facts.rows, "list": bool(facts.list),
+                "range": tuple(facts.range) if facts.has_range else None}
+
+    def __getitem__(self, name: str) -> Any:
+        number, column = self._find(name)
+        about = self.facts(name)
+        options = made(c.ebpo_read_options, threads=self._threads)
+        values = Struct(c.ebpo_attribute_values, "ebpo_attribute_values_free")
+        call("ebpo_file_read_attribute", self._file, number, ctypes.byref(options), values)
+        flat = array(values, values.c.values, (values.c.count,), about["dtype"])
+        if values.c.ends:
+            ends = array(values, values.c.ends, (about["rows"],), np.uint64)
+            return np.split(flat, ends[:-1].astype(np.int64))
+        if not about["rows"]:
+            return flat
+        rows = flat.reshape(about["rows"], -1)
+        if about["list"]:
+            return rows
+        return rows[:, column] if len(about["names"]) > 1 or rows.shape[1] == 1 else rows
+
+
+class Subtree:
+    """A subtree of the octree as plain arrays, which are the library's own.
+
+    Nodes, level after level, octcodes ascending; n of them:
+
+    level: of its root; level_first: (levels + 1,) the first node of each level.
+    octcode: (n,) uint64; type: (n,) uint8, a NodeType; winding: (n,) int32 or None.
+    children: (n,) uint32, the first of eight, octant after octant; NO_CHILDREN: none here.
+    plane_first: (n + 1,) uint32, where each node's planes begin in planes: uint32 codes (see
+    `half_spaces`); None without them. above_first, above_planes: the same of the nodes above.
+
+    Faces, if the file has a mesh and no `levels` were given; else None:
+
+    vertices: (v, 3) float32 or float64; faces: (f, 3) uint32, of these vertices.
+    outer_count: so many of the faces, the first ones, are other subtrees' own.
+    number: (f,) uint32, in the file; source: (f,) uint32, in the source, or None.
+    list_first: (n + 1,) uint32, where each leaf's list of faces begins in list.
+    """
+
+    NO_CHILDREN = 2**32 - 1
+
+    def __init__(self, file: Handle, octcode: int, levels: int | None, memory: int, or_leaf_above: bool) -> None:
+        options = made(c.ebpo_subtree_options, memory=memory, or_leaf_above=or_leaf_above)
+        if levels is not None:
+            options.levels = levels
+        self._handle = Handle.made("ebpo_subtree_open", file, octcode, ctypes.byref(options),
+                                   free="ebpo_subtree_close")
+        nodes = made(c.ebpo_subtree_nodes)
+        lib.ebpo_subtree_get_nodes(self._handle, ctypes.byref(nodes))
+        self._set_nodes(nodes)
+        none: Any = None
+        self.vertices = self.faces = self.number = self.source = self.list_first = self.list = none
+        self.outer_count = 0
+        faces = made(c.ebpo_subtree_faces)
+        from .errors import AbsentError
+        try:
+            call("ebpo_subtree_get_faces", self._handle, ctypes.byref(faces))
+        except AbsentError:
+            return
+        self._set_faces(faces)
+
+    def _array(self, address: int | None, shape: tuple, dtype: Any) -> Any:
+        return array(self._handle, address, shape, dtype)
+
+    def _set_nodes(self, nodes: Any) -> None:
+        count = self.node_count = nodes.node_count
+        self.level = nodes.level
+        self.level_first = self._array(nodes.level_first, (nodes.level_count + 1,), np.uint64)
+        self.octcode = self._array(nodes.octcodes, (count,), np.uint64)
+        self.type = self._array(nodes.types, (count,), np.uint8)
+        self.winding = self._array(nodes.windings, (count,), np.int32)
+        self.children = self._array(nodes.children, (count,), np.uint32)
+        none: Any = None
+        self.planes = self.plane_first = self.above_first = self.above_planes = none
+        if nodes.plane_first:
+            self.plane_first = self._array(nodes.plane_first, (count + 1,), np.uint32)
+            self.planes = self._array(nodes.planes, (int(self.plane_first[-1]),), np.uint32)
+        if nodes.above_first:
+            self.above_first = self._array(nodes.above_first, (self.level + 1,), np.uint32)
+            self.above_planes = self._array(nodes.above_planes, (int(self.above_first[-1]),), np.uint32)
+        self.nbytes = nodes.memory
+
+    def _set_faces(self, faces: Any) -> None:
+        dtype = np.float64 if faces.xyz64 else np.float32
+        self.vertices = self._array(faces.xyz64 or faces.xyz32, (faces.vertex_count, 3), dtype)
+        self.faces = self._array(faces.faces, (faces.face_count, 3), np.uint32)
+        self.number = self._array(faces.numbers, (faces.face_count,), np.uint32)
+        self.source = self._array(faces.source, (faces.face_count,), np.uint32)
+        self.outer_count = faces.outer_count
+        self.list_first = self._array(faces.list_first, (self.node_count + 1,), np.uint32)
+        self.list = self._array(faces.list, (int(self.list_first[-1]),), np.uint32)
+
+    def faces_of(self, node: int) -> np.ndarray:
+        """The faces of a leaf: rows of `faces`."""
+        return self.list[self.list_first[node]:self.list_first[node + 1]]
+
+    def __repr__(self) -> str:
+        return f"<ebpo.Subtree {int(self.octcode[0]):o}: {self.node_count} nodes>"
+
+
+def half_spaces(codes: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The half-spaces of plane codes, in coordinates of their node's cell, where xi is 0 to 1.
+
+    codes: (k,) uint32. Returns n: (k, 3) int32, of 1-norm 511, and d: (k,) int32; a point is kept if
+    4096 n . xi <= d. A code that stands for no plane is a ValueError.
+
+    >>> n, d = half_spaces([511 | 1022 << 10 | 1000 << 20])
+    >>> n.tolist()
+    [[0, 511, 0]]
+    """
+    codes = np.ascontiguousarray(codes, dtype=np.uint32).ravel()
+    n, d = np.zeros((len(codes), 3), np.int32), np.zeros(len(codes), np.int32)
+    for i, code in enumerate(codes.tolist()):
+        if not lib.ebpo_plane_decode(code, n[i].ctypes.data, d[i:].ctypes.data):
+            raise ValueError(f"{code:#x} is no plane")
+    return n, d

@@ -1,0 +1,214 @@
+"""Where bytes come from: paths, URLs, bytes in memory, file objects, objects with ranges, fsspec."""
+from __future__ import annotations
+
+import ctypes
+import os
+import threading
+import urllib.error
+import urllib.request
+from collections import OrderedDict
+from typing import Any
+
+import numpy as np
+
+from . import _declared as c
+from ._library import Handle, made, size_in_bytes
+from .errors import UnsupportedError
+
+FUNCTIONS: dict = {name: kind for name, kind in c.ebpo_source._fields_}
+IO, CANCELLED = -3, -9
+
+
+class Seekable:
+    """A file object with seek and read, one thread at a time."""
+
+    def __init__(self, file: Any) -> None:
+        self.file, self.lock = file, threading.Lock()
+        self.size = file.seek(0, os.SEEK_END)
+        if self.size is None:
+            self.size = file.tell()
+
+    def read_range(self, offset: int, size: int) -> bytes:
+        with self.lock:
+            self.file.seek(offset)
+            data = self.file.read(size)
+            while data and len(data) < size:  # raw files give what they have
+                more = self.file.read(size - len(data))
+                if not more:
+                    break
+                data += more
+        return data
+
+
+class Stored:
+    """A path of an fsspec file system, read by ranges."""
+
+    def __init__(self, url: str, storage_options: dict | None = None) -> None:
+        try:
+            import fsspec
+        except ImportError:
+            raise ImportError(f"{url}: this kind of address takes fsspec, which is not installed") from None
+        self.fs, self.path = fsspec.core.url_to_fs(url, **(storage_options or {}))
+        self.size = self.fs.size(self.path)
+
+    def read_range(self, offset: int, size: int) -> bytes:
+        return self.fs.cat_file(self.path, start=offset, end=offset + size)
+
+
+class Web:
+    """A URL by Python's own HTTP, where the library has none. Answers are of one version of the file."""
+
+    BLOCK, HELD, TRIES = 1 << 17, 384, 4
+
+    def __init__(self, url: str, headers: dict | None = None) -> None:
+        self.url, self.headers, self.lock = url, dict(headers or {}), threading.Lock()
+        self.blocks: OrderedDict[int, bytes] = OrderedDict()
+        self.version: Any = None
+        self.size = 0
+        self.blocks[0] = self.fetch(0)
+
+    def fetch(self, number: int) -> bytes:
+        begin = number * self.BLOCK
+        end = begin + self.BLOCK - 1
+        if self.version is not None:
+            end = min(end, self.size - 1)
+        request = urllib.request.Request(self.url, headers={**self.headers, "Range": f"bytes={begin}-{end}"})
+        for trial in range(self.TRIES):
+            try:
+                with urllib.request.urlopen(request, timeout=60) as answer:
+                    return self.checked(answer, begin)
+            except urllib.error.HTTPError as error:
+                if error.code not in (408, 429, 500, 502, 503, 504) or trial + 1 == self.TRIES:
+                    raise
+            except (urllib.error.URLError, TimeoutError, ConnectionError):
+                if trial + 1 == self.TRIES:
+                    raise
+            threading.Event().wait(0.2 * 2**trial)
+        raise AssertionError
+
+    def checked(self, answer: Any, begin: int) -> bytes:
+        if answer.status != 206:
+            raise OSError(f"the server does not answer ranges (status {answer.status})")
+        first, _, whole = answer.headers["Content-Range"].partition(" ")[2].partition("/")
+        version = answer.headers["ETag"] or answer.headers["Last-Modified"], whole
+        if self.version not in (None, version):
+            raise OSError("the file on the server has changed since it was opened")
+        data = answer.read()
+        self.version, self.size = version, int(whole)
+        if int(first.partition("-")[0]) != begin or len(data) != min(self.BLOCK, self.size - begin):
+            raise OSError("the server sent another range than was asked for")
+        return data
+
+    def block(self, number: int) -> bytes:
+        with self.lock:
+            if number in self.blocks:
+                self.blocks.move_to_end(number)
+                return self.blocks[number]
+        data = self.fetch(number)
+        with self.lock:
+            self.blocks[number] = data
+            while len(self.blocks) > self.HELD:
+                self.blocks.popitem(last=False)
+        return data
+
+    def read_range(self, offset: int, size: int) -> bytes:
+        first, last = offset // self.BLOCK, (offset + size - 1) // self.BLOCK
+        data = b"".join(map(self.block, range(first, last + 1)))
+        return data[offset - first * self.BLOCK:][:size]
+
+
+class Source:
+    """An object with ranges as the library wants it."""
+
+    def __init__(self, ranges: Any) -> None:
+        self.ranges = ranges
+        size = ranges.size
+        self.struct = made(c.ebpo_source, size=size() if callable(size) else size,
+                           read=FUNCTIONS["read"](self.read))
+
+    def read(self, _user: int, offset: int, size: int, data: int, error: int) -> int:
+        try:
+            told = memoryview(self.ranges.read_range(offset, size)).cast("B")
+            if len(told) != size:
+                raise OSError(f"{len(told)} bytes came instead of {size} at byte {offset}")
+            ctypes.memmove(data, np.frombuffer(told, np.uint8).ctypes.data, size)
+            return 0
+        except BaseException as raised:
+            status = CANCELLED if isinstance(raised, KeyboardInterrupt) else IO
+            if error:
+                out = c.ebpo_error.from_address(error)
+                out.status, out.offset = status, offset
+                out.message = f"reading failed: {type(raised).__name__}: {raised}".encode()[:400]
+            return status
+
+
+def http_options(options: dict) -> tuple[Any, list]:
+    """Options of URLs as the library takes them, and what must live as long."""
+    struct, keep = made(c.ebpo_http_options), []
+    for name, value in options.items():
+        if name == "headers":
+            lines = [f"{key}: {text}".encode() for key, text in value.items()] + [None]
+            keep.append((ctypes.c_char_p * len(lines))(*lines))
+            value = ctypes.addressof(keep[-1])
+        elif name in ("memory", "whole_limit", "cache_bytes"):
+            value = size_in_bytes(value)
+        elif isinstance(value, (str, os.PathLike)):
+            value = os.fsencode(value)
+        known = dict(c.ebpo_http_options._fields_)
+        if name not in known or name in ("struct_size", "stop", "stop_user", "reserved"):
+            raise TypeError(f"there is no option {name!r} of URLs")
+        setattr(struct, name, value)
+    return struct, keep
+
+
+def by_url(url: str, http: dict) -> Handle:
+    struct, keep = http_options(http)
+    try:
+        return Handle.made("ebpo_open_url", url.encode(), ctypes.byref(struct), free="ebpo_close")
+    except UnsupportedError:
+        if set(http) - {"headers"}:
+            raise
+    del keep
+    return by_ranges(Web(url, http.get("headers")), url.partition("?")[0])
+
+
+def by_ranges(ranges: Any, name: str) -> Handle:
+    source = Source(ranges)
+    return Handle.made("ebpo_open_source", ctypes.byref(source.struct), name.encode(), free="ebpo_close",
+                       keep=(source,))
+
+
+def opened(source: Any, http: dict, storage_options: dict | None) -> Handle:
+    """An ebpo_file of whatever `ebpo.open` takes."""
+    if isinstance(source, (str, os.PathLike)):
+        name = os.fspath(source)
+        if isinstance(name, str) and name.startswith(("http://", "https://")) and storage_options is None:
+            return by_url(name, http)
+        if http:
+            raise TypeError(f"{name} is no URL: there is nothing to do for {', '.join(http)}")
+        if isinstance(name, str) and "://" in name:
+            return by_ranges(Stored(name, storage_options), name)
+        return Handle.made("ebpo_open", os.fsencode(name), free="ebpo_close")
+    if http or storage_options is not None:
+        raise TypeError("options of URLs are for URLs")
+    name = str(getattr(source, "name", "") or type(source).__name__)
+    if hasattr(source, "read_range") and hasattr(source, "size"):
+        return by_ranges(source, name)
+    if hasattr(source, "seek") and hasattr(source, "read") and not isinstance(source, _mmap()):
+        return by_ranges(Seekable(source), name)
+    try:
+        data = np.frombuffer(source, np.uint8)
+    except (TypeError, ValueError):
+        raise TypeError(f"{type(source).__name__} is neither a path, a URL, bytes, a file with seek and read nor "
+                        "an object with size and read_range(offset, size)") from None
+    return Handle.made("ebpo_open_memory", data.ctypes.data, data.nbytes, name.encode(), free="ebpo_close",
+                       keep=(data, source))
+
+
+def _mmap() -> type:
+    """Has seek and read, but is bytes as well."""
+    import mmap
+    return mmap.mmap
+
+
+__all__ = ["Seekable", "Stored", "Web", "opened"]
