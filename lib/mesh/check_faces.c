@@ -95,10 +95,17 @@ static void measure(face_block *block, const ebpo_units *units, const double cen
                                       (a[2] - centre[2]) * cross[2]);
 }
 
+static void note(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
+                 ebpo_finding_kind kind, uint64_t face)
+{
+    ebpo_check_note(check, worker, finding, kind, ebpo_mesh_source_face(check->mesh, face),
+                    (uint32_t)face, (uint32_t)face);
+}
+
 static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                          ebpo_error *error)
 {
-    (void)worker, (void)error;
+    (void)error;
     const face_pass *pass = context;
     const ebpo_mesh *mesh = pass->check->mesh;
     uint32_t *parents = pass->check->parents;
@@ -108,8 +115,8 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
         join(parents, v[0], v[1]);
         join(parents, v[1], v[2]);
         if (ebpo_face_repeats_index(v)) {
-            ebpo_finding_add(&block.index_repeated, ebpo_mesh_source_face(mesh, f));
-            ebpo_finding_add(&block.zero_area, ebpo_mesh_source_face(mesh, f));
+            note(pass->check, worker, &block.index_repeated, EBPO_FOUND_INDEX_REPEATED_FACE, f);
+            note(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
             continue;
         }
         double a[3], b[3], c[3], cross[3];
@@ -124,7 +131,7 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
             ebpo_mesh_position(mesh, v[2], c);
         }
         if (zero_area(a, b, c))
-            ebpo_finding_add(&block.zero_area, ebpo_mesh_source_face(mesh, f));
+            note(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
     }
     pass->blocks[begin / FACE_GRAIN] = block;
     return EBPO_OK;

@@ -24,6 +24,7 @@ typedef struct scratch {
     uint64_t fan_capacity;
     ebpo_same_faces same;
     ebpo_boundary *boundary;
+    unsigned worker;
 } scratch;
 
 typedef struct star_pass {
@@ -50,9 +51,10 @@ static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t uses)
     return a != b;
 }
 
-static bool classify_edge(const ebpo_mesh *mesh, star_block *block, scratch *s, uint32_t v,
+static bool classify_edge(const ebpo_check *check, star_block *block, const scratch *s, uint32_t v,
                           const ebpo_link *links, uint64_t uses)
 {
+    const ebpo_mesh *mesh = check->mesh;
     uint64_t out = 0;
     uint32_t neighbour = ebpo_link_neighbour(&links[0]);
     uint64_t face = UINT64_MAX; /* the lowest */
@@ -63,14 +65,18 @@ static bool classify_edge(const ebpo_mesh *mesh, star_block *block, scratch *s, 
     }
     block->edges++;
     if (uses > 2)
-        ebpo_finding_add(&block->nonmanifold, face);
+        ebpo_check_note(check, s->worker, &block->nonmanifold, EBPO_FOUND_NONMANIFOLD_EDGE, face, v,
+                        neighbour);
     if (uses == 2 && out != 1)
-        ebpo_finding_add(&block->misoriented, face);
+        ebpo_check_note(check, s->worker, &block->misoriented, EBPO_FOUND_MISORIENTED_EDGE, face, v,
+                        neighbour);
     if (2 * out != uses)
-        ebpo_finding_add(&block->unbalanced, face);
+        ebpo_check_note(check, s->worker, &block->unbalanced, EBPO_FOUND_UNBALANCED_EDGE, face, v,
+                        neighbour);
     if (uses != 1)
         return true;
-    ebpo_finding_add(&block->boundary, face);
+    ebpo_check_note(check, s->worker, &block->boundary, EBPO_FOUND_BOUNDARY_EDGE, face, v,
+                    neighbour);
     return ebpo_boundary_add(s->boundary, mesh, out ? v : neighbour, out ? neighbour : v,
                              ebpo_link_face(&links[0]));
 }
@@ -102,11 +108,12 @@ static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, 
         if (neighbour < v) /* the edge is counted at its lower end */
             continue;
         ebpo_sum_add(&block->length, edge_length(check, v, neighbour));
-        if (!classify_edge(check->mesh, block, s, v, star->links + begin, end - begin))
+        if (!classify_edge(check, block, s, v, star->links + begin, end - begin))
             return false;
     }
     if (fans > 1)
-        ebpo_finding_add(&block->bowtie, ebpo_mesh_source_vertex(check->mesh, v));
+        ebpo_check_note(check, s->worker, &block->bowtie, EBPO_FOUND_BOWTIE_VERTEX,
+                        ebpo_mesh_source_vertex(check->mesh, v), v, v);
     return true;
 }
 
@@ -116,7 +123,8 @@ static bool check_repeated(const ebpo_check *check, star_block *block, scratch *
         return false;
     for (uint64_t i = 1; i < s->same.count; i++)
         if (ebpo_same_faces_repeats(&s->same, i))
-            ebpo_finding_add(&block->repeated_face, s->same.item[i].source);
+            ebpo_check_note(check, s->worker, &block->repeated_face, EBPO_FOUND_REPEATED_FACE,
+                            s->same.item[i].source, s->same.item[i].face, s->same.item[i].face);
     return true;
 }
 
@@ -182,7 +190,7 @@ ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
         goto done;
     }
     for (unsigned t = 0; t < check->threads; t++)
-        pass.scratch[t].boundary = &boundaries[t];
+        pass.scratch[t].boundary = &boundaries[t], pass.scratch[t].worker = t;
     status = ebpo_parallel_for(check->threads, NULL, count, STAR_GRAIN, stars, &pass,
                                &check->progress, "checking edges", error);
     if (status != EBPO_OK)

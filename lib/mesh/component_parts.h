@@ -45,6 +45,11 @@ EBPO_MUST_USE ebpo_status ebpo_components_find(const ebpo_mesh *mesh, unsigned t
                                                const ebpo_progress *progress, ebpo_components **out,
                                                ebpo_error *error);
 
+/* The component of each vertex, [vertex_count]; EBPO_NO_INDEX: no face names it. The mesh's
+ * workspace owns it. On failure NULL. */
+EBPO_MUST_USE ebpo_status ebpo_components_number(const ebpo_mesh *mesh, uint32_t **number,
+                                                 ebpo_error *error);
+
 /* Edges and volumes; needs the groups of faces. */
 EBPO_MUST_USE ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
                                                   const ebpo_progress *progress, ebpo_error *error);

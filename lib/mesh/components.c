@@ -241,6 +241,25 @@ ebpo_status ebpo_components_find(const ebpo_mesh *mesh, unsigned threads,
     return status == EBPO_OK ? ebpo_components_measure(c, threads, progress, error) : status;
 }
 
+ebpo_status ebpo_components_number(const ebpo_mesh *mesh, uint32_t **number, ebpo_error *error)
+{
+    *number = NULL;
+    ebpo_status status = ebpo_components_check(mesh, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_components *c = ebpo_alloc_zero(1, sizeof *c);
+    if (!c)
+        return ebpo_fail_memory(error, sizeof *c);
+    c->mesh = mesh;
+    status = find(c, error);
+    if (status == EBPO_OK) {
+        *number = c->number;
+        c->number = NULL;
+    }
+    ebpo_components_free(c);
+    return status;
+}
+
 static ebpo_status group_all(ebpo_components *c, ebpo_error *error)
 {
     ebpo_status status = ebpo_cavities_place(c, error);

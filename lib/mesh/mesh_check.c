@@ -57,13 +57,15 @@ typedef struct vertex_pass {
 static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
                             ebpo_error *error)
 {
-    (void)worker, (void)error;
+    (void)error;
     const vertex_pass *pass = context;
     vertex_block b = { .min = { INFINITY, INFINITY, INFINITY },
                        .max = { -INFINITY, -INFINITY, -INFINITY } };
     for (uint64_t v = begin; v < end; v++) {
         if (ebpo_stars_degree(&pass->check->stars, (uint32_t)v) == 0) {
-            ebpo_finding_add(&b.unreferenced, ebpo_mesh_source_vertex(pass->check->mesh, v));
+            ebpo_check_note(pass->check, worker, &b.unreferenced, EBPO_FOUND_UNREFERENCED_VERTEX,
+                            ebpo_mesh_source_vertex(pass->check->mesh, v), (uint32_t)v,
+                            (uint32_t)v);
             continue;
         }
         double p[3];
@@ -146,42 +148,53 @@ static int compare_runs(const curve_run *a, const curve_run *b)
     return 0;
 }
 
+static void note_repeated(const ebpo_check *check, uint32_t v)
+{
+    ebpo_check_note(check, 0, &check->report->repeated_positions, EBPO_FOUND_REPEATED_POSITION,
+                    ebpo_mesh_source_vertex(check->mesh, v), v, v);
+}
+
 /* Steps over the vertices of a run's next position. All but the one that the source has first
  * repeat that one. */
-static void take_position(curve_run *r, uint64_t *lowest, ebpo_finding *finding)
+static void take_position(const ebpo_check *check, curve_run *r, uint32_t *lowest)
 {
     double here[3], p[3];
     ebpo_mesh_position(r->mesh, r->at, here);
     do {
-        uint64_t source = ebpo_mesh_source_vertex(r->mesh, r->at++);
-        if (*lowest != UINT64_MAX)
-            ebpo_finding_add(finding, source > *lowest ? source : *lowest);
-        *lowest = source < *lowest ? source : *lowest;
+        uint32_t v = (uint32_t)r->at++, later = v;
+        if (*lowest == EBPO_NO_INDEX) {
+            *lowest = v;
+        } else {
+            if (ebpo_mesh_source_vertex(r->mesh, v) < ebpo_mesh_source_vertex(r->mesh, *lowest))
+                later = *lowest, *lowest = v;
+            note_repeated(check, later);
+        }
         if (r->at < r->end)
             ebpo_mesh_position(r->mesh, r->at, p);
     } while (r->at < r->end && p[0] == here[0] && p[1] == here[1] && p[2] == here[2]);
 }
 
 /* Of an arranged mesh: those that faces name, and the others, are a run each, or all are one. */
-static void compare_along_curve(const ebpo_mesh *mesh, ebpo_finding *finding)
+static void compare_along_curve(const ebpo_check *check)
 {
+    const ebpo_mesh *mesh = check->mesh;
     uint64_t first =
         mesh->arrangement->grouped ? mesh->vertex_count : mesh->arrangement->referenced;
     curve_run a = { mesh, 0, first }, b = { mesh, first, mesh->vertex_count };
     for (uint64_t steps = 0; a.at < a.end || b.at < b.end; steps++) {
-        uint64_t lowest = UINT64_MAX;
+        uint32_t lowest = EBPO_NO_INDEX;
         int order = compare_runs(&a, &b);
         if (order <= 0)
-            take_position(&a, &lowest, finding);
+            take_position(check, &a, &lowest);
         if (order >= 0)
-            take_position(&b, &lowest, finding);
+            take_position(check, &b, &lowest);
         if (steps % EBPO_ITEMS_IN_ORDER == 0)
             ebpo_release_pages(mesh->workspace);
     }
 }
 
 /* Of any mesh: by a table of positions. */
-static ebpo_status compare_all(ebpo_check *check, ebpo_finding *finding, ebpo_error *error)
+static ebpo_status compare_all(const ebpo_check *check, ebpo_error *error)
 {
     const ebpo_mesh *mesh = check->mesh;
     uint64_t count = mesh->vertex_count;
@@ -204,7 +217,7 @@ static ebpo_status compare_all(ebpo_check *check, ebpo_finding *finding, ebpo_er
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, lowest ? count : 0) {
         uint64_t source = ebpo_mesh_source_vertex(mesh, v);
         if (lowest[ebpo_positions_first(&positions, (uint32_t)v)] != source)
-            ebpo_finding_add(finding, source);
+            note_repeated(check, (uint32_t)v);
     }
     ebpo_array_free(mesh->workspace, lowest);
     ebpo_positions_free(&positions);
@@ -213,11 +226,10 @@ static ebpo_status compare_all(ebpo_check *check, ebpo_finding *finding, ebpo_er
 
 ebpo_status ebpo_check_positions(ebpo_check *check, ebpo_error *error)
 {
-    ebpo_finding *finding = &check->report->repeated_positions;
     const struct ebpo_arrangement *order = check->mesh->arrangement;
     if (!order || (!order->grouped && !order->key))
-        return compare_all(check, finding, error);
-    compare_along_curve(check->mesh, finding);
+        return compare_all(check, error);
+    compare_along_curve(check);
     return EBPO_OK;
 }
 
@@ -282,11 +294,10 @@ static ebpo_status run(ebpo_check *c, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_mesh_check(const ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
-                            ebpo_mesh_report *report, ebpo_error *error)
+ebpo_status ebpo_check_run(ebpo_check *check, ebpo_error *error)
 {
-    EBPO_DEFAULT_FP;
-    memset(report, 0, sizeof *report);
+    const ebpo_mesh *mesh = check->mesh;
+    memset(check->report, 0, sizeof *check->report);
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)
         return status;
@@ -294,13 +305,20 @@ ebpo_status ebpo_mesh_check(const ebpo_mesh *mesh, unsigned threads, ebpo_progre
         return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
                               "%llu vertices but no faces; give a triangle mesh, not a point cloud",
                               (unsigned long long)mesh->vertex_count);
+    status = run(check, error);
+    ebpo_stars_free(&check->stars);
+    ebpo_boundary_free(&check->boundary);
+    if (status != EBPO_OK)
+        memset(check->report, 0, sizeof *check->report);
+    return status;
+}
+
+ebpo_status ebpo_mesh_check(const ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
+                            ebpo_mesh_report *report, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
     ebpo_check check = {
         .mesh = mesh, .threads = ebpo_thread_count(threads), .progress = progress, .report = report
     };
-    status = run(&check, error);
-    ebpo_stars_free(&check.stars);
-    ebpo_boundary_free(&check.boundary);
-    if (status != EBPO_OK)
-        memset(report, 0, sizeof *report);
-    return status;
+    return ebpo_check_run(&check, error);
 }

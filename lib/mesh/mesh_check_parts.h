@@ -5,6 +5,8 @@
 
 #include <math.h>
 
+#include <ebpo/places.h>
+
 #include "mesh/boundary.h"
 #include "mesh/stars.h"
 #include "mesh/sum.h"
@@ -17,6 +19,21 @@ typedef struct ebpo_units {
     int length, area, volume; /* exponents of what sums are kept in */
 } ebpo_units;
 
+/* A place while checking: of edges and vertices the vertices, of a face that one, as the mesh has
+ * them now. */
+typedef struct ebpo_found {
+    uint32_t kind, place; /* as ebpo_finding has it */
+    uint32_t a, b;
+} ebpo_found;
+
+static inline bool ebpo_found_is_edge(uint32_t kind) { return kind <= EBPO_FOUND_UNBALANCED_EDGE; }
+
+typedef struct ebpo_found_list {
+    ebpo_found *item;
+    uint64_t count, capacity;
+    bool short_of_memory; /* some are missing */
+} ebpo_found_list;
+
 typedef struct ebpo_check {
     const ebpo_mesh *mesh;
     unsigned threads; /* resolved */
@@ -27,6 +44,7 @@ typedef struct ebpo_check {
     ebpo_boundary boundary; /* all boundary edges, in no order */
     uint64_t referenced;    /* vertices that faces use */
     ebpo_units units;
+    ebpo_found_list *found; /* [threads]; NULL: places are not wanted */
 } ebpo_check;
 
 /* For measuring: the position in the units. */
@@ -71,6 +89,21 @@ static inline void ebpo_finding_merge(ebpo_finding *finding, const ebpo_finding 
         ebpo_finding_add(finding, other->place[i]);
     finding->count += other->count - kept;
 }
+
+/* Adds to the worker's list. */
+void ebpo_found_add(const ebpo_check *check, unsigned worker, ebpo_found found);
+
+/* Counts a place, and keeps it where all are wanted. */
+static inline void ebpo_check_note(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
+                                   ebpo_finding_kind kind, uint64_t place, uint32_t a, uint32_t b)
+{
+    ebpo_finding_add(finding, place);
+    if (check->found)
+        ebpo_found_add(check, worker, (ebpo_found){ (uint32_t)kind, (uint32_t)place, a, b });
+}
+
+/* ebpo_mesh_check: fills in the report of a check that has its mesh, threads and report. */
+EBPO_MUST_USE ebpo_status ebpo_check_run(ebpo_check *check, ebpo_error *error);
 
 /* Every coordinate finite. */
 EBPO_MUST_USE ebpo_status ebpo_check_coordinates(ebpo_check *check, ebpo_error *error);

@@ -88,6 +88,27 @@ static ebpo_status call_check(every_call_env *e)
     return status;
 }
 
+static bool take_place(void *user, const ebpo_mesh_place *place)
+{
+    uint8_t rgb[3];
+    (void)user;
+    ebpo_finding_colour(place->kind, rgb);
+    return ebpo_finding_name(place->kind) != NULL;
+}
+
+static ebpo_status call_places(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_places_options options = EBPO_PLACES_OPTIONS_INIT;
+    ebpo_status status = read_mesh(e, EVERY_CALL_HOLED, &mesh);
+    options.threads = 1;
+    options.ply = scratch("places.ply");
+    if (status == EBPO_OK)
+        status = ebpo_mesh_places(&mesh, &options, take_place, NULL, NULL, e->error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
 static ebpo_status call_arrange(every_call_env *e)
 {
     ebpo_mesh mesh;
@@ -313,6 +334,7 @@ const every_call every_call_meshes[] = {
     { "write_ply", call_write_ply },
     { "colours", call_colours },
     { "check", call_check },
+    { "places", call_places },
     { "arrange", call_arrange },
     { "weld", call_weld },
     { "orient", call_orient },

@@ -1,6 +1,7 @@
 #include "cli/mesh_findings.h"
 
 #include <stddef.h>
+#include <string.h>
 
 #include "cli/words.h"
 
@@ -34,6 +35,14 @@ static const struct finding_text {
       "vertex" },
 };
 enum { FINDINGS = sizeof findings / sizeof *findings };
+
+const char *findings_many(const char *name)
+{
+    for (int i = 0; i < FINDINGS; i++)
+        if (strcmp(findings[i].key, name) == 0)
+            return findings[i].many;
+    return name;
+}
 
 static const ebpo_finding *finding_of(const ebpo_mesh_report *report, int i)
 {

@@ -11,6 +11,8 @@
  * faces that cross are looked for later. */
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                     const ebpo_mesh_report *report, bool crossings_follow);
+/* What several findings of the kind that the report calls `name` are called. */
+const char *findings_many(const char *name);
 /* What mending did; nothing when nothing was asked for. */
 void findings_print_mending(FILE *out, const ebpo_mend_record *record);
 void findings_json(json *j, const char *key, const ebpo_mesh_report *report);

@@ -10,12 +10,13 @@
 #include "cli/progress.h"
 #include "cli/standard_files.h"
 #include "cmd/check_crossings.h"
+#include "cmd/check_places.h"
 #include "cmd/commands.h"
 
 typedef struct values {
     mending mend;
     bool require_solid, crossings, json, quiet;
-    const char *out;
+    const char *out, *places;
     int64_t threads;
     memory_values memory;
 } values;
@@ -69,7 +70,12 @@ static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo
     command_flush("check");
     mesh_input_warn("check", path, &p->mesh);
     advice_warn(stderr, "check", path, p);
-    if (v->crossings)
+    if (v->places) /* before crossings, which take the mesh */
+        status = check_places(&p->mesh, v->places, (unsigned)v->threads, progress,
+                              v->json ? &j : NULL, v->quiet, line, error);
+    else if (v->json)
+        json_null(&j, "places"); /* not asked for */
+    if (status == EBPO_OK && v->crossings)
         status = check_crossings(&p->mesh, &p->prepared.report, &how, v->json ? &j : NULL, v->quiet,
                                  line, error);
     else if (v->json)
@@ -106,12 +112,21 @@ static int run(void *given, const char **operand)
         return EXIT_USAGE;
     if (v->out && !v->crossings)
         return command_usage("check", "--output shows what --crossings finds; give both");
+    if (v->places && !check_places_good(v->places))
+        return command_usage("check", "--places takes 'all', or a file whose name ends in .ply");
+    const char *picture = v->places ? check_places_ply(v->places) : NULL;
+    if (picture && command_overwrites("check", operand[0], picture))
+        return EXIT_USAGE;
+    if (picture && v->out && command_overwrites("check", v->out, picture))
+        return EXIT_USAGE;
     if (v->out && command_overwrites("check", operand[0], v->out))
         return EXIT_USAGE;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace *workspace = NULL;
     mesh_input p;
     ebpo_status status = v->out ? ebpo_check_output(v->out, &error) : EBPO_OK;
+    if (status == EBPO_OK && picture)
+        status = ebpo_check_output(picture, &error);
     if (status == EBPO_OK)
         status = memory_make(&workspace, &v->memory, &error);
     if (status == EBPO_OK)

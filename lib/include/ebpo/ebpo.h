@@ -5,6 +5,7 @@
  *   workspace.h   how much memory the work may use
  *   memory.h      how much there is
  *   mesh.h        triangle meshes: reading, checking, mending
+ *   places.h      where a mesh has what checking it finds
  *   repair.h      which repairs make a solid of a mesh
  *   groups.h      groups of faces that a file has names for
  *   rows.h        numbers from any HDF5 file
@@ -37,6 +38,7 @@
 #include <ebpo/workspace.h>
 #include <ebpo/memory.h>
 #include <ebpo/mesh.h>
+#include <ebpo/places.h>
 #include <ebpo/repair.h>
 #include <ebpo/groups.h>
 #include <ebpo/rows.h>

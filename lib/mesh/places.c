@@ -1,0 +1,247 @@
+/* Every place of what checking a mesh finds: noted while checking, then sorted, then told with the
+ * faces around it. */
+#include "geom/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/arrays.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/parallel.h"
+#include "base/sized.h"
+#include "mesh/component_parts.h"
+#include "mesh/mesh_check_parts.h"
+#include "mesh/places_ply.h"
+
+static bool is_vertex(uint32_t kind) { return kind >= EBPO_FOUND_BOWTIE_VERTEX; }
+
+/* ---- telling ---- */
+
+typedef struct places {
+    const ebpo_mesh *mesh;
+    ebpo_places_options options;
+    ebpo_places_fn take;
+    void *user;
+    ebpo_found_list all;
+    uint32_t *component; /* [vertex_count] */
+    ebpo_stars stars;
+    uint64_t *faces; /* around a place */
+    uint64_t face_count, face_capacity;
+    ebpo_places_picture picture;
+} places;
+
+static int compare_found(const void *x, const void *y, void *user)
+{
+    const ebpo_found *p = x, *q = y;
+    const ebpo_mesh *mesh = user;
+    if (p->kind != q->kind)
+        return p->kind < q->kind ? -1 : 1;
+    if (p->place != q->place)
+        return p->place < q->place ? -1 : 1;
+    if (!ebpo_found_is_edge(p->kind))
+        return 0; /* the place is the face or vertex */
+    const uint32_t ends[2][2] = { { p->a, q->a }, { p->b, q->b } };
+    for (int i = 0; i < 2; i++) {
+        uint64_t u = ebpo_mesh_source_vertex(mesh, ends[i][0]),
+                 v = ebpo_mesh_source_vertex(mesh, ends[i][1]);
+        if (u != v)
+            return u < v ? -1 : 1;
+    }
+    return 0;
+}
+
+/* What the workers noted, in one list, which does not depend on who noted what. */
+static ebpo_status gather(places *p, const ebpo_found_list *lists, unsigned count,
+                          ebpo_error *error)
+{
+    ebpo_workspace *workspace = p->mesh->workspace;
+    uint64_t all = 0;
+    for (unsigned t = 0; t < count; t++) {
+        all += lists[t].count;
+        if (lists[t].short_of_memory)
+            return ebpo_workspace_fail(workspace, 2 * lists[t].count * sizeof *p->all.item, error);
+    }
+    p->all.item = ebpo_array_alloc(workspace, all + 1, sizeof *p->all.item);
+    if (!p->all.item)
+        return ebpo_workspace_fail(workspace, all * sizeof *p->all.item, error);
+    for (unsigned t = 0; t < count; t++) {
+        ebpo_array_copy(workspace, p->all.item + p->all.count, lists[t].item,
+                        lists[t].count * sizeof *p->all.item);
+        p->all.count += lists[t].count;
+    }
+    qsort_r(p->all.item, p->all.count, sizeof *p->all.item, compare_found, (void *)p->mesh);
+    return EBPO_OK;
+}
+
+static bool has_corner(const uint32_t face[3], uint32_t v)
+{
+    return face[0] == v || face[1] == v || face[2] == v;
+}
+
+static int compare_numbers(const void *x, const void *y)
+{
+    const uint64_t *a = x, *b = y;
+    return *a < *b ? -1 : *a > *b;
+}
+
+/* The source's numbers of the faces that have all `count` corners; looked for around the corner
+ * that has the fewest, as others may be the hub of a great fan. */
+static bool gather_faces(places *p, const uint32_t *corner, int count)
+{
+    uint32_t about = corner[0];
+    for (int i = 1; i < count; i++)
+        if (ebpo_stars_degree(&p->stars, corner[i]) < ebpo_stars_degree(&p->stars, about))
+            about = corner[i];
+    p->face_count = 0;
+    if (!ebpo_array_grow_late(p->mesh->workspace, &p->faces, &p->face_capacity,
+                              ebpo_stars_degree(&p->stars, about), sizeof *p->faces))
+        return false;
+    for (uint64_t i = p->stars.first[about]; i < p->stars.first[about + (uint64_t)1]; i++) {
+        const uint32_t *face = p->mesh->faces + 3 * (uint64_t)p->stars.face[i];
+        bool all = true;
+        for (int k = 0; k < count; k++)
+            all = all && has_corner(face, corner[k]);
+        if (all)
+            p->faces[p->face_count++] = p->stars.face[i];
+    }
+    return true;
+}
+
+/* Its faces in the mesh as it is. */
+static bool faces_of(places *p, const ebpo_found *f)
+{
+    if (ebpo_found_is_edge(f->kind))
+        return gather_faces(p, (const uint32_t[2]){ f->a, f->b }, 2);
+    if (is_vertex(f->kind))
+        return gather_faces(p, &f->a, 1);
+    if (f->kind == EBPO_FOUND_REPEATED_FACE)
+        return gather_faces(p, p->mesh->faces + 3 * (uint64_t)f->a, 3);
+    if (!ebpo_array_grow_late(p->mesh->workspace, &p->faces, &p->face_capacity, 1,
+                              sizeof *p->faces))
+        return false;
+    p->faces[0] = f->a;
+    p->face_count = 1;
+    return true;
+}
+
+/* Vertices in the mesh as it is: of an edge two, of a vertex one, of a face three. */
+static int vertices_of(const places *p, const ebpo_found *f, uint32_t out[3])
+{
+    if (!ebpo_found_is_edge(f->kind) && !is_vertex(f->kind)) {
+        memcpy(out, p->mesh->faces + 3 * (uint64_t)f->a, 3 * sizeof *out);
+        return 3;
+    }
+    out[0] = f->a;
+    out[1] = f->b;
+    return ebpo_found_is_edge(f->kind) ? 2 : 1;
+}
+
+static ebpo_mesh_place place_of(places *p, const ebpo_found *f)
+{
+    uint32_t v[3];
+    int count = vertices_of(p, f, v);
+    ebpo_mesh_place place = { .kind = (int32_t)f->kind, .component = p->component[v[0]] };
+    for (int i = 0; i < count; i++) {
+        double x[3];
+        ebpo_mesh_position(p->mesh, v[i], x);
+        for (int k = 0; k < 3; k++)
+            place.point[k] += x[k] / count;
+    }
+    for (int i = 0; i < 2; i++)
+        place.vertex[i] = ebpo_mesh_source_vertex(p->mesh, v[count == 1 ? 0 : i]);
+    for (uint64_t i = 0; i < p->face_count; i++)
+        p->faces[i] = ebpo_mesh_source_face(p->mesh, p->faces[i]);
+    qsort(p->faces, p->face_count, sizeof *p->faces, compare_numbers);
+    place.faces = p->face_count ? p->faces : NULL;
+    place.face_count = p->face_count;
+    return place;
+}
+
+enum { BETWEEN_STEPS = 1 << 12 };
+
+static ebpo_status tell_all(places *p, ebpo_error *error)
+{
+    ebpo_workspace *workspace = p->mesh->workspace;
+    EBPO_FOR_ITEMS(workspace, i, 0, p->all.count) {
+        const ebpo_found *f = &p->all.item[i];
+        if (!faces_of(p, f))
+            return ebpo_workspace_fail(workspace, p->face_capacity * 2 * sizeof *p->faces, error);
+        if (p->options.ply)
+            ebpo_places_picture_note(&p->picture, f, p->faces, p->face_count);
+        if (i % BETWEEN_STEPS == 0 &&
+            !ebpo_progress_step(&p->options.progress, "places", i, p->all.count, error))
+            return EBPO_E_CANCELLED;
+        ebpo_mesh_place place = place_of(p, f);
+        if (p->take && !p->take(p->user, &place)) {
+            p->take = NULL;
+            if (!p->options.ply)
+                break;
+        }
+    }
+    return EBPO_OK;
+}
+
+/* ---- the call ---- */
+
+static ebpo_status note_all(places *p, ebpo_mesh_report *report, ebpo_error *error)
+{
+    unsigned threads = ebpo_thread_count(p->options.threads);
+    ebpo_found_list *lists = ebpo_alloc_zero(threads, sizeof *lists);
+    if (!lists)
+        return ebpo_fail_memory(error, threads * sizeof *lists);
+    ebpo_check check = { .mesh = p->mesh,
+                         .threads = threads,
+                         .progress = p->options.progress,
+                         .report = report,
+                         .found = lists };
+    ebpo_status status = ebpo_check_run(&check, error);
+    if (status == EBPO_OK)
+        status = gather(p, lists, threads, error);
+    for (unsigned t = 0; t < threads; t++)
+        ebpo_array_free(p->mesh->workspace, lists[t].item);
+    free(lists);
+    return status;
+}
+
+static ebpo_status find(places *p, ebpo_mesh_report *report, ebpo_error *error)
+{
+    ebpo_status status = note_all(p, report, error);
+    if (status == EBPO_OK)
+        status = ebpo_components_number(p->mesh, &p->component, error);
+    if (status == EBPO_OK)
+        status = ebpo_stars_build(&p->stars, p->mesh, ebpo_thread_count(p->options.threads),
+                                  &p->options.progress, error);
+    if (status == EBPO_OK && p->options.ply)
+        status = ebpo_places_picture_begin(&p->picture, p->mesh, p->options.ply, error);
+    if (status == EBPO_OK)
+        status = tell_all(p, error);
+    if (status == EBPO_OK && p->options.ply)
+        status = ebpo_places_picture_write(&p->picture, report, error);
+    return status;
+}
+
+ebpo_status ebpo_mesh_places(const ebpo_mesh *mesh, const ebpo_places_options *options,
+                             ebpo_places_fn take, void *user, ebpo_mesh_report *report,
+                             ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    places p = { .mesh = mesh,
+                 .options = EBPO_PLACES_OPTIONS_INIT,
+                 .take = take,
+                 .user = user,
+                 .picture = EBPO_PLACES_PICTURE_INIT };
+    ebpo_mesh_report found = { .edges = 0 };
+    ebpo_status status = EBPO_TAKE(ebpo_places_options, &p.options, options, error);
+    if (status == EBPO_OK)
+        status = find(&p, &found, error);
+    ebpo_array_free(mesh->workspace, p.all.item);
+    ebpo_array_free(mesh->workspace, p.component);
+    ebpo_array_free(mesh->workspace, p.faces);
+    ebpo_stars_free(&p.stars);
+    ebpo_places_picture_end(&p.picture);
+    if (report)
+        *report = found;
+    return status;
+}
