@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -150,6 +151,22 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
     def log_message(self, *_):
         pass
 
+    def do_GET(self):
+        """What is below /slow comes after a while, by ranges."""
+        asked = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
+        if not self.path.startswith("/slow/") or not asked:
+            super().do_GET()
+            return
+        time.sleep(0.15)
+        with open(self.translate_path(self.path[5:]), "rb") as file:
+            data = file.read()
+        first, last = int(asked[1]), min(int(asked[2]), len(data) - 1)
+        self.send_response(206)
+        self.send_header("Content-Range", f"bytes {first}-{last}/{len(data)}")
+        self.send_header("Content-Length", str(last + 1 - first))
+        self.end_headers()
+        self.wfile.write(data[first:last + 1])
+
 
 def serve(folder):
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0),
@@ -181,7 +198,7 @@ def main():
     schemas = Schemas(folder_of_schemas)
     self_test(schemas)
     environment = dict(os.environ, LC_ALL="C.UTF-8", PATH=os.path.dirname(os.path.abspath(tool)) + ":"
-                       + os.environ["PATH"])
+                       + os.environ["PATH"], TESTS=HERE)
     bad, seen, ran, count = [], {"common"}, set(), 0
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([inputs, folder], check=True)

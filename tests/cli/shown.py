@@ -32,7 +32,7 @@ to them, and fails where a cell has none. A cell names the files with tests of i
 | people | runs the command and compares the words that it prints |
 | `--json` | compares its JSON, or holds it against the schema |
 | errors | expects a message and an exit code other than 0 |
-| progress | looks at the line on a terminal; \\*: the same lines of `tools/cli/progress.c`, with no test of their own yet |
+| progress | looks at the line on a terminal |
 | pipes | output that cannot be written, or is read to a part only, or input from standard input |
 
 """
@@ -66,7 +66,7 @@ def column(name, code, out, error, command, ran):
             rf"[|] *(?:timeout \d+ )?ebpo {ran}\b|ebpo {ran} [^|;&]* - |ebpo {ran} [^|;&]* -$|"
             rf"ebpo {ran} [^|;&]*<", command):
         yield "pipes"
-    if "script -" in command or "interrupt.py" in command:
+    if "script -" in command or "interrupt.py" in command or "shows_progress.py" in command:
         yield "progress"
 
 
@@ -82,8 +82,6 @@ def table(commands):
 def cell(cells, command, c):
     if cells[command, c]:
         return ", ".join(sorted(cells[command, c]))
-    if c == "progress" and command not in NONE[c] and any(cells[other, c] for other, _ in cells):
-        return "\\*"
     return "" if command not in NONE[c] else "-"
 
 

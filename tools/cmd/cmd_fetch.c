@@ -46,9 +46,9 @@ static void remove_part(const char *folder)
 /* --- progress: the transfers' own thread draws, as this one waits for them --- */
 
 typedef struct ticker {
-    bool active;
-    _Atomic bool shown; /* the transfers' thread ticks */
-    _Atomic(ebpo_file *) file;
+    _Atomic bool active;
+    _Atomic bool shown;        /* the transfers' thread ticks */
+    _Atomic(ebpo_file *) file; /* NULL while it is being opened */
     double last;
 } ticker;
 
@@ -59,11 +59,15 @@ static bool tick(void *user)
     ebpo_file *file = atomic_load(&t->file);
     double now = progress_now();
     char bytes[32], before[32];
-    if (!t->active || !file || now - t->last < 0.2 || ebpo_file_get_http_stats(file, &s) != EBPO_OK)
+    if (!t->active || now - t->last < 0.2 ||
+        (file && ebpo_file_get_http_stats(file, &s) != EBPO_OK))
         return false;
     t->last = now;
-    fprintf(stderr, "\r\033[Kfetch: %s in %" PRIu64 " requests",
-            words_bytes(bytes, sizeof bytes, s.bytes), s.requests);
+    if (!file)
+        fputs("\r\033[Kfetch: opening", stderr);
+    else
+        fprintf(stderr, "\r\033[Kfetch: %s in %" PRIu64 " requests",
+                words_bytes(bytes, sizeof bytes, s.bytes), s.requests);
     if (s.cache_bytes)
         fprintf(stderr, ", %s fetched earlier", words_bytes(before, sizeof before, s.cache_bytes));
     fflush(stderr);
@@ -73,7 +77,7 @@ static bool tick(void *user)
 
 static void wipe(ticker *t)
 {
-    atomic_store(&t->file, NULL);
+    t->active = false;
     if (t->shown)
         fputs("\r\033[K", stderr);
     t->shown = false;
@@ -108,7 +112,8 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
     double begun = progress_now();
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    ticker t = { .active = !v->quiet && isatty(STDERR_FILENO) };
+    ticker t = { .last = 0 };
+    atomic_init(&t.active, !v->quiet && isatty(STDERR_FILENO));
     atomic_init(&t.file, NULL);
     v->remote.stop = tick;
     v->remote.stop_user = &t;
@@ -119,6 +124,8 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
         v->remote.cache_block = v->box ? BOX_BLOCK : 0;
     }
     ebpo_status status = remote_open(&file, url, &v->remote, &error);
+    if (t.shown)
+        fputs("\r\033[K", stderr);
     bool held = status == EBPO_OK && part && tell_resuming(v, file, url, part);
     atomic_store(&t.file, file);
     if (status == EBPO_OK)

@@ -210,6 +210,8 @@ int report_find_methods(comparison *c, const char *const *operand)
         report_stem(c->methods->info.source_name, c->model, sizeof c->model);
     c->diagonal = hypot(hypot(r->max[0] - r->min[0], r->max[1] - r->min[1]), r->max[2] - r->min[2]);
     if (c->first > comparison_last(c)) {
+        if (c->progress.user)
+            progress_wipe(c->progress.user);
         fprintf(stderr, "ebpo report: --levels: there is no level %d; the deepest is %d\n",
                 c->first, comparison_last(c));
         return EXIT_USAGE;
