@@ -91,7 +91,8 @@ static uint32_t component_of(const ebpo_mesh *m, uint64_t face)
         for (uint64_t f = 0; f < m->face_count; f++)
             for (uint64_t g = 0; g < m->face_count; g++)
                 for (int k = 0; k < 3; k++)
-                    if (label[g] < label[f] && names(m->faces + 3 * g, m->faces[3 * f + (unsigned)k])) {
+                    if (label[g] < label[f] &&
+                        names(m->faces + 3 * g, m->faces[3 * f + (unsigned)k])) {
                         label[f] = label[g];
                         changed = true;
                     }
@@ -160,9 +161,9 @@ static void judge_point(const ebpo_mesh *m, const told *t)
 static const ebpo_finding *finding(const ebpo_mesh_report *r, int kind)
 {
     const ebpo_finding *const all_kinds[EBPO_FINDING_KINDS] = {
-        &r->boundary_edges,        &r->nonmanifold_edges,    &r->misoriented_edges,
-        &r->unbalanced_edges,      &r->repeated_faces,       &r->index_repeated_faces,
-        &r->zero_area_faces,       &r->bowtie_vertices,      &r->repeated_positions,
+        &r->boundary_edges,        &r->nonmanifold_edges, &r->misoriented_edges,
+        &r->unbalanced_edges,      &r->repeated_faces,    &r->index_repeated_faces,
+        &r->zero_area_faces,       &r->bowtie_vertices,   &r->repeated_positions,
         &r->unreferenced_vertices,
     };
     return all_kinds[kind];

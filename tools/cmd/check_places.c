@@ -54,7 +54,10 @@ static void place_words(const ebpo_mesh_place *p)
         printf(", vertices %llu %llu", (unsigned long long)p->vertex[0],
                (unsigned long long)p->vertex[1]);
     for (uint64_t i = 0; i < p->face_count && i < FACES_SHOWN; i++)
-        printf("%s %llu", i ? "" : p->face_count == 1 ? ", face" : ", faces",
+        printf("%s %llu",
+               i                    ? ""
+               : p->face_count == 1 ? ", face"
+                                    : ", faces",
                (unsigned long long)p->faces[i]);
     puts(p->face_count > FACES_SHOWN ? " ..." : "");
 }

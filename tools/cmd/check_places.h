@@ -13,8 +13,8 @@ bool check_places_good(const char *to);
 /* The PLY that `to` names; NULL: "all". */
 const char *check_places_ply(const char *to);
 
-/* Prints all places, or writes the picture and prints its legend. `j`: into its open object instead;
- * NULL: words, unless `quiet`. */
+/* Prints all places, or writes the picture and prints its legend. `j`: into its open object
+ * instead; NULL: words, unless `quiet`. */
 EBPO_MUST_USE ebpo_status check_places(const ebpo_mesh *mesh, const char *to, unsigned threads,
                                        ebpo_progress progress, json *j, bool quiet,
                                        progress_line *line, ebpo_error *error);
