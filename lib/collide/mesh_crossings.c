@@ -69,7 +69,7 @@ static ebpo_status store(crossings *c, const char *folder, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_tree_write_into(&c->tree, ebpo_publish_path(&named), folder, &how, error);
     if (status == EBPO_OK)
-        status = ebpo_open(ebpo_publish_path(&named), &c->file, error);
+        status = ebpo_open_own(ebpo_publish_path(&named), &c->file, error);
     ebpo_publish_abort(&named);
     return status;
 }

@@ -62,6 +62,9 @@ struct ebpo_file {
     ebpo_idle_readers idle;
 };
 
+/* ebpo_open of what this process has written: however much it has decoded. */
+EBPO_MUST_USE ebpo_status ebpo_open_own(const char *path, ebpo_file **out, ebpo_error *error);
+
 /* After this the chunks of an array that is present are known. Reads from a file that is far away,
  * once. Any thread. */
 EBPO_MUST_USE ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array,

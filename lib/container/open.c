@@ -228,7 +228,7 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
 
 /* Takes the source over, whatever happens. */
 static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const char *name,
-                               ebpo_error *error)
+                               uint64_t most_expansion, ebpo_error *error)
 {
     ebpo_file *file = ebpo_alloc_zero(1, sizeof *file);
     if (!file) {
@@ -247,6 +247,8 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
         status = read_head(file, &head, error);
     status = ebpo_head_close(&head, status, error);
     if (status == EBPO_OK)
+        status = ebpo_stored_check_expansion(file, most_expansion, error);
+    if (status == EBPO_OK)
         status = check_bare(file, error);
     if (status == EBPO_OK)
         *out = file;
@@ -255,27 +257,65 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     return status;
 }
 
+static ebpo_status open_bytes(const ebpo_source *source, const char *name, uint64_t most_expansion,
+                              ebpo_file **out, ebpo_error *error)
+{
+    ebpo_source own = EBPO_SOURCE_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_source, &own, source, error);
+    if (status == EBPO_E_UNSUPPORTED && source->close) /* a newer caller's: what we know of it is */
+        source->close(source->user);
+    if (status != EBPO_OK)
+        return status;
+    if (own.read)
+        return open_source(out, &own, name ? name : "source", most_expansion, error);
+    if (own.close)
+        own.close(own.user);
+    return ebpo_fail_file(error, EBPO_E_ARGUMENT, name ? name : "source",
+                          "a source without a read function; set one");
+}
+
+ebpo_status ebpo_open_with(const char *path, const ebpo_open_options *options, ebpo_file **out,
+                           ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_open_options own = EBPO_OPEN_OPTIONS_INIT;
+    ebpo_source source = EBPO_SOURCE_INIT;
+    char shown[EBPO_SHOWN_BYTES];
+    *out = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_open_options, &own, options, error);
+    if (status == EBPO_OK && own.source)
+        return open_bytes(own.source, path, own.most_expansion, out, error);
+    if (status == EBPO_OK)
+        status = ebpo_is_url(path) ? ebpo_source_of_url(path, own.http, &source, error)
+                                   : ebpo_source_of_path(&source, path, error);
+    const char *name =
+        status == EBPO_OK && ebpo_is_url(path) ? ebpo_url_redact(path, shown, sizeof shown) : path;
+    return status == EBPO_OK ? open_source(out, &source, name, own.most_expansion, error) : status;
+}
+
 ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error)
+{
+    return ebpo_open_with(path, NULL, out, error);
+}
+
+ebpo_status ebpo_open_own(const char *path, ebpo_file **out, ebpo_error *error)
+{
+    ebpo_open_options any = EBPO_OPEN_OPTIONS_INIT;
+    any.most_expansion = UINT64_MAX;
+    return ebpo_open_with(path, &any, out, error);
+}
+
+ebpo_status ebpo_open_url(const char *url, const ebpo_http_options *http, ebpo_file **out,
+                          ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_source source = EBPO_SOURCE_INIT;
-    *out = NULL;
-    if (ebpo_is_url(path))
-        return ebpo_open_url(path, NULL, out, error);
-    ebpo_status status = ebpo_source_of_path(&source, path, error);
-    return status == EBPO_OK ? open_source(out, &source, path, error) : status;
-}
-
-ebpo_status ebpo_open_url(const char *url, const ebpo_http_options *options, ebpo_file **out,
-                          ebpo_error *error)
-{
-    ebpo_source source = EBPO_SOURCE_INIT;
-    *out = NULL;
-    ebpo_status status = ebpo_source_of_url(url, options, &source, error);
-    if (status != EBPO_OK)
-        return status;
     char shown[EBPO_SHOWN_BYTES];
-    return open_source(out, &source, ebpo_url_redact(url, shown, sizeof shown), error);
+    *out = NULL;
+    ebpo_status status = ebpo_source_of_url(url, http, &source, error);
+    return status == EBPO_OK
+               ? open_source(out, &source, ebpo_url_redact(url, shown, sizeof shown), 0, error)
+               : status;
 }
 
 ebpo_status ebpo_open_memory(const void *data, uint64_t size, const char *name, ebpo_file **out,
@@ -287,26 +327,15 @@ ebpo_status ebpo_open_memory(const void *data, uint64_t size, const char *name, 
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, name ? name : "memory",
                               "no bytes; give the file's bytes with their count");
     ebpo_source source = ebpo_source_of_memory(data, size);
-    return open_source(out, &source, name ? name : "memory", error);
+    return open_source(out, &source, name ? name : "memory", 0, error);
 }
 
 ebpo_status ebpo_open_source(const ebpo_source *source, const char *name, ebpo_file **out,
                              ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_source own = EBPO_SOURCE_INIT;
     *out = NULL;
-    ebpo_status status = EBPO_TAKE(ebpo_source, &own, source, error);
-    if (status == EBPO_E_UNSUPPORTED && source->close) /* a newer caller's: what we know of it is */
-        source->close(source->user);
-    if (status != EBPO_OK)
-        return status;
-    if (own.read)
-        return open_source(out, &own, name ? name : "source", error);
-    if (own.close)
-        own.close(own.user);
-    return ebpo_fail_file(error, EBPO_E_ARGUMENT, name ? name : "source",
-                          "a source without a read function; set one");
+    return open_bytes(source, name, 0, out, error);
 }
 
 void ebpo_close(ebpo_file *file)

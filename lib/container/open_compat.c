@@ -104,17 +104,20 @@ static ebpo_status find_from(const char *path, const ebpo_http_options *http, co
 }
 
 /* The copy by its descriptor, which stays the caller's; and whether it is what the head says. */
-static ebpo_status open_copy(int to, const char *shown, unsigned threads, ebpo_file **out,
-                             ebpo_error *error)
+static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_options *o,
+                             ebpo_file **out, ebpo_error *error)
 {
     char name[32];
     ebpo_source source = EBPO_SOURCE_INIT;
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
-    read.threads = threads;
+    ebpo_open_options open = EBPO_OPEN_OPTIONS_INIT;
+    read.threads = o->threads;
+    open.source = &source;
+    open.most_expansion = o->most_expansion;
     snprintf(name, sizeof name, "/dev/fd/%d", to);
     ebpo_status status = ebpo_source_of_path(&source, name, error);
     if (status == EBPO_OK)
-        status = ebpo_open_source(&source, shown, out, error);
+        status = ebpo_open_with(shown, &open, out, error);
     if (status == EBPO_OK)
         status = ebpo_file_check_content(*out, &read, error);
     if (status != EBPO_OK) {
@@ -141,7 +144,7 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
     if (status == EBPO_OK)
         status = ebpo_h5_clean_copy(from, fetched.fd >= 0, copy.name, shown, &limits, error);
     if (status == EBPO_OK)
-        status = open_copy(copy.fd, shown, o->threads, out, error);
+        status = open_copy(copy.fd, shown, o, out, error);
     remove_temporary(&copy);
     remove_temporary(&fetched);
     return status;
@@ -159,8 +162,10 @@ ebpo_status ebpo_open_compat(const char *path, const ebpo_compat_options *option
         return status;
     own.memory_bytes = own.memory_bytes ? own.memory_bytes : UINT64_C(1) << 30;
     own.seconds = own.seconds ? own.seconds : 60;
-    status = ebpo_is_url(path) ? ebpo_open_url(path, own.http, out, &first)
-                               : ebpo_open(path, out, &first);
+    ebpo_open_options open = EBPO_OPEN_OPTIONS_INIT;
+    open.most_expansion = own.most_expansion;
+    open.http = own.http;
+    status = ebpo_open_with(path, &open, out, &first);
     if (status == EBPO_E_UNSUPPORTED)
         return open_foreign(path, &own, out, error);
     return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &first);

@@ -15,7 +15,7 @@ static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
                                  const ebpo_read_options *read, ebpo_error *error)
 {
     ebpo_file *file;
-    ebpo_status status = ebpo_open(ebpo_publish_path(out), &file, error);
+    ebpo_status status = ebpo_open_own(ebpo_publish_path(out), &file, error);
     if (status != EBPO_OK)
         return status;
     bool same = memcmp(file->info.content_sha256, from->info.content_sha256,

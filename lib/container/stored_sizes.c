@@ -47,3 +47,29 @@ ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
             "the arrays' chunks take more room than the file has; get a fresh copy of the file");
     return EBPO_OK;
 }
+
+static double decoded_bytes(const ebpo_array_in *a)
+{
+    return a->present ? (double)a->shape.rows * (double)ebpo_shape_row_bytes(&a->shape) : 0;
+}
+
+ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uint64_t most, ebpo_error *error)
+{
+    double bytes = 0, room = (double)file->info.file_bytes;
+    for (int level = 0; level < file->info.level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            bytes += decoded_bytes(&file->level_array[level][id]);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        bytes += decoded_bytes(&file->root_array[id]);
+    for (int i = 0; i < file->attributes.arrays; i++)
+        bytes += decoded_bytes(&file->attributes.array[i]);
+    most = most ? most : EBPO_EXPANSION_MOST;
+    if (most == UINT64_MAX || bytes <= (double)EBPO_EXPANSION_FREE || bytes <= (double)most * room)
+        return EBPO_OK;
+    return ebpo_fail_file(
+        error, EBPO_E_LIMIT, file->in.shown,
+        "decoded, its arrays take %.0f MB, %.0f times the file and more than %llu "
+        "times: it may be made to exhaust memory; if you trust it, read it with "
+        "--most-expansion %.0f",
+        bytes / 1e6, bytes / room, (unsigned long long)most, bytes / room + 1);
+}

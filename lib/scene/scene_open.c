@@ -115,8 +115,8 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
 
 /* ---- models ---- */
 
-static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t *number,
-                             ebpo_error *error)
+static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t most_expansion,
+                             uint64_t *number, ebpo_error *error)
 {
     uint64_t n = 0;
     while (n < scene->files_count && strcmp(scene->files[n].path, path) != 0)
@@ -127,7 +127,10 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t *numb
     if (!ebpo_grow(&scene->files, &scene->files_capacity, n + 1, sizeof *scene->files))
         return ebpo_fail_memory(error, (n + 1) * sizeof *scene->files);
     scene_file f = { .path = strdup(path) };
-    ebpo_status status = f.path ? ebpo_open(path, &f.file, error) : ebpo_fail_memory(error, 1);
+    ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
+    how.most_expansion = most_expansion;
+    ebpo_status status =
+        f.path ? ebpo_open_with(path, &how, &f.file, error) : ebpo_fail_memory(error, 1);
     if (status != EBPO_OK) {
         free(f.path);
         return status;
@@ -160,7 +163,8 @@ static ebpo_status check_digest(const scene_model *m, const ebpo_info *info, ebp
                           m->name);
 }
 
-static ebpo_status load_model(ebpo_scene *scene, scene_model *m, ebpo_error *error)
+static ebpo_status load_model(ebpo_scene *scene, scene_model *m, uint64_t most_expansion,
+                              ebpo_error *error)
 {
     char *path = scene_join_path(scene->folder, m->path);
     uint64_t number = 0;
@@ -169,7 +173,7 @@ static ebpo_status load_model(ebpo_scene *scene, scene_model *m, ebpo_error *err
     if (status == EBPO_OK && of_text && !scene->outside)
         status = scene_stays_within(scene->folder, path, error);
     if (status == EBPO_OK)
-        status = open_file(scene, path, &number, error);
+        status = open_file(scene, path, most_expansion, &number, error);
     free(path);
     if (status != EBPO_OK)
         return status;
@@ -207,7 +211,7 @@ ebpo_status ebpo_scene_load(ebpo_scene *scene, const ebpo_load_options *options,
         status = EBPO_E_CANCELLED;
     for (uint64_t i = 0; i < scene->models_count && status == EBPO_OK; i++) {
         if (scene->models[i].file == EBPO_SCENE_NONE)
-            status = load_model(scene, &scene->models[i], error);
+            status = load_model(scene, &scene->models[i], own.most_expansion, error);
         if (status == EBPO_OK &&
             !ebpo_progress_step(&own.progress, "opening models", i + 1, scene->models_count, error))
             status = EBPO_E_CANCELLED;

@@ -11,6 +11,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "container/file_in.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
 #include "scene/packed_text.h"
@@ -75,7 +76,7 @@ static ebpo_status publish_folder(packing *p)
 static ebpo_status look_at(packing *p, const char *path, ebpo_scene_packed *out)
 {
     ebpo_file *file = NULL;
-    ebpo_status status = ebpo_open(path, &file, p->error);
+    ebpo_status status = ebpo_open_own(path, &file, p->error);
     if (status != EBPO_OK)
         return status;
     const ebpo_info *info = ebpo_file_info(file);

@@ -53,7 +53,7 @@ ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path,
         status = ebpo_tree_write_into(tree, ebpo_publish_path(&whole), path, &write, error);
     ebpo_tree_free(tree);
     if (status == EBPO_OK)
-        status = ebpo_open(ebpo_publish_path(&whole), &file, error);
+        status = ebpo_open_own(ebpo_publish_path(&whole), &file, error);
     if (status == EBPO_OK)
         status = ebpo_subset(file, path, &wanted, error);
     ebpo_close(file);

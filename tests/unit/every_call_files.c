@@ -89,6 +89,15 @@ static ebpo_status call_open(every_call_env *e)
     return end_open(file, status, e->error);
 }
 
+static ebpo_status call_open_with(every_call_env *e)
+{
+    ebpo_file *file;
+    ebpo_open_options options = EBPO_OPEN_OPTIONS_INIT;
+    options.most_expansion = 1;
+    ebpo_status status = ebpo_open_with(scratch(EVERY_CALL_MODEL), &options, &file, e->error);
+    return end_open(file, status, e->error);
+}
+
 static ebpo_status call_open_compat(every_call_env *e)
 {
     ebpo_file *file;
@@ -350,6 +359,7 @@ const every_call every_call_files[] = {
     { "filters", call_filters },
     { "open", call_open },
     { "open_memory", call_open_memory },
+    { "open_with", call_open_with },
     { "open_compat", call_open_compat },
     { "open_source", call_open_source },
     { "source_of_url", call_source_of_url },

@@ -575,6 +575,13 @@ START_TEST(missing_arguments_are_refused_and_the_source_closed)
     ebpo_file *file;
     ck_assert_int_eq(ebpo_open_source(&source, "x", &file, NULL), EBPO_E_ARGUMENT);
     ck_assert_uint_eq(p.closes, 1);
+    p.closes = 0;
+    ebpo_open_options by_source = EBPO_OPEN_OPTIONS_INIT;
+    by_source.source = &source;
+    ck_assert_int_eq(ebpo_open_with("x", &by_source, &file, NULL), EBPO_E_ARGUMENT);
+    ck_assert_uint_eq(p.closes, 1);
+    by_source.struct_size = 0;
+    ck_assert_int_eq(ebpo_open_with("x", &by_source, &file, NULL), EBPO_E_ARGUMENT);
     ck_assert_int_eq(ebpo_open_memory(NULL, 5, NULL, &file, NULL), EBPO_E_ARGUMENT);
     ck_assert_int_eq(ebpo_open_memory(NULL, 0, NULL, &file, NULL), EBPO_E_FORMAT);
     ck_assert_int_eq(ebpo_open_memory("text", 4, NULL, &file, NULL), EBPO_E_FORMAT);

@@ -29,10 +29,11 @@ static bool options_from(const remote_values *v, ebpo_http_options *o, ebpo_erro
     return true;
 }
 
-static ebpo_status open_plain(const char *name, const ebpo_http_options *http, ebpo_file **out,
-                              ebpo_error *error)
+ebpo_status remote_open_own(const char *path, ebpo_file **out, ebpo_error *error)
 {
-    return ebpo_is_url(name) ? ebpo_open_url(name, http, out, error) : ebpo_open(name, out, error);
+    ebpo_open_options any = EBPO_OPEN_OPTIONS_INIT;
+    any.most_expansion = UINT64_MAX;
+    return ebpo_open_with(path, &any, out, error);
 }
 
 /* The checksum of the content does not count attributes, such as the root's box. Nothing guards
@@ -54,11 +55,12 @@ static ebpo_status verify_all(const ebpo_file *file, const char *name, ebpo_erro
     return status;
 }
 
-static ebpo_status open_foreign(const char *name, const ebpo_http_options *http, ebpo_file **out,
+static ebpo_status open_foreign(const char *name, const ebpo_open_options *open, ebpo_file **out,
                                 ebpo_error *error)
 {
     ebpo_compat_options compat = EBPO_COMPAT_OPTIONS_INIT;
-    compat.http = http;
+    compat.http = open->http;
+    compat.most_expansion = open->most_expansion;
     ebpo_status status = ebpo_open_compat(name, &compat, out, error);
     if (status == EBPO_OK)
         status = verify_all(*out, name, error);
@@ -76,8 +78,11 @@ ebpo_status remote_open(ebpo_file **out, const char *name, const remote_values *
     *out = NULL;
     if (!options_from(values, &options, error))
         return EBPO_E_ARGUMENT;
-    ebpo_status status = open_plain(name, &options, out, error);
-    return status == EBPO_E_UNSUPPORTED && values->compat ? open_foreign(name, &options, out, error)
+    ebpo_open_options open = EBPO_OPEN_OPTIONS_INIT;
+    open.http = &options;
+    open.most_expansion = (uint64_t)values->most_expansion;
+    ebpo_status status = ebpo_open_with(name, &open, out, error);
+    return status == EBPO_E_UNSUPPORTED && values->compat ? open_foreign(name, &open, out, error)
                                                           : status;
 }
 

@@ -10,7 +10,8 @@
 
 typedef struct remote_values {
     bool stats, unversioned;
-    bool compat; /* also what another program has laid out */
+    int64_t most_expansion; /* as in ebpo_open_options */
+    bool compat;            /* also what another program has laid out */
     const char *cache, *cache_size, *user, *ca_file;
     unsigned cache_block; /* bytes; 0: as usual */
     double timeout, stall;
@@ -28,6 +29,9 @@ typedef struct remote_values {
  * option that makes no sense. */
 EBPO_MUST_USE ebpo_status remote_open(ebpo_file **out, const char *name,
                                       const remote_values *values, ebpo_error *error);
+
+/* The command's own output: however much it has decoded. */
+EBPO_MUST_USE ebpo_status remote_open_own(const char *path, ebpo_file **out, ebpo_error *error);
 
 /* The name as output shows it: of a URL without password and query. Valid until the next call. */
 const char *remote_shown(const char *name);

@@ -85,7 +85,7 @@ static ebpo_status tell(const values *v, const char *out, const ebpo_file *from,
     ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
     if (v->quiet && !v->json)
         return EBPO_OK;
-    ebpo_status status = ebpo_open(out, &file, error);
+    ebpo_status status = remote_open_own(out, &file, error);
     if (status == EBPO_OK)
         status = ebpo_file_locate(file, &stored, error);
     traffic t = traffic_of(from);

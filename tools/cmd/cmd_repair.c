@@ -11,12 +11,13 @@
 #include "cli/memory_args.h"
 #include "cli/mesh_input.h"
 #include "cli/progress.h"
+#include "cli/remote_args.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 
 typedef struct values {
     const char *out, *source;
-    int64_t threads;
+    int64_t threads, most_expansion;
     memory_values memory;
     bool json, quiet;
 } values;
@@ -271,7 +272,7 @@ static ebpo_status make(const patient *p, remade *r, ebpo_error *error)
 static ebpo_status compare(patient *p, ebpo_error *error)
 {
     ebpo_file *made;
-    ebpo_status status = ebpo_open(p->v->out, &made, error);
+    ebpo_status status = remote_open_own(p->v->out, &made, error);
     if (status != EBPO_OK)
         return status;
     p->same = memcmp(ebpo_file_info(made)->content_sha256, p->info->content_sha256,
@@ -364,6 +365,8 @@ static int run(void *given, const char **operand)
     const values *v = given;
     progress_line line;
     patient p = { .v = v };
+    ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
+    how.most_expansion = (uint64_t)v->most_expansion;
     ebpo_error error = EBPO_ERROR_INIT;
     if (!v->out)
         return command_usage("repair", "give the new file with --output");
@@ -376,7 +379,7 @@ static int run(void *given, const char **operand)
     if (status == EBPO_OK)
         status = memory_make(&p.workspace, &v->memory, &error);
     if (status == EBPO_OK)
-        status = ebpo_open(operand[0], &p.file, &error);
+        status = ebpo_open_with(operand[0], &how, &p.file, &error);
     if (status == EBPO_OK) {
         p.info = ebpo_file_info(p.file);
         status = repair(&p, &error);

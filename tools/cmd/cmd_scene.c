@@ -110,6 +110,7 @@ static int run(void *given, const char **operand)
             operand[0]);
     ebpo_scene_options how = EBPO_SCENE_OPTIONS_INIT;
     ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
+    load.most_expansion = (uint64_t)v->most_expansion;
     how.outside = v->outside;
     how.remote = v->remote;
     const char *wrong = NULL;

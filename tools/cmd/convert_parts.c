@@ -13,6 +13,7 @@
 #include "cli/mesh_advice.h"
 #include "cli/mesh_findings.h"
 #include "cli/progress.h"
+#include "cli/remote_args.h"
 #include "cli/signals.h"
 #include "cli/words.h"
 #include "cmd/part_names.h"
@@ -206,7 +207,7 @@ static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
 static ebpo_status look_at(part *p, const char *path, ebpo_error *error)
 {
     ebpo_file *file = NULL;
-    ebpo_status status = ebpo_open(path, &file, error);
+    ebpo_status status = remote_open_own(path, &file, error);
     if (status != EBPO_OK)
         return status;
     const ebpo_info *info = ebpo_file_info(file);

@@ -8,6 +8,7 @@
 #include "cli/file_facts.h"
 #include "cli/mesh_advice.h"
 #include "cli/mesh_findings.h"
+#include "cli/remote_args.h"
 #include "cli/tables.h"
 #include "cli/words.h"
 #include "cmd/subset_run.h"
@@ -144,7 +145,7 @@ ebpo_status convert_tell_file(const convert_told *t, const mesh_input *p, const 
         return EBPO_OK;
     ebpo_file *file = NULL;
     ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
-    ebpo_status status = ebpo_open(t->out, &file, error);
+    ebpo_status status = remote_open_own(t->out, &file, error);
     if (status == EBPO_OK)
         status = ebpo_file_locate(file, &stored, error);
     if (status == EBPO_OK && t->json) {

@@ -10,6 +10,7 @@ typedef struct scene_values {
     const char *out, *target_size, *memory;
     int purpose; /* an ebpo_scene_purpose */
     int64_t threads;
+    int64_t most_expansion; /* as in ebpo_open_options */
     bool outside, remote, json, csv, count, places, solids, least, quiet;
 } scene_values;
 

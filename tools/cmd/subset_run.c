@@ -8,6 +8,7 @@
 
 #include "cli/command.h"
 #include "cli/file_facts.h"
+#include "cli/remote_args.h"
 #include "cli/words.h"
 
 const char *const profile_words[] = { "full", "lod", "collision", NULL }; /* by ebpo_profile */
@@ -202,7 +203,7 @@ ebpo_status subset_tell(const subset_values *v, const char *out_path, const ebpo
     if (v->quiet && !v->json)
         return EBPO_OK;
     ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
-    ebpo_status status = ebpo_open(out_path, &file, error);
+    ebpo_status status = remote_open_own(out_path, &file, error);
     if (status == EBPO_OK)
         status = ebpo_file_locate(file, &stored, error);
     if (status != EBPO_OK) {

@@ -5,7 +5,8 @@
  *   Contents   ebpo_level, ebpo_info, ebpo_tree: a whole model in memory
  *   Writing    ebpo_tree_write
  *   Sources    ebpo_source: where bytes come from
- *   Opening    ebpo_open, ebpo_open_memory, ebpo_open_source, ebpo_close
+ *   Opening    ebpo_open, ebpo_open_with, ebpo_open_memory, ebpo_open_source,
+ *              ebpo_close
  *   Facts      ebpo_file_info, ebpo_file_get_stats, ebpo_file_locate
  *   Reading    ebpo_file_read_level, ebpo_file_read_mesh, ebpo_file_read_tree ...
  *   Rewriting  ebpo_file_repack
@@ -498,11 +499,46 @@ typedef struct ebpo_file ebpo_file;
  * EBPO_E_IO. EBPO_E_FORMAT: not such a file, or damaged. EBPO_E_VERSION: another
  * major version, or a part that this library does not know. EBPO_E_UNSUPPORTED: a
  * file that another program, such as h5repack, has laid out in a way that this
- * library does not write. EBPO_E_MEMORY.
+ * library does not write. EBPO_E_LIMIT: its arrays take very much more room decoded
+ * than in the file (ebpo_open_options). EBPO_E_MEMORY.
  *
  * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error);
+
+/*
+ * How often the bytes of a file its decoded arrays may take, and how many bytes they
+ * may take in any case: small files are never refused. A flat sheet of two million
+ * equal squares has 26 times its file; a file that was made to exhaust memory can
+ * have thousands of times.
+ */
+#define EBPO_EXPANSION_MOST 256
+#define EBPO_EXPANSION_FREE (UINT64_C(64) << 20)
+
+/* How a file is opened; 0 and NULL: as usual. */
+typedef struct ebpo_open_options {
+    size_t struct_size; /* EBPO_OPEN_OPTIONS_INIT sets it */
+
+    /* Instead of EBPO_EXPANSION_MOST; UINT64_MAX: any. */
+    uint64_t most_expansion;
+
+    /* Open these bytes instead; the name is for messages. Closed as by ebpo_open_source. */
+    const ebpo_source *source;
+
+    /* Of a URL: http.h. */
+    const struct ebpo_http_options *http;
+} ebpo_open_options;
+
+#define EBPO_OPEN_OPTIONS_INIT EBPO_SIZED(ebpo_open_options)
+
+/*
+ * ebpo_open with options.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_with(const char *path,
+                                                  const ebpo_open_options *options, ebpo_file **out,
+                                                  ebpo_error *error);
 
 /* How ebpo_open_compat goes about it; 0 and NULL: as usual. */
 typedef struct ebpo_compat_options {
@@ -519,6 +555,9 @@ typedef struct ebpo_compat_options {
 
     /* Of a URL: http.h. NULL: as usual. */
     const struct ebpo_http_options *http;
+
+    /* As in ebpo_open_options. */
+    uint64_t most_expansion;
 } ebpo_compat_options;
 
 #define EBPO_COMPAT_OPTIONS_INIT EBPO_SIZED(ebpo_compat_options)

@@ -318,6 +318,9 @@ typedef struct ebpo_load_options {
     uint64_t memory;
 
     ebpo_progress progress;
+
+    /* As in ebpo_open_options. */
+    uint64_t most_expansion;
 } ebpo_load_options;
 
 #define EBPO_LOAD_OPTIONS_INIT EBPO_SIZED(ebpo_load_options)

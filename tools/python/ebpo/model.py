@@ -71,7 +71,7 @@ class AllHits(NamedTuple):
 
 def open(source: Any, *, memory: int | str | None = None, cut_level: int | None = None,
          prefetch: bool = False, threads: int | None = None,
-         storage_options: dict | None = None, **http: Any) -> Model:
+         storage_options: dict | None = None, most_expansion: int | None = None, **http: Any) -> Model:
     """Opens a file: reads its head, and nothing else before it is asked for.
 
     source: a path; a URL (http, https, or what fsspec knows); bytes, an mmap or an array of them, which
@@ -84,6 +84,8 @@ def open(source: Any, *, memory: int | str | None = None, cut_level: int | None 
     prefetch: subtrees around the last questions are loaded in the background.
     threads: so many work at questions and at reading. None: all cores.
     storage_options: fsspec's, of the URL.
+    most_expansion: how often the file's bytes its decoded arrays may take. None: 256 times, and 64 MiB in
+        any case; beyond that a file is refused (LimitError), as it may be made to exhaust memory.
     http: members of ebpo_http_options in ebpo/http.h: headers={"Name": "value"}, user="name:password",
         cache_folder=..., retries=...
 
@@ -94,7 +96,7 @@ def open(source: Any, *, memory: int | str | None = None, cut_level: int | None 
     12
     """
     options = {"memory": memory, "cut_level": cut_level, "prefetch": prefetch, "threads": threads,
-               "storage_options": storage_options, **http}
+               "storage_options": storage_options, "most_expansion": most_expansion, **http}
     return Model(source, options)
 
 
@@ -116,14 +118,16 @@ class Model:
 
     def __init__(self, source: Any, options: dict) -> None:
         http = {name: value for name, value in options.items()
-                if name not in ("memory", "cut_level", "prefetch", "threads", "storage_options")}
+                if name not in ("memory", "cut_level", "prefetch", "threads", "storage_options",
+                                 "most_expansion")}
         self._source, self._options = source, options
         self._threads = options["threads"] or 0
         self._model_options = made(c.ebpo_model_options, memory=size_in_bytes(options["memory"]),
                                    prefetch=bool(options["prefetch"]), threads=self._threads)
         if options["cut_level"] is not None:
             self._model_options.cut_level = options["cut_level"]
-        self._file: Handle | None = opened(source, http, options["storage_options"])
+        self._file: Handle | None = opened(source, http, options["storage_options"],
+                                            options.get("most_expansion") or 0)
         self._lock = threading.RLock()
         self._made: Handle | None = None
         self._contexts: collections.deque[Handle] = collections.deque()

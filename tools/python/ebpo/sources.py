@@ -161,48 +161,65 @@ def http_options(options: dict) -> tuple[Any, list]:
     return struct, keep
 
 
-def by_url(url: str, http: dict) -> Handle:
+def by_name(name: bytes, most_expansion: int, keep: tuple = (), **members: Any) -> Handle:
+    options = made(c.ebpo_open_options, most_expansion=most_expansion,
+                   **{member: ctypes.addressof(struct) for member, struct in members.items()})
+    return Handle.made("ebpo_open_with", name, ctypes.byref(options), free="ebpo_close", keep=keep)
+
+
+def by_url(url: str, http: dict, most_expansion: int) -> Handle:
     struct, keep = http_options(http)
     try:
-        return Handle.made("ebpo_open_url", url.encode(), ctypes.byref(struct), free="ebpo_close")
+        return by_name(url.encode(), most_expansion, http=struct)
     except UnsupportedError:
         if set(http) - {"headers"}:
             raise
     del keep
-    return by_ranges(Web(url, http.get("headers")), url.partition("?")[0])
+    return by_ranges(Web(url, http.get("headers")), url.partition("?")[0], most_expansion)
 
 
-def by_ranges(ranges: Any, name: str) -> Handle:
+def by_ranges(ranges: Any, name: str, most_expansion: int) -> Handle:
     source = Source(ranges)
-    return Handle.made("ebpo_open_source", ctypes.byref(source.struct), name.encode(), free="ebpo_close",
-                       keep=(source,))
+    return by_name(name.encode(), most_expansion, keep=(source,), source=source.struct)
 
 
-def opened(source: Any, http: dict, storage_options: dict | None) -> Handle:
+def opened(source: Any, http: dict, storage_options: dict | None, most_expansion: int = 0) -> Handle:
     """An ebpo_file of whatever `ebpo.open` takes."""
     if isinstance(source, (str, os.PathLike)):
         name = os.fspath(source)
         if isinstance(name, str) and name.startswith(("http://", "https://")) and storage_options is None:
-            return by_url(name, http)
+            return by_url(name, http, most_expansion)
         if http:
             raise TypeError(f"{name} is no URL: there is nothing to do for {', '.join(http)}")
         if isinstance(name, str) and "://" in name:
-            return by_ranges(Stored(name, storage_options), name)
-        return Handle.made("ebpo_open", os.fsencode(name), free="ebpo_close")
+            return by_ranges(Stored(name, storage_options), name, most_expansion)
+        return by_name(os.fsencode(name), most_expansion)
     if http or storage_options is not None:
         raise TypeError("options of URLs are for URLs")
     name = str(getattr(source, "name", "") or type(source).__name__)
     if hasattr(source, "read_range") and hasattr(source, "size"):
-        return by_ranges(source, name)
+        return by_ranges(source, name, most_expansion)
     if hasattr(source, "seek") and hasattr(source, "read") and not isinstance(source, _mmap()):
-        return by_ranges(Seekable(source), name)
+        return by_ranges(Seekable(source), name, most_expansion)
     try:
         data = np.frombuffer(source, np.uint8)
     except (TypeError, ValueError):
         raise TypeError(f"{type(source).__name__} is neither a path, a URL, bytes, a file with seek and read nor "
                         "an object with size and read_range(offset, size)") from None
+    if most_expansion:
+        return by_ranges(Bytes(data), name, most_expansion)
     return Handle.made("ebpo_open_memory", data.ctypes.data, data.nbytes, name.encode(), free="ebpo_close",
                        keep=(data, source))
+
+
+class Bytes:
+    """Ranges of bytes in memory."""
+
+    def __init__(self, data: np.ndarray) -> None:
+        self.data, self.size = data, data.nbytes
+
+    def read_range(self, offset: int, size: int) -> memoryview:
+        return self.data[offset:offset + size].data
 
 
 def _mmap() -> type:
