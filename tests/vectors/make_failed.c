@@ -158,6 +158,37 @@ static void v_contiguous(void)
 {
     replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 4, 3, 0, false, false, NULL, NULL });
 }
+/* Bytes, and rows, of other files. */
+static void external_storage(hid_t dcpl)
+{
+    need(H5Pset_external(dcpl, "elsewhere.bin", 0, H5F_UNLIMITED) >= 0, "external storage");
+}
+static void v_external_storage(void)
+{
+    replace("/mesh/faces",
+            (new_array){ H5T_STD_U32LE, 4, 3, 0, false, true, external_storage, NULL });
+}
+static void virtual_rows(hid_t dcpl)
+{
+    const hsize_t rows[2] = { 4, 3 };
+    hid_t space = H5Screate_simple(2, rows, NULL);
+    need(H5Pset_virtual(dcpl, space, "elsewhere.h5", "/mesh/faces", space) >= 0, "virtual dataset");
+    H5Sclose(space);
+}
+static void v_virtual(void)
+{
+    replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 4, 3, 0, false, true, virtual_rows, NULL });
+}
+/* A number that nobody has registered: libhdf5 would look for a plugin of that name. */
+static void unknown_filter(hid_t dcpl)
+{
+    need(H5Pset_filter(dcpl, 65000, H5Z_FLAG_OPTIONAL, 0, NULL) >= 0, "unknown filter");
+}
+static void v_unknown_filter(void)
+{
+    replace("/mesh/faces",
+            (new_array){ H5T_STD_U32LE, 4, 3, 4, false, true, unknown_filter, NULL });
+}
 static void v_unlimited(void)
 {
     replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 4, 3, 4, true, false, checksum, NULL });
@@ -338,7 +369,15 @@ static void v_gates_long(void)
 static void v_attributes_image(void) { set_text("/attributes/001", "names", "sha256"); }
 static void v_content(void) { poke("/mesh/vertices", 0, 2); }
 
-typedef enum late_change { NONE, CUT, FLIP_CHUNK, FLIP_HEAD, SWAP_CHUNK, NOT_HDF5 } late_change;
+typedef enum late_change {
+    NONE,
+    CUT,
+    FLIP_CHUNK,
+    FLIP_HEAD,
+    SWAP_CHUNK,
+    NOT_HDF5,
+    USER_BLOCK
+} late_change;
 
 typedef struct failed_vector {
     const char *name, *base;
@@ -351,6 +390,7 @@ typedef struct failed_vector {
 static const failed_vector failed[] = {
     { "not_hdf5", LEAVES, NULL, NOT_HDF5, "2", "whole HDF5 file" },
     { "cut_off", LEAVES, NULL, CUT, "2", "whole HDF5 file" },
+    { "user_block", LEAVES, NULL, USER_BLOCK, "2", "must refuse a user block" },
     { "head_bit_flipped", LEAVES, NULL, FLIP_HEAD, "2", "all metadata is checksummed" },
     { "format_wrong", LEAVES, v_format, NONE, "3", "it is not `EBP-Octree in HDF5`" },
     { "format_missing", LEAVES, v_format_missing, NONE, "3", "it is not `EBP-Octree in HDF5`" },
@@ -453,7 +493,12 @@ static const failed_vector failed[] = {
     { "array_with_other_chunks", ONE, v_chunk, NONE, "2",
       "the largest power of two for which a chunk has at most 65,536 bytes" },
     { "array_contiguous", ONE, v_contiguous, NONE, "2", "integers as stated, chunked" },
+    { "array_in_external_storage", ONE, v_external_storage, NONE, "2",
+      "integers as stated, chunked" },
+    { "array_virtual", ONE, v_virtual, NONE, "2", "integers as stated, chunked" },
     { "array_unlimited", ONE, v_unlimited, NONE, "2", "1 or 2 fixed dimensions" },
+    { "array_with_unknown_filter", ONE, v_unknown_filter, NONE, "2",
+      "A reader must refuse any other pipeline" },
     { "array_with_other_filter", ONE, v_filter, NONE, "2",
       "A reader must refuse any other pipeline" },
     { "chunk_bit_flipped", LEAVES, NULL, FLIP_CHUNK, "2", "the frame's checksum" },
@@ -535,6 +580,8 @@ static const failed_vector failed[] = {
       "are not those whose SHA-256 stands there" },
 };
 
+enum { USER_BLOCK_BYTES = 512 };
+
 static void change_bytes(const char *path, late_change late)
 {
     size_t size;
@@ -549,6 +596,13 @@ static void change_bytes(const char *path, late_change late)
     case FLIP_CHUNK: data[faces + chunk_size / 2] ^= 16; break;
     case FLIP_HEAD: data[60] ^= 16; break;
     case SWAP_CHUNK: memcpy(data + faces, data + types, other_size); break;
+    case USER_BLOCK:
+        data = realloc(data, size + USER_BLOCK_BYTES);
+        need(data != NULL, "memory");
+        memmove(data + USER_BLOCK_BYTES, data, size);
+        memset(data, ' ', USER_BLOCK_BYTES);
+        size += USER_BLOCK_BYTES;
+        break;
     case NOT_HDF5: memset(data, ' ', size = 64); break;
     case NONE: break;
     }
