@@ -1,5 +1,6 @@
 #include "cli/mesh_findings.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -107,6 +108,15 @@ static const char *kind(const ebpo_mesh_report *report)
                             : "a solid: its edges balance, though it is not a 2-manifold";
 }
 
+/* Of coordinates far out an area is beyond doubles although each of them is not. */
+static void print_extent(FILE *out, const char *what, double x)
+{
+    if (isfinite(x))
+        fprintf(out, ", %s %.6g", what, x);
+    else
+        fprintf(out, ", %s beyond 1.8e+308 (ebpo measure tells it, of the converted file)", what);
+}
+
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                     const ebpo_mesh_report *report, bool crossings_follow)
 {
@@ -125,9 +135,9 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                 words_plural(parts, sizeof parts, report->boundary_loops, "hole", "holes"));
     if (report->genus_known)
         fprintf(out, ", genus %lld", (long long)report->genus);
-    fprintf(out, ", area %.6g", report->area);
+    print_extent(out, "area", report->area);
     if (report->balanced)
-        fprintf(out, ", volume %.6g", report->volume);
+        print_extent(out, "volume", report->volume);
     fprintf(out, ", mean edge %.4g\n  box %.6g %.6g %.6g to %.6g %.6g %.6g\n", report->mean_edge,
             report->min[0], report->min[1], report->min[2], report->max[0], report->max[1],
             report->max[2]);
