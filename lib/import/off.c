@@ -209,8 +209,9 @@ static ebpo_status keep(off_reading *r, import_sort sort, int first, bool *good)
         *good = read_float(r, word, &value[k]);
         if (sort != IMPORT_COLOURS)
             continue;
-        r->broken |= memchr(word.s, '.', word.n) || value[k] < 0 || value[k] > 255 ||
-                     value[k] != (float)(int)value[k];
+        /* the range first, in this way: what is not a number has no int */
+        bool byte = value[k] >= 0 && value[k] <= 255;
+        r->broken |= memchr(word.s, '.', word.n) || !byte || value[k] != (float)(int)value[k];
         r->most = value[k] > r->most ? value[k] : r->most;
     }
     return r->build->attributes ? ebpo_import_row(r->build, sort, value) : EBPO_OK;

@@ -137,6 +137,7 @@ for flags in (0, 16):
     put("import", f"stl_binary_{flags}", bytes([1 | flags]) + binary)
     put("import", f"off_{flags}", bytes([(18 if flags else 2)]) + off)
     put("import", f"coff_{flags}", bytes([(18 if flags else 2)]) + b"C" + off.replace(b"0 0 0\n", b"0 0 0 9 9 9 255\n"))
+    put("import", f"coff_nan_{flags}", bytes([2 | flags]) + b"C" + off.replace(b"0 0 0\n", b"0 0 0 nan 9 9 255\n"))
 put("import", "groups", bytes([24]) + obj)
 put("import", "mtl", bytes([4]) + mtl)
 put("import", "ply_names", bytes([4]) + b"ply\ncomment TextureFile a b.png\ncomment TextureFile ../x.png\nend_header\n")
