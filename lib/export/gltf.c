@@ -13,6 +13,7 @@
 #include "base/endian.h"
 #include "base/arrays.h"
 #include "base/error.h"
+#include "base/text_stream.h"
 #include "export/floats.h"
 #include "export/formats.h"
 #include "io/file_source.h"
@@ -308,16 +309,14 @@ static void write_bin(FILE *f, const model *m)
 
 static ebpo_status write_glb(FILE *f, const model *m, const char *path, ebpo_error *error)
 {
-    char *text = NULL;
-    size_t length = 0;
-    FILE *t = open_memstream(&text, &length);
-    if (!t)
+    ebpo_text_stream t;
+    if (!ebpo_text_stream_begin(&t))
         return ebpo_fail_memory(error, BUFSIZ);
-    print_text(t, m);
-    if (fclose(t) != 0 || !text) {
-        free(text);
-        return ebpo_fail_memory(error, length);
-    }
+    print_text(t.file, m);
+    if (!ebpo_text_stream_end(&t))
+        return ebpo_fail_memory(error, t.bytes);
+    char *text = t.text;
+    uint64_t length = t.bytes;
     size_t padding = -length & 3;
     uint64_t bin = bin_bytes(m), total = EBPO_GLB_HEADS + length + padding + bin;
     ebpo_status status = ebpo_export_check_glb(path, length, bin, error);

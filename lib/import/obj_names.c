@@ -8,6 +8,7 @@
 #include "base/alloc.h"
 #include "base/arrays.h"
 #include "base/error.h"
+#include "base/text_stream.h"
 #include "base/hash.h"
 
 enum { RUNS_MOST = 100000000, MATERIALS_MOST = 10000000 };
@@ -129,11 +130,10 @@ static void print_properties(FILE *out, const ebpo_attributes *attributes, const
 static ebpo_status make_header(ebpo_attributes *attributes, const obj_names *names,
                                ebpo_error *error)
 {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    if (!out)
+    ebpo_text_stream text;
+    if (!ebpo_text_stream_begin(&text))
         return ebpo_fail_memory(error, BUFSIZ);
+    FILE *out = text.file;
     fputs("ply\nformat binary_little_endian 1.0\n", out);
     print_names(out, names);
     fputs("element vertex 0\nproperty float x\nproperty float y\nproperty float z\n", out);
@@ -141,18 +141,15 @@ static ebpo_status make_header(ebpo_attributes *attributes, const obj_names *nam
     fputs("element face 0\nproperty list uchar int vertex_indices\n", out);
     print_properties(out, attributes, "face");
     fputs("end_header\n", out);
-    bool fine = !ferror(out);
-    if (fclose(out) != 0 || !fine) {
-        free(text);
-        return ebpo_fail_memory(error, size);
-    }
-    if (size > EBPO_ATTRIBUTE_HEADER) {
-        free(text);
+    if (!ebpo_text_stream_end(&text))
+        return ebpo_fail_memory(error, text.bytes);
+    if (text.bytes > EBPO_ATTRIBUTE_HEADER) {
+        free(text.text);
         ebpo_attributes_lose(attributes, "names of materials (more than 1 MiB)");
         return EBPO_OK;
     }
-    attributes->header = text;
-    attributes->header_bytes = size;
+    attributes->header = text.text;
+    attributes->header_bytes = text.bytes;
     return EBPO_OK;
 }
 

@@ -8,6 +8,7 @@
 #include "base/alloc.h"
 #include "base/arrays.h"
 #include "base/error.h"
+#include "base/text_stream.h"
 #include "ply/ply_layout.h"
 
 typedef struct making {
@@ -344,17 +345,23 @@ static bool make_as_source(making *m)
 
 ebpo_status ebpo_ply_layout_make(ply_layout *out, const ebpo_mesh *mesh, ebpo_error *error)
 {
+    ebpo_text_stream header;
     *out = (ply_layout){ .element = NULL };
     making m = { .out = out,
                  .mesh = mesh,
                  .index_type = mesh->vertex_count < UINT64_C(1) << 31 ? PLY_INT32 : PLY_UINT32 };
     m.taken = ebpo_alloc_zero(array_count(&m) + 1, EBPO_ATTRIBUTE_COLUMNS);
-    m.text = open_memstream(&out->header, &out->header_bytes);
+    if (ebpo_text_stream_begin(&header))
+        m.text = header.file;
     m.no_memory = !m.taken || !m.text;
     if (!m.no_memory && !make_as_source(&m))
         make_plain(&m);
-    if (m.text && (ferror(m.text) || fclose(m.text) != 0))
+    if (m.text && !ebpo_text_stream_end(&header))
         m.no_memory = true;
+    if (m.text) {
+        out->header = header.text;
+        out->header_bytes = header.bytes;
+    }
     free(m.taken);
     if (!m.no_memory)
         return EBPO_OK;
