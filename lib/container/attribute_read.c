@@ -83,10 +83,12 @@ static ebpo_status check_ends(const ebpo_file *file, uint64_t n, const ebpo_attr
                                  "the lists do not end where their items do", error);
 }
 
-static ebpo_status read_one(const ebpo_file *file, uint64_t n, const ebpo_read_options *read,
-                            ebpo_attribute *a, ebpo_error *error)
+static ebpo_status read_parts(const ebpo_file *file, uint64_t n, const ebpo_read_options *read,
+                              bool ends_only, ebpo_attribute *a, ebpo_error *error)
 {
     uint8_t *values;
+    if (ends_only && !file->attributes.head[n].different)
+        return EBPO_OK;
     ebpo_status status = read_array(file, ebpo_values_number(n), read, &values, error);
     if (!file->attributes.head[n].different) {
         a->values = values;
@@ -95,8 +97,15 @@ static ebpo_status read_one(const ebpo_file *file, uint64_t n, const ebpo_read_o
     a->ends = (uint64_t *)(void *)values;
     if (status == EBPO_OK)
         status = check_ends(file, n, a, read->workspace, error);
-    return status == EBPO_OK ? read_array(file, ebpo_items_number(n), read, &a->values, error)
-                             : status;
+    return status == EBPO_OK && !ends_only
+               ? read_array(file, ebpo_items_number(n), read, &a->values, error)
+               : status;
+}
+
+static ebpo_status read_one(const ebpo_file *file, uint64_t n, const ebpo_read_options *read,
+                            ebpo_attribute *a, ebpo_error *error)
+{
+    return read_parts(file, n, read, false, a, error);
 }
 
 static ebpo_status read_header(const ebpo_file *file, ebpo_attributes *to, ebpo_error *error)
@@ -185,9 +194,8 @@ static ebpo_status check_images(const ebpo_file *file, const ebpo_read_options *
     return status;
 }
 
-ebpo_status ebpo_file_read_attribute(const ebpo_file *file, unsigned n,
-                                     const ebpo_read_options *options, ebpo_attribute_values *out,
-                                     ebpo_error *error)
+static ebpo_status read_public(const ebpo_file *file, unsigned n, const ebpo_read_options *options,
+                               bool ends_only, ebpo_attribute_values *out, ebpo_error *error)
 {
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
@@ -198,17 +206,31 @@ ebpo_status ebpo_file_read_attribute(const ebpo_file *file, unsigned n,
     if (status != EBPO_OK)
         return status;
     ebpo_attribute a = file->attributes.head[n].head;
-    if (ebpo_attribute_is_of_textures(&a) &&
+    if (!ends_only && ebpo_attribute_is_of_textures(&a) &&
         strcmp(a.names, ebpo_texture_array_name(EBPO_TEXTURE_BYTES)) == 0)
         status = check_images(file, &read, error);
     if (status == EBPO_OK)
-        status = read_one(file, n, &read, &a, error);
+        status = read_parts(file, n, &read, ends_only, &a, error);
     *out = (ebpo_attribute_values){ a.values, a.ends, 0, read.workspace };
     if (status == EBPO_OK)
         out->count = ebpo_attribute_value_count(&a);
     else
         ebpo_attribute_values_free(out);
     return status;
+}
+
+ebpo_status ebpo_file_read_attribute(const ebpo_file *file, unsigned n,
+                                     const ebpo_read_options *options, ebpo_attribute_values *out,
+                                     ebpo_error *error)
+{
+    return read_public(file, n, options, false, out, error);
+}
+
+ebpo_status ebpo_file_attribute_ends(const ebpo_file *file, unsigned n,
+                                     const ebpo_read_options *options, ebpo_attribute_values *out,
+                                     ebpo_error *error)
+{
+    return read_public(file, n, options, true, out, error);
 }
 
 /* All of one array's values at a time would do, but whole parts are small beside the mesh. */

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "attributes/attributes.h"
+#include "attributes/textures_named.h"
 #include "base/alloc.h"
 #include "base/arrays.h"
 #include "base/error.h"
@@ -106,5 +107,9 @@ ebpo_status ebpo_components_mesh(const ebpo_components *c, uint64_t number, ebpo
     }
     copy_vertices(c, number, out);
     copy_faces(c, number, out);
-    return EBPO_OK;
+    status = ebpo_textures_keep_named(out->attributes, out->arrangement->face_source,
+                                      out->face_count, error);
+    if (status != EBPO_OK)
+        ebpo_mesh_free(out);
+    return status;
 }

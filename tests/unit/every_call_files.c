@@ -252,7 +252,10 @@ static ebpo_status call_read_attribute(every_call_env *e)
 {
     ebpo_attribute_values values;
     ebpo_read_options options = reading(e);
-    ebpo_status status = ebpo_file_read_attribute(e->file, 0, &options, &values, e->error);
+    ebpo_status status = ebpo_file_attribute_ends(e->file, 1, &options, &values, e->error);
+    ebpo_attribute_values_free(&values);
+    if (status == EBPO_OK)
+        status = ebpo_file_read_attribute(e->file, 0, &options, &values, e->error);
     ebpo_attribute_values_free(&values);
     return status;
 }

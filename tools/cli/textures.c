@@ -53,6 +53,8 @@ ebpo_status textures_read(textures *out, const ebpo_file *file, bool bytes, ebpo
         out->embedded = out->embedded || i == BYTES;
         if (i != BYTES || bytes)
             status = ebpo_file_read_attribute(file, n, NULL, &out->list[i], error);
+        else /* images may be large: only whether there are any */
+            status = ebpo_file_attribute_ends(file, n, NULL, &out->list[i], error);
     }
     if (status != EBPO_OK)
         textures_free(out);
@@ -67,6 +69,24 @@ void textures_free(textures *t)
 }
 
 /* --- facts --- */
+
+/* Also where they were not read. */
+static uint64_t byte_count(const textures *t, uint64_t row)
+{
+    const uint64_t *ends = t->list[BYTES].ends;
+    return !ends ? t->columns[BYTES] : row ? ends[row] - ends[row - 1] : ends[0];
+}
+
+/* A row has a digest and no bytes where the image was left out, unless it was an empty file. */
+static bool is_kept(const textures *t, uint64_t row)
+{
+    static const char nothing[] =
+        "\xe3\xb0\xc4\x42\x98\xfc\x1c\x14\x9a\xfb\xf4\xc8\x99\x6f\xb9\x24"
+        "\x27\xae\x41\xe4\x64\x9b\x93\x4c\xa4\x95\x99\x1b\x78\x52\xb8\x55";
+    span digest = list_of(t, SHA256, row);
+    return t->embedded && digest.n == DIGEST &&
+           (byte_count(t, row) || memcmp(digest.s, nothing, DIGEST) == 0);
+}
 
 /* A copy that ends with a zero, without control characters; NULL when memory is short. */
 static char *text_of(span s)
@@ -95,7 +115,9 @@ void textures_print(FILE *out, const textures *t)
         digest_of(t, i, hex);
         fprintf(out, "  %s %s, %s%s%s%s%s\n", i ? "          " : "textures  ", name ? name : "?",
                 hex[0] ? "sha256 " : "was not found", hex, use && *use ? ", " : "", use ? use : "",
-                t->embedded && hex[0] ? ", kept" : "");
+                is_kept(t, i) ? ", kept"
+                : hex[0]      ? ", only name and digest are kept"
+                              : "");
         free(name);
         free(use);
     }
@@ -112,7 +134,7 @@ void textures_json(json *j, const textures *t)
         json_text(j, "name", name ? name : "");
         json_text(j, "use", use ? use : "");
         json_text(j, "sha256", hex);
-        json_bool(j, "kept", t->embedded && hex[0]);
+        json_bool(j, "kept", is_kept(t, i));
         json_end(j);
         free(name);
         free(use);
@@ -234,17 +256,6 @@ static bool write_file(int top, char *name, span bytes)
     close(folder);
     errno = why;
     return good;
-}
-
-/* A row has a digest and no bytes where the image was left out, unless it was an empty file. */
-static bool is_kept(const textures *t, uint64_t row)
-{
-    static const char nothing[] =
-        "\xe3\xb0\xc4\x42\x98\xfc\x1c\x14\x9a\xfb\xf4\xc8\x99\x6f\xb9\x24"
-        "\x27\xae\x41\xe4\x64\x9b\x93\x4c\xa4\x95\x99\x1b\x78\x52\xb8\x55";
-    span digest = list_of(t, SHA256, row);
-    return t->list[BYTES].values && digest.n == DIGEST &&
-           (list_of(t, BYTES, row).n || memcmp(digest.s, nothing, DIGEST) == 0);
 }
 
 static ebpo_status check_names(const textures *t, ebpo_error *error)

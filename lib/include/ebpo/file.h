@@ -866,6 +866,21 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_attribute(const ebpo_file *fil
                                                             ebpo_error *error);
 
 /*
+ * Of an array of lists only where they end: `values` is NULL, `ends` and `count` are
+ * those of ebpo_file_read_attribute. `ends` is NULL where all lists are as long as the
+ * array has columns, and of an array without lists. Freed by
+ * ebpo_attribute_values_free. On failure `out` is cleared.
+ *
+ * EBPO_E_ABSENT: the file has fewer. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_attribute_ends(const ebpo_file *file, unsigned n,
+                                                            const ebpo_read_options *options,
+                                                            ebpo_attribute_values *out,
+                                                            ebpo_error *error);
+
+/*
  * Frees the arrays and clears the struct.
  *
  * Threads: one per struct.
