@@ -1,5 +1,5 @@
-/* A stream into memory that tells when memory was short: those of the C library (open_memstream) may
- * lose what did not fit and say nothing. */
+/* A stream into memory that tells when memory was short: those of the C library (open_memstream)
+ * may lose what did not fit and say nothing. */
 #ifndef EBPO_BASE_TEXT_STREAM_H
 #define EBPO_BASE_TEXT_STREAM_H
 

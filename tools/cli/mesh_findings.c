@@ -237,7 +237,7 @@ void findings_json_mending(json *j, const char *key, const ebpo_mend_record *r)
     json_end(j);
 }
 
-void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh)
+void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh, const char *unread)
 {
     char hex[65];
     words_hex(mesh->source_sha256, hex);
@@ -253,5 +253,9 @@ void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh)
     json_uint(j, "polygons_concave", mesh->polygons_concave);
     json_uint(j, "polygons_dropped", mesh->polygons_dropped);
     json_uint(j, "strips", mesh->strips);
+    if (unread[0])
+        json_text(j, "left_out", unread);
+    else
+        json_null(j, "left_out");
     json_end(j);
 }

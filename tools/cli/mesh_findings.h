@@ -17,6 +17,7 @@ const char *findings_many(const char *name);
 void findings_print_mending(FILE *out, const ebpo_mend_record *record);
 void findings_json(json *j, const char *key, const ebpo_mesh_report *report);
 void findings_json_mending(json *j, const char *key, const ebpo_mend_record *record);
-void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh);
+/* unread   what reading left out; empty: nothing */
+void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh, const char *unread);
 
 #endif

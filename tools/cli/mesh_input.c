@@ -101,6 +101,8 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
                                 : ebpo_mesh_read(path, &how, &out->mesh, error);
     if (status != EBPO_OK)
         return status;
+    const char *unread = ebpo_mesh_unread(&out->mesh);
+    snprintf(out->unread, sizeof out->unread, "%s", unread ? unread : "");
     out->as_read = out->mesh;
     out->as_read.faces = NULL;
     out->as_read.attributes = NULL;
@@ -129,9 +131,9 @@ ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked, me
                                   error);
 }
 
-void mesh_input_warn(const char *command, const char *path, const ebpo_mesh *mesh)
+void mesh_input_warn(const char *command, const char *path, const mesh_input *input)
 {
-    const char *unread = ebpo_mesh_unread(mesh);
-    if (unread)
-        fprintf(stderr, "ebpo %s: %s: warning: left out in reading: %s\n", command, path, unread);
+    if (input->unread[0])
+        fprintf(stderr, "ebpo %s: %s: warning: left out in reading: %s\n", command, path,
+                input->unread);
 }

@@ -16,6 +16,7 @@ typedef struct mending {
 typedef struct mesh_input {
     ebpo_mesh mesh;         /* as mended */
     ebpo_mesh as_read;      /* facts only; its array pointers tell which there were, no more */
+    char unread[512];       /* ebpo_mesh_unread; empty: nothing was left out */
     ebpo_prepared prepared; /* what was found and mended */
     bool tried;             /* repairs, which `repairs` tells of */
     ebpo_repairs repairs;
@@ -47,6 +48,6 @@ EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *pa
                                                  ebpo_progress progress, ebpo_error *error);
 
 /* A warning where the file holds or names what reading it left out. */
-void mesh_input_warn(const char *command, const char *path, const ebpo_mesh *mesh);
+void mesh_input_warn(const char *command, const char *path, const mesh_input *input);
 
 #endif

@@ -29,7 +29,7 @@ static void print_json(json *j, const mesh_input *p, const char *path)
     json_begin(j, stdout);
     json_object(j, NULL);
     json_text(j, "file", path);
-    findings_json_source(j, "source", &p->as_read);
+    findings_json_source(j, "source", &p->as_read, p->unread);
     findings_json(j, "report", &p->prepared.before);
     if (p->prepared.mended) {
         findings_json_mending(j, "mend", &p->prepared.record);
@@ -68,7 +68,7 @@ static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo
     else if (!v->quiet)
         print_words(v, p, path);
     command_flush("check");
-    mesh_input_warn("check", path, &p->mesh);
+    mesh_input_warn("check", path, p);
     advice_warn(stderr, "check", path, p);
     if (v->places) /* before crossings, which take the mesh */
         status = check_places(&p->mesh, v->places, (unsigned)v->threads, progress,

@@ -355,7 +355,7 @@ static void print_json(const writing *w, double seconds)
     }
     json_end(&j);
     json_object(&j, "input");
-    findings_json_source(&j, "mesh", &w->whole->as_read);
+    findings_json_source(&j, "mesh", &w->whole->as_read, w->whole->unread);
     findings_json(&j, "report", &w->whole->prepared.before);
     json_end(&j);
     json_real(&j, "seconds", seconds);

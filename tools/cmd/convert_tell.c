@@ -24,7 +24,7 @@ void convert_tell_mesh(const convert_told *t, const mesh_input *p)
         advice_print_shells(stdout, p);
     }
     command_flush("convert");
-    mesh_input_warn("convert", t->in, &p->mesh);
+    mesh_input_warn("convert", t->in, p);
     const char *lost = ebpo_mesh_attributes_lost(&p->mesh);
     if (lost)
         fprintf(stderr, "ebpo convert: %s: note: not kept: %s\n", t->in, lost);
@@ -129,7 +129,7 @@ static void print_json(const convert_told *t, const mesh_input *p, const ebpo_in
     json_object(&j, NULL);
     facts_json(&j, t->out, info, stored);
     json_object(&j, "input");
-    findings_json_source(&j, "mesh", &p->as_read);
+    findings_json_source(&j, "mesh", &p->as_read, p->unread);
     findings_json(&j, "report", &p->prepared.before);
     advice_json(&j, p);
     json_end(&j);

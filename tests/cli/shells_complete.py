@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+"""What zsh and fish themselves make of our completions: shells_complete.py FOLDER
+
+Each shell that is installed is asked what follows some beginnings of a line. bash is asked by
+whole_lines of cli_man. Exit code 77: neither is installed."""
+import pathlib
+import pty
+import os
+import select
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+folder = pathlib.Path(sys.argv[1]).resolve()
+ASKED = {  # what is typed: what has to be offered
+    "ebpo rep": ["repack", "repair", "report"],
+    "ebpo convert --codec ": ["deflate", "none", "zstd"],
+    "ebpo check --pla": ["--places"],
+    "ebpo inside --most-e": ["--most-expansion"],
+}
+
+
+def by_fish(line):
+    script = f"source {folder}/ebpo.fish; complete -C {line!r}"
+    return subprocess.run(["fish", "-N", "-c", script], capture_output=True, text=True, check=True).stdout
+
+
+def by_zsh(line):
+    """On a terminal, as zsh completes nowhere else: all that it shows until all is there that is asked for."""
+    with tempfile.TemporaryDirectory() as home:
+        child, terminal = pty.fork()
+        if child == 0:
+            os.environ.update(HOME=home, TERM="dumb", COLUMNS="200", LINES="100")
+            os.execvp("zsh", ["zsh", "-f", "-i"])
+        shown = ""
+
+        def see(words, seconds):
+            nonlocal shown
+            end = time.monotonic() + seconds
+            while time.monotonic() < end and not all(w in shown for w in words):
+                if select.select([terminal], [], [], 0.2)[0]:
+                    shown += os.read(terminal, 65536).decode(errors="replace")
+
+        os.write(terminal, f"fpath=({folder} $fpath); autoload -Uz compinit; compinit -u -d {home}/dump; "
+                 "LISTMAX=1000; echo rea''dy\n".encode())
+        see(["ready"], 60)
+        shown = ""
+        os.write(terminal, (line + "\t").encode())
+        see(ASKED[line], 60)
+        os.kill(child, 9)
+        os.close(terminal)
+        os.waitpid(child, 0)
+    return shown
+
+
+wrong, asked = 0, 0
+for shell, ask in ("fish", by_fish), ("zsh", by_zsh):
+    if not shutil.which(shell):
+        print(f"{shell} is not installed")
+        continue
+    for line, words in ASKED.items():
+        found, asked = ask(line), asked + 1
+        missing = [word for word in words if word not in found]
+        if missing:
+            print(f"{shell}: after {line!r} there is no {', '.join(missing)}:\n{found}")
+            wrong += 1
+sys.exit(77 if not asked else wrong > 0)
