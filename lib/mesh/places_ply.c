@@ -9,18 +9,16 @@
 #include "base/endian.h"
 #include "base/error.h"
 
-enum { NOTHING = UINT8_MAX, VERTEX_BYTES = 3 * 8 + 3, FACE_BYTES = 1 + 3 * 4 + 3 };
+enum { NOTHING = UINT8_MAX, VERTEX_BYTES = 3 * 8, FACE_BYTES = 1 + 3 * 4 + 3 };
 
 ebpo_status ebpo_places_picture_begin(ebpo_places_picture *picture, const ebpo_mesh *mesh,
                                       const char *path, ebpo_error *error)
 {
     picture->mesh = mesh;
     picture->face = ebpo_array_alloc(mesh->workspace, mesh->face_count, 1);
-    picture->vertex = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, 1);
-    if (!picture->face || !picture->vertex)
-        return ebpo_workspace_fail(mesh->workspace, mesh->face_count + mesh->vertex_count, error);
+    if (!picture->face)
+        return ebpo_workspace_fail(mesh->workspace, mesh->face_count, error);
     ebpo_array_fill(mesh->workspace, picture->face, NOTHING, mesh->face_count);
-    ebpo_array_fill(mesh->workspace, picture->vertex, NOTHING, mesh->vertex_count);
     return ebpo_publish_begin(&picture->target, path, error);
 }
 
@@ -28,8 +26,6 @@ void ebpo_places_picture_note(ebpo_places_picture *picture, const ebpo_found *fo
                               const uint64_t *faces, uint64_t count)
 {
     uint8_t kind = (uint8_t)found->kind;
-    if (kind >= EBPO_FOUND_BOWTIE_VERTEX && kind < picture->vertex[found->a])
-        picture->vertex[found->a] = kind;
     for (uint64_t i = 0; i < count; i++)
         if (kind < picture->face[faces[i]])
             picture->face[faces[i]] = kind;
@@ -65,7 +61,6 @@ static void print_header(const ebpo_places_picture *p, FILE *f, const ebpo_mesh_
     }
     fprintf(f,
             "element vertex %" PRIu64 "\nproperty double x\nproperty double y\nproperty double z\n"
-            "property uchar red\nproperty uchar green\nproperty uchar blue\n"
             "element face %" PRIu64 "\nproperty list uchar uint vertex_indices\n"
             "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
             p->mesh->vertex_count, p->mesh->face_count);
@@ -107,7 +102,6 @@ static bool put_vertex(const ebpo_places_picture *p, FILE *f, uint64_t v)
         memcpy(&bits, &x[k], sizeof bits);
         ebpo_store64(row + 8 * k, bits);
     }
-    put_colour(p->vertex[v], row + 24);
     return fwrite(row, 1, sizeof row, f) == sizeof row;
 }
 
@@ -177,9 +171,7 @@ ebpo_status ebpo_places_picture_write(ebpo_places_picture *picture, const ebpo_m
 
 void ebpo_places_picture_end(ebpo_places_picture *picture)
 {
-    if (picture->mesh) {
+    if (picture->mesh)
         ebpo_array_free(picture->mesh->workspace, picture->face);
-        ebpo_array_free(picture->mesh->workspace, picture->vertex);
-    }
     ebpo_publish_abort(&picture->target);
 }

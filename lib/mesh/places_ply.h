@@ -7,13 +7,13 @@
 
 typedef struct ebpo_places_picture {
     const ebpo_mesh *mesh;
-    uint8_t *face, *vertex; /* the kind that each shows, as the mesh has them now */
+    uint8_t *face; /* the kind that each shows, as the mesh has them now */
     ebpo_publish target;
 } ebpo_places_picture;
 
-#define EBPO_PLACES_PICTURE_INIT            \
-    {                                       \
-        NULL, NULL, NULL, EBPO_PUBLISH_INIT \
+#define EBPO_PLACES_PICTURE_INIT      \
+    {                                 \
+        NULL, NULL, EBPO_PUBLISH_INIT \
     }
 
 EBPO_MUST_USE ebpo_status ebpo_places_picture_begin(ebpo_places_picture *picture,

@@ -14,7 +14,7 @@
 extern "C" {
 #endif
 
-/* Kinds of findings, as ebpo_mesh_report counts them. Where a face or a vertex has several, the
+/* Kinds of findings, as ebpo_mesh_report counts them. Where a face has several, the
  * picture shows the one that stands first here. */
 typedef enum ebpo_finding_kind {
     EBPO_FOUND_BOUNDARY_EDGE,
@@ -84,8 +84,8 @@ typedef struct ebpo_places_options {
     /*
      * A binary PLY file to write, which appears whole or not at all: the mesh in the source's
      * order, but for faces that were dropped; positions as doubles; faces of places in the colours
-     * of their kinds, vertices of places of vertices likewise, all else grey (200, 200, 200). Its
-     * comments are the legend. NULL: none.
+     * of their kinds, all else grey (200, 200, 200). Its comments are the legend. Vertices have no
+     * colours, as most programs would show these instead. NULL: none.
      */
     const char *ply;
 } ebpo_places_options;
