@@ -11,6 +11,7 @@
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/sized.h"
+#include "base/sort.h"
 #include "mesh/component_parts.h"
 #include "mesh/mesh_check_parts.h"
 #include "mesh/places_ply.h"
@@ -32,47 +33,102 @@ typedef struct places {
     ebpo_places_picture picture;
 } places;
 
-static int compare_found(const void *x, const void *y, void *user)
+/* A place with what it is sorted by: its kind, then the number that the report has. */
+typedef struct keyed {
+    uint64_t key;
+    uint64_t ends; /* of an edge, by their numbers in the source; of others 0 */
+    ebpo_found found;
+} keyed;
+
+/* Above this the key has at most 18 bits, as ebpo_sort wants. */
+enum { KEY_SHIFT = 18 };
+
+typedef struct sorting {
+    const ebpo_mesh *mesh;
+    const ebpo_found *from;
+    ebpo_found *to;
+} sorting;
+
+static ebpo_status make_keyed(void *context, uint64_t begin, uint64_t end, void *records,
+                              ebpo_error *error)
 {
-    const ebpo_found *p = x, *q = y;
-    const ebpo_mesh *mesh = user;
-    if (p->kind != q->kind)
-        return p->kind < q->kind ? -1 : 1;
-    if (p->place != q->place)
-        return p->place < q->place ? -1 : 1;
-    if (!ebpo_found_is_edge(p->kind))
-        return 0; /* the place is the face or vertex */
-    const uint32_t ends[2][2] = { { p->a, q->a }, { p->b, q->b } };
-    for (int i = 0; i < 2; i++) {
-        uint64_t u = ebpo_mesh_source_vertex(mesh, ends[i][0]),
-                 v = ebpo_mesh_source_vertex(mesh, ends[i][1]);
-        if (u != v)
-            return u < v ? -1 : 1;
+    const sorting *s = context;
+    keyed *out = records;
+    (void)error;
+    for (uint64_t i = begin; i < end; i++, out++) {
+        *out = (keyed){ .key = (uint64_t)s->from[i].kind << 32 | s->from[i].place,
+                        .found = s->from[i] };
+        if (ebpo_found_is_edge(s->from[i].kind))
+            out->ends = ebpo_mesh_source_vertex(s->mesh, s->from[i].a) << 32 |
+                        ebpo_mesh_source_vertex(s->mesh, s->from[i].b);
     }
-    return 0;
+    return EBPO_OK;
 }
 
-/* What the workers noted, in one list, which does not depend on who noted what. */
-static ebpo_status gather(places *p, const ebpo_found_list *lists, unsigned count,
-                          ebpo_error *error)
+static int compare_keyed(const void *x, const void *y)
+{
+    const keyed *a = x, *b = y;
+    return a->ends < b->ends ? -1 : a->ends > b->ends;
+}
+
+static void take_keyed(void *context, uint64_t place, const void *records, uint64_t count)
+{
+    const sorting *s = context;
+    const keyed *in = records;
+    for (uint64_t i = 0; i < count; i++)
+        s->to[place + i] = in[i].found;
+}
+
+/* What the workers noted, one list after the other. */
+static ebpo_status join_lists(const places *p, const ebpo_found_list *lists, unsigned count,
+                              ebpo_found_list *out, ebpo_error *error)
 {
     ebpo_workspace *workspace = p->mesh->workspace;
     uint64_t all = 0;
     for (unsigned t = 0; t < count; t++) {
         all += lists[t].count;
         if (lists[t].short_of_memory)
-            return ebpo_workspace_fail(workspace, 2 * lists[t].count * sizeof *p->all.item, error);
+            return ebpo_workspace_fail(workspace, 2 * lists[t].count * sizeof *out->item, error);
     }
-    p->all.item = ebpo_array_alloc(workspace, all + 1, sizeof *p->all.item);
-    if (!p->all.item)
-        return ebpo_workspace_fail(workspace, all * sizeof *p->all.item, error);
+    out->item = ebpo_array_alloc(workspace, all + 1, sizeof *out->item);
+    if (!out->item)
+        return ebpo_workspace_fail(workspace, all * sizeof *out->item, error);
     for (unsigned t = 0; t < count; t++) {
-        ebpo_array_copy(workspace, p->all.item + p->all.count, lists[t].item,
-                        lists[t].count * sizeof *p->all.item);
-        p->all.count += lists[t].count;
+        ebpo_array_copy(workspace, out->item + out->count, lists[t].item,
+                        lists[t].count * sizeof *out->item);
+        out->count += lists[t].count;
     }
-    qsort_r(p->all.item, p->all.count, sizeof *p->all.item, compare_found, (void *)p->mesh);
     return EBPO_OK;
+}
+
+/* In one list, which does not depend on who noted what. */
+static ebpo_status gather(places *p, const ebpo_found_list *lists, unsigned count,
+                          ebpo_error *error)
+{
+    ebpo_workspace *workspace = p->mesh->workspace;
+    ebpo_found_list joined = { NULL, 0, 0, false };
+    ebpo_status status = join_lists(p, lists, count, &joined, error);
+    if (status == EBPO_OK)
+        p->all.item = ebpo_array_alloc(workspace, joined.count + 1, sizeof *p->all.item);
+    if (status == EBPO_OK && !p->all.item)
+        status = ebpo_workspace_fail(workspace, joined.count * sizeof *p->all.item, error);
+    p->all.count = joined.count;
+    sorting s = { p->mesh, joined.item, p->all.item };
+    const ebpo_sort sort = { .workspace = workspace,
+                             .threads = ebpo_thread_count(p->options.threads),
+                             .progress = &p->options.progress,
+                             .stage = "sorting places",
+                             .count = joined.count,
+                             .record = sizeof(keyed),
+                             .shift = KEY_SHIFT,
+                             .context = &s,
+                             .make = make_keyed,
+                             .compare = compare_keyed,
+                             .take = take_keyed };
+    if (status == EBPO_OK && joined.count)
+        status = ebpo_sort_run(&sort, error);
+    ebpo_array_free(workspace, joined.item);
+    return status;
 }
 
 static bool has_corner(const uint32_t face[3], uint32_t v)

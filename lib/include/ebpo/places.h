@@ -97,9 +97,9 @@ typedef struct ebpo_places_options {
 
 /*
  * Checks a mesh as ebpo_mesh_check does, and hands out every place that it counts: kind by kind,
- * within a kind by the lowest face, then by the vertices. Takes 16 bytes a place of the mesh's
- * workspace, beside what checking takes, and with `ply` at most 13 bytes of it for each face and
- * vertex.
+ * within a kind by the lowest face, then by the vertices. Takes some 80 bytes a place of
+ * the mesh's workspace while they are sorted, and 16 afterwards, beside what checking
+ * takes; with `ply` at most 13 bytes of it for each face and vertex.
  *
  * take     NULL: nothing is handed out. When it returns false it is not called again, and the call
  *          succeeds; `ply` is whole nevertheless
