@@ -178,7 +178,7 @@ def by_url(url: str, http: dict, most_expansion: int) -> Handle:
     return by_ranges(Web(url, http.get("headers")), url.partition("?")[0], most_expansion)
 
 
-def by_ranges(ranges: Any, name: str, most_expansion: int) -> Handle:
+def by_ranges(ranges: Any, name: str, most_expansion: int = 0) -> Handle:
     source = Source(ranges)
     return by_name(name.encode(), most_expansion, keep=(source,), source=source.struct)
 
