@@ -13,6 +13,9 @@ newlines); an empty one means that there must be no output,
 * means anything, @NAME that the output equals the file NAME beside this script. "png:0" runs the
 line only when FEATURES (words with commas between) has png, "no-png:2" only when it has not. Lines
 that begin with # are comments.
+
+python3 within a line is the interpreter that runs this script: where a machine has several, that
+one was chosen for its modules, and another first in PATH may lack them.
 """
 import os
 import re
@@ -81,13 +84,22 @@ def lines_of(path):
         yield number, test
 
 
+def python_in(folder):
+    """Writes a command python3 that is this interpreter into a folder."""
+    command = os.path.join(folder, "python3")
+    with open(command, "w", encoding="utf-8") as f:
+        f.write(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
+    os.chmod(command, 0o755)
+
+
 def main():
     tool, inputs, features, tests = sys.argv[1:]
-    environment = dict(os.environ, LC_ALL="C.UTF-8",
-                       PATH=os.path.dirname(os.path.abspath(tool)) + ":" + os.environ["PATH"],
-                       TESTS=HERE, INPUTS=os.path.abspath(inputs))
     bad = lines = 0
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as commands:
+        python_in(commands)
+        path = [commands, os.path.dirname(os.path.abspath(tool)), os.environ["PATH"]]
+        environment = dict(os.environ, LC_ALL="C.UTF-8", PATH=":".join(path), TESTS=HERE,
+                           INPUTS=os.path.abspath(inputs))
         subprocess.run([inputs, folder], check=True)
         for number, line in lines_of(tests):
             lines += 1
