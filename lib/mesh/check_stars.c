@@ -121,10 +121,13 @@ static bool check_repeated(const ebpo_check *check, star_block *block, scratch *
 {
     if (!ebpo_same_faces_gather(&s->same, &check->stars, check->mesh, v))
         return false;
-    for (uint64_t i = 1; i < s->same.count; i++)
-        if (ebpo_same_faces_repeats(&s->same, i))
+    uint32_t first = 0; /* of the same vertices */
+    for (uint64_t i = 0; i < s->same.count; i++)
+        if (i && ebpo_same_faces_repeats(&s->same, i))
             ebpo_check_note(check, s->worker, &block->repeated_face, EBPO_FOUND_REPEATED_FACE,
-                            s->same.item[i].source, s->same.item[i].face, s->same.item[i].face);
+                            s->same.item[i].source, s->same.item[i].face, first);
+        else
+            first = s->same.item[i].face;
     return true;
 }
 

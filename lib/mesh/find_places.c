@@ -172,13 +172,12 @@ static bool faces_of(places *p, const ebpo_found *f)
         return gather_faces(p, (const uint32_t[2]){ f->a, f->b }, 2);
     if (is_vertex(f->kind))
         return gather_faces(p, &f->a, 1);
-    if (f->kind == EBPO_FOUND_REPEATED_FACE)
-        return gather_faces(p, p->mesh->faces + 3 * (uint64_t)f->a, 3);
-    if (!ebpo_array_grow_late(p->mesh->workspace, &p->faces, &p->face_capacity, 1,
+    if (!ebpo_array_grow_late(p->mesh->workspace, &p->faces, &p->face_capacity, 2,
                               sizeof *p->faces))
         return false;
     p->faces[0] = f->a;
-    p->face_count = 1;
+    p->faces[1] = f->b;
+    p->face_count = f->kind == EBPO_FOUND_REPEATED_FACE ? 2 : 1;
     return true;
 }
 

@@ -19,8 +19,8 @@ typedef struct ebpo_units {
     int length, area, volume; /* exponents of what sums are kept in */
 } ebpo_units;
 
-/* A place while checking: of edges and vertices the vertices, of a face that one, as the mesh has
- * them now. */
+/* A place while checking: of edges and vertices the vertices, of a face that one (`b` of a repeated
+ * one: the first of its vertices), as the mesh has them now. */
 typedef struct ebpo_found {
     uint32_t kind, place; /* as ebpo_finding has it */
     uint32_t a, b;

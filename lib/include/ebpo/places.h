@@ -60,7 +60,7 @@ typedef struct ebpo_mesh_place {
      * first two corners. */
     uint64_t vertex[2];
 
-    /* All faces that use the edge or the vertex; of a repeated face it and all others of its
+    /* All faces that use the edge or the vertex; of a repeated face it and the first one of its
      * vertices; of another face that one. Ascending, lent until the callback returns. NULL:
      * none. */
     const uint64_t *faces;
