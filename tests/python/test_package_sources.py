@@ -27,8 +27,17 @@ class Ranges:
 class Server(http.server.BaseHTTPRequestHandler):
     """Ranges of one file; what `fail` holds comes before."""
     data, etag, fail, protocol_version = b"", '"1"', [], "HTTP/1.1"
+    keys: list = []  # of requests for the file: the header X-Key
+    silent = False  # about ranges
 
     def do_GET(self):
+        if self.path.startswith("/to?"):
+            self.send_response(302)
+            self.send_header("Location", self.path[4:])
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+            return
+        Server.keys.append(self.headers["X-Key"])
         if Server.fail:
             code = Server.fail.pop()
             self.send_response(code)
@@ -38,7 +47,8 @@ class Server(http.server.BaseHTTPRequestHandler):
         first, last = map(int, re.match(r"bytes=(\d+)-(\d+)", self.headers["Range"]).groups())
         part = Server.data[first:last + 1]
         self.send_response(206)
-        self.send_header("Content-Range", f"bytes {first}-{first + len(part) - 1}/{len(Server.data)}")
+        if not Server.silent:
+            self.send_header("Content-Range", f"bytes {first}-{first + len(part) - 1}/{len(Server.data)}")
         self.send_header("Content-Length", str(len(part)))
         self.send_header("ETag", Server.etag)
         self.end_headers()
@@ -115,12 +125,32 @@ class Sources(Case):
             file.write(self.data)
         self.same(ebpo.open("memory://scan.ebpo.h5").distance(P), self.expected)
 
-    def test_web(self):
+    def serve(self):
         server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Server)
         threading.Thread(target=server.serve_forever, daemon=True).start()
         self.addCleanup(server.server_close)
         self.addCleanup(server.shutdown)
-        url, Server.data = f"http://127.0.0.1:{server.server_port}/scan.ebpo.h5?key=secret", self.data
+        Server.data = self.data
+        return f"http://127.0.0.1:{server.server_port}"
+
+    def test_headers_stay_with_their_server(self):
+        one, other = self.serve(), self.serve()
+        for address, key in ((one, "1"), (f"{one}/to?{one}", "1"), (f"{one}/to?{other}", None),
+                             (f"{one}/to?{other}/to?{one}", None)):
+            Server.keys.clear()
+            self.assertEqual(sources.Web(f"{address}/scan.ebpo.h5", {"X-Key": "1"}).size, len(self.data))
+            self.assertEqual(Server.keys, [key], address)
+        with self.assertRaisesRegex(OSError, "302|not followed"):
+            sources.Web(f"{one}/to?ftp://127.0.0.1/scan.ebpo.h5")
+        with self.assertRaisesRegex(OSError, "302|redirect"):
+            sources.Web(f"{one}/to?" * 6 + f"{one}/scan.ebpo.h5")
+        Server.silent = True
+        self.addCleanup(setattr, Server, "silent", False)
+        with self.assertRaisesRegex(OSError, "which range"):
+            sources.Web(f"{one}/scan.ebpo.h5")
+
+    def test_web(self):
+        url = f"{self.serve()}/scan.ebpo.h5?key=secret"
         self.same(ebpo.open(url, headers={"X-Key": "1"}, retries=2).distance(P), self.expected)
 
         # where the library has no HTTP, Python's is taken

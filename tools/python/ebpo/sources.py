@@ -5,6 +5,7 @@ import ctypes
 import os
 import threading
 import urllib.error
+import urllib.parse
 import urllib.request
 from collections import OrderedDict
 from typing import Any
@@ -55,6 +56,25 @@ class Stored:
         return self.fs.cat_file(self.path, start=offset, end=offset + size)
 
 
+class Redirects(urllib.request.HTTPRedirectHandler):
+    """As the library follows them: five, http and https alone, never from https to http; the caller's
+    headers, which may be secret, stay with the server that they were given for."""
+
+    max_redirections = 5
+
+    def redirect_request(self, request: Any, answer: Any, code: int, message: str, headers: Any, url: str) -> Any:
+        new = super().redirect_request(request, answer, code, message, headers, url)
+        before, after = urllib.parse.urlsplit(request.full_url), urllib.parse.urlsplit(url)
+        if after.scheme not in ("http", "https") or (before.scheme, after.scheme) == ("https", "http"):
+            raise OSError(f"the server leads from {before.scheme} to {after.scheme}, which is not followed")
+        if (before.scheme, before.netloc.lower()) != (after.scheme, after.netloc.lower()):
+            new.headers = {"Range": new.headers["Range"]}
+        return new
+
+
+OPENER = urllib.request.build_opener(Redirects)
+
+
 class Web:
     """A URL by Python's own HTTP, where the library has none. Answers are of one version of the file."""
 
@@ -75,7 +95,7 @@ class Web:
         request = urllib.request.Request(self.url, headers={**self.headers, "Range": f"bytes={begin}-{end}"})
         for trial in range(self.TRIES):
             try:
-                with urllib.request.urlopen(request, timeout=60) as answer:
+                with OPENER.open(request, timeout=60) as answer:
                     return self.checked(answer, begin)
             except urllib.error.HTTPError as error:
                 if error.code not in (408, 429, 500, 502, 503, 504) or trial + 1 == self.TRIES:
@@ -89,11 +109,13 @@ class Web:
     def checked(self, answer: Any, begin: int) -> bytes:
         if answer.status != 206:
             raise OSError(f"the server does not answer ranges (status {answer.status})")
-        first, _, whole = answer.headers["Content-Range"].partition(" ")[2].partition("/")
+        first, _, whole = (answer.headers["Content-Range"] or "").partition(" ")[2].partition("/")
+        if not first.partition("-")[0].isdecimal() or not whole.isdecimal():
+            raise OSError("the server does not say which range it sent")
         version = answer.headers["ETag"] or answer.headers["Last-Modified"], whole
         if self.version not in (None, version):
             raise OSError("the file on the server has changed since it was opened")
-        data = answer.read()
+        data = answer.read(self.BLOCK + 1)  # not more, however much a server sends
         self.version, self.size = version, int(whole)
         if int(first.partition("-")[0]) != begin or len(data) != min(self.BLOCK, self.size - begin):
             raise OSError("the server sent another range than was asked for")
