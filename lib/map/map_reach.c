@@ -46,8 +46,8 @@ static double apart(const double a[3], const double b[3])
 {
     double d[3] = { a[0] - b[0], a[1] - b[1], a[2] - b[2] };
     double most = fmax(fabs(d[0]), fmax(fabs(d[1]), fabs(d[2])));
-    if (most == 0)
-        return 0;
+    if (most == 0 || isinf(most)) /* farther apart than a number can tell */
+        return most;
     for (int c = 0; c < 3; c++)
         d[c] /= most;
     return most * sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * (1 + 0x1p-48);

@@ -17,6 +17,10 @@ static const char *const palette_words[] = { "diverging", "thesis", NULL };
 
 #include "options/map.inc"
 
+static const map_values usual = { .margin = MAP_MARGIN,
+                                  .max_distance = INFINITY,
+                                  .remote = REMOTE_VALUES_INIT };
+
 /* --- what is asked for --- */
 
 static bool ends_so(const char *out, const char *const *endings)
@@ -47,6 +51,10 @@ static int check_output(const map_values *v)
     if (v->picture && !ends_so(v->picture, png))
         return command_usage("map", "--picture '%s': expected a name that ends with .png",
                              v->picture);
+    bool coloured = v->picture || (v->out && (v->from || ends_so(v->out, png)));
+    if (!coloured && (v->range != usual.range || v->palette != usual.palette))
+        return command_usage("map", "--range and --palette belong to pictures and to the PLY of "
+                                    "--from");
     return EXIT_FINE;
 }
 
@@ -55,10 +63,12 @@ static int check(const map_values *v)
     int kinds = (v->plane != NULL) + (v->grid != NULL) + (v->from != NULL);
     if (kinds != 1)
         return command_usage("map", "expected one of --plane, --grid and --from: which points?");
-    if (v->from && (v->box || v->margin != 0.1))
+    if (v->from && (v->box || v->margin != usual.margin))
         return command_usage("map", "--box and --margin belong to --plane and --grid");
-    if (v->grid && v->size)
+    if ((v->grid || v->from) && v->size && !v->picture)
         return command_usage("map", "--size belongs to --plane and to the picture of --from");
+    if (v->box && v->margin != usual.margin)
+        return command_usage("map", "--margin is around the model's box; leave it out with --box");
     if (v->bounds && !v->from)
         return command_usage("map", "--bounds belongs to --from");
     if (v->bounds && isfinite(v->max_distance))
@@ -213,10 +223,6 @@ static int run_job(map_job *j, uint64_t memory)
         tell(j);
     return status == EBPO_OK ? EXIT_FINE : command_failed("map", &error);
 }
-
-static const map_values usual = { .margin = 0.1,
-                                  .max_distance = INFINITY,
-                                  .remote = REMOTE_VALUES_INIT };
 
 static int run(void *given, const char **operand)
 {

@@ -6,6 +6,8 @@
 
 #include "cli/remote_args.h"
 
+#define MAP_MARGIN 0.1 /* usually */
+
 typedef struct map_values {
     const char *plane, *grid, *from, *out, *picture, *size, *box, *memory;
     double margin, max_distance, range;

@@ -92,11 +92,13 @@ static int find_rectangle(const map_job *j, rectangle *r)
     *r = (rectangle){ 0 };
     if (read_place(j, j->v->plane, &axis, &at)) {
         int code = find_box(j, low, high), right = axis == 0, up = axis == 2 ? 1 : 2;
+        if (code != EXIT_FINE)
+            return code;
         memcpy(r->corner, low, sizeof r->corner);
         r->corner[axis] = at;
         r->edge[0][right] = high[right] - low[right];
         r->edge[1][up] = high[up] - low[up];
-        return code;
+        return EXIT_FINE;
     }
     if (!read_reals(j->v->plane, 9, all))
         return wrong("--plane", j->v->plane,
@@ -104,6 +106,8 @@ static int find_rectangle(const map_job *j, rectangle *r)
                      "corner and two edges");
     if (j->v->box)
         return command_usage("map", "--box belongs to --grid and to planes across an axis");
+    if (j->v->margin != MAP_MARGIN)
+        return command_usage("map", "--margin belongs to --grid and to planes across an axis");
     memcpy(r, all, sizeof *r);
     double a = length_of(r->edge[0]), b = length_of(r->edge[1]), dot = 0;
     for (int c = 0; c < 3; c++)
