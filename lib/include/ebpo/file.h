@@ -491,10 +491,14 @@ typedef struct ebpo_file ebpo_file;
  * and where each chunk of each array lies. libhdf5 has no part in it, nor in anything
  * that is read later, and nothing that it could load has.
  *
- * Safe on untrusted files. A file that another program shortens or changes while it
- * is open gives EBPO_E_IO or EBPO_E_FORMAT, never wrong data. Where chunks have no
- * checksums (`h5repack -f NONE`) all of the file is read, and content_sha256 compared,
- * before it is open.
+ * Safe on untrusted files: whatever the bytes, nothing is read or written beyond what
+ * was allocated, and nothing is loaded or run because of them. What is answered about a
+ * file that was made to deceive is true of that file; ebpo_verify proves that its parts
+ * belong together. A file that another program shortens or damages while it is open
+ * gives EBPO_E_IO or EBPO_E_FORMAT: chunks have checksums. Not noticed by each question
+ * is a whole chunk in another's place, for which there is ebpo_file_check_content.
+ * Where chunks have no checksums, as in copies by other programs, all of the file is
+ * read, and content_sha256 compared, before it is open; later changes are not noticed.
  *
  * EBPO_E_IO. EBPO_E_FORMAT: not such a file, or damaged. EBPO_E_VERSION: another
  * major version, or a part that this library does not know. EBPO_E_UNSUPPORTED: a
