@@ -150,6 +150,11 @@ class Parts(Case):
             ebpo.convert("open_box.ply", "never.ebpo.h5", require_solid=True)
         with self.assertRaises(TypeError):
             ebpo.convert("scan.ply", "never.ebpo.h5", nonsense=1)
+        with self.assertRaises(TypeError):  # of the theses' selections, which there are none of here
+            ebpo.convert("scan.ply", "never.ebpo.h5", percent=5)
+        for wrong in ({"rule": "none"}, {"codec": "none at all"}, {"without": "mess"}, {"without": ["maps", "mess"]}):
+            with self.assertRaisesRegex(ValueError, "not '"):
+                ebpo.convert("scan.ply", "never.ebpo.h5", **wrong)
         for wrong in ((mesh.vertices, mesh.faces + 10**6), (mesh.vertices, mesh.faces[:, :2])):
             with self.assertRaises(ValueError):
                 ebpo.convert(wrong, "never.ebpo.h5")

@@ -13,7 +13,7 @@ from .model import Model
 from .model import open as open_model
 
 PREPARE = ("weld", "orient", "fill_holes", "flip", "drop_duplicates")
-BUILD = ("max_level", "leaf_faces", "epsilon", "require_solid", "percent", "k_root", "seed", "unit", "crs", "date")
+BUILD = ("max_level", "leaf_faces", "epsilon", "require_solid", "seed", "unit", "crs", "date")
 WITHOUT = {"planes": c.EBPO_PART_PLANES, "mesh": c.EBPO_PART_MESH, "maps": c.EBPO_PART_MAPS,
            "attributes": c.EBPO_PART_ATTRIBUTES | c.EBPO_PART_COLOURS, "colours": c.EBPO_PART_COLOURS}
 CODECS = {"zstd": c.EBPO_CODEC_ZSTD, "deflate": c.EBPO_CODEC_DEFLATE, "none": c.EBPO_CODEC_NONE}
@@ -25,8 +25,8 @@ def convert(mesh: Any, output: Any, *, without: Any = (), rule: str = "nonzero",
             threads: int | None = None, progress: Callable | None = None, **options: Any) -> Model:
     """Converts a mesh to an .ebpo.h5 file, which appears whole or not at all, and opens it.
 
-    mesh: the path of a PLY (OBJ, STL, OFF where the library has assimp), or (vertices, faces): (v, 3) of
-        float32, which stay such, or anything that float64 takes, and (f, 3) integers.
+    mesh: the path of a PLY, OBJ, STL or OFF, or (vertices, faces): (v, 3) of float32, which stay such, or
+        anything that float64 takes, and (f, 3) integers.
     without: names of "planes", "mesh", "maps", "attributes", "colours".
     rule: "nonzero", "evenodd" or "positive": winding numbers that are inside.
     codec: "zstd", "deflate" or "none".
@@ -47,6 +47,10 @@ def convert(mesh: Any, output: Any, *, without: Any = (), rule: str = "nonzero",
     unknown = set(options) - {*PREPARE, *BUILD}
     if unknown:
         raise TypeError(f"convert() has no option {', '.join(sorted(unknown))}")
+    left_out = [without] if isinstance(without, str) else list(without)
+    for what, given, known in (("rule", [rule], RULES), ("codec", [codec], CODECS), ("without", left_out, WITHOUT)):
+        if not set(given) <= set(known):
+            raise ValueError(f"{what}: {', '.join(map(repr, known))}, not {', '.join(map(repr, given))}")
     call("ebpo_register_filters")  # a library without libhdf5 says now, not after hours, that it cannot write
     call("ebpo_check_output", os.fsencode(output))
     space = made(c.ebpo_workspace_options, memory=size_in_bytes(memory),
@@ -55,7 +59,7 @@ def convert(mesh: Any, output: Any, *, without: Any = (), rule: str = "nonzero",
     with Reporter(progress) as reported:
         common = {"threads": threads or 0, "progress": reported}
         parts = c.EBPO_PART_PLANES | c.EBPO_PART_MESH | c.EBPO_PART_MAPS | c.EBPO_PART_ATTRIBUTES | c.EBPO_PART_COLOURS
-        for name in [without] if isinstance(without, str) else without:
+        for name in left_out:
             parts &= ~WITHOUT[name]
         read = read_mesh(mesh, workspace, bool(parts & c.EBPO_PART_ATTRIBUTES), common)
         prepare = made(c.ebpo_prepare_options, **common, **{n: options[n] for n in PREPARE if n in options})
