@@ -171,7 +171,8 @@ def thesis_table(plain, planes):
 
 
 HEAD = """# Bytes to fetch for a level
-Made by `tests/bench/transmission.py BUILD_DIR bunny_closed.ply armadillo.ply igea.ply -o docs/measured/transmission.md`; no figure depends on the machine.
+Made by `tests/bench/transmission.py BUILD_DIR bunny_closed.ply armadillo.ply igea.ply
+-o docs/measured/transmission.md`; no figure depends on the machine.
 
 Until a level of detail is good enough, against fetching the model's binary PLY, compressed with
 `zstd -19`, whole. Nothing is interpolated: the first level that reaches the goal counts, with
