@@ -132,7 +132,8 @@ typedef struct remade {
     ebpo_mesh mesh;
     ebpo_mesh_report report;
     ebpo_mend_record record;
-    uint32_t *vertex_source; /* of a vertex of the mesh, its number in the source; or NULL */
+    /* of a vertex or face of the mesh, its number in the source; NULL: it is that */
+    uint32_t *vertex_source, *face_source;
 } remade;
 
 static int in_order(const void *a, const void *b)
@@ -141,24 +142,32 @@ static int in_order(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Welding leaves gaps in the source's numbers, which the mesh alone does not tell. */
+/* The numbers of a map, ascending. */
+static uint32_t *sorted(const uint32_t *map, uint64_t count)
+{
+    uint32_t *out = malloc(count * sizeof *out);
+    if (!out)
+        return NULL;
+    memcpy(out, map, count * sizeof *out);
+    qsort(out, count, sizeof *out, in_order);
+    return out;
+}
+
+/* Welding and dropping leave gaps in the source's numbers, which the mesh alone does not tell. */
 static ebpo_status numbers_of(const patient *p, remade *r, ebpo_error *error)
 {
+    const ebpo_mend_record *m = &p->info->mend;
     ebpo_maps maps;
     ebpo_read_options read = reading(p);
-    if (p->fate[MAPS] != KEPT || !p->info->mend.welded_vertices)
+    if (p->fate[MAPS] != KEPT || (!m->welded_vertices && !m->dropped_faces))
         return EBPO_OK;
     ebpo_status status = ebpo_file_read_maps(p->file, &read, &maps, error);
     if (status != EBPO_OK)
         return status;
-    r->vertex_source = malloc(p->info->vertex_count * sizeof *r->vertex_source);
-    if (r->vertex_source) {
-        memcpy(r->vertex_source, maps.vertex_source,
-               p->info->vertex_count * sizeof *r->vertex_source);
-        qsort(r->vertex_source, p->info->vertex_count, sizeof *r->vertex_source, in_order);
-    }
+    r->vertex_source = sorted(maps.vertex_source, p->info->vertex_count);
+    r->face_source = sorted(maps.face_source, p->info->face_count);
     ebpo_maps_free(&maps);
-    if (r->vertex_source)
+    if (r->vertex_source && r->face_source)
         return EBPO_OK;
     snprintf(error->message, sizeof error->message, "not enough memory");
     return error->status = EBPO_E_MEMORY;
@@ -193,6 +202,7 @@ static ebpo_status from_source(patient *p, remade *r, ebpo_error *error)
 {
     const ebpo_mend_record *m = &p->info->mend;
     mending steps = { .weld = m->weld,
+                      .drop_duplicates = m->dropped_faces > 0,
                       .orient = m->orient,
                       .flip = !m->orient && m->flipped_faces,
                       .fill_holes = m->fill_holes };
@@ -260,6 +270,8 @@ static ebpo_status make(const patient *p, remade *r, ebpo_error *error)
         return status;
     for (uint64_t i = 0; r->vertex_source && tree.vertex_source && i < tree.info.vertex_count; i++)
         tree.vertex_source[i] = r->vertex_source[tree.vertex_source[i]];
+    for (uint64_t i = 0; r->face_source && tree.face_source && i < tree.info.face_count; i++)
+        tree.face_source[i] = r->face_source[tree.face_source[i]];
     write.codec = p->info->codec;
     write.threads = (unsigned)p->v->threads;
     write.face_coding = p->info->gates ? EBPO_FACES_GATES : EBPO_FACES_USUAL;
@@ -320,6 +332,7 @@ static ebpo_status repair(patient *p, ebpo_error *error)
     else
         ebpo_mesh_free(&r.mesh);
     free(r.vertex_source);
+    free(r.face_source);
     return status == EBPO_OK ? compare(p, error) : status;
 }
 
