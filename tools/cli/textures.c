@@ -39,6 +39,15 @@ static int which_of(const ebpo_attribute_facts *a)
     return -1;
 }
 
+bool textures_embedded(const ebpo_file *file)
+{
+    ebpo_attribute_facts facts = EBPO_ATTRIBUTE_FACTS_INIT;
+    bool found = false;
+    for (unsigned n = 0; !found && ebpo_file_attribute(file, n, &facts); n++)
+        found = which_of(&facts) == BYTES;
+    return found;
+}
+
 ebpo_status textures_read(textures *out, const ebpo_file *file, bool bytes, ebpo_error *error)
 {
     ebpo_attribute_facts a = EBPO_ATTRIBUTE_FACTS_INIT;
@@ -66,6 +75,24 @@ void textures_free(textures *t)
     for (int i = 0; i < TEXTURE_ARRAYS; i++)
         ebpo_attribute_values_free(&t->list[i]);
     memset(t, 0, sizeof *t);
+}
+
+bool textures_same(const ebpo_file *a, const ebpo_file *b)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    textures x = { 0 }, y = { 0 };
+    bool same = textures_read(&x, a, false, &error) != EBPO_OK ||
+                textures_read(&y, b, false, &error) != EBPO_OK;
+    if (!same) {
+        same = x.count == y.count && x.embedded == y.embedded;
+        for (int i = 0; i < BYTES && same; i++)
+            same = x.list[i].count == y.list[i].count &&
+                   (!x.list[i].count ||
+                    memcmp(x.list[i].values, y.list[i].values, x.list[i].count) == 0);
+    }
+    textures_free(&x);
+    textures_free(&y);
+    return same;
 }
 
 /* --- facts --- */

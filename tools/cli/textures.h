@@ -21,6 +21,12 @@ typedef struct textures {
 EBPO_MUST_USE ebpo_status textures_read(textures *out, const ebpo_file *file, bool bytes,
                                         ebpo_error *error);
 void textures_free(textures *t);
+/* Whether the file has bytes of images; nothing of them is read. */
+bool textures_embedded(const ebpo_file *file);
+
+/* Whether both files name the same images, of the same bytes as far as digests tell. True where one
+ * of them cannot be read. */
+bool textures_same(const ebpo_file *a, const ebpo_file *b);
 
 void textures_print(FILE *out, const textures *t);
 void textures_json(json *j, const textures *t);

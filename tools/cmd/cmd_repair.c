@@ -12,6 +12,7 @@
 #include "cli/mesh_input.h"
 #include "cli/progress.h"
 #include "cli/remote_args.h"
+#include "cli/textures.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 
@@ -207,10 +208,11 @@ static ebpo_status from_source(patient *p, remade *r, ebpo_error *error)
                       .flip = !m->orient && m->flipped_faces,
                       .fill_holes = m->fill_holes };
     mesh_input in;
-    bool attributes = p->info->parts & EBPO_PART_ATTRIBUTES;
-    ebpo_status status =
-        mesh_input_read(&in, p->v->source, steps, attributes ? READ_ATTRIBUTES : READ_MESH,
-                        p->workspace, (unsigned)p->v->threads, p->progress, error);
+    mesh_reading more = !(p->info->parts & EBPO_PART_ATTRIBUTES) ? READ_MESH
+                        : textures_embedded(p->file)             ? READ_TEXTURES
+                                                                 : READ_ATTRIBUTES;
+    ebpo_status status = mesh_input_read(&in, p->v->source, steps, more, p->workspace,
+                                         (unsigned)p->v->threads, p->progress, error);
     if (status != EBPO_OK)
         return status;
     r->mesh = in.mesh;
@@ -292,6 +294,11 @@ static ebpo_status compare(patient *p, ebpo_error *error)
     /* what was read without fault is kept only if it has become what it was */
     if (p->fate[LEVELS] == LOST || !p->same)
         p->fate[LEVELS] = REBUILT;
+    if (p->v->source && !textures_same(p->file, made)) {
+        p->fate[ATTRIBUTES] = LOST;
+        snprintf(p->why[ATTRIBUTES], sizeof p->why[ATTRIBUTES],
+                 "images that %.200s names are no more what they were", p->v->source);
+    }
     ebpo_close(made);
     return EBPO_OK;
 }
