@@ -322,31 +322,60 @@ def check_faces_of_subtrees(file, counts, sums, firsts, refs):
         assert outer[begin:begin + row[4] + row[5]].tolist() == blocks[0] + blocks[1], f"subtree {i}: blocks"
 
 
+LEVEL_NAMES = ["types", "plane_counts", "planes", "leaf_winding", "black_winding", "white_winding",
+               "leaf_skip", "leaf_new", "leaf_ref_count", "leaf_refs", "types_index", "gray_index",
+               "leaf_index", "leaf_plane_counts", "leaf_planes", "gray_colours"]
+ROOT_PATHS = {4096: "/mesh/vertices", 4097: "/mesh/faces", 4098: "/mesh/faces_index",
+              4099: "/maps/vertex_source", 4100: "/maps/face_source", 4112: "/subtrees/index",
+              4113: "/subtrees/counts", 4114: "/subtrees/outer"}
+
+
+def path_of(number):
+    """README.md, "Places": the array that a number stands for; None: a gap, or not one of sections 4 and 9."""
+    level, name = divmod(number, 64)
+    if level < 64:
+        return f"/levels/{level:02d}/{LEVEL_NAMES[name]}" if name < len(LEVEL_NAMES) else None
+    return ROOT_PATHS.get(number)
+
+
+def holds(file, path):
+    """Whether a list about all chunks is true: other programs that write the file anew leave it as it was."""
+    own, stated = file[path].id.get_chunk_info(0), {k: one(v) for k, v in file[path].attrs.items() if k in ("file_bytes", "offset")}
+    return stated == {"file_bytes": pathlib.Path(file.filename).stat().st_size, "offset": own.byte_offset}
+
+
+def check_sums(file):
+    """README.md, "Sums of chunks": each chunk of the arrays that the head calls for ends as the list says."""
+    if "chunk_sums" not in file or not holds(file, "/chunk_sums"):
+        return
+    numbers, sums = np.divmod(file["/chunk_sums"][...], np.uint64(1 << 32))
+    assert (numbers[:-1] <= numbers[1:]).all(), "chunk_sums: not in order"
+    listed_paths = {path_of(int(number)): int(number) for number in np.unique(numbers)}
+    stored = pathlib.Path(file.filename).read_bytes()
+    for path, dataset in arrays(file).items():
+        if path != "/subtrees/places":
+            chunks = [dataset.id.get_chunk_info(i) for i in range(dataset.id.get_num_chunks())]
+            ends = [int.from_bytes(stored[c.byte_offset:c.byte_offset + c.size][-4:], "little") for c in chunks]
+            assert ends == sums[numbers == listed_paths[path]].tolist(), f"{path}: another chunk's bytes"
+
+
 def check_places(file):
     """The list of chunks leads to where HDF5 says that they are; it is ignored where its attributes are not true."""
     own = file["/subtrees/places"].id.get_chunk_info(0)
-    stated = {name: one(value) for name, value in file["/subtrees/places"].attrs.items() if name in ("file_bytes", "offset")}
-    if stated != {"file_bytes": pathlib.Path(file.filename).stat().st_size, "offset": own.byte_offset}:
+    if not holds(file, "/subtrees/places"):
         return
-    names = ["types", "plane_counts", "planes", "leaf_winding", "black_winding", "white_winding",
-             "leaf_skip", "leaf_new", "leaf_ref_count", "leaf_refs", "types_index", "gray_index",
-             "leaf_index", "leaf_plane_counts", "leaf_planes", "gray_colours"]
-    roots = {4096: "/mesh/vertices", 4097: "/mesh/faces", 4098: "/mesh/faces_index",
-             4099: "/maps/vertex_source", 4100: "/maps/face_source", 4112: "/subtrees/index",
-             4113: "/subtrees/counts", 4114: "/subtrees/outer"}
     places, seen = file["/subtrees/places"], {}
     at = file["/levels/00/types"].id.get_chunk_info(0).byte_offset
     for place in places[...]:
         number, size = divmod(int(place), 1 << 32)
-        path = (f"/levels/{number // 64:02d}/{names[number % 64]}" if number < 4096
-                else roots.get(number))
+        path = path_of(number)
         if path:
             chunk = file[path].id.get_chunk_info(seen.setdefault(path, 0))
             assert (chunk.byte_offset, chunk.size) == (at, size), f"{path}: chunk {seen[path]}"
             seen[path] += 1
         at += int(size)
     assert all(count == file[path].id.get_num_chunks() for path, count in seen.items())
-    assert own.byte_offset + own.size == stated["file_bytes"]
+    assert own.byte_offset + own.size == pathlib.Path(file.filename).stat().st_size
 
 
 def attribute_values(dataset, kind):
@@ -656,6 +685,7 @@ def read(path):
             assert content_sha256(file, of_colours=True) == text(file.attrs["colours_sha256"]), "colours_sha256 differs"
         check_pruned(file, "pruned" in parts)
         check_codings(file)
+        check_sums(file)
         check_colours(file)
         if "subtrees" in parts:
             check_subtrees(file)

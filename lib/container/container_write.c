@@ -12,10 +12,12 @@
 #include "base/sized.h"
 #include "codec/face_gates.h"
 #include "container/chunk_order.h"
+#include "container/chunk_sums.h"
 #include "container/content.h"
 #include "container/head_facts.h"
 #include "container/container_write.h"
 #include "container/headers_write.h"
+#include "container/long_chunk.h"
 #include "container/places.h"
 #include "io/publish.h"
 
@@ -42,7 +44,9 @@ typedef struct writer {
     ebpo_array_digest *digest; /* [arrays of the plan] */
     ebpo_content content[EBPO_DIGESTS];
     uint64_t chunk_bytes, chunks_done;
-    uint64_t *place; /* [rows of places] */
+    uint64_t *sum; /* [chunks], if sums are written: of the plan's arrays one after the other */
+    uint64_t *first_sum; /* [arrays of the plan] */
+    uint64_t *place;     /* [rows of places] */
     uint64_t place_count, top_bytes;
     uint64_t index_at; /* where the index begins; 0: there is none, or not yet */
 } writer;
@@ -141,7 +145,7 @@ static ebpo_status encode_window(writer *w, ebpo_error *error)
 
 static void note_place(writer *w, uint32_t number, uint64_t bytes)
 {
-    if (!w->head.places.shape.rows)
+    if (!w->head.list[EBPO_LIST_PLACES].shape.rows)
         return;
     w->place[w->place_count++] = ebpo_place(number, bytes);
 }
@@ -153,7 +157,11 @@ static void place_chunk(writer *w, const slot *s)
         w->index_at = w->head.head_bytes + w->chunk_bytes;
         note_place(w, EBPO_PLACE_GAP, w->head.index_bytes);
     }
-    note_place(w, ebpo_place_number(s->array->id, s->array->level), s->stored_bytes);
+    uint32_t number = ebpo_place_number(s->array->id, s->array->level);
+    note_place(w, number, s->stored_bytes);
+    if (w->head.list[EBPO_LIST_SUMS].shape.rows)
+        w->sum[w->first_sum[s->array - w->plan.array] + s->chunk] =
+            ebpo_place(number, ebpo_chunk_sum(s->stored, s->stored_bytes));
     w->chunk_bytes += s->stored_bytes;
     if (w->chunks_done + 1 == w->order.top)
         w->top_bytes =
@@ -191,25 +199,48 @@ static ebpo_status write_chunks(writer *w, ebpo_error *error)
     return status == EBPO_OK && w->used ? flush_window(w, error) : status;
 }
 
-/* The last chunk of the file. Where libhdf5 has put something else in between, the list says that
- * it does not hold. */
-static ebpo_status write_places(writer *w, ebpo_error *error)
+static ebpo_status write_list(writer *w, ebpo_list list, const uint64_t *values, size_t *bytes,
+                              ebpo_error *error)
 {
+    const ebpo_array_out *a = &w->head.list[list];
     uint8_t *stored = NULL;
-    size_t bytes = 0;
-    uint64_t offset = w->head.head_bytes + w->chunk_bytes + w->head.index_bytes, size = 0;
-    ebpo_status status = ebpo_places_encode(w->place, w->place_count, w->head.places.shape.pipeline,
-                                            w->options->codec_level, &stored, &bytes, error);
+    *bytes = 0;
+    if (!a->shape.rows)
+        return EBPO_OK;
+    ebpo_status status = ebpo_long_chunk_encode(values, a->shape.rows, a->shape.pipeline,
+                                                w->options->codec_level, &stored, bytes, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_put_chunk(&w->head.out, w->head.places.path, w->head.places.handle,
-                                   &w->head.places.shape, 0, stored, bytes, error);
+        status = ebpo_h5_put_chunk(&w->head.out, a->path, a->handle, &a->shape, 0, stored, *bytes,
+                                   error);
     free(stored);
+    return status;
+}
+
+/* The last chunks of the file. Where libhdf5 has put something else in between, the lists say that
+ * they do not hold. */
+static ebpo_status write_lists(writer *w, ebpo_error *error)
+{
+    size_t bytes[EBPO_LISTS];
+    uint64_t offset = w->head.head_bytes + w->chunk_bytes + w->head.index_bytes, size = 0;
+    const uint64_t *values[EBPO_LISTS] = { w->sum, w->place };
+    ebpo_status status =
+        write_list(w, EBPO_LIST_SUMS, values[EBPO_LIST_SUMS], &bytes[EBPO_LIST_SUMS], error);
+    if (status == EBPO_OK && bytes[EBPO_LIST_SUMS])
+        note_place(w, ebpo_place_number(EBPO_A_CHUNK_SUMS, 0), bytes[EBPO_LIST_SUMS]);
+    if (status == EBPO_OK)
+        status = write_list(w, EBPO_LIST_PLACES, values[EBPO_LIST_PLACES], &bytes[EBPO_LIST_PLACES],
+                            error);
     if (status == EBPO_OK)
         status = ebpo_h5_size(&w->head.out, &size, error);
-    bool holds = size == offset + bytes;
-    return status == EBPO_OK
-               ? ebpo_headers_put_holds(&w->head, holds ? size : 0, holds ? offset : 0, error)
-               : status;
+    bool holds =
+        status == EBPO_OK && size == offset + bytes[EBPO_LIST_SUMS] + bytes[EBPO_LIST_PLACES];
+    for (ebpo_list l = 0; l < EBPO_LISTS && status == EBPO_OK; l++) {
+        if (w->head.list[l].shape.rows)
+            status =
+                ebpo_headers_put_holds(&w->head, l, holds ? size : 0, holds ? offset : 0, error);
+        offset += bytes[l];
+    }
+    return status;
 }
 
 static ebpo_status make_window(writer *w, ebpo_error *error)
@@ -222,12 +253,19 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
     uint8_t *block = ebpo_alloc(wanted, slot_bytes);
     w->slots[0].raw = block;
     w->digest = ebpo_alloc(w->plan.count, sizeof *w->digest);
-    w->place = ebpo_alloc(w->head.places.shape.rows, sizeof *w->place);
-    if (!w->coders || !block || !w->digest || !w->place)
+    w->place = ebpo_alloc(w->head.list[EBPO_LIST_PLACES].shape.rows, sizeof *w->place);
+    w->sum = ebpo_alloc(w->head.list[EBPO_LIST_SUMS].shape.rows, sizeof *w->sum);
+    w->first_sum = ebpo_alloc(w->plan.count, sizeof *w->first_sum);
+    if (!w->coders || !block || !w->digest || !w->place || !w->sum || !w->first_sum)
         return ebpo_fail_memory(error, wanted * slot_bytes);
     for (unsigned i = 0; i < wanted; i++) {
         w->slots[i].raw = block + i * slot_bytes;
         w->slots[i].stored = w->slots[i].raw + EBPO_CHUNK_BYTES_MAX;
+    }
+    uint64_t sums = 0;
+    for (unsigned i = 0; i < w->plan.count; i++) {
+        w->first_sum[i] = sums;
+        sums += ebpo_shape_chunks(&w->plan.array[i].shape);
     }
     return EBPO_OK;
 }
@@ -273,8 +311,8 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
         status = ebpo_headers_begin_index(&w->head, error);
     if (status == EBPO_OK)
         status = write_chunks(w, error);
-    if (status == EBPO_OK && w->head.places.shape.rows)
-        status = write_places(w, error);
+    if (status == EBPO_OK)
+        status = write_lists(w, error);
     if (status == EBPO_OK)
         status = put_digests(w, error);
     if (status == EBPO_OK)
@@ -300,6 +338,9 @@ static ebpo_status check_options(const ebpo_write_options *options, const char *
         return ebpo_fail_file(
             error, EBPO_E_ARGUMENT, path,
             "no such codec or codec level; zstd takes 1 to 22, deflate 1 to 9, none takes 0");
+    if ((unsigned)options->chunk_sums > EBPO_SUMS_NONE)
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, path, "chunk_sums: there is no choice %u",
+                              (unsigned)options->chunk_sums);
     return EBPO_OK;
 }
 
@@ -323,7 +364,7 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
         status = ebpo_plan_make(&w->plan, tree, w->options, shown, error);
     if (status == EBPO_OK)
         status = ebpo_chunk_order_make(&w->order, &w->plan, error);
-    ebpo_headers_plan(&w->head, &w->plan, w->order.count, w->options->codec_level);
+    ebpo_headers_plan(&w->head, &w->plan, w->order.count, w->options);
     if (status == EBPO_OK)
         status = make_window(w, error);
     if (status == EBPO_OK && publish)
@@ -340,6 +381,8 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
     free(w->slots[0].raw);
     free(w->digest);
     free(w->place);
+    free(w->sum);
+    free(w->first_sum);
     ebpo_chunk_order_free(&w->order);
     ebpo_plan_free(&w->plan);
     for (int i = 0; i < EBPO_DIGESTS; i++)

@@ -15,7 +15,8 @@ bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id)
 {
     if (id == EBPO_A_FACES_INDEX && info->subtree_level)
         return info->face_count > PLAIN_FACE_ROWS;
-    return !(ebpo_schema[id].needs & (EBPO_NEEDS_SUBTREES | EBPO_NEEDS_ATTRIBUTES));
+    return !ebpo_schema_is_list(id) &&
+           !(ebpo_schema[id].needs & (EBPO_NEEDS_SUBTREES | EBPO_NEEDS_ATTRIBUTES));
 }
 
 void ebpo_array_digest_begin(ebpo_array_digest *digest) { ebpo_sha256_begin(&digest->state); }

@@ -48,7 +48,8 @@ void ebpo_expect_level(ebpo_expected *e, int level, uint32_t without)
 
 void ebpo_expect_root(ebpo_expected *e, uint32_t needs)
 {
-    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+    /* the list of sums comes with whatever is read first */
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_CHUNK_SUMS; id++)
         if (ebpo_schema[id].needs & needs)
             ebpo_expect_array(e, &e->file->root_array[id]);
 }
@@ -101,8 +102,22 @@ uint64_t ebpo_expected_bytes(ebpo_expected *e)
     return sum;
 }
 
+/* Without the list of sums nothing is read. */
+static bool wants_sums(const ebpo_file *file)
+{
+    return file->has_sums && !atomic_load(&file->summed);
+}
+
+static ebpo_range where_sums(const ebpo_file *file)
+{
+    const ebpo_chunk_place *at = file->root_array[EBPO_A_CHUNK_SUMS].chunks;
+    return (ebpo_range){ at->address, at->bytes };
+}
+
 void ebpo_expect_all(ebpo_expected *e)
 {
+    if (e->count && wants_sums(e->file))
+        add(e, where_sums(e->file).offset, where_sums(e->file).size);
     if (ebpo_input_expects(&e->file->in))
         ebpo_input_expect(&ebpo_reader_own(e->file)->in, e->range, e->count);
     else
@@ -128,8 +143,10 @@ void ebpo_expect_top(const ebpo_file *file)
         !is_top(info))
         return;
     const ebpo_chunk_place *places = file->root_array[EBPO_A_PLACES].chunks;
-    ebpo_range range[3] = { { places->address, places->bytes } };
+    ebpo_range range[4] = { { places->address, places->bytes } };
     size_t count = 1;
+    if (wants_sums(file))
+        range[count++] = where_sums(file);
     from = file->in.source.prefetched;
     if (from < info->chunk_index_offset && info->chunk_index_offset <= top)
         range[count++] = (ebpo_range){ from, info->chunk_index_offset - from };

@@ -24,6 +24,7 @@ typedef struct ebpo_array_in {
     /* [ebpo_shape_chunks(&shape)] where each is; NULL when the array is absent. After
      * ebpo_reader_locate, unless it has one chunk only */
     ebpo_chunk_place *chunks;
+    uint64_t first_sum; /* of its chunks, in the file's sums */
     const char *coding; /* of attributes; the others' stand in ebpo_schema */
 } ebpo_array_in;
 
@@ -59,6 +60,9 @@ struct ebpo_file {
     pthread_mutex_t lock;
     atomic_bool located; /* the chunks of all arrays are known */
     bool has_places;     /* a list says where they are */
+    bool has_sums;       /* a list says how each chunk ends: chunk_sums.h */
+    atomic_bool summed;  /* it has been read */
+    uint32_t *sums;
     ebpo_idle_readers idle;
 };
 
@@ -94,7 +98,7 @@ static inline ebpo_file *ebpo_reader_own(const ebpo_file *file)
 /* How many rows the file's chunks may have. */
 static inline ebpo_head_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, ebpo_array_id id)
 {
-    return id == EBPO_A_PLACES        ? EBPO_HEAD_ROWS_ALL
+    return ebpo_schema_is_list(id)    ? EBPO_HEAD_ROWS_ALL
            : file->info.subtree_level ? EBPO_HEAD_ROWS_POWER
                                       : EBPO_HEAD_ROWS_FULL;
 }

@@ -17,19 +17,29 @@ static bool has_index(const ebpo_plan *plan)
     return false;
 }
 
-void ebpo_headers_plan(ebpo_headers *h, ebpo_plan *plan, uint64_t chunks, int codec_level)
+static void plan_list(ebpo_headers *h, ebpo_list list, ebpo_array_id id, uint64_t rows)
 {
-    *h = (ebpo_headers){ .plan = plan, .root = -1, .chunks = chunks, .codec_level = codec_level };
+    ebpo_array_out *a = &h->list[list];
+    *a = (ebpo_array_out){ .id = id, .handle = -1 };
+    ebpo_schema_path(id, 0, a->path);
+    if (rows)
+        a->shape = (ebpo_shape){ .rows = rows,
+                                 .chunk_rows = (uint32_t)rows,
+                                 .element_size = ebpo_schema[id].sizes,
+                                 .pipeline = h->plan->array[0].shape.pipeline };
+}
+
+void ebpo_headers_plan(ebpo_headers *h, ebpo_plan *plan, uint64_t chunks,
+                       const ebpo_write_options *options)
+{
+    bool summed = options->chunk_sums == EBPO_SUMS_USUAL;
+    *h = (ebpo_headers){
+        .plan = plan, .root = -1, .chunks = chunks, .codec_level = options->codec_level
+    };
     h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
-    h->places = (ebpo_array_out){ .id = EBPO_A_PLACES, .handle = -1 };
-    ebpo_schema_path(EBPO_A_PLACES, 0, h->places.path);
-    if (!plan->info.subtree_level)
-        return;
-    uint64_t rows = chunks + has_index(plan);
-    h->places.shape = (ebpo_shape){ .rows = rows,
-                                    .chunk_rows = (uint32_t)rows,
-                                    .element_size = 8,
-                                    .pipeline = plan->array[0].shape.pipeline };
+    plan_list(h, EBPO_LIST_SUMS, EBPO_A_CHUNK_SUMS, summed ? chunks : 0);
+    plan_list(h, EBPO_LIST_PLACES, EBPO_A_PLACES,
+              plan->info.subtree_level ? chunks + has_index(plan) + summed : 0);
 }
 
 static ebpo_status make_level_groups(ebpo_headers *h, ebpo_error *error)
@@ -68,13 +78,12 @@ static ebpo_status make_root_group(ebpo_headers *h, const char *path, uint32_t n
     return status;
 }
 
-ebpo_status ebpo_headers_put_holds(ebpo_headers *h, uint64_t file_bytes, uint64_t offset,
-                                   ebpo_error *error)
+ebpo_status ebpo_headers_put_holds(ebpo_headers *h, ebpo_list list, uint64_t file_bytes,
+                                   uint64_t offset, ebpo_error *error)
 {
-    ebpo_status status =
-        ebpo_h5_put_count(&h->out, h->places.handle, "file_bytes", file_bytes, error);
-    return status == EBPO_OK ? ebpo_h5_put_count(&h->out, h->places.handle, "offset", offset, error)
-                             : status;
+    ebpo_h5_id id = h->list[list].handle;
+    ebpo_status status = ebpo_h5_put_count(&h->out, id, "file_bytes", file_bytes, error);
+    return status == EBPO_OK ? ebpo_h5_put_count(&h->out, id, "offset", offset, error) : status;
 }
 
 static ebpo_status make_array(ebpo_headers *h, ebpo_array_out *a, const ebpo_first_chunk *first,
@@ -104,7 +113,9 @@ static ebpo_status lay_out(ebpo_headers *h, const char *path, const char *shown,
     h->out.codec_level = h->codec_level;
     ebpo_status status =
         ebpo_h5_create(&h->out, path, shown, head_bytes,
-                       3 + (plan->info.subtree_level != 0) + (plan->attributes != NULL), error);
+                       3 + (h->list[EBPO_LIST_SUMS].shape.rows != 0) +
+                           (plan->info.subtree_level != 0) + (plan->attributes != NULL),
+                       error);
     if (status == EBPO_OK)
         status = ebpo_h5_root(&h->out, &h->root, error);
     if (status == EBPO_OK)
@@ -121,10 +132,13 @@ static ebpo_status lay_out(ebpo_headers *h, const char *path, const char *shown,
         status = ebpo_attributes_put_group(&h->out, plan, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)
         status = make_array(h, &plan->array[i], i == 0 ? &first : NULL, error);
-    if (status == EBPO_OK && h->places.shape.rows)
-        status = make_array(h, &h->places, NULL, error);
-    if (status == EBPO_OK && h->places.shape.rows)
-        status = ebpo_headers_put_holds(h, 0, 0, error);
+    for (ebpo_list l = 0; l < EBPO_LISTS && status == EBPO_OK; l++) {
+        if (h->list[l].shape.rows == 0)
+            continue;
+        status = make_array(h, &h->list[l], NULL, error);
+        if (status == EBPO_OK)
+            status = ebpo_headers_put_holds(h, l, 0, 0, error);
+    }
     return status;
 }
 
@@ -134,9 +148,12 @@ void ebpo_headers_close(ebpo_headers *h)
         ebpo_h5_close_id(&h->out, h->plan->array[i].handle);
         h->plan->array[i].handle = -1;
     }
-    ebpo_h5_close_id(&h->out, h->places.handle);
+    for (ebpo_list l = 0; l < EBPO_LISTS; l++) {
+        ebpo_h5_close_id(&h->out, h->list[l].handle);
+        h->list[l].handle = -1;
+    }
     ebpo_h5_close_id(&h->out, h->root);
-    h->places.handle = h->root = -1;
+    h->root = -1;
 }
 
 ebpo_status ebpo_headers_lay_out(ebpo_headers *h, const char *path, const char *shown,
@@ -179,7 +196,8 @@ ebpo_status ebpo_headers_begin_index(ebpo_headers *h, ebpo_error *error)
     for (unsigned i = 0; i < h->plan->count && status == EBPO_OK; i++)
         status =
             ebpo_h5_open_array(&h->out, h->plan->array[i].path, &h->plan->array[i].handle, error);
-    if (status == EBPO_OK && h->places.shape.rows)
-        status = ebpo_h5_open_array(&h->out, h->places.path, &h->places.handle, error);
+    for (ebpo_list l = 0; l < EBPO_LISTS && status == EBPO_OK; l++)
+        if (h->list[l].shape.rows)
+            status = ebpo_h5_open_array(&h->out, h->list[l].path, &h->list[l].handle, error);
     return status;
 }

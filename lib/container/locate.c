@@ -4,22 +4,10 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/sized.h"
-#include "container/stored_sizes.h"
+#include "container/all_arrays.h"
+#include "container/long_chunk.h"
 #include "container/places.h"
-
-enum {
-    OF_LEVELS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS,
-    OF_FORMAT = OF_LEVELS + EBPO_ARRAYS - EBPO_LEVEL_ARRAYS /* then come attributes */
-};
-
-static ebpo_array_in *array_number(ebpo_file *file, int i)
-{
-    return i < OF_LEVELS   ? &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS]
-           : i < OF_FORMAT ? &file->root_array[EBPO_LEVEL_ARRAYS + i - OF_LEVELS]
-                           : &file->attributes.array[i - OF_FORMAT];
-}
-
-static int all_arrays(const ebpo_file *file) { return OF_FORMAT + file->attributes.arrays; }
+#include "container/stored_sizes.h"
 
 /* --- by HDF5's index --- */
 
@@ -56,8 +44,8 @@ static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
     ebpo_status status = ebpo_head_open(&head, &file->in, error);
     if (status == EBPO_OK)
         ebpo_head_expect_index(&head, index);
-    for (int i = 0; i < all_arrays(file) && status == EBPO_OK; i++)
-        status = locate_array(file, &head, array_number(file, i), error);
+    for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
+        status = locate_array(file, &head, ebpo_array_number(file, i), error);
     status = ebpo_head_close(&head, status, error);
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
@@ -81,8 +69,7 @@ static uint64_t *seen_of(listing *l, ebpo_array_id id, int level)
 static ebpo_status list_fails(const ebpo_file *file, const char *what, const char *path,
                               ebpo_error *error)
 {
-    return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, file->root_array[EBPO_A_PLACES].path,
-                        -1, "%s %s; get a fresh copy of the file", what, path);
+    return ebpo_long_chunk_fail(file, EBPO_A_PLACES, what, path, error);
 }
 
 static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_place chunk,
@@ -129,7 +116,7 @@ static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chun
 static ebpo_status end_array(listing *l, const ebpo_array_in *a, ebpo_error *error)
 {
     uint64_t seen = *seen_of(l, a->id, a->level);
-    return !a->present || a->id == EBPO_A_PLACES || seen == ebpo_shape_chunks(&a->shape)
+    return !a->present || ebpo_schema_is_list(a->id) || seen == ebpo_shape_chunks(&a->shape)
                ? EBPO_OK
                : list_fails(l->file, "the list has fewer chunks than", a->path, error);
 }
@@ -140,8 +127,8 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
     listing *l = ebpo_alloc_zero(1, sizeof *l);
     uint64_t at = file->info.head_bytes, chunks = 0;
     ebpo_status status = l ? EBPO_OK : ebpo_fail_memory(error, sizeof *l);
-    for (int i = 0; i < all_arrays(file) && status == EBPO_OK; i++)
-        status = begin_array(file, array_number(file, i), &chunks, error);
+    for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
+        status = begin_array(file, ebpo_array_number(file, i), &chunks, error);
     if (l)
         l->file = file;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
@@ -153,8 +140,8 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
                                 (ebpo_chunk_place){ at, ebpo_place_bytes_of(places[i]) }, error);
         at += ebpo_place_bytes_of(places[i]);
     }
-    for (int i = 0; i < all_arrays(file) && status == EBPO_OK; i++)
-        status = end_array(l, array_number(file, i), error);
+    for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
+        status = end_array(l, ebpo_array_number(file, i), error);
     free(l);
     return status;
 }
@@ -162,8 +149,8 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
 /* A list half read is none. */
 static void forget(ebpo_file *file)
 {
-    for (int i = 0; i < all_arrays(file); i++) {
-        ebpo_array_in *a = array_number(file, i);
+    for (int i = 0; i < ebpo_all_arrays(file); i++) {
+        ebpo_array_in *a = ebpo_array_number(file, i);
         if (a->present && ebpo_shape_chunks(&a->shape) > 1) {
             free(a->chunks);
             a->chunks = NULL;
@@ -174,22 +161,8 @@ static void forget(ebpo_file *file)
 static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
 {
     const ebpo_array_in *a = &file->root_array[EBPO_A_PLACES];
-    ebpo_chunk_place chunk = a->chunks[0];
-    uint64_t *places = NULL;
-    const char *why = "";
-    if (a->shape.rows > file->info.file_bytes)
-        return list_fails(file, "the list has more rows than", "the file has bytes", error);
-    uint8_t *stored = ebpo_alloc(chunk.bytes, 1);
-    ebpo_status status = stored
-                             ? ebpo_input_read(&file->in, chunk.address, chunk.bytes, stored, error)
-                             : ebpo_fail_memory(error, chunk.bytes);
-    if (status == EBPO_OK) {
-        status = ebpo_places_decode(stored, chunk.bytes, a->shape.pipeline, a->shape.rows, &places,
-                                    &why, error);
-        if (status == EBPO_E_FORMAT)
-            status = list_fails(file, "the chunk is damaged:", why, error);
-    }
-    free(stored);
+    uint64_t *places;
+    ebpo_status status = ebpo_long_chunk_read(file, a, &places, error);
     if (status == EBPO_OK)
         status = list_chunks(file, places, a->shape.rows, error);
     free(places);

@@ -133,22 +133,23 @@ static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
     return status;
 }
 
-/* The list of all chunks, which holds unless another program has rewritten the file. */
-static ebpo_status open_places(ebpo_file *file, ebpo_head *head, ebpo_error *error)
+/* A list about all chunks, which holds unless another program has rewritten the file. */
+static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id list, bool *holds,
+                             ebpo_error *error)
 {
-    const ebpo_array_in *a = &file->root_array[EBPO_A_PLACES];
-    ebpo_head_object id, group;
+    const ebpo_array_in *a = &file->root_array[list];
+    ebpo_head_object id;
     uint64_t bytes = 0, offset = 0;
-    ebpo_status status = ebpo_head_open_group(head, "/subtrees", &group, error);
-    if (status == EBPO_OK)
-        status = open_array(file, head, EBPO_A_PLACES, 0, error);
-    if (status == EBPO_OK)
-        status = ebpo_head_open_array(head, a->path, &id, error);
+    *holds = false;
+    ebpo_status status = open_array(file, head, list, 0, error);
+    if (status != EBPO_OK || !a->present)
+        return status;
+    status = ebpo_head_open_array(head, a->path, &id, error);
     if (status != EBPO_OK)
         return status;
     bool stated = ebpo_head_get_count(head, id, a->path, "file_bytes", &bytes, NULL) == EBPO_OK &&
                   ebpo_head_get_count(head, id, a->path, "offset", &offset, NULL) == EBPO_OK;
-    file->has_places =
+    *holds =
         stated && bytes == file->info.file_bytes && a->chunks && offset == a->chunks[0].address;
     return EBPO_OK;
 }
@@ -158,12 +159,13 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
     ebpo_info *info = &file->info;
     info->index_level = info->level_count;
     info->file_bytes = file->in.source.size;
-    if (info->subtree_level) {
-        ebpo_status places = open_places(file, head, error);
-        if (places != EBPO_OK)
-            return places;
-    }
-    ebpo_status status = open_group(head, "/mesh", info->parts & EBPO_PART_MESH, error);
+    ebpo_status status = open_group(head, "/subtrees", info->subtree_level != 0, error);
+    if (status == EBPO_OK && info->subtree_level)
+        status = open_list(file, head, EBPO_A_PLACES, &file->has_places, error);
+    if (status == EBPO_OK)
+        status = open_list(file, head, EBPO_A_CHUNK_SUMS, &file->has_sums, error);
+    if (status == EBPO_OK)
+        status = open_group(head, "/mesh", info->parts & EBPO_PART_MESH, error);
     if (status == EBPO_OK)
         status = open_group(head, "/maps", info->parts & EBPO_PART_MAPS, error);
     for (int level = 0; level < info->level_count; level++)
@@ -240,6 +242,7 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     pthread_mutex_init(&file->lock, NULL);
     ebpo_idle_readers_make(&file->idle);
     atomic_init(&file->located, true);
+    atomic_init(&file->summed, false);
     ebpo_status status = ebpo_input_open(&file->in, source, name, error);
     if (status == EBPO_OK)
         status = ebpo_head_open(&head, &file->in, error);
@@ -346,6 +349,7 @@ void ebpo_close(ebpo_file *file)
         free(file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS].chunks);
     for (int i = 0; i < EBPO_ARRAYS; i++)
         free(file->root_array[i].chunks);
+    free(file->sums);
     ebpo_attributes_close(file);
     ebpo_input_close(&file->in);
     ebpo_idle_readers_free(&file->idle);

@@ -23,16 +23,4 @@ static inline uint64_t ebpo_place(uint32_t number, uint64_t bytes)
 static inline uint32_t ebpo_place_number_of(uint64_t place) { return (uint32_t)(place >> 32); }
 static inline uint32_t ebpo_place_bytes_of(uint64_t place) { return (uint32_t)place; }
 
-/* The list as one chunk, however long. `bytes`: of the encoded list,
- * which the caller frees. */
-EBPO_MUST_USE ebpo_status ebpo_places_encode(const uint64_t *places, uint64_t count,
-                                             ebpo_pipeline pipeline, int codec_level,
-                                             uint8_t **stored, size_t *bytes, ebpo_error *error);
-/* Of `stored_bytes` that may be anything; *places is the caller's. EBPO_E_FORMAT: *why says what is
- * wrong. */
-EBPO_MUST_USE ebpo_status ebpo_places_decode(const uint8_t *stored, size_t stored_bytes,
-                                             ebpo_pipeline pipeline, uint64_t count,
-                                             uint64_t **places, const char **why,
-                                             ebpo_error *error);
-
 #endif

@@ -10,6 +10,7 @@
 #include "base/arrays.h"
 #include "codec/coding.h"
 #include "codec/face_gates.h"
+#include "container/chunk_sums.h"
 
 enum {
     RUN_BYTES = 1 << 20, /* of one read, at most */
@@ -58,6 +59,8 @@ static ebpo_status unpack(const ebpo_file *file, const ebpo_array_in *array, uin
     ebpo_shape shape = ebpo_stored_shape(&array->shape, array->gates);
     size_t bytes = shape.chunk_rows * ebpo_shape_row_bytes(&shape);
     const char *why;
+    if (!ebpo_chunk_fits(file, array, chunk, stored, array->chunks[chunk].bytes))
+        return damaged(file, array, chunk, "it is not the one that was written there", error);
     ebpo_status status = ebpo_chunk_decode(coder, shape.pipeline, shape.element_size, stored,
                                            array->chunks[chunk].bytes, raw, bytes, &why);
     if (status == EBPO_E_MEMORY)
@@ -95,6 +98,8 @@ static ebpo_status fetch_chunk(const ebpo_file *file, const ebpo_array_in *array
                                ebpo_chunk_reader *reader, ebpo_error *error)
 {
     ebpo_status status = ebpo_reader_locate(file, array, error);
+    if (status == EBPO_OK)
+        status = ebpo_chunk_sums_read(file, error);
     if (status != EBPO_OK)
         return status;
     const ebpo_chunk_place *at = &array->chunks[chunk];
@@ -176,6 +181,8 @@ ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
 {
     uint64_t chunks = ebpo_shape_chunks(&array->shape);
     ebpo_status status = ebpo_reader_locate(file, array, error);
+    if (status == EBPO_OK)
+        status = ebpo_chunk_sums_read(file, error);
     if (status != EBPO_OK)
         return status;
     unsigned threads = chunks > 2 ? ebpo_thread_count(options->threads) : 1;

@@ -53,6 +53,16 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
                       .bytes = offsetof(ebpo_stored_sizes, subtree_bytes),  \
                       .coding = "plain",                                    \
                       .about = about_ },
+#define SUM_ARRAY(ID, path, stored, per_, about_)                      \
+    [EBPO_A_##ID] = { .name = path,                                    \
+                      .per = EBPO_PER_##per_,                          \
+                      .needs = EBPO_NEEDS_ALWAYS,                      \
+                      .sizes = stored,                                 \
+                      .since = 1,                                      \
+                      .if_needed = true,                               \
+                      .bytes = offsetof(ebpo_stored_sizes, sum_bytes), \
+                      .coding = "plain",                               \
+                      .about = about_ },
 #include "container/array_table.inc"
     [EBPO_A_ATTRIBUTE] = { .name = "/attributes",
                            .per = EBPO_PER_CHUNK,

@@ -18,6 +18,7 @@ typedef enum ebpo_array_id {
     EBPO_BEFORE_ROOT = EBPO_LEVEL_ARRAYS - 1,
 #define ROOT_ARRAY(ID, ...)  EBPO_A_##ID,
 #define TABLE_ARRAY(ID, ...) EBPO_A_##ID,
+#define SUM_ARRAY(ID, ...)   EBPO_A_##ID,
 #include "container/array_table.inc"
     /* all arrays of /attributes, which files have as many of as they like: the `level` is then the
      * number of the array there (attribute_arrays.h) */
@@ -182,6 +183,12 @@ static inline bool ebpo_schema_is_index(int id)
 {
     return ebpo_schema[id].per >= EBPO_PER_GROUP_BLOCK &&
            ebpo_schema[id].per <= EBPO_PER_LEAF_BLOCK;
+}
+
+/* A list about all chunks: a single one itself, and not told of in any. */
+static inline bool ebpo_schema_is_list(ebpo_array_id id)
+{
+    return id == EBPO_A_PLACES || id == EBPO_A_CHUNK_SUMS;
 }
 
 static inline bool ebpo_schema_is_held(int id) { return ebpo_schema[id].held_size != 0; }

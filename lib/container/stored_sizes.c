@@ -38,7 +38,7 @@ ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
 {
     ebpo_stored_sizes sizes = ebpo_reader_sizes(file);
     uint64_t stored = sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes +
-                      sizes.subtree_bytes + sizes.attribute_bytes;
+                      sizes.subtree_bytes + sizes.attribute_bytes + sizes.sum_bytes;
     for (int level = 0; level < file->info.level_count; level++)
         stored += sizes.level_bytes[level];
     if (stored > file->info.file_bytes)

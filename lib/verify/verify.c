@@ -135,6 +135,8 @@ ebpo_status ebpo_verify(const ebpo_file *file, const ebpo_verify_options *option
     ebpo_tally tally = { 0 };
     status = ebpo_check_places(&tally, file, options, error);
     if (status == EBPO_OK)
+        status = ebpo_check_sums(&tally, file, error);
+    if (status == EBPO_OK)
         status = check_content(file, options, &tally, error);
     if (status == EBPO_OK)
         status = check_tree(file, options, &tally, error);

@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "container/long_chunk.h"
 #include "container/places.h"
 #include "container/reader.h"
 #include "verify/verify_subtrees.h"
@@ -78,8 +79,8 @@ static ebpo_status read_list(comparison *c, ebpo_error *error)
                                                a->chunks[0].bytes, stored, error)
                              : ebpo_fail_memory(error, a->chunks[0].bytes);
     if (status == EBPO_OK)
-        status = ebpo_places_decode(stored, a->chunks[0].bytes, a->shape.pipeline, c->rows,
-                                    &c->list, &why, error);
+        status = ebpo_long_chunk_decode(stored, a->chunks[0].bytes, a->shape.pipeline, c->rows,
+                                        &c->list, &why, error);
     if (status == EBPO_E_FORMAT)
         status = ebpo_fail_file(error, status, c->file->in.shown, "/subtrees/places: %s", why);
     free(stored);

@@ -17,6 +17,11 @@ EBPO_MUST_USE ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file
 EBPO_MUST_USE ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
                                             const ebpo_verify_options *options, ebpo_error *error);
 
+/* Each row of the list of how chunks end (section 20), and whether each chunk has one. Nothing to
+ * do in files without, or where another program has rewritten the file. */
+EBPO_MUST_USE ebpo_status ebpo_check_sums(ebpo_tally *tally, const ebpo_file *file,
+                                          ebpo_error *error);
+
 /* Every chunk of faces with the coding `gates`, by ebpo_plain_gates_read. Nothing to do without. */
 EBPO_MUST_USE ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file,
                                            const ebpo_tree *tree, ebpo_error *error);

@@ -9,8 +9,9 @@
  * stood. After each, every kind of answer must be the good file's, or an error. -v: verifies as
  * well, and names what verifying does not see. -w: keeps files that answered wrongly.
  *
- * A chunk's own checksum does not tell its place: chunks that have changed places, or come from
- * another file, are noticed by content_sha256 at the latest, that is by verifying.
+ * A chunk's own checksum does not tell its place: in files without /chunk_sums, chunks that have
+ * changed places, or come from another file, are noticed by content_sha256 at the latest, that is
+ * by verifying. In files that have it every question must notice them.
  *
  * Exit code 1: some answer was wrong, and neither was anything said nor, of whole chunks, does
  * verifying see it. */
@@ -156,10 +157,11 @@ static void judge(damage *d, uint64_t at)
         }
     bool seen = a.verify != EBPO_OK || a.violations;
     d->wrong[d->way] += wrong;
-    d->silent += wrong && !(whole_chunks && seen);
+    bool told = whole_chunks && seen && !d->file->has_sums;
+    d->silent += wrong && !told;
     d->noticed[d->way] += noticed && !wrong;
     d->harmless[d->way] += !noticed && !wrong;
-    if (wrong && !(whole_chunks && seen))
+    if (wrong && !told)
         say_wrong(d, &a, at);
     if ((d->verify || whole_chunks) && !seen) {
         d->unseen[d->way]++;
@@ -232,7 +234,8 @@ static void swap_chunks(damage *d)
                     uint8_t *x = d->now.at + a->chunks[i].address,
                             *y = d->now.at + b->chunks[k].address;
                     if (a->chunks[i].bytes != b->chunks[k].bytes ||
-                        memcmp(x, y, a->chunks[i].bytes) == 0 || (d->every && turn++ % d->every))
+                        memcmp(x, y, a->chunks[i].bytes) == 0 ||
+                        (d->every && !d->file->has_sums && turn++ % d->every))
                         continue;
                     swap(x, y, a->chunks[i].bytes);
                     judge(d, a->chunks[i].address);

@@ -4,7 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/endian.h"
 #include "codec/chunk.h"
+#include "container/chunk_sums.h"
 #include "container/reader.h"
 
 void changeable_load(changeable *c, const char *path)
@@ -17,7 +19,8 @@ void changeable_load(changeable *c, const char *path)
     rewind(f);
     if (!c->data || fread(c->data, 1, c->size, f) != c->size || fclose(f) != 0 ||
         ebpo_open(path, &c->file, NULL) != EBPO_OK ||
-        ebpo_file_locate(c->file, NULL, NULL) != EBPO_OK)
+        ebpo_file_locate(c->file, NULL, NULL) != EBPO_OK ||
+        ebpo_chunk_sums_read(c->file, NULL) != EBPO_OK)
         abort();
 }
 
@@ -56,27 +59,31 @@ uint64_t changeable_get(const changeable *c, ebpo_array_id id, uint64_t item)
     return value;
 }
 
+/* Makes the checksum behind a chunk's bytes fit; returns it. */
+static uint32_t seal(changeable *c, ebpo_chunk_place chunk)
+{
+    uint8_t *end = c->data + chunk.address + chunk.bytes - 4;
+    ebpo_store32(end, ebpo_fletcher32(c->data + chunk.address, chunk.bytes - 4));
+    return ebpo_load32(end);
+}
+
+/* So that the list of sums does not tell either. */
+static void seal_sum(changeable *c, const ebpo_array_in *a, uint64_t chunk, uint32_t sum)
+{
+    const ebpo_array_in *list = array_of(c, EBPO_A_CHUNK_SUMS);
+    if (!c->file->has_sums || ebpo_schema_is_list(a->id))
+        return;
+    ebpo_store32(c->data + list->chunks[0].address + 8 * (a->first_sum + chunk), sum);
+    (void)seal(c, list->chunks[0]);
+}
+
 uint64_t changeable_put(changeable *c, ebpo_array_id id, uint64_t item, uint64_t value)
 {
     const ebpo_array_in *a = array_of(c, id);
     const ebpo_chunk_place *chunk;
     uint8_t *at = item_at(c, a, item, &chunk);
     uint64_t before = changeable_get(c, id, item);
-    ebpo_chunk_coder *coder = calloc(1, sizeof *coder);
-    size_t raw_bytes = chunk->bytes - 4, bytes;
-    uint8_t *raw = malloc(raw_bytes), *stored = malloc(ebpo_chunk_bound(raw_bytes));
     memcpy(at, &value, a->shape.element_size);
-    if (!coder || !raw || !stored)
-        abort();
-    memcpy(raw, c->data + chunk->address, raw_bytes);
-    if (ebpo_chunk_encode(coder, EBPO_PIPELINE_CHECKSUM, 0, a->shape.element_size, raw, raw_bytes,
-                          stored, &bytes) != EBPO_OK ||
-        bytes != chunk->bytes)
-        abort();
-    memcpy(c->data + chunk->address, stored, bytes);
-    ebpo_chunk_coder_clear(coder);
-    free(coder);
-    free(raw);
-    free(stored);
+    seal_sum(c, a, (uint64_t)(chunk - a->chunks), seal(c, *chunk));
     return before;
 }

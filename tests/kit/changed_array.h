@@ -1,5 +1,5 @@
 /* Files without compression, in memory, of which one number is changed: its chunk's checksum is
- * made to fit, so that nothing but the number tells. */
+ * made to fit, and what the file says of how it ends, so that nothing but the number tells. */
 #ifndef EBPO_TESTS_CHANGED_ARRAY_H
 #define EBPO_TESTS_CHANGED_ARRAY_H
 

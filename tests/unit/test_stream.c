@@ -261,7 +261,8 @@ START_TEST(only_the_level_asked_for_is_read)
         while (next_node(stream, &node))
             ;
         after = ebpo_test_file_stats(file).bytes_read;
-        ck_assert_uint_le(after - before, stored.level_bytes[i]);
+        /* the list of sums comes with the first chunk */
+        ck_assert_uint_le(after - before, stored.level_bytes[i] + (i ? 0 : stored.sum_bytes));
     }
     ebpo_stream_free(stream);
     ebpo_close(file);

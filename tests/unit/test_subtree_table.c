@@ -295,7 +295,10 @@ static unsigned step_of(const ebpo_info *info, const placed *p)
         return list ? 200 : 100 + (unsigned)p->level;
     if (of_level)
         return list ? 400 : 300;
-    return p->id == EBPO_A_PLACES ? 700 : p->id == EBPO_A_VERTEX_SOURCE ? 600 : 500;
+    return p->id == EBPO_A_PLACES          ? 700
+           : p->id == EBPO_A_CHUNK_SUMS    ? 650
+           : p->id == EBPO_A_VERTEX_SOURCE ? 600
+                                           : 500;
 }
 
 static unsigned column_of(const ebpo_info *info, const placed *p)

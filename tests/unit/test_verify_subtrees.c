@@ -113,6 +113,23 @@ START_TEST(every_place_is_compared_with_the_index)
 }
 END_TEST
 
+START_TEST(every_sum_is_compared_with_its_chunk)
+{
+    changeable c;
+    write_model(ebpo_test_torus(2, 0.7, 60, 40), ~0u, 8);
+    changeable_load(&c, path);
+    expect_fine(&c);
+    uint64_t count = changeable_count(&c, EBPO_A_CHUNK_SUMS);
+    for (uint64_t i = 0; i < count; i += steps(23)) {
+        uint64_t sum = changeable_get(&c, EBPO_A_CHUNK_SUMS, i);
+        expect_named(&c, EBPO_A_CHUNK_SUMS, i, sum + 1);
+        expect_named(&c, EBPO_A_CHUNK_SUMS, i, sum ^ UINT64_C(1) << 32);
+        expect_named(&c, EBPO_A_CHUNK_SUMS, i, UINT64_C(63) << 32);
+    }
+    changeable_free(&c);
+}
+END_TEST
+
 /* Rows of the list in another order, whose sizes agree. */
 START_TEST(chunks_that_have_changed_places_are_noticed)
 {
@@ -183,6 +200,7 @@ Suite *test_suite(void)
     tcase_add_checked_fixture(tests, enter, scratch_leave);
     tcase_add_loop_test(tests, every_number_of_the_table_is_counted_anew, 0, 2);
     tcase_add_test(tests, every_place_is_compared_with_the_index);
+    tcase_add_test(tests, every_sum_is_compared_with_its_chunk);
     tcase_add_test(tests, chunks_that_have_changed_places_are_noticed);
     tcase_add_loop_test(tests, without_parts_the_table_holds_too, 0, 4);
     tcase_add_loop_test(tests, subsets_have_rows_for_pruned_nodes, 0, 2);

@@ -31,6 +31,7 @@ static const char *folder;
 #define PAINTED   "42_colours_of_vertices"
 #define GATES     "47_gates_unfiltered"
 #define TEXTURED  "51_textures"
+#define SUMMED    "55_chunk_sums_of_subtrees"
 
 /* As the library writes it; elements of one byte are not shuffled. */
 static void zstd(hid_t dcpl)
@@ -367,6 +368,10 @@ static void v_gates_long(void)
         poke("/mesh/faces", 16 + 4 * i, 1 + i % 3);
 }
 static void v_attributes_image(void) { set_text("/attributes/001", "names", "sha256"); }
+/* The row of the root's colour becomes one of an array that is not there; the first one's number is
+ * beyond those behind it. */
+static void v_sums_fewer(void) { poke("/chunk_sums", 3, INT64_C(14) << 32); }
+static void v_sums_order(void) { poke("/chunk_sums", 0, INT64_C(70) << 32); }
 static void v_content(void) { poke("/mesh/vertices", 0, 2); }
 
 typedef enum late_change {
@@ -375,6 +380,7 @@ typedef enum late_change {
     FLIP_CHUNK,
     FLIP_HEAD,
     SWAP_CHUNK,
+    MOVE_CHUNKS,
     NOT_HDF5,
     USER_BLOCK
 } late_change;
@@ -576,11 +582,33 @@ static const failed_vector failed[] = {
       "A required attribute that is missing" },
     { "colours_changed", PAINTED, v_colours_changed, NONE, "3", "it does not match" },
     { "attributes_without_mesh", COLOURED, v_attributes_no_mesh, NONE, "18", "only with `mesh`" },
+    { "chunk_in_place_of_another", SUMMED, NULL, MOVE_CHUNKS, "20",
+      "a chunk whose last four bytes are not what its row says" },
+    { "chunk_sums_of_fewer_chunks", SUMMED, v_sums_fewer, NONE, "20",
+      "more or fewer rows than it has chunks" },
+    { "chunk_sums_out_of_order", SUMMED, v_sums_order, NONE, "20",
+      "a number that is less than the one before" },
     { "attributes_image_of_another_digest", TEXTURED, v_attributes_image, NONE, "18",
       "are not those whose SHA-256 stands there" },
 };
 
 enum { USER_BLOCK_BYTES = 512 };
+
+/* Exchanges two chunks that take as many bytes, each with the checksum of its own. */
+static void move_chunks(const char *path, uint8_t *data)
+{
+    hsize_t bytes = 0, other_bytes = 0;
+    uint8_t kept[64];
+    changed = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+    haddr_t at = chunk_address("/levels/02/leaf_new", &bytes),
+            other = chunk_address("/levels/02/leaf_ref_count", &other_bytes);
+    H5Fclose(changed);
+    need(bytes == other_bytes && bytes <= sizeof kept && memcmp(data + at, data + other, bytes),
+         "chunks to exchange");
+    memcpy(kept, data + at, bytes);
+    memcpy(data + at, data + other, bytes);
+    memcpy(data + other, kept, bytes);
+}
 
 static void change_bytes(const char *path, late_change late)
 {
@@ -596,6 +624,7 @@ static void change_bytes(const char *path, late_change late)
     case FLIP_CHUNK: data[faces + chunk_size / 2] ^= 16; break;
     case FLIP_HEAD: data[60] ^= 16; break;
     case SWAP_CHUNK: memcpy(data + faces, data + types, other_size); break;
+    case MOVE_CHUNKS: move_chunks(path, data); break;
     case USER_BLOCK:
         data = realloc(data, size + USER_BLOCK_BYTES);
         need(data != NULL, "memory");

@@ -375,6 +375,15 @@ EBPO_API void ebpo_tree_free(ebpo_tree *tree);
 
 /* ---- writing ---- */
 
+/*
+ * Whether the file tells how each of its chunks ends (format-spec/README.md, section
+ * 20), so that readers notice one that is in another's place or of another version.
+ */
+typedef enum ebpo_chunk_sums {
+    EBPO_SUMS_USUAL = 0, /* it does */
+    EBPO_SUMS_NONE = 1   /* as in files of 1.0 */
+} ebpo_chunk_sums;
+
 typedef struct ebpo_write_options {
     size_t struct_size; /* EBPO_WRITE_OPTIONS_INIT sets it */
 
@@ -405,7 +414,8 @@ typedef struct ebpo_write_options {
 
     /* Of the mesh, if it is written. */
     ebpo_face_coding face_coding;
-    int32_t reserved; /* 0 */
+
+    ebpo_chunk_sums chunk_sums;
 } ebpo_write_options;
 
 #define EBPO_NO_SUBTREES UINT64_MAX
@@ -413,7 +423,7 @@ typedef struct ebpo_write_options {
 #define EBPO_WRITE_OPTIONS_INIT                                                    \
     {                                                                              \
         sizeof(ebpo_write_options), EBPO_CODEC_ZSTD, 0, 0, ~0u, { NULL, NULL }, 0, \
-            EBPO_FACES_USUAL, 0                                                    \
+            EBPO_FACES_USUAL, EBPO_SUMS_USUAL                                      \
     }
 
 /*
@@ -495,8 +505,9 @@ typedef struct ebpo_file ebpo_file;
  * was allocated, and nothing is loaded or run because of them. What is answered about a
  * file that was made to deceive is true of that file; ebpo_verify proves that its parts
  * belong together. A file that another program shortens or damages while it is open
- * gives EBPO_E_IO or EBPO_E_FORMAT: chunks have checksums. Not noticed by each question
- * is a whole chunk in another's place, for which there is ebpo_file_check_content.
+ * gives EBPO_E_IO or EBPO_E_FORMAT: chunks have checksums, and the file says which chunk
+ * ends with which (ebpo_chunk_sums), so that a whole chunk in another's place is noticed
+ * too; of files without that list ebpo_file_check_content tells.
  * Where chunks have no checksums, as in copies by other programs, all of the file is
  * read, and content_sha256 compared, before it is open; later changes are not noticed.
  *
@@ -721,6 +732,9 @@ typedef struct ebpo_stored_sizes {
     uint64_t subtree_bytes;
 
     uint64_t attribute_bytes;
+
+    /* Of the list of all chunks' checksums. */
+    uint64_t sum_bytes;
 } ebpo_stored_sizes;
 
 #define EBPO_STORED_SIZES_INIT EBPO_SIZED(ebpo_stored_sizes)

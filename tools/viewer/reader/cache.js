@@ -3,6 +3,7 @@
 import { decodeChunk } from './chunk.js';
 import { formatError } from './error.js';
 import { decodeGates } from './gates.js';
+import { chunkFits } from './sums.js';
 
 const GAP_BYTES = 16 * 1024;            // rather read this much for nothing than ask twice
 const REQUEST_BYTES = 4 * 1024 * 1024;  // a request's most
@@ -57,9 +58,10 @@ function withoutGates(bytes, array, chunk) {
 export class ChunkCache {
   /**
    * `head`: the file's first bytes, which are not fetched again. `values(array, chunk, bytes)`: what is kept of a chunk: something with byteLength, or a promise of it.
+   * `sums()`: a promise of how chunks must end (sums.js), or of undefined; it is not asked about lists of chunks.
    */
-  constructor(source, head, { zstd, values, budget = CACHE_BYTES }) {
-    Object.assign(this, { source, head, zstd, values, budget });
+  constructor(source, head, { zstd, values, sums, budget = CACHE_BYTES }) {
+    Object.assign(this, { source, head, zstd, values, sums, budget });
     this.kept = new Map();    // by key, oldest first
     this.bytes = 0;           // of what is kept
     this.pending = new Map(); // promises by key
@@ -112,9 +114,13 @@ export class ChunkCache {
 
   /** Decoded bytes of chunks, not kept: [Promise]. */
   decoded(wanted) {
+    const sums = wanted.some(({ array }) => !array.list) ? this.sums?.() : undefined; // on its way beside what it tells of
+    sums?.catch(() => {}); // who waits for it tells
     return this.fetch(wanted.map(({ array, chunk }) => array.chunks[chunk])).map(async (promise, i) => {
-      const { array, chunk } = wanted[i];
-      const { elementSize, rowBytes } = array.stored, got = await decodeChunk(await promise, array.pipeline, elementSize, array.chunkRows * rowBytes, await this.zstd);
+      const { array, chunk } = wanted[i], stored = await promise;
+      if (!array.list && !chunkFits((await sums)?.get(array), chunk, stored))
+        throw formatError(`${array.path}: chunk ${chunk}`, 'the chunk is damaged: it is not the one that was written there');
+      const { elementSize, rowBytes } = array.stored, got = await decodeChunk(stored, array.pipeline, elementSize, array.chunkRows * rowBytes, await this.zstd);
       const { bytes, fault } = got.bytes && array.gates ? withoutGates(got.bytes, array, chunk) : got;
       if (fault)
         throw formatError(`${array.path}: chunk ${chunk}`, `the chunk is damaged: ${fault}`);

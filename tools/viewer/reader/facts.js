@@ -334,12 +334,17 @@ export function attributesFacts(attributes, path) {
 /** Columns of /subtrees/counts. */
 export const subtreeCols = (info) => 6 + 7 * (info.level_count - 1 - info.subtree_level);
 
+export const PLACES = '/subtrees/places', CHUNK_SUMS = '/chunk_sums';
+
+/** Whether an array is a list about all chunks: a single one itself, and not told of in any. */
+export const isList = (path) => path === PLACES || path === CHUNK_SUMS;
+
 // With the part subtrees. rows: undefined where the array itself says it.
 const subtreeArrays = (info) => (info.subtree_level === undefined ? [] : [
   { path: '/subtrees/counts', cols: subtreeCols(info), sizes: [4], rows: info.levels[info.subtree_level].gray },
   { path: '/subtrees/index', cols: subtreeCols(info), sizes: [8], rows: undefined },
   { path: '/subtrees/outer', cols: 0, sizes: [4], rows: undefined, mayBeAbsent: true },
-  { path: '/subtrees/places', cols: 0, sizes: [8], rows: undefined },
+  { path: PLACES, cols: 0, sizes: [8], rows: undefined },
 ]);
 
 /** The arrays that a file with these facts has: [{ path, level, order, name, cols, sizes, signed, rows, mayBeAbsent }]. `order`: among those of its level. */
@@ -353,14 +358,17 @@ export function arraysOf(info) {
   for (const [path, [cols, sizes, signed, rows]] of Object.entries(ROOT_ARRAYS))
     out.push({ path, level: undefined, name: path, cols, sizes, signed, rows: rows(info), gates: path === '/mesh/faces' && info.parts.has('gates') });
   out.push(...subtreeArrays(info).map((a) => ({ ...a, level: undefined, name: a.path, signed: false })));
+  out.push({ path: CHUNK_SUMS, level: undefined, name: CHUNK_SUMS, cols: 0, sizes: [8], signed: false, rows: undefined, mayBeAbsent: true });
   return out.filter((a) => a.rows !== 0);
 }
 
 /** Rows of a chunk, with the part subtrees. */
-export const FIXED_ROWS = { '/mesh/faces': 2048, '/mesh/vertices': 1024, '/subtrees/places': Infinity };
+export const FIXED_ROWS = { '/mesh/faces': 2048, '/mesh/vertices': 1024 };
 
 /** Whether chunks of an array may have so many rows. */
 export function chunkRowsFit(info, path, rows, cols, elementSize, chunk) {
+  if (isList(path))
+    return chunk === rows;
   if (info.subtree_level === undefined)
     return chunk === chunkRows(rows, cols, elementSize);
   if (FIXED_ROWS[path])

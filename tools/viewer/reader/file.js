@@ -2,7 +2,7 @@
 import { CHUNK_BYTES_MAX, chunkBound, pipelineOf } from './chunk.js';
 import { EbpoError, formatError } from './error.js';
 import { chooseColours, columnPaths, describeColumns } from './colours.js';
-import { INDEX_ROWS, arraysOf, attributesFacts, checkCoding, checkFacts, chunkRows, chunkRowsFit, readFacts, readLevelFacts } from './facts.js';
+import { INDEX_ROWS, PLACES, arraysOf, attributesFacts, checkCoding, checkFacts, chunkRows, chunkRowsFit, isList, readFacts, readLevelFacts } from './facts.js';
 import { GATES_COLS } from './gates.js';
 import { Hdf5, NeedBytes } from './hdf5.js';
 import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeaves, decodeMap, decodeVertices, recode } from './decode.js';
@@ -12,10 +12,9 @@ import { sourceOf } from './source.js';
 import { Store, everyChunk } from './store.js';
 
 const AHEAD_BYTES = 1024 * 1024, HEAD_BYTES = 128 * 1024, HEAD_BYTES_MOST = 256 * 1024 * 1024, INDEX_BYTES_MOST = 256 * 1024 * 1024;
-const PLACES_BYTES_MOST = 128 * 1024 * 1024;
+const LIST_BYTES_MOST = 128 * 1024 * 1024;
 
 const FACE_TABLES = ['leaf_skip', 'leaf_new', 'leaf_ref_count', 'leaf_refs', 'leaf_index'];
-const PLACES = '/subtrees/places';
 const folder = (level) => `/levels/${String(level).padStart(2, '0')}/`;
 
 /**
@@ -107,7 +106,7 @@ export class EbpoFile {
         group(`/${part}`, root.links.get(part));
     const arrays = new Map();
     for (const wanted of arraysOf(info)) {
-      const cut = wanted.path.lastIndexOf('/'), links = objects.get(wanted.path.slice(0, cut)).links, name = wanted.path.slice(cut + 1);
+      const cut = wanted.path.lastIndexOf('/'), links = objects.get(wanted.path.slice(0, cut) || '/').links, name = wanted.path.slice(cut + 1);
       if (wanted.mayBeAbsent && !links.has(name))
         continue;
       arrays.set(wanted.path, describe(hdf5, wanted, links.has(name), links.get(name), info));
@@ -183,7 +182,7 @@ export class EbpoFile {
       return false;
     try {
       const [bytes] = await Promise.all(this.store.cache.decoded([{ array: places, chunk: 0 }]));
-      const others = [...this.arrays.values()].filter((a) => a !== places);
+      const others = [...this.arrays.values()].filter((a) => !a.list);
       for (const [array, chunks] of readPlaces(new Uint32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4), others, this.source.size))
         if (!array.chunks)
           place(array, chunks);
@@ -467,7 +466,7 @@ export class EbpoFile {
   /** Compares content_sha256 and colours_sha256 (format-spec, section 8). Reads the whole file. In a page: only over https and from localhost. */
   async verifyContent() {
     const of = (path) => (path.endsWith('/gray_colours') ? 'colours_sha256' : 'content_sha256');
-    const paths = [...this.arrays.keys()].filter((p) => !/^\/(subtrees|attributes)\//.test(p)).sort();
+    const paths = [...this.arrays.keys()].filter((p) => !isList(p) && !/^\/(subtrees|attributes)\//.test(p)).sort();
     for (const name of ['content_sha256', 'colours_sha256'].filter((n) => this.info[n])) {
       if (await this.#checksum(paths.filter((p) => of(p) === name)) !== this.info[name])
         throw named(this.source, formatError('', `the content is not what ${name} says: the file was changed`, 'get a fresh copy'));
@@ -547,10 +546,10 @@ function describe(hdf5, wanted, linked, address, info) {
     throw formatError(path, "the array's type contradicts coordinate_type");
   checkCoding(o.attributes, path, gates);
   const storedRow = elementSize * Math.max(gates ? GATES_COLS : cols, 1), whole = fit * storedRow;
-  if (whole > (path === PLACES ? Math.min(PLACES_BYTES_MOST, 2 * hdf5.size) : CHUNK_BYTES_MAX))
+  if (whole > (isList(path) ? Math.min(LIST_BYTES_MOST, 2 * hdf5.size) : CHUNK_BYTES_MAX))
     throw formatError(path, "the array's chunks do not have the size that the format fixes");
   return { path, number: placeNumber(path, wanted.level, wanted.order), level: wanted.level, name: wanted.name, rows, cols,
     elementSize: gates ? 4 : elementSize, signed: o.type.signed, chunkRows: fit, chunkCount: Math.ceil(rows / fit), chunkMost: chunkBound(whole), gates,
     stored: { elementSize, rowBytes: storedRow }, rowBytes: gates ? 4 * cols : storedRow, pipeline,
-    object: o, indexed: o.layout.index !== 1, chunks: undefined, bytes: undefined };
+    list: isList(path), object: o, indexed: o.layout.index !== 1, chunks: undefined, bytes: undefined };
 }

@@ -1,6 +1,6 @@
 // Where all chunks lie, by the list that files with subtrees have: format-spec/README.md, section 9, "Places".
 import { formatError } from './error.js';
-import { LEVELS_MAX, LEVEL_ARRAY_COUNT } from './facts.js';
+import { LEVELS_MAX, LEVEL_ARRAY_COUNT, PLACES } from './facts.js';
 
 /** The number of an array in that list. `order`: of the arrays of a level. */
 export function placeNumber(path, level, order) {
@@ -9,16 +9,16 @@ export function placeNumber(path, level, order) {
 }
 
 const ROOT_NUMBERS = { '/mesh/vertices': 4096, '/mesh/faces': 4097, '/mesh/faces_index': 4098, '/maps/vertex_source': 4099, '/maps/face_source': 4100,
-  '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/outer': 4114, '/subtrees/places': 4115 }; // the last one is not in its list
+  '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/outer': 4114, '/subtrees/places': 4115, '/chunk_sums': 4116 }; // neither list of chunks tells of itself
 
-const WHERE = '/subtrees/places';
+const WHERE = PLACES;
 
 // Whether a number is that of an array which may be in the list; others are gaps, or of later versions.
 function isArray(number) {
-  return number < 64 * LEVELS_MAX ? number % 64 < LEVEL_ARRAY_COUNT : number !== ROOT_NUMBERS[WHERE] && Object.values(ROOT_NUMBERS).includes(number);
+  return number < 64 * LEVELS_MAX ? number % 64 < LEVEL_ARRAY_COUNT : number < ROOT_NUMBERS[WHERE] && Object.values(ROOT_NUMBERS).includes(number);
 }
 
-/** Whether the list is still true: other programs that write the file anew leave it as it was. */
+/** Whether a list about all chunks is still true: other programs that write the file anew leave it as it was. */
 export function placesHold(places, size) {
   const { attributes } = places.object, stated = (name) => {
     const a = attributes.get(name);

@@ -3,6 +3,9 @@ import { ChunkCache } from './cache.js';
 import { decodeColours } from './colours.js';
 import { decodeFaces, decodeVertices } from './decode.js';
 import { formatError } from './error.js';
+import { CHUNK_SUMS } from './facts.js';
+import { placesHold } from './places.js';
+import { readSums } from './sums.js';
 
 export class Store {
   /** `arrays`: by path, as file.js describes them; all that is asked for must have its chunks. */
@@ -10,7 +13,18 @@ export class Store {
     this.info = info;
     this.arrays = arrays;
     this.small = new Map();
-    this.cache = new ChunkCache(source, head, { ...options, values: (array, chunk, bytes) => this.#values(array, chunk, bytes) });
+    this.cache = new ChunkCache(source, head, { ...options, sums: () => this.sums(), values: (array, chunk, bytes) => this.#values(array, chunk, bytes) });
+  }
+
+  /** How the chunks must end; undefined where the file does not say, or what it says is of before another program rewrote it. Read once. */
+  sums() {
+    const list = this.arrays.get(CHUNK_SUMS);
+    if (!list || !placesHold(list, this.cache.source.size))
+      return Promise.resolve(undefined);
+    this.ends ??= Promise.all(this.cache.decoded([{ array: list, chunk: 0 }])).then(([bytes]) =>
+      readSums(new Uint32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4), [...this.arrays.values()].filter((a) => !a.list)));
+    this.ends.catch(() => (this.ends = undefined)); // the next one tries again
+    return this.ends;
   }
 
   async #values(array, chunk, bytes) {

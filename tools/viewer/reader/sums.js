@@ -1,0 +1,28 @@
+// How every chunk ends, by the list that files may have, so that one in another's place is noticed: format-spec/README.md, section 20.
+import { formatError } from './error.js';
+
+const WHERE = '/chunk_sums';
+
+/** `rows`: for each chunk, its sum and its array's number; `arrays`: those of the file. -> Map(array, Uint32Array of sums). */
+export function readSums(rows, arrays) {
+  const numbers = new Map(), out = new Map();
+  for (let begin = 0, end; begin < rows.length; begin = end) {
+    const number = rows[begin + 1];
+    for (end = begin; end < rows.length && rows[end + 1] === number; end += 2);
+    if (end < rows.length && rows[end + 1] < number)
+      throw formatError(WHERE, "the list is not in the order of arrays' numbers");
+    numbers.set(number, rows.subarray(begin, end).filter((_, i) => i % 2 === 0));
+  }
+  for (const array of arrays) {
+    const sums = numbers.get(array.number) ?? new Uint32Array(0);
+    if (sums.length !== array.chunkCount)
+      throw formatError(WHERE, `it has more or fewer chunks of ${array.path} than that has`);
+    out.set(array, sums);
+  }
+  return out;
+}
+
+/** Whether stored bytes are those of a chunk. `sums`: of its array; undefined: the file does not say. */
+export function chunkFits(sums, chunk, stored) {
+  return sums === undefined || (stored.length >= 4 && new DataView(stored.buffer, stored.byteOffset + stored.length - 4, 4).getUint32(0, true) === sums[chunk]);
+}
