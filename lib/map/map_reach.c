@@ -1,7 +1,7 @@
 /* How far faces reach from a model, their insides included. Branch and bound over triangles, which
  * are cut into four: the distance changes by no more than its argument moves, so that all of a
- * triangle is at most as far as a corner and the longest way from there. Rounds, in which all
- * triangles that stand in the way are cut at once, make the result independent of threads. */
+ * triangle is at most as far as a corner and the longest way from there. Rounds, in which those of
+ * the greatest bounds are cut at once, make the result independent of threads. */
 #include "geom/strict_fp.h"
 
 #include <inttypes.h>
@@ -37,8 +37,10 @@ typedef struct search {
     ebpo_map_reach_options o;
     double slack; /* more than what rounding may move a point or change a length */
     ebpo_map_reach reach;
+    uint64_t allowed; /* questions by the end of these faces */
     triangles now, next;
-    double (*middle)[3][3], (*middle_away)[3]; /* [now.count], of the edges after each corner */
+    uint64_t cut;                              /* the first ones of `now`, which are cut now */
+    double (*middle)[3][3], (*middle_away)[3]; /* [cut], of the edges after each corner */
     uint64_t middle_capacity, away_capacity;
 } search;
 
@@ -74,7 +76,7 @@ static ebpo_status keep(search *s, triangles *list, const triangle *t, ebpo_erro
 {
     if (!in_the_way(s, t->upper))
         return EBPO_OK;
-    if (list->count == TRIANGLES_MOST || s->reach.questions >= s->o.questions) {
+    if (list->count == TRIANGLES_MOST || s->reach.questions >= s->allowed) {
         s->reach.hi = fmax(s->reach.hi, t->upper);
         return EBPO_OK;
     }
@@ -123,21 +125,40 @@ static void child_of(const search *s, uint64_t i, int which, triangle *out)
     }
 }
 
+/* Puts those first whose bounds are above half of the greatest one: to cut others helps nobody yet.
+ */
+static void choose(search *s)
+{
+    double most = 0;
+    uint64_t left = s->allowed > s->reach.questions ? s->allowed - s->reach.questions : 0;
+    s->cut = 0;
+    for (uint64_t i = 0; i < s->now.count; i++)
+        most = fmax(most, s->now.item[i].upper);
+    for (uint64_t i = 0; i < s->now.count && 3 * s->cut < left; i++)
+        if (s->now.item[i].upper >= most / 2) {
+            triangle t = s->now.item[i];
+            s->now.item[i] = s->now.item[s->cut];
+            s->now.item[s->cut++] = t;
+        }
+}
+
 static ebpo_status cut(search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    s->reach.questions += 3 * s->now.count;
-    for (uint64_t i = 0; i < s->now.count; i++)
+    s->reach.questions += 3 * s->cut;
+    for (uint64_t i = 0; i < s->cut; i++)
         for (int k = 0; k < 3; k++)
             learn(s, s->middle_away[i][k] - s->slack, s->middle[i][k]);
     s->next.count = 0;
-    for (uint64_t i = 0; i < s->now.count && status == EBPO_OK; i++)
+    for (uint64_t i = 0; i < s->cut && status == EBPO_OK; i++)
         for (int which = 0; which < 4 && status == EBPO_OK; which++) {
             triangle t;
             child_of(s, i, which, &t);
             bound(s, &t);
             status = keep(s, &s->next, &t, error);
         }
+    for (uint64_t i = s->cut; i < s->now.count && status == EBPO_OK; i++)
+        status = keep(s, &s->next, &s->now.item[i], error);
     triangles old = s->now;
     s->now = s->next;
     s->next = old;
@@ -149,11 +170,12 @@ static ebpo_status refine(search *s, ebpo_error *error)
     ebpo_status status = EBPO_OK;
     ebpo_progress none = { NULL, NULL };
     while (status == EBPO_OK && s->now.count) {
-        if (!ebpo_grow(&s->middle, &s->middle_capacity, s->now.count, sizeof *s->middle) ||
-            !ebpo_grow(&s->middle_away, &s->away_capacity, s->now.count, sizeof *s->middle_away))
-            return ebpo_fail_memory(error, s->now.count * sizeof *s->middle);
-        status = ebpo_parallel_for(s->askers.threads, NULL, s->now.count, 256, ask_middles, s,
-                                   &none, "", error);
+        choose(s);
+        if (!ebpo_grow(&s->middle, &s->middle_capacity, s->cut, sizeof *s->middle) ||
+            !ebpo_grow(&s->middle_away, &s->away_capacity, s->cut, sizeof *s->middle_away))
+            return ebpo_fail_memory(error, s->cut * sizeof *s->middle);
+        status = ebpo_parallel_for(s->askers.threads, NULL, s->cut, 256, ask_middles, s, &none, "",
+                                   error);
         if (status == EBPO_OK)
             status = cut(s, error);
     }
@@ -172,6 +194,9 @@ static void corner_of(const ebpo_mesh *m, uint32_t vertex, double out[3])
 static ebpo_status look_at_faces(search *s, uint64_t begin, uint64_t end, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
+    double share = (double)end / (double)s->mesh->face_count; /* all faces have theirs */
+    s->allowed =
+        end == s->mesh->face_count ? s->o.questions : (uint64_t)((double)s->o.questions * share);
     s->now.count = 0;
     for (uint64_t f = begin; f < end && status == EBPO_OK; f++) {
         triangle t;

@@ -327,6 +327,11 @@ START_TEST(reaches_hold_between_vertices)
         model_must(ebpo_map_find_reach(o.model, &m, away, &options, &many, &error), "reach",
                    &error);
         ck_assert(sampled <= many.hi && many.hi >= one.hi && many.lo <= one.lo);
+        double widest = many.hi;
+        options.questions = 300; /* spent where the bounds are widest, and no more */
+        model_must(ebpo_map_find_reach(o.model, &m, away, &options, &many, &error), "reach",
+                   &error);
+        ck_assert(sampled <= many.hi && many.hi < widest && many.questions <= 303);
         ebpo_mesh_free(&m);
         close_model(&o);
     }
