@@ -369,6 +369,13 @@ static void print_json(const patient *p, const char *in)
     for (int i = 0; i < PIECES; i++)
         json_text(&j, piece_words[i], fate_words[p->fate[i]]);
     json_end(&j);
+    json_object(&j, "damage");
+    for (int i = 0; i < PIECES; i++)
+        if (p->why[i][0])
+            json_text(&j, piece_words[i], p->why[i]);
+        else
+            json_null(&j, piece_words[i]);
+    json_end(&j);
     json_finish(&j);
 }
 
