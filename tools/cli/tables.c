@@ -23,6 +23,11 @@ const char *table_cell(char out[TABLE_CELL], const char *format, double x)
     return out;
 }
 
+const char *table_volume(char out[TABLE_CELL], const char *format, double x)
+{
+    return isfinite(x) ? table_cell(out, format, x) : strcpy(out, "beyond 1.8e+308");
+}
+
 void table_beyond(FILE *out)
 {
     fputs("-: not known, as volumes are beyond what the file's numbers hold, 1.8e+308\n", out);

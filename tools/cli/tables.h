@@ -15,6 +15,9 @@ void table_legend(FILE *out);
 /* printf's `format` of x, which has one conversion of a double; "-" where x is not finite. */
 const char *table_cell(char out[TABLE_CELL], const char *format, double x);
 
+/* As above; where x is not finite, words that follow "volume". */
+const char *table_volume(char out[TABLE_CELL], const char *format, double x);
+
 /* What "-" means in columns of volumes; below a table that has some. */
 void table_beyond(FILE *out);
 

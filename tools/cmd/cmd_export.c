@@ -9,6 +9,7 @@
 #include "cli/json.h"
 #include "cli/progress.h"
 #include "cli/remote_args.h"
+#include "cli/tables.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 
@@ -89,7 +90,7 @@ static void print_colours(const ebpo_export_report *r)
 
 static void print_report(const char *out, const char *second, const ebpo_export_report *r)
 {
-    char count[2][40];
+    char count[2][40], volume[TABLE_CELL];
     printf("%s%s%s\n", out, *second ? ", " : "", second);
     for (int i = 0; i < r->block_count; i++) {
         const ebpo_export_block *b = &r->block[i];
@@ -98,8 +99,8 @@ static void print_report(const char *out, const char *second, const ebpo_export_
         if (b->level < 0)
             printf("mesh: %s, %s\n", count[0], count[1]);
         else
-            printf("level %d: %" PRIu64 " envelopes, %s, %s, volume %.9g\n", b->level, b->nodes,
-                   count[0], count[1], b->volume);
+            printf("level %d: %" PRIu64 " envelopes, %s, %s, volume %s\n", b->level, b->nodes,
+                   count[0], count[1], table_volume(volume, "%.9g", b->volume));
     }
     if (r->origin[0] != 0 || r->origin[1] != 0 || r->origin[2] != 0)
         printf("vertices are relative to %.9g %.9g %.9g, the nodes' translation\n", r->origin[0],

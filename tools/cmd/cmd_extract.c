@@ -10,6 +10,7 @@
 #include "cli/reading.h"
 #include "cli/remote_args.h"
 #include "cli/standard_files.h"
+#include "cli/tables.h"
 #include "cli/textures.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
@@ -162,12 +163,12 @@ static ebpo_status take_textures(const ebpo_file *file, const values *v, ebpo_er
 
 static void summarise(const values *v, const char *path, const extracted *out)
 {
-    char vertices[40], faces[40];
+    char vertices[40], faces[40], volume[TABLE_CELL];
     words_plural(vertices, sizeof vertices, out->mesh.vertex_count, "vertex", "vertices");
     words_plural(faces, sizeof faces, out->mesh.face_count, "face", "faces");
     printf("%s: %s, %s", standard_files_shown(path), vertices, faces);
     if (v->level >= 0)
-        printf(", envelope volume %.9g", out->volume);
+        printf(", envelope volume %s", table_volume(volume, "%.9g", out->volume));
     putchar('\n');
 }
 
