@@ -2,6 +2,7 @@
 #include "geom/strict_fp.h"
 
 #include <ebpo/repair.h>
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -54,6 +55,25 @@ static uint32_t doubts_of_filling(double area, const ebpo_mesh_report *report,
     return doubts;
 }
 
+/* A sheet, or turned inside out. Of what lies far from 1 volume and area overflow or vanish, though
+ * they keep their signs: only what has no thickness is surely a sheet then. */
+static uint32_t doubts_of_volume(const ebpo_mesh_report *report)
+{
+    enum { FAR = 1000 };
+    int exponent[3], sum = 0;
+    bool flat = false;
+    for (int k = 0; k < 3; k++) {
+        double extent = report->max[k] - report->min[k];
+        flat |= extent == 0;
+        frexp(isfinite(extent) ? extent : DBL_MAX, &exponent[k]);
+        sum += exponent[k];
+    }
+    bool far = sum > FAR || sum < -FAR;
+    if (flat || (!far && cbrt(fabs(report->volume)) <= THIN * sqrt(report->area)))
+        return EBPO_DOUBT_NO_VOLUME;
+    return signbit(report->volume) ? EBPO_DOUBT_INSIDE_OUT : 0;
+}
+
 uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
                           const ebpo_mend_record *record)
 {
@@ -61,11 +81,7 @@ uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
     uint32_t doubts = doubts_of_filling(area, report, record);
     if (!report->balanced)
         return doubts | EBPO_DOUBT_OPEN;
-    if (cbrt(fabs(report->volume)) <= THIN * sqrt(report->area) && isfinite(report->area))
-        doubts |= EBPO_DOUBT_NO_VOLUME;
-    else if (report->volume < 0)
-        doubts |= EBPO_DOUBT_INSIDE_OUT;
-    return doubts;
+    return doubts | doubts_of_volume(report);
 }
 
 /* ---- sequences ---- */

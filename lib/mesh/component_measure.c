@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "mesh/component_parts.h"
+#include "mesh/mesh_frame.h"
 #include "mesh/stars.h"
 #include "mesh/sum.h"
 
@@ -16,6 +17,7 @@ enum { VERTEX_GRAIN = 1 << 13, COMPONENT_GRAIN = 64 };
 
 typedef struct measuring {
     ebpo_components *components;
+    ebpo_mesh_frame frame; /* of volumes */
     ebpo_stars stars;
     ebpo_star *star; /* one for each thread */
 } measuring;
@@ -69,16 +71,20 @@ static ebpo_status look_at_edges(measuring *m, unsigned threads, const ebpo_prog
 
 /* ---- volumes ---- */
 
-/* Six times that of the tetrahedron from `base`. */
-static double term_of(mesh_component *c, const ebpo_mesh *mesh, uint64_t face, const double base[3])
+/* Six times that of the tetrahedron from `base`, in the frame. */
+static double term_of(const measuring *m, mesh_component *c, uint64_t face, const double base[3])
 {
+    const ebpo_mesh *mesh = m->components->mesh;
     double t[3][3], cross[3];
     for (uint64_t k = 0; k < 3; k++) {
-        ebpo_mesh_position(mesh, mesh->faces[3 * face + k], t[k]);
+        uint32_t v = mesh->faces[3 * face + k];
+        ebpo_mesh_position(mesh, v, t[k]);
         for (int i = 0; i < 3; i++) {
             c->min[i] = t[k][i] < c->min[i] ? t[k][i] : c->min[i];
             c->max[i] = t[k][i] > c->max[i] ? t[k][i] : c->max[i];
         }
+        if (m->frame.scaled)
+            ebpo_frame_position(&m->frame, mesh, v, t[k]);
     }
     ebpo_face_cross(t[0], t[1], t[2], cross);
     return (t[0][0] - base[0]) * cross[0] + (t[0][1] - base[1]) * cross[1] +
@@ -96,11 +102,11 @@ static ebpo_status sum_volumes(void *context, uint64_t begin, uint64_t end, unsi
         mesh_component *one = &c->list[n];
         ebpo_sum sum = { .adds = 0 };
         double base[3];
-        ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)one->face], base);
+        ebpo_frame_position(&m->frame, c->mesh, c->mesh->faces[3 * (uint64_t)one->face], base);
         for (int k = 0; k < 3; k++)
             one->min[k] = INFINITY, one->max[k] = -INFINITY;
         EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[n], c->faces.begin[n + 1])
-            ebpo_sum_add(&sum, term_of(one, c->mesh, c->faces.of[i], base));
+            ebpo_sum_add(&sum, term_of(m, one, c->faces.of[i], base));
         one->volume = one->open ? 0 : ebpo_sum_value(&sum) / 6;
     }
     return EBPO_OK;
@@ -109,7 +115,7 @@ static ebpo_status sum_volumes(void *context, uint64_t begin, uint64_t end, unsi
 ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
                                     const ebpo_progress *progress, ebpo_error *error)
 {
-    measuring m = { .components = c };
+    measuring m = { .components = c, .frame = ebpo_mesh_frame_of(c->mesh) };
     threads = ebpo_thread_count(threads);
     ebpo_status status = look_at_edges(&m, threads, progress, error);
     return status == EBPO_OK ? ebpo_parallel_for(threads, NULL, c->count, COMPONENT_GRAIN,

@@ -9,6 +9,7 @@
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/arrays.h"
+#include "mesh/mesh_frame.h"
 #include "mesh/mesh_check_parts.h"
 #include "mesh/positions.h"
 
@@ -80,15 +81,12 @@ static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigne
     return EBPO_OK;
 }
 
-/* Squares and cubes of what lies between these are far from overflow and underflow. */
-enum { EXPONENT_MAX = 256 };
-
 static ebpo_units choose_units(const ebpo_mesh_report *r)
 {
     ebpo_units u = { .scaled = false };
     for (int k = 0; k < 3; k++) {
         frexp(fmax(fabs(r->min[k]), fabs(r->max[k])), &u.exponent[k]); /* 0 for 0 */
-        u.scaled |= u.exponent[k] > EXPONENT_MAX || u.exponent[k] < -EXPONENT_MAX;
+        u.scaled |= ebpo_exponent_is_far(u.exponent[k]);
     }
     if (!u.scaled)
         return (ebpo_units){ .scaled = false };

@@ -8,6 +8,7 @@
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/arrays.h"
+#include "mesh/mesh_frame.h"
 #include "mesh/mesh_parts.h"
 #include "mesh/stars.h"
 #include "mesh/sum.h"
@@ -30,6 +31,7 @@ typedef struct patch {
 
 typedef struct orienting {
     ebpo_mesh *mesh;
+    ebpo_mesh_frame frame; /* of volumes, of which signs count */
     ebpo_stars stars;
     ebpo_star *star; /* one for each thread */
     /* [face_count] a lower face of the patch, or itself: number << 1 | 1 when the two run against
@@ -237,13 +239,13 @@ static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned
                 add_volume(o, last, &sum);
             sum = (ebpo_sum){ .adds = 0 };
             last = p;
-            ebpo_mesh_position(mesh, mesh->faces[3 * (uint64_t)p->seed], base);
+            ebpo_frame_position(&o->frame, mesh, mesh->faces[3 * (uint64_t)p->seed], base);
         }
         const uint32_t *v = mesh->faces + 3 * f;
         double a[3], b[3], c[3], cross[3];
-        ebpo_mesh_position(mesh, v[0], a);
-        ebpo_mesh_position(mesh, v[1], b);
-        ebpo_mesh_position(mesh, v[2], c);
+        ebpo_frame_position(&o->frame, mesh, v[0], a);
+        ebpo_frame_position(&o->frame, mesh, v[1], b);
+        ebpo_frame_position(&o->frame, mesh, v[2], c);
         ebpo_face_cross(a, b, c, cross);
         double term =
             (a[0] - base[0]) * cross[0] + (a[1] - base[1]) * cross[1] + (a[2] - base[2]) * cross[2];
@@ -297,6 +299,7 @@ static ebpo_status run(orienting *o, ebpo_error *error)
     if (o->patch_count == 0)
         return EBPO_OK;
     count_faces(o);
+    o->frame = ebpo_mesh_frame_of(mesh);
     status = ebpo_parallel_for(0, NULL, count, FACE_GRAIN, measure, o, NULL, "", error);
     for (uint64_t i = 0; i < o->patch_count; i++)
         decide(&o->patches[i]);

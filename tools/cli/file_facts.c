@@ -1,5 +1,6 @@
 #include "cli/file_facts.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -17,6 +18,8 @@ static double cell_volume(const ebpo_info *info, int level)
 
 double facts_volume(const ebpo_info *info, int level)
 {
+    if (!isnormal(cell_volume(info, level))) /* the file's sums mean nothing then */
+        return NAN;
     double sum = info->level[level].gray_volume;
     for (int i = 0; i <= level; i++)
         /* a cell's volume may be infinite */
@@ -61,9 +64,16 @@ double facts_excess_ratio(const ebpo_info *info, double volume, double limit)
     return least > 1e-7 ? facts_excess(info, volume) / least : NAN;
 }
 
+/* A volume too small for a double keeps its sign. */
+static bool is_less_than_nothing(const ebpo_mesh_report *r)
+{
+    double box = (r->max[0] - r->min[0]) * (r->max[1] - r->min[1]) * (r->max[2] - r->min[2]);
+    return r->volume == 0 && signbit(r->volume) && box < DBL_MIN;
+}
+
 const char *facts_inside_out(const ebpo_info *info)
 {
-    if (!info->solid || !(info->report.volume < 0))
+    if (!info->solid || !(info->report.volume < 0 || is_less_than_nothing(&info->report)))
         return NULL;
     return info->rule == EBPO_RULE_POSITIVE
                ? "turned inside out: normals look inwards, and points within have winding number "
@@ -103,11 +113,12 @@ static void print_model(FILE *out, const ebpo_info *info)
             info->double_coordinates ? "double" : "float");
     if (!(info->parts & EBPO_PART_MESH))
         fputs(" (not in this file)", out);
-    char cell[TABLE_CELL], unit[TABLE_CELL];
+    char volume[40], unit[TABLE_CELL];
+    double v = info->report.volume;
     if (info->solid)
-        fprintf(out, "\n  solid     volume %s%s, by winding number, rule %s",
-                isfinite(info->report.volume) ? table_cell(cell, "%.6g", info->report.volume)
-                                              : "beyond 1.8e+308 (ebpo measure tells it)",
+        fprintf(out, "\n  solid     volume %s%s%s, by winding number, rule %s",
+                findings_extent(volume, sizeof volume, v, 3, &info->report),
+                isnormal(v) || volume[0] == '0' ? "" : " (ebpo measure tells it)",
                 table_unit(unit, info->unit, 3), words_rule(info->rule));
     if (facts_inside_out(info))
         fprintf(out, "\n  warning   %s", facts_inside_out(info));

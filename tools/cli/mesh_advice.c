@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "cli/tables.h"
+#include "cli/mesh_findings.h"
 #include "cli/words.h"
 
 static const struct doubt_text {
@@ -65,12 +65,12 @@ static void warn_of_surface(FILE *out, const ebpo_mesh_report *r)
 /* What was tried; else where that is done. */
 static void say_remedy(FILE *out, const mesh_input *p)
 {
-    char steps[64], volume[TABLE_CELL];
+    char steps[64], volume[40];
     if (p->tried && p->repairs.chosen >= 0) {
         const ebpo_repair_try *best = &p->repairs.tries[p->repairs.chosen];
         fprintf(out, "; %s, which --repair does, leaves a solid of volume %s",
                 steps_text(steps, sizeof steps, &best->record),
-                table_volume(volume, "%.6g", best->report.volume));
+                findings_extent(volume, sizeof volume, best->report.volume, 3, &best->report));
     } else if (p->tried)
         fputs("; no repair of ours leaves a plausible solid: use a mesh editor", out);
     else
@@ -105,7 +105,7 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
 {
     const ebpo_finding *f = &p->prepared.report.repeated_faces;
     const ebpo_repair_try *t = dropping_alone(p);
-    char text[80], steps[64], volume[TABLE_CELL];
+    char text[80], steps[64], volume[40];
     fprintf(out, "ebpo %s: %s: warning: %s of the same three vertices as an earlier one (face %llu",
             command, path, words_plural(text, sizeof text, f->count, "face is", "faces are"),
             (unsigned long long)f->place[0]);
@@ -124,7 +124,7 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
     fputs(steps_text(steps, sizeof steps, &t->record), out);
     if (t->report.balanced)
         fprintf(out, " leaves a solid of volume %s\n",
-                table_volume(volume, "%.6g", t->report.volume));
+                findings_extent(volume, sizeof volume, t->report.volume, 3, &t->report));
     else
         fprintf(out, " alone leaves a surface, %llu edges of which do not balance\n",
                 (unsigned long long)t->report.unbalanced_edges.count);
@@ -167,12 +167,12 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
 
 static void print_try(FILE *out, const ebpo_repair_try *t)
 {
-    char steps[64], text[80], volume[TABLE_CELL];
+    char steps[64], text[80];
     const ebpo_mesh_report *r = &t->report;
     fprintf(out, "    %s: %s, ", steps_text(steps, sizeof steps, &t->record),
             words_plural(text, sizeof text, r->components, "component", "components"));
     if (r->balanced)
-        fprintf(out, "volume %s", table_volume(volume, "%.6g", r->volume));
+        fprintf(out, "volume %s", findings_extent(text, sizeof text, r->volume, 3, r));
     else
         fprintf(out, "%llu edges do not balance", (unsigned long long)r->unbalanced_edges.count);
     if (t->record.filled_holes) {

@@ -1,5 +1,6 @@
 #include "cli/mesh_findings.h"
 
+#include <float.h>
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -108,13 +109,29 @@ static const char *kind(const ebpo_mesh_report *report)
                             : "a solid: its edges balance, though it is not a 2-manifold";
 }
 
-/* Of coordinates far out an area is beyond doubles although each of them is not. */
-static void print_extent(FILE *out, const char *what, double x)
+const char *findings_extent(char *text, size_t size, double x, int power,
+                            const ebpo_mesh_report *report)
 {
-    if (isfinite(x))
-        fprintf(out, ", %s %.6g", what, x);
+    int thick = 0;
+    for (int k = 0; k < 3; k++)
+        thick += report->max[k] > report->min[k];
+    if (!isfinite(x))
+        snprintf(text, size, "%s1.8e+308", signbit(x) ? "below -" : "beyond ");
+    else if (fabs(x) < DBL_MIN && thick >= power)
+        snprintf(text, size, signbit(x) ? "between -2.2e-308 and 0" : "below 2.2e-308");
     else
-        fprintf(out, ", %s beyond 1.8e+308 (ebpo measure tells it, of the converted file)", what);
+        snprintf(text, size, "%.6g", x);
+    return text;
+}
+
+static void print_extent(FILE *out, const char *what, double x, int power,
+                         const ebpo_mesh_report *report)
+{
+    char text[40];
+    bool told = isfinite(x) && fabs(x) >= DBL_MIN;
+    findings_extent(text, sizeof text, x, power, report);
+    fprintf(out, ", %s %s%s", what, text,
+            told || text[0] == '0' ? "" : " (ebpo measure tells it, of the converted file)");
 }
 
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
@@ -135,9 +152,9 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                 words_plural(parts, sizeof parts, report->boundary_loops, "hole", "holes"));
     if (report->genus_known)
         fprintf(out, ", genus %lld", (long long)report->genus);
-    print_extent(out, "area", report->area);
+    print_extent(out, "area", report->area, 2, report);
     if (report->balanced)
-        print_extent(out, "volume", report->volume);
+        print_extent(out, "volume", report->volume, 3, report);
     fprintf(out, ", mean edge %.4g\n  box %.6g %.6g %.6g to %.6g %.6g %.6g\n", report->mean_edge,
             report->min[0], report->min[1], report->min[2], report->max[0], report->max[1],
             report->max[2]);

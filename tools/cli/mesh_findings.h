@@ -15,6 +15,10 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
 const char *findings_many(const char *name);
 /* What mending did; nothing when nothing was asked for. */
 void findings_print_mending(FILE *out, const ebpo_mend_record *record);
+/* An area (power 2) or volume (3) of what the report is of: %.6g, or that it is more or less than
+ * doubles hold, as it may be although each coordinate is one. `text`: of `size` bytes. */
+const char *findings_extent(char *text, size_t size, double x, int power,
+                            const ebpo_mesh_report *report);
 void findings_json(json *j, const char *key, const ebpo_mesh_report *report);
 void findings_json_mending(json *j, const char *key, const ebpo_mend_record *record);
 /* unread   what reading left out; empty: nothing */

@@ -30,7 +30,8 @@ const char *table_volume(char out[TABLE_CELL], const char *format, double x)
 
 void table_beyond(FILE *out)
 {
-    fputs("-: not known, as volumes are beyond what the file's numbers hold, 1.8e+308\n", out);
+    fputs("-: not known, as volumes are not what the file's numbers hold, 2.2e-308 to 1.8e+308\n",
+          out);
 }
 
 bool table_in_range(double x, int64_t exponent)

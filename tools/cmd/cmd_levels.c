@@ -34,7 +34,7 @@ typedef struct printer {
 static double share(const printer *p, double volume)
 {
     double last = facts_volume(p->info, p->info->level_count - 1);
-    return isinf(last) ? NAN : last > 0 ? 100 * volume / last : 100;
+    return !isfinite(last) ? NAN : last > 0 ? 100 * volume / last : 100;
 }
 
 /* --- one level --- */

@@ -45,7 +45,7 @@ static void print_what(const char *out, const ebpo_info *info)
 
 static void print_sound(const ebpo_info *info, const mesh_input *p)
 {
-    char text[1024], cell[TABLE_CELL], unit[TABLE_CELL];
+    char text[1024], unit[TABLE_CELL];
     if (p->doubts) {
         printf("  sound     no: %s\n", advice_doubts(text, sizeof text, p));
         return;
@@ -53,7 +53,8 @@ static void print_sound(const ebpo_info *info, const mesh_input *p)
     printf("  sound     yes: %s, ",
            info->report.manifold ? "a closed 2-manifold" : "its edges balance");
     printf("volume %s%s; faces that cross were not looked for\n",
-           table_volume(cell, "%.6g", info->report.volume), table_unit(unit, info->unit, 3));
+           findings_extent(text, sizeof text, info->report.volume, 3, &info->report),
+           table_unit(unit, info->unit, 3));
 }
 
 static void print_size(const ebpo_info *info, bool chosen, double seconds)

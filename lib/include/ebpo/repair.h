@@ -28,7 +28,10 @@ typedef enum ebpo_doubt {
     /* Filling holes added as much area as there was, or more. */
     EBPO_DOUBT_MOSTLY_FILLED = 1 << 3,
 
-    /* The volume is that of a sheet: at most the cube of a hundredth of the area's root. */
+    /*
+     * The volume is that of a sheet: at most the cube of a hundredth of the area's root. Of
+     * coordinates so far from 1 that a volume is no double: there is no thickness at all.
+     */
     EBPO_DOUBT_NO_VOLUME = 1 << 4,
 
     /* The volume is negative: faces look inwards. */
