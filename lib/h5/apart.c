@@ -148,5 +148,10 @@ ebpo_status ebpo_apart(ebpo_apart_fn work, void *user, const char *shown,
         return ebpo_fail_errno(error, shown, "what the process that read it says is not known");
     if (!told)
         return judge_death(state, shown, error);
+    /* whatever has become of that process, its words end */
+    r.error.message[sizeof r.error.message - 1] = r.error.file[sizeof r.error.file - 1] =
+        r.error.object[sizeof r.error.object - 1] = 0;
+    if (r.status != EBPO_OK && r.status != r.error.status)
+        return judge_death(state, shown, error);
     return r.status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &r.error);
 }

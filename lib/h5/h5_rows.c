@@ -16,12 +16,20 @@
 #include "h5/h5.h"
 #include "h5/scope.h"
 
-enum { COLUMNS_MOST = 64, ROWS_AT_ONCE = 16384 };
+enum {
+    COLUMNS_MOST = 64,
+    ROWS_AT_ONCE = 16384,
+    /* Of a file's bytes, what its rows may take: as much as deflate can save, and so much anyhow. A
+     * file of a kilobyte can state any number of rows. */
+    EXPANSION_MOST = 1024,
+    EXPANSION_FREE = 64 << 20
+};
 
 typedef struct dataset {
     const char *path, *name;
     int to; /* the descriptor of where rows go */
     unsigned least, most;
+    uint64_t bytes_most; /* of all rows */
     double fill;
     hid_t file, set, space, type;
     hsize_t size[2];
@@ -32,12 +40,39 @@ static ebpo_status fail(const dataset *d, const char *what, ebpo_error *error)
     return ebpo_h5_fail(error, EBPO_E_FORMAT, d->path, d->name, what);
 }
 
+static herr_t follow_none(const char *parent_file, const char *parent_group, const char *file,
+                          const char *object, unsigned *flags, hid_t access, void *user)
+{
+    (void)parent_file, (void)parent_group, (void)file, (void)object, (void)flags, (void)access;
+    *(bool *)user = true;
+    return -1;
+}
+
+/* Whether the values lie in files that this one names. */
+static bool lies_elsewhere(hid_t set)
+{
+    hid_t made = H5Dget_create_plist(set);
+    bool elsewhere =
+        made >= 0 && (H5Pget_layout(made) == H5D_VIRTUAL || H5Pget_external_count(made) > 0);
+    if (made >= 0)
+        H5Pclose(made);
+    return elsewhere;
+}
+
 static ebpo_status open_set(dataset *d, ebpo_error *error)
 {
+    bool elsewhere = false;
     d->file = H5Fopen(d->path, H5F_ACC_RDONLY, H5P_DEFAULT);
     if (d->file < 0)
         return ebpo_h5_fail(error, EBPO_E_FORMAT, d->path, "", "not a whole HDF5 file");
-    d->set = H5Dopen2(d->file, d->name, H5P_DEFAULT);
+    hid_t access = H5Pcreate(H5P_DATASET_ACCESS);
+    if (access < 0 || H5Pset_elink_cb(access, follow_none, &elsewhere) < 0)
+        return ebpo_fail_memory(error, sizeof *d);
+    d->set = H5Dopen2(d->file, d->name, access);
+    H5Pclose(access);
+    if (elsewhere || (d->set >= 0 && lies_elsewhere(d->set)))
+        return fail(d, "its values lie in another file, which is not looked for; name that one",
+                    error);
     if (d->set < 0)
         return fail(d, "there is no such dataset", error);
     d->space = H5Dget_space(d->set);
@@ -54,7 +89,11 @@ static ebpo_status check_set(dataset *d, unsigned least, unsigned most, ebpo_err
     if (H5Sget_simple_extent_ndims(d->space) == 2 &&
         H5Sget_simple_extent_dims(d->space, d->size, NULL) == 2 && d->size[1] >= least &&
         d->size[1] <= most)
-        return EBPO_OK;
+        return d->size[0] <= d->bytes_most / (most * sizeof(double))
+                   ? EBPO_OK
+                   : ebpo_h5_fail(error, EBPO_E_LIMIT, d->path, d->name,
+                                  "has so many more rows than its file has bytes that it may be "
+                                  "made to exhaust memory; give its rows as a NumPy array");
     snprintf(what, sizeof what, "rows of %u%s%.0u numbers are expected", least,
              most > least ? " to " : "", most > least ? most : 0);
     return fail(d, what, error);
@@ -134,6 +173,10 @@ static ebpo_status make_ready(dataset *d, ebpo_error *error)
         return ebpo_fail_errno(error, d->path, "cannot be opened");
     if (!S_ISREG(facts.st_mode))
         return ebpo_fail_file(error, EBPO_E_IO, d->path, "is no regular file; name one");
+    uint64_t bytes = (uint64_t)facts.st_size;
+    d->bytes_most =
+        bytes > UINT64_MAX / 2 / EXPANSION_MOST ? UINT64_MAX / 2 : bytes * EXPANSION_MOST;
+    d->bytes_most = d->bytes_most < EXPANSION_FREE ? EXPANSION_FREE : d->bytes_most;
     d->to = ebpo_open_unnamed(folder && *folder ? folder : "/tmp");
     return d->to >= 0 ? EBPO_OK : ebpo_fail_errno(error, d->path, "no room for its rows in TMPDIR");
 }
@@ -142,8 +185,8 @@ ebpo_status ebpo_rows_read(const char *path, const char *name, unsigned least, u
                            double fill, double **rows, uint64_t *count, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_apart_limits limits = { UINT64_C(1) << 30, UINT64_MAX, 600 };
-    dataset d = { path, name, -1, least, most, fill, -1, -1, -1, -1, { 0, 0 } };
+    ebpo_apart_limits limits = { UINT64_C(1) << 30, 0, 600 };
+    dataset d = { path, name, -1, least, most, 0, fill, -1, -1, -1, -1, { 0, 0 } };
     *rows = NULL;
     *count = 0;
     if (least < 1 || most < least || most > COLUMNS_MOST)
@@ -152,6 +195,7 @@ ebpo_status ebpo_rows_read(const char *path, const char *name, unsigned least, u
     ebpo_status status = ebpo_h5_register(error); /* our own files have such datasets, too */
     if (status == EBPO_OK)
         status = make_ready(&d, error);
+    limits.file_bytes = d.bytes_most;
     if (status == EBPO_OK)
         status = ebpo_apart(read_apart, &d, path, &limits, error);
     if (status == EBPO_OK)

@@ -20,9 +20,11 @@ extern "C" {
  * rows           [*count][most] doubles. Freed by free(). On failure NULL.
  *
  * EBPO_E_IO: the file cannot be read. EBPO_E_FORMAT: it is no HDF5 file, has no such dataset, or
- * one of another shape or type. EBPO_E_ARGUMENT, EBPO_E_MEMORY. EBPO_E_UNSUPPORTED: this library
- * was built without libhdf5. That reads the file in a process of its own, with limits on memory and
- * time and without plugins; rows come by a file without a name in TMPDIR.
+ * one of another shape or type, or whose values lie in another file. EBPO_E_LIMIT: the rows would
+ * take more than 64 MiB and than 1,024 times the file. EBPO_E_ARGUMENT, EBPO_E_MEMORY.
+ * EBPO_E_UNSUPPORTED: this library was built without libhdf5. That reads the file in a process of
+ * its own, with limits on memory and time and without plugins; rows come by a file without a name
+ * in TMPDIR.
  *
  * Threads: any.
  */
