@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "mesh/mesh_frame.h"
 
 #include "base/arrays.h"

@@ -3,7 +3,7 @@
 import { decodeChunk } from './chunk.js';
 import { formatError } from './error.js';
 import { decodeGates } from './gates.js';
-import { chunkFits } from './sums.js';
+import { chunkEnd } from './sums.js';
 
 const GAP_BYTES = 16 * 1024;            // rather read this much for nothing than ask twice
 const REQUEST_BYTES = 4 * 1024 * 1024;  // a request's most
@@ -58,10 +58,12 @@ function withoutGates(bytes, array, chunk) {
 export class ChunkCache {
   /**
    * `head`: the file's first bytes, which are not fetched again. `values(array, chunk, bytes)`: what is kept of a chunk: something with byteLength, or a promise of it.
-   * `sums()`: a promise of how chunks must end (sums.js), or of undefined; it is not asked about lists of chunks.
+   * `sums()`: a promise of how chunks must end (sums.js), or of undefined; it is not asked about lists of chunks. `late()`: whether that has still to come,
+   * so that what has come before is given first.
    */
-  constructor(source, head, { zstd, values, sums, budget = CACHE_BYTES }) {
-    Object.assign(this, { source, head, zstd, values, sums, budget });
+  constructor(source, head, { zstd, values, sums, late, budget = CACHE_BYTES }) {
+    Object.assign(this, { source, head, zstd, values, sums, late, budget });
+    this.early = [];          // chunks that were given before it was known how they must end
     this.kept = new Map();    // by key, oldest first
     this.bytes = 0;           // of what is kept
     this.pending = new Map(); // promises by key
@@ -118,14 +120,39 @@ export class ChunkCache {
     sums?.catch(() => {}); // who waits for it tells
     return this.fetch(wanted.map(({ array, chunk }) => array.chunks[chunk])).map(async (promise, i) => {
       const { array, chunk } = wanted[i], stored = await promise;
-      if (!array.list && !chunkFits((await sums)?.get(array), chunk, stored))
-        throw formatError(`${array.path}: chunk ${chunk}`, 'the chunk is damaged: it is not the one that was written there');
+      if (!array.list)
+        await this.#judge(sums, array, chunk, stored);
       const { elementSize, rowBytes } = array.stored, got = await decodeChunk(stored, array.pipeline, elementSize, array.chunkRows * rowBytes, await this.zstd);
       const { bytes, fault } = got.bytes && array.gates ? withoutGates(got.bytes, array, chunk) : got;
       if (fault)
         throw formatError(`${array.path}: chunk ${chunk}`, `the chunk is damaged: ${fault}`);
       return bytes;
     });
+  }
+
+  async #judge(sums, array, chunk, stored) {
+    const end = chunkEnd(stored), { at, bytes } = array.chunks[chunk];
+    if (this.broken)
+      throw this.broken;
+    if (at + bytes <= this.coming && this.late?.())
+      this.early.push({ array, chunk, end });
+    else
+      this.#compare(await sums, array, chunk, end);
+  }
+
+  #compare(sums, array, chunk, end) {
+    if (sums && sums.get(array)[chunk] !== end)
+      throw formatError(`${array.path}: chunk ${chunk}`, 'the chunk is damaged: it is not the one that was written there');
+  }
+
+  /** Now it is known how chunks must end: was one of those that were given another one, nothing more is given. */
+  judgeEarly(sums) {
+    try {
+      for (const { array, chunk, end } of this.early.splice(0))
+        this.#compare(sums, array, chunk, end);
+    } catch (error) {
+      this.broken = error;
+    }
   }
 
   // --- what is kept: also other things than chunks, under keys that are texts ---

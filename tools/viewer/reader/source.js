@@ -155,6 +155,11 @@ export class UrlSource {
     return this.whole ? this.whole.length : this.first ? (this.running.has(this.first) ? Math.min(this.first.to, this.size ?? 0) : this.first.end) : 0;
   }
 
+  /** How many of the file's first bytes have come. */
+  get come() {
+    return this.whole ? this.whole.length : this.first?.got ?? 0;
+  }
+
   /** What is waited for: { from, to, got, quiet }, `quiet` the ms since a byte of it came. */
   underway() {
     return [...this.running.keys()].filter((t) => t.end < t.to).map((t) => ({ from: t.from, to: t.to, got: t.got, quiet: performance.now() - t.at }));

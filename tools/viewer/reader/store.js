@@ -13,7 +13,7 @@ export class Store {
     this.info = info;
     this.arrays = arrays;
     this.small = new Map();
-    this.cache = new ChunkCache(source, head, { ...options, sums: () => this.sums(), values: (array, chunk, bytes) => this.#values(array, chunk, bytes) });
+    this.cache = new ChunkCache(source, head, { ...options, sums: () => this.sums(), late: () => this.#sumsAreLate(), values: (array, chunk, bytes) => this.#values(array, chunk, bytes) });
   }
 
   /** How the chunks must end; undefined where the file does not say, or what it says is of before another program rewrote it. Read once. */
@@ -21,10 +21,23 @@ export class Store {
     const list = this.arrays.get(CHUNK_SUMS);
     if (!list || !placesHold(list, this.cache.source.size))
       return Promise.resolve(undefined);
-    this.ends ??= Promise.all(this.cache.decoded([{ array: list, chunk: 0 }])).then(([bytes]) =>
-      readSums(new Uint32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4), [...this.arrays.values()].filter((a) => !a.list)));
+    this.ends ??= this.#readSums(list);
     this.ends.catch(() => (this.ends = undefined)); // the next one tries again
     return this.ends;
+  }
+
+  async #readSums(list) {
+    const [bytes] = await Promise.all(this.cache.decoded([{ array: list, chunk: 0 }]));
+    const sums = readSums(new Uint32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4), [...this.arrays.values()].filter((a) => !a.list));
+    this.summed = true;
+    this.cache.judgeEarly(sums);
+    return sums;
+  }
+
+  // Of a source that tells how much has come, the first levels are given as soon as they have, also when the list never does.
+  #sumsAreLate() {
+    const [{ at, bytes }] = this.arrays.get(CHUNK_SUMS)?.chunks ?? [{ at: 0, bytes: 0 }], { head, source } = this.cache;
+    return !this.summed && source.come !== undefined && at + bytes > Math.max(head.length, source.come);
   }
 
   async #values(array, chunk, bytes) {

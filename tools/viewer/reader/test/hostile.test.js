@@ -40,6 +40,60 @@ async function refused(bytes, said, read = readBySubtree) {
   });
 }
 
+// --- how chunks end ---
+
+const summed = readFileSync(new URL('../../../../format-spec/vectors/passed/55_chunk_sums_of_subtrees.ebpo.h5', import.meta.url));
+
+// The beginning of a file is there; what lies behind `limit` comes when `gate` opens.
+class SlowSource {
+  constructor(data, limit, gate) {
+    Object.assign(this, { data, limit, gate, name: 'slow', size: data.length, requests: 0, bytes: 0 });
+  }
+
+  async open(bytes) {
+    return this.data.subarray(0, Math.min(bytes, this.limit));
+  }
+
+  async read(offset, length) {
+    if (offset + length > this.limit)
+      await this.gate;
+    return this.data.subarray(offset, offset + length);
+  }
+
+  get coming() {
+    return this.limit;
+  }
+
+  get come() {
+    return this.limit;
+  }
+}
+
+// With another end in the list for the types of level 2 than they have.
+function withWrongEnd(data, { at, bytes: length }) {
+  const bytes = Buffer.from(data), rows = bytes.subarray(at, at + length - 4);
+  for (let row = 0; row < rows.length; row += 8)
+    rows[row] ^= Number(rows.readUInt32LE(row + 4) === 2 * 64);
+  bytes.writeUInt32LE(fletcher32(rows), at + length - 4);
+  return bytes;
+}
+
+test('levels that have come are given before the list of sums; a wrong one among them is told when that has come', async () => {
+  const list = (await openEbpo(summed)).arrays.get('/chunk_sums').chunks[0], wrong = withWrongEnd(summed, list);
+  for (const data of [summed, wrong]) {
+    let open;
+    const file = await openEbpo(new SlowSource(data, list.at, new Promise((done) => (open = done))));
+    assert.equal((await file.levels(0, 2)).length, 3);
+    open();
+    await file.store.sums();
+    if (data === summed)
+      assert.equal((await file.levels(3, 3)).length, 1);
+    else
+      await assert.rejects(file.levels(3, 3), /levels\/02\/types: chunk 0: the chunk is damaged: it is not the one/);
+  }
+  await assert.rejects((await openEbpo(wrong)).levels(2, 2), /it is not the one/); // all is there: nothing is given
+});
+
 // The list of a file with arrays of several chunks, as pairs of bytes and number.
 const many = await openEbpo(readFileSync(new URL('../../../../format-spec/vectors/passed/16_many_subtrees.ebpo.h5', import.meta.url)));
 const list = many.arrays.get('/subtrees/places'), arrays = [...many.arrays.values()].filter((a) => a !== list), [stored] = await Promise.all(many.store.cache.decoded([{ array: list, chunk: 0 }]));
