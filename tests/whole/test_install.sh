@@ -13,8 +13,16 @@ log=$build/meson-logs/install-log.txt
 [ -f "$log" ] && cp -p "$log" "$work/log"
 DESTDIR="$work/all" "$meson" install -C "$build" --no-rebuild >"$work/out" 2>&1
 installed=$?
+# Uninstalled, nothing is left, not even a folder.
+if [ $installed = 0 ]; then
+    cp -a "$work/all" "$work/again"
+    (cd "$build" && "$meson" --internal uninstall) >"$work/uninstalled" 2>&1
+    [ ! -d "$work/all" ] || find "$work/all" -mindepth 1 >"$work/left"
+    rm -rf "$work/all" && mv "$work/again" "$work/all"
+fi
 if [ -f "$work/log" ]; then cp -p "$work/log" "$log"; else rm -f "$log"; fi
 [ $installed = 0 ] || fail "meson install"
+if [ -s "$work/left" ]; then cp "$work/left" "$work/out"; fail "left after uninstall"; fi
 
 # Nothing lies beside the prefix.
 find "$work/all" ! -type d ! -path "$work/all$prefix/*" >"$work/out"
@@ -68,6 +76,33 @@ if command -v pkg-config >/dev/null &&
     "$meson" configure "$build" 2>/dev/null | grep -q 'pkgconfig.relocatable *true'; then
     PKG_CONFIG_PATH=$(dirname "$pc") pkg-config --variable=prefix ebpo >"$work/out" 2>&1 || fail pkg-config
     there=$(cd "$(sed 's/\\//g' "$work/out")" && pwd -P) && [ "$there" = "$own" ] || fail "ebpo.pc moves along"
+fi
+
+# And by CMake.
+if command -v cmake >/dev/null; then
+    mkdir "$work/user"
+    cat >"$work/user/CMakeLists.txt" <<'CMAKE'
+cmake_minimum_required(VERSION 3.10)
+project(user C)
+find_package(ebpo 0.1 REQUIRED)
+add_executable(user user.c)
+target_link_libraries(user ebpo::ebpo)
+CMAKE
+    cat >"$work/user/user.c" <<'C'
+#include <ebpo/ebpo.h>
+#include <stdio.h>
+int main(void)
+{
+    puts(ebpo_version());
+    return 0;
+}
+C
+    (cd "$work/user" && cmake -S . -B made -DCMAKE_PREFIX_PATH="$own" && cmake --build made) \
+        >"$work/out" 2>&1 || fail "find_package(ebpo)"
+    "$work/user/made/user" >"$work/out" 2>&1 || fail "a program made by CMake"
+    sed 's/ebpo 0.1 /ebpo 0.9 /' "$work/user/CMakeLists.txt" >"$work/new" && mv "$work/new" "$work/user/CMakeLists.txt"
+    (cd "$work/user" && cmake -S . -B later -DCMAKE_PREFIX_PATH="$own") >"$work/out" 2>&1 &&
+        fail "find_package takes an older version"
 fi
 
 # Configured for a machine whose programs do not run here, none is run.
