@@ -421,6 +421,41 @@ static ebpo_status call_map(every_call_env *e)
     return status;
 }
 
+static ebpo_status touch(ebpo_model *model, ebpo_error *error)
+{
+    static const double away[3] = { 9, 0, 0 }, closer[3] = { 6, 0, 0 };
+    ebpo_touch *touch;
+    ebpo_touch_result answer;
+    ebpo_touch_stats stats = EBPO_TOUCH_STATS_INIT;
+    double way[EBPO_TOUCH_WAY_MOST][3];
+    ebpo_touch_options options = EBPO_TOUCH_OPTIONS_INIT;
+    options.faces = 1 << 12;
+    ebpo_status status = ebpo_touch_new(model, &options, away, &touch, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_touch_move(touch, away, &answer);
+    (void)ebpo_touch_way(touch, way);
+    status = ebpo_touch_place(touch, closer, error);
+    if (status == EBPO_OK)
+        status = ebpo_touch_check(touch, error);
+    if (status == EBPO_OK)
+        status = ebpo_touch_get_stats(touch, &stats);
+    ebpo_touch_free(touch);
+    return status;
+}
+
+static ebpo_status call_touch(every_call_env *e)
+{
+    ebpo_model *model;
+    ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
+    opening.threads = 1;
+    ebpo_status status = ebpo_model_new(e->file, &opening, &model, e->error);
+    if (status == EBPO_OK)
+        status = touch(model, e->error);
+    ebpo_model_free(model);
+    return status;
+}
+
 static ebpo_status call_measure(every_call_env *e)
 {
     ebpo_mass mass = EBPO_MASS_INIT;
@@ -807,6 +842,7 @@ const every_call every_call_answers[] = {
     { "ask_nodes", call_ask_nodes },
     { "budget", call_budget },
     { "map", call_map },
+    { "touch", call_touch },
     { "measure", call_measure },
     { "deviation", call_deviation },
     { "limit", call_limit },

@@ -22,6 +22,7 @@
  *   subtree.h     a part of a model as plain arrays: nodes, envelopes, faces
  *   lod.h         a level as closed polygons
  *   map.h         maps of distance: planes, grids, two scans
+ *   touch.h       a hand that touches a model, at a steady rate
  *   export.h      levels and the mesh in other programs' formats
  *   subset.h      a smaller file from a file
  *   verify.h      proving that a file keeps its promises
@@ -55,6 +56,7 @@
 #include <ebpo/lod.h>
 #include <ebpo/export.h>
 #include <ebpo/map.h>
+#include <ebpo/touch.h>
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 #include <ebpo/deviation.h>

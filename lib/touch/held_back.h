@@ -1,0 +1,17 @@
+/* A way that planes through its beginning hold back: the nearest that is allowed to where it wanted
+ * to end. */
+#ifndef EBPO_TOUCH_HELD_BACK_H
+#define EBPO_TOUCH_HELD_BACK_H
+
+enum { EBPO_PLANES_MOST = 12 };
+
+typedef struct ebpo_held_planes {
+    double normal[EBPO_PLANES_MOST][3]; /* unit vectors to the side that is free */
+    int count;
+} ebpo_held_planes;
+
+/* `out` is the way `want` projected onto the cone n . x >= 0 for all planes; 0 if rounding finds
+ * none. Returns how far below 0 n . out may be. */
+double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], double out[3]);
+
+#endif

@@ -1,0 +1,92 @@
+/* Inside lib/touch: the object, and who may use which part of it. */
+#ifndef EBPO_TOUCH_TOUCH_PARTS_H
+#define EBPO_TOUCH_TOUCH_PARTS_H
+
+#include <ebpo/touch.h>
+#include <pthread.h>
+#include <stdatomic.h>
+
+#include "touch/face_box.h"
+#include "touch/held_back.h"
+
+enum {
+    /* The tick's box, the one it looked at last, the one between, the one being loaded. */
+    EBPO_TOUCH_BOXES = 4,
+    EBPO_TOUCH_FRESH = 8, /* beside a box's number: the tick has not seen it */
+
+    /* What one step of a tick may look at: at most. */
+    EBPO_TOUCH_FACES = 2048,
+    EBPO_TOUCH_VISITS = 4096,
+
+    EBPO_TOUCH_PIECES = EBPO_TOUCH_WAY_MOST - 1
+};
+
+struct ebpo_touch {
+    /* for good */
+    ebpo_model *model;
+    ebpo_touch_options options;
+    ebpo_extent root; /* no face is outside */
+    double diagonal; /* of the root cell */
+    double reach, band, margin;
+    bool solid;
+
+    /* of the ticks' thread */
+    unsigned at, seen; /* boxes */
+    double proxy[3], hand[3], force[3];
+    bool touching;
+    ebpo_held_planes planes; /* that hold the proxy */
+    double way[EBPO_TOUCH_WAY_MOST][3];
+    uint32_t way_count;
+    double given; /* energy */
+    ebpo_touch_stats stats;
+    uint32_t found[EBPO_TOUCH_FACES];
+    double met[EBPO_TOUCH_FACES];
+    double away[EBPO_TOUCH_FACES][3];
+    ebpo_context *asking; /* for places */
+
+    /* handed over */
+    ebpo_face_box box[EBPO_TOUCH_BOXES];
+    atomic_uint between;            /* a box, perhaps fresh */
+    _Atomic double proxy_told[3];   /* each for itself: what the loader makes of a mixture is */
+    _Atomic double hand_told[3];    /* a box like any other, and the tick looks whether it fits */
+    _Atomic bool stop;
+    atomic_uint_fast64_t loads, too_many, load_ns, load_ns_most;
+
+    /* of the loading thread */
+    ebpo_context *loading;
+    unsigned own; /* box */
+    ebpo_extent last;
+    double half; /* of a box's sides */
+    double hand_before[3];
+    uint64_t when_before;
+    pthread_t thread;
+    bool has_thread;
+
+    pthread_mutex_t mutex; /* of `failure`: never locked by a tick */
+    ebpo_error failure;
+};
+
+/* touch_step.c: the proxy goes towards the goal, as far as faces and the box at hand allow; bits of
+ * ebpo_touch_flag. */
+uint32_t ebpo_touch_go(ebpo_touch *t, const double goal[3], uint32_t *work);
+
+/* touch_around.c: nearest face, weights, depth and the smooth normal. */
+void ebpo_touch_look(ebpo_touch *t, ebpo_touch_result *out);
+
+/* touch_loader.c */
+EBPO_MUST_USE ebpo_status ebpo_touch_loader_start(ebpo_touch *t, ebpo_error *error);
+void ebpo_touch_loader_stop(ebpo_touch *t);
+
+/* touch_move.c: a box that is fresh and holds the proxy becomes the one at hand. True: one did. */
+bool ebpo_touch_take_box(ebpo_touch *t);
+void ebpo_touch_tell(ebpo_touch *t, const double hand[3]);
+
+static inline bool ebpo_extent_holds(const ebpo_extent *e, const double p[3])
+{
+    for (int i = 0; i < 3; i++)
+        if (!(p[i] >= e->min[i] && p[i] <= e->max[i]))
+            return false;
+    return true;
+}
+
+#endif

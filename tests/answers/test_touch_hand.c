@@ -1,0 +1,452 @@
+/* A hand that touches: never through a face and never closer than its radius, judged by arithmetic
+ * that does not round, however wildly it is moved; forces on a plane, by formula; friction; energy;
+ * and nothing is called in a tick that could make it late. */
+#include <ebpo/touch.h>
+#include <gmp.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "check_main.h"
+#include "query_kit.h"
+
+/* --- what a tick may not call: the linker hands these calls over to here --- */
+
+static _Thread_local bool in_tick;
+static unsigned long forbidden;
+
+static void watch(void) { forbidden += in_tick; }
+
+#define WATCH(type, name, parameters, arguments) \
+    type __real_##name parameters;               \
+    type __wrap_##name parameters;               \
+    type __wrap_##name parameters                \
+    {                                            \
+        watch();                                 \
+        return __real_##name arguments;          \
+    }
+WATCH(void *, malloc, (size_t n), (n))
+WATCH(void *, calloc, (size_t n, size_t m), (n, m))
+WATCH(void *, realloc, (void *p, size_t n), (p, n))
+WATCH(void *, aligned_alloc, (size_t a, size_t n), (a, n))
+WATCH(int, pthread_mutex_lock, (pthread_mutex_t * m), (m))
+WATCH(int, pthread_cond_wait, (pthread_cond_t * c, pthread_mutex_t *m), (c, m))
+WATCH(int, pthread_cond_signal, (pthread_cond_t * c), (c))
+WATCH(int, pthread_cond_broadcast, (pthread_cond_t * c), (c))
+WATCH(ssize_t, pread64, (int fd, void *p, size_t n, off_t at), (fd, p, n, at))
+WATCH(ssize_t, read, (int fd, void *p, size_t n), (fd, p, n))
+WATCH(int, nanosleep, (const struct timespec *t, struct timespec *left), (t, left))
+
+void __real_free(void *p);
+void __wrap_free(void *p);
+void __wrap_free(void *p)
+{
+    watch();
+    __real_free(p);
+}
+
+static void *gmp_take(size_t n)
+{
+    watch();
+    return __real_malloc(n);
+}
+static void *gmp_more(void *p, size_t old, size_t n)
+{
+    (void)old;
+    watch();
+    return __real_realloc(p, n);
+}
+static void gmp_give(void *p, size_t n)
+{
+    (void)n;
+    watch();
+    __real_free(p);
+}
+
+static void tick(ebpo_touch *touch, const double hand[3], ebpo_touch_result *out)
+{
+    in_tick = true;
+    ebpo_touch_move(touch, hand, out);
+    in_tick = false;
+}
+
+static void pause_a_little(void)
+{
+    const struct timespec t = { 0, 300000 };
+    nanosleep(&t, NULL);
+}
+
+/* --- a wild hand, judged --- */
+
+typedef struct judged {
+    query_model *m;
+    ebpo_touch *touch;
+    ebpo_touch_options options;
+    double skin, proxy[3], hand[3], force[3];
+    double given, step; /* energy; the longest step */
+    bool placed;
+} judged;
+
+static bool has_area(judged *j, uint32_t face)
+{
+    double n[3];
+    oracle_normal(j->m->judge, face, n);
+    return n[0] != 0 || n[1] != 0 || n[2] != 0;
+}
+
+static void judge_piece(judged *j, const double from[3], const double to[3])
+{
+    const oracle_hit *hits;
+    uint32_t count;
+    double way[3];
+    for (int i = 0; i < 3; i++)
+        way[i] = to[i] - from[i];
+    if (way[0] == 0 && way[1] == 0 && way[2] == 0)
+        return;
+    oracle_ray(j->m->judge, from, way, 1, &hits, &count);
+    for (uint32_t i = 0; i < count; i++)
+        ck_assert_msg(!has_area(j, hits[i].face), "%s: the proxy went through face %u", j->m->name,
+                      hits[i].face);
+    oracle_nearest near;
+    oracle_find_nearest(j->m->judge, to, &near);
+    ck_assert_msg(near.distance >= j->options.radius + j->skin / 2,
+                  "%s: %g from a face, radius %g, skin %g", j->m->name, near.distance,
+                  j->options.radius, j->skin);
+}
+
+/* All pieces, which are one way from where the proxy was. */
+static void judge_way(judged *j, const double to[3])
+{
+    double way[EBPO_TOUCH_WAY_MOST][3];
+    uint32_t count = ebpo_touch_way(j->touch, way);
+    ck_assert_uint_ge(count, 1);
+    ck_assert_mem_eq(way[0], j->proxy, sizeof way[0]);
+    ck_assert_mem_eq(way[count - 1], to, sizeof way[0]);
+    for (uint32_t i = 1; i < count; i++)
+        judge_piece(j, way[i - 1], way[i]);
+}
+
+static double apart(const double a[3], const double b[3])
+{
+    return hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+}
+
+static void judge_face(judged *j, const ebpo_touch_result *r)
+{
+    oracle_nearest near;
+    if (r->flags & EBPO_TOUCH_PARTLY)
+        return;
+    oracle_find_nearest(j->m->judge, r->proxy, &near);
+    double gap = near.distance - j->options.radius;
+    if (r->face == EBPO_NO_FACE) {
+        ck_assert_double_ge(gap, j->options.look * (1 - 1e-9));
+        return;
+    }
+    ck_assert_double_le(fabs(r->weight[0] + r->weight[1] + r->weight[2] - 1), 1e-12);
+    ck_assert_double_le(fabs(apart(r->proxy, r->point) - near.distance), j->skin / 16);
+    if (!(r->flags & EBPO_TOUCH_CONTACT))
+        ck_assert_double_le(fabs(r->depth + gap), j->skin / 16);
+}
+
+static void judge_tick(judged *j, const double hand[3], bool closely)
+{
+    ebpo_touch_result r;
+    tick(j->touch, hand, &r);
+    double work = 0;
+    for (int i = 0; i < 3; i++)
+        work += j->force[i] * (hand[i] - j->hand[i]);
+    j->given += work;
+    j->step = fmax(j->step, apart(hand, j->hand));
+    ck_assert_msg(j->given <= j->options.stiffness * j->step * j->step,
+                  "%s: the wall gave %g, the longest step is %g", j->m->name, j->given, j->step);
+    judge_way(j, r.proxy);
+    if (closely)
+        judge_face(j, &r);
+    if (!(r.flags & (EBPO_TOUCH_CONTACT | EBPO_TOUCH_WAITS | EBPO_TOUCH_SHORT)))
+        ck_assert_msg(apart(r.proxy, hand) <= j->skin, "%s: nothing holds the proxy", j->m->name);
+    for (int i = 0; i < 3; i++) {
+        j->proxy[i] = r.proxy[i];
+        j->hand[i] = hand[i];
+        j->force[i] = r.force[i];
+    }
+}
+
+/* A place outside, far enough from faces; false: this is none. */
+static bool begin(judged *j, uint64_t *state)
+{
+    const ebpo_info *info = ebpo_file_info(j->m->file);
+    double place[3], diagonal = 0;
+    for (int i = 0; i < 3; i++) {
+        place[i] = info->box_origin[i] +
+                   (1.4 * ebpo_test_random_unit(state) - 0.2) * info->box_size[i];
+        diagonal = hypot(diagonal, info->box_size[i]);
+    }
+    j->skin = 1e-5 * diagonal;
+    j->options = (ebpo_touch_options)EBPO_TOUCH_OPTIONS_INIT;
+    j->options.skin = j->skin;
+    j->options.look = 0.05 * diagonal;
+    j->options.faces = 1 << 10;
+    j->options.radius = ebpo_test_random(state) % 2 ? 0.02 * diagonal : 0;
+    j->options.friction = ebpo_test_random(state) % 2 ? 0.3 : 0;
+    ebpo_error why = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_touch_new(j->m->model, &j->options, place, &j->touch, &why);
+    ck_assert_msg(status == EBPO_OK || status == EBPO_E_ARGUMENT, "%s", why.message);
+    for (int i = 0; i < 3; i++) {
+        j->proxy[i] = j->hand[i] = place[i];
+        j->force[i] = 0;
+    }
+    return status == EBPO_OK;
+}
+
+/* Goes to random places, slowly or at once; through the solid, too. */
+static void wave(judged *j, uint64_t ticks, uint64_t *state)
+{
+    const ebpo_info *info = ebpo_file_info(j->m->file);
+    double goal[3], hand[3];
+    for (uint64_t i = 0; i < ticks;) {
+        uint64_t steps = ebpo_test_random(state) % 3 ? 1 + ebpo_test_random(state) % 40 : 1;
+        for (int k = 0; k < 3; k++)
+            goal[k] = info->box_origin[k] +
+                      (1.4 * ebpo_test_random_unit(state) - 0.2) * info->box_size[k];
+        double from[3] = { j->hand[0], j->hand[1], j->hand[2] };
+        for (uint64_t s = 1; s <= steps && i < ticks; s++, i++) {
+            for (int k = 0; k < 3; k++)
+                hand[k] = from[k] + (goal[k] - from[k]) * (double)s / (double)steps;
+            judge_tick(j, hand, i % 8 == 0);
+            if (i % 4 == 0)
+                pause_a_little(); /* as a device does: boxes come meanwhile */
+        }
+    }
+}
+
+static const char *const wild[] = { "sphere",       "thin_wall", "thin_hollow", "cavity",
+                                    "staircase",    "blob",      "needle",      "cone_slivers",
+                                    "giant_and_dust", "open_box", "mobius",     "far_away",
+                                    "zero_area_face", "turned_boxes", "gap_of_one_ulp", "l_shape" };
+enum { WILD = sizeof wild / sizeof *wild };
+
+START_TEST(a_wild_hand_goes_through_nothing)
+{
+    query_model m;
+    uint64_t state = 77 + (uint64_t)_i;
+    query_model_make(&m, wild[_i], query_solid_by_name(wild[_i]), &query_variants[0]);
+    uint64_t ticks = query_scaled(3000);
+    for (int turn = 0, begun = 0; turn < 40 && begun < 2; turn++) {
+        judged j = { .m = &m };
+        if (!begin(&j, &state))
+            continue;
+        begun++;
+        wave(&j, ticks, &state);
+        ebpo_touch_stats stats = EBPO_TOUCH_STATS_INIT;
+        ck_assert_int_eq(ebpo_touch_get_stats(j.touch, &stats), EBPO_OK);
+        ck_assert_uint_eq(stats.ticks, ticks);
+        ck_assert_uint_gt(stats.loads, 0);
+        ASSERT_OK(ebpo_touch_check(j.touch, error));
+        ebpo_touch_free(j.touch);
+    }
+    ck_assert_msg(forbidden == 0, "%lu calls in ticks that may not be", forbidden);
+    query_model_free(&m);
+}
+END_TEST
+
+/* --- on a cube of 1: by formula --- */
+
+typedef struct cube_hand {
+    query_model m;
+    ebpo_touch *touch;
+    ebpo_touch_options options;
+    ebpo_touch_result r;
+} cube_hand;
+
+static void cube_begin(cube_hand *c, double radius, double friction)
+{
+    static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    const double above[3] = { 0.3, 0.4, 1.5 };
+    query_model_make(&c->m, "box", ebpo_test_box(low, high, 4), &query_variants[0]);
+    c->options = (ebpo_touch_options)EBPO_TOUCH_OPTIONS_INIT;
+    c->options.radius = radius;
+    c->options.friction = friction;
+    c->options.skin = 1e-6;
+    c->options.stiffness = 100;
+    c->options.damping = 0;
+    ASSERT_OK(ebpo_touch_new(c->m.model, &c->options, above, &c->touch, error));
+}
+
+static void cube_end(cube_hand *c)
+{
+    ASSERT_OK(ebpo_touch_check(c->touch, error));
+    ebpo_touch_free(c->touch);
+    query_model_free(&c->m);
+}
+
+/* Goes there in steps, and stays until nothing waits any more. */
+static void cube_move(cube_hand *c, double x, double y, double z, int steps)
+{
+    ebpo_touch_stats stats = EBPO_TOUCH_STATS_INIT;
+    static double at[3] = { 0.3, 0.4, 1.5 };
+    double from[3] = { at[0], at[1], at[2] };
+    const double to[3] = { x, y, z };
+    ck_assert_int_eq(ebpo_touch_get_stats(c->touch, &stats), EBPO_OK);
+    if (stats.ticks == 0) {
+        const double above[3] = { 0.3, 0.4, 1.5 };
+        for (int k = 0; k < 3; k++)
+            from[k] = above[k];
+    }
+    for (int s = 1; s <= steps; s++) {
+        for (int k = 0; k < 3; k++)
+            at[k] = s == steps ? to[k] : from[k] + (to[k] - from[k]) * s / steps;
+        int patience = 20000;
+        do {
+            ck_assert_msg(patience-- > 0, "flags %u", c->r.flags);
+            tick(c->touch, at, &c->r);
+            if (c->r.flags & (EBPO_TOUCH_WAITS | EBPO_TOUCH_PARTLY))
+                pause_a_little();
+        } while (c->r.flags & (EBPO_TOUCH_WAITS | EBPO_TOUCH_SHORT | EBPO_TOUCH_PARTLY));
+    }
+}
+
+static void check_vector(const double got[3], double x, double y, double z, double within)
+{
+    ck_assert_msg(fabs(got[0] - x) <= within && fabs(got[1] - y) <= within &&
+                      fabs(got[2] - z) <= within,
+                  "(%g, %g, %g), not (%g, %g, %g)", got[0], got[1], got[2], x, y, z);
+}
+
+START_TEST(a_cube_holds_the_hand_as_its_planes_do)
+{
+    cube_hand c;
+    double radius = _i ? 0.1 : 0;
+    cube_begin(&c, radius, 0);
+    cube_move(&c, 0.3, 0.4, 1.2, 10);
+    ck_assert_uint_eq(c.r.flags, 0);
+    check_vector(c.r.proxy, 0.3, 0.4, 1.2, 1e-6);
+    check_vector(c.r.force, 0, 0, 0, 0);
+    ck_assert_double_le(fabs(c.r.depth + (0.2 - radius)), 1e-9);
+    cube_move(&c, 0.35, 0.4, 0.9, 30); /* into the top */
+    ck_assert_uint_eq(c.r.flags, EBPO_TOUCH_CONTACT);
+    check_vector(c.r.proxy, 0.35, 0.4, 1 + radius, 3e-6);
+    check_vector(c.r.force, 0, 0, 100 * (0.1 + radius), 3e-4);
+    ck_assert_double_le(fabs(c.r.depth - (0.1 + radius)), 3e-6);
+    cube_move(&c, 0.7, 0.6, 0.8, 50); /* along it: edges within the plane do not matter */
+    check_vector(c.r.proxy, 0.7, 0.6, 1 + radius, 3e-6);
+    cube_move(&c, 0.7, 0.6, -3, 1); /* out at the bottom: still on top */
+    check_vector(c.r.proxy, 0.7, 0.6, 1 + radius, 3e-6);
+    cube_move(&c, 1.5, 0.6, -3, 40); /* over the edge, and down outside */
+    check_vector(c.r.proxy, 1.5, 0.6, -3, 3e-6);
+    ck_assert_uint_eq(c.r.flags, 0);
+    ck_assert_uint_eq(forbidden, 0);
+    cube_end(&c);
+}
+END_TEST
+
+START_TEST(friction_holds_as_coulomb_says)
+{
+    cube_hand c;
+    cube_begin(&c, 0, 0.5);
+    cube_move(&c, 0.3, 0.4, 1.1, 10);
+    cube_move(&c, 0.3, 0.4, 0.9, 20); /* straight down: depth 0.1 */
+    double x = c.r.proxy[0];
+    cube_move(&c, 0.34, 0.4, 0.9, 10); /* 0.04 < 0.5 * 0.1 */
+    check_vector(c.r.proxy, x, 0.4, 1, 3e-6);
+    check_vector(c.r.force, 100 * (x - 0.34), 0, 10, 1e-3);
+    cube_move(&c, 0.6, 0.4, 0.9, 100); /* pulled along, 0.05 behind */
+    check_vector(c.r.proxy, 0.55, 0.4, 1, 1e-4);
+    cube_end(&c);
+}
+END_TEST
+
+/* Over the top of a cube, around its edge x = z = 1 and down its side: at part 0 to 3. */
+static void around_edge(double part, double at[3])
+{
+    double turn = fmin(fmax(part - 1, 0), 1) * 1.5707963267948966;
+    at[0] = 1 + 0.15 * sin(turn) - 0.3 * fmax(1 - part, 0);
+    at[1] = 0.4;
+    at[2] = 1 + 0.15 * cos(turn) - 0.3 * fmax(part - 2, 0);
+}
+
+/* Where faces' normals jump by a right angle. */
+START_TEST(normals_turn_steadily)
+{
+    cube_hand c;
+    double before[3] = { 0, 0, 1 }, most = 0, at[3];
+    cube_begin(&c, 0.1, 0);
+    cube_move(&c, 0.7, 0.4, 1.15, 10);
+    for (int i = 0; i <= 600; i++) {
+        around_edge(i / 200.0, at);
+        cube_move(&c, at[0], at[1], at[2], 1);
+        most = i ? fmax(most, apart(before, c.r.normal)) : 0;
+        for (int k = 0; k < 3; k++)
+            before[k] = c.r.normal[k];
+    }
+    ck_assert_double_le(most, 0.05);
+    ck_assert_double_ge(before[0], 0.99);
+    cube_end(&c);
+}
+END_TEST
+
+START_TEST(what_makes_no_sense_is_refused)
+{
+    cube_hand c;
+    ebpo_touch *none;
+    ebpo_error why = EBPO_ERROR_INIT;
+    cube_begin(&c, 0, 0);
+    const double inside[3] = { 0.5, 0.5, 0.5 }, close[3] = { 0.5, 0.5, 1 + 1e-7 };
+    const double far[3] = { 0.5, 0.5, NAN }, fine[3] = { 0.5, 0.5, 2 };
+    ck_assert_int_eq(ebpo_touch_place(c.touch, inside, &why), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_touch_place(c.touch, close, &why), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_touch_place(c.touch, far, &why), EBPO_E_ARGUMENT);
+    tick(c.touch, far, &c.r);
+    ck_assert_uint_eq(c.r.flags, EBPO_TOUCH_ASTRAY);
+    check_vector(c.r.proxy, 0.3, 0.4, 1.5, 0);
+    ASSERT_OK(ebpo_touch_place(c.touch, fine, error));
+    tick(c.touch, fine, &c.r);
+    check_vector(c.r.proxy, 0.5, 0.5, 2, 0);
+    for (int i = 0; i < 9; i++) {
+        ebpo_touch_options o = c.options;
+        double *const value[] = { &o.radius,  &o.skin,    &o.look,     &o.stiffness,
+                                  &o.damping, &o.friction, &o.tick };
+        if (i < 7)
+            *value[i] = i == 6 ? 0 : -1;
+        o.faces = i == 7 ? 63 : o.faces;
+        o.skin = i == 8 ? 1e-12 : o.skin;
+        ck_assert_int_eq(ebpo_touch_new(c.m.model, &o, fine, &none, &why), EBPO_E_ARGUMENT);
+        ck_assert_ptr_null(none);
+    }
+    cube_end(&c);
+}
+END_TEST
+
+/* More faces around one place than a box has room for: told, and the hand stays outside. */
+START_TEST(a_crowd_of_faces_is_refused)
+{
+    query_model m;
+    ebpo_touch *none;
+    ebpo_error why = EBPO_ERROR_INIT;
+    const double above[3] = { 0, 0, 1.0001 }, zero[3] = { 0, 0, 0 };
+    query_model_make(&m, "sphere", ebpo_test_sphere(zero, 1, 4), &query_variants[0]);
+    ebpo_touch_options o = EBPO_TOUCH_OPTIONS_INIT;
+    o.faces = 64;
+    o.look = 1;
+    ck_assert_int_eq(ebpo_touch_new(m.model, &o, above, &none, &why), EBPO_E_LIMIT);
+    query_model_free(&m);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("touch_hand");
+    TCase *hand = tcase_create("hand");
+    mp_set_memory_functions(gmp_take, gmp_more, gmp_give);
+    tcase_set_timeout(hand, 600);
+    tcase_add_loop_test(hand, a_wild_hand_goes_through_nothing, 0, WILD);
+    tcase_add_loop_test(hand, a_cube_holds_the_hand_as_its_planes_do, 0, 2);
+    tcase_add_test(hand, friction_holds_as_coulomb_says);
+    tcase_add_test(hand, normals_turn_steadily);
+    tcase_add_test(hand, what_makes_no_sense_is_refused);
+    tcase_add_test(hand, a_crowd_of_faces_is_refused);
+    suite_add_tcase(suite, hand);
+    return suite;
+}
