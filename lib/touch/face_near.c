@@ -1,6 +1,6 @@
 /* The distance from a face, a convex set, is a convex function along a line: where it falls,
- * tangents lie below it, so that Newton's steps towards a distance never go too far. That finds when
- * a ball touches a face, whichever of its features it is. */
+ * tangents lie below it, so that Newton's steps towards a distance never go too far. That finds
+ * when a ball touches a face, whichever of its features it is. */
 #include "geom/strict_fp.h"
 
 #include "touch/face_near.h"

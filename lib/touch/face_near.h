@@ -16,8 +16,8 @@ void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_nea
 typedef struct ebpo_ball_way {
     const double *from, *way; /* [3] */
     double reach, band;       /* the ball's radius; it touches if it is that much farther away */
-    /* Going towards a face by less than this over the whole way is none; the least where the ball is
-     * closer than its radius already. */
+    /* Going towards a face by less than this over the whole way is none; the least where the ball
+     * is closer than its radius already. */
     double slack, least_slack;
 } ebpo_ball_way;
 

@@ -74,8 +74,7 @@ static ebpo_status load(ebpo_touch *t, const double goal[3], ebpo_error *error)
     ebpo_extent centres;
     for (bool fits = false; !fits;) {
         place_box(t, goal, &centres);
-        ebpo_status status =
-            ebpo_face_box_load(box, t->loading, &centres, t->margin, &fits, error);
+        ebpo_status status = ebpo_face_box_load(box, t->loading, &centres, t->margin, &fits, error);
         if (status != EBPO_OK)
             return status;
         if (fits)

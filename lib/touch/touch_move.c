@@ -55,9 +55,9 @@ static uint32_t rub(ebpo_touch *t, const double from[3], const double hand[3], u
 
 /* So that what is given in sum, `given`, never exceeds A = stiffness s^2, s being the longest step
  * that the hand ever made in a tick. With g = -given, a step of s' gives at most F s', and F s' - g
- * must not exceed stiffness max(s, s')^2. That is so for all s' where F^2 <= 4 stiffness g; and where
- * F <= 2 stiffness s and F s - g <= A, as from s on the right side then grows faster than the left
- * one. A spring that was pressed steadily to the depth d has F = stiffness d and g at least
+ * must not exceed stiffness max(s, s')^2. That is so for all s' where F^2 <= 4 stiffness g; and
+ * where F <= 2 stiffness s and F s - g <= A, as from s on the right side then grows faster than the
+ * left one. A spring that was pressed steadily to the depth d has F = stiffness d and g at least
  * stiffness d^2 / 2: there the one or the other holds, and nothing is taken off. */
 static double most_force(const ebpo_touch *t)
 {

@@ -54,12 +54,12 @@ static ebpo_status measure(ebpo_touch *t, ebpo_error *error)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the skin must be at least %g, for rounding of coordinates", least);
     if (t->options.look == 0)
-        t->options.look =
-            3 * t->diagonal / sqrt(fmax(1, (double)info->face_count));
+        t->options.look = 3 * t->diagonal / sqrt(fmax(1, (double)info->face_count));
     t->options.look = fmax(t->options.look, 4 * t->options.skin);
     t->reach = t->options.radius + t->options.skin;
     t->band = fmax(0x1p-24 * t->options.skin, 0x1p-48 * most);
     t->margin = t->options.radius + t->options.look;
+    t->stride = t->diagonal;
     t->half = fmin(1, sqrt((double)t->options.faces / fmax(1, (double)info->face_count))) *
               t->diagonal / 8;
     return EBPO_OK;

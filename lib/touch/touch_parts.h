@@ -15,8 +15,11 @@ enum {
     EBPO_TOUCH_FRESH = 8, /* beside a box's number: the tick has not seen it */
 
     /* What one step of a tick may look at: at most. */
-    EBPO_TOUCH_FACES = 2048,
-    EBPO_TOUCH_VISITS = 4096,
+    EBPO_TOUCH_FACES = 512,
+    EBPO_TOUCH_VISITS = 1024,
+
+    /* And all of them together: no step begins after so many faces. */
+    EBPO_TOUCH_WORK = 768,
 
     EBPO_TOUCH_PIECES = EBPO_TOUCH_WAY_MOST - 1
 };
@@ -26,7 +29,7 @@ struct ebpo_touch {
     ebpo_model *model;
     ebpo_touch_options options;
     ebpo_extent root; /* no face is outside */
-    double diagonal; /* of the root cell */
+    double diagonal;  /* of the root cell */
     double reach, band, margin;
     bool solid;
 
@@ -37,7 +40,8 @@ struct ebpo_touch {
     ebpo_held_planes planes; /* that hold the proxy */
     double way[EBPO_TOUCH_WAY_MOST][3];
     uint32_t way_count;
-    double given; /* energy */
+    double stride; /* so long a piece of a way may be */
+    double given;  /* energy */
     ebpo_touch_stats stats;
     uint32_t found[EBPO_TOUCH_FACES];
     double met[EBPO_TOUCH_FACES];
@@ -46,9 +50,9 @@ struct ebpo_touch {
 
     /* handed over */
     ebpo_face_box box[EBPO_TOUCH_BOXES];
-    atomic_uint between;            /* a box, perhaps fresh */
-    _Atomic double proxy_told[3];   /* each for itself: what the loader makes of a mixture is */
-    _Atomic double hand_told[3];    /* a box like any other, and the tick looks whether it fits */
+    atomic_uint between;          /* a box, perhaps fresh */
+    _Atomic double proxy_told[3]; /* each for itself: what the loader makes of a mixture is */
+    _Atomic double hand_told[3];  /* a box like any other, and the tick looks whether it fits */
     _Atomic bool stop;
     atomic_uint_fast64_t loads, too_many, load_ns, load_ns_most;
 

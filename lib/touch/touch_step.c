@@ -40,7 +40,8 @@ static void shorten(double way[3], double part)
         way[i] *= part;
 }
 
-/* Part of the way until the wall of `e`, from within; a hair less, so that rounding stays inside. */
+/* Part of the way until the wall of `e`, from within; a hair less, so that rounding stays inside.
+ */
 static double part_inside(const double p[3], const double way[3], const ebpo_extent *e)
 {
     double part = 1;
@@ -71,10 +72,20 @@ static bool keep_known(step *s)
     }
     double part = part_inside(t->proxy, s->way, centres);
     if (part < 1) {
-        s->cut = EBPO_TOUCH_WAITS;
+        s->cut = EBPO_TOUCH_WAITS; /* whether or not it was short */
         shorten(s->way, part);
     }
     return true;
+}
+
+/* Not farther than the last time that there were few enough faces around a way, or twice that. */
+static void keep_short(step *s)
+{
+    double length = sqrt(dot(s->way, s->way));
+    if (length <= s->t->stride)
+        return;
+    s->cut = EBPO_TOUCH_SHORT;
+    shorten(s->way, s->t->stride / length);
 }
 
 /* The faces around the way, which is made shorter where they are too many. */
@@ -82,17 +93,21 @@ static bool find_faces(step *s)
 {
     ebpo_touch *t = s->t;
     ebpo_extent around;
-    for (int i = 0; i < HALVINGS; i++) {
+    for (int i = 0; i < HALVINGS && *s->work < EBPO_TOUCH_WORK; i++) {
         swept(t->proxy, s->way, t->reach + 2 * t->band, &around);
         bool all = ebpo_extent_holds(&t->box[t->at].centres, t->proxy)
                        ? ebpo_face_box_find(&t->box[t->at], &around, t->found, EBPO_TOUCH_FACES,
                                             EBPO_TOUCH_VISITS, &s->count)
                        : (s->count = 0, true); /* outside of all, see keep_known */
-        *s->work += s->count;
-        if (all)
+        *s->work += all ? s->count : EBPO_TOUCH_FACES;
+        if (all) {
+            if (s->count < EBPO_TOUCH_FACES / 8 && t->stride < t->diagonal)
+                t->stride *= 2;
             return true;
+        }
         s->cut = EBPO_TOUCH_SHORT;
         shorten(s->way, 0.25);
+        t->stride = sqrt(dot(s->way, s->way));
     }
     s->flags |= EBPO_TOUCH_SHORT;
     return false;
@@ -104,8 +119,8 @@ static double first_touch(step *s)
     const ebpo_ball_way w = { t->proxy, s->way, t->reach, t->band, s->slack, s->least_slack };
     double first = 1;
     for (uint32_t i = 0; i < s->count; i++) {
-        t->met[i] = ebpo_ball_meets(
-            &w, (const double(*)[3])t->box[t->at].corner[t->found[i]], t->away[i]);
+        t->met[i] =
+            ebpo_ball_meets(&w, (const double(*)[3])t->box[t->at].corner[t->found[i]], t->away[i]);
         first = fmin(first, t->met[i]);
     }
     return first;
@@ -149,6 +164,7 @@ static bool go_on(step *s)
     if (sqrt(dot(s->way, s->way)) <= 0x1p-12 * t->options.skin)
         return false;
     s->cut = 0;
+    keep_short(s);
     if (!keep_known(s) || !find_faces(s))
         return false;
     double part = first_touch(s);

@@ -180,8 +180,8 @@ static bool begin(judged *j, uint64_t *state)
     const ebpo_info *info = ebpo_file_info(j->m->file);
     double place[3], diagonal = 0;
     for (int i = 0; i < 3; i++) {
-        place[i] = info->box_origin[i] +
-                   (1.4 * ebpo_test_random_unit(state) - 0.2) * info->box_size[i];
+        place[i] =
+            info->box_origin[i] + (1.4 * ebpo_test_random_unit(state) - 0.2) * info->box_size[i];
         diagonal = hypot(diagonal, info->box_size[i]);
     }
     j->skin = 1e-5 * diagonal;
@@ -222,10 +222,11 @@ static void wave(judged *j, uint64_t ticks, uint64_t *state)
     }
 }
 
-static const char *const wild[] = { "sphere",       "thin_wall", "thin_hollow", "cavity",
-                                    "staircase",    "blob",      "needle",      "cone_slivers",
-                                    "giant_and_dust", "open_box", "mobius",     "far_away",
-                                    "zero_area_face", "turned_boxes", "gap_of_one_ulp", "l_shape" };
+static const char *const wild[] = {
+    "sphere",         "thin_wall",    "thin_hollow",    "cavity",   "staircase", "blob",
+    "needle",         "cone_slivers", "giant_and_dust", "open_box", "mobius",    "far_away",
+    "zero_area_face", "turned_boxes", "gap_of_one_ulp", "l_shape"
+};
 enum { WILD = sizeof wild / sizeof *wild };
 
 START_TEST(a_wild_hand_goes_through_nothing)
@@ -406,7 +407,7 @@ START_TEST(what_makes_no_sense_is_refused)
     check_vector(c.r.proxy, 0.5, 0.5, 2, 0);
     for (int i = 0; i < 9; i++) {
         ebpo_touch_options o = c.options;
-        double *const value[] = { &o.radius,  &o.skin,    &o.look,     &o.stiffness,
+        double *const value[] = { &o.radius,  &o.skin,     &o.look, &o.stiffness,
                                   &o.damping, &o.friction, &o.tick };
         if (i < 7)
             *value[i] = i == 6 ? 0 : -1;

@@ -19,8 +19,8 @@ COLUMNS = ("people", "--json", "errors", "progress", "pipes")
 # What has no cell, and why.
 NONE = {
     "people": {}, "--json": {}, "errors": {}, "pipes": {},
-    "progress": {command: "none: it takes no time, or its answers are the progress"
-                 for command in ("info", "levels", "view", "bench")},
+    "progress": {command: "none: it takes no time or as much as was asked for, or its answers "
+                 "are the progress" for command in ("info", "levels", "view", "bench", "touch")},
 }
 TEXT = """# What is shown of each command
 

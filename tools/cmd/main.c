@@ -16,7 +16,7 @@ static const command *const commands[] = {
     &command_extract,  &command_export,  &command_subset,  &command_repack, &command_repair,
     &command_fetch,    &command_measure, &command_render,  &command_verify, &command_inside,
     &command_distance, &command_ray,     &command_box,     &command_bench,  &command_report,
-    &command_scene,    &command_boolean, &command_collide, &command_map
+    &command_scene,    &command_boolean, &command_collide, &command_map,    &command_touch
 };
 enum { COMMANDS = sizeof commands / sizeof *commands };
 

@@ -72,8 +72,8 @@ typedef struct ebpo_touch_options {
     uint64_t faces;
 } ebpo_touch_options;
 
-#define EBPO_TOUCH_OPTIONS_INIT                                            \
-    {                                                                      \
+#define EBPO_TOUCH_OPTIONS_INIT                                          \
+    {                                                                    \
         sizeof(ebpo_touch_options), 0, 0, 0, 400, 0.4, 0, 0.001, 1 << 14 \
     }
 
@@ -156,8 +156,8 @@ typedef struct ebpo_touch_result {
 } ebpo_touch_result;
 
 /*
- * One tick: the device is at `hand`. Takes bounded time, without lock, memory or reading. Results
- * depend on when boxes were loaded; where EBPO_TOUCH_WAITS never was, on the hand only.
+ * One tick: the device is at `hand`. Takes bounded time, without lock, memory or reading. How far
+ * the proxy has come where it waited or was short depends on when boxes were loaded.
  *
  * Force: stiffness times the way from hand to proxy, less damping times the hand's speed; never
  * towards the faces. It is made weaker where the hand would be given more energy in sum than was
