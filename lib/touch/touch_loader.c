@@ -11,9 +11,10 @@
 #include "touch/touch_parts.h"
 #include "touch/vectors.h"
 
-/* Seconds that a box should be ahead of the hand; of half a box's side, how far the proxy may be
- * from the middle when it is made, and how far the middle moves before another is. */
-static const double ahead = 0.05, aside = 0.6, enough = 0.25;
+/* Seconds that a box should be ahead of the hand, and over which its speed is measured; of half a
+ * box's side, how far the proxy may be from the middle when it is made, and how far the middle
+ * moves before another is. */
+static const double ahead = 0.05, measured = 0.02, aside = 0.6, enough = 0.25;
 
 static void wait_a_little(void)
 {
@@ -21,18 +22,23 @@ static void wait_a_little(void)
     nanosleep(&half_a_millisecond, NULL);
 }
 
-/* Where the hand will be if it goes on like this. */
+/* Where the hand will be if it goes on like this. Its speed is that of some ticks: from one look to
+ * the next the hand has often made one step or none. */
 static void foresee(ebpo_touch *t, double out[3])
 {
     uint64_t now = ebpo_clock();
     double seconds = 1e-9 * (double)(now - t->when_before);
+    bool again = seconds >= measured;
     for (int i = 0; i < 3; i++) {
         double hand = atomic_load_explicit(&t->hand_told[i], memory_order_relaxed);
-        double speed = seconds > 0 ? (hand - t->hand_before[i]) / seconds : 0;
-        out[i] = hand + ahead * speed;
-        t->hand_before[i] = hand;
+        if (again) {
+            t->speed[i] = (hand - t->hand_before[i]) / seconds;
+            t->hand_before[i] = hand;
+        }
+        out[i] = hand + ahead * t->speed[i];
     }
-    t->when_before = now;
+    if (again)
+        t->when_before = now;
 }
 
 /* The centres of a box around the proxy, shifted to where the hand goes. */

@@ -61,7 +61,7 @@ struct ebpo_touch {
     unsigned own; /* box */
     ebpo_extent last;
     double half; /* of a box's sides */
-    double hand_before[3];
+    double hand_before[3], speed[3];
     uint64_t when_before;
     pthread_t thread;
     bool has_thread;

@@ -44,8 +44,7 @@ static void print_times(const char *name, const touch_times *t)
 {
     printf("  %-8s %10llu %6llu %9.2f %9.2f %9.2f %9.2f %9.2f %11.2f %9.2f\n", name,
            (unsigned long long)t->ticks, (unsigned long long)t->late, 1e6 * t->p50, 1e6 * t->p99,
-           1e6 * t->p99_9, 1e6 * t->p99_99, 1e6 * t->most, 1e6 * t->wake_p99_9,
-           1e6 * t->wake_most);
+           1e6 * t->p99_9, 1e6 * t->p99_99, 1e6 * t->most, 1e6 * t->wake_p99_9, 1e6 * t->wake_most);
 }
 
 static void print_bins(const touch_times *t)
@@ -53,8 +52,8 @@ static void print_bins(const touch_times *t)
     puts("  microseconds from begin to end: ticks");
     for (int i = 0; i < TOUCH_BINS; i++)
         if (t->bins[i])
-            printf("  %6d %s %llu\n", i ? 1 << (i - 1) : 0, i < TOUCH_BINS - 1 ? "up  " : "and more",
-                   (unsigned long long)t->bins[i]);
+            printf("  %6d %s %llu\n", i ? 1 << (i - 1) : 0,
+                   i < TOUCH_BINS - 1 ? "up  " : "and more", (unsigned long long)t->bins[i]);
 }
 
 static void print_report(const job *j)
@@ -182,8 +181,9 @@ static ebpo_status play(job *j, ebpo_error *error)
     const values *v = j->v;
     double seconds = j->path ? (double)j->count / v->rate : v->seconds;
     const touch_play empty = { .rate = v->rate, .seconds = seconds / 10 };
-    const touch_play all = { v->rate, seconds, j->touch, j->path, j->count,
-                             ebpo_file_info(j->file) };
+    const touch_play all = {
+        v->rate, seconds, j->touch, j->path, j->count, ebpo_file_info(j->file)
+    };
     j->scheduling = touch_play_first();
     if (!touch_play_run(&empty, &j->empty) || !touch_play_run(&all, &j->times)) {
         *error = (ebpo_error){ .status = EBPO_E_MEMORY };
@@ -213,10 +213,9 @@ static int run_job(job *j, uint64_t memory)
 static int run(void *given, const char **operand)
 {
     const values *v = given;
-    job j = { .v = v,
-              .name = operand[0],
-              .stats = EBPO_TOUCH_STATS_INIT,
-              .memory = EBPO_MODEL_STATS_INIT };
+    job j = {
+        .v = v, .name = operand[0], .stats = EBPO_TOUCH_STATS_INIT, .memory = EBPO_MODEL_STATS_INIT
+    };
     uint64_t memory = 0;
     if (v->memory && !words_read_size(v->memory, &memory))
         return command_usage("touch", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
@@ -233,9 +232,8 @@ static int run(void *given, const char **operand)
     return code;
 }
 
-static const values usual = { .rate = 1000,
-                              .seconds = 10,
-                              .faces = 1 << 14,
-                              .remote = REMOTE_VALUES_INIT };
+static const values usual = {
+    .rate = 1000, .seconds = 10, .faces = 1 << 14, .remote = REMOTE_VALUES_INIT
+};
 
 const command command_touch = { &spec, sizeof usual, &usual, run };
