@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "base/alloc.h"
+#include "base/arrays.h"
 #include "verify/touch.h"
 #include "verify/winding.h"
 
@@ -30,12 +31,18 @@ static face_list list_of(const ebpo_twin_tree *view, const ebpo_twin_node *leaf)
     return list;
 }
 
+/* Faces that touch a node ascend, as those of its parent do. */
 static bool among(const uint32_t *faces, uint64_t count, uint32_t face)
 {
-    for (uint64_t i = 0; i < count; i++)
-        if (faces[i] == face)
-            return true;
-    return false;
+    uint64_t low = 0, high = count;
+    while (low < high) {
+        uint64_t middle = low + (high - low) / 2;
+        if (faces[middle] < face)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < count && faces[low] == face;
 }
 
 /* A listed face that does not touch the leaf must touch it widened by 1/256: level-limited
@@ -59,10 +66,10 @@ static void check_near(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo
 static void check_spare(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
                         const face_list *list, const uint32_t *faces, uint64_t count)
 {
-    for (uint32_t i = 0; i < list->ref_count; i++)
+    EBPO_FOR_ITEMS_SCATTERED(view->workspace, i, 0, list->ref_count)
         if (!among(faces, count, list->refs[i]))
             check_near(tally, view, leaf, list->refs[i]);
-    for (uint32_t i = 0; i < list->new_count; i++)
+    EBPO_FOR_ITEMS_SCATTERED(view->workspace, i, 0, list->new_count)
         if (!among(faces, count, (uint32_t)(list->first + i)))
             check_near(tally, view, leaf, (uint32_t)(list->first + i));
 }
@@ -73,7 +80,7 @@ static void check_leaf(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo
     face_list list = list_of(view, leaf);
     uint64_t found = 0;
     uint32_t at = 0;
-    for (uint64_t i = 0; i < count; i++) {
+    EBPO_FOR_ITEMS(view->workspace, i, 0, count) {
         uint32_t face = faces[i];
         while (at < list.ref_count && list.refs[at] < face)
             at++;
@@ -83,7 +90,7 @@ static void check_leaf(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo
         if (!listed)
             unlisted(tally, leaf, face, "the face touches the leaf, which does not list it");
     }
-    for (uint32_t i = 1; i < list.ref_count; i++)
+    EBPO_FOR_ITEMS(view->workspace, i, 1, list.ref_count)
         if (list.refs[i] <= list.refs[i - 1])
             unlisted(tally, leaf, list.refs[i], "the list names the face twice or not in order");
     if (list.ref_count && list.refs[list.ref_count - 1] >= list.first)
@@ -104,39 +111,23 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_twin_tree *view,
         return;
     }
     tally->checks[EBPO_VERIFY_LISTS] += count ? count : 1;
-    for (uint64_t i = 0; i < count; i++)
+    EBPO_FOR_ITEMS(view->workspace, i, 0, count)
         unlisted(tally, node, faces[i],
                  node->type == EBPO_WHITE ? "the face touches a white cell"
                                           : "the face touches a black cell");
 }
 
-/* Faces listed below a node, repeated as they come. */
+enum { LIMIT_OF_LISTS = 1 << 16 };
+
+/* Different faces listed below a node, as long as they are no more than `limit`: twice as many are
+ * held, however many there are, or where that were many a bit for each of the mesh. */
 typedef struct gathering {
     uint32_t *faces;
-    uint64_t count, capacity;
+    uint8_t *seen; /* NULL where `faces` are held */
+    uint64_t count, capacity, limit;
+    bool more; /* than the limit */
     bool short_of_memory;
 } gathering;
-
-static void gather(gathering *g, const ebpo_twin_tree *view, const ebpo_twin_node *node)
-{
-    if (node->type == EBPO_LEAF) {
-        face_list list = list_of(view, node);
-        uint64_t more = (uint64_t)list.ref_count + list.new_count;
-        if (g->short_of_memory ||
-            !ebpo_grow(&g->faces, &g->capacity, g->count + more, sizeof *g->faces)) {
-            g->short_of_memory = true;
-            return;
-        }
-        for (uint32_t i = 0; i < list.ref_count; i++)
-            g->faces[g->count++] = list.refs[i];
-        for (uint32_t i = 0; i < list.new_count; i++)
-            g->faces[g->count++] = (uint32_t)(list.first + i);
-    }
-    for (unsigned octant = 0; node->type == EBPO_GRAY && octant < 8; octant++) {
-        ebpo_twin_node child = ebpo_twin_child(view, node, octant);
-        gather(g, view, &child);
-    }
-}
 
 static int compare_numbers(const void *a, const void *b)
 {
@@ -144,16 +135,87 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+static void keep_different(gathering *g)
+{
+    uint64_t kept = g->count > 0;
+    if (g->count)
+        qsort(g->faces, g->count, sizeof *g->faces, compare_numbers);
+    for (uint64_t i = 1; i < g->count; i++)
+        if (g->faces[i] != g->faces[kept - 1])
+            g->faces[kept++] = g->faces[i];
+    g->count = kept;
+    g->more |= kept > g->limit;
+}
+
+static void see(gathering *g, uint64_t face)
+{
+    uint8_t bit = (uint8_t)(1u << (face & 7));
+    g->count += !(g->seen[face >> 3] & bit);
+    g->seen[face >> 3] |= bit;
+    g->more |= g->count > g->limit;
+}
+
+static void see_list(gathering *g, const face_list *list)
+{
+    for (uint32_t i = 0; i < list->ref_count; i++)
+        see(g, list->refs[i]);
+    for (uint32_t i = 0; i < list->new_count; i++)
+        see(g, list->first + i);
+}
+
+/* A list names no face twice, so that one longer than the limit decides. */
+static void gather_list(gathering *g, const face_list *list)
+{
+    uint64_t more = (uint64_t)list->ref_count + list->new_count;
+    if (more > g->limit) {
+        g->more = true;
+        return;
+    }
+    if (g->seen) {
+        see_list(g, list);
+        return;
+    }
+    if (g->count + more > 2 * g->limit + 64)
+        keep_different(g);
+    if (!ebpo_grow(&g->faces, &g->capacity, g->count + more, sizeof *g->faces)) {
+        g->short_of_memory = true;
+        return;
+    }
+    for (uint32_t i = 0; i < list->ref_count; i++)
+        g->faces[g->count++] = list->refs[i];
+    for (uint32_t i = 0; i < list->new_count; i++)
+        g->faces[g->count++] = (uint32_t)(list->first + i);
+}
+
+static void gather(gathering *g, const ebpo_twin_tree *view, const ebpo_twin_node *node)
+{
+    if (g->more || g->short_of_memory)
+        return;
+    if (node->type == EBPO_LEAF) {
+        face_list list = list_of(view, node);
+        gather_list(g, &list);
+    }
+    for (unsigned octant = 0; node->type == EBPO_GRAY && octant < 8; octant++) {
+        ebpo_twin_node child = ebpo_twin_child(view, node, octant);
+        gather(g, view, &child);
+    }
+}
+
 bool ebpo_lists_more_faces(const ebpo_twin_tree *view, const ebpo_twin_node *node, uint64_t limit)
 {
-    gathering g = { 0 };
+    gathering g = { .limit = limit };
+    uint64_t faces = view->tree->mesh.face_count;
+    if (limit >= faces)
+        return false;
+    if (limit > LIMIT_OF_LISTS) {
+        g.seen = ebpo_array_zero(view->workspace, faces / 8 + 1, 1);
+        g.short_of_memory = !g.seen;
+    }
     gather(&g, view, node);
-    if (g.count)
-        qsort(g.faces, g.count, sizeof *g.faces, compare_numbers);
-    uint64_t different = g.count > 0;
-    for (uint64_t i = 1; i < g.count; i++)
-        different += g.faces[i] != g.faces[i - 1];
+    if (!g.seen)
+        keep_different(&g);
     free(g.faces);
+    ebpo_array_free(view->workspace, g.seen);
     /* memory that is short proves nothing against the file */
-    return different > limit || g.short_of_memory;
+    return g.more || g.short_of_memory;
 }

@@ -82,7 +82,7 @@ static bool leaf_faces_in_range(const ebpo_level *level, uint64_t leaf, uint64_t
     if (first > face_count || level->leaf_new[leaf] > face_count - first)
         return false;
     const uint32_t *refs = level->leaf_refs ? level->leaf_refs + first_ref : NULL;
-    for (uint32_t i = 0; i < level->leaf_ref_count[leaf]; i++)
+    EBPO_FOR_ITEMS(level->workspace, i, 0, level->leaf_ref_count[leaf])
         if (refs[i] >= first || (i > 0 && refs[i] <= refs[i - 1]))
             return false;
     return true;

@@ -95,7 +95,7 @@ void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_twin_tree *vie
     out->known = node->type == EBPO_LEAF && !view->has_mesh ? 1 : 255;
     if (node->type != EBPO_LEAF || !view->has_mesh)
         return;
-    for (uint64_t i = 0; i < count; i++) {
+    EBPO_FOR_ITEMS_SCATTERED(view->workspace, i, 0, count) {
         ebpo_corners face;
         ebpo_face_corners(&view->tree->mesh, faces[i], &face);
         add_crossings(change, frame, &face);

@@ -43,6 +43,7 @@ static const char *const level_names[] = { "gray nodes",  "leaves",     "black n
 typedef struct numbers {
     uint32_t *at;
     uint64_t count, capacity;
+    uint64_t different; /* when they were last sorted */
 } numbers;
 
 typedef struct recount {
@@ -61,11 +62,12 @@ typedef struct recount {
     bool no_memory;
 } recount;
 
-static bool add(numbers *list, uint32_t number)
+static bool add(ebpo_workspace *workspace, numbers *list, uint32_t number)
 {
     if (list->count && list->at[list->count - 1] == number)
         return true;
-    if (!ebpo_grow(&list->at, &list->capacity, list->count + 1, sizeof *list->at))
+    if (!ebpo_array_grow_late(workspace, &list->at, &list->capacity, list->count + 1,
+                              sizeof *list->at))
         return false;
     list->at[list->count++] = number;
     return true;
@@ -86,6 +88,16 @@ static void sort_once(numbers *list)
         if (!kept || list->at[kept - 1] != list->at[i])
             list->at[kept++] = list->at[i];
     list->count = kept;
+}
+
+/* Of numbers that come again and again, without keeping each time. */
+static bool add_block(numbers *list, uint32_t block)
+{
+    if (list->count >= 2 * list->different + 4096) {
+        sort_once(list);
+        list->different = list->count;
+    }
+    return add(NULL, list, block);
 }
 
 static const char *column_name(const recount *c, unsigned column, int *level)
@@ -123,7 +135,7 @@ static void note_vertices(recount *c, numbers *blocks, uint64_t face, uint64_t f
 {
     for (int k = 0; k < 3; k++) {
         uint32_t vertex = c->view->tree->mesh.faces[3 * face + (uint64_t)k];
-        if (vertex < first_vertex && !add(blocks, vertex / ROWS_OF_VERTICES))
+        if (vertex < first_vertex && !add_block(blocks, vertex / ROWS_OF_VERTICES))
             c->no_memory = true;
     }
 }
@@ -132,13 +144,13 @@ static void check_outer(recount *c)
 {
     numbers faces = { 0 }, vertices = { 0 };
     uint64_t first_face = c->faces - c->row[FACES], first_vertex = c->vertices - c->row[VERTICES];
-    for (uint64_t i = 0; i < c->outer_faces.count; i++)
+    EBPO_FOR_ITEMS_SCATTERED(c->view->workspace, i, 0, c->outer_faces.count)
         if (c->outer_faces.at[i] < first_face) {
-            if (!add(&faces, c->outer_faces.at[i] / ROWS_OF_FACES))
+            if (!add_block(&faces, c->outer_faces.at[i] / ROWS_OF_FACES))
                 c->no_memory = true;
             note_vertices(c, &vertices, c->outer_faces.at[i], first_vertex);
         }
-    for (uint64_t face = first_face; face < c->faces; face++)
+    EBPO_FOR_ITEMS(c->view->workspace, face, first_face, c->faces)
         note_vertices(c, &vertices, face, first_vertex);
     sort_once(&faces);
     sort_once(&vertices);
@@ -180,7 +192,7 @@ static void see_faces(recount *c, uint64_t count)
 {
     const ebpo_mesh *mesh = &c->view->tree->mesh;
     uint64_t seen = c->vertices;
-    for (uint64_t i = 3 * c->faces; i < 3 * (c->faces + count); i++)
+    EBPO_FOR_ITEMS(c->view->workspace, i, 3 * c->faces, 3 * (c->faces + count))
         seen += mesh->faces[i] == seen;
     c->row[c->within ? FACES : FACES_BETWEEN] += count;
     c->row[c->within ? VERTICES : VERTICES_BETWEEN] += seen - c->vertices;
@@ -202,8 +214,8 @@ static void see_leaf(recount *c, const ebpo_twin_node *leaf, uint64_t *row)
     if (c->within) {
         const uint32_t *face = ebpo_twin_refs(c->view, leaf, &references);
         uint64_t end = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
-        for (uint32_t i = 0; i < references; i++)
-            if (!add(&c->outer_faces, face[i]))
+        EBPO_FOR_ITEMS(c->view->workspace, i, 0, references)
+            if (!add(c->view->workspace, &c->outer_faces, face[i]))
                 c->no_memory = true;
         row[REFERENCES] += references;
         row[END] += end - c->end[leaf->cell.level];
@@ -259,8 +271,9 @@ static ebpo_status recount_table(recount *c, ebpo_error *error)
     CHECK(c->outer_done == c->outer_rows,
           "/subtrees/outer has %" PRIu64 " rows, but %" PRIu64 " blocks are needed", c->outer_rows,
           c->outer_done);
-    free(c->outer_faces.at);
-    return c->no_memory ? ebpo_fail_memory(error, 0) : EBPO_OK;
+    ebpo_array_free(c->view->workspace, c->outer_faces.at);
+    return c->no_memory ? ebpo_workspace_fail_while(c->view->workspace, "counting subtrees", error)
+                        : EBPO_OK;
 }
 
 ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
@@ -273,6 +286,7 @@ ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
     ebpo_error own = EBPO_ERROR_INIT;
     recount c = { .tally = tally, .view = view, .level = file->info.subtree_level };
     read.threads = options->threads;
+    read.workspace = options->workspace;
     if (!c.level)
         return EBPO_OK;
     c.cols = counts->shape.cols;
@@ -288,9 +302,9 @@ ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
                                   (void *)&c.outer, &own);
     if (status == EBPO_OK)
         status = recount_table(&c, &own);
-    free((void *)(uintptr_t)c.counts);
-    free((void *)(uintptr_t)c.index);
-    free((void *)(uintptr_t)c.outer);
+    ebpo_array_free(read.workspace, (void *)(uintptr_t)c.counts);
+    ebpo_array_free(read.workspace, (void *)(uintptr_t)c.index);
+    ebpo_array_free(read.workspace, (void *)(uintptr_t)c.outer);
     if (status != EBPO_E_FORMAT)
         return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
     CHECK(false, "%s", own.message);

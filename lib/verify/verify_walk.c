@@ -160,31 +160,38 @@ static void finish_gray(const walk *w, worker *self, const ebpo_twin_node *node,
     ebpo_check_corners_contained(&self->tally, &self->planes, node, inside);
 }
 
-/* False when memory is short. */
-static bool walk_terminal(const walk *w, worker *self, const ebpo_twin_node *node,
-                          const uint32_t *faces, uint64_t count, ebpo_corner_windings *corners)
+static bool is_terminal(const walk *w, const ebpo_twin_node *node)
+{
+    return node->type != EBPO_GRAY || ebpo_twin_is_pruned(w->view, node);
+}
+
+/* The faces may be all of the mesh. */
+static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_twin_node *node,
+                                 const uint32_t *faces, uint64_t count,
+                                 ebpo_corner_windings *corners, ebpo_error *error)
 {
     const ebpo_twin_tree *view = w->view;
     ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
     if (view->has_mesh && node->type != EBPO_GRAY) /* pruned */
         ebpo_check_terminal_lists(&self->tally, view, node, faces, count);
     ebpo_half_spaces_of(&self->planes, view, node);
-    for (uint64_t i = 0; i < count && self->planes.count; i++) {
+    EBPO_FOR_ITEMS_SCATTERED(w->options->workspace, i, 0, self->planes.count ? count : 0) {
         ebpo_corners face;
         ebpo_face_corners(&view->tree->mesh, faces[i], &face);
         ebpo_check_face_contained(&self->tally, &self->planes, node, &frame, &face, faces[i]);
     }
     *corners = (ebpo_corner_windings){ { 0 }, 0 };
     if (!view->tree->info.solid || node->type == EBPO_GRAY)
-        return true;
+        return EBPO_OK;
     ebpo_check_terminal_label(&self->tally, view, node);
     if (w->rays && !ebpo_label_note(&self->points, view, node, &frame, &w->plan))
-        return false;
+        return ebpo_workspace_fail(w->options->workspace,
+                                   self->points.count * sizeof *self->points.point, error);
     ebpo_terminal_windings(corners, view, node, &frame, faces, count);
     if (self->planes.count)
         ebpo_check_corners_contained(&self->tally, &self->planes, node,
                                      ebpo_windings_inside(view, corners));
-    return true;
+    return EBPO_OK;
 }
 
 static bool stack_reserve(face_stack *s, uint64_t need)
@@ -209,12 +216,8 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_twin_node *
                              ebpo_error *error)
 {
     face_stack *s = &self->stack;
-    if (node->type != EBPO_GRAY || ebpo_twin_is_pruned(w->view, node)) {
-        if (!walk_terminal(w, self, node, count ? s->faces + first : NULL, count, corners))
-            return ebpo_workspace_fail(w->options->workspace,
-                                       self->points.count * sizeof *self->points.point, error);
-        return EBPO_OK;
-    }
+    if (is_terminal(w, node))
+        return walk_terminal(w, self, node, count ? s->faces + first : NULL, count, corners, error);
     if (!stack_reserve(s, first + 2 * count + 1)) /* never NULL */
         return ebpo_fail_memory(error, (first + 2 * count) * 5);
     family f;
@@ -258,14 +261,14 @@ static ebpo_status add_child(walk *w, uint64_t parent, unsigned octant, ebpo_err
     const upper_node *from = &w->upper[parent];
     upper_node *to = &w->upper[w->upper_count];
     *to = (upper_node){ .node = ebpo_twin_child(w->view, &from->node, octant) };
-    for (uint64_t i = 0; i < from->face_count; i++)
+    EBPO_FOR_ITEMS(w->options->workspace, i, 0, from->face_count)
         to->face_count += w->shared_octants[i] >> octant & 1;
     to->faces = ebpo_array_alloc(w->options->workspace, to->face_count, sizeof *to->faces);
     if (!to->faces)
         return ebpo_workspace_fail(w->options->workspace, to->face_count * sizeof *to->faces,
                                    error);
     uint64_t own = 0;
-    for (uint64_t i = 0; i < from->face_count; i++)
+    EBPO_FOR_ITEMS(w->options->workspace, i, 0, from->face_count)
         if (w->shared_octants[i] >> octant & 1)
             to->faces[own++] = from->faces[i];
     w->upper_count++;
@@ -319,9 +322,7 @@ static ebpo_status walk_upper(walk *w, ebpo_error *error)
 {
     ebpo_status status = add_root(w, error);
     for (uint64_t at = 0; at < w->upper_count && status == EBPO_OK; at++)
-        if (w->upper[at].node.type == EBPO_GRAY &&
-            !ebpo_twin_is_pruned(w->view, &w->upper[at].node) &&
-            w->upper[at].face_count > w->subtree_limit)
+        if (!is_terminal(w, &w->upper[at].node) && w->upper[at].face_count > w->subtree_limit)
             status = open_node(w, at, error);
     if (status != EBPO_OK)
         return status;
@@ -334,6 +335,18 @@ static ebpo_status walk_upper(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* A leaf may have more faces than a stack should take: they stay where they are. */
+static ebpo_status walk_subtree(const walk *w, worker *self, upper_node *n, ebpo_error *error)
+{
+    if (is_terminal(w, &n->node))
+        return walk_terminal(w, self, &n->node, n->faces, n->face_count, &n->corners, error);
+    if (!stack_reserve(&self->stack, n->face_count))
+        return ebpo_fail_memory(error, n->face_count * 5);
+    if (n->face_count)
+        memcpy(self->stack.faces, n->faces, n->face_count * sizeof *n->faces);
+    return walk_down(w, self, &n->node, 0, n->face_count, &n->corners, error);
+}
+
 static ebpo_status subtree_task(void *context, uint64_t begin, uint64_t end, unsigned number,
                                 ebpo_error *error)
 {
@@ -341,11 +354,7 @@ static ebpo_status subtree_task(void *context, uint64_t begin, uint64_t end, uns
     worker *self = &w->workers[number];
     for (uint64_t i = begin; i < end; i++) {
         upper_node *n = &w->upper[w->subtrees[i]];
-        if (!stack_reserve(&self->stack, n->face_count))
-            return ebpo_fail_memory(error, n->face_count * 5);
-        if (n->face_count)
-            memcpy(self->stack.faces, n->faces, n->face_count * sizeof *n->faces);
-        ebpo_status status = walk_down(w, self, &n->node, 0, n->face_count, &n->corners, error);
+        ebpo_status status = walk_subtree(w, self, n, error);
         ebpo_array_free(w->options->workspace, n->faces);
         n->faces = NULL;
         if (status != EBPO_OK)
