@@ -39,7 +39,7 @@ void ebpo_array_free(ebpo_workspace *workspace, void *array)
 {
     /* malloc never gives whole pages but by chance: the table knows */
     ebpo_extent *b = workspace && array && (uintptr_t)array % EBPO_PAGE == 0
-                         ? ebpo_extent_take(workspace, array, false)
+                         ? ebpo_extent_take(workspace, array)
                          : NULL;
     if (b)
         ebpo_extent_free(workspace, b);

@@ -35,7 +35,7 @@ void ebpo_release_pages(ebpo_workspace *workspace)
     }
     for (int i = 0; i < 1 << EBPO_BUCKET_BITS; i++)
         for (ebpo_extent *b = w->table[i]; b; b = b->next)
-            if (b->kind != EBPO_EXTENT_PART && (b->filed || b->kind == EBPO_EXTENT_FOREIGN))
+            if (b->kind != EBPO_EXTENT_PART && b->filed)
                 /* of a file: what was written stays in it */
                 madvise(b->at, b->bytes, MADV_DONTNEED);
     /* Other threads bring pages in meanwhile, which are no floor: it rises slowly. */

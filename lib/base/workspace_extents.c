@@ -20,18 +20,17 @@ static void enter(ebpo_workspace *w, ebpo_extent *b)
     pthread_mutex_unlock(&w->table_lock);
 }
 
-static bool is_at(const ebpo_extent *b, const void *at, bool foreign)
+static bool is_at(const ebpo_extent *b, const void *at)
 {
-    return b->at == at && b->kind != EBPO_EXTENT_POOL &&
-           (b->kind == EBPO_EXTENT_FOREIGN) == foreign;
+    return b->at == at && b->kind != EBPO_EXTENT_POOL;
 }
 
 /* Not pools: their first parts begin where they do. */
-ebpo_extent *ebpo_extent_take(ebpo_workspace *w, const void *at, bool foreign)
+ebpo_extent *ebpo_extent_take(ebpo_workspace *w, const void *at)
 {
     pthread_mutex_lock(&w->table_lock);
     ebpo_extent **link = ebpo_extent_bucket(w, at), *found = NULL;
-    while (*link && !is_at(*link, at, foreign))
+    while (*link && !is_at(*link, at))
         link = &(*link)->next;
     if (*link) {
         found = *link;
@@ -182,21 +181,4 @@ void ebpo_extent_free(ebpo_workspace *w, ebpo_extent *b)
     ebpo_extent *pool = b->pool;
     free(b);
     leave_pool(w, pool);
-}
-
-/* --- not ours --- */
-
-void ebpo_workspace_watch(ebpo_workspace *workspace, void *mapped, size_t bytes)
-{
-    ebpo_extent *b = workspace && mapped ? ebpo_alloc_zero(1, sizeof *b) : NULL;
-    if (!b)
-        return;
-    *b = (ebpo_extent){ .at = mapped, .bytes = bytes, .kind = EBPO_EXTENT_FOREIGN };
-    enter(workspace, b);
-}
-
-void ebpo_workspace_unwatch(ebpo_workspace *workspace, void *mapped)
-{
-    if (workspace && mapped)
-        free(ebpo_extent_take(workspace, mapped, true));
 }

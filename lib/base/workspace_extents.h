@@ -8,11 +8,7 @@
 ebpo_extent *ebpo_extent_make(ebpo_workspace *w, size_t bytes, ebpo_extent_kind kind);
 ebpo_extent *ebpo_part_make(ebpo_workspace *w, size_t bytes);
 /* Takes the extent that begins there out of the table; NULL: it is none of the workspace's. */
-ebpo_extent *ebpo_extent_take(ebpo_workspace *w, const void *at, bool foreign);
+ebpo_extent *ebpo_extent_take(ebpo_workspace *w, const void *at);
 void ebpo_extent_free(ebpo_workspace *w, ebpo_extent *extent);
-
-/* A mapping of somebody else's whose pages may be let go of too (of a file that is only read). */
-void ebpo_workspace_watch(ebpo_workspace *workspace, void *mapped, size_t bytes);
-void ebpo_workspace_unwatch(ebpo_workspace *workspace, void *mapped);
 
 #endif

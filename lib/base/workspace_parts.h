@@ -19,8 +19,7 @@ enum {
 typedef enum ebpo_extent_kind {
     EBPO_EXTENT_OWN,
     EBPO_EXTENT_POOL,
-    EBPO_EXTENT_PART,
-    EBPO_EXTENT_FOREIGN /* not ours to free */
+    EBPO_EXTENT_PART
 } ebpo_extent_kind;
 
 typedef struct ebpo_extent {

@@ -8,7 +8,6 @@
 #include "base/parallel.h"
 #include "base/sha256.h"
 #include "base/arrays.h"
-#include "base/workspace_extents.h"
 #include "base/sized.h"
 #include "import/import.h"
 #include "input/texture_files.h"
@@ -110,7 +109,11 @@ static ebpo_status read_mesh(const char *path, const ebpo_mesh_read_options *opt
         status = ebpo_whole_file_open(&file, path, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_workspace_watch(workspace, file.mapped, (size_t)file.size);
+    status = ebpo_whole_file_load(&file, workspace, wanted.threads, &wanted.progress, path, error);
+    if (status != EBPO_OK) {
+        ebpo_whole_file_close(&file);
+        return status;
+    }
     hash_begin(&hash);
     status = parse(out, &file, path, &wanted, groups, error);
     hash_end(&hash);
@@ -124,7 +127,6 @@ static ebpo_status read_mesh(const char *path, const ebpo_mesh_read_options *opt
         memcpy(out->source_sha256, hash.digest, sizeof hash.digest);
     else
         ebpo_mesh_free(out);
-    ebpo_workspace_unwatch(workspace, file.mapped);
     ebpo_whole_file_close(&file);
     return status;
 }

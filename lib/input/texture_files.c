@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "attributes/textures.h"
+#include "base/alloc.h"
 #include "base/error.h"
 #include "base/sha256.h"
 #include "input/texture_names.h"
@@ -84,6 +85,7 @@ static bool read_library(finding *f, const char *name)
     bool good = how == FOUND && file.size <= LIBRARY_BYTES - f->library_bytes;
     if (good)
         f->library_bytes += file.size;
+    good = good && ebpo_whole_file_load(&file, NULL, 1, NULL, name, NULL) == EBPO_OK;
     if (good)
         ebpo_texture_names_of_mtl(&f->names, file.data, file.size);
     ebpo_whole_file_close(&file);
@@ -118,14 +120,35 @@ static void find_names(finding *f, const ebpo_mesh *mesh, const uint8_t *data, u
 
 /* --- images --- */
 
-static void make_digest(const ebpo_whole_file *file, uint8_t digest[DIGEST])
+/* Piece by piece: where the bytes are not kept they need not be in memory all at once. */
+static ebpo_status make_digest(const ebpo_whole_file *file, const char *name,
+                               uint8_t digest[DIGEST], ebpo_error *error)
 {
     ebpo_sha256 state;
+    ebpo_status status = EBPO_OK;
+    uint8_t *piece = file->data ? NULL : ebpo_alloc(STEP, 1);
+    if (!file->data && !piece)
+        return ebpo_fail_memory(error, STEP);
     ebpo_sha256_begin(&state);
-    for (uint64_t at = 0; at < file->size; at += STEP)
-        ebpo_sha256_add(&state, file->data + at,
-                        file->size - at < STEP ? (size_t)(file->size - at) : STEP);
+    for (uint64_t at = 0; at < file->size && status == EBPO_OK; at += STEP) {
+        size_t bytes = file->size - at < STEP ? (size_t)(file->size - at) : STEP;
+        if (piece)
+            status = ebpo_whole_file_read(file, at, piece, bytes, name, error);
+        if (status == EBPO_OK)
+            ebpo_sha256_add(&state, piece ? piece : file->data + at, bytes);
+    }
     ebpo_sha256_end(&state, digest);
+    free(piece);
+    return status;
+}
+
+/* Bytes that are kept, and the digest. */
+static ebpo_status read_image(const finding *f, ebpo_whole_file *file, const char *name,
+                              uint8_t digest[DIGEST])
+{
+    ebpo_status status =
+        f->keep ? ebpo_whole_file_load(file, NULL, 1, NULL, name, f->error) : EBPO_OK;
+    return status == EBPO_OK ? make_digest(file, name, digest, f->error) : status;
 }
 
 static ebpo_status add_image(finding *f, ebpo_attributes *to, const ebpo_texture_name *named)
@@ -141,15 +164,17 @@ static ebpo_status add_image(finding *f, ebpo_attributes *to, const ebpo_texture
     f->outside += how == OUTSIDE;
     if (how == NO_MEMORY)
         return ebpo_fail_memory(f->error, strlen(f->path));
+    ebpo_status status = EBPO_OK;
     if (how == FOUND && file.size > IMAGE_BYTES) {
         f->large++;
     } else if (how == FOUND) {
-        make_digest(&file, digest);
+        status = read_image(f, &file, named->name, digest);
         list[EBPO_TEXTURE_SHA256] = (ebpo_texture_bytes){ digest, DIGEST };
         if (f->keep)
             list[EBPO_TEXTURE_BYTES] = (ebpo_texture_bytes){ file.data, file.size };
     }
-    ebpo_status status = ebpo_textures_add(to, f->keep, list, f->error);
+    if (status == EBPO_OK)
+        status = ebpo_textures_add(to, f->keep, list, f->error);
     if (status == EBPO_OK && how == FOUND)
         status = ebpo_whole_file_unchanged(&file, named->name, f->error);
     ebpo_whole_file_close(&file);

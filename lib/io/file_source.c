@@ -4,50 +4,27 @@
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "base/alloc.h"
+#include "base/arrays.h"
 #include "base/error.h"
+#include "base/parallel.h"
+#include "base/workspace.h"
 
-static ebpo_status read_whole(ebpo_whole_file *file, const char *path, ebpo_error *error)
-{
-    uint8_t *buffer = ebpo_alloc(file->size, 1);
-    if (!buffer)
-        return ebpo_fail_memory(error, file->size);
-    file->buffer = buffer;
-    file->data = buffer;
-    uint64_t at = 0;
-    while (at < file->size) {
-        size_t piece = file->size - at < (1u << 30) ? (size_t)(file->size - at) : (1u << 30);
-        ssize_t got = read(file->fd, buffer + at, piece);
-        if (got < 0 && errno == EINTR)
-            continue;
-        if (got < 0)
-            return ebpo_fail_errno(error, path, "cannot be read");
-        if (got == 0)
-            return ebpo_fail_file(error, EBPO_E_IO, path,
-                                  "became shorter while it was read; read it again");
-        at += (uint64_t)got;
-    }
-    return EBPO_OK;
-}
+enum { PIECE = 1 << 22, FRESH_NS = 100000000 };
 
-static ebpo_status map_or_read(ebpo_whole_file *file, const char *path, ebpo_error *error)
+/* Less than 0.1 s ago, or in times to come: the system's times go in steps of some milliseconds. */
+static bool is_fresh(const struct stat *st)
 {
-    if (file->size == 0) {
-        file->data = (const uint8_t *)"";
-        return EBPO_OK;
-    }
-    if (file->size > (uint64_t)PTRDIFF_MAX)
-        return ebpo_fail_file(error, EBPO_E_LIMIT, path, "too large for this machine's addresses");
-    void *mapped = mmap(NULL, (size_t)file->size, PROT_READ, MAP_PRIVATE, file->fd, 0);
-    if (mapped == MAP_FAILED)
-        return read_whole(file, path, error);
-    file->mapped = mapped;
-    file->data = mapped;
-    return EBPO_OK;
+    struct timespec now;
+    if (clock_gettime(CLOCK_REALTIME, &now) != 0)
+        return true;
+    int64_t seconds = (int64_t)now.tv_sec - st->st_ctim.tv_sec;
+    return seconds < 1 ||
+           (seconds == 1 && 1000000000 + now.tv_nsec - st->st_ctim.tv_nsec < FRESH_NS);
 }
 
 ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path, ebpo_error *error)
@@ -63,26 +40,97 @@ ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path, ebpo_er
 ebpo_status ebpo_whole_file_take(ebpo_whole_file *out, int fd, const char *path, ebpo_error *error)
 {
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
-    ebpo_status status;
+    ebpo_status status = EBPO_OK;
     struct stat st;
     file.fd = fd;
-    if (fstat(file.fd, &st) != 0) {
+    if (fstat(file.fd, &st) != 0)
         status = ebpo_fail_errno(error, path, "cannot be examined");
-        goto done;
-    }
-    if (!S_ISREG(st.st_mode)) {
+    else if (!S_ISREG(st.st_mode))
         status = ebpo_fail_file(error, EBPO_E_IO, path, "%s; name a regular file",
                                 S_ISDIR(st.st_mode) ? "is a folder" : "is a pipe or device");
-        goto done;
-    }
-    file.size = (uint64_t)st.st_size;
-    file.mtime_s = st.st_mtim.tv_sec;
-    file.mtime_ns = st.st_mtim.tv_nsec;
-    status = map_or_read(&file, path, error);
-done:
+    else
+        file = (ebpo_whole_file){ .fd = fd,
+                                  .size = (uint64_t)st.st_size,
+                                  .mtime_s = st.st_mtim.tv_sec,
+                                  .mtime_ns = st.st_mtim.tv_nsec,
+                                  .ctime_s = st.st_ctim.tv_sec,
+                                  .ctime_ns = st.st_ctim.tv_nsec,
+                                  .fresh = is_fresh(&st) };
     if (status != EBPO_OK)
         ebpo_whole_file_close(&file);
     *out = file;
+    return status;
+}
+
+ebpo_status ebpo_whole_file_read(const ebpo_whole_file *file, uint64_t at, void *to, uint64_t bytes,
+                                 const char *path, ebpo_error *error)
+{
+    uint8_t *next = to;
+    while (bytes) {
+        ssize_t got = pread(file->fd, next, bytes < PIECE ? (size_t)bytes : PIECE, (off_t)at);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got < 0)
+            return ebpo_fail_errno(error, path, "cannot be read");
+        if (got == 0)
+            return ebpo_fail_file(error, EBPO_E_IO, path,
+                                  "became shorter while it was read; read it again");
+        next += got;
+        at += (uint64_t)got;
+        bytes -= (uint64_t)got;
+    }
+    return EBPO_OK;
+}
+
+typedef struct loading {
+    const ebpo_whole_file *file;
+    uint8_t *to;
+    const char *path;
+} loading;
+
+static ebpo_status load_piece(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
+{
+    const loading *l = context;
+    (void)worker;
+    return ebpo_whole_file_read(l->file, begin, l->to + begin, end - begin, l->path, error);
+}
+
+ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspace, unsigned threads,
+                                 const ebpo_progress *progress, const char *path, ebpo_error *error)
+{
+    file->data = (const uint8_t *)"";
+    if (file->size == 0)
+        return EBPO_OK;
+    file->workspace = workspace;
+    file->buffer = ebpo_array_alloc(workspace, file->size, 1);
+    if (!file->buffer)
+        return ebpo_workspace_fail(workspace, file->size, error);
+    loading l = { file, file->buffer, path };
+    file->data = file->buffer;
+    return ebpo_parallel_for(threads, workspace, file->size, PIECE, load_piece, &l, progress,
+                             "reading", error);
+}
+
+/* Whether it still says what was loaded. */
+static ebpo_status compare(const ebpo_whole_file *file, const char *path, bool *same,
+                           ebpo_error *error)
+{
+    enum { STEP = 1 << 16 };
+    ebpo_status status = EBPO_OK;
+    uint8_t *now = ebpo_alloc(STEP, 1);
+    if (!now)
+        return ebpo_fail_memory(error, STEP);
+    *same = true;
+    EBPO_FOR_ITEMS_EVERY(file->workspace, 64, step, 0, (file->size + STEP - 1) / STEP) {
+        uint64_t at = step * STEP, left = file->size - at;
+        size_t bytes = left < STEP ? (size_t)left : STEP;
+        status = ebpo_whole_file_read(file, at, now, bytes, path, error);
+        *same = status == EBPO_OK && memcmp(now, file->data + at, bytes) == 0;
+        if (!*same)
+            break;
+    }
+    free(now);
     return status;
 }
 
@@ -92,18 +140,21 @@ ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *p
     struct stat st;
     if (fstat(file->fd, &st) != 0)
         return ebpo_fail_errno(error, path, "cannot be examined");
-    if ((uint64_t)st.st_size != file->size || st.st_mtim.tv_sec != file->mtime_s ||
-        st.st_mtim.tv_nsec != file->mtime_ns)
+    bool same = (uint64_t)st.st_size == file->size && st.st_mtim.tv_sec == file->mtime_s &&
+                st.st_mtim.tv_nsec == file->mtime_ns;
+    bool doubtful =
+        file->fresh || st.st_ctim.tv_sec != file->ctime_s || st.st_ctim.tv_nsec != file->ctime_ns;
+    ebpo_status status =
+        same && doubtful && file->data ? compare(file, path, &same, error) : EBPO_OK;
+    if (status == EBPO_OK && !same)
         return ebpo_fail_file(error, EBPO_E_IO, path,
                               "was changed while it was read; read it again");
-    return EBPO_OK;
+    return status;
 }
 
 void ebpo_whole_file_close(ebpo_whole_file *file)
 {
-    if (file->mapped)
-        munmap(file->mapped, (size_t)file->size);
-    free(file->buffer);
+    ebpo_array_free(file->workspace, file->buffer);
     if (file->fd >= 0)
         close(file->fd);
     *file = (ebpo_whole_file)EBPO_WHOLE_FILE_INIT;

@@ -1,30 +1,32 @@
-/* Whole files for reading: mapped where the system can, else read into memory. */
+/* Whole files for reading. They are read and not mapped: a mapping of a file that another program
+ * shortens ends the process. */
 #ifndef EBPO_IO_FILE_H
 #define EBPO_IO_FILE_H
 
 #include <ebpo/base.h>
+#include <ebpo/workspace.h>
 
-/* The bytes of one regular file. Fields are for reading; `data` is never NULL after a successful
- * open, `size` may be 0. */
+/* One regular file. Fields are for reading; `size` may be 0, and `data` is NULL until it is loaded.
+ */
 typedef struct ebpo_whole_file {
     const uint8_t *data;
     uint64_t size;
-    void *mapped;    /* to unmap, or NULL */
-    void *buffer;    /* to free, or NULL */
-    int fd;          /* stays open, for ebpo_whole_file_unchanged */
-    int64_t mtime_s; /* when it was opened */
-    int64_t mtime_ns;
+    void *buffer; /* to free, or NULL */
+    ebpo_workspace *workspace;
+    int fd; /* stays open, for ebpo_whole_file_unchanged */
+    /* when it was opened: times of its change, and whether it had just been changed, so that the
+     * clock of such times could miss another change */
+    int64_t mtime_s, mtime_ns, ctime_s, ctime_ns;
+    bool fresh;
 } ebpo_whole_file;
 
-#define EBPO_WHOLE_FILE_INIT          \
-    {                                 \
-        NULL, 0, NULL, NULL, -1, 0, 0 \
+#define EBPO_WHOLE_FILE_INIT                       \
+    {                                              \
+        NULL, 0, NULL, NULL, -1, 0, 0, 0, 0, false \
     }
 
-/* Opens `path` for reading. EBPO_E_IO when it is missing, may not be read, or is no regular file (a
- * pipe cannot be mapped, and its end is not known). On failure `out` is as EBPO_WHOLE_FILE_INIT. A
- * mapped file that another program shortens while it is being read raises SIGBUS, as with every
- * mapping. */
+/* Opens `path` for reading, without its bytes. EBPO_E_IO when it is missing, may not be read, or is
+ * no regular file (the end of a pipe is not known). On failure `out` is as EBPO_WHOLE_FILE_INIT. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path,
                                                ebpo_error *error);
 
@@ -32,8 +34,21 @@ EBPO_MUST_USE ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char 
 EBPO_MUST_USE ebpo_status ebpo_whole_file_take(ebpo_whole_file *out, int fd, const char *path,
                                                ebpo_error *error);
 
-/* EBPO_E_IO when size or time of change are not what they were at opening: what was read then
- * belongs to no one version. */
+/* Reads all bytes, into an array of `workspace` (NULL: into memory) that is freed with the file;
+ * `data` is not NULL then. Stage "reading" of `progress`, which may be NULL. EBPO_E_IO when the
+ * file has become shorter. */
+EBPO_MUST_USE ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspace,
+                                               unsigned threads, const ebpo_progress *progress,
+                                               const char *path, ebpo_error *error);
+
+/* Some of its bytes, loaded or not; as the above. */
+EBPO_MUST_USE ebpo_status ebpo_whole_file_read(const ebpo_whole_file *file, uint64_t at, void *to,
+                                               uint64_t bytes, const char *path, ebpo_error *error);
+
+/* EBPO_E_IO when the file is not what it was at opening, by its size, by the time of its last
+ * change or, where that could be set back or be too coarse to tell, by what it says now and `data`
+ * (which has to be loaded then): what was read may belong to no one version. A file that another
+ * one has been renamed over is not changed: this is the old one. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *path,
                                                     ebpo_error *error);
 

@@ -67,6 +67,10 @@ static ebpo_status copy_poses(const ebpo_scene *scene, const char *csv, const ch
     if (status == EBPO_OK)
         status = ebpo_whole_file_open(&file, path, error);
     if (status == EBPO_OK)
+        status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_unchanged(&file, path, error);
+    if (status == EBPO_OK)
         status = write_in(folder, name, file.data, file.size, error);
     ebpo_whole_file_close(&file);
     free(path);

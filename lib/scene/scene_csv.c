@@ -133,34 +133,45 @@ static ebpo_status read_rows(lines *l, scene_route *route, ebpo_error *error)
     return status;
 }
 
-ebpo_status scene_read_csv(scene_route *route, const char *path, uint64_t *left, ebpo_error *error)
+static ebpo_status read_text(const ebpo_whole_file *file, scene_route *route, const char *path,
+                             ebpo_error *error)
 {
-    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
-    ebpo_status status = ebpo_whole_file_open(&file, path, error);
-    if (status != EBPO_OK)
-        return status;
-    lines l = { (const char *)file.data,
-                (const char *)file.data + file.size,
+    lines l = { (const char *)file->data,
+                (const char *)file->data + file->size,
                 path,
                 0,
                 { 0 },
                 0,
                 newlocale(LC_ALL_MASK, "C", (locale_t)0) };
-    l.at += scene_text_mark(l.at, file.size);
-    if (file.size > *left)
-        status = ebpo_fail_file(error, EBPO_E_LIMIT, path,
-                                "files of poses have more bytes than the limit that was given");
-    else if (scene_text_is_wide(l.at, file.size))
+    l.at += scene_text_mark(l.at, file->size);
+    ebpo_status status;
+    if (scene_text_is_wide(l.at, file->size))
         status = ebpo_fail_file(error, EBPO_E_FORMAT, path,
                                 "begins with a byte order mark (BOM) of UTF-16; save it as UTF-8");
     else if (!l.c_locale)
         status = ebpo_fail_memory(error, 1);
     else
         status = read_rows(&l, route, error);
-    if (status == EBPO_OK)
-        *left -= file.size;
     if (l.c_locale)
         freelocale(l.c_locale);
+    return status;
+}
+
+ebpo_status scene_read_csv(scene_route *route, const char *path, uint64_t *left, ebpo_error *error)
+{
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
+    ebpo_status status = ebpo_whole_file_open(&file, path, error);
+    if (status == EBPO_OK && file.size > *left)
+        status = ebpo_fail_file(error, EBPO_E_LIMIT, path,
+                                "files of poses have more bytes than the limit that was given");
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
+    if (status == EBPO_OK)
+        status = read_text(&file, route, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_unchanged(&file, path, error);
+    if (status == EBPO_OK)
+        *left -= file.size;
     ebpo_whole_file_close(&file);
     return status;
 }

@@ -298,14 +298,19 @@ static ebpo_status parse_failed(const char *name, const json_error_t *e, ebpo_er
     return ebpo_fail_file(error, EBPO_E_FORMAT, name, "line %d: is not JSON: %s", e->line, what);
 }
 
+ebpo_status scene_too_long(const char *name, const ebpo_scene_options *options, ebpo_error *error)
+{
+    return ebpo_fail_file(error, EBPO_E_LIMIT, name, "has more than %llu bytes",
+                          (unsigned long long)options->most_bytes);
+}
+
 ebpo_status scene_read_json(ebpo_scene *scene, const char *text, size_t size, const char *name,
                             const ebpo_scene_options *options, ebpo_error *error)
 {
     json_error_t parsed;
     ebpo_error why = EBPO_ERROR_INIT;
     if (size > options->most_bytes)
-        return ebpo_fail_file(error, EBPO_E_LIMIT, name, "has more than %llu bytes",
-                              (unsigned long long)options->most_bytes);
+        return scene_too_long(name, options, error);
     if (scene_text_is_wide(text, size))
         return ebpo_fail_file(error, EBPO_E_FORMAT, name,
                               "begins with a byte order mark (BOM) of UTF-16; save it as UTF-8");

@@ -106,9 +106,19 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
     ebpo_status status = take_options(&own, options, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_open(&file, path, error);
+    if (status == EBPO_OK && file.size > own.most_bytes)
+        status = scene_too_long(path, &own, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
     if (status == EBPO_OK)
         status = parse((const char *)file.data, file.size, path, scene_folder_of(path), &own, out,
                        error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_unchanged(&file, path, error);
+    if (status != EBPO_OK) {
+        ebpo_scene_free(*out);
+        *out = NULL;
+    }
     ebpo_whole_file_close(&file);
     return status;
 }

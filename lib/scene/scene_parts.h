@@ -114,6 +114,8 @@ void scene_sort_rules(ebpo_scene *scene);
 
 /* ---- scene_json.c ---- */
 
+/* EBPO_E_LIMIT, of a text of more than `most_bytes`. */
+ebpo_status scene_too_long(const char *name, const ebpo_scene_options *options, ebpo_error *error);
 /* Adds what `text` says to an empty scene with a folder. */
 EBPO_MUST_USE ebpo_status scene_read_json(ebpo_scene *scene, const char *text, size_t size,
                                           const char *name, const ebpo_scene_options *options,

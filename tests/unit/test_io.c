@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -39,6 +40,7 @@ static void check_content(const char *path, const char *content)
 {
     ebpo_whole_file file;
     ck_assert(ebpo_whole_file_open(&file, path, NULL) == EBPO_OK);
+    ck_assert(ebpo_whole_file_load(&file, NULL, 1, NULL, path, NULL) == EBPO_OK);
     ck_assert(file.size == strlen(content) && memcmp(file.data, content, file.size) == 0);
     ebpo_whole_file_close(&file);
 }
@@ -185,6 +187,45 @@ START_TEST(change_while_reading_is_noticed)
 }
 END_TEST
 
+/* The old times again, as copying with times or unpacking an archive would do it. */
+static void set_back(const char *path, const struct stat *old)
+{
+    struct timespec times[2] = { old->st_atim, old->st_mtim };
+    ck_assert(utimensat(AT_FDCWD, path, times, 0) == 0);
+}
+
+START_TEST(change_whose_time_is_set_back_is_noticed)
+{
+    ebpo_whole_file file;
+    struct stat old;
+    write_file(target, "one");
+    ck_assert(stat(target, &old) == 0 && ebpo_whole_file_open(&file, target, NULL) == EBPO_OK);
+    ck_assert(ebpo_whole_file_load(&file, NULL, 2, NULL, target, NULL) == EBPO_OK);
+    write_file(target, "two");
+    set_back(target, &old);
+    ck_assert(ebpo_whole_file_unchanged(&file, target, NULL) == EBPO_E_IO);
+    write_file(target, "one");
+    set_back(target, &old);
+    ck_assert(ebpo_whole_file_unchanged(&file, target, NULL) == EBPO_OK);
+    ebpo_whole_file_close(&file);
+}
+END_TEST
+
+START_TEST(a_file_that_becomes_shorter_is_an_error)
+{
+    ebpo_whole_file file;
+    ebpo_error error = EBPO_ERROR_INIT;
+    char byte;
+    write_file(target, "some bytes");
+    ck_assert(ebpo_whole_file_open(&file, target, NULL) == EBPO_OK && truncate(target, 4) == 0);
+    ck_assert(ebpo_whole_file_load(&file, NULL, 1, NULL, target, &error) == EBPO_E_IO);
+    ck_assert(strstr(error.message, "became shorter while it was read") != NULL);
+    ck_assert(ebpo_whole_file_read(&file, 4, &byte, 1, target, &error) == EBPO_E_IO);
+    ck_assert(ebpo_whole_file_read(&file, 3, &byte, 1, target, &error) == EBPO_OK && byte == 'e');
+    ebpo_whole_file_close(&file);
+}
+END_TEST
+
 START_TEST(pipes_and_folders_are_refused_without_hanging)
 {
     ebpo_whole_file file;
@@ -211,6 +252,8 @@ Suite *test_suite(void)
     tcase_add_test(tests, signal_handler_removes_what_is_unfinished);
     tcase_add_test(tests, empty_file_is_read_as_no_bytes);
     tcase_add_test(tests, change_while_reading_is_noticed);
+    tcase_add_test(tests, change_whose_time_is_set_back_is_noticed);
+    tcase_add_test(tests, a_file_that_becomes_shorter_is_an_error);
     tcase_add_test(tests, pipes_and_folders_are_refused_without_hanging);
     Suite *suite = suite_create("io");
     suite_add_tcase(suite, tests);
