@@ -127,7 +127,8 @@ static ebpo_status make_room(ebpo_builder *b, top_split *t, uint32_t *lists[8], 
     if (!ebpo_array_grow_late(b->workspace, &s->crossing, &s->cross_capacity,
                               s->cross_count + sizes[8], sizeof *s->crossing))
         return no_memory(b, error);
-    t->to[8] = s->crossing + s->cross_count;
+    /* without any, there is no array yet */
+    t->to[8] = s->crossing ? s->crossing + s->cross_count : NULL;
     s->cross_count += sizes[8];
     return EBPO_OK;
 }

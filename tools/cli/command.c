@@ -1,4 +1,5 @@
 #include "cli/command.h"
+#include "cli/process_memory.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -10,8 +11,11 @@
 
 int command_failed(const char *name, const ebpo_error *error)
 {
-    fprintf(stderr, "ebpo %s: %s\n", name,
-            error->message[0] ? error->message : ebpo_status_name(error->status));
+    char why[128] = "";
+    if (error->status == EBPO_E_MEMORY)
+        process_memory_why(why, sizeof why);
+    fprintf(stderr, "ebpo %s: %s%s\n", name,
+            error->message[0] ? error->message : ebpo_status_name(error->status), why);
     if (error->status == EBPO_E_ARGUMENT)
         return EXIT_USAGE;
     return error->status == EBPO_E_NOT_SOLID ? EXIT_NOT_SOLID : EXIT_FAILED;
@@ -30,7 +34,9 @@ int command_usage(const char *name, const char *format, ...)
 
 int command_no_memory(const char *name)
 {
-    fprintf(stderr, "ebpo %s: not enough memory\n", name);
+    char why[128];
+    process_memory_why(why, sizeof why);
+    fprintf(stderr, "ebpo %s: not enough memory%s\n", name, why);
     return EXIT_FAILED;
 }
 

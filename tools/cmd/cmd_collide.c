@@ -1,4 +1,5 @@
 /* ebpo collide: which faces of two models meet, and how far apart they are. */
+#include <ebpo/memory.h>
 #include <float.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -6,6 +7,7 @@
 
 #include "cli/command.h"
 #include "cli/json.h"
+#include "cli/model_memory.h"
 #include "cli/pose_args.h"
 #include "cli/progress.h"
 #include "cli/query_args.h"
@@ -236,6 +238,24 @@ static ebpo_status share_memory(const query_session *a, const query_session *b,
     return ebpo_budget_new(holding->memory, &holding->budget, error);
 }
 
+/* Where --memory is not given: half of what is free if all of both would take more, or the least
+ * that will do. */
+static void usual_memory(const query_session *a, const query_session *b,
+                         ebpo_model_options *holding)
+{
+    ebpo_model_plan plan[2] = { EBPO_MODEL_PLAN_INIT, EBPO_MODEL_PLAN_INIT };
+    if (ebpo_model_memory(a->file, holding, &plan[0], NULL) != EBPO_OK ||
+        (b && ebpo_model_memory(b->file, holding, &plan[1], NULL) != EBPO_OK))
+        return; /* what is wrong is said when the models are made */
+    uint64_t half = ebpo_free_memory() / 2;
+    uint64_t least = plan[0].least + plan[1].least;
+    if (plan[0].whole + plan[1].whole <= half)
+        return;
+    holding->memory = half > least ? half : least;
+    if (least > half)
+        model_memory_tell_least("collide", "both models", least, half);
+}
+
 static int open_both(query_session *a, query_session *b, const collide_values *v,
                      const char **operand, ebpo_model_options *holding)
 {
@@ -246,6 +266,8 @@ static int open_both(query_session *a, query_session *b, const collide_values *v
     int code = query_open_file(a, "collide", path[0], holding, level, &v->query.remote);
     if (code == EXIT_FINE && !one)
         code = query_open_file(b, "collide", path[1], holding, level, &v->query.remote);
+    if (code == EXIT_FINE && !v->query.memory && holding->cut_level < 0)
+        usual_memory(a, one ? NULL : b, holding);
     if (code == EXIT_FINE && !one && holding->memory &&
         share_memory(a, b, holding, &error) != EBPO_OK)
         return command_failed("collide", &error);

@@ -7,6 +7,7 @@
 
 #include "cli/command.h"
 #include "cli/json.h"
+#include "cli/process_memory.h"
 #include "cli/progress.h"
 #include "cli/remote_args.h"
 #include "cli/tables.h"
@@ -16,7 +17,7 @@
 typedef struct values {
     int format;
     int64_t level, threads;
-    const char *levels;
+    const char *levels, *memory;
     bool mesh, json, quiet, to_deepest;
     remote_values remote;
 } values;
@@ -193,6 +194,8 @@ static int run(void *given, const char **operand)
     int code = choose_format(v, operand[1]);
     if (code == EXIT_FINE)
         code = choose_levels(v, &o);
+    if (code == EXIT_FINE && !process_memory_take("export", v->memory))
+        code = EXIT_USAGE;
     if (code != EXIT_FINE)
         return code;
     if (!ebpo_export_second_file((ebpo_export_format)v->format, operand[1], second, sizeof second))

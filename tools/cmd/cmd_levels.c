@@ -9,6 +9,7 @@
 #include "cli/command.h"
 #include "cli/file_facts.h"
 #include "cli/json.h"
+#include "cli/process_memory.h"
 #include "cli/progress.h"
 #include "cli/remote_args.h"
 #include "cli/tables.h"
@@ -17,6 +18,7 @@
 
 typedef struct values {
     int64_t to, threads;
+    const char *memory;
     bool nodes, json;
     remote_values remote;
 } values;
@@ -215,6 +217,8 @@ static int run(void *given, const char **operand)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     printer p = { .v = v, .begin = progress_now() };
+    if (!process_memory_take("levels", v->memory))
+        return EXIT_USAGE;
     if (!command_wants_hdf5("levels", operand[0]))
         return EXIT_FAILED;
     if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)

@@ -6,6 +6,7 @@
 
 #include "cli/command.h"
 #include "cli/json.h"
+#include "cli/model_memory.h"
 #include "cli/progress.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
@@ -185,20 +186,15 @@ static void tell(const map_job *j)
 
 /* --- running --- */
 
-/* Half of what is free, or the least that will do. */
 static ebpo_status open_model(map_job *j, uint64_t memory, bool given, ebpo_progress progress,
                               ebpo_error *error)
 {
     ebpo_model_options o = EBPO_MODEL_OPTIONS_INIT;
-    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
     o.memory = memory;
     o.threads = (unsigned)j->v->threads;
     o.progress = progress;
-    if (!given && !ebpo_is_url(j->path) &&
-        ebpo_model_memory(j->file, &o, &plan, error) == EBPO_OK) {
-        uint64_t half = ebpo_free_memory() / 2;
-        o.memory = plan.whole <= half ? 0 : half > plan.least ? half : plan.least;
-    }
+    if (!given)
+        model_memory_usual("map", j->file, j->path, &o);
     return ebpo_model_new(j->file, &o, &j->model, error);
 }
 

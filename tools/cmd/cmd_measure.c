@@ -7,6 +7,7 @@
 
 #include "cli/command.h"
 #include "cli/file_facts.h"
+#include "cli/process_memory.h"
 #include "cli/progress.h"
 #include "cli/remote_args.h"
 #include "cli/tables.h"
@@ -16,6 +17,7 @@ typedef struct values {
     bool json, deviation, derived, limit;
     int64_t threads, questions;
     double tolerance;
+    const char *memory;
     remote_values remote;
 } values;
 
@@ -285,6 +287,8 @@ static const values usual = { .tolerance = 0.05,
 static int run(void *given, const char **operand)
 {
     values *v = given;
+    if (!process_memory_take("measure", v->memory))
+        return EXIT_USAGE;
     return command_wants_hdf5("measure", operand[0]) ? measure(operand[0], v) : EXIT_FAILED;
 }
 

@@ -12,6 +12,7 @@
 #include "cli/command.h"
 #include "cli/file_facts.h"
 #include "cli/json.h"
+#include "cli/process_memory.h"
 #include "cli/progress.h"
 #include "cli/reading.h"
 #include "cli/remote_args.h"
@@ -25,7 +26,7 @@ enum { TILES_MAX = 24, MESH = -1, SIDE_MAX = 8192 };
 
 typedef struct values {
     int64_t level, threads;
-    const char *levels, *view, *size;
+    const char *levels, *view, *size, *memory;
     int up;
     bool mesh, edges, no_colours, json, quiet;
     remote_values remote;
@@ -369,6 +370,8 @@ static int run(void *given, const char **operand)
 {
     values *v = given;
 #if EBPO_HAVE_PNG
+    if (!process_memory_take("render", v->memory))
+        return EXIT_USAGE;
     job *j = calloc(1, sizeof *j);
     if (!j)
         return command_no_memory("render");

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "cli/command.h"
+#include "cli/process_memory.h"
 #include "cli/selection_args.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
@@ -235,6 +236,8 @@ static int run(void *given, const char **operand)
     report_values *v = given;
     char named_after_input[256];
     comparison c = { .v = v };
+    if (!process_memory_take("report", v->memory))
+        return EXIT_USAGE;
     int is_hdf5 = command_is_hdf5("report", operand[0]);
     int code = is_hdf5 < 0 ? EXIT_FAILED : read_options(&c, v, !is_hdf5);
     if (code != EXIT_FINE)

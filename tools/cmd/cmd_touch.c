@@ -8,6 +8,7 @@
 
 #include "cli/command.h"
 #include "cli/json.h"
+#include "cli/model_memory.h"
 #include "cli/points.h"
 #include "cli/remote_args.h"
 #include "cli/words.h"
@@ -164,6 +165,8 @@ static ebpo_status open_hand(job *j, uint64_t memory, ebpo_error *error)
     wanted.tick = 1 / v->rate;
     wanted.faces = (uint64_t)v->faces;
     ebpo_status status = remote_open(&j->file, j->name, &v->remote, error);
+    if (status == EBPO_OK && !v->memory)
+        model_memory_usual("touch", j->file, j->name, &opening);
     if (status == EBPO_OK)
         status = ebpo_model_new(j->file, &opening, &j->model, error);
     if (status != EBPO_OK)

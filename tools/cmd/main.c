@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "cli/command.h"
+#include "cli/process_memory.h"
 #include "cli/signals.h"
 #include "cli/standard_files.h"
 #include "cli/words.h"
@@ -104,6 +105,7 @@ int main(int argc, char **argv)
     fesetenv(FE_DFL_ENV);
     signals_install();
     words_init();
+    process_memory_usual();
     int code = dispatch(argc, argv);
     const command *c = argc > 1 ? find(argv[1]) : NULL;
     if (!command_flush(c ? c->spec->command : NULL) && code == EXIT_FINE)

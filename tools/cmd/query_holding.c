@@ -228,7 +228,10 @@ void query_holding_tell(const query_holding *h)
     if (!h->automatic)
         return;
     words_bytes(half, sizeof half, h->options.memory);
-    fprintf(stderr, "memory: at most %s, half of what was free; ", half);
+    fprintf(stderr, "memory: at most %s, %s; ", half,
+            h->options.memory > h->free_memory / 2
+                ? "the least that will do, which is more than half of what was free"
+                : "half of what was free");
     if (!h->subtrees)
         fprintf(stderr, "all of the model at once, as it is small\n");
     else if (h->whole_later)

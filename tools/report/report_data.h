@@ -159,7 +159,7 @@ typedef struct report_values {
     int normals, up;
     double epsilon;
     int64_t max_level, leaf_faces, points, seed, threads;
-    const char *view;
+    const char *view, *memory;
     arg_list names;
     bool no_pictures, need, keep, json, quiet;
     remote_values remote;

@@ -1,0 +1,192 @@
+#!/usr/bin/env python3
+"""limits.py TOOL INPUTS LITTLE FEATURES: what commands may take of a machine.
+
+Each keeps to its limit of memory, given or not, or ends with an error and without output; a mesh that
+is shortened while it is read is an error. LITTLE is preloaded where a machine has little memory left.
+"""
+import json
+import math
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.dont_write_bytecode = True
+HERE = os.path.dirname(os.path.abspath(__file__))
+TOOL, INPUTS, LITTLE = map(os.path.abspath, sys.argv[1:4])
+FEATURES = sys.argv[4].split(",")
+failures = []
+
+
+def check(good, what):
+    print(("ok      " if good else "FAILED  ") + what, flush=True)
+    if not good:
+        failures.append(what)
+
+
+def small_stacks():
+    """Stacks of threads come on top of a limit: this test should not need a model larger than all."""
+    resource.setrlimit(resource.RLIMIT_STACK, (160 << 10, 160 << 10))
+
+
+def run(*words, free=None, given="", before=None):
+    """Exit code, both outputs, peak of resident bytes."""
+    environment = dict(os.environ, LC_ALL="C.UTF-8")
+    if free is not None:
+        environment.update(LD_PRELOAD=LITTLE, EBPO_TEST_FREE=str(free))
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as said, \
+            tempfile.TemporaryFile("w+") as stdin:
+        stdin.write(given)
+        stdin.seek(0)
+        process = subprocess.Popen([TOOL, *words], stdin=stdin, stdout=out, stderr=said,
+                                   env=environment, preexec_fn=before)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        out.seek(0)
+        said.seek(0)
+        return process.returncode, out.read(), said.read(), usage.ru_maxrss * 1024
+
+
+def slurp(path):
+    with open(path, "rb") as f:
+        return f.read()
+
+
+def write_ball(path, rows):
+    """A closed sphere with 4 rows^2 faces, roughly."""
+    columns, points, faces = 2 * rows, ["0 0 -1"], []
+    for i in range(1, rows):
+        for k in range(columns):
+            a, b = math.pi * i / rows, 2 * math.pi * k / columns
+            points.append(f"{math.sin(a) * math.cos(b)} {math.sin(a) * math.sin(b)} {-math.cos(a)}")
+    points.append("0 0 1")
+    top = len(points) - 1
+    for k in range(columns):
+        after = (k + 1) % columns
+        faces.append((0, 1 + after, 1 + k))
+        faces.append((top, top - columns + k, top - columns + after))
+        for i in range(rows - 2):
+            a, b = 1 + i * columns, 1 + (i + 1) * columns
+            faces += [(a + k, a + after, b + after), (a + k, b + after, b + k)]
+    with open(path, "w", encoding="ascii") as f:
+        f.write(f"ply\nformat ascii 1.0\nelement vertex {len(points)}\nproperty double x\n"
+                f"property double y\nproperty double z\nelement face {len(faces)}\n"
+                "property list uchar int vertex_indices\nend_header\n")
+        f.writelines(p + "\n" for p in points)
+        f.writelines("3 %d %d %d\n" % face for face in faces)
+
+
+# Commands that hold what their work takes, and their outputs.
+HOLDING = [(["measure", "b.ebpo.h5"], None), (["export", "--mesh", "b.ebpo.h5", "o.glb"], "o.glb")]
+if "png" in FEATURES:
+    HOLDING.append((["render", "--size", "640x480", "b.ebpo.h5", "o.png"], "o.png"))
+
+
+def holding_is_limited():
+    for words, out in HOLDING:
+        command = words[0]
+        code, _, said, _ = run(command, "--memory", "1K", *words[1:], before=small_stacks)
+        check(code == 1 and "1.00 kB is what --memory allows" in said,
+              f"{command} --memory 1K is refused ({code}: {said.strip()})")
+        check(not out or not os.path.exists(out), f"{command} leaves no output")
+        code, _, said, _ = run(*words, free=1000, before=small_stacks)
+        check(code == 1 and "1.00 kB was free when this began" in said,
+              f"{command} with 1000 bytes free is refused ({code}: {said.strip()})")
+        for limit in ([], ["--memory", "1G"], ["--memory", "0"]):
+            code, _, said, _ = run(command, *limit, *words[1:])
+            check(code == 0, f"{command} {' '.join(limit)} works ({code}: {said.strip()})")
+        code, _, said, _ = run(command, "--memory", "much", *words[1:])
+        check(code == 2 and "--memory: 'much' is not a size" in said, f"{command} --memory much")
+
+
+def models_are_held_in_parts():
+    """The same answers, from parts; where the least is more than half, that is said."""
+    plan = json.loads(run("info", "--json", "--memory", "0", "b.ebpo.h5")[1])["memory"]
+    whole, least = plan["whole"], plan["least"]
+    asked = {"map": ["map", "--grid", "9,9,9", "-o", "OUT.nrrd", "b.ebpo.h5"],
+             "collide": ["collide", "--all", "--pose-b", "1 0 0 0 0.01 0 0", "b.ebpo.h5", "b.ebpo.h5"],
+             "touch": ["touch", "--seconds", "0.1", "b.ebpo.h5"]}
+    for command, words in asked.items():
+        right = None
+        for free, noted in ((1 << 40, False), (whole + least, False), (least + least // 2, True)):
+            out = f"{command}{free}.nrrd"
+            code, told, said, _ = run(*(out if w == "OUT.nrrd" else w for w in words), free=free)
+            check(code == 0, f"{command} with {free} bytes free works ({said.strip()})")
+            check(("note: at least" in said) == noted,
+                  f"{command} with {free} bytes free: what is held is said ({said.strip()})")
+            answer = slurp(out) if command == "map" else sorted(told.splitlines())
+            right = right or answer
+            check(command == "touch" or answer == right, f"{command} answers the same from parts")
+
+
+def verify_keeps_its_budget():
+    """Eight million faces in one leaf; they took 173 MB once."""
+    run("convert", "-q", "quads.ply", "one.ebpo.h5")
+    subprocess.run([sys.executable, os.path.join(HERE, "bomb.py"), "one.ebpo.h5", "bomb.ebpo.h5",
+                    "8000000"], check=True, stdout=subprocess.DEVNULL)
+    code, _, said, peak = run("verify", "--memory", "128M", "--most-expansion", "1000",
+                              "bomb.ebpo.h5")
+    check(code == 1 and "content" in said, f"verify of many faces in one leaf ({said.strip()})")
+    check(peak <= 128e6, f"it keeps to 128 MB: {peak / 1e6:.0f} MB")
+
+
+def shortened_while_read():
+    """Whenever that is, it is an error that says so, or comes too late."""
+    whole = slurp("b.ply")
+    for i in range(6):
+        with open("s.ply", "wb") as f:
+            f.write(whole)
+        process = subprocess.Popen([TOOL, "check", "-q", "s.ply"], stderr=subprocess.PIPE)
+        time.sleep(0.006 * i)
+        os.truncate("s.ply", 2000)
+        said = process.communicate()[1].decode()
+        told = "while it was read" in said or "cut short" in said or "the file ends" in said
+        check(process.returncode == 0 or (process.returncode == 1 and told),
+              f"check of a mesh that is shortened ({process.returncode}: {said.strip()})")
+
+
+def changed_while_open():
+    """An .ebpo.h5 file that is replaced goes on being the old one; shortened, it is an error."""
+    for how in "replaced", "shortened":
+        run("repack", "-q", "--subtree-faces", "64", "b.ebpo.h5", "open.ebpo.h5")
+        process = subprocess.Popen([TOOL, "inside", "--cut-level", "2", "open.ebpo.h5"],
+                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        process.stdin.write("0 0 0\n")
+        process.stdin.flush()
+        first = process.stdout.readline()
+        if how == "replaced":
+            run("repack", "-q", "cube.ebpo.h5", "new.ebpo.h5")
+            os.replace("new.ebpo.h5", "open.ebpo.h5")
+        else:
+            os.truncate("open.ebpo.h5", 9000)
+        rest, said = process.communicate("".join(f"{s * 0.6} {t * 0.6} 0.52\n" for s in (-1, 1)
+                                                 for t in (-1, 1)))
+        check(first.startswith("IN"), f"{how}: the first answer ({first.strip()}{said})")
+        if how == "replaced":
+            check(process.returncode == 0 and rest.count("IN") == 4, f"replaced: {rest} {said}")
+        else:
+            check(process.returncode == 1 and "became shorter" in said, f"shortened: {rest} {said}")
+
+
+def main():
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        subprocess.run([INPUTS, "."], check=True)
+        write_ball("b.ply", 100)
+        run("convert", "-q", "b.ply", "b.ebpo.h5")
+        run("convert", "-q", "quads.ply", "cube.ebpo.h5")
+        holding_is_limited()
+        models_are_held_in_parts()
+        if "h5py" in FEATURES:
+            verify_keeps_its_budget()
+        shortened_while_read()
+        changed_while_open()
+        os.chdir("/")
+    print(f"{len(failures)} failed")
+    return 1 if failures else 0
+
+
+sys.exit(main())

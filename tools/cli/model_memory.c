@@ -1,0 +1,30 @@
+#include "cli/model_memory.h"
+
+#include <ebpo/http.h>
+#include <ebpo/memory.h>
+#include <stdio.h>
+
+#include "cli/words.h"
+
+void model_memory_tell_least(const char *command, const char *path, uint64_t least, uint64_t half)
+{
+    char needs[32], has[32];
+    words_bytes(needs, sizeof needs, least);
+    words_bytes(has, sizeof has, half);
+    fprintf(stderr,
+            "ebpo %s: %s: note: at least %s must be held, which is more than %s, half of what is "
+            "free\n",
+            command, path, needs, has);
+}
+
+void model_memory_usual(const char *command, const ebpo_file *file, const char *path,
+                        ebpo_model_options *options)
+{
+    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
+    if (ebpo_is_url(path) || ebpo_model_memory(file, options, &plan, NULL) != EBPO_OK)
+        return; /* what is wrong is said when the model is made */
+    uint64_t half = ebpo_free_memory() / 2;
+    options->memory = plan.whole <= half ? 0 : half > plan.least ? half : plan.least;
+    if (plan.whole > half && plan.least > half)
+        model_memory_tell_least(command, path, plan.least, half);
+}

@@ -1,0 +1,81 @@
+#include "cli/process_memory.h"
+
+#include <ebpo/memory.h>
+#include <stdio.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/words.h"
+
+enum { THREADS_MOST = 256 };
+
+/* Of this process, which has one thread and runs one command. */
+static uint64_t limit_bytes;
+static bool limit_given;
+
+/* What counts has been taken before: private memory that may be written, which under sanitizers is
+ * most of the address space. */
+static uint64_t taken_already(void)
+{
+    unsigned long long pages = 0;
+    FILE *f = fopen("/proc/self/statm", "re");
+    if (!f)
+        return 0;
+    if (fscanf(f, "%*u %*u %*u %*u %*u %llu", &pages) != 1)
+        pages = 0;
+    fclose(f);
+    return pages * (uint64_t)sysconf(_SC_PAGESIZE);
+}
+
+/* Stacks of threads count as a whole, though hardly any of each is used. */
+static uint64_t stacks(void)
+{
+    struct rlimit stack;
+    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    uint64_t each = UINT64_C(8) << 20;
+    if (getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur != RLIM_INFINITY)
+        each = stack.rlim_cur;
+    return each * (uint64_t)(cores < 1 ? 1 : cores > THREADS_MOST ? THREADS_MOST : cores);
+}
+
+/* 0: no limit of ours. */
+static void limit_to(uint64_t bytes, bool given)
+{
+    struct rlimit limit;
+    uint64_t already = taken_already(), all = already + stacks() + bytes;
+    if (!already || all < bytes || getrlimit(RLIMIT_DATA, &limit) != 0)
+        return;
+    if (limit.rlim_max != RLIM_INFINITY && all > limit.rlim_max)
+        return; /* the system's own limit is less */
+    limit.rlim_cur = bytes ? all : limit.rlim_max;
+    if (setrlimit(RLIMIT_DATA, &limit) != 0)
+        return;
+    limit_bytes = bytes;
+    limit_given = given;
+}
+
+void process_memory_usual(void) { limit_to(ebpo_free_memory(), false); }
+
+bool process_memory_take(const char *command, const char *size)
+{
+    uint64_t bytes;
+    if (!size)
+        return true;
+    if (!words_read_size(size, &bytes)) {
+        command_usage(command, "--memory: '%s' is not " WORDS_SIZE_EXPECTED, size);
+        return false;
+    }
+    limit_to(bytes, true);
+    return true;
+}
+
+void process_memory_why(char *out, size_t capacity)
+{
+    char size[32];
+    words_bytes(size, sizeof size, limit_bytes);
+    snprintf(out, capacity, "%s%s%s", limit_bytes ? "; " : "", limit_bytes ? size : "",
+             !limit_bytes  ? ""
+             : limit_given ? " is what --memory allows"
+                           : " was free when this began");
+}
