@@ -165,7 +165,8 @@ static ebpo_status list_outer(const counting *c, ebpo_error *error)
                                         level_sum(c, i, l, EBPO_S_REFS));
         ebpo_outer_blocks_use(&blocks, &c->tree->mesh, &own);
         if (!ebpo_grow(&c->sums->outer, &c->sums->outer_capacity,
-                       c->sums->outer_count + blocks.face_blocks + blocks.vertex_blocks,
+                       c->sums->outer_count + blocks.face_blocks + blocks.vertex_blocks +
+                           1, /* never NULL */
                        sizeof *c->sums->outer))
             status = ebpo_fail_memory(error, c->sums->outer_count * sizeof *c->sums->outer);
         else

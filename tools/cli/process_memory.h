@@ -1,5 +1,5 @@
-/* What a command may hold besides files, whatever it does: a model that is larger than it seems ends
- * with an error, and not with other programs of this machine. */
+/* What a command may hold besides files, whatever it does: a model that is larger than it seems
+ * ends with an error, and not with other programs of this machine. */
 #ifndef EBPO_TOOLS_PROCESS_MEMORY_H
 #define EBPO_TOOLS_PROCESS_MEMORY_H
 

@@ -310,6 +310,17 @@ static ebpo_status refuse(const patient *p, const char *why, ebpo_error *error)
     return error->status = EBPO_E_ABSENT;
 }
 
+/* What is damaged may be the list of how chunks end: nothing can be told to be the file's then. */
+static ebpo_status refuse_mesh(const patient *p, ebpo_error *error)
+{
+    char why[sizeof error->message];
+    snprintf(why, sizeof why,
+             "the file's mesh cannot be read, and all else is made of it; give the mesh that the "
+             "file was made from with --source (%.300s)",
+             p->why[MESH]);
+    return refuse(p, why, error);
+}
+
 static ebpo_status repair(patient *p, ebpo_error *error)
 {
     remade r = { .vertex_source = NULL };
@@ -325,14 +336,14 @@ static ebpo_status repair(patient *p, ebpo_error *error)
         status = look_at_levels(p, error);
     if (status != EBPO_OK)
         return status;
+    if (!p->v->source && p->fate[MESH] == LOST)
+        return refuse_mesh(p, error);
     if (!p->v->source && p->fate[MESH] != KEPT)
-        return refuse(p,
-                      p->fate[MESH] == LOST
-                          ? "the file's mesh is damaged, and all else is made of it; give the mesh "
-                            "that the file was made from with --source"
-                          : "the file has no mesh, of which all else is made; give the mesh that "
-                            "the file was made from with --source",
-                      error);
+        return refuse(
+            p,
+            "the file has no mesh, of which all else is made; give the mesh that the file "
+            "was made from with --source",
+            error);
     status = p->v->source ? from_source(p, &r, error) : from_file(p, &r, error);
     if (status == EBPO_OK)
         status = make(p, &r, error);

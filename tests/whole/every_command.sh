@@ -1,0 +1,64 @@
+#!/bin/sh
+# every_command.sh EBPO VECTORS MODELS: each command that reads over all conformance files, and a few
+# real models converted in several ways. For builds with sanitizers, as of clang:
+#
+#   CC=clang CXX=clang++ meson setup BUILD -Db_sanitize=undefined -Db_lundef=false \\
+#       --buildtype=debugoptimized -Dc_args=-fno-sanitize-recover=all
+#
+# Prints how many runs there were, and those with an exit code that no command has, or with a word of a
+# sanitizer; exit code 1 where there is one. Not part of the tests: it takes minutes.
+ebpo=$(realpath "$1") vectors=$(realpath "$2") models=$(realpath "$3")
+folder=$(mktemp -d) && cd "$folder" || exit 2
+trap 'rm -rf "$folder"' EXIT
+runs=0 bad=0
+
+r() {
+    runs=$((runs + 1))
+    timeout 600 "$ebpo" "$@" </dev/null >/dev/null 2>said
+    code=$?
+    if [ $code -gt 4 ] || grep -q 'runtime error\|Sanitizer' said; then
+        bad=$((bad + 1))
+        echo "code $code: ebpo $*"
+        grep 'runtime error\|Sanitizer' said
+    fi
+}
+
+for i in 1 2 3 4 5 6 7 8 9; do
+    echo "0.$i -0.$i 0.0$i" >>points
+    echo "-5 -0.$i 0.0$i 1 0.$i 0" >>rays
+done
+echo "-1 -1 -1 1 1 1" >boxes
+r convert "$models/bunny.ply" bunny.ebpo.h5
+r convert "$models/office_chair.ply" chair.ebpo.h5
+r convert --face-coding gates --with leaf-planes --subtree-faces 512 "$models/cad_adis16480.ply" cad.ebpo.h5
+r convert --repair "$models/blade.ply" blade.ebpo.h5
+r convert --codec deflate --weld --orient --fill-holes "$models/motorbike.ply" motorbike.ebpo.h5
+r check --crossings "$models/selfint_A.ply"
+r verify --against "$models/office_chair.ply" chair.ebpo.h5
+r report -o report --no-pictures bunny.ebpo.h5
+for file in "$vectors"/failed/*.h5; do
+    r info "$file"
+    r verify "$file"
+done
+for file in "$vectors"/passed/*.h5 bunny.ebpo.h5 chair.ebpo.h5 cad.ebpo.h5; do
+    for command in info verify levels 'measure --derived' 'view --eye 5,5,5' 'collide --self' \
+        'touch --seconds 0.05' 'map --grid 5,5,5 -o grid.nrrd'; do
+        # shellcheck disable=SC2086
+        r $command "$file"
+    done
+    r inside "$file" points
+    r distance "$file" points
+    r distance --nearest 3 "$file" points
+    r ray "$file" rays
+    r box "$file" boxes
+    r extract --mesh "$file" mesh.ply
+    r extract --level 1 "$file" level.ply
+    r subset --levels 0-1 "$file" subset.ebpo.h5
+    r repack "$file" repacked.ebpo.h5
+    r repair -o repaired.ebpo.h5 "$file"
+    r export --mesh "$file" mesh.glb
+    r export --levels 0-1 "$file" levels.xdmf
+    r render --size 64x64 "$file" picture.png
+done
+echo "$runs runs, $bad bad"
+[ $bad = 0 ]
