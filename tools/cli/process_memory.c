@@ -5,7 +5,6 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "cli/command.h"
 #include "cli/words.h"
 
 enum { THREADS_MOST = 256 };
@@ -63,7 +62,9 @@ bool process_memory_take(const char *command, const char *size)
     if (!size)
         return true;
     if (!words_read_size(size, &bytes)) {
-        command_usage(command, "--memory: '%s' is not " WORDS_SIZE_EXPECTED, size);
+        fprintf(stderr,
+                "ebpo %s: --memory: '%s' is not " WORDS_SIZE_EXPECTED "; try 'ebpo %s --help'\n",
+                command, size, command);
         return false;
     }
     limit_to(bytes, true);
