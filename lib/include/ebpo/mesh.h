@@ -175,8 +175,8 @@ typedef struct ebpo_mesh_read_options {
  * and those that no face names are left out. ebpo_mesh_unread tells what could not
  * be read.
  *
- * Safe on untrusted files; but as they are mapped, one that another program shortens
- * meanwhile ends the process by SIGBUS.
+ * Safe on untrusted files. They are read as a whole, into an array of `workspace`: one that
+ * another program changes meanwhile is EBPO_E_IO.
  *
  * EBPO_E_IO, EBPO_E_MEMORY, EBPO_E_CANCELLED. EBPO_E_FORMAT: no mesh, or a damaged
  * one. EBPO_E_LIMIT: too large. EBPO_E_UNSUPPORTED: a dialect that is not read, such
