@@ -147,6 +147,33 @@ def shortened_while_read():
               f"check of a mesh that is shortened ({process.returncode}: {said.strip()})")
 
 
+PIPES = ["scene info pipe", "scene boxes names.json", "verify --against pipe b.ebpo.h5",
+         "repair --source pipe -o x.ebpo.h5 b.ebpo.h5", "map --from pipe -o x.ply b.ebpo.h5",
+         "map --plane z=0 -o x.nrrd pipe", "touch pipe", "render pipe x.png", "report -o x pipe",
+         "collide b.ebpo.h5 pipe", "collide pipe b.ebpo.h5", "boolean A|B b.ebpo.h5 pipe",
+         "repair -o x.ebpo.h5 pipe", "bench pipe", "fetch pipe x.ebpo.h5", "distance pipe",
+         "ray pipe", "box pipe", "scene info /dev/zero", "check /dev/zero", "touch /dev/zero"]
+
+
+def pipes_are_refused():
+    """At once, wherever a file is expected: nobody writes to this one."""
+    os.mkfifo("pipe")
+    with open("names.json", "w", encoding="ascii") as f:
+        f.write('{"ebpo_scene": "1.0", "models": {"m": {"file": "pipe"}}, '
+                '"instances": [{"name": "a", "model": "m"}]}')
+    for words in PIPES:
+        if words.startswith("render") and "png" not in FEATURES:
+            continue
+        try:
+            done = subprocess.run([TOOL, *words.split()], stdin=subprocess.DEVNULL, text=True,
+                                  capture_output=True, timeout=60, check=False)
+        except subprocess.TimeoutExpired:
+            check(False, f"{words} waits")
+            continue
+        told = "is a pipe or device" in done.stderr or "not a regular file" in done.stderr
+        check(done.returncode == 1 and told, f"{words}: {done.returncode}, {done.stderr.strip()}")
+
+
 def changed_while_open():
     """An .ebpo.h5 file that is replaced goes on being the old one; shortened, it is an error."""
     for how in "replaced", "shortened":
@@ -183,6 +210,7 @@ def main():
         if "h5py" in FEATURES:
             verify_keeps_its_budget()
         shortened_while_read()
+        pipes_are_refused()
         changed_while_open()
         os.chdir("/")
     print(f"{len(failures)} failed")

@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
 #include "check_main.h"
@@ -175,6 +176,25 @@ START_TEST(empty_file_is_read_as_no_bytes)
 }
 END_TEST
 
+START_TEST(replaced_output_keeps_extended_attributes_and_mode)
+{
+    ebpo_publish out;
+    struct stat st;
+    char value[8] = "";
+    write_file(target, "old");
+    ck_assert(chmod(target, 0604) == 0);
+    bool has =
+        setxattr(target, "user.ebpo", "kept", 4, 0) == 0; /* not all file systems have them */
+    ck_assert(ebpo_publish_begin(&out, target, NULL) == EBPO_OK);
+    fputs("new", ebpo_publish_stream(&out));
+    ck_assert(ebpo_publish_commit(&out, NULL) == EBPO_OK);
+    check_content(target, "new");
+    ck_assert(stat(target, &st) == 0 && (st.st_mode & 07777) == 0604);
+    ck_assert(!has || (getxattr(target, "user.ebpo", value, sizeof value) == 4 &&
+                       memcmp(value, "kept", 4) == 0));
+}
+END_TEST
+
 START_TEST(change_while_reading_is_noticed)
 {
     ebpo_whole_file file;
@@ -251,6 +271,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, more_outputs_than_slots_are_refused_and_slots_come_back);
     tcase_add_test(tests, signal_handler_removes_what_is_unfinished);
     tcase_add_test(tests, empty_file_is_read_as_no_bytes);
+    tcase_add_test(tests, replaced_output_keeps_extended_attributes_and_mode);
     tcase_add_test(tests, change_while_reading_is_noticed);
     tcase_add_test(tests, change_whose_time_is_set_back_is_noticed);
     tcase_add_test(tests, a_file_that_becomes_shorter_is_an_error);
