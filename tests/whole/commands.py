@@ -1,10 +1,11 @@
 """Commands and what they write, for trials in which calls fail (faults.py) or programs are killed
 (killed.py). In a command NAME.ply and the like are inputs that make_inputs makes, URL is one of
 model.ebpo.h5, and what begins with OUT is written. An output that ends with a slash is a folder,
-which appears whole.
+which appears whole. Before, outputs are what put_old makes them.
 """
 import dataclasses
 import os
+import shutil
 import subprocess
 
 OLD = b"what was there before\n"
@@ -69,7 +70,8 @@ class Command:
     need: str = ""  # what the build must have
     times_printed: bool = False  # what is printed differs from run to run
     times_written: bool = False  # so do outputs, of which the size then counts
-    replaces: bool = False  # a folder that is there is replaced
+    fresh: bool = False  # outputs may not be there before; so are folders
+    replaces: bool = False  # but this folder, a report
     seconds: bool = False  # takes seconds: a twentieth of the calls are made to fail
 
 
@@ -102,7 +104,8 @@ COMMANDS = {
     "export stl": Command("export -q --level 2 model.ebpo.h5 OUT.stl", ("OUT.stl",),
                           need="assimp"),
     "extract": Command("extract -q --mesh model.ebpo.h5 OUT.ply", ("OUT.ply",)),
-    "extract images": Command("extract -q --textures OUT image.ebpo.h5"),
+    "extract images": Command("extract -q --textures OUT image.ebpo.h5", ("OUT/image.png",),
+                              fresh=True),
     "render": Command("render --size 32x32 model.ebpo.h5 OUT.png", ("OUT.png",), need="png"),
     "map grid": Command("map -q --threads 1 --grid 4,4,4 -o OUT.vtkhdf model.ebpo.h5",
                         ("OUT.vtkhdf",)),
@@ -120,8 +123,10 @@ COMMANDS = {
     "ray": Command("ray --all --threads 1 model.ebpo.h5 rays.txt"),
     "box": Command("box --threads 1 model.ebpo.h5 boxes.txt"),
     "touch": Command("touch --path hand.txt model.ebpo.h5", times_printed=True),
-    "bench": Command("bench --count 5 --save-points OUT.p --save-answers OUT.a model.ebpo.h5",
-                     ("OUT.p", "OUT.a"), times_printed=True),
+    "bench": Command("bench --count 5 --save-answers OUT.a model.ebpo.h5", ("OUT.a",),
+                     times_printed=True),
+    "bench points": Command("bench --count 5 --save-points OUT.p model.ebpo.h5", ("OUT.p",),
+                            times_printed=True),
     "collide": Command("collide --pose-b '0.5 0 0' -o OUT.h5 model.ebpo.h5 model.ebpo.h5",
                        ("OUT.h5",)),
     "collide ply": Command("collide --pose-b '0.5 0 0' -o OUT.ply model.ebpo.h5 model.ebpo.h5",
@@ -165,6 +170,36 @@ def read(path):
             return f.read()
     except FileNotFoundError:
         return None
+
+
+def old(command, name):
+    """What an output is before."""
+    if command.replaces:
+        return {"report.json": OLD}
+    return None if command.fresh or name.endswith("/") else OLD
+
+
+def put_old(command, folder):
+    for name in command.outputs:
+        path = os.path.join(folder, name)
+        if name.endswith("/") or command.fresh:
+            shutil.rmtree(os.path.join(folder, name.partition("/")[0]), ignore_errors=True)
+        if command.replaces:
+            os.mkdir(path)
+            write(path, "report.json", OLD)
+        elif old(command, name) is not None:
+            write(folder, name, OLD)
+
+
+def is_new(command, name, content, right):
+    """Whether an output is whole and right: `right` is that of a run that nothing befell."""
+    if not command.times_written or content is None:
+        return content == right
+    if name.endswith("/"):
+        return (content.keys() == right.keys() and OLD not in content.values() and
+                all(c.rstrip()[-1:] == right[n].rstrip()[-1:] for n, c in content.items()
+                    if not n.endswith(".csv")))
+    return content != OLD and abs(len(content) - len(right)) <= 64 # seconds have digits
 
 
 def damaged(tool, folder, content):

@@ -25,7 +25,7 @@ import tempfile
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "kit"))
 import ranges_server
-from commands import COMMANDS, OLD, make_inputs, read
+from commands import COMMANDS, is_new, make_inputs, old, put_old, read
 
 # What each kind fails with. Interrupted and short calls are no failures: all goes on.
 KINDS = {"malloc": ["ENOMEM"], "read": ["EIO", "EINTR"], "short-read": [""],
@@ -48,10 +48,7 @@ class Place:
         os.makedirs(self.temporary)
         for name in os.listdir(inputs):
             os.link(os.path.join(inputs, name), os.path.join(root, name))
-        for name in self.outputs:
-            if not name.endswith("/"):
-                with open(os.path.join(root, name), "wb") as f:
-                    f.write(OLD)
+        put_old(COMMANDS[case], root)
 
     def files(self):
         return {os.path.join(folder, name)[len(self.root) + 1:]
@@ -101,15 +98,7 @@ class Case:
         return self.place("count").run(f"{kind}:0:5", foreign)[3]
 
     def is_right(self, name, content):
-        right = self.right[name]
-        if not self.command.times_written or content is None:
-            return content == right
-        if name.endswith("/"):
-            return content.keys() == right.keys()
-        return content != OLD and abs(len(content) - len(right)) <= 64 # seconds have digits
-
-    def before_of(self, name):
-        return None if name.endswith("/") else OLD
+        return is_new(self.command, name, content, self.right[name])
 
     def judge(self, place, kind, error, outcome):
         """What is wrong, or an empty text."""
@@ -129,7 +118,7 @@ class Case:
             return "" # something failed later: the sync of the folder, looking at what was written
         if "of the two files only" in said: # neither forwards nor back
             return ""
-        changed = [name for name in place.outputs if place.content(name) != self.before_of(name)]
+        changed = [name for name in place.outputs if place.content(name) != old(self.command, name)]
         left = place.files() - self.before
         if self.name == "fetch": # from which the next one resumes
             left = {name for name in left if not name.startswith("OUT.part/")}

@@ -218,7 +218,9 @@ static void count_answers(const bench_job *job, results *r)
 
 static int save_answers(const bench_job *job, const char *path)
 {
-    FILE *f = fopen(path, "wb");
+    char *data = NULL;
+    size_t size = 0;
+    FILE *f = open_memstream(&data, &size);
     for (uint64_t i = 0; f && i < job->count; i++) {
         if (job->query == BENCH_INSIDE) {
             putc(((const ebpo_inside_result *)job->answers)[i].where, f);
@@ -229,12 +231,7 @@ static int save_answers(const bench_job *job, const char *path)
         raw_double(f, job->query == BENCH_DISTANCE ? d->distance : h->t);
         raw_u64(f, job->query == BENCH_DISTANCE ? d->face : h->face); /* EBPO_NO_FACE is -1 */
     }
-    bool good = f && !ferror(f);
-    if (f && fclose(f) != 0)
-        good = false;
-    if (!good)
-        fprintf(stderr, "ebpo bench: %s: cannot be written: %s\n", path, strerror(errno));
-    return good ? EXIT_FINE : EXIT_FAILED;
+    return bench_save(f, &data, &size, path);
 }
 
 /* --- telling --- */
@@ -400,11 +397,8 @@ static int prepare(const values *v, const char *path, bench_points *p)
     *p = (bench_points){ .rows = NULL };
     if (!command_wants_hdf5("bench", path))
         return EXIT_FAILED;
-    int code = bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw,
-                                 (uint64_t)v->count, (uint64_t)v->seed, v->q.tmax);
-    if (code == EXIT_FINE && v->save_points)
-        code = bench_points_save(p, v->save_points);
-    return code;
+    return bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw,
+                             (uint64_t)v->count, (uint64_t)v->seed, v->q.tmax);
 }
 
 static const values usual = {
@@ -437,6 +431,8 @@ static int run(void *given, const char **operand)
     }
     if (code == EXIT_FINE)
         code = bench(&job, v, operand[0], &holding, batch);
+    if (code == EXIT_FINE && v->save_points)
+        code = bench_points_save(&p, v->save_points);
     free(batch);
     free(job.answers);
     free(job.ns);
