@@ -234,6 +234,17 @@ static int save_answers(const bench_job *job, const char *path)
     return bench_save(f, &data, &size, path);
 }
 
+/* Before anything is measured. */
+static int outputs_are_free(const values *v)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    const char *const paths[] = { v->save_points, v->save_answers };
+    for (int i = 0; i < 2; i++)
+        if (paths[i] && ebpo_check_output(paths[i], &error) != EBPO_OK)
+            return command_failed("bench", &error);
+    return EXIT_FINE;
+}
+
 /* --- telling --- */
 
 static const char *const inside_names[] = { "out", "in", "on", "maybe" }, *const other_names[] = {
@@ -364,7 +375,7 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
 
 /* --- the command --- */
 
-static int bench(bench_job *job, const values *v, const char *path,
+static int bench(bench_job *job, const values *v, const bench_points *p, const char *path,
                  const ebpo_model_options *holding, void *batch)
 {
     results r = { .clock_ns = bench_clock_cost(),
@@ -382,6 +393,8 @@ static int bench(bench_job *job, const values *v, const char *path,
     if (s.file)
         r.traffic = traffic_of(s.file);
     query_close(&s);
+    if (code == EXIT_FINE && v->save_points)
+        code = bench_points_save(p, v->save_points);
     if (code == EXIT_FINE && v->save_answers)
         code = save_answers(job, v->save_answers);
     if (code != EXIT_FINE)
@@ -395,7 +408,7 @@ static int prepare(const values *v, const char *path, bench_points *p)
 {
     points_kind kind = v->query >= BENCH_RAY ? POINTS_RAYS : POINTS;
     *p = (bench_points){ .rows = NULL };
-    if (!command_wants_hdf5("bench", path))
+    if (!command_wants_hdf5("bench", path) || outputs_are_free(v) != EXIT_FINE)
         return EXIT_FAILED;
     return bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw,
                              (uint64_t)v->count, (uint64_t)v->seed, v->q.tmax);
@@ -430,9 +443,7 @@ static int run(void *given, const char **operand)
         code = command_no_memory("bench");
     }
     if (code == EXIT_FINE)
-        code = bench(&job, v, operand[0], &holding, batch);
-    if (code == EXIT_FINE && v->save_points)
-        code = bench_points_save(&p, v->save_points);
+        code = bench(&job, v, &p, operand[0], &holding, batch);
     free(batch);
     free(job.answers);
     free(job.ns);
