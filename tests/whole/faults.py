@@ -8,7 +8,8 @@ Then the program has to end by itself, what it wrote is whole and right or as it
 other file is left, and the message says what was wrong. CASE: names of commands.py, all of them
 else. EBPO_TEST_SCALE from 1 on: all calls, or, with --every, N apart; less: of each command that
 share of the kinds, one call of each. --foreign: allocations by libhdf5 and other libraries instead
-of our own, counted apart. --table prints counts in Markdown.
+of our own, counted apart. --table prints counts in Markdown. FAULTS may name more that is
+preloaded, after a colon: liblsan.so.0, which finds what is not freed on the way out.
 """
 import collections
 import concurrent.futures
@@ -202,7 +203,8 @@ def main():
     return 1 if bad and not foreign else 0
 
 
-TOOL, GENERATE, FAULTS = (os.path.abspath(a) for a in sys.argv[1:4])
+TOOL, GENERATE = (os.path.abspath(a) for a in sys.argv[1:3])
+FAULTS = ":".join(map(os.path.abspath, sys.argv[3].split(":")))
 SCALE, EVERY, SUPPRESSIONS = float(os.environ.get("EBPO_TEST_SCALE", "1")), 1, ""
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Programs that are killed at any moment: killed.py TOOL GENERATE FEATURES [NAME...]
+"""Programs that are killed at any moment: killed.py TOOL GENERATE FEATURES [--kills=N] [NAME...]
 
 Every command of commands.py that writes is killed (SIGKILL) after times that are drawn between none
 and somewhat more than a run takes. Afterwards each output is the old one or the new one, whole;
 beside it lies at most one temporary file of its own, which the next run removes (and what fetch
-resumes from, and folders that were being made). 200 kills for each command; where EBPO_TEST_SCALE
-is less than 1, two for each third one. Then two writers of one output, and two readers of one cache
+resumes from, and folders that were being made). 200 kills for each command, or N; where
+EBPO_TEST_SCALE is less than 1, two for each third one. Then two writers of one output, and two readers of one cache
 folder.
 """
 import collections
@@ -86,7 +86,7 @@ def kill_once(name, command, root, wait):
     return process.returncode == 0
 
 
-def kill_often(name, url, inputs, root, draw):
+def kill_often(name, url, inputs, root, draw, kills):
     """Kills in one folder, so that what remains meets the next run."""
     command, outputs = arguments(COMMANDS[name].text, url), COMMANDS[name].outputs
     make_place(inputs, root)
@@ -96,8 +96,12 @@ def kill_often(name, url, inputs, root, draw):
     length = time.monotonic() - began
     right = {out: read(os.path.join(root, out)) for out in outputs}
     counts, done, left, mixed = collections.Counter(), 0, 0, 0
-    for _ in range(KILLS if SCALE >= 1 else 2):
-        done += kill_once(name, command, root, draw.uniform(0, 1.1 * length))
+    for _ in range(kills):
+        wait = draw.uniform(0, 1.1 * length)
+        ended = kill_once(name, command, root, wait)
+        done += ended
+        # other work on the machine makes runs longer and shorter
+        length *= 0.95 if ended and wait < length else 1.1 if not ended and wait > 0.9 * length else 1
         states = [state(name, out, read(os.path.join(root, out)), right[out]) for out in outputs]
         check("neither" not in states, f"{name}: {outputs} are {states}")
         counts.update(states[:1])
@@ -157,7 +161,9 @@ def two_readers(inputs, root, url):
 
 
 def main():
-    features, wanted = sys.argv[3].split(","), sys.argv[4:]
+    features, wanted = sys.argv[3].split(","), [a for a in sys.argv[4:] if a[0] != "-"]
+    kills = [int(a.partition("=")[2]) for a in sys.argv[4:] if a.startswith("--kills=")]
+    kills = kills[0] if kills else KILLS if SCALE >= 1 else 2
     draw = random.Random(1)
     names = [n for n, c in COMMANDS.items() if c.outputs and (not c.need or c.need in features)]
     names = wanted or (names if SCALE >= 1 else names[::3])
@@ -167,7 +173,7 @@ def main():
         print("| command | old | new | neither | of two one | had ended | something left |\n"
               "|---|---:|---:|---:|---:|---:|---:|")
         for name in names:
-            kill_often(name, url, inputs, os.path.join(root, "killed"), draw)
+            kill_often(name, url, inputs, os.path.join(root, "killed"), draw, kills)
         two_writers(inputs, os.path.join(root, "writers"))
         if "http" in features:
             two_readers(inputs, os.path.join(root, "readers"), url)
