@@ -28,8 +28,8 @@ static void point_of(const mix_asker *a, uint64_t number, double point[3])
     const ebpo_info *info = ebpo_file_info(a->file);
     uint64_t state = number * 7919 + 1;
     for (int k = 0; k < 3; k++)
-        point[k] = info->box_origin[k] +
-                   info->box_size[k] * (1.2 * ebpo_test_random_unit(&state) - 0.1);
+        point[k] =
+            info->box_origin[k] + info->box_size[k] * (1.2 * ebpo_test_random_unit(&state) - 0.1);
 }
 
 static ebpo_ray ray_of(const mix_asker *a, uint64_t number)
@@ -305,8 +305,7 @@ static ebpo_status ask_subtree(const mix_asker *a, uint64_t number, uint64_t *ha
     return status;
 }
 
-static ebpo_status ask_level(const mix_asker *a, uint64_t number, uint64_t *hash,
-                             ebpo_error *error)
+static ebpo_status ask_level(const mix_asker *a, uint64_t number, uint64_t *hash, ebpo_error *error)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
     ebpo_level level;
@@ -335,8 +334,7 @@ static ebpo_status ask_counts(const mix_asker *a, uint64_t number, uint64_t *has
 }
 
 /* A hand that goes through the model; what it meets depends on what has been loaded. */
-static ebpo_status ask_touch(const mix_asker *a, uint64_t number, uint64_t *hash,
-                             ebpo_error *error)
+static ebpo_status ask_touch(const mix_asker *a, uint64_t number, uint64_t *hash, ebpo_error *error)
 {
     enum { TICKS = 40 };
     const ebpo_info *info = ebpo_file_info(a->file);
@@ -369,15 +367,14 @@ static ebpo_status ask_touch(const mix_asker *a, uint64_t number, uint64_t *hash
 typedef ebpo_status (*ask_fn)(const mix_asker *asker, uint64_t number, uint64_t *hash,
                               ebpo_error *error);
 static const ask_fn ask[MIX_KINDS] = {
-    ask_inside,  ask_inside_many, ask_distance, ask_distance_many, ask_within,  ask_ray,
-    ask_ray_all, ask_rays,        ask_box,      ask_triangles,     ask_stream,  ask_view,
+    ask_inside,  ask_inside_many, ask_distance, ask_distance_many, ask_within, ask_ray,
+    ask_ray_all, ask_rays,        ask_box,      ask_triangles,     ask_stream, ask_view,
     ask_subtree, ask_level,       ask_counts,   ask_touch,
 };
 enum { RAYS = 7, TOUCH = 15 };
 const char *const mix_names[MIX_KINDS] = {
-    "inside",  "inside, many", "distance", "distance, many", "within", "ray",
-    "ray all", "rays",         "box",      "triangles",      "stream", "view",
-    "subtree", "level",        "counts",   "touch",
+    "inside", "inside, many", "distance", "distance, many", "within",  "ray",   "ray all", "rays",
+    "box",    "triangles",    "stream",   "view",           "subtree", "level", "counts",  "touch",
 };
 
 bool mix_has_workers(int kind) { return kind == RAYS || kind == TOUCH; }

@@ -192,8 +192,8 @@ static void tell(worker *w, int kind, uint64_t number, const char *what)
     w->s->wrong++;
     w->s->enough = true;
     if (w->s->told++ < 10)
-        fprintf(stderr, "thread %u, %s %" PRIu64 " of %s: %s\n", w->number, mix_names[kind],
-                number, names[w->which], what);
+        fprintf(stderr, "thread %u, %s %" PRIu64 " of %s: %s\n", w->number, mix_names[kind], number,
+                names[w->which], what);
 }
 
 /* Whether it may fail so: for its own read, or one in a thread of the library on its behalf. */

@@ -410,8 +410,8 @@ static int prepare(const values *v, const char *path, bench_points *p)
     *p = (bench_points){ .rows = NULL };
     if (!command_wants_hdf5("bench", path) || outputs_are_free(v) != EXIT_FINE)
         return EXIT_FAILED;
-    return bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw,
-                             (uint64_t)v->count, (uint64_t)v->seed, v->q.tmax);
+    return bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw, (uint64_t)v->count,
+                             (uint64_t)v->seed, v->q.tmax);
 }
 
 static const values usual = {
