@@ -140,7 +140,7 @@ static void ask_alone(int which)
 
 static void begin(void)
 {
-    const uint32_t n = seconds() > 0 ? 100 : 50;
+    const uint32_t n = seconds() > 0 ? 70 : 50;
     scratch_enter();
     write_model(names[0], ebpo_test_torus(3, 1, 2 * n, n));
     write_model(names[1], ebpo_test_torus(2, 1.5, n, 2 * n));

@@ -158,7 +158,8 @@ def attempts(case, foreign):
 def prepare(root):
     inputs = os.path.join(root, "inputs")
     with open(SUPPRESSIONS, "w", encoding="ascii") as f:
-        f.write("leak:libhdf5\nleak:libcurl\nleak:libgnutls\nleak:libcrypto\n")
+        f.write("leak:libhdf5\nleak:libcurl\nleak:libgnutls\nleak:libcrypto\n"
+                "leak:libfontconfig\n")
     return inputs, ranges_server.serve(make_inputs(TOOL, GENERATE, inputs, 600))
 
 
