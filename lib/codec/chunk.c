@@ -1,4 +1,5 @@
 #include "codec/chunk.h"
+#include "codec/zstd_frame.h"
 
 #include <string.h>
 #include <zlib.h>
@@ -244,8 +245,8 @@ static ebpo_status zstd_decode(ebpo_chunk_coder *coder, const uint8_t *stored, s
         return broken(why, "the zstd frame does not state the chunk's size");
     if (!has_checksum(stored, stored_bytes))
         return broken(why, "the zstd frame has no checksum");
-    if (stored[4] & 1 << 4) /* which zstd does not look at, and no checksum covers */
-        return broken(why, "the unused bit of the zstd frame's descriptor is set");
+    if (ebpo_zstd_unused_set(stored, stored_bytes))
+        return broken(why, "an unused bit of the zstd frame is set");
     if (ZSTD_findFrameCompressedSize(stored, stored_bytes) != stored_bytes)
         return broken(why, "the zstd frame does not fill the chunk");
     size_t size = ZSTD_decompressDCtx(coder->zstd_in, raw, raw_bytes, stored, stored_bytes);

@@ -119,6 +119,7 @@ static const char *read_fixed_header(ebpo_head_state *s, const ebpo_head_chunks 
         return no_index;
     if (!ebpo_head_sound(block, BYTES))
         return damaged;
+    ebpo_head_note_range(s, l->address, BYTES);
     ebpo_head_cursor c = { block + 5, block + BYTES, false };
     unsigned client = ebpo_cursor_u8(&c), page_bits;
     f->entry = ebpo_cursor_u8(&c);
@@ -145,6 +146,7 @@ static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const f
         return beyond;
     if (!ebpo_head_sound(block, size))
         return damaged;
+    ebpo_head_note_range(s, at, size);
     ebpo_head_cursor c = { block + before, block + size, false };
     const char *wrong = NULL;
     for (uint64_t i = 0; i < count && !wrong; i++) {
@@ -165,6 +167,7 @@ static const char *check_pages(ebpo_head_state *s, ebpo_head_chunks *t, const fi
         return beyond;
     if (!ebpo_head_sound(block, prefix + 4))
         return damaged;
+    ebpo_head_note_range(s, f->data, prefix + 4);
     for (uint64_t page = 0; page < pages; page++)
         if (!(block[14 + page / 8] >> (7 - page % 8) & 1)) {
             t->at = page << t->layout->page_bits;

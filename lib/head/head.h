@@ -35,6 +35,15 @@ void ebpo_head_expect_index(ebpo_head *head, ebpo_range index);
  * as what could not be read may have been taken for absent meanwhile. */
 EBPO_MUST_USE ebpo_status ebpo_head_close(ebpo_head *head, ebpo_status status, ebpo_error *error);
 
+/* From here on keeps which bytes of the file headers and indexes are, each as often as it is read:
+ * for who looks for bytes that belong to nothing. */
+void ebpo_head_keep_ranges(ebpo_head *head);
+/* These ranges, the caller's to free; the superblock is not among them. EBPO_E_MEMORY, also when
+ * memory was short meanwhile. */
+EBPO_MUST_USE ebpo_status ebpo_head_take_ranges(ebpo_head *head, ebpo_range **ranges,
+                                                uint64_t *count, ebpo_error *error);
+enum { EBPO_HEAD_SUPERBLOCK_BYTES = 48 };
+
 /* What a path names. Soft and external links are not followed: OTHER, as is what is damaged. */
 typedef enum ebpo_head_kind {
     EBPO_HEAD_ABSENT,

@@ -54,10 +54,29 @@ ebpo_status ebpo_head_close(ebpo_head *head, ebpo_status status, ebpo_error *err
     if (s) {
         ebpo_head_headers_free(s);
         ebpo_head_bytes_close(&s->bytes);
+        free(s->kept);
     }
     free(s);
     *head = (ebpo_head)EBPO_HEAD_INIT;
     return status;
+}
+
+void ebpo_head_keep_ranges(ebpo_head *head)
+{
+    head->state->keeps = true;
+    for (int i = 0; i < EBPO_HEAD_SLOTS; i++) /* those are read again */
+        head->state->slot[i].used = 0;
+}
+
+ebpo_status ebpo_head_take_ranges(ebpo_head *head, ebpo_range **ranges, uint64_t *count,
+                                  ebpo_error *error)
+{
+    ebpo_head_state *s = head->state;
+    *ranges = s->kept;
+    *count = s->kept_count;
+    s->kept = NULL;
+    s->kept_count = s->kept_capacity = 0;
+    return s->kept_short ? ebpo_fail_memory(error, *count * sizeof **ranges) : EBPO_OK;
 }
 
 /* Whether a link message has this name; then where it leads, EBPO_NO_ADDRESS for soft and external

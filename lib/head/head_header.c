@@ -88,6 +88,7 @@ static bool take_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uin
         return ebpo_refuse(s, damaged_block);
     if (!ebpo_head_sound(block, before + size + 4))
         return ebpo_refuse(s, "its header's checksum differs");
+    ebpo_head_note_range(s, at, before + size + 4);
     uint64_t from = h->byte_count;
     if (!ebpo_grow(&h->bytes, &h->byte_capacity, from + size + 1, 1))
         return note_memory(s, size);

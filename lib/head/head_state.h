@@ -2,6 +2,7 @@
 #ifndef EBPO_HEAD_HEAD_STATE_H
 #define EBPO_HEAD_HEAD_STATE_H
 
+#include "base/alloc.h"
 #include "head/head.h"
 #include "head/head_bytes.h"
 #include "head/head_cursor.h"
@@ -49,7 +50,21 @@ typedef struct ebpo_head_state {
     uint64_t root, clock;
     ebpo_head_header slot[EBPO_HEAD_SLOTS]; /* those used last */
     ebpo_head_refusal refusal;              /* the last one */
+    ebpo_range *kept;                       /* see ebpo_head_keep_ranges */
+    uint64_t kept_count, kept_capacity;
+    bool keeps, kept_short; /* short of memory */
 } ebpo_head_state;
+
+/* These bytes of the file are ours. */
+static inline void ebpo_head_note_range(ebpo_head_state *s, uint64_t at, uint64_t size)
+{
+    if (!s->keeps)
+        return;
+    if (ebpo_grow(&s->kept, &s->kept_capacity, s->kept_count + 1, sizeof *s->kept))
+        s->kept[s->kept_count++] = (ebpo_range){ at, size };
+    else
+        s->kept_short = true;
+}
 
 /* Notes why; false, so that `return` reads well. */
 static inline bool ebpo_refuse(ebpo_head_state *s, const char *what)

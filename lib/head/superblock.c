@@ -18,7 +18,7 @@ static bool has_user_block(ebpo_head_state *s)
 
 bool ebpo_head_read_superblock(ebpo_head_state *s)
 {
-    enum { BYTES = 48, OPEN_FOR_WRITING = 1 };
+    enum { BYTES = EBPO_HEAD_SUPERBLOCK_BYTES, OPEN_FOR_WRITING = 1 };
     const uint8_t *block = ebpo_head_bytes_at(&s->bytes, 0, BYTES);
     s->refusal = (ebpo_head_refusal){ NULL, false };
     if (!block)

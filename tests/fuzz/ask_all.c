@@ -405,6 +405,7 @@ void ask_all(const uint8_t *data, size_t size, bool verified, asked *out)
         options.threads = 1;
         out->verify = ebpo_verify(file, &options, &report, NULL);
         out->violations = report.violations;
+        out->spare_filled = report.spare_filled;
     }
     ebpo_close(file);
 }

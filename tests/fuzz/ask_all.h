@@ -15,6 +15,7 @@ typedef struct asked {
     /* what `ebpo verify` says; EBPO_OK and no violations: that all is well */
     ebpo_status verify;
     uint64_t violations;
+    uint64_t spare_filled; /* bytes that belong to nothing and are not zero */
 } asked;
 
 extern const char *const asked_names[ASKED_KINDS];

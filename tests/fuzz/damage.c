@@ -155,7 +155,7 @@ static void judge(damage *d, uint64_t at)
             wrong |= a.status[i] == EBPO_OK;
             noticed |= a.status[i] != EBPO_OK;
         }
-    bool seen = a.verify != EBPO_OK || a.violations;
+    bool seen = a.verify != EBPO_OK || a.violations || a.spare_filled != d->right.spare_filled;
     d->wrong[d->way] += wrong;
     bool told = whole_chunks && seen && !d->file->has_sums;
     d->silent += wrong && !told;

@@ -16,7 +16,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         found = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
         begin, end = (int(found[1]), min(int(found[2]) + 1, len(data))) if found else (0, len(data))
         self.send_response_only(206 if found else 200)
-        self.send_header("ETag", '"1"')
+        self.send_header("ETag", self.server.etag)
         self.send_header("Content-Length", str(end - begin))
         if found:
             self.send_header("Content-Range", f"bytes {begin}-{end - 1}/{len(data)}")
@@ -27,9 +27,18 @@ class Handler(http.server.BaseHTTPRequestHandler):
             pass
 
 
-def serve(data):
+def start(data):
+    """A server whose members `data` and `etag` may be changed."""
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     server.daemon_threads = True
-    server.data = data
+    server.data, server.etag = data, '"1"'
     threading.Thread(target=server.serve_forever, daemon=True).start()
+    return server
+
+
+def url_of(server):
     return f"http://127.0.0.1:{server.server_address[1]}/model.ebpo.h5"
+
+
+def serve(data):
+    return url_of(start(data))

@@ -658,6 +658,39 @@ START_TEST(chunks_come_back_from_every_pipeline)
 }
 END_TEST
 
+/* The two lowest bits of the modes of sequences, which zstd ignores, and no checksum covers. */
+START_TEST(unused_bits_of_a_frame_are_refused)
+{
+    static const struct {
+        size_t bytes, raw_bytes, modes;
+        const char *frame;
+    } frames[] = {
+        { 29, 32, 15,
+          "\x28\xb5\x2f\xfd\x24\x20\x85\x00\x00\x20\x00\x00\x01\x00\x04\x00\x29\x1c\x54\x06"
+          "\x80\xc3\x2d\xc0\x02\x11\xde\x4a\xac" },
+        { 41, 32, 29,
+          "\x28\xb5\x2f\xfd\x24\x20\xe5\x00\x00\x90\x00\x02\x02\x01\x02\x02\x02\x01\x03\x03"
+          "\x02\x02\x03\x03\x02\x02\x02\x02\x03\x00\x29\x01\x68\x1e\x56\x5b\xbc\xe6\x7c\x27\xda" },
+    };
+    static ebpo_chunk_coder coder;
+    uint8_t stored[64], back[64];
+    const char *why;
+    memcpy(stored, frames[_i].frame, frames[_i].bytes);
+    ck_assert_int_eq(ebpo_chunk_decode(&coder, EBPO_PIPELINE_ZSTD, 1, stored, frames[_i].bytes,
+                                       back, frames[_i].raw_bytes, &why),
+                     EBPO_OK);
+    for (uint8_t bit = 1; bit <= 2; bit++) {
+        stored[frames[_i].modes] ^= bit;
+        ck_assert_int_eq(ebpo_chunk_decode(&coder, EBPO_PIPELINE_ZSTD, 1, stored, frames[_i].bytes,
+                                           back, frames[_i].raw_bytes, &why),
+                         EBPO_E_FORMAT);
+        ck_assert_str_eq(why, "an unused bit of the zstd frame is set");
+        stored[frames[_i].modes] ^= bit;
+    }
+    ebpo_chunk_coder_clear(&coder);
+}
+END_TEST
+
 /* 4,096 numbers of ten bits of noise are 5,120 bytes; with one table of codes for all planes they
  * would be some 5,700 at the default. */
 START_TEST(planes_of_bytes_are_compressed_each_by_itself)
@@ -730,6 +763,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, codec_and_level_are_checked);
     tcase_add_test(tests, what_is_no_file_of_ours_is_named);
     tcase_add_test(tests, callers_error_printing_is_given_back);
+    tcase_add_loop_test(tests, unused_bits_of_a_frame_are_refused, 0, 2);
     tcase_add_test(tests, planes_of_bytes_are_compressed_each_by_itself);
     tcase_add_test(tests, chunks_come_back_from_every_pipeline);
     tcase_add_test(tests, codings_return_every_bit_pattern);

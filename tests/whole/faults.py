@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """Calls of the system that fail.
 
-faults.py TOOL GENERATE FAULTS FEATURES [--foreign] [--table] [CASE...]
+faults.py TOOL GENERATE FAULTS FEATURES [--foreign] [--table] [--every=N] [CASE...]
 
 For each command and each kind of call the n-th fails, once and from then on (tests/kit/faults.h).
 Then the program has to end by itself, what it wrote is whole and right or as it was before, no
-other file is left, and the message says what was wrong. EBPO_TEST_SCALE is the share of the calls
-that are tried: all of them from 1 on. --foreign: allocations by libhdf5 and other libraries instead
-of our own, of which only wrong files count. --table prints counts in Markdown.
+other file is left, and the message says what was wrong. CASE: names of commands.py, all of them
+else. EBPO_TEST_SCALE from 1 on: all calls, or, with --every, N apart; less: of each command that
+share of the kinds, one call of each. --foreign: allocations by libhdf5 and other libraries instead
+of our own, counted apart. --table prints counts in Markdown. FAULTS may name more that is
+preloaded, after a colon: liblsan.so.0, which finds what is not freed on the way out.
 """
 import collections
 import concurrent.futures
@@ -24,6 +26,7 @@ import tempfile
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "kit"))
 import ranges_server
+from commands import COMMANDS, is_new, make_inputs, old, put_old, read
 
 # What each kind fails with. Interrupted and short calls are no failures: all goes on.
 KINDS = {"malloc": ["ENOMEM"], "read": ["EIO", "EINTR"], "short-read": [""],
@@ -32,71 +35,28 @@ KINDS = {"malloc": ["ENOMEM"], "read": ["EIO", "EINTR"], "short-read": [""],
          "open": ["EMFILE"], "allocate": ["ENOSPC"], "thread": ["EAGAIN"]}
 HARMLESS = ("EINTR", "")
 SAID = {"ENOMEM": r"memory|Cannot allocate", "EAGAIN": r"temporarily unavailable|thread"}
-OLD = b"what was there before\n"
 LEAK = 23  # LeakSanitizer's exit code
-TIMES_PRINTED = ("subset", "repack", "report")
-TIMES_WRITTEN = ("scene",)
-
-POINTS = "0 0 0\n0.3 0.2 0.1\n2 2 2\n-0.5 0.1 0.9\n1 0 0\n"
-SCENE = """{"ebpo_scene": "1.0", "models": {"m": {"file": "model.ebpo.h5"}},
-"instances": [{"name": "a", "model": "m"},
-{"name": "b", "model": "m", "pose": {"translation": [0.5, 0, 0]}}]}"""
-
-# name: what the build must have, the command, its outputs
-CASES = {
-    "convert": ("", "convert -q --threads 1 model.ply OUT", ["OUT"]),
-    "convert bounded": ("", "convert -q --threads 2 --memory 128MiB model.ply OUT", ["OUT"]),
-    "verify": ("", "verify -q model.ebpo.h5", []),
-    "info": ("", "info model.ebpo.h5", []),
-    "subset": ("", "subset --levels 0-3 model.ebpo.h5 OUT", ["OUT"]),
-    "repack": ("", "repack model.ebpo.h5 OUT", ["OUT"]),
-    "fetch": ("http", "fetch -q URL OUT", ["OUT"]),
-    "export xdmf": ("", "export -q --levels 0-2 model.ebpo.h5 OUT.xdmf",
-                    ["OUT.xdmf", "OUT.xdmf.h5"]),
-    "export vtkhdf": ("", "export -q --levels 0-2 model.ebpo.h5 OUT.vtkhdf", ["OUT.vtkhdf"]),
-    "export gltf": ("", "export -q --levels 0-2 model.ebpo.h5 OUT.gltf", ["OUT.gltf", "OUT.bin"]),
-    "export glb": ("", "export -q --levels 0-2 model.ebpo.h5 OUT.glb", ["OUT.glb"]),
-    "export obj": ("assimp", "export -q --levels 0-2 model.ebpo.h5 OUT.obj", ["OUT.obj"]),
-    "extract": ("", "extract -q --mesh model.ebpo.h5 OUT.ply", ["OUT.ply"]),
-    "render": ("png", "render --size 32x32 model.ebpo.h5 OUT.png", ["OUT.png"]),
-    "inside": ("", "inside --threads 1 model.ebpo.h5 points.txt", []),
-    "inside bounded": ("", "inside --threads 1 --memory 1MiB parts.ebpo.h5 points.txt", []),
-    "distance": ("", "distance --threads 1 model.ebpo.h5 points.txt", []),
-    "collide": ("", "collide --pose-b '0.5 0 0' -o OUT.h5 model.ebpo.h5 model.ebpo.h5",
-                ["OUT.h5"]),
-    "boolean": ("", "boolean 'A - B' model.ebpo.h5 model.ebpo.h5 --pose 'B 0.5 0 0' --inside "
-                "points.txt", []),
-    "scene": ("", "scene report -q -o OUT.h5 a.scene.json", ["OUT.h5"]),
-    "report": ("", "report -q --points 20 --no-pictures --leaf-faces 64 --max-level 1 -o OUT "
-               "model.ply", []),
-}
 
 
 class Place:
     """A folder with the inputs, the outputs as they were before, and one for temporary files."""
 
-    def __init__(self, inputs, root, case, url, old=True):
-        self.root, self.outputs = root, CASES[case][2]
+    def __init__(self, inputs, root, case, url):
+        self.root, self.outputs = root, COMMANDS[case].outputs
         self.temporary = os.path.join(root, "temporary")
-        self.command = [TOOL, *shlex.split(CASES[case][1].replace("URL", url))]
+        self.command = [TOOL, *shlex.split(COMMANDS[case].text.replace("URL", url))]
         shutil.rmtree(root, ignore_errors=True)
         os.makedirs(self.temporary)
         for name in os.listdir(inputs):
             os.link(os.path.join(inputs, name), os.path.join(root, name))
-        for name in self.outputs if old else []:
-            with open(os.path.join(root, name), "wb") as f:
-                f.write(OLD)
+        put_old(COMMANDS[case], root)
 
     def files(self):
         return {os.path.join(folder, name)[len(self.root) + 1:]
                 for folder, _, names in os.walk(self.root) for name in names if name != "counts"}
 
     def content(self, name):
-        try:
-            with open(os.path.join(self.root, name), "rb") as f:
-                return f.read()
-        except FileNotFoundError:
-            return None
+        return read(os.path.join(self.root, name))
 
     def run(self, fault, foreign=False):
         """Exit code, output, what was said, calls of the kind, and how many of them failed."""
@@ -122,6 +82,7 @@ class Case:
 
     def __init__(self, name, inputs, root, url):
         self.name, self.inputs, self.root, self.url = name, inputs, root, url
+        self.command = COMMANDS[name]
         place = self.place("reference")
         code, self.printed, said, _, _ = place.run("read:0:5")
         if code != 0:
@@ -138,17 +99,14 @@ class Case:
         return self.place("count").run(f"{kind}:0:5", foreign)[3]
 
     def is_right(self, name, content):
-        right = self.right[name]
-        if self.name in TIMES_WRITTEN and content is not None:
-            return len(content) == len(right) and content != OLD
-        return content == right
+        return is_new(self.command, name, content, self.right[name])
 
     def judge(self, place, kind, error, outcome):
         """What is wrong, or an empty text."""
         code, printed, said, _, failed = outcome
         wrong = [name for name in place.outputs if not self.is_right(name, place.content(name))]
         if code == 0:
-            if wrong or (printed != self.printed and self.name not in TIMES_PRINTED):
+            if wrong or (printed != self.printed and not self.command.times_printed):
                 return f"success, with wrong {wrong or 'answers'}"
             return "" if place.files() == self.files else f"success, left {place.files()}"
         if code != 1:
@@ -161,18 +119,20 @@ class Case:
             return "" # something failed later: the sync of the folder, looking at what was written
         if "of the two files only" in said: # neither forwards nor back
             return ""
-        changed = [name for name in place.outputs if place.content(name) != OLD]
+        changed = [name for name in place.outputs if place.content(name) != old(self.command, name)]
         left = place.files() - self.before
         if self.name == "fetch": # from which the next one resumes
             left = {name for name in left if not name.startswith("OUT.part/")}
         return f"changed {changed}, left {sorted(left)}: {said}" if changed or left else ""
 
 
-def places(calls, name):
+def places(calls, case, kind):
     """Which calls are tried."""
-    draw = random.Random(name)
-    return sorted(draw.sample(range(1, calls + 1), calls if SCALE >= 1 else
-                              min(calls, max(1, round(4 * SCALE)))))
+    draw = random.Random(f"{case.name} {kind}")
+    if SCALE < 1:
+        return [draw.randint(1, calls)] if calls and draw.random() < max(SCALE, 0.2) else []
+    step = max(EVERY, 20 if case.command.seconds else 1)
+    return range(draw.randint(1, min(step, calls)), calls + 1, step) if calls else []
 
 
 def attempt(case, kind, error, n, onward, foreign):
@@ -188,7 +148,7 @@ def attempts(case, foreign):
     for kind, errors in KINDS.items():
         if foreign and kind != "malloc":
             continue
-        for n in places(case.calls(kind, foreign), f"{case.name} {kind}"):
+        for n in places(case.calls(kind, foreign), case, kind):
             for error in errors if SCALE >= 1 else errors[n % len(errors):][:1]:
                 for onward in (False, True) if SCALE >= 1 else (n % 2 == 1,):
                     if not (onward and error == "EINTR"): # which would never end
@@ -197,21 +157,10 @@ def attempts(case, foreign):
 
 def prepare(root):
     inputs = os.path.join(root, "inputs")
-    os.makedirs(inputs)
-    model = os.path.join(inputs, "model.ply")
-    subprocess.run([GENERATE, "--base", "torus", "--faces", "600", model], check=True,
-                   stdout=subprocess.DEVNULL)
-    for name, options in {"model": ["--leaf-faces", "32"],
-                          "parts": ["--leaf-faces", "32", "--subtree-faces", "100"]}.items():
-        subprocess.run([TOOL, "convert", "-q", *options, model,
-                        os.path.join(inputs, f"{name}.ebpo.h5")], check=True)
-    for name, text in {"points.txt": POINTS, "a.scene.json": SCENE}.items():
-        with open(os.path.join(inputs, name), "w", encoding="ascii") as f:
-            f.write(text)
     with open(SUPPRESSIONS, "w", encoding="ascii") as f:
-        f.write("leak:libhdf5\nleak:libcurl\nleak:libgnutls\nleak:libcrypto\n")
-    with open(os.path.join(inputs, "model.ebpo.h5"), "rb") as f:
-        return inputs, ranges_server.serve(f.read())
+        f.write("leak:libhdf5\nleak:libcurl\nleak:libgnutls\nleak:libcrypto\n"
+                "leak:libfontconfig\n")
+    return inputs, ranges_server.serve(make_inputs(TOOL, GENERATE, inputs, 600))
 
 
 def print_table(results):
@@ -231,13 +180,14 @@ def main():
     options = [a for a in sys.argv[5:] if a.startswith("--")]
     wanted = [a for a in sys.argv[5:] if not a.startswith("--")]
     features, foreign = sys.argv[4].split(","), "--foreign" in options
+    global EVERY, SUPPRESSIONS
+    EVERY = max([int(o.partition("=")[2]) for o in options if o.startswith("--every=")] or [1])
     base = os.environ.get("EBPO_TEST_FOLDER", "/dev/shm" if os.access("/dev/shm", os.W_OK) else None)
     with tempfile.TemporaryDirectory(dir=base) as root:
-        global SUPPRESSIONS
         SUPPRESSIONS = os.path.join(root, "suppressions")
         inputs, url = prepare(root)
-        names = [n for n, (need, _, _) in CASES.items()
-                 if (not need or need in features) and (not wanted or n in wanted)]
+        names = [n for n, c in COMMANDS.items()
+                 if (not c.need or c.need in features) and (not wanted or n in wanted)]
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
             cases = pool.map(lambda name: Case(name, inputs, root, url), names)
             todo = [a for some in pool.map(lambda c: list(attempts(c, foreign)), cases)
@@ -254,7 +204,8 @@ def main():
     return 1 if bad and not foreign else 0
 
 
-TOOL, GENERATE, FAULTS = (os.path.abspath(a) for a in sys.argv[1:4])
-SCALE, SUPPRESSIONS = float(os.environ.get("EBPO_TEST_SCALE", "1")), ""
+TOOL, GENERATE = (os.path.abspath(a) for a in sys.argv[1:3])
+FAULTS = ":".join(map(os.path.abspath, sys.argv[3].split(":")))
+SCALE, EVERY, SUPPRESSIONS = float(os.environ.get("EBPO_TEST_SCALE", "1")), 1, ""
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""Programs that are killed at any moment: killed.py TOOL GENERATE FEATURES
+"""Programs that are killed at any moment: killed.py TOOL GENERATE FEATURES [--kills=N] [NAME...]
 
-convert, subset, repack, export and fetch are killed (SIGKILL) after times that are drawn between
-none and somewhat more than a run takes. Afterwards the output is the old one or the new one, byte
-for byte; beside it lies at most one temporary file of its own (and what fetch resumes from), and the
-next run removes it. 200 kills for each command, fewer where EBPO_TEST_SCALE is less than 1. Then two writers of one
-output, and two readers of one cache folder.
+Every command of commands.py that writes is killed (SIGKILL) after times that are drawn between none
+and somewhat more than a run takes. Afterwards each output is the old one or the new one, whole;
+beside it lies at most one temporary file of its own, which the next run removes (and what fetch
+resumes from, and folders that were being made). 200 kills for each command, or N; where
+EBPO_TEST_SCALE is less than 1, two for each third one. Then two writers of one output, and two readers of one cache
+folder.
 """
+import collections
 import os
 import random
 import re
@@ -19,16 +21,11 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "kit"))
 import ranges_server
+from commands import COMMANDS, is_new, make_inputs, old, put_old, read
 
-KILLS, OLD = 200, b"what was there before\n"
-LEFT = re.compile(r"\.OUT(\.[a-z0-9]+)?\.\d+-\d+\.tmp|OUT\.part(/.*)?")
-COMMANDS = {
-    "convert": ("", "convert -q model.ply OUT", ["OUT"]),
-    "subset": ("", "subset -q --levels 0-4 model.ebpo.h5 OUT", ["OUT"]),
-    "repack": ("", "repack -q model.ebpo.h5 OUT", ["OUT"]),
-    "export": ("", "export -q --levels 0-4 model.ebpo.h5 OUT.vtkhdf", ["OUT.vtkhdf"]),
-    "fetch": ("http", "fetch -q URL OUT", ["OUT"]),
-}
+KILLS = 200
+LEFT = re.compile(r"\.OUT(\.[a-z0-9]+)*\.\d+-\d+\.tmp|OUT\.part(/.*)?|OUT\.part-\w{6}(\.old)?")
+NAMED = re.compile(r"\.ebpo-crossings\.\d+-\d+\.tmp") # until libhdf5 has opened it
 failures = []
 
 
@@ -36,11 +33,6 @@ def check(good, what):
     if not good:
         failures.append(what)
         print(f"FAILED: {what}")
-
-
-def read(path):
-    with open(path, "rb") as f:
-        return f.read()
 
 
 def arguments(command, url):
@@ -60,43 +52,76 @@ def make_place(inputs, root):
         os.link(os.path.join(inputs, name), os.path.join(root, name))
 
 
-def kill_often(name, command, outputs, inputs, root, draw):
-    """Kills in one folder, so that what remains meets the next run; returns counts."""
+def state(name, out, content, right):
+    """old, new, or neither."""
+    command = COMMANDS[name]
+    if content == old(command, out):
+        return "old"
+    return "new" if is_new(command, out, content, right) else "neither"
+
+
+def beside(root, inputs, outputs):
+    return (set(os.listdir(root)) - set(os.listdir(inputs)) - {"temporary"} -
+            {out.partition("/")[0] for out in outputs})
+
+
+def look_beside(name, root, inputs):
+    """Whether something is left."""
+    others = beside(root, inputs, COMMANDS[name].outputs)
+    check(all(LEFT.fullmatch(o) for o in others) and
+          len([o for o in others if o.endswith(".tmp")]) <= len(COMMANDS[name].outputs),
+          f"{name}: left {others}")
+    temporary = os.listdir(os.path.join(root, "temporary"))
+    check(all(NAMED.fullmatch(t) for t in temporary), f"{name}: temporary files: {temporary}")
+    return bool(others or temporary)
+
+
+def kill_once(name, command, root, wait):
+    """Whether it had ended by itself."""
+    put_old(COMMANDS[name], root)
+    process = run(command, root)
+    time.sleep(wait)
+    process.kill()
+    process.communicate(timeout=300)
+    return process.returncode == 0
+
+
+def kill_often(name, url, inputs, root, draw, kills):
+    """Kills in one folder, so that what remains meets the next run."""
+    command, outputs = arguments(COMMANDS[name].text, url), COMMANDS[name].outputs
     make_place(inputs, root)
+    put_old(COMMANDS[name], root)
     began = time.monotonic()
     check(run(command, root).wait(timeout=300) == 0, f"{name}: a run that nobody kills")
     length = time.monotonic() - began
     right = {out: read(os.path.join(root, out)) for out in outputs}
-    inputs_there = set(os.listdir(inputs)) | {"temporary"}
-    done = old = new = left = 0
-    for _ in range(KILLS if SCALE >= 1 else max(4, round(KILLS * SCALE / 10))):
-        for out in outputs:
-            with open(os.path.join(root, out), "wb") as f:
-                f.write(OLD)
-        process = run(command, root)
-        time.sleep(draw.uniform(0, 1.1 * length))
-        process.kill()
-        process.communicate(timeout=300)
-        done += process.returncode == 0
-        for out in outputs:
-            content = read(os.path.join(root, out))
-            old += content == OLD
-            new += content == right[out]
-            check(content in (OLD, right[out]), f"{name}: {out} is neither the old nor the new")
-        others = set(os.listdir(root)) - inputs_there - set(outputs)
-        left += bool(others)
-        check(all(LEFT.fullmatch(o) for o in others) and
-              len([o for o in others if o.endswith(".tmp")]) <= 1, f"{name}: left {others}")
-        check(not os.listdir(os.path.join(root, "temporary")),
-              f"{name}: temporary files have names: {os.listdir(os.path.join(root, 'temporary'))}")
+    counts, done, left, mixed = collections.Counter(), 0, 0, 0
+    for _ in range(kills):
+        wait = draw.uniform(0, 1.1 * length)
+        ended = kill_once(name, command, root, wait)
+        done += ended
+        # other work on the machine makes runs longer and shorter
+        length *= 0.95 if ended and wait < length else 1.1 if not ended and wait > 0.9 * length else 1
+        states = [state(name, out, read(os.path.join(root, out)), right[out]) for out in outputs]
+        check("neither" not in states, f"{name}: {outputs} are {states}")
+        counts.update(states[:1])
+        mixed += len(set(states)) > 1
+        left += look_beside(name, root, inputs)
+    for folder in beside(root, inputs, outputs): # which nobody removes
+        if os.path.isdir(os.path.join(root, folder)) and folder != "OUT.part":
+            shutil.rmtree(os.path.join(root, folder))
+    put_old(COMMANDS[name], root)
     process = run(command, root)
     said = process.communicate(timeout=300)[1]
     check(process.returncode == 0, f"{name}: the run after the kills: {said}")
     for out in outputs:
-        check(read(os.path.join(root, out)) == right[out], f"{name}: the run after: {out}")
-    others = set(os.listdir(root)) - inputs_there - set(outputs)
+        check(state(name, out, read(os.path.join(root, out)), right[out]) == "new",
+              f"{name}: the run after: {out}")
+    others = beside(root, inputs, outputs) | set(os.listdir(os.path.join(root, "temporary")))
     check(not others, f"{name}: the run after leaves {others}")
-    print(f"{name}: {old} old, {new} new; {done} had ended; after {left} a temporary file was there")
+    print(f"| {name} | {counts['old']} | {counts['new']} | {counts['neither']} | {mixed} | {done} |"
+          f" {left} |", flush=True)
+    shutil.rmtree(root)
 
 
 def two_writers(inputs, root):
@@ -136,20 +161,19 @@ def two_readers(inputs, root, url):
 
 
 def main():
-    features = sys.argv[3].split(",")
+    features, wanted = sys.argv[3].split(","), [a for a in sys.argv[4:] if a[0] != "-"]
+    kills = [int(a.partition("=")[2]) for a in sys.argv[4:] if a.startswith("--kills=")]
+    kills = kills[0] if kills else KILLS if SCALE >= 1 else 2
     draw = random.Random(1)
+    names = [n for n, c in COMMANDS.items() if c.outputs and (not c.need or c.need in features)]
+    names = wanted or (names if SCALE >= 1 else names[::3])
     with tempfile.TemporaryDirectory(dir=os.environ.get("TMPDIR", "/var/tmp")) as root:
         inputs = os.path.join(root, "inputs")
-        os.makedirs(inputs)
-        model, file = (os.path.join(inputs, n) for n in ("model.ply", "model.ebpo.h5"))
-        subprocess.run([GENERATE, "--base", "torus", "--faces", "5000", model], check=True,
-                       stdout=subprocess.DEVNULL)
-        subprocess.run([TOOL, "convert", "-q", model, file], check=True)
-        url = ranges_server.serve(read(file))
-        for name, (need, command, outputs) in COMMANDS.items():
-            if not need or need in features:
-                kill_often(name, arguments(command, url), outputs, inputs,
-                           os.path.join(root, name), draw)
+        url = ranges_server.serve(make_inputs(TOOL, GENERATE, inputs, 5000))
+        print("| command | old | new | neither | of two one | had ended | something left |\n"
+              "|---|---:|---:|---:|---:|---:|---:|")
+        for name in names:
+            kill_often(name, url, inputs, os.path.join(root, "killed"), draw, kills)
         two_writers(inputs, os.path.join(root, "writers"))
         if "http" in features:
             two_readers(inputs, os.path.join(root, "readers"), url)

@@ -156,18 +156,28 @@ void bench_points_free(bench_points *p)
     *p = (bench_points){ .rows = NULL };
 }
 
+int bench_save(FILE *stream, char *const *data, const size_t *size, const char *path)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    bool good = stream && !ferror(stream);
+    if (stream && fclose(stream) != 0)
+        good = false;
+    int code = !good ? command_no_memory("bench")
+               : ebpo_write_file(path, *data, *size, &error) == EBPO_OK
+                   ? EXIT_FINE
+                   : command_failed("bench", &error);
+    free(*data);
+    return code;
+}
+
 int bench_points_save(const bench_points *p, const char *path)
 {
-    FILE *f = fopen(path, "wb");
-    bool good = f != NULL;
+    char *data = NULL;
+    size_t size = 0;
+    FILE *f = open_memstream(&data, &size);
     int width = points_width(p->kind), kept = points_raw_width(p->kind);
-    for (uint64_t i = 0; i < p->count && good; i++)
+    for (uint64_t i = 0; f && i < p->count; i++)
         for (int k = 0; k < kept; k++)
             raw_double(f, p->rows[i * (uint64_t)width + (unsigned)k]);
-    good = good && !ferror(f);
-    if (f && fclose(f) != 0)
-        good = false;
-    if (!good)
-        fprintf(stderr, "ebpo bench: %s: cannot be written: %s\n", path, strerror(errno));
-    return good ? EXIT_FINE : EXIT_FAILED;
+    return bench_save(f, &data, &size, path);
 }

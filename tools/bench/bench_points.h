@@ -25,6 +25,10 @@ int bench_points_make(bench_points *out, points_kind kind, const char *model,
 bool bench_points_generated(const char *what);
 void bench_points_free(bench_points *p);
 
+/* Closes a stream of open_memstream (NULL: there was no memory for it), writes its data to a file,
+ * which appears whole or not at all, and frees it. */
+int bench_save(FILE *stream, char *const *data, const size_t *size, const char *path);
+
 /* As little-endian doubles, 3 or 6 for each. */
 int bench_points_save(const bench_points *p, const char *path);
 

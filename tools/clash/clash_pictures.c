@@ -250,7 +250,8 @@ static ebpo_status draw_tile(clash_strip *s, const painted_mesh *p, double time,
     ebpo_status status = draw(&s->picture, x, y, HEIGHT - caption, &view, p, s->threads, error);
     snprintf(text, sizeof text, "time %.4g: %llu meet", time, (unsigned long long)count);
     if (status == EBPO_OK && caption)
-        picture_caption(&s->picture, x, y + HEIGHT - caption, WIDTH, caption, ink, text);
+        status =
+            picture_caption(&s->picture, x, y + HEIGHT - caption, WIDTH, caption, ink, text, error);
     return status;
 }
 

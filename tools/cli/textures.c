@@ -264,6 +264,14 @@ static bool write_all(int fd, span bytes)
     return true;
 }
 
+/* The name comes last, so that it never stands for a part of the image. */
+static bool give_name(int fd, int folder, const char *name)
+{
+    char path[64];
+    snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
+    return linkat(AT_FDCWD, path, folder, name, AT_SYMLINK_FOLLOW) == 0;
+}
+
 /* What is there already is left as it is. */
 static bool write_file(int top, char *name, span bytes)
 {
@@ -271,14 +279,19 @@ static bool write_file(int top, char *name, span bytes)
     int folder = open_folder(top, name, &last);
     if (folder < 0)
         return false;
-    int fd = openat(folder, last, O_CREAT | O_EXCL | O_WRONLY | O_NOFOLLOW | O_CLOEXEC, 0666);
-    bool good = fd >= 0 && write_all(fd, bytes);
+    int fd = openat(folder, ".", O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
+    bool named = fd < 0; /* a file system without files that have no name */
+    if (named)
+        fd = openat(folder, last, O_CREAT | O_EXCL | O_WRONLY | O_NOFOLLOW | O_CLOEXEC, 0666);
+    bool good = fd >= 0 && write_all(fd, bytes) && (fsync(fd) == 0 || errno == EINVAL),
+         ours = named || (good && give_name(fd, folder, last));
+    good = good && ours;
     int why = errno;
     if (fd >= 0 && close(fd) != 0 && good) {
         good = false;
         why = errno;
     }
-    if (fd >= 0 && !good)
+    if (fd >= 0 && !good && ours)
         unlinkat(folder, last, 0);
     close(folder);
     errno = why;

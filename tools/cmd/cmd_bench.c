@@ -218,7 +218,9 @@ static void count_answers(const bench_job *job, results *r)
 
 static int save_answers(const bench_job *job, const char *path)
 {
-    FILE *f = fopen(path, "wb");
+    char *data = NULL;
+    size_t size = 0;
+    FILE *f = open_memstream(&data, &size);
     for (uint64_t i = 0; f && i < job->count; i++) {
         if (job->query == BENCH_INSIDE) {
             putc(((const ebpo_inside_result *)job->answers)[i].where, f);
@@ -229,12 +231,18 @@ static int save_answers(const bench_job *job, const char *path)
         raw_double(f, job->query == BENCH_DISTANCE ? d->distance : h->t);
         raw_u64(f, job->query == BENCH_DISTANCE ? d->face : h->face); /* EBPO_NO_FACE is -1 */
     }
-    bool good = f && !ferror(f);
-    if (f && fclose(f) != 0)
-        good = false;
-    if (!good)
-        fprintf(stderr, "ebpo bench: %s: cannot be written: %s\n", path, strerror(errno));
-    return good ? EXIT_FINE : EXIT_FAILED;
+    return bench_save(f, &data, &size, path);
+}
+
+/* Before anything is measured. */
+static int outputs_are_free(const values *v)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    const char *const paths[] = { v->save_points, v->save_answers };
+    for (int i = 0; i < 2; i++)
+        if (paths[i] && ebpo_check_output(paths[i], &error) != EBPO_OK)
+            return command_failed("bench", &error);
+    return EXIT_FINE;
 }
 
 /* --- telling --- */
@@ -367,7 +375,7 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
 
 /* --- the command --- */
 
-static int bench(bench_job *job, const values *v, const char *path,
+static int bench(bench_job *job, const values *v, const bench_points *p, const char *path,
                  const ebpo_model_options *holding, void *batch)
 {
     results r = { .clock_ns = bench_clock_cost(),
@@ -385,6 +393,8 @@ static int bench(bench_job *job, const values *v, const char *path,
     if (s.file)
         r.traffic = traffic_of(s.file);
     query_close(&s);
+    if (code == EXIT_FINE && v->save_points)
+        code = bench_points_save(p, v->save_points);
     if (code == EXIT_FINE && v->save_answers)
         code = save_answers(job, v->save_answers);
     if (code != EXIT_FINE)
@@ -398,13 +408,10 @@ static int prepare(const values *v, const char *path, bench_points *p)
 {
     points_kind kind = v->query >= BENCH_RAY ? POINTS_RAYS : POINTS;
     *p = (bench_points){ .rows = NULL };
-    if (!command_wants_hdf5("bench", path))
+    if (!command_wants_hdf5("bench", path) || outputs_are_free(v) != EXIT_FINE)
         return EXIT_FAILED;
-    int code = bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw,
-                                 (uint64_t)v->count, (uint64_t)v->seed, v->q.tmax);
-    if (code == EXIT_FINE && v->save_points)
-        code = bench_points_save(p, v->save_points);
-    return code;
+    return bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw, (uint64_t)v->count,
+                             (uint64_t)v->seed, v->q.tmax);
 }
 
 static const values usual = {
@@ -436,7 +443,7 @@ static int run(void *given, const char **operand)
         code = command_no_memory("bench");
     }
     if (code == EXIT_FINE)
-        code = bench(&job, v, operand[0], &holding, batch);
+        code = bench(&job, v, &p, operand[0], &holding, batch);
     free(batch);
     free(job.answers);
     free(job.ns);

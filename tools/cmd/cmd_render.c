@@ -258,7 +258,7 @@ static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const came
     ebpo_status status =
         raster_draw(p, at[0], at[1], at[2], drawn, view, &t->mesh, &style, thread_count(j), error);
     if (status == EBPO_OK && caption)
-        picture_caption(p, at[0], at[1] + drawn, at[2], caption, ink, t->caption);
+        status = picture_caption(p, at[0], at[1] + drawn, at[2], caption, ink, t->caption, error);
     return status;
 }
 

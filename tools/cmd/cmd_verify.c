@@ -77,6 +77,11 @@ static void print_words(const ebpo_verify_report *report, const char *path, cons
     }
     if (u->words[0])
         printf("%s: not compared: %s\n", against, u->words);
+    if (report->spare_filled)
+        printf("%s: note: %llu of %llu bytes that belong to nothing are not zero, as this program "
+               "leaves them\n",
+               path, (unsigned long long)report->spare_filled,
+               (unsigned long long)report->spare_bytes);
     if (!report->violations)
         printf("%s: fine: %llu checks, no violation\n", path, (unsigned long long)report->checks);
 }
@@ -115,6 +120,8 @@ static void print_json(const ebpo_verify_report *report, const char *path, const
         json_end(&j);
     }
     json_end(&j);
+    json_uint(&j, "spare_bytes", report->spare_bytes);
+    json_uint(&j, "spare_filled", report->spare_filled);
     remote_json(&j, t, remote);
     json_finish(&j);
 }

@@ -34,9 +34,11 @@ static void put(picture *p, int x, int y, const uint8_t rgb[3])
 }
 
 /* A bar of all colours, with numbers where it ends and in the middle. */
-static void draw_legend(const map_job *j, picture *p, int x, bool has_signs)
+static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_signs,
+                               ebpo_error *error)
 {
     int top = EDGE, bottom = p->height - EDGE;
+    ebpo_status status = EBPO_OK;
     for (int y = top; y < bottom; y++) {
         double share = (double)(bottom - 1 - y) / fmax(1, bottom - 1 - top);
         double distance = (has_signs ? 2 * share - 1 : share) * j->range;
@@ -45,13 +47,14 @@ static void draw_legend(const map_job *j, picture *p, int x, bool has_signs)
         for (int i = 0; i < BAR; i++)
             put(p, x + EDGE + i, y, rgb);
     }
-    for (int i = 0; i < 3 && bottom - top >= 3 * LINE; i++) {
+    for (int i = 0; i < 3 && bottom - top >= 3 * LINE && status == EBPO_OK; i++) {
         char text[32];
         double share = i / 2.0;
         snprintf(text, sizeof text, "%.4g", (has_signs ? 2 * share - 1 : share) * j->range);
         int y = bottom - LINE - (int)(share * (bottom - top - LINE));
-        picture_caption(p, x + EDGE + BAR, y, LEGEND - EDGE - BAR, LINE, ink, text);
+        status = picture_caption(p, x + EDGE + BAR, y, LEGEND - EDGE - BAR, LINE, ink, text, error);
     }
+    return status;
 }
 
 /* Where the sign changes between neighbours, or it is 0: the surface. */
@@ -84,8 +87,9 @@ ebpo_status map_draw_plane(const map_job *j, const double *values, const char *p
                             values[(size_t)y * (size_t)width + (size_t)x], j->range, rgb);
             put(&p, x, height - 1 - y, on_surface(values, width, height, x, y) ? ink : rgb);
         }
-    draw_legend(j, &p, width, has_signs(j));
-    ebpo_status status = picture_write_png(&p, path, error);
+    ebpo_status status = draw_legend(j, &p, width, has_signs(j), error);
+    if (status == EBPO_OK)
+        status = picture_write_png(&p, path, error);
     picture_free(&p);
     return status;
 }
@@ -107,7 +111,8 @@ ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *p
         status = raster_draw(&p, 0, 0, j->width, j->height, &view, mesh, &style,
                              threads < 64 ? threads : 64, error);
     }
-    draw_legend(j, &p, j->width, has_signs(j));
+    if (status == EBPO_OK)
+        status = draw_legend(j, &p, j->width, has_signs(j), error);
     if (status == EBPO_OK)
         status = picture_write_png(&p, path, error);
     ebpo_colours_free(&colours);

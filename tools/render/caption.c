@@ -8,6 +8,8 @@
 #include <cairo.h>
 #include <dlfcn.h>
 #include <math.h>
+#include <stdio.h>
+#include <string.h>
 
 #if defined __SANITIZE_ADDRESS__
 /* fontconfig keeps some of its patterns to the end, and nobody else may free them. */
@@ -32,6 +34,7 @@ const char *__lsan_default_options(void) { return "print_suppressions=0"; }
     X(set_font_size)            \
     X(text_extents)             \
     X(move_to)                  \
+    X(status)                   \
     X(show_text)
 
 static struct {
@@ -40,25 +43,33 @@ static struct {
 #undef MEMBER
 } lib;
 
-static bool load(void)
+/* MISSING: it is not installed. FAILED: it is, but could not be loaded: a picture without captions
+ * would then not be the one that was asked for. */
+static enum { UNTRIED, LOADED, MISSING, FAILED } loaded;
+
+static void load(void)
 {
-    static bool tried, loaded;
-    if (tried)
-        return loaded;
-    tried = true;
+    if (loaded != UNTRIED)
+        return;
     void *library = dlopen("libcairo.so.2", RTLD_NOW | RTLD_LOCAL);
-    loaded = library != NULL;
-#define FIND(name)                                                        \
-    *(void **)&lib.name = loaded ? dlsym(library, "cairo_" #name) : NULL; \
-    loaded = loaded && lib.name;
+    const char *why = library ? NULL : dlerror();
+    loaded = library ? LOADED : why && strstr(why, "No such file") ? MISSING : FAILED;
+#define FIND(name)                                                         \
+    *(void **)&lib.name = library ? dlsym(library, "cairo_" #name) : NULL; \
+    if (library && !lib.name)                                              \
+        loaded = MISSING; /* a version without it */
     CAIRO_FUNCTIONS(FIND)
 #undef FIND
-    return loaded;
 }
 
-bool picture_has_captions(void) { return load(); }
+bool picture_has_captions(void)
+{
+    load();
+    return loaded != MISSING;
+}
 
-static cairo_surface_t *coverage(int width, int height, const char *text)
+/* *good: memory sufficed. */
+static cairo_surface_t *coverage(int width, int height, const char *text, bool *good)
 {
     cairo_surface_t *surface = lib.image_surface_create(CAIRO_FORMAT_A8, width, height);
     cairo_t *cairo = lib.create(surface);
@@ -74,18 +85,30 @@ static cairo_surface_t *coverage(int width, int height, const char *text)
     /* on whole pixels, and all captions on one line, whichever letters they have */
     lib.move_to(cairo, floor((width - extents.x_advance) / 2), floor(0.72 * height));
     lib.show_text(cairo, text);
+    *good = lib.status(cairo) == CAIRO_STATUS_SUCCESS;
     lib.destroy(cairo);
     lib.surface_flush(surface);
     return surface;
 }
 
-void picture_caption(picture *p, int x, int y, int width, int height, const uint8_t colour[3],
-                     const char *text)
+static ebpo_status no_memory(ebpo_error *error)
 {
-    if (!load())
-        return;
-    cairo_surface_t *surface = coverage(width, height, text);
-    const unsigned char *row = lib.image_surface_get_data(surface); /* NULL: no memory */
+    snprintf(error->message, sizeof error->message, "out of memory for a picture's captions");
+    return error->status = EBPO_E_MEMORY;
+}
+
+ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
+                            const uint8_t colour[3], const char *text, ebpo_error *error)
+{
+    bool good = false;
+    load();
+    if (loaded == MISSING)
+        return EBPO_OK;
+    if (loaded == FAILED)
+        return no_memory(error);
+    cairo_surface_t *surface = coverage(width, height, text, &good);
+    const unsigned char *row = good ? lib.image_surface_get_data(surface) : NULL;
+    good = row != NULL;
     for (int j = 0; row && j < height; j++, row += lib.image_surface_get_stride(surface))
         for (int i = 0; i < width; i++) {
             uint8_t *rgb = p->rgb + 3 * ((size_t)(y + j) * (size_t)p->width + (size_t)(x + i));
@@ -93,14 +116,15 @@ void picture_caption(picture *p, int x, int y, int width, int height, const uint
                 rgb[k] = (uint8_t)((rgb[k] * (255 - row[i]) + colour[k] * row[i] + 127) / 255);
         }
     lib.surface_destroy(surface);
+    return good ? EBPO_OK : no_memory(error);
 }
 
 #else
 
 bool picture_has_captions(void) { return false; }
 
-void picture_caption(picture *p, int x, int y, int width, int height, const uint8_t colour[3],
-                     const char *text)
+ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
+                            const uint8_t colour[3], const char *text, ebpo_error *error)
 {
     (void)p;
     (void)x;
@@ -109,6 +133,8 @@ void picture_caption(picture *p, int x, int y, int width, int height, const uint
     (void)height;
     (void)colour;
     (void)text;
+    (void)error;
+    return EBPO_OK;
 }
 
 #endif

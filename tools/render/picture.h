@@ -15,9 +15,11 @@ void picture_free(picture *p);
 
 /* Whether this build can write into pictures (cairo); without, captions are left out. */
 bool picture_has_captions(void);
-/* Text in the middle of a rectangle that lies in the picture. */
-void picture_caption(picture *p, int x, int y, int width, int height, const uint8_t colour[3],
-                     const char *text);
+/* Text in the middle of a rectangle that lies in the picture. EBPO_E_MEMORY, also where what draws
+ * it is there and could not be loaded. */
+EBPO_MUST_USE ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
+                                          const uint8_t colour[3], const char *text,
+                                          ebpo_error *error);
 
 /* PNG in memory, to be freed: `channels` 3 (RGB) or 4 (RGB and opacity), 8 bits each, rows from the
  * top. `what` is for messages. */

@@ -2,6 +2,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -132,13 +133,6 @@ static bool remove_folder(const char *folder, bool ours_only)
     return rmdir(folder) == 0;
 }
 
-void output_drop(const char *folder)
-{
-    if (folder[0])
-        remove_folder(folder, false);
-    being_made[0] = 0;
-}
-
 /* In a signal handler: only what may be called there. Names are known beforehand. */
 static void abandon_file(const char *stem, const char *ending)
 {
@@ -160,6 +154,14 @@ static void abandon(void)
         abandon_file(selection_words[i], MODEL_ENDING);
     abandon_file("need", MODEL_ENDING); /* a trial of report_needs.c */
     rmdir(being_made);
+}
+
+/* Without memory for looking into the folder, what a report has goes by its names. */
+void output_drop(const char *folder)
+{
+    if (folder[0] && !remove_folder(folder, false))
+        abandon();
+    being_made[0] = 0;
 }
 
 int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity)
@@ -184,15 +186,31 @@ int output_begin(const char *place, const char *const *operand, char *folder, si
     return EXIT_FINE;
 }
 
+/* Of the report that was there. Something may have come into it meanwhile. */
+static bool tell_rest(const char *older)
+{
+    if (!remove_folder(older, true))
+        fprintf(stderr,
+                "ebpo report: warning: what else is in the report that was there is now in %s\n",
+                older);
+    return true;
+}
+
 bool output_commit(const char *place, const char *folder)
 {
     char older[8192], target[4200];
+    bool moved = false;
     size_t length = strlen(place);
     while (length > 1 && place[length - 1] == '/')
         length--;
     snprintf(target, sizeof target, "%.*s", (int)length, place);
+    /* At once, so that there is no moment without a report; not all file systems can. */
+    if (renameat2(AT_FDCWD, folder, AT_FDCWD, target, RENAME_EXCHANGE) == 0) {
+        being_made[0] = 0;
+        return tell_rest(folder);
+    }
     snprintf(older, sizeof older, "%s.old", folder);
-    bool moved = rename(target, older) == 0;
+    moved = errno != ENOENT && rename(target, older) == 0;
     if (rename(folder, target) != 0) {
         told(EXIT_FAILED, place, strerror(errno));
         if (moved && rename(older, target) != 0)
@@ -200,9 +218,5 @@ bool output_commit(const char *place, const char *folder)
         return false;
     }
     being_made[0] = 0;
-    if (moved && !remove_folder(older, true)) /* something came into it meanwhile */
-        fprintf(stderr,
-                "ebpo report: warning: what else is in the report that was there is now in %s\n",
-                older);
-    return true;
+    return !moved || tell_rest(older);
 }

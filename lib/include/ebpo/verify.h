@@ -50,6 +50,13 @@ typedef struct ebpo_verify_report {
 
     /* Sums over all kinds. */
     uint64_t checks, violations;
+
+    /*
+     * Bytes of the file that belong to nothing, neither to its headers and indexes nor to a chunk,
+     * and how many of them are not zero: 0 in what this library writes. They change no answer, and
+     * are no violation. Files far away (http.h): 0, they are not read.
+     */
+    uint64_t spare_bytes, spare_filled;
 } ebpo_verify_report;
 
 #define EBPO_VERIFY_REPORT_INIT EBPO_SIZED(ebpo_verify_report)

@@ -52,6 +52,27 @@ function unshuffle(data, size) {
   return out;
 }
 
+/** Whether a compressed block's sequences have one of the two bits of their modes that zstd does not look at. Source: RFC 8878, section 3.1.1.3. */
+function modesFault(block) {
+  const kind = block[0] & 3, format = block[0] >> 2 & 3;
+  let at;
+  if (kind < 2) {
+    const header = [1, 2, 1, 3][format];
+    const count = header === 1 ? block[0] >> 3 : (block[0] | block[1] << 8 | (header === 3 ? block[2] << 16 : 0)) >> 4;
+    at = header + (kind === 1 ? 1 : count);
+  } else {
+    const header = [3, 3, 4, 5][format], width = [10, 10, 14, 18][format];
+    let bits = 0;
+    for (let i = header - 1; i >= 0; i--)
+      bits = bits * 256 + block[i];
+    at = header + Math.floor(bits / 2 ** (4 + width)) % 2 ** width;
+  }
+  if (!(at < block.length) || block[at] === 0) // cut short, which decoding tells; or no sequences
+    return false;
+  at += block[at] < 128 ? 1 : block[at] < 255 ? 2 : 3;
+  return (block[at] & 3) !== 0;
+}
+
 /**
  * What is wrong with a chunk as a single zstd frame that states its size, has a checksum and fills the chunk, or undefined. (The wasm decoder
  * alone would take several frames, and frames without a checksum.) Source: RFC 8878, section 3.1.
@@ -73,14 +94,17 @@ export function zstdFrameFault(data, size) {
   if (!(descriptor & 4))
     return 'the zstd frame has no checksum';
   if (descriptor & 16) // which zstd does not look at, and no checksum covers
-    return "the unused bit of the zstd frame's descriptor is set";
+    return 'an unused bit of the zstd frame is set';
   at += contentBytes;
   for (let last = 0; !last;) {
     if (at + 3 > data.length)
       return 'the zstd frame is cut short';
     const header = data[at] | data[at + 1] << 8 | data[at + 2] << 16;
     last = header & 1;
-    at += 3 + ((header >> 1 & 3) === 1 ? 1 : header >> 3);
+    const kind = header >> 1 & 3, size = kind === 1 ? 1 : header >> 3;
+    if (kind === 2 && modesFault(data.subarray(at + 3, at + 3 + size)))
+      return 'an unused bit of the zstd frame is set';
+    at += 3 + size;
   }
   return at + 4 === data.length ? undefined : 'the zstd frame does not fill the chunk';
 }
