@@ -107,7 +107,9 @@ command_lines = [
     b"a.h5\no.png\n--width\n640", b"a.h5\n--source\na.ply\n--memory\n64M",
     b"a.h5\n-\n--mode\nnodes-plain\n--deadline=5us", b"a.h5\np.npy\n--unsigned\n--nearest\n3",
     b"a.h5\n--any\n--raw", b"a.h5\n--csv\n--header", b"a.h5\n--points\n1000", b"a.ply\no.html",
-    b"report\ns.scene.json", b"A-B\na.h5\nb.h5\n--pose\nB:1 2 3", b"a.h5\nb.h5\n--distance"]
+    b"report\ns.scene.json", b"A-B\na.h5\nb.h5\n--pose\nB:1 2 3", b"a.h5\nb.h5\n--distance",
+    b"a.h5\n-o\nb.h5\n--source\na.ply", b"a.h5\n--plane\nz=50%\n--size\n64x64\n-o\nm.png\n--range=1",
+    b"a.h5\n--path\np.txt\n--rate\n1000\n--radius=0.1\n--json"]
 for i, text in enumerate(command_lines):
     put("args", f"command_{i:02}", bytes([i]) + text)
 values = {
@@ -117,10 +119,11 @@ values = {
     3: [b"A", b"A - (B | C)", b"A&B*C^D+E", b"((((A))))", b"A - "],
     4: [b"none", b"1024", b"0"], 5: [b"500ns", b"50us", b"1ms", b"2s"], 6: [b"2G", b"1"],
     7: [b"500", b"1%", b"100%", b"1e9"],
-    8: [b"0.1", b"-1e-320", b"inf", b"nan", b"0x1.8p3", b"9007199254740993", b"1e400"]}
+    8: [b"800x600", b"2x8192", b"99999x3"],
+    9: [b"0.1", b"-1e-320", b"inf", b"nan", b"0x1.8p3", b"9007199254740993", b"1e400"]}
 for kind, texts in values.items():
     for i, text in enumerate(texts):
-        put("args", f"value_{kind}_{i}", bytes([22 + kind + (9 * 9 if kind == 3 and i else 0)]) + text)
+        put("args", f"value_{kind}_{i}", bytes([64 + kind + (10 * 9 if kind == 3 and i else 0)]) + text)
 
 # --- meshes of others: format and flags; the file ---
 obj = (b"mtllib a.mtl\no first\nv 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvn 0 0 1\nusemtl red\ns 1\n"
