@@ -144,3 +144,30 @@ for flags in (0, 16):
 put("import", "groups", bytes([24]) + obj)
 put("import", "mtl", bytes([4]) + mtl)
 put("import", "ply_names", bytes([4]) + b"ply\ncomment TextureFile a b.png\ncomment TextureFile ../x.png\nend_header\n")
+
+# --- heads: indexes of chunks in pages, and what lies beyond the first bytes that are read ---
+(folder / "head").mkdir(parents=True, exist_ok=True)
+try:
+    import h5py
+    import numpy
+except ImportError:
+    sys.exit(0)  # the vectors remain
+
+
+def head(name, paths, filler=0, **how):
+    with h5py.File(folder / "head" / (name + ".h5"), "w", libver="latest") as out:
+        if filler:
+            out["filler"] = numpy.zeros(filler, "u1")
+            out.flush()
+        for array, width, rows, cols in paths:
+            shape, chunks = ((rows, cols), (2, cols)) if cols else ((rows,), (2,))
+            made = out.create_dataset(array, data=numpy.ones(shape, f"<u{width}"), chunks=chunks,
+                                      **how)
+            made.attrs.create("coding", numpy.bytes_("plain"))
+
+
+head("pages", [("/levels/00/plane_counts", 1, 2600, 0)])
+head("pages_filtered", [("/levels/00/plane_counts", 1, 2600, 0)], fletcher32=True)
+head("far", [("/levels/00/plane_counts", 1, 40, 0), ("/levels/00/leaf_new", 4, 40, 0),
+             ("/mesh/vertices", 4, 40, 3), ("/subtrees/counts", 4, 40, 21)], filler=140000)
+head("pages_far", [("/levels/01/leaf_new", 4, 4200, 0)], filler=140000, fletcher32=True)
