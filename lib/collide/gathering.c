@@ -117,8 +117,9 @@ static ebpo_status put_together(ebpo_gathering *g, const ebpo_accel_pair *pair, 
             memcpy(g->met + g->met_count, w->met, w->met_count * sizeof *w->met);
         g->met_count += w->met_count;
     }
-    ebpo_met_sort(g->met, g->met + count, count, pair->accel[0]->face_count,
-                  pair->accel[1]->face_count);
+    if (count)
+        ebpo_met_sort(g->met, g->met + count, count, pair->accel[0]->face_count,
+                      pair->accel[1]->face_count);
     return EBPO_OK;
 }
 

@@ -20,7 +20,7 @@ static void view(ebpo_file *file, ebpo_priority priority)
     options.observer = &observer;
     options.polygons = options.windings = true;
     options.faces = ebpo_file_info(file)->parts & EBPO_PART_MESH;
-    options.nodes = 2000;
+    options.nodes = 200;
     if (ebpo_view_stream_new(file, &options, &stream, NULL) != EBPO_OK)
         return;
     while (ebpo_view_stream_next(stream, &node, &end, NULL) == EBPO_OK && end == EBPO_VIEW_NODE)
@@ -53,7 +53,7 @@ static void stream(ebpo_file *file)
     if (ebpo_stream_new(file, &options, &of, NULL) != EBPO_OK)
         return;
     while (ebpo_stream_next_level(of, &level, &more, NULL) == EBPO_OK && more)
-        for (int nodes = 0; nodes < 500 && more_nodes; nodes++)
+        for (int nodes = 0; nodes < 60 && more_nodes; nodes++)
             if (ebpo_stream_next_node(of, &node, &more_nodes, NULL) != EBPO_OK)
                 break;
     ebpo_stream_free(of);
