@@ -20,10 +20,10 @@
 #include "cmd/map_job.h"
 
 static const command *const commands[] = {
-    &command_convert, &command_check,  &command_info,   &command_levels, &command_view,
-    &command_extract, &command_export, &command_subset, &command_repack, &command_fetch,
-    &command_measure, &command_render, &command_verify, &command_inside, &command_distance,
-    &command_ray,     &command_box,    &command_bench,  &command_report, &command_scene,
+    &command_convert, &command_check,   &command_info,   &command_levels, &command_view,
+    &command_extract, &command_export,  &command_subset, &command_repack, &command_fetch,
+    &command_measure, &command_render,  &command_verify, &command_inside, &command_distance,
+    &command_ray,     &command_box,     &command_bench,  &command_report, &command_scene,
     &command_boolean, &command_collide, &command_repair, &command_map,    &command_touch
 };
 enum { COMMANDS = sizeof commands / sizeof *commands, WORDS_MOST = 40, VALUES = 64 };

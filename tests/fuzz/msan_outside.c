@@ -86,23 +86,22 @@ void __wrap_nettle_sha256_digest(struct sha256_ctx *of, size_t bytes, uint8_t *o
 
 /* --- GMP: a number is written from when it has begun, and its limbs are always --- */
 
-#define GMP_INIT(type, name)                           \
-    void __real___gmp##name##_init(type of);           \
-    void __wrap___gmp##name##_init(type of);           \
-    void __wrap___gmp##name##_init(type of)            \
-    {                                                  \
-        __msan_unpoison(of, sizeof *of);               \
-        __real___gmp##name##_init(of);                 \
-    }                                                  \
-    void __wrap___gmp##name##_inits(type first, ...);  \
-    void __wrap___gmp##name##_inits(type first, ...)   \
-    {                                                  \
-        va_list more;                                  \
-        va_start(more, first);                         \
-        for (__typeof__(&first[0]) of = first; of;     \
-             of = va_arg(more, __typeof__(&first[0]))) \
-            __wrap___gmp##name##_init(of);             \
-        va_end(more);                                  \
+#define GMP_INIT(type, name)                                                                 \
+    void __real___gmp##name##_init(type of);                                                 \
+    void __wrap___gmp##name##_init(type of);                                                 \
+    void __wrap___gmp##name##_init(type of)                                                  \
+    {                                                                                        \
+        __msan_unpoison(of, sizeof *of);                                                     \
+        __real___gmp##name##_init(of);                                                       \
+    }                                                                                        \
+    void __wrap___gmp##name##_inits(type first, ...);                                        \
+    void __wrap___gmp##name##_inits(type first, ...)                                         \
+    {                                                                                        \
+        va_list more;                                                                        \
+        va_start(more, first);                                                               \
+        for (__typeof__(&first[0]) of = first; of; of = va_arg(more, __typeof__(&first[0]))) \
+            __wrap___gmp##name##_init(of);                                                   \
+        va_end(more);                                                                        \
     }
 
 GMP_INIT(mpz_t, z)

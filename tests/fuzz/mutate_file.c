@@ -105,7 +105,8 @@ static size_t plain_bytes(const ebpo_array_in *a, ebpo_chunk_place place)
                : a->shape.chunk_rows * ebpo_shape_row_bytes(&a->shape);
 }
 
-/* Decodes a chunk, changes some numbers, and encodes it again. The file's new size; 0: as it was. */
+/* Decodes a chunk, changes some numbers, and encodes it again. The file's new size; 0: as it was.
+ */
 static size_t change_numbers(uint8_t *data, size_t size, size_t most, const ebpo_array_in *a,
                              uint64_t *state)
 {
