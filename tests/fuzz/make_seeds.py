@@ -171,3 +171,44 @@ head("pages_filtered", [("/levels/00/plane_counts", 1, 2600, 0)], fletcher32=Tru
 head("far", [("/levels/00/plane_counts", 1, 40, 0), ("/levels/00/leaf_new", 4, 40, 0),
              ("/mesh/vertices", 4, 40, 3), ("/subtrees/counts", 4, 40, 21)], filler=140000)
 head("pages_far", [("/levels/01/leaf_new", 4, 4200, 0)], filler=140000, fletcher32=True)
+
+
+def changed(name, source, at, value):
+    data = bytearray((folder / "head" / (source + ".h5")).read_bytes())
+    data[at(data):at(data) + len(value)] = value
+    put("head", name + ".h5", bytes(data))
+
+
+def layout(data):  # its last member is the address of the index; before it are page bits and kind
+    return data.index(struct.pack("<Q", data.index(b"FAHD")))
+
+
+early = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+early.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+head("implicit", [("/levels/00/plane_counts", 1, 40, 0)], dcpl=early)
+head("fixed", [("/levels/00/plane_counts", 1, 40, 0)])
+head("fixed_filtered", [("/levels/00/plane_counts", 1, 40, 0)], fletcher32=True)
+NOWHERE, BEYOND = b"\xff" * 8, struct.pack("<Q", 1 << 40)
+changed("implicit_nowhere", "implicit",
+        lambda d: d.index(struct.pack("<Q", d.index(b"\1" * 40))), NOWHERE)
+changed("implicit_overflows", "implicit",
+        lambda d: d.index(struct.pack("<Q", d.index(b"\1" * 40))), b"\xfe" + b"\xff" * 7)
+for name, at in (("index", layout), ("block", lambda d: d.index(b"FAHD") + 16)):
+    for where, address in (("nowhere", NOWHERE), ("beyond", BEYOND), ("elsewhere", bytes(8))):
+        changed(f"fixed_{name}_{where}", "fixed", at, address)
+        changed(f"pages_{name}_{where}", "pages", at, address)
+changed("pages_missing", "pages", lambda d: d.index(b"FADB") + 14, b"\x80")
+changed("pages_cut", "pages", lambda d: d.index(b"FAHD") + 16, b"\xf0")
+changed("entry_nowhere", "fixed", lambda d: d.index(b"FADB") + 14, NOWHERE)
+changed("entry_masked", "fixed_filtered", lambda d: d.index(b"FADB") + 14 + 9, b"\1\1\1\1\1")
+changed("entry_filtered", "fixed", lambda d: d.index(b"FAHD") + 5, b"\1")
+changed("entry_of_13", "fixed_filtered", lambda d: d.index(b"FAHD") + 6, b"\x20")
+changed("page_bits", "fixed", lambda d: d.index(b"FAHD") + 7, b"\x11")
+for kind in (0, 1, 2, 4, 5):
+    changed(f"index_of_kind_{kind}", "fixed", lambda d: layout(d) - 2, bytes([kind]))
+changed("layout_3", "fixed", lambda d: d.rindex(b"\4\2", 0, layout(d)), b"\3")
+changed("layout_contiguous", "fixed", lambda d: d.rindex(b"\4\2", 0, layout(d)) + 1, b"\1")
+changed("layout_cut", "fixed", lambda d: d.rindex(b"\4\2", 0, layout(d)) - 3, b"\6\0")
+for name in ("far", "pages_far"):  # with an odd size the target expects headers in the second half
+    put("head", name + "_expected.h5", (folder / "head" / (name + ".h5")).read_bytes() + b"\0" *
+        (1 + (folder / "head" / (name + ".h5")).stat().st_size % 2))
