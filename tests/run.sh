@@ -50,7 +50,7 @@ run() { # build
     thread) CC=gcc configure "$1" $(sanitized thread) ;;
     # without what is not instrumented, as far as that goes; msan_outside.c tells of the rest
     memory)
-        CC=clang CXX=false configure "$1" $(sanitized memory) -Dtests=disabled -Dfuzzing=true \
+        CC=clang configure "$1" $(sanitized memory) -Dtests=disabled -Dfuzzing=true \
             -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled \
             -Dcaptions=disabled -Dqhull=disabled -Doptimization=0 # as soon built as run
         ;;

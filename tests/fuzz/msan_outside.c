@@ -9,6 +9,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <zlib.h>
 #include <zstd.h>
 
@@ -146,6 +147,21 @@ json_t *__wrap_json_loadb(const char *text, size_t bytes, size_t flags, json_err
     __msan_unpoison(error, sizeof *error);
     return __real_json_loadb(text, bytes, flags, error);
 }
+
+/* --- what clang 14 does not know of this C library --- */
+
+#define STAT_OUT(name, first)                     \
+    int __real_##name(first, struct stat *out);   \
+    int __wrap_##name(first, struct stat *out);   \
+    int __wrap_##name(first of, struct stat *out) \
+    {                                             \
+        int status = __real_##name(of, out);      \
+        if (status == 0)                          \
+            __msan_unpoison(out, sizeof *out);    \
+        return status;                            \
+    }
+STAT_OUT(stat64, const char *)
+STAT_OUT(fstat64, int)
 
 __attribute__((constructor)) static void begin(void)
 {
