@@ -11,20 +11,16 @@
 
 enum { PAIRS_MOST = 2000, DEADLINE_NS = 20000000 };
 
-typedef struct taken {
-    uint64_t count;
-} taken;
-
 static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     (void)pairs;
-    return (((taken *)user)->count += count) < PAIRS_MOST;
+    return (*(uint64_t *)user += count) < PAIRS_MOST;
 }
 
 static bool take_line(void *user, const ebpo_polyline *line)
 {
     (void)line;
-    return ++((taken *)user)->count < PAIRS_MOST;
+    return ++*(uint64_t *)user < PAIRS_MOST;
 }
 
 /* The model and itself: as it is, beside itself, turned and half as large. */
@@ -45,7 +41,7 @@ static ebpo_pose pose_of(int which, const ebpo_info *info)
 static void ask_pair(ebpo_collider *collider, const ebpo_collide_options *options)
 {
     static const double direction[3] = { 1, 0.5, 0 };
-    taken taken = { 0 };
+    uint64_t taken = 0;
     ebpo_face_pair pair;
     ebpo_relation_result relation;
     ebpo_clearance clearance;
