@@ -1,16 +1,17 @@
 #!/bin/sh
 # The tests, in three tiers. Each installs what it needs, builds (warnings are errors) and tests:
-#   tests/run.sh           medium, what CI runs: gcc, clang, sanitize, thread; meant for 40 minutes
+#   tests/run.sh           medium, what CI runs: gcc, clang, sanitize, thread, memory; 40 minutes
 #   tests/run.sh short     gcc alone, few inputs and nothing costly: while one works
 #   tests/run.sh long      every check in every build, all inputs with gcc: before a release
-#   tests/run.sh [TIER] BUILD...    only these of its builds; sanitize: address and undefined
+#   tests/run.sh [TIER] BUILD...    only these of its builds; sanitize: address and undefined;
+#                          memory: fuzz targets alone, whose corpora MemorySanitizer looks at
 # What a tier leaves out is in the table below, nowhere else. Needs no model files; with
 # ../shared/models or $EBPO_MODELS the real ones are tested too.
 set -eu
 cd "$(dirname "$0")/.."
 tier=medium
 case "${1:-}" in short | medium | long) tier=$1 && shift ;; esac
-[ $# -gt 0 ] || case $tier in short) set -- gcc ;; *) set -- gcc clang sanitize thread ;; esac
+[ $# -gt 0 ] || case $tier in short) set -- gcc ;; *) set -- gcc clang sanitize thread memory ;; esac
 
 # The share of repeated inputs (EBPO_TEST_SCALE), and the suites that are left out:
 #   once     not compiled: one build is enough
@@ -27,6 +28,7 @@ plan() { # build
     long-clang) echo "0.2" ;;
     long-sanitize) echo "0.2" ;;
     *-thread) echo "1" ;; # only the suite threads, all of it
+    *-memory) echo "1" ;; # only the suite fuzz
     esac
 }
 
@@ -46,14 +48,21 @@ run() { # build
     gcc | clang) CC=$1 configure "$1" ;;
     sanitize) CC=gcc configure "$1" $(sanitized address,undefined) ;;
     thread) CC=gcc configure "$1" $(sanitized thread) ;;
+    # without what is not instrumented, as far as that goes; msan_outside.c tells of the rest
+    memory)
+        CC=clang configure "$1" $(sanitized memory) -Dtests=disabled -Dfuzzing=true \
+            -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled \
+            -Dcaptions=disabled -Dqhull=disabled -Doptimization=0 # as soon built as run
+        ;;
     esac
     read -r share left_out <<EOF
 $(plan "$1")
 EOF
     suites=
-    if [ "$1" = thread ]; then
-        suites="--suite threads"
-    fi
+    case $1 in
+    thread) suites="--suite threads" ;;
+    memory) suites="--suite fuzz" ;;
+    esac
     for suite in $left_out; do suites="$suites --no-suite $suite"; done
     # Everything where everything is tested; else meson builds what the chosen tests need.
     if [ -z "$left_out$suites" ]; then
@@ -66,8 +75,8 @@ EOF
 
 for build in "$@"; do
     case $build in
-    gcc | clang | sanitize | thread) ;;
-    *) echo "usage: tests/run.sh [short|medium|long] [gcc] [clang] [sanitize] [thread]" >&2; exit 2 ;;
+    gcc | clang | sanitize | thread | memory) ;;
+    *) echo "usage: tests/run.sh [short|medium|long] [gcc] [clang] [sanitize] [thread] [memory]" >&2; exit 2 ;;
     esac
 done
 sh tools/install-deps.sh --tests

@@ -158,11 +158,13 @@ static ebpo_status list_outer(const counting *c, ebpo_error *error)
         };
         if (status != EBPO_OK)
             break;
-        for (int l = c->info->subtree_level + 1; l < c->info->level_count; l++)
-            ebpo_outer_blocks_refer(&blocks, &c->tree->mesh, &own,
-                                    c->tree->level[l].leaf_refs + level_sum(c, i, l, EBPO_S_REFS),
-                                    level_sum(c, i + 1, l, EBPO_S_REFS) -
-                                        level_sum(c, i, l, EBPO_S_REFS));
+        for (int l = c->info->subtree_level + 1; l < c->info->level_count; l++) {
+            uint64_t first = level_sum(c, i, l, EBPO_S_REFS),
+                     end = level_sum(c, i + 1, l, EBPO_S_REFS);
+            if (end > first) /* a level without any has no array */
+                ebpo_outer_blocks_refer(&blocks, &c->tree->mesh, &own,
+                                        c->tree->level[l].leaf_refs + first, end - first);
+        }
         ebpo_outer_blocks_use(&blocks, &c->tree->mesh, &own);
         if (!ebpo_grow(&c->sums->outer, &c->sums->outer_capacity,
                        c->sums->outer_count + blocks.face_blocks + blocks.vertex_blocks +

@@ -24,10 +24,18 @@ for t in $targets; do
     [ ! -f "$root/tests/fuzz/dict/$name.dict" ] ||
         cp "$root/tests/fuzz/dict/$name.dict" "$OUT/$t.dict"
     mkdir -p "$OUT/${t}_seeds"
-    for from in "$root/tests/fuzz/seeds/$name" "$root/tests/fuzz/corpus/$name" \
-        "$WORK/tests/fuzz/seeds_made/$name"; do
+    for from in "$root/tests/fuzz/seeds/$name" "$WORK/tests/fuzz/seeds_made/$name"; do
         [ ! -d "$from" ] || cp "$from"/* "$OUT/${t}_seeds/"
     done
+    [ ! -f "$root/tests/fuzz/corpus/$name.pack" ] ||
+        python3 "$root/tests/fuzz/corpus.py" unpack "$root/tests/fuzz/corpus/$name.pack" \
+            "$OUT/${t}_seeds"
+    case $name in
+    export | file | head | levels | pair | questions | verify)
+        find "$root"/format-spec/vectors "$root/tests/fuzz/seeds/file" -name '*.h5' -size -24k \
+            -exec cp '{}' "$OUT/${t}_seeds/" ';'
+        [ $name = head ] || cp "$root/tests/fuzz/dict/file.dict" "$OUT/$t.dict"
+        ;;
+    esac
 done
-cp "$root"/format-spec/vectors/*/*.h5 "$OUT/fuzz_file_seeds/"
 echo "built: $OUT"

@@ -2,7 +2,7 @@
  * Any bytes as a command line, for each command's table; and as what options take: sizes, levels,
  * times, poses, expressions, numbers.
  *
- * Input: a byte for what it is, the text; arguments end with line feeds. */
+ * Input: a byte for what it is (64 and above: a value), the text; arguments end with line feeds. */
 #include "fuzz_kit.h"
 #include "fuzz_quiet.h"
 
@@ -17,15 +17,16 @@
 #include "cli/subtree_args.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
+#include "cmd/map_job.h"
 
 static const command *const commands[] = {
-    &command_convert, &command_check,  &command_info,   &command_levels, &command_view,
-    &command_extract, &command_export, &command_subset, &command_repack, &command_fetch,
-    &command_measure, &command_render, &command_verify, &command_inside, &command_distance,
-    &command_ray,     &command_box,    &command_bench,  &command_report, &command_scene,
-    &command_boolean, &command_collide
+    &command_convert, &command_check,   &command_info,   &command_levels, &command_view,
+    &command_extract, &command_export,  &command_subset, &command_repack, &command_fetch,
+    &command_measure, &command_render,  &command_verify, &command_inside, &command_distance,
+    &command_ray,     &command_box,     &command_bench,  &command_report, &command_scene,
+    &command_boolean, &command_collide, &command_repair, &command_map,    &command_touch
 };
-enum { COMMANDS = sizeof commands / sizeof *commands, WORDS_MOST = 40 };
+enum { COMMANDS = sizeof commands / sizeof *commands, WORDS_MOST = 40, VALUES = 64 };
 
 static void command_line(const command *c, char *text)
 {
@@ -66,13 +67,20 @@ static void expression(const char *text, uint32_t operands)
     fuzz_must(nodes.count > 0 && nodes.count <= EBPO_BOOLEAN_NODES_MAX);
 }
 
+static void picture_size(const char *text)
+{
+    int width, height;
+    if (map_read_size(text, &width, &height))
+        fuzz_must(width >= 2 && width <= 8192 && height >= 2 && height <= 8192);
+}
+
 static void value(uint8_t what, const char *text)
 {
     word_levels levels;
     ebpo_pose pose = EBPO_POSE_INIT;
     uint64_t n;
     double planes;
-    switch (what % 9) {
+    switch (what % 10) {
     case 0: (void)words_read_size(text, &n); break;
     case 1:
         if (words_read_levels(text, &levels))
@@ -82,7 +90,7 @@ static void value(uint8_t what, const char *text)
         if (pose_read(text, &pose))
             fuzz_must(isfinite(pose.scale) && isfinite(pose.translation[0]));
         break;
-    case 3: expression(text, 1 + what / 9 % 12); break;
+    case 3: expression(text, 1 + what / 10 % 12); break;
     case 4: (void)subtree_faces_read("fuzz", text, &n); break;
     case 5: (void)query_read_time("fuzz", text, &n); break;
     case 6: (void)memory_good("fuzz", &(memory_values){ text, NULL }); break;
@@ -93,6 +101,7 @@ static void value(uint8_t what, const char *text)
             fuzz_must(planes >= 0 && planes <= 1e9);
         break;
     }
+    case 8: picture_size(text); break;
     default: number(text);
     }
 }
@@ -108,10 +117,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (size < 1)
         return 0;
     char *text = fuzz_text(data + 1, size - 1);
-    if (data[0] < COMMANDS)
-        command_line(commands[data[0]], text);
+    if (data[0] < VALUES)
+        command_line(commands[data[0] % COMMANDS], text);
     else
-        value((uint8_t)(data[0] - COMMANDS), text);
+        value((uint8_t)(data[0] - VALUES), text);
     free(text);
     return 0;
 }

@@ -3,6 +3,8 @@
  *
  *     fuzz_x [-n MUTATIONS] [-s SEED] FILE_OR_FOLDER...
  *
+ * A file NAME.pack is a corpus (corpus.py): its inputs are replayed and not mutated.
+ *
  * When the target crashes, its last words name the file, the seed and the number of the mutation;
  * -1 is the file as it is. */
 #include <dirent.h>
@@ -121,8 +123,36 @@ static size_t mutate(uint8_t *data, size_t size, uint64_t *state)
     return size;
 }
 
+/* Lengths of four bytes, little-endian, each with so many bytes behind it. */
+static int run_pack(const char *path)
+{
+    FILE *f = fopen(path, "rb");
+    uint8_t *input = malloc(LARGEST_SEED), b[4];
+    size_t bytes = 0, got = 0;
+    if (!f || !input) {
+        perror(path);
+        return 2;
+    }
+    now.file = path;
+    for (now.mutation = 0; got == bytes && fread(b, 1, 4, f) == 4; now.mutation++) {
+        bytes = b[0] | (size_t)b[1] << 8 | (size_t)b[2] << 16 | (size_t)b[3] << 24;
+        got = bytes <= LARGEST_SEED ? fread(input, 1, bytes, f) : 0;
+        if (got == bytes)
+            run(input, bytes);
+    }
+    fclose(f);
+    free(input);
+    if (got == bytes)
+        return 0;
+    fprintf(stderr, "%s: cut off at input %ld\n", path, now.mutation - 1);
+    return 2;
+}
+
 static int run_file(const char *path)
 {
+    const char *ending = strrchr(path, '.');
+    if (ending && strcmp(ending, ".pack") == 0)
+        return run_pack(path);
     FILE *f = fopen(path, "rb");
     uint8_t *seed = malloc(LARGEST_SEED), *changed = malloc(LARGEST_SEED);
     if (!f || !seed || !changed) {

@@ -176,6 +176,113 @@ old_with("2024-32605_variable_text_in_attribute.h5", attribute + 8, b"\x19\x01\x
 old_with("2024-32613_deflate_of_zero.h5", layout + 3, NONE)
 old_with("2024-33874_message_longer_than_header.h5", kind - 6, b"\xf8\xff")
 old_with("2024-33877_size_of_conversion.h5", kind + 4, b"\xff\xff\xff\xff")
+old_with("2024-29163_bits_of_type.h5", kind + 8, b"\xff\xff\xff\xff")
+old_with("2024-29165_checksum_of_three_bytes.h5", place(old, b"TREE", 1) + 24, struct.pack("<I", 3))
+old_with("2024-32607_attribute_of_no_type.h5", attribute + 4, b"\0\0")
+old_with("2024-32608_attribute_of_no_space.h5", attribute + 6, b"\0\0")
+old_with("2024-32609_array_of_arrays.h5", kind, b"\x3a\0\0\0\xff\xff\xff\xff" * 2)
+old_with("2024-32610_shared_type.h5", kind - 4, b"\x03")
+old_with("2024-32612_free_list_of_heap.h5", heap + 16, struct.pack("<Q", (1 << 16) - 1))
+old_with("2024-32614_layout_smaller_than_space.h5", layout + 3, struct.pack("<QQ", 96, 1))
+old_with("2024-32616_compound_of_65535.h5", kind, b"\x36\xff\xff\x00\x04\0\0\0")
+old_with("2024-32617_text_without_end.h5", attribute + 8, b"\xff" * 16)
+old_with("2024-32618_member_beyond_its_type.h5", kind, b"\x16\x01\0\0\x04\0\0\0" + b"aaaaaaa\0" + b"\xff" * 4)
+old_with("2024-32620_address_in_a_short_message.h5", kind - 6, b"\x08\0")
+old_with("2024-32622_rank_and_no_sizes.h5", space + 1, b"\x20\x00")
+old_with("2024-32623_fill_longer_than_its_type.h5", fill, b"\x02\x02\x02\x01\xff\xff\0\0")
+old_with("2024-32624_fill_of_a_reference.h5", kind, b"\x17\x01\0\0\x0c\0\0\0")
+old_with("2024-33873_chunk_larger_than_space.h5", layout + 11, b"\xff\xff\0\0\xff\xff\0\0")
+old_with("2024-33875_layout_of_another_version.h5", layout, b"\x01")
+old_with("2025-2309_precision_of_type.h5", kind + 8, b"\xff\0\x01\0")
+old_with("2025-2310_name_of_attribute.h5", attribute + 2, b"\xff\x00")
+old_with("2025-2912_version_of_header.h5", message(old, 1) - 24, b"\x02")
+old_with("2025-2913_continuation_into_itself.h5", space - 8,
+         struct.pack("<HHI", 16, 16, 0) + struct.pack("<QQ", space - 24, 64))
+old_with("2025-2915_end_of_file.h5", 40, struct.pack("<Q", 100))
+old_with("2025-2923_size_of_addresses.h5", 13, b"\x02")
+old_with("2025-2924_free_block_at_the_end.h5", heap + 16, old[heap + 8:heap + 16])
+old_with("2025-2925_heap_of_no_bytes.h5", heap + 8, NONE)
+old_with("2025-2926_message_of_no_bytes.h5", space - 6, b"\0\0")
+old_with("2025-6516_sizes_of_superblock.h5", 13, b"\x20\x20")
+old_with("2025-6817_tree_at_its_own_place.h5", tree + 16, struct.pack("<Q", tree))
+old_with("2025-6818_continuation_beyond_the_end.h5", space - 8,
+         struct.pack("<HHI", 16, 16, 0) + struct.pack("<QQ", len(old) - 8, 1 << 20))
+old_with("2025-6856_table_is_its_own_child.h5", tree + 24 + 8, struct.pack("<Q", snod - 8))
+old_with("2025-6857_names_of_a_table.h5", snod + 8, struct.pack("<Q", 0xffffffff))
+old_with("2025-6858_driver_block_is_the_root.h5", 48, struct.pack("<Q", 96))
+old_with("2025-44904_space_larger_than_layout.h5", space + 8, struct.pack("<Q", 1 << 40))
+old_with("2026-19024_negative_size_of_fill.h5", fill, b"\x02\x02\x02\x01\xff\xff\xff\xff")
+old_with("2026-26200_conversion_of_members.h5", kind, b"\x26\x02\0\0\x04\0\0\0")
+
+
+# --- what only files of other programs have: written by libhdf5, then damaged behind a signature ---
+
+def made(name, change, signature, at, value, **how):
+    path = folder / name
+    with h5py.File(path, "w", **how) as target:
+        change(target)
+    data = bytearray(path.read_bytes())
+    where = place(data, signature) + at
+    data[where:where + len(value)] = value
+    damaged(name, data)
+
+
+def references(target):
+    data = target.create_dataset("faces", data=numpy.zeros((4, 3), "<u4"))
+    target.create_dataset("regions", (2,), h5py.regionref_dtype)[0] = data.regionref[[0, 2], :]
+
+
+def texts(target):
+    target.create_dataset("text", data=["one", "two"], dtype=h5py.string_dtype())
+
+
+def many_attributes(target):
+    for i in range(40):
+        target.attrs[f"name_{i:02}"] = i
+
+
+def many_links(target):
+    for i in range(40):
+        target.create_group(f"group_{i:02}")
+
+
+def scale_offset(target):
+    target.create_dataset("faces", data=numpy.arange(400, dtype="<u4").reshape(100, 4), chunks=(100, 4),
+                          scaleoffset=12)
+
+
+def freed(target):
+    for i in range(30):
+        target.create_dataset(f"{i}", data=numpy.zeros(1000 + i))
+    for i in range(0, 30, 2):
+        del target[f"{i}"]
+
+
+GLOBAL_HEAP, SCALE, LATEST = b"GCOL", b"scaleoffset\0", {"libver": "latest"}
+FREED = {"libver": "latest", "fs_strategy": "fsm", "fs_persist": True, "fs_threshold": 1}
+made("2024-29159_scaleoffset_parameters.h5", scale_offset, SCALE, 16, b"\xff" * 16)
+made("2024-29161_attributes_of_a_heap.h5", many_attributes, b"FRHP", 14, BIG, **LATEST)
+made("2024-29162_object_of_global_heap.h5", references, GLOBAL_HEAP, 16, b"\xff" * 16)
+made("2024-29164_reference_into_a_heap.h5", references, GLOBAL_HEAP, 24, BIG)
+made("2024-29166_link_info.h5", many_links, b"OHDR", 16, b"\x02\xff\xff\xff\xff", **LATEST)
+made("2024-32606_text_of_no_object.h5", texts, GLOBAL_HEAP, 16, NONE)
+made("2024-32611_tree_of_attributes.h5", many_attributes, b"BTHD", 6, b"\xff" * 12, **LATEST)
+made("2024-32615_nbit_parameters.h5", scale_offset, SCALE, -8, b"\x05\0")
+made("2024-32619_heap_of_another_type.h5", references, GLOBAL_HEAP, 8, NONE)
+made("2024-32621_length_in_global_heap.h5", texts, GLOBAL_HEAP, 24, BIG)
+made("2024-33876_points_of_a_region.h5", references, GLOBAL_HEAP, 32, b"\x01\0\0\0" + b"\xff" * 28)
+made("2025-2153_table_of_shared_messages.h5", many_attributes, b"\x89HDF", 20, struct.pack("<Q", 48), **LATEST)
+made("2025-2308_bits_of_scaleoffset.h5", scale_offset, SCALE, 20, b"\x09\xff\xff\xff")
+made("2025-2914_section_of_free_space.h5", freed, b"FSSE", 13, b"\xff" * 16, **FREED)
+made("2025-6269_cache_image.h5", freed, b"FSHD", -8, b"MDCI\0\0\0\0", **FREED)
+made("2025-6270_sections_that_overlap.h5", freed, b"FSSE", 13, b"\0" * 16, **FREED)
+made("2025-6750_message_of_time.h5", many_links, b"OHDR", 16, b"\x12\0\0\0", **LATEST)
+made("2025-6816_info_of_free_space.h5", freed, b"FSHD", 8, b"\xff" * 24, **FREED)
+made("2025-7067_class_of_free_space.h5", freed, b"FSHD", 5, b"\xff", **FREED)
+made("2025-7068_count_of_sections.h5", freed, b"FSHD", 14, BIG, **FREED)
+made("2025-7069_size_of_sections.h5", freed, b"FSHD", 30, BIG, **FREED)
+made("2025-44905_minimum_of_scaleoffset.h5", scale_offset, SCALE, 24, b"\xff\xff\xff\x7f")
+made("2026-19023_text_of_two_elements.h5", texts, GLOBAL_HEAP, 40, b"\xff" * 16)
 
 
 # --- what this format calls for, written by others ---
@@ -273,6 +380,25 @@ new_with("2024-29157_shared_message", first(3), "flags", b"\x02")
 for kind, what in ((11, "pipeline_of_255_filters"), (12, "attribute_of_long_name")):
     if any(messages(kind)):
         new_with(what, first(kind), 1 if kind == 11 else 2, b"\xff\xff"[:1 if kind == 11 else 2])
+if any(messages(11)):
+    for report, filter_id in (("2024-29159_scaleoffset", 6), ("2024-29165_fletcher32_twice", 3),
+                              ("2024-32615_nbit", 5), ("2024-33873_szip", 4)):
+        new_with(report, first(11), 2, struct.pack("<H", filter_id))
+new_with("2024-29163_bits_of_type", first(3), 8, b"\xff\xff\xff\xff")
+new_with("2024-29166_link_info", first(1), "type", b"\x02")
+new_with("2024-32614_layout_beyond_the_end", first(8), first(8)[3] - 8, BIG)
+new_with("2024-32616_compound", first(3), 0, b"\x36\xff\xff\0")
+new_with("2024-32621_variable_length", first(3), 0, b"\x19\x01\0\0")
+new_with("2024-32622_rank_and_no_sizes", first(1), 1, b"\x00")
+new_with("2024-32624_reference", first(3), 0, b"\x17\x01\0\0\x0c\0\0\0")
+new_with("2025-2309_precision", first(3), 8, b"\xff\0\x01\0")
+if any(messages(12)):
+    new_with("2025-2310_name_of_attribute", first(12), 2, b"\xff\xff")
+    new_with("2024-32607_attribute_of_no_type", first(12), 4, b"\0\0")
+    new_with("2024-32608_attribute_of_no_space", first(12), 6, b"\0\0")
+new_with("2025-2926_message_of_no_bytes", first(1), "size", b"\0\0")
+new_with("2025-6818_continuation_beyond_the_end", first(3), "type", b"\x10")
+superblock_with("2025-2153_extension_is_the_root", 20, bytes(new[36:44]))
 superblock_with("2018-13866_size_of_address", 9, b"\xff\xff")
 superblock_with("2021-31009_version_4", 8, b"\x04")
 superblock_with("end_beyond_the_file", 28, BIG)

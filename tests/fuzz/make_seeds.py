@@ -107,7 +107,9 @@ command_lines = [
     b"a.h5\no.png\n--width\n640", b"a.h5\n--source\na.ply\n--memory\n64M",
     b"a.h5\n-\n--mode\nnodes-plain\n--deadline=5us", b"a.h5\np.npy\n--unsigned\n--nearest\n3",
     b"a.h5\n--any\n--raw", b"a.h5\n--csv\n--header", b"a.h5\n--points\n1000", b"a.ply\no.html",
-    b"report\ns.scene.json", b"A-B\na.h5\nb.h5\n--pose\nB:1 2 3", b"a.h5\nb.h5\n--distance"]
+    b"report\ns.scene.json", b"A-B\na.h5\nb.h5\n--pose\nB:1 2 3", b"a.h5\nb.h5\n--distance",
+    b"a.h5\n-o\nb.h5\n--source\na.ply", b"a.h5\n--plane\nz=50%\n--size\n64x64\n-o\nm.png\n--range=1",
+    b"a.h5\n--path\np.txt\n--rate\n1000\n--radius=0.1\n--json"]
 for i, text in enumerate(command_lines):
     put("args", f"command_{i:02}", bytes([i]) + text)
 values = {
@@ -117,10 +119,11 @@ values = {
     3: [b"A", b"A - (B | C)", b"A&B*C^D+E", b"((((A))))", b"A - "],
     4: [b"none", b"1024", b"0"], 5: [b"500ns", b"50us", b"1ms", b"2s"], 6: [b"2G", b"1"],
     7: [b"500", b"1%", b"100%", b"1e9"],
-    8: [b"0.1", b"-1e-320", b"inf", b"nan", b"0x1.8p3", b"9007199254740993", b"1e400"]}
+    8: [b"800x600", b"2x8192", b"99999x3"],
+    9: [b"0.1", b"-1e-320", b"inf", b"nan", b"0x1.8p3", b"9007199254740993", b"1e400"]}
 for kind, texts in values.items():
     for i, text in enumerate(texts):
-        put("args", f"value_{kind}_{i}", bytes([22 + kind + (9 * 9 if kind == 3 and i else 0)]) + text)
+        put("args", f"value_{kind}_{i}", bytes([64 + kind + (10 * 9 if kind == 3 and i else 0)]) + text)
 
 # --- meshes of others: format and flags; the file ---
 obj = (b"mtllib a.mtl\no first\nv 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvn 0 0 1\nusemtl red\ns 1\n"
@@ -141,3 +144,71 @@ for flags in (0, 16):
 put("import", "groups", bytes([24]) + obj)
 put("import", "mtl", bytes([4]) + mtl)
 put("import", "ply_names", bytes([4]) + b"ply\ncomment TextureFile a b.png\ncomment TextureFile ../x.png\nend_header\n")
+
+# --- heads: indexes of chunks in pages, and what lies beyond the first bytes that are read ---
+(folder / "head").mkdir(parents=True, exist_ok=True)
+try:
+    import h5py
+    import numpy
+except ImportError:
+    sys.exit(0)  # the vectors remain
+
+
+def head(name, paths, filler=0, **how):
+    with h5py.File(folder / "head" / (name + ".h5"), "w", libver="latest") as out:
+        if filler:
+            out["filler"] = numpy.zeros(filler, "u1")
+            out.flush()
+        for array, width, rows, cols in paths:
+            shape, chunks = ((rows, cols), (2, cols)) if cols else ((rows,), (2,))
+            made = out.create_dataset(array, data=numpy.ones(shape, f"<u{width}"), chunks=chunks,
+                                      **how)
+            made.attrs.create("coding", numpy.bytes_("plain"))
+
+
+head("pages", [("/levels/00/plane_counts", 1, 2600, 0)])
+head("pages_filtered", [("/levels/00/plane_counts", 1, 2600, 0)], fletcher32=True)
+head("far", [("/levels/00/plane_counts", 1, 40, 0), ("/levels/00/leaf_new", 4, 40, 0),
+             ("/mesh/vertices", 4, 40, 3), ("/subtrees/counts", 4, 40, 21)], filler=140000)
+head("pages_far", [("/levels/01/leaf_new", 4, 4200, 0)], filler=140000, fletcher32=True)
+
+
+def changed(name, source, at, value):
+    data = bytearray((folder / "head" / (source + ".h5")).read_bytes())
+    data[at(data):at(data) + len(value)] = value
+    put("head", name + ".h5", bytes(data))
+
+
+def layout(data):  # its last member is the address of the index; before it are page bits and kind
+    return data.index(struct.pack("<Q", data.index(b"FAHD")))
+
+
+early = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+early.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+head("implicit", [("/levels/00/plane_counts", 1, 40, 0)], dcpl=early)
+head("fixed", [("/levels/00/plane_counts", 1, 40, 0)])
+head("fixed_filtered", [("/levels/00/plane_counts", 1, 40, 0)], fletcher32=True)
+NOWHERE, BEYOND = b"\xff" * 8, struct.pack("<Q", 1 << 40)
+changed("implicit_nowhere", "implicit",
+        lambda d: d.index(struct.pack("<Q", d.index(b"\1" * 40))), NOWHERE)
+changed("implicit_overflows", "implicit",
+        lambda d: d.index(struct.pack("<Q", d.index(b"\1" * 40))), b"\xfe" + b"\xff" * 7)
+for name, at in (("index", layout), ("block", lambda d: d.index(b"FAHD") + 16)):
+    for where, address in (("nowhere", NOWHERE), ("beyond", BEYOND), ("elsewhere", bytes(8))):
+        changed(f"fixed_{name}_{where}", "fixed", at, address)
+        changed(f"pages_{name}_{where}", "pages", at, address)
+changed("pages_missing", "pages", lambda d: d.index(b"FADB") + 14, b"\x80")
+changed("pages_cut", "pages", lambda d: d.index(b"FAHD") + 16, b"\xf0")
+changed("entry_nowhere", "fixed", lambda d: d.index(b"FADB") + 14, NOWHERE)
+changed("entry_masked", "fixed_filtered", lambda d: d.index(b"FADB") + 14 + 9, b"\1\1\1\1\1")
+changed("entry_filtered", "fixed", lambda d: d.index(b"FAHD") + 5, b"\1")
+changed("entry_of_13", "fixed_filtered", lambda d: d.index(b"FAHD") + 6, b"\x20")
+changed("page_bits", "fixed", lambda d: d.index(b"FAHD") + 7, b"\x11")
+for kind in (0, 1, 2, 4, 5):
+    changed(f"index_of_kind_{kind}", "fixed", lambda d: layout(d) - 2, bytes([kind]))
+changed("layout_3", "fixed", lambda d: d.rindex(b"\4\2", 0, layout(d)), b"\3")
+changed("layout_contiguous", "fixed", lambda d: d.rindex(b"\4\2", 0, layout(d)) + 1, b"\1")
+changed("layout_cut", "fixed", lambda d: d.rindex(b"\4\2", 0, layout(d)) - 3, b"\6\0")
+for name in ("far", "pages_far"):  # with an odd size the target expects headers in the second half
+    put("head", name + "_expected.h5", (folder / "head" / (name + ".h5")).read_bytes() + b"\0" *
+        (1 + (folder / "head" / (name + ".h5")).stat().st_size % 2))

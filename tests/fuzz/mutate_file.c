@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * The mutator of targets whose input is a whole file: numbers in an array's chunk, which is encoded
- * again in its place; or the tree, which is read, changed and written anew, in another layout
+ * again; or the tree, which is read, changed and written anew, in another layout
  * perhaps. What random bytes would only damage reaches the code behind the checks that way. */
 #include "fuzz_kit.h"
 #include "mutate.h"
@@ -9,6 +9,8 @@
 #include <stdio.h>
 #include <unistd.h>
 
+#include "base/endian.h"
+#include "base/sums.h"
 #include "codec/chunk.h"
 #include "container/file_in.h"
 #include "read_by.h"
@@ -66,38 +68,78 @@ static void change_number(uint8_t *raw, size_t count, size_t width, uint64_t *st
     memcpy(at, &value, width);
 }
 
-/* Where chunks are not compressed, their bytes stay as many. */
-static bool change_chunk(uint8_t *data, size_t size, uint64_t *state)
+/* A chunk that has become of another size goes behind the file's end. The entry of its index is
+ * known by the address: before it stand the size and a filter mask (an array of one chunk), or
+ * the size stands behind it. Headers' checksums are wrong then: for builds that compare none. 0: it
+ * did not fit, or the entry was not found. */
+static size_t put_elsewhere(uint8_t *data, size_t size, size_t most, ebpo_chunk_place old,
+                            const uint8_t *chunk, size_t stored)
+{
+    enum { END_OF_FILE = 28, ONE_BEFORE = 12 };
+    if (EBPO_SUMS_COMPARED || most < size || most - size < stored || stored > UINT16_MAX)
+        return 0;
+    for (size_t i = END_OF_FILE + 8; i + 10 <= size; i++) {
+        if (ebpo_load64(data + i) != old.address)
+            continue;
+        if (ebpo_load64(data + i - ONE_BEFORE) == old.bytes)
+            ebpo_store64(data + i - ONE_BEFORE, stored);
+        else if (old.bytes <= UINT16_MAX && ebpo_load16(data + i + 8) == old.bytes)
+            ebpo_store16(data + i + 8, (uint16_t)stored);
+        else
+            continue;
+        ebpo_store64(data + i, size);
+        ebpo_store64(data + END_OF_FILE, size + stored);
+        memcpy(data + size, chunk, stored);
+        return size + stored;
+    }
+    return 0;
+}
+
+/* What a chunk holds when it is decoded; the last one is as long as the others. */
+static size_t plain_bytes(const ebpo_array_in *a, ebpo_chunk_place place)
+{
+    if (a->shape.pipeline == EBPO_PIPELINE_CHECKSUM)
+        return place.bytes > 4 ? place.bytes - 4 : 0;
+    return a->shape.pipeline > EBPO_PIPELINE_CHECKSUM
+               ? place.bytes
+               : a->shape.chunk_rows * ebpo_shape_row_bytes(&a->shape);
+}
+
+/* Decodes a chunk, changes some numbers, and encodes it again. The file's new size; 0: as it was.
+ */
+static size_t change_numbers(uint8_t *data, size_t size, size_t most, const ebpo_array_in *a,
+                             uint64_t *state)
 {
     static ebpo_chunk_coder coder;
     static uint8_t raw[EBPO_CHUNK_BYTES_MAX], again[2 * EBPO_CHUNK_BYTES_MAX];
     const char *why;
     size_t stored;
-    bool changed = false;
-    ebpo_file *file = open_bytes(data, size);
+    ebpo_chunk_place place = a->chunks[fuzz_below(state, (uint32_t)ebpo_shape_chunks(&a->shape))];
+    size_t width = a->shape.element_size, plain = plain_bytes(a, place);
+    if (plain > sizeof raw || plain < width || plain % width ||
+        ebpo_chunk_decode(&coder, a->shape.pipeline, width, data + place.address, place.bytes, raw,
+                          plain, &why) != EBPO_OK)
+        return 0;
+    for (uint32_t times = 1 + fuzz_below(state, 3); times > 0; times--)
+        change_number(raw, plain / width, width, state);
+    if (ebpo_chunk_encode(&coder, a->shape.pipeline, 0, width, raw, plain, again, &stored) !=
+        EBPO_OK)
+        return 0;
+    if (stored != place.bytes)
+        return put_elsewhere(data, size, most, place, again, stored);
+    memcpy(data + place.address, again, stored);
+    return size;
+}
+
+static size_t change_chunk(uint8_t *data, size_t size, size_t most, uint64_t *state)
+{
+    uint8_t *copy = fuzz_copy(data, size);
+    ebpo_file *file = open_bytes(copy, size);
     const ebpo_array_in *a = file ? some_array(file, state) : NULL;
-    if (a) {
-        uint64_t chunks =
-            a->shape.rows / a->shape.chunk_rows + (a->shape.rows % a->shape.chunk_rows != 0);
-        uint32_t chunk = fuzz_below(state, (uint32_t)chunks);
-        size_t at = (size_t)a->chunks[chunk].address, bytes = a->chunks[chunk].bytes,
-               width = a->shape.element_size,
-               plain = a->shape.pipeline == EBPO_PIPELINE_CHECKSUM ? bytes - 4 : bytes;
-        if (a->shape.pipeline >= EBPO_PIPELINE_CHECKSUM && plain <= sizeof raw && plain >= width &&
-            plain % width == 0 &&
-            ebpo_chunk_decode(&coder, a->shape.pipeline, width, data + at, bytes, raw, plain,
-                              &why) == EBPO_OK) {
-            for (uint32_t times = 1 + fuzz_below(state, 3); times > 0; times--)
-                change_number(raw, plain / width, width, state);
-            changed = ebpo_chunk_encode(&coder, a->shape.pipeline, 0, width, raw, plain, again,
-                                        &stored) == EBPO_OK &&
-                      stored == bytes;
-            if (changed)
-                memcpy(data + at, again, bytes);
-        }
-    }
+    size_t made = a ? change_numbers(data, size, most, a, state) : 0;
     ebpo_close(file);
-    return changed;
+    free(copy);
+    return made;
 }
 
 /* --- a tree --- */
@@ -260,8 +302,8 @@ size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned
 {
     uint64_t state = seed;
     uint32_t way = fuzz_below(&state, 8);
-    if (way < 4 && change_chunk(data, size, &state))
-        return size;
-    size_t made = way == 4 ? change_tree(data, size, most, &state) : 0;
+    size_t made = way < 4    ? change_chunk(data, size, most, &state)
+                  : way == 4 ? change_tree(data, size, most, &state)
+                             : 0;
     return made ? made : LLVMFuzzerMutate(data, size, most);
 }

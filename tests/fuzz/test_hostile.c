@@ -4,16 +4,16 @@
  *
  *     test_hostile FOLDER
  *
- * Linked with H5open and what opens objects wrapped. Prints how long the slowest took. */
+ * Linked with H5open and what opens objects wrapped. Prints how long the slowest took: of the
+ * processor's time, as others may use the machine. */
 #include <dirent.h>
 #include <hdf5.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include <ebpo/file.h>
-
-#include "base/clock.h"
 
 static int entered;
 
@@ -50,6 +50,13 @@ hid_t __wrap_H5Gopen2(hid_t at, const char *name, hid_t gapl)
 }
 htri_t __wrap_H5Aexists(hid_t at, const char *name) { return (htri_t)__wrap_H5Dopen2(at, name, 0); }
 
+static double processor_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
 static bool is_refused(const char *path)
 {
     ebpo_file *file = NULL;
@@ -71,10 +78,10 @@ int main(int argc, char **argv)
         if (names[i]->d_name[0] == '.')
             continue;
         snprintf(path, sizeof path, "%s/%s", argv[1], names[i]->d_name);
-        double began = ebpo_seconds();
+        double began = processor_seconds();
         int before = entered;
         bool refused = is_refused(path);
-        double took = ebpo_seconds() - began;
+        double took = processor_seconds() - began;
         slowest = took > slowest ? took : slowest;
         if (!refused || entered != before)
             fprintf(stderr, "%s: %s\n", names[i]->d_name,

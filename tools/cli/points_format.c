@@ -108,6 +108,8 @@ static bool read_npy(points *p, points_block *b)
     char head[4096];
     while (p->rest_count < BEFORE && !p->ended && points_fill(p, b))
         ;
+    if (!b->failed && p->rest_count < BEFORE)
+        return points_fault(b, 0, "has a head that is no NumPy array's");
     const uint8_t *u = (const uint8_t *)p->rest;
     size_t before = u[6] == 1 ? 10 : 12,
            length = u[6] == 1 ? (size_t)u[8] | (size_t)u[9] << 8

@@ -368,10 +368,10 @@ static const values usual = {
 
 static int run(void *given, const char **operand)
 {
-    values *v = given;
 #if EBPO_HAVE_PNG
     if (!process_memory_take("render", v->memory))
         return EXIT_USAGE;
+    values *v = given;
     job *j = calloc(1, sizeof *j);
     if (!j)
         return command_no_memory("render");
@@ -382,6 +382,8 @@ static int run(void *given, const char **operand)
     free(j);
     return code;
 #else
+    (void)given;
+    (void)operand;
     fprintf(stderr, "ebpo render: this build has no libpng; install libpng and rebuild ebpo\n");
     return EXIT_USAGE;
 #endif

@@ -47,13 +47,16 @@ static int find_box(const map_job *j, double low[3], double high[3])
             return wrong("--box", j->v->box, "six numbers, the low corner below the high one");
         memcpy(low, all, 3 * sizeof *low);
         memcpy(high, all + 3, 3 * sizeof *high);
-        return EXIT_FINE;
     }
     for (int c = 0; c < 3; c++)
         longest = fmax(longest, info->box_size[c]);
     for (int c = 0; c < 3; c++) {
-        low[c] = info->box_origin[c] - j->v->margin * longest;
-        high[c] = info->box_origin[c] + info->box_size[c] + j->v->margin * longest;
+        if (!j->v->box) {
+            low[c] = info->box_origin[c] - j->v->margin * longest;
+            high[c] = info->box_origin[c] + info->box_size[c] + j->v->margin * longest;
+        }
+        if (!isfinite(high[c] - low[c])) /* what is computed of it would be no number */
+            return command_usage("map", "a box whose edges are longer than a double tells");
     }
     return EXIT_FINE;
 }
