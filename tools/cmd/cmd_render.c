@@ -43,6 +43,7 @@ typedef struct tile {
     uint64_t face_count;
     ebpo_mesh mesh;
     ebpo_colours colours; /* of the model, as far as it has any */
+    float *normals;       /* of a level, by triangle: which way it is lit */
     bool closed;
     char caption[64];
 } tile;
@@ -128,6 +129,33 @@ static int parse(job *j)
 
 /* --- what to draw --- */
 
+/* A level's polygons as its triangles. */
+static void spread(const ebpo_lod_nodes *nodes, const float *of_polygon, float *of_triangle)
+{
+    for (uint64_t i = 0; i < nodes->polygon_count; i++, of_polygon += 3)
+        for (unsigned n = nodes->corners[i]; n > 2; n--, of_triangle += 3)
+            memcpy(of_triangle, of_polygon, 3 * sizeof *of_polygon);
+}
+
+static ebpo_status load_normals(tile *t, const ebpo_info *info, const ebpo_lod_nodes *nodes,
+                                ebpo_error *error)
+{
+    float *normals = malloc((nodes->polygon_count + 1) * 3 * sizeof *normals);
+    t->normals = malloc((t->mesh.face_count + 1) * 3 * sizeof *t->normals);
+    ebpo_status status = EBPO_OK;
+    if (normals && t->normals) {
+        status = ebpo_lod_normals(info, &t->mesh, nodes, normals, error);
+    } else {
+        snprintf(error->message, sizeof error->message,
+                 "not enough memory for level %d; choose a coarser one", t->level);
+        status = error->status = EBPO_E_MEMORY;
+    }
+    if (status == EBPO_OK)
+        spread(nodes, normals, t->normals);
+    free(normals);
+    return status;
+}
+
 static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress progress,
                              ebpo_error *error)
 {
@@ -152,6 +180,8 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
     ebpo_status status = ebpo_lod_level_nodes(file, t->level, &lod, &t->mesh, &nodes, NULL, error);
     if (status == EBPO_OK && !j->v.no_colours)
         status = ebpo_lod_colours(&nodes, t->mesh.vertex_count, &t->colours, error);
+    if (status == EBPO_OK)
+        status = load_normals(t, info, &nodes, error);
     ebpo_lod_nodes_free(&nodes);
     if (status == EBPO_OK)
         snprintf(t->caption, sizeof t->caption,
@@ -250,7 +280,8 @@ static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const came
                            .closed = t->closed,
                            .edges = j->v.edges,
                            .face_colours = t->colours.by_face ? t->colours.face : NULL,
-                           .vertex_colours = t->colours.by_face ? NULL : t->colours.vertex };
+                           .vertex_colours = t->colours.by_face ? NULL : t->colours.vertex,
+                           .normals = t->normals };
     if (t->level == MESH)
         memcpy(style.colour, (const double[3]){ 0.66, 0.54, 0.40 }, sizeof style.colour);
     int caption = caption_height(j, at[2]), drawn = at[3] - caption;
@@ -308,6 +339,7 @@ static ebpo_status render(job *j, bool is_file, ebpo_progress progress, ebpo_err
         j->tiles[i].face_count = j->tiles[i].mesh.face_count;
         ebpo_mesh_free(&j->tiles[i].mesh);
         ebpo_colours_free(&j->tiles[i].colours);
+        free(j->tiles[i].normals);
     }
     return status;
 }
