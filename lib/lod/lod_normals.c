@@ -1,10 +1,10 @@
-/* Which way a level's polygons are lit. A polygon on a plane lies nearly as the surface below it. One
- * on a wall between cells, a step from one envelope to the next, says nothing of the surface: it takes
- * the direction that the planes around it have.
+/* Which way a level's polygons are lit. A polygon on a plane lies nearly as the surface below it.
+ * One on a wall between cells, a step from one envelope to the next, says nothing of the surface:
+ * it takes the direction that the planes around it have.
  *
- * For each of the six sides: at every corner of a drawn cell the mean, by area, of the plane polygons
- * of the nodes around it that look to that side; between corners, linearly. Planes of the other side
- * of a thin part do not count. */
+ * For each of the six sides: at every corner of a drawn cell the mean, by area, of the plane
+ * polygons of the nodes around it that look to that side; between corners, linearly. Planes of the
+ * other side of a thin part do not count. */
 #include "geom/strict_fp.h"
 
 #include <ebpo/lod.h>
@@ -33,10 +33,10 @@ typedef struct polygon {
 typedef struct lighting {
     ebpo_box box;
     const ebpo_lod_nodes *nodes;
-    polygon *polygons;    /* [polygon_count] */
-    uint32_t (*at)[8];    /* of each node, its corners' numbers */
-    double (*sum)[4];     /* [corner_count] of normals, and of their lengths */
-    uint64_t *keys;       /* [corner_count] where they are */
+    polygon *polygons; /* [polygon_count] */
+    uint32_t (*at)[8]; /* of each node, its corners' numbers */
+    double (*sum)[4];  /* [corner_count] of normals, and of their lengths */
+    uint64_t *keys;    /* [corner_count] where they are */
     uint64_t corner_count, key_capacity;
 } lighting;
 
@@ -65,8 +65,8 @@ static const double *corner_of(const ebpo_mesh *mesh, const uint32_t *face, unsi
     return mesh->xyz64 + 3 * (uint64_t)v;
 }
 
-/* Corners on a wall have its very coordinate. Beyond walls of the root cell there is nothing to step
- * to: what lies on them counts as a plane. */
+/* Corners on a wall have its very coordinate. Beyond walls of the root cell there is nothing to
+ * step to: what lies on them counts as a plane. */
 static int side_of(const ebpo_box *box, ebpo_cell cell, const ebpo_mesh *mesh, const uint32_t *face,
                    unsigned corners)
 {

@@ -2,8 +2,9 @@
 """What coarse levels look like for their bytes: docs/measured/coarse-looks.md.
 
     /usr/bin/python3 tests/bench/coarse_looks.py BUILD_DIR FILE.ebpo.h5 [--levels 3-7]
+    [--directions 5]
 
-Draws the model and its levels from 20 directions and compares the pictures: levels as they lie;
+Draws the model and its levels from 20 directions, or some of these, and compares the pictures: levels as they lie;
 with walls lit as the planes around them; with normals that a file might store; and covered with
 pictures taken around the model (BP-Octree thesis, 4.4). No figure depends on the machine.
 
@@ -18,6 +19,7 @@ import zlib
 import numpy
 
 PIXELS = 320       # the side of a picture; two samples across each
+LARGE, SMALL = 384, 192  # of one that is stored
 NONE = 0xffffffff
 BACKGROUND = numpy.array([.80, .82, .85])
 PLAIN = numpy.array([.66, .54, .40])
@@ -120,15 +122,17 @@ class Reference:
     def likeness(self, image, inside):
         """Mean SSIM of the channels, and the root of the mean square of differences, where one of
         the two shows something."""
-        other, where = srgb(image), self.inside | inside
+        where = self.inside | inside
+        part = tuple(slice(max(0, at.min() - 5), at.max() + 6) for at in numpy.nonzero(where))
+        where, other, mine = where[part], srgb(image[part]), self.channels[part]
         c1, c2, total = (.01 * 255) ** 2, (.03 * 255) ** 2, 0
         for k in range(3):
-            a, b, ma = self.channels[..., k], other[..., k], self.means[k]
+            a, b, ma, aa = mine[..., k], other[..., k], self.means[k][part], self.squares[k][part]
             mb = blurred(b)
-            va, vb, ab = self.squares[k] - ma * ma, blurred(b * b) - mb * mb, blurred(a * b) - ma * mb
+            va, vb, ab = aa - ma * ma, blurred(b * b) - mb * mb, blurred(a * b) - ma * mb
             total += ((2 * ma * mb + c1) * (2 * ab + c2) /
                       ((ma * ma + mb * mb + c1) * (va + vb + c2)))[where].mean() / 3
-        return total, ((self.channels - other)[where] ** 2).mean() ** .5
+        return total, ((mine - other)[where] ** 2).mean() ** .5
 
 
 def check_likeness():
@@ -195,7 +199,7 @@ class Shown:
 
 
 class Model:
-    def __init__(self, bench, path, scratch):
+    def __init__(self, bench, path, scratch, directions):
         self.bench, self.path, self.scratch = bench, path, scratch
         box = Shown(bench, path, "mesh", [], ([0, 0, 0], 1), 1, scratch)
         low, high = box.xyz.min(0).astype("f8"), box.xyz.max(0).astype("f8")
@@ -205,7 +209,7 @@ class Model:
                                          for i in range(0, len(box.faces), 2 ** 20)])
         self.middle = sum(box.xyz[box.faces[:, k]] for k in range(3)) / 3
         self.cells, self.coloured = {}, box.rgb is not None
-        self.views = cameras(dodecahedron())
+        self.views = cameras(dodecahedron()[::20 // directions])
         self.references = [Reference(picture(hit, light), covered(hit))
                            for hit, light, _ in self.shots(self.views, 2 * PIXELS)]
 
@@ -328,22 +332,37 @@ class Level:
 
 # --- pictures around the model ---
 
+class Taken:
+    """Pictures from the directions that some numbers of them need, light and normals."""
+
+    def __init__(self, model, halvings):
+        self.directions = {h: octahedron(h) for h in halvings}
+        self.needed = {h: sorted({int(numpy.argmax(d @ view[2])) for view in model.views})
+                       for h, d in self.directions.items()}
+        views = [view for h in halvings for view in cameras(self.directions[h][self.needed[h]])]
+        self.light, self.normals, self.seen = {}, {}, {}
+        names = [(h, i) for h in halvings for i in self.needed[h]]
+        for name, (hit, light, n) in zip(names, model.shots(views, 2 * LARGE)):
+            image = numpy.zeros(hit.shape + (3,), "f4")
+            image[hit] = n
+            self.normals[name] = halved(image)
+            self.light[name], self.seen[name] = picture(hit, light).astype("f4"), covered(hit)
+
+
 class Pictures:
-    def __init__(self, model, halvings, pixels, quality=60, normals=False):
-        self.directions, self.pixels, self.normals = octahedron(halvings), pixels, normals
+    def __init__(self, model, taken, halvings, pixels, quality=60, normals=False):
+        self.directions, self.pixels, self.normals = taken.directions[halvings], pixels, normals
         self.name = f"{len(self.directions)} {'normals' if normals else 'pictures'} of {pixels}"
-        needed = sorted({self.nearest(view[2]) for view in model.views})
+        needed = taken.needed[halvings]
         self.cameras = dict(zip(needed, cameras(self.directions[needed])))
-        images, self.seen = [], {}
-        for i, (hit, light, n) in zip(needed, model.shots(list(self.cameras.values()), 2 * pixels)):
-            if normals:
-                image = numpy.zeros(hit.shape + (3,))
-                image[hit] = n
-                image = 127.5 + 127.5 * unit(halved(image))
-            else:
-                image = srgb(picture(hit, light))
-            self.seen[i] = covered(hit)
-            images.append(self.grown(image, self.seen[i]).round().clip(0, 255).astype("u1"))
+        images = []
+        for i in needed:
+            image, seen = (taken.normals if normals else taken.light)[halvings, i], \
+                taken.seen[halvings, i]
+            if pixels < LARGE:
+                image, seen = halved(image), halved(seen[..., None])[..., 0] > 0
+            image = 127.5 + 127.5 * unit(image) if normals else srgb(image)
+            images.append(self.grown(image, seen).round().clip(0, 255).astype("u1"))
         done = subprocess.run([model.bench / "jpeg_pictures", str(pixels), str(pixels), str(quality),
                                str(len(images))], input=b"".join(i.tobytes() for i in images),
                               capture_output=True, check=True)
@@ -391,6 +410,17 @@ def towards(n, view):
     return unit(n)
 
 
+def compare_nodes(model, level, of_nodes):
+    """Mean SSIM, mean difference, lit by node normals."""
+    field, values = level.field(of_nodes), []
+    for i, view in enumerate(model.views):
+        hit, which, share = level.shown.at(i)
+        n = towards(level.from_field(field, which, share), view)
+        values.append(model.references[i].likeness(
+            picture(hit, lit(n, level.shown.colour(which, share))), covered(hit)))
+    return numpy.mean(values, axis=0)
+
+
 def compare(model, level, pictures, stored):
     """Of each way of drawing: bytes beside the level's, mean SSIM, mean difference."""
     s, found = level.shown, {}
@@ -400,14 +430,16 @@ def compare(model, level, pictures, stored):
         hit, which, share = s.at(i)
         colour, flat, wall = s.colour(which, share), level.flat[which], level.wall[which][:, None]
         places = s.between(s.xyz, which, share)
-        by_nodes = level.from_field(node_field, which, share)
+        by_nodes, by_field = (level.from_field(f, which, share) for f in (node_field, field))
 
         def note(name, extra, light):
             values = model.references[i].likeness(picture(hit, light), covered(hit))
             found.setdefault(name, (extra, []))[1].append(values)
         for name, extra, n in (
                 ("as they lie", 0, flat), ("walls lit", 0, s.lent[which]),
-                ("field", 0, level.from_field(field, which, share)),
+                ("walls lit, planes half", 0,
+                 numpy.where(wall, s.lent[which], unit(flat + by_field))),
+                ("field", 0, by_field),
                 ("node normals", node_bytes, by_nodes),
                 ("walls by node normals", node_bytes, numpy.where(wall, by_nodes, flat))):
             note(name, extra, lit(towards(n, view), colour))
@@ -418,6 +450,8 @@ def compare(model, level, pictures, stored):
                 continue
             light = LINEAR[shown.round().clip(0, 255).astype("i8")]
             note(p.name, p.bytes, light)
+            if p.pixels > SMALL:
+                continue
             faces = (s.lent[which] @ taken > .3)[:, None]
             note(p.name + ", node normals where it looks away", p.bytes + node_bytes,
                  numpy.where(faces, light, lit(towards(by_nodes, view), colour)))
@@ -448,16 +482,19 @@ def main():
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("file", type=pathlib.Path)
     parser.add_argument("--levels", default="3-6")
+    parser.add_argument("--directions", type=int, default=20, choices=(1, 2, 4, 5, 10, 20))
     o = parser.parse_args()
     first, last = (int(x) for x in o.levels.split("-"))
     check_likeness()
     with tempfile.TemporaryDirectory() as folder:
         scratch, bench, ebpo = pathlib.Path(folder), o.build / "tests/bench", o.build / "tools/ebpo"
-        model = Model(bench, o.file, scratch)
-        pictures = [Pictures(model, *a) for a in ((1, 192), (2, 192), (3, 192), (2, 384), (3, 384))]
+        model = Model(bench, o.file, scratch, o.directions)
+        taken = Taken(model, (1, 2, 3))
+        pictures = [Pictures(model, taken, *a) for a in (
+            (1, SMALL), (2, SMALL), (3, SMALL), (3, LARGE))]
         if not model.coloured:
-            pictures.append(Pictures(model, 2, 384, 75, True))
-        print(f"{o.file.name}: {o.file.stat().st_size} bytes")
+            pictures.append(Pictures(model, taken, 2, LARGE, 75, True))
+        print(f"{o.file.name}: {o.file.stat().st_size} bytes", flush=True)
         for p in pictures:
             print(f"{p.name}: {p.bytes:.0f} bytes, one {p.one:.0f}")
         print("\n| level | way | bytes | SSIM | difference |\n|---|---|---|---|---|")
@@ -474,7 +511,7 @@ def main():
             stored = level.stored(leaves=True)
             found["planes of the level above, normals of all nodes"] = (
                 cut.stat().st_size - size + stored[1],
-                *compare(model, level, [], stored)["node normals"][1:])
+                *compare_nodes(model, level, stored[0]))
             for name, (extra, likeness, difference) in found.items():
                 print(f"| {deepest} | {name} | {size + extra:.0f} | {likeness:.4f} | "
                       f"{difference:.1f} |", flush=True)

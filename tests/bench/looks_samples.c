@@ -1,12 +1,13 @@
-/* What coarse_looks.py draws with: which triangle each sample of some pictures shows, and where on it.
+/* What coarse_looks.py draws with: which triangle each sample of some pictures shows, and where on
+ * it.
  *
  *     looks_samples FILE LEVEL|mesh SAMPLES OUT < CAMERAS
  *     looks_samples FILE --planes-to LEVEL OUT.ebpo.h5
  *
- * Cameras are orthographic: how many, then of each right, up and back, the middle, and half the side
- * of the picture, 13 numbers. OUT, in the machine's byte order: eight counts, the box, positions,
- * triangles, colours, nodes, corners of polygons, normals of polygons (ebpo_lod_normals), samples.
- * The second form copies a file without the planes below a level. */
+ * Cameras are orthographic: how many, then of each right, up and back, the middle, and half the
+ * side of the picture, 13 numbers. OUT, in the machine's byte order: eight counts, the box,
+ * positions, triangles, colours, nodes, corners of polygons, normals of polygons
+ * (ebpo_lod_normals), samples. The second form copies a file without the planes below a level. */
 #include <ebpo/ebpo.h>
 #include <math.h>
 #include <stdio.h>
@@ -102,9 +103,10 @@ static void draw(const shown *s, const double *at, int side, sample *to)
 static void write_shown(const shown *s, const ebpo_info *info, int side, int cameras, FILE *out)
 {
     const ebpo_mesh *m = &s->mesh;
-    uint64_t head[8] = { m->vertex_count,          m->face_count,  s->nodes.node_count,
-                         s->nodes.polygon_count,   (uint64_t)side, (uint64_t)cameras,
-                         m->xyz32 != NULL,         s->colours.vertex != NULL };
+    uint64_t head[8] = { m->vertex_count,     m->face_count,
+                         s->nodes.node_count, s->nodes.polygon_count,
+                         (uint64_t)side,      (uint64_t)cameras,
+                         m->xyz32 != NULL,    s->colours.vertex != NULL };
     fwrite(head, 8, 8, out);
     fwrite(info->box_origin, 8, 3, out);
     fwrite(info->box_size, 8, 3, out);

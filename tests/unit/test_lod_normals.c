@@ -1,5 +1,5 @@
-/* Which way a level's polygons are lit: against the definition, node by node and without tables; and
- * against spheres, whose normals are known. */
+/* Which way a level's polygons are lit: against the definition, node by node and without tables;
+ * and against spheres, whose normals are known. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -49,8 +49,8 @@ static void find_polygons(level *l)
                 const double *a = corner_of(l, polygon, c),
                              *b = corner_of(l, polygon, (c + 1) % l->nodes.corners[polygon]);
                 for (int j = 0; j < 3; j++) /* Newell */
-                    l->area[polygon][j] += (a[(j + 1) % 3] - b[(j + 1) % 3]) *
-                                           (a[(j + 2) % 3] + b[(j + 2) % 3]);
+                    l->area[polygon][j] +=
+                        (a[(j + 1) % 3] - b[(j + 1) % 3]) * (a[(j + 2) % 3] + b[(j + 2) % 3]);
             }
             triangle += l->nodes.corners[polygon] - 2u;
         }
@@ -61,14 +61,14 @@ static level take(ebpo_mesh mesh, uint32_t leaf_faces, int number)
 {
     level l = { .file = NULL };
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_tree tree = model_build_parts(
-        mesh, leaf_faces, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS);
+    ebpo_tree tree =
+        model_build_parts(mesh, leaf_faces, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS);
     model_write(&tree, scratch("x.ebpo.h5"), NULL);
     l.file = model_open(scratch("x.ebpo.h5"));
     l.info = ebpo_file_info(l.file);
     ck_assert_int_lt(number, l.info->level_count);
-    ck_assert_int_eq(
-        ebpo_lod_level_nodes(l.file, number, NULL, &l.mesh, &l.nodes, NULL, &error), EBPO_OK);
+    ck_assert_int_eq(ebpo_lod_level_nodes(l.file, number, NULL, &l.mesh, &l.nodes, NULL, &error),
+                     EBPO_OK);
     uint64_t count = l.nodes.polygon_count;
     l.normals = room(count, 3 * sizeof *l.normals);
     l.node = room(count, sizeof *l.node);
@@ -197,8 +197,8 @@ START_TEST(normals_are_those_of_the_definition)
     for (uint64_t i = 0; i < l.nodes.polygon_count; i++)
         sides[i] = side_of(&l, i);
     for (uint64_t i = 0; i < l.nodes.polygon_count; i++) {
-        double n[3], scale = fmax(fmax(l.info->box_size[0], l.info->box_size[1]),
-                                  l.info->box_size[2]);
+        double n[3],
+            scale = fmax(fmax(l.info->box_size[0], l.info->box_size[1]), l.info->box_size[2]);
         if ((sides[i] < 6 && i % 3) || length_of(l.area[i]) < 1e-7 * scale * scale)
             continue; /* the definition is slow; of a sliver, which way it lies is rounding */
         expect(&l, sides, i, n);

@@ -18,6 +18,7 @@
 #include "cli/standard_files.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
+#include "render/level_normals.h"
 #include "render/picture.h"
 #include "render/raster.h"
 
@@ -129,33 +130,6 @@ static int parse(job *j)
 
 /* --- what to draw --- */
 
-/* A level's polygons as its triangles. */
-static void spread(const ebpo_lod_nodes *nodes, const float *of_polygon, float *of_triangle)
-{
-    for (uint64_t i = 0; i < nodes->polygon_count; i++, of_polygon += 3)
-        for (unsigned n = nodes->corners[i]; n > 2; n--, of_triangle += 3)
-            memcpy(of_triangle, of_polygon, 3 * sizeof *of_polygon);
-}
-
-static ebpo_status load_normals(tile *t, const ebpo_info *info, const ebpo_lod_nodes *nodes,
-                                ebpo_error *error)
-{
-    float *normals = malloc((nodes->polygon_count + 1) * 3 * sizeof *normals);
-    t->normals = malloc((t->mesh.face_count + 1) * 3 * sizeof *t->normals);
-    ebpo_status status = EBPO_OK;
-    if (normals && t->normals) {
-        status = ebpo_lod_normals(info, &t->mesh, nodes, normals, error);
-    } else {
-        snprintf(error->message, sizeof error->message,
-                 "not enough memory for level %d; choose a coarser one", t->level);
-        status = error->status = EBPO_E_MEMORY;
-    }
-    if (status == EBPO_OK)
-        spread(nodes, normals, t->normals);
-    free(normals);
-    return status;
-}
-
 static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress progress,
                              ebpo_error *error)
 {
@@ -181,7 +155,7 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
     if (status == EBPO_OK && !j->v.no_colours)
         status = ebpo_lod_colours(&nodes, t->mesh.vertex_count, &t->colours, error);
     if (status == EBPO_OK)
-        status = load_normals(t, info, &nodes, error);
+        status = level_normals(info, &t->mesh, &nodes, &t->normals, error);
     ebpo_lod_nodes_free(&nodes);
     if (status == EBPO_OK)
         snprintf(t->caption, sizeof t->caption,
