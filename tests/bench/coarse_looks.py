@@ -270,12 +270,23 @@ class Level:
         self.low = model.origin + self.cell * self.step
         self.area = s.area()
         self.flat = unit(self.area)
-        self.wall = (numpy.abs(self.flat - s.lent) > 1e-5).any(1)  # lit otherwise than it lies
+        self.wall = self.walls()
         corners = numpy.array([[c & 1, c >> 1 & 1, c >> 2] for c in range(8)])
         at = (self.cell[:, None] + corners) << (12 - self.depth)[:, None, None]
         _, self.corner = numpy.unique((at[..., 0] << 42) + (at[..., 1] << 21) + at[..., 2],
                                       return_inverse=True)
         self.corner = self.corner.reshape(-1, 8)
+
+    def walls(self):
+        """Which triangles lie on walls that are not the root cell's."""
+        node, out = self.shown.face_node, numpy.zeros(len(self.area), bool)
+        for axis in range(3):
+            at, last = self.cell[node, axis], (1 << self.depth[node]) - 1
+            place = (self.shown.xyz[self.shown.faces, axis] - self.low[node, axis, None]) / \
+                self.step[node, axis, None]
+            for end, outmost in ((0, at == 0), (1, at == last)):
+                out |= (numpy.abs(place - end) < 1e-9).all(1) & ~outmost
+        return out
 
     def own(self):
         """Of each node what its planes add up to, as in the viewer: a vector, and its length
@@ -450,7 +461,7 @@ def compare(model, level, pictures, stored):
                 continue
             light = LINEAR[shown.round().clip(0, 255).astype("i8")]
             note(p.name, p.bytes, light)
-            if p.pixels > SMALL:
+            if p.pixels > SMALL or len(p.directions) < 66:
                 continue
             faces = (s.lent[which] @ taken > .3)[:, None]
             note(p.name + ", node normals where it looks away", p.bytes + node_bytes,
