@@ -199,7 +199,7 @@ class Shown:
 
 
 class Model:
-    def __init__(self, bench, path, scratch, directions):
+    def __init__(self, bench, path, scratch, directions, deepest):
         self.bench, self.path, self.scratch = bench, path, scratch
         box = Shown(bench, path, "mesh", [], ([0, 0, 0], 1), 1, scratch)
         low, high = box.xyz.min(0).astype("f8"), box.xyz.max(0).astype("f8")
@@ -208,7 +208,7 @@ class Model:
         self.normal = numpy.concatenate([box.area(slice(i, i + 2 ** 20))
                                          for i in range(0, len(box.faces), 2 ** 20)])
         self.middle = sum(box.xyz[box.faces[:, k]] for k in range(3)) / 3
-        self.cells, self.coloured = {}, box.rgb is not None
+        self.cells, self.deepest, self.coloured = {}, deepest, box.rgb is not None
         self.views = cameras(dodecahedron()[::20 // directions])
         self.references = [Reference(picture(hit, light), covered(hit))
                            for hit, light, _ in self.shots(self.views, 2 * PIXELS)]
@@ -230,14 +230,18 @@ class Model:
 
     def of_cells(self, level):
         """Cells with something in them: keys, sums of normals, and of their lengths."""
-        if level in self.cells:
-            return self.cells[level]
-        n = 1 << level
-        at = ((self.middle - self.origin) / self.size * n).astype("i8").clip(0, n - 1)
-        keys, inverse = numpy.unique(self.keys(level, at), return_inverse=True)
-        length = numpy.linalg.norm(self.normal, axis=1)
-        self.cells[level] = keys, numpy.stack(
-            [numpy.bincount(inverse, w) for w in (*self.normal.T, length)], 1)
+        if level not in self.cells:
+            if level < self.deepest:
+                keys, sums = self.of_cells(level + 1)
+                n = 2 << level
+                at = numpy.stack([keys // (n * n), keys // n % n, keys % n], 1) >> 1
+            else:
+                n = 1 << level
+                at = ((self.middle - self.origin) / self.size * n).astype("i8").clip(0, n - 1)
+                sums = numpy.column_stack([self.normal, numpy.linalg.norm(self.normal, axis=1)])
+            keys, inverse = numpy.unique(self.keys(level, at), return_inverse=True)
+            self.cells[level] = keys, numpy.stack(
+                [numpy.bincount(inverse, w) for w in sums.T], 1)
         return self.cells[level]
 
 
@@ -499,7 +503,7 @@ def main():
     check_likeness()
     with tempfile.TemporaryDirectory() as folder:
         scratch, bench, ebpo = pathlib.Path(folder), o.build / "tests/bench", o.build / "tools/ebpo"
-        model = Model(bench, o.file, scratch, o.directions)
+        model = Model(bench, o.file, scratch, o.directions, last)
         taken = Taken(model, (1, 2, 3))
         pictures = [Pictures(model, taken, *a) for a in (
             (1, SMALL), (2, SMALL), (3, SMALL), (3, LARGE))]
