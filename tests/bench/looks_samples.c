@@ -147,7 +147,7 @@ static ebpo_status load(const ebpo_file *file, const char *level, shown *out, eb
 static ebpo_status draw_all(const ebpo_file *file, char **argv, ebpo_error *error)
 {
     shown s = { .normals = NULL };
-    int side = atoi(argv[3]), cameras;
+    int side = atoi(argv[3]), cameras = 0;
     ebpo_status status = load(file, argv[2], &s, error);
     FILE *out = fopen(argv[4], "wb");
     if (status != EBPO_OK)
