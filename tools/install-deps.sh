@@ -19,7 +19,9 @@ for option in "$@"; do
             clang clang-format libclang-rt-14-dev mandoc chromium patchelf python3-pip zsh fish $viewer"
         [ $modules = yes ] || modules=tests ;;
     --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;
-    --bench) packages="$packages libembree-dev libcgal-dev libfcl-dev python3 linux-perf valgrind" ;;
+    --bench)
+        packages="$packages libembree-dev libcgal-dev libfcl-dev libjpeg62-turbo-dev python3 \
+            linux-perf valgrind" ;;
     --paraview) packages="$packages paraview python3-paraview xvfb xauth" ;;
     --viewer) packages="$packages $viewer" modules=yes ;;
     *) echo "usage: install-deps.sh [--tests] [--demo] [--bench] [--viewer] [--paraview]" \

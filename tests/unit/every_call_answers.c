@@ -1,5 +1,6 @@
 /* Calls that answer questions about a model, or hand out its levels. */
 #include <math.h>
+#include <stdlib.h>
 #include <unistd.h>
 
 #include "every_call.h"
@@ -516,7 +517,11 @@ static ebpo_status call_lod_nodes(every_call_env *e)
         ebpo_lod_level_nodes(e->file, last_level(e), &options, &mesh, &nodes, &volume, e->error);
     if (status == EBPO_OK) {
         ebpo_colours colours;
+        float *normals = malloc((nodes.polygon_count + 1) * 3 * sizeof *normals);
         status = ebpo_lod_colours(&nodes, mesh.vertex_count, &colours, e->error);
+        if (status == EBPO_OK && normals)
+            status = ebpo_lod_normals(ebpo_file_info(e->file), &mesh, &nodes, normals, e->error);
+        free(normals);
         ebpo_colours_free(&colours);
         ebpo_mesh_free(&mesh);
         ebpo_lod_nodes_free(&nodes);

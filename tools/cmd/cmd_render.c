@@ -19,6 +19,7 @@
 #include "cli/standard_files.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
+#include "render/level_normals.h"
 #include "render/picture.h"
 #include "render/raster.h"
 
@@ -44,6 +45,7 @@ typedef struct tile {
     uint64_t face_count;
     ebpo_mesh mesh;
     ebpo_colours colours; /* of the model, as far as it has any */
+    float *normals;       /* of a level, by triangle: which way it is lit */
     bool closed;
     char caption[64];
 } tile;
@@ -153,6 +155,8 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
     ebpo_status status = ebpo_lod_level_nodes(file, t->level, &lod, &t->mesh, &nodes, NULL, error);
     if (status == EBPO_OK && !j->v.no_colours)
         status = ebpo_lod_colours(&nodes, t->mesh.vertex_count, &t->colours, error);
+    if (status == EBPO_OK)
+        status = level_normals(info, &t->mesh, &nodes, &t->normals, error);
     ebpo_lod_nodes_free(&nodes);
     if (status == EBPO_OK)
         snprintf(t->caption, sizeof t->caption,
@@ -251,7 +255,8 @@ static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const came
                            .closed = t->closed,
                            .edges = j->v.edges,
                            .face_colours = t->colours.by_face ? t->colours.face : NULL,
-                           .vertex_colours = t->colours.by_face ? NULL : t->colours.vertex };
+                           .vertex_colours = t->colours.by_face ? NULL : t->colours.vertex,
+                           .normals = t->normals };
     if (t->level == MESH)
         memcpy(style.colour, (const double[3]){ 0.66, 0.54, 0.40 }, sizeof style.colour);
     int caption = caption_height(j, at[2]), drawn = at[3] - caption;
@@ -309,6 +314,7 @@ static ebpo_status render(job *j, bool is_file, ebpo_progress progress, ebpo_err
         j->tiles[i].face_count = j->tiles[i].mesh.face_count;
         ebpo_mesh_free(&j->tiles[i].mesh);
         ebpo_colours_free(&j->tiles[i].colours);
+        free(j->tiles[i].normals);
     }
     return status;
 }

@@ -160,6 +160,18 @@ static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned ou
         }
 }
 
+/* The normal that the style has for a face, in the camera's axes. */
+static void light_from(const raster *r, uint64_t face, double n[3])
+{
+    const float *given = r->style->normals ? r->style->normals + 3 * face : NULL;
+    if (!given || (given[0] == 0 && given[1] == 0 && given[2] == 0))
+        return;
+    double v[3] = { (double)given[0], (double)given[1], (double)given[2] };
+    n[0] = dot(v, r->view->right);
+    n[1] = dot(v, r->view->up);
+    n[2] = dot(v, r->view->back);
+}
+
 static void draw_face(raster *r, uint64_t face)
 {
     double c[3][3], n[3];
@@ -174,6 +186,7 @@ static void draw_face(raster *r, uint64_t face)
     if (front && r->style->paint && r->style->paint[face] & RASTER_HOLLOW)
         return;
     unsigned outlines = r->style->edges ? outline(r, face, n) : 0;
+    light_from(r, face, n);
     for (int k = 0; k < 3; k++)
         r->normal[face][k] = (float)(front ? n[k] : -n[k]);
     seen p[3] = { project(r, c[0]), project(r, c[1]), project(r, c[2]) };

@@ -30,6 +30,8 @@ typedef struct raster_style {
     /* Instead of `colour`, sRGB and a fourth byte each: of faces, or of vertices and interpolated
      * on faces; NULL: none. */
     const uint8_t *face_colours, *vertex_colours;
+    /* [face_count][3] which way faces are lit, of length 1, or 0: as they lie; NULL: all of them */
+    const float *normals;
 } raster_style;
 
 /* Draws the mesh into the rectangle (x, y, width, height) of the picture, over what is there.

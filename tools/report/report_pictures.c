@@ -11,6 +11,7 @@
 
 #if EBPO_HAVE_PNG
 
+#include "render/level_normals.h"
 #include "render/picture.h"
 #include "render/raster.h"
 
@@ -112,19 +113,34 @@ static ebpo_status fit(const comparison *c, ebpo_file *const *file, camera *view
     return status;
 }
 
+static ebpo_status draw_level(const comparison *c, ebpo_file *file, int level, const camera *view,
+                              char **uri, ebpo_error *error)
+{
+    raster_style style = { .colour = { 0.30, 0.48, 0.66 }, .closed = true };
+    ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
+    ebpo_mesh mesh;
+    ebpo_lod_nodes nodes;
+    float *normals = NULL;
+    options.threads = (unsigned)c->v->threads;
+    ebpo_status status = ebpo_lod_level_nodes(file, level, &options, &mesh, &nodes, NULL, error);
+    if (status == EBPO_OK)
+        status = level_normals(ebpo_file_info(file), &mesh, &nodes, &normals, error);
+    style.normals = normals;
+    if (status == EBPO_OK && mesh.face_count)
+        status = draw(c, &mesh, view, TILE_WIDTH, TILE_HEIGHT, &style, uri, error);
+    free(normals);
+    ebpo_lod_nodes_free(&nodes);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
 static ebpo_status one_method(comparison *c, method *m, ebpo_file *file, const camera *view,
                               ebpo_error *error)
 {
-    static const raster_style style = { .colour = { 0.30, 0.48, 0.66 }, .closed = true };
     ebpo_status status = EBPO_OK;
     for (int i = c->first;
-         i <= method_last(c, m) && i < c->first + LEVELS_DRAWN && status == EBPO_OK; i++) {
-        ebpo_mesh mesh = { 0 };
-        status = level_mesh(c, file, i, &mesh, error);
-        if (status == EBPO_OK && mesh.face_count)
-            status = draw(c, &mesh, view, TILE_WIDTH, TILE_HEIGHT, &style, &m->picture[i], error);
-        ebpo_mesh_free(&mesh);
-    }
+         i <= method_last(c, m) && i < c->first + LEVELS_DRAWN && status == EBPO_OK; i++)
+        status = draw_level(c, file, i, view, &m->picture[i], error);
     return method_without(m, "pictures", status, error);
 }
 

@@ -131,6 +131,25 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes,
                                                     uint64_t vertex_count, ebpo_colours *out,
                                                     ebpo_error *error);
 
+/*
+ * Which way to light a level's polygons: those on planes as they lie; those on
+ * walls between cells, which are steps and not surface, as the planes around them
+ * that look to the same side, by area, or as they lie where there is none. Walls of
+ * the root cell count as planes. For pictures: rounded, and no promise about the
+ * solid.
+ *
+ * info  of the file that the level is of
+ * mesh  that came with the nodes
+ * out   [polygon_count][3] of length 1, of a polygon without area 0; the caller's
+ *
+ * EBPO_E_ARGUMENT: the nodes have another number of triangles. EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_normals(const ebpo_info *info, const ebpo_mesh *mesh,
+                                                    const ebpo_lod_nodes *nodes, float *out,
+                                                    ebpo_error *error);
+
 #ifdef __cplusplus
 }
 #endif
