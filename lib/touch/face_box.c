@@ -136,8 +136,7 @@ static bool face_meets(const double face[3][3], const ebpo_extent *around)
     return meet(&e, around);
 }
 
-bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
-                        uint32_t most, uint32_t visits, uint32_t *count)
+bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found, uint32_t most, uint32_t *visits, uint32_t *count)
 {
     uint64_t stack[64]; /* a level leaves one behind */
     int depth = 0;
@@ -145,8 +144,9 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
     stack[depth++] = 1;
     while (depth > 0) {
         uint64_t n = stack[--depth];
-        if (visits-- == 0)
+        if (*visits == 0)
             return false;
+        --*visits;
         if (!meet(&box->node[n], around))
             continue;
         if (n < box->leaves) {
@@ -165,6 +165,7 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
     return true;
 }
 
+/* Squared. */
 static double between(const ebpo_extent *a, const ebpo_extent *b)
 {
     double square = 0;
@@ -172,7 +173,7 @@ static double between(const ebpo_extent *a, const ebpo_extent *b)
         double d = fmax(0, fmax(a->min[i] - b->max[i], b->min[i] - a->max[i]));
         square += d * d;
     }
-    return sqrt(square);
+    return square;
 }
 
 static double closest_of_leaf(const ebpo_face_box *box, uint64_t leaf, const ebpo_extent *around)
@@ -190,8 +191,8 @@ static double closest_of_leaf(const ebpo_face_box *box, uint64_t leaf, const ebp
     return least;
 }
 
-double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *around,
-                               uint32_t most_visits, uint64_t *visits)
+static double find_square(const ebpo_face_box *box, const ebpo_extent *around,
+                          uint32_t most_visits, uint64_t *visits)
 {
     struct {
         uint64_t node;
@@ -224,4 +225,10 @@ double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *arou
         }
     }
     return least;
+}
+
+double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *around,
+                               uint32_t most_visits, uint64_t *visits)
+{
+    return sqrt(find_square(box, around, most_visits, visits)) * (1 - 0x1p-48);
 }

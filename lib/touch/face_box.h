@@ -32,10 +32,10 @@ EBPO_MUST_USE ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *c
                                              const ebpo_extent *centres, double margin, bool *fits,
                                              ebpo_error *error);
 
-/* Faces whose boxes meet `around`, into found[most]; false: there are more, or more than `visits`
- * nodes would have to be looked at. */
+/* Faces whose boxes meet `around`, into found[most]; false: there are more, or more than *visits
+ * nodes would have to be looked at, which is less by those that were. */
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
-                        uint32_t most, uint32_t visits, uint32_t *count);
+                        uint32_t most, uint32_t *visits, uint32_t *count);
 
 /* Of what is in `around`, no point is closer to a face of the box than this; after so many nodes it
  * says less. *visits counts them. */

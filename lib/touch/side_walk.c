@@ -30,7 +30,7 @@ static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const dou
     uint32_t count;
     int32_t change = 0;
     extent_of(side->at, to, &around);
-    bool all = ebpo_face_box_find(box, &around, found, most, visits, &count);
+    bool all = ebpo_face_box_find(box, &around, found, most, &visits, &count);
     *work += count;
     if (!all)
         return TOO_MANY;
@@ -90,7 +90,7 @@ bool ebpo_side_on(const ebpo_face_box *box, const double place[3], uint32_t *fou
     ebpo_extent around;
     uint32_t count;
     extent_of(place, place, &around);
-    bool all = ebpo_face_box_find(box, &around, found, most, visits, &count);
+    bool all = ebpo_face_box_find(box, &around, found, most, &visits, &count);
     for (uint32_t i = 0; i < count; i++)
         if (ebpo_segment_may_meet(place, place, (const double(*)[3])box->corner[found[i]]))
             return true;

@@ -13,7 +13,7 @@ enum {
     EBPO_TOOL_PIECES = 6,     /* of way in a tick */
     EBPO_TOOL_POOL = 1 << 16, /* faces around points, all in all */
     EBPO_TOOL_NEAR = 64,      /* around one */
-    EBPO_TOOL_WORK = 24000    /* of a tick: nodes looked at, and six for each face */
+    EBPO_TOOL_WORK = 4000    /* of a tick: nodes looked at, and six for each face */
 };
 
 typedef struct ebpo_tool_cluster {

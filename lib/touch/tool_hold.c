@@ -4,7 +4,7 @@
 
 #include "touch/tool_hold.h"
 
-enum { ACTIVE = 16, SWEEPS = 40 };
+enum { ACTIVE = 12, SWEEPS = 20 };
 
 static void swap(ebpo_tool_contacts *all, int i, int j)
 {

@@ -8,7 +8,7 @@
 #include "touch/tool.h"
 #include "touch/touch_parts.h"
 
-enum { CLUSTER_VISITS = 64, POINT_VISITS = 48, FACE_COST = 6 };
+enum { CLUSTER_VISITS = 64, POINT_VISITS = 48, FACE_VISITS = 256, FACE_COST = 6 };
 
 /* Of the skin: faces this close are looked at; the way ends where a point would come closer; where
  * it ends none is closer. What turning adds to straight ways is less than a bend (see limit). */
@@ -74,18 +74,20 @@ static bool add_close(const piece *p, uint32_t point)
     ebpo_tool *tool = p->tool;
     double from[3], way[3], to[3];
     ebpo_extent e;
-    uint32_t count;
+    uint32_t count, visits = FACE_VISITS;
     ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[point], from);
     ebpo_rigid_lever((const double(*)[3])tool->to_matrix, tool->point[point], way);
     for (int i = 0; i < 3; i++)
         to[i] = tool->proxy.place[i] + tool->way[i] + way[i];
     difference(to, from, way);
     around(from, to, looks * p->skin, &e);
-    if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL ||
-        !ebpo_face_box_find(p->box, &e, tool->pool + tool->pool_count, EBPO_TOOL_NEAR,
-                            EBPO_TOUCH_VISITS, &count))
+    if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL)
         return false;
-    *p->work += 24 + FACE_COST * (uint64_t)count;
+    bool all = ebpo_face_box_find(p->box, &e, tool->pool + tool->pool_count, EBPO_TOOL_NEAR,
+                                  &visits, &count);
+    *p->work += FACE_VISITS - visits + FACE_COST * (uint64_t)count;
+    if (!all)
+        return false;
     const ebpo_ball_way w = { from, way, blocks * p->skin, p->t->band, 0, 0 };
     for (uint32_t i = 0; i < count; i++) {
         double away[3];

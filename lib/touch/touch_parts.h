@@ -18,11 +18,11 @@ enum {
     EBPO_TOUCH_FRESH = 8, /* beside a box's number: the tick has not seen it */
 
     /* What one step of a tick may look at: at most. */
-    EBPO_TOUCH_FACES = 512,
+    EBPO_TOUCH_FACES = 384,
     EBPO_TOUCH_VISITS = 1024,
 
     /* And all of them together: no step begins after so many faces. */
-    EBPO_TOUCH_WORK = 768,
+    EBPO_TOUCH_WORK = 512,
 
     EBPO_TOUCH_PIECES = EBPO_TOUCH_WAY_MOST - 1
 };

@@ -43,7 +43,10 @@ static uint32_t go(ebpo_touch *t, const ebpo_rigid *hand, uint64_t *work)
     for (int piece = 0; piece < EBPO_TOOL_PIECES; piece++) {
         bool arrived;
         if (tool->stage == EBPO_TOOL_STANDS) {
+            if (*work > EBPO_TOOL_WORK)
+                return flags | EBPO_TOUCH_SHORT;
             (void)ebpo_touch_take_box(t);
+            *work += 4 * (uint64_t)tool->contacts.count; /* what holding back takes */
             if (!set_out(t, hand, &flags))
                 return flags;
         }

@@ -129,7 +129,7 @@ static ebpo_touch_turned judge_tick(judged *j, const pose *hand, bool closely)
         judge_way(j, &r);
     if (!(r.flags & EBPO_TOUCH_CONTACT))
         ck_assert(length(r.force) == 0 && length(r.torque) == 0 && r.depth == 0);
-    ck_assert_uint_le(r.work, 60000);
+    ck_assert_uint_le(r.work, 12000);
     memcpy(j->proxy.place, r.proxy, sizeof r.proxy);
     memcpy(j->proxy.turn, r.turn, sizeof r.turn);
     memcpy(j->force, r.force, sizeof r.force);
@@ -386,7 +386,7 @@ START_TEST(many_points_take_no_longer)
         in_tick = true;
         ebpo_touch_turn(touch, hand, turn, &r);
         in_tick = false;
-        ck_assert_uint_le(r.work, 60000);
+        ck_assert_uint_le(r.work, 12000);
         if (i % 8 == 0)
             pause_a_little();
     }
