@@ -107,7 +107,8 @@ static bool look_at_points(const piece *p, uint32_t number)
     ebpo_tool *tool = p->tool;
     ebpo_tool_cluster *c = &tool->cluster[number];
     double need = looks * p->skin;
-    c->free = INFINITY;
+    double all = INFINITY;
+    c->free = 0; /* if it is given up */
     for (uint32_t i = c->first; i < c->first + c->count; i++) {
         double way = far(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
         if (tool->free[i] - c->gone - way <= 0) {
@@ -119,8 +120,9 @@ static bool look_at_points(const piece *p, uint32_t number)
         }
         if (tool->free[i] - c->gone - way <= 0 && !add_close(p, i))
             return false;
-        c->free = fmin(c->free, tool->free[i]);
+        all = fmin(all, tool->free[i]);
     }
+    c->free = all;
     return true;
 }
 
