@@ -128,8 +128,8 @@ START_TEST(bounds_hold_the_exact_distance)
                      &query_variants[_i % query_variant_count]);
     begin(&p, &m);
     roam(&p, query_scaled(4000), &state);
-    ck_assert_uint_ge(p.close * 20, p.ticks);
-    ck_assert_uint_ge(p.sided * 2, p.ticks);
+    ck_assert_uint_gt(p.close, 0); /* it rests until it is */
+    ck_assert_uint_ge(p.sided, p.close);
     ck_assert_msg(forbidden == 0, "%lu calls in ticks that may not be", forbidden);
     ASSERT_OK(ebpo_touch_check(p.touch, error));
     ebpo_touch_free(p.touch);

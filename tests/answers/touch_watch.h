@@ -13,7 +13,12 @@
 static _Thread_local bool in_tick;
 static unsigned long forbidden;
 
-static void watch(void) { forbidden += in_tick; }
+/* Only the thread of the ticks counts. */
+static void watch(void)
+{
+    if (in_tick)
+        forbidden++;
+}
 
 #define WATCH(type, name, parameters, arguments) \
     type __real_##name parameters;               \
