@@ -136,7 +136,8 @@ static bool face_meets(const double face[3][3], const ebpo_extent *around)
     return meet(&e, around);
 }
 
-bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found, uint32_t most, uint32_t *visits, uint32_t *count)
+bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
+                        uint32_t most, uint32_t *visits, uint32_t *count)
 {
     uint64_t stack[64]; /* a level leaves one behind */
     int depth = 0;
@@ -191,8 +192,8 @@ static double closest_of_leaf(const ebpo_face_box *box, uint64_t leaf, const ebp
     return least;
 }
 
-static double find_square(const ebpo_face_box *box, const ebpo_extent *around,
-                          uint32_t most_visits, uint64_t *visits)
+static double find_square(const ebpo_face_box *box, const ebpo_extent *around, uint32_t most_visits,
+                          uint64_t *visits)
 {
     struct {
         uint64_t node;

@@ -11,6 +11,14 @@ typedef struct ebpo_extent {
     double min[3], max[3];
 } ebpo_extent;
 
+static inline bool ebpo_extent_holds(const ebpo_extent *e, const double p[3])
+{
+    for (int i = 0; i < 3; i++)
+        if (!(p[i] >= e->min[i] && p[i] <= e->max[i]))
+            return false;
+    return true;
+}
+
 typedef struct ebpo_face_box {
     /* Of every ball whose centre is in it, all faces within the margin are there. */
     ebpo_extent centres;

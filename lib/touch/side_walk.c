@@ -8,7 +8,6 @@
 #include <math.h>
 
 #include "touch/face_near.h"
-#include "touch/touch_parts.h"
 #include "touch/vectors.h"
 
 enum { PIECES = 12 };

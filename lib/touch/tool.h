@@ -13,7 +13,7 @@ enum {
     EBPO_TOOL_PIECES = 6,     /* of way in a tick */
     EBPO_TOOL_POOL = 1 << 16, /* faces around points, all in all */
     EBPO_TOOL_NEAR = 64,      /* around one */
-    EBPO_TOOL_WORK = 4000    /* of a tick: nodes looked at, and six for each face */
+    EBPO_TOOL_WORK = 4000     /* of a tick: nodes looked at, and six for each face */
 };
 
 typedef struct ebpo_tool_cluster {
@@ -28,14 +28,18 @@ typedef struct ebpo_tool_close {
     uint32_t point, first, count;
 } ebpo_tool_close;
 
-typedef enum ebpo_tool_stage { EBPO_TOOL_STANDS, EBPO_TOOL_LOOKS, EBPO_TOOL_CHECKS } ebpo_tool_stage;
+typedef enum ebpo_tool_stage {
+    EBPO_TOOL_STANDS,
+    EBPO_TOOL_LOOKS,
+    EBPO_TOOL_CHECKS
+} ebpo_tool_stage;
 
 typedef struct ebpo_tool {
     uint64_t count, cluster_count;
-    double (*point)[3];  /* in its own coordinates, cluster after cluster */
-    uint32_t *number;    /* as the caller has them */
-    double *free;        /* [count] as of clusters */
-    double radius, arm;  /* of all points; root of the mean square of their distances */
+    double (*point)[3]; /* in its own coordinates, cluster after cluster */
+    uint32_t *number;   /* as the caller has them */
+    double *free;       /* [count] as of clusters */
+    double radius, arm; /* of all points; root of the mean square of their distances */
     ebpo_tool_cluster *cluster;
 
     ebpo_rigid proxy, hand;

@@ -13,7 +13,7 @@ typedef struct ebpo_tool_contact {
     double grip[EBPO_SCREW]; /* grip . way: how far the point comes away from the face */
     double room;             /* so far it may come closer; below 0: it shall come away */
     double gap;
-    uint64_t point, face;    /* as callers know them */
+    uint64_t point, face; /* as callers know them */
     double normal[3];
 } ebpo_tool_contact;
 

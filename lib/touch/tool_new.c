@@ -93,7 +93,7 @@ static void fill(ebpo_tool *t, const double (*points)[3], placed *p)
         t->close[i] = (ebpo_tool_close){ 0 };
     }
     for (uint64_t i = 0; i < EBPO_TOOL_POOL; i++)
-        t->pool[i] = 0; /* no tick is the first to use a page */
+        t->pool[i] = 0;                     /* no tick is the first to use a page */
     t->arm = square > 0 ? sqrt(square) : 1; /* one point in the middle: turning does nothing */
 }
 

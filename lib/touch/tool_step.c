@@ -27,7 +27,10 @@ static piece piece_of(ebpo_touch *t, uint64_t *work)
     ebpo_tool *tool = t->tool;
     const ebpo_face_box *box = &t->box[t->at];
     bool known = ebpo_extent_holds(&box->centres, tool->proxy.place);
-    return (piece){ t,    tool, known ? box : NULL, t->options.skin,
+    return (piece){ t,
+                    tool,
+                    known ? box : NULL,
+                    t->options.skin,
                     sqrt(dot(tool->way + 3, tool->way + 3)) / tool->arm,
                     work };
 }
@@ -50,8 +53,8 @@ static double clearance(const piece *p, const ebpo_extent *e, uint32_t visits)
     if (!p->box)
         return out;
     for (int i = 0; i < 3; i++)
-        inside = fmin(inside, fmin(e->min[i] - p->box->loaded.min[i],
-                                   p->box->loaded.max[i] - e->max[i]));
+        inside = fmin(inside,
+                      fmin(e->min[i] - p->box->loaded.min[i], p->box->loaded.max[i] - e->max[i]));
     return fmax(out, fmin(inside, ebpo_face_box_clearance(p->box, e, visits, p->work)));
 }
 
@@ -91,8 +94,10 @@ static bool add_close(const piece *p, uint32_t point)
     const ebpo_ball_way w = { from, way, blocks * p->skin, p->t->band, 0, 0 };
     for (uint32_t i = 0; i < count; i++) {
         double away[3];
-        double met = ebpo_ball_meets(
-            &w, (const double(*)[3])p->box->corner[tool->pool[tool->pool_count + i]], away);
+        double met =
+            ebpo_ball_meets(&w,
+                            (const double(*)[3])p->box->corner[tool->pool[tool->pool_count + i]],
+                            away);
         tool->part = fmin(tool->part, met);
     }
     tool->close[tool->close_count++] =
@@ -166,8 +171,8 @@ static void add_contact(const piece *p, const ebpo_tool_close *close, uint32_t f
 }
 
 /* Of faces that meet in an edge, one is below the point and pushes it straight away; the others
- * would hold it back from going on to them, askew. So a face counts if what is nearest of it lies in
- * its inside, or if it is the nearest of all. */
+ * would hold it back from going on to them, askew. So a face counts if what is nearest of it lies
+ * in its inside, or if it is the nearest of all. */
 static void add_contacts(const piece *p, const ebpo_tool_close *close, const ebpo_face_near *near)
 {
     double nearest = INFINITY;
@@ -193,8 +198,7 @@ static bool check_close(const piece *p, const ebpo_tool_close *close)
     ebpo_tool_at(&tool->end, (const double(*)[3])tool->end_matrix, tool->point[close->point], to);
     *p->work += FACE_COST * (uint64_t)close->count;
     for (uint32_t i = 0; i < close->count; i++) {
-        const double(*face)[3] =
-            (const double(*)[3])p->box->corner[tool->pool[close->first + i]];
+        const double(*face)[3] = (const double(*)[3])p->box->corner[tool->pool[close->first + i]];
         ebpo_face_nearest(to, face, &near[i]);
         if (tool->part > 0 && (near[i].distance < least * p->skin + p->t->band ||
                                ebpo_segment_may_meet(from, to, face)))

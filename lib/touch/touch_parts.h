@@ -123,12 +123,4 @@ void ebpo_touch_tell(ebpo_touch *t, const double hand[3]);
 void ebpo_touch_try_other(ebpo_touch *t);
 void ebpo_touch_count(ebpo_touch *t, uint32_t flags, uint64_t work);
 
-static inline bool ebpo_extent_holds(const ebpo_extent *e, const double p[3])
-{
-    for (int i = 0; i < 3; i++)
-        if (!(p[i] >= e->min[i] && p[i] <= e->max[i]))
-            return false;
-    return true;
-}
-
 #endif

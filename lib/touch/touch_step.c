@@ -100,7 +100,8 @@ static bool find_faces(step *s)
         uint32_t visits = EBPO_TOUCH_VISITS;
         swept(t->proxy, s->way, t->reach + 2 * t->band, &around);
         bool all = ebpo_extent_holds(&t->box[t->at].centres, t->proxy)
-                       ? ebpo_face_box_find(&t->box[t->at], &around, t->found, EBPO_TOUCH_FACES, &visits, &s->count)
+                       ? ebpo_face_box_find(&t->box[t->at], &around, t->found, EBPO_TOUCH_FACES,
+                                            &visits, &s->count)
                        : (s->count = 0, true); /* outside of all, see keep_known */
         *s->work += all ? s->count : EBPO_TOUCH_FACES;
         if (all) {

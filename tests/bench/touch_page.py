@@ -83,7 +83,8 @@ a tenth of the time.
               f"{us(t['p99_9'])} | {us(t['p99_99'])} | {us(t['most'])} | {us(t['cpu_p99_9'])} | "
               f"{us(t['cpu_most'])} | {r['load']} | {r['steal']:.1f} |")
     print("""
-| hand | late | wake p99.9 | most | of nothing: p99.9 | most | wake p99.9 | most | contact | waits | short | boxes | longest load, s | subtrees | model, MiB |
+| hand | late | wake p99.9 | most | of nothing: p99.9 | most | wake p99.9 | most | contact | waits | short """
+          """| boxes | longest load, s | subtrees | model, MiB |
 |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|""")
     for name, words, r in rows:
         t, n = r["touch"], r["nothing"]

@@ -208,7 +208,8 @@ static double tool_radius(const job *j)
 {
     double most = j->v->radius;
     for (uint64_t i = 0; i < j->point_count; i++)
-        most = fmax(most, hypot(hypot(j->points[3 * i], j->points[3 * i + 1]), j->points[3 * i + 2]));
+        most =
+            fmax(most, hypot(hypot(j->points[3 * i], j->points[3 * i + 1]), j->points[3 * i + 2]));
     return most;
 }
 
@@ -271,8 +272,9 @@ static ebpo_status play_nothing(job *j, ebpo_error *error)
 static ebpo_status play(job *j, ebpo_error *error)
 {
     const values *v = j->v;
-    touch_play all = { v->rate, v->seconds, j->touch, &j->device, j->kind,
-                       diagonal(ebpo_file_info(j->file)) / 20, NULL };
+    touch_play all = { v->rate,    v->seconds, j->touch,
+                       &j->device, j->kind,    diagonal(ebpo_file_info(j->file)) / 20,
+                       NULL };
     if (v->record) {
         j->record = calloc(touch_play_ticks(&all), sizeof *j->record);
         if (!j->record)

@@ -14,14 +14,14 @@ typedef struct touch_times {
     double cpu_p99_9, cpu_most;           /* processor time from begin to end of a tick */
     uint64_t over_ms;                     /* took more than a millisecond from begin to end */
     uint64_t bins[TOUCH_BINS];
-    uint64_t page_faults; /* of the ticks' thread */
+    uint64_t page_faults;              /* of the ticks' thread */
     double between_mean, between_most; /* of a probe: from lo to hi */
 } touch_times;
 
 typedef struct touch_play {
     double rate, seconds;
-    ebpo_touch *touch;           /* NULL: an empty loop */
-    const touch_device *device;  /* of the hand */
+    ebpo_touch *touch;          /* NULL: an empty loop */
+    const touch_device *device; /* of the hand */
     ebpo_touch_kind kind;
     double range;       /* of colours, for probes */
     touch_pose *record; /* [ticks] where the hand was, or NULL */

@@ -1,5 +1,6 @@
-/* A device that sends its places in packets of UDP, and is sent what it should feel: docs/guide/touch.md
- * has their layout. Who sends the first packet that is one is the device; all else is ignored. */
+/* A device that sends its places in packets of UDP, and is sent what it should feel:
+ * docs/guide/touch.md has their layout. Who sends the first packet that is one is the device; all
+ * else is ignored. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -94,8 +95,7 @@ static bool take(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_i
         return false;
     uint64_t kind = get(p + 6, 2), sequence = get(p + 8, 8);
     if (u->known && (from->sin_port != u->device.sin_port ||
-                     from->sin_addr.s_addr != u->device.sin_addr.s_addr ||
-                     sequence <= u->sequence))
+                     from->sin_addr.s_addr != u->device.sin_addr.s_addr || sequence <= u->sequence))
         return false;
     if (kind == END && u->known)
         u->ended = true;
@@ -136,7 +136,8 @@ static bool begin(void *self, double seconds, touch_pose *first)
     }
     *first = u->pose;
     if (!u->known)
-        fprintf(stderr, "ebpo touch: no device has sent its place in %g seconds (%llu packets were none)\n",
+        fprintf(stderr,
+                "ebpo touch: no device has sent its place in %g seconds (%llu packets were none)\n",
                 seconds, (unsigned long long)u->ignored);
     return u->known;
 }
