@@ -109,6 +109,8 @@ ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
         min[i] = centres->min[i] - margin;
         max[i] = centres->max[i] + margin;
     }
+    copy(min, box->loaded.min);
+    copy(max, box->loaded.max);
     ebpo_status status = ebpo_triangles_in_box(context, min, max, take, &l, error);
     *fits = l.fits;
     if (status == EBPO_OK && l.fits)
@@ -135,7 +137,7 @@ static bool face_meets(const double face[3][3], const ebpo_extent *around)
 }
 
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
-                        uint32_t most, uint32_t visits, uint32_t *count)
+                        uint32_t most, uint32_t *visits, uint32_t *count)
 {
     uint64_t stack[64]; /* a level leaves one behind */
     int depth = 0;
@@ -143,8 +145,9 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
     stack[depth++] = 1;
     while (depth > 0) {
         uint64_t n = stack[--depth];
-        if (visits-- == 0)
+        if (*visits == 0)
             return false;
+        --*visits;
         if (!meet(&box->node[n], around))
             continue;
         if (n < box->leaves) {
@@ -161,4 +164,72 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
             }
     }
     return true;
+}
+
+/* Squared. */
+static double between(const ebpo_extent *a, const ebpo_extent *b)
+{
+    double square = 0;
+    for (int i = 0; i < 3; i++) {
+        double d = fmax(0, fmax(a->min[i] - b->max[i], b->min[i] - a->max[i]));
+        square += d * d;
+    }
+    return square;
+}
+
+static double closest_of_leaf(const ebpo_face_box *box, uint64_t leaf, const ebpo_extent *around)
+{
+    double least = INFINITY;
+    uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
+    for (; f < end && f < box->count; f++) {
+        ebpo_extent e;
+        copy(box->corner[f][0], e.min);
+        copy(box->corner[f][0], e.max);
+        widen(&e, box->corner[f][1], box->corner[f][1]);
+        widen(&e, box->corner[f][2], box->corner[f][2]);
+        least = fmin(least, between(&e, around));
+    }
+    return least;
+}
+
+static double find_square(const ebpo_face_box *box, const ebpo_extent *around, uint32_t most_visits,
+                          uint64_t *visits)
+{
+    struct {
+        uint64_t node;
+        double lower;
+    } stack[64]; /* a level leaves one behind */
+    int depth = 0;
+    double least = INFINITY;
+    if (box->count == 0)
+        return INFINITY;
+    stack[depth].node = 1;
+    stack[depth++].lower = between(&box->node[1], around);
+    for (uint32_t n = 0; depth > 0; n++) {
+        uint64_t node = stack[--depth].node;
+        double lower = stack[depth].lower;
+        if (!(lower < least))
+            continue;
+        ++*visits;
+        if (n >= most_visits) {
+            least = lower;
+        } else if (node >= box->leaves) {
+            least = fmin(least, closest_of_leaf(box, node - box->leaves, around));
+        } else {
+            double l = between(&box->node[2 * node], around);
+            double r = between(&box->node[2 * node + 1], around);
+            bool first = l <= r; /* is looked at first, so goes on last */
+            stack[depth].node = 2 * node + first;
+            stack[depth++].lower = first ? r : l;
+            stack[depth].node = 2 * node + !first;
+            stack[depth++].lower = first ? l : r;
+        }
+    }
+    return least;
+}
+
+double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *around,
+                               uint32_t most_visits, uint64_t *visits)
+{
+    return sqrt(find_square(box, around, most_visits, visits)) * (1 - 0x1p-48);
 }

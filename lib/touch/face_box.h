@@ -11,9 +11,18 @@ typedef struct ebpo_extent {
     double min[3], max[3];
 } ebpo_extent;
 
+static inline bool ebpo_extent_holds(const ebpo_extent *e, const double p[3])
+{
+    for (int i = 0; i < 3; i++)
+        if (!(p[i] >= e->min[i] && p[i] <= e->max[i]))
+            return false;
+    return true;
+}
+
 typedef struct ebpo_face_box {
     /* Of every ball whose centre is in it, all faces within the margin are there. */
     ebpo_extent centres;
+    ebpo_extent loaded;               /* all faces that meet it are there */
     uint64_t count, capacity, leaves; /* leaves: a power of two */
     double (*corner)[3][3];           /* [capacity] */
     uint64_t *face;                   /* [capacity] as callers are told */
@@ -31,9 +40,14 @@ EBPO_MUST_USE ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *c
                                              const ebpo_extent *centres, double margin, bool *fits,
                                              ebpo_error *error);
 
-/* Faces whose boxes meet `around`, into found[most]; false: there are more, or more than `visits`
- * nodes would have to be looked at. */
+/* Faces whose boxes meet `around`, into found[most]; false: there are more, or more than *visits
+ * nodes would have to be looked at, which is less by those that were. */
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
-                        uint32_t most, uint32_t visits, uint32_t *count);
+                        uint32_t most, uint32_t *visits, uint32_t *count);
+
+/* Of what is in `around`, no point is closer to a face of the box than this; after so many nodes it
+ * says less. *visits counts them. */
+double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *around,
+                               uint32_t most_visits, uint64_t *visits);
 
 #endif

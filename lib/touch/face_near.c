@@ -183,3 +183,19 @@ bool ebpo_segment_may_meet(const double p[3], const double q[3], const double fa
     }
     return !(left && right);
 }
+
+int ebpo_segment_crosses(const double p[3], const double q[3], const double face[3][3])
+{
+    if (!ebpo_segment_may_meet(p, q, face))
+        return 0;
+    int at_p = volume_sign(face[0], face[1], face[2], p);
+    int at_q = volume_sign(face[0], face[1], face[2], q);
+    if (at_p * at_q != -1)
+        return EBPO_CROSSES_BADLY;
+    for (int k = 0; k < 3; k++) {
+        int sign = volume_sign(p, q, face[k], face[(k + 1) % 3]);
+        if (sign != 1 && sign != -1)
+            return EBPO_CROSSES_BADLY;
+    }
+    return at_p; /* from its outer side */
+}

@@ -30,4 +30,10 @@ double ebpo_ball_meets(const ebpo_ball_way *w, const double face[3][3], double a
  * area have none. No memory is taken. */
 bool ebpo_segment_may_meet(const double p[3], const double q[3], const double face[3][3]);
 
+/* How the winding number changes from p to q through the face: 1 from outside to inside, -1 back,
+ * 0: they have no common point. EBPO_CROSSES_BADLY: through an edge, a corner, from or to the
+ * face's plane, or perhaps not at all. No memory is taken. */
+enum { EBPO_CROSSES_BADLY = 2 };
+int ebpo_segment_crosses(const double p[3], const double q[3], const double face[3][3]);
+
 #endif

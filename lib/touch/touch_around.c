@@ -61,14 +61,14 @@ void ebpo_touch_look(ebpo_touch *t, ebpo_touch_result *out)
     double wide = t->options.radius + t->options.look;
     around a = { .t = t, .nearest = INFINITY, .out = out };
     ebpo_extent e;
-    uint32_t count = 0;
+    uint32_t count = 0, visits = EBPO_TOUCH_VISITS;
     for (int i = 0; i < 3; i++) {
         e.min[i] = t->proxy[i] - wide;
         e.max[i] = t->proxy[i] + wide;
     }
     out->face = EBPO_NO_FACE;
     if (ebpo_extent_holds(&box->centres, t->proxy)) {
-        if (!ebpo_face_box_find(box, &e, t->found, EBPO_TOUCH_FACES, EBPO_TOUCH_VISITS, &count))
+        if (!ebpo_face_box_find(box, &e, t->found, EBPO_TOUCH_FACES, &visits, &count))
             out->flags |= EBPO_TOUCH_PARTLY;
     } else if (!no_face_close(t, &e)) {
         out->flags |= EBPO_TOUCH_PARTLY;

@@ -111,9 +111,12 @@ static void *run(void *user)
         ebpo_extent centres;
         foresee(t, goal);
         place_box(t, goal, &centres);
+        bool moved = false;
         if (far_from_last(t, &centres))
             status = load(t, goal, &error);
-        else
+        else if (t->options.kind == EBPO_TOUCH_PROBE)
+            status = ebpo_touch_learn(t, &moved, &error);
+        if (status == EBPO_OK && !moved)
             wait_a_little();
     }
     if (status != EBPO_OK) {
@@ -128,6 +131,7 @@ ebpo_status ebpo_touch_loader_start(ebpo_touch *t, ebpo_error *error)
 {
     for (int i = 0; i < 3; i++) {
         t->last.min[i] = t->last.max[i] = NAN; /* far from all */
+        t->asked[i] = NAN;
         t->hand_before[i] = atomic_load(&t->hand_told[i]);
     }
     t->when_before = ebpo_clock();

@@ -11,6 +11,7 @@
 #include "base/sized.h"
 #include "geom/length.h"
 #include "query/query_model.h"
+#include "touch/tool.h"
 #include "touch/touch_parts.h"
 #include "touch/vectors.h"
 
@@ -25,6 +26,18 @@ static ebpo_status check_options(const ebpo_touch_options *o, ebpo_error *error)
                          "stiffness, damping and friction must be 0 or more");
     if (!is_amount(o->tick) || o->tick == 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a tick must take more than 0 seconds");
+    if (o->kind > EBPO_TOUCH_TOOL)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no such kind of hand");
+    if (o->kind != EBPO_TOUCH_BALL && o->radius != 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "only balls have a radius");
+    if ((o->kind == EBPO_TOUCH_TOOL) != (o->points != NULL && o->point_count > 0) ||
+        o->point_count > EBPO_TOOL_POINTS)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "a tool has 1 to %d points, and only a tool has",
+                         EBPO_TOOL_POINTS);
+    for (uint64_t i = 0; i < 3 * o->point_count; i++)
+        if (!(fabs(o->points[i / 3][i % 3]) <= 0x1p200))
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "point %llu of the tool is not finite",
+                             (unsigned long long)(i / 3));
     if (o->faces < 64 || o->faces > 1 << 20)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a box must have room for 64 to 2^20 faces");
     return EBPO_OK;
@@ -49,16 +62,17 @@ static ebpo_status measure(ebpo_touch *t, ebpo_error *error)
                          "coordinates are too large or too small to be touched");
     double least = fmax(0x1p-30 * t->diagonal, 0x1p-42 * most);
     if (t->options.skin == 0)
-        t->options.skin = fmax(0x1p-20 * t->diagonal, least);
+        t->options.skin = fmax((t->tool ? 0x1p-15 : 0x1p-20) * t->diagonal, least);
     if (t->options.skin < least)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the skin must be at least %g, for rounding of coordinates", least);
     if (t->options.look == 0)
         t->options.look = 3 * t->diagonal / sqrt(fmax(1, (double)info->face_count));
     t->options.look = fmax(t->options.look, 4 * t->options.skin);
-    t->reach = t->options.radius + t->options.skin;
+    double wide = t->tool ? t->tool->radius * (1 + 0x1p-40) : t->options.radius;
+    t->reach = wide + t->options.skin;
     t->band = fmax(0x1p-24 * t->options.skin, 0x1p-48 * most);
-    t->margin = t->options.radius + t->options.look;
+    t->margin = wide + (t->tool ? 4 * t->options.skin : t->options.look);
     t->stride = t->diagonal;
     t->half = fmin(1, sqrt((double)t->options.faces / fmax(1, (double)info->face_count))) *
               t->diagonal / 8;
@@ -75,17 +89,19 @@ static ebpo_status make_parts(ebpo_touch *t, ebpo_error *error)
     t->seen = 1;
     t->own = 3;
     atomic_store(&t->between, 2);
+    t->own_known = 1;
+    atomic_store(&t->known_between, 2);
+    if (status == EBPO_OK && t->options.kind == EBPO_TOUCH_PROBE)
+        status = ebpo_held_levels_read(t->model->file, &t->levels, error);
     return status;
 }
 
-static ebpo_status check_place(ebpo_touch *t, const double place[3], ebpo_error *error)
+static ebpo_status check_point(ebpo_touch *t, const double place[3], double reach,
+                               ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     ebpo_distance_result near;
-    for (int i = 0; i < 3; i++)
-        if (!(fabs(place[i]) <= 0x1p200))
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "the place must be three finite numbers");
-    options.max_distance = t->reach + t->options.skin / 2;
+    options.max_distance = reach + t->options.skin / 2;
     ebpo_status status = ebpo_distance(t->asking, place, &options, &near, error);
     if (status == EBPO_OK && near.distance <= options.max_distance && near.distance >= 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -98,6 +114,24 @@ static ebpo_status check_place(ebpo_touch *t, const double place[3], ebpo_error 
     return status != EBPO_OK || inside.where == EBPO_OUT
                ? status
                : ebpo_fail(error, EBPO_E_ARGUMENT, "the place is in the solid; begin outside");
+}
+
+/* Anywhere for a probe; a tool with its axes along the model's. */
+static ebpo_status check_place(ebpo_touch *t, const double place[3], ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < 3; i++)
+        if (!(fabs(place[i]) <= 0x1p200))
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "the place must be three finite numbers");
+    if (t->options.kind == EBPO_TOUCH_BALL)
+        return check_point(t, place, t->reach, error);
+    for (uint64_t i = 0; t->tool && i < t->tool->count && status == EBPO_OK; i++) {
+        double at[3];
+        for (int k = 0; k < 3; k++)
+            at[k] = place[k] + t->tool->point[i][k];
+        status = check_point(t, at, t->options.skin, error);
+    }
+    return status;
 }
 
 /* Until a box holds the proxy. */
@@ -135,6 +169,12 @@ ebpo_status ebpo_touch_place(ebpo_touch *t, const double place[3], ebpo_error *e
         ebpo_touch_tell(t, hand);
         return status;
     }
+    t->side.known = false;
+    if (t->tool) {
+        ebpo_rigid there = { .turn = { 0, 0, 0, 1 } };
+        copy(place, there.place);
+        ebpo_tool_put(t->tool, &there);
+    }
     t->touching = false;
     for (int i = 0; i < 3; i++)
         t->force[i] = 0;
@@ -167,7 +207,12 @@ ebpo_status ebpo_touch_new(ebpo_model *model, const ebpo_touch_options *options,
     t->options = own;
     t->failure = (ebpo_error)EBPO_ERROR_INIT;
     pthread_mutex_init(&t->mutex, NULL);
-    status = measure(t, error);
+    t->passive.stiffness = own.stiffness;
+    if (own.kind == EBPO_TOUCH_TOOL)
+        status = ebpo_tool_new(own.points, own.point_count, &t->tool, error);
+    t->options.points = NULL; /* the caller's */
+    if (status == EBPO_OK)
+        status = measure(t, error);
     if (status == EBPO_OK)
         status = make_parts(t, error);
     if (status == EBPO_OK)
@@ -186,6 +231,8 @@ void ebpo_touch_free(ebpo_touch *t)
     ebpo_touch_loader_stop(t);
     for (int i = 0; i < EBPO_TOUCH_BOXES; i++)
         ebpo_face_box_free(&t->box[i]);
+    ebpo_held_levels_free(&t->levels);
+    ebpo_tool_free(t->tool);
     ebpo_context_free(t->asking);
     ebpo_context_free(t->loading);
     pthread_mutex_destroy(&t->mutex);

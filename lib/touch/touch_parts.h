@@ -8,6 +8,9 @@
 
 #include "touch/face_box.h"
 #include "touch/held_back.h"
+#include "touch/held_levels.h"
+#include "touch/passive.h"
+#include "touch/side_walk.h"
 
 enum {
     /* The tick's box, the one it looked at last, the one between, the one being loaded. */
@@ -15,14 +18,23 @@ enum {
     EBPO_TOUCH_FRESH = 8, /* beside a box's number: the tick has not seen it */
 
     /* What one step of a tick may look at: at most. */
-    EBPO_TOUCH_FACES = 512,
+    EBPO_TOUCH_FACES = 384,
     EBPO_TOUCH_VISITS = 1024,
 
     /* And all of them together: no step begins after so many faces. */
-    EBPO_TOUCH_WORK = 768,
+    EBPO_TOUCH_WORK = 512,
 
     EBPO_TOUCH_PIECES = EBPO_TOUCH_WAY_MOST - 1
 };
+
+/* What the loading thread has been told of a place, for probes. */
+typedef struct ebpo_known_place {
+    double place[3];
+    double distance; /* unsigned; of nothing infinite */
+    double point[3], normal[3];
+    int32_t winding;
+    bool there, on;
+} ebpo_known_place;
 
 struct ebpo_touch {
     /* for good */
@@ -32,6 +44,7 @@ struct ebpo_touch {
     double diagonal;  /* of the root cell */
     double reach, band, margin;
     bool solid;
+    ebpo_held_levels levels; /* of probes */
 
     /* of the ticks' thread */
     unsigned at, seen; /* boxes */
@@ -41,24 +54,31 @@ struct ebpo_touch {
     double way[EBPO_TOUCH_WAY_MOST][3];
     uint32_t way_count;
     double stride; /* so long a piece of a way may be */
-    double given;  /* energy */
+    ebpo_passive passive;
+    struct ebpo_tool *tool; /* or NULL */
     ebpo_touch_stats stats;
     uint32_t found[EBPO_TOUCH_FACES];
     double met[EBPO_TOUCH_FACES];
     double away[EBPO_TOUCH_FACES][3];
     ebpo_context *asking; /* for places */
+    ebpo_side side;
+    unsigned answer; /* number of a known place */
 
     /* handed over */
     ebpo_face_box box[EBPO_TOUCH_BOXES];
     atomic_uint between;          /* a box, perhaps fresh */
     _Atomic double proxy_told[3]; /* each for itself: what the loader makes of a mixture is */
     _Atomic double hand_told[3];  /* a box like any other, and the tick looks whether it fits */
+    ebpo_known_place known[3];
+    atomic_uint known_between; /* as `between` */
     _Atomic bool stop;
     atomic_uint_fast64_t loads, too_many, load_ns, load_ns_most;
 
     /* of the loading thread */
     ebpo_context *loading;
     unsigned own; /* box */
+    unsigned own_known;
+    double asked[3]; /* the last place that was asked about */
     ebpo_extent last;
     double half; /* of a box's sides */
     double hand_before[3], speed[3];
@@ -74,8 +94,23 @@ struct ebpo_touch {
  * ebpo_touch_flag. */
 uint32_t ebpo_touch_go(ebpo_touch *t, const double goal[3], uint32_t *work);
 
+/* The part of the proxy's way, itself between a straight one's ends, of which all faces within
+ * `reach` are known: to the wall of the box at hand, or all of it where no face can be. */
+double ebpo_touch_known_part(const ebpo_touch *t, const double way[3], double reach);
+
+/* tool_step.c: a tool's next piece of way; flags are given when it is there. False: it cannot
+ * begin. */
+bool ebpo_tool_set_out(ebpo_touch *t, const double way[6], uint32_t *flags);
+/* Goes on with it; bits of ebpo_touch_flag. */
+uint32_t ebpo_tool_go_on(ebpo_touch *t, uint64_t *work, bool *arrived);
+
 /* touch_around.c: nearest face, weights, depth and the smooth normal. */
 void ebpo_touch_look(ebpo_touch *t, ebpo_touch_result *out);
+
+/* touch_known.c: the loading thread asks about the place where a probe is. True: it has moved. */
+EBPO_MUST_USE ebpo_status ebpo_touch_learn(ebpo_touch *t, bool *moved, ebpo_error *error);
+/* The last that is known. */
+const ebpo_known_place *ebpo_touch_known(ebpo_touch *t);
 
 /* touch_loader.c */
 EBPO_MUST_USE ebpo_status ebpo_touch_loader_start(ebpo_touch *t, ebpo_error *error);
@@ -84,13 +119,8 @@ void ebpo_touch_loader_stop(ebpo_touch *t);
 /* touch_move.c: a box that is fresh and holds the proxy becomes the one at hand. True: one did. */
 bool ebpo_touch_take_box(ebpo_touch *t);
 void ebpo_touch_tell(ebpo_touch *t, const double hand[3]);
-
-static inline bool ebpo_extent_holds(const ebpo_extent *e, const double p[3])
-{
-    for (int i = 0; i < 3; i++)
-        if (!(p[i] >= e->min[i] && p[i] <= e->max[i]))
-            return false;
-    return true;
-}
+/* The box before, if it holds the proxy: perhaps that one reaches further. */
+void ebpo_touch_try_other(ebpo_touch *t);
+void ebpo_touch_count(ebpo_touch *t, uint32_t flags, uint64_t work);
 
 #endif

@@ -55,25 +55,28 @@ static double part_inside(const double p[3], const double way[3], const ebpo_ext
     return part < 1 ? fmax(0, part * (1 - 0x1p-20)) : 1;
 }
 
+double ebpo_touch_known_part(const ebpo_touch *t, const double way[3], double reach)
+{
+    const ebpo_extent *centres = &t->box[t->at].centres;
+    ebpo_extent all;
+    swept(t->proxy, way, reach, &all);
+    if (apart(&all, &t->root))
+        return 1;
+    return ebpo_extent_holds(centres, t->proxy) ? part_inside(t->proxy, way, centres) : 0;
+}
+
 /* Cuts the way to where all faces around it are known. False: there is no such part. */
 static bool keep_known(step *s)
 {
     ebpo_touch *t = s->t;
-    const ebpo_extent *centres = &t->box[t->at].centres;
-    ebpo_extent all;
-    swept(t->proxy, s->way, t->reach + t->band, &all);
-    if (apart(&all, &t->root)) {
-        s->count = 0;
-        return true; /* nothing is there */
-    }
-    if (!ebpo_extent_holds(centres, t->proxy)) {
-        s->flags |= EBPO_TOUCH_WAITS;
-        return false;
-    }
-    double part = part_inside(t->proxy, s->way, centres);
+    double part = ebpo_touch_known_part(t, s->way, t->reach + t->band);
     if (part < 1) {
         s->cut = EBPO_TOUCH_WAITS; /* whether or not it was short */
         shorten(s->way, part);
+    }
+    if (part <= 0 && !ebpo_extent_holds(&t->box[t->at].centres, t->proxy)) {
+        s->flags |= EBPO_TOUCH_WAITS;
+        return false;
     }
     return true;
 }
@@ -94,10 +97,11 @@ static bool find_faces(step *s)
     ebpo_touch *t = s->t;
     ebpo_extent around;
     for (int i = 0; i < HALVINGS && *s->work < EBPO_TOUCH_WORK; i++) {
+        uint32_t visits = EBPO_TOUCH_VISITS;
         swept(t->proxy, s->way, t->reach + 2 * t->band, &around);
         bool all = ebpo_extent_holds(&t->box[t->at].centres, t->proxy)
                        ? ebpo_face_box_find(&t->box[t->at], &around, t->found, EBPO_TOUCH_FACES,
-                                            EBPO_TOUCH_VISITS, &s->count)
+                                            &visits, &s->count)
                        : (s->count = 0, true); /* outside of all, see keep_known */
         *s->work += all ? s->count : EBPO_TOUCH_FACES;
         if (all) {

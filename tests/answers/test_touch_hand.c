@@ -2,81 +2,17 @@
  * that does not round, however wildly it is moved; forces on a plane, by formula; friction; energy;
  * and nothing is called in a tick that could make it late. */
 #include <ebpo/touch.h>
-#include <gmp.h>
 #include <math.h>
-#include <pthread.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <time.h>
-#include <unistd.h>
 
 #include "check_main.h"
 #include "query_kit.h"
-
-/* --- what a tick may not call: the linker hands these calls over to here --- */
-
-static _Thread_local bool in_tick;
-static unsigned long forbidden;
-
-static void watch(void) { forbidden += in_tick; }
-
-#define WATCH(type, name, parameters, arguments) \
-    type __real_##name parameters;               \
-    type __wrap_##name parameters;               \
-    type __wrap_##name parameters                \
-    {                                            \
-        watch();                                 \
-        return __real_##name arguments;          \
-    }
-WATCH(void *, malloc, (size_t n), (n))
-WATCH(void *, calloc, (size_t n, size_t m), (n, m))
-WATCH(void *, realloc, (void *p, size_t n), (p, n))
-WATCH(void *, aligned_alloc, (size_t a, size_t n), (a, n))
-WATCH(int, pthread_mutex_lock, (pthread_mutex_t * m), (m))
-WATCH(int, pthread_cond_wait, (pthread_cond_t * c, pthread_mutex_t *m), (c, m))
-WATCH(int, pthread_cond_signal, (pthread_cond_t * c), (c))
-WATCH(int, pthread_cond_broadcast, (pthread_cond_t * c), (c))
-WATCH(ssize_t, pread64, (int fd, void *p, size_t n, off_t at), (fd, p, n, at))
-WATCH(ssize_t, read, (int fd, void *p, size_t n), (fd, p, n))
-WATCH(int, nanosleep, (const struct timespec *t, struct timespec *left), (t, left))
-
-void __real_free(void *p);
-void __wrap_free(void *p);
-void __wrap_free(void *p)
-{
-    watch();
-    __real_free(p);
-}
-
-static void *gmp_take(size_t n)
-{
-    watch();
-    return __real_malloc(n);
-}
-static void *gmp_more(void *p, size_t old, size_t n)
-{
-    (void)old;
-    watch();
-    return __real_realloc(p, n);
-}
-static void gmp_give(void *p, size_t n)
-{
-    (void)n;
-    watch();
-    __real_free(p);
-}
+#include "touch_watch.h"
 
 static void tick(ebpo_touch *touch, const double hand[3], ebpo_touch_result *out)
 {
     in_tick = true;
     ebpo_touch_move(touch, hand, out);
     in_tick = false;
-}
-
-static void pause_a_little(void)
-{
-    const struct timespec t = { 0, 300000 };
-    nanosleep(&t, NULL);
 }
 
 /* --- a wild hand, judged --- */
@@ -440,7 +376,7 @@ Suite *test_suite(void)
 {
     Suite *suite = suite_create("touch_hand");
     TCase *hand = tcase_create("hand");
-    mp_set_memory_functions(gmp_take, gmp_more, gmp_give);
+    watch_gmp();
     tcase_set_timeout(hand, 600);
     tcase_add_loop_test(hand, a_wild_hand_goes_through_nothing, 0, WILD);
     tcase_add_loop_test(hand, a_cube_holds_the_hand_as_its_planes_do, 0, 2);

@@ -434,8 +434,15 @@ static ebpo_status touch(ebpo_model *model, ebpo_error *error)
     ebpo_status status = ebpo_touch_new(model, &options, away, &touch, error);
     if (status != EBPO_OK)
         return status;
+    ebpo_touch_sensed sensed;
+    ebpo_touch_turned turned;
+    double poses[EBPO_TOUCH_WAY_MOST][7];
+    static const double turn[4] = { 0, 0, 0, 1 };
     ebpo_touch_move(touch, away, &answer);
     (void)ebpo_touch_way(touch, way);
+    ebpo_touch_sense(touch, away, &sensed); /* not of its kind: answers so */
+    ebpo_touch_turn(touch, away, turn, &turned);
+    (void)ebpo_touch_poses(touch, poses);
     status = ebpo_touch_place(touch, closer, error);
     if (status == EBPO_OK)
         status = ebpo_touch_check(touch, error);

@@ -1,6 +1,6 @@
 #!/bin/sh
 # The samples do what they say: test_samples.sh EBPO SAMPLES PLUGIN_FOLDER INPUTS QUERY LIBEBPO
-# GENERATE PACKAGE_FOLDER PYTHON_WITH_NUMPY (or "")
+# GENERATE PACKAGE_FOLDER PYTHON_WITH_NUMPY (or "") TOUCH_DEVICE
 set -u
 ebpo=$1 samples=$2 inputs=$4 query=$5 library=$6 generate=$7 package=$8 numpy=$9
 export HDF5_PLUGIN_PATH="$3"
@@ -118,6 +118,24 @@ cmp "$work/robot.csv" "$work/packed.csv" >"$work/out" 2>&1 || fail "the packed r
 grep -q '"hand",near,' "$work/robot.csv" || { cat "$work/robot.csv"; fail "the hand comes near"; }
 ring=$(wc -c <"$work/robot/ring.ebpo.h5") part=$(wc -c <"$work/packed/model-1.ebpo.h5")
 [ "$part" -lt $((ring / 2)) ] || fail "of the ring little is needed: $part of $ring bytes"
+
+# A device by UDP: on top of the cube it feels a force, and what it did is recorded. Whichever port
+# is free; the address is this machine's.
+shift 9
+"$ebpo" touch --device udp:0 --seconds 30 --rate 500 --stiffness 100 --record "$work/hand.txt" \
+    "$work/cube.ebpo.h5" >"$work/touched" 2>"$work/out" &
+touching=$!
+for i in 1 2 3 4 5 6 7 8 9 10; do
+    port=$(sed -n 's/.*waits for a device at 127.0.0.1, port //p' "$work/out")
+    [ -n "$port" ] && break
+    sleep 0.5
+done
+"$1" "$port" 0.3 0.4 1.5 0.8 >"$work/felt" 2>&1 || { cat "$work/felt"; fail "touch_device is answered"; }
+wait $touching || fail "ebpo touch ends with its device"
+[ "$(cat "$work/felt")" = "some answers, a force up, proxy at 0.30 0.40 1.00" ] ||
+    { cat "$work/felt"; fail "touch_device feels the cube"; }
+[ "$(wc -l <"$work/hand.txt")" -gt 50 ] && "$ebpo" touch --path "$work/hand.txt" \
+    "$work/cube.ebpo.h5" >"$work/out" 2>&1 || fail "a recorded hand is played"
 
 command -v h5dump >/dev/null && command -v h5ls >/dev/null || exit 77
 "$ebpo" convert -q --leaf-faces 8 "$work/sphere.ply" "$work/a.ebpo.h5" || fail convert

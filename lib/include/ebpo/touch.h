@@ -2,8 +2,9 @@
  * EBP-Octree in HDF5: a hand that touches a model, at a steady rate and never late.
  *
  *   Making    ebpo_touch_new, ebpo_touch_free
- *   A tick    ebpo_touch_move, ebpo_touch_way
- *   Else      ebpo_touch_place, ebpo_touch_check, ebpo_touch_get_stats
+ *   A tick    ebpo_touch_move, ebpo_touch_way: a ball; ebpo_touch_sense: a point that nothing
+ * stops; ebpo_touch_turn: a tool of many points, with force and torque Else      ebpo_touch_place,
+ * ebpo_touch_check, ebpo_touch_get_stats
  *
  *     ebpo_touch *touch = NULL;
  *     ebpo_touch_result answer;
@@ -36,6 +37,13 @@ extern "C" {
 #endif
 
 typedef struct ebpo_touch ebpo_touch;
+
+/* What a hand is: which of the ticks it has. */
+typedef enum ebpo_touch_kind {
+    EBPO_TOUCH_BALL = 0,  /* ebpo_touch_move */
+    EBPO_TOUCH_PROBE = 1, /* ebpo_touch_sense */
+    EBPO_TOUCH_TOOL = 2   /* ebpo_touch_turn */
+} ebpo_touch_kind;
 
 typedef struct ebpo_touch_options {
     size_t struct_size; /* EBPO_TOUCH_OPTIONS_INIT sets it */
@@ -70,11 +78,21 @@ typedef struct ebpo_touch_options {
     /* Faces of a box at most; 64 to 2^20. Four such boxes are held: about 550 bytes a face in all,
      * beside the model's budget. */
     uint64_t faces;
+
+    /*
+     * Of a tool: points[point_count][3] in its own coordinates, 1 to 10,000; copied. Points keep to
+     * the side of faces from which they came, and so need no normals. For others NULL and 0.
+     */
+    const double (*points)[3];
+    uint64_t point_count;
+
+    /* An ebpo_touch_kind. */
+    uint64_t kind;
 } ebpo_touch_options;
 
-#define EBPO_TOUCH_OPTIONS_INIT                                          \
-    {                                                                    \
-        sizeof(ebpo_touch_options), 0, 0, 0, 400, 0.4, 0, 0.001, 1 << 14 \
+#define EBPO_TOUCH_OPTIONS_INIT                                                      \
+    {                                                                                \
+        sizeof(ebpo_touch_options), 0, 0, 0, 400, 0.4, 0, 0.001, 1 << 14, NULL, 0, 0 \
     }
 
 /*
@@ -120,7 +138,13 @@ typedef enum ebpo_touch_flag {
     EBPO_TOUCH_PARTLY = 8,
 
     /* The hand was not finite: it was taken to be where it was before. */
-    EBPO_TOUCH_ASTRAY = 16
+    EBPO_TOUCH_ASTRAY = 16,
+
+    /* This kind of hand has no such tick: nothing was done. */
+    EBPO_TOUCH_OTHER = 32,
+
+    /* Of ebpo_touch_sense: the distance is known to rounding. */
+    EBPO_TOUCH_CLOSE = 64
 } ebpo_touch_flag;
 
 typedef struct ebpo_touch_result {
@@ -172,6 +196,14 @@ EBPO_API void ebpo_touch_move(ebpo_touch *touch, const double hand[3], ebpo_touc
 enum { EBPO_TOUCH_WAY_MOST = 17 };
 
 /*
+ * A tool's way in the last tick, as ebpo_touch_way: a place and a quaternion each. Each point went
+ * straight from one of its places to the next.
+ *
+ * Threads: one per object.
+ */
+EBPO_API uint32_t ebpo_touch_poses(const ebpo_touch *touch, double way[EBPO_TOUCH_WAY_MOST][7]);
+
+/*
  * The proxy's way in the last tick, from where it was to where it is: segments between way[0] and
  * way[n - 1], none of which meets a face. Returns n, which is 1 if it stayed, 0 before the first
  * tick.
@@ -180,8 +212,111 @@ enum { EBPO_TOUCH_WAY_MOST = 17 };
  */
 EBPO_API uint32_t ebpo_touch_way(const ebpo_touch *touch, double way[EBPO_TOUCH_WAY_MOST][3]);
 
+/* What a probe senses of the model around a place. */
+typedef struct ebpo_touch_sensed {
+    /*
+     * Of solids negative inside. Right to some roundings of the coordinates with EBPO_TOUCH_CLOSE,
+     * else NAN: only the bounds are known. The colour for it is ebpo_map_colour's.
+     */
+    double distance;
+
+    /*
+     * The distance is certainly within, signed as it is; from -hi to hi where it is not known
+     * whether the place is inside.
+     */
+    double lo, hi;
+
+    /* Unit vector, of solids outward: as in ebpo_touch_result if a face is within `look`; else that
+     * of the nearest face of a moment ago, or (0, 0, 0) if there was none. */
+    double normal[3];
+
+    /* The nearest face within `look` as in ebpo_touch_result; else EBPO_NO_FACE. */
+    uint64_t face;
+    double point[3], weight[3];
+
+    /* An ebpo_where; of surfaces EBPO_OUT. */
+    int32_t where;
+
+    /* ebpo_touch_flag bits. */
+    uint32_t flags;
+
+    /* Faces that the tick has looked at. */
+    uint64_t work;
+} ebpo_touch_sensed;
+
 /*
- * Lifts the hand and puts it elsewhere; waits until that is loaded. Not for a tick.
+ * One tick of a probe, which nothing stops: how far its place is from the model, by what is in
+ * memory. That is
+ *   - the faces around, and on which side of each the probe has gone through it, by exact
+ *     arithmetic: within `look` of a face the answer is known to rounding;
+ *   - the first levels of the octree, at most 2^17 nodes: which cells have faces, and in which
+ *     cells without the solid is;
+ *   - the exact answer for a place where the probe was a moment ago, from the loading thread: the
+ *     distance has changed by no more than the way since.
+ * Bounds are what all three allow. Time, locks, memory and reading as in ebpo_touch_move.
+ *
+ * Threads: one per object.
+ */
+EBPO_API void ebpo_touch_sense(ebpo_touch *touch, const double place[3], ebpo_touch_sensed *out);
+
+/* A tick of a tool. */
+typedef struct ebpo_touch_turned {
+    /* Where the tool is on the free side: its place, and its turn, a unit quaternion x, y, z, w. */
+    double proxy[3], turn[4];
+
+    /* What the device should push and turn with, in the axes of the model; the torque is about the
+     * tool's place. 0 unless EBPO_TOUCH_CONTACT. */
+    double force[3], torque[3];
+
+    /* How far the hand is behind the proxy if they touch: the way between them that contacts hold
+     * back, with angles as lengths (see ebpo_touch_turn). Else 0. */
+    double depth;
+
+    /* Of the point that is closest to a face, if one is within 2 skins: its number in the tool
+     * (EBPO_NO_FACE: none), the face's as in ebpo_distance_result, and the unit vector from the
+     * face to it. */
+    uint64_t point, face;
+    double normal[3];
+
+    /* Pairs of a point and a face that are so close; at most 256 are told. */
+    uint64_t contacts;
+
+    /* Nodes that the tick has looked at, and six for each face. */
+    uint64_t work;
+
+    /* ebpo_touch_flag bits. */
+    uint32_t flags;
+    uint32_t reserved;
+} ebpo_touch_turned;
+
+/*
+ * One tick of a tool: the device is at `place`, turned by the quaternion x, y, z, w, of any length.
+ * Of the tool's points none goes through a face, nor closer to one than half a skin: every step of
+ * each is decided as the ball's are. Between its points a tool is nothing: they should be closer to
+ * each other than what is to be felt.
+ *
+ * Turning counts as its angle times the tool's arm, the root of the mean square of the points'
+ * distances from the tool's place. Of all ways that the points in contact allow, the proxy takes
+ * the one that ends nearest to the hand; force and torque are those of a spring of `stiffness` for
+ * what they hold back (for an angle, stiffness times arm^2), and weaker where the hand would be
+ * given energy, as for ebpo_touch_move: also in the lengths of turning.
+ *
+ * Time is bounded as there. Points that cannot have come close since they were looked at cost next
+ * to nothing. Where many are close and there is more to do than a tick can, the next ones go on
+ * with it (EBPO_TOUCH_SHORT), and the tool stays where it is until then.
+ *
+ * Sources: Ortega, Redon and Coquillart 2007 (six degrees of freedom, the way by Gauss'
+ * principle); McNeely, Puterbaugh and Troy 1999 (points for a tool); Barbic and James 2008 (points
+ * in clusters, of which only those are looked at that can have come close).
+ *
+ * Threads: one per object.
+ */
+EBPO_API void ebpo_touch_turn(ebpo_touch *touch, const double place[3], const double turn[4],
+                              ebpo_touch_turned *out);
+
+/*
+ * Lifts the hand and puts it elsewhere, a tool without turning it; waits until that is loaded. Not
+ * for a tick.
  *
  * Errors are those of ebpo_touch_new. After a failure the hand is where it was.
  *

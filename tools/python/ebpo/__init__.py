@@ -20,6 +20,7 @@ from .errors import (AbsentError, ArgumentError, Cancelled, Error, FormatError, 
 from .model import AllHits, Bounds, Hits, Located, Model, Nearest, open
 from .parts import Attributes, Info, Level, Maps, Mass, Mesh, Subtree, half_spaces
 from .scenes import Scene, open_scene
+from .touching import Sensed, Touch, Touched
 
 __version__: str = _lib.ebpo_version().decode()
 
@@ -37,6 +38,7 @@ __all__ = [
     "open", "Model", "Info", "Located", "Nearest", "Bounds", "Hits", "AllHits", "Where",
     "Mesh", "Maps", "Level", "Subtree", "Attributes", "Mass", "NodeType", "Part", "Rule", "half_spaces",
     "Collider", "pose", "Relation", "PairKind", "Scene", "open_scene", "MeetingKind",
+    "Touch", "Touched", "Sensed",
     "convert", "from_trimesh", "bar", "library",
     "Error", "ArgumentError", "IOFailure", "FormatError", "VersionError", "UnsupportedError", "NotSolidError",
     "LimitError", "Cancelled", "AbsentError", "NoMemory",
