@@ -449,6 +449,28 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_place(const ebpo_paint *paint, ebp
 
 /* ---- answers ---- */
 
+/* How answers are found out. */
+typedef struct ebpo_paint_options {
+    size_t struct_size; /* EBPO_PAINT_OPTIONS_INIT sets it */
+
+    /*
+     * Of areas, 1 to 65,536: where it is not clear to which stroke a part of a face belongs, it is
+     * cut down to this part of the least radius around. 256 gives the area of a disc to 1 % for
+     * certain, and `value` to 0.1 %.
+     */
+    unsigned fineness;
+
+    /* Of areas. 0: all cores. The result does not depend on it. */
+    unsigned threads;
+
+    ebpo_progress progress;
+} ebpo_paint_options;
+
+#define EBPO_PAINT_OPTIONS_INIT                            \
+    {                                                      \
+        sizeof(ebpo_paint_options), 256, 0, { NULL, NULL } \
+    }
+
 /* A face of a stroke's reach, lent until the function returns that is called with it. */
 typedef struct ebpo_paint_face {
     /* As in ebpo_distance_result; and in the file. */
@@ -468,14 +490,15 @@ typedef bool (*ebpo_paint_face_fn)(void *user, const ebpo_paint_face *face);
 
 /*
  * The faces of the reach of a stroke's points, each once, in the order of the file, and which of
- * their corners are covered. Takes 120 bytes for each such face.
+ * their corners are covered. Takes 110 bytes for each such face, and 300 for each that the box
+ * around one point meets, as all that follows does.
  *
  * context     of a model that fits
  * elsewhere   points whose faces a subset does not have; or NULL
  *
  * EBPO_E_ARGUMENT: there is no such stroke, or the model is another one. EBPO_E_FORMAT: a point
  * does not lie on its face. EBPO_E_UNSUPPORTED: the model's coordinates are beyond 2^200.
- * EBPO_E_LIMIT: a point's ball meets more than 2^31 faces. EBPO_E_ABSENT, EBPO_E_MEMORY, and the
+ * EBPO_E_LIMIT: a point's ball meets more than 2^28 faces. EBPO_E_ABSENT, EBPO_E_MEMORY, and the
  * errors of reading.
  *
  * Threads: one per context.
@@ -510,12 +533,14 @@ typedef struct ebpo_paint_baked {
  * Takes, beside the mesh, 4 bytes a vertex, 72 for each covered one, and where numbers of faces in
  * the source have gaps 4 for each face.
  *
- * Errors are those of ebpo_paint_cover; EBPO_E_ARGUMENT also where the mesh is another one.
+ * Errors are those of ebpo_paint_cover; EBPO_E_ARGUMENT also where the mesh is another one;
+ * EBPO_E_CANCELLED, with some colours changed.
  *
  * Threads: one per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_bake(const ebpo_paint *paint, ebpo_context *context,
-                                                   const ebpo_mesh *mesh, uint8_t *rgba,
+                                                   const ebpo_mesh *mesh,
+                                                   const ebpo_paint_options *options, uint8_t *rgba,
                                                    ebpo_paint_baked *baked, ebpo_error *error);
 
 /*
@@ -569,22 +594,18 @@ typedef struct ebpo_paint_areas {
  * How much of the surface is painted: visible layers and others, whatever their opacity. What a
  * later stroke of the same layer covers is no longer an earlier one's.
  *
- * fineness   1 to 65,536: faces are cut down to this part of the least radius around, where it is
- *            not clear before to which stroke they belong. 256 gives a disc's area to 1 % for
- *            certain, and `value` to 0.1 %
- * threads    0: all cores. The result does not depend on it.
- * out        freed by ebpo_paint_areas_free
+ * out   freed by ebpo_paint_areas_free
  *
  * Takes 24 bytes for each face and point that reaches it, and 80 for each such face.
  *
- * Errors are those of ebpo_paint_cover; EBPO_E_ARGUMENT also for the fineness.
+ * Errors are those of ebpo_paint_cover; EBPO_E_ARGUMENT also for the fineness; EBPO_E_CANCELLED.
  *
  * Threads: one per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_measure(const ebpo_paint *paint,
-                                                      ebpo_context *context, unsigned fineness,
-                                                      unsigned threads, ebpo_paint_areas *out,
-                                                      ebpo_error *error);
+                                                      ebpo_context *context,
+                                                      const ebpo_paint_options *options,
+                                                      ebpo_paint_areas *out, ebpo_error *error);
 
 /*
  * Frees the arrays and clears the struct, but for its size.
