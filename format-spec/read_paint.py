@@ -244,8 +244,7 @@ def bake_file(path, model, base):
     paint = read(path)
     with h5py.File(model, "r") as file:
         vertices = read_ebpo.vertices(file["/mesh/vertices"]).reshape(-1, 3).astype("f8").tolist()
-        faces = read_ebpo.read(model)["mesh"]["faces"]
-        faces = [faces[i:i + 3] for i in range(0, len(faces), 3)]
+        faces = read_ebpo.faces(file["/mesh/faces"]).reshape(-1, 3).tolist()
         if paint["face_numbers"] == "source":
             rows = {n: i for i, n in enumerate(read_ebpo.delta(file["/maps/face_source"]).tolist())}
         else:

@@ -145,8 +145,7 @@ static verdict judge_layer(const ebpo_area_cut *c, const triangle *t, const doub
     for (uint64_t i = from; i < end; i++) {
         const ebpo_area_ball *b = &c->ball[i];
         uint32_t colour = c->keys->colour[b->stroke];
-        if (v.at_centre == UINT32_MAX &&
-            ebpo_ball_holds(b->centre, b->radius * b->radius, centre))
+        if (v.at_centre == UINT32_MAX && ebpo_ball_holds(b->centre, b->radius * b->radius, centre))
             v.at_centre = b->stroke;
         if (paints(c, b->stroke)) {
             v.one_colour = v.one_colour && (first || v.colour == colour);
@@ -179,8 +178,8 @@ static void add_layer(ebpo_area_cut *c, const triangle *t, const verdict *v, uin
         bool again = i > from && c->ball[i - 1].stroke == stroke;
         if (again || !paints(c, stroke))
             continue;
-        add(&strokes[stroke], t->area, certain && c->ball[from].stroke == stroke &&
-                                           c->ball[end - 1].stroke == stroke,
+        add(&strokes[stroke], t->area,
+            certain && c->ball[from].stroke == stroke && c->ball[end - 1].stroke == stroke,
             v->at_centre == stroke);
         if (c->seen[colour] == c->part)
             continue;

@@ -189,8 +189,7 @@ static void give_colours(const bake *b)
                 (uint8_t)floor(b->dyed[i].colour[k] + 0.5);
 }
 
-static ebpo_status check_mesh(const ebpo_context *context, const ebpo_mesh *mesh,
-                              ebpo_error *error)
+static ebpo_status check_mesh(const ebpo_context *context, const ebpo_mesh *mesh, ebpo_error *error)
 {
     const ebpo_info *info = context->model->info;
     return mesh->faces && mesh->face_count == info->face_count &&

@@ -5,10 +5,14 @@
 
 #include "base/endian.h"
 
-#define OF_STROKES(path, element, cols, member) \
-    { "/strokes/" path, element, cols, false, offsetof(ebpo_stroke_held, member) }
-#define OF_POINTS(path, element, cols, member) \
-    { "/points/" path, element, cols, true, offsetof(ebpo_paint_point, member) }
+#define OF_STROKES(path, element, cols, member)                                    \
+    {                                                                              \
+        "/strokes/" path, element, cols, false, offsetof(ebpo_stroke_held, member) \
+    }
+#define OF_POINTS(path, element, cols, member)                                   \
+    {                                                                            \
+        "/points/" path, element, cols, true, offsetof(ebpo_paint_point, member) \
+    }
 
 const ebpo_paint_column ebpo_paint_columns[EBPO_PAINT_COLUMNS] = {
     OF_STROKES("layer", 4, 0, layer),      OF_STROKES("kind", 4, 0, kind),

@@ -34,7 +34,7 @@ typedef struct lay {
     ebpo_paint_point *point;
     run *run;
     uint64_t point_count, point_capacity, run_count, run_capacity, random, room;
-    bool down; /* the pen painted at the step before */
+    bool down;    /* the pen painted at the step before */
     double begun; /* when the stroke did */
     ebpo_paint_laid laid;
 } lay;
@@ -78,8 +78,8 @@ static ebpo_status check(const lay *l, const ebpo_paint *p, const ebpo_paint_han
         wrong = hand_wrong(&hand[i]);
     ebpo_stroke_held stroke = { .radius = l->pen.radius,
                                 .time = l->pen.time,
-                                .layer = l->pen.layer < UINT32_MAX ? (uint32_t)l->pen.layer
-                                                                   : UINT32_MAX,
+                                .layer =
+                                    l->pen.layer < UINT32_MAX ? (uint32_t)l->pen.layer : UINT32_MAX,
                                 .kind = (uint32_t)l->pen.kind,
                                 .count = 1 };
     for (int i = 0; i < 4; i++)
@@ -305,9 +305,10 @@ static ebpo_status go(lay *l, const ebpo_paint_hand *hand, uint64_t count, ebpo_
     for (uint64_t i = 1; i < count && status == EBPO_OK; i++) {
         double length = length_between(&hand[i - 1], &hand[i]), at = ahead;
         if (!(length / step <= EBPO_PAINT_POINTS))
-            return ebpo_fail(error, EBPO_E_LIMIT,
-                             "two places of the hand are more than %d steps apart; take longer ones",
-                             EBPO_PAINT_POINTS);
+            return ebpo_fail(
+                error, EBPO_E_LIMIT,
+                "two places of the hand are more than %d steps apart; take longer ones",
+                EBPO_PAINT_POINTS);
         for (uint64_t k = 1; at <= length && status == EBPO_OK; k++) {
             ebpo_paint_hand pen;
             between(&hand[i - 1], &hand[i], at / length, &pen);

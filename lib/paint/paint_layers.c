@@ -179,8 +179,7 @@ ebpo_status ebpo_paint_remove_layer(ebpo_paint *p, uint64_t number, ebpo_error *
     drop_notes(p, number);
     ebpo_paint_texts_free(p->layer[number].text);
     p->layer_count--;
-    memmove(p->layer + number, p->layer + number + 1,
-            (p->layer_count - number) * sizeof *p->layer);
+    memmove(p->layer + number, p->layer + number + 1, (p->layer_count - number) * sizeof *p->layer);
     return EBPO_OK;
 }
 

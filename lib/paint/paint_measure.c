@@ -66,8 +66,8 @@ static ebpo_status find_hits(measure *m, ebpo_context *context, ebpo_error *erro
         for (uint32_t i = 0; i < p->stroke[s].count && status == EBPO_OK; i++) {
             bool here;
             uint64_t point = p->stroke[s].first + i;
-            if (point % 256 == 0 && !ebpo_progress_step(&m->options->progress, "reach", point,
-                                                        p->point_count, error))
+            if (point % 256 == 0 &&
+                !ebpo_progress_step(&m->options->progress, "reach", point, p->point_count, error))
                 status = EBPO_E_CANCELLED;
             if (status == EBPO_OK)
                 status = ebpo_paint_reach(&reach, p, s, i, &here, error);
@@ -138,8 +138,7 @@ static ebpo_status find_colours(measure *m, ebpo_error *error)
     m->keys.colours = kept;
     for (uint64_t i = 0; i < p->stroke_count; i++) {
         ebpo_paint_colour_area key = colour_of(&p->stroke[i]);
-        const ebpo_paint_colour_area *found =
-            bsearch(&key, m->colour, kept, sizeof key, by_colour);
+        const ebpo_paint_colour_area *found = bsearch(&key, m->colour, kept, sizeof key, by_colour);
         m->keys.colour[i] = found ? (uint32_t)(found - m->colour) : 0;
     }
     return EBPO_OK;
@@ -259,8 +258,8 @@ ebpo_status ebpo_paint_measure(const ebpo_paint *p, ebpo_context *context,
     if (status == EBPO_OK)
         status = EBPO_CHECK_SIZED(ebpo_paint_areas, out, error);
     if (status == EBPO_OK && (wanted.fineness < 1 || wanted.fineness > FINENESS_MOST))
-        status = ebpo_fail(error, EBPO_E_ARGUMENT, "the fineness of areas is 1 to %d",
-                           FINENESS_MOST);
+        status =
+            ebpo_fail(error, EBPO_E_ARGUMENT, "the fineness of areas is 1 to %d", FINENESS_MOST);
     if (status == EBPO_OK)
         status = ebpo_paint_check_context(p, context, error);
     if (status == EBPO_OK)

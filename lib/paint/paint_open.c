@@ -50,8 +50,8 @@ static ebpo_status get_text(reader *r, ebpo_head_object object, const char *path
     return status;
 }
 
-static ebpo_status get_count(reader *r, ebpo_head_object object, const char *path,
-                             const char *name, uint64_t most, uint64_t *out, ebpo_error *error)
+static ebpo_status get_count(reader *r, ebpo_head_object object, const char *path, const char *name,
+                             uint64_t most, uint64_t *out, ebpo_error *error)
 {
     char what[96];
     ebpo_status status = ebpo_head_get_count(&r->head, object, path, name, out, error);
@@ -71,8 +71,7 @@ static ebpo_status judge(reader *r, ebpo_head_object root, ebpo_error *error)
     ebpo_status status =
         ebpo_head_get_text(&r->head, root, "/", "format", format, sizeof format, error);
     if (status != EBPO_OK || strcmp(format, EBPO_PAINT_FORMAT) != 0)
-        return ebpo_fail_file(error, EBPO_E_FORMAT, r->input.shown,
-                              "this is not a paint file%s",
+        return ebpo_fail_file(error, EBPO_E_FORMAT, r->input.shown, "this is not a paint file%s",
                               status == EBPO_OK && strcmp(format, "EBP-Octree in HDF5") == 0
                                   ? " but a model; paint files mostly end in .paint.h5"
                                   : "; name a .paint.h5 file");
@@ -127,8 +126,8 @@ static ebpo_status read_texts(reader *r, ebpo_head_object group, const char *pat
                               ebpo_error *error)
 {
     for (int i = 0; i < EBPO_PAINT_TEXTS; i++) {
-        ebpo_status status = get_text(r, group, path, kinds[i].name, true, r->text,
-                                      kinds[i].most + 1, error);
+        ebpo_status status =
+            get_text(r, group, path, kinds[i].name, true, r->text, kinds[i].most + 1, error);
         if (status != EBPO_OK)
             return status;
         r->text_bytes += strlen(r->text);
@@ -251,8 +250,8 @@ static ebpo_status find_column(reader *r, const ebpo_paint_column *c, uint64_t r
         *place = chunks[0];
     free(chunks);
     if (!same)
-        return wrong(r, c->path, "the array has not the type, shape and filter that the format fixes",
-                     error);
+        return wrong(r, c->path,
+                     "the array has not the type, shape and filter that the format fixes", error);
     return place->bytes == rows * ebpo_shape_row_bytes(&expected) + 4
                ? EBPO_OK
                : wrong(r, c->path, "the chunk has not as many bytes as its rows", error);

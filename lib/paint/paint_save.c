@@ -35,11 +35,9 @@ static ebpo_status put_root(ebpo_h5_out *out, const ebpo_paint *p, ebpo_error *e
     for (size_t i = 0; i < sizeof texts / sizeof *texts && status == EBPO_OK; i++)
         status = ebpo_h5_put_text(out, root, texts[i][0], texts[i][1], error);
     if (status == EBPO_OK)
-        status =
-            ebpo_h5_put_int(out, root, "format_version_major", EBPO_PAINT_FORMAT_MAJOR, error);
+        status = ebpo_h5_put_int(out, root, "format_version_major", EBPO_PAINT_FORMAT_MAJOR, error);
     if (status == EBPO_OK)
-        status =
-            ebpo_h5_put_int(out, root, "format_version_minor", EBPO_PAINT_FORMAT_MINOR, error);
+        status = ebpo_h5_put_int(out, root, "format_version_minor", EBPO_PAINT_FORMAT_MINOR, error);
     for (size_t i = 0; i < sizeof counts / sizeof *counts && status == EBPO_OK; i++)
         status = ebpo_h5_put_count(out, root, counts[i].name, counts[i].count, error);
     ebpo_h5_close_id(out, root);
@@ -165,8 +163,8 @@ ebpo_status ebpo_paint_save(const ebpo_paint *p, const char *path, ebpo_error *e
     ebpo_h5_out out = EBPO_H5_OUT_INIT;
     ebpo_status status = ebpo_publish_begin(&publish, path, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_create(&out, ebpo_publish_path(&publish), path, head_bytes(p), LINKS,
-                                error);
+        status =
+            ebpo_h5_create(&out, ebpo_publish_path(&publish), path, head_bytes(p), LINKS, error);
     if (status == EBPO_OK)
         status = put_all(&out, p, error);
     if (status == EBPO_OK)

@@ -18,8 +18,7 @@ void ebpo_reach_begin(ebpo_reach *r, ebpo_context *context)
 {
     const double *size = context->model->info->box_size;
     *r = (ebpo_reach){ .context = context };
-    r->tolerance =
-        sqrt((size[0] * size[0] + size[1] * size[1]) + size[2] * size[2]) * 0x1p-20;
+    r->tolerance = sqrt((size[0] * size[0] + size[1] * size[1]) + size[2] * size[2]) * 0x1p-20;
 }
 
 void ebpo_reach_end(ebpo_reach *r)
@@ -187,8 +186,7 @@ static void join_at_edges(ebpo_reach *r, const ebpo_reach_ball *ball)
     for (uint64_t i = 0; i < 3 * r->count; i++) {
         const ebpo_reach_face *f = &r->face[i / 3];
         uint64_t k = i % 3, next = (k + 1) % 3;
-        if (f->within[k] || f->within[next] ||
-            !segment_within(ball, f->corner[k], f->corner[next]))
+        if (f->within[k] || f->within[next] || !segment_within(ball, f->corner[k], f->corner[next]))
             continue;
         ebpo_reach_edge e = { f->at[k], f->at[next] };
         if (e.a > e.b)

@@ -123,10 +123,7 @@ static int check(const paint_values *v)
     return code == EXIT_FINE ? check_texts(v) : code;
 }
 
-static bool needs_model(const paint_values *v)
-{
-    return v->path || v->note || v->bake || v->area;
-}
+static bool needs_model(const paint_values *v) { return v->path || v->note || v->bake || v->area; }
 
 static int overwrites(const paint_job *j)
 {

@@ -107,8 +107,7 @@ static ebpo_status add_note(paint_job *j, ebpo_error *error)
 
 /* --- strokes --- */
 
-static ebpo_status lay(paint_job *j, const ebpo_paint_hand *hand, uint64_t count,
-                       ebpo_error *error)
+static ebpo_status lay(paint_job *j, const ebpo_paint_hand *hand, uint64_t count, ebpo_error *error)
 {
     const paint_values *v = j->v;
     ebpo_paint_pen pen = EBPO_PAINT_PEN_INIT;
@@ -169,9 +168,8 @@ ebpo_status paint_change(paint_job *j, const ebpo_paint_hand *hand, uint64_t cou
         status = lay(j, hand, count, error);
     if (status == EBPO_OK && v->note)
         status = add_note(j, error);
-    return status == EBPO_OK
-               ? ebpo_paint_save(j->paint, v->out ? v->out : j->paint_path, error)
-               : status;
+    return status == EBPO_OK ? ebpo_paint_save(j->paint, v->out ? v->out : j->paint_path, error)
+                             : status;
 }
 
 /* --- baking --- */

@@ -161,10 +161,10 @@ typedef struct ebpo_paint_layer {
     uint64_t visible;
 } ebpo_paint_layer;
 
-#define EBPO_PAINT_LAYER_INIT                                                              \
-    {                                                                                      \
-        sizeof(ebpo_paint_layer), (const char *)0, (const char *)0, (const char *)0,       \
-            (const char *)0, 0xd62728ff, 255, 1                                            \
+#define EBPO_PAINT_LAYER_INIT                                                        \
+    {                                                                                \
+        sizeof(ebpo_paint_layer), (const char *)0, (const char *)0, (const char *)0, \
+            (const char *)0, 0xd62728ff, 255, 1                                      \
     }
 
 /*
@@ -398,10 +398,10 @@ typedef struct ebpo_paint_pen {
     uint64_t time;
 } ebpo_paint_pen;
 
-#define EBPO_PAINT_PEN_INIT                                                             \
-    {                                                                                   \
+#define EBPO_PAINT_PEN_INIT                                                            \
+    {                                                                                  \
         sizeof(ebpo_paint_pen), 0, EBPO_PAINT_PAINTS, 0xd62728ff, 0, 0, 1, 0, 1, 1, 0, \
-            __builtin_inf(), 1, 0                                                       \
+            __builtin_inf(), 1, 0                                                      \
     }
 
 typedef struct ebpo_paint_laid {
