@@ -1,5 +1,6 @@
-/* Fuzz target: any bytes as a paint file. What comes out keeps every limit that format-spec/paint.md
- * states, and can be changed and taken apart. Tests build it twice, as fuzz_head.c. */
+/* Fuzz target: any bytes as a paint file. What comes out keeps every limit that
+ * format-spec/paint.md states, and can be changed and taken apart. Tests build it twice, as
+ * fuzz_head.c. */
 #include "fuzz_kit.h"
 
 #include <math.h>
@@ -64,7 +65,8 @@ static void take_apart(ebpo_paint *paint, const ebpo_paint_info *info)
 {
     ebpo_paint_info now = EBPO_PAINT_INFO_INIT;
     for (uint64_t i = 0; i < info->stroke_count && i < 4; i++)
-        fuzz_must(ebpo_paint_remove_stroke(paint, (info->stroke_count - 1 - i) / 2, NULL) == EBPO_OK);
+        fuzz_must(ebpo_paint_remove_stroke(paint, (info->stroke_count - 1 - i) / 2, NULL) ==
+                  EBPO_OK);
     for (uint64_t i = info->layer_count; i-- > 0;)
         fuzz_must(ebpo_paint_remove_layer(paint, i, NULL) == EBPO_OK);
     fuzz_must(ebpo_paint_get_info(paint, &now) == EBPO_OK);

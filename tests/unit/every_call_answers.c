@@ -553,7 +553,8 @@ static ebpo_status call_paint(every_call_env *e)
     if (status == EBPO_OK)
         status = keep_paint(paint, e->error);
     ebpo_paint_free(paint);
-    if (status == EBPO_OK && ebpo_paint_open_memory(none, sizeof none, NULL, &paint, NULL) == EBPO_OK)
+    if (status == EBPO_OK &&
+        ebpo_paint_open_memory(none, sizeof none, NULL, &paint, NULL) == EBPO_OK)
         abort();
     ebpo_context_free(context);
     ebpo_model_free(model);

@@ -26,8 +26,7 @@ static opened open_model(ebpo_mesh mesh, int cut_level)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    ebpo_tree tree =
-        model_build_parts(mesh, 8, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS);
+    ebpo_tree tree = model_build_parts(mesh, 8, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS);
     opened o = { NULL, NULL, NULL, NULL };
     model_write(&tree, scratch("m.ebpo.h5"), NULL);
     o.file = model_open(scratch("m.ebpo.h5"));
@@ -292,8 +291,8 @@ static sides sides_of(const opened *o, uint64_t stroke)
 START_TEST(the_other_side_of_a_thin_wall_stays_clean)
 {
     for (int cut = -1; cut <= 1; cut += 2) {
-        opened o = open_model(
-            ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 2, 2, 0.1 }, 20), cut);
+        opened o =
+            open_model(ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 2, 2, 0.1 }, 20), cut);
         add_dab(&o, 0, 0xff0000ff, 0.4, 1, 1, 0.2);
         add_dab(&o, 0, 0xff0000ff, 0.4, 1, 0.1, 0.2);
         add_dab(&o, 0, 0xff0000ff, 0.4, 1, 1, -0.2);
