@@ -161,10 +161,9 @@ typedef struct ebpo_paint_layer {
     uint64_t visible;
 } ebpo_paint_layer;
 
-#define EBPO_PAINT_LAYER_INIT                                                        \
-    {                                                                                \
-        sizeof(ebpo_paint_layer), (const char *)0, (const char *)0, (const char *)0, \
-            (const char *)0, 0xd62728ff, 255, 1                                      \
+#define EBPO_PAINT_LAYER_INIT                                                \
+    {                                                                        \
+        sizeof(ebpo_paint_layer), NULL, NULL, NULL, NULL, 0xd62728ff, 255, 1 \
     }
 
 /*
