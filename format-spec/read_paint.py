@@ -60,7 +60,8 @@ def text(group, name, most, required=True):
 def number(group, name, dtype, least, most, shape=()):
     must(name in group.attrs, f"{group.name}: {name} is missing")
     a = h5py.h5a.open(group.id, name.encode())
-    must(a.dtype == np.dtype(dtype) and int(np.prod(a.shape)) == max(1, int(np.prod(shape))), f"{group.name}: {name} is of another type")
+    count = int(np.prod(shape)) if shape else 1
+    must(a.dtype == np.dtype(dtype) and int(np.prod(a.shape)) == count, f"{group.name}: {name} is of another type")
     value = np.zeros(a.shape, a.dtype)
     a.read(value)
     must(bool(np.all((value >= least) & (value <= most))), f"{group.name}: {name} is out of range")
@@ -85,7 +86,8 @@ def array(file, path, dtype, cols, rows):
     shape = (rows, cols) if cols else (rows,)
     must(a.shape == a.maxshape == shape, f"{path} has another shape")
     made = a.id.get_create_plist()
-    must(a.chunks == shape and made.get_nfilters() == 1 and made.get_filter(0)[0] == h5py.h5z.FILTER_FLETCHER32, f"{path}: chunks or filters")
+    must(a.chunks == shape, f"{path} is not one chunk")
+    must(made.get_nfilters() == 1 and made.get_filter(0)[0] == h5py.h5z.FILTER_FLETCHER32, f"{path} has other filters")
     must(a.id.get_num_chunks() == 1 and a.id.get_chunk_info(0).filter_mask == 0, f"{path}: a chunk is missing")
     try:
         return a[...]

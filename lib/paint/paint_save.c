@@ -1,4 +1,6 @@
 /* Writing paint files: format-spec/paint.md. */
+#include "geom/strict_fp.h"
+
 #include <ebpo/paint.h>
 
 #include <inttypes.h>

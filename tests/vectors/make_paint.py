@@ -48,8 +48,8 @@ def with_note():
     f["attributes"].update(layer_count=2, note_count=1, stroke_count=3, point_count=4, model_name="two_levels.ebpo.h5", unit="mm")
     f["groups"]["layers"]["groups"]["0001"] = layer(title="Retuschen \u2014 \u4fee\u5fa9", author="A. B.", date="2026-11-26", opacity=128,
                                                     visible=0, description="one\u2028two", colour=0)
-    f["groups"]["notes"] = {"groups": {"0000": note(title="Here", body="First line\u2028second line", layer=1, face=2, weights=[5.0, 2.0 ** 30 - 5],
-                                                    place=[0.25, 0.0, -0.0], date="2026-11-26T21:43:05Z")}}
+    f["groups"]["notes"] = {"groups": {"0000": note(title="Here", body="First line\u2028second line", layer=1, face=2,
+                                                    weights=[5.0, 2.0 ** 30 - 5], place=[0.25, 0.0, -0.0], date="2026-11-26T21:43:05Z")}}
     f["groups"]["strokes"]["arrays"] = {
         "layer": Array("u4", [1, 0, 1]), "kind": Array("u4", [0, 1, 0]),
         "colour": Array("u1", [[0, 0, 0, 0], [0, 0, 0, 0], [1, 2, 3, 4]]), "radius": Array("f8", [2.0 ** -200, 1e-3, 2.0 ** 200]),
@@ -192,7 +192,8 @@ def expected(f):
         s = {name: part.rows for name, part in g["strokes"]["arrays"].items()}
         p = {name: part.rows for name, part in g["points"]["arrays"].items()}
         for i, count in enumerate(s["points"]):
-            points = [{name: p[name][k] for name in ("face", "weights", "place", "size", "pressure", "time")} for k in range(at, at + count)]
+            names = ("face", "weights", "place", "size", "pressure", "time")
+            points = [{name: p[name][k] for name in names} for k in range(at, at + count)]
             strokes.append({"layer": s["layer"][i], "kind": ["paints", "erases"][s["kind"][i]], "radius": s["radius"][i],
                             "colour": "#" + "".join(f"{v:02x}" for v in s["colour"][i]), "time": s["time"][i], "points": points})
             at += count
