@@ -2,6 +2,7 @@
 """What `ebpo paint` reads and bakes, against the second reader (format-spec/read_paint.py):
 
 paint_reads.py vectors           all of format-spec/vectors/paint, read and refused
+paint_reads.py areas PAINT MODEL    each layer's area against points strewn over faces
 paint_reads.py baked PAINT MODEL PLY [GLB]    MODEL: without filters of one's own (convert --codec deflate)
 
 Baked colours are compared bit for bit with those that the reader finds by going from face to face, and
@@ -73,14 +74,12 @@ def linear(c):
     return int(65535 * (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4) + 0.5)
 
 
-def baked(paint_path, model, out, glb=None):
+def read_both(paint_path, model):
+    """The paint, whose points get the rows of their faces, and the model's vertices, faces, numbers of vertices."""
     import h5py
     import numpy as np
     import read_ebpo
     import read_paint
-    subprocess.run(["ebpo", "extract", "-q", "--mesh", model, "own.ply"], check=True, stderr=subprocess.DEVNULL)
-    own, own_rest = ply("own.ply")
-    got, rest = ply(out)
     paint = read_paint.read(paint_path)
     with h5py.File(model, "r") as file:
         faces = read_ebpo.faces(file["/mesh/faces"]).reshape(-1, 3).tolist()
@@ -91,6 +90,54 @@ def baked(paint_path, model, out, glb=None):
     for stroke in paint["strokes"]:
         for point in stroke["points"]:
             point["row"] = rows.get(point["face"])
+    return paint, vertices, faces, source
+
+
+def middles(corners, n):
+    """The middles of the n^2 equal parts of a triangle."""
+    a, b, c = corners
+    for i in range(n):
+        for k in range(2 * (n - i) - 1):
+            u, v = ((i + 1 / 3, k // 2 + 1 / 3) if k % 2 == 0 else (i + 2 / 3, k // 2 + 2 / 3))
+            yield [a[x] + (b[x] - a[x]) * u / n + (c[x] - a[x]) * v / n for x in range(3)]
+
+
+def areas(paint_path, model, n=24):
+    import numpy as np
+    import read_paint
+    told = json.loads(subprocess.run(["ebpo", "paint", "--json", "--area", paint_path, model], capture_output=True, check=True).stdout)["areas"]
+    paint, vertices, faces, _ = read_both(paint_path, model)
+    by_corner = {}
+    for i, face in enumerate(faces):
+        for v in face:
+            by_corner.setdefault(tuple(vertices[v]), []).append(i)
+    reached, wrong = {}, []
+    for i, stroke in enumerate(paint["strokes"]):
+        for point in stroke["points"]:
+            found, p, square = read_paint.reach(point, stroke["radius"], vertices, faces, by_corner)
+            for face in found:
+                reached.setdefault(face, {}).setdefault(stroke["layer"], []).append((i, p, square))
+    sums = [0.0] * len(paint["layers"])
+    for face, layers in reached.items():
+        corners = [vertices[v] for v in faces[face]]
+        part = float(np.linalg.norm(np.cross(np.subtract(corners[1], corners[0]), np.subtract(corners[2], corners[0])))) / 2 / n ** 2
+        for q in middles(corners, n):
+            for layer, balls in layers.items():
+                last = max((i for i, p, square in balls if read_paint.within(p, square, q)), default=None)
+                sums[layer] += part if last is not None and paint["strokes"][last]["kind"] == "paints" else 0
+    for layer, (found, one) in enumerate(zip(sums, told["layers"])):
+        if abs(found - one["area"]) > 2e-3 * found or not one["lo"] <= one["area"] <= one["hi"] < 1.02 * one["lo"]:
+            wrong.append(f"layer {layer}: {found}, told {one}")
+    return wrong
+
+
+def baked(paint_path, model, out, glb=None):
+    import numpy as np
+    import read_paint
+    subprocess.run(["ebpo", "extract", "-q", "--mesh", model, "own.ply"], check=True, stderr=subprocess.DEVNULL)
+    own, own_rest = ply("own.ply")
+    got, rest = ply(out)
+    paint, vertices, faces, source = read_both(paint_path, model)
     place = np.argsort(np.argsort(source))
     names = ("red", "green", "blue")
     base = np.stack([own[n] for n in names], axis=1) if "red" in own.dtype.names else np.full((len(own), 3), 230)
@@ -111,7 +158,7 @@ def baked(paint_path, model, out, glb=None):
 
 
 def main(words):
-    wrong = vectors() if words[0] == "vectors" else baked(*words[1:])
+    wrong = {"vectors": vectors, "areas": areas, "baked": baked}[words[0]](*words[1:])
     print("\n".join(wrong) or "fine")
 
 

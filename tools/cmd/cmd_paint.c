@@ -198,9 +198,11 @@ static int run_job(paint_job *j, const ebpo_paint_hand *hand, uint64_t count, ui
         status = open_paint(j, &error);
     if (status != EBPO_OK)
         return command_failed("paint", &error);
-    if (j->file && ebpo_paint_check_model(j->paint, j->file, &error) != EBPO_OK) {
-        (void)command_failed("paint", &error);
-        return EXIT_DIFFERS;
+    if (j->file)
+        status = ebpo_paint_check_model(j->paint, j->file, &error);
+    if (status != EBPO_OK) {
+        int code = command_failed("paint", &error);
+        return status == EBPO_E_ARGUMENT ? EXIT_DIFFERS : code;
     }
     status = work(j, hand, count, memory, &error);
     progress_wipe(&line);
