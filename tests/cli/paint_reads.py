@@ -105,7 +105,8 @@ def middles(corners, n):
 def areas(paint_path, model, n=24):
     import numpy as np
     import read_paint
-    told = json.loads(subprocess.run(["ebpo", "paint", "--json", "--area", paint_path, model], capture_output=True, check=True).stdout)["areas"]
+    done = subprocess.run(["ebpo", "paint", "--json", "--area", paint_path, model], capture_output=True, check=True)
+    told = json.loads(done.stdout)["areas"]
     paint, vertices, faces, _ = read_both(paint_path, model)
     by_corner = {}
     for i, face in enumerate(faces):
