@@ -223,6 +223,14 @@ static double longest_edge(const triangle *t, int *which)
     return sqrt(longest);
 }
 
+/* The middle of an edge; false: it is one of its ends, as doubles are no finer. */
+static bool find_middle(const double a[3], const double b[3], double middle[3])
+{
+    for (int i = 0; i < 3; i++)
+        middle[i] = a[i] + (b[i] - a[i]) / 2;
+    return memcmp(middle, a, 3 * sizeof *a) != 0 && memcmp(middle, b, 3 * sizeof *b) != 0;
+}
+
 /* Balls are at [from, from + count); deeper parts use what is behind. */
 static bool cut(ebpo_area_cut *c, const triangle *t, uint64_t from, uint64_t count, int depth)
 {
@@ -233,16 +241,14 @@ static bool cut(ebpo_area_cut *c, const triangle *t, uint64_t from, uint64_t cou
     uint64_t kept = sift(c, t, from, count, &sure), at = from + count;
     if (kept == 0)
         return true;
-    if (sure || depth == DEEPEST ||
-        longest_edge(t, &edge) * c->fineness <= least_radius(c, at, kept)) {
+    double longest = longest_edge(t, &edge), middle[3];
+    const double *a = t->p[edge], *b = t->p[(edge + 1) % 3];
+    if (sure || depth == DEEPEST || longest * c->fineness <= least_radius(c, at, kept) ||
+        !find_middle(a, b, middle)) {
         account(c, t, at, kept);
         return true;
     }
     triangle half = *t;
-    const double *a = t->p[edge], *b = t->p[(edge + 1) % 3];
-    double middle[3];
-    for (int i = 0; i < 3; i++)
-        middle[i] = a[i] + (b[i] - a[i]) / 2;
     half.area = t->area / 2;
     memcpy(half.p[edge], middle, sizeof middle);
     if (!cut(c, &half, at, kept, depth + 1))

@@ -12,6 +12,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/parallel.h"
 #include "base/random.h"
 #include "base/sized.h"
 #include "paint/paint_parts.h"
@@ -304,6 +305,8 @@ static ebpo_status go(lay *l, const ebpo_paint_hand *hand, uint64_t count, ebpo_
     ebpo_status status = make_step(l, &hand[0], error);
     for (uint64_t i = 1; i < count && status == EBPO_OK; i++) {
         double length = length_between(&hand[i - 1], &hand[i]), at = ahead;
+        if (i % 64 == 1 && !ebpo_progress_step(&l->pen.progress, "lay", i, count, error))
+            return EBPO_E_CANCELLED;
         if (!(length / step <= EBPO_PAINT_POINTS))
             return ebpo_fail(
                 error, EBPO_E_LIMIT,

@@ -368,6 +368,22 @@ START_TEST(areas_are_those_of_discs)
 }
 END_TEST
 
+/* Balls that are smaller than what doubles can tell apart there; large ones beside them. */
+START_TEST(the_smallest_balls_come_to_an_end)
+{
+    opened o = open_model(ebpo_test_sheet(8, 3), -1);
+    for (int i = 0; i < 20; i++)
+        add_dab(&o, 0, 0xff0000ffu + ((uint32_t)i << 8), ldexp(1, -10 * i), 4.1 + 1e-15 * i, 3.9,
+                0);
+    add_dab(&o, 0, 0x00ff00ff, 0x1p-200, 4, 4, 0);
+    add_dab(&o, 0, 0, 0x1p-60, 4.1, 3.9, 0);
+    ebpo_paint_areas areas = measured(&o, 4096, 0);
+    ck_assert(areas.all.hi > areas.all.lo && fabs(areas.all.value - PI) < 1e-4);
+    ebpo_paint_areas_free(&areas);
+    close_model(&o);
+}
+END_TEST
+
 /* All of a sphere, and a cap of it: the area of a cap within a chord r is pi r^2. */
 START_TEST(areas_follow_the_surface)
 {
@@ -526,6 +542,7 @@ Suite *test_suite(void)
     tcase_add_test(c, the_other_side_of_a_thin_wall_stays_clean);
     tcase_add_test(c, faces_are_joined_across_edges_whose_ends_are_far);
     tcase_add_test(c, areas_are_those_of_discs);
+    tcase_add_test(c, the_smallest_balls_come_to_an_end);
     tcase_add_test(c, areas_follow_the_surface);
     tcase_add_test(c, the_more_pressure_the_more_points);
     tcase_add_test(c, a_pen_that_makes_no_sense_lays_nothing);

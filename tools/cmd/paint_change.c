@@ -127,6 +127,7 @@ static ebpo_status lay(paint_job *j, const ebpo_paint_hand *hand, uint64_t count
     pen.step = v->step;
     pen.within = v->within;
     pen.seed = (uint64_t)v->seed;
+    pen.progress = j->progress;
     status = ebpo_paint_lay(j->paint, j->context, hand, count, &pen, &j->laid, error);
     return status != EBPO_OK || j->laid.points
                ? status

@@ -395,12 +395,17 @@ typedef struct ebpo_paint_pen {
 
     /* As of strokes. */
     uint64_t time;
+
+    ebpo_progress progress;
 } ebpo_paint_pen;
 
 #define EBPO_PAINT_PEN_INIT                                                            \
     {                                                                                  \
         sizeof(ebpo_paint_pen), 0, EBPO_PAINT_PAINTS, 0xd62728ff, 0, 0, 1, 0, 1, 1, 0, \
-            __builtin_inf(), 1, 0                                                      \
+            __builtin_inf(), 1, 0,                                                     \
+        {                                                                              \
+            NULL, NULL                                                                 \
+        }                                                                              \
     }
 
 typedef struct ebpo_paint_laid {
@@ -425,7 +430,8 @@ typedef struct ebpo_paint_laid {
  * laid      what was done; or NULL
  *
  * On failure no stroke is added. EBPO_E_ARGUMENT: something is not as said above, or the model is
- * another one. EBPO_E_ABSENT, EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading.
+ * another one. EBPO_E_ABSENT, EBPO_E_CANCELLED, EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of
+ * reading.
  *
  * Threads: one per paint, one per context.
  */
@@ -533,7 +539,7 @@ typedef struct ebpo_paint_baked {
  * the source have gaps 4 for each face.
  *
  * Errors are those of ebpo_paint_cover; EBPO_E_ARGUMENT also where the mesh is another one;
- * EBPO_E_CANCELLED, with some colours changed.
+ * EBPO_E_CANCELLED. On failure the colours are as they were.
  *
  * Threads: one per context.
  */
@@ -545,7 +551,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_bake(const ebpo_paint *paint, ebpo
 /*
  * Gives a mesh's vertices these colours where they differ from those that it has
  * (ebpo_mesh_colours): in the properties red, green and blue (or diffuse_red and so on), which
- * keep their types. A mesh without them gets them, as uint8, of all vertices. All else stays.
+ * keep their types (of which int8 holds no more than 127). A mesh without them gets them, as uint8,
+ * of all vertices. All else stays.
  *
  * rgba   [vertex_count][4]; alpha is not looked at
  *
