@@ -33,11 +33,25 @@ int ebpo_block_level(const ebpo_export_options *o, int i)
                : -1;
 }
 
+/* Those that the caller gave, in place of the mesh's own. */
+static ebpo_status take_colours(ebpo_block *out, const uint8_t *rgba, ebpo_error *error)
+{
+    uint64_t bytes = 4 * out->mesh.vertex_count;
+    uint8_t *copy = ebpo_alloc(bytes, 1);
+    if (!copy)
+        return ebpo_fail_memory(error, bytes);
+    memcpy(copy, rgba, bytes);
+    free(out->colours.vertex);
+    out->colours.vertex = copy;
+    out->colours.by_face = 0;
+    return EBPO_OK;
+}
+
 static ebpo_status read_mesh(ebpo_block *out, const ebpo_file *file, ebpo_block_order order,
-                             unsigned threads, ebpo_error *error)
+                             const ebpo_export_options *options, ebpo_error *error)
 {
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
-    read.threads = threads;
+    read.threads = options->threads;
     read.attributes = 1;
     snprintf(out->name, sizeof out->name, "mesh");
     ebpo_status status = order == EBPO_SOURCE_ORDER
@@ -45,6 +59,8 @@ static ebpo_status read_mesh(ebpo_block *out, const ebpo_file *file, ebpo_block_
                              : ebpo_file_read_mesh(file, &read, &out->mesh, error);
     if (status == EBPO_OK)
         status = ebpo_mesh_colours(&out->mesh, &out->colours, error);
+    if (status == EBPO_OK && options->vertex_colours)
+        status = take_colours(out, options->vertex_colours, error);
     ebpo_attributes_free(out->mesh.attributes); /* other ones are not exported */
     out->mesh.attributes = NULL;
     if (status == EBPO_OK && order == EBPO_FILE_ORDER &&
@@ -59,7 +75,7 @@ ebpo_status ebpo_block_read(ebpo_block *out, const ebpo_file *file, int level,
 {
     *out = (ebpo_block){ .level = level };
     if (level < 0)
-        return read_mesh(out, file, order, options->threads, error);
+        return read_mesh(out, file, order, options, error);
     ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
     lod.threads = options->threads;
     lod.progress = options->progress;

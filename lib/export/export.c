@@ -47,6 +47,10 @@ static ebpo_status check(const ebpo_info *info, ebpo_export_format format,
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "there is no level %d; this file has levels 0 to %d", asked,
                          info->level_count - 1);
+    if (o->vertex_colours && (!o->mesh || (format != EBPO_EXPORT_GLTF &&
+                                           format != EBPO_EXPORT_GLB && format != EBPO_EXPORT_OBJ)))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "colours can be given to the mesh in glTF, GLB and OBJ only");
     if (format == EBPO_EXPORT_STL && blocks > 1)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "an STL file holds one thing: one level, or the mesh");

@@ -452,6 +452,122 @@ static ebpo_status touch(ebpo_model *model, ebpo_error *error)
     return status;
 }
 
+static bool take_painted(void *user, const ebpo_paint_face *face)
+{
+    (void)user;
+    return face->file_face != 1;
+}
+
+/* A paint's strokes on the model, asked about. */
+static ebpo_status ask_paint(ebpo_paint *paint, ebpo_context *context, ebpo_error *error)
+{
+    const ebpo_paint_hand hand[2] = { { { 3, 0, 1 }, 1, 0 }, { { 3, 0.5, 1 }, 0.5, 10 } };
+    ebpo_paint_pen pen = EBPO_PAINT_PEN_INIT;
+    ebpo_paint_laid laid = EBPO_PAINT_LAID_INIT;
+    ebpo_paint_areas areas = EBPO_PAINT_AREAS_INIT;
+    ebpo_paint_options options = EBPO_PAINT_OPTIONS_INIT;
+    ebpo_paint_note note = EBPO_PAINT_NOTE_INIT;
+    uint64_t elsewhere;
+    pen.radius = 0.3;
+    pen.spread = 0.4;
+    pen.density = 3;
+    options.fineness = 8;
+    options.threads = 1;
+    ebpo_status status = ebpo_paint_lay(paint, context, hand, 2, &pen, &laid, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_cover(paint, context, 0, take_painted, NULL, &elsewhere, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_measure(paint, context, &options, &areas, error);
+    if (status == EBPO_OK)
+        ebpo_paint_areas_free(&areas);
+    if (status == EBPO_OK)
+        status = ebpo_paint_place(paint, context, hand[0].place, &note.at, error);
+    note.body = "here";
+    return status == EBPO_OK ? ebpo_paint_add_note(paint, &note, error) : status;
+}
+
+static ebpo_status bake_paint(const ebpo_paint *paint, const ebpo_file *file, ebpo_context *context,
+                              ebpo_error *error)
+{
+    ebpo_paint_baked baked = EBPO_PAINT_BAKED_INIT;
+    ebpo_mesh mesh;
+    ebpo_status status = ebpo_file_read_source_mesh(file, NULL, &mesh, NULL, error);
+    if (status != EBPO_OK)
+        return status;
+    uint8_t *rgba = calloc(mesh.vertex_count, 4);
+    if (rgba)
+        status = ebpo_paint_bake(paint, context, &mesh, NULL, rgba, &baked, error);
+    if (rgba && status == EBPO_OK)
+        status = ebpo_paint_dye_mesh(&mesh, rgba, error);
+    if (!rgba)
+        *error = (ebpo_error){ .status = status = EBPO_E_MEMORY, .message = "colours" };
+    free(rgba);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+/* Written, read, and taken apart. */
+static ebpo_status keep_paint(ebpo_paint *paint, ebpo_error *error)
+{
+    ebpo_paint *read = NULL;
+    ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
+    ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
+    ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
+    ebpo_paint_note note = EBPO_PAINT_NOTE_INIT;
+    ebpo_status status = ebpo_paint_save(paint, scratch("every.paint.h5"), error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_open(scratch("every.paint.h5"), &read, error);
+    if (status != EBPO_OK)
+        return status;
+    (void)ebpo_paint_get_info(read, &info);
+    (void)ebpo_paint_get_layer(read, 0, &layer);
+    (void)ebpo_paint_get_note(read, 0, &note);
+    (void)ebpo_paint_get_stroke(read, 0, &stroke);
+    status = ebpo_paint_set_layer(read, 0, &layer, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_add_stroke(paint, &stroke, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_remove_stroke(read, 0, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_remove_note(read, 0, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_remove_layer(read, 0, error);
+    ebpo_paint_free(read);
+    return status;
+}
+
+static ebpo_status call_paint(every_call_env *e)
+{
+    static const uint8_t none[8] = { 0 };
+    ebpo_model *model = NULL;
+    ebpo_context *context = NULL;
+    ebpo_paint *paint = NULL;
+    ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
+    opening.threads = 1;
+    ebpo_status status = ebpo_model_new(e->file, &opening, &model, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_context_new(model, &context, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_new(e->file, &paint, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_check_model(paint, e->file, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_add_layer(paint, NULL, NULL, e->error);
+    if (status == EBPO_OK)
+        status = ask_paint(paint, context, e->error);
+    if (status == EBPO_OK)
+        status = bake_paint(paint, e->file, context, e->error);
+    if (status == EBPO_OK)
+        status = keep_paint(paint, e->error);
+    ebpo_paint_free(paint);
+    if (status == EBPO_OK &&
+        ebpo_paint_open_memory(none, sizeof none, NULL, &paint, NULL) == EBPO_OK)
+        abort();
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return status;
+}
+
 static ebpo_status call_touch(every_call_env *e)
 {
     ebpo_model *model;
@@ -855,6 +971,7 @@ const every_call every_call_answers[] = {
     { "budget", call_budget },
     { "map", call_map },
     { "touch", call_touch },
+    { "paint", call_paint },
     { "measure", call_measure },
     { "deviation", call_deviation },
     { "limit", call_limit },

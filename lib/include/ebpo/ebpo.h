@@ -23,6 +23,7 @@
  *   lod.h         a level as closed polygons
  *   map.h         maps of distance: planes, grids, two scans
  *   touch.h       a hand that touches a model, at a steady rate
+ *   paint.h       paint and notes on a model, in a file of their own
  *   export.h      levels and the mesh in other programs' formats
  *   subset.h      a smaller file from a file
  *   verify.h      proving that a file keeps its promises
@@ -57,6 +58,7 @@
 #include <ebpo/export.h>
 #include <ebpo/map.h>
 #include <ebpo/touch.h>
+#include <ebpo/paint.h>
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 #include <ebpo/deviation.h>

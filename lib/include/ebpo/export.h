@@ -70,11 +70,18 @@ typedef struct ebpo_export_options {
     unsigned threads;
 
     ebpo_progress progress;
+
+    /*
+     * glTF and OBJ: colours of the mesh's vertices in place of its own, [vertex_count][4] red,
+     * green, blue and alpha in the order of ebpo_file_read_source_mesh; NULL: its own. With other
+     * formats: EBPO_E_ARGUMENT.
+     */
+    const uint8_t *vertex_colours;
 } ebpo_export_options;
 
-#define EBPO_EXPORT_OPTIONS_INIT                                    \
-    {                                                               \
-        sizeof(ebpo_export_options), 0, -1, true, 0, { NULL, NULL } \
+#define EBPO_EXPORT_OPTIONS_INIT                                          \
+    {                                                                     \
+        sizeof(ebpo_export_options), 0, -1, true, 0, { NULL, NULL }, NULL \
     }
 
 /* A level, or the mesh, as it was written. */

@@ -1,0 +1,79 @@
+/* Which faces a stroke reaches, and which of their corners it covers. */
+#include "geom/strict_fp.h"
+
+#include <ebpo/paint.h>
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "paint/met_faces.h"
+#include "paint/paint_parts.h"
+#include "paint/paint_reach.h"
+
+static int by_file_face(const void *a, const void *b)
+{
+    const ebpo_met_face *x = a, *y = b;
+    return (x->file_face > y->file_face) - (x->file_face < y->file_face);
+}
+
+static ebpo_status add_point(ebpo_met_faces *met, ebpo_reach *reach, ebpo_error *error)
+{
+    for (uint64_t i = 0; i < reach->count; i++) {
+        const ebpo_reach_face *f = &reach->face[i];
+        uint32_t number;
+        ebpo_status status = ebpo_met_faces_add(met, f, &number, error);
+        if (status != EBPO_OK)
+            return status;
+        for (int k = 0; k < 3; k++)
+            met->face[number].covered[k] |= f->within[k];
+    }
+    return EBPO_OK;
+}
+
+static void give(const ebpo_met_faces *met, ebpo_paint_face_fn take, void *user)
+{
+    qsort(met->face, met->count, sizeof *met->face, by_file_face);
+    for (uint64_t i = 0; i < met->count; i++) {
+        const ebpo_met_face *f = &met->face[i];
+        ebpo_paint_face out = { .face = f->face, .file_face = f->file_face };
+        memcpy(out.corner, f->corner, sizeof out.corner);
+        for (int k = 0; k < 3; k++)
+            out.covered[k] = f->covered[k];
+        if (!take(user, &out))
+            return;
+    }
+}
+
+ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_t stroke,
+                             ebpo_paint_face_fn take, void *user, uint64_t *elsewhere,
+                             ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_met_faces met = { 0 };
+    ebpo_reach reach;
+    uint64_t absent = 0;
+    ebpo_status status = ebpo_paint_check_context(p, context, error);
+    if (status == EBPO_OK && stroke >= p->stroke_count)
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "there is no stroke %llu",
+                           (unsigned long long)stroke);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_reach_begin(&reach, context);
+    for (uint32_t i = 0; i < p->stroke[stroke].count && status == EBPO_OK; i++) {
+        bool here;
+        status = ebpo_paint_reach(&reach, p, stroke, i, &here, error);
+        if (status == EBPO_OK && here)
+            status = add_point(&met, &reach, error);
+        absent += status == EBPO_OK && !here;
+    }
+    ebpo_reach_end(&reach);
+    if (status == EBPO_OK && elsewhere)
+        *elsewhere = absent;
+    if (status == EBPO_OK)
+        give(&met, take, user);
+    ebpo_met_faces_free(&met);
+    return status;
+}
