@@ -7,7 +7,7 @@ import { listSamples } from './samples.js';
 import { Scene } from './scene.js';
 import { LEVEL_COLOURS, MESH_COLOUR, TYPE_COLOURS } from './shade.js';
 import { address, atHome, changed, said, shareOf, went, whereTo } from './share.js';
-import { $, count, state, tell, toModel } from './state.js';
+import { $, count, on, state, tell, toModel } from './state.js';
 
 const MORE_MS = 5000; // after the first picture the tools are loaded, or when nothing more comes before
 const TRIANGLES_MOST = 2_000_000; // about; a tile more does no harm
@@ -416,12 +416,15 @@ addEventListener('popstate', (e) => {
     openUrl(what, { step: false });
 });
 
+on('complaint', (message) => showError({ message }));
+
 // --- what comes later: measuring, notes, the pen, sharing ---
 
 let coming;
 function more() {
-  coming ??= import('./more.js').then((m) => m.begin({ scene, worker, ask, cutChanged, changed, address, shownAs, layout }),
+  coming ??= import('./more.js').then((m) => m.begin({ scene, worker, ask, cutChanged, changed, address, shownAs, layout, query: boot.query }),
     (error) => showError({ message: `The page's tools could not be loaded (${error.message}); reload the page` }));
+  return coming;
 }
 
 // --- begin: what an address may say is told in docs/guide/viewer.md ---
@@ -450,3 +453,7 @@ window.ebpoViewer = {
   },
   scene, probeAt, address,
 };
+
+// more.js is bundled apart from this, and must not bring these along a second time.
+export { kit } from './scene.js';
+export * from './state.js';

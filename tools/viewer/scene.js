@@ -211,7 +211,14 @@ export class Scene {
   pick(x, y) {
     const box = this.canvas.getBoundingClientRect(), ray = new THREE.Raycaster();
     ray.setFromCamera(new THREE.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height), this.camera);
-    return pickAlong(ray, this.tiles.meshes, this.cut);
+    const found = pickAlong(ray, this.tiles.meshes, this.cut);
+    this.pickedCut = found?.onCut ?? false; // not on the surface, but where a body is cut
+    return found?.point;
+  }
+
+  /** How many pixels of the page a length of 1 is at a point. */
+  pixelsAt(point) {
+    return this.canvas.clientHeight / (2 * Math.tan(this.camera.fov * Math.PI / 360)) / Math.max(1e-6, this.camera.position.distanceTo(new THREE.Vector3(...point)));
   }
 
   /** Where a point of the scene is on the page: [x, y], or undefined behind the camera. */
@@ -267,7 +274,8 @@ function pickAlong(ray, meshes, cut) {
   for (const hit of ray.intersectObjects(meshes, false)) {
     if (hit.distance < enter || hit.distance > leave)
       continue;
-    return cut && enter > 0 && hit.face.normal.dot(direction) > 0 ? ray.ray.at(enter, new THREE.Vector3()).toArray() : hit.point.toArray();
+    const onCut = Boolean(cut) && enter > 0 && hit.face.normal.dot(direction) > 0;
+    return { onCut, point: (onCut ? ray.ray.at(enter, new THREE.Vector3()) : hit.point).toArray() };
   }
   return undefined;
 }
