@@ -13,20 +13,21 @@ const HTML = `
 const between = (a, b) => Math.hypot(...a.map((x, k) => x - b[k]));
 
 export function addMeasuring(page) {
-  section('Measure', HTML);
-  distances(page);
+  const details = section('Measure', HTML);
+  distances(page, details);
   sections(page);
   on('theme', () => $('sectionAnswer').hidden || drawOutline());
 }
 
 // --- distances ---
 
-function distances({ scene, worker, changed }) {
+function distances({ scene, worker, changed }, details) {
   let shown = [];
   const show = () => {
     shown.forEach((remove) => remove());
     shown = [];
     const points = state.measured ?? [], rows = points.slice(1).map((p, i) => between(points[i], p));
+    details.open ||= points.length > 0;
     $('measureClear').hidden = !points.length;
     $('measures').replaceChildren(...rows.map((d) => make('li', length(d, 6))), ...(rows.length > 1 ? [make('li', `${length(rows.reduce((a, b) => a + b), 6)} in all`, { className: 'sum' })] : []));
     points.forEach((p) => shown.push(mark(svg('circle', { r: 4 }), [toScene(p)], ([[x, y]], element) => {
