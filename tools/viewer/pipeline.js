@@ -1,6 +1,11 @@
 // A picture in two steps: the scene with its depths first, then what is made of these: shading by depth ("eye-dome lighting", Boucheny 2009), and paint.
 const FLOAT = 1015, HALF_FLOAT = 1016; // three.js' constants
-const SAMPLES = 4;
+const SAMPLES = 4; // of a pixel; without a graphics card they would cost most of the time
+
+function isSoftware(gl) {
+  const names = gl.getExtension('WEBGL_debug_renderer_info');
+  return names !== null && /swiftshader|llvmpipe|software/i.test(gl.getParameter(names.UNMASKED_RENDERER_WEBGL));
+}
 
 const VERTEX = 'void main() { gl_Position = vec4(position.xy, 0.0, 1.0); }';
 const FRAGMENT = `
@@ -72,7 +77,8 @@ export class Pipeline {
       return;
     }
     const size = renderer.getDrawingBufferSize(new kit.Vector2());
-    this.target ??= new kit.WebGLRenderTarget(size.x, size.y, { samples: SAMPLES, type: HALF_FLOAT, depthTexture: new kit.DepthTexture(size.x, size.y, FLOAT) });
+    this.samples ??= isSoftware(renderer.getContext()) ? 0 : SAMPLES;
+    this.target ??= new kit.WebGLRenderTarget(size.x, size.y, { samples: this.samples, type: HALF_FLOAT, depthTexture: new kit.DepthTexture(size.x, size.y, FLOAT) });
     const { probe } = scene, marked = probe.visible;
     probe.visible = false; // is drawn over all of it
     renderer.setRenderTarget(this.target);

@@ -3,7 +3,7 @@ import { complain, make, modelName, placesOf, save, section, take, taken } from 
 import { kit } from '../scene.js';
 import { $, length, on, state, tell, toModel, toScene } from '../state.js';
 import { Decals } from './decals.js';
-import { PaintDocument, misfit } from './document.js';
+import { PaintDocument, identityOf, misfit } from './document.js';
 import { MOST, cleanText, readPaint, writePaint } from './paint_file.js';
 import { Stroke } from './stroke.js';
 
@@ -22,7 +22,7 @@ const NARROW = 2e-4, WIDE = 0.1;    // radii of the pen, in halves of the box's 
 const FULL_SIZE = 32768, AT_ONCE = 500, OFF = 2 ** -20; // of the diagonal: how far a point may be from its face
 
 export function addPen({ scene, worker, query }, pipeline) {
-  const decals = pipeline.layers = new Decals(kit), normals = new WeakMap(); // by a point of a document
+  const decals = pipeline.layers = new Decals(kit), docs = new Map(), normals = new WeakMap(); // by a model's digest; by a point of a document
   let doc, layer = 0, stroke, pending = 0, details, asked = 0;
   const colour = () => [1, 3, 5].map((i) => parseInt($('penColour').value.slice(i, i + 2), 16));
   const radius = () => NARROW * (WIDE / NARROW) ** ($('penSize').value / 100) / state.scene.scale;
@@ -160,7 +160,10 @@ export function addPen({ scene, worker, query }, pipeline) {
   }
 
   async function openBytes(name, bytes) {
+    if (!doc.isSaved && !confirm('What is painted and noted here is not saved. Open the other file in its place?'))
+      return;
     const mine = ++asked;
+    pending++;
     try {
       const file = readPaint(bytes), why = misfit(file, state.info);
       if (why)
@@ -172,6 +175,7 @@ export function addPen({ scene, worker, query }, pipeline) {
       if (mine === asked)
         complain(`${name}: ${error.message}`);
     }
+    pending--;
   }
 
   // The normals of opened points, which keep paint on its own side of a wall; and whether they lie on the model at all.
@@ -192,7 +196,10 @@ export function addPen({ scene, worker, query }, pipeline) {
 
   function fresh() {
     asked++;
-    doc = new PaintDocument(state.info ?? { parts: new Set() }, `${modelName()}.ebpo.h5`, changed);
+    const key = state.info && identityOf(state.info).model; // what was painted before another model was opened is still there
+    doc = docs.get(key) ?? new PaintDocument(state.info ?? { parts: new Set() }, `${modelName()}.ebpo.h5`, changed);
+    if (key)
+      docs.set(key, doc);
     layer = 0;
     stroke = undefined;
     changed();
@@ -202,7 +209,7 @@ export function addPen({ scene, worker, query }, pipeline) {
 
   async function fromAddress() {
     const wanted = new URLSearchParams(location.search).get('paint');
-    if (!wanted || !state.info)
+    if (!wanted || !state.info || doc.past.length || doc.state.strokes.length)
       return;
     try {
       const answer = await fetch(new URL(wanted, location.href));
@@ -251,7 +258,7 @@ export function addPen({ scene, worker, query }, pipeline) {
         e.shiftKey ? doc.redo() : doc.undo();
       }
     });
-    addEventListener('beforeunload', (e) => doc.isSaved || e.preventDefault());
+    addEventListener('beforeunload', (e) => [...docs.values()].every((d) => d.isSaved) || e.preventDefault());
     on('opened', () => {
       fresh();
       fromAddress();

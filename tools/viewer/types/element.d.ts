@@ -28,7 +28,7 @@ export interface EbpoInfo {
   [attribute: string]: unknown;
 }
 
-export interface EbpoViewerEventMap extends HTMLElementEventMap {
+export interface EbpoViewerEventMap extends Omit<HTMLElementEventMap, 'error' | 'progress' | 'load'> {
   /** The head is there. */
   load: CustomEvent<EbpoInfo>;
   progress: CustomEvent<{ got: number; want: number; quiet: number }>;
