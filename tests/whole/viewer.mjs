@@ -434,7 +434,8 @@ async function statuses(browser, { address, line }) {
 
 // What an address says is shown; what is looked at stands in it, without steps of the history; another file is a step, and back goes back.
 async function shares(browser, address) {
-  const view = '120,30,2.2,0.1,0,-0.05', page = await show(browser, `${address}?file=models/ring.ebpo.h5&level=3&view=${view}&clip=-y0.4&box=0,0,0.125,1,1,1&colour=type&point=0.5,0.25,0&measure=1,0,0,0,1,0`);
+  const view = '120,30,2.2,0.1,0,-0.05', page = await show(browser,
+    `${address}?file=models/ring.ebpo.h5&level=3&view=${view}&clip=-y0.4&box=0,0,0.125,1,1,1&colour=type&point=0.5,0.25,0&measure=1,0,0,0,1,0`);
   await settled(page);
   const { eye, target } = await page.evaluate(() => window.ebpoViewer.scene.place), d = eye.map((x, k) => x - target[k]);
   assert.ok(Math.hypot(target[0] - 0.1, target[1], target[2] + 0.05) < 1e-9 && Math.abs(Math.hypot(...d) - 2.2) < 1e-9 && Math.abs(d[1] - 1.1) < 1e-9, `${eye} ${target}`);
@@ -495,7 +496,8 @@ async function measures(browser, address) {
 
 // A stroke and a note, kept in a file, which another page shows again; an eraser and undo.
 async function paints(browser, address) {
-  const page = await show(browser, `${address}?file=models/ring.ebpo.h5`), red = (from) => from.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => { // pixels
+  const page = await show(browser, `${address}?file=models/ring.ebpo.h5`),
+    red = (from) => from.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => { // pixels
     const canvas = document.querySelector('#canvas'), context = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d');
     context.drawImage(canvas, 0, 0);
     const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
@@ -565,7 +567,8 @@ async function embeds(browser, address) {
   run('node', [join(viewer, 'package.mjs'), own]);
   symlinkSync(join(viewer, 'node_modules/three'), join(folder, 'node_modules/three'));
   writeFileSync(join(folder, 'main.js'), `import 'ebpo-viewer'; import { EbpoModel } from 'ebpo-viewer/three'; import * as THREE from 'three';
-    const renderer = new THREE.WebGLRenderer({ canvas: document.querySelector('canvas'), preserveDrawingBuffer: true }), scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(40, 1, 0.01, 20);
+    const renderer = new THREE.WebGLRenderer({ canvas: document.querySelector('canvas'), preserveDrawingBuffer: true }), scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(40,
+      1, 0.01, 20);
     const model = new EbpoModel(), draw = () => { model.update(camera, renderer); renderer.render(scene, camera); };
     renderer.setSize(300, 300);
     scene.add(model, new THREE.HemisphereLight('#fff', '#888', 3));
@@ -580,11 +583,14 @@ async function embeds(browser, address) {
     });
     window.probe = () => model.probe(new THREE.Vector3(0.5, 0.5, 0.5));`);
   const { outputFiles: [main] } = await build({ entryPoints: [join(folder, 'main.js')], bundle: true, format: 'esm', write: false });
-  const html = `<body style="margin:0;display:flex"><canvas></canvas><ebpo-viewer style="width:300px;height:300px" theme="light" level="3" view="10,20,2.5" src="${address}models/ring.ebpo.h5"></ebpo-viewer>
-    <script>window.heard = []; for (const name of ['load', 'idle', 'view', 'point', 'error']) document.querySelector('ebpo-viewer').addEventListener(name, (e) => heard.push([name, e.detail]));</script>
+  const html = `<body style="margin:0;display:flex"><canvas></canvas>
+    <ebpo-viewer style="width:300px;height:300px" theme="light" level="3" view="10,20,2.5" src="${address}models/ring.ebpo.h5"></ebpo-viewer>
+    <script>window.heard = []; for (const name of ['load', 'idle', 'view', 'point', 'error']) document.querySelector('ebpo-viewer').addEventListener(name, (e) => heard.push([name,
+      e.detail]));</script>
     <script type="module" src="main.js"></script>`;
   const server = createHttp((question, answer) => {
-    const file = { '/': ['text/html', html], '/main.js': ['text/javascript', main.text], '/worker.js': ['text/javascript', readFileSync(join(own, 'worker.js'))] }[question.url] ?? ['image/x-icon', ''];
+    const file = { '/': ['text/html', html], '/main.js': ['text/javascript', main.text], '/worker.js': ['text/javascript', readFileSync(join(own,
+      'worker.js'))] }[question.url] ?? ['image/x-icon', ''];
     answer.writeHead(200, { 'content-type': file[0] });
     answer.end(file[1]);
   });

@@ -54,7 +54,8 @@ export function cutOf(size, scale, clip, box) {
   if (k === undefined && low.every((x) => x <= 0) && high.every((x) => x >= 1))
     return undefined;
   const inScene = (share, axis) => (share <= 0 && axis !== k ? -BEYOND : share >= 1 && axis !== k ? BEYOND : (share - 0.5) * size[axis] * scale);
-  return { low: low.map((x, axis) => (axis === k && !clip.flip && x <= 0 ? -BEYOND : inScene(x, axis))), high: high.map((x, axis) => (axis === k && clip.flip && x >= 1 ? BEYOND : inScene(x, axis))) };
+  return { low: low.map((x, axis) => (axis === k && !clip.flip && x <= 0 ? -BEYOND : inScene(x, axis))), high: high.map((x, axis) => (axis === k && clip.flip &&
+    x >= 1 ? BEYOND : inScene(x, axis))) };
 }
 const BEYOND = 9; // of the scene, which is 1 in size
 

@@ -24,7 +24,8 @@ shareOf(scene);
 // `begun`: boot.js has told the worker already.
 function open(what, name, begun) {
   state.opening++;
-  Object.assign(state, { info: undefined, depth: -1, idle: false, timeline: [], stats: undefined, probe: undefined, box: undefined, measured: undefined, error: undefined, shownAfter: undefined, auto: AUTO.first, frames: [] });
+  Object.assign(state, { info: undefined, depth: -1, idle: false, timeline: [], stats: undefined, probe: undefined, box: undefined, measured: undefined, error: undefined,
+    shownAfter: undefined, auto: AUTO.first, frames: [] });
   scene.clear();
   const { camera, level } = said(new URLSearchParams(location.search));
   Object.assign(state, { levelAsked: level });

@@ -3,7 +3,8 @@ import { complain, make, mark, modelName, placesOf, save, section, svg, take, ta
 import { $, length, on, state, toScene } from './state.js';
 
 const HTML = `
-  <div class="row"><button id="measureOn" class="small" aria-pressed="false" title="Click points one after the other (D)">Distance</button><button id="measureClear" class="small" hidden>Clear</button></div>
+  <div class="row"><button id="measureOn" class="small" aria-pressed="false" title="Click points one after the other (D)">Distance</button>
+    <button id="measureClear" class="small" hidden>Clear</button></div>
   <p class="hint" id="measureHint">Points are put on the nearest faces; on a section they stay where they are clicked.</p>
   <ol id="measures" class="list"></ol>
   <div class="row"><button id="sectionOn" class="small">Area and outline of the section</button></div>
@@ -121,7 +122,8 @@ function showOutline() {
   const { area, length: long, faces, partial, axis, at } = outline;
   $('sectionAnswer').hidden = false;
   $('sectionArea').textContent = area === undefined ? length(long, 6) : length(area, 6, 2);
-  $('sectionNote').textContent = `${area === undefined ? 'outline; a surface has no area inside' : `area; outline ${length(long, 6)}`}; ${faces} faces at ${'xyz'[axis]} = ${length(at, 6)}${partial ? '; part of it is not in this subset' : ''}`;
+  $('sectionNote').textContent = `${area === undefined ? 'outline; a surface has no area inside' : `area; outline ${length(long,
+    6)}`}; ${faces} faces at ${'xyz'[axis]} = ${length(at, 6)}${partial ? '; part of it is not in this subset' : ''}`;
   drawOutline();
 }
 

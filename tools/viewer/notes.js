@@ -7,8 +7,10 @@ import { $, on, state, toScene } from './state.js';
 const KEPT = 'Saved with the paint.';
 const HTML = `
   <div class="row"><button id="noteAdd" class="small" aria-pressed="false" title="Then click the place (N)">Add a note</button><span class="hint" id="noteHint">${KEPT}</span></div>
-  <form id="noteForm" hidden><input id="noteTitle" type="text" placeholder="Title" aria-label="Title" maxlength="200"><textarea id="noteBody" rows="4" placeholder="Text" aria-label="Text" maxlength="16000"></textarea>
-    <input id="noteAuthor" type="text" placeholder="Author" aria-label="Author" maxlength="200"><div class="row"><button class="small">Keep</button><button type="button" class="small" id="noteCancel">Cancel</button></div></form>
+  <form id="noteForm" hidden><input id="noteTitle" type="text" placeholder="Title" aria-label="Title" maxlength="200">
+    <textarea id="noteBody" rows="4" placeholder="Text" aria-label="Text" maxlength="16000"></textarea>
+    <input id="noteAuthor" type="text" placeholder="Author" aria-label="Author" maxlength="200">
+    <div class="row"><button class="small">Keep</button><button type="button" class="small" id="noteCancel">Cancel</button></div></form>
   <ol id="notes" class="list"></ol>
   <div class="row"><span>Views</span><button id="viewSave" class="small">Save this view</button></div>
   <ul id="views" class="list"></ul>`;
@@ -31,7 +33,8 @@ export function addNotes({ scene, changed, shownAs }, drawing) {
     });
     $('notes').replaceChildren(...(state.info ? list() : []).map((note, i) => {
       const li = make('li', ''), go = make('button', note.title || 'Untitled', { className: 'link' }), body = make('p', note.body.replaceAll('\u2028', '\n'), { className: 'body' });
-      const by = make('small', [note.author, note.date.slice(0, 10)].filter(Boolean).join(', ')), change = make('button', 'Edit', { className: 'small' }), remove = make('button', 'Remove', { className: 'small' });
+      const by = make('small', [note.author, note.date.slice(0, 10)].filter(Boolean).join(', ')), change = make('button', 'Edit', { className: 'small' }), remove = make('button', 'Remove',
+        { className: 'small' });
       go.onclick = () => goTo(i);
       change.onclick = () => edit({ number: i });
       remove.onclick = () => drawing().removeNote(i);

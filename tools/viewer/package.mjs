@@ -11,7 +11,8 @@ const PARTS = { element: 'element.js', three: 'model.js', reader: 'reader/index.
 rmSync(folder, { recursive: true, force: true });
 mkdirSync(folder, { recursive: true });
 const common = { bundle: true, format: 'esm', target: 'es2022', platform: 'browser', legalComments: 'eof', logLevel: 'warning', outdir: folder };
-await build({ ...common, entryPoints: Object.fromEntries(Object.entries(PARTS).map(([name, file]) => [name, join(here, file)])), splitting: true, chunkNames: 'common-[hash]', external: ['three', 'three/*'] });
+await build({ ...common, entryPoints: Object.fromEntries(Object.entries(PARTS).map(([name, file]) => [name, join(here, file)])), splitting: true, chunkNames: 'common-[hash]',
+  external: ['three', 'three/*'] });
 await build({ ...common, entryPoints: [join(here, 'worker.js')], minify: true });
 for (const name of Object.keys(PARTS))
   copyFileSync(join(here, 'types', `${name}.d.ts`), join(folder, `${name}.d.ts`));

@@ -27,8 +27,9 @@ export function addSharing({ address }) {
     const local = typeof state.what !== 'string';
     $('shareHint').textContent = local ? 'This file is on this computer: others need it on a server, and its address in ?file=.' : '';
     $('shareLink').value = link;
-    $('shareFrame').value = `<iframe src="${quoted(link)}" width="800" height="600" style="border:0" allow="fullscreen" title="${quoted(state.shownName ?? '')}"></iframe>`;
-    $('shareElement').value = `<ebpo-viewer src="${quoted(local ? 'ADDRESS' : state.what)}" ${attributes.map((name) => `${name}="${quoted(query.get(name))}" `).join('')}style="height: 600px"></ebpo-viewer>`;
+    $('shareFrame').value = `<iframe src="${quoted(link)}" width="800" height="600" style="border:0" title="${quoted(state.shownName ?? '')}"></iframe>`;
+    const chosen = attributes.map((name) => `${name}="${quoted(query.get(name))}" `).join('');
+    $('shareElement').value = `<ebpo-viewer src="${quoted(local ? 'ADDRESS' : state.what)}" ${chosen}style="height: 600px"></ebpo-viewer>`;
     dialog.showModal();
   };
 }

@@ -39,8 +39,10 @@ export class Decals {
     this.kit = kit;
     this.layers = []; // { opacity, runs: [{ mesh, erases, alpha }] }
     this.uniforms = { depths: { value: null }, size: { value: null }, back: { value: new kit.Matrix4() } };
-    const blend = (source) => ({ blending: BLENDING.custom, blendEquation: BLENDING.add, blendSrc: source, blendDst: BLENDING.withoutAlpha, blendSrcAlpha: source, blendDstAlpha: BLENDING.withoutAlpha });
-    const ball = (source) => new kit.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms: this.uniforms, side: BACK, depthTest: false, depthWrite: false, transparent: true, ...blend(source) });
+    const blend = (source) => ({ blending: BLENDING.custom, blendEquation: BLENDING.add, blendSrc: source, blendDst: BLENDING.withoutAlpha, blendSrcAlpha: source,
+      blendDstAlpha: BLENDING.withoutAlpha });
+    const ball = (source) => new kit.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms: this.uniforms, side: BACK, depthTest: false, depthWrite: false,
+      transparent: true, ...blend(source) });
     this.paints = ball(BLENDING.one);
     this.erases = ball(BLENDING.zero);
     this.over = new kit.ShaderMaterial({ vertexShader: ALL_VERTEX, fragmentShader: ALL_FRAGMENT, uniforms: { map: { value: null }, opacity: { value: 1 } }, depthTest: false, depthWrite: false,

@@ -9,10 +9,12 @@ import { Stroke } from './stroke.js';
 
 const SWATCHES = ['#d9483b', '#f08c2e', '#f2cf3b', '#4cae50', '#2e86de', '#7d4fc4', '#ffffff', '#1c1c1c'];
 const HTML = `
-  <div class="row"><div class="buttons"><button id="penOn" class="small" aria-pressed="false" title="Pen (B)">Pen</button><button id="eraserOn" class="small" aria-pressed="false" title="Eraser (R)">Eraser</button></div>
+  <div class="row"><div class="buttons"><button id="penOn" class="small" aria-pressed="false" title="Pen (B)">Pen</button>
+    <button id="eraserOn" class="small" aria-pressed="false" title="Eraser (R)">Eraser</button></div>
     <div class="buttons"><button id="penUndo" class="small" title="Undo (Ctrl Z)">Undo</button><button id="penRedo" class="small" title="Redo (Ctrl Shift Z)">Redo</button></div></div>
   <p class="hint" id="penHint"></p>
-  <div class="swatches" role="group" aria-label="Colour of the pen">${SWATCHES.map((c) => `<button data-colour="${c}" style="background:${c}" aria-label="${c}"></button>`).join('')}
+  <div class="swatches" role="group" aria-label="Colour of the pen">
+    ${SWATCHES.map((c) => `<button data-colour="${c}" style="background:${c}" aria-label="${c}"></button>`).join('')}
     <input type="color" id="penColour" value="${SWATCHES[0]}" aria-label="Another colour"></div>
   <div class="row"><label for="penSize">Radius</label><input type="range" id="penSize" min="0" max="100" value="55"><output id="penSizeText"></output></div>
   <ul id="layers" class="list"></ul>
@@ -63,8 +65,10 @@ export function addPen({ scene, worker, query }, pipeline) {
   function showLayers() {
     $('layers').replaceChildren(...doc.state.layers.map((l, i) => {
       const li = make('li', '', { className: i === layer ? 'chosen' : '' }), pick = make('input', '', { type: 'radio', name: 'layer', checked: i === layer, ariaLabel: `Paint on ${l.title}` });
-      const name = make('input', '', { type: 'text', value: l.title, ariaLabel: 'Name of the layer', maxLength: 100 }), opacity = make('input', '', { type: 'range', min: 0, max: 255, value: l.opacity, ariaLabel: `Opacity of ${l.title}` });
-      const eye = make('button', l.visible ? 'Hide' : 'Show', { className: 'small', ariaPressed: String(!l.visible) }), remove = make('button', '✕', { className: 'small', ariaLabel: `Remove ${l.title}` });
+      const name = make('input', '', { type: 'text', value: l.title, ariaLabel: 'Name of the layer', maxLength: 100 }), opacity = make('input', '', { type: 'range', min: 0, max: 255,
+        value: l.opacity, ariaLabel: `Opacity of ${l.title}` });
+      const eye = make('button', l.visible ? 'Hide' : 'Show', { className: 'small', ariaPressed: String(!l.visible) }), remove = make('button', '✕', { className: 'small',
+        ariaLabel: `Remove ${l.title}` });
       const count = doc.state.strokes.filter((s) => s.layer === i).length;
       pick.onchange = () => {
         layer = i;

@@ -28,7 +28,8 @@ test('a box is cut into a rectangle on each axis, also through its corners, and 
 });
 
 test('weights give the point back', () => {
-  const corners = Float64Array.of(1, 0, 0, 4, 1, 0, 0, 3, 2), at = (w) => [0, 1, 2].map((k) => corners[k] * (1 - (w[0] + w[1]) / 2 ** 30) + corners[3 + k] * w[0] / 2 ** 30 + corners[6 + k] * w[1] / 2 ** 30);
+  const corners = Float64Array.of(1, 0, 0, 4, 1, 0, 0, 3, 2), at = (w) => [0, 1,
+    2].map((k) => corners[k] * (1 - (w[0] + w[1]) / 2 ** 30) + corners[3 + k] * w[0] / 2 ** 30 + corners[6 + k] * w[1] / 2 ** 30);
   for (const [s, t] of [[0, 0], [1, 0], [0, 1], [0.25, 0.5], [0.3, 0.7]]) {
     const p = [0, 1, 2].map((k) => corners[k] * (1 - s - t) + corners[3 + k] * s + corners[6 + k] * t), w = weightsOf(p, corners);
     assert.ok(w[0] + w[1] <= 2 ** 30 && w.every((x) => Number.isInteger(x) && x >= 0));

@@ -35,7 +35,8 @@ test('the package is packed, bundled for browsers, and has the types of what it 
     const { metafile } = await esbuild.build({ entryPoints: [join(own, `${part}.js`)], metafile: true, bundle: true, external: ['three', 'three/*'], format: 'esm', write: false, outdir: work });
     const [{ exports: exported }] = Object.values(metafile.outputs);
     const types = readFileSync(join(own, `${part}.d.ts`), 'utf8');
-    const declared = [...types.matchAll(/^export declare (?:const|function|class) ([^;(<{]+)/gm)].flatMap((m) => m[1].replace(/ (extends|implements) .*/, '').split(',').map((name) => name.split(':')[0].trim()));
+    const declared = [...types.matchAll(/^export declare (?:const|function|class) ([^;(<{]+)/gm)].flatMap((m) => m[1].replace(/ (extends|implements) .*/,
+      '').split(',').map((name) => name.split(':')[0].trim()));
     assert.deepEqual(declared.filter((name, i, all) => all.indexOf(name) === i).sort(), exported.sort(), part);
   }
 

@@ -15,7 +15,8 @@ function sample(strokes = 3, points = 5) {
     layers: [{ title: 'Risse', author: 'A. Ö.', date: '2026-11-26', description: '', colour: 0xd03030ff, opacity: 255, visible: true },
       { title: '', author: '', date: '', description: 'zwei\u2028Zeilen', colour: 0xffffffff, opacity: 100, visible: false }],
     notes: [{ title: 'Here', author: 'me', date: '2026-11-26T21:43:05Z', body: 'a loss', layer: 1, face: 12, weights: [5, 2 ** 30 - 5], place: [1, 2, -0.5] }],
-    strokes: Array.from({ length: strokes }, (_, s) => ({ layer: s % 2, erases: s % 3 === 2, colour: s % 3 === 2 ? [0, 0, 0, 0] : [200, 10 * s % 256, 3, 255], radius: 0.25 + s, time: s ? 1.7e12 + s : 0,
+    strokes: Array.from({ length: strokes }, (_, s) => ({ layer: s % 2, erases: s % 3 === 2, colour: s % 3 === 2 ? [0, 0, 0, 0] : [200, 10 * s % 256, 3, 255], radius: 0.25 + s,
+      time: s ? 1.7e12 + s : 0,
       points: Array.from({ length: points }, (__, i) => point(100 * s + i)) })) };
 }
 
@@ -37,14 +38,16 @@ test('other programs read it: h5dump and h5py', (t) => {
   }
   const script = `import h5py, json, sys
 f = h5py.File(sys.argv[1]); p = f["points"]; s = f["strokes"]
-print(json.dumps([f.attrs["format"].decode(), f.attrs["model_name"].decode(), int(f.attrs["point_count"]), p["face"][:].tolist(), p["place"][:].view("f8").tolist(), s["radius"][:].view("f8").tolist(),
+print(json.dumps([f.attrs["format"].decode(), f.attrs["model_name"].decode(), int(f.attrs["point_count"]), p["face"][:].tolist(), p["place"][:].view("f8").tolist(),
+  s["radius"][:].view("f8").tolist(),
   s["colour"][:].tolist(), s["time"][:].tolist(), f["notes/0000"].attrs["place"].tolist(), f["layers/0001"].attrs["title"].decode(), sorted(f)]))`;
   if (spawnSync('/usr/bin/python3', ['-c', 'import h5py']).status !== 0) {
     t.diagnostic('h5py is not installed');
     return;
   }
   const doc = sample(), all = doc.strokes.flatMap((s) => s.points);
-  assert.deepEqual(JSON.parse(execFileSync('/usr/bin/python3', ['-c', script, path], { encoding: 'utf8' })), ['EBP-Octree paint 1', 'büste.ebpo.h5', 15, all.map((p) => p.face), all.map((p) => p.place),
+  assert.deepEqual(JSON.parse(execFileSync('/usr/bin/python3', ['-c', script, path], { encoding: 'utf8' })), ['EBP-Octree paint 1', 'büste.ebpo.h5', 15, all.map((p) => p.face),
+    all.map((p) => p.place),
     doc.strokes.map((s) => s.radius), doc.strokes.map((s) => s.colour), doc.strokes.map((s) => s.time), [1, 2, -0.5], '', ['layers', 'notes', 'points', 'strokes']]);
 });
 
@@ -56,7 +59,8 @@ test('what breaks a rule is refused', () => {
   };
   for (const [change, said] of [[(d) => (d.strokes[0].layer = 2), /layer/], [(d) => (d.strokes[1].radius = Infinity), /radius/], [(d) => (d.strokes[1].radius = 0), /radius/],
     [(d) => (d.strokes[0].points[0].size = 0), /size/], [(d) => (d.strokes[0].points[0].weights = [2 ** 30, 1]), /weights/], [(d) => (d.strokes[0].points[0].place = [0, NaN, 0]), /place/],
-    [(d) => (d.strokes[0].points[0].face = 2 ** 32 - 1), /face/], [(d) => (d.strokes[0].points = []), /points/], [(d) => (d.model = 'x'), /model_sha256/], [(d) => (d.faceNumbers = 'mine'), /face_numbers/],
+    [(d) => (d.strokes[0].points[0].face = 2 ** 32 - 1), /face/], [(d) => (d.strokes[0].points = []), /points/], [(d) => (d.model = 'x'), /model_sha256/], [(d) => (d.faceNumbers = 'mine'),
+      /face_numbers/],
     [(d) => (d.notes[0].layer = 2), /layer/], [(d) => (d.notes[0].weights = [0.5, 0]), /weights/], [(d) => (d.layers[0].opacity = 256), /opacity/], [(d) => (d.layers[0].title = 'a\nb'), /title/]])
     assert.throws(() => readPaint(broken(change)), (e) => e.code === 'FORMAT' && said.test(e.message), String(said));
   assert.throws(() => readPaint(new TextEncoder().encode('nothing of the kind, but long enough to be looked at ...')), /not a whole HDF5 file/);
