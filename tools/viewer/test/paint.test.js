@@ -1,7 +1,7 @@
 // Paint files: what is written is read again, by this reader, and as HDF5 by h5dump and h5py; what breaks a rule is refused.
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
-import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import test from 'node:test';
@@ -85,4 +85,31 @@ test('the checksum of blocks is lookup3\'s, and texts are made fit', () => {
   assert.equal(lookup3(new TextEncoder().encode('Four score and seven years ago'), 0, 30), 0x17770551); // the published example
   assert.equal(cleanText('a\r\nb\u0007', 9), 'a\u2028b');
   assert.equal(cleanText('ääää', 5), 'ää');
+});
+
+// The vectors of format-spec/paint.md: every one that must be read gives what its text says, every one that must be refused is.
+const vectors = process.env.EBPO_PAINT_VECTORS ?? join(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '../../../format-spec/vectors/paint');
+test('vectors of paint files', { skip: existsSync(vectors) ? false : 'there are no vectors' }, () => {
+  const files = (folder) => readdirSync(join(vectors, folder)).filter((name) => name.endsWith('.paint.h5'));
+  const read = (folder, name) => readPaint(new Uint8Array(readFileSync(join(vectors, folder, name))));
+  const wrong = files('failed').filter((name) => {
+    try {
+      read('failed', name);
+      return true;
+    } catch (error) {
+      assert.equal(error.name, 'EbpoError', `${name}: ${error.stack}`);
+      return false;
+    }
+  });
+  assert.deepEqual(wrong, []);
+  for (const name of files('passed')) {
+    const doc = read('passed', name), said = JSON.parse(readFileSync(join(vectors, 'passed', name.replace('.paint.h5', '.json')), 'utf8'));
+    const hex = (list) => `#${list.map((x) => x.toString(16).padStart(2, '0')).join('')}`, bytesOf = (c) => [24, 16, 8, 0].map((shift) => c >>> shift & 255);
+    const layers = doc.layers.map((l) => ({ ...l, colour: hex(bytesOf(l.colour)) }));
+    const strokes = doc.strokes.map(({ erases, colour, ...rest }) => ({ ...rest, kind: erases ? 'erases' : 'paints', colour: hex(colour) }));
+    assert.deepEqual([doc.model, doc.modelName, doc.unit, doc.faceNumbers], [said.model_sha256, said.model_name, said.unit, said.face_numbers], name);
+    assert.deepEqual({ layers, notes: doc.notes, strokes }, { layers: said.layers, notes: said.notes, strokes: said.strokes }, name);
+    assert.deepEqual(readPaint(writePaint(doc)), doc);
+  }
+  assert.ok(files('passed').length > 0 && files('failed').length > 0);
 });
