@@ -386,7 +386,8 @@ const KEYS = {
 const STEER = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, 1], arrowdown: [0, -1], '+': 0.8, '=': 0.8, '-': 1.25 };
 
 addEventListener('keydown', (e) => {
-  if (e.ctrlKey || e.metaKey || e.altKey || $('help').open || (e.target.matches('input:not([type=range]):not([type=radio]):not([type=checkbox]), select') && e.key !== 'Escape'))
+  const writes = e.target.matches('input:not([type=range]):not([type=radio]):not([type=checkbox]), select, textarea');
+  if (e.ctrlKey || e.metaKey || e.altKey || document.querySelector('dialog[open]') || (writes && e.key !== 'Escape'))
     return;
   const key = e.key.toLowerCase();
   if (!state.info && !['t', '?'].includes(key))
