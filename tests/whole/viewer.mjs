@@ -19,6 +19,7 @@ if (!chromium || !nginx || !existsSync(join(viewer, 'node_modules/playwright-cor
 const load = (path) => import(pathToFileURL(join(viewer, path)));
 const { chromium: playwright } = await load('node_modules/playwright-core/index.mjs');
 const { openEbpo } = await load('reader/index.js');
+const { cutFaces, measureOf } = await load('answers.js'), { readPaint } = await load('paint/paint_file.js');
 
 const work = mkdtempSync(join(tmpdir(), 'ebpo-viewer-')), models = join(work, 'models'), log = join(work, 'access.log'), model = join(models, 'ring.ebpo.h5');
 const run = (program, args, input, env) => execFileSync(program, args, { encoding: 'utf8', input, env, stdio: ['pipe', 'pipe', 'pipe'], maxBuffer: 1 << 26 });
@@ -125,8 +126,8 @@ async function silhouette(page) {
 }
 
 // The screenshot, without the panels: where it differs from one without the model, and the mean colour there. The page decodes the PNG.
-async function look(page) {
-  const hide = await page.addStyleTag({ content: '#panel, #bar, #tools, #progress { visibility: hidden; }' });
+async function look(page, hidden = '#panel, #bar, #tools, #progress, #compass, #scale { visibility: hidden; }') {
+  const hide = await page.addStyleTag({ content: hidden });
   const shot = async () => (await page.screenshot()).toString('base64');
   const withModel = await shot(), stage = await page.addStyleTag({ content: '#canvas { visibility: hidden; }' }), without = await shot();
   await stage.evaluate((node) => node.remove());
@@ -431,6 +432,204 @@ async function statuses(browser, { address, line }) {
   complaints.length = quiet;
 }
 
+// What an address says is shown; what is looked at stands in it, without steps of the history; another file is a step, and back goes back.
+async function shares(browser, address) {
+  const view = '120,30,2.2,0.1,0,-0.05', page = await show(browser,
+    `${address}?file=models/ring.ebpo.h5&level=3&view=${view}&clip=-y0.4&box=0,0,0.125,1,1,1&colour=type&point=0.5,0.25,0&measure=1,0,0,0,1,0`);
+  await settled(page);
+  const { eye, target } = await page.evaluate(() => window.ebpoViewer.scene.place), d = eye.map((x, k) => x - target[k]);
+  assert.ok(Math.hypot(target[0] - 0.1, target[1], target[2] + 0.05) < 1e-9 && Math.abs(Math.hypot(...d) - 2.2) < 1e-9 && Math.abs(d[1] - 1.1) < 1e-9, `${eye} ${target}`);
+  assert.equal(await page.inputValue('#level'), '3');
+  assert.ok(await page.isChecked('input[name=clip][value="1"]') && await page.isChecked('input[name=colouring][value=type]'));
+  const { low, high } = await page.evaluate(() => window.ebpoViewer.scene.cut), { info } = await openEbpo(readFileSync(model)), scale = 2 / Math.hypot(...info.box_size);
+  assert.ok(Math.abs(low[1] + 0.1 * info.box_size[1] * scale) < 1e-9 && high[1] > 1 && Math.abs(low[2] + 0.375 * info.box_size[2] * scale) < 1e-9, `${low} ${high}`);
+  assert.deepEqual((await stateOf(page)).probe.point, [0.5, 0.25, 0]);
+  await page.waitForSelector('#measures li');
+  const wanted = new URL(page.url()).search;
+  assert.equal(await page.evaluate(() => new URL(window.ebpoViewer.address()).search), wanted);
+  const steps = await page.evaluate(() => history.length);
+  await page.focus('#canvas');
+  await page.keyboard.press('ArrowRight'); // turns by 7.5 degrees
+  await page.keyboard.press('.');
+  await page.waitForFunction(() => /view=127.5,30,2.2/.test(location.search) && /level=4/.test(location.search));
+  assert.equal(await page.evaluate(() => history.length), steps);
+  await page.keyboard.press('o');
+  await page.fill('#url', 'models/red.ebpo.h5');
+  await page.keyboard.press('Enter');
+  await settled(page);
+  assert.doesNotMatch(page.url(), /view=|clip=|level=/);
+  await page.goBack();
+  await page.waitForSelector('#start:not([hidden])');
+  await page.goBack();
+  await page.waitForFunction(() => document.querySelector('#name').textContent === 'ring.ebpo.h5' && window.ebpoViewer.state.idle);
+  assert.match(page.url(), /view=127.5,30,2.2.*level=4|level=4.*view=127.5,30,2.2/);
+  assert.ok(await page.isChecked('input[name=clip][value="1"]'));
+  await page.close();
+}
+
+// Distances and sections are those of the faces.
+async function measures(browser, address) {
+  const page = await show(browser, `${address}?file=models/ring.ebpo.h5&clip=z0.5`);
+  await settled(page);
+  await page.waitForFunction(() => window.ebpoViewer.paint);
+  await page.evaluate(() => document.querySelectorAll('#panel details').forEach((d) => (d.open = true)));
+  await page.click('#sectionOn');
+  await page.waitForSelector('#sectionAnswer:not([hidden])');
+  const { info, vertices, faces } = await openEbpo(readFileSync(model)).then(async (file) => ({ info: file.info, ...await file.mesh() })), segments = [];
+  cutFaces(Float64Array.from([...faces].flatMap((v) => [...vertices.subarray(3 * v, 3 * v + 3)])), 2, info.box_origin[2] + 0.5 * info.box_size[2], segments);
+  assert.equal(Number(await page.textContent('#sectionArea')), Number(measureOf(segments).area.toPrecision(6)));
+  const [download] = await Promise.all([page.waitForEvent('download'), page.click('#sectionCsv')]), lines = readFileSync(await download.path(), 'utf8').trim().split('\n');
+  assert.equal(lines[0], 'line,x,y,z');
+  assert.equal(lines.length - 1, segments.length / 4 + 2); // two closed lines
+  await page.keyboard.press('x'); // no plane
+  await page.keyboard.press('d');
+  const [x0, y0, x1, y1] = await silhouette(page);
+  for (const share of [0.4, 0.6])
+    await page.mouse.click(x0 + (x1 - x0) * share, y1 - (y1 - y0) * 0.15);
+  await page.waitForSelector('#measures li');
+  const points = await page.evaluate(() => new URL(window.ebpoViewer.address()).searchParams.get('measure').split(',').map(Number));
+  assert.ok(Math.abs(Number(await page.textContent('#measures li')) - Math.hypot(points[0] - points[3], points[1] - points[4], points[2] - points[5])) < 1e-5);
+  for (const p of [points.slice(0, 3), points.slice(3)])
+    assert.ok(JSON.parse(run(ebpo, ['distance', '--json', '--unsigned', model], `${p.join(' ')}\n`)).distance < 2e-6, 'a measured point lies on the faces');
+  await page.close();
+}
+
+// A stroke and a note, kept in a file, which another page shows again; an eraser and undo.
+async function paints(browser, address) {
+  const page = await show(browser, `${address}?file=models/ring.ebpo.h5`),
+    red = (from) => from.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => { // pixels
+    const canvas = document.querySelector('#canvas'), context = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d');
+    context.drawImage(canvas, 0, 0);
+    const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
+    done(data.reduce((sum, r, i) => sum + (i % 4 === 0 && r > data[i + 1] + 40 ? 1 : 0), 0));
+  }))));
+  await settled(page);
+  await page.waitForFunction(() => window.ebpoViewer.paint);
+  const [x0, y0, x1, y1] = await silhouette(page), drag = async (from, to) => {
+    const strokes = await page.evaluate(() => window.ebpoViewer.paint.file.strokes.length), at = ([u, v]) => [x0 + (x1 - x0) * u, y0 + (y1 - y0) * v];
+    await page.mouse.move(...at(from));
+    await page.mouse.down();
+    await page.mouse.move(...at(to), { steps: 3 });
+    await page.mouse.up();
+    await page.waitForFunction((n) => window.ebpoViewer.paint.file.strokes.length > n && !window.ebpoViewer.paint.pending, strokes);
+  }, camera = await page.evaluate(() => window.ebpoViewer.address());
+  await page.evaluate(() => document.querySelectorAll('#panel details').forEach((d) => (d.open = true)));
+  await page.evaluate(() => {
+    document.querySelector('#penSize').value = 95;
+  });
+  await page.keyboard.press('b');
+  await drag([0.38, 0.87], [0.62, 0.87]);
+  assert.equal(await page.evaluate(() => window.ebpoViewer.address()), camera, 'painting does not turn the model');
+  const painted = await red(page);
+  assert.ok(painted > 1000, `the stroke is seen: ${painted} pixels`);
+  await page.keyboard.press('r');
+  await drag([0.38, 0.87], [0.62, 0.87]);
+  assert.ok(await red(page) < 0.02 * painted, 'the eraser takes it away');
+  await page.keyboard.press('Control+z');
+  assert.equal(await red(page), painted, 'and undo brings it back');
+  await page.keyboard.press('n');
+  await page.mouse.click(x0 + (x1 - x0) * 0.5, y0 + (y1 - y0) * 0.87);
+  await page.waitForSelector('#noteForm:not([hidden])');
+  await page.fill('#noteTitle', 'A loss');
+  await page.focus('#noteBody');
+  await page.keyboard.type('two\nlines'); // not taken for keys of the page
+  await page.click('#noteForm button');
+  const [download] = await Promise.all([page.waitForEvent('download'), page.click('#paintSave')]), path = join(models, download.suggestedFilename());
+  assert.equal(download.suggestedFilename(), 'ring.paint.h5');
+  await download.saveAs(path);
+  const doc = readPaint(new Uint8Array(readFileSync(path))), { info } = await openEbpo(readFileSync(model)), [stroke] = doc.strokes;
+  assert.deepEqual([doc.model, doc.faceNumbers, doc.strokes.length, doc.layers.length, doc.notes[0].title, doc.notes[0].body], [info.content_sha256, 'source', 1, 1, 'A loss', 'two\u2028lines']);
+  const far = run(ebpo, ['distance', '--json', '--unsigned', model], stroke.points.map((p) => `${p.place.join(' ')}\n`).join('')).trim().split('\n').map((line) => JSON.parse(line).distance);
+  assert.ok(stroke.points.length > 5 && far.every((d) => d < 1e-12 * Math.hypot(...info.box_size)), 'its points lie on the faces');
+  await page.close({ runBeforeUnload: false });
+
+  const other = await show(browser, `${address}?file=models/ring.ebpo.h5`);
+  await settled(other);
+  await other.waitForFunction(() => window.ebpoViewer.paint);
+  await other.setInputFiles('#paintFile', path);
+  await other.waitForFunction(() => window.ebpoViewer.paint.file.strokes.length === 1);
+  await other.waitForFunction(() => !window.ebpoViewer.paint.pending);
+  const again = await red(other);
+  assert.ok(Math.abs(again - painted) < 0.02 * painted, `it looks as before: ${painted} and ${again} pixels`);
+  assert.equal(await other.textContent('.pin'), '1');
+  await other.evaluate(() => document.querySelector('#errorClose').click());
+  await other.keyboard.press('o');
+  await other.fill('#url', 'models/red.ebpo.h5');
+  await other.keyboard.press('Enter');
+  await settled(other);
+  await other.setInputFiles('#paintFile', path);
+  await other.waitForSelector('#error:not([hidden]):has-text("this paint is for")');
+  await other.close({ runBeforeUnload: false });
+}
+
+// The package in a page of somebody else's, of another origin: the element, and the object in a scene of its own.
+async function embeds(browser, address) {
+  const folder = join(work, 'project'), own = join(folder, 'node_modules/ebpo-viewer'), { build } = await load('node_modules/esbuild/lib/main.js');
+  run('node', [join(viewer, 'package.mjs'), own]);
+  symlinkSync(join(viewer, 'node_modules/three'), join(folder, 'node_modules/three'));
+  writeFileSync(join(folder, 'main.js'), `import 'ebpo-viewer'; import { EbpoModel } from 'ebpo-viewer/three'; import * as THREE from 'three';
+    const renderer = new THREE.WebGLRenderer({ canvas: document.querySelector('canvas'), preserveDrawingBuffer: true }), scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(40,
+      1, 0.01, 20);
+    const model = new EbpoModel(), draw = () => { model.update(camera, renderer); renderer.render(scene, camera); };
+    renderer.setSize(300, 300);
+    scene.add(model, new THREE.HemisphereLight('#fff', '#888', 3));
+    model.addEventListener('change', draw);
+    model.addEventListener('idle', () => (window.done = true));
+    window.loaded = model.load('${address}models/red.ebpo.h5').then((info) => {
+      const { min, max } = model.box; // in the file's coordinates
+      camera.position.set(max.x + 2, max.y + 1, max.z + 2);
+      camera.lookAt(min.clone().add(max).multiplyScalar(0.5));
+      draw();
+      return [info.face_count, min.toArray(), max.toArray()];
+    });
+    window.probe = () => model.probe(new THREE.Vector3(0.5, 0.5, 0.5));`);
+  const { outputFiles: [main] } = await build({ entryPoints: [join(folder, 'main.js')], bundle: true, format: 'esm', write: false });
+  const html = `<body style="margin:0;display:flex"><canvas></canvas>
+    <ebpo-viewer style="width:300px;height:300px" theme="light" level="3" view="10,20,2.5" src="${address}models/ring.ebpo.h5"></ebpo-viewer>
+    <script>window.heard = []; for (const name of ['load', 'idle', 'view', 'point', 'error']) document.querySelector('ebpo-viewer').addEventListener(name, (e) => heard.push([name,
+      e.detail]));</script>
+    <script type="module" src="main.js"></script>`;
+  const server = createHttp((question, answer) => {
+    const file = { '/': ['text/html', html], '/main.js': ['text/javascript', main.text], '/worker.js': ['text/javascript', readFileSync(join(own,
+      'worker.js'))] }[question.url] ?? ['image/x-icon', ''];
+    answer.writeHead(200, { 'content-type': file[0] });
+    answer.end(file[1]);
+  });
+  await new Promise((done) => server.listen(0, '127.0.0.1', done));
+  cleanup.push(() => server.closeAllConnections() ?? server.close());
+  const page = await show(browser, `http://127.0.0.1:${server.address().port}/`);
+  await page.waitForFunction(() => window.done && window.heard?.some(([name]) => name === 'idle'), undefined, { timeout: 60000 });
+  const [faces, low, high] = await page.evaluate(() => window.loaded), { info } = await openEbpo(readFileSync(join(models, 'red.ebpo.h5')));
+  assert.deepEqual([faces, low, high], [info.face_count, info.box_origin, info.box_origin.map((x, k) => x + info.box_size[k])]);
+  const { where, distance } = await page.evaluate(() => window.probe());
+  assert.deepEqual([where, distance], ['in', 0.5]);
+  const [r, g, b] = await page.evaluate(() => { // the middle of the picture
+    const gl = document.querySelector('canvas').getContext('webgl2'), pixel = new Uint8Array(4);
+    gl.readPixels(gl.drawingBufferWidth / 2, gl.drawingBufferHeight / 2, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    return [...pixel];
+  });
+  assert.ok(r > 60 && r > 2 * Math.max(g, b), `a red box: ${[r, g, b]}`);
+  const element = page.locator('ebpo-viewer');
+  assert.equal(await element.evaluate((e) => e.view), '10,20,2.5');
+  await element.evaluate((e) => e.shadowRoot.querySelector('canvas').focus());
+  await page.keyboard.press('ArrowLeft');
+  await page.waitForFunction(() => window.heard.some(([name, detail]) => name === 'view' && detail.view === '2.5,20,2.5'));
+  const answer = await element.evaluate((e) => e.ask(e.info.box_origin));
+  assert.equal(answer.where, 'out');
+  await element.evaluate((e) => (e.src = e.src.replace('ring', 'none')));
+  await page.waitForFunction(() => window.heard.some(([name, detail]) => name === 'error' && /404/.test(detail.message)));
+  await element.evaluate((e) => e.remove());
+  await page.close();
+}
+
+// From disk a page has no worker: it says so.
+async function fromFolder(browser) {
+  const page = await browser.newPage();
+  await page.goto(pathToFileURL(join(viewer, 'index.html')).href);
+  await page.waitForSelector('#fromDisk', { state: 'visible' });
+  await page.close();
+}
+
 // The page as it is written, without a bundle.
 async function fromSources(browser) {
   const page = await show(browser, `${await serve('--sources')}?file=models/ring.ebpo.h5&level=4`), state = await settled(page);
@@ -489,6 +688,13 @@ async function main() {
   await step('errors say what, and what next', () => errors(browser, address));
   await step('the model is asked for before the page\'s code is there', () => modelFirst(browser, address));
   await step('a small file comes in one request, and is not fetched again unless it has changed', () => oneRequest(browser, address));
+  await step('an address says what is shown, and back goes back', () => shares(browser, address));
+  await step('distances and sections are those of the faces', () => measures(browser, address));
+  await step('what is painted is kept, and shown again', () => paints(browser, address));
+  const quiet = complaints.length;
+  await step('the element and the three.js object work in a page of another origin', () => embeds(browser, address));
+  complaints.length = quiet; // the browser logs the 404
+  await step('from disk the page says that it must be served', () => fromFolder(browser));
   const bad = await badLine(address);
   await step('a stall is told, and Retry goes on with what has not come', () => stalls(browser, bad));
   await step('a dead line loses nothing', () => dies(browser, bad));

@@ -1,34 +1,36 @@
 // The page: what is asked for, what is shown, and the worker in between.
+import { cutOf } from './address.js';
+import { frameMs, frameTook, makeLevels, showLevel, showLevels, showStats } from './figures.js';
 import { busy, bytes, showError, showLine, showOpening } from './line.js';
-import { LEVEL_COLOURS, MESH_COLOUR, Scene, TYPE_COLOURS } from './scene.js';
+import { probeAt, probeShown, probeWith } from './probe.js';
+import { listSamples } from './samples.js';
+import { Scene } from './scene.js';
+import { LEVEL_COLOURS, MESH_COLOUR, TYPE_COLOURS } from './shade.js';
+import { address, atHome, changed, said, shareOf, went, whereTo } from './share.js';
+import { $, count, on, state, tell, toModel } from './state.js';
 
-const $ = (id) => document.getElementById(id);
+const MORE_MS = 5000; // after the first picture the tools are loaded, or when nothing more comes before
 const TRIANGLES_MOST = 2_000_000; // about; a tile more does no harm
-
-const state = {
-  opening: 0, want: 0, settled: 0, idle: false, info: undefined, scene: undefined, depth: -1, bytesTo: [], timeline: [], stats: undefined, traffic: undefined,
-  clip: { axis: undefined, flip: false }, probe: undefined, frames: [],
-};
 
 let timer; // until the worker hears of the camera
 
 const boot = window.ebpoBoot, { worker } = boot; // boot.js has begun, perhaps with a file
 const scene = new Scene($('canvas'), boot, { changed: cameraMoved, drawn: frameDrawn });
-
-// --- numbers for people ---
-
-const count = (n) => n.toLocaleString('en');
-const time = (ms) => (ms < 1000 ? `${Math.round(ms)} ms` : `${(ms / 1000).toFixed(2)} s`);
-const length = (x, digits = 5) => `${Number(x.toPrecision(digits))}${state.info?.unit ? ' ' + state.info.unit : ''}`;
+probeWith(scene, worker);
+shareOf(scene);
 
 // --- opening ---
 
 // `begun`: boot.js has told the worker already.
 function open(what, name, begun) {
   state.opening++;
-  Object.assign(state, { info: undefined, depth: -1, idle: false, timeline: [], stats: undefined, probe: undefined, error: undefined, shownAfter: undefined, auto: AUTO.first, frames: [] });
+  Object.assign(state, { info: undefined, depth: -1, idle: false, timeline: [], stats: undefined, probe: undefined, box: undefined, measured: undefined, error: undefined,
+    shownAfter: undefined, auto: AUTO.first, frames: [] });
   scene.clear();
-  scene.home();
+  const { camera, level } = said(new URLSearchParams(location.search));
+  Object.assign(state, { levelAsked: level });
+  home(camera);
+  tell('closed');
   showError();
   busy(true);
   showOpening(name);
@@ -39,7 +41,8 @@ function open(what, name, begun) {
   ask();
 }
 
-function openUrl(text, begun) {
+// `step`: a new one of the history; not when it has been taken already, or when the page comes with this file.
+function openUrl(text, { begun = false, step = true } = {}) {
   let url;
   try {
     url = new URL(text, location.href);
@@ -47,23 +50,24 @@ function openUrl(text, begun) {
     showError({ message: `${text}: this is no address; give one that begins with https://` });
     return;
   }
-  const address = new URL(location.href);
-  address.searchParams.set('file', text);
-  history.replaceState(null, '', address);
+  if (step)
+    went(text);
   $('url').value = text;
   open(url.href, boot.nameOf(url.href), begun);
 }
 
-function openFile(file) {
-  const address = new URL(location.href);
-  address.searchParams.delete('file');
-  history.replaceState(null, '', address);
+function openFile(file, { step = true } = {}) {
+  if (step)
+    went(file);
   open(file, file.name);
 }
 
-function close() {
+function close({ step = true } = {}) {
+  if (step)
+    went();
   state.opening++;
-  Object.assign(state, { info: undefined, depth: -1 });
+  Object.assign(state, { info: undefined, depth: -1, idle: false });
+  tell('closed');
   worker.postMessage({ type: 'close', opening: state.opening });
   scene.clear();
   busy(false);
@@ -73,7 +77,16 @@ function close() {
     $(id).hidden = true;
   $('start').hidden = false;
   layout();
+  document.title = 'EBP-Octree viewer';
   $('url').focus();
+}
+
+// The view that an address asks for, or the usual one.
+function home(camera) {
+  scene.home();
+  atHome();
+  if (camera)
+    scene.place = camera;
 }
 
 // --- from the worker ---
@@ -81,7 +94,7 @@ function close() {
 const handlers = {
   located(m) {
     Object.assign(state, { bytesTo: m.bytesTo, traffic: m.traffic });
-    makeLevels();
+    makeLevels(chooseLevel);
     levelChanged();
   },
   opened(m) {
@@ -97,42 +110,43 @@ const handlers = {
       $(id).hidden = id === 'panel' && innerWidth <= 760;
     const stops = i.level_count - 1 + (i.parts.has('mesh') ? 1 : 0);
     $('level').max = stops;
-    $('level').value = boot.level ?? stops;
-    makeLevels();
+    makeLevels(chooseLevel);
     layout();
-    scene.home();
-    levelChanged();
-    clipChanged();
-    probeShown();
+    shownAs(said(new URLSearchParams(location.search)));
+    tell('opened');
   },
   loaded(m) {
     Object.assign(state, { depth: m.depth, timeline: m.timeline, traffic: m.traffic });
     showLevels();
-    showStats();
+    showStats(scene.walls);
   },
   tiles(m) {
     scene.setTiles(m.set, m.removed);
     if (m.set.length) {
+      if (state.shownAfter === undefined)
+        setTimeout(more, MORE_MS);
       state.shownAfter ??= m.ms;
       showOpening();
     }
     Object.assign(state, { stats: m.stats, traffic: m.traffic });
     showLevels();
-    showStats();
+    showStats(scene.walls);
   },
   probed(m) {
     state.traffic = m.traffic;
     state.probe = m;
     probeShown();
-    showStats();
+    showStats(scene.walls);
+    tell('probed');
   },
   idle(m) {
     Object.assign(state, { traffic: m.traffic, settled: m.want, idle: m.want === state.want });
     if (state.idle) {
       busy(false);
       refineMore();
+      more();
     }
-    showStats();
+    showStats(scene.walls);
   },
   line(m) {
     state.line = m;
@@ -151,7 +165,7 @@ worker.onmessage = ({ data }) => {
   if (data.type === 'forget')
     boot.forget();
   else if (data.opening === state.opening)
-    handlers[data.type](data);
+    (handlers[data.type] ?? ((news) => tell(data.type, news)))(data);
 };
 worker.onerror = (e) => showError({ message: `The page's worker failed (${e.message ?? 'it could not be loaded'}); run npm ci in tools/viewer, and reload` });
 
@@ -170,19 +184,25 @@ function retry() {
 
 function cameraMoved() {
   timer ??= setTimeout(ask, 90);
+  changed();
+}
+
+function frameDrawn(ms, info) {
+  frameTook(ms, info.calls);
+  tell('frame');
 }
 
 function ask() {
   clearTimeout(timer);
   timer = undefined;
   const mesh = state.info?.parts.has('mesh') && Number($('level').value) === state.info.level_count;
-  const level = mesh ? 99 : state.info ? Number($('level').value) : boot.level ?? 99; // already right while the file is being opened
+  const level = mesh ? 99 : state.info ? Number($('level').value) : state.levelAsked ?? 99; // already right while the file is being opened
   state.idle = false;
   if (state.info)
     busy(true);
   worker.postMessage({ type: 'view', view: scene.view(), want: {
     number: ++state.want, level, mesh: Boolean(mesh), pixels: detail(), triangles: detail() === 0 ? Infinity : TRIANGLES_MOST,
-    black: state.clip.axis !== undefined, lines: $('wire').checked, cells: $('cells').checked } });
+    black: scene.cut !== undefined, lines: $('wire').checked, cells: $('cells').checked } });
 }
 
 // Automatic detail: 16 pixels, and when all of that is there 8 if the frames are fast, 32 if they are slow.
@@ -196,86 +216,15 @@ function refineMore() {
   ask();
 }
 
-// --- level strip ---
-
-const bytesOf = (size) => (size >= 0 ? bytes(size) : 'not yet known how much');
-
-function makeLevels() {
-  const i = state.info, sizes = i.levels.map((_, l) => state.bytesTo[l] - (l ? state.bytesTo[l - 1] : 0)), stops = [...sizes]; // NaN: not known yet
-  if (i.parts.has('mesh'))
-    stops.push(state.size - state.bytesTo.at(-1));
-  const most = Math.max(...stops.filter((size) => size >= 0), 1);
-  $('levels').replaceChildren(...stops.map((size, l) => {
-    const b = document.createElement('button'), bar = document.createElement('i'), isMesh = l === i.level_count;
-    bar.style.height = `${4 + 24 * Math.sqrt((size || 0) / most)}px`;
-    b.append(bar, isMesh ? '▲' : String(l));
-    b.title = isMesh ? `The mesh: ${bytesOf(size)}, fetched where it is seen` : `Level ${l}: ${bytesOf(size)}; file up to here ${bytesOf(state.bytesTo[l])}`;
-    b.onclick = () => {
-      $('level').value = l;
-      levelChanged();
-    };
-    return b;
-  }));
-}
-
-function showLevels() {
-  const at = Number($('level').value), drawn = state.stats?.levels ?? [];
-  [...$('levels').children].forEach((b, l) => {
-    const isMesh = l === state.info.level_count;
-    b.classList.toggle('here', isMesh ? (state.stats?.meshTriangles ?? 0) > 0 : l <= state.depth);
-    b.classList.toggle('shown', isMesh ? (state.stats?.meshTriangles ?? 0) > 0 : (drawn[l] ?? 0) > 0);
-    b.classList.toggle('now', l === at);
-  });
-}
-
 function levelChanged() {
-  const at = Number($('level').value), i = state.info, mesh = at === i.level_count;
-  $('levelText').textContent = mesh ? 'all, and the mesh' : `0 to ${at}`;
-  $('levelHint').textContent = mesh ? 'Refined where it is seen; leaves show the real faces.' : `Envelopes of level ${at} and of leaves above it: ${bytesOf(state.bytesTo[at])} of the file.`;
-  const excess = volumeExcess(Math.min(at, i.level_count - 1));
-  $('sExcess').textContent = excess === undefined || mesh ? '–' : `+${excess < 10 ? excess.toFixed(2) : excess.toFixed(0)} %`;
-  showLevels();
+  showLevel();
+  changed();
   ask();
 }
 
-// The stated volumes: envelopes of the level's gray nodes, leaves and black cells so far, against the model.
-function volumeExcess(level) {
-  const i = state.info;
-  if (!i.solid || !(i.mesh_volume > 0) || i.winding_rule !== 'nonzero')
-    return undefined;
-  let sum = i.levels[level].gray_volume;
-  for (let l = 0; l <= level; l++)
-    sum += i.levels[l].leaf_volume + i.levels[l].black * i.box_size.reduce((v, s) => v * (s / 2 ** l), 1);
-  return Math.max(0, 100 * (sum / i.mesh_volume - 1));
-}
-
-// --- statistics ---
-
-function frameDrawn(ms, info) {
-  state.frames.push(ms);
-  if (state.frames.length > 30)
-    state.frames.shift();
-  state.calls = info.calls;
-  $('sFrame').textContent = `${frameMs().toFixed(1)} ms`;
-  $('sFrame').title = `${info.calls} draw calls`;
-}
-
-const frameMs = () => state.frames.reduce((a, b) => a + b, 0) / Math.max(state.frames.length, 1);
-
-function showStats() {
-  if (!state.info)
-    return;
-  const s = state.stats, t = state.traffic;
-  $('sRequests').textContent = count(t.requests);
-  $('sBytes').textContent = `${bytes(t.bytes)} of ${bytes(state.size)}`;
-  $('sFirst').textContent = state.shownAfter === undefined ? '' : time(state.shownAfter);
-  $('sLevels').textContent = state.depth < 0 ? '' : `0–${state.depth} of 0–${state.info.level_count - 1}`;
-  if (s) {
-    const drawn = s.triangles - (scene.walls ? 0 : s.wallTriangles);
-    $('sNodes').textContent = count(s.nodes);
-    $('sTriangles').textContent = count(drawn);
-    $('sMesh').textContent = state.info.parts.has('mesh') ? count(s.meshTriangles) : 'not in the file';
-  }
+function chooseLevel(level) {
+  $('level').value = level;
+  levelChanged();
 }
 
 // --- view ---
@@ -283,6 +232,7 @@ function showStats() {
 function colouringChanged() {
   const mode = document.querySelector('input[name=colouring]:checked').value;
   scene.setColouring(mode);
+  changed();
   const key = (c, text) => {
     const span = document.createElement('span'), i = document.createElement('i');
     i.style.background = c;
@@ -293,74 +243,53 @@ function colouringChanged() {
     : mode === 'level' ? LEVEL_COLOURS.slice(0, state.info?.level_count ?? 9).map((c, l) => key(c, String(l))) : []));
 }
 
-function clipChanged() {
-  const value = document.querySelector('input[name=clip]:checked').value, was = state.clip.axis;
-  state.clip.axis = value === '' ? undefined : Number(value);
-  $('clipRow').hidden = state.clip.axis === undefined;
-  if (state.clip.axis === undefined) {
-    scene.setClip();
-  } else {
-    const k = state.clip.axis, half = state.info ? state.info.box_size[k] / 2 * state.scene.scale : 1, sign = state.clip.flip ? -1 : 1;
-    const normal = [0, 0, 0];
-    normal[k] = sign;
-    scene.setClip(normal, sign * half * (Number($('clipAt').value) / 500 - 1));
-  }
-  if (state.info && (was === undefined) !== (state.clip.axis === undefined))
+// The plane and the box together: shares of the model's box, of each axis from and to.
+function cutChanged() {
+  const value = document.querySelector('input[name=clip]:checked').value, { clip } = state, was = scene.cut;
+  Object.assign(clip, { axis: value === '' ? undefined : Number(value), at: Number($('clipAt').value) / 1000 });
+  $('clipRow').hidden = clip.axis === undefined;
+  if (!state.info)
+    return;
+  const cut = cutOf(state.info.box_size, state.scene.scale, clip, state.box);
+  scene.setCut(cut?.low, cut?.high);
+  if ((was === undefined) !== (cut === undefined))
     ask();
+  changed();
+  tell('cut');
+}
+
+// All that an address can say of a view.
+function shownAs({ camera, level, clip, box, point, measured, colouring, walls, detail: pixels }) {
+  home(camera);
+  $('level').value = level ?? $('level').max;
+  $('detail').value = pixels;
+  $('detail').value ||= 'auto';
+  const check = (name, value) => ([...document.querySelectorAll(`input[name=${name}]`)].find((i) => i.value === value) ?? document.querySelector(`input[name=${name}]`)).click();
+  Object.assign(state, { box, measured });
+  $('clipAt').value = 1000 * (clip?.at ?? 0.5);
+  state.clip.flip = clip?.flip ?? false;
+  check('clip', clip ? String(clip.axis) : '');
+  check('colouring', colouring);
+  cutChanged();
+  colouringChanged();
+  $('walls').checked = walls;
+  scene.setWalls(walls);
+  levelChanged();
+  if (point || state.probe)
+    probeAt(point);
+  else
+    probeShown();
 }
 
 function setTheme(theme) {
   document.documentElement.dataset.theme = theme;
   scene.setTheme(theme === 'dark');
+  tell('theme');
 }
 
 function layout() {
   const narrow = innerWidth <= 760, shown = !$('panel').hidden;
   scene.setInsets(shown && !narrow ? 310 : 0, shown && narrow ? $('panel').offsetHeight + 60 : 0);
-}
-
-// --- the probe ---
-
-const toModel = (p) => p.map((x, k) => x / state.scene.scale + state.scene.center[k]);
-const toScene = (p) => p.map((x, k) => (x - state.scene.center[k]) * state.scene.scale);
-
-function probeAt(point) {
-  state.probe = { point, pending: true };
-  worker.postMessage({ type: 'probe', opening: state.opening, point });
-  probeShown();
-}
-
-function probeShown() {
-  const p = state.probe;
-  $('probe').hidden = !p;
-  $('probeHint').hidden = Boolean(p);
-  if (!p) {
-    scene.showProbe();
-    return;
-  }
-  ['px', 'py', 'pz'].forEach((id, k) => {
-    if (document.activeElement !== $(id))
-      $(id).value = Number(p.point[k].toPrecision(6));
-    $(id).title = p.point[k];
-  });
-  const tints = { in: '#4cc38a', out: '#ff6b6b', on: '#ffffff', maybe: '#ffb020' };
-  scene.showProbe(toScene(p.point), p.nearest && toScene(p.nearest), tints[p.where] ?? '#ffb020');
-  if (p.pending)
-    return;
-  const words = { in: 'Inside', out: 'Outside', on: 'On the surface', maybe: 'Undecided' };
-  $('where').textContent = p.solid ? words[p.where] : 'No inside';
-  $('where').className = p.solid ? p.where : 'maybe';
-  $('whereNote').textContent = !p.solid ? 'the model is a surface, not a solid'
-    : p.exact ? 'exact'
-    : p.where === 'maybe' ? (p.done ? `levels 0–${p.depth} do not say; the file has no mesh` : 'asking the leaf …')
-    : `certain by levels 0–${p.depth}`;
-  if (p.exact) {
-    $('distance').textContent = length(p.where === 'on' ? 0 : p.distance, 7);
-    $('distanceNote').textContent = `to the nearest face, in doubles; levels 0–${p.depth}: ${length(p.lo, 3)} to ${length(p.hi, 3)}`;
-  } else {
-    $('distance').textContent = `${length(p.lo, 4)} – ${length(p.hi, 4)}`;
-    $('distanceNote').textContent = `certified by the cells of levels 0–${p.depth}`;
-  }
 }
 
 // --- wiring ---
@@ -375,37 +304,35 @@ $('close').onclick = close;
 $('stallRetry').onclick = () => worker.postMessage({ type: 'retry' });
 $('errorClose').onclick = () => showError();
 $('level').oninput = levelChanged;
-$('detail').onchange = ask;
+$('detail').onchange = () => {
+  ask();
+  changed();
+};
 $('walls').onchange = () => {
   scene.setWalls($('walls').checked);
-  showStats();
+  showStats(scene.walls);
+  changed();
 };
 $('own').onchange = () => scene.setOwnColours($('own').checked);
 $('wire').onchange = ask;
 $('cells').onchange = ask;
 $('colouring').onchange = colouringChanged;
-$('clipAxis').onchange = clipChanged;
-$('clipAt').oninput = clipChanged;
+$('clipAxis').onchange = cutChanged;
+$('clipAt').oninput = cutChanged;
 $('clipFlip').onclick = () => {
   state.clip.flip = !state.clip.flip;
-  clipChanged();
+  cutChanged();
 };
-$('toolHome').onclick = () => scene.home();
+$('toolHome').onclick = () => {
+  home();
+  changed();
+};
 $('toolTheme').onclick = () => setTheme(document.documentElement.dataset.theme === 'light' ? 'dark' : 'light');
 $('toolPanel').onclick = () => {
   $('panel').hidden = !$('panel').hidden;
   layout();
 };
 $('toolHelp').onclick = () => $('help').showModal();
-['px', 'py', 'pz'].forEach((id, k) => {
-  $(id).onchange = () => { // the other coordinates keep the digits that are not shown
-    const point = [...state.probe.point], x = Number($(id).value);
-    point[k] = x;
-    if ($(id).value.trim() && Number.isFinite(x))
-      probeAt(point);
-  };
-});
-
 let down;
 $('canvas').addEventListener('pointerdown', (e) => (down = e.button === 0 ? [e.clientX, e.clientY] : undefined));
 $('canvas').addEventListener('pointerup', (e) => {
@@ -413,7 +340,7 @@ $('canvas').addEventListener('pointerup', (e) => {
     return;
   const point = scene.pick(e.clientX, e.clientY);
   if (point)
-    probeAt(toModel(point));
+    (state.clicked ?? probeAt)(toModel(point)); // a tool may want the point
 });
 
 addEventListener('dragover', (e) => {
@@ -446,45 +373,63 @@ const slide = (id, step, then) => () => {
 };
 const KEYS = {
   arrowleft: slide('level', -1, levelChanged), arrowright: slide('level', 1, levelChanged), g: click('walls'), w: click('wire'), c: click('cells'), m: click('own'),
-  k: () => choose('colouring', 1), x: () => choose('clip', 1), '[': slide('clipAt', -15, clipChanged), ']': slide('clipAt', 15, clipChanged), '/': click('clipFlip'),
+  k: () => choose('colouring', 1), x: () => choose('clip', 1), '[': slide('clipAt', -15, cutChanged), ']': slide('clipAt', 15, cutChanged), '/': click('clipFlip'),
   f: click('toolHome'), t: click('toolTheme'), p: click('toolPanel'), '?': click('toolHelp'), o: close,
+  ',': slide('level', -1, levelChanged), '.': slide('level', 1, levelChanged),
   escape: () => {
-    state.probe = undefined;
-    probeShown();
+    tell('escape');
+    probeAt();
     showError();
   },
 };
+// In the picture arrows turn (with Shift they move), and + and - go nearer and farther.
+const STEER = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, 1], arrowdown: [0, -1], '+': 0.8, '=': 0.8, '-': 1.25 };
+
 addEventListener('keydown', (e) => {
-  if (e.ctrlKey || e.metaKey || e.altKey || $('help').open || (e.target.matches('input:not([type=range]):not([type=radio]):not([type=checkbox]), select') && e.key !== 'Escape'))
+  const writes = e.target.matches('input:not([type=range]):not([type=radio]):not([type=checkbox]), select, textarea');
+  if (e.ctrlKey || e.metaKey || e.altKey || document.querySelector('dialog[open]') || (writes && e.key !== 'Escape'))
     return;
   const key = e.key.toLowerCase();
   if (!state.info && !['t', '?'].includes(key))
     return;
-  if (KEYS[key]) {
-    e.preventDefault();
-    KEYS[key]();
+  const steer = e.target === $('canvas') ? STEER[key] : undefined;
+  if (!steer && !KEYS[key]) {
+    tell('key', e);
+    return;
   }
+  e.preventDefault();
+  if (steer)
+    scene.steer(steer, e.shiftKey);
+  else
+    KEYS[key]();
 });
 
-async function listSamples(address) {
-  const list = await (await fetch(address)).json();
-  $('samples').hidden = list.length === 0;
-  $('samples').querySelector('ul').replaceChildren(...list.map(({ name, file, faces, bytes: size }) => {
-    const li = document.createElement('li'), a = document.createElement('a'), small = document.createElement('small');
-    const url = new URL(file, new URL(address, location.href)).href;
-    a.href = `?file=${encodeURIComponent(url)}`;
-    a.onclick = (e) => {
-      e.preventDefault();
-      openUrl(url);
-    };
-    small.textContent = [faces && `${count(faces)} faces`, size && bytes(size)].filter(Boolean).join(' · ');
-    a.append(name, small);
-    li.append(a);
-    return li;
-  }));
+// --- the history ---
+
+addEventListener('popstate', (e) => {
+  const query = new URLSearchParams(location.search), what = whereTo(query, e.state);
+  if (what === undefined)
+    close({ step: false });
+  else if (typeof what !== 'string')
+    openFile(what, { step: false });
+  else if (state.info && typeof state.what === 'string' && new URL(what, location.href).href === state.what)
+    shownAs(said(query));
+  else
+    openUrl(what, { step: false });
+});
+
+on('complaint', (message) => showError({ message }));
+
+// --- what comes later: measuring, notes, the pen, sharing ---
+
+let coming;
+function more() {
+  coming ??= import('./more.js').then((m) => m.begin({ scene, worker, ask, cutChanged, changed, address, shownAs, layout, query: boot.query }),
+    (error) => showError({ message: `The page's tools could not be loaded (${error.message}); reload the page` }));
+  return coming;
 }
 
-// --- begin: ?file= address, &level= number or mesh, &detail= pixels, &theme=, &samples= list ---
+// --- begin: what an address may say is told in docs/guide/viewer.md ---
 
 const { query } = boot;
 setTheme(document.documentElement.dataset.theme);
@@ -492,9 +437,9 @@ $('detail').value = query.get('detail') ?? 'auto';
 if (!$('detail').value)
   $('detail').value = 'auto';
 if (query.has('samples'))
-  listSamples(query.get('samples')).catch((e) => showError({ message: `${query.get('samples')}: the list of samples cannot be read (${e.message}); check the address` }));
+  listSamples(query.get('samples'), openUrl).catch((e) => showError({ message: `${query.get('samples')}: the list of samples cannot be read (${e.message}); check the address` }));
 if (query.has('file'))
-  openUrl(query.get('file'), boot.opening === 1);
+  openUrl(query.get('file'), { begun: boot.opening === 1, step: false });
 boot.over();
 boot.said.splice(0).forEach((data) => worker.onmessage({ data }));
 
@@ -508,5 +453,9 @@ window.ebpoViewer = {
   get place() {
     return state.scene;
   },
-  scene, probeAt,
+  scene, probeAt, address,
 };
+
+// more.js is bundled apart from this, and must not bring these along a second time.
+export { kit } from './scene.js';
+export * from './state.js';

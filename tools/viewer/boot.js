@@ -11,6 +11,10 @@
   const query = new URLSearchParams(location.search), said = [];
   const number = (name) => (/^\d+$/.test(query.get(name) ?? '') ? Number(query.get(name)) : undefined);
   document.documentElement.dataset.theme = query.get('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark');
+  if (location.protocol === 'file:') { // browsers give pages from disk neither modules nor workers
+    addEventListener('DOMContentLoaded', () => document.documentElement.classList.add('disk'));
+    return;
+  }
   const worker = new Worker('worker.js', { type: 'module' });
   worker.onmessage = ({ data }) => said.push(data);
   const boot = window.ebpoBoot = { worker, said, query, level: number('level'), detail: number('detail'), fieldOfView: FIELD_OF_VIEW, opening: 0, over() {},
@@ -76,8 +80,10 @@
   })().catch((error) => post({ failed: error.message })).finally(begin);
 
   // About what the camera will see; the page tells exactly when it is there.
-  const eye = [0.42, 0.32, 0.85], distance = 0.98 / Math.sin(FIELD_OF_VIEW * Math.PI / 360), length = Math.hypot(...eye);
+  const asked = (query.get('view') ?? '').split(',').filter(Boolean).map(Number);
+  const [azimuth = 26.3, height = 18.65, distance = 0.98 / Math.sin(FIELD_OF_VIEW * Math.PI / 360), ...at] = asked.every(Number.isFinite) ? asked : [];
+  const a = azimuth * Math.PI / 180, h = height * Math.PI / 180, away = [Math.sin(a) * Math.cos(h), Math.sin(h), Math.cos(a) * Math.cos(h)];
   worker.postMessage({ type: 'open', opening: 1, what: boot.url, ahead: boot.ahead });
-  worker.postMessage({ type: 'view', view: { eye: eye.map((x) => x / length * distance), planes: [], pixels: innerHeight / (2 * Math.tan(FIELD_OF_VIEW * Math.PI / 360)) },
+  worker.postMessage({ type: 'view', view: { eye: away.map((x, k) => (at[k] ?? 0) + x * distance), planes: [], pixels: innerHeight / (2 * Math.tan(FIELD_OF_VIEW * Math.PI / 360)) },
     want: { number: 0, level: boot.level ?? 99, mesh: false, pixels: boot.detail ?? 16, triangles: 2_000_000 } });
 })();

@@ -1,6 +1,7 @@
-// Reads, chooses and cuts, so that the page stays responsive. The page sends 'open', 'close', 'view' and 'probe'; it gets 'opened', 'located', 'tiles', 'loaded', 'probed',
-// 'idle' and 'failed'.
+// Reads, chooses and cuts, so that the page stays responsive. The page sends 'open', 'close', 'view', 'probe', 'places' and 'section'; it gets 'opened', 'located', 'tiles', 'loaded',
+// 'probed', 'places', 'section', 'idle' and 'failed'.
 import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
+import { placesOf, sectionOf } from './answers.js';
 import { Cut } from './cut.js';
 import { fetchAfter, takeFirst } from './handover.js';
 import { GRAY, Tree, UrlSource, distanceInterval, growForQuestion, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo, sourceOf } from './reader/index.js';
@@ -11,6 +12,8 @@ const FIRST_LEVELS = 5;                   // come with the first request, as a r
 const SMALL_MESH = 8 * 1024 * 1024;       // stored bytes
 const MESH_BYTES_A_VIEW = 16 * 1024 * 1024; // of larger ones, before the camera moves again
 const SUBTREE_BYTES_A_VIEW = 1.5 * 1024 * 1024; // the same where the file has subtrees, of which few bytes are for nothing
+
+const PLACES_A_TREE = 5000;
 
 let current; // one open file
 let view, want;
@@ -184,6 +187,20 @@ class OpenFile {
   }
 }
 
+// Longer questions, answered one after the other; a section that another overtakes ends.
+let sections = 0;
+async function answer(data, mine) {
+  if (data.type === 'places') {
+    const tree = (mine.asked ??= mine.tree.lean()), places = await placesOf(mine.file, tree, data.points);
+    if ((mine.places = (mine.places ?? 0) + data.points.length) > PLACES_A_TREE)
+      mine.asked = mine.places = undefined; // what it has gathered goes
+    post({ type: 'places', opening: mine.number, id: data.id, places });
+    return;
+  }
+  const number = ++sections, tell = (news) => mine.ended || number !== sections || post({ type: 'section', opening: mine.number, axis: data.axis, at: data.at, traffic: mine.file.traffic, ...news });
+  await sectionOf(mine.file, mine.tree.lean(), data.axis, data.at, tell, () => mine.ended || number !== sections);
+}
+
 // What is under way, for the page; and that nothing is any more.
 let silent = true;
 function tellLine() {
@@ -224,6 +241,8 @@ self.onmessage = async ({ data }) => {
         await current.pump();
     } else if (data.type === 'probe' && current?.tree?.root) {
       await current.probe(data.point);
+    } else if ((data.type === 'places' || data.type === 'section') && current?.tree?.root && data.opening === current.number) {
+      await answer(data, current);
     }
   } catch (error) {
     post({ type: 'failed', opening: data.opening ?? current?.number, error: describe(error) });

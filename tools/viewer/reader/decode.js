@@ -237,17 +237,35 @@ export function decodeFaces(bytes, array, chunk, index, vertexCount) {
   return out;
 }
 
-/** A map: running sums of zigzag differences, afresh in each chunk. */
-export function decodeMap(bytes, array, limit) {
-  const codes = new Uint32Array(bytes.buffer, bytes.byteOffset, array.rows), out = new Uint32Array(array.rows), used = new Uint8Array(Math.ceil(limit / 8));
+// A map's running sums of zigzag differences, afresh in each chunk; `each` is called with them.
+function sumMap(codes, array, limit, each) {
   let sum = 0;
-  for (let i = 0; i < out.length; i++) {
+  for (let i = 0; i < codes.length; i++) {
     const code = codes[i];
     sum = ((i % array.chunkRows ? sum : 0) + ((code >>> 1) ^ -(code & 1))) >>> 0;
-    if (sum >= limit || used[sum >>> 3] >> (sum & 7) & 1)
+    if (sum >= limit || !each(i, sum))
       throw formatError(array.path, 'a source number is out of range or used twice');
+  }
+}
+
+/** A whole map. */
+export function decodeMap(bytes, array, limit) {
+  const codes = new Uint32Array(bytes.buffer, bytes.byteOffset, array.rows), out = new Uint32Array(array.rows), used = new Uint8Array(Math.ceil(limit / 8));
+  sumMap(codes, array, limit, (i, sum) => {
+    const fresh = !(used[sum >>> 3] >> (sum & 7) & 1);
     used[sum >>> 3] |= 1 << (sum & 7);
     out[i] = sum;
-  }
+    return fresh;
+  });
+  return out;
+}
+
+/** A chunk of a map; whether other chunks have a number, too, is not known. */
+export function decodeMapChunk(bytes, array, limit) {
+  const codes = new Uint32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4), out = new Uint32Array(codes.length);
+  sumMap(codes, array, limit, (i, sum) => {
+    out[i] = sum;
+    return true;
+  });
   return out;
 }

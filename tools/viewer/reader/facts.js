@@ -23,7 +23,7 @@ const DIGESTS = ['source_sha256', 'content_sha256'];
 const LEVEL_COUNTS = ['gray', 'leaf', 'white', 'black', 'planes', 'leaf_planes', 'faces_new', 'faces_referenced'];
 
 /** Reads attributes of one object by type. */
-class Facts {
+export class Facts {
   constructor(attributes, where) {
     this.attributes = attributes;
     this.where = where;

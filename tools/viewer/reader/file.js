@@ -452,6 +452,16 @@ export class EbpoFile {
     }
   }
 
+  /** The source's numbers of some faces, by theirs in the file; from `source_face_count` on: faces that mending has added. Without reading the whole map. */
+  async sourceFaces(numbers) {
+    if (!this.info.parts.has('maps'))
+      throw new EbpoError('ABSENT', `${this.source.name}: the file was written without its maps to the source's numbers; convert it again with them`);
+    return this.#told(async () => {
+      await this.#findChunks(['/maps/face_source']);
+      return this.store.column('/maps/face_source', 0, numbers, Uint32Array);
+    });
+  }
+
   // --- everything ---
 
   /** Checks that the leaves of all levels (read with `faces`) have every face as a new one once, in depth-first order. */

@@ -6,7 +6,7 @@ import { EbpoError, formatError } from './error.js';
 
 const UNDEFINED = 0xffffffffffffffffn;
 const SIGNATURE = [0x89, 0x48, 0x44, 0x46, 0x0d, 0x0a, 0x1a, 0x0a];
-const MESSAGES_MOST = 4096, BLOCKS_MOST = 256; // of one object header: far above what is written, far below what hurts
+const MESSAGES_MOST = 8192, BLOCKS_MOST = 256; // of one object header: far above what is written, far below what hurts
 
 const NIL = 0x00, DATASPACE = 0x01, LINK_INFO = 0x02, DATATYPE = 0x03, FILL_OLD = 0x04, FILL = 0x05, LINK = 0x06, LAYOUT = 0x08, GROUP_INFO = 0x0a,
   PIPELINE = 0x0b, ATTRIBUTE = 0x0c, CONTINUATION = 0x10, ATTRIBUTE_INFO = 0x15;

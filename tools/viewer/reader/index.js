@@ -1,4 +1,4 @@
-// Reads EBP-Octree files: docs/guide/viewer.md.
+// Reads EBP-Octree files: docs/guide/embedding.md.
 export { EbpoError } from './error.js';
 export { openEbpo, EbpoFile } from './file.js';
 export { BlobSource, BytesSource, UrlSource, sourceOf } from './source.js';

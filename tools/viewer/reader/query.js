@@ -141,11 +141,11 @@ export function nearestOnTriangle(p, f, at) {
 }
 
 /**
- * The nearest face: { distance, point, leaves }. `facesOf(leaves)` gives (a promise of) the faces of each leaf, and `deeper(nodes)` brings the
+ * The nearest face: { distance, point, face, corners, leaves }: its number and its nine coordinates. `facesOf(leaves)` gives (a promise of) the faces of each leaf, and `deeper(nodes)` brings the
  * children of these nodes into the tree, all at once. Cells are searched nearest first, so few leaves are looked at.
  */
 export async function nearestFace(tree, p, facesOf, deeper) {
-  let best = [Infinity], bound = Infinity, looked = 0, together = TOGETHER, ahead = 1;
+  let best = [Infinity], face, bound = Infinity, looked = 0, together = TOGETHER, ahead = 1;
   const queue = [];
   const add = (node) => {
     queue.push([cellNear(tree, node, p), node]);
@@ -181,9 +181,11 @@ export async function nearestFace(tree, p, facesOf, deeper) {
     for (const faces of await facesOf(leaves))
       for (let at = 0; at < faces.length; at += 9) {
         const found = nearestOnTriangle(p, faces, at);
-        if (found[0] < best[0])
+        if (found[0] < best[0]) {
           best = found;
+          face = { number: faces.numbers?.[at / 9], corners: faces.subarray(at, at + 9) };
+        }
       }
   }
-  return { distance: best[0], point: best.slice(1), leaves: looked };
+  return { distance: best[0], point: best.slice(1), face: face?.number, corners: face?.corners, leaves: looked };
 }

@@ -1,7 +1,7 @@
 // Arrays of an open file, by rows: which chunks hold them, and their values.
 import { ChunkCache } from './cache.js';
 import { decodeColours } from './colours.js';
-import { decodeFaces, decodeVertices } from './decode.js';
+import { decodeFaces, decodeMapChunk, decodeVertices } from './decode.js';
 import { formatError } from './error.js';
 import { CHUNK_SUMS } from './facts.js';
 import { placesHold } from './places.js';
@@ -45,6 +45,8 @@ export class Store {
       return decodeFaces(bytes, array, chunk, await this.facesIndex(), this.info.vertex_count);
     if (array.columns)
       return decodeColours(bytes, array, Math.min(array.chunkRows, array.rows - chunk * array.chunkRows));
+    if (array.path === '/maps/face_source')
+      return decodeMapChunk(bytes.subarray(0, 4 * Math.min(array.chunkRows, array.rows - chunk * array.chunkRows)), array, this.info.source_face_count + this.info.mend_added_faces);
     return array.path === '/mesh/vertices' ? decodeVertices(bytes, array, chunk) : typed(array, bytes);
   }
 
@@ -105,9 +107,9 @@ export class Store {
     }
   }
 
-  /** One column's value of each of some rows, as bytes (colours.js). */
-  async column(path, column, rows) {
-    const array = this.arrays.get(path), width = Math.max(array.cols, 1), chunks = new Map(), out = new Uint8Array(rows.length);
+  /** One column's value of each of some rows; as bytes, if they are colours (colours.js). */
+  async column(path, column, rows, Type = Uint8Array) {
+    const array = this.arrays.get(path), width = Math.max(array.cols, 1), chunks = new Map(), out = new Type(rows.length);
     for (const row of rows)
       chunks.set(Math.floor(row / array.chunkRows), undefined);
     const wanted = [...chunks.keys()], values = await this.cache.get(wanted.map((chunk) => ({ array, chunk })));

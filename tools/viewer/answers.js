@@ -1,0 +1,113 @@
+// Longer questions of the page, answered in the worker: places on faces for what is painted and measured, and sections of the real faces.
+import { GRAY, LEAF, growForQuestion, nearestFace } from './reader/index.js';
+
+const ONE_WEIGHT = 2 ** 30;     // format-spec/paint.md
+const LEAVES_AT_ONCE = 1024, NODES_AT_ONCE = 256;
+const FACES_MOST = 4_000_000;   // of a section
+
+const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]], dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+
+/** The weights of a triangle's second and third corner at a point of it, in units of 2^-30. `corners`: nine numbers. */
+export function weightsOf(p, corners) {
+  const a = corners.subarray(0, 3), u = sub(corners.subarray(3, 6), a), v = sub(corners.subarray(6, 9), a), w = sub(p, a);
+  const uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), wu = dot(w, u), wv = dot(w, v), area = uu * vv - uv * uv;
+  if (!(area > 0)) // a segment or a point: along its longer side
+    return uu >= vv ? [unit(uu > 0 ? wu / uu : 0), 0] : [0, unit(wv / vv)];
+  const second = unit((vv * wu - uv * wv) / area);
+  return [second, Math.min(ONE_WEIGHT - second, unit((uu * wv - uv * wu) / area))];
+}
+const unit = (x) => Math.round(Math.min(1, Math.max(0, x)) * ONE_WEIGHT);
+
+/**
+ * The nearest places on the faces: [{ face, weights, place, normal, distance }], `face` as paint files number them. In doubles. Needs the part `mesh`.
+ */
+export async function placesOf(file, tree, points) {
+  const found = [];
+  for (const p of points)
+    found.push(await nearestFace(tree, p, (leaves) => file.leafFaces(leaves), (nodes) => growForQuestion(file, tree, nodes)));
+  const own = found.map((f) => f.face), numbers = file.info.parts.has('maps') ? await file.sourceFaces(own) : own;
+  return found.map(({ point, corners, distance }, i) => {
+    const n = cross(sub(corners.subarray(3, 6), corners.subarray(0, 3)), sub(corners.subarray(6, 9), corners.subarray(0, 3))), size = Math.hypot(...n);
+    return { face: numbers[i], weights: weightsOf(point, corners), place: point, normal: n.map((x) => (size > 0 ? x / size : 0)), distance };
+  });
+}
+
+/**
+ * What a plane across an axis cuts of some faces (nine numbers each): adds segments [u, v, u, v] to `out`, on the two axes after `axis`, with what is
+ * inside of a closed mesh on their left as seen from the axis' upper end. Corners on the plane count as above it, so that outlines are closed.
+ */
+export function cutFaces(faces, axis, at, out) {
+  const u = (axis + 1) % 3, v = (axis + 2) % 3, crossing = (low, high) => { // from below to above: both faces of an edge find the same
+    const t = (at - faces[low + axis]) / (faces[high + axis] - faces[low + axis]);
+    return [faces[low + u] + t * (faces[high + u] - faces[low + u]), faces[low + v] + t * (faces[high + v] - faces[low + v])];
+  };
+  for (let f = 0; f < faces.length; f += 9) {
+    const above = [0, 3, 6].map((c) => faces[f + c + axis] >= at);
+    if (above[0] === above[1] && above[1] === above[2])
+      continue;
+    let up, down;
+    for (let c = 0; c < 3; c++) {
+      const next = (c + 1) % 3;
+      if (!above[c] && above[next])
+        up = crossing(f + 3 * c, f + 3 * next);
+      else if (above[c] && !above[next])
+        down = crossing(f + 3 * next, f + 3 * c);
+    }
+    out.push(...down, ...up);
+  }
+}
+
+/** Of segments as cutFaces() gives them: { area, length }; the area counts each place as often as faces wind around it. */
+export function measureOf(segments) {
+  const [u, v] = segments; // near by, so that little is lost
+  let area = 0, length = 0;
+  for (let i = 0; i < segments.length; i += 4) {
+    const [a, b, c, d] = [segments[i] - u, segments[i + 1] - v, segments[i + 2] - u, segments[i + 3] - v];
+    area += (a * d - b * c) / 2;
+    length += Math.hypot(c - a, d - b);
+  }
+  return { area, length };
+}
+
+/**
+ * The section of the real faces by a plane across an axis, in the model's coordinates. `tell` gets { looked, of } now and then, and in the end { segments,
+ * area, length, faces, partial } or { fault }. Area only of solids. `partial`: a subset has left some of it out.
+ */
+export async function sectionOf(file, tree, axis, at, tell, ended) {
+  const { info } = file;
+  if (!info.parts.has('mesh')) {
+    tell({ fault: 'the file has no faces; convert it with its mesh' });
+    return;
+  }
+  const leaves = [];
+  let partial = false;
+  for (let nodes = [tree.root]; nodes.length && !ended();) {
+    const here = nodes.filter((node) => (node.type === GRAY || node.type === LEAF) && tree.wall(node, axis, 0) <= at && tree.wall(node, axis, 1) >= at);
+    leaves.push(...here.filter((node) => node.type === LEAF));
+    const gray = here.filter((node) => node.type === GRAY && !tree.isPruned(node)), missing = gray.filter((node) => !tree.children(node));
+    partial ||= gray.length < here.filter((node) => node.type === GRAY).length;
+    for (let i = 0; i < missing.length && !ended(); i += NODES_AT_ONCE) { // nodes keep their parts, which may go when others come
+      await growForQuestion(file, tree, missing.slice(i, i + NODES_AT_ONCE));
+      missing.slice(i, i + NODES_AT_ONCE).forEach((node) => tree.children(node));
+    }
+    partial ||= gray.some((node) => !tree.children(node) && tree.isPruned(node));
+    nodes = gray.flatMap((node) => tree.children(node) ?? (tree.isPruned(node) ? [] : [node]));
+  }
+  const seen = new Set(), segments = [];
+  for (let i = 0; i < leaves.length && !ended(); i += LEAVES_AT_ONCE) {
+    for (const faces of await file.leafFaces(leaves.slice(i, i + LEAVES_AT_ONCE))) {
+      const fresh = faces.numbers.reduce((list, number, k) => (seen.has(number) ? list : (seen.add(number), list.push(k), list)), []);
+      cutFaces(fresh.length === faces.numbers.length ? faces : Float64Array.from(fresh.flatMap((k) => [...faces.subarray(9 * k, 9 * k + 9)])), axis, at, segments);
+    }
+    if (seen.size > FACES_MOST) {
+      tell({ fault: `the section meets more than ${FACES_MOST / 1e6} million faces; cut a part of the model out with ebpo subset` });
+      return;
+    }
+    tell({ looked: Math.min(leaves.length, i + LEAVES_AT_ONCE), of: leaves.length });
+  }
+  if (!ended()) {
+    const { area, length } = segments.length ? measureOf(segments) : { area: 0, length: 0 };
+    tell({ segments: Float64Array.from(segments), area: info.solid ? area : undefined, length, faces: segments.length / 4, partial });
+  }
+}

@@ -1,0 +1,230 @@
+// <ebpo-viewer src="statue.ebpo.h5">: the picture and its camera as an element for other people's pages. Importing this file defines it.
+import { boxOf, cameraOf, cameraText, clipOf, cutOf, pointsOf } from './address.js';
+import { Client } from './client.js';
+import { Scene } from './scene.js';
+
+const FIELD_OF_VIEW = 38, TRIANGLES_MOST = 2_000_000, PIXELS = 12, LATER_MS = 200;
+const STYLE = `
+  :host { display: block; position: relative; min-height: 200px; --text: #e6e9ef; --back: radial-gradient(ellipse at 45% 38%, #1b2028, #101318 72%); --plate: rgba(22, 26, 33, .86); }
+  :host([hidden]) { display: none; }
+  .light { --text: #1a2130; --back: radial-gradient(ellipse at 45% 38%, #d9dde5, #eef0f4 72%); --plate: rgba(255, 255, 255, .88); }
+  #stage { position: absolute; inset: 0; background: var(--back); overflow: hidden; }
+  canvas { width: 100%; height: 100%; display: block; outline: none; touch-action: none; cursor: grab; }
+  canvas:focus-visible { outline: 2px solid #e8784f; outline-offset: -3px; }
+  #bar { position: absolute; inset: 0 auto auto 0; height: 3px; background: #e8784f; transition: width .2s; }
+  #say { position: absolute; left: 12px; right: 12px; bottom: 12px; margin: 0 auto; width: fit-content; max-width: 90%; padding: 8px 12px; border-radius: 8px; font: 13px/1.4 system-ui, sans-serif;
+    color: var(--text); background: var(--plate); }
+  #say:empty { display: none; }`;
+const STEER = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1], '+': 0.8, '=': 0.8, '-': 1.25 };
+
+export class EbpoViewerElement extends HTMLElement {
+  static observedAttributes = ['src', 'view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'theme', 'walls'];
+  /** Where worker.js is, if it does not lie beside this file. To be set before the first element is there. */
+  static worker = undefined;
+
+  #client;
+  #scene;
+  #timer;
+
+  constructor() {
+    super();
+    this.attachShadow({ mode: 'open' }).innerHTML = `<style>${STYLE}</style><div id="stage"><canvas tabindex="0" role="img"></canvas><div id="bar" hidden></div><p id="say" role="status"></p></div>`;
+  }
+
+  #part(name) {
+    return this.shadowRoot.querySelector(name);
+  }
+
+  connectedCallback() {
+    if (this.#scene)
+      return;
+    const canvas = this.#part('canvas');
+    canvas.ariaLabel = this.getAttribute('alt') ?? 'A model in three dimensions: drag or arrow keys turn it, wheel, + and - go nearer and farther';
+    this.#scene = new Scene(canvas, { contextOptions: { antialias: true }, fieldOfView: FIELD_OF_VIEW }, { changed: () => this.#moved(), drawn() {} });
+    this.#client = new Client({ worker: EbpoViewerElement.worker, heard: (type, news) => this.#hear(type, news) });
+    this.#listen(canvas);
+    EbpoViewerElement.observedAttributes.filter((name) => name !== 'src' && this.hasAttribute(name)).forEach((name) => this.#apply(name));
+    if (!this.hasAttribute('theme'))
+      this.#apply('theme');
+    if (this.hasAttribute('src'))
+      this.#apply('src');
+  }
+
+  // An element that is moved within its page is taken out of it for a moment.
+  disconnectedCallback() {
+    queueMicrotask(() => {
+      if (this.isConnected || !this.#scene)
+        return;
+      this.#client.end();
+      this.#scene.end();
+      this.#scene = this.#client = undefined;
+      this.#part('canvas').replaceWith(Object.assign(document.createElement('canvas'), { tabIndex: 0, role: 'img' })); // a lost context does not come back
+    });
+  }
+
+  attributeChangedCallback(name, was, is) {
+    if (this.#scene && was !== is)
+      this.#apply(name);
+  }
+
+  #listen(canvas) {
+    let down;
+    canvas.addEventListener('pointerdown', (e) => (down = e.button === 0 ? [e.clientX, e.clientY] : undefined));
+    canvas.addEventListener('pointerup', (e) => {
+      const at = down && Math.hypot(e.clientX - down[0], e.clientY - down[1]) <= 4 && this.info ? this.#scene.pick(e.clientX, e.clientY) : undefined;
+      if (at)
+        this.ask(at.map((x, k) => x / this.#client.scene.scale + this.#client.scene.center[k])).catch(() => {});
+    });
+    canvas.addEventListener('keydown', (e) => {
+      if (!STEER[e.key] || e.ctrlKey || e.metaKey || e.altKey)
+        return;
+      e.preventDefault();
+      this.#scene.steer(STEER[e.key], e.shiftKey);
+    });
+  }
+
+  #apply(name) {
+    const text = this.getAttribute(name), scene = this.#scene;
+    if (name === 'src')
+      text ? this.load(text).catch(() => {}) : this.#close();
+    else if (name === 'view')
+      this.#look();
+    else if (name === 'clip' || name === 'box')
+      this.#cut();
+    else if (name === 'point' && this.info && pointsOf(text)?.length === 1)
+      this.ask(pointsOf(text)[0]).catch(() => {});
+    else if (name === 'point' && !text)
+      scene.showProbe();
+    else if (name === 'colour')
+      scene.setColouring(['level', 'type'].includes(text) ? text : 'plain');
+    else if (name === 'walls')
+      scene.setWalls(text !== '0');
+    else if (name === 'theme')
+      this.#dress(text ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark'));
+    this.#want();
+  }
+
+  #dress(theme) {
+    this.#part('#stage').className = theme === 'light' ? 'light' : '';
+    this.#scene.setTheme(theme !== 'light');
+  }
+
+  #look() {
+    const camera = cameraOf(this.getAttribute('view'));
+    if (camera)
+      this.#scene.place = camera;
+    else
+      this.#scene.home();
+  }
+
+  #cut() {
+    if (!this.info)
+      return;
+    const cut = cutOf(this.info.box_size, this.#client.scene.scale, clipOf(this.getAttribute('clip')), boxOf(this.getAttribute('box')));
+    this.#scene.setCut(cut?.low, cut?.high);
+  }
+
+  #want() {
+    const number = (name) => (/^\d+$/.test(this.getAttribute(name) ?? '') ? Number(this.getAttribute(name)) : undefined);
+    const level = number('level') ?? 99, pixels = number('detail') ?? PIXELS, { info } = this;
+    this.#client.look(this.#scene.view(), { level, mesh: Boolean(info?.parts.has('mesh')) && level >= info.level_count, pixels, triangles: pixels === 0 ? Infinity : TRIANGLES_MOST,
+      black: this.#scene.cut !== undefined, lines: false, cells: false });
+  }
+
+  #moved() {
+    if (!this.#client)
+      return;
+    this.#want();
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => this.#tell('view', { view: this.view }), LATER_MS);
+  }
+
+  #tell(name, detail) {
+    this.dispatchEvent(new CustomEvent(name, { detail }));
+  }
+
+  #hear(type, news) {
+    if (type === 'tiles') {
+      this.#scene.setTiles(news.set, news.removed);
+    } else if (type === 'line') {
+      const { got, want, quiet } = news, bar = this.#part('#bar');
+      bar.hidden = !(want > 0);
+      bar.style.width = want > 0 ? `${100 * got / want}%` : '';
+      this.#say(news.trouble ?? (want > 0 && quiet > 3000 ? `Nothing has come for ${Math.floor(quiet / 1000)} s` : ''));
+      this.#tell('progress', { got, want, quiet });
+    } else if (type === 'idle') {
+      this.#part('#bar').hidden = true;
+      this.#tell('idle', { traffic: news.traffic });
+    } else if (type === 'failed') {
+      this.#say(news.error.message);
+      this.#tell('error', { code: news.error.code, message: news.error.message });
+    }
+  }
+
+  #say(text) {
+    if (this.#part('#say').textContent !== text)
+      this.#part('#say').textContent = text;
+  }
+
+  #close() {
+    this.#client.close();
+    this.#scene.clear();
+  }
+
+  // --- for the page ---
+
+  /** The open file's facts, by the format's names. */
+  get info() {
+    return this.#client?.info;
+  }
+
+  /** The view, as in the viewer's address. */
+  get view() {
+    return cameraText(this.#scene.place);
+  }
+
+  set view(text) {
+    this.setAttribute('view', text);
+  }
+
+  get src() {
+    return this.getAttribute('src');
+  }
+
+  set src(text) {
+    this.setAttribute('src', text);
+  }
+
+  /** Opens an address, a File or a Blob (`src` does so, too). Resolves to the facts. */
+  async load(what) {
+    this.#scene.clear();
+    this.#say('');
+    const { info } = await this.#client.open(what);
+    this.#look();
+    this.#cut();
+    this.#want();
+    this.#tell('load', info);
+    const points = pointsOf(this.getAttribute('point'));
+    if (points?.length === 1)
+      this.ask(points[0]).catch(() => {});
+    return info;
+  }
+
+  /** Shows all of the model. */
+  home() {
+    this.#scene.home();
+  }
+
+  /** Asks about a point of the model and marks it: { point, where, distance, nearest, lo, hi, exact }; the event `point` has the same. */
+  async ask(point) {
+    const { center, scale } = this.#client.scene, inScene = (p) => p.map((x, k) => (x - center[k]) * scale);
+    this.#scene.showProbe(inScene(point));
+    const { where, distance, nearest, lo, hi, exact } = await this.#client.probe(point), answer = { point, where, distance, nearest, lo, hi, exact };
+    this.#scene.showProbe(inScene(point), nearest && inScene(nearest), where === 'in' ? '#4cc38a' : where === 'out' ? '#ff6b6b' : '#ffb020');
+    this.#tell('point', answer);
+    return answer;
+  }
+}
+
+if (!customElements.get('ebpo-viewer'))
+  customElements.define('ebpo-viewer', EbpoViewerElement);

@@ -1,0 +1,83 @@
+// The strip of levels and the statistics.
+import { bytes } from './line.js';
+import { $, count, state, time } from './state.js';
+
+const bytesOf = (size) => (size >= 0 ? bytes(size) : 'not yet known how much');
+
+/** A button for each level and one for the mesh; `choose(level)` is called for one that is pressed. */
+export function makeLevels(choose) {
+  const i = state.info, sizes = i.levels.map((_, l) => state.bytesTo[l] - (l ? state.bytesTo[l - 1] : 0)), stops = [...sizes]; // NaN: not known yet
+  if (i.parts.has('mesh'))
+    stops.push(state.size - state.bytesTo.at(-1));
+  const most = Math.max(...stops.filter((size) => size >= 0), 1);
+  $('levels').replaceChildren(...stops.map((size, l) => {
+    const b = document.createElement('button'), bar = document.createElement('i'), isMesh = l === i.level_count;
+    bar.style.height = `${4 + 24 * Math.sqrt((size || 0) / most)}px`;
+    b.append(bar, isMesh ? '▲' : String(l));
+    b.title = isMesh ? `The mesh: ${bytesOf(size)}, fetched where it is seen` : `Level ${l}: ${bytesOf(size)}; file up to here ${bytesOf(state.bytesTo[l])}`;
+    b.ariaLabel = isMesh ? 'All levels, and the mesh' : `Level ${l}`;
+    b.onclick = () => choose(l);
+    return b;
+  }));
+}
+
+/** Which are here, which are drawn, which is chosen. */
+export function showLevels() {
+  const at = Number($('level').value), drawn = state.stats?.levels ?? [];
+  [...$('levels').children].forEach((b, l) => {
+    const isMesh = l === state.info.level_count;
+    b.classList.toggle('here', isMesh ? (state.stats?.meshTriangles ?? 0) > 0 : l <= state.depth);
+    b.classList.toggle('shown', isMesh ? (state.stats?.meshTriangles ?? 0) > 0 : (drawn[l] ?? 0) > 0);
+    b.classList.toggle('now', l === at);
+    b.ariaPressed = l === at;
+  });
+}
+
+/** What a level means, in words and in volume. */
+export function showLevel() {
+  const at = Number($('level').value), i = state.info, mesh = at === i.level_count;
+  $('levelText').textContent = mesh ? 'all, and the mesh' : `0 to ${at}`;
+  $('levelHint').textContent = mesh ? 'Refined where it is seen; leaves show the real faces.' : `Envelopes of level ${at} and of leaves above it: ${bytesOf(state.bytesTo[at])} of the file.`;
+  const excess = volumeExcess(Math.min(at, i.level_count - 1));
+  $('sExcess').textContent = excess === undefined || mesh ? '–' : `+${excess < 10 ? excess.toFixed(2) : excess.toFixed(0)} %`;
+  showLevels();
+}
+
+// The stated volumes: envelopes of the level's gray nodes, leaves and black cells so far, against the model.
+function volumeExcess(level) {
+  const i = state.info;
+  if (!i.solid || !(i.mesh_volume > 0) || i.winding_rule !== 'nonzero')
+    return undefined;
+  let sum = i.levels[level].gray_volume;
+  for (let l = 0; l <= level; l++)
+    sum += i.levels[l].leaf_volume + i.levels[l].black * i.box_size.reduce((v, s) => v * (s / 2 ** l), 1);
+  return Math.max(0, 100 * (sum / i.mesh_volume - 1));
+}
+
+/** A frame took so long. */
+export function frameTook(ms, calls) {
+  state.frames.push(ms);
+  if (state.frames.length > 30)
+    state.frames.shift();
+  state.calls = calls;
+  $('sFrame').textContent = `${frameMs().toFixed(1)} ms`;
+  $('sFrame').title = `${calls} draw calls`;
+}
+
+export const frameMs = () => state.frames.reduce((a, b) => a + b, 0) / Math.max(state.frames.length, 1);
+
+/** `walls`: whether they are drawn. */
+export function showStats(walls) {
+  if (!state.info)
+    return;
+  const s = state.stats, t = state.traffic;
+  $('sRequests').textContent = count(t.requests);
+  $('sBytes').textContent = `${bytes(t.bytes)} of ${bytes(state.size)}`;
+  $('sFirst').textContent = state.shownAfter === undefined ? '' : time(state.shownAfter);
+  $('sLevels').textContent = state.depth < 0 ? '' : `0–${state.depth} of 0–${state.info.level_count - 1}`;
+  if (s) {
+    $('sNodes').textContent = count(s.nodes);
+    $('sTriangles').textContent = count(s.triangles - (walls ? 0 : s.wallTriangles));
+    $('sMesh').textContent = state.info.parts.has('mesh') ? count(s.meshTriangles) : 'not in the file';
+  }
+}

@@ -1,0 +1,139 @@
+// A model in somebody's own three.js scene: an Object3D that is finer where the camera looks. Its coordinates are the file's.
+import { Box3, DoubleSide, Group, MeshStandardMaterial, Object3D, Vector3 } from 'three';
+import { Client } from './client.js';
+import { NO_HUE, Tiles, lookOf, makeLook, setCut } from './shade.js';
+
+const TRIANGLES_MOST = 2_000_000, PIXELS = 12;
+
+const BEND = `
+  attribute vec2 bend;
+  attribute vec4 tag, hue;
+  varying vec3 ebpoHue, ebpoPlace;
+  varying float ebpoWeight;
+  vec3 ebpoUnbent() { // octahedral
+    vec3 n = vec3(bend, 1.0 - abs(bend.x) - abs(bend.y));
+    if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0);
+    return normalize(n);
+  }`;
+const LIGHT = 'mix(hue.rgb / 12.92, pow((hue.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, hue.rgb))';
+
+/** A MeshStandardMaterial, lit by the scene's own lights, that knows what the tiles' attributes mean. `parameters`: as its constructor's. */
+export function standardMaterial(parameters = {}, { low, high, clipping, own } = makeLook().uniforms) {
+  const material = new MeshStandardMaterial({ color: '#c9cdd6', roughness: 0.75, metalness: 0, side: DoubleSide, ...parameters });
+  material.defaultAttributeValues = NO_HUE;
+  material.onBeforeCompile = (shader) => {
+    Object.assign(shader.uniforms, { ebpoLow: low, ebpoHigh: high, ebpoClipping: clipping, ebpoOwn: own });
+    shader.vertexShader = shader.vertexShader.replace('#include <common>', `#include <common>${BEND}`)
+      .replace('#include <beginnormal_vertex>', 'vec3 objectNormal = ebpoUnbent(); ebpoWeight = tag.z / 255.0;')
+      .replace('#include <begin_vertex>', `#include <begin_vertex>\nebpoPlace = position; ebpoHue = hue.w < 0.5 ? ${LIGHT} : vec3(-1.0);`);
+    shader.fragmentShader = shader.fragmentShader.replace('#include <common>', `#include <common>
+      varying vec3 ebpoHue, ebpoPlace;
+      varying float ebpoWeight;
+      uniform vec3 ebpoLow, ebpoHigh;
+      uniform bool ebpoClipping, ebpoOwn;`)
+      .replace('#include <clipping_planes_fragment>', `#include <clipping_planes_fragment>
+      if (ebpoClipping && (any(lessThan(ebpoPlace, ebpoLow)) || any(greaterThan(ebpoPlace, ebpoHigh)))) discard;`)
+      .replace('#include <color_fragment>', '#include <color_fragment>\nif (ebpoOwn && ebpoHue.r >= 0.0) diffuseColor.rgb = ebpoHue;')
+      .replace('#include <normal_fragment_begin>', `#include <normal_fragment_begin>
+      { // where the field of normals says little, the polygon's own
+        vec3 flatly = normalize(cross(dFdx(vViewPosition), dFdy(vViewPosition)));
+        normal = normalize(mix(flatly, normal, min(ebpoWeight, 1.0)) + 0.0001 * flatly);
+      }`);
+  };
+  material.customProgramCacheKey = () => 'ebpo';
+  return material;
+}
+
+export class EbpoModel extends Object3D {
+  /**
+   * Options, all of which may be left out: `worker`, the address of worker.js; `material`, 'standard' (the scene's lights), 'viewer' (as the viewer's page
+   * draws) or one of standardMaterial(); `detail`, `level`, `mesh`, `triangles`: as the members of these names.
+   */
+  constructor({ worker, material = 'standard', detail = PIXELS, level = Infinity, mesh = true, triangles = TRIANGLES_MOST } = {}) {
+    super();
+    this.type = 'EbpoModel';
+    Object.assign(this, { detail, level, mesh, triangles });
+    this.info = undefined;                  // the root attributes of the open file, by the format's names
+    this.content = new Group();             // what is drawn, in coordinates of its own
+    this.content.matrixAutoUpdate = false;
+    this.add(this.content);
+    this.look = makeLook();
+    if (material !== 'viewer')
+      this.look.faces = material === 'standard' ? standardMaterial({}, this.look.uniforms) : material;
+    this.tiles = new Tiles(this.content, this.look);
+    this.client = new Client({ worker, heard: (type, news) => this.#hear(type, news) });
+  }
+
+  get material() {
+    return this.look.faces;
+  }
+
+  #hear(type, news) {
+    if (type === 'tiles') {
+      this.tiles.set(news.set, news.removed);
+      this.dispatchEvent({ type: 'change', stats: news.stats });
+    } else if (type === 'line') {
+      this.dispatchEvent({ type: 'progress', got: news.got, want: news.want, quiet: news.quiet });
+    } else if (type === 'idle') {
+      if (news.want === this.client.want)
+        this.dispatchEvent({ type: 'idle', traffic: news.traffic });
+    } else if (type === 'failed') {
+      this.dispatchEvent({ type: 'error', error: news.error });
+    }
+  }
+
+  /** Opens an address, a File or a Blob. Resolves to its facts when its head is there; errors have a `code`, and a sentence that says what next. */
+  async load(what) {
+    this.tiles.clear();
+    const { info, scene } = await this.client.open(what);
+    this.info = info;
+    this.content.matrix.makeScale(1 / scene.scale, 1 / scene.scale, 1 / scene.scale).setPosition(...scene.center);
+    this.content.matrixWorldNeedsUpdate = true;
+    this.clip = this.cut;
+    this.dispatchEvent({ type: 'load', info });
+    return info;
+  }
+
+  /** The root cell's box, in this object's coordinates; the model lies within. */
+  get box() {
+    const { box_origin: low, box_size: size } = this.info;
+    return new Box3(new Vector3(...low), new Vector3(...low.map((x, k) => x + size[k])));
+  }
+
+  /** To be called before each frame: tells what is seen. `renderer`, or the picture's height in pixels of the page. Costs little when nothing has moved. */
+  update(camera, renderer) {
+    if (!this.info)
+      return;
+    this.updateWorldMatrix(true, true);
+    const height = typeof renderer === 'number' ? renderer : renderer.domElement.clientHeight, { level, mesh, detail, triangles, info } = this;
+    const faces = mesh && level >= info.level_count && info.parts.has('mesh');
+    this.client.look(lookOf(camera, height, this.content.matrixWorld),
+      { level: Math.min(level, 99), mesh: faces, pixels: detail, triangles: detail === 0 ? Infinity : triangles, black: this.cut !== undefined, lines: false, cells: false });
+  }
+
+  /** Shows only what lies in a Box3 of this object's coordinates; everything if undefined. */
+  set clip(box) {
+    this.cut = box;
+    if (!this.info)
+      return;
+    const { center, scale } = this.client.scene, of = (v) => v.toArray().map((x, k) => Math.max(-9, Math.min(9, (x - center[k]) * scale)));
+    setCut(this.look, box && of(box.min), box && of(box.max));
+  }
+
+  get clip() {
+    return this.cut;
+  }
+
+  /** About a point (Vector3) of this object's coordinates: { where, distance, nearest, lo, hi, exact }. */
+  async probe(point) {
+    const { where, distance, nearest, lo, hi, exact } = await this.client.probe(point.toArray());
+    return { where, distance, nearest: nearest && new Vector3(...nearest), lo, hi, exact };
+  }
+
+  /** Ends the worker and frees what the graphics card holds. */
+  dispose() {
+    this.client.end();
+    this.tiles.clear();
+    [this.look.faces, this.look.wire, this.look.cells].forEach((material) => material.dispose());
+  }
+}

@@ -1,0 +1,51 @@
+// What the page loads when the picture is there: measuring, a section box, notes, the pen, sharing, shading by depth, cube and scale.
+import { addCompass } from './compass.js';
+import { addMeasuring } from './measure.js';
+import { addNotes } from './notes.js';
+import { addPen } from './paint/pen.js';
+import { markOn } from './parts.js';
+import { Pipeline } from './pipeline.js';
+import { kit } from './scene.js';
+import { addSectionBox } from './section_box.js';
+import { addSharing } from './sharebox.js';
+import { $, on, state } from './state.js';
+
+const styled = () => new Promise((done) => {
+  const link = Object.assign(document.createElement('link'), { rel: 'stylesheet', href: new URL('more.css', import.meta.url).href, onload: done, onerror: done });
+  document.head.append(link);
+});
+
+export async function begin(page) {
+  await styled();
+  const { scene } = page;
+  state.address = page.address;
+  markOn(scene);
+  addSectionBox(page);
+  addMeasuring(page);
+  const pipeline = scene.pipeline = new Pipeline(kit), pen = addPen(page, pipeline);
+  addNotes(page, pen.drawing);
+  pen.begin(); // its section stands last, and tells the others what is there
+  addDome(scene, pipeline);
+  addSharing(page);
+  addCompass(page);
+  addHelp();
+  on('key', (e) => ({ e: 'dome', l: 'toolShare' })[e.key.toLowerCase()] && $({ e: 'dome', l: 'toolShare' }[e.key.toLowerCase()]).click());
+  state.more = true;
+}
+
+function addDome(scene, pipeline) {
+  const label = document.createElement('label');
+  label.className = 'switch';
+  label.innerHTML = '<input type="checkbox" id="dome"><span>Shade by depth</span><kbd>E</kbd>';
+  $('cells').closest('label').after(label);
+  $('dome').onchange = () => {
+    pipeline.dome = $('dome').checked;
+    scene.redraw();
+  };
+}
+
+// Keys of what has come along; keys without meaning would be worse than none.
+function addHelp() {
+  $('help').querySelector('dl').insertAdjacentHTML('beforeend', `<dt><kbd>D</kbd> <kbd>N</kbd></dt><dd>measure distances, add a note</dd>
+    <dt><kbd>B</kbd> <kbd>R</kbd></dt><dd>pen, eraser; <kbd>Ctrl Z</kbd> undo</dd><dt><kbd>E</kbd> <kbd>L</kbd></dt><dd>shade by depth, share</dd>`);
+}

@@ -1,0 +1,27 @@
+// node package.mjs FOLDER: the npm package "ebpo-viewer" as a folder for npm pack or npm publish: the element, the three.js object and the reader, each as one
+// module with its types, the worker with all that it needs, and a package.json. three.js is not in it. Writes FOLDER, nothing else.
+import { copyFileSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { build } from 'esbuild';
+
+const [folder] = process.argv.slice(2), here = import.meta.dirname ?? new URL('.', import.meta.url).pathname;
+const { version, license, description, dependencies } = JSON.parse(readFileSync(join(here, 'package.json'), 'utf8'));
+const PARTS = { element: 'element.js', three: 'model.js', reader: 'reader/index.js' };
+
+rmSync(folder, { recursive: true, force: true });
+mkdirSync(folder, { recursive: true });
+const common = { bundle: true, format: 'esm', target: 'es2022', platform: 'browser', legalComments: 'eof', logLevel: 'warning', outdir: folder };
+await build({ ...common, entryPoints: Object.fromEntries(Object.entries(PARTS).map(([name, file]) => [name, join(here, file)])), splitting: true, chunkNames: 'common-[hash]',
+  external: ['three', 'three/*'] });
+await build({ ...common, entryPoints: [join(here, 'worker.js')], minify: true });
+for (const name of Object.keys(PARTS))
+  copyFileSync(join(here, 'types', `${name}.d.ts`), join(folder, `${name}.d.ts`));
+copyFileSync(join(here, 'types/README.md'), join(folder, 'README.md'));
+copyFileSync(join(here, '../../LICENSE'), join(folder, 'LICENSE'));
+
+const way = (name) => ({ types: `./${name}.d.ts`, default: `./${name}.js` });
+writeFileSync(join(folder, 'package.json'), JSON.stringify({
+  name: 'ebpo-viewer', version, description, license, type: 'module', keywords: ['ebpo', 'octree', 'level of detail', 'mesh', 'three', 'viewer', 'web component'],
+  types: './element.d.ts', exports: { '.': way('element'), './three': way('three'), './reader': way('reader'), './worker.js': './worker.js', './package.json': './package.json' },
+  files: ['*.js', '*.d.ts'], sideEffects: ['./element.js'], peerDependencies: { three: `>=${dependencies.three}` },
+}, null, 2) + '\n');

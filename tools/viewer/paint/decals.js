@@ -1,0 +1,159 @@
+// Strokes in the picture: balls around their points, that colour what of the surface lies in them. By the depths that are seen, so as fine as the picture,
+// whatever level is drawn. That the part of the surface hangs together (format-spec/paint.md, section 4) is judged by its normal only.
+const VERTEX = `
+  attribute vec3 corner, centre, facing;
+  attribute vec4 tint; // red, green, blue, radius
+  varying vec3 at, outward;
+  varying vec4 what;
+  void main() {
+    at = centre;
+    outward = facing;
+    what = tint;
+    gl_Position = projectionMatrix * viewMatrix * vec4(centre + corner * tint.w * 1.05, 1.0);
+  }`;
+const FRAGMENT = `
+  uniform sampler2D depths;
+  uniform vec2 size;
+  uniform mat4 back;
+  varying vec3 at, outward;
+  varying vec4 what;
+  void main() {
+    vec2 uv = gl_FragCoord.xy / size;
+    float z = texture2D(depths, uv).r;
+    vec4 p = back * vec4(uv * 2.0 - 1.0, z * 2.0 - 1.0, 1.0);
+    vec3 here = p.xyz / p.w, across = dFdx(here), n = cross(across, dFdy(here));
+    float away = distance(here, at), soft = min(length(across), 0.2 * what.w);
+    float cover = clamp((what.w - away) / max(soft, 1.0e-9) + 0.5, 0.0, 1.0);
+    if (z >= 1.0 || cover <= 0.0 || dot(n, outward) < -0.2 * length(n)) discard;
+    gl_FragColor = vec4(what.rgb * cover, cover);
+  }`;
+const ALL_VERTEX = 'varying vec2 uv2; void main() { uv2 = position.xy * 0.5 + 0.5; gl_Position = vec4(position.xy, 0.0, 1.0); }';
+const ALL_FRAGMENT = 'uniform sampler2D map; uniform float opacity; varying vec2 uv2; void main() { gl_FragColor = texture2D(map, uv2) * opacity; }';
+const CUBE = Float32Array.from([0, 1, 2, 3, 4, 5, 6, 7].flatMap((i) => [0, 1, 2].map((k) => (i >> k & 1 ? 1 : -1))));
+const SIDES = [0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5];
+const BLENDING = { custom: 5, none: 0, add: 100, zero: 200, one: 201, withoutAlpha: 205 }; // three.js' constants
+const BACK = 1;
+
+export class Decals {
+  constructor(kit) {
+    this.kit = kit;
+    this.layers = []; // { opacity, runs: [{ mesh, erases, alpha }] }
+    this.uniforms = { depths: { value: null }, size: { value: null }, back: { value: new kit.Matrix4() } };
+    const blend = (source) => ({ blending: BLENDING.custom, blendEquation: BLENDING.add, blendSrc: source, blendDst: BLENDING.withoutAlpha, blendSrcAlpha: source,
+      blendDstAlpha: BLENDING.withoutAlpha });
+    const ball = (source) => new kit.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms: this.uniforms, side: BACK, depthTest: false, depthWrite: false,
+      transparent: true, ...blend(source) });
+    this.paints = ball(BLENDING.one);
+    this.erases = ball(BLENDING.zero);
+    this.over = new kit.ShaderMaterial({ vertexShader: ALL_VERTEX, fragmentShader: ALL_FRAGMENT, uniforms: { map: { value: null }, opacity: { value: 1 } }, depthTest: false, depthWrite: false,
+      transparent: true, ...blend(BLENDING.one) });
+    const geometry = new kit.BufferGeometry();
+    geometry.setAttribute('position', new kit.BufferAttribute(Float32Array.of(-1, -1, 0, 3, -1, 0, -1, 3, 0), 3));
+    this.all = new kit.Scene();
+    const triangle = new kit.Mesh(geometry, this.over);
+    triangle.frustumCulled = false;
+    this.all.add(triangle);
+    this.corner = new kit.BufferAttribute(CUBE, 3);
+    this.one = new kit.Scene();
+  }
+
+  get any() {
+    return this.layers.length > 0;
+  }
+
+  resize() {
+    for (const name of ['sum', 'layer', 'stroke'])
+      this[name]?.dispose();
+    this.sum = this.layer = this.stroke = undefined;
+  }
+
+  /**
+   * What is drawn from now on: [{ opacity (0 to 1), strokes: [{ erases, colour, radius, points: [{ centre, normal, share }] }] }], lowest first; scene
+   * coordinates, `share` of the radius.
+   */
+  set(layers) {
+    this.layers.forEach((layer) => layer.runs.forEach((run) => run.mesh.geometry.dispose()));
+    this.layers = layers.map(({ opacity, strokes }) => ({ opacity, runs: this.#runs(strokes) })).filter((layer) => layer.runs.length);
+  }
+
+  // Strokes that follow each other and are opaque are drawn at once; one that is not is drawn by itself, as it covers but once.
+  #runs(strokes) {
+    const runs = [];
+    for (const stroke of strokes) {
+      const alpha = stroke.erases ? 255 : stroke.colour[3], last = runs.at(-1);
+      if (last && last.erases === stroke.erases && alpha === 255 && last.alpha === 255)
+        last.strokes.push(stroke);
+      else
+        runs.push({ erases: stroke.erases, alpha, strokes: [stroke] });
+    }
+    return runs.filter((run) => run.alpha > 0).map((run) => ({ ...run, strokes: undefined, mesh: this.#mesh(run) }));
+  }
+
+  #mesh({ strokes, erases }) {
+    const { kit } = this, count = strokes.reduce((sum, s) => sum + s.points.length, 0), centre = new Float32Array(3 * count), facing = new Float32Array(3 * count), tint = new Float32Array(4 * count);
+    let i = 0;
+    for (const { colour, radius, points } of strokes)
+      for (const p of points) {
+        centre.set(p.centre, 3 * i);
+        facing.set(p.normal ?? [0, 0, 0], 3 * i);
+        tint.set([colour[0] / 255, colour[1] / 255, colour[2] / 255, radius * p.share], 4 * i++);
+      }
+    const geometry = new kit.InstancedBufferGeometry();
+    geometry.setIndex(SIDES);
+    geometry.setAttribute('corner', this.corner);
+    geometry.setAttribute('position', this.corner);
+    for (const [name, array, size] of [['centre', centre, 3], ['facing', facing, 3], ['tint', tint, 4]])
+      geometry.setAttribute(name, new kit.InstancedBufferAttribute(array, size));
+    geometry.instanceCount = count;
+    const mesh = new kit.Mesh(geometry, erases ? this.erases : this.paints);
+    mesh.frustumCulled = false;
+    return mesh;
+  }
+
+  /** Draws all layers into a texture: sRGB, times alpha. */
+  render(renderer, camera, depths, size) {
+    const { kit } = this, target = () => new kit.WebGLRenderTarget(size.x, size.y, { depthBuffer: false });
+    this.sum ??= target();
+    this.uniforms.depths.value = depths;
+    this.uniforms.size.value = size;
+    this.uniforms.back.value.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).invert();
+    const clear = renderer.autoClear;
+    renderer.autoClear = false;
+    this.#begin(renderer, this.sum);
+    for (const { opacity, runs } of this.layers) {
+      const straight = opacity === 1 && runs.every((run) => !run.erases), own = straight ? this.sum : (this.layer ??= target());
+      if (!straight)
+        this.#begin(renderer, own);
+      for (const run of runs)
+        this.#run(renderer, camera, run, own, target);
+      if (!straight)
+        this.#add(renderer, camera, own, this.sum, opacity);
+    }
+    renderer.autoClear = clear;
+    return this.sum.texture;
+  }
+
+  #begin(renderer, target) {
+    renderer.setRenderTarget(target);
+    renderer.clear();
+  }
+
+  #run(renderer, camera, { mesh, erases, alpha }, own, target) {
+    const alone = !erases && alpha < 255, to = alone ? (this.stroke ??= target()) : own;
+    if (alone)
+      this.#begin(renderer, to);
+    renderer.setRenderTarget(to);
+    this.one.add(mesh);
+    renderer.render(this.one, camera);
+    this.one.remove(mesh);
+    if (alone)
+      this.#add(renderer, camera, to, own, alpha / 255);
+  }
+
+  #add(renderer, camera, from, to, opacity) {
+    this.over.uniforms.map.value = from.texture;
+    this.over.uniforms.opacity.value = opacity;
+    renderer.setRenderTarget(to);
+    renderer.render(this.all, camera);
+  }
+}

@@ -1,0 +1,276 @@
+// The pen: paints and erases with mouse, finger or stylus; layers; undo; save and open.
+import { complain, make, modelName, placesOf, save, section, take, taken } from '../parts.js';
+import { kit } from '../scene.js';
+import { $, length, on, state, tell, toModel, toScene } from '../state.js';
+import { Decals } from './decals.js';
+import { PaintDocument, identityOf, misfit } from './document.js';
+import { MOST, cleanText, readPaint, writePaint } from './paint_file.js';
+import { Stroke } from './stroke.js';
+
+const SWATCHES = ['#d9483b', '#f08c2e', '#f2cf3b', '#4cae50', '#2e86de', '#7d4fc4', '#ffffff', '#1c1c1c'];
+const HTML = `
+  <div class="row"><div class="buttons"><button id="penOn" class="small" aria-pressed="false" title="Pen (B)">Pen</button>
+    <button id="eraserOn" class="small" aria-pressed="false" title="Eraser (R)">Eraser</button></div>
+    <div class="buttons"><button id="penUndo" class="small" title="Undo (Ctrl Z)">Undo</button><button id="penRedo" class="small" title="Redo (Ctrl Shift Z)">Redo</button></div></div>
+  <p class="hint" id="penHint"></p>
+  <div class="swatches" role="group" aria-label="Colour of the pen">
+    ${SWATCHES.map((c) => `<button data-colour="${c}" style="background:${c}" aria-label="${c}"></button>`).join('')}
+    <input type="color" id="penColour" value="${SWATCHES[0]}" aria-label="Another colour"></div>
+  <div class="row"><label for="penSize">Radius</label><input type="range" id="penSize" min="0" max="100" value="55"><output id="penSizeText"></output></div>
+  <ul id="layers" class="list"></ul>
+  <div class="buttons"><button id="layerAdd" class="small">Add a layer</button><button id="paintOpen" class="small">Open …</button><button id="paintSave" class="small">Save</button></div>
+  <input type="file" id="paintFile" accept=".h5" hidden>`;
+const NARROW = 2e-4, WIDE = 0.1;    // radii of the pen, in halves of the box's diagonal
+const FULL_SIZE = 32768, AT_ONCE = 500, OFF = 2 ** -20; // of the diagonal: how far a point may be from its face
+
+export function addPen({ scene, worker, query }, pipeline) {
+  const decals = pipeline.layers = new Decals(kit), docs = new Map(), normals = new WeakMap(); // by a model's digest; by a point of a document
+  let doc, layer = 0, stroke, pending = 0, details, asked = 0;
+  const colour = () => [1, 3, 5].map((i) => parseInt($('penColour').value.slice(i, i + 2), 16));
+  const radius = () => NARROW * (WIDE / NARROW) ** ($('penSize').value / 100) / state.scene.scale;
+  const askPlaces = (points) => {
+    if (!state.info.parts.has('mesh'))
+      throw new Error('the file has no faces to paint on; convert the model with its mesh');
+    return placesOf(worker, points);
+  };
+
+  // What the rest of the page may ask of the document.
+  const drawing = () => Object.assign(doc, { placesOf: askPlaces, layerForNew() {
+    if (!doc.state.layers.length)
+      doc.addLayer({});
+    return layer;
+  } });
+
+  // --- the picture ---
+
+  const decal = (s) => ({ erases: s.erases, colour: s.colour, radius: s.radius * state.scene.scale,
+    points: s.points.map((p) => ({ centre: toScene(p.place), normal: normals.get(p) ?? p.normal, share: p.size / FULL_SIZE })) });
+  function draw() {
+    const { layers, strokes } = doc.state, all = stroke ? [...strokes, stroke] : strokes;
+    decals.set(layers.map((l, i) => ({ opacity: l.opacity / 255, strokes: l.visible ? all.filter((s) => s.layer === i && s.points.length).map(decal) : [] })));
+    scene.redraw();
+  }
+
+  function changed() {
+    layer = Math.max(0, Math.min(layer, doc.state.layers.length - 1));
+    $('penUndo').disabled = !doc.past.length;
+    $('penRedo').disabled = !doc.future.length;
+    showLayers();
+    draw();
+    tell('drawing');
+  }
+
+  // --- layers ---
+
+  function showLayers() {
+    $('layers').replaceChildren(...doc.state.layers.map((l, i) => {
+      const li = make('li', '', { className: i === layer ? 'chosen' : '' }), pick = make('input', '', { type: 'radio', name: 'layer', checked: i === layer, ariaLabel: `Paint on ${l.title}` });
+      const name = make('input', '', { type: 'text', value: l.title, ariaLabel: 'Name of the layer', maxLength: 100 }), opacity = make('input', '', { type: 'range', min: 0, max: 255,
+        value: l.opacity, ariaLabel: `Opacity of ${l.title}` });
+      const eye = make('button', l.visible ? 'Hide' : 'Show', { className: 'small', ariaPressed: String(!l.visible) }), remove = make('button', '✕', { className: 'small',
+        ariaLabel: `Remove ${l.title}` });
+      const count = doc.state.strokes.filter((s) => s.layer === i).length;
+      pick.onchange = () => {
+        layer = i;
+        showLayers();
+      };
+      name.onchange = () => doc.setLayer(i, { title: cleanText(name.value, MOST.title) });
+      opacity.onchange = () => doc.setLayer(i, { opacity: Number(opacity.value) });
+      eye.onclick = () => doc.setLayer(i, { visible: !l.visible });
+      remove.onclick = () => doc.removeLayer(i);
+      li.append(pick, name, eye, remove, opacity, make('small', `${count} ${count === 1 ? 'stroke' : 'strokes'}${l.author ? ` · ${l.author}` : ''}`));
+      return li;
+    }));
+  }
+
+  // --- strokes ---
+
+  const tools = {
+    penOn: { hint: 'Drag on the model to paint; beside it, or with two fingers, to turn. Pressure widens.' },
+    eraserOn: { hint: 'Drag over what shall go from the chosen layer.' },
+  };
+  for (const [id, tool] of Object.entries(tools)) {
+    tool.click = () => {};
+    tool.end = () => {
+      $(id).ariaPressed = 'false';
+      $('penHint').textContent = '';
+    };
+  }
+  const pick = (x, y) => {
+    const point = scene.pick(x, y);
+    return point && toModel(point);
+  };
+  const active = () => Object.keys(tools).find((id) => taken() === tools[id]);
+
+  function down(e) {
+    if (!active() || !e.isPrimary || e.button !== 0 || stroke || !scene.pick(e.clientX, e.clientY))
+      return;
+    if (!state.info.parts.has('mesh')) {
+      complain('the file has no faces to paint on; convert the model with its mesh');
+      return;
+    }
+    e.stopImmediatePropagation(); // the camera stays
+    $('canvas').setPointerCapture(e.pointerId);
+    const erases = active() === 'eraserOn' || e.buttons === 32; // a stylus' other end
+    if (!doc.state.layers.length)
+      doc.addLayer({ author: localStorage.getItem('ebpo:author') ?? '', colour: (colour().reduce((sum, c) => sum * 256 + c, 0) * 256 + 255) });
+    stroke = new Stroke({ layer, erases, colour: [...colour(), 255], radius: radius() },
+      { pick, pixels: (place) => scene.pixelsAt(toScene(place)) * state.scene.scale });
+    stroke.pointer = e.pointerId;
+    add(e);
+  }
+
+  function add(e) {
+    const events = e.getCoalescedEvents?.() ?? [], light = e.pointerType === 'pen';
+    const fresh = (events.length ? events : [e]).reduce((sum, one) => sum + stroke.to(one.clientX, one.clientY, one.pressure || 0.5, light), 0);
+    if (fresh)
+      draw();
+  }
+
+  function move(e) {
+    if (stroke?.pointer !== e.pointerId)
+      return;
+    e.stopImmediatePropagation();
+    add(e);
+  }
+
+  async function up(e) {
+    if (stroke?.pointer !== e.pointerId)
+      return;
+    e.stopImmediatePropagation();
+    const done = stroke, { opening } = state;
+    stroke = undefined;
+    if (!done.points.length)
+      return;
+    pending++;
+    try {
+      const settled = done.settled(await askPlaces(done.points.map((p) => p.place)));
+      if (opening === state.opening && settled.points.length)
+        doc.addStroke(settled);
+    } catch (error) {
+      if (opening === state.opening)
+        complain(error.message);
+    }
+    pending--;
+  }
+
+  // --- files ---
+
+  async function saveFile() {
+    while (pending) // strokes whose places are on their way
+      await new Promise((done) => setTimeout(done, 20));
+    save(`${modelName()}.paint.h5`, writePaint(doc.file), 'application/x-hdf5');
+    doc.saved = doc.state;
+  }
+
+  async function openBytes(name, bytes) {
+    if (!doc.isSaved && !confirm('What is painted and noted here is not saved. Open the other file in its place?'))
+      return;
+    const mine = ++asked;
+    pending++;
+    try {
+      const file = readPaint(bytes), why = misfit(file, state.info);
+      if (why)
+        throw new Error(why);
+      doc.take(file);
+      details.open = true;
+      await checkPlaces(file, () => mine === asked && doc.state.strokes === file.strokes);
+    } catch (error) {
+      if (mine === asked)
+        complain(`${name}: ${error.message}`);
+    }
+    pending--;
+  }
+
+  // The normals of opened points, which keep paint on its own side of a wall; and whether they lie on the model at all.
+  async function checkPlaces({ strokes, notes }, goes) {
+    const points = [...notes, ...strokes.flatMap((s) => s.points)], most = OFF * Math.hypot(...state.info.box_size);
+    for (let i = 0; i < points.length && goes() && state.info.parts.has('mesh') && !state.info.subset_of; i += AT_ONCE) {
+      const some = points.slice(i, i + AT_ONCE), places = await placesOf(worker, some.map((p) => p.place));
+      if (!goes())
+        return;
+      if (places.some((p) => p.distance > most)) {
+        doc.take({ layers: [], notes: [], strokes: [] });
+        throw new Error('the paint has points that do not lie on the model: it was changed; get a fresh copy');
+      }
+      places.forEach((p, k) => normals.set(some[k], p.normal));
+    }
+    draw();
+  }
+
+  function fresh() {
+    asked++;
+    const key = state.info && identityOf(state.info).model; // what was painted before another model was opened is still there
+    doc = docs.get(key) ?? new PaintDocument(state.info ?? { parts: new Set() }, `${modelName()}.ebpo.h5`, changed);
+    if (key)
+      docs.set(key, doc);
+    layer = 0;
+    stroke = undefined;
+    changed();
+    if (state.info)
+      $('penSizeText').textContent = length(radius(), 2);
+  }
+
+  async function fromAddress() {
+    const wanted = new URLSearchParams(location.search).get('paint');
+    if (!wanted || !state.info || doc.past.length || doc.state.strokes.length)
+      return;
+    try {
+      const answer = await fetch(new URL(wanted, location.href));
+      if (!answer.ok)
+        throw new Error(`the server answers ${answer.status}; check the address`);
+      await openBytes(wanted, new Uint8Array(await answer.arrayBuffer()));
+    } catch (error) {
+      complain(`${wanted}: ${error.message}`);
+    }
+  }
+
+  function begin() {
+    details = section('Paint', HTML, { open: query.has('paint') });
+    for (const id of Object.keys(tools))
+      $(id).onclick = () => {
+        const starts = taken() !== tools[id];
+        take(starts ? tools[id] : undefined);
+        $(id).ariaPressed = String(starts);
+        $('penHint').textContent = starts ? tools[id].hint : '';
+        details.open = true;
+      };
+    $('penUndo').onclick = () => doc.undo();
+    $('penRedo').onclick = () => doc.redo();
+    details.querySelectorAll('[data-colour]').forEach((b) => (b.onclick = () => ($('penColour').value = b.dataset.colour)));
+    $('penSize').oninput = () => ($('penSizeText').textContent = length(radius(), 2));
+    $('layerAdd').onclick = () => {
+      doc.addLayer({ author: localStorage.getItem('ebpo:author') ?? '' });
+      layer = doc.state.layers.length - 1;
+      showLayers();
+    };
+    $('paintSave').onclick = saveFile;
+    $('paintOpen').onclick = () => $('paintFile').click();
+    $('paintFile').onchange = async () => {
+      const [file] = $('paintFile').files;
+      if (file)
+        await openBytes(file.name, new Uint8Array(await file.arrayBuffer()));
+      $('paintFile').value = '';
+    };
+    const canvas = $('canvas'), early = { capture: true };
+    for (const [name, listener] of [['pointerdown', down], ['pointermove', move], ['pointerup', up], ['pointercancel', up]])
+      canvas.parentElement.addEventListener(name, listener, early); // before the camera hears of it
+    on('key', (e) => ({ b: 'penOn', r: 'eraserOn' })[e.key.toLowerCase()] && $({ b: 'penOn', r: 'eraserOn' }[e.key.toLowerCase()]).click());
+    addEventListener('keydown', (e) => {
+      if ((e.ctrlKey || e.metaKey) && e.key.toLowerCase() === 'z' && state.info && !e.target.matches('input[type=text], textarea')) {
+        e.preventDefault();
+        e.shiftKey ? doc.redo() : doc.undo();
+      }
+    });
+    addEventListener('beforeunload', (e) => [...docs.values()].every((d) => d.isSaved) || e.preventDefault());
+    on('opened', () => {
+      fresh();
+      fromAddress();
+    });
+    on('closed', fresh);
+    fresh();
+    fromAddress();
+    window.ebpoViewer.paint = { get file() { return doc.file; }, get pending() { return pending; }, openBytes, write: () => writePaint(doc.file) };
+  }
+  return { begin, drawing };
+}

@@ -1,0 +1,61 @@
+// The point asked about: its numbers, its answer, its marker.
+import { $, length, state, tell, toScene } from './state.js';
+
+let picture, questions;
+
+/** `scene` shows the marker, `worker` is asked. */
+export function probeWith(scene, worker) {
+  picture = scene;
+  questions = worker;
+}
+
+/** Asks about a point of the model; forgets the last one without a point. */
+export function probeAt(point) {
+  state.probe = point && { point, pending: true };
+  if (point)
+    questions.postMessage({ type: 'probe', opening: state.opening, point });
+  probeShown();
+  tell('point');
+}
+
+export function probeShown() {
+  const p = state.probe;
+  $('probe').hidden = !p;
+  $('probeHint').hidden = Boolean(p);
+  if (!p) {
+    picture.showProbe();
+    return;
+  }
+  ['px', 'py', 'pz'].forEach((id, k) => {
+    if (document.activeElement !== $(id))
+      $(id).value = Number(p.point[k].toPrecision(6));
+    $(id).title = p.point[k];
+  });
+  const tints = { in: '#4cc38a', out: '#ff6b6b', on: '#ffffff', maybe: '#ffb020' };
+  picture.showProbe(toScene(p.point), p.nearest && toScene(p.nearest), tints[p.where] ?? '#ffb020');
+  if (p.pending)
+    return;
+  const words = { in: 'Inside', out: 'Outside', on: 'On the surface', maybe: 'Undecided' };
+  $('where').textContent = p.solid ? words[p.where] : 'No inside';
+  $('where').className = p.solid ? p.where : 'maybe';
+  $('whereNote').textContent = !p.solid ? 'the model is a surface, not a solid'
+    : p.exact ? 'exact'
+    : p.where === 'maybe' ? (p.done ? `levels 0–${p.depth} do not say; the file has no mesh` : 'asking the leaf …')
+    : `certain by levels 0–${p.depth}`;
+  if (p.exact) {
+    $('distance').textContent = length(p.where === 'on' ? 0 : p.distance, 7);
+    $('distanceNote').textContent = `to the nearest face, in doubles; levels 0–${p.depth}: ${length(p.lo, 3)} to ${length(p.hi, 3)}`;
+  } else {
+    $('distance').textContent = `${length(p.lo, 4)} – ${length(p.hi, 4)}`;
+    $('distanceNote').textContent = `certified by the cells of levels 0–${p.depth}`;
+  }
+}
+
+['px', 'py', 'pz'].forEach((id, k) => {
+  $(id).onchange = () => { // the other coordinates keep the digits that are not shown
+    const point = [...state.probe.point], x = Number($(id).value);
+    point[k] = x;
+    if ($(id).value.trim() && Number.isFinite(x))
+      probeAt(point);
+  };
+});

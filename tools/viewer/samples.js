@@ -1,0 +1,22 @@
+// The list of samples on the first page.
+import { bytes } from './line.js';
+import { $, count } from './state.js';
+
+/** Shows the list at an address; `open(url)` is called for one that is chosen. */
+export async function listSamples(address, open) {
+  const list = await (await fetch(address)).json();
+  $('samples').hidden = list.length === 0;
+  $('samples').querySelector('ul').replaceChildren(...list.map(({ name, file, faces, bytes: size }) => {
+    const li = document.createElement('li'), a = document.createElement('a'), small = document.createElement('small');
+    const url = new URL(file, new URL(address, location.href)).href;
+    a.href = `?file=${encodeURIComponent(url)}`;
+    a.onclick = (e) => {
+      e.preventDefault();
+      open(url);
+    };
+    small.textContent = [faces && `${count(faces)} faces`, size && bytes(size)].filter(Boolean).join(' · ');
+    a.append(name, small);
+    li.append(a);
+    return li;
+  }));
+}

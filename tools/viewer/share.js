@@ -1,0 +1,57 @@
+// The page's address follows what is shown, and what an address says is shown. Looking around never makes steps of the browser's history; another file does.
+import { boxOf, boxText, cameraOf, cameraText, clipOf, clipText, pointsOf, pointsText, withQuery } from './address.js';
+import { $, state } from './state.js';
+
+const LATER_MS = 300; // browsers refuse when addresses change too often
+const OF_A_VIEW = ['view', 'level', 'clip', 'box', 'point', 'measure', 'colour', 'walls', 'detail'];
+
+const files = []; // from disk, by their number in the history's entries
+let timer, home, picture;
+
+export function shareOf(scene) {
+  picture = scene;
+}
+
+/** The camera is where it is when nobody has moved it. */
+export function atHome() {
+  home = cameraText(picture.place);
+}
+
+/** Another file, named by its address or as a File, or none: a step of the history. */
+export function went(what) {
+  clearTimeout(timer);
+  timer = undefined;
+  const href = withQuery(location.href, [...OF_A_VIEW.map((name) => [name]), ['file', typeof what === 'string' ? what : undefined]]);
+  const local = what !== undefined && typeof what !== 'string' ? files.push(what) - 1 : undefined;
+  if (href !== location.href || local !== undefined || history.state?.local !== undefined)
+    history.pushState({ local }, '', href);
+}
+
+/** What an entry of the history is about: an address, a File or nothing. */
+export const whereTo = (query, entry) => (entry?.local !== undefined ? files[entry.local] : query.get('file') ?? undefined);
+
+/** What an address says, of the open file: { camera, level, clip, box, point, measured, colouring, walls, detail }; members that it does not name are undefined. */
+export function said(query) {
+  const one = (name) => pointsOf(query.get(name))?.[0], level = query.get('level');
+  return { camera: cameraOf(query.get('view')), level: /^\d+$/.test(level ?? '') ? Number(level) : undefined, clip: clipOf(query.get('clip')), box: boxOf(query.get('box')),
+    point: one('point'), measured: pointsOf(query.get('measure')), colouring: query.get('colour') ?? 'plain', walls: query.get('walls') !== '0', detail: query.get('detail') ?? 'auto' };
+}
+
+/** The address of what is shown now. */
+export function address() {
+  const i = state.info, diagonal = Math.hypot(...i.box_size), view = cameraText(picture.place), chosen = (name) => document.querySelector(`input[name=${name}]:checked`).value;
+  const points = (list) => (list?.length ? pointsText(list, diagonal) : undefined), unless = (value, usual) => (value === usual ? undefined : value);
+  return withQuery(location.href, [['view', unless(view, home)], ['level', unless($('level').value, $('level').max)], ['clip', clipText(state.clip)], ['box', boxText(state.box)],
+    ['point', points(state.probe && [state.probe.point])], ['measure', points(state.measured)], ['colour', unless(chosen('colouring'), 'plain')],
+    ['walls', $('walls').checked ? undefined : '0'], ['detail', unless($('detail').value, 'auto')]]);
+}
+
+/** Something changed: soon the address says so. */
+export function changed() {
+  const { opening } = state;
+  timer ??= setTimeout(() => {
+    timer = undefined;
+    if (state.info && opening === state.opening && address() !== location.href)
+      history.replaceState(history.state, '', address());
+  }, LATER_MS);
+}

@@ -1,0 +1,35 @@
+// What to copy for others: a link to this view, a line for a page, an element.
+import { make } from './parts.js';
+import { $, state } from './state.js';
+
+const quoted = (text) => text.replace(/[&"<>]/g, (c) => ({ '&': '&amp;', '"': '&quot;', '<': '&lt;', '>': '&gt;' })[c]);
+
+/** `address()`: of this view. */
+export function addSharing({ address }) {
+  const button = make('button', 'Share', { id: 'toolShare', className: 'ghost', title: 'Link, iframe, element (L)' }), dialog = document.createElement('dialog');
+  dialog.id = 'share';
+  dialog.ariaLabel = 'Share this view';
+  dialog.innerHTML = `<h2>Share this view</h2><p class="hint" id="shareHint"></p>
+    ${[['Link', 'Link to this view'], ['Frame', 'In a page: one line'], ['Element', 'In a page that has the package ebpo-viewer']].map(([id, label]) => `<label for="share${id}">${label}</label>
+    <div class="row"><textarea id="share${id}" rows="2" readonly></textarea><button class="small" type="button" data-copy="share${id}">Copy</button></div>`).join('')}
+    <form method="dialog"><button>Close</button></form>`;
+  $('toolHelp').before(button);
+  document.body.append(dialog);
+  dialog.querySelectorAll('[data-copy]').forEach((b) => (b.onclick = async () => {
+    const field = $(b.dataset.copy);
+    field.select();
+    await navigator.clipboard?.writeText(field.value).catch(() => document.execCommand('copy'));
+    b.textContent = 'Copied';
+    setTimeout(() => (b.textContent = 'Copy'), 1500);
+  }));
+  button.onclick = () => {
+    const link = address(), query = new URL(link).searchParams, attributes = ['view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'walls'].filter((name) => query.has(name));
+    const local = typeof state.what !== 'string';
+    $('shareHint').textContent = local ? 'This file is on this computer: others need it on a server, and its address in ?file=.' : '';
+    $('shareLink').value = link;
+    $('shareFrame').value = `<iframe src="${quoted(link)}" width="800" height="600" style="border:0" title="${quoted(state.shownName ?? '')}"></iframe>`;
+    const chosen = attributes.map((name) => `${name}="${quoted(query.get(name))}" `).join('');
+    $('shareElement').value = `<ebpo-viewer src="${quoted(local ? 'ADDRESS' : state.what)}" ${chosen}style="height: 600px"></ebpo-viewer>`;
+    dialog.showModal();
+  };
+}

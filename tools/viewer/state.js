@@ -1,0 +1,29 @@
+// What the page knows of the open file, for all its parts; and how they hear of each other.
+export const $ = (id) => document.getElementById(id);
+
+export const state = {
+  opening: 0, want: 0, settled: 0, idle: false, info: undefined, scene: undefined, depth: -1, bytesTo: [], timeline: [], stats: undefined, traffic: undefined,
+  clip: { axis: undefined, at: 0.5, flip: false }, box: undefined, measured: undefined, probe: undefined, frames: [],
+};
+
+// --- numbers for people ---
+
+export const count = (n) => n.toLocaleString('en');
+export const time = (ms) => (ms < 1000 ? `${Math.round(ms)} ms` : `${(ms / 1000).toFixed(2)} s`);
+/** In the file's unit; `power` 2 for areas. */
+export const length = (x, digits = 5, power = 1) => `${Number(x.toPrecision(digits))}${state.info?.unit ? ` ${state.info.unit}${power > 1 ? '²' : ''}` : ''}`;
+
+// --- places ---
+
+export const toModel = (p) => p.map((x, k) => x / state.scene.scale + state.scene.center[k]);
+export const toScene = (p) => p.map((x, k) => (x - state.scene.center[k]) * state.scene.scale);
+
+// --- news: frame, opened, closed, cut, theme, point, view (the user moved on), and what the worker says to parts that came later ---
+
+const listeners = new Map();
+export function on(name, listener) {
+  listeners.set(name, [...(listeners.get(name) ?? []), listener]);
+}
+export function tell(name, news) {
+  listeners.get(name)?.forEach((listener) => listener(news));
+}

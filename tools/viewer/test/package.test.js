@@ -1,0 +1,50 @@
+// The npm package, as somebody else's project would have it: packed, unpacked, bundled for browsers without a word about Node.js; and the reader in it, under node.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { pathToFileURL } from 'node:url';
+
+const here = join(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '..');
+const esbuild = existsSync(join(here, 'node_modules/esbuild')) ? await import('esbuild') : undefined;
+
+test('the package is packed, bundled for browsers, and has the types of what it exports', { skip: esbuild ? false : 'esbuild is not installed' }, async (t) => {
+  const work = mkdtempSync(join(tmpdir(), 'ebpo-package-')), project = join(work, 'project'), own = join(project, 'node_modules/ebpo-viewer');
+  t.after(() => rmSync(work, { recursive: true, force: true }));
+  execFileSync(process.execPath, [join(here, 'package.mjs'), join(work, 'package')]);
+  execFileSync('npm', ['pack', '--silent', '--offline', '--pack-destination', work], { cwd: join(work, 'package'), stdio: ['ignore', 'pipe', 'inherit'] });
+  mkdirSync(own, { recursive: true });
+  execFileSync('tar', ['-xzf', join(work, readdirSync(work).find((name) => name.endsWith('.tgz'))), '-C', own, '--strip-components', '1']);
+  symlinkSync(join(here, 'node_modules/three'), join(project, 'node_modules/three'));
+  assert.ok(['element.d.ts', 'three.d.ts', 'reader.d.ts', 'worker.js', 'README.md', 'LICENSE'].every((name) => existsSync(join(own, name))));
+
+  writeFileSync(join(project, 'main.js'), `import { EbpoViewerElement } from 'ebpo-viewer'; import { EbpoModel, standardMaterial } from 'ebpo-viewer/three';
+    import { openEbpo, Tree } from 'ebpo-viewer/reader'; import { Object3D } from 'three';
+    globalThis.all = [EbpoViewerElement, openEbpo, Tree, standardMaterial, new EbpoModel() instanceof Object3D];`);
+  const { outputFiles, warnings } = await esbuild.build({ entryPoints: [join(project, 'main.js')], bundle: true, format: 'esm', platform: 'browser', write: false, logLevel: 'silent' });
+  assert.deepEqual(warnings, []);
+  const text = outputFiles[0].text;
+  assert.doesNotMatch(text, /(from|import\()\s*["']node:/);
+  assert.equal(text.match(/\bWebGLRenderer = class\b|class WebGLRenderer\b/g)?.length ?? 0, 1, 'three.js is there once');
+  assert.doesNotMatch(readFileSync(join(own, 'worker.js'), 'utf8'), /(from|import\()\s*["'](node:|three|zstddec|\.\/node_modules)/);
+
+  // Types: each exported name is declared, and what is declared as a value is exported.
+  for (const part of ['element', 'three', 'reader']) {
+    const { metafile } = await esbuild.build({ entryPoints: [join(own, `${part}.js`)], metafile: true, bundle: true, external: ['three', 'three/*'], format: 'esm', write: false, outdir: work });
+    const [{ exports: exported }] = Object.values(metafile.outputs);
+    const types = readFileSync(join(own, `${part}.d.ts`), 'utf8');
+    const declared = [...types.matchAll(/^export declare (?:const|function|class) ([^;(<{]+)/gm)].flatMap((m) => m[1].replace(/ (extends|implements) .*/,
+      '').split(',').map((name) => name.split(':')[0].trim()));
+    assert.deepEqual(declared.filter((name, i, all) => all.indexOf(name) === i).sort(), exported.sort(), part);
+  }
+
+  const { openEbpo, Tree, inside } = await import(pathToFileURL(join(own, 'reader.js')));
+  const path = (process.env.EBPO_FILES ?? '').split(' ').find((name) => name.endsWith('/ring.ebpo.h5'));
+  if (path) {
+    const file = await openEbpo(readFileSync(path)), tree = new Tree(file.info);
+    (await file.levels(0, 2)).forEach((level) => tree.add(level));
+    assert.equal(inside(tree, file.info.box_origin.map((o) => o - 1)).where, 'out');
+  }
+});
