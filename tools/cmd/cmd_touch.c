@@ -218,14 +218,9 @@ static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
 {
     ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
     opening.memory = memory;
-    wanted.radius = v->radius;
-    wanted.friction = v->friction;
-    wanted.tick = 1 / v->rate;
-    wanted.faces = (uint64_t)v->faces;
-    ebpo_status status = remote_open(&j->file, j->name, &v->remote, error);
-    if (status == EBPO_OK && !v->memory)
-        model_memory_usual("touch", j->file, j->name, &opening);
     ebpo_status status = remote_open(&j->file, j->name, &j->v->remote, error);
+    if (status == EBPO_OK && !j->v->memory)
+        model_memory_usual("touch", j->file, j->name, &opening);
     if (status == EBPO_OK)
         status = ebpo_model_new(j->file, &opening, &j->model, error);
     if (status == EBPO_OK && !j->v->path && !j->v->device)
