@@ -128,7 +128,8 @@ static bool number_corners(lighting *l)
             EBPO_HASH_FIND(at, ebpo_hash_number(key), slots - 1,
                            table[at] == none || l->keys[table[at]] == key);
             if (table[at] == none) {
-                fine = ebpo_grow(&l->keys, &l->key_capacity, l->corner_count + 1, sizeof *l->keys);
+                fine = l->corner_count < none &&
+                       ebpo_grow(&l->keys, &l->key_capacity, l->corner_count + 1, sizeof *l->keys);
                 if (fine)
                     l->keys[table[at] = (uint32_t)l->corner_count++] = key;
             }
