@@ -12,9 +12,8 @@ static void verify(ebpo_file *file)
     ebpo_workspace_options limited = EBPO_WORKSPACE_OPTIONS_INIT;
     ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
     ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
-    limited.memory = 64 << 20;
-    if (ebpo_workspace_new(&limited, &options.workspace, NULL) != EBPO_OK)
-        return;
+    limited.memory = 512 << 20;
+    fuzz_must(ebpo_workspace_new(&limited, &options.workspace, NULL) == EBPO_OK);
     options.threads = 1;
     options.label_samples = 64;
     (void)!ebpo_verify(file, &options, &report, NULL);
