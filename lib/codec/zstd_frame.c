@@ -1,7 +1,6 @@
 /* Source: RFC 8878, 3.1.1. */
 #include "codec/zstd_frame.h"
 
-
 enum { RAW, RLE, COMPRESSED, RESERVED };
 
 /* How many bytes the literals of a compressed block take, with their header; 0: it is cut short. */
@@ -43,8 +42,8 @@ bool ebpo_zstd_unused_set(const uint8_t *frame, size_t bytes)
     if (bytes <= DESCRIPTOR)
         return false;
     unsigned d = frame[DESCRIPTOR], single = d >> 5 & 1, size_code = d >> 6;
-    size_t at = DESCRIPTOR + 1 + !single + id_bytes[d & 3] +
-                (size_code ? (size_t)1 << size_code : single);
+    size_t at =
+        DESCRIPTOR + 1 + !single + id_bytes[d & 3] + (size_code ? (size_t)1 << size_code : single);
     if (d & UNUSED)
         return true;
     for (bool last = false; !last && at + BLOCK_HEADER <= bytes;) {

@@ -318,6 +318,7 @@ START_TEST(many_threads_get_the_answers_of_one)
     uint64_t asked = 0;
     if (s.place == FROM_SERVER && !served)
         return;
+    background_fails = false;
     make_models(&s);
     background_fails = s.place == FROM_SOURCE;
     s.until = seconds() > 0 ? ebpo_seconds() + seconds() : 0;
