@@ -103,6 +103,11 @@ export function addPen({ scene, worker, query }, pipeline) {
   const active = () => Object.keys(tools).find((id) => taken() === tools[id]);
 
   function down(e) {
+    if (stroke && e.pointerType === 'touch') { // a second finger: the model is to be turned
+      stroke = undefined;
+      draw();
+      return;
+    }
     if (!active() || !e.isPrimary || e.button !== 0 || stroke || !scene.pick(e.clientX, e.clientY))
       return;
     if (!state.info.parts.has('mesh')) {

@@ -1,6 +1,6 @@
 // The npm package, as somebody else's project would have it: packed, unpacked, bundled for browsers without a word about Node.js; and the reader in it, under node.
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
+import { execFileSync, spawnSync } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -8,9 +8,9 @@ import { test } from 'node:test';
 import { pathToFileURL } from 'node:url';
 
 const here = join(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '..');
-const esbuild = existsSync(join(here, 'node_modules/esbuild')) ? await import('esbuild') : undefined;
+const esbuild = existsSync(join(here, 'node_modules/esbuild')) && spawnSync('npm', ['--version']).status === 0 ? await import('esbuild') : undefined;
 
-test('the package is packed, bundled for browsers, and has the types of what it exports', { skip: esbuild ? false : 'esbuild is not installed' }, async (t) => {
+test('the package is packed, bundled for browsers, and has the types of what it exports', { skip: esbuild ? false : 'esbuild or npm is not installed' }, async (t) => {
   const work = mkdtempSync(join(tmpdir(), 'ebpo-package-')), project = join(work, 'project'), own = join(project, 'node_modules/ebpo-viewer');
   t.after(() => rmSync(work, { recursive: true, force: true }));
   execFileSync(process.execPath, [join(here, 'package.mjs'), join(work, 'package')]);
