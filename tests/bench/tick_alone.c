@@ -1,5 +1,5 @@
-/* What the machine alone makes of a tick: the same sums each time, some 20 us of them, and nothing of
- * the library, at 1 kHz with the policy SCHED_FIFO and locked memory, as `ebpo touch` plays.
+/* What the machine alone makes of a tick: the same sums each time, some 20 us of them, and nothing
+ * of the library, at 1 kHz with the policy SCHED_FIFO and locked memory, as `ebpo touch` plays.
  *
  *     gcc -O2 tests/bench/tick_alone.c -o tick_alone -lm && ./tick_alone SECONDS
  */
