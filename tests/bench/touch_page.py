@@ -64,7 +64,7 @@ def main(ebpo, model, seconds="600"):
     print(f"""# How late a hand is
 
 Made by `python3 tests/bench/touch_page.py EBPO {os.path.basename(model)} {seconds}` on {os.cpu_count()} cores.
-The model has {info["faces"]:,} faces; 256 MiB are its budget, boxes of faces come to that. The hand is
+The model has {info["faces"]:,} faces; 256 MiB are its budget, boxes of faces come beside. The hand is
 that of `ebpo touch` itself: around the model in 8 seconds, and into the surface and out of it. Every
 row is one run of `ebpo touch --json` with the options named. *Thread*: {rows[0][2]["scheduling"]};
 the thread that loads runs as others do. *Load* is the machine's over a minute, before and after the

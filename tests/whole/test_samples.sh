@@ -125,7 +125,7 @@ shift 9
 "$ebpo" touch --device udp:0 --seconds 30 --rate 500 --stiffness 100 --record "$work/hand.txt" \
     "$work/cube.ebpo.h5" >"$work/touched" 2>"$work/out" &
 touching=$!
-for i in 1 2 3 4 5 6 7 8 9 10; do
+for i in $(seq 60); do
     port=$(sed -n 's/.*waits for a device at 127.0.0.1, port //p' "$work/out")
     [ -n "$port" ] && break
     sleep 0.5

@@ -125,9 +125,20 @@ static void take_all(udp *u)
     }
 }
 
+static void tell_port(const udp *u)
+{
+    struct sockaddr_in at = { .sin_port = 0 };
+    socklen_t length = sizeof at;
+    char text[64] = "";
+    (void)getsockname(u->socket, (struct sockaddr *)&at, &length);
+    inet_ntop(AF_INET, &at.sin_addr, text, sizeof text);
+    fprintf(stderr, "ebpo touch: waits for a device at %s, port %u\n", text, ntohs(at.sin_port));
+}
+
 static bool begin(void *self, double seconds, touch_pose *first)
 {
     udp *u = self;
+    tell_port(u);
     uint64_t until = tool_clock() + (uint64_t)(1e9 * fmin(seconds, 1e9));
     while (!u->known && tool_clock() < until) {
         struct pollfd waiting = { .fd = u->socket, .events = POLLIN };
@@ -214,7 +225,6 @@ static bool read_name(const char *name, struct sockaddr_in *out)
 bool touch_udp_open(touch_device *out, const char *name)
 {
     struct sockaddr_in at;
-    socklen_t length = sizeof at;
     udp *u = calloc(1, sizeof *u);
     *out = (touch_device){ begin, read_place, write_answer, ticks, end, u };
     if (!u)
@@ -225,13 +235,9 @@ bool touch_udp_open(touch_device *out, const char *name)
         return false;
     }
     u->socket = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    if (u->socket < 0 || bind(u->socket, (const struct sockaddr *)&at, sizeof at) != 0 ||
-        getsockname(u->socket, (struct sockaddr *)&at, &length) != 0) {
+    if (u->socket < 0 || bind(u->socket, (const struct sockaddr *)&at, sizeof at) != 0) {
         fprintf(stderr, "ebpo touch: %s: %s\n", name, strerror(errno));
         return false;
     }
-    char text[64] = "";
-    inet_ntop(AF_INET, &at.sin_addr, text, sizeof text);
-    fprintf(stderr, "ebpo touch: waits for a device at %s, port %u\n", text, ntohs(at.sin_port));
     return true;
 }
