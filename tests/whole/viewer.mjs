@@ -494,7 +494,20 @@ async function measures(browser, address) {
   await page.close();
 }
 
-// A stroke and a note, kept in a file, which another page shows again; an eraser and undo.
+// What was painted in a browser, as the command sees it: listed, measured, baked into colours of vertices, and these shown.
+async function readsPaint(browser, address, path) {
+  const baked = join(work, 'baked.ply'), told = JSON.parse(run(ebpo, ['paint', '--json', '--area', path, model]));
+  assert.deepEqual([told.stroke_count, told.layers.length, told.notes[0].title], [1, 1, 'A loss']);
+  const { lo, area, hi } = told.areas.all;
+  assert.ok(lo > 0 && lo <= area && area <= hi);
+  run(ebpo, ['paint', path, model, '--bake', baked]);
+  run(ebpo, ['convert', '-q', baked, join(models, 'baked.ebpo.h5')]);
+  const page = await show(browser, `${address}?file=models/baked.ebpo.h5`);
+  await settled(page);
+  assert.ok(await red(page) > 500, 'what was baked is seen');
+  await page.close();
+}
+
 async function paints(browser, address) {
   const page = await show(browser, `${address}?file=models/ring.ebpo.h5`),
     red = (from) => from.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => { // pixels
@@ -541,6 +554,7 @@ async function paints(browser, address) {
   assert.deepEqual([doc.model, doc.faceNumbers, doc.strokes.length, doc.layers.length, doc.notes[0].title, doc.notes[0].body], [info.content_sha256, 'source', 1, 1, 'A loss', 'two\u2028lines']);
   const far = run(ebpo, ['distance', '--json', '--unsigned', model], stroke.points.map((p) => `${p.place.join(' ')}\n`).join('')).trim().split('\n').map((line) => JSON.parse(line).distance);
   assert.ok(stroke.points.length > 5 && far.every((d) => d < 1e-12 * Math.hypot(...info.box_size)), 'its points lie on the faces');
+  await readsPaint(browser, address, path);
   await page.close({ runBeforeUnload: false });
 
   const other = await show(browser, `${address}?file=models/ring.ebpo.h5`);
