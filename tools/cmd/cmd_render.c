@@ -375,9 +375,9 @@ static const values usual = {
 static int run(void *given, const char **operand)
 {
 #if EBPO_HAVE_PNG
+    values *v = given;
     if (!process_memory_take("render", v->memory))
         return EXIT_USAGE;
-    values *v = given;
     job *j = calloc(1, sizeof *j);
     if (!j)
         return command_no_memory("render");

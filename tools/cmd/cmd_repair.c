@@ -15,6 +15,7 @@
 #include "cli/textures.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
+#include "cmd/unlisted.h"
 
 typedef struct values {
     const char *out, *source;
@@ -30,11 +31,12 @@ typedef struct values {
 typedef enum fate { NONE, KEPT, REBUILT, LOST } fate; /* NONE: the file has no such part */
 static const char *const fate_words[] = { "none", "kept", "rebuilt", "lost" };
 
-typedef enum piece { MESH, MAPS, ATTRIBUTES, LEVELS, PIECES } piece;
-static const char *const piece_words[] = { "mesh", "maps", "attributes", "levels" };
+typedef enum piece { MESH, MAPS, ATTRIBUTES, LEVELS, SUMS, PIECES } piece;
+static const char *const piece_words[] = { "mesh", "maps", "attributes", "levels", "sums" };
 
 typedef struct patient {
     const values *v;
+    const char *path;
     ebpo_file *file;
     const ebpo_info *info;
     ebpo_workspace *workspace;
@@ -124,6 +126,63 @@ static ebpo_status look_at_levels(patient *p, ebpo_error *error)
             ebpo_level_free(&level);
         status = good ? EBPO_OK : take_down(p, LEVELS, status, &told, error);
     }
+    return status;
+}
+
+/* --- a list of sums that is damaged --- */
+
+static void forget(patient *p)
+{
+    memset(p->fate, 0, sizeof p->fate);
+    memset(p->why, 0, sizeof p->why);
+}
+
+static ebpo_status look_at_all(patient *p, ebpo_error *error)
+{
+    forget(p);
+    ebpo_status status = look_at_mesh(p, error);
+    if (status == EBPO_OK)
+        status = look_at_attributes(p, error);
+    return status == EBPO_OK ? look_at_levels(p, error) : status;
+}
+
+/* Opens it without its list, if its content is then that of the head. */
+static ebpo_status open_unlisted(const patient *p, ebpo_file **out, ebpo_error *error)
+{
+    ebpo_read_options read = reading(p);
+    ebpo_status status = unlisted_open(p->path, (uint64_t)p->v->most_expansion, out, error);
+    return status == EBPO_OK ? ebpo_file_check_content(*out, &read, error) : status;
+}
+
+/* Nothing can be read without the list of how chunks end. Where it is what is damaged, and nothing
+ * else, the content without it is that of the head: that is a proof, so all of it is kept. */
+static ebpo_status look(patient *p, ebpo_error *error)
+{
+    ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
+    ebpo_error told = EBPO_ERROR_INIT;
+    ebpo_file *unlisted = NULL;
+    ebpo_status status = look_at_all(p, error);
+    if (status == EBPO_OK)
+        status = ebpo_file_locate(p->file, &stored, error);
+    if (status != EBPO_OK || !stored.sum_bytes)
+        return status;
+    p->fate[SUMS] = KEPT;
+    if (p->fate[MESH] != LOST)
+        return EBPO_OK;
+    status = open_unlisted(p, &unlisted, &told);
+    if (status != EBPO_OK) {
+        ebpo_close(unlisted);
+        *error = told;
+        return is_damage(status) ? EBPO_OK : status;
+    }
+    char why[sizeof p->why[MESH]];
+    memcpy(why, p->why[MESH], sizeof why);
+    ebpo_close(p->file);
+    p->file = unlisted;
+    p->info = ebpo_file_info(unlisted);
+    status = look_at_all(p, error);
+    p->fate[SUMS] = REBUILT;
+    memcpy(p->why[SUMS], why, sizeof why);
     return status;
 }
 
@@ -329,11 +388,7 @@ static ebpo_status repair(patient *p, ebpo_error *error)
                       "the file is a subset: of what was left out nothing can be made again; take "
                       "another subset of the original",
                       error);
-    ebpo_status status = look_at_mesh(p, error);
-    if (status == EBPO_OK)
-        status = look_at_attributes(p, error);
-    if (status == EBPO_OK)
-        status = look_at_levels(p, error);
+    ebpo_status status = look(p, error);
     if (status != EBPO_OK)
         return status;
     if (!p->v->source && p->fate[MESH] == LOST)
@@ -402,7 +457,7 @@ static int run(void *given, const char **operand)
 {
     const values *v = given;
     progress_line line;
-    patient p = { .v = v };
+    patient p = { .v = v, .path = operand[0] };
     ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
     how.most_expansion = (uint64_t)v->most_expansion;
     ebpo_error error = EBPO_ERROR_INIT;
