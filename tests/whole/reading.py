@@ -13,7 +13,8 @@ TOOL, LIBRARY, INPUTS, VECTORS = map(os.path.abspath, sys.argv[1:5])
 FEATURES = sys.argv[5].split(",")
 CANNOT = "was built without libhdf5"
 READING = dict(os.environ, LC_ALL="C.UTF-8", LD_LIBRARY_PATH=os.path.dirname(LIBRARY))
-USUAL = dict(os.environ, LC_ALL="C.UTF-8")
+# The build finds its own by itself; Meson may put the other one's folder before it.
+USUAL = {k: v for k, v in READING.items() if k != "LD_LIBRARY_PATH"}
 failures = []
 
 
