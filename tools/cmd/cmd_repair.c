@@ -15,7 +15,7 @@
 #include "cli/textures.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
-#include "cmd/unlisted.h"
+#include "cmd/repair_look.h"
 
 typedef struct values {
     const char *out, *source;
@@ -26,165 +26,8 @@ typedef struct values {
 
 #include "options/repair.inc"
 
-/* --- what is left --- */
-
-typedef enum fate { NONE, KEPT, REBUILT, LOST } fate; /* NONE: the file has no such part */
 static const char *const fate_words[] = { "none", "kept", "rebuilt", "lost" };
-
-typedef enum piece { MESH, MAPS, ATTRIBUTES, LEVELS, SUMS, PIECES } piece;
 static const char *const piece_words[] = { "mesh", "maps", "attributes", "levels", "sums" };
-
-typedef struct patient {
-    const values *v;
-    const char *path;
-    ebpo_file *file;
-    const ebpo_info *info;
-    ebpo_workspace *workspace;
-    ebpo_progress progress;
-    fate fate[PIECES];
-    char why[PIECES][sizeof((ebpo_error *)NULL)->message]; /* what is wrong; "": nothing */
-    bool same;                                             /* the new content is that of the file */
-} patient;
-
-static ebpo_read_options reading(const patient *p)
-{
-    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
-    read.threads = (unsigned)p->v->threads;
-    read.workspace = p->workspace;
-    return read;
-}
-
-/* A failure that says something about the file and not about this machine. */
-static bool is_damage(ebpo_status status)
-{
-    return status == EBPO_E_FORMAT || status == EBPO_E_VERSION || status == EBPO_E_LIMIT ||
-           status == EBPO_E_ABSENT;
-}
-
-/* What came of reading a part. */
-static ebpo_status take_down(patient *p, piece which, ebpo_status status, const ebpo_error *told,
-                             ebpo_error *error)
-{
-    if (status == EBPO_OK || is_damage(status)) {
-        p->fate[which] = status == EBPO_OK ? KEPT : LOST;
-        if (status != EBPO_OK && !p->why[which][0])
-            snprintf(p->why[which], sizeof p->why[which], "%s", told->message);
-        return EBPO_OK;
-    }
-    *error = *told;
-    return status;
-}
-
-static ebpo_status look_at_mesh(patient *p, ebpo_error *error)
-{
-    ebpo_error told = EBPO_ERROR_INIT;
-    ebpo_read_options read = reading(p);
-    ebpo_mesh mesh = { 0 };
-    ebpo_maps maps = { 0 };
-    if (!(p->info->parts & EBPO_PART_MESH))
-        return EBPO_OK;
-    ebpo_status status = ebpo_file_read_mesh(p->file, &read, &mesh, &told);
-    ebpo_mesh_free(&mesh);
-    status = take_down(p, MESH, status, &told, error);
-    if (status != EBPO_OK || !(p->info->parts & EBPO_PART_MAPS))
-        return status;
-    status = ebpo_file_read_maps(p->file, &read, &maps, &told);
-    ebpo_maps_free(&maps);
-    return take_down(p, MAPS, status, &told, error);
-}
-
-static ebpo_status look_at_attributes(patient *p, ebpo_error *error)
-{
-    ebpo_error told = EBPO_ERROR_INIT;
-    ebpo_read_options read = reading(p);
-    ebpo_status status = EBPO_OK;
-    if (!(p->info->parts & EBPO_PART_ATTRIBUTES))
-        return EBPO_OK;
-    p->fate[ATTRIBUTES] = KEPT;
-    for (unsigned n = 0; status == EBPO_OK && p->fate[ATTRIBUTES] == KEPT; n++) {
-        ebpo_attribute_values got;
-        status = ebpo_file_read_attribute(p->file, n, &read, &got, &told);
-        ebpo_attribute_values_free(&got);
-        if (status == EBPO_E_ABSENT) /* that was the last one */
-            return EBPO_OK;
-        status = take_down(p, ATTRIBUTES, status, &told, error);
-    }
-    return status;
-}
-
-static ebpo_status look_at_levels(patient *p, ebpo_error *error)
-{
-    ebpo_error told = EBPO_ERROR_INIT;
-    ebpo_read_options read = reading(p);
-    ebpo_status status = EBPO_OK;
-    p->fate[LEVELS] = KEPT;
-    for (int l = 0; l < p->info->level_count && status == EBPO_OK; l++) {
-        ebpo_level level;
-        status = ebpo_file_read_level(p->file, l, &read, &level, &told);
-        bool good = status == EBPO_OK;
-        if (good)
-            ebpo_level_free(&level);
-        status = good ? EBPO_OK : take_down(p, LEVELS, status, &told, error);
-    }
-    return status;
-}
-
-/* --- a list of sums that is damaged --- */
-
-static void forget(patient *p)
-{
-    memset(p->fate, 0, sizeof p->fate);
-    memset(p->why, 0, sizeof p->why);
-}
-
-static ebpo_status look_at_all(patient *p, ebpo_error *error)
-{
-    forget(p);
-    ebpo_status status = look_at_mesh(p, error);
-    if (status == EBPO_OK)
-        status = look_at_attributes(p, error);
-    return status == EBPO_OK ? look_at_levels(p, error) : status;
-}
-
-/* Opens it without its list, if its content is then that of the head. */
-static ebpo_status open_unlisted(const patient *p, ebpo_file **out, ebpo_error *error)
-{
-    ebpo_read_options read = reading(p);
-    ebpo_status status = unlisted_open(p->path, (uint64_t)p->v->most_expansion, out, error);
-    return status == EBPO_OK ? ebpo_file_check_content(*out, &read, error) : status;
-}
-
-/* Nothing can be read without the list of how chunks end. Where it is what is damaged, and nothing
- * else, the content without it is that of the head: that is a proof, so all of it is kept. */
-static ebpo_status look(patient *p, ebpo_error *error)
-{
-    ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
-    ebpo_error told = EBPO_ERROR_INIT;
-    ebpo_file *unlisted = NULL;
-    ebpo_status status = look_at_all(p, error);
-    if (status == EBPO_OK)
-        status = ebpo_file_locate(p->file, &stored, error);
-    if (status != EBPO_OK || !stored.sum_bytes)
-        return status;
-    p->fate[SUMS] = KEPT;
-    if (p->fate[MESH] != LOST)
-        return EBPO_OK;
-    status = open_unlisted(p, &unlisted, &told);
-    if (status != EBPO_OK) {
-        ebpo_close(unlisted);
-        *error = told;
-        return is_damage(status) ? EBPO_OK : status;
-    }
-    char why[sizeof p->why[MESH]];
-    memcpy(why, p->why[MESH], sizeof why);
-    ebpo_close(p->file);
-    p->file = unlisted;
-    p->info = ebpo_file_info(unlisted);
-    status = look_at_all(p, error);
-    p->fate[SUMS] = REBUILT;
-    memcpy(p->why[SUMS], why, sizeof why);
-    return status;
-}
 
 /* --- the mesh to build from --- */
 
@@ -218,7 +61,7 @@ static ebpo_status numbers_of(const patient *p, remade *r, ebpo_error *error)
 {
     const ebpo_mend_record *m = &p->info->mend;
     ebpo_maps maps;
-    ebpo_read_options read = reading(p);
+    ebpo_read_options read = patient_reading(p);
     if (p->fate[MAPS] != KEPT || (!m->welded_vertices && !m->dropped_faces))
         return EBPO_OK;
     ebpo_status status = ebpo_file_read_maps(p->file, &read, &maps, error);
@@ -235,7 +78,7 @@ static ebpo_status numbers_of(const patient *p, remade *r, ebpo_error *error)
 
 static ebpo_status from_file(patient *p, remade *r, ebpo_error *error)
 {
-    ebpo_read_options read = reading(p);
+    ebpo_read_options read = patient_reading(p);
     ebpo_prepare_options prepare = EBPO_PREPARE_OPTIONS_INIT;
     ebpo_prepared prepared = EBPO_PREPARED_INIT;
     bool ordered;
@@ -246,7 +89,7 @@ static ebpo_status from_file(patient *p, remade *r, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     r->mesh.workspace = p->workspace;
-    prepare.threads = (unsigned)p->v->threads;
+    prepare.threads = p->threads;
     prepare.progress = p->progress;
     status = ebpo_mesh_prepare(&r->mesh, &prepare, &prepared, error);
     r->report = prepared.report;
@@ -270,8 +113,8 @@ static ebpo_status from_source(patient *p, remade *r, ebpo_error *error)
     mesh_reading more = !(p->info->parts & EBPO_PART_ATTRIBUTES) ? READ_MESH
                         : textures_embedded(p->file)             ? READ_TEXTURES
                                                                  : READ_ATTRIBUTES;
-    ebpo_status status = mesh_input_read(&in, p->v->source, steps, more, p->workspace,
-                                         (unsigned)p->v->threads, p->progress, error);
+    ebpo_status status = mesh_input_read(&in, p->v->source, steps, more, p->workspace, p->threads,
+                                         p->progress, error);
     if (status != EBPO_OK)
         return status;
     r->mesh = in.mesh;
@@ -312,7 +155,7 @@ static ebpo_build_options building(const patient *p)
         o.parts &= ~(uint32_t)(EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS);
     o.rule = info->rule;
     o.require_solid = info->solid;
-    o.threads = (unsigned)p->v->threads;
+    o.threads = p->threads;
     o.unit = info->unit[0] ? info->unit : NULL;
     o.crs = info->crs[0] ? info->crs : NULL;
     o.date = info->date[0] ? info->date : NULL;
@@ -334,7 +177,7 @@ static ebpo_status make(const patient *p, remade *r, ebpo_error *error)
     for (uint64_t i = 0; r->face_source && tree.face_source && i < tree.info.face_count; i++)
         tree.face_source[i] = r->face_source[tree.face_source[i]];
     write.codec = p->info->codec;
-    write.threads = (unsigned)p->v->threads;
+    write.threads = p->threads;
     write.face_coding = p->info->gates ? EBPO_FACES_GATES : EBPO_FACES_USUAL;
     write.progress = p->progress;
     status = ebpo_tree_write(&tree, p->v->out, &write, error);
@@ -388,7 +231,7 @@ static ebpo_status repair(patient *p, ebpo_error *error)
                       "the file is a subset: of what was left out nothing can be made again; take "
                       "another subset of the original",
                       error);
-    ebpo_status status = look(p, error);
+    ebpo_status status = patient_look(p, error);
     if (status != EBPO_OK)
         return status;
     if (!p->v->source && p->fate[MESH] == LOST)
@@ -457,7 +300,10 @@ static int run(void *given, const char **operand)
 {
     const values *v = given;
     progress_line line;
-    patient p = { .v = v, .path = operand[0] };
+    patient p = { .v = v,
+                  .path = operand[0],
+                  .threads = (unsigned)v->threads,
+                  .most_expansion = (uint64_t)v->most_expansion };
     ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
     how.most_expansion = (uint64_t)v->most_expansion;
     ebpo_error error = EBPO_ERROR_INIT;

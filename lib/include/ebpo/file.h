@@ -931,7 +931,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_source_mesh(const ebpo_file *f
                                                               ebpo_error *error);
 
 /*
- * Computes the content checksum again from all arrays.
+ * Computes the content checksum again from all arrays. Reads the whole file; of it a few
+ * chunks for each thread are held, and images that it has embedded.
  *
  * EBPO_E_FORMAT: it is not the one in the head. EBPO_E_IO, EBPO_E_MEMORY.
  *

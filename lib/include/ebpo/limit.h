@@ -61,6 +61,10 @@ typedef struct ebpo_limit {
  * unit cubed it is infinite or 0 where the volume of a cell is no normal double,
  * which takes coordinates beyond about 1e102 or below 1e-102.
  *
+ * All of the tree and the mesh is held in memory, decoded, and a number for each node
+ * of the level; a hull costs as its faces do. Nothing else bounds memory and time, but
+ * that `progress` may stop it.
+ *
  * EBPO_E_ABSENT: the file has no mesh, or the library was built without qhull.
  * EBPO_E_ARGUMENT: no such level. EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors
  * of reading.

@@ -45,6 +45,10 @@ typedef struct ebpo_lod_options {
  *          vertices. Freed by ebpo_mesh_free. NULL: only the volume is wanted.
  * volume   the sum of the polyhedra's volumes, in the model's unit cubed; or NULL
  *
+ * The level's nodes, their polygons and `out` are held in memory, whatever `workspace`
+ * says, and all of them are made: nothing but the level bounds memory and time, unless
+ * `progress` stops it.
+ *
  * EBPO_E_ARGUMENT: no such level. EBPO_E_LIMIT: more than 2^32 - 2 vertices or
  * triangles. EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
  *
