@@ -344,6 +344,46 @@ def holds(file, path):
     return stated == {"file_bytes": pathlib.Path(file.filename).stat().st_size, "offset": own.byte_offset}
 
 
+def literals_bytes(block):
+    """How many bytes the literals of a zstd block take. RFC 8878, section 3.1.1.3.1."""
+    kind, form = block[0] & 3, block[0] >> 2 & 3
+    header = ((1, 2, 1, 3) if kind < 2 else (3, 3, 4, 5))[form]
+    bits = int.from_bytes(block[:header], "little")
+    if kind < 2:
+        return header + (1 if kind else bits >> (3 if header == 1 else 4))
+    width = (10, 10, 14, 18)[form]
+    return header + (bits >> 4 + width) % 2**width
+
+
+def check_frame(frame, path):
+    """A zstd frame states its size, has a checksum, and nothing in it that decoders do not look at."""
+    descriptor = frame[4]
+    single, size_code = descriptor >> 5 & 1, descriptor >> 6
+    assert descriptor & 4 and (single or size_code), f"{path}: a frame without its checksum or size"
+    assert not descriptor & 16, f"{path}: an unused bit of a frame is set"
+    at, last = 5 + (not single) + (0, 1, 2, 4)[descriptor & 3] + (1 << size_code if size_code else 1), False
+    while not last:
+        header = int.from_bytes(frame[at:at + 3], "little")
+        last, kind, size = header & 1, header >> 1 & 3, header >> 3
+        assert not (kind == 1 and size == 1), f"{path}: a block repeats its byte once"
+        block = frame[at + 3:at + 3 + (1 if kind == 1 else size)]
+        if kind == 2:
+            sequences = block[literals_bytes(block):]
+            modes = 1 if sequences[0] < 128 else 2 if sequences[0] < 255 else 3
+            assert sequences[0] == 0 or not sequences[modes] & 3, f"{path}: an unused bit of a frame is set"
+        at += 3 + len(block)
+    assert at + 4 == len(frame), f"{path}: the frame does not fill the chunk"
+
+
+def check_frames(file):
+    """README.md, "HDF5": the frames of a file whose pipeline is zstd."""
+    for path, dataset in arrays(file).items():
+        pipeline = dataset.id.get_create_plist()
+        if any(pipeline.get_filter(i)[0] == 32015 for i in range(pipeline.get_nfilters())):
+            for i in range(dataset.id.get_num_chunks()):
+                check_frame(dataset.id.read_direct_chunk(dataset.id.get_chunk_info(i).chunk_offset)[1], path)
+
+
 def check_sums(file):
     """README.md, "Sums of chunks": each chunk of the arrays that the head calls for ends as the list says."""
     if "chunk_sums" not in file or not holds(file, "/chunk_sums"):
@@ -680,6 +720,7 @@ def read(path):
                                  ("source_face_count", "mend_added_faces", "mend_dropped_faces"))
         assert dropped <= given, "more faces were dropped than the source has"
         assert one(file.attrs["face_count"]) <= given + added - dropped, "more faces than the source's"
+        check_frames(file)
         assert content_sha256(file) == text(file.attrs["content_sha256"]), "content_sha256 differs"
         if "colours" in parts:
             assert content_sha256(file, of_colours=True) == text(file.attrs["colours_sha256"]), "colours_sha256 differs"

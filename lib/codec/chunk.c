@@ -245,8 +245,9 @@ static ebpo_status zstd_decode(ebpo_chunk_coder *coder, const uint8_t *stored, s
         return broken(why, "the zstd frame does not state the chunk's size");
     if (!has_checksum(stored, stored_bytes))
         return broken(why, "the zstd frame has no checksum");
-    if (ebpo_zstd_unused_set(stored, stored_bytes))
-        return broken(why, "an unused bit of the zstd frame is set");
+    const char *fault = ebpo_zstd_fault(stored, stored_bytes);
+    if (fault)
+        return broken(why, fault);
     if (ZSTD_findFrameCompressedSize(stored, stored_bytes) != stored_bytes)
         return broken(why, "the zstd frame does not fill the chunk");
     size_t size = ZSTD_decompressDCtx(coder->zstd_in, raw, raw_bytes, stored, stored_bytes);

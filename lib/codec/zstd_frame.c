@@ -1,7 +1,10 @@
 /* Source: RFC 8878, 3.1.1. */
 #include "codec/zstd_frame.h"
 
+#include <stdbool.h>
+
 enum { RAW, RLE, COMPRESSED, RESERVED };
+static const char unused_set[] = "an unused bit of the zstd frame is set";
 
 /* How many bytes the literals of a compressed block take, with their header; 0: it is cut short. */
 static size_t literals_bytes(const uint8_t *block, size_t size)
@@ -35,28 +38,35 @@ static bool block_has_unused(const uint8_t *block, size_t size)
     return at < size && block[at] & 3;
 }
 
-bool ebpo_zstd_unused_set(const uint8_t *frame, size_t bytes)
+static const char *block_fault(unsigned kind, const uint8_t *block, size_t stated)
+{
+    if (kind == RLE && stated == 1)
+        return "a block of the zstd frame repeats its byte once";
+    return kind == COMPRESSED && block_has_unused(block, stated) ? unused_set : NULL;
+}
+
+const char *ebpo_zstd_fault(const uint8_t *frame, size_t bytes)
 {
     static const uint8_t id_bytes[4] = { 0, 1, 2, 4 };
     enum { DESCRIPTOR = 4, UNUSED = 1 << 4, BLOCK_HEADER = 3 };
+    const char *fault = NULL;
     if (bytes <= DESCRIPTOR)
-        return false;
+        return NULL;
     unsigned d = frame[DESCRIPTOR], single = d >> 5 & 1, size_code = d >> 6;
     size_t at =
         DESCRIPTOR + 1 + !single + id_bytes[d & 3] + (size_code ? (size_t)1 << size_code : single);
     if (d & UNUSED)
-        return true;
-    for (bool last = false; !last && at + BLOCK_HEADER <= bytes;) {
+        return unused_set;
+    for (bool last = false; !last && !fault && at + BLOCK_HEADER <= bytes;) {
         uint32_t header = (uint32_t)(frame[at] | frame[at + 1] << 8 | frame[at + 2] << 16);
         unsigned kind = header >> 1 & 3;
         size_t size = kind == RLE ? 1 : header >> 3;
         at += BLOCK_HEADER;
         last = header & 1;
         if (kind == RESERVED || size > bytes - at)
-            return false;
-        if (kind == COMPRESSED && block_has_unused(frame + at, size))
-            return true;
+            return NULL;
+        fault = block_fault(kind, frame + at, header >> 3);
         at += size;
     }
-    return false;
+    return fault;
 }

@@ -8,24 +8,21 @@
 #include <ebpo/base.h>
 
 #include "base/error.h"
+#include "io/stale_folders.h"
 
 ebpo_status ebpo_folder_begin(const char *folder, char **making, ebpo_error *error)
 {
-    static const char ending[] = ".part-XXXXXX";
-    size_t size = strlen(folder);
     struct stat st;
     *making = NULL;
-    while (size > 1 && folder[size - 1] == '/')
-        size--;
     if (stat(folder, &st) == 0)
         return ebpo_fail_file(error, EBPO_E_IO, folder,
                               "is there already; what is written has to be a new folder");
-    char *path = malloc(size + sizeof ending);
+    ebpo_remove_stale_folders(folder);
+    char *path = ebpo_making_name(folder);
     if (!path)
-        return ebpo_fail_memory(error, size + sizeof ending);
-    memcpy(path, folder, size);
-    memcpy(path + size, ending, sizeof ending);
+        return ebpo_fail_memory(error, strlen(folder));
     if (mkdtemp(path)) {
+        ebpo_making_settle(&path);
         *making = path;
         return EBPO_OK;
     }

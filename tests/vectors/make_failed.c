@@ -239,6 +239,31 @@ static void v_no_checksum(void)
     need(H5Dwrite_chunk(id, H5P_DEFAULT, 0, at, bytes, frame) >= 0, "chunk");
     H5Dclose(id);
 }
+/* Turns a bit of the array's first frame which zstd does not notice: the first such, from that byte
+ * on. */
+static void turn_unseen(const char *path, size_t from, uint8_t bit)
+{
+    uint8_t stored[4096], raw[4096], other[4096];
+    hsize_t at[2] = { 0, 0 }, size = 0;
+    uint32_t mask;
+    (void)chunk_address(path, &size);
+    hid_t id = H5Dopen2(changed, path, H5P_DEFAULT);
+    need(size <= sizeof stored && H5Dread_chunk(id, H5P_DEFAULT, at, &mask, stored) >= 0, path);
+    size_t bytes = ZSTD_decompress(raw, sizeof raw, stored, (size_t)size), i = from;
+    need(!ZSTD_isError(bytes), "ZSTD_decompress");
+    for (bool found = false; !found; i += !found) {
+        need(i + 4 < size, "a bit that zstd does not look at");
+        stored[i] ^= bit;
+        found = ZSTD_decompress(other, sizeof other, stored, (size_t)size) == bytes &&
+                memcmp(raw, other, bytes) == 0;
+        stored[i] ^= found ? 0 : bit;
+    }
+    need(H5Dwrite_chunk(id, H5P_DEFAULT, 0, at, (size_t)size, stored) >= 0, "chunk");
+    H5Dclose(id);
+}
+enum { FRAME_HEADER = 6, BLOCK_HEADER = 3 }; /* of frames below 256 bytes */
+static void v_unused_bit(void) { turn_unseen("/mesh/faces", FRAME_HEADER + BLOCK_HEADER, 1); }
+static void v_repeated_once(void) { turn_unseen("/levels/00/plane_counts", FRAME_HEADER, 2); }
 /* One frame, which is right, with hundreds of empty blocks before the others. RFC 8878, 3.1.1. */
 static void v_long_chunk(void)
 {
@@ -512,6 +537,10 @@ static const failed_vector failed[] = {
       "takes more than its raw bytes, a 256th of them, and 1,024" },
     { "chunk_frame_without_checksum", LEAVES, v_no_checksum, NONE, "2",
       "a frame without its checksum" },
+    { "chunk_frame_with_unused_bit", LEAVES, v_unused_bit, NONE, "2",
+      "so are the two reserved bits of the modes of each section of sequences" },
+    { "chunk_frame_repeats_once", LEAVES, v_repeated_once, NONE, "2",
+      "no block repeats its byte once" },
     { "chunk_frame_of_other_size", LEAVES, NULL, SWAP_CHUNK, "2",
       "does not decode to exactly its size" },
     { "root_with_siblings", LEAVES, v_root_siblings, NONE, "4", "level 0: bits 2 .. 15 not 0" },

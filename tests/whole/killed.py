@@ -3,17 +3,19 @@
 
 Every command of commands.py that writes is killed (SIGKILL) after times that are drawn between none
 and somewhat more than a run takes. Afterwards each output is the old one or the new one, whole;
-beside it lies at most one temporary file of its own, which the next run removes (and what fetch
-resumes from, and folders that were being made). 200 kills for each command, or N; where
+beside it lies at most one temporary file of its own, or a folder in the making, which the next run
+removes (and what fetch resumes from). 200 kills for each command, or N; where
 EBPO_TEST_SCALE is less than 1, two for each third one. Then two writers of one output, and two readers of one cache
 folder.
 """
 import collections
+import glob
 import os
 import random
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -21,10 +23,11 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "kit"))
 import ranges_server
-from commands import COMMANDS, is_new, make_inputs, old, put_old, read
+from commands import COMMANDS, OLD, is_new, make_inputs, old, put_old, read
 
 KILLS = 200
-LEFT = re.compile(r"\.OUT(\.[a-z0-9]+)*\.\d+-\d+\.tmp|OUT\.part(/.*)?|OUT\.part-\w{6}(\.old)?")
+LEFT = re.compile(r"\.OUT(\.[a-z0-9]+)*\.\d+-\d+\.tmp|OUT\.part(/.*)?|"
+                  r"(OUT|\.OUT\.new)\.part-[0-9a-f]{8}-\d+-\w+(\.old)?")
 NAMED = re.compile(r"\.ebpo-crossings\.\d+-\d+\.tmp") # until libhdf5 has opened it
 failures = []
 
@@ -86,6 +89,12 @@ def kill_once(name, command, root, wait):
     return process.returncode == 0
 
 
+def is_replaced_report(path):
+    """What was in a report's place, between the exchange and its removal: no later run takes it for
+    its own."""
+    return os.path.isdir(path) and read(path).get("report.json") == OLD
+
+
 def kill_often(name, url, inputs, root, draw, kills):
     """Kills in one folder, so that what remains meets the next run."""
     command, outputs = arguments(COMMANDS[name].text, url), COMMANDS[name].outputs
@@ -107,9 +116,6 @@ def kill_often(name, url, inputs, root, draw, kills):
         counts.update(states[:1])
         mixed += len(set(states)) > 1
         left += look_beside(name, root, inputs)
-    for folder in beside(root, inputs, outputs): # which nobody removes
-        if os.path.isdir(os.path.join(root, folder)) and folder != "OUT.part":
-            shutil.rmtree(os.path.join(root, folder))
     put_old(COMMANDS[name], root)
     process = run(command, root)
     said = process.communicate(timeout=300)[1]
@@ -117,7 +123,9 @@ def kill_often(name, url, inputs, root, draw, kills):
     for out in outputs:
         check(state(name, out, read(os.path.join(root, out)), right[out]) == "new",
               f"{name}: the run after: {out}")
-    others = beside(root, inputs, outputs) | set(os.listdir(os.path.join(root, "temporary")))
+    others = {other for other in beside(root, inputs, outputs)
+              if not is_replaced_report(os.path.join(root, other))}
+    others |= set(os.listdir(os.path.join(root, "temporary")))
     check(not others, f"{name}: the run after leaves {others}")
     print(f"| {name} | {counts['old']} | {counts['new']} | {counts['neither']} | {mixed} | {done} |"
           f" {left} |", flush=True)
@@ -136,6 +144,40 @@ def two_writers(inputs, root):
         good = subprocess.run([TOOL, "verify", "-q", "OUT"], cwd=root, capture_output=True)
         check(good.returncode == 0, f"two writers: {good.stderr}")
         check(not [n for n in os.listdir(root) if n.endswith(".tmp")], "two writers: files left")
+
+
+def stop_at_folder(command, root):
+    """A program that stands still while a folder of its own is in the making, and that folder."""
+    for _ in range(50):
+        process, made = run(command, root), []
+        while not made and process.poll() is None:
+            made = glob.glob(os.path.join(root, "OUT.part-*", "*"))
+        process.send_signal(signal.SIGSTOP)
+        if process.poll() is None and made and os.path.exists(made[0]):
+            return process, os.path.dirname(made[0])
+        process.send_signal(signal.SIGCONT)
+        process.communicate(timeout=300)
+        shutil.rmtree(os.path.join(root, "OUT"), ignore_errors=True)
+    sys.exit("no run could be stopped while it fills its folder")
+
+
+def folders_in_use(inputs, root):
+    """A folder in the making goes once its program is not there any more, and no other goes."""
+    make_place(inputs, root)
+    command = arguments(COMMANDS["convert components"].text, "")
+    process, folder = stop_at_folder(command, root)
+    check(run(command, root).wait(timeout=300) == 0, "folders: beside one that is stopped")
+    check(os.listdir(folder), "folders: one that is in use is removed")
+    like = [folder + "0", os.path.join(root, "OUT.part-abcdef")]
+    for other in like: # no program has made a folder of that inode under that name
+        shutil.copytree(folder, other)
+    process.kill()
+    process.communicate(timeout=300)
+    shutil.rmtree(os.path.join(root, "OUT"))
+    check(run(command, root).wait(timeout=300) == 0, "folders: after the kill")
+    check(not os.path.exists(folder), "folders: that of a killed program stays")
+    check(all(os.listdir(other) for other in like if os.path.exists(other)) and
+          all(map(os.path.exists, like)), "folders: somebody's own are removed")
 
 
 def two_readers(inputs, root, url):
@@ -174,6 +216,7 @@ def main():
               "|---|---:|---:|---:|---:|---:|---:|")
         for name in names:
             kill_often(name, url, inputs, os.path.join(root, "killed"), draw, kills)
+        folders_in_use(inputs, os.path.join(root, "folders"))
         two_writers(inputs, os.path.join(root, "writers"))
         if "http" in features:
             two_readers(inputs, os.path.join(root, "readers"), url)

@@ -164,22 +164,40 @@ void output_drop(const char *folder)
     being_made[0] = 0;
 }
 
+/* Under a hidden name, since a report may be in its place, which the library would refuse. */
+static bool make_folder(const char *place, size_t length, char *folder, size_t capacity)
+{
+    char *making, hidden[4200];
+    size_t name = length;
+    ebpo_error error = EBPO_ERROR_INIT;
+    while (name && place[name - 1] != '/')
+        name--;
+    snprintf(hidden, sizeof hidden, "%.*s.%.*s.new", (int)name, place, (int)(length - name),
+             place + name);
+    if (ebpo_folder_begin(hidden, &making, &error) != EBPO_OK)
+        return told(EXIT_FAILED, place, error.message) == EXIT_FINE;
+    bool fits = strlen(making) < capacity && strlen(making) < sizeof being_made - 300;
+    if (fits)
+        memcpy(folder, making, strlen(making) + 1);
+    else
+        rmdir(making);
+    free(making);
+    return fits || told(EXIT_USAGE, place, "the name is too long") == EXIT_FINE;
+}
+
 int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity)
 {
     size_t length = strlen(place);
     while (length > 1 && place[length - 1] == '/')
         length--;
     folder[0] = 0;
-    if (length + 40 > capacity || length + 40 > sizeof being_made)
+    if (length + 80 > capacity || length + 400 > sizeof being_made)
         return told(EXIT_USAGE, place, "the name is too long");
     int code = place_is_free(place, operand);
     if (code != EXIT_FINE)
         return code;
-    snprintf(folder, capacity, "%.*s.part-XXXXXX", (int)length, place);
-    if (!mkdtemp(folder)) {
-        folder[0] = 0;
-        return told(EXIT_FAILED, place, strerror(errno));
-    }
+    if (!make_folder(place, length, folder, capacity))
+        return EXIT_FAILED;
     chmod(folder, 0755);
     memcpy(being_made, folder, strlen(folder) + 1);
     signals_also(abandon);

@@ -228,6 +228,7 @@ EBPO_API void ebpo_abandon_outputs(void);
 /*
  * Makes a folder beside `folder`, to be filled and then put in its place. It is
  * the caller's: where it is not published, he removes it and what is in it.
+ * Those for the same `folder` that killed programs left are removed.
  *
  * making   the new folder's path. Freed by free(). On failure NULL.
  *

@@ -102,6 +102,8 @@ export function zstdFrameFault(data, size) {
     const header = data[at] | data[at + 1] << 8 | data[at + 2] << 16;
     last = header & 1;
     const kind = header >> 1 & 3, size = kind === 1 ? 1 : header >> 3;
+    if (kind === 1 && header >> 3 === 1) // zstd writes it as it is
+      return 'a block of the zstd frame repeats its byte once';
     if (kind === 2 && modesFault(data.subarray(at + 3, at + 3 + size)))
       return 'an unused bit of the zstd frame is set';
     at += 3 + size;
