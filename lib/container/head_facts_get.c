@@ -145,9 +145,11 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
     if (status != EBPO_OK || strcmp(format, EBPO_FORMAT_NAME) != 0)
         return ebpo_fail_file(error, EBPO_E_FORMAT, in->shown,
                               "an HDF5 file, but not an EBP-Octree (its root attribute format does "
-                              "not say \"%s\"); "
-                              "make one with `ebpo convert`",
-                              EBPO_FORMAT_NAME);
+                              "not say \"%s\"); %s",
+                              EBPO_FORMAT_NAME,
+                              status == EBPO_OK && strncmp(format, "EBP-Octree paint", 16) == 0
+                                  ? "it is paint: `ebpo paint` tells of which model"
+                                  : "make one with `ebpo convert`");
     status = get_fact(in, root, "/", &major, info, error);
     if (status == EBPO_OK)
         status = get_fact(in, root, "/", &minor, info, error);

@@ -70,8 +70,7 @@ static ebpo_status open_regular(const char *path, int *fd, uint64_t *size, ebpo_
     if (fstat(*fd, &facts) < 0)
         status = ebpo_fail_errno(error, path, "cannot be examined");
     else if (!S_ISREG(facts.st_mode))
-        status = ebpo_fail_file(error, EBPO_E_IO, path,
-                                "not a regular file; give the name of an .ebpo.h5 file");
+        status = ebpo_fail_file(error, EBPO_E_IO, path, "not a regular file; give the name of one");
     else
         *size = (uint64_t)facts.st_size;
     if (status != EBPO_OK)

@@ -68,9 +68,11 @@ static ebpo_status take_texts(const char *const from[EBPO_PAINT_TEXTS],
 
 /* --- layers --- */
 
-static ebpo_status no_layer(uint64_t number, ebpo_error *error)
+static ebpo_status no_layer(const ebpo_paint *p, uint64_t number, ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no layer %llu", (unsigned long long)number);
+    return ebpo_fail(error, EBPO_E_ARGUMENT,
+                     "there is no layer %llu: layers are counted from 0, and the paint has %llu",
+                     (unsigned long long)number, (unsigned long long)p->layer_count);
 }
 
 static ebpo_status take_layer(const ebpo_paint_layer *given, ebpo_layer_held *out,
@@ -129,7 +131,7 @@ ebpo_status ebpo_paint_set_layer(ebpo_paint *p, uint64_t number, const ebpo_pain
 {
     ebpo_layer_held held;
     if (number >= p->layer_count)
-        return no_layer(number, error);
+        return no_layer(p, number, error);
     ebpo_status status = take_layer(layer, &held, error);
     if (status != EBPO_OK)
         return status;
@@ -174,7 +176,7 @@ static void drop_notes(ebpo_paint *p, uint64_t layer)
 ebpo_status ebpo_paint_remove_layer(ebpo_paint *p, uint64_t number, ebpo_error *error)
 {
     if (number >= p->layer_count)
-        return no_layer(number, error);
+        return no_layer(p, number, error);
     drop_strokes(p, number);
     drop_notes(p, number);
     ebpo_paint_texts_free(p->layer[number].text);
@@ -214,7 +216,7 @@ ebpo_status ebpo_paint_add_note(ebpo_paint *p, const ebpo_paint_note *given, ebp
     if (wrong)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a note: %s", wrong);
     if (note.layer >= p->layer_count)
-        return no_layer(note.layer, error);
+        return no_layer(p, note.layer, error);
     if (p->note_count == EBPO_PAINT_NOTES)
         return ebpo_fail(error, EBPO_E_LIMIT, "a paint has at most %d notes", EBPO_PAINT_NOTES);
     if (!ebpo_grow(&p->note, &p->note_capacity, p->note_count + 1, sizeof *p->note))
@@ -231,8 +233,9 @@ ebpo_status ebpo_paint_add_note(ebpo_paint *p, const ebpo_paint_note *given, ebp
 ebpo_status ebpo_paint_remove_note(ebpo_paint *p, uint64_t number, ebpo_error *error)
 {
     if (number >= p->note_count)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no note %llu",
-                         (unsigned long long)number);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "there is no note %llu: notes are counted from 0, and the paint has %llu",
+                         (unsigned long long)number, (unsigned long long)p->note_count);
     ebpo_paint_texts_free(p->note[number].text);
     p->note_count--;
     memmove(p->note + number, p->note + number + 1, (p->note_count - number) * sizeof *p->note);

@@ -104,8 +104,10 @@ ebpo_status ebpo_paint_add_stroke(ebpo_paint *p, const ebpo_paint_stroke *given,
 ebpo_status ebpo_paint_remove_stroke(ebpo_paint *p, uint64_t number, ebpo_error *error)
 {
     if (number >= p->stroke_count)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no stroke %llu",
-                         (unsigned long long)number);
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "there is no stroke %llu: strokes are counted from 0, and the paint has %llu",
+            (unsigned long long)number, (unsigned long long)p->stroke_count);
     ebpo_stroke_held gone = p->stroke[number];
     uint64_t end = gone.first + gone.count;
     memmove(p->point + gone.first, p->point + end, (p->point_count - end) * sizeof *p->point);

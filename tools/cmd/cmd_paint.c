@@ -1,4 +1,5 @@
 /* ebpo paint: paint and notes on a model, in a file beside it. */
+#include <errno.h>
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
@@ -133,6 +134,8 @@ static int overwrites(const paint_job *j)
             return EXIT_USAGE;
     if (model && command_overwrites("paint", model, paint))
         return EXIT_USAGE;
+    if (j->v->out && j->v->path && command_overwrites("paint", j->v->path, j->v->out))
+        return EXIT_USAGE;
     return j->v->bake && command_overwrites("paint", paint, j->v->bake) ? EXIT_USAGE : EXIT_FINE;
 }
 
@@ -141,7 +144,17 @@ static int overwrites(const paint_job *j)
 /* One that is not there is made where a layer is added. */
 static ebpo_status open_paint(paint_job *j, ebpo_error *error)
 {
-    j->made = j->v->new_layer && j->file && access(j->paint_path, F_OK) != 0;
+    bool absent = access(j->paint_path, F_OK) != 0 && errno == ENOENT;
+    j->made = absent && j->v->new_layer && j->file;
+    if (absent && !j->made) {
+        *error = (ebpo_error){ .status = EBPO_E_IO, .offset = -1 };
+        snprintf(
+            error->message, sizeof error->message,
+            "%.200s: no such file; 'ebpo paint PAINT FILE --new-layer TITLE' makes a new one, for "
+            "the model FILE",
+            j->paint_path);
+        return error->status;
+    }
     return j->made ? ebpo_paint_new(j->file, &j->paint, error)
                    : ebpo_paint_open(j->paint_path, &j->paint, error);
 }

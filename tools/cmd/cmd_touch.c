@@ -1,5 +1,4 @@
 /* ebpo touch: a hand played at a steady rate, and whether any of its ticks was late. */
-#include <errno.h>
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
@@ -252,10 +251,10 @@ static double diagonal(const ebpo_info *info)
     return hypot(hypot(info->box_size[0], info->box_size[1]), info->box_size[2]);
 }
 
-static ebpo_status no_memory(ebpo_error *error)
+static ebpo_status no_memory(ebpo_error *error, const char *what)
 {
     *error = (ebpo_error){ .status = EBPO_E_MEMORY };
-    snprintf(error->message, sizeof error->message, "not enough memory for the times of ticks");
+    snprintf(error->message, sizeof error->message, "not enough memory for %s", what);
     return EBPO_E_MEMORY;
 }
 
@@ -269,7 +268,7 @@ static ebpo_status play_nothing(job *j, ebpo_error *error)
     touch_play_first();
     bool fine = touch_play_run(&empty, &j->empty);
     touch_play_behind(); /* and so does what loads, which is made now */
-    return fine ? EBPO_OK : no_memory(error);
+    return fine ? EBPO_OK : no_memory(error, "the times of ticks");
 }
 
 static ebpo_status play(job *j, ebpo_error *error)
@@ -281,24 +280,21 @@ static ebpo_status play(job *j, ebpo_error *error)
     if (v->record) {
         j->record = calloc(touch_play_ticks(&all), sizeof *j->record);
         if (!j->record)
-            return no_memory(error);
+            return no_memory(error, "the record");
         all.record = j->record;
     }
     j->scheduling = touch_play_first();
     if (!touch_play_run(&all, &j->times))
-        return no_memory(error);
+        return no_memory(error, "the times of ticks");
     ebpo_touch_get_stats(j->touch, &j->stats);
     ebpo_model_get_stats(j->model, &j->memory);
     return ebpo_touch_check(j->touch, error);
 }
 
 /* As --path reads it: each number to the last bit. */
-static bool write_record(const job *j)
+static bool print_record(const job *j, FILE *out)
 {
-    char name[4096];
-    int length = snprintf(name, sizeof name, "%s.part", j->v->record);
-    FILE *out = length > 0 && length < (int)sizeof name ? fopen(name, "wx") : NULL;
-    bool fine = out != NULL;
+    bool fine = true;
     for (uint64_t i = 0; fine && i < j->times.ticks; i++) {
         const touch_pose *p = &j->record[i];
         char line[7 * (NUMBER_ROOM + 1)], *at = line;
@@ -308,21 +304,30 @@ static bool write_record(const job *j)
         }
         fine = fwrite(line, 1, (size_t)(at - line), out) == (size_t)(at - line);
     }
-    if (out)
-        fine = (fclose(out) == 0) & fine && rename(name, j->v->record) == 0;
-    if (!fine) {
-        fprintf(stderr, "ebpo touch: %s: %s\n", j->v->record, strerror(errno));
-        if (out)
-            remove(name);
-    }
     return fine;
+}
+
+static ebpo_status write_record(const job *j, ebpo_error *error)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    bool whole = out && print_record(j, out);
+    if (out && fclose(out) != 0)
+        whole = false;
+    ebpo_status status =
+        whole ? ebpo_write_file(j->v->record, text, size, error) : no_memory(error, "the record");
+    free(text);
+    return status;
 }
 
 static int run_job(job *j, uint64_t memory)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     touch_pose start;
-    ebpo_status status = open_model(j, memory, &error);
+    ebpo_status status = j->v->record ? ebpo_check_output(j->v->record, &error) : EBPO_OK;
+    if (status == EBPO_OK)
+        status = open_model(j, memory, &error);
     if (status == EBPO_OK)
         status = play_nothing(j, &error);
     if (status == EBPO_OK && !j->device.begin(j->device.self, j->v->seconds, &start))
@@ -331,10 +336,10 @@ static int run_job(job *j, uint64_t memory)
         status = open_hand(j, start.place, &error);
     if (status == EBPO_OK)
         status = play(j, &error);
+    if (status == EBPO_OK && j->v->record)
+        status = write_record(j, &error);
     if (status != EBPO_OK)
         return command_failed("touch", &error);
-    if (j->v->record && !write_record(j))
-        return EXIT_FAILED;
     if (j->v->json)
         json_report(j);
     else
@@ -352,11 +357,24 @@ static int check(const values *v, uint64_t *memory)
                                       "its last place");
     if (v->path && v->device)
         return command_usage("touch", "--path and --device: either moves the hand");
+    if (v->device && !touch_udp_named(v->device))
+        return command_usage("touch", "--device '%s': expected udp:PORT or udp:ADDRESS:PORT",
+                             v->device);
     if (v->tool && v->sense)
         return command_usage("touch", "--tool and --sense: a probe is a point");
     if ((v->tool || v->sense) && v->radius > 0)
         return command_usage("touch", "--radius is for a ball, without --tool and --sense");
     return 0;
+}
+
+/* The record would replace what is read. */
+static bool overwrites(const values *v, const char *model)
+{
+    const char *in[] = { model, v->path, v->tool };
+    for (int i = 0; v->record && i < 3; i++)
+        if (in[i] && command_overwrites("touch", in[i], v->record))
+            return true;
+    return false;
 }
 
 static int run(void *given, const char **operand)
@@ -371,8 +389,8 @@ static int run(void *given, const char **operand)
               .memory = EBPO_MODEL_STATS_INIT };
     uint64_t memory = 0;
     int code = check(v, &memory);
-    if (code != 0)
-        return code;
+    if (code != 0 || overwrites(v, operand[0]))
+        return EXIT_USAGE;
     bool fine = command_wants_hdf5("touch", operand[0]) && read_tool(&j) &&
                 (!v->path || touch_path_open(&j.device, v->path)) &&
                 (!v->device || touch_udp_open(&j.device, v->device));

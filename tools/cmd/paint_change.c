@@ -26,8 +26,13 @@ ebpo_status paint_layer(const paint_job *j, uint64_t *layer, ebpo_error *error)
     *layer = j->v->layer >= 0 ? (uint64_t)j->v->layer : info.layer_count - 1;
     if (info.layer_count == 0)
         return fail(error, EBPO_E_ARGUMENT, "the paint has no layer; add one with --new-layer");
-    return *layer < info.layer_count ? EBPO_OK
-                                     : fail(error, EBPO_E_ARGUMENT, "the paint has no such layer");
+    if (*layer < info.layer_count)
+        return EBPO_OK;
+    char what[120];
+    snprintf(what, sizeof what,
+             "there is no layer %llu: layers are counted from 0, and the paint has %llu",
+             (unsigned long long)*layer, (unsigned long long)info.layer_count);
+    return fail(error, EBPO_E_ARGUMENT, what);
 }
 
 /* --- layers and notes --- */
@@ -139,8 +144,13 @@ static ebpo_status lay(paint_job *j, const ebpo_paint_hand *hand, uint64_t count
 static ebpo_status undo(paint_job *j, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    if ((uint64_t)j->v->undo > info_of(j).stroke_count)
-        return fail(error, EBPO_E_ARGUMENT, "the paint has not so many strokes");
+    uint64_t strokes = info_of(j).stroke_count;
+    if ((uint64_t)j->v->undo > strokes) {
+        char what[80];
+        snprintf(what, sizeof what, "--undo %lld: the paint has not so many strokes, but %llu",
+                 (long long)j->v->undo, (unsigned long long)strokes);
+        return fail(error, EBPO_E_ARGUMENT, what);
+    }
     for (int64_t i = 0; i < j->v->undo && status == EBPO_OK; i++)
         status = ebpo_paint_remove_stroke(j->paint, info_of(j).stroke_count - 1, error);
     return status;

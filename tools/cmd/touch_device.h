@@ -40,7 +40,8 @@ typedef struct touch_device {
  * stderr. `end` it in any case. */
 bool touch_path_open(touch_device *out, const char *path);
 
-/* touch_udp.c: 'udp:PORT' or 'udp:ADDRESS:PORT'. */
+/* touch_udp.c: 'udp:PORT' or 'udp:ADDRESS:PORT', as touch_udp_named says. */
+bool touch_udp_named(const char *name);
 bool touch_udp_open(touch_device *out, const char *name);
 
 /* touch_own.c: goes around the model, into its surface and out again. */

@@ -1,4 +1,5 @@
 /* A recorded hand. */
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -123,7 +124,7 @@ bool touch_path_open(touch_device *out, const char *name)
     *out = (touch_device){ begin, read_pose, write_answer, ticks, end, p };
     bool fine = p && in;
     if (!in)
-        fprintf(stderr, "ebpo touch: %s cannot be opened\n", name);
+        fprintf(stderr, "ebpo touch: %s: cannot be opened: %s\n", name, strerror(errno));
     if (fine)
         fine = read_lines(p, in, standard ? "standard input" : name);
     if (in && !standard)

@@ -222,6 +222,12 @@ static bool read_name(const char *name, struct sockaddr_in *out)
     return *after == 0 && number <= 65535 && inet_pton(AF_INET, address, &out->sin_addr) == 1;
 }
 
+bool touch_udp_named(const char *name)
+{
+    struct sockaddr_in at;
+    return read_name(name, &at);
+}
+
 bool touch_udp_open(touch_device *out, const char *name)
 {
     struct sockaddr_in at;
@@ -230,10 +236,8 @@ bool touch_udp_open(touch_device *out, const char *name)
     if (!u)
         return false;
     u->socket = -1;
-    if (!read_name(name, &at)) {
-        fprintf(stderr, "ebpo touch: --device '%s': expected udp:PORT or udp:ADDRESS:PORT\n", name);
+    if (!read_name(name, &at))
         return false;
-    }
     u->socket = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     if (u->socket < 0 || bind(u->socket, (const struct sockaddr *)&at, sizeof at) != 0) {
         fprintf(stderr, "ebpo touch: %s: %s\n", name, strerror(errno));
