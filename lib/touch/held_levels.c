@@ -123,8 +123,9 @@ void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], i
         else
             add_children(levels, p, n->children, lower, stack, &depth);
     }
-    *lo = fmax(0, lower - levels->slack);
-    *hi = upper + levels->slack;
+    /* Without faces both are infinite. */
+    *lo = isfinite(lower) ? fmax(0, lower - levels->slack - EBPO_LENGTH_SLACK * lower) : lower;
+    *hi = upper + levels->slack + EBPO_LENGTH_SLACK * upper;
 }
 
 bool ebpo_held_levels_winding(const ebpo_held_levels *levels, const double p[3], int32_t *winding)

@@ -5,6 +5,10 @@
 
 #include <ebpo/query.h>
 
+/* What roundings add to a length from a place to another, as a share of it: a few units in the last
+ * place. From afar that is more than `slack`. */
+#define EBPO_LENGTH_SLACK 0x1p-48
+
 typedef struct ebpo_held_node {
     double low[3], high[3];
     uint32_t children; /* the first of eight; EBPO_NO_CHILDREN */
@@ -15,7 +19,7 @@ typedef struct ebpo_held_node {
 typedef struct ebpo_held_levels {
     ebpo_held_node *node; /* [count] the first is the root */
     uint64_t count;
-    double slack; /* what roundings may add up to */
+    double slack; /* what roundings of the model's coordinates may add up to */
 } ebpo_held_levels;
 
 /* As many levels as have at most 2^17 nodes, 6 or fewer below the root. */

@@ -21,6 +21,12 @@ static void narrow(bounds *b, double lo, double hi)
     b->hi = fmin(b->hi, hi);
 }
 
+/* What roundings may add up to: of the model's coordinates, and of lengths such as this. */
+static double rounding_of(const ebpo_touch *t, double length)
+{
+    return t->levels.slack + EBPO_LENGTH_SLACK * length;
+}
+
 /* The faces of the box at hand. True: the nearest is known. */
 static bool sense_faces(ebpo_touch *t, const double place[3], ebpo_touch_sensed *out, bounds *b)
 {
@@ -33,13 +39,14 @@ static bool sense_faces(ebpo_touch *t, const double place[3], ebpo_touch_sensed 
     copy(near.point, out->point);
     copy(near.weight, out->weight);
     bool all = !(near.flags & EBPO_TOUCH_PARTLY);
-    double distance = INFINITY, rounding = t->levels.slack;
+    double distance = INFINITY, look = t->options.look;
     if (near.face != EBPO_NO_FACE) {
         double way[3];
         difference(place, near.point, way);
         distance = sqrt(dot(way, way));
     }
-    narrow(b, all ? fmin(distance, t->options.look) - rounding : 0, distance + rounding);
+    double nearer = fmin(distance, look);
+    narrow(b, all ? nearer - rounding_of(t, nearer) : 0, distance + rounding_of(t, distance));
     return all && near.face != EBPO_NO_FACE;
 }
 
@@ -47,11 +54,11 @@ static bool sense_faces(ebpo_touch *t, const double place[3], ebpo_touch_sensed 
 static bool sense_known(ebpo_touch *t, const double place[3], ebpo_touch_sensed *out, bounds *b)
 {
     const ebpo_known_place *known = ebpo_touch_known(t);
-    double way[3], rounding = t->levels.slack;
+    double way[3];
     if (!known->there)
         return false;
     difference(place, known->place, way);
-    double far = sqrt(dot(way, way));
+    double far = sqrt(dot(way, way)), rounding = rounding_of(t, far + known->distance);
     narrow(b, known->distance - far - rounding, known->distance + far + rounding);
     if (out->normal[0] == 0 && out->normal[1] == 0 && out->normal[2] == 0)
         copy(known->normal, out->normal);

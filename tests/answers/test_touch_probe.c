@@ -137,6 +137,38 @@ START_TEST(bounds_hold_the_exact_distance)
 }
 END_TEST
 
+/* Far away a place is known to less than the model's size. What was learnt there says nothing about
+ * a place near the model, and bounds there are wider by what rounding of lengths adds. */
+START_TEST(bounds_hold_after_a_jump_from_afar)
+{
+    static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    static const double afar[] = { 1e3, 1e6, 1e9, 1e13, 1e17, 1e30, 1e60 };
+    enum { FAR = sizeof afar / sizeof *afar, JUMPS = 20 };
+    query_model m;
+    probe p;
+    uint64_t state = 77;
+    query_model_make(&m, "box", ebpo_test_box(low, high, 4), &query_variants[0]);
+    begin(&p, &m);
+    for (int i = 0; i < FAR * JUMPS; i++) {
+        double far = afar[i / JUMPS], at[3], near[3];
+        ebpo_touch_sensed r;
+        for (int k = 0; k < 3; k++)
+            at[k] = far * (2 * ebpo_test_random_unit(&state) - 1);
+        choose(&p, &state, near);
+        ebpo_touch_sense(p.touch, at, &r);
+        for (int n = 0; n < 20000 && !(r.flags & EBPO_TOUCH_CLOSE); n++) {
+            pause_a_little();
+            ebpo_touch_sense(p.touch, at, &r);
+        }
+        ck_assert_msg((r.flags & EBPO_TOUCH_CLOSE) != 0, "nothing becomes known");
+        ck_assert_double_ge(r.hi - r.lo, far * 0x1p-52);
+        sense(&p, near);
+    }
+    ebpo_touch_free(p.touch);
+    query_model_free(&m);
+}
+END_TEST
+
 /* On faces, edges and corners of a cube, and straight through them along its planes. */
 START_TEST(a_cube_is_sensed_on_its_faces)
 {
@@ -195,6 +227,7 @@ Suite *test_suite(void)
     watch_gmp();
     tcase_set_timeout(probes, 600);
     tcase_add_loop_test(probes, bounds_hold_the_exact_distance, 0, WILD);
+    tcase_add_test(probes, bounds_hold_after_a_jump_from_afar);
     tcase_add_test(probes, a_cube_is_sensed_on_its_faces);
     tcase_add_test(probes, a_probe_has_no_other_ticks);
     suite_add_tcase(suite, probes);
