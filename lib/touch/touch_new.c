@@ -20,12 +20,13 @@ static bool is_amount(double x) { return x >= 0 && x <= 0x1p200; }
 static ebpo_status check_options(const ebpo_touch_options *o, ebpo_error *error)
 {
     if (!is_amount(o->radius) || !is_amount(o->skin) || !is_amount(o->look))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "radius, skin and look must be 0 or more");
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "radius, skin and look must be 0 to 2^200");
     if (!is_amount(o->stiffness) || !is_amount(o->damping) || !is_amount(o->friction))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "stiffness, damping and friction must be 0 or more");
+                         "stiffness, damping and friction must be 0 to 2^200");
     if (!is_amount(o->tick) || o->tick == 0)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "a tick must take more than 0 seconds");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "a tick must take more than 0 seconds, and 2^200 at most");
     if (o->kind > EBPO_TOUCH_TOOL)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no such kind of hand");
     if (o->kind != EBPO_TOUCH_BALL && o->radius != 0)
@@ -134,11 +135,21 @@ static ebpo_status check_place(ebpo_touch *t, const double place[3], ebpo_error 
     return status;
 }
 
+/* The box before counts, too: it may be the last one that was loaded, which a tick has laid aside
+ * as it was made for another place, and then there comes no other for this one. */
+static bool has_box(ebpo_touch *t)
+{
+    if (ebpo_extent_holds(&t->box[t->at].centres, t->proxy) || ebpo_touch_take_box(t))
+        return true;
+    ebpo_touch_try_other(t);
+    return ebpo_extent_holds(&t->box[t->at].centres, t->proxy);
+}
+
 /* Until a box holds the proxy. */
 static ebpo_status await_box(ebpo_touch *t, ebpo_error *error)
 {
     const struct timespec short_time = { 0, 100000 };
-    while (!ebpo_extent_holds(&t->box[t->at].centres, t->proxy) && !ebpo_touch_take_box(t)) {
+    while (!has_box(t)) {
         ebpo_status status = ebpo_touch_check(t, error);
         if (status != EBPO_OK)
             return status;

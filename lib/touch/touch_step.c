@@ -91,7 +91,8 @@ static void keep_short(step *s)
     shorten(s->way, s->t->stride / length);
 }
 
-/* The faces around the way, which is made shorter where they are too many. */
+/* The faces around the way, which is made shorter where they are too many. The stride stays above 0:
+ * it would never grow again. */
 static bool find_faces(step *s)
 {
     ebpo_touch *t = s->t;
@@ -111,7 +112,7 @@ static bool find_faces(step *s)
         }
         s->cut = EBPO_TOUCH_SHORT;
         shorten(s->way, 0.25);
-        t->stride = sqrt(dot(s->way, s->way));
+        t->stride = fmax(sqrt(dot(s->way, s->way)), 0x1p-8 * t->options.skin);
     }
     s->flags |= EBPO_TOUCH_SHORT;
     return false;

@@ -341,6 +341,50 @@ START_TEST(a_tilted_plate_turns_the_hand_back)
 }
 END_TEST
 
+/* A contact pushes and never pulls: all of them together push away from the face, and as if at a
+ * place on the plate. Where the hand lifts an end of it, what held that end before lets go. */
+static void judge_push(const judged *j, const ebpo_touch_turned *r)
+{
+    double reach[2] = { 0, 0 }, tiny = 1e-9 * j->options.stiffness;
+    for (int p = 0; p < POINTS; p++) {
+        double lever[3];
+        turned_by(r->turn, j->point[p], lever);
+        reach[0] = fmax(reach[0], fabs(lever[0]));
+        reach[1] = fmax(reach[1], fabs(lever[1]));
+    }
+    ck_assert_msg(r->force[2] >= 0, "the cube pulls with %g", r->force[2]);
+    ck_assert_msg(fabs(r->torque[1]) <= reach[0] * r->force[2] + tiny &&
+                      fabs(r->torque[0]) <= reach[1] * r->force[2] + tiny,
+                  "force %g with torque (%g, %g): as if from beside the plate", r->force[2],
+                  r->torque[0], r->torque[1]);
+}
+
+START_TEST(contacts_never_pull)
+{
+    query_model m;
+    judged j;
+    ebpo_touch_turned r;
+    uint64_t state = 31, contacts = 0;
+    cube_begin(&j, &m, 0);
+    go(&j, (const double[3]){ 0.5, 0.5, 1.01 }, 20, &r);
+    for (int i = 0; i < 2000; i++) {
+        pose hand = { .place = { 0.5, 0.5, 0.98 + 0.03 * ebpo_test_random_unit(&state) } };
+        double square = 0;
+        for (int k = 0; k < 4; k++) {
+            hand.turn[k] = k == 3 ? 1 : k == 2 ? 0 : 0.3 * (ebpo_test_random_unit(&state) - 0.5);
+            square += hand.turn[k] * hand.turn[k];
+        }
+        for (int k = 0; k < 4; k++)
+            hand.turn[k] /= sqrt(square);
+        r = judge_tick(&j, &hand, false);
+        judge_push(&j, &r);
+        contacts += (r.flags & EBPO_TOUCH_CONTACT) != 0;
+    }
+    ck_assert_uint_gt(contacts, 1000);
+    cube_end(&j, &m);
+}
+END_TEST
+
 START_TEST(friction_holds_a_plate)
 {
     query_model m;
@@ -381,12 +425,14 @@ START_TEST(many_points_take_no_longer)
     ck_assert_int_eq(ebpo_touch_new(m.model, &options, above, &none, &why), EBPO_E_ARGUMENT);
     options.point_count = 10000;
     ASSERT_OK(ebpo_touch_new(m.model, &options, above, &touch, error));
-    for (int i = 0; i < 1500; i++) {
+    bool rests = false;
+    for (int i = 0; i < 1500 || (!rests && i < 20000); i++) { /* boxes may come late */
         const double hand[3] = { 0.5, 0.5, fmax(0.9, 1.5 - 0.002 * i) }, turn[4] = { 0, 0, 0, 1 };
         in_tick = true;
         ebpo_touch_turn(touch, hand, turn, &r);
         in_tick = false;
         ck_assert_uint_le(r.work, 12000);
+        rests = !(r.flags & (EBPO_TOUCH_WAITS | EBPO_TOUCH_SHORT));
         if (i % 8 == 0)
             pause_a_little();
     }
@@ -408,6 +454,7 @@ Suite *test_suite(void)
     tcase_add_loop_test(tools, a_wild_tool_goes_through_nothing, 0, WILD);
     tcase_add_test(tools, a_plate_lies_on_a_cube);
     tcase_add_test(tools, a_tilted_plate_turns_the_hand_back);
+    tcase_add_test(tools, contacts_never_pull);
     tcase_add_test(tools, friction_holds_a_plate);
     tcase_add_test(tools, many_points_take_no_longer);
     suite_add_tcase(suite, tools);

@@ -443,6 +443,7 @@ async function shares(browser, address) {
   assert.ok(await page.isChecked('input[name=clip][value="1"]') && await page.isChecked('input[name=colouring][value=type]'));
   const { low, high } = await page.evaluate(() => window.ebpoViewer.scene.cut), { info } = await openEbpo(readFileSync(model)), scale = 2 / Math.hypot(...info.box_size);
   assert.ok(Math.abs(low[1] + 0.1 * info.box_size[1] * scale) < 1e-9 && high[1] > 1 && Math.abs(low[2] + 0.375 * info.box_size[2] * scale) < 1e-9, `${low} ${high}`);
+  await page.waitForFunction(() => window.ebpoViewer.state.probe);
   assert.deepEqual((await stateOf(page)).probe.point, [0.5, 0.25, 0]);
   await page.waitForSelector('#measures li');
   const wanted = new URL(page.url()).search;
@@ -494,6 +495,14 @@ async function measures(browser, address) {
   await page.close();
 }
 
+// How many pixels of the model's picture are red.
+const red = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => {
+  const canvas = document.querySelector('#canvas'), context = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d');
+  context.drawImage(canvas, 0, 0);
+  const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
+  done(data.reduce((sum, r, i) => sum + (i % 4 === 0 && r > data[i + 1] + 40 ? 1 : 0), 0));
+}))));
+
 // What was painted in a browser, as the command sees it: listed, measured, baked into colours of vertices, and these shown.
 async function readsPaint(browser, address, path) {
   const baked = join(work, 'baked.ply'), told = JSON.parse(run(ebpo, ['paint', '--json', '--area', path, model]));
@@ -509,13 +518,7 @@ async function readsPaint(browser, address, path) {
 }
 
 async function paints(browser, address) {
-  const page = await show(browser, `${address}?file=models/ring.ebpo.h5`),
-    red = (from) => from.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => { // pixels
-    const canvas = document.querySelector('#canvas'), context = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d');
-    context.drawImage(canvas, 0, 0);
-    const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
-    done(data.reduce((sum, r, i) => sum + (i % 4 === 0 && r > data[i + 1] + 40 ? 1 : 0), 0));
-  }))));
+  const page = await show(browser, `${address}?file=models/ring.ebpo.h5`);
   await settled(page);
   await page.waitForFunction(() => window.ebpoViewer.paint);
   const [x0, y0, x1, y1] = await silhouette(page), drag = async (from, to) => {

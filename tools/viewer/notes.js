@@ -18,7 +18,7 @@ const NEAR = 0.35; // how far from a note the camera goes, at least
 
 export function addNotes({ scene, changed, shownAs }, drawing) {
   const details = section('Notes and views', HTML);
-  let shown = [], editing; // { number } or { place }
+  let shown = [], editing; // { note }, one of the list, or { place }
   const list = () => drawing().state.notes;
 
   const show = () => {
@@ -36,7 +36,7 @@ export function addNotes({ scene, changed, shownAs }, drawing) {
       const by = make('small', [note.author, note.date.slice(0, 10)].filter(Boolean).join(', ')), change = make('button', 'Edit', { className: 'small' }), remove = make('button', 'Remove',
         { className: 'small' });
       go.onclick = () => goTo(i);
-      change.onclick = () => edit({ number: i });
+      change.onclick = () => edit({ note });
       remove.onclick = () => drawing().removeNote(i);
       li.append(go, body, by, change, remove);
       return li;
@@ -53,7 +53,7 @@ export function addNotes({ scene, changed, shownAs }, drawing) {
 
   function edit(what) {
     editing = what;
-    const note = what?.number === undefined ? { title: '', body: '', author: localStorage.getItem('ebpo:author') ?? '' } : list()[what.number];
+    const note = what?.note ?? { title: '', body: '', author: localStorage.getItem('ebpo:author') ?? '' };
     $('noteForm').hidden = !what;
     if (!what)
       return;
@@ -67,8 +67,11 @@ export function addNotes({ scene, changed, shownAs }, drawing) {
     const members = { title: cleanText($('noteTitle').value, MOST.title), body: cleanText($('noteBody').value, MOST.body), author: cleanText($('noteAuthor').value, MOST.author), date: today() };
     localStorage.setItem('ebpo:author', members.author);
     try {
-      if (editing.number !== undefined) {
-        drawing().setNote(editing.number, members);
+      if (editing.note) { // its number may be another one by now
+        const number = list().indexOf(editing.note);
+        if (number < 0)
+          throw new Error('the note is not there any more; undo brings it back');
+        drawing().setNote(number, members);
       } else {
         const { face, weights, place } = editing.place;
         drawing().addNote({ ...members, layer: drawing().layerForNew(), face, weights, place });

@@ -21,7 +21,7 @@ export function atHome() {
 export function went(what) {
   clearTimeout(timer);
   timer = undefined;
-  const href = withQuery(location.href, [...OF_A_VIEW.map((name) => [name]), ['file', typeof what === 'string' ? what : undefined]]);
+  const href = withQuery(location.href, [...OF_A_VIEW.map((name) => [name]), ['paint'], ['file', typeof what === 'string' ? what : undefined]]);
   const local = what !== undefined && typeof what !== 'string' ? files.push(what) - 1 : undefined;
   if (href !== location.href || local !== undefined || history.state?.local !== undefined)
     history.pushState({ local }, '', href);

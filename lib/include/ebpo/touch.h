@@ -2,9 +2,12 @@
  * EBP-Octree in HDF5: a hand that touches a model, at a steady rate and never late.
  *
  *   Making    ebpo_touch_new, ebpo_touch_free
- *   A tick    ebpo_touch_move, ebpo_touch_way: a ball; ebpo_touch_sense: a point that nothing
- * stops; ebpo_touch_turn: a tool of many points, with force and torque Else      ebpo_touch_place,
- * ebpo_touch_check, ebpo_touch_get_stats
+ *
+ *   A tick    ebpo_touch_move, ebpo_touch_way: a ball
+ *             ebpo_touch_sense: a point that nothing stops
+ *             ebpo_touch_turn, ebpo_touch_poses: a tool of many points, with force and torque
+ *
+ *   Else      ebpo_touch_place, ebpo_touch_check, ebpo_touch_get_stats
  *
  *     ebpo_touch *touch = NULL;
  *     ebpo_touch_result answer;

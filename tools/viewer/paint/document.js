@@ -2,6 +2,8 @@
 import { MOST, cleanText } from './paint_file.js';
 
 const STEPS_MOST = 200;
+/** Of the diagonal of the root cell: so far a point may be from its face. */
+export const OFF = 2 ** -20;
 
 /** The digest that a paint file for a model has, and whose face numbers: format-spec/paint.md, section 2. */
 export function identityOf(info) {
@@ -15,7 +17,8 @@ export function misfit(doc, info) {
   if (!(doc.model === model && doc.faceNumbers === faceNumbers) && !(doc.faceNumbers === 'source' && info.parts.has('maps') && doc.model === info.content_sha256))
     return `this paint is for ${wanted} (${doc.model.slice(0, 12)}…), not for the open one (${model.slice(0, 12)}…); open that model first`;
   const whole = !info.subset_of, most = faceNumbers === 'source' ? info.source_face_count + info.mend_added_faces : info.face_count;
-  const far = (p) => p.some((x, k) => !(x >= info.box_origin[k] && x <= info.box_origin[k] + info.box_size[k])), all = [...doc.notes, ...doc.strokes.flatMap((s) => s.points)];
+  const slack = OFF * Math.hypot(...info.box_size);
+  const far = (p) => p.some((x, k) => !(x >= info.box_origin[k] - slack && x <= info.box_origin[k] + info.box_size[k] + slack)), all = [...doc.notes, ...doc.strokes.flatMap((s) => s.points)];
   if (whole && all.some((p) => p.face >= most || far(p.place)))
     return 'the paint has points that the model cannot have: it was changed; get a fresh copy';
   return undefined;
@@ -96,11 +99,19 @@ export class PaintDocument {
     this.step({ layers: this.state.layers.filter((_, i) => i !== number), notes: keep(this.state.notes), strokes: keep(this.state.strokes) });
   }
 
+  /** A stroke or a note of a layer that is not there would make a file that nobody reads. */
+  #mustHave(layer) {
+    if (!(layer < this.state.layers.length))
+      throw new Error('the layer is not there any more; choose another one, and paint again');
+  }
+
   addStroke(stroke) {
+    this.#mustHave(stroke.layer);
     this.step({ strokes: [...this.state.strokes, stroke] });
   }
 
   addNote(note) {
+    this.#mustHave(note.layer);
     this.step({ notes: [...this.state.notes, note] });
   }
 

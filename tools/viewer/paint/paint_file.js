@@ -42,10 +42,8 @@ export function writePaint(doc) {
 /** A text as the file may have it: without control characters, at most so many bytes; lines end with U+2028. */
 export function cleanText(value, most) {
   // eslint-disable-next-line no-control-regex
-  let out = value.replace(/\r?\n/g, '\u2028').replace(/[\u0000-\u001f\u007f-\u009f]/g, ' ').replace(/[\ud800-\udbff](?![\udc00-\udfff])|(?<![\ud800-\udbff])[\udc00-\udfff]/g, ' ').trim();
-  while (new TextEncoder().encode(out).length > most)
-    out = [...out].slice(0, -1).join('');
-  return out;
+  const out = value.replace(/\r?\n/g, '\u2028').replace(/[\u0000-\u001f\u007f-\u009f]/g, ' ').replace(/[\ud800-\udbff](?![\udc00-\udfff])|(?<![\ud800-\udbff])[\udc00-\udfff]/g, ' ').trim();
+  return out.slice(0, new TextEncoder().encodeInto(out, new Uint8Array(most)).read); // whole characters
 }
 
 // --- reading ---

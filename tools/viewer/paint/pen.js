@@ -3,7 +3,7 @@ import { complain, make, modelName, placesOf, save, section, take, taken } from 
 import { kit } from '../scene.js';
 import { $, length, on, state, tell, toModel, toScene } from '../state.js';
 import { Decals } from './decals.js';
-import { PaintDocument, identityOf, misfit } from './document.js';
+import { OFF, PaintDocument, identityOf, misfit } from './document.js';
 import { MOST, cleanText, readPaint, writePaint } from './paint_file.js';
 import { Stroke } from './stroke.js';
 
@@ -21,11 +21,11 @@ const HTML = `
   <div class="buttons"><button id="layerAdd" class="small">Add a layer</button><button id="paintOpen" class="small">Open …</button><button id="paintSave" class="small">Save</button></div>
   <input type="file" id="paintFile" accept=".h5" hidden>`;
 const NARROW = 2e-4, WIDE = 0.1;    // radii of the pen, in halves of the box's diagonal
-const FULL_SIZE = 32768, AT_ONCE = 500, OFF = 2 ** -20; // of the diagonal: how far a point may be from its face
+const FULL_SIZE = 32768, AT_ONCE = 500;
 
 export function addPen({ scene, worker, query }, pipeline) {
   const decals = pipeline.layers = new Decals(kit), docs = new Map(), normals = new WeakMap(); // by a model's digest; by a point of a document
-  let doc, layer = 0, stroke, pending = 0, details, asked = 0;
+  let doc, layer = 0, stroke, pending = 0, unsettled = 0, details, asked = 0;
   const colour = () => [1, 3, 5].map((i) => parseInt($('penColour').value.slice(i, i + 2), 16));
   const radius = () => NARROW * (WIDE / NARROW) ** ($('penSize').value / 100) / state.scene.scale;
   const askPlaces = (points) => {
@@ -60,6 +60,16 @@ export function addPen({ scene, worker, query }, pipeline) {
     tell('drawing');
   }
 
+  // Strokes whose places are on their way come first: what is undone is the last one that is seen, and no layer goes before its stroke is there.
+  async function inTurn(change) {
+    const mine = doc;
+    while (unsettled)
+      await new Promise((done) => setTimeout(done, 20));
+    if (!stroke && doc === mine)
+      change();
+  }
+  const undo = () => inTurn(() => doc.undo()), redo = () => inTurn(() => doc.redo());
+
   // --- layers ---
 
   function showLayers() {
@@ -77,7 +87,7 @@ export function addPen({ scene, worker, query }, pipeline) {
       name.onchange = () => doc.setLayer(i, { title: cleanText(name.value, MOST.title) });
       opacity.onchange = () => doc.setLayer(i, { opacity: Number(opacity.value) });
       eye.onclick = () => doc.setLayer(i, { visible: !l.visible });
-      remove.onclick = () => doc.removeLayer(i);
+      remove.onclick = () => inTurn(() => doc.state.layers[i] === l && doc.removeLayer(i));
       li.append(pick, name, eye, remove, opacity, make('small', `${count} ${count === 1 ? 'stroke' : 'strokes'}${l.author ? ` · ${l.author}` : ''}`));
       return li;
     }));
@@ -148,6 +158,7 @@ export function addPen({ scene, worker, query }, pipeline) {
     if (!done.points.length)
       return;
     pending++;
+    unsettled++;
     try {
       const settled = done.settled(await askPlaces(done.points.map((p) => p.place)));
       if (opening === state.opening && settled.points.length)
@@ -156,6 +167,7 @@ export function addPen({ scene, worker, query }, pipeline) {
       if (opening === state.opening)
         complain(error.message);
     }
+    unsettled--;
     pending--;
   }
 
@@ -217,16 +229,19 @@ export function addPen({ scene, worker, query }, pipeline) {
   }
 
   async function fromAddress() {
-    const wanted = new URLSearchParams(location.search).get('paint');
+    const wanted = new URLSearchParams(location.search).get('paint'), { opening } = state;
     if (!wanted || !state.info || doc.past.length || doc.state.strokes.length)
       return;
     try {
       const answer = await fetch(new URL(wanted, location.href));
       if (!answer.ok)
         throw new Error(`the server answers ${answer.status}; check the address`);
-      await openBytes(wanted, new Uint8Array(await answer.arrayBuffer()));
+      const bytes = new Uint8Array(await answer.arrayBuffer());
+      if (opening === state.opening) // another model may have been opened meanwhile
+        await openBytes(wanted, bytes);
     } catch (error) {
-      complain(`${wanted}: ${error.message}`);
+      if (opening === state.opening)
+        complain(`${wanted}: ${error.message}`);
     }
   }
 
@@ -240,8 +255,8 @@ export function addPen({ scene, worker, query }, pipeline) {
         $('penHint').textContent = starts ? tools[id].hint : '';
         details.open = true;
       };
-    $('penUndo').onclick = () => doc.undo();
-    $('penRedo').onclick = () => doc.redo();
+    $('penUndo').onclick = undo;
+    $('penRedo').onclick = redo;
     details.querySelectorAll('[data-colour]').forEach((b) => (b.onclick = () => ($('penColour').value = b.dataset.colour)));
     $('penSize').oninput = () => ($('penSizeText').textContent = length(radius(), 2));
     $('layerAdd').onclick = () => {
@@ -264,7 +279,7 @@ export function addPen({ scene, worker, query }, pipeline) {
     addEventListener('keydown', (e) => {
       if ((e.ctrlKey || e.metaKey) && e.key.toLowerCase() === 'z' && state.info && !e.target.matches('input[type=text], textarea')) {
         e.preventDefault();
-        e.shiftKey ? doc.redo() : doc.undo();
+        e.shiftKey ? redo() : undo();
       }
     });
     addEventListener('beforeunload', (e) => [...docs.values()].every((d) => d.isSaved) || e.preventDefault());

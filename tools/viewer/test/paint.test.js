@@ -85,6 +85,7 @@ test('the checksum of blocks is lookup3\'s, and texts are made fit', () => {
   assert.equal(lookup3(new TextEncoder().encode('Four score and seven years ago'), 0, 30), 0x17770551); // the published example
   assert.equal(cleanText('a\r\nb\u0007', 9), 'a\u2028b');
   assert.equal(cleanText('ääää', 5), 'ää');
+  assert.equal(cleanText('a😀😀', 8), 'a😀');
 });
 
 // The vectors of format-spec/paint.md: every one that must be read gives what its text says, every one that must be refused is.

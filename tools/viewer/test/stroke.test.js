@@ -44,6 +44,8 @@ test('each step can be undone and done again; layers take what is theirs along',
   assert.equal(doc.state, full);
   doc.redo();
   assert.equal(doc.state.layers.length, 1);
+  assert.throws(() => doc.addStroke({ layer: 1, points: [point] }), /layer is not there/);
+  assert.throws(() => doc.addNote({ layer: 1, ...point }), /layer is not there/);
   for (let i = 0; i < 10; i++)
     doc.undo();
   assert.deepEqual([doc.state.layers.length, doc.isSaved], [0, true]);
@@ -57,6 +59,8 @@ test('paint of another model, or on faces that the model cannot have, is refused
   assert.match(with_({ faceNumbers: 'file' }), /open that model/);
   assert.match(with_({ strokes: strokes(12, [0, 0, 0]) }), /cannot have/);
   assert.match(with_({ strokes: strokes(0, [0, 0, 1.5]) }), /cannot have/);
+  assert.match(with_({ strokes: strokes(0, [0, 0, 1 + 2e-6]) }), /cannot have/);
+  assert.equal(with_({ strokes: strokes(0, [-(2 ** -60), 0.5, 1 + 2 ** -52]) }), undefined); // places are rounded
   const subset = { ...INFO, content_sha256: 'c'.repeat(64), subset_of: INFO.content_sha256 };
   assert.equal(misfit({ ...doc, strokes: strokes(99, [5, 5, 5]) }, subset), undefined); // elsewhere in the whole
 });
