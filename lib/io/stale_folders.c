@@ -18,8 +18,8 @@
 
 static const char MARK[] = ".part-", MADE[] = "XXXXXX";
 
-/* One number for all who see the same processes: since this start of the machine, in this namespace.
- * 0: not known. */
+/* One number for all who see the same processes: since this start of the machine, in this
+ * namespace. 0: not known. */
 static uint32_t system_number(void)
 {
     struct stat space;
