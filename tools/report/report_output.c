@@ -174,8 +174,12 @@ static bool make_folder(const char *place, size_t length, char *folder, size_t c
         name--;
     snprintf(hidden, sizeof hidden, "%.*s.%.*s.new", (int)name, place, (int)(length - name),
              place + name);
-    if (ebpo_folder_begin(hidden, &making, &error) != EBPO_OK)
-        return told(EXIT_FAILED, place, error.message) == EXIT_FINE;
+    if (ebpo_folder_begin(hidden, &making, &error) != EBPO_OK) {
+        const char *cause = strncmp(error.message, hidden, strlen(hidden)) == 0
+                                ? error.message + strlen(hidden) + 2 /* and ": " */
+                                : error.message;
+        return told(EXIT_FAILED, access(hidden, F_OK) == 0 ? hidden : place, cause) == EXIT_FINE;
+    }
     bool fits = strlen(making) < capacity && strlen(making) < sizeof being_made - 300;
     if (fits)
         memcpy(folder, making, strlen(making) + 1);
