@@ -2,7 +2,7 @@
 # every_command.sh EBPO VECTORS MODELS: each command that reads over all conformance files, and a few
 # real models converted in several ways. For builds with sanitizers, as of clang:
 #
-#   CC=clang CXX=clang++ meson setup BUILD -Db_sanitize=undefined -Db_lundef=false \\
+#   CC=clang CXX=clang++ meson setup BUILD -Db_sanitize=undefined -Db_lundef=false \
 #       --buildtype=debugoptimized -Dc_args=-fno-sanitize-recover=all
 #
 # Prints how many runs there were, and those with an exit code that no command has, or with a word of a
