@@ -1,6 +1,6 @@
 #!/bin/sh
 # The tests, in three tiers. Each installs what it needs, builds (warnings are errors) and tests:
-#   tests/run.sh           medium, what CI runs: gcc, clang, sanitize, thread, memory; 40 minutes
+#   tests/run.sh           medium, what CI runs: gcc, clang, sanitize, thread, memory (< 1 h)
 #   tests/run.sh short     gcc alone, few inputs and nothing costly: while one works
 #   tests/run.sh long      every check in every build, all inputs with gcc: before a release
 #   tests/run.sh [TIER] BUILD...    only these of its builds; sanitize: address and undefined;

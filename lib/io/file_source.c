@@ -23,8 +23,8 @@ static bool is_fresh(const struct stat *st)
     if (clock_gettime(CLOCK_REALTIME, &now) != 0)
         return true;
     int64_t seconds = (int64_t)now.tv_sec - st->st_ctim.tv_sec;
-    return seconds < 1 ||
-           (seconds == 1 && 1000000000 + now.tv_nsec - st->st_ctim.tv_nsec < FRESH_NS);
+    return seconds < 0 ||
+           (seconds <= 1 && seconds * 1000000000 + now.tv_nsec - st->st_ctim.tv_nsec < FRESH_NS);
 }
 
 ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path, ebpo_error *error)

@@ -227,9 +227,12 @@ static ebpo_status prepare(lighting *l, ebpo_error *error)
 static ebpo_status check(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes, ebpo_error *error)
 {
     uint64_t triangles = 0;
+    if (!mesh->xyz64 && mesh->face_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the mesh is of single precision; give the one that came with the nodes");
     for (uint64_t i = 0; i < nodes->polygon_count; i++)
         triangles += nodes->corners[i] - 2u;
-    if (triangles == mesh->face_count && mesh->xyz64)
+    if (triangles == mesh->face_count)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_ARGUMENT,
                      "the nodes have %llu triangles, the mesh %llu; give both of one level",

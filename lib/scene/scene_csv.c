@@ -143,9 +143,9 @@ static ebpo_status read_text(const ebpo_whole_file *file, scene_route *route, co
                 { 0 },
                 0,
                 newlocale(LC_ALL_MASK, "C", (locale_t)0) };
-    l.at += scene_text_mark(l.at, file->size);
     ebpo_status status;
-    if (scene_text_is_wide(l.at, file->size))
+    l.at += scene_text_mark(l.at, file->size);
+    if (scene_text_is_wide(l.at, (size_t)(l.end - l.at)))
         status = ebpo_fail_file(error, EBPO_E_FORMAT, path,
                                 "begins with a byte order mark (BOM) of UTF-16; save it as UTF-8");
     else if (!l.c_locale)

@@ -144,7 +144,8 @@ ebpo_status ebpo_verify(const ebpo_file *file, const ebpo_verify_options *option
     if (status == EBPO_OK && options->source)
         status = check_source(file, options, &tally, error);
     if (status == EBPO_OK)
-        status = ebpo_count_spare(file, &found.spare_bytes, &found.spare_filled, error);
+        status = ebpo_count_spare(file, &options->progress, &found.spare_bytes, &found.spare_filled,
+                                  error);
     if (status == EBPO_OK)
         ebpo_tally_report(&tally, &found);
     EBPO_GIVE(ebpo_verify_report, report, &found);

@@ -4,12 +4,14 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/parallel.h"
 #include "container/long_chunk.h"
 #include "head/head.h"
 #include "verify/verify_subtrees.h"
 
 typedef struct survey {
     const ebpo_file *file;
+    const ebpo_progress *progress;
     ebpo_head head;
     ebpo_range *range; /* what belongs to something */
     uint64_t count, capacity;
@@ -76,14 +78,18 @@ static int by_offset(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Counts the bytes of a gap that are not zero. */
-static ebpo_status look_at_gap(ebpo_input *in, ebpo_range gap, uint64_t *filled, ebpo_error *error)
+/* Counts the bytes of a gap that are not zero. It may be nearly all of a large file. */
+static ebpo_status look_at_gap(const survey *s, ebpo_range gap, uint64_t *filled, ebpo_error *error)
 {
     enum { PIECE = 1 << 14 };
     uint8_t piece[PIECE];
+    ebpo_input *in = &ebpo_reader_own(s->file)->in;
     ebpo_status status = EBPO_OK;
     while (gap.size && status == EBPO_OK) {
         uint64_t size = gap.size < PIECE ? gap.size : PIECE;
+        if (!ebpo_progress_step(s->progress, "looking at unused bytes", gap.offset, in->source.size,
+                                error))
+            return EBPO_E_CANCELLED;
         status = ebpo_input_read(in, gap.offset, size, piece, error);
         for (uint64_t i = 0; i < size && status == EBPO_OK; i++)
             *filled += piece[i] != 0;
@@ -94,8 +100,8 @@ static ebpo_status look_at_gap(ebpo_input *in, ebpo_range gap, uint64_t *filled,
 
 static ebpo_status look_at_gaps(survey *s, uint64_t *spare, uint64_t *filled, ebpo_error *error)
 {
-    ebpo_input *in = &ebpo_reader_own(s->file)->in;
-    ebpo_status status = add_range(s, (ebpo_range){ in->source.size, 0 }, error);
+    uint64_t file_end = ebpo_reader_own(s->file)->in.source.size;
+    ebpo_status status = add_range(s, (ebpo_range){ file_end, 0 }, error);
     uint64_t end = 0;
     if (status == EBPO_OK)
         qsort(s->range, s->count, sizeof *s->range, by_offset);
@@ -103,7 +109,7 @@ static ebpo_status look_at_gaps(survey *s, uint64_t *spare, uint64_t *filled, eb
         ebpo_range r = s->range[i];
         if (r.offset > end) {
             *spare += r.offset - end;
-            status = look_at_gap(in, (ebpo_range){ end, r.offset - end }, filled, error);
+            status = look_at_gap(s, (ebpo_range){ end, r.offset - end }, filled, error);
         }
         if (r.offset + r.size > end)
             end = r.offset + r.size;
@@ -111,11 +117,11 @@ static ebpo_status look_at_gaps(survey *s, uint64_t *spare, uint64_t *filled, eb
     return status;
 }
 
-ebpo_status ebpo_count_spare(const ebpo_file *file, uint64_t *spare, uint64_t *filled,
-                             ebpo_error *error)
+ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progress, uint64_t *spare,
+                             uint64_t *filled, ebpo_error *error)
 {
     ebpo_input *in = &ebpo_reader_own(file)->in;
-    survey s = { .file = file, .head = EBPO_HEAD_INIT };
+    survey s = { .file = file, .progress = progress, .head = EBPO_HEAD_INIT };
     ebpo_error own = EBPO_ERROR_INIT;
     *spare = *filled = 0;
     if (ebpo_input_expects(in))

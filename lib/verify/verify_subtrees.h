@@ -24,8 +24,8 @@ EBPO_MUST_USE ebpo_status ebpo_check_sums(ebpo_tally *tally, const ebpo_file *fi
 
 /* Which bytes of the file belong to nothing: neither to superblock, headers and indexes nor to a
  * chunk; and how many of them are not zero. Nothing to do in files far away. */
-EBPO_MUST_USE ebpo_status ebpo_count_spare(const ebpo_file *file, uint64_t *spare, uint64_t *filled,
-                                           ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progress,
+                                           uint64_t *spare, uint64_t *filled, ebpo_error *error);
 
 /* Every chunk of faces with the coding `gates`, by ebpo_plain_gates_read. Nothing to do without. */
 EBPO_MUST_USE ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file,

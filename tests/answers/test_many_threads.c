@@ -206,13 +206,15 @@ static bool is_own(const worker *w, int kind, bool wanted, const ebpo_error *err
     return mix_has_workers(kind) && strstr(error->message, "refused by background");
 }
 
-static void ask_one(worker *w)
+/* The first one of each thread meets refusals, so that there are some however few are asked: not
+ * everything is in memory yet. */
+static void ask_one(worker *w, bool first)
 {
     int kind = (int)draw(w, MIX_KINDS);
-    bool wanted = w->s->place != FROM_FILE && draw(w, 8) == 0;
+    bool wanted = w->s->place != FROM_FILE && (draw(w, 8) == 0 || first);
     uint64_t number = draw(w, NUMBERS), hash = 0;
     ebpo_error error = EBPO_ERROR_INIT;
-    fail_in = wanted ? 1 + (unsigned)draw(w, 4) : 0;
+    fail_in = first && wanted ? 1 : wanted ? 1 + (unsigned)draw(w, 4) : 0;
     ebpo_status status = mix_ask(&w->asker, kind, number, &hash, &error);
     fail_in = 0;
     w->s->asked[kind]++;
@@ -251,7 +253,7 @@ static void *work(void *user)
             break;
         if (i % 20 == 0 && !change_context(w))
             break;
-        ask_one(w);
+        ask_one(w, i == 0);
         if (ebpo_budget_get_stats(s->budget, &stats) != EBPO_OK || stats.memory > stats.budget)
             tell(w, 0, 0, "more is taken than the budget");
     }

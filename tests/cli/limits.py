@@ -101,6 +101,22 @@ def holding_is_limited():
         check(code == 2 and "--memory: 'much' is not a size" in said, f"{command} --memory much")
 
 
+def limits_of_others_stay():
+    """A soft limit that is less than what is free, asked for when a question has been answered."""
+    soft = 512 << 20
+    process = subprocess.Popen(
+        [TOOL, "distance", "--threads", "1", "b.ebpo.h5"], text=True, stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env=dict(os.environ, LD_PRELOAD=LITTLE, EBPO_TEST_FREE=str(4 << 30)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_DATA, (soft, resource.RLIM_INFINITY)))
+    process.stdin.write("0 0 0\n")
+    process.stdin.flush()
+    answer = process.stdout.readline()
+    limit = resource.prlimit(process.pid, resource.RLIMIT_DATA)[0]
+    process.communicate()
+    check(answer and limit == soft, f"a limit of {soft} bytes is kept: {limit}, {answer!r}")
+
+
 def models_are_held_in_parts():
     """The same answers, from parts; where the least is more than half, that is said."""
     plan = json.loads(run("info", "--json", "--memory", "0", "b.ebpo.h5")[1])["memory"]
@@ -206,6 +222,7 @@ def main():
         run("convert", "-q", "b.ply", "b.ebpo.h5")
         run("convert", "-q", "quads.ply", "cube.ebpo.h5")
         holding_is_limited()
+        limits_of_others_stay()
         models_are_held_in_parts()
         if "h5py" in FEATURES:
             verify_keeps_its_budget()

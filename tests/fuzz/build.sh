@@ -36,6 +36,7 @@ for t in $targets; do
             -exec cp '{}' "$OUT/${t}_seeds/" ';'
         [ $name = head ] || cp "$root/tests/fuzz/dict/file.dict" "$OUT/$t.dict"
         ;;
+    paint) cp "$root"/format-spec/vectors/paint/*/*.h5 "$OUT/${t}_seeds/" ;;
     esac
 done
 echo "built: $OUT"

@@ -24,7 +24,8 @@ static const command *const commands[] = {
     &command_extract, &command_export,  &command_subset, &command_repack, &command_fetch,
     &command_measure, &command_render,  &command_verify, &command_inside, &command_distance,
     &command_ray,     &command_box,     &command_bench,  &command_report, &command_scene,
-    &command_boolean, &command_collide, &command_repair, &command_map,    &command_touch
+    &command_boolean, &command_collide, &command_repair, &command_map,    &command_touch,
+    &command_paint
 };
 enum { COMMANDS = sizeof commands / sizeof *commands, WORDS_MOST = 40, VALUES = 64 };
 

@@ -109,7 +109,8 @@ command_lines = [
     b"a.h5\n--any\n--raw", b"a.h5\n--csv\n--header", b"a.h5\n--points\n1000", b"a.ply\no.html",
     b"report\ns.scene.json", b"A-B\na.h5\nb.h5\n--pose\nB:1 2 3", b"a.h5\nb.h5\n--distance",
     b"a.h5\n-o\nb.h5\n--source\na.ply", b"a.h5\n--plane\nz=50%\n--size\n64x64\n-o\nm.png\n--range=1",
-    b"a.h5\n--path\np.txt\n--rate\n1000\n--radius=0.1\n--json"]
+    b"a.h5\n--path\np.txt\n--rate\n1000\n--radius=0.1\n--json",
+    b"list\na.paint.h5\n--json"]
 for i, text in enumerate(command_lines):
     put("args", f"command_{i:02}", bytes([i]) + text)
 values = {

@@ -246,6 +246,13 @@ START_TEST(nodes_of_another_level_are_refused)
     ck_assert_int_eq(ebpo_lod_normals(l.info, &l.mesh, &l.nodes, l.normals, &error),
                      EBPO_E_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(error.message, "give both of one level"));
+    l.mesh.face_count++;
+    double *corners = l.mesh.xyz64;
+    l.mesh.xyz64 = NULL;
+    ck_assert_int_eq(ebpo_lod_normals(l.info, &l.mesh, &l.nodes, l.normals, &error),
+                     EBPO_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "single precision"));
+    l.mesh.xyz64 = corners;
     release(&l);
 }
 END_TEST

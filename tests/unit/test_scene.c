@@ -198,6 +198,7 @@ START_TEST(csv)
         { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n\n2;2;3;5;0;0;0;-1\r\n", NULL },
         { "\xef\xbb\xbftime,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n2,2,3,5,0,0,0,-1\n", NULL },
         { "\xff\xfet\0i\0", "byte order mark (BOM) of UTF-16" },
+        { "\xef\xbb\xbf", "there are no poses" }, /* and nothing behind it */
         { "scale, qw ,qz,qy,qx,z,y,x,time\n 1 , 1,0,0,0,4,3,2,1\n1,1,0,0,0,5,3,2,2", NULL },
         { "time,x,y,z\n", "line 1: the first line names" },
         { "time,x,y,z,qx,qy,qz,qw,qw\n", "line 1: each column is one of" },

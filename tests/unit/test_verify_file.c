@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <ebpo/build.h>
@@ -214,6 +215,32 @@ START_TEST(verifying_needs_a_file_and_may_be_stopped)
 }
 END_TEST
 
+static bool stop_at_unused(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    (void)user, (void)done, (void)total;
+    return strcmp(stage, "looking at unused bytes") != 0;
+}
+
+/* As sparse files may have without taking space. */
+START_TEST(looking_at_unused_bytes_may_be_stopped)
+{
+    enum { UNUSED = 1 << 20 };
+    ebpo_error error = EBPO_ERROR_INIT;
+    struct stat st;
+    ebpo_file *file;
+    ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
+    write_file(ebpo_test_make("torus"), false, ~0u);
+    ck_assert(stat(path, &st) == 0 && truncate(path, st.st_size + UNUSED) == 0);
+    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
+    ck_assert(ebpo_verify(file, NULL, &report, &error) == EBPO_OK);
+    ck_assert(report.spare_bytes >= UNUSED && report.spare_filled == 0 && !report.violations);
+    options.progress.report = stop_at_unused;
+    ck_assert(ebpo_verify(file, &options, &report, &error) == EBPO_E_CANCELLED);
+    ck_assert_str_eq(error.message, "stopped on request during looking at unused bytes");
+    ebpo_close(file);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     TCase *tests = tcase_create("verify file");
@@ -225,6 +252,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, another_source_is_noticed_down_to_the_sign_of_zero);
     tcase_add_test(tests, damaged_files_are_findings_and_not_failures);
     tcase_add_test(tests, verifying_needs_a_file_and_may_be_stopped);
+    tcase_add_test(tests, looking_at_unused_bytes_may_be_stopped);
     Suite *suite = suite_create("verify file");
     suite_add_tcase(suite, tests);
     return suite;

@@ -12,6 +12,7 @@ enum { THREADS_MOST = 256 };
 /* Of this process, which has one thread and runs one command. */
 static uint64_t limit_bytes;
 static bool limit_given;
+static rlim_t before_us = RLIM_INFINITY; /* of who began the process */
 
 /* What counts has been taken before: private memory that may be written, which under sanitizers is
  * most of the address space. */
@@ -38,19 +39,20 @@ static uint64_t stacks(void)
     return each * (uint64_t)(cores < 1 ? 1 : cores > THREADS_MOST ? THREADS_MOST : cores);
 }
 
-/* 0: no limit of ours. */
+/* 0: no limit of ours. Never more than the process was given by who began it. */
 static void limit_to(uint64_t bytes, bool given)
 {
     struct rlimit limit;
     uint64_t already = taken_already(), all = already + stacks() + bytes;
     if (!already || all < bytes || getrlimit(RLIMIT_DATA, &limit) != 0)
         return;
-    if (limit.rlim_max != RLIM_INFINITY && all > limit.rlim_max)
-        return; /* the system's own limit is less */
-    limit.rlim_cur = bytes ? all : limit.rlim_max;
+    if (!given)
+        before_us = limit.rlim_cur;
+    bool ours = bytes && all <= before_us; /* RLIM_INFINITY is the greatest */
+    limit.rlim_cur = ours ? all : before_us;
     if (setrlimit(RLIMIT_DATA, &limit) != 0)
         return;
-    limit_bytes = bytes;
+    limit_bytes = ours ? bytes : 0;
     limit_given = given;
 }
 

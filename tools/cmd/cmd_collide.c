@@ -1,4 +1,5 @@
 /* ebpo collide: which faces of two models meet, and how far apart they are. */
+#include <ebpo/http.h>
 #include <ebpo/memory.h>
 #include <float.h>
 #include <stddef.h>
@@ -239,10 +240,12 @@ static ebpo_status share_memory(const query_session *a, const query_session *b,
 }
 
 /* Where --memory is not given: half of what is free if all of both would take more, or the least
- * that will do. */
-static void usual_memory(const query_session *a, const query_session *b,
+ * that will do. Files on a server keep the library's usual budget. */
+static void usual_memory(const query_session *a, const query_session *b, const char *const path[2],
                          ebpo_model_options *holding)
 {
+    if (ebpo_is_url(path[0]) || (b && ebpo_is_url(path[1])))
+        return;
     ebpo_model_plan plan[2] = { EBPO_MODEL_PLAN_INIT, EBPO_MODEL_PLAN_INIT };
     if (ebpo_model_memory(a->file, holding, &plan[0], NULL) != EBPO_OK ||
         (b && ebpo_model_memory(b->file, holding, &plan[1], NULL) != EBPO_OK))
@@ -267,7 +270,7 @@ static int open_both(query_session *a, query_session *b, const collide_values *v
     if (code == EXIT_FINE && !one)
         code = query_open_file(b, "collide", path[1], holding, level, &v->query.remote);
     if (code == EXIT_FINE && !v->query.memory && holding->cut_level < 0)
-        usual_memory(a, one ? NULL : b, holding);
+        usual_memory(a, one ? NULL : b, path, holding);
     if (code == EXIT_FINE && !one && holding->memory &&
         share_memory(a, b, holding, &error) != EBPO_OK)
         return command_failed("collide", &error);

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "cli/command.h"
+#include "cli/model_memory.h"
 #include "cli/progress.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
@@ -162,15 +163,11 @@ static ebpo_status open_paint(paint_job *j, ebpo_error *error)
 static ebpo_status open_model(paint_job *j, uint64_t memory, ebpo_error *error)
 {
     ebpo_model_options o = EBPO_MODEL_OPTIONS_INIT;
-    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
     o.memory = memory;
     o.threads = (unsigned)j->v->threads;
     o.progress = j->progress;
-    if (!j->v->memory && !ebpo_is_url(j->model_path) &&
-        ebpo_model_memory(j->file, &o, &plan, error) == EBPO_OK) {
-        uint64_t half = ebpo_free_memory() / 2;
-        o.memory = plan.whole <= half ? 0 : half > plan.least ? half : plan.least;
-    }
+    if (!j->v->memory)
+        model_memory_usual("paint", j->file, j->model_path, &o);
     ebpo_status status = ebpo_model_new(j->file, &o, &j->model, error);
     return status == EBPO_OK ? ebpo_context_new(j->model, &j->context, error) : status;
 }

@@ -91,9 +91,9 @@ static cairo_surface_t *coverage(int width, int height, const char *text, bool *
     return surface;
 }
 
-static ebpo_status no_memory(ebpo_error *error)
+static ebpo_status no_memory(const char *what, ebpo_error *error)
 {
-    snprintf(error->message, sizeof error->message, "out of memory for a picture's captions");
+    snprintf(error->message, sizeof error->message, "%s", what);
     return error->status = EBPO_E_MEMORY;
 }
 
@@ -105,7 +105,9 @@ ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
     if (loaded == MISSING)
         return EBPO_OK;
     if (loaded == FAILED)
-        return no_memory(error);
+        return no_memory("libcairo, which draws captions, cannot be loaded: memory is short, or "
+                         "the library damaged",
+                         error);
     cairo_surface_t *surface = coverage(width, height, text, &good);
     const unsigned char *row = good ? lib.image_surface_get_data(surface) : NULL;
     good = row != NULL;
@@ -116,7 +118,7 @@ ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
                 rgb[k] = (uint8_t)((rgb[k] * (255 - row[i]) + colour[k] * row[i] + 127) / 255);
         }
     lib.surface_destroy(surface);
-    return good ? EBPO_OK : no_memory(error);
+    return good ? EBPO_OK : no_memory("out of memory for a picture's captions", error);
 }
 
 #else

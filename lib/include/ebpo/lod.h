@@ -146,7 +146,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes,
  * mesh  that came with the nodes
  * out   [polygon_count][3] of length 1, of a polygon without area 0; the caller's
  *
- * EBPO_E_ARGUMENT: the nodes have another number of triangles. EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: the nodes have another number of triangles, or the mesh is of
+ * single precision. EBPO_E_MEMORY.
  *
  * Threads: any.
  */
