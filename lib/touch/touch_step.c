@@ -91,8 +91,8 @@ static void keep_short(step *s)
     shorten(s->way, s->t->stride / length);
 }
 
-/* The faces around the way, which is made shorter where they are too many. The stride stays above 0:
- * it would never grow again. */
+/* The faces around the way, which is made shorter where they are too many. The stride stays above
+ * 0: it would never grow again. */
 static bool find_faces(step *s)
 {
     ebpo_touch *t = s->t;
