@@ -1,5 +1,4 @@
 /* ebpo touch: a hand played at a steady rate, and whether any of its ticks was late. */
-#include <errno.h>
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
@@ -252,10 +251,10 @@ static double diagonal(const ebpo_info *info)
     return hypot(hypot(info->box_size[0], info->box_size[1]), info->box_size[2]);
 }
 
-static ebpo_status no_memory(ebpo_error *error)
+static ebpo_status no_memory(ebpo_error *error, const char *what)
 {
     *error = (ebpo_error){ .status = EBPO_E_MEMORY };
-    snprintf(error->message, sizeof error->message, "not enough memory for the times of ticks");
+    snprintf(error->message, sizeof error->message, "not enough memory for %s", what);
     return EBPO_E_MEMORY;
 }
 
@@ -269,7 +268,7 @@ static ebpo_status play_nothing(job *j, ebpo_error *error)
     touch_play_first();
     bool fine = touch_play_run(&empty, &j->empty);
     touch_play_behind(); /* and so does what loads, which is made now */
-    return fine ? EBPO_OK : no_memory(error);
+    return fine ? EBPO_OK : no_memory(error, "the times of ticks");
 }
 
 static ebpo_status play(job *j, ebpo_error *error)
@@ -281,48 +280,43 @@ static ebpo_status play(job *j, ebpo_error *error)
     if (v->record) {
         j->record = calloc(touch_play_ticks(&all), sizeof *j->record);
         if (!j->record)
-            return no_memory(error);
+            return no_memory(error, "what is recorded");
         all.record = j->record;
     }
     j->scheduling = touch_play_first();
     if (!touch_play_run(&all, &j->times))
-        return no_memory(error);
+        return no_memory(error, "the times of ticks");
     ebpo_touch_get_stats(j->touch, &j->stats);
     ebpo_model_get_stats(j->model, &j->memory);
     return ebpo_touch_check(j->touch, error);
 }
 
 /* As --path reads it: each number to the last bit. */
-static bool write_record(const job *j)
+static ebpo_status write_record(const job *j, ebpo_error *error)
 {
-    char name[4096];
-    int length = snprintf(name, sizeof name, "%s.part", j->v->record);
-    FILE *out = length > 0 && length < (int)sizeof name ? fopen(name, "wx") : NULL;
-    bool fine = out != NULL;
-    for (uint64_t i = 0; fine && i < j->times.ticks; i++) {
+    enum { LINE = 7 * (NUMBER_ROOM + 1) };
+    char *text = malloc(j->times.ticks * LINE + 1), *at = text;
+    if (!text)
+        return no_memory(error, "what is recorded");
+    for (uint64_t i = 0; i < j->times.ticks; i++) {
         const touch_pose *p = &j->record[i];
-        char line[7 * (NUMBER_ROOM + 1)], *at = line;
         for (int k = 0; k < 7; k++) {
             at = number_write(at, k < 3 ? p->place[k] : p->turn[k - 3]);
             *at++ = k < 6 ? ' ' : '\n';
         }
-        fine = fwrite(line, 1, (size_t)(at - line), out) == (size_t)(at - line);
     }
-    if (out)
-        fine = (fclose(out) == 0) & fine && rename(name, j->v->record) == 0;
-    if (!fine) {
-        fprintf(stderr, "ebpo touch: %s: %s\n", j->v->record, strerror(errno));
-        if (out)
-            remove(name);
-    }
-    return fine;
+    ebpo_status status = ebpo_write_file(j->v->record, text, (size_t)(at - text), error);
+    free(text);
+    return status;
 }
 
 static int run_job(job *j, uint64_t memory)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     touch_pose start;
-    ebpo_status status = open_model(j, memory, &error);
+    ebpo_status status = j->v->record ? ebpo_check_output(j->v->record, &error) : EBPO_OK;
+    if (status == EBPO_OK)
+        status = open_model(j, memory, &error);
     if (status == EBPO_OK)
         status = play_nothing(j, &error);
     if (status == EBPO_OK && !j->device.begin(j->device.self, j->v->seconds, &start))
@@ -331,10 +325,10 @@ static int run_job(job *j, uint64_t memory)
         status = open_hand(j, start.place, &error);
     if (status == EBPO_OK)
         status = play(j, &error);
+    if (status == EBPO_OK && j->v->record)
+        status = write_record(j, &error);
     if (status != EBPO_OK)
         return command_failed("touch", &error);
-    if (j->v->record && !write_record(j))
-        return EXIT_FAILED;
     if (j->v->json)
         json_report(j);
     else
@@ -373,6 +367,8 @@ static int run(void *given, const char **operand)
     int code = check(v, &memory);
     if (code != 0)
         return code;
+    if (v->record && command_overwrites("touch", operand[0], v->record))
+        return EXIT_USAGE;
     bool fine = command_wants_hdf5("touch", operand[0]) && read_tool(&j) &&
                 (!v->path || touch_path_open(&j.device, v->path)) &&
                 (!v->device || touch_udp_open(&j.device, v->device));
