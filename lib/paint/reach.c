@@ -71,7 +71,7 @@ static ebpo_status gather(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo_error
                            FACES_MOST);
     if (status == EBPO_OK && r->short_of_memory)
         status = ebpo_fail_memory(error, (r->count + EBPO_TRIANGLES_MOST) * sizeof *r->face);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK && r->count) /* none is there where a place is far from all faces */
         qsort(r->face, r->count, sizeof *r->face, by_number);
     return status;
 }

@@ -372,6 +372,35 @@ START_TEST(a_crowd_of_faces_is_refused)
 }
 END_TEST
 
+/* A ball around which there are more faces than a tick looks at stays; put elsewhere it goes on,
+ * however long that was. */
+START_TEST(a_ball_among_many_faces_is_put_elsewhere)
+{
+    static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    const double edge[3] = { 1.3, 0.5, 1.3 }, above[3] = { 0.5, 0.5, 2 }, away[3] = { 0.5, 0.5, 3 };
+    query_model m;
+    ebpo_touch *touch;
+    ebpo_touch_result r;
+    query_model_make(&m, "box", ebpo_test_box(low, high, 40), &query_variants[0]);
+    ebpo_touch_options o = EBPO_TOUCH_OPTIONS_INIT;
+    o.radius = 0.4;
+    ASSERT_OK(ebpo_touch_new(m.model, &o, edge, &touch, error));
+    for (int i = 0; i < 1000; i++)
+        tick(touch, away, &r);
+    ck_assert_uint_eq(r.flags & (EBPO_TOUCH_SHORT | EBPO_TOUCH_CONTACT), EBPO_TOUCH_SHORT);
+    check_vector(r.proxy, edge[0], edge[1], edge[2], 0);
+    ASSERT_OK(ebpo_touch_place(touch, above, error));
+    for (int i = 0; i < 5000 && r.proxy[2] != away[2]; i++) {
+        tick(touch, away, &r);
+        if (r.flags & EBPO_TOUCH_WAITS)
+            pause_a_little();
+    }
+    check_vector(r.proxy, away[0], away[1], away[2], 1e-6);
+    ebpo_touch_free(touch);
+    query_model_free(&m);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("touch_hand");
@@ -384,6 +413,7 @@ Suite *test_suite(void)
     tcase_add_test(hand, normals_turn_steadily);
     tcase_add_test(hand, what_makes_no_sense_is_refused);
     tcase_add_test(hand, a_crowd_of_faces_is_refused);
+    tcase_add_test(hand, a_ball_among_many_faces_is_put_elsewhere);
     suite_add_tcase(suite, hand);
     return suite;
 }

@@ -292,31 +292,20 @@ static ebpo_status play(job *j, ebpo_error *error)
 }
 
 /* As --path reads it: each number to the last bit. */
-static bool print_record(const job *j, FILE *out)
+static ebpo_status write_record(const job *j, ebpo_error *error)
 {
-    bool fine = true;
-    for (uint64_t i = 0; fine && i < j->times.ticks; i++) {
+    enum { LINE = 7 * (NUMBER_ROOM + 1) };
+    char *text = malloc(j->times.ticks * LINE + 1), *at = text;
+    if (!text)
+        return no_memory(error, "what is recorded");
+    for (uint64_t i = 0; i < j->times.ticks; i++) {
         const touch_pose *p = &j->record[i];
-        char line[7 * (NUMBER_ROOM + 1)], *at = line;
         for (int k = 0; k < 7; k++) {
             at = number_write(at, k < 3 ? p->place[k] : p->turn[k - 3]);
             *at++ = k < 6 ? ' ' : '\n';
         }
-        fine = fwrite(line, 1, (size_t)(at - line), out) == (size_t)(at - line);
     }
-    return fine;
-}
-
-static ebpo_status write_record(const job *j, ebpo_error *error)
-{
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    bool whole = out && print_record(j, out);
-    if (out && fclose(out) != 0)
-        whole = false;
-    ebpo_status status =
-        whole ? ebpo_write_file(j->v->record, text, size, error) : no_memory(error, "the record");
+    ebpo_status status = ebpo_write_file(j->v->record, text, (size_t)(at - text), error);
     free(text);
     return status;
 }

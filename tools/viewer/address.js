@@ -59,9 +59,11 @@ export function cutOf(size, scale, clip, box) {
 }
 const BEYOND = 9; // of the scene, which is 1 in size
 
+const POINTS_MOST = 1000; // an address may come from anybody, and each is drawn
+
 export function pointsOf(text) {
   const list = numbers(text);
-  return list && list.length % 3 === 0 ? Array.from({ length: list.length / 3 }, (_, i) => list.slice(3 * i, 3 * i + 3)) : undefined;
+  return list && list.length % 3 === 0 && list.length <= 3 * POINTS_MOST ? Array.from({ length: list.length / 3 }, (_, i) => list.slice(3 * i, 3 * i + 3)) : undefined;
 }
 
 /** Points to a millionth of `diagonal`, or better if that is as short. */

@@ -51,7 +51,9 @@ typedef enum ebpo_touch_kind {
 typedef struct ebpo_touch_options {
     size_t struct_size; /* EBPO_TOUCH_OPTIONS_INIT sets it */
 
-    /* Of the hand, in the model's unit, at least 0. 0: a point. */
+    /* Of the hand, in the model's unit, at least 0. 0: a point. A tick looks at 384 faces around
+     * the ball at most. Where more are in its box, as the radius is many edges of the mesh, the
+     * ball does not come (EBPO_TOUCH_SHORT); begun there, it stays until it is put elsewhere. */
     double radius;
 
     /*

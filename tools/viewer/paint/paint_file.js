@@ -101,9 +101,15 @@ export function readPaint(bytes) {
   must(['source', 'file'].includes(doc.faceNumbers), '/', 'attribute face_numbers: it is neither source nor file');
   const [layers, notes, strokes, points] = ['layer', 'note', 'stroke', 'point'].map((name) => facts.count(`${name}_count`, MOST[`${name}s`]));
   must(4 * (layers + notes + strokes + points) <= bytes.length, '/', 'the counts are more than the file can hold');
+  let room = bytes.length;
   const items = (name, count, of) => {
     const group = count ? reader.group(`/${name}`, links.get(name)) : undefined;
-    return Array.from({ length: count }, (_, i) => of(reader.group(`/${name}/${number4(i)}`, group.links.get(number4(i))).facts, `/${name}/${number4(i)}`));
+    return Array.from({ length: count }, (_, i) => {
+      const path = `/${name}/${number4(i)}`, item = of(reader.group(path, group.links.get(number4(i))).facts, path);
+      room -= Object.values(item).reduce((sum, v) => sum + (typeof v === 'string' ? v.length : 0), 0);
+      must(room >= 0, path, 'there is more text than the file has bytes: groups share it');
+      return item;
+    });
   };
   doc.layers = items('layers', layers, (f) => ({ title: f.text('title', 255), author: f.text('author', 255), date: f.text('date', 31), description: f.text('description', 4095),
     colour: f.count('colour', 2 ** 32 - 1), opacity: f.count('opacity', 255), visible: f.count('visible', 1) === 1 }));

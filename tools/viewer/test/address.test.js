@@ -29,6 +29,7 @@ test('planes, boxes and points come back; what is none is nothing', () => {
     assert.equal(boxOf(text), undefined, text);
   assert.deepEqual(pointsOf('1,2,3,4e2,-5,6'), [[1, 2, 3], [400, -5, 6]]);
   assert.equal(pointsOf('1,2'), undefined);
+  assert.equal(pointsOf('1,2,3,'.repeat(2000).slice(0, -1)), undefined); // too many to draw
   near(pointsOf(pointsText([[0.123456789, 1, 2]], 0.25))[0], [0.123456789, 1, 2], 0.25e-6);
   assert.equal(pointsText([[12345.678, 0, -1]], 20000), '12345.68,0,-1');
 });

@@ -5,7 +5,8 @@ import { existsSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSy
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import test from 'node:test';
-import { cleanText, readPaint, writePaint } from '../paint/paint_file.js';
+import { MOST, cleanText, readPaint, writePaint } from '../paint/paint_file.js';
+import { H5Writer, i64, text, u64 } from '../paint/write_h5.js';
 import { lookup3 } from '../reader/hdf5.js';
 
 const SHA = '0123456789abcdef'.repeat(4);
@@ -64,6 +65,18 @@ test('what breaks a rule is refused', () => {
     [(d) => (d.notes[0].layer = 2), /layer/], [(d) => (d.notes[0].weights = [0.5, 0]), /weights/], [(d) => (d.layers[0].opacity = 256), /opacity/], [(d) => (d.layers[0].title = 'a\nb'), /title/]])
     assert.throws(() => readPaint(broken(change)), (e) => e.code === 'FORMAT' && said.test(e.message), String(said));
   assert.throws(() => readPaint(new TextEncoder().encode('nothing of the kind, but long enough to be looked at ...')), /not a whole HDF5 file/);
+});
+
+test('groups that share their texts are not read again and again', () => {
+  const h5 = new H5Writer(), layer = h5.group([...['title', 'author', 'date'].map((name) => [name, text('')]), ['description', text('d'.repeat(4000))],
+    ...['colour', 'opacity', 'visible'].map((name) => [name, u64(1)])]), layers = (n) => h5.group([], Array.from({ length: n }, (_, i) => [String(i).padStart(4, '0'), layer]));
+  const file = (n) => {
+    const links = [['layers', layers(n)]];
+    return h5.end(h5.group([['format', text('EBP-Octree paint 1')], ['format_version_major', i64(1)], ['format_version_minor', i64(0)], ['generator', text('t')], ['model_sha256', text(SHA)],
+      ['face_numbers', text('file')], ['layer_count', u64(n)], ...['note', 'stroke', 'point'].map((name) => [`${name}_count`, u64(0)])], links));
+  };
+  assert.equal(readPaint(file(1)).layers.length, 1);
+  assert.throws(() => readPaint(file(MOST.layers)), /groups share it/);
 });
 
 test('no damaged byte gives another drawing', () => {
