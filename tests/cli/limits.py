@@ -117,6 +117,23 @@ def limits_of_others_stay():
     check(answer and limit == soft, f"a limit of {soft} bytes is kept: {limit}, {answer!r}")
 
 
+def little_data():
+    """A limit of the caller's that the process could widen, but must not."""
+    resource.setrlimit(resource.RLIMIT_DATA, (100 << 20, resource.RLIM_INFINITY))
+
+
+def what_the_caller_allows():
+    """A limit of the process is never exceeded."""
+    if "png" not in FEATURES:
+        return
+    large = ["render", "-q", "--size", "4000x4000", "b.ebpo.h5", "o.png"]
+    for limit in ([], ["--memory", "1G"], ["--memory", "0"]):
+        code, _, said, _ = run(*large, *limit, before=little_data)
+        check(code == 1 and "not enough memory" in said,
+              f"what the caller allows holds with {limit} ({code}: {said.strip()})")
+    check(not os.path.exists("o.png"), "no output is left")
+
+
 def models_are_held_in_parts():
     """The same answers, from parts; where the least is more than half, that is said."""
     plan = json.loads(run("info", "--json", "--memory", "0", "b.ebpo.h5")[1])["memory"]
@@ -223,6 +240,7 @@ def main():
         run("convert", "-q", "quads.ply", "cube.ebpo.h5")
         holding_is_limited()
         limits_of_others_stay()
+        what_the_caller_allows()
         models_are_held_in_parts()
         if "h5py" in FEATURES:
             verify_keeps_its_budget()

@@ -28,22 +28,24 @@ static uint64_t taken_already(void)
     return pages * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
-/* Stacks of threads count as a whole, though hardly any of each is used. */
-static uint64_t stacks(void)
+/* Stacks of threads count as a whole, though hardly any of each is used. So many threads; 0: one
+ * for each core. */
+static uint64_t stacks(int64_t threads)
 {
     struct rlimit stack;
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
     uint64_t each = UINT64_C(8) << 20;
     if (getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur != RLIM_INFINITY)
         each = stack.rlim_cur;
-    return each * (uint64_t)(cores < 1 ? 1 : cores > THREADS_MOST ? THREADS_MOST : cores);
+    int64_t most = threads > cores ? threads : cores;
+    return each * (uint64_t)(most < 1 ? 1 : most > THREADS_MOST ? THREADS_MOST : most);
 }
 
 /* 0: no limit of ours. Never more than the process was given by who began it. */
-static void limit_to(uint64_t bytes, bool given)
+static void limit_to(uint64_t bytes, int64_t threads, bool given)
 {
     struct rlimit limit;
-    uint64_t already = taken_already(), all = already + stacks() + bytes;
+    uint64_t already = taken_already(), all = already + stacks(threads) + bytes;
     if (!already || all < bytes || getrlimit(RLIMIT_DATA, &limit) != 0)
         return;
     if (!given)
@@ -56,9 +58,9 @@ static void limit_to(uint64_t bytes, bool given)
     limit_given = given;
 }
 
-void process_memory_usual(void) { limit_to(ebpo_free_memory(), false); }
+void process_memory_usual(void) { limit_to(ebpo_free_memory(), 0, false); }
 
-bool process_memory_take(const char *command, const char *size)
+bool process_memory_take(const char *command, const char *size, int64_t threads)
 {
     uint64_t bytes;
     if (!size)
@@ -69,7 +71,7 @@ bool process_memory_take(const char *command, const char *size)
                 command, size, command);
         return false;
     }
-    limit_to(bytes, true);
+    limit_to(bytes, threads, true);
     return true;
 }
 

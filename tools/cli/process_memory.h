@@ -9,9 +9,10 @@
 /* The limit of all commands, before anything else: what is free. */
 void process_memory_usual(void);
 
-/* --memory of commands that hold as much as their work takes; NULL: as it is. False, with the usage
- * message printed, when it is no size. */
-bool process_memory_take(const char *command, const char *size);
+/* --memory of commands that hold as much as their work takes; NULL: as it is. `threads`
+ * as of --threads: their stacks come on top. What whoever began the process allows is never
+ * exceeded. False, with the usage message printed, when it is no size. */
+bool process_memory_take(const char *command, const char *size, int64_t threads);
 
 /* For messages where memory was short: what the limit is, and whose; "" where there is none. */
 void process_memory_why(char *out, size_t capacity);

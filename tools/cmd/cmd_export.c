@@ -194,7 +194,7 @@ static int run(void *given, const char **operand)
     int code = choose_format(v, operand[1]);
     if (code == EXIT_FINE)
         code = choose_levels(v, &o);
-    if (code == EXIT_FINE && !process_memory_take("export", v->memory))
+    if (code == EXIT_FINE && !process_memory_take("export", v->memory, v->threads))
         code = EXIT_USAGE;
     if (code != EXIT_FINE)
         return code;

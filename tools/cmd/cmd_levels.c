@@ -217,7 +217,7 @@ static int run(void *given, const char **operand)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     printer p = { .v = v, .begin = progress_now() };
-    if (!process_memory_take("levels", v->memory))
+    if (!process_memory_take("levels", v->memory, v->threads))
         return EXIT_USAGE;
     if (!command_wants_hdf5("levels", operand[0]))
         return EXIT_FAILED;

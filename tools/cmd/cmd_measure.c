@@ -287,7 +287,7 @@ static const values usual = { .tolerance = 0.05,
 static int run(void *given, const char **operand)
 {
     values *v = given;
-    if (!process_memory_take("measure", v->memory))
+    if (!process_memory_take("measure", v->memory, v->threads))
         return EXIT_USAGE;
     return command_wants_hdf5("measure", operand[0]) ? measure(operand[0], v) : EXIT_FAILED;
 }

@@ -376,7 +376,7 @@ static int run(void *given, const char **operand)
 {
 #if EBPO_HAVE_PNG
     values *v = given;
-    if (!process_memory_take("render", v->memory))
+    if (!process_memory_take("render", v->memory, v->threads))
         return EXIT_USAGE;
     job *j = calloc(1, sizeof *j);
     if (!j)

@@ -236,7 +236,7 @@ static int run(void *given, const char **operand)
     report_values *v = given;
     char named_after_input[256];
     comparison c = { .v = v };
-    if (!process_memory_take("report", v->memory))
+    if (!process_memory_take("report", v->memory, v->threads))
         return EXIT_USAGE;
     int is_hdf5 = command_is_hdf5("report", operand[0]);
     int code = is_hdf5 < 0 ? EXIT_FAILED : read_options(&c, v, !is_hdf5);
