@@ -169,9 +169,14 @@ static bool go_on(step *s)
     if (sqrt(dot(s->way, s->way)) <= 0x1p-12 * t->options.skin)
         return false;
     s->cut = 0;
+    double whole = sqrt(dot(s->way, s->way));
     keep_short(s);
     if (!keep_known(s) || !find_faces(s))
         return false;
+    /* Slacks are those of the whole way: of a hand far away they would be those of long strides. */
+    double share = sqrt(dot(s->way, s->way)) / whole;
+    s->slack *= share;
+    s->least_slack *= share;
     double part = first_touch(s);
     for (int i = 0; i < 3; i++)
         to[i] = t->proxy[i] + part * s->way[i];

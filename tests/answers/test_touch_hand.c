@@ -279,6 +279,55 @@ START_TEST(a_cube_holds_the_hand_as_its_planes_do)
 }
 END_TEST
 
+/* How far a place is from a box, from outside. */
+static double off_box(const double at[3], const double low[3], const double high[3])
+{
+    double sum = 0;
+    for (int i = 0; i < 3; i++) {
+        double beyond = fmax(fmax(low[i] - at[i], at[i] - high[i]), 0);
+        sum += beyond * beyond;
+    }
+    return sqrt(sum);
+}
+
+/* A ball slides on one box towards another. Its way is cut to what is near: what rounding does to
+ * the whole way, which is long, is no measure of what the ball does to a face. */
+START_TEST(a_hand_far_away_brings_the_ball_no_nearer)
+{
+    static const double floor_low[3] = { 0, 0, 0 }, floor_high[3] = { 1, 1, 1 };
+    static const double wall_low[3] = { 1.3, 0, 0 }, wall_high[3] = { 2, 1, 2 };
+    static const double hands[][3] = { { 1e3, 0.4, -1e3 }, { 1e13, 0.4, -1e13 } };
+    const double start[3] = { 0.3, 0.4, 1.5 };
+    for (int h = 0; h < 2; h++) {
+        query_model m;
+        ebpo_touch *touch;
+        ebpo_touch_result r;
+        ebpo_touch_options options = EBPO_TOUCH_OPTIONS_INIT;
+        ebpo_mesh both = ebpo_test_box(floor_low, floor_high, 2);
+        ebpo_mesh wall = ebpo_test_box(wall_low, wall_high, 2);
+        ebpo_test_append(&both, &wall);
+        ebpo_mesh_free(&wall);
+        query_model_make(&m, "corner", both, &query_variants[0]);
+        options.radius = 0.2;
+        options.skin = 1e-6;
+        ASSERT_OK(ebpo_touch_new(m.model, &options, start, &touch, error));
+        /* until it has come between the boxes, and then some */
+        for (int i = 0, there = 0; there < 100; i++) {
+            ck_assert_msg(i < 20000, "the ball stays at %g, flags %u", r.proxy[0], r.flags);
+            tick(touch, hands[h], &r);
+            if (r.flags & (EBPO_TOUCH_WAITS | EBPO_TOUCH_PARTLY))
+                pause_a_little();
+            there += r.proxy[0] > 1;
+            double least = fmin(off_box(r.proxy, floor_low, floor_high),
+                                off_box(r.proxy, wall_low, wall_high));
+            ck_assert_msg(least >= 0.2, "%.17g after %d", least, i);
+        }
+        ebpo_touch_free(touch);
+        query_model_free(&m);
+    }
+}
+END_TEST
+
 START_TEST(friction_holds_as_coulomb_says)
 {
     cube_hand c;
@@ -409,6 +458,7 @@ Suite *test_suite(void)
     tcase_set_timeout(hand, 600);
     tcase_add_loop_test(hand, a_wild_hand_goes_through_nothing, 0, WILD);
     tcase_add_loop_test(hand, a_cube_holds_the_hand_as_its_planes_do, 0, 2);
+    tcase_add_test(hand, a_hand_far_away_brings_the_ball_no_nearer);
     tcase_add_test(hand, friction_holds_as_coulomb_says);
     tcase_add_test(hand, normals_turn_steadily);
     tcase_add_test(hand, what_makes_no_sense_is_refused);
