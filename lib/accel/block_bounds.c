@@ -3,6 +3,7 @@
  * in single precision still bounds. */
 #include "geom/strict_fp.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -354,6 +355,17 @@ static double size_of(const ebpo_bound *b)
     return 255 * (double)fmaxf(b->step[0], fmaxf(b->step[1], b->step[2]));
 }
 
+/* Not so of faces that are so far from their leaf that squares overflow (in files of others): such
+ * slabs say nothing, as a step that is infinite or NaN has no multiples. */
+static bool is_known(int count, const slab child[8], const double radius[8])
+{
+    for (int lane = 0; lane < count; lane++)
+        if (!(fabs(child[lane].from) < FLT_MAX / 4 && fabs(child[lane].to) < FLT_MAX / 4 &&
+              radius[lane] < FLT_MAX / 4))
+            return false;
+    return true;
+}
+
 static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab child[8])
 {
     double slack = size * slab_slack, along = 0, aside = 0, radius[8];
@@ -363,9 +375,15 @@ static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab chi
         radius[lane] = sqrt(larger(child[lane].radius2, 0) + size * size * 0x1p-46) + slack;
         aside = larger(aside, radius[lane]);
     }
-    b->along_step = (float)(along / SHORT_MOST);
-    b->aside_step = (float)(aside / SHORT_MOST);
+    bool known = is_known(count, child, radius);
+    b->along_step = (float)((known ? along : FLT_MAX / 4) / SHORT_MOST);
+    b->aside_step = (float)((known ? aside : FLT_MAX / 4) / SHORT_MOST);
     for (int lane = 0; lane < count; lane++) {
+        if (!known) {
+            b->from[lane] = -SHORT_MOST;
+            b->to[lane] = b->radius[lane] = SHORT_MOST;
+            continue;
+        }
         b->from[lane] = (int16_t)round_down((child[lane].from - slack) / (double)b->along_step);
         b->to[lane] = (int16_t)round_up((child[lane].to + slack) / (double)b->along_step);
         b->radius[lane] = (int16_t)round_up(radius[lane] / (double)b->aside_step);
