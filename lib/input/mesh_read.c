@@ -95,6 +95,19 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char
                           "unrecognised format; expected PLY, OBJ, STL or OFF");
 }
 
+/* A file that is changed while it is read may be of no form at all: then that is what is told. */
+static ebpo_status tell_change(const ebpo_whole_file *file, const char *path, ebpo_status status,
+                               ebpo_error *error)
+{
+    ebpo_error changed = EBPO_ERROR_INIT;
+    ebpo_status unchanged = ebpo_whole_file_unchanged(file, path, &changed);
+    if (unchanged == EBPO_OK)
+        return status;
+    if (error)
+        *error = changed;
+    return unchanged;
+}
+
 static ebpo_status read_mesh(const char *path, const ebpo_mesh_read_options *options,
                              ebpo_mesh *out, ebpo_mesh_groups **groups, ebpo_error *error)
 {
@@ -121,8 +134,8 @@ static ebpo_status read_mesh(const char *path, const ebpo_mesh_read_options *opt
     if (status == EBPO_OK && wanted.attributes)
         status =
             ebpo_textures_find(out, path, file.data, file.size, wanted.embed_textures != 0, error);
-    if (status == EBPO_OK)
-        status = ebpo_whole_file_unchanged(&file, path, error);
+    if (status == EBPO_OK || status == EBPO_E_FORMAT)
+        status = tell_change(&file, path, status, error);
     if (status == EBPO_OK)
         memcpy(out->source_sha256, hash.digest, sizeof hash.digest);
     else

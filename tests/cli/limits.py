@@ -126,12 +126,12 @@ def what_the_caller_allows():
     """A limit of the process is never exceeded."""
     if "png" not in FEATURES:
         return
-    large = ["render", "-q", "--size", "4000x4000", "b.ebpo.h5", "o.png"]
+    large = ["render", "-q", "--size", "4000x4000", "b.ebpo.h5", "large.png"]
     for limit in ([], ["--memory", "1G"], ["--memory", "0"]):
         code, _, said, _ = run(*large, *limit, before=little_data)
         check(code == 1 and "not enough memory" in said,
               f"what the caller allows holds with {limit} ({code}: {said.strip()})")
-    check(not os.path.exists("o.png"), "no output is left")
+    check(not os.path.exists("large.png"), "no output is left")
 
 
 def models_are_held_in_parts():
