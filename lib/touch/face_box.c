@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "touch/vectors.h"
 
-static uint64_t leaves_for(uint64_t count)
+uint64_t ebpo_face_box_leaves(uint64_t count)
 {
     uint64_t leaves = 1;
     while (leaves * EBPO_FACE_BOX_LEAF < count)
@@ -21,14 +21,14 @@ static uint64_t leaves_for(uint64_t count)
 uint64_t ebpo_face_box_bytes(uint64_t capacity)
 {
     return capacity * (sizeof(double[3][3]) + sizeof(uint64_t)) +
-           2 * leaves_for(capacity) * sizeof(ebpo_extent);
+           2 * ebpo_face_box_leaves(capacity) * sizeof(ebpo_extent);
 }
 
 /* All pages are written here, so that no tick is the first to use one. */
 ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity, ebpo_error *error)
 {
     *out = (ebpo_face_box){ .capacity = capacity, .leaves = 1 };
-    uint64_t nodes = 2 * leaves_for(capacity);
+    uint64_t nodes = 2 * ebpo_face_box_leaves(capacity);
     out->corner = ebpo_alloc(capacity, sizeof *out->corner);
     out->face = ebpo_alloc(capacity, sizeof *out->face);
     out->node = ebpo_alloc(nodes, sizeof *out->node);
@@ -82,7 +82,7 @@ static void make_tree(ebpo_face_box *box)
 {
     static const ebpo_extent nothing = { { INFINITY, INFINITY, INFINITY },
                                          { -INFINITY, -INFINITY, -INFINITY } };
-    box->leaves = leaves_for(box->count);
+    box->leaves = ebpo_face_box_leaves(box->count);
     for (uint64_t leaf = 0; leaf < box->leaves; leaf++) {
         ebpo_extent *e = &box->node[box->leaves + leaf];
         *e = nothing;

@@ -33,6 +33,7 @@ EBPO_MUST_USE ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacit
                                             ebpo_error *error);
 void ebpo_face_box_free(ebpo_face_box *box);
 uint64_t ebpo_face_box_bytes(uint64_t capacity);
+uint64_t ebpo_face_box_leaves(uint64_t capacity); /* of its tree, at most */
 
 /* Loads what is within `margin` of the centres. *fits is false if that is more than there is room
  * for. The order of faces is the file's, along a curve: so the tree needs no sorting. */

@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <string.h>
 
 #include "touch/vectors.h"
 
@@ -67,4 +68,13 @@ double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], doub
         for (int j = 0; j < i; j++)
             try_line(&t, planes->normal[i], planes->normal[j], slack);
     return t.slack;
+}
+
+void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3])
+{
+    for (int k = 0; k < planes->count; k++)
+        if (memcmp(planes->normal[k], normal, sizeof planes->normal[k]) == 0)
+            return;
+    if (planes->count < EBPO_PLANES_MOST)
+        copy(normal, planes->normal[planes->count++]);
 }

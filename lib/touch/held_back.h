@@ -10,6 +10,9 @@ typedef struct ebpo_held_planes {
     int count;
 } ebpo_held_planes;
 
+/* One more, unless it is there already, or there is no room. */
+void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3]);
+
 /* `out` is the way `want` projected onto the cone n . x >= 0 for all planes; 0 if rounding finds
  * none. Returns how far below 0 n . out may be. */
 double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], double out[3]);

@@ -43,9 +43,12 @@ void ebpo_touch_tell(ebpo_touch *t, const double hand[3])
     }
 }
 
+static bool stands(const ebpo_touch *t) { return t->walk.stage == EBPO_BALL_STANDS; }
+
 /* Coulomb: the proxy, which slid from `from` without friction, follows only as far as the
  * tangential part of the spring is more than friction takes. */
-static uint32_t rub(ebpo_touch *t, const double from[3], const double hand[3], uint32_t *work)
+static uint32_t rub(ebpo_touch *t, const double from[3], const ebpo_held_planes *before,
+                    const double hand[3], ebpo_ball_work *work)
 {
     double slid[3], depth[3], goal[3];
     difference(t->proxy, from, slid);
@@ -57,7 +60,11 @@ static uint32_t rub(ebpo_touch *t, const double from[3], const double hand[3], u
         goal[i] = from[i] + part * slid[i] + (part > 0 ? depth[i] : 0);
     copy(from, t->proxy);
     t->way_count = 1;
-    return part > 0 ? ebpo_touch_go(t, goal, work) : 0;
+    if (part > 0)
+        return ebpo_touch_go(t, goal, work);
+    if (length > 0)
+        t->planes = *before; /* of where it is again */
+    return 0;
 }
 
 /* From the hand to the proxy; where the proxy waits, what faces hold back of that. */
@@ -89,6 +96,7 @@ void ebpo_touch_move(ebpo_touch *t, const double hand[3], ebpo_touch_result *out
     EBPO_DEFAULT_FP;
     double at[3], from[3], moved[3];
     bool astray = false;
+    ebpo_ball_work work = { 0 };
     if (t->options.kind != EBPO_TOUCH_BALL) {
         *out = (ebpo_touch_result){ .face = EBPO_NO_FACE, .flags = EBPO_TOUCH_OTHER };
         return;
@@ -99,11 +107,12 @@ void ebpo_touch_move(ebpo_touch *t, const double hand[3], ebpo_touch_result *out
     *out = (ebpo_touch_result){ .flags = astray ? EBPO_TOUCH_ASTRAY : 0 };
     difference(at, t->hand, moved);
     ebpo_passive_moved(&t->passive, t->force, moved, 3);
-    (void)ebpo_touch_take_box(t);
     copy(t->proxy, from);
-    uint32_t flags = ebpo_touch_go(t, at, &out->work);
-    if (t->touching && (flags & EBPO_TOUCH_CONTACT) && t->options.friction > 0)
-        flags |= rub(t, from, at, &out->work);
+    ebpo_held_planes before = t->planes;
+    uint32_t flags = ebpo_touch_go(t, at, &work);
+    if (t->touching && (flags & EBPO_TOUCH_CONTACT) && t->options.friction > 0 && stands(t))
+        flags |= rub(t, from, &before, at, &work);
+    out->work = work.faces;
     out->flags |= flags;
     ebpo_touch_look(t, out);
     t->touching = (flags & EBPO_TOUCH_CONTACT) != 0;
@@ -117,7 +126,7 @@ void ebpo_touch_move(ebpo_touch *t, const double hand[3], ebpo_touch_result *out
     copy(t->proxy, out->proxy);
     copy(out->force, t->force);
     copy(at, t->hand);
-    if (flags & EBPO_TOUCH_WAITS)
+    if ((flags & EBPO_TOUCH_WAITS) && stands(t))
         ebpo_touch_try_other(t);
     ebpo_touch_count(t, out->flags, out->work);
     ebpo_touch_tell(t, at);

@@ -61,6 +61,8 @@ static ebpo_status measure(ebpo_touch *t, ebpo_error *error)
     if (!(most <= 0x1p200 && t->diagonal >= 0x1p-200))
         return ebpo_fail(error, EBPO_E_UNSUPPORTED,
                          "coordinates are too large or too small to be touched");
+    double wide = t->tool ? t->tool->radius * (1 + 0x1p-40) : t->options.radius;
+    most += wide; /* where the hand may be when it touches */
     double least = fmax(0x1p-30 * t->diagonal, 0x1p-42 * most);
     if (t->options.skin == 0)
         t->options.skin = fmax((t->tool ? 0x1p-15 : 0x1p-20) * t->diagonal, least);
@@ -70,7 +72,6 @@ static ebpo_status measure(ebpo_touch *t, ebpo_error *error)
     if (t->options.look == 0)
         t->options.look = 3 * t->diagonal / sqrt(fmax(1, (double)info->face_count));
     t->options.look = fmax(t->options.look, 4 * t->options.skin);
-    double wide = t->tool ? t->tool->radius * (1 + 0x1p-40) : t->options.radius;
     t->reach = wide + t->options.skin;
     t->band = fmax(0x1p-24 * t->options.skin, 0x1p-48 * most);
     t->margin = wide + (t->tool ? 4 * t->options.skin : t->options.look);
@@ -87,6 +88,8 @@ static ebpo_status make_parts(ebpo_touch *t, ebpo_error *error)
         status = ebpo_context_new(t->model, &t->loading, error);
     for (int i = 0; i < EBPO_TOUCH_BOXES && status == EBPO_OK; i++)
         status = ebpo_face_box_new(&t->box[i], t->options.faces, error);
+    if (status == EBPO_OK && t->options.kind == EBPO_TOUCH_BALL)
+        status = ebpo_ball_walk_new(&t->walk, t->options.faces, error);
     t->seen = 1;
     t->own = 3;
     atomic_store(&t->between, 2);
@@ -167,6 +170,7 @@ ebpo_status ebpo_touch_place(ebpo_touch *t, const double place[3], ebpo_error *e
     ebpo_status status = check_place(t, place, error);
     if (status != EBPO_OK)
         return status;
+    t->walk.stage = EBPO_BALL_STANDS; /* also where this fails: it goes on from where it is */
     copy(place, t->proxy);
     copy(place, t->hand);
     ebpo_touch_tell(t, place);
@@ -242,6 +246,7 @@ void ebpo_touch_free(ebpo_touch *t)
     ebpo_touch_loader_stop(t);
     for (int i = 0; i < EBPO_TOUCH_BOXES; i++)
         ebpo_face_box_free(&t->box[i]);
+    ebpo_ball_walk_free(&t->walk);
     ebpo_held_levels_free(&t->levels);
     ebpo_tool_free(t->tool);
     ebpo_context_free(t->asking);

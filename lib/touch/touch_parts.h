@@ -6,6 +6,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
+#include "touch/ball_walk.h"
 #include "touch/face_box.h"
 #include "touch/held_back.h"
 #include "touch/held_levels.h"
@@ -17,12 +18,9 @@ enum {
     EBPO_TOUCH_BOXES = 4,
     EBPO_TOUCH_FRESH = 8, /* beside a box's number: the tick has not seen it */
 
-    /* What one step of a tick may look at: at most. */
+    /* What is looked at for the normal, and for the side of a probe: at most. */
     EBPO_TOUCH_FACES = 384,
     EBPO_TOUCH_VISITS = 1024,
-
-    /* And all of them together: no step begins after so many faces. */
-    EBPO_TOUCH_WORK = 512,
 
     EBPO_TOUCH_PIECES = EBPO_TOUCH_WAY_MOST - 1
 };
@@ -50,16 +48,20 @@ struct ebpo_touch {
     unsigned at, seen; /* boxes */
     double proxy[3], hand[3], force[3];
     bool touching;
-    ebpo_held_planes planes; /* that hold the proxy */
+    ebpo_ball_walk walk;     /* the piece of way it is on */
+    ebpo_held_planes along;  /* what that goes along */
+    ebpo_held_planes planes; /* that hold the proxy: of the last piece that is done */
+    uint32_t cut;            /* flags if the piece's end is reached */
+    bool felt;               /* a piece is done that goes to where the hand is */
     double way[EBPO_TOUCH_WAY_MOST][3];
     uint32_t way_count;
-    double stride; /* so long a piece of a way may be */
+    double stride; /* so long a piece of a tool's way may be */
     ebpo_passive passive;
     struct ebpo_tool *tool; /* or NULL */
     ebpo_touch_stats stats;
     uint32_t found[EBPO_TOUCH_FACES];
-    double met[EBPO_TOUCH_FACES];
-    double away[EBPO_TOUCH_FACES][3];
+    ebpo_near_node looking[EBPO_TOUCH_VISITS + 2];
+    double gap[EBPO_TOUCH_FACES];
     ebpo_context *asking; /* for places */
     ebpo_side side;
     unsigned answer; /* number of a known place */
@@ -92,7 +94,7 @@ struct ebpo_touch {
 
 /* touch_step.c: the proxy goes towards the goal, as far as faces and the box at hand allow; bits of
  * ebpo_touch_flag. */
-uint32_t ebpo_touch_go(ebpo_touch *t, const double goal[3], uint32_t *work);
+uint32_t ebpo_touch_go(ebpo_touch *t, const double goal[3], ebpo_ball_work *work);
 
 /* The part of the proxy's way, itself between a straight one's ends, of which all faces within
  * `reach` are known: to the wall of the box at hand, or all of it where no face can be. */
