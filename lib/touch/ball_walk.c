@@ -22,7 +22,9 @@ enum {
     STEPS = 6,
     /* What looking leaves of a tick's work for checking. */
     KEPT_FACES = 64,
-    KEPT_NODES = 256
+    KEPT_NODES = 256,
+    /* How many more are looked at where one holds the ball where it is. */
+    HELD_FACES = 48
 };
 
 static const double worth = 1.0 / 32; /* part of a way that is worth ending it */
@@ -132,8 +134,9 @@ static bool end_before_that(ebpo_ball_walk *w)
 
 static bool look(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
+    uint32_t held = work->faces; /* when it was not yet */
     while (w->queue.count > 0 && w->queue.item[0].key < w->part) {
-        if (w->part <= 0 && w->met.count == EBPO_PLANES_MOST)
+        if (w->part <= 0 && (w->met.count == EBPO_PLANES_MOST || work->faces >= held + HELD_FACES))
             break;
         if (work->faces + EBPO_FACE_BOX_LEAF + KEPT_FACES > EBPO_BALL_FACES ||
             work->nodes + 2 + KEPT_NODES > EBPO_BALL_NODES) {
@@ -143,6 +146,7 @@ static bool look(ebpo_ball_walk *w, ebpo_ball_work *work)
         }
         uint64_t node = ebpo_near_pop(&w->queue).node;
         if (node >= w->box->leaves) {
+            held = w->part > 0 ? work->faces : held;
             look_at_leaf(w, node - w->box->leaves, work);
             continue;
         }

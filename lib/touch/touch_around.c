@@ -13,7 +13,8 @@ typedef struct around {
     ebpo_near_queue queue;
     double look;      /* all faces that are closer to the ball are found */
     double nearest;   /* centre to face */
-    uint32_t count;   /* of t->found */
+    uint32_t looked;
+    uint32_t count; /* of t->found */
     ebpo_touch_result *out;
 } around;
 
@@ -39,7 +40,7 @@ static void add_face(around *a, uint64_t f)
     ebpo_face_near near;
     ebpo_face_nearest(a->t->proxy, face, &near);
     double gap = near.distance - a->t->options.radius;
-    a->out->work++;
+    a->looked++;
     if (!(gap < a->t->options.look))
         return;
     a->t->found[a->count] = (uint32_t)f;
@@ -47,6 +48,7 @@ static void add_face(around *a, uint64_t f)
     if (near.distance >= a->nearest)
         return;
     a->nearest = near.distance;
+    copy(near.away, a->t->away);
     a->out->face = a->box->face[f];
     for (int i = 0; i < 3; i++) {
         a->out->weight[i] = near.weight[i];
@@ -70,7 +72,7 @@ static void wait_for(around *a, uint64_t node)
 static void find_faces(around *a)
 {
     for (uint32_t visits = 0; a->queue.count > 0; visits++) {
-        if (visits >= EBPO_TOUCH_VISITS || a->count + EBPO_FACE_BOX_LEAF > EBPO_TOUCH_FACES) {
+        if (visits >= EBPO_TOUCH_VISITS || a->looked + EBPO_FACE_BOX_LEAF > EBPO_TOUCH_FACES) {
             a->out->flags |= EBPO_TOUCH_PARTLY;
             a->look = fmin(a->look, a->queue.item[0].key - a->t->options.radius);
             return;
@@ -128,6 +130,7 @@ void ebpo_touch_look(ebpo_touch *t, ebpo_touch_result *out)
         wait_for(&a, 1);
         find_faces(&a);
     }
+    out->work += a.looked;
     tell_normal(&a, out->normal);
     out->depth = -fmin(t->options.look, a.nearest - t->options.radius);
 }

@@ -2,6 +2,7 @@
 #include "geom/strict_fp.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "base/fp_env.h"
 #include "base/sized.h"
@@ -47,8 +48,7 @@ static bool stands(const ebpo_touch *t) { return t->walk.stage == EBPO_BALL_STAN
 
 /* Coulomb: the proxy, which slid from `from` without friction, follows only as far as the
  * tangential part of the spring is more than friction takes. */
-static uint32_t rub(ebpo_touch *t, const double from[3], const ebpo_held_planes *before,
-                    const double hand[3], ebpo_ball_work *work)
+static uint32_t rub(ebpo_touch *t, const double from[3], const double hand[3], ebpo_ball_work *work)
 {
     double slid[3], depth[3], goal[3];
     difference(t->proxy, from, slid);
@@ -62,8 +62,8 @@ static uint32_t rub(ebpo_touch *t, const double from[3], const ebpo_held_planes 
     t->way_count = 1;
     if (part > 0)
         return ebpo_touch_go(t, goal, work);
-    if (length > 0)
-        t->planes = *before; /* of where it is again */
+    if (length > 0 && memcmp(from, t->along_at, sizeof t->along_at) == 0)
+        t->planes = t->along; /* it is there again */
     return 0;
 }
 
@@ -77,6 +77,25 @@ static void find_depth(const ebpo_touch *t, const double hand[3], uint32_t flags
     difference(hand, t->proxy, want);
     (void)ebpo_hold_back(&t->planes, want, way);
     difference(way, want, out);
+}
+
+/* The way from hand to proxy is not quite along the faces' normals: by what the proxy has still to
+ * go, by rounding far from 0, and by friction, which puts it askew. Damping across that way may pull
+ * towards faces, and huge damping with all force: what does so is taken out, and the force no
+ * greater. What was touched first may be the edge of a face that the ball is beside, by next to
+ * nothing: so the nearest face counts, too. A face that the spring itself pulls to is another one of
+ * a narrow corner. */
+static void keep_from_faces(const ebpo_touch *t, bool near, const double depth[3], double force[3])
+{
+    ebpo_held_planes off = { .count = 0 };
+    double wanted[3];
+    if (near && dot(t->away, depth) >= 0)
+        ebpo_held_planes_add(&off, t->away);
+    for (int i = 0; i < t->planes.count; i++)
+        if (dot(t->planes.normal[i], depth) >= 0)
+            ebpo_held_planes_add(&off, t->planes.normal[i]);
+    copy(force, wanted);
+    (void)ebpo_hold_back(&off, wanted, force);
 }
 
 void ebpo_touch_count(ebpo_touch *t, uint32_t flags, uint64_t work)
@@ -94,7 +113,7 @@ void ebpo_touch_count(ebpo_touch *t, uint32_t flags, uint64_t work)
 void ebpo_touch_move(ebpo_touch *t, const double hand[3], ebpo_touch_result *out)
 {
     EBPO_DEFAULT_FP;
-    double at[3], from[3], moved[3];
+    double at[3], from[3], moved[3], along_at[3];
     bool astray = false;
     ebpo_ball_work work = { 0 };
     if (t->options.kind != EBPO_TOUCH_BALL) {
@@ -108,10 +127,14 @@ void ebpo_touch_move(ebpo_touch *t, const double hand[3], ebpo_touch_result *out
     difference(at, t->hand, moved);
     ebpo_passive_moved(&t->passive, t->force, moved, 3);
     copy(t->proxy, from);
-    ebpo_held_planes before = t->planes;
+    copy(t->along_at, along_at);
+    ebpo_held_planes along = t->along;
     uint32_t flags = ebpo_touch_go(t, at, &work);
-    if (t->touching && (flags & EBPO_TOUCH_CONTACT) && t->options.friction > 0 && stands(t))
-        flags |= rub(t, from, &before, at, &work);
+    if (t->touching && (flags & EBPO_TOUCH_CONTACT) && t->options.friction > 0 && stands(t)) {
+        t->along = along;
+        copy(along_at, t->along_at);
+        flags |= rub(t, from, at, &work);
+    }
     out->work = work.faces;
     out->flags |= flags;
     ebpo_touch_look(t, out);
@@ -121,6 +144,7 @@ void ebpo_touch_move(ebpo_touch *t, const double hand[3], ebpo_touch_result *out
         find_depth(t, at, flags, depth);
         ebpo_passive_push(&t->passive, t->options.damping / t->options.tick, depth, moved, 3,
                           out->force);
+        keep_from_faces(t, out->face != EBPO_NO_FACE, depth, out->force);
         out->depth = sqrt(dot(depth, depth));
     }
     copy(t->proxy, out->proxy);

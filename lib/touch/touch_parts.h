@@ -49,7 +49,8 @@ struct ebpo_touch {
     double proxy[3], hand[3], force[3];
     bool touching;
     ebpo_ball_walk walk;     /* the piece of way it is on */
-    ebpo_held_planes along;  /* what that goes along */
+    ebpo_held_planes along;  /* what the ball touches */
+    double along_at[3];      /* with its centre here */
     ebpo_held_planes planes; /* that hold the proxy: of the last piece that is done */
     uint32_t cut;            /* flags if the piece's end is reached */
     bool felt;               /* a piece is done that goes to where the hand is */
@@ -62,6 +63,7 @@ struct ebpo_touch {
     uint32_t found[EBPO_TOUCH_FACES];
     ebpo_near_node looking[EBPO_TOUCH_VISITS + 2];
     double gap[EBPO_TOUCH_FACES];
+    double away[3]; /* from the nearest face, if one was found */
     ebpo_context *asking; /* for places */
     ebpo_side side;
     unsigned answer; /* number of a known place */
@@ -106,7 +108,7 @@ bool ebpo_tool_set_out(ebpo_touch *t, const double way[6], uint32_t *flags);
 /* Goes on with it; bits of ebpo_touch_flag. */
 uint32_t ebpo_tool_go_on(ebpo_touch *t, uint64_t *work, bool *arrived);
 
-/* touch_around.c: nearest face, weights, depth and the smooth normal. */
+/* touch_around.c: nearest face, weights, depth and the smooth normal; t->away. */
 void ebpo_touch_look(ebpo_touch *t, ebpo_touch_result *out);
 
 /* touch_known.c: the loading thread asks about the place where a probe is. True: it has moved. */

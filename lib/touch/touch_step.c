@@ -5,6 +5,7 @@
 #include "geom/strict_fp.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "touch/touch_parts.h"
 #include "touch/vectors.h"
@@ -80,6 +81,11 @@ static bool keep_known(step *s)
     return true;
 }
 
+static bool differ(const double a[3], const double b[3])
+{
+    return a[0] != b[0] || a[1] != b[1] || a[2] != b[2];
+}
+
 /* The next piece. False: the proxy is where it stays. */
 static bool set_out(step *s)
 {
@@ -87,8 +93,12 @@ static bool set_out(step *s)
     ebpo_ball_walk *w = &t->walk;
     double want[3];
     (void)ebpo_touch_take_box(t);
+    if (memcmp(t->along_at, t->proxy, sizeof t->along_at) != 0)
+        t->along.count = 0;
     difference(s->goal, t->proxy, want);
     s->slack = ebpo_hold_back(&t->along, want, s->way);
+    if (differ(s->way, want))
+        s->flags |= EBPO_TOUCH_CONTACT;
     s->least_slack = 0x1p-44 * sqrt(dot(want, want));
     double whole = sqrt(dot(s->way, s->way));
     if (whole <= 0x1p-12 * t->options.skin)
@@ -110,29 +120,46 @@ static bool set_out(step *s)
     return true;
 }
 
+/* Of planes that hold back, three do: those along which the last way did not go make room. */
+static void make_room(ebpo_held_planes *along, const double way[3])
+{
+    double length = sqrt(dot(way, way));
+    int kept = 0;
+    for (int i = 0; i < along->count; i++)
+        if (dot(along->normal[i], way) <= 0x1p-30 * length)
+            copy(along->normal[i], along->normal[kept++]);
+    along->count = kept < EBPO_PLANES_MOST ? kept : kept - 1;
+}
+
+static void add_planes(ebpo_touch *t)
+{
+    const ebpo_ball_walk *w = &t->walk;
+    if (w->part > 0)
+        t->along.count = 0;
+    else if (t->along.count + w->met.count > EBPO_PLANES_MOST)
+        make_room(&t->along, w->way);
+    for (int i = 0; i < w->met.count; i++)
+        ebpo_held_planes_add(&t->along, w->met.normal[i]);
+    copy(t->proxy, t->along_at);
+}
+
 /* The proxy is at the piece's end. What the ball touches there is what it slides along; after a way,
  * only that. False: it touches nothing, and goes no farther in this tick. */
 static bool settle(step *s)
 {
     ebpo_touch *t = s->t;
     const ebpo_ball_walk *w = &t->walk;
+    bool touches = !w->cut && w->part < 1;
     if (w->part > 0) {
         copy(w->to, t->proxy);
         copy(w->to, t->way[t->way_count++]);
     }
-    t->felt = true;
-    if (w->cut || w->part >= 1) {
-        s->flags |= w->cut ? EBPO_TOUCH_SHORT : t->cut;
-        t->planes = t->along;
-        return false;
-    }
-    s->flags |= EBPO_TOUCH_CONTACT;
-    if (w->part > 0)
-        t->along.count = 0;
-    for (int i = 0; i < w->met.count && t->along.count < EBPO_PLANES_MOST; i++)
-        ebpo_held_planes_add(&t->along, w->met.normal[i]);
+    if (touches)
+        add_planes(t);
+    s->flags |= touches ? EBPO_TOUCH_CONTACT : w->cut ? EBPO_TOUCH_SHORT : t->cut;
     t->planes = t->along;
-    return t->along.count < EBPO_PLANES_MOST;
+    t->felt = true;
+    return touches;
 }
 
 /* Until more is known, what held the proxy holds it still. */
@@ -144,36 +171,41 @@ static uint32_t still_held(const step *s)
         return 0;
     difference(s->goal, t->proxy, want);
     (void)ebpo_hold_back(&t->planes, want, way);
-    bool held = way[0] != want[0] || way[1] != want[1] || way[2] != want[2];
-    return held ? EBPO_TOUCH_CONTACT : 0;
+    return differ(way, want) ? EBPO_TOUCH_CONTACT : 0;
 }
 
-/* A piece that was begun in another tick went to where the hand was then: when it is done, the way
- * to the hand begins anew. */
+static uint32_t go_by_pieces(step *s)
+{
+    ebpo_touch *t = s->t;
+    bool resumed = t->walk.stage != EBPO_BALL_STANDS;
+    for (int piece = 0; piece < EBPO_TOUCH_PIECES; piece++) {
+        if (t->walk.stage == EBPO_BALL_STANDS && !set_out(s))
+            return s->flags;
+        ebpo_ball_end end = ebpo_ball_go_on(&t->walk, s->work);
+        if (end == EBPO_BALL_LATER)
+            return s->flags | EBPO_TOUCH_SHORT | still_held(s);
+        if (end == EBPO_BALL_THROUGH)
+            return s->flags | EBPO_TOUCH_SHORT;
+        if (!settle(s)) {
+            if (!resumed)
+                return s->flags;
+            s->flags = 0; /* that was on the way to where the hand was */
+            t->felt = false;
+        }
+        resumed = false;
+    }
+    return s->flags | EBPO_TOUCH_SHORT;
+}
+
 uint32_t ebpo_touch_go(ebpo_touch *t, const double goal[3], ebpo_ball_work *work)
 {
     step s = { .t = t, .goal = goal, .work = work };
-    bool resumed = t->walk.stage != EBPO_BALL_STANDS;
+    double left[3];
     t->felt = false;
     t->way_count = 0;
     copy(t->proxy, t->way[t->way_count++]);
-    if (!resumed)
-        t->along.count = 0;
-    for (int piece = 0; piece < EBPO_TOUCH_PIECES; piece++) {
-        if (t->walk.stage == EBPO_BALL_STANDS && !set_out(&s))
-            return s.flags;
-        ebpo_ball_end end = ebpo_ball_go_on(&t->walk, work);
-        if (end == EBPO_BALL_LATER)
-            return s.flags | EBPO_TOUCH_SHORT | still_held(&s);
-        if (end == EBPO_BALL_THROUGH)
-            return s.flags | EBPO_TOUCH_SHORT;
-        if (!settle(&s) && !resumed)
-            return s.flags;
-        if (!resumed)
-            continue;
-        resumed = t->felt = false;
-        t->along.count = 0;
-        s.flags = 0;
-    }
-    return s.flags | EBPO_TOUCH_SHORT;
+    uint32_t flags = go_by_pieces(&s);
+    difference(goal, t->proxy, left);
+    bool there = sqrt(dot(left, left)) <= 0x1p-12 * t->options.skin;
+    return there ? flags & ~(uint32_t)EBPO_TOUCH_CONTACT : flags;
 }
