@@ -654,6 +654,31 @@ async function embeds(browser, address) {
   await page.close();
 }
 
+// Paint on one of two plates with a crack between them, whose ball meets the other: the picture has it where ebpo paint has it.
+async function paintsByReach(browser) {
+  const { plates } = await load('test/plates.js'), at = (name) => join(models, name);
+  plates(join(work, 'plates.ply'));
+  run(ebpo, ['convert', '-q', join(work, 'plates.ply'), at('plates.ebpo.h5')]);
+  run(ebpo, ['paint', at('plates.paint.h5'), at('plates.ebpo.h5'), '--new-layer', 'x', '--colour', 'ff0000', '--path', '-', '--radius', '0.4'], '-0.2 0.5 0.05\n');
+  const page = await show(browser, `${await serve()}?file=models/plates.ebpo.h5&paint=models/plates.paint.h5&view=0,0,1.6`);
+  await settled(page);
+  await page.waitForFunction(() => window.ebpoViewer.paint?.file.strokes.length === 1 && window.ebpoViewer.paint.pending === 0);
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+  // Red pixels of the canvas where x is below and above the crack, and the crack's column.
+  const [left, right] = await page.evaluate(() => {
+    const { scene, place } = window.ebpoViewer, canvas = document.getElementById('canvas'), gl = canvas.getContext('webgl2'), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight;
+    const pixels = new Uint8Array(4 * w * h), crack = scene.project([0, 0.5, 0.05].map((x, k) => (x - place.center[k]) * place.scale))[0] * w / canvas.clientWidth, sides = [0, 0];
+    gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    for (let i = 0; i < w * h; i++)
+      if (pixels[4 * i] > 80 && pixels[4 * i] > 2.5 * pixels[4 * i + 1])
+        sides[i % w < crack ? 0 : 1]++;
+    return sides;
+  });
+  assert.ok(left > 2000, `${left} red pixels on the painted plate`);
+  assert.ok(right < left / 100, `${right} red pixels on the other plate`);
+  await page.close();
+}
+
 // Two models and a scene: what is drawn where, what a click means, distances across models, what is hidden, the time, the address.
 async function together(browser, address) {
   const query = '?model=models/ring.ebpo.h5&model=models/red.ebpo.h5&pose=0,0,0&pose=2,0,0', at = (x, y) => ({ position: { x, y } });
@@ -772,6 +797,7 @@ async function main() {
   await step('an address says what is shown, and back goes back', () => shares(browser, address));
   await step('distances and sections are those of the faces', () => measures(browser, address));
   await step('what is painted is kept, and shown again', () => paints(browser, address));
+  await step('paint is seen on what hangs together with it', () => paintsByReach(browser));
   await step('several models and scenes are shown together', () => together(browser, address));
   const quiet = complaints.length;
   await step('the element and the three.js object work in a page of another origin', () => embeds(browser, address));

@@ -1,7 +1,8 @@
-// Reads, chooses and cuts, so that the page stays responsive. The page sends 'open', 'close', 'end', 'view', 'probe', 'places' and 'section'; it gets 'opened', 'located', 'tiles', 'loaded',
+// Reads, chooses and cuts, so that the page stays responsive. The page sends 'open', 'close', 'end', 'view', 'probe', 'places', 'reach' and 'section'; it gets 'opened', 'located', 'tiles', 'loaded',
 // 'probed', 'places', 'section', 'idle' and 'failed'. Several files may be open: `file` says about which one a message is, both ways; it is 0 where nothing is said.
 import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
 import { placesOf, sectionOf } from './answers.js';
+import { reachOf } from './reach.js';
 import { Cut } from './cut.js';
 import { fetchAfter, takeFirst } from './handover.js';
 import { GRAY, Tree, UrlSource, distanceInterval, growForQuestion, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo, sourceOf } from './reader/index.js';
@@ -196,7 +197,7 @@ async function answer(data, slot, mine) {
     await sectionOf(mine.file, mine.tree.lean(), data.axis, data.at, tell, over);
     return;
   }
-  const tree = (mine.asked ??= mine.tree.lean()), places = await placesOf(mine.file, tree, data.points);
+  const tree = (mine.asked ??= mine.tree.lean()), places = await (data.type === 'reach' ? reachOf : placesOf)(mine.file, tree, data.points);
   if ((mine.places = (mine.places ?? 0) + data.points.length) > PLACES_A_TREE)
     mine.asked = mine.places = undefined; // what it has gathered goes
   post(slot, { type: 'places', opening: mine.number, id: data.id, places });
@@ -245,7 +246,7 @@ async function heed(data, slot) {
       await current.pump();
   } else if (data.type === 'probe' && ready) {
     await current.probe(data.point);
-  } else if ((data.type === 'places' || data.type === 'section') && ready && data.opening === current.number) {
+  } else if (['places', 'reach', 'section'].includes(data.type) && ready && data.opening === current.number) {
     await answer(data, slot, current);
   }
 }

@@ -111,8 +111,9 @@ test('instances are where ebpo scene has them', { skip: process.env.EBPO_TOOL ? 
   const { vertices } = await (await openEbpo(readFileSync(model))).mesh();
   const mine = await read(scene);
   for (const time of [0, 0.7, 1.9, 4.2]) {
-    const { instances } = JSON.parse(execFileSync(process.env.EBPO_TOOL, ['scene', 'boxes', '--json', '--from', String(time), '--to', String(time), join(folder, 's.scene.json')], { encoding: 'utf8' }));
-    instances.forEach((theirs, i) => {
+    const { boxes } = JSON.parse(execFileSync(process.env.EBPO_TOOL, ['scene', 'boxes', '--json', '--from', String(time), '--to', String(time), join(folder, 's.scene.json')], { encoding: 'utf8' }));
+    assert.equal(boxes.length, mine.instances.length);
+    boxes.forEach((theirs, i) => {
       const pose = poseAt(mine.instances[i], time), low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
       for (let v = 0; v < vertices.length; v += 3)
         placed(pose, vertices.subarray(v, v + 3)).forEach((x, k) => {
