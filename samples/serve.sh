@@ -2,9 +2,9 @@
 # The viewer and models on this machine: serves them by nginx and prints the address. Ends with
 # Ctrl-C.
 #   serve.sh [--port N] [--folder DIR] [--log FILE] [--sources]
-# DIR holds .ebpo.h5 files (samples/out, which samples/quickstart.sh fills), and .paint.h5 files for
-# &paint=models/NAME.paint.h5. The page is bundled
-# anew each time; --sources serves it as it is written. Installs nothing and writes nothing outside
+# DIR holds .ebpo.h5 files (samples/out, which samples/quickstart.sh fills), .paint.h5 files for
+# &paint=models/NAME.paint.h5, and scenes (.scene.json) with their models, poses and folders. The
+# page is bundled anew each time; --sources serves it as it is written. Installs nothing and writes nothing outside
 # a temporary folder; what is missing is said.
 set -eu
 here=$(cd "$(dirname "$0")/.." && pwd)
@@ -52,10 +52,11 @@ if [ $bundle = yes ]; then
 else
     for file in "$viewer"/*; do ln -s "$file" "$work/www/"; done
 fi
-for file in "$folder"/*.ebpo.h5 "$folder"/*.paint.h5; do
-    [ ! -e "$file" ] || ln -s "$file" "$work/www/models/"
+for file in "$folder"/*.ebpo.h5 "$folder"/*.paint.h5 "$folder"/*.scene.json "$folder"/*.csv "$folder"/*/; do
+    [ ! -e "$file" ] || ln -s "${file%/}" "$work/www/models/"
 done
-node "$viewer/list.js" "$work"/www/models/*.ebpo.h5 >"$work/www/models/index.json" || {
+find -L "$work/www/models" -maxdepth 1 \( -name '*.ebpo.h5' -o -name '*.scene.json' \) \
+    -exec node "$viewer/list.js" {} + >"$work/www/models/index.json" || {
     echo "serve.sh: $folder: none of its files can be shown" >&2
     exit 1
 }

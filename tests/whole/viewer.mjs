@@ -594,12 +594,14 @@ async function embeds(browser, address) {
   const folder = join(work, 'project'), own = join(folder, 'node_modules/ebpo-viewer'), { build } = await load('node_modules/esbuild/lib/main.js');
   run('node', [join(viewer, 'package.mjs'), own]);
   symlinkSync(join(viewer, 'node_modules/three'), join(folder, 'node_modules/three'));
-  writeFileSync(join(folder, 'main.js'), `import 'ebpo-viewer'; import { EbpoModel } from 'ebpo-viewer/three'; import * as THREE from 'three';
+  writeFileSync(join(folder, 'main.js'), `import 'ebpo-viewer'; import { EbpoGroup } from 'ebpo-viewer/three'; import * as THREE from 'three';
     const renderer = new THREE.WebGLRenderer({ canvas: document.querySelector('canvas'), preserveDrawingBuffer: true }), scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(40,
       1, 0.01, 20);
-    const model = new EbpoModel(), draw = () => { model.update(camera, renderer); renderer.render(scene, camera); };
+    const group = new EbpoGroup({ triangles: 3000, workers: 1 }), model = group.make(), ring = group.make(), draw = () => { group.update(camera, renderer); renderer.render(scene, camera); };
     renderer.setSize(300, 300);
-    scene.add(model, new THREE.HemisphereLight('#fff', '#888', 3));
+    ring.position.set(-30, -18, -30);
+    ring.load('${address}models/ring.ebpo.h5').then(draw);
+    scene.add(group, new THREE.HemisphereLight('#fff', '#888', 3));
     model.addEventListener('change', draw);
     model.addEventListener('idle', () => (window.done = true));
     window.loaded = model.load('${address}models/red.ebpo.h5').then((info) => {
@@ -609,6 +611,7 @@ async function embeds(browser, address) {
       draw();
       return [info.face_count, min.toArray(), max.toArray()];
     });
+    window.shares = () => [group.crew.workers.length, model.triangles, ring.triangles];
     window.probe = () => model.probe(new THREE.Vector3(0.5, 0.5, 0.5));`);
   const { outputFiles: [main] } = await build({ entryPoints: [join(folder, 'main.js')], bundle: true, format: 'esm', write: false });
   const html = `<body style="margin:0;display:flex"><canvas></canvas>
@@ -630,6 +633,8 @@ async function embeds(browser, address) {
   assert.deepEqual([faces, low, high], [info.face_count, info.box_origin, info.box_origin.map((x, k) => x + info.box_size[k])]);
   const { where, distance } = await page.evaluate(() => window.probe());
   assert.deepEqual([where, distance], ['in', 0.5]);
+  await page.waitForFunction(() => window.shares()[2] < 2_000_000);
+  assert.deepEqual(await page.evaluate(() => window.shares()), [1, 24, 2976], 'what the box cannot use the ring gets, from the same worker');
   const [r, g, b] = await page.evaluate(() => { // the middle of the picture
     const gl = document.querySelector('canvas').getContext('webgl2'), pixel = new Uint8Array(4);
     gl.readPixels(gl.drawingBufferWidth / 2, gl.drawingBufferHeight / 2, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
@@ -647,6 +652,80 @@ async function embeds(browser, address) {
   await page.waitForFunction(() => window.heard.some(([name, detail]) => name === 'error' && /404/.test(detail.message)));
   await element.evaluate((e) => e.remove());
   await page.close();
+}
+
+// Paint on one of two plates with a crack between them, whose ball meets the other: the picture has it where ebpo paint has it.
+async function paintsByReach(browser) {
+  const { plates } = await load('test/plates.js'), at = (name) => join(models, name);
+  plates(join(work, 'plates.ply'));
+  run(ebpo, ['convert', '-q', join(work, 'plates.ply'), at('plates.ebpo.h5')]);
+  run(ebpo, ['paint', at('plates.paint.h5'), at('plates.ebpo.h5'), '--new-layer', 'x', '--colour', 'ff0000', '--path', '-', '--radius', '0.4'], '-0.2 0.5 0.05\n');
+  const page = await show(browser, `${await serve()}?file=models/plates.ebpo.h5&paint=models/plates.paint.h5&view=0,0,1.6`);
+  await settled(page);
+  await page.waitForFunction(() => window.ebpoViewer.paint?.file.strokes.length === 1 && window.ebpoViewer.paint.pending === 0);
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+  // Red pixels of the canvas where x is below and above the crack, and the crack's column.
+  const [left, right] = await page.evaluate(() => {
+    const { scene, place } = window.ebpoViewer, canvas = document.getElementById('canvas'), gl = canvas.getContext('webgl2'), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight;
+    const pixels = new Uint8Array(4 * w * h), crack = scene.project([0, 0.5, 0.05].map((x, k) => (x - place.center[k]) * place.scale))[0] * w / canvas.clientWidth, sides = [0, 0];
+    gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    for (let i = 0; i < w * h; i++)
+      if (pixels[4 * i] > 80 && pixels[4 * i] > 2.5 * pixels[4 * i + 1])
+        sides[i % w < crack ? 0 : 1]++;
+    return sides;
+  });
+  assert.ok(left > 2000, `${left} red pixels on the painted plate`);
+  assert.ok(right < left / 100, `${right} red pixels on the other plate`);
+  await page.close();
+}
+
+// Two models and a scene: what is drawn where, what a click means, distances across models, what is hidden, the time, the address.
+async function together(browser, address) {
+  const query = '?model=models/ring.ebpo.h5&model=models/red.ebpo.h5&pose=0,0,0&pose=2,0,0', at = (x, y) => ({ position: { x, y } });
+  const page = await show(browser, `${address}${query}`);
+  await settled(page);
+  const seen = () => page.evaluate(() => window.ebpoViewer.together.assembly.stats), all = await seen(), faces = (await openEbpo(readFileSync(model))).info.face_count;
+  assert.equal(all.meshTriangles, all.triangles);
+  assert.equal(all.triangles, faces + 12);
+  // Where points of the world are on the page.
+  const spot = (p) => page.evaluate((point) => {
+    const { scene, together: { assembly } } = window.ebpoViewer, s = assembly.scene;
+    return scene.project(point.map((x, k) => (x - s.center[k]) * s.scale));
+  }, p);
+  await page.mouse.click(...await spot([2.5, 0.5, 1])); // the middle of the red cube's front
+  await page.waitForFunction(() => document.getElementById('chosenWhere').textContent !== '');
+  assert.equal(await page.textContent('#chosenName'), 'red');
+  assert.match(await page.textContent('#chosenNote'), /to the nearest face; at 2\.5, 0\.5, 1$/);
+  // From a corner region of the cube to another of its places: 0.6 apart, in the world.
+  await page.keyboard.press('d');
+  for (const x of [2.2, 2.8])
+    await page.mouse.click(...await spot([x, 0.5, 1]));
+  await page.waitForSelector('#measures li');
+  assert.ok(Math.abs(Number.parseFloat(await page.textContent('#measures li')) - 0.6) < 0.02);
+  await page.keyboard.press('Escape');
+  const red = await look(page);
+  await page.locator('#models input[type=checkbox]').nth(1).uncheck();
+  await settled(page);
+  assert.ok((await look(page)).share < red.share, 'what is hidden is not seen');
+  await page.waitForFunction(() => location.search.includes('hide=red') && location.search.includes('measure='));
+  await page.goto(page.url());
+  await settled(page);
+  assert.deepEqual([await page.locator('#models input[type=checkbox]').nth(1).isChecked(), await page.locator('#measures li').count()], [false, 1]);
+  await page.close();
+
+  writeFileSync(join(models, 'move.scene.json'), JSON.stringify({ ebpo_scene: '1.0', title: 'Moving', models: { red: { file: 'red.ebpo.h5' } }, routes: { up: { keys: [{ time: 0, pose: {} },
+    { time: 4, pose: { translation: [0, 0, 8] } }] } }, instances: [0, 3, 6].map((x) => ({ name: `cube ${x}`, model: 'red', pose: { translation: [x, 0, 0] }, ...(x === 3 && { route: 'up' }) })) }));
+  const again = await serve(), scene = await show(browser, `${again}?scene=models/move.scene.json&time=1`);
+  await settled(scene);
+  assert.deepEqual(await scene.evaluate(() => window.ebpoViewer.together.assembly.inWorld(window.ebpoViewer.together.assembly.instances[1], [0, 0, 0])), [3, 0, 2]);
+  assert.deepEqual(await scene.evaluate(() => { const { models, stats } = window.ebpoViewer.together.assembly; return [models.length, models[0].shown.length, stats.triangles, stats.requests]; }), [1, 3, 36, 1]);
+  await scene.locator('#time').fill('500');
+  await scene.waitForFunction(() => location.search.includes('time=2.000'));
+  await scene.close();
+  const wrong = await show(browser, `${again}?scene=models/index.json`);
+  await wrong.waitForSelector('#error', { state: 'visible' });
+  assert.match(await wrong.textContent('#errorWhat'), /index\.json: the scene: is not an object/);
+  await wrong.close();
 }
 
 // From disk a page has no worker: it says so.
@@ -718,6 +797,8 @@ async function main() {
   await step('an address says what is shown, and back goes back', () => shares(browser, address));
   await step('distances and sections are those of the faces', () => measures(browser, address));
   await step('what is painted is kept, and shown again', () => paints(browser, address));
+  await step('paint is seen on what hangs together with it', () => paintsByReach(browser));
+  await step('several models and scenes are shown together', () => together(browser, address));
   const quiet = complaints.length;
   await step('the element and the three.js object work in a page of another origin', () => embeds(browser, address));
   complaints.length = quiet; // the browser logs the 404

@@ -136,21 +136,23 @@ static void print_done(const paint_job *j)
 {
     const ebpo_paint_laid *l = &j->laid;
     const ebpo_paint_baked *b = &j->baked;
+    char points[40], strokes[40], steps[40], vertices[40];
     if (j->v->path)
-        printf("  laid       %llu points in %llu strokes, at %llu steps; lifted at %llu, strayed "
-               "%llu\n",
-               (unsigned long long)l->points, (unsigned long long)l->strokes,
-               (unsigned long long)l->steps, (unsigned long long)l->lifted,
-               (unsigned long long)l->strayed);
+        printf("  laid       %s in %s, at %s; lifted at %llu, strayed %llu\n",
+               words_plural(points, sizeof points, l->points, "point", "points"),
+               words_plural(strokes, sizeof strokes, l->strokes, "stroke", "strokes"),
+               words_plural(steps, sizeof steps, l->steps, "step", "steps"),
+               (unsigned long long)l->lifted, (unsigned long long)l->strayed);
     if (j->v->bake)
-        printf("  baked      %llu vertices of %llu; of %llu points %llu cover no vertex\n",
-               (unsigned long long)b->vertices,
+        printf("  baked      %s of %llu; of %s %llu cover no vertex\n",
+               words_plural(vertices, sizeof vertices, b->vertices, "vertex", "vertices"),
                (unsigned long long)ebpo_file_info(j->file)->vertex_count,
-               (unsigned long long)b->points, (unsigned long long)b->between);
+               words_plural(points, sizeof points, b->points, "point", "points"),
+               (unsigned long long)b->between);
     uint64_t elsewhere = j->v->bake ? b->elsewhere : j->v->area ? j->areas.elsewhere : 0;
     if (elsewhere)
-        printf("  elsewhere  %llu points, on faces that this subset does not have\n",
-               (unsigned long long)elsewhere);
+        printf("  elsewhere  %s, on faces that this subset does not have\n",
+               words_plural(points, sizeof points, elsewhere, "point", "points"));
 }
 
 static void print_all(const paint_job *j, const ebpo_paint_info *info, const counts *c)

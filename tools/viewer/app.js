@@ -62,7 +62,29 @@ function openFile(file, { step = true } = {}) {
   open(file, file.name);
 }
 
+// Several models or a scene: a page of another kind, until it is left.
+async function openTogether(asked) {
+  try {
+    const together = await import('./together.js');
+    await together.begin({ scene, layout }, await asked(together));
+  } catch (error) {
+    showOpening();
+    showError(error);
+  }
+}
+
+function openFiles(files) {
+  if (files.length > 1)
+    openTogether(({ ofFiles }) => ofFiles([...files]));
+  else if (files.length)
+    openFile(files[0]);
+}
+
 function close({ step = true } = {}) {
+  if (state.together) {
+    location.assign(location.pathname);
+    return;
+  }
   if (step)
     went();
   state.opening++;
@@ -183,6 +205,10 @@ function retry() {
 }
 
 function cameraMoved() {
+  if (state.together) {
+    state.together.moved();
+    return;
+  }
   timer ??= setTimeout(ask, 90);
   changed();
 }
@@ -299,7 +325,7 @@ $('openForm').onsubmit = (e) => {
   if ($('url').value.trim())
     openUrl($('url').value.trim());
 };
-$('file').onchange = () => $('file').files[0] && openFile($('file').files[0]);
+$('file').onchange = () => openFiles($('file').files);
 $('close').onclick = close;
 $('stallRetry').onclick = () => worker.postMessage({ type: 'retry' });
 $('errorClose').onclick = () => showError();
@@ -325,7 +351,7 @@ $('clipFlip').onclick = () => {
 };
 $('toolHome').onclick = () => {
   home();
-  changed();
+  (state.together ?? { changed }).changed();
 };
 $('toolTheme').onclick = () => setTheme(document.documentElement.dataset.theme === 'light' ? 'dark' : 'light');
 $('toolPanel').onclick = () => {
@@ -340,7 +366,7 @@ $('canvas').addEventListener('pointerup', (e) => {
     return;
   const point = scene.pick(e.clientX, e.clientY);
   if (point)
-    (state.clicked ?? probeAt)(toModel(point)); // a tool may want the point
+    (state.clicked ?? ((p) => (state.together ? state.together.clicked(p) : probeAt(p))))(toModel(point)); // a tool may want the point
 });
 
 addEventListener('dragover', (e) => {
@@ -354,9 +380,11 @@ addEventListener('dragleave', (e) => {
 addEventListener('drop', (e) => {
   e.preventDefault();
   $('dropHint').hidden = true;
-  const file = e.dataTransfer.files[0], text = e.dataTransfer.getData('text/uri-list');
-  if (file)
-    openFile(file);
+  const { files } = e.dataTransfer, text = e.dataTransfer.getData('text/uri-list');
+  if (state.together)
+    showError({ message: 'several models are shown here; go back to the first page to open others' });
+  else if (files.length)
+    openFiles(files);
   else if (text)
     openUrl(text);
 });
@@ -385,6 +413,9 @@ const KEYS = {
 // In the picture arrows turn (with Shift they move), and + and - go nearer and farther.
 const STEER = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, 1], arrowdown: [0, -1], '+': 0.8, '=': 0.8, '-': 1.25 };
 
+// With several models there is no level to choose, and no clipping plane.
+const TOGETHER_KEYS = ['g', 'm', 'k', 'f', 't', 'p', '?', 'o'];
+
 addEventListener('keydown', (e) => {
   const writes = e.target.matches('input:not([type=range]):not([type=radio]):not([type=checkbox]), select, textarea');
   if (e.ctrlKey || e.metaKey || e.altKey || document.querySelector('dialog[open]') || (writes && e.key !== 'Escape'))
@@ -393,7 +424,12 @@ addEventListener('keydown', (e) => {
   if (!state.info && !['t', '?'].includes(key))
     return;
   const steer = e.target === $('canvas') ? STEER[key] : undefined;
-  if (!steer && !KEYS[key]) {
+  if (state.together && key === 'escape') {
+    tell('escape');
+    showError();
+    return;
+  }
+  if (!steer && (!KEYS[key] || (state.together && !TOGETHER_KEYS.includes(key)))) {
     tell('key', e);
     return;
   }
@@ -407,6 +443,10 @@ addEventListener('keydown', (e) => {
 // --- the history ---
 
 addEventListener('popstate', (e) => {
+  if (state.together) {
+    location.reload();
+    return;
+  }
   const query = new URLSearchParams(location.search), what = whereTo(query, e.state);
   if (what === undefined)
     close({ step: false });
@@ -438,7 +478,9 @@ if (!$('detail').value)
   $('detail').value = 'auto';
 if (query.has('samples'))
   listSamples(query.get('samples'), openUrl).catch((e) => showError({ message: `${query.get('samples')}: the list of samples cannot be read (${e.message}); check the address` }));
-if (query.has('file'))
+if (query.has('scene') || query.has('model'))
+  openTogether(({ wanted }) => wanted(query, location.href));
+else if (query.has('file'))
   openUrl(query.get('file'), { begun: boot.opening === 1, step: false });
 boot.over();
 boot.said.splice(0).forEach((data) => worker.onmessage({ data }));
@@ -448,14 +490,18 @@ window.ebpoViewer = {
   get state() {
     return { idle: state.idle, depth: state.depth, stats: state.stats, traffic: state.traffic, timeline: state.timeline, shownAfter: state.shownAfter, probe: state.probe,
       error: state.error, line: state.line,
-      levels: state.info?.levels.length, walls: scene.walls, calls: state.calls };
+      levels: state.info?.levels.length, walls: scene.walls, calls: state.calls, box: state.box, measured: state.measured };
   },
   get place() {
     return state.scene;
+  },
+  get together() {
+    return state.together;
   },
   scene, probeAt, address,
 };
 
 // more.js is bundled apart from this, and must not bring these along a second time.
 export { kit } from './scene.js';
+export * from './shade.js';
 export * from './state.js';

@@ -1,5 +1,5 @@
-// node bundle.mjs FOLDER: the page in six files and an icon: index.html with its style and boot.js, app.js with three.js, worker.js with the reader and zstd, and what the page loads
-// when its picture is there, more.js and more.css; smaller, and each again with .gz behind its name for servers that send such (nginx: gzip_static). Writes FOLDER, nothing else.
+// node bundle.mjs FOLDER: the page in seven files and an icon: index.html with its style and boot.js, app.js with three.js, worker.js with the reader and zstd, and what the page loads
+// when its picture is there, more.js and more.css, or for several models together.js; smaller, and each again with .gz behind its name for servers that send such (nginx: gzip_static). Writes FOLDER, nothing else.
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { gzipSync } from 'node:zlib';
@@ -24,10 +24,10 @@ page = replace(page, /<script type="importmap">[^]*?<\/script>\n/.exec(page)[0],
 
 const common = { outdir: folder, bundle: true, minify: true, format: 'esm', target: TARGET, legalComments: 'eof', write: false, logLevel: 'warning' };
 // What comes later takes from app.js what that has already: another copy would be another page's state, and another three.js.
-const fromApp = { name: 'from-app', setup: ({ onResolve }) => onResolve({ filter: /\/(state|scene)\.js$/ }, () => ({ path: './app.js', external: true })) };
+const fromApp = { name: 'from-app', setup: ({ onResolve }) => onResolve({ filter: /\/(state|scene|shade)\.js$/ }, () => ({ path: './app.js', external: true })) };
 const built = await Promise.all([
-  build({ ...common, entryPoints: ['app.js', 'worker.js'].map((name) => join(here, name)), external: ['./more.js', 'node:*'] }),
-  build({ ...common, entryPoints: ['more.js', 'more.css'].map((name) => join(here, name)), plugins: [fromApp], external: ['node:*'] }),
+  build({ ...common, entryPoints: ['app.js', 'worker.js'].map((name) => join(here, name)), external: ['./more.js', './together.js', 'node:*'] }),
+  build({ ...common, entryPoints: ['more.js', 'together.js', 'more.css'].map((name) => join(here, name)), plugins: [fromApp], external: ['node:*'] }),
 ]);
 const files = new Map([['index.html', Buffer.from(page)], ['icon.svg', Buffer.from(read('icon.svg'))],
   ...built.flatMap(({ outputFiles }) => outputFiles).map((f) => [f.path.slice(f.path.lastIndexOf('/') + 1), Buffer.from(f.contents)])]);

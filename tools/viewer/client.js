@@ -12,16 +12,54 @@ function start(address) {
 }
 
 const AHEAD = 1 << 20;    // bytes of the first request: small models come whole
+const WORKERS_MOST = 4;   // of a crew, unless it is told otherwise
 const PATIENCE_MS = 90;   // at most so often the worker hears of the camera
 
+/** Some workers for many files: each file goes to the worker that has fewest. */
+export class Crew {
+  /** `worker`: the address of worker.js, or undefined for the one that lies beside this file; `most`: how many workers. */
+  constructor({ worker = WORKER, most = Math.max(1, Math.min(WORKERS_MOST, (navigator.hardwareConcurrency ?? 2) - 1)) } = {}) {
+    Object.assign(this, { address: worker, most });
+    this.workers = []; // { worker, members: Map by the number of the file }
+    this.files = 0;
+  }
+
+  /** For one file more: `heard(message)`, `failed(error)`. Returns { post(message, transfer), leave() }. */
+  join({ heard, failed }) {
+    const file = this.files++, fewest = () => this.workers.reduce((a, b) => (b.members.size < a.members.size ? b : a));
+    const own = this.workers.length < this.most ? this.#another() : fewest();
+    own.members.set(file, { heard, failed });
+    return {
+      post: (message, transfer = []) => own.worker.postMessage({ file, ...message }, transfer),
+      leave: () => {
+        own.members.delete(file);
+        if (own.members.size) {
+          own.worker.postMessage({ file, type: 'end' });
+          return;
+        }
+        own.worker.terminate();
+        this.workers.splice(this.workers.indexOf(own), 1);
+      },
+    };
+  }
+
+  #another() {
+    const own = { worker: start(this.address), members: new Map() };
+    own.worker.onmessage = ({ data }) => own.members.get(data.file)?.heard(data);
+    own.worker.onerror = (e) => [...own.members.values()].forEach(({ failed }) => failed({ code: 'FAULT',
+      message: `${this.address}: the worker failed (${e.message ?? 'it could not be loaded'}); give the address of worker.js` }));
+    this.workers.push(own);
+    return own;
+  }
+}
+
 export class Client {
-  /** `worker`: the address of worker.js, or undefined for the one that lies beside this file. `heard(type, news)` gets tiles, idle, line, failed, loaded, located. */
-  constructor({ worker = WORKER, heard }) {
-    this.worker = start(worker);
+  /** `worker`: as of a Crew, for a worker of its own; or `crew`, to share some. `heard(type, news)` gets tiles, idle, line, failed, loaded, located. */
+  constructor({ worker, crew = new Crew({ worker, most: 1 }), heard }) {
     this.heard = heard;
-    this.opening = this.want = 0;
-    this.worker.onmessage = ({ data }) => this.#hear(data);
-    this.worker.onerror = (e) => this.#failed({ code: 'FAULT', message: `${worker}: the worker failed (${e.message ?? 'it could not be loaded'}); give the address of worker.js` });
+    this.opening = this.want = this.asks = 0;
+    this.waiting = new Map(); // of questions about places, by their numbers
+    this.worker = crew.join({ heard: (data) => this.#hear(data), failed: (error) => this.#failed(error) });
   }
 
   #hear(data) {
@@ -36,6 +74,9 @@ export class Client {
     } else if (data.type === 'probed') {
       if (data.done)
         this.asked?.done(data);
+    } else if (data.type === 'places') {
+      this.waiting.get(data.id)?.done(data.places);
+      this.waiting.delete(data.id);
     } else if (data.type === 'failed') {
       this.#failed(data.error);
       return;
@@ -48,52 +89,77 @@ export class Client {
     const waiting = this.opened ?? this.asked;
     this.opened = this.asked = undefined;
     waiting?.fail(problem);
+    this.#forget(problem);
     this.heard('failed', { error: problem });
   }
 
-  /** An address, a File or a Blob. Resolves when its head is there: { info, scene: { center, scale }, size }. */
-  open(what) {
-    this.opened?.fail(new DOMException('another file was opened', 'AbortError'));
+  // Questions that get no answer any more.
+  #forget(problem) {
+    this.waiting.forEach(({ fail }) => fail(problem));
+    this.waiting.clear();
+  }
+
+  /** An address, a File or a Blob; `ahead`: bytes of the first request, `cacheBytes`: of decoded chunks that are kept. Resolves when its head is there: { info, scene: { center, scale }, size }. */
+  open(what, { ahead = AHEAD, cacheBytes } = {}) {
+    const over = new DOMException('another file was opened', 'AbortError');
+    this.opened?.fail(over);
+    this.#forget(over);
     this.info = this.sent = undefined;
     const url = typeof what === 'string' || what instanceof URL ? new URL(what, document.baseURI).href : what;
     const promise = new Promise((done, fail) => (this.opened = { done, fail }));
-    this.worker.postMessage({ type: 'open', opening: ++this.opening, what: url, ahead: AHEAD });
+    this.worker.post({ type: 'open', opening: ++this.opening, what: url, ahead, cacheBytes });
     return promise;
   }
 
   close() {
-    this.opened?.fail(new DOMException('the file was closed', 'AbortError'));
+    const over = new DOMException('the file was closed', 'AbortError');
+    this.opened?.fail(over);
+    this.#forget(over);
     this.opened = this.info = undefined;
-    this.worker.postMessage({ type: 'close', opening: ++this.opening });
+    this.worker.post({ type: 'close', opening: ++this.opening });
   }
 
-  /** What is seen (lookOf() of shade.js) and wanted: { level, mesh, pixels, triangles, black, lines, cells }. Told to the worker if it is new, and not too often. */
+  /** What is seen (lookOf() of shade.js) and wanted: { level, mesh, pixels, triangles, black, lines, cells }. Told to the worker if it is new, and not too often; says whether it was. */
   look(view, wanted) {
     const text = JSON.stringify([view, wanted]);
     if (text === this.sent)
-      return;
+      return false;
     this.sent = text;
     this.next = { view, wanted };
     this.timer ??= setTimeout(() => {
       this.timer = undefined;
-      this.worker.postMessage({ type: 'view', view: this.next.view, want: { number: ++this.want, ...this.next.wanted } });
+      this.worker.post({ type: 'view', view: this.next.view, want: { number: ++this.want, ...this.next.wanted } });
     }, PATIENCE_MS);
+    return true;
+  }
+
+  /** Whether the worker has not heard yet of what is seen now. */
+  get pending() {
+    return this.timer !== undefined;
   }
 
   /** About a point of the model: { where, distance, nearest, lo, hi, exact, depth, ... }. An answer that another question overtakes never comes: AbortError. */
   probe(point) {
     this.asked?.fail(new DOMException('another point was asked about', 'AbortError'));
     const promise = new Promise((done, fail) => (this.asked = { done, fail }));
-    this.worker.postMessage({ type: 'probe', opening: this.opening, point });
+    this.worker.post({ type: 'probe', opening: this.opening, point });
+    return promise;
+  }
+
+  /** The nearest places on the faces to some points of the model: [{ face, weights, place, normal, distance }]. */
+  places(points) {
+    const id = ++this.asks, promise = new Promise((done, fail) => this.waiting.set(id, { done, fail }));
+    this.worker.post({ type: 'places', opening: this.opening, id, points });
     return promise;
   }
 
   retry() {
-    this.worker.postMessage({ type: 'retry' });
+    this.worker.post({ type: 'retry' });
   }
 
   end() {
     clearTimeout(this.timer);
-    this.worker.terminate();
+    this.#forget(new DOMException('the model was given up', 'AbortError'));
+    this.worker.leave();
   }
 }

@@ -5,14 +5,18 @@ const SIDES = [['+X', 'right', 90, 0], ['−X', 'left', -90, 0], ['+Y', 'top', 0
 const TURNS = ['rotateY(90deg)', 'rotateY(-90deg)', 'rotateX(90deg)', 'rotateX(-90deg)', '', 'rotateY(180deg)'];
 const BAR_PIXELS = [60, 160]; // least and most
 
-export function addCompass({ scene, changed }) {
+// Where z is upwards the picture's y is z, and its z is -y.
+const AXES = { '+Y': '+Z', '−Y': '−Z', '+Z': '−Y', '−Z': '+Y' };
+
+/** `up`: 2 if the model's z is upwards. */
+export function addCompass({ scene, changed, up }) {
   const box = document.createElement('div'), cube = document.createElement('div'), scale = document.createElement('div');
   box.id = 'compass';
   scale.id = 'scale';
   scale.innerHTML = '<i></i><span></span>';
   scale.title = 'A length at the distance of what is looked at';
-  SIDES.forEach(([text, from, azimuth, height], i) => {
-    const b = document.createElement('button');
+  SIDES.forEach(([side, from, azimuth, height], i) => {
+    const b = document.createElement('button'), text = (up === 2 && AXES[side]) || side;
     b.textContent = text;
     b.ariaLabel = `View from ${text.replace('−', 'minus ').replace('+', 'plus ')} (${from})`;
     b.style.transform = `${TURNS[i]} translateZ(26px)`;

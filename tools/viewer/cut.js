@@ -89,8 +89,19 @@ export class Cut {
     return { low: this.low.map((l, k) => l + 2 * node.at[k] * h[k]), size: h.map((x) => 2 * x) };
   }
 
-  // Projected size of the node's cell in pixels; what is out of sight counts a tenth, and `unseen` says that it was.
+  // Projected size of the node's cell in pixels, the largest of all views; `unseen` says that it is out of sight in each.
   #pixels(node, view) {
+    let px = this.#pixelsOf(node, view), { unseen } = this;
+    for (const other of view.also ?? []) {
+      px = Math.max(px, this.#pixelsOf(node, other));
+      unseen &&= this.unseen;
+    }
+    this.unseen = unseen;
+    return px;
+  }
+
+  // In one view; what is out of sight counts a tenth.
+  #pixelsOf(node, view) {
     this.unseen = false;
     const h = this.half[node.level];
     let near = 0, c, d;
@@ -112,7 +123,8 @@ export class Cut {
   }
 
   /**
-   * One pass. `view`: { eye, planes, pixels } in scene coordinates, `pixels` those of a length 1 at distance 1. `want`: { level (deepest), mesh
+   * One pass. `view`: { eye, planes, pixels, also } in scene coordinates, `pixels` those of a length 1 at distance 1, `also` other such views at the same time: of a
+   * model that is in the picture several times. `want`: { level (deepest), mesh
    * (real faces in leaves), pixels (cells are refined until they are smaller), triangles (at most about), black (draw black nodes), lines, cells }.
    * Returns { set: [tile], removed: [key], more, deeper, missing, leaves, stats }: `more`: another pass would refine further; `deeper`: nodes are
    * missing: those below `missing`, [{ node, levels }], most important first, so many levels of them; `leaves`: leaves whose faces are missing, likewise.
@@ -247,7 +259,7 @@ export class Cut {
           offer(child);
     }
     out.levels = Array.from(out.levels, (n) => n ?? 0);
-    if (!this.small && !out.more && want.pixels > 0 && (out.missing.length || groups.size))
+    if (!this.small && !out.more && want.pixels > 0 && !view.also?.length && (out.missing.length || groups.size))
       this.#leaveHidden(view, out, groups);
     return Object.assign(out, whole ?? { leaves: this.#leavesToFetch(groups, want) });
   }

@@ -1,4 +1,4 @@
-// node list.js FILE ...: a list of files for the viewer's first page (?samples=), as JSON. Files that
+// node list.js FILE ...: a list of files, and scenes (.scene.json), for the viewer's first page (?samples=), as JSON. Files that
 // cannot be read are left out, which is said; if no other is there, the exit code is 1.
 import { promises as fs } from 'node:fs';
 import { basename } from 'node:path';
@@ -17,10 +17,18 @@ async function headOf(path) {
   }
 }
 
+// A scene's own words; its models are looked at when it is opened.
+async function sceneOf(path) {
+  const scene = JSON.parse(await fs.readFile(path, 'utf8'));
+  if (typeof scene.ebpo_scene !== 'string')
+    throw new Error('this is no scene; it has no member ebpo_scene');
+  return { name: typeof scene.title === 'string' && scene.title ? scene.title : basename(path, '.scene.json'), scene: basename(path), instances: scene.instances?.length ?? 0 };
+}
+
 const list = [];
-for (const path of process.argv.slice(2)) {
+for (const path of process.argv.slice(2).sort()) {
   try {
-    list.push(await headOf(path));
+    list.push(await (path.endsWith('.scene.json') ? sceneOf : headOf)(path));
   } catch (error) {
     console.error(`list.js: left out: ${basename(path)}: ${error.message.replace(`${path}: `, '')}`);
   }

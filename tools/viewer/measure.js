@@ -2,27 +2,35 @@
 import { complain, make, mark, modelName, placesOf, save, section, svg, take, taken } from './parts.js';
 import { $, length, on, state, toScene } from './state.js';
 
-const HTML = `
-  <div class="row"><button id="measureOn" class="small" aria-pressed="false" title="Click points one after the other (D)">Distance</button>
-    <button id="measureClear" class="small" hidden>Clear</button></div>
-  <p class="hint" id="measureHint">Points are put on the nearest faces; on a section they stay where they are clicked.</p>
-  <ol id="measures" class="list"></ol>
+const SECTIONS = `
   <div class="row"><button id="sectionOn" class="small">Area and outline of the section</button></div>
   <div id="sectionAnswer" hidden><div class="answer"><strong id="sectionArea"></strong><span id="sectionNote"></span></div><canvas id="sectionPicture" width="528" height="360"></canvas>
     <div class="row"><button id="sectionSvg" class="small">Save as SVG</button><button id="sectionCsv" class="small">Save as CSV</button></div></div>`;
 
 const between = (a, b) => Math.hypot(...a.map((x, k) => x - b[k]));
 
+const DISTANCES = `
+  <div class="row"><button id="measureOn" class="small" aria-pressed="false" title="Click points one after the other (D)">Distance</button>
+    <button id="measureClear" class="small" hidden>Clear</button></div>
+  <p class="hint" id="measureHint">Points are put on the nearest faces; on a section they stay where they are clicked.</p>
+  <ol id="measures" class="list"></ol>`;
+
+/** Distances only, as several models have them. `placeOf(point)` gives (a promise of) the place on a face that is meant by a point which was clicked. */
+export function addDistances(page) {
+  distances(page, section('Measure', DISTANCES));
+}
+
 export function addMeasuring(page) {
-  const details = section('Measure', HTML);
-  distances(page, details);
+  const { worker, scene } = page, details = section('Measure', DISTANCES + SECTIONS);
+  const placeOf = async (point) => (state.info.parts.has('mesh') && !scene.pickedCut ? (await placesOf(worker, [point]))[0].place : point);
+  distances({ ...page, placeOf }, details);
   sections(page);
   on('theme', () => $('sectionAnswer').hidden || drawOutline());
 }
 
 // --- distances ---
 
-function distances({ scene, worker, changed }, details) {
+function distances({ placeOf, changed }, details) {
   let shown = [];
   const show = () => {
     shown.forEach((remove) => remove());
@@ -46,9 +54,9 @@ function distances({ scene, worker, changed }, details) {
     changed();
   };
   const click = async (point) => {
-    const { opening } = state, onFaces = state.info.parts.has('mesh') && !scene.pickedCut;
+    const { opening } = state;
     try {
-      const place = onFaces ? (await placesOf(worker, [point]))[0].place : point;
+      const place = await placeOf(point);
       if (opening === state.opening) {
         state.measured = [...(state.measured ?? []), place];
         show();

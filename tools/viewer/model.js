@@ -1,7 +1,8 @@
 // A model in somebody's own three.js scene: an Object3D that is finer where the camera looks. Its coordinates are the file's.
 import { Box3, DoubleSide, Group, MeshStandardMaterial, Object3D, Vector3 } from 'three';
-import { Client } from './client.js';
+import { Client, Crew } from './client.js';
 import { NO_HUE, Tiles, lookOf, makeLook, setCut } from './shade.js';
+import { sharesOf, weightOf } from './together/budget.js';
 
 const TRIANGLES_MOST = 2_000_000, PIXELS = 12;
 
@@ -44,12 +45,14 @@ export function standardMaterial(parameters = {}, { low, high, clipping, own } =
   return material;
 }
 
+const heightOf = (renderer) => (typeof renderer === 'number' ? renderer : renderer.domElement.clientHeight);
+
 export class EbpoModel extends Object3D {
   /**
    * Options, all of which may be left out: `worker`, the address of worker.js; `material`, 'standard' (the scene's lights), 'viewer' (as the viewer's page
-   * draws) or one of standardMaterial(); `detail`, `level`, `mesh`, `triangles`: as the members of these names.
+   * draws) or one of standardMaterial(); `crew`, workers shared with other models (EbpoGroup has one); `detail`, `level`, `mesh`, `triangles`: as the members of these names.
    */
-  constructor({ worker, material = 'standard', detail = PIXELS, level = Infinity, mesh = true, triangles = TRIANGLES_MOST } = {}) {
+  constructor({ worker, crew, material = 'standard', detail = PIXELS, level = Infinity, mesh = true, triangles = TRIANGLES_MOST } = {}) {
     super();
     this.type = 'EbpoModel';
     Object.assign(this, { detail, level, mesh, triangles });
@@ -61,7 +64,7 @@ export class EbpoModel extends Object3D {
     if (material !== 'viewer')
       this.look.faces = material === 'standard' ? standardMaterial({}, this.look.uniforms) : material;
     this.tiles = new Tiles(this.content, this.look);
-    this.client = new Client({ worker, heard: (type, news) => this.#hear(type, news) });
+    this.client = new Client({ worker, crew, heard: (type, news) => this.#hear(type, news) });
   }
 
   get material() {
@@ -105,7 +108,7 @@ export class EbpoModel extends Object3D {
     if (!this.info)
       return;
     this.updateWorldMatrix(true, true);
-    const height = typeof renderer === 'number' ? renderer : renderer.domElement.clientHeight, { level, mesh, detail, triangles, info } = this;
+    const height = heightOf(renderer), { level, mesh, detail, triangles, info } = this;
     const faces = mesh && level >= info.level_count && info.parts.has('mesh');
     this.client.look(lookOf(camera, height, this.content.matrixWorld),
       { level: Math.min(level, 99), mesh: faces, pixels: detail, triangles: detail === 0 ? Infinity : triangles, black: this.cut !== undefined, lines: false, cells: false });
@@ -135,5 +138,46 @@ export class EbpoModel extends Object3D {
     this.client.end();
     this.tiles.clear();
     [this.look.faces, this.look.wire, this.look.cells].forEach((material) => material.dispose());
+  }
+}
+
+/** Several models that share workers and a budget of triangles: each has as much of it as it may fill of the picture. Where they are is up to you. */
+export class EbpoGroup extends Group {
+  /** `triangles`: of all models together, about; `worker`: the address of worker.js; `workers`: how many at most. */
+  constructor({ triangles = TRIANGLES_MOST, worker, workers } = {}) {
+    super();
+    this.type = 'EbpoGroup';
+    this.triangles = triangles;
+    this.crew = new Crew({ ...(worker && { worker }), ...(workers && { most: workers }) });
+  }
+
+  /** A new EbpoModel in this group; options as its constructor's. */
+  make(options = {}) {
+    const model = new EbpoModel({ ...options, crew: this.crew });
+    this.add(model);
+    return model;
+  }
+
+  get models() {
+    return this.children.filter((child) => child instanceof EbpoModel);
+  }
+
+  /** To be called before each frame, in place of the models' own update(): shares the budget among those that are seen, then tells each. */
+  update(camera, renderer) {
+    this.updateWorldMatrix(true, true);
+    const height = heightOf(renderer), models = this.models.filter((model) => model.info && model.visible);
+    const shares = sharesOf(this.triangles, models.map(({ content, info }) => ({ weight: weightOf(lookOf(camera, height, content.matrixWorld)), copies: 1, faces: 2 * info.face_count })));
+    models.forEach((model, i) => {
+      model.triangles = shares[i];
+      model.update(camera, height);
+    });
+  }
+
+  /** Ends all models, and their workers. */
+  dispose() {
+    this.models.forEach((model) => {
+      this.remove(model);
+      model.dispose();
+    });
   }
 }

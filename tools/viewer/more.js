@@ -7,13 +7,9 @@ import { markOn } from './parts.js';
 import { Pipeline } from './pipeline.js';
 import { kit } from './scene.js';
 import { addSectionBox } from './section_box.js';
+import { addShading, styled } from './shading.js';
 import { addSharing } from './sharebox.js';
 import { $, on, state } from './state.js';
-
-const styled = () => new Promise((done) => {
-  const link = Object.assign(document.createElement('link'), { rel: 'stylesheet', href: new URL('more.css', import.meta.url).href, onload: done, onerror: done });
-  document.head.append(link);
-});
 
 export async function begin(page) {
   await styled();
@@ -25,23 +21,12 @@ export async function begin(page) {
   const pipeline = scene.pipeline = new Pipeline(kit), pen = addPen(page, pipeline);
   addNotes(page, pen.drawing);
   pen.begin(); // its section stands last, and tells the others what is there
-  addDome(scene, pipeline);
+  addShading(scene, pipeline);
   addSharing(page);
   addCompass(page);
   addHelp();
-  on('key', (e) => ({ e: 'dome', l: 'toolShare' })[e.key.toLowerCase()] && $({ e: 'dome', l: 'toolShare' }[e.key.toLowerCase()]).click());
+  on('key', (e) => e.key.toLowerCase() === 'l' && $('toolShare').click());
   state.more = true;
-}
-
-function addDome(scene, pipeline) {
-  const label = document.createElement('label');
-  label.className = 'switch';
-  label.innerHTML = '<input type="checkbox" id="dome"><span>Shade by depth</span><kbd>E</kbd>';
-  $('cells').closest('label').after(label);
-  $('dome').onchange = () => {
-    pipeline.dome = $('dome').checked;
-    scene.redraw();
-  };
 }
 
 // Keys of what has come along; keys without meaning would be worse than none.

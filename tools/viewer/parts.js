@@ -96,9 +96,14 @@ export const modelName = () => (state.shownName ?? 'model').replace(/(\.ebpo)?\.
 const waiting = new Map();
 let asks = 0;
 /** The nearest places on the faces to some points of the model: [{ face, weights, place, normal, distance }]. */
-export function placesOf(worker, points) {
+export const placesOf = (worker, points) => ask(worker, 'places', points);
+
+/** What points of paint cover, as reachOf() of reach.js says it. */
+export const reachOf = (worker, points) => ask(worker, 'reach', points);
+
+function ask(worker, type, points) {
   const id = ++asks;
-  worker.postMessage({ type: 'places', opening: state.opening, id, points });
+  worker.postMessage({ type, opening: state.opening, id, points });
   return new Promise((done, fail) => waiting.set(id, { done, fail, opening: state.opening }));
 }
 on('places', ({ id, places }) => {

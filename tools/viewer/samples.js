@@ -6,15 +6,16 @@ import { $, count } from './state.js';
 export async function listSamples(address, open) {
   const list = await (await fetch(address)).json();
   $('samples').hidden = list.length === 0;
-  $('samples').querySelector('ul').replaceChildren(...list.map(({ name, file, faces, bytes: size }) => {
+  $('samples').querySelector('ul').replaceChildren(...list.map(({ name, file, scene, instances, faces, bytes: size }) => {
     const li = document.createElement('li'), a = document.createElement('a'), small = document.createElement('small');
-    const url = new URL(file, new URL(address, location.href)).href;
-    a.href = `?file=${encodeURIComponent(url)}`;
-    a.onclick = (e) => {
-      e.preventDefault();
-      open(url);
-    };
-    small.textContent = [faces && `${count(faces)} faces`, size && bytes(size)].filter(Boolean).join(' · ');
+    const url = new URL(scene ?? file, new URL(address, location.href)).href;
+    a.href = `?${scene ? 'scene' : 'file'}=${encodeURIComponent(url)}`;
+    if (!scene) // which is a page of its own
+      a.onclick = (e) => {
+        e.preventDefault();
+        open(url);
+      };
+    small.textContent = [instances && `${count(instances)} instances`, faces && `${count(faces)} faces`, size && bytes(size)].filter(Boolean).join(' · ');
     a.append(name, small);
     li.append(a);
     return li;

@@ -5,7 +5,7 @@ import { Tiles, lookOf, makeLook, setCut, setTheme } from './shade.js';
 
 /** For code that is loaded later: it must not bring another three.js along. */
 export const kit = { InstancedBufferAttribute: THREE.InstancedBufferAttribute, InstancedBufferGeometry: THREE.InstancedBufferGeometry, BufferAttribute: THREE.BufferAttribute,
-  BufferGeometry: THREE.BufferGeometry, Color: THREE.Color, DepthTexture: THREE.DepthTexture, Matrix4: THREE.Matrix4, Mesh: THREE.Mesh, Scene: THREE.Scene, ShaderMaterial: THREE.ShaderMaterial,
+  BufferGeometry: THREE.BufferGeometry, Color: THREE.Color, DepthTexture: THREE.DepthTexture, Frustum: THREE.Frustum, Group: THREE.Group, InstancedMesh: THREE.InstancedMesh, Matrix4: THREE.Matrix4, Mesh: THREE.Mesh, Scene: THREE.Scene, ShaderMaterial: THREE.ShaderMaterial, Sphere: THREE.Sphere,
   Vector2: THREE.Vector2, Vector3: THREE.Vector3, WebGLRenderTarget: THREE.WebGLRenderTarget };
 
 const TURN = Math.PI / 24, MOVE = 0.06; // of keys: radians, and shares of the distance
@@ -211,7 +211,8 @@ export class Scene {
   pick(x, y) {
     const box = this.canvas.getBoundingClientRect(), ray = new THREE.Raycaster();
     ray.setFromCamera(new THREE.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height), this.camera);
-    const found = pickAlong(ray, this.tiles.meshes, this.cut);
+    const found = pickAlong(ray, (this.others ?? this.tiles).meshes, this.cut); // `others`: several models, in place of the one
+    this.picked = found?.hit;
     this.pickedCut = found?.onCut ?? false; // not on the surface, but where a body is cut
     return found?.point;
   }
@@ -263,6 +264,15 @@ export class Scene {
   }
 }
 
+// In the world, of any length: of an instance its mesh' normal is turned.
+function normalOf({ face, object, instanceId }) {
+  if (instanceId === undefined)
+    return face.normal;
+  const placed = new THREE.Matrix4();
+  object.getMatrixAt(instanceId, placed);
+  return face.normal.clone().transformDirection(placed);
+}
+
 function pickAlong(ray, meshes, cut) {
   const { origin, direction } = ray.ray, o = origin.toArray(), d = direction.toArray();
   let enter = 0, leave = Infinity;
@@ -274,8 +284,8 @@ function pickAlong(ray, meshes, cut) {
   for (const hit of ray.intersectObjects(meshes, false)) {
     if (hit.distance < enter || hit.distance > leave)
       continue;
-    const onCut = Boolean(cut) && enter > 0 && hit.face.normal.dot(direction) > 0;
-    return { onCut, point: (onCut ? ray.ray.at(enter, new THREE.Vector3()) : hit.point).toArray() };
+    const onCut = Boolean(cut) && enter > 0 && normalOf(hit).dot(direction) > 0;
+    return { hit, onCut, point: (onCut ? ray.ray.at(enter, new THREE.Vector3()) : hit.point).toArray() };
   }
   return undefined;
 }

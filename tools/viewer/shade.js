@@ -17,22 +17,30 @@ const VERTEX = `
   varying vec3 lent;
   varying float turned;
   flat varying int kind;
-  uniform int colouring;
+  uniform int colouring, chosen; // chosen: which instance stands out
   uniform bool own; // the model's colours rather than the plain one
-  uniform vec3 plain, mesh, types[4], levels[21];
+  uniform vec3 plain, mesh, accent, types[4], levels[21];
   void main() {
-    vec4 at = modelViewMatrix * vec4(position, 1.0);
-    eyeSpace = at.xyz;
-    scenePlace = position;
     kind = int(tag.y + 0.5) & 3;
     bool face = int(tag.y + 0.5) > 3;
     vec3 n = vec3(bend, 1.0 - abs(bend.x) - abs(bend.y)); // octahedral
     if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0);
+    vec4 placed = vec4(position, 1.0);
+    #ifdef USE_INSTANCING
+      placed = instanceMatrix * placed;
+      n = mat3(instanceMatrix) * n; // which turns and scales
+    #endif
+    vec4 at = modelViewMatrix * placed;
+    eyeSpace = at.xyz;
+    scenePlace = placed.xyz;
     lent = normalMatrix * normalize(n) * (tag.z / 255.0);
     turned = face ? 1.0 : 0.0;
     colour = colouring == 0 ? plain : colouring == 1 ? levels[int(tag.x + 0.5)] : face ? mesh : types[kind];
     if (own && colouring == 0 && hue.w < 0.5)
       colour = mix(hue.rgb / 12.92, pow((hue.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, hue.rgb)); // as light
+    #ifdef USE_INSTANCING
+      if (gl_InstanceID == chosen) colour = mix(colour, accent, 0.55);
+    #endif
     gl_Position = projectionMatrix * at;
   }`;
 
@@ -94,7 +102,7 @@ const colour = (text) => new THREE.Color(text);
 /** Materials and what they share: { uniforms, faces, wire, cells }. Coordinates are those of the scene (cut.js). */
 export function makeLook() {
   const uniforms = {
-    colouring: { value: 0 }, own: { value: true }, plain: { value: colour('#c9cdd6') }, mesh: { value: colour(MESH_COLOUR) },
+    colouring: { value: 0 }, own: { value: true }, plain: { value: colour('#c9cdd6') }, mesh: { value: colour(MESH_COLOUR) }, chosen: { value: -1 }, accent: { value: colour('#e8784f') },
     types: { value: TYPE_COLOURS.map(colour) }, levels: { value: LEVEL_COLOURS.map(colour) },
     low: { value: new THREE.Vector3() }, high: { value: new THREE.Vector3() }, clipping: { value: false }, section: { value: colour('#d97757') },
     sky: { value: colour('#59616f') }, ground: { value: colour('#23252b') },
@@ -139,10 +147,10 @@ export function lookOf(camera, height, placed) {
 }
 const ORTHOGRAPHIC_AWAY = 1000; // as if seen from very far
 
-/** The worker's tiles as meshes below `parent`. */
+/** The worker's tiles as meshes below `parent`; `make(geometry, material)` makes another kind of mesh. */
 export class Tiles {
-  constructor(parent, { faces, wire, cells }) {
-    Object.assign(this, { parent, faces, wire, cells });
+  constructor(parent, { faces, wire, cells }, make = (geometry, material) => new THREE.Mesh(geometry, material)) {
+    Object.assign(this, { parent, faces, wire, cells, make });
     this.byKey = new Map();
     this.walls = true;
   }
@@ -166,7 +174,7 @@ export class Tiles {
       geometry.setAttribute('hue', new THREE.BufferAttribute(t.hue, 4, true));
     geometry.setIndex(new THREE.BufferAttribute(t.index, 1));
     geometry.computeBoundingSphere();
-    tile.mesh = new THREE.Mesh(geometry, this.faces);
+    tile.mesh = this.make(geometry, this.faces);
     tile.mesh.castShadow = tile.mesh.receiveShadow = true;
     if (t.lines) {
       const lines = new THREE.BufferGeometry();

@@ -48,6 +48,8 @@ export function address() {
 
 /** Something changed: soon the address says so. */
 export function changed() {
+  if (state.together) // which keeps an address of its own
+    return;
   const { opening } = state;
   timer ??= setTimeout(() => {
     timer = undefined;

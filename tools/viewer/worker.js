@@ -1,7 +1,8 @@
-// Reads, chooses and cuts, so that the page stays responsive. The page sends 'open', 'close', 'view', 'probe', 'places' and 'section'; it gets 'opened', 'located', 'tiles', 'loaded',
-// 'probed', 'places', 'section', 'idle' and 'failed'.
+// Reads, chooses and cuts, so that the page stays responsive. The page sends 'open', 'close', 'end', 'view', 'probe', 'places', 'reach' and 'section'; it gets 'opened', 'located', 'tiles', 'loaded',
+// 'probed', 'places', 'section', 'idle' and 'failed'. Several files may be open: `file` says about which one a message is, both ways; it is 0 where nothing is said.
 import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
 import { placesOf, sectionOf } from './answers.js';
+import { reachOf } from './reach.js';
 import { Cut } from './cut.js';
 import { fetchAfter, takeFirst } from './handover.js';
 import { GRAY, Tree, UrlSource, distanceInterval, growForQuestion, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo, sourceOf } from './reader/index.js';
@@ -15,18 +16,18 @@ const SUBTREE_BYTES_A_VIEW = 1.5 * 1024 * 1024; // the same where the file has s
 
 const PLACES_A_TREE = 5000;
 
-let current; // one open file
-let view, want;
+// By `file`: { number, current (an OpenFile), view, want, sections, silent }.
+const slots = new Map();
+const slotOf = (number = 0) => slots.get(number) ?? slots.set(number, { number, sections: 0, silent: true }).get(number);
 let zstd; // the decoder, soon
 
-function post(message, transfer = []) {
-  self.postMessage(message, transfer);
-}
+const post = (slot, message, transfer = []) => self.postMessage({ file: slot.number, ...message }, transfer);
 
 const describe = (error) => ({ code: error.code ?? 'FAULT', message: error.message ?? String(error) });
 
 class OpenFile {
-  constructor(number) {
+  constructor(slot, number) {
+    this.slot = slot;
     this.number = number;
     this.began = performance.now();
     this.timeline = []; // { level, ms, bytes, requests }
@@ -36,24 +37,24 @@ class OpenFile {
   }
 
   get ended() {
-    return current !== this;
+    return this.slot.current !== this;
   }
 
-  async open(what, ahead) {
+  async open(what, ahead, cacheBytes) {
     zstd ??= loadZstd(ZSTDDecoder); // is made while the head comes
-    this.source = typeof what === 'string' ? new UrlSource(what, { ahead, timeout: TIMEOUT_MS, patient: true, fetch: fetchAfter(() => post({ type: 'forget' })) }) : sourceOf(what);
-    this.file = await openEbpo(this.source, { zstd });
+    this.source = typeof what === 'string' ? new UrlSource(what, { ahead, timeout: TIMEOUT_MS, patient: true, fetch: fetchAfter(() => post(this.slot, { type: 'forget' })) }) : sourceOf(what);
+    this.file = await openEbpo(this.source, { zstd, ...(cacheBytes && { cacheBytes }) });
     const { info, source } = this.file;
     this.tree = new Tree(info);
     const meshBytes = ['/mesh/vertices', '/mesh/faces'].reduce((sum, path) => sum + (this.file.arrays.has(path) ? this.file.arrays.get(path).bytes ?? Infinity : 0), 0);
     this.cut = new Cut(this.tree, { small: Math.min(meshBytes, source.size) < SMALL_MESH });
-    post({ type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene, coloured: this.file.colours !== undefined || info.parts.has('colours'),
+    post(this.slot, { type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene, coloured: this.file.colours !== undefined || info.parts.has('colours'),
       bytesTo: this.#bytesTo(), traffic: this.file.traffic, ms: performance.now() - this.began });
     await this.load(Math.min(FIRST_LEVELS, info.level_count) - 1);
     if (!this.file.located) {
       await this.file.locate();
       if (!this.ended)
-        post({ type: 'located', opening: this.number, bytesTo: this.#bytesTo(), traffic: this.file.traffic });
+        post(this.slot, { type: 'located', opening: this.number, bytesTo: this.#bytesTo(), traffic: this.file.traffic });
     }
   }
 
@@ -79,7 +80,7 @@ class OpenFile {
   #loaded() {
     for (let level = this.timeline.length; level <= this.tree.depth; level++)
       this.timeline.push({ level, ms: performance.now() - this.began, ...this.file.traffic });
-    post({ type: 'loaded', opening: this.number, depth: this.tree.depth, timeline: this.timeline, traffic: this.file.traffic });
+    post(this.slot, { type: 'loaded', opening: this.number, depth: this.tree.depth, timeline: this.timeline, traffic: this.file.traffic });
   }
 
   async pump() {
@@ -99,7 +100,7 @@ class OpenFile {
     let result;
     do {
       this.again = false;
-      result = this.cut.update(view, want);
+      result = this.cut.update(this.slot.view, this.slot.want);
       this.#send(result);
       if (result.deeper && !this.busy.nodes && !this.busy.level)
         this.#later(this.#loadNodes(result.missing));
@@ -108,10 +109,11 @@ class OpenFile {
       await new Promise((done) => setTimeout(done)); // lets a newer view in
     } while (!this.ended && (this.again || result.more));
     if (!this.ended && !this.busy.level && !this.busy.nodes && !this.busy.mesh)
-      post({ type: 'idle', opening: this.number, want: want.number, traffic: this.file.traffic, deeper: result.deeper });
+      post(this.slot, { type: 'idle', opening: this.number, want: this.slot.want.number, traffic: this.file.traffic, deeper: result.deeper });
   }
 
   #meshAllowed() {
+    const { want } = this.slot;
     if (this.viewNumber !== want.number) {
       this.viewNumber = want.number;
       this.meshBytes = 0;
@@ -120,7 +122,7 @@ class OpenFile {
   }
 
   #later(work) {
-    work.then(() => this.ended || this.pump(), (error) => this.ended || post({ type: 'failed', opening: this.number, error: describe(error), late: true }));
+    work.then(() => this.ended || this.pump(), (error) => this.ended || post(this.slot, { type: 'failed', opening: this.number, error: describe(error), late: true }));
   }
 
   async #loadNodes(missing) {
@@ -149,13 +151,13 @@ class OpenFile {
 
   #send({ set, removed, stats }) {
     const transfer = set.flatMap((t) => [t.position.buffer, t.tag.buffer, t.normal.buffer, t.hue?.buffer, t.index.buffer, t.lines?.buffer, t.cells?.buffer]).filter(Boolean);
-    post({ type: 'tiles', opening: this.number, set, removed, stats, traffic: this.file.traffic, ms: performance.now() - this.began, want: want.number }, transfer);
+    post(this.slot, { type: 'tiles', opening: this.number, set, removed, stats, traffic: this.file.traffic, ms: performance.now() - this.began, want: this.slot.want.number }, transfer);
   }
 
   /** Where a point is: at once what the levels at hand say for certain, then exactly, by the faces of the leaves that matter. */
   async probe(point) {
     const number = ++this.probes, { tree, file } = this, solid = tree.info.solid;
-    const answer = (more) => this.ended || number !== this.probes || post({ type: 'probed', opening: this.number, point, solid, traffic: file.traffic, ...more });
+    const answer = (more) => this.ended || number !== this.probes || post(this.slot, { type: 'probed', opening: this.number, point, solid, traffic: file.traffic, ...more });
     const coarse = { depth: tree.depth, where: solid ? inside(tree, point).where : undefined, ...distanceInterval(tree, point) };
     answer({ ...coarse, exact: false, done: !file.info.parts.has('mesh') });
     if (!file.info.parts.has('mesh'))
@@ -188,63 +190,72 @@ class OpenFile {
 }
 
 // Longer questions, answered one after the other; a section that another overtakes ends.
-let sections = 0;
-async function answer(data, mine) {
-  if (data.type === 'places') {
-    const tree = (mine.asked ??= mine.tree.lean()), places = await placesOf(mine.file, tree, data.points);
-    if ((mine.places = (mine.places ?? 0) + data.points.length) > PLACES_A_TREE)
-      mine.asked = mine.places = undefined; // what it has gathered goes
-    post({ type: 'places', opening: mine.number, id: data.id, places });
+async function answer(data, slot, mine) {
+  if (data.type === 'section') {
+    const number = ++slot.sections, over = () => mine.ended || number !== slot.sections;
+    const tell = (news) => over() || post(slot, { type: 'section', opening: mine.number, axis: data.axis, at: data.at, traffic: mine.file.traffic, ...news });
+    await sectionOf(mine.file, mine.tree.lean(), data.axis, data.at, tell, over);
     return;
   }
-  const number = ++sections, tell = (news) => mine.ended || number !== sections || post({ type: 'section', opening: mine.number, axis: data.axis, at: data.at, traffic: mine.file.traffic, ...news });
-  await sectionOf(mine.file, mine.tree.lean(), data.axis, data.at, tell, () => mine.ended || number !== sections);
+  const tree = (mine.asked ??= mine.tree.lean()), places = await (data.type === 'reach' ? reachOf : placesOf)(mine.file, tree, data.points);
+  if ((mine.places = (mine.places ?? 0) + data.points.length) > PLACES_A_TREE)
+    mine.asked = mine.places = undefined; // what it has gathered goes
+  post(slot, { type: 'places', opening: mine.number, id: data.id, places });
 }
 
 // What is under way, for the page; and that nothing is any more.
-let silent = true;
-function tellLine() {
-  const underway = current?.source?.underway?.() ?? [];
-  if (!underway.length && silent)
+function tellLine(slot) {
+  const { current } = slot, underway = current?.source?.underway?.() ?? [];
+  if (!underway.length && slot.silent)
     return;
-  silent = !underway.length;
+  slot.silent = !underway.length;
   const sum = (of) => underway.reduce((total, t) => total + of(t), 0), { busy, source } = current ?? {};
   const what = !current?.tree?.root ? 'the first levels' : busy.mesh && !busy.nodes ? 'faces' : 'finer levels';
-  post({ type: 'line', opening: current?.number, got: sum((t) => t.got), want: sum((t) => t.to - t.from), quiet: underway.length ? Math.min(...underway.map((t) => t.quiet)) : 0,
+  post(slot, { type: 'line', opening: current?.number, got: sum((t) => t.got), want: sum((t) => t.to - t.from), quiet: underway.length ? Math.min(...underway.map((t) => t.quiet)) : 0,
     what, trouble: source?.trouble?.message });
 }
-setInterval(tellLine, LINE_MS);
-self.addEventListener('online', () => current?.source?.retry?.());
+setInterval(() => slots.forEach(tellLine), LINE_MS);
+const retry = ({ current }) => current?.source?.retry?.();
+self.addEventListener('online', () => slots.forEach(retry));
 
-function end() {
-  current?.source?.close?.();
-  current = undefined;
+function end(slot) {
+  slot.current?.source?.close?.();
+  slot.current = undefined;
+}
+
+async function heed(data, slot) {
+  const { current } = slot, ready = current?.tree?.root;
+  if (data.type === 'first') {
+    takeFirst(data);
+  } else if (data.type === 'open') {
+    end(slot);
+    const mine = slot.current = new OpenFile(slot, data.opening);
+    await mine.open(data.what, data.ahead, data.cacheBytes);
+    if (!mine.ended && slot.view)
+      await mine.pump();
+  } else if (data.type === 'retry') {
+    retry(slot);
+  } else if (data.type === 'close') {
+    end(slot);
+  } else if (data.type === 'end') { // nobody will ask about it again
+    end(slot);
+    slots.delete(slot.number);
+  } else if (data.type === 'view') {
+    Object.assign(slot, { view: data.view, want: data.want });
+    if (ready)
+      await current.pump();
+  } else if (data.type === 'probe' && ready) {
+    await current.probe(data.point);
+  } else if (['places', 'reach', 'section'].includes(data.type) && ready && data.opening === current.number) {
+    await answer(data, slot, current);
+  }
 }
 
 self.onmessage = async ({ data }) => {
+  const slot = slotOf(data.file);
   try {
-    if (data.type === 'first') {
-      takeFirst(data);
-    } else if (data.type === 'open') {
-      end();
-      const mine = current = new OpenFile(data.opening);
-      await mine.open(data.what, data.ahead);
-      if (!mine.ended && view)
-        await mine.pump();
-    } else if (data.type === 'retry') {
-      current?.source?.retry?.();
-    } else if (data.type === 'close') {
-      end();
-    } else if (data.type === 'view') {
-      ({ view, want } = data);
-      if (current?.tree?.root)
-        await current.pump();
-    } else if (data.type === 'probe' && current?.tree?.root) {
-      await current.probe(data.point);
-    } else if ((data.type === 'places' || data.type === 'section') && current?.tree?.root && data.opening === current.number) {
-      await answer(data, current);
-    }
+    await heed(data, slot);
   } catch (error) {
-    post({ type: 'failed', opening: data.opening ?? current?.number, error: describe(error) });
+    post(slot, { type: 'failed', opening: data.opening ?? slot.current?.number, error: describe(error) });
   }
 };

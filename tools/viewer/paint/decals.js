@@ -1,5 +1,6 @@
 // Strokes in the picture: balls around their points, that colour what of the surface lies in them. By the depths that are seen, so as fine as the picture,
-// whatever level is drawn. That the part of the surface hangs together (format-spec/paint.md, section 4) is judged by its normal only.
+// whatever level is drawn. Where the ball meets faces that do not hang together with the point (format-spec/paint.md, section 4), only what is seen of
+// those that do is coloured: they are drawn themselves, where they are what the depths show.
 const VERTEX = `
   attribute vec3 corner, centre, facing;
   attribute vec4 tint; // red, green, blue, radius
@@ -27,24 +28,56 @@ const FRAGMENT = `
     if (z >= 1.0 || cover <= 0.0 || dot(n, outward) < -0.2 * length(n)) discard;
     gl_FragColor = vec4(what.rgb * cover, cover);
   }`;
+const REACH_VERTEX = `
+  attribute vec3 centre;
+  attribute vec4 tint;
+  varying vec3 at, face;
+  varying vec4 what;
+  void main() {
+    at = centre;
+    face = position;
+    what = tint;
+    gl_Position = projectionMatrix * viewMatrix * vec4(position, 1.0);
+  }`;
+const REACH_FRAGMENT = `
+  uniform sampler2D depths;
+  uniform vec2 size;
+  uniform mat4 back;
+  uniform float near; // so many pixels may lie between a face and what is drawn for it
+  varying vec3 at, face;
+  varying vec4 what;
+  void main() {
+    vec2 uv = gl_FragCoord.xy / size;
+    vec4 p = back * vec4(uv * 2.0 - 1.0, texture2D(depths, uv).r * 2.0 - 1.0, 1.0);
+    float away = distance(face, at), pixel = length(dFdx(face)) + length(dFdy(face)), soft = min(pixel, 0.2 * what.w);
+    float cover = clamp((what.w - away) / max(soft, 1.0e-9) + 0.5, 0.0, 1.0);
+    if (cover <= 0.0 || distance(p.xyz / p.w, face) > near * pixel) discard;
+    gl_FragColor = vec4(what.rgb * cover, cover);
+  }`;
 const ALL_VERTEX = 'varying vec2 uv2; void main() { uv2 = position.xy * 0.5 + 0.5; gl_Position = vec4(position.xy, 0.0, 1.0); }';
 const ALL_FRAGMENT = 'uniform sampler2D map; uniform float opacity; varying vec2 uv2; void main() { gl_FragColor = texture2D(map, uv2) * opacity; }';
 const CUBE = Float32Array.from([0, 1, 2, 3, 4, 5, 6, 7].flatMap((i) => [0, 1, 2].map((k) => (i >> k & 1 ? 1 : -1))));
 const SIDES = [0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5];
 const BLENDING = { custom: 5, none: 0, add: 100, zero: 200, one: 201, withoutAlpha: 205 }; // three.js' constants
-const BACK = 1;
+const FRONT = 0, BACK = 1, DOUBLE = 2;
+const NEAR_PIXELS = 2; // of real faces; of envelopes as many as cells have, about
 
 export class Decals {
   constructor(kit) {
     this.kit = kit;
-    this.layers = []; // { opacity, runs: [{ mesh, erases, alpha }] }
-    this.uniforms = { depths: { value: null }, size: { value: null }, back: { value: new kit.Matrix4() } };
+    this.near = () => 0; // how many pixels what is drawn may be from the faces, now
+    this.layers = []; // { opacity, runs: [{ meshes, erases, alpha }] }
+    this.uniforms = { depths: { value: null }, size: { value: null }, back: { value: new kit.Matrix4() }, near: { value: NEAR_PIXELS } };
     const blend = (source) => ({ blending: BLENDING.custom, blendEquation: BLENDING.add, blendSrc: source, blendDst: BLENDING.withoutAlpha, blendSrcAlpha: source,
       blendDstAlpha: BLENDING.withoutAlpha });
     const ball = (source) => new kit.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms: this.uniforms, side: BACK, depthTest: false, depthWrite: false,
       transparent: true, ...blend(source) });
+    const reach = (source) => new kit.ShaderMaterial({ vertexShader: REACH_VERTEX, fragmentShader: REACH_FRAGMENT, uniforms: this.uniforms, side: FRONT, depthTest: false, depthWrite: false,
+      transparent: true, ...blend(source) });
     this.paints = ball(BLENDING.one);
     this.erases = ball(BLENDING.zero);
+    this.reachPaints = reach(BLENDING.one);
+    this.reachErases = reach(BLENDING.zero);
     this.over = new kit.ShaderMaterial({ vertexShader: ALL_VERTEX, fragmentShader: ALL_FRAGMENT, uniforms: { map: { value: null }, opacity: { value: 1 } }, depthTest: false, depthWrite: false,
       transparent: true, ...blend(BLENDING.one) });
     const geometry = new kit.BufferGeometry();
@@ -68,11 +101,12 @@ export class Decals {
   }
 
   /**
-   * What is drawn from now on: [{ opacity (0 to 1), strokes: [{ erases, colour, radius, points: [{ centre, normal, share }] }] }], lowest first; scene
-   * coordinates, `share` of the radius.
+   * What is drawn from now on: [{ opacity (0 to 1), strokes: [{ erases, colour, radius, points: [{ centre, normal, faces, share }] }] }], lowest first; scene
+   * coordinates, `share` of the radius; `faces`: nine numbers each, what is coloured in place of all that is in the ball. `solid`: backs of faces are never seen.
    */
-  set(layers) {
-    this.layers.forEach((layer) => layer.runs.forEach((run) => run.mesh.geometry.dispose()));
+  set(layers, solid = true) {
+    this.reachPaints.side = this.reachErases.side = solid ? FRONT : DOUBLE;
+    this.layers.forEach((layer) => layer.runs.forEach((run) => run.meshes.forEach((mesh) => mesh.geometry.dispose())));
     this.layers = layers.map(({ opacity, strokes }) => ({ opacity, runs: this.#runs(strokes) })).filter((layer) => layer.runs.length);
   }
 
@@ -86,10 +120,34 @@ export class Decals {
       else
         runs.push({ erases: stroke.erases, alpha, strokes: [stroke] });
     }
-    return runs.filter((run) => run.alpha > 0).map((run) => ({ ...run, strokes: undefined, mesh: this.#mesh(run) }));
+    return runs.filter((run) => run.alpha > 0).map((run) => ({ ...run, strokes: undefined, meshes: [this.#balls(run), this.#reach(run)].filter(Boolean) }));
   }
 
-  #mesh({ strokes, erases }) {
+  // The faces of points whose balls meet others, too: undefined if there is none.
+  #reach({ strokes, erases }) {
+    const { kit } = this, all = strokes.flatMap(({ colour, radius, points }) => points.filter((p) => p.faces?.length).map((p) => ({ ...p, tint: [...colour.slice(0, 3).map((c) => c / 255), radius * p.share] })));
+    const corners = all.reduce((sum, p) => sum + p.faces.length / 3, 0), position = new Float32Array(3 * corners), centre = new Float32Array(3 * corners), tint = new Float32Array(4 * corners);
+    if (!corners)
+      return undefined;
+    let i = 0;
+    for (const p of all) {
+      position.set(p.faces, 3 * i);
+      for (let end = i + p.faces.length / 3; i < end; i++) {
+        centre.set(p.centre, 3 * i);
+        tint.set(p.tint, 4 * i);
+      }
+    }
+    const geometry = new kit.BufferGeometry();
+    for (const [name, array, size] of [['position', position, 3], ['centre', centre, 3], ['tint', tint, 4]])
+      geometry.setAttribute(name, new kit.BufferAttribute(array, size));
+    const mesh = new kit.Mesh(geometry, erases ? this.reachErases : this.reachPaints);
+    mesh.frustumCulled = false;
+    return mesh;
+  }
+
+  // The balls of all other points.
+  #balls({ strokes: all, erases }) {
+    const strokes = all.map((s) => ({ ...s, points: s.points.filter((p) => !p.faces) }));
     const { kit } = this, count = strokes.reduce((sum, s) => sum + s.points.length, 0), centre = new Float32Array(3 * count), facing = new Float32Array(3 * count), tint = new Float32Array(4 * count);
     let i = 0;
     for (const { colour, radius, points } of strokes)
@@ -116,6 +174,7 @@ export class Decals {
     this.sum ??= target();
     this.uniforms.depths.value = depths;
     this.uniforms.size.value = size;
+    this.uniforms.near.value = Math.max(NEAR_PIXELS, this.near());
     this.uniforms.back.value.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).invert();
     const clear = renderer.autoClear;
     renderer.autoClear = false;
@@ -138,14 +197,14 @@ export class Decals {
     renderer.clear();
   }
 
-  #run(renderer, camera, { mesh, erases, alpha }, own, target) {
+  #run(renderer, camera, { meshes, erases, alpha }, own, target) {
     const alone = !erases && alpha < 255, to = alone ? (this.stroke ??= target()) : own;
     if (alone)
       this.#begin(renderer, to);
     renderer.setRenderTarget(to);
-    this.one.add(mesh);
+    this.one.add(...meshes);
     renderer.render(this.one, camera);
-    this.one.remove(mesh);
+    this.one.remove(...meshes);
     if (alone)
       this.#add(renderer, camera, to, own, alpha / 255);
   }

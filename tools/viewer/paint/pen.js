@@ -1,9 +1,9 @@
 // The pen: paints and erases with mouse, finger or stylus; layers; undo; save and open.
-import { complain, make, modelName, placesOf, save, section, take, taken } from '../parts.js';
+import { complain, make, modelName, placesOf, reachOf, save, section, take, taken } from '../parts.js';
 import { kit } from '../scene.js';
 import { $, length, on, state, tell, toModel, toScene } from '../state.js';
 import { Decals } from './decals.js';
-import { OFF, PaintDocument, identityOf, misfit } from './document.js';
+import { PaintDocument, identityOf, misfit } from './document.js';
 import { MOST, cleanText, readPaint, writePaint } from './paint_file.js';
 import { Stroke } from './stroke.js';
 
@@ -21,10 +21,10 @@ const HTML = `
   <div class="buttons"><button id="layerAdd" class="small">Add a layer</button><button id="paintOpen" class="small">Open …</button><button id="paintSave" class="small">Save</button></div>
   <input type="file" id="paintFile" accept=".h5" hidden>`;
 const NARROW = 2e-4, WIDE = 0.1;    // radii of the pen, in halves of the box's diagonal
-const FULL_SIZE = 32768, AT_ONCE = 500;
+const FULL_SIZE = 32768, AT_ONCE = 200;
 
 export function addPen({ scene, worker, query }, pipeline) {
-  const decals = pipeline.layers = new Decals(kit), docs = new Map(), normals = new WeakMap(); // by a model's digest; by a point of a document
+  const decals = pipeline.layers = new Decals(kit), docs = new Map(), reaches = new WeakMap(); // by a model's digest; by a point of a document: { normal, faces }
   let doc, layer = 0, stroke, pending = 0, unsettled = 0, details, asked = 0;
   const colour = () => [1, 3, 5].map((i) => parseInt($('penColour').value.slice(i, i + 2), 16));
   const radius = () => NARROW * (WIDE / NARROW) ** ($('penSize').value / 100) / state.scene.scale;
@@ -44,10 +44,13 @@ export function addPen({ scene, worker, query }, pipeline) {
   // --- the picture ---
 
   const decal = (s) => ({ erases: s.erases, colour: s.colour, radius: s.radius * state.scene.scale,
-    points: s.points.map((p) => ({ centre: toScene(p.place), normal: normals.get(p) ?? p.normal, share: p.size / FULL_SIZE })) });
+    points: s.points.map((p) => ({ centre: toScene(p.place), normal: reaches.get(p)?.normal ?? p.normal, faces: reaches.get(p)?.faces, share: p.size / FULL_SIZE })) });
+  const inPicture = (faces) => faces && Float32Array.from({ length: faces.length }, (_, i) => (faces[i] - state.scene.center[i % 3]) * state.scene.scale);
+  // Real faces are in their places, envelopes within a cell of them.
+  decals.near = () => (state.stats?.meshTriangles === state.stats?.triangles ? 0 : 2 * (Number($('detail').value) || state.auto || 0));
   function draw() {
     const { layers, strokes } = doc.state, all = stroke ? [...strokes, stroke] : strokes;
-    decals.set(layers.map((l, i) => ({ opacity: l.opacity / 255, strokes: l.visible ? all.filter((s) => s.layer === i && s.points.length).map(decal) : [] })));
+    decals.set(layers.map((l, i) => ({ opacity: l.opacity / 255, strokes: l.visible ? all.filter((s) => s.layer === i && s.points.length).map(decal) : [] })), state.info?.solid !== false);
     scene.redraw();
   }
 
@@ -161,8 +164,10 @@ export function addPen({ scene, worker, query }, pipeline) {
     unsettled++;
     try {
       const settled = done.settled(await askPlaces(done.points.map((p) => p.place)));
-      if (opening === state.opening && settled.points.length)
+      if (opening === state.opening && settled.points.length) {
+        await findReach([settled], () => opening === state.opening);
         doc.addStroke(settled);
+      }
     } catch (error) {
       if (opening === state.opening)
         complain(error.message);
@@ -199,20 +204,31 @@ export function addPen({ scene, worker, query }, pipeline) {
     pending--;
   }
 
-  // The normals of opened points, which keep paint on its own side of a wall; and whether they lie on the model at all.
-  async function checkPlaces({ strokes, notes }, goes) {
-    const points = [...notes, ...strokes.flatMap((s) => s.points)], most = OFF * Math.hypot(...state.info.box_size);
-    for (let i = 0; i < points.length && goes() && state.info.parts.has('mesh') && !state.info.subset_of; i += AT_ONCE) {
-      const some = points.slice(i, i + AT_ONCE), places = await placesOf(worker, some.map((p) => p.place));
+  // What the points of strokes cover, by the worker: on the faces that they name. Returns a message if a point is not where it says to be. The work ends when `goes()` says no.
+  async function findReach(strokes, goes, told = () => {}) {
+    const points = strokes.flatMap((s) => s.points.map((p) => ({ p, radius: s.radius * p.size / FULL_SIZE })));
+    for (let i = 0; i < points.length && goes(); i += AT_ONCE) {
+      const some = points.slice(i, i + AT_ONCE), found = await reachOf(worker, some.map(({ p: { face, place }, radius }) => ({ face, place, radius })));
       if (!goes())
-        return;
-      if (places.some((p) => p.distance > most)) {
-        doc.take({ layers: [], notes: [], strokes: [] });
-        throw new Error('the paint has points that do not lie on the model: it was changed; get a fresh copy');
-      }
-      places.forEach((p, k) => normals.set(some[k], p.normal));
+        return undefined;
+      if (found.some((f) => f.here === 'no'))
+        return 'the paint has points that do not lie on the model, on the faces that they name: it was changed; get a fresh copy';
+      found.forEach(({ normal, faces }, k) => reaches.set(some[k].p, { normal, faces: inPicture(faces) }));
+      told();
     }
-    draw();
+    return undefined;
+  }
+
+  async function checkPlaces({ strokes, notes }, goes) {
+    if (!state.info.parts.has('mesh'))
+      return;
+    const onNotes = { radius: 0, points: notes.map(({ face, place }) => ({ face, place, size: FULL_SIZE })) }, why = await findReach([onNotes, ...strokes], goes, draw);
+    if (why) {
+      doc.take({ layers: [], notes: [], strokes: [] });
+      throw new Error(why);
+    }
+    if (goes())
+      draw();
   }
 
   function fresh() {

@@ -124,7 +124,8 @@ export function readFacts(attributes) {
     format = facts.text('format');
   } catch { /* said below */ }
   if (format !== 'EBP-Octree in HDF5')
-    throw formatError('', 'an HDF5 file, but not an EBP-Octree (its root attribute format does not say "EBP-Octree in HDF5")', 'make one with `ebpo convert`');
+    throw formatError('', 'an HDF5 file, but not an EBP-Octree (its root attribute format does not say "EBP-Octree in HDF5")',
+      /^EBP-Octree paint/.test(format) ? 'this is paint for a model: open the model, then this file by Open in its section Paint' : 'make one with `ebpo convert`');
   out.format_version_major = facts.int('format_version_major');
   out.format_version_minor = facts.int('format_version_minor');
   if (out.format_version_major !== 1)

@@ -7,6 +7,8 @@ export interface EbpoModelOptions {
   worker?: string | URL;
   /** 'standard' (lit by the scene), 'viewer' (as the viewer's page draws), or one of standardMaterial() */
   material?: 'standard' | 'viewer' | Material;
+  /** of an EbpoGroup: its make() gives it */
+  crew?: unknown;
   detail?: number;
   level?: number;
   mesh?: boolean;
@@ -43,6 +45,18 @@ export declare class EbpoModel extends Object3D<EbpoModelEventMap> {
   /** to be called before each frame; a number is the picture's height in pixels of the page */
   update(camera: Camera, renderer: WebGLRenderer | number): void;
   probe(point: Vector3): Promise<{ where?: 'in' | 'out' | 'on' | 'maybe'; distance?: number; nearest?: Vector3; lo: number; hi: number; exact: boolean }>;
+  dispose(): void;
+}
+
+/** Several models that share workers and a budget of triangles. */
+export declare class EbpoGroup extends Group {
+  constructor(options?: { triangles?: number; worker?: string | URL; workers?: number });
+  /** of all models together, about */
+  triangles: number;
+  readonly models: EbpoModel[];
+  make(options?: EbpoModelOptions): EbpoModel;
+  /** in place of the models' own update() */
+  update(camera: Camera, renderer: WebGLRenderer | number): void;
   dispose(): void;
 }
 

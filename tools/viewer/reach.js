@@ -1,0 +1,113 @@
+// What a point of paint covers (format-spec/paint.md, section 4), in the worker: the faces that hang together with its own one within its ball.
+import { GRAY, LEAF, cellNear, growForQuestion, nearestOnTriangle } from './reader/index.js';
+
+const FACES_MOST = 100_000;   // around a point; beyond that the picture shows its ball
+const LEAVES_AT_ONCE = 1024;
+const OFF = 2 ** -20;         // of the diagonal: so far a place may be from its face
+
+// The leaves whose cells come within a distance of a point; undefined if a subset has left out some of them.
+async function leavesAround(file, tree, point, distance) {
+  const leaves = [], meets = (node) => (node.type === GRAY || node.type === LEAF) && cellNear(tree, node, point) <= distance;
+  for (let nodes = [tree.root].filter(meets); nodes.length;) {
+    leaves.push(...nodes.filter((node) => node.type === LEAF));
+    const gray = nodes.filter((node) => node.type === GRAY), missing = gray.filter((node) => !tree.children(node));
+    if (missing.some((node) => tree.isPruned(node)))
+      return undefined;
+    if (missing.length)
+      await growForQuestion(file, tree, missing);
+    if (gray.some((node) => !tree.children(node)))
+      return undefined;
+    nodes = gray.flatMap((node) => tree.children(node)).filter(meets);
+  }
+  return leaves;
+}
+
+// All faces of some leaves that may meet a ball, each once: { numbers, corners: [nine numbers each] }; undefined if they are too many.
+async function facesAround(file, leaves, point, radius) {
+  const corners = new Map();
+  for (let i = 0; i < leaves.length; i += LEAVES_AT_ONCE)
+    for (const faces of await file.leafFaces(leaves.slice(i, i + LEAVES_AT_ONCE))) {
+      faces.numbers.forEach((number, k) => {
+        const nine = faces.subarray(9 * k, 9 * k + 9);
+        if (!corners.has(number) && boxMeets(nine, point, radius))
+          corners.set(number, nine);
+      });
+      if (corners.size > FACES_MOST)
+        return undefined;
+    }
+  return { numbers: [...corners.keys()], corners: [...corners.values()] };
+}
+
+function boxMeets(f, point, radius) {
+  for (let k = 0; k < 3; k++)
+    if (Math.min(f[k], f[k + 3], f[k + 6]) > point[k] + radius || Math.max(f[k], f[k + 3], f[k + 6]) < point[k] - radius)
+      return false;
+  return true;
+}
+
+const holds = (centre, square, q) => {
+  const [x, y, z] = [q[0] - centre[0], q[1] - centre[1], q[2] - centre[2]];
+  return (x * x + y * y) + z * z <= square;
+};
+
+function segmentWithin(centre, square, p, q) {
+  const differs = [0, 1, 2].find((k) => p[k] !== q[k]), [a, b] = differs === undefined || p[differs] < q[differs] ? [p, q] : [q, p];
+  const e = [0, 1, 2].map((k) => b[k] - a[k]), d = [0, 1, 2].map((k) => centre[k] - a[k]), length = (e[0] * e[0] + e[1] * e[1]) + e[2] * e[2];
+  const t = length === 0 ? 0 : Math.max(0, Math.min(1, ((d[0] * e[0] + d[1] * e[1]) + d[2] * e[2]) / length));
+  return holds(centre, square, [0, 1, 2].map((k) => a[k] + t * e[k]));
+}
+
+/** Of faces (nine numbers each), by their places in the list: those that hang together with one of them, `own`, within a ball. Ascending. */
+export function hangTogether(faces, own, centre, radius) {
+  const square = radius * radius, places = new Map(), root = faces.map((_, i) => i), edges = new Map();
+  const setOf = (i) => {
+    while (root[i] !== i)
+      i = root[i] = root[root[i]];
+    return i;
+  };
+  const join = (table, key, i) => (table.has(key) ? (root[setOf(i)] = setOf(table.get(key))) : table.set(key, i));
+  faces.forEach((f, i) => {
+    const p = [0, 3, 6].map((c) => f.subarray(c, c + 3)), within = p.map((q) => holds(centre, square, q)), keys = p.map((q) => `${q[0] + 0},${q[1] + 0},${q[2] + 0}`); // -0 is 0
+    for (let c = 0; c < 3; c++) {
+      const next = (c + 1) % 3;
+      if (within[c])
+        join(places, keys[c], i);
+      if (!within[c] && !within[next] && segmentWithin(centre, square, p[c], p[next])) // with an end within they are joined there
+        join(edges, [keys[c], keys[next]].sort().join(' '), i);
+    }
+  });
+  const set = setOf(own);
+  return faces.map((_, i) => i).filter((i) => setOf(i) === set);
+}
+
+/**
+ * Of points [{ face, place, radius }], `face` as paint files number it: [{ here, normal, faces }]. `here`: 'yes'; 'no', the named face is not where the point is; 'elsewhere', a
+ * subset has left it out, or some of what is around it. `faces` (nine numbers each): of the reach, only where the ball meets others as well, which are not to be coloured; undefined
+ * where the ball alone says it, or where there are too many. A radius of 0 asks for the face alone.
+ */
+export async function reachOf(file, tree, points) {
+  const { info } = file, tolerance = OFF * Math.hypot(...info.box_size), subset = Boolean(info.subset_of), bySource = info.parts.has('maps'), out = [];
+  for (const { face, place, radius } of points) {
+    const leaves = await leavesAround(file, tree, place, Math.max(radius, tolerance));
+    let around = leaves && await facesAround(file, leaves, place, Math.max(radius, tolerance)), crowded = false;
+    if (leaves && !around) { // the face is near its place, whatever else the ball meets
+      crowded = true;
+      around = await facesAround(file, await leavesAround(file, tree, place, tolerance), place, tolerance) ?? { numbers: [], corners: [] };
+    }
+    const names = !around?.numbers.length ? [] : bySource ? await file.sourceFaces(Uint32Array.from(around.numbers)) : around.numbers, own = names.indexOf(face);
+    if (own < 0 || !(nearestOnTriangle(place, around.corners[own], 0)[0] <= tolerance)) {
+      out.push({ here: subset && own < 0 ? 'elsewhere' : 'no' });
+      continue;
+    }
+    const reach = crowded || !(radius > 0) ? undefined : hangTogether(around.corners, own, place, radius), met = reach && around.corners.filter((f) => nearestOnTriangle(place, f, 0)[0] <= radius);
+    const alone = reach && met.length > reach.filter((i) => nearestOnTriangle(place, around.corners[i], 0)[0] <= radius).length;
+    out.push({ here: 'yes', normal: normalOf(around.corners[own]), faces: alone ? Float64Array.from(reach.flatMap((i) => [...around.corners[i]])) : undefined });
+  }
+  return out;
+}
+
+function normalOf(f) {
+  const u = [0, 1, 2].map((k) => f[3 + k] - f[k]), v = [0, 1, 2].map((k) => f[6 + k] - f[k]), n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+  const size = Math.hypot(...n);
+  return n.map((x) => (size > 0 ? x / size : 0));
+}

@@ -1,0 +1,88 @@
+// What a point of paint covers, against a plain twin, and against what ebpo paint bakes: on plates with a crack between them, where the ball says too much.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { Tree, openEbpo } from '../reader/index.js';
+import { readPaint } from '../paint/paint_file.js';
+import { hangTogether, reachOf } from '../reach.js';
+import { plates } from './plates.js';
+
+// A crooked generator of numbers, the same each time.
+function chance(seed) {
+  let state = seed;
+  return () => (state = (state * 48271) % 2147483647) / 2147483647;
+}
+
+// Slow and plain: faces are joined if they share a corner in the ball, or an edge whose nearest place, looked for in small steps and at its ends, is.
+function plainly(faces, own, centre, radius) {
+  const corners = (f) => [0, 3, 6].map((c) => [...f.subarray(c, c + 3)]), near = (q) => Math.hypot(...q.map((x, k) => x - centre[k])) <= radius, same = (a, b) => a.every((x, k) => x === b[k]);
+  const reached = (a, b) => Array.from({ length: 2001 }, (_, i) => i / 2000).some((t) => near(a.map((x, k) => x + t * (b[k] - x))));
+  const joined = (f, g) => {
+    const common = corners(f).filter((p) => corners(g).some((q) => same(p, q)));
+    return common.some(near) || (common.length > 1 && reached(common[0], common[1]));
+  };
+  const reach = new Set([own]);
+  for (let grew = true; grew;) {
+    grew = false;
+    for (let i = 0; i < faces.length; i++)
+      if (!reach.has(i) && [...reach].some((j) => joined(faces[i], faces[j])))
+        grew = reach.add(i) !== undefined;
+  }
+  return [...reach].sort((a, b) => a - b);
+}
+
+test('faces hang together as a plain twin says', () => {
+  const next = chance(7);
+  for (let round = 0; round < 60; round++) {
+    const points = Array.from({ length: 14 }, () => [next(), next(), next() * 0.4]), pick = () => points[Math.floor(next() * points.length)];
+    const faces = Array.from({ length: 12 }, () => Float64Array.from([...pick(), ...pick(), ...pick()])), centre = [next(), next(), 0.2], radius = 0.1 + 0.3 * next();
+    assert.deepEqual(hangTogether(faces, 0, centre, radius), plainly(faces, 0, centre, radius), `round ${round}`);
+  }
+});
+
+test('the reach is what ebpo paint colours', { skip: process.env.EBPO_TOOL ? false : 'EBPO_TOOL is not set' }, async (t) => {
+  const folder = mkdtempSync(join(tmpdir(), 'ebpo-reach-')), at = (name) => join(folder, name), ebpo = (...args) => execFileSync(process.env.EBPO_TOOL, args, { encoding: 'utf8' });
+  t.after(() => rmSync(folder, { recursive: true, force: true }));
+  plates(at('plates.ply'));
+  ebpo('convert', '-q', at('plates.ply'), at('plates.ebpo.h5'));
+  const file = await openEbpo(readFileSync(at('plates.ebpo.h5'))), whole = new Tree(file.info);
+  for (const level of await file.levels(0, file.info.levels.length - 1))
+    whole.add(level);
+  const tree = whole.lean();
+  const painted = async (place, radius) => {
+    rmSync(at('p.paint.h5'), { force: true });
+    writeFileSync(at('way'), `${place.join(' ')}\n`);
+    ebpo('paint', at('p.paint.h5'), at('plates.ebpo.h5'), '--new-layer', 'x', '--colour', 'ff0000', '--path', at('way'), '--radius', String(radius));
+    ebpo('paint', at('p.paint.h5'), at('plates.ebpo.h5'), '--base', '000000', '--bake', at('baked.ply'));
+    const text = readFileSync(at('baked.ply'), 'latin1'), count = Number(/element vertex (\d+)/.exec(text)[1]);
+    ebpo('convert', '-q', at('baked.ply'), at('baked.ebpo.h5'));
+    const baked = await openEbpo(readFileSync(at('baked.ebpo.h5'))), faces = await baked.facesByNumber(Uint32Array.from({ length: baked.info.face_count }, (_, i) => i)), red = new Set();
+    for (let c = 0; c < faces.length / 3; c++)
+      if (faces.colours[3 * c] > 0)
+        red.add([...faces.subarray(3 * c, 3 * c + 3)].join());
+    assert.ok(count > 0 && red.size > 0);
+    const [point] = readPaint(Uint8Array.from(readFileSync(at('p.paint.h5')))).strokes[0].points;
+    return { point, red };
+  };
+  for (const [place, radius, differs] of [[[-0.1, 0.5, 0.05], 0.3, true], [[0.6, 0.51, 0.05], 0.3, true], [[0.6, 0.51, 0.05], 0.04, false], [[0.05, 0.95, 0], 0.25, true]]) {
+    const { point, red } = await painted(place, radius), [found] = await reachOf(file, tree, [{ face: point.face, place: point.place, radius }]);
+    assert.equal(found.here, 'yes');
+    assert.equal(found.faces !== undefined, differs, `at ${place} with ${radius}`);
+    if (!differs)
+      continue;
+    const mine = new Set();
+    for (let c = 0; c < found.faces.length; c += 3)
+      if (Math.hypot(...[0, 1, 2].map((k) => found.faces[c + k] - point.place[k])) <= radius)
+        mine.add([...found.faces.subarray(c, c + 3)].join());
+    assert.deepEqual([...mine].sort(), [...red].sort(), `at ${place} with ${radius}`);
+  }
+  // On the face that is named, although another one is as near: on an edge; and not on one that is elsewhere.
+  const all = await file.facesByNumber(Uint32Array.from({ length: file.info.face_count }, (_, i) => i)), numbers = await file.sourceFaces(Uint32Array.from({ length: file.info.face_count }, (_, i) => i));
+  const place = [0, 1, 2].map((k) => (all[k] + all[3 + k]) / 2), holders = [...numbers].filter((_, f) => [0, 3, 6].filter((c) => [0, 3].some((d) => [0, 1, 2].every((k) => all[9 * f + c + k] === all[d + k]))).length === 2);
+  assert.equal(holders.length, 2);
+  const [one, other, wrong] = await reachOf(file, tree, [...holders, numbers.find((n) => !holders.includes(n))].map((face) => ({ face, place, radius: 0 })));
+  assert.deepEqual([one.here, other.here, wrong.here, (await reachOf(file, tree, [{ face: holders[0], place: [5, 5, 5], radius: 0 }]))[0].here], ['yes', 'yes', 'no', 'no']);
+});

@@ -1,0 +1,352 @@
+// The page with several models or a scene in it: who is there, where, in which colour; the time; what is clicked. What one model has (levels, paint, notes) is not here.
+import { Assembly, COLOURS } from './assembly.js';
+import { boxText, cameraOf, cameraText, boxOf, cutOf, pointsOf, pointsText, withQuery } from '../address.js';
+import { addCompass } from '../compass.js';
+import { bytes, showError } from '../line.js';
+import { addDistances } from '../measure.js';
+import { complain, make, markOn, section } from '../parts.js';
+import { Pipeline } from '../pipeline.js';
+import { kit } from '../scene.js';
+import { addSectionBox } from '../section_box.js';
+import { addShading, styled } from '../shading.js';
+import { $, count, length, on, state, tell, toScene, upright } from '../state.js';
+import { cameraAt } from './scene_file.js';
+
+const TRIANGLES_MOST = 2_000_000, PIXELS = 12, LATER_MS = 300, NAMES_MOST = 300;
+const HTML = `<div class="row" id="timeRow" hidden><button id="timePlay" class="small" aria-pressed="false">Play</button><input type="range" id="time" min="0" max="1000" value="0"
+  aria-label="Time"><output id="timeText"></output></div>
+  <div id="cameras" class="buttons"></div><ul id="models" class="list"></ul><div id="sceneLayers" class="toggles"></div>`;
+const CHOSEN = `<p class="hint" id="chosenHint">Click a model to choose it and to ask about the point.</p><div id="chosen" hidden>
+  <div class="answer"><strong id="chosenName"></strong><span id="chosenModel"></span></div><dl id="chosenFacts" class="facts"></dl>
+  <div class="answer"><strong id="chosenWhere"></strong><span id="chosenNote"></span></div>
+  <div class="buttons"><button id="chosenLook" class="small">Look at it</button><a id="chosenOpen" class="small">Open it alone</a></div></div>`;
+
+/** `page`: { scene, layout } of app.js; `asked`: what wanted() or ofFiles() of asked.js give. Shows it. */
+export async function begin(page, asked) {
+  const { scene } = page;
+  await styled();
+  markOn(scene);
+  return new Together(page, asked, scene).open();
+}
+
+class Together {
+  constructor(page, asked, scene) {
+    Object.assign(this, { page, asked, scene, hidden: new Set(), hiddenLayers: new Set() });
+    this.query = new URLSearchParams(location.search);
+    this.assembly = new Assembly({ changed: () => this.#soon(), news: () => this.#news(), failed: (model, error) => showError({ message: `${model.name}: ${error.message}` }) });
+    this.assembly.setTheme(document.documentElement.dataset.theme !== 'light');
+    state.together = this;
+  }
+
+  async open() {
+    const { asked, assembly, scene } = this;
+    document.documentElement.classList.add('together');
+    $('start').hidden = true;
+    document.documentElement.classList.add('opening');
+    $('openingName').textContent = asked.title;
+    $('openingText').textContent = `${count(asked.models.length)} models`;
+    scene.scene.add(assembly.group);
+    scene.others = assembly;
+    const there = await assembly.open(asked);
+    document.documentElement.classList.remove('opening');
+    if (!there) {
+      $('start').hidden = false;
+      return;
+    }
+    state.scene = assembly.scene;
+    state.info = { box_origin: assembly.box.origin, box_size: assembly.box.size, unit: asked.unit ?? assembly.models.find((m) => m.info?.unit)?.info.unit, parts: new Set(), levels: [], level_count: 0 };
+    this.#build();
+    this.#takeAddress();
+    this.#soon();
+    tell('opened');
+  }
+
+  // --- panel ---
+
+  #build() {
+    const { asked, assembly, scene, page } = this, faces = assembly.instances.reduce((sum, i) => sum + (assembly.models[i.model].info?.face_count ?? 0), 0);
+    document.title = `${asked.title} – EBP-Octree viewer`;
+    $('name').textContent = asked.title;
+    $('facts').textContent = `${count(assembly.models.length)} models · ${count(assembly.instances.length)} instances · ${count(faces)} faces`;
+    for (const id of ['panel', 'bar', 'tools'])
+      $(id).hidden = id === 'panel' && innerWidth <= 760;
+    section('Models', HTML, { open: true });
+    section('Chosen', CHOSEN, { open: true });
+    addSectionBox({ cutChanged: () => this.#cut() });
+    addDistances({ scene, placeOf: (point) => this.#placeOf(point), changed: () => this.changed() });
+    addShading(scene, scene.pipeline = new Pipeline(kit));
+    addCompass({ scene, changed: () => this.changed(), up: assembly.up });
+    this.#rows();
+    this.#layers();
+    this.#cameras();
+    this.#times();
+    $('ownRow').hidden = false;
+    $('own').onchange = () => (assembly.setOwnColours($('own').checked), scene.redraw());
+    $('walls').onchange = () => (assembly.setWalls($('walls').checked), scene.redraw());
+    $('colouring').onchange = () => (assembly.setColouring(document.querySelector('input[name=colouring]:checked').value), scene.redraw());
+    $('detail').onchange = () => this.moved();
+    $('chosenLook').onclick = () => this.#lookAt(assembly.chosen);
+    on('theme', () => (assembly.setTheme(document.documentElement.dataset.theme !== 'light'), scene.redraw()));
+    on('escape', () => this.#choose());
+    page.layout();
+    scene.home();
+    this.homeView = cameraText(scene.place);
+  }
+
+  #rows() {
+    const { assembly } = this;
+    $('models').replaceChildren(...assembly.models.map((model) => {
+      const li = make('li', ''), eye = make('input', '', { type: 'checkbox', checked: model.visible, ariaLabel: `Show ${model.name}` }), colour = make('input', '', { type: 'color',
+        value: model.colour, ariaLabel: `Colour of ${model.name}` });
+      const name = make('button', model.name, { className: 'link', disabled: !model.info });
+      const facts = model.info ? [`${count(model.info.face_count)} faces`, model.instances.length > 1 && `${count(model.instances.length)} times`, model.size && bytes(model.size)]
+        : [model.error ? 'could not be opened' : 'no instance'];
+      eye.onchange = () => this.#show(model, eye.checked);
+      colour.oninput = () => {
+        assembly.setColour(model, colour.value);
+        this.scene.redraw();
+        this.changed();
+      };
+      name.onclick = () => this.#choose(model.instances.find((i) => i.visible) ?? model.instances[0]);
+      li.append(eye, colour, name, make('small', facts.filter(Boolean).join(' · ')));
+      return li;
+    }));
+  }
+
+  #show(model, visible) {
+    model.visible = visible;
+    this.moved();
+    this.changed();
+  }
+
+  #layers() {
+    const { layers = [] } = this.asked;
+    $('sceneLayers').replaceChildren(...layers.slice(0, NAMES_MOST).map((layer) => {
+      const label = make('label', '', { className: 'switch' }), box = make('input', '', { type: 'checkbox', checked: !this.hiddenLayers.has(layer) });
+      box.onchange = () => {
+        box.checked ? this.hiddenLayers.delete(layer) : this.hiddenLayers.add(layer);
+        this.#applyLayers();
+        this.changed();
+      };
+      label.append(box, make('span', layer));
+      return label;
+    }));
+  }
+
+  #applyLayers() {
+    this.assembly.instances.forEach((i) => (i.visible = !this.hiddenLayers.has(i.layer)));
+    this.moved();
+  }
+
+  #cameras() {
+    const { cameras = [] } = this.asked;
+    $('cameras').replaceChildren(...cameras.slice(0, NAMES_MOST).map((camera) => {
+      const go = make('button', camera.name, { className: 'small' });
+      go.onclick = () => {
+        const { eye, target } = cameraAt(camera, this.assembly.time);
+        this.scene.place = { eye: toScene(eye), target: toScene(target) };
+        this.changed();
+      };
+      return go;
+    }));
+  }
+
+  // --- time ---
+
+  #times() {
+    const { from, to } = this.assembly, moves = to > from;
+    $('timeRow').hidden = !moves;
+    if (!moves)
+      return;
+    $('time').oninput = () => this.#setTime(from + (to - from) * $('time').value / 1000);
+    $('timePlay').onclick = () => {
+      this.playing = !this.playing;
+      $('timePlay').ariaPressed = String(this.playing);
+      let last = performance.now();
+      const step = (now) => {
+        if (!this.playing)
+          return;
+        const time = this.assembly.time + (now - last) / 1000;
+        last = now;
+        this.#setTime(time > to ? from : time);
+        requestAnimationFrame(step);
+      };
+      requestAnimationFrame(step);
+    };
+    this.#showTime();
+  }
+
+  #setTime(time) {
+    this.assembly.setTime(time);
+    this.#showTime();
+    this.#marks();
+    this.changed();
+  }
+
+  #showTime() {
+    const { from, to, time } = this.assembly;
+    $('time').value = 1000 * (time - from) / (to - from);
+    $('timeText').textContent = `${time.toFixed(2)} s`;
+  }
+
+  // --- what is clicked ---
+
+  /** By app.js, with the picture's point in the world. */
+  clicked(point) {
+    const instance = this.scene.picked && this.assembly.instanceOf(this.scene.picked);
+    this.#choose(instance, instance && this.assembly.inModel(instance, point));
+  }
+
+  async #choose(instance, point) {
+    const { assembly } = this, asks = this.asks = (this.asks ?? 0) + 1, model = instance && assembly.models[instance.model];
+    assembly.chosen = instance;
+    this.point = point;
+    this.near = undefined;
+    $('chosen').hidden = !instance;
+    $('chosenHint').hidden = Boolean(instance);
+    this.#marks();
+    this.moved();
+    if (!instance)
+      return;
+    this.#tellChosen(instance, model);
+    if (!point || !model.info)
+      return;
+    try {
+      const answer = await model.client.probe(point);
+      if (asks !== this.asks)
+        return;
+      this.near = answer.nearest;
+      this.#tellAnswer(model, answer, instance.now.scale);
+      this.#marks();
+    } catch (error) {
+      if (error.name !== 'AbortError')
+        complain(error.message);
+    }
+  }
+
+  #tellChosen(instance, { name, info, size, error, file }) {
+    $('chosenName').textContent = instance.name;
+    $('chosenModel').textContent = instance.name === name ? '' : name;
+    const rows = info ? [['Faces', count(info.face_count)], ['Kind', info.solid ? 'solid' : 'surface'], ['Levels', `0–${info.level_count - 1}`], ['File', bytes(size)],
+      ...(instance.layer ? [['Layer', instance.layer]] : []), ...(instance.now?.scale === 1 ? [] : [['Scale', String(Number(instance.now?.scale.toPrecision(5)))]])] : [['Problem', error?.message ?? '']];
+    $('chosenFacts').replaceChildren(...rows.flatMap(([dt, dd]) => [make('dt', dt), make('dd', dd)]));
+    $('chosenWhere').textContent = $('chosenNote').textContent = '';
+    $('chosenOpen').hidden = typeof file !== 'string';
+    if (typeof file === 'string')
+      $('chosenOpen').href = withQuery(new URL(location.pathname, location.href).href, [['file', file]]);
+  }
+
+  #tellAnswer({ info }, { where, distance, lo, hi, exact }, scale) {
+    const words = { in: 'Inside', out: 'Outside', on: 'On the surface', maybe: 'Undecided' };
+    $('chosenWhere').textContent = info.solid ? words[where] ?? '' : 'A surface';
+    $('chosenNote').textContent = `${exact ? `${length(distance * scale, 6)} to the nearest face` : `${length(lo * scale, 3)} – ${length(hi * scale, 3)} to the surface`}; at ` +
+      this.assembly.inWorld(this.assembly.chosen, this.point).map((x) => Number(x.toPrecision(6))).join(', ');
+  }
+
+  // The point and its nearest one move with their instance.
+  #marks() {
+    const { assembly, point, near } = this, at = (p) => p && toScene(assembly.inWorld(assembly.chosen, p));
+    this.scene.showProbe(assembly.chosen && at(point), assembly.chosen && at(near));
+  }
+
+  // For distances: on the nearest face of what is clicked.
+  async #placeOf(point) {
+    const { picked, pickedCut } = this.scene, instance = picked && this.assembly.instanceOf(picked), model = instance && this.assembly.models[instance.model];
+    if (!instance || pickedCut || !model.info.parts.has('mesh'))
+      return point;
+    const [{ place }] = await model.client.places([this.assembly.inModel(instance, point)]);
+    return this.assembly.inWorld(instance, place);
+  }
+
+  #lookAt(instance) {
+    if (!instance?.at)
+      return;
+    const { eye, target } = this.scene.place, away = eye.map((x, k) => x - target[k]), far = Math.hypot(...away), near = Math.min(11, Math.max(0.01, 3 * instance.radius));
+    this.scene.place = { target: instance.at, eye: instance.at.map((x, k) => x + away[k] / far * near) };
+    this.changed();
+  }
+
+  // --- the picture ---
+
+  #cut() {
+    const { size } = this.assembly.box, turned = (p) => upright(p, this.assembly.up).map(Math.abs);
+    // Shares of the world's axes as shares of the picture's: an axis that is turned over counts from its other end.
+    const box = state.box && this.assembly.up === 2 ? [state.box[0], state.box[2], 1 - state.box[4], state.box[3], state.box[5], 1 - state.box[1]] : state.box;
+    const cut = cutOf(turned(size), this.assembly.scene.scale, { axis: undefined }, box);
+    this.assembly.setCut(cut?.low, cut?.high);
+    this.scene.cut = cut;
+    this.moved();
+    this.changed();
+  }
+
+  /** The camera has moved, or what is shown is another. */
+  moved() {
+    this.#soon();
+    this.changed();
+  }
+
+  #soon() {
+    this.timer ??= requestAnimationFrame(() => {
+      this.timer = undefined;
+      if (!state.info)
+        return;
+      const detail = $('detail').value === 'auto' ? PIXELS : Number($('detail').value);
+      this.assembly.update(this.scene.camera, this.scene.canvas.clientHeight, { pixels: detail, triangles: TRIANGLES_MOST, mesh: true });
+      this.scene.redraw();
+      this.#news();
+    });
+  }
+
+  #news() {
+    const idle = this.assembly.idle, s = this.assembly.stats;
+    state.idle = Boolean(state.info) && idle;
+    $('progress').classList.toggle('on', !idle);
+    Object.entries({ sRequests: count(s.requests), sBytes: `${bytes(s.bytes)} of ${bytes(s.size)}`, sNodes: count(s.nodes), sTriangles: count(s.triangles), sMesh: count(s.meshTriangles) })
+      .forEach(([id, text]) => ($(id).textContent = text));
+  }
+
+  // --- the address ---
+
+  #takeAddress() {
+    const { query, assembly } = this, names = (key) => (query.get(key) ?? '').split('|').filter(Boolean), time = Number(query.get('time')), [home] = [this.scene.place];
+    const view = cameraOf(query.get('view'));
+    this.scene.place = view ?? home;
+    for (const name of names('hide')) {
+      assembly.models.filter((m) => m.name === name).forEach((m) => (m.visible = false));
+      if (this.asked.layers?.includes(name))
+        this.hiddenLayers.add(name);
+    }
+    names('colours').forEach((pair) => {
+      const [, name, hex] = /^(.*):([0-9a-f]{6})$/i.exec(pair) ?? [], model = assembly.models.find((m) => m.name === name);
+      if (model)
+        assembly.setColour(model, `#${hex.toLowerCase()}`);
+    });
+    this.#rows();
+    this.#layers();
+    this.#applyLayers();
+    if (query.has('time') && Number.isFinite(time) && assembly.to > assembly.from)
+      this.#setTime(Math.max(assembly.from, Math.min(assembly.to, time)));
+    state.box = boxOf(query.get('box'));
+    if (state.box)
+      this.#cut();
+    state.measured = pointsOf(query.get('measure'));
+  }
+
+  /** The address of what is shown now. */
+  address() {
+    const { assembly, scene } = this, view = cameraText(scene.place), diagonal = Math.hypot(...assembly.box.size), hidden = [...assembly.models.filter((m) => !m.visible).map((m) => m.name), ...this.hiddenLayers];
+    const colours = assembly.models.filter((m, i) => m.colour !== COLOURS[i % COLOURS.length]).map((m) => `${m.name}:${m.colour.slice(1)}`);
+    return withQuery(location.href, [['view', view === this.homeView ? undefined : view], ['time', assembly.time === assembly.from ? undefined : assembly.time.toFixed(3)],
+      ['hide', hidden.join('|')], ['colours', colours.join('|')], ['box', boxText(state.box)], ['measure', state.measured?.length ? pointsText(state.measured, diagonal) : undefined]]);
+  }
+
+  changed() {
+    if (!state.info || this.asked.local)
+      return;
+    this.later ??= setTimeout(() => {
+      this.later = undefined;
+      if (this.address() !== location.href)
+        history.replaceState(history.state, '', this.address());
+    }, LATER_MS);
+  }
+}

@@ -1,0 +1,169 @@
+// A scene file (format-spec/scene.md) as the page shows it: models, instances, routes, cameras. What only questions are about (ignore, clearance) is checked to be
+// there in form and not used. JSON.parse() does not tell of members that are there twice; the last one holds.
+import { AT_HOME, placed, quaternionOf, routeAt, unitQuaternion } from './poses.js';
+
+export const MOST = { bytes: 64 << 20, instances: 100_000, models: 1000 };
+const SCALE_MOST = 2 ** 300, TIME_MOST = 2 ** 1000, LIKE_ROTATION = 2 ** -20;
+
+const refuse = (where, what) => {
+  throw new Error(`${where}: ${what}; see format-spec/scene.md, or ask ebpo scene info about the file`);
+};
+const must = (good, where, what) => good || refuse(where, what);
+const isObject = (value) => typeof value === 'object' && value !== null && !Array.isArray(value);
+
+// An object's members: those that are named here, and `x-`.
+function members(value, where, names) {
+  must(isObject(value), where, 'is not an object');
+  for (const name of Object.keys(value))
+    must(names.includes(name) || name.startsWith('x-'), where, `has a member ${JSON.stringify(name)} that no scene has`);
+  return value;
+}
+const list = (value, where) => (value === undefined ? [] : Array.isArray(value) ? value : refuse(where, 'is not an array'));
+function number(value, where, most = Infinity) {
+  must(Number.isFinite(value) && Math.abs(value) <= most, where, 'is not a number in range');
+  return value;
+}
+function numbers(value, where, count) {
+  must(Array.isArray(value) && value.length === count, where, `is not ${count} numbers`);
+  return value.map((x, i) => number(x, `${where}[${i}]`));
+}
+function text(value, where) {
+  must(typeof value === 'string', where, 'is not a text');
+  return value;
+}
+function name(value, where) {
+  // eslint-disable-next-line no-control-regex
+  must(typeof value === 'string' && value.length > 0 && new TextEncoder().encode(value).length <= 255 && !/[\u0000-\u001f\u007f]/.test(value), where, 'is not a name');
+  must(value !== '*' && !/^(layer|group):/.test(value), where, `"${value}" cannot be a name`);
+  return value;
+}
+const unique = (names, where) => must(new Set(names).size === names.length, where, 'has a name twice');
+
+function rotationOf(r, where) {
+  for (let i = 0; i < 3; i++)
+    for (let k = i; k < 3; k++) {
+      const off = Math.abs(r[i] * r[k] + r[3 + i] * r[3 + k] + r[6 + i] * r[6 + k] - (i === k ? 1 : 0));
+      must(off <= LIKE_ROTATION, where, `is no rotation: off by ${off.toPrecision(2)}`);
+    }
+  const det = r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) + r[2] * (r[3] * r[7] - r[4] * r[6]);
+  must(det > 0, where, 'is a mirror');
+  return r;
+}
+
+/** A pose of a file: with `turn`, a quaternion of length 1, beside its rotation. */
+export function poseOf(value, where) {
+  const p = members(value ?? {}, where, ['translation', 'scale', 'rotation', 'quaternion']);
+  must(!(p.rotation && p.quaternion), where, 'has both a rotation and a quaternion');
+  const scale = p.scale === undefined ? 1 : number(p.scale, `${where}.scale`);
+  must(scale >= 1 / SCALE_MOST && scale <= SCALE_MOST, `${where}.scale`, 'is not from 2^-300 to 2^300');
+  const rotation = p.rotation && rotationOf(numbers(p.rotation, `${where}.rotation`, 9), `${where}.rotation`);
+  const turn = rotation ? quaternionOf(rotation) : unitQuaternion(p.quaternion ? numbers(p.quaternion, `${where}.quaternion`, 4) : [0, 0, 0, 1]);
+  must(turn !== undefined, `${where}.quaternion`, 'is 0');
+  const translation = p.translation === undefined ? [0, 0, 0] : numbers(p.translation, `${where}.translation`, 3);
+  return { ...routeAt({ keys: [{ time: 0, turn, scale, translation }] }, 0), ...(rotation && { rotation }), turn };
+}
+
+// --- routes ---
+
+function csvKeys(csv, where) {
+  const lines = csv.replace(/^\ufeff/, '').split(/\r?\n/).filter((line) => line.trim()), cells = (line) => line.split(/[,;]/).map((cell) => cell.trim()), [head] = lines;
+  must(head !== undefined, where, 'is empty');
+  const columns = cells(head), needed = ['time', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw'];
+  unique(columns, where);
+  must(needed.every((c) => columns.includes(c)) && columns.every((c) => [...needed, 'scale'].includes(c)), `${where}: line 1`, 'does not name the columns time, x, y, z, qx, qy, qz, qw and perhaps scale');
+  return lines.slice(1).map((line, i) => {
+    const at = `${where}: line ${i + 2}`, row = cells(line).map((cell) => number(cell === '' ? NaN : Number(cell), at)), of = (c) => row[columns.indexOf(c)];
+    must(row.length === columns.length, at, `has not ${columns.length} numbers`);
+    return { time: of('time'), pose: poseOf({ translation: [of('x'), of('y'), of('z')], quaternion: [of('qx'), of('qy'), of('qz'), of('qw')], scale: of('scale') ?? 1 }, at) };
+  });
+}
+
+async function routeOf(value, where, fetchText) {
+  const r = members(value, where, ['keys', 'poses', 'csv', 'begin', 'step', 'between']);
+  must([r.keys, r.poses, r.csv].filter((x) => x !== undefined).length === 1, where, 'needs one of keys, poses, csv');
+  must(r.between === undefined || ['even', 'jump'].includes(r.between), `${where}.between`, 'is neither even nor jump');
+  must(r.poses !== undefined || (r.begin === undefined && r.step === undefined), where, 'has begin or step without poses');
+  let keys;
+  if (r.csv !== undefined)
+    keys = csvKeys(await fetchText(pathOf(r.csv, `${where}.csv`)), r.csv);
+  else if (r.poses !== undefined)
+    keys = list(r.poses, `${where}.poses`).map((pose, i) => ({ time: number(r.begin ?? 0, `${where}.begin`) + i * number(r.step, `${where}.step`), pose: poseOf(pose, `${where}.poses[${i}]`) }));
+  else
+    keys = list(r.keys, `${where}.keys`).map((key, i) => {
+      const at = `${where}.keys[${i}]`, { time, pose } = members(key, at, ['time', 'pose']);
+      return { time: number(time, `${at}.time`), pose: poseOf(pose, `${at}.pose`) };
+    });
+  must(keys.length > 0, where, 'has no keys');
+  keys.forEach(({ time }, i) => must(Math.abs(time) <= TIME_MOST && (i === 0 || time > keys[i - 1].time), where, `key ${i}: times do not ascend`));
+  return { jumps: r.between === 'jump', keys: keys.map(({ time, pose: { turn, scale, translation } }) => ({ time, turn, scale, translation })) };
+}
+
+/** A path within the scene's folder, or an address; `where` it stands. */
+function pathOf(value, where) {
+  const path = text(value, where);
+  if (/^https?:\/\//i.test(path))
+    return path;
+  must(path !== '' && !/^([/\\]|[a-z][a-z0-9+.-]*:)/i.test(path) && !path.split(/[/\\]/).includes('..'), where, `"${path}" leads out of the scene's folder`);
+  return path;
+}
+
+// --- the whole ---
+
+/**
+ * From a file's text: { title, unit, models: [{ name, file, digest }], layers, instances: [{ name, model (its number), layer, pose, route }], cameras, from, to (the times of the
+ * keys; equal where nothing moves) }. `fetchText(path)` brings files of poses. Throws an Error that says where and what.
+ */
+export async function readScene(source, fetchText) {
+  must(source.length <= MOST.bytes, 'the scene', 'is larger than 64 MiB');
+  let json;
+  try {
+    json = JSON.parse(source.replace(/^\ufeff/, ''));
+  } catch (error) {
+    throw new Error(`this is no JSON (${error.message}); give a scene file`);
+  }
+  const s = members(json, 'the scene', ['ebpo_scene', 'title', 'unit', 'models', 'layers', 'groups', 'routes', 'instances', 'cameras', 'ignore', 'clearance']);
+  must(typeof s.ebpo_scene === 'string' && /^1\.\d+$/.test(s.ebpo_scene), 'ebpo_scene', 'is not 1.0: this is no scene, or one that is newer than this page');
+  const models = Object.entries(members(s.models ?? {}, 'models', Object.keys(s.models ?? {}))).map(([key, value]) => {
+    const where = `models.${name(key, 'models')}`, m = members(value, where, ['file', 'content_sha256', 'subset_of']), file = pathOf(m.file, `${where}.file`);
+    must(m.content_sha256 === undefined || /^[0-9a-f]{64}$/.test(m.content_sha256), `${where}.content_sha256`, 'is not 64 digits');
+    must(m.content_sha256 !== undefined || !/^https?:/i.test(file), where, 'is on a server, and has no content_sha256');
+    return { name: key, file, digest: m.content_sha256 };
+  });
+  const [layers, groups] = ['layers', 'groups'].map((kind) => list(s[kind], kind).map((n, i) => name(n, `${kind}[${i}]`)));
+  unique(layers, 'layers');
+  unique(groups, 'groups');
+  const routes = new Map();
+  for (const [key, value] of Object.entries(members(s.routes ?? {}, 'routes', Object.keys(s.routes ?? {}))))
+    routes.set(name(key, 'routes'), await routeOf(value, `routes.${key}`, fetchText));
+  const numberOf = new Map(models.map((m, i) => [m.name, i])), declared = (value, where, known, kind) => must(known(value), where, `"${value}" is no ${kind} of this scene`);
+  const instances = list(s.instances, 'instances').map((value, i) => {
+    const where = `instances[${i}]`, one = members(value, where, ['name', 'model', 'pose', 'route', 'layer', 'groups', 'fixed']);
+    must(one.fixed === undefined || typeof one.fixed === 'boolean', `${where}.fixed`, 'is neither true nor false');
+    must(!(one.fixed && one.route !== undefined), where, 'is fixed and has a route');
+    declared(one.model, `${where}.model`, (n) => numberOf.has(n), 'model');
+    if (one.route !== undefined)
+      declared(one.route, `${where}.route`, (n) => routes.has(n), 'route');
+    if (one.layer !== undefined)
+      declared(one.layer, `${where}.layer`, (n) => layers.includes(n), 'layer');
+    list(one.groups, `${where}.groups`).forEach((n) => declared(n, `${where}.groups`, (g) => groups.includes(g), 'group'));
+    return { name: name(one.name, `${where}.name`), model: numberOf.get(one.model), layer: one.layer, pose: poseOf(one.pose, `${where}.pose`), route: routes.get(one.route) };
+  });
+  unique(instances.map((i) => i.name), 'instances');
+  must(instances.length <= MOST.instances && models.length <= MOST.models, 'the scene', `has more than ${MOST.instances} instances or ${MOST.models} models, which is more than this page shows`);
+  const cameras = list(s.cameras, 'cameras').map((value, i) => cameraOf(value, `cameras[${i}]`, routes));
+  const times = instances.flatMap(({ route }) => (route ? [route.keys[0].time, route.keys.at(-1).time] : [])), span = times.length ? [Math.min(...times), Math.max(...times)] : [0, 0];
+  return { title: s.title === undefined ? '' : text(s.title, 'title'), unit: s.unit === undefined ? '' : text(s.unit, 'unit'), models, layers, instances, cameras, from: span[0], to: span[1] };
+}
+
+function cameraOf(value, where, routes) {
+  const c = members(value, where, ['name', 'eye', 'target', 'up', 'fov', 'pixels', 'route']);
+  must(c.route === undefined || routes.has(c.route), `${where}.route`, 'is no route of this scene');
+  return { name: name(c.name, `${where}.name`), eye: numbers(c.eye, `${where}.eye`, 3), target: numbers(c.target, `${where}.target`, 3),
+    up: c.up === undefined ? [0, 0, 1] : numbers(c.up, `${where}.up`, 3), route: routes.get(c.route) };
+}
+
+/** A camera's eye and target at a time. */
+export function cameraAt({ eye, target, route }, time) {
+  const pose = route ? routeAt(route, time) : AT_HOME;
+  return { eye: placed(pose, eye), target: placed(pose, target) };
+}
