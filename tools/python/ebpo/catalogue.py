@@ -70,7 +70,7 @@ class Catalogue:
         """
         def entry(path: Any) -> Entry:
             name = absolute(os.fspath(path), os.getcwd())
-            with open_model(name, **options) as model:
+            with open_model(name, **for_source(name, options)) as model:
                 info = model.info
                 return Entry(name, info.content_sha256, bool(info.solid), *map(tuple, info.box.tolist()))
 
@@ -150,8 +150,9 @@ class Catalogue:
         """surface: what rays and distances see."""
         entry = self.entries[number]
         if surface and entry.surface:
-            return held.model(entry.surface, entry.surface_sha256, len(self), **self.options)
-        return held.model(entry.path, entry.content_sha256, len(self), **self.options)
+            return held.model(entry.surface, entry.surface_sha256, len(self),
+                              **for_source(entry.surface, self.options))
+        return held.model(entry.path, entry.content_sha256, len(self), **for_source(entry.path, self.options))
 
     def _stretches(self, points: Any, held: Holding) -> tuple[Rows, np.ndarray, Iterator[np.ndarray]]:
         """Rows, all of them as doubles, and numbers of points by stretches of the Morton curve, which do not
@@ -339,6 +340,15 @@ def runs(pairs: Pairs) -> Iterator[tuple[int, np.ndarray]]:
     begins = np.flatnonzero(np.diff(box, prepend=-1))
     for begin, end in zip(begins, [*begins[1:], len(box)]):
         yield int(box[begin]), point[begin:end]
+
+
+def for_source(name: str, options: dict) -> dict:
+    """Options for opening it: of URLs alone. Long work waits for servers that are away for some minutes."""
+    if "://" not in name:
+        return {}
+    if name.startswith(("http://", "https://")) and "storage_options" not in options:
+        return {"time_limit": 300.0, "retries": 60, **options}
+    return options
 
 
 def absolute(path: str, folder: str) -> str:
