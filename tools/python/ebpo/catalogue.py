@@ -118,6 +118,10 @@ class Catalogue:
     def __getstate__(self) -> dict:
         return {name: value for name, value in self.__dict__.items() if name not in ("boxes", "seen", "numbers")}
 
+    def __dask_tokenize__(self) -> tuple:
+        """What answers depend on: equal in every process."""
+        return "ebpo-catalogue", repr(self.entries), self.parts, self.rule
+
     def __len__(self) -> int:
         return len(self.entries)
 

@@ -92,14 +92,20 @@ def read_stretch(file: tuple, begin: int, end: int) -> np.ndarray:
     return PointFile(*file).read(begin, end)
 
 
-def answer_block(block: np.ndarray, what: str = "", asked: Catalogue | None = None, memory: Any = None,
-                 threads: int = 1, options: tuple = ()) -> np.ndarray:
-    """Of a chunk, in the worker. dask tries it with no rows, too."""
-    block = np.asarray(block)
-    if len(block) == 0 or asked is None:
-        return np.zeros(len(block), DTYPES[what])
-    ask = getattr(asked, what)
-    rest = dict(options, memory=memory, threads=threads)
+class Means:
+    """What answers do not depend on, nor the names of their arrays."""
+
+    def __init__(self, memory: Any, threads: int) -> None:
+        self.options = {"memory": memory, "threads": threads}
+
+    def __dask_tokenize__(self) -> str:
+        return "ebpo-means"
+
+
+def answer_block(block: np.ndarray, what: str, asked: Catalogue, means: Means, options: tuple) -> np.ndarray:
+    """Of a chunk, in the worker."""
+    block, ask = np.asarray(block), getattr(asked, what)
+    rest = {**dict(options), **means.options}
     return ask(block[:, :3], block[:, 3:], **rest) if what == "ray" else ask(block, **rest)
 
 
@@ -116,7 +122,6 @@ def ask(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk: 
     options: those of the method of Catalogue, such as boundary=False, max_distance, signed, t_max.
     """
     import dask.array as da
-    from dask.base import tokenize
     if what not in DTYPES:
         raise ValueError(f"{', '.join(DTYPES)} can be asked for, not {what!r}")
     asked = catalogue(model, **(http or {}))
@@ -124,11 +129,8 @@ def ask(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk: 
     columns = 6 if what == "ray" else 3
     if given.ndim != 2 or given.shape[1] != columns:
         raise ValueError(f"{what} takes the shape (n, {columns}), not {given.shape}")
-    rest = tuple(sorted(options.items()))
-    token = tokenize(what, asked.entries, asked.parts, asked.rule, rest, given.name)
-    return da.map_blocks(answer_block, given, dtype=DTYPES[what], drop_axis=1, name=f"ebpo-{what}-{token}",
-                         meta=np.zeros(0, DTYPES[what]), what=what, asked=asked, memory=memory, threads=threads,
-                         options=rest)
+    return da.map_blocks(answer_block, given, what, asked, Means(memory, threads), tuple(sorted(options.items())),
+                         dtype=DTYPES[what], drop_axis=1, name=f"ebpo-{what}", meta=np.zeros(0, DTYPES[what]))
 
 
 def inside(model: Any, rows: Any, **options: Any) -> Any:

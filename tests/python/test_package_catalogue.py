@@ -128,6 +128,7 @@ class Holdings(Case):
             self.assertLessEqual(held.counts()["memory"], 3_000_000)
         counts = held.counts()
         self.assertEqual(counts["opened"], counts["closed"] + counts["models"])
+        self.assertGreater(counts["closed"], 2)
         self.assertGreater(counts["bytes_read"], 0)
         with held.model(names[-1], among=3):
             self.assertEqual(held.counts()["opened"], counts["opened"], "it was held")
