@@ -120,7 +120,7 @@ class Many(Case):
 
 class Holdings(Case):
     def test_the_least_recently_asked_goes(self):
-        names = spheres()[:5]
+        names = spheres()[:12]
         held = Holding("3M")  # three shares of 1,000,000 bytes
         for name in names * 2:
             with held.model(name, among=3) as m:

@@ -213,6 +213,9 @@ class Cluster(Case):
 
     @classmethod
     def setUpClass(cls):
+        main = sys.modules["__main__"]  # workers are not to run this file
+        cls.addClassCleanup(setattr, main, "__file__", main.__file__)
+        main.__file__ = None
         dask.config.set({"distributed.worker.use-file-locking": False, "temporary-directory": os.getcwd()})
         cls.cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True,
                                                dashboard_address=None, memory_limit=None)
