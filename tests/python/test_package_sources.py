@@ -6,6 +6,7 @@ import mmap
 import pathlib
 import re
 import threading
+import time
 
 from package_kit import Case, model, np, points, run
 
@@ -29,6 +30,8 @@ class Server(http.server.BaseHTTPRequestHandler):
     data, etag, fail, protocol_version = b"", '"1"', [], "HTTP/1.1"
     keys: list = []  # of requests for the file: the header X-Key
     silent = False  # about ranges
+    later = ""  # Retry-After
+    cut = 0  # answers that end before their time
 
     def do_GET(self):
         if self.path.startswith("/to?"):
@@ -41,6 +44,8 @@ class Server(http.server.BaseHTTPRequestHandler):
         if Server.fail:
             code = Server.fail.pop()
             self.send_response(code)
+            if Server.later:
+                self.send_header("Retry-After", Server.later)
             self.send_header("Content-Length", "0")
             self.end_headers()
             return
@@ -52,6 +57,11 @@ class Server(http.server.BaseHTTPRequestHandler):
         self.send_header("Content-Length", str(len(part)))
         self.send_header("ETag", Server.etag)
         self.end_headers()
+        if Server.cut:
+            Server.cut -= 1
+            self.wfile.write(part[:len(part) // 2])
+            self.close_connection = True
+            return
         self.wfile.write(part)
 
     def log_message(self, *_):
@@ -166,6 +176,42 @@ class Sources(Case):
         Server.etag, Server.fail = '"1"', [404]
         with self.assertRaisesRegex(OSError, "404"):
             sources.Web(url)
+
+    def test_patience(self):
+        """Servers that are away for a while are waited for, as long as they say and as is allowed."""
+        url = f"{self.serve()}/scan.ebpo.h5?key=secret"
+        self.addCleanup(setattr, Server, "later", "")
+        self.addCleanup(Server.fail.clear)
+        waited = []
+        real, sources.Patience.FIRST = sources.Patience.FIRST, 0.001
+        self.addCleanup(setattr, sources.Patience, "FIRST", real)
+        Server.fail[:] = [503] * 7
+        self.assertEqual(sources.Web(url).size, len(self.data))
+        Server.cut = 2
+        self.assertEqual(sources.Web(url).size, len(self.data), "short bodies are asked for again")
+        Server.fail[:] = [503] * 5
+        with self.assertRaisesRegex(OSError, "no answer after 4 requests.*503.* 3 retries") as caught:
+            sources.Web(url, retries=3)
+        self.assertNotIn("secret", str(caught.exception))
+        Server.fail[:] = [503] * 1000
+        with self.assertRaisesRegex(OSError, "status 503; 0.3 s"):
+            sources.Web(url, time_limit=.3)
+        Server.fail[:], Server.later = [429], "3600"
+        with self.assertRaisesRegex(OSError, "after 1 requests.*status 429"):
+            sources.Web(url)
+        Server.fail[:], Server.later = [503], "1"
+        begin = time.monotonic()
+        sources.Web(url)
+        self.assertGreaterEqual(time.monotonic() - begin, 1)
+        for _ in range(20):  # doubling, and never together
+            patience = sources.Patience(1e9, None, "it")
+            patience.FIRST, patience.failures = 0.001, 3
+            begin = time.monotonic()
+            patience.wait(TimeoutError())
+            waited.append(time.monotonic() - begin)
+        self.assertTrue(.004 <= min(waited) < max(waited))
+        with self.assertRaisesRegex(OSError, "refused"):
+            sources.Web("http://127.0.0.1:1/", time_limit=.01)
 
 
 if __name__ == "__main__":

@@ -2,12 +2,17 @@
 from __future__ import annotations
 
 import ctypes
+import datetime
+import email.utils
 import os
+import random
 import threading
+import time
 import urllib.error
 import urllib.parse
 import urllib.request
 from collections import OrderedDict
+from http.client import HTTPException
 from typing import Any
 
 import numpy as np
@@ -75,13 +80,57 @@ class Redirects(urllib.request.HTTPRedirectHandler):
 OPENER = urllib.request.build_opener(Redirects)
 
 
+class Patience:
+    """How long a request is sent again: with pauses that double, by chance shorter, so that many clients do
+    not come back together; or as long as the server says (Retry-After)."""
+
+    FIRST, LONGEST, AGAIN = 0.2, 20.0, (408, 429, 500, 502, 503, 504)
+
+    def __init__(self, seconds: float, retries: int | None, what: str) -> None:
+        self.began, self.seconds, self.retries, self.what, self.failures = time.monotonic(), seconds, retries, what, 0
+
+    def wait(self, error: Exception) -> None:
+        """Before the next trial. Raises OSError if it would come too late, and `error` if it is no use."""
+        code = getattr(error, "code", None)
+        if code is not None and code not in self.AGAIN:
+            raise error
+        pause = min(self.LONGEST, self.FIRST * 2**min(self.failures, 16)) * random.uniform(0.5, 1)
+        pause = max(pause, self.told(error))
+        self.failures += 1
+        gone = time.monotonic() - self.began
+        if gone + pause > self.seconds or (self.retries is not None and self.failures > self.retries):
+            said = f"status {code}" if code is not None else str(getattr(error, "reason", error))
+            raise OSError(f"{self.what}: no answer after {self.failures} requests in {gone:.1f} s, the last one: "
+                          f"{said}; {self.seconds:g} s (time_limit) and "
+                          f"{'any number of' if self.retries is None else self.retries} retries are allowed") from error
+        threading.Event().wait(pause)
+
+    @staticmethod
+    def told(error: Exception) -> float:
+        """Seconds that a server asks for, as a number or a date; 0: none."""
+        text = (getattr(error, "headers", None) or {}).get("Retry-After") or ""
+        if text.strip().isdecimal():
+            return float(text)
+        try:
+            then = email.utils.parsedate_to_datetime(text)
+            return max(0.0, (then - datetime.datetime.now(datetime.timezone.utc)).total_seconds())
+        except (TypeError, ValueError):
+            return 0.0
+
+
 class Web:
-    """A URL by Python's own HTTP, where the library has none. Answers are of one version of the file."""
+    """A URL by Python's own HTTP, where the library has none. Answers are of one version of the file.
 
-    BLOCK, HELD, TRIES = 1 << 17, 384, 4
+    time_limit: seconds for a request with all that repeat it; retries: how many do at most, None: any number.
+    One may be silent for SILENT seconds.
+    """
 
-    def __init__(self, url: str, headers: dict | None = None) -> None:
+    BLOCK, HELD, SILENT = 1 << 17, 384, 60.0
+
+    def __init__(self, url: str, headers: dict | None = None, time_limit: float = 120.0,
+                 retries: int | None = None) -> None:
         self.url, self.headers, self.lock = url, dict(headers or {}), threading.Lock()
+        self.time_limit, self.retries = time_limit, retries
         self.blocks: OrderedDict[int, bytes] = OrderedDict()
         self.version: Any = None
         self.size = 0
@@ -93,18 +142,13 @@ class Web:
         if self.version is not None:
             end = min(end, self.size - 1)
         request = urllib.request.Request(self.url, headers={**self.headers, "Range": f"bytes={begin}-{end}"})
-        for trial in range(self.TRIES):
+        patience = Patience(self.time_limit, self.retries, self.url.partition("?")[0])
+        while True:
             try:
-                with OPENER.open(request, timeout=60) as answer:
+                with OPENER.open(request, timeout=min(self.SILENT, self.time_limit)) as answer:
                     return self.checked(answer, begin)
-            except urllib.error.HTTPError as error:
-                if error.code not in (408, 429, 500, 502, 503, 504) or trial + 1 == self.TRIES:
-                    raise
-            except (urllib.error.URLError, TimeoutError, ConnectionError):
-                if trial + 1 == self.TRIES:
-                    raise
-            threading.Event().wait(0.2 * 2**trial)
-        raise AssertionError
+            except (urllib.error.URLError, TimeoutError, ConnectionError, HTTPException) as error:
+                patience.wait(error)
 
     def checked(self, answer: Any, begin: int) -> bytes:
         if answer.status != 206:
@@ -117,6 +161,8 @@ class Web:
             raise OSError("the file on the server has changed since it was opened")
         data = answer.read(self.BLOCK + 1)  # not more, however much a server sends
         self.version, self.size = version, int(whole)
+        if int(first.partition("-")[0]) == begin and len(data) < min(self.BLOCK, self.size - begin):
+            raise ConnectionError(f"the connection ended after {len(data)} bytes")
         if int(first.partition("-")[0]) != begin or len(data) != min(self.BLOCK, self.size - begin):
             raise OSError("the server sent another range than was asked for")
         return data
@@ -194,10 +240,10 @@ def by_url(url: str, http: dict, most_expansion: int) -> Handle:
     try:
         return by_name(url.encode(), most_expansion, http=struct)
     except UnsupportedError:
-        if set(http) - {"headers"}:
+        if set(http) - {"headers", "time_limit", "retries"}:
             raise
     del keep
-    return by_ranges(Web(url, http.get("headers")), url.partition("?")[0], most_expansion)
+    return by_ranges(Web(url, **http), url.partition("?")[0], most_expansion)
 
 
 def by_ranges(ranges: Any, name: str, most_expansion: int = 0) -> Handle:
@@ -250,4 +296,4 @@ def _mmap() -> type:
     return mmap.mmap
 
 
-__all__ = ["Seekable", "Stored", "Web", "opened"]
+__all__ = ["Patience", "Seekable", "Stored", "Web", "opened"]

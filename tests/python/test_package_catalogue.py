@@ -1,0 +1,280 @@
+#!/usr/bin/env python3
+"""Catalogues from Python: many models against each of them by itself, the parts of one against the whole."""
+import importlib.util
+import json
+import os
+import pathlib
+import sys
+import threading
+
+from package_kit import Case, answers, model, np, points, run
+
+import ebpo
+from ebpo.boxes import Boxes, morton_order
+from ebpo.catalogue import Catalogue, Where
+from ebpo.holding import Holding, ours
+
+CUT = pathlib.Path(sys.argv[4]) / "samples/cut_along_octcodes.py"
+P = points(6000, seed=5, reach=3)
+
+
+def spheres(count=27):
+    """Copies of the scan, each moved; some overlap."""
+    names = [f"moved/{i:02d}.ebpo.h5" for i in range(count)]
+    if not os.path.isdir("moved"):
+        os.mkdir("moved")
+        mesh = model("scan").mesh(order="source")
+        for name, at in zip(names, points(count, seed=9, reach=2.5)):
+            ebpo.convert((mesh.vertices[:, :3] * .4 + at, mesh.faces), name)
+    return names
+
+
+class Many(Case):
+    def setUp(self):
+        self.names = spheres()
+        self.models = [ebpo.open(name) for name in self.names]
+        self.catalogue = Catalogue.of(self.names)
+
+    def test_inside_is_the_sum(self):
+        told = [m.locate(P) for m in self.models]
+        located = self.catalogue.locate(P)
+        inner = np.any([t.where == Where.IN for t in told], axis=0)
+        np.testing.assert_array_equal(located["winding"], np.sum([t.winding for t in told], axis=0))
+        np.testing.assert_array_equal(located["where"] == Where.IN, inner)
+        self.assertGreater(located["winding"].max(), 1)
+        on = self.models[3].mesh().vertices[:200].astype(float)
+        where = self.catalogue.locate(on)["where"]
+        buried = np.any([m.locate(on).where == Where.IN for m in self.models], axis=0)
+        np.testing.assert_array_equal(where, np.where(buried, Where.IN, Where.ON))
+        np.testing.assert_array_equal(self.catalogue.inside(on, boundary=False), buried)
+
+    def test_distance_is_the_least(self):
+        told = [m.distance(P, signed=False) for m in self.models]
+        every = np.array([t.distance for t in told])
+        nearest, row = every.argmin(axis=0), np.arange(len(P))
+        d = self.catalogue.distance(P)
+        np.testing.assert_array_equal(abs(d["distance"]), every.min(axis=0))
+        np.testing.assert_array_equal(d["model"], nearest)
+        np.testing.assert_array_equal(d["face"], np.array([t.face for t in told])[nearest, row])
+        np.testing.assert_array_equal(d["point"], np.array([t.point for t in told])[nearest, row])
+        np.testing.assert_array_equal(d["distance"] < 0, self.catalogue.inside(P, boundary=False))
+        near = self.catalogue.distance(P, max_distance=.3)
+        np.testing.assert_array_equal(near["face"] == -1, every.min(axis=0) > .3)
+        twice = Catalogue.of(self.names[:1] * 3).distance(P[:500])
+        self.assertEqual(set(twice["model"]), {0}, "of equal ones the first")
+
+    def test_rays(self):
+        d = points(len(P), seed=6)
+        d[:2000:2, 1], d[:2000:5, 2] = 0, 0
+        hits = [m.ray(P, d) for m in self.models]
+        t, found = np.array([h.t for h in hits]), self.catalogue.ray(P, d)
+        np.testing.assert_array_equal(found["t"], t.min(axis=0))
+        np.testing.assert_array_equal(found["model"], np.where(np.isinf(t.min(axis=0)), -1, t.argmin(axis=0)))
+        self.assertTrue(0 < np.isfinite(found["t"]).mean() < 1)
+
+    def test_few_models_are_asked(self):
+        p = points(50, seed=3, reach=.01) + (self.catalogue.entries[4].low + np.array(self.catalogue.entries[4].high)) / 2
+        boxes = self.catalogue.boxes
+        self.assertLess(len(set(boxes.containing(p)[1])), 6)
+        _, box, _ = boxes.nearest(p)
+        self.assertLess(len(set(box)), 20)
+
+    def test_files(self):
+        self.catalogue.save("moved/catalogue.json")
+        told = json.loads(pathlib.Path("moved/catalogue.json").read_text())
+        self.assertEqual(told["models"][3]["path"], "03.ebpo.h5")
+        again = Catalogue.open("moved/catalogue.json")
+        self.assertEqual(again.entries, self.catalogue.entries)
+        told["of later"] = told["models"][0]["of later"] = 1
+        for change, kind, message in (({}, None, ""), ({"version": 2}, ebpo.VersionError, "version 2"),
+                                      ({"format": "x"}, ebpo.FormatError, "ebpo-catalogue"),
+                                      ({"models": [{"path": "a"}]}, ebpo.FormatError, "box_min"),
+                                      ({"models": []}, ebpo.FormatError, "one model"),
+                                      ({"models": 5}, ebpo.FormatError, "catalogue")):
+            pathlib.Path("moved/changed.json").write_text(json.dumps({**told, **change}))
+            if kind is None:
+                self.assertEqual(len(Catalogue.open("moved/changed.json")), 27)
+                continue
+            with self.assertRaisesRegex(kind, message):
+                Catalogue.open("moved/changed.json")
+
+    def test_errors(self):
+        bad = P.copy()
+        bad[77, 2] = np.nan
+        with self.assertRaisesRegex(ebpo.ArgumentError, "number 77 "):
+            self.catalogue.inside(bad)
+        model("open_box")
+        surface = Catalogue.of(["open_box.ebpo.h5"])
+        with self.assertRaisesRegex(ebpo.NotSolidError, "open_box"):
+            surface.winding(P)
+        self.same([surface.distance(P)["distance"]], [model("open_box").distance(P).distance])
+        self.assertEqual(len(self.catalogue.distance(np.zeros((0, 3)))), 0)
+        ebpo.convert("scan.ply", "other.ebpo.h5")
+        one = Catalogue.of(["other.ebpo.h5"])
+        one.inside(P[:9])
+        ebpo.convert("open_box.ply", "other.ebpo.h5")
+        ours().clear()
+        with self.assertRaisesRegex(ebpo.FormatError, "has changed"):
+            one.inside(P[:9])
+
+
+class Holdings(Case):
+    def test_the_least_recently_asked_goes(self):
+        names = spheres()[:12]
+        held = Holding("3M")  # three shares of 1,000,000 bytes
+        for name in names * 2:
+            with held.model(name, among=3) as m:
+                m.inside(P[:100])
+            self.assertLessEqual(held.counts()["memory"], 3_000_000)
+        counts = held.counts()
+        self.assertEqual(counts["opened"], counts["closed"] + counts["models"])
+        self.assertGreater(counts["closed"], 2)
+        self.assertGreater(counts["bytes_read"], 0)
+        with held.model(names[-1], among=3):
+            self.assertEqual(held.counts()["opened"], counts["opened"], "it was held")
+        held.clear()
+        self.assertEqual(held.counts()["models"], 0)
+
+    def test_threads_and_refusals(self):
+        names, held, found = spheres()[:6], Holding("3M"), []
+        expected = {name: ebpo.open(name).inside(P[:500]).tobytes() for name in names}
+
+        def work(turn):
+            for name in names[turn:] + names[:turn]:
+                with held.model(name, among=3) as m:
+                    found.append(m.inside(P[:500], threads=1).tobytes() == expected[name])
+
+        threads = [threading.Thread(target=work, args=(turn,)) for turn in range(6)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(60)
+        self.assertEqual(found, [True] * 36)
+        small = Holding(1000)
+        for _ in range(2):
+            with self.assertRaises(ebpo.LimitError):
+                with small.model(names[0]) as m:
+                    m.inside(P)
+        self.assertEqual(small.counts()["models"], 0)
+
+
+class Trees(Case):
+    def test_against_all_pairs(self):
+        rng = np.random.default_rng(1)
+        low = rng.uniform(-1, 1, (500, 3))
+        high = low + rng.uniform(0, .2, (500, 3)) ** 2
+        low[7], high[7] = low[8], high[8]
+        among = np.setdiff1d(np.arange(500), [3, 5])
+        boxes = Boxes(low, high, among)
+        p = rng.uniform(-1.2, 1.2, (1000, 3))
+        p[:300] = low[rng.integers(0, 500, 300)]
+        p = p[morton_order(p, p.min(axis=0), p.max(axis=0))]
+        held = ((low <= p[:, None]) & (p[:, None] <= high)).all(axis=2)
+        held[:, [3, 5]] = False
+        point, box = boxes.containing(p)
+        self.assertEqual(set(zip(point.tolist(), box.tolist())), set(zip(*map(np.ndarray.tolist, np.nonzero(held)))))
+        least = np.sqrt((np.maximum(np.maximum(low - p[:, None], p[:, None] - high), 0) ** 2).sum(axis=2))
+        most = np.sqrt((np.maximum(high - p[:, None], p[:, None] - low) ** 2).sum(axis=2))
+        point, box, told = boxes.nearest(p)
+        np.testing.assert_allclose(told, least[point, box], rtol=1e-14)
+        needed = least <= most[:, among].min(axis=1)[:, None]
+        needed[:, [3, 5]] = False
+        self.assertTrue(set(zip(*map(np.ndarray.tolist, np.nonzero(needed)))) <= set(zip(point.tolist(), box.tolist())))
+        self.assertLess(len(point), 1.1 * needed.sum())
+        same = np.diff(point) == 0
+        self.assertTrue((np.diff(told)[same] >= 0).all() and (np.diff(point) >= 0).all())
+
+
+class Parts(Case):
+    """A model cut into eight files answers as the whole does, on its faces and on caps as well."""
+
+    @classmethod
+    def setUpClass(cls):
+        spec = importlib.util.spec_from_file_location("cut_along_octcodes", CUT)
+        cls.cut = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(cls.cut)
+        model("scan")
+        sys.argv, kept = ["cut", "scan.ebpo.h5", "cut"], sys.argv
+        cls.cut.main()
+        sys.argv = kept
+        cls.whole, cls.catalogue = ebpo.open("scan.ebpo.h5"), Catalogue.open("cut/catalogue.json")
+        vertices, faces = cls.whole.mesh(order="source")
+        cls.corners = vertices.astype(float)[faces]
+        cls.caps = []
+        for entry in cls.catalogue.entries:
+            vertices, faces = ebpo.open(entry.path).mesh(order="source")
+            shown = len(np.load(entry.numbers))
+            real = set(map(bytes, cls.corners[np.load(entry.numbers)]))
+            corners = np.ascontiguousarray(vertices.astype(float)[faces])
+            capped = np.array([bytes(face) not in real for face in corners])
+            assert (~capped).sum() == shown
+            cls.caps.append(corners[capped])
+        cls.caps = np.concatenate(cls.caps)
+
+    def test_faces_are_dealt_out_and_caps_cancel(self):
+        self.assertEqual(len(self.catalogue), 8)
+        numbers = np.concatenate([np.load(entry.numbers) for entry in self.catalogue.entries])
+        np.testing.assert_array_equal(np.sort(numbers), np.arange(self.whole.info.face_count))
+        self.assertGreater(len(self.caps), 100)
+        balance = {}
+        for face in self.caps:
+            key = tuple(sorted(map(tuple, face)))
+            order = [key.index(tuple(corner)) for corner in face]
+            even = order in ([0, 1, 2], [1, 2, 0], [2, 0, 1])
+            balance[key] = balance.get(key, 0) + (1 if even else -1)
+        self.assertEqual(set(balance.values()), {0})
+
+    def points(self):
+        """At random; and on faces and caps, at places that doubles have exactly."""
+        yield points(5000, seed=8)
+        for k in (self.corners[::3], self.caps):
+            yield np.concatenate([k[:, 0], (k[:, 0] + k[:, 1]) / 2, (2 * k[:, 0] + k[:, 1] + k[:, 2]) / 4])
+
+    def test_inside_and_winding(self):
+        for p, least in zip(self.points(), (1, 1, 100)):
+            told, expected = self.catalogue.locate(p), self.whole.locate(p)
+            np.testing.assert_array_equal(told["where"], expected.where)
+            np.testing.assert_array_equal(told["winding"], expected.winding)
+            on_parts = np.zeros(len(p), bool)
+            for entry in self.catalogue.entries:
+                on_parts |= ebpo.open(entry.path).locate(p).where == Where.ON
+            np.testing.assert_array_equal(self.catalogue.inside(p), self.whole.inside(p))
+            self.caps_met = (on_parts & (expected.where != Where.ON)).sum()
+        self.assertGreater(self.caps_met, least, "points on caps, which are no faces of the whole")
+
+    def test_distance_and_rays_do_not_see_caps(self):
+        for p in self.points():
+            told, expected = self.catalogue.distance(p), self.whole.distance(p)
+            np.testing.assert_array_equal(told["distance"], expected.distance)
+            np.testing.assert_allclose(told["point"], expected.point, rtol=0, atol=1e-14)
+            only = told["face"] == expected.face
+            corners = self.corners[told["face"][~only]]  # another one as near: they share the point
+            shared = np.abs(self.corners[expected.face[~only]][:, :, None] - corners[:, None]).max(axis=3) == 0
+            self.assertTrue(shared.any(axis=(1, 2)).all())
+        o, d = 2 * points(4000, seed=2), points(4000, seed=3)
+        told, expected = self.catalogue.ray(o, d), self.whole.ray(o, d)
+        for name in ("t", "face", "side"):
+            np.testing.assert_array_equal(told[name], getattr(expected, name))
+        np.testing.assert_array_equal(answers("inside", "scan", o)["where"], self.catalogue.locate(o)["where"])
+
+    def test_what_is_not_closed_is_refused(self):
+        faces = np.arange(9).reshape(3, 3)
+        with self.assertRaises(SystemExit):
+            list(self.cut.cycles(self.cut.open_edges(faces)[:-1]))
+
+    def test_chains(self):
+        for count in range(3, 40):
+            chain = np.arange(count) * 7 % 1000
+            cap = self.cut.filled(chain)
+            self.assertEqual(len(cap), count - 2)
+            edges = {tuple(edge) for face in cap for edge in zip(face, np.roll(face, -1))}
+            border = {(a, b) for a, b in edges if (b, a) not in edges}
+            self.assertEqual(border, set(zip(chain.tolist(), np.roll(chain, -1).tolist())))
+            self.assertLess(np.unique(cap, return_counts=True)[1].max(), 2 * np.log2(count) + 2)
+        eight = np.array([[0, 1, 2], [0, 3, 4]])  # two chains with one vertex
+        found = sorted(sorted(chain.tolist()) for chain in self.cut.cycles(self.cut.open_edges(eight)))
+        self.assertEqual(found, [[0, 1, 2], [0, 3, 4]])
+
+
+if __name__ == "__main__":
+    run()

@@ -1,0 +1,274 @@
+#!/usr/bin/env python3
+"""ebpo.dask: the same bytes with every scheduler, chunk and worker; workers and clients that die.
+
+Exit code 77: dask or distributed is missing.
+"""
+import http.server
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+try:
+    import dask.array
+    import distributed
+except ImportError as error:
+    print(f"skipped: {error} (tools/install-deps.sh --tests)")
+    sys.exit(77)
+
+from package_kit import Case, model, np, points, run
+
+import ebpo
+import ebpo.dask as ed
+from ebpo.catalogue import Catalogue
+
+P = points(20_000, seed=4)
+D = points(20_000, seed=6)
+INPUT = pathlib.Path("points.npy")
+
+
+def h5py_or_none():
+    try:
+        import h5py
+        return h5py
+    except ImportError:
+        return None
+
+
+def setUpModule():
+    model("scan")
+    np.save(INPUT, P)
+    P.tofile("points.raw")
+
+
+class Answers(Case):
+    """With schedulers in this process."""
+
+    def test_the_models_own(self):
+        m = model("scan")
+        for scheduler, chunk in (("sync", 7000), ("threads", 999), ("threads", 1 << 18)):
+            options = {"chunk": chunk}
+            with dask.config.set(scheduler=scheduler):
+                np.testing.assert_array_equal(ed.inside("scan.ebpo.h5", P, **options).compute(), m.inside(P))
+                np.testing.assert_array_equal(ed.winding("scan.ebpo.h5", P, **options).compute(), m.winding(P))
+                nearest = ed.distance("scan.ebpo.h5", P[:5000], **options)
+                self.same(dask.compute(*nearest[:4]), m.distance(P[:5000]))
+                for o, d in ((2 * P, D), (2 * P, np.array([0, .1, 1.]))):
+                    self.same(dask.compute(*ed.ray("scan.ebpo.h5", o, d, **options)[:3]), m.ray(o, d))
+        near = ed.distance("scan.ebpo.h5", P[:999], max_distance=.1).face.compute()
+        np.testing.assert_array_equal(near, m.distance(P[:999], max_distance=.1).face)
+
+    def test_points_from_everywhere(self):
+        m, expected = model("scan"), model("scan").winding(P)
+        given = [(P, None), (dask.array.from_array(P, chunks=(6000, 2)), None), (INPUT, None), ("points.raw", None),
+                 (P.tolist()[:500], None)]
+        if h5py_or_none():
+            with h5py_or_none().File("points.h5", "w") as file:
+                file["a/P"], file["other"] = P, np.zeros(3)
+            given += [("points.h5", "a/P"), ("points.h5", None)]
+        for source, dataset in given:
+            told = ed.winding("scan.ebpo.h5", source, dataset=dataset, chunk=3333)
+            np.testing.assert_array_equal(told.compute(), expected[:told.shape[0]])
+        some = dask.array.from_array(P, chunks=(1000, 3))
+        some = some[some[:, 0] > 0]  # chunks of unknown sizes
+        np.testing.assert_array_equal(ed.inside("scan.ebpo.h5", some).compute(), m.inside(P[P[:, 0] > 0]))
+        self.assertEqual(ed.inside("scan.ebpo.h5", np.zeros((0, 3))).compute().shape, (0,))
+
+    def test_what_cannot_be_asked(self):
+        pathlib.Path("odd.raw").write_bytes(b"x" * 100)
+        np.save("wide.npy", np.zeros((5, 4)))
+        for wrong in ("odd.raw", "wide.npy"):
+            with self.assertRaisesRegex(ebpo.FormatError, wrong):
+                ed.points(wrong)
+        with self.assertRaisesRegex(ValueError, "shape"):
+            ed.inside("scan.ebpo.h5", np.zeros((5, 2)))
+        with self.assertRaisesRegex(ValueError, "asked for"):
+            ed.ask("beauty", "scan.ebpo.h5", P)
+        with self.assertRaisesRegex(TypeError, "Catalogue"):
+            ed.inside(model("scan"), P)
+        with self.assertRaises(ebpo.NotSolidError):
+            model("open_box")
+            ed.inside("open_box.ebpo.h5", P).compute()
+
+    def test_files_that_change(self):
+        shutil.copy(INPUT, "changing.npy")
+        asked = ed.inside("scan.ebpo.h5", "changing.npy")
+        np.save("changing.npy", P[::-1])
+        with self.assertRaisesRegex(ebpo.IOFailure, "changed"):
+            asked.compute()
+        shutil.copy("scan.ebpo.h5", "changing.ebpo.h5")
+        asked = ed.inside("changing.ebpo.h5", P)
+        model("open_box")
+        shutil.copy("open_box.ebpo.h5", "changing.ebpo.h5")
+        with self.assertRaisesRegex(ebpo.FormatError, "has changed"):
+            asked.compute()
+
+    def test_one_budget(self):
+        for i in range(6):
+            shutil.copy("scan.ebpo.h5", f"copy{i}.ebpo.h5")
+        before = ed.counts()
+        told = ed.winding([f"copy{i}.ebpo.h5" for i in range(6)], P, memory="9M", chunk=2000)
+        np.testing.assert_array_equal(told.compute(), 6 * model("scan").winding(P))
+        after = ed.counts()
+        self.assertGreaterEqual(after["opened"] - before["opened"], 6)
+        self.assertGreater(after["bytes_read"], before["bytes_read"])
+        self.assertLessEqual(after["memory"], 9_000_000)
+        ebpo.holding.ours("1GiB").clear()
+
+
+class Files(Case):
+    def test_every_kind(self):
+        inside = ed.inside("scan.ebpo.h5", INPUT, chunk=3000)
+        ed.to_file(inside, "inside.npy")
+        np.testing.assert_array_equal(np.load("inside.npy"), model("scan").inside(P))
+        rows = ed.ask("distance", "scan.ebpo.h5", P[:4000], chunk=1500)
+        ed.to_file(rows, "nearest.npy", scheduler="sync")
+        np.testing.assert_array_equal(np.load("nearest.npy"), rows.compute())
+        ed.to_file(inside, "folder")
+        parts = sorted(pathlib.Path("folder").glob("*.npy"))
+        np.testing.assert_array_equal(np.concatenate([np.load(part) for part in parts]), model("scan").inside(P))
+        if h5py_or_none():
+            ed.to_file(rows, "nearest.h5", dataset="near")
+            with h5py_or_none().File("nearest.h5") as file:
+                np.testing.assert_array_equal(file["near"][:], rows.compute())
+        with self.assertRaises(FileExistsError):
+            ed.to_file(inside, "inside.npy")
+        self.assertEqual([str(p) for p in pathlib.Path(".").glob("*.parts")], [])
+        self.assertEqual([str(p) for p in pathlib.Path(".").glob(".*")], [], "no temporary files stay")
+
+    def test_a_killed_client_goes_on(self):
+        """It is killed after some chunks; what is there then is not asked again."""
+        script = (f"import sys, time; sys.argv[1:] = []\nimport ebpo.dask as ed, ebpo.catalogue as cat\n"
+                  f"slow = cat.Catalogue.inside\n"
+                  f"def inside(*a, **k):\n    time.sleep(.2)\n    return slow(*a, **k)\n"
+                  f"cat.Catalogue.inside = inside\n"
+                  f"ed.to_file(ed.inside('scan.ebpo.h5', '{INPUT}', chunk=500), 'killed.npy', scheduler='sync')\n")
+        client = subprocess.Popen([sys.executable, "-c", script])
+        self.addCleanup(shutil.rmtree, "killed.npy.parts", ignore_errors=True)
+        folder, deadline = pathlib.Path("killed.npy.parts"), time.monotonic() + 60
+        while len(list(folder.glob("*.npy"))) < 5 and time.monotonic() < deadline:
+            time.sleep(.02)
+        client.kill()
+        client.wait()
+        self.assertFalse(os.path.exists("killed.npy"))
+        done = {part.name: part.stat().st_mtime_ns for part in folder.glob("0*.npy")}
+        self.assertTrue(5 <= len(done) < 40)
+        with self.assertRaisesRegex(ValueError, "another question"):
+            ed.to_file(ed.winding("scan.ebpo.h5", INPUT, chunk=500), "killed.npy")
+        kept = {}
+        joined = ed.join_parts
+        ed.join_parts = lambda path, names, dataset: (
+            kept.update((n.name, n.stat().st_mtime_ns) for n in names), joined(path, names, dataset))
+        try:
+            ed.to_file(ed.inside("scan.ebpo.h5", INPUT, chunk=500), "killed.npy")
+        finally:
+            ed.join_parts = joined
+        self.assertEqual({name: kept[name] for name in done}, done)
+        np.testing.assert_array_equal(np.load("killed.npy"), model("scan").inside(P))
+
+
+class Away(http.server.BaseHTTPRequestHandler):
+    """Ranges of a file, by a server that is away until `until`."""
+    until, refused, protocol_version = 0.0, 0, "HTTP/1.1"
+
+    def do_GET(self):
+        if time.monotonic() < Away.until:
+            Away.refused += 1
+            self.send_response(503)
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+            return
+        data = pathlib.Path("scan.ebpo.h5").read_bytes()
+        first, last = map(int, re.match(r"bytes=(\d+)-(\d+)", self.headers["Range"]).groups())
+        part = data[first:last + 1]
+        self.send_response(206)
+        self.send_header("Content-Range", f"bytes {first}-{first + len(part) - 1}/{len(data)}")
+        self.send_header("Content-Length", str(len(part)))
+        self.send_header("ETag", '"1"')
+        self.end_headers()
+        self.wfile.write(part)
+
+    def log_message(self, *_):
+        pass
+
+
+def take_time():
+    """In a worker: its answers come slowly, so that it is in the middle when it dies."""
+    quick = Catalogue.distance
+
+    def slow(*arguments, **options):
+        time.sleep(.05)
+        return quick(*arguments, **options)
+
+    Catalogue.distance = slow
+
+
+class Cluster(Case):
+    """Two worker processes."""
+
+    @classmethod
+    def setUpClass(cls):
+        main = sys.modules["__main__"]  # workers are not to run this file
+        cls.addClassCleanup(setattr, main, "__file__", main.__file__)
+        main.__file__ = None
+        dask.config.set({"distributed.worker.use-file-locking": False, "temporary-directory": os.getcwd()})
+        cls.cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True,
+                                               dashboard_address=None, memory_limit=None)
+        cls.client = distributed.Client(cls.cluster)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.client.close()
+        cls.cluster.close()
+
+    def test_a_worker_dies_and_one_is_slow(self):
+        pids = self.client.run(os.getpid)
+        self.assertEqual(len(pids), 2)
+        rows = ed.ask("distance", os.path.abspath("scan.ebpo.h5"), INPUT, chunk=500, memory="64M")
+        expected = Catalogue.of(["scan.ebpo.h5"]).distance(P)
+        self.client.run(take_time)
+        future = self.client.compute(rows)
+        deadline = time.monotonic() + 30
+        while time.monotonic() < deadline and not all(c["hits"] + c["models"] for c in ed.counts(self.client).values()):
+            time.sleep(.05)
+        self.assertFalse(future.done())
+        first, second = pids.values()
+        os.kill(first, signal.SIGKILL)
+        os.kill(second, signal.SIGSTOP)
+        time.sleep(.5)
+        os.kill(second, signal.SIGCONT)
+        self.assertEqual(future.result(60).tobytes(), expected.tobytes())
+        self.assertNotIn(first, self.client.run(os.getpid).values())
+
+    def test_workers_keep_the_model(self):
+        name = os.path.abspath("scan.ebpo.h5")
+        inside = ed.inside(name, P, chunk=1000)
+        np.testing.assert_array_equal(inside.compute(), model("scan").inside(P))
+        before = ed.counts(self.client)
+        np.testing.assert_array_equal(ed.inside(name, P[::-1], chunk=700).compute(), model("scan").inside(P[::-1]))
+        after = ed.counts(self.client)
+        self.assertEqual(sum(c["opened"] for c in after.values()), sum(max(1, c["opened"]) for c in before.values()))
+
+    def test_a_server_is_away(self):
+        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Away)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        self.addCleanup(server.server_close)
+        self.addCleanup(server.shutdown)
+        asked = Catalogue.of([f"http://127.0.0.1:{server.server_port}/scan.ebpo.h5"])
+        Away.until = time.monotonic() + 2
+        told = ed.inside(asked, P, chunk=5000).compute()
+        np.testing.assert_array_equal(told, model("scan").inside(P))
+        self.assertGreater(Away.refused, 0)
+
+    def test_to_file(self):
+        ed.to_file(ed.inside(os.path.abspath("scan.ebpo.h5"), INPUT, chunk=1500), "of_cluster.npy")
+        np.testing.assert_array_equal(np.load("of_cluster.npy"), model("scan").inside(P))
+
+
+if __name__ == "__main__":
+    run()

@@ -1,0 +1,377 @@
+"""Catalogues: any number of models that are asked as one, or the parts of one that is too large for a file."""
+from __future__ import annotations
+
+import functools
+import json
+import os
+import pathlib
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Iterator, NamedTuple
+
+import numpy as np
+
+from ._declared import Where
+from .asking import Rows
+from .boxes import SLACK, Boxes, Pairs, morton_order
+from .errors import ArgumentError, FormatError, NotSolidError, VersionError
+from .holding import Holding, ours
+from .model import open as open_model
+
+FORMAT, VERSION = "ebpo-catalogue", 1
+STRETCH = 1 << 16  # points whose pairs with models are in memory at a time
+DIRECTIONS = 64  # rays that are tried before a point is given up
+
+NEAREST = np.dtype([("distance", "f8"), ("point", "f8", 3), ("normal", "f8", 3), ("face", "i8"), ("model", "i8")])
+HIT = np.dtype([("t", "f8"), ("face", "i8"), ("side", "i4"), ("model", "i4")])
+LOCATED = np.dtype([("where", "i1"), ("winding", "i4")])
+
+
+class Entry(NamedTuple):
+    """A model: `path` is asked for winding numbers. Of parts: `surface`, which distances and rays are asked
+    of, has no caps; "": there are none, None: there is nothing else; `numbers`, a .npy, says which faces of
+    the whole its faces are."""
+
+    path: str
+    content_sha256: str
+    solid: bool
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+    surface: str | None = ""
+    surface_sha256: str = ""
+    numbers: str = ""
+
+
+class Catalogue:
+    """Many models, asked as one. Made by `Catalogue.open` or `Catalogue.of`; pickles.
+
+    A point is asked of the models whose boxes hold it. Winding numbers are summed up. A point is inside
+    that is inside any model, or, of parts of one model, where the sum is inside by `rule`. Distances are
+    those to the nearest model, of several the first; negative inside. Numbers of models are rows here.
+
+    >>> two = Catalogue.of(["cube.ebpo.h5", "cube.ebpo.h5"])
+    >>> two.winding([[.5, .5, .5], [2, 0, 0]])
+    array([2, 0], dtype=int32)
+    """
+
+    def __init__(self, entries: list[Entry], *, parts: bool = False, rule: str = "nonzero", **options: Any) -> None:
+        if not entries:
+            raise ValueError("a catalogue has one model at least")
+        if rule not in ("nonzero", "evenodd", "positive"):
+            raise ValueError(f"rule is 'nonzero', 'evenodd' or 'positive', not {rule!r}")
+        self.entries, self.parts, self.rule, self.options = list(entries), parts, rule, options
+
+    # ---- files ----
+
+    @classmethod
+    def of(cls, paths: Any, *, parts: bool = False, rule: str = "nonzero", **options: Any) -> Catalogue:
+        """Of paths and URLs, in this order; each is opened for its box and digest.
+
+        options: of URLs, as `ebpo.open` takes them.
+        """
+        def entry(path: Any) -> Entry:
+            name = absolute(os.fspath(path), os.getcwd())
+            with open_model(name, **for_source(name, options)) as model:
+                info = model.info
+                return Entry(name, info.content_sha256, bool(info.solid), *map(tuple, info.box.tolist()))
+
+        with ThreadPoolExecutor(8) as pool:
+            return cls(list(pool.map(entry, paths)), parts=parts, rule=rule, **options)
+
+    @classmethod
+    def open(cls, path: Any, **options: Any) -> Catalogue:
+        """Of what `ebpo catalogue` or `save` has written. FormatError, VersionError: it is not that."""
+        path = pathlib.Path(path).absolute()
+        try:
+            told = json.loads(path.read_bytes())
+            if not isinstance(told, dict) or told.get("format") != FORMAT:
+                raise ValueError(f'there is no "format": "{FORMAT}"')
+            if told.get("version") != VERSION:
+                raise VersionError(f"{path}: a catalogue of version {told.get('version')!r}; this package reads "
+                                   f"{VERSION}", "EBPO_E_VERSION", str(path))
+            entries = [read_entry(model, str(path.parent)) for model in told["models"]]
+            return cls(entries, parts=bool(told.get("parts", False)), rule=told.get("rule", "nonzero"), **options)
+        except VersionError:
+            raise
+        except (ValueError, KeyError, TypeError) as error:
+            raise FormatError(f"{path}: not a catalogue: {type(error).__name__}: {error}", "EBPO_E_FORMAT",
+                              str(path)) from None
+
+    def save(self, path: Any) -> None:
+        """As a file that `open` reads, whole or not at all. Paths in its folder and below become relative."""
+        path = pathlib.Path(path).absolute()
+        told: dict[str, Any] = {"format": FORMAT, "version": VERSION}
+        if self.parts:
+            told.update(parts=True, rule=self.rule)
+        told["models"] = []
+        for entry in self.entries:
+            row = {"path": relative(entry.path, path.parent), "content_sha256": entry.content_sha256,
+                   "solid": entry.solid, "box_min": list(entry.low), "box_max": list(entry.high)}
+            row.update((name, relative(getattr(entry, name), path.parent)) for name in ("surface", "surface_sha256", "numbers")
+                       if getattr(entry, name))
+            if entry.surface is None:
+                row["surface"] = None
+            told["models"].append(row)
+        from .stretches import published
+        with published(path) as file:
+            file.write(json.dumps(told, indent=1).encode() + b"\n")
+
+    def __getstate__(self) -> dict:
+        return {name: value for name, value in self.__dict__.items() if name not in ("boxes", "seen", "numbers")}
+
+    def __dask_tokenize__(self) -> tuple:
+        """What answers depend on: equal in every process."""
+        return "ebpo-catalogue", repr(self.entries), self.parts, self.rule
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    def __repr__(self) -> str:
+        return f"<ebpo.Catalogue of {len(self)} {'parts of a model' if self.parts else 'models'}>"
+
+    @functools.cached_property
+    def boxes(self) -> Boxes:
+        return Boxes(*self._corners(), np.arange(len(self)))
+
+    @functools.cached_property
+    def seen(self) -> Boxes:
+        """Of the models that rays and distances see."""
+        seen = np.array([entry.surface is not None for entry in self.entries])
+        if not seen.any():
+            raise ValueError("the catalogue has caps alone, and no surface")
+        return Boxes(*self._corners(), np.flatnonzero(seen))
+
+    def _corners(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array([entry.low for entry in self.entries]), np.array([entry.high for entry in self.entries])
+
+    @functools.cached_property
+    def numbers(self) -> list:
+        """Of each model an array of numbers in the whole, or None."""
+        return [np.load(entry.numbers, mmap_mode="r") if entry.numbers else None for entry in self.entries]
+
+    # ---- asking ----
+
+    def _model(self, number: int, held: Holding, surface: bool) -> Any:
+        """surface: what rays and distances see."""
+        entry = self.entries[number]
+        if surface and entry.surface:
+            return held.model(entry.surface, entry.surface_sha256, len(self),
+                              **for_source(entry.surface, self.options))
+        return held.model(entry.path, entry.content_sha256, len(self), **for_source(entry.path, self.options))
+
+    def _stretches(self, points: Any, held: Holding) -> tuple[Rows, np.ndarray, Iterator[np.ndarray]]:
+        """Rows, all of them as doubles, and numbers of points by stretches of the Morton curve, which do not
+        matter where there is one model and it is in memory as a whole."""
+        rows = Rows(points)
+        all_points = rows[0:rows.count]
+        finite = np.isfinite(all_points).all(axis=1)
+        if not finite.all():
+            raise ArgumentError(f"points: number {int(finite.argmin())} has a coordinate that is not a finite number",
+                                "EBPO_E_ARGUMENT")
+        order = np.arange(rows.count)
+        if not self._resident(held):
+            order = morton_order(all_points, self.boxes.low.min(axis=0), self.boxes.high.max(axis=0))
+        return rows, all_points, (order[at:at + STRETCH] for at in range(0, len(order), STRETCH))
+
+    def _resident(self, held: Holding) -> bool:
+        if len(self) > 1:
+            return False
+        with self._model(0, held, False) as model:
+            return bool(model.stats["resident"])
+
+    def locate(self, points: Any, *, memory: int | str | None = None, threads: int | None = None) -> np.ndarray:
+        """Where points are: (n,) structured, `where` as of `Model.locate`, `winding` the sum.
+
+        Of parts, exactly what the whole would say, also on caps. Of others, `where` is IN where any says so,
+        else ON where any does; a model adds 0 to the sum at points on its faces.
+
+        memory: bytes that models of this process may take, from now on; at first 1 GiB.
+
+        Raises NotSolidError if a model is a surface.
+        """
+        for entry in self.entries:
+            if not entry.solid:
+                raise NotSolidError(f"{entry.path} is a surface: there is no inside", "EBPO_E_NOT_SOLID", entry.path)
+        held = ours(memory)
+        rows, all_points, stretches = self._stretches(points, held)
+        out = np.zeros(rows.count, LOCATED)
+        for order in stretches:
+            p = all_points[order]
+            inner, on, winding = np.zeros(len(p), bool), np.zeros(len(p), bool), np.zeros(len(p), np.int64)
+            for number, some in runs(self.boxes.containing(p)):
+                with self._model(number, held, False) as model:
+                    told = model.locate(p[some], threads=threads)
+                inner[some] |= told.where == Where.IN
+                on[some] |= told.where == Where.ON
+                winding[some] += told.winding
+            if self.parts:
+                on, inner = self._of_whole(p, on, winding, held, threads)
+            out["winding"][order] = winding
+            out["where"][order] = np.where(inner, Where.IN, np.where(on, Where.ON, Where.OUT))
+        return out[0] if rows.single else out
+
+    def _of_whole(self, p: np.ndarray, on: np.ndarray, winding: np.ndarray, held: Holding, threads: int | None
+                  ) -> tuple[np.ndarray, np.ndarray]:
+        """Whether points are on the whole's faces, and inside. `on`: those on faces or caps of a part, of
+        which `winding` does not hold yet."""
+        doubtful = np.flatnonzero(on)
+        real = np.zeros(len(p), bool)
+        if len(doubtful):
+            real[doubtful] = self._on_surface(p[doubtful], held)
+            capped = doubtful[~real[doubtful]]
+            winding[real] = 0
+            winding[capped] = self._crossings(p[capped], held, threads)
+        inner = {"nonzero": winding != 0, "evenodd": winding % 2 != 0, "positive": winding > 0}[self.rule]
+        return real, inner & ~real
+
+    def _on_surface(self, p: np.ndarray, held: Holding) -> np.ndarray:
+        """Whether points are on real faces, exactly: the triangles that meet a box of one point."""
+        found = np.zeros(len(p), bool)
+        for number, some in runs(self.seen.containing(p)):
+            with self._model(number, held, True) as model:
+                for at in some[~found[some]]:
+                    found[at] = len(model.faces_in_box(p[at], p[at])) > 0
+        return found
+
+    def _crossings(self, p: np.ndarray, held: Holding, threads: int | None) -> np.ndarray:
+        """Winding numbers of points that are on no real face: what rays go out through less what they go in
+        through. A ray that meets an edge or runs along a face tells nothing: another one is cast."""
+        out, left = np.zeros(len(p), np.int64), np.arange(len(p))
+        for direction in np.random.default_rng(20).uniform(-1, 1, (DIRECTIONS, 3)):
+            if not len(left):
+                break
+            sum_, plain = np.zeros(len(left), np.int64), np.ones(len(left), bool)
+            o, d = p[left], np.broadcast_to(direction, (len(left), 3))
+            for number, some in runs(self.seen.on_rays(o, d)):
+                with self._model(number, held, True) as model:
+                    hits = model.ray_all(o[some], direction, threads=threads)
+                np.subtract.at(sum_, some[hits.ray], hits.side)
+                plain[some[hits.ray[hits.side == 0]]] = False
+            out[left[plain]] = sum_[plain]
+            left = left[~plain]
+        if len(left):
+            raise ArithmeticError(f"no ray from {p[left[0]].tolist()} tells its winding number")
+        return out
+
+    def inside(self, points: Any, *, boundary: bool = True, memory: int | str | None = None,
+               threads: int | None = None) -> Any:
+        """Whether points are inside: (n,) bool. boundary: points on faces are, too. Raises as `locate`."""
+        where = self.locate(points, memory=memory, threads=threads)["where"]
+        return where != Where.OUT if boundary else where == Where.IN
+
+    def winding(self, points: Any, *, memory: int | str | None = None, threads: int | None = None) -> Any:
+        """The sum of winding numbers: (n,) int32. Raises as `locate`."""
+        return self.locate(points, memory=memory, threads=threads)["winding"].copy()
+
+    def distance(self, points: Any, *, max_distance: float = float("inf"), signed: bool = True,
+                 memory: int | str | None = None, threads: int | None = None) -> np.ndarray:
+        """The nearest face of any model: (n,) structured as `Model.distance`, with `model`, its number here.
+
+        Negative inside (`inside`; not of catalogues in which there is a surface). Of models at the same
+        rounded distance the first is taken.
+        """
+        held = ours(memory)
+        rows, all_points, stretches = self._stretches(points, held)
+        out = np.zeros(rows.count, NEAREST)
+        for order in stretches:
+            out[order] = self._nearest(all_points[order], max_distance, held, threads)
+        if signed and rows.count and all(entry.solid for entry in self.entries):
+            inner = self.locate(all_points, memory=memory, threads=threads)["where"] == Where.IN
+            out["distance"][inner] *= -1
+        return out[0] if rows.single else out
+
+    def _nearest(self, p: np.ndarray, max_distance: float, held: Holding, threads: int | None) -> np.ndarray:
+        best = np.zeros(len(p), NEAREST)
+        best["distance"], best["point"], best["face"], best["model"] = np.inf, np.nan, -1, -1
+        point, box, least = self.seen.nearest(p)
+        begin = np.searchsorted(point, np.arange(len(p) + 1))
+        turn = begin[:-1].copy()
+        while True:  # each point asks its next box, as long as that may hold something nearer
+            asks = np.flatnonzero(turn < begin[1:])
+            limit = np.minimum(best["distance"][asks], max_distance)
+            asks = asks[least[turn[asks]] * (1 - SLACK) <= limit]  # boxes behind it are farther still
+            if not len(asks):
+                return best
+            for number, some in runs(by_model(asks, box[turn[asks]])):
+                limit = min(float(best["distance"][some].max()) * (1 + SLACK), max_distance)
+                with self._model(number, held, True) as model:
+                    told = model.distance(p[some], max_distance=limit, signed=False, threads=threads)
+                now = best["distance"][some]
+                better = (told.face >= 0) & ((told.distance < now) |
+                                             ((told.distance == now) & (number < best["model"][some])))
+                rows = some[better]
+                for name in ("distance", "point", "normal"):
+                    best[name][rows] = getattr(told, name)[better]
+                best["face"][rows] = self._faces(number, told.face[better])
+                best["model"][rows] = number
+            turn[asks] += 1
+
+    def _faces(self, number: int, faces: np.ndarray) -> np.ndarray:
+        numbers = self.numbers[number]
+        return faces if numbers is None else numbers[faces]
+
+    def ray(self, origins: Any, directions: Any, *, t_max: float = float("inf"), memory: int | str | None = None,
+            threads: int | None = None) -> np.ndarray:
+        """The first face that each ray meets: (n,) structured as `Model.ray`, with `model`."""
+        held = ours(memory)
+        o, d = Rows(origins, "origins"), Rows(directions, "directions")
+        count = max(o.count, d.count)
+        if o.count != d.count and not (o.single or d.single):
+            raise ValueError(f"{o.count} origins and {d.count} directions")
+        o_rows = np.broadcast_to(o[0:o.count], (count, 3))
+        d_rows = np.broadcast_to(d[0:d.count], (count, 3))
+        out = np.zeros(count, HIT)
+        out["t"], out["face"], out["model"] = np.inf, -1, -1
+        for at in range(0, count, STRETCH):
+            rays = slice(at, min(count, at + STRETCH))
+            for number, some in runs(self.seen.on_rays(o_rows[rays], d_rows[rays])):
+                with self._model(number, held, True) as model:
+                    hits = model.ray(o_rows[rays][some], d_rows[rays][some], t_max=t_max, threads=threads)
+                nearer = hits.t < out["t"][rays][some]  # models come in order: of equal ones the first stays
+                rows = at + some[nearer]
+                out["t"][rows], out["side"][rows] = hits.t[nearer], hits.side[nearer]
+                out["face"][rows], out["model"][rows] = self._faces(number, hits.face[nearer]), number
+        return out[0] if o.single and d.single else out
+
+
+def by_model(points: np.ndarray, models: np.ndarray) -> Pairs:
+    order = np.lexsort((points, models))
+    return points[order], models[order]
+
+
+def runs(pairs: Pairs) -> Iterator[tuple[int, np.ndarray]]:
+    """Each model with its points."""
+    point, box = pairs
+    begins = np.flatnonzero(np.diff(box, prepend=-1))
+    for begin, end in zip(begins, [*begins[1:], len(box)]):
+        yield int(box[begin]), point[begin:end]
+
+
+def for_source(name: str, options: dict) -> dict:
+    """Options for opening it: of URLs alone. Long work waits for servers that are away for some minutes."""
+    if "://" not in name:
+        return {}
+    if name.startswith(("http://", "https://")) and "storage_options" not in options:
+        return {"time_limit": 300.0, "retries": 60, **options}
+    return options
+
+
+def absolute(path: str, folder: str) -> str:
+    return path if "://" in path else os.path.join(folder, path)
+
+
+def relative(path: str, folder: pathlib.Path) -> str:
+    return path[len(str(folder)) + 1:] if path.startswith(f"{folder}{os.sep}") else path
+
+
+def read_entry(model: dict, folder: str) -> Entry:
+    corners = [tuple(map(float, model[name])) for name in ("box_min", "box_max")]
+    if not all(len(corner) == 3 and np.isfinite(corner).all() for corner in corners):
+        raise ValueError("a box has two corners of three numbers")
+    texts = {name: model.get(name) or "" for name in ("path", "content_sha256", "surface", "surface_sha256",
+                                                  "numbers")}
+    if not all(isinstance(text, str) for text in texts.values()) or not texts["path"]:
+        raise ValueError("a model has no path")
+    for name in ("path", "surface", "numbers"):
+        texts[name] = texts[name] and absolute(texts[name], folder)
+    return Entry(texts["path"], texts["content_sha256"], bool(model["solid"]), corners[0], corners[1],
+                 texts["surface"] if model.get("surface", "") is not None else None, texts["surface_sha256"], texts["numbers"])

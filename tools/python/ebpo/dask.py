@@ -1,0 +1,250 @@
+"""Point sets of any size on Dask: its threads, or a cluster of dask.distributed.
+
+    from dask.distributed import Client
+    import ebpo.dask
+
+    client = Client("scheduler:8786")
+    P = ebpo.dask.points("points.npy")                   # or .h5, raw doubles; dask and numpy arrays do as well
+    inside = ebpo.dask.inside("https://example.org/scan.ebpo.h5", P, memory="2G")
+    ebpo.dask.to_file(inside, "inside.npy")              # goes on where it was, if it was stopped
+
+Answers are dask arrays, computed when they are asked for. Each worker opens the model, or those of the
+catalogue that its points come to, by path or URL, and keeps them between tasks. Answers are the same, byte
+for byte, whatever the number of workers and the size of chunks. Dask is imported when it is needed.
+"""
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import shutil
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import catalogue as cat
+from .catalogue import Catalogue
+from .holding import ours
+from .stretches import HDF5, PointFile, h5py_of, published, save_array
+
+CHUNK = 1 << 18  # points of a task
+DTYPES = {"inside": np.dtype(bool), "winding": np.dtype("i4"), "locate": cat.LOCATED, "distance": cat.NEAREST,
+          "ray": cat.HIT}
+
+
+class Nearest(NamedTuple):
+    """dask arrays of `Catalogue.distance`: distance (n,), point (n, 3), normal (n, 3), face (n,), model (n,)."""
+
+    distance: Any
+    point: Any
+    normal: Any
+    face: Any
+    model: Any
+
+
+class Hits(NamedTuple):
+    """dask arrays of `Catalogue.ray`: t, face, side, model, each (n,)."""
+
+    t: Any
+    face: Any
+    side: Any
+    model: Any
+
+
+def catalogue(model: Any, **options: Any) -> Catalogue:
+    """A catalogue of whatever can be asked: one, the path of one (.json), a path or URL of a model, a list."""
+    if isinstance(model, Catalogue):
+        return model
+    if isinstance(model, (str, os.PathLike)):
+        if os.fspath(model).endswith(".json"):
+            return Catalogue.open(model, **options)
+        return Catalogue.of([model], **options)
+    if isinstance(model, (list, tuple)):
+        return Catalogue.of(model, **options)
+    raise TypeError(f"{type(model).__name__}: workers take a path, a URL, a list of such or a Catalogue")
+
+
+def points(source: Any, dataset: str | None = None, *, chunk: int = CHUNK, columns: int = 3) -> Any:
+    """A dask array (n, columns) of a file of points; workers read it by stretches of `chunk` rows.
+
+    source: the path of a .npy, an HDF5 file (with h5py; `dataset`, or the only one that fits), or raw
+        doubles; it has to be the same for all workers. Or a dask array, or anything of numpy's.
+    """
+    import dask.array as da
+    from dask.base import tokenize
+    if isinstance(source, da.Array):
+        return source.rechunk({1: source.shape[1]}) if source.ndim == 2 else source
+    if not isinstance(source, (str, os.PathLike)):
+        values = np.asarray(source)
+        if values.ndim != 2 or values.shape[1] != columns:
+            raise ValueError(f"points have the shape (n, {columns}), not {values.shape}")
+        return da.from_array(values, chunks=(chunk, columns))
+    file = PointFile.at(source, dataset, columns)
+    name = "ebpo-points-" + tokenize(tuple(file), chunk)
+    begins = range(0, max(1, file.count), chunk)
+    graph = {(name, i, 0): (read_stretch, tuple(file), begin, min(file.count, begin + chunk))
+             for i, begin in enumerate(begins)}
+    sizes = tuple(min(file.count, begin + chunk) - begin for begin in begins)
+    return da.Array(graph, name, (sizes, (columns,)), np.float64)
+
+
+def read_stretch(file: tuple, begin: int, end: int) -> np.ndarray:
+    return PointFile(*file).read(begin, end)
+
+
+class Means:
+    """What answers do not depend on, nor the names of their arrays."""
+
+    def __init__(self, memory: Any, threads: int) -> None:
+        self.options = {"memory": memory, "threads": threads}
+
+    def __dask_tokenize__(self) -> str:
+        return "ebpo-means"
+
+
+def answer_block(block: np.ndarray, what: str, asked: Catalogue, means: Means, options: tuple) -> np.ndarray:
+    """Of a chunk, in the worker."""
+    block, ask = np.asarray(block), getattr(asked, what)
+    rest = {**dict(options), **means.options}
+    return ask(block[:, :3], block[:, 3:], **rest) if what == "ray" else ask(block, **rest)
+
+
+def ask(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk: int = CHUNK,
+        memory: int | str | None = None, threads: int = 1, http: dict | None = None, **options: Any) -> Any:
+    """A dask array (n,) of answers: bool, int32, or structured (`catalogue.LOCATED`, NEAREST, HIT).
+
+    what: "inside", "winding", "locate", "distance" or "ray".
+    model: a path or URL that each worker can open, a list of such, a Catalogue, or the path of one (.json).
+    rows: as `points` takes them; of rays (n, 6), origins and directions.
+    memory: bytes for all models that a worker process holds; at first 1 GiB. It holds from then on.
+    threads: so many work at a chunk; Dask's workers have threads of their own.
+    http: options of URLs, such as headers.
+    options: those of the method of Catalogue, such as boundary=False, max_distance, signed, t_max.
+    """
+    import dask.array as da
+    if what not in DTYPES:
+        raise ValueError(f"{', '.join(DTYPES)} can be asked for, not {what!r}")
+    asked = catalogue(model, **(http or {}))
+    given = points(rows, dataset, chunk=chunk, columns=6 if what == "ray" else 3)
+    columns = 6 if what == "ray" else 3
+    if given.ndim != 2 or given.shape[1] != columns:
+        raise ValueError(f"{what} takes the shape (n, {columns}), not {given.shape}")
+    return da.map_blocks(answer_block, given, what, asked, Means(memory, threads), tuple(sorted(options.items())),
+                         dtype=DTYPES[what], drop_axis=1, name=f"ebpo-{what}", meta=np.zeros(0, DTYPES[what]))
+
+
+def inside(model: Any, rows: Any, **options: Any) -> Any:
+    """Whether points are inside: a dask array (n,) of bool. Options are those of `ask`; boundary=True."""
+    return ask("inside", model, rows, **options)
+
+
+def winding(model: Any, rows: Any, **options: Any) -> Any:
+    """Winding numbers, summed over models: a dask array (n,) of int32. Options are those of `ask`."""
+    return ask("winding", model, rows, **options)
+
+
+def distance(model: Any, rows: Any, **options: Any) -> Nearest:
+    """Nearest faces. Options are those of `ask`; max_distance, signed. For files: `ask("distance", ...)`."""
+    return Nearest(*members(ask("distance", model, rows, **options)))
+
+
+def ray(model: Any, origins: Any, directions: Any, **options: Any) -> Hits:
+    """First hits of rays. origins: dask or numpy (n, 3); directions: the same, or (3,); t_max."""
+    import dask.array as da
+    o = points(origins, chunk=options.get("chunk", CHUNK))
+    if isinstance(directions, da.Array) or np.ndim(directions) == 2:
+        d = points(directions).rechunk((o.chunks[0], 3))
+    else:
+        d = da.broadcast_to(da.from_array(np.asarray(directions, np.float64)), o.shape, chunks=o.chunks)
+    rays = da.concatenate([o, d], axis=1).rechunk({1: 6})
+    return Hits(*members(ask("ray", model, rays, **options)))
+
+
+def members(rows: Any) -> list:
+    return [rows[name] if not rows.dtype[name].shape else
+            rows.map_blocks(member, name, dtype=np.float64, new_axis=1, chunks=(rows.chunks[0], rows.dtype[name].shape),
+                            meta=np.zeros((0, 3)))
+            for name in rows.dtype.names]
+
+
+def member(block: np.ndarray, name: str) -> np.ndarray:
+    return np.ascontiguousarray(block[name])
+
+
+def counts(client: Any = None) -> Any:
+    """What models have cost (`holding.Holding.counts`): of this process, or a dict of the client's workers."""
+    return ours().counts() if client is None else client.run(worker_counts)
+
+
+def worker_counts() -> dict:
+    return ours().counts()
+
+
+# ---- files of answers ----
+
+def to_file(answers: Any, path: Any, *, dataset: str = "answers", **compute: Any) -> None:
+    """Computes a dask array into a file, which appears whole: .npy, HDF5 (.h5, with h5py), or else a folder.
+
+    Workers write their chunks to PATH.parts (a folder that they share with this process), each whole or not
+    at all. When it is called again after it was stopped, what is there is not computed again; chunks of
+    another question are refused (ValueError). In the end they become the file, and the folder goes; with a
+    path without such an ending, PATH itself is the folder, of 000000.npy and so on.
+
+    answers: one array, also structured, as `ask` gives it.
+    compute: for dask.compute, such as scheduler="threads".
+    """
+    import dask
+    path = pathlib.Path(path).absolute()
+    is_file = path.suffix in (".npy", *HDF5)
+    if path.suffix in HDF5:
+        h5py_of(str(path))  # says now, not after hours, that it is missing
+    if is_file and path.exists():
+        raise FileExistsError(f"{path} is there already")
+    folder = path.with_name(path.name + ".parts") if is_file else path
+    begin_parts(folder, answers)
+    blocks = answers.to_delayed().ravel()
+    names = [folder / f"{i:06d}.npy" for i in range(len(blocks))]
+    dask.compute(*[dask.delayed(save_part)(str(name), block) for name, block in zip(names, blocks)
+                   if not name.exists()], **compute)
+    missing = [name for name in names if not name.exists()]
+    if missing:
+        raise FileNotFoundError(f"{missing[0]}: workers have written it elsewhere; the folder has to be shared")
+    if is_file:
+        join_parts(path, names, dataset)
+        shutil.rmtree(folder)
+
+
+def begin_parts(folder: pathlib.Path, answers: Any) -> None:
+    question = {"question": answers.name, "chunks": answers.numblocks[0], "dtype": repr(answers.dtype)}
+    folder.mkdir(parents=True, exist_ok=True)
+    stated = folder / "question.json"
+    if stated.exists():
+        if json.loads(stated.read_bytes()) != question:
+            raise ValueError(f"{folder} holds answers to another question, or of other chunks; remove it, or name "
+                             "another file")
+        return
+    if any(folder.iterdir()):
+        raise ValueError(f"{folder} is not empty, and does not say of what question it is; remove it, or name another")
+    with published(stated) as file:
+        file.write(json.dumps(question).encode())
+
+
+def save_part(name: str, block: np.ndarray) -> None:
+    save_array(name, block)
+
+
+def join_parts(path: pathlib.Path, names: list, dataset: str) -> None:
+    parts = [np.load(name, mmap_mode="r", allow_pickle=False) for name in names]
+    shape = (sum(len(part) for part in parts), *parts[0].shape[1:])
+    if path.suffix == ".npy":
+        with published(path) as file:
+            np.lib.format.write_array_header_1_0(file, {"descr": np.lib.format.dtype_to_descr(parts[0].dtype),
+                                                        "fortran_order": False, "shape": shape})
+            for part in parts:
+                file.write(np.ascontiguousarray(part).data)
+        return
+    with published(path) as file, h5py_of(str(path)).File(file, "w") as out:
+        made, at = out.create_dataset(dataset, shape, parts[0].dtype), 0
+        for part in parts:
+            made[at:at + len(part)] = part
+            at += len(part)

@@ -1,0 +1,114 @@
+"""Points in files, read by stretches, and files that appear whole or not at all."""
+from __future__ import annotations
+
+import contextlib
+import os
+import pathlib
+import uuid
+from typing import Any, Iterator, NamedTuple
+
+import numpy as np
+
+from .errors import FormatError, IOFailure
+
+HDF5 = (".h5", ".hdf5", ".hdf", ".nc")
+
+
+@contextlib.contextmanager
+def published(path: Any) -> Iterator[Any]:
+    """A file to write into, which takes the place of `path` when all has been written to the disk."""
+    path = pathlib.Path(path)
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex[:12]}")
+    try:
+        with open(temporary, "xb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+class PointFile(NamedTuple):
+    """Points in a file of some format, which is read wherever a stretch is wanted.
+
+    dataset: of HDF5. count: points. stamp: size and time of the file when it was looked at.
+    """
+
+    path: str
+    dataset: str
+    count: int
+    columns: int
+    stamp: tuple[int, int]
+
+    @classmethod
+    def at(cls, path: Any, dataset: str | None = None, columns: int = 3) -> PointFile:
+        """Looks at a .npy, an HDF5 dataset, or raw doubles of this machine's byte order.
+
+        FormatError: it has not so many columns.
+        """
+        path = os.path.abspath(os.fspath(path))
+        if is_hdf5(path, dataset):
+            with h5py_of(path).File(path, "r") as file:
+                dataset = dataset or only_dataset(file, path, columns)
+                if dataset not in file or not hasattr(file[dataset], "shape"):
+                    raise FormatError(f"{path}: there is no dataset {dataset}", "EBPO_E_FORMAT", path)
+                shape = file[dataset].shape
+        elif path.endswith(".npy"):
+            shape = np.load(path, mmap_mode="r", allow_pickle=False).shape
+        else:
+            size = os.path.getsize(path)
+            if size % (8 * columns):
+                raise FormatError(f"{path}: {size} bytes are no rows of {columns} doubles", "EBPO_E_FORMAT", path)
+            shape = (size // (8 * columns), columns)
+        if len(shape) != 2 or shape[1] != columns:
+            raise FormatError(f"{path}: points have the shape (n, {columns}), not {shape}", "EBPO_E_FORMAT", path)
+        return cls(path, dataset or "", int(shape[0]), columns, stamp_of(path))
+
+    def read(self, begin: int, end: int) -> np.ndarray:
+        """Rows as doubles. IOFailure: the file is not the one that was looked at."""
+        if stamp_of(self.path) != self.stamp:
+            raise IOFailure(f"{self.path} has changed since it was asked about; ask anew", "EBPO_E_IO", self.path)
+        if self.dataset:
+            with h5py_of(self.path).File(self.path, "r") as file:
+                return np.asarray(file[self.dataset][begin:end], dtype=np.float64)
+        if self.path.endswith(".npy"):
+            return np.array(np.load(self.path, mmap_mode="r", allow_pickle=False)[begin:end], dtype=np.float64)
+        rows = np.fromfile(self.path, np.float64, (end - begin) * self.columns, offset=begin * 8 * self.columns)
+        return rows.reshape(-1, self.columns)
+
+
+def is_hdf5(path: str, dataset: str | None) -> bool:
+    return dataset is not None or path.endswith(HDF5)
+
+
+def h5py_of(path: str) -> Any:
+    try:
+        import h5py
+    except ImportError:
+        raise ImportError(f"{path}: HDF5 takes h5py, which is not installed") from None
+    return h5py
+
+
+def only_dataset(file: Any, path: str, columns: int) -> str:
+    found: list[str] = []
+
+    def look(name: str, item: Any) -> None:
+        if len(getattr(item, "shape", None) or ()) == 2 and item.shape[1] == columns:
+            found.append(name)
+
+    file.visititems(look)
+    if len(found) != 1:
+        raise FormatError(f"{path}: {len(found)} datasets have {columns} columns; name one (dataset=)",
+                          "EBPO_E_FORMAT", path)
+    return found[0]
+
+
+def stamp_of(path: str) -> tuple[int, int]:
+    stat = os.stat(path)
+    return stat.st_size, stat.st_mtime_ns
+
+
+def save_array(path: Any, values: np.ndarray) -> None:
+    with published(path) as file:
+        np.lib.format.write_array(file, np.ascontiguousarray(values), allow_pickle=False)
