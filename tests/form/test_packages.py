@@ -113,7 +113,7 @@ def check_symbols():
 
 def check_versions(control, conda, brew):
     said = {
-        "debian/changelog": re.match(r"ebpo-octree \((.*)-\d+\)", (debian / "changelog").read_text())[1],
+        "debian/changelog": re.match(r"ebpo-octree \((.*)-\w+\)", (debian / "changelog").read_text())[1],
         "conda/meta.yaml": re.search(r'^  version: "(.*)"', conda, re.M)[1],
         "homebrew/ebpo.rb": re.search(r'^  version "(.*)"', brew, re.M)[1],
     }
