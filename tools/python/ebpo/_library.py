@@ -7,6 +7,7 @@ import os
 import pathlib
 import re
 import subprocess
+import sysconfig
 import weakref
 
 import numpy as np
@@ -23,7 +24,8 @@ def candidates():
         yield os.environ["EBPO_LIBRARY"]
         return
     yield from map(str, sorted(HERE.glob("libebpo.so*")))  # of a wheel
-    for folder in (HERE.parents[2], HERE.parents[2] / "lib"):  # of a prefix, of a build folder
+    several = sysconfig.get_config_var("MULTIARCH") or "."  # Debian has the libraries of each machine apart
+    for folder in (HERE.parents[2], HERE.parents[2] / "lib", HERE.parents[2] / several):  # prefix, build, Debian
         yield from map(str, sorted(folder.glob("libebpo.so.?")))
     try:
         told = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)
