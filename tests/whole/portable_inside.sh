@@ -62,8 +62,7 @@ fi
     tail /build.log
     exit 1
 }
-units="dialects ply head container predicates distance ray crossing pair hash codec face_gates \
-    chunk_sums source import number slice"
+units="dialects ply head container predicates face_gates chunk_sums source import number slice wide"
 programs="tools/ebpo samples/ebpo-generate tests/vectors/make_vectors tests/vectors/test_vectors \
     tests/flags/fp_hash_usual tests/flags/predicates_hash_small"
 targets=$(ninja -C /build -t targets all | sed -n 's/: c_LINKER$//p')
@@ -74,8 +73,8 @@ done
 [ "$tests" = chosen ] ||
     chosen=$(echo "$targets" | grep -E '^tests/(unit|answers)/test_[a-z_]*$' | tr '\n' ' ')
 # shellcheck disable=SC2086
-ninja -C /build -j "${EBPO_JOBS:-$(nproc)}" $programs $chosen >/build.log 2>&1 || {
-    grep -A5 -E 'error|FAILED' /build.log | head -40
+ninja -C /build -k 0 -j "${EBPO_JOBS:-$(nproc)}" $programs $chosen >/build.log 2>&1 || {
+    grep -A3 -E ' (fatal )?error: |undefined reference' /build.log | head -60
     exit 1
 }
 

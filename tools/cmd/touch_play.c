@@ -76,13 +76,13 @@ static void sum_up(const spans *s, uint64_t count, touch_times *out)
 
 static uint64_t page_faults(void)
 {
-#ifdef EBPO_HAVE_RUSAGE_THREAD
-    enum { WHOSE = RUSAGE_THREAD };
-#else
-    enum { WHOSE = RUSAGE_SELF };
-#endif
     struct rusage r;
-    return getrusage(WHOSE, &r) == 0 ? (uint64_t)(r.ru_minflt + r.ru_majflt) : 0;
+#ifdef EBPO_HAVE_RUSAGE_THREAD
+    bool known = getrusage(RUSAGE_THREAD, &r) == 0;
+#else
+    bool known = getrusage(RUSAGE_SELF, &r) == 0;
+#endif
+    return known ? (uint64_t)(r.ru_minflt + r.ru_majflt) : 0;
 }
 
 static uint64_t thread_clock(void)
