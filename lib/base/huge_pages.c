@@ -6,7 +6,7 @@
 
 void ebpo_prefer_huge_pages(void *array, size_t bytes)
 {
-#ifdef MADV_HUGEPAGE
+#if defined(EBPO_HAVE_MADVISE) && defined(MADV_HUGEPAGE)
     const uintptr_t page = (uintptr_t)1 << 21;
     uintptr_t from = (uintptr_t)array, to = from + bytes;
     uintptr_t skipped = (page - from % page) % page;

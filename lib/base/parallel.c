@@ -1,10 +1,10 @@
 #include "base/parallel.h"
 
 #include <pthread.h>
-#include <sched.h>
 #include <stdatomic.h>
 
 #include "base/clock.h"
+#include "base/cores.h"
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/release_pages.h"
@@ -36,8 +36,7 @@ unsigned ebpo_thread_count(unsigned requested)
 {
     if (requested)
         return requested < MAX_THREADS ? requested : MAX_THREADS;
-    cpu_set_t set;
-    int cores = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
+    int cores = ebpo_cores();
     return cores < 1 ? 1 : cores > MAX_THREADS ? MAX_THREADS : (unsigned)cores;
 }
 

@@ -21,6 +21,15 @@ static residency resident(const ebpo_workspace *w)
     return (residency){ pages * w->page, of_files * w->page };
 }
 
+static void let_go(const ebpo_extent *b)
+{
+#ifdef EBPO_HAVE_MADVISE
+    madvise(b->at, b->bytes, MADV_DONTNEED);
+#else
+    msync(b->at, b->bytes, MS_ASYNC); /* the system then takes them when it is short */
+#endif
+}
+
 void ebpo_release_pages(ebpo_workspace *workspace)
 {
     ebpo_workspace *w = workspace;
@@ -37,7 +46,7 @@ void ebpo_release_pages(ebpo_workspace *workspace)
         for (ebpo_extent *b = w->table[i]; b; b = b->next)
             if (b->kind != EBPO_EXTENT_PART && b->filed)
                 /* of a file: what was written stays in it */
-                madvise(b->at, b->bytes, MADV_DONTNEED);
+                let_go(b);
     /* Other threads bring pages in meanwhile, which are no floor: it rises slowly. */
     uint64_t left = resident(w).files, most = w->floor + w->figures.memory / 64;
     w->floor = left < most ? left : most;

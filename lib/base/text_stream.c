@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 
+#ifdef EBPO_HAVE_FOPENCOOKIE
 static ssize_t keep(void *cookie, const char *data, size_t bytes)
 {
     ebpo_text_stream *s = cookie;
@@ -25,11 +26,26 @@ bool ebpo_text_stream_begin(ebpo_text_stream *s)
         setvbuf(s->file, s->buffer, _IOFBF, sizeof s->buffer);
     return s->file != NULL;
 }
+#else
+bool ebpo_text_stream_begin(ebpo_text_stream *s)
+{
+    memset(s, 0, sizeof *s);
+    s->file = open_memstream(&s->text, &s->size);
+    return s->file != NULL;
+}
+#endif
 
 bool ebpo_text_stream_end(ebpo_text_stream *s)
 {
-    bool whole = fclose(s->file) == 0 && !s->failed && ebpo_grow(&s->text, &s->capacity, 1, 1);
+    s->failed = s->failed || ferror(s->file);
+    bool whole = fclose(s->file) == 0 && !s->failed;
     s->file = NULL;
+#ifdef EBPO_HAVE_FOPENCOOKIE
+    whole = whole && ebpo_grow(&s->text, &s->capacity, 1, 1);
+#else
+    whole = whole && s->text;
+    s->bytes = s->size;
+#endif
     if (whole) {
         s->text[s->bytes] = 0;
         return true;

@@ -1,5 +1,5 @@
 /* A stream into memory that tells when memory was short: those of the C library (open_memstream)
- * may lose what did not fit and say nothing. */
+ * may lose what did not fit and say nothing. They serve where there is nothing better. */
 #ifndef EBPO_BASE_TEXT_STREAM_H
 #define EBPO_BASE_TEXT_STREAM_H
 
@@ -12,6 +12,7 @@ typedef struct ebpo_text_stream {
     uint64_t bytes, capacity;
     FILE *file; /* to print to */
     bool failed;
+    size_t size;       /* of open_memstream */
     char buffer[1024]; /* the stream's, so that it needs none of its own */
 } ebpo_text_stream;
 

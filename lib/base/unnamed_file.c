@@ -47,8 +47,10 @@ static int open_and_unlink(const char *folder)
 
 int ebpo_open_unnamed(const char *folder)
 {
+#ifdef EBPO_HAVE_O_TMPFILE
     int fd = open(folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
-    return fd >= 0 || (errno != EOPNOTSUPP && errno != EISDIR && errno != EINVAL)
-               ? fd
-               : open_and_unlink(folder);
+    if (fd >= 0 || (errno != EOPNOTSUPP && errno != EISDIR && errno != EINVAL))
+        return fd;
+#endif
+    return open_and_unlink(folder);
 }

@@ -67,13 +67,32 @@ static void dismiss(ebpo_workspace *w, size_t bytes, bool filed)
     ebpo_workspace_leave(w);
 }
 
+/* 0, or why not. */
+static int take_blocks(int fd, size_t bytes)
+{
+#ifdef EBPO_HAVE_POSIX_FALLOCATE
+    int fault;
+    do /* some file systems give way to signals */
+        fault = posix_fallocate(fd, 0, (off_t)bytes);
+    while (fault == EINTR);
+    return fault;
+#else
+    static const char zeros[1 << 16];
+    for (size_t left = bytes; left > 0;) {
+        ssize_t done = write(fd, zeros, left < sizeof zeros ? left : sizeof zeros);
+        if (done < 0 && errno != EINTR)
+            return errno;
+        left -= done > 0 ? (size_t)done : 0;
+    }
+    return 0;
+#endif
+}
+
 /* The file's blocks are had before it is written to: a full disk would otherwise show as a signal.
  */
 static void *map_file(ebpo_workspace *w, size_t bytes)
 {
-    int fd = ebpo_open_unnamed(w->folder), fault = fd < 0 ? errno : EINTR;
-    while (fault == EINTR) /* some file systems give way to signals */
-        fault = posix_fallocate(fd, 0, (off_t)bytes);
+    int fd = ebpo_open_unnamed(w->folder), fault = fd < 0 ? errno : take_blocks(fd, bytes);
     void *at = MAP_FAILED;
     if (fault == 0) {
         at = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
@@ -169,15 +188,24 @@ static void leave_pool(ebpo_workspace *w, ebpo_extent *pool)
     unmap(w, pool);
 }
 
+/* A part's memory or blocks; whether it can be done or not. */
+static void give_back(const ebpo_extent *b)
+{
+#ifdef EBPO_HAVE_MADV_REMOVE
+    madvise(b->at, b->bytes, b->filed ? MADV_REMOVE : MADV_DONTNEED);
+#else
+    (void)b;
+#endif
+}
+
 void ebpo_extent_free(ebpo_workspace *w, ebpo_extent *b)
 {
     if (b->kind != EBPO_EXTENT_PART) {
         unmap(w, b);
         return;
     }
-    if (w->page == EBPO_PAGE) /* whole pages, so none of a neighbour's; whether it can be done or
-                                 not */
-        madvise(b->at, b->bytes, b->filed ? MADV_REMOVE : MADV_DONTNEED);
+    if (w->page == EBPO_PAGE) /* whole pages, so none of a neighbour's */
+        give_back(b);
     ebpo_extent *pool = b->pool;
     free(b);
     leave_pool(w, pool);

@@ -12,7 +12,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "mesh/sum.h"
+#include "base/wide.h"
 #include "octree/node_types.h"
 
 enum { GROUP_GRAIN = 1 << 12, GROUPS_A_TIME = 16 };
@@ -62,16 +62,16 @@ static void add_face(const colouring *c, uint64_t face, colour_sums *sums)
         unsigned thrice = c->by_face ? 3u * ebpo_colour_byte(&c->column[k], face) : 0;
         for (int i = 0; i < 3 && !c->by_face; i++)
             thrice += ebpo_colour_byte(&c->column[k], corner[i]);
-        sums->colour[k] += (ebpo_wide)weight * thrice;
+        sums->colour[k] = ebpo_wide_plus(sums->colour[k], ebpo_wide_product(weight, thrice));
     }
-    sums->weight += (ebpo_wide)weight * 3;
+    sums->weight = ebpo_wide_plus(sums->weight, ebpo_wide_product(weight, 3));
 }
 
 static void add_sums(colour_sums *to, const colour_sums *more)
 {
     for (int k = 0; k < 3; k++)
-        to->colour[k] += more->colour[k];
-    to->weight += more->weight;
+        to->colour[k] = ebpo_wide_plus(to->colour[k], more->colour[k]);
+    to->weight = ebpo_wide_plus(to->weight, more->weight);
 }
 
 static void add_leaf(const colouring *c, uint64_t leaf, uint64_t ref, colour_sums *sums)
@@ -83,11 +83,22 @@ static void add_leaf(const colouring *c, uint64_t leaf, uint64_t ref, colour_sum
         add_face(c, l->leaf_refs[ref + i], sums);
 }
 
+/* The nearest integer to colour / weight, half of one upwards: a byte, found bit by bit. */
+static uint32_t mean_of_channel(ebpo_wide colour, ebpo_wide weight)
+{
+    ebpo_wide most = ebpo_wide_plus(ebpo_wide_left(colour, 1), weight);
+    uint32_t byte = 0;
+    for (uint32_t bit = 128; bit; bit >>= 1)
+        if (!ebpo_wide_less(most, ebpo_wide_times(weight, 2 * (byte | bit))))
+            byte |= bit;
+    return byte;
+}
+
 static uint32_t mean_of(const colour_sums *sums)
 {
     uint32_t colour = 0;
     for (int k = 0; k < 3; k++)
-        colour |= (uint32_t)((2 * sums->colour[k] + sums->weight) / (2 * sums->weight)) << 8 * k;
+        colour |= mean_of_channel(sums->colour[k], sums->weight) << 8 * k;
     return colour;
 }
 

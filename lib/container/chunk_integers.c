@@ -1,5 +1,4 @@
 /* Rows of plain arrays, out of decoded chunks. */
-#include <endian.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +11,7 @@
 static void widen(const ebpo_shape *shape, const uint8_t *rows, uint64_t numbers, uint8_t *values,
                   size_t size)
 {
-    if (shape->element_size == size && __BYTE_ORDER == __LITTLE_ENDIAN)
+    if (shape->element_size == size && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__)
         memcpy(values, rows, numbers * size);
     else
         ebpo_integers_decode(rows, shape->element_size, shape->is_signed, numbers, values, size);

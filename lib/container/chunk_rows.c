@@ -1,5 +1,6 @@
 #include "container/chunk_rows.h"
 
+#include "base/wide.h"
 #include "codec/shape.h"
 
 enum {
@@ -13,8 +14,6 @@ enum {
     OUTER_ROWS = 4096,
     ATTRIBUTE_ROWS = 2048
 };
-
-__extension__ typedef unsigned __int128 wide; /* of rows there are at most 2^40 */
 
 int ebpo_last_whole_level(const ebpo_info *info)
 {
@@ -31,13 +30,18 @@ int ebpo_first_deep_level(const ebpo_info *info)
 }
 
 /* The power of two that is nearest, by its ratio, to the rows that go with CHUNK_FACES faces: the
- * first one that is not less than these over the root of 2. In integers, as bytes depend on it. */
+ * first one that is not less than these over the root of 2. In integers, as bytes depend on it: of
+ * rows there are at most 2^40, and both sides of the comparison below 2^64 before they are squared.
+ */
 static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
 {
-    wide wanted = (wide)rows * CHUNK_FACES, found = 1;
-    while (2 * (found * info->face_count) * (found * info->face_count) < wanted * wanted)
-        found *= 2;
-    return (uint64_t)found;
+    uint64_t wanted = rows * CHUNK_FACES, found = 1;
+    for (;; found *= 2) {
+        uint64_t has = found * info->face_count;
+        if (!ebpo_wide_less(ebpo_wide_left(ebpo_wide_product(has, has), 1),
+                            ebpo_wide_product(wanted, wanted)))
+            return found;
+    }
 }
 
 static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,

@@ -12,8 +12,6 @@
 #include <string.h>
 #include <strings.h>
 
-__extension__ typedef unsigned __int128 wide;
-
 typedef struct decimal {
     uint64_t digits;
     int32_t exponent; /* value = digits * 10^exponent */
@@ -97,6 +95,9 @@ static bool one_operation(double *out, const decimal *d)
     return true;
 }
 
+#ifdef EBPO_HAVE_INT128
+__extension__ typedef unsigned __int128 wide;
+
 /* digits / 10^e to `bits` bits. The quotient has at least 65 bits, so what rounding needs to know
  * is the bits below and the remainder. */
 static bool long_quotient(double *out, const decimal *d, int bits)
@@ -120,6 +121,15 @@ static bool long_quotient(double *out, const decimal *d, int bits)
     *out = ldexp((double)kept, shift - 64 - lift - e);
     return true;
 }
+
+#else
+/* The C library decides. */
+static bool long_quotient(double *out, const decimal *d, int bits)
+{
+    (void)out, (void)d, (void)bits;
+    return false;
+}
+#endif
 
 /* Between two floats, exactly: of the 29 bits that a float lacks, only the first is set. */
 static bool is_float_tie(double value)

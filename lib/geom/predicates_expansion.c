@@ -45,6 +45,7 @@ int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c
 
 /* --- orient3d: integers of 128 bits, then expansions --- */
 
+#ifdef EBPO_HAVE_INT128
 __extension__ typedef __int128 wide;
 
 /* 2^(exponent of x), x normal and positive. */
@@ -90,6 +91,15 @@ static bool integer_determinant(int *sign, ebpo_pair m[3][3])
     *sign = (det > 0) - (det < 0);
     return true;
 }
+
+#else
+/* Expansions decide alone. */
+static bool integer_determinant(int *sign, ebpo_pair m[3][3])
+{
+    (void)sign, (void)m;
+    return false;
+}
+#endif
 
 /* out = the determinant; room for 192. */
 static int expand_determinant(double *out, ebpo_difference m[3][3])

@@ -115,13 +115,23 @@ static ebpo_status judge_death(int state, const char *shown, ebpo_error *error)
         WTERMSIG(state), strsignal(WTERMSIG(state)));
 }
 
+static bool make_pipe(int ends[2])
+{
+#ifdef EBPO_HAVE_PIPE2
+    return pipe2(ends, O_CLOEXEC) == 0;
+#else
+    return pipe(ends) == 0 && fcntl(ends[0], F_SETFD, FD_CLOEXEC) == 0 &&
+           fcntl(ends[1], F_SETFD, FD_CLOEXEC) == 0;
+#endif
+}
+
 ebpo_status ebpo_apart(ebpo_apart_fn work, void *user, const char *shown,
                        const ebpo_apart_limits *limits, ebpo_error *error)
 {
     int ends[2], state = 0;
     ebpo_h5_scope scope;
     report r;
-    if (pipe2(ends, O_CLOEXEC) != 0)
+    if (!make_pipe(ends))
         return ebpo_fail_errno(error, shown, "no process could be started for it");
     uint64_t has = addresses();
     ebpo_h5_enter(&scope); /* so that no thread is inside of libhdf5 when the process is copied */

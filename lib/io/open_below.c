@@ -7,11 +7,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#if defined(__linux__) && defined(__has_include)
-#if __has_include(<linux/openat2.h>)
+#ifdef EBPO_HAVE_OPENAT2
 #include <linux/openat2.h>
 #include <sys/syscall.h>
-#endif
 #endif
 
 enum { FLAGS = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY };
@@ -19,7 +17,7 @@ enum { FLAGS = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY };
 /* False: the system has no such call, or a filter forbids it. */
 static bool open_at_once(int top, const char *name, int *fd)
 {
-#ifdef RESOLVE_BENEATH
+#ifdef EBPO_HAVE_OPENAT2
     struct open_how how = { .flags = FLAGS, .resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS };
     *fd = (int)syscall(SYS_openat2, top, name, &how, sizeof how);
     return *fd >= 0 || (errno != ENOSYS && errno != EPERM && errno != EINVAL && errno != E2BIG);

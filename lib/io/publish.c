@@ -252,7 +252,14 @@ ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
 /* Exchanges it for what was there, which is then the temporary file. */
 static bool exchange(const ebpo_publish *publish)
 {
+#ifdef EBPO_HAVE_RENAMEAT2
     return renameat2(AT_FDCWD, publish->temporary, AT_FDCWD, publish->target, RENAME_EXCHANGE) == 0;
+#else
+    struct stat st;
+    if (lstat(publish->target, &st) == 0) /* else errno says that there is nothing to exchange */
+        errno = ENOSYS;
+    return false;
+#endif
 }
 
 /* The second could not be put in its place: the first gives way to what was there. */

@@ -5,9 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#ifdef EBPO_HAVE_XATTR
 #include <sys/xattr.h>
+#endif
 #include <unistd.h>
 
+#ifdef EBPO_HAVE_XATTR
 /* No system lets a file have more of these. */
 enum { NAMES_MOST = 65536, VALUE_MOST = 65536 };
 
@@ -28,6 +31,10 @@ static void take_attributes(int from, int to)
     free(names);
     free(value);
 }
+
+#else
+static void take_attributes(int from, int to) { (void)from, (void)to; }
+#endif
 
 /* Who may not give a file away keeps it; it then does not act for another owner (set-user-ID). */
 static mode_t take_owner(int to, const struct stat *was)

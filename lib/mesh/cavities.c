@@ -5,6 +5,7 @@
 
 #include "base/arrays.h"
 #include "base/error.h"
+#include "base/sort_with.h"
 #include "geom/predicates.h"
 #include "mesh/component_parts.h"
 
@@ -55,7 +56,7 @@ static void list_both(placing *p)
         ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)m->face], v->at);
     }
     qsort(p->cavities, p->count, sizeof *p->cavities, compare_cavities);
-    qsort_r(p->hosts, p->host_count, sizeof *p->hosts, compare_hosts, c->list);
+    ebpo_sort_with(p->hosts, p->host_count, sizeof *p->hosts, compare_hosts, c->list);
 }
 
 /* The first cavity at y or beyond. */

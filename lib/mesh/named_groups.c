@@ -6,6 +6,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/sized.h"
+#include "base/sort_with.h"
 #include "mesh/mesh_parts.h"
 
 /* Of faces under no name, as the OBJ format has it. */
@@ -48,7 +49,7 @@ static void find_alike(naming *n)
         n->order[i] = (uint32_t)i;
         n->number[i] = EBPO_NO_INDEX;
     }
-    qsort_r(n->order, n->count, sizeof *n->order, compare_runs, (void *)(uintptr_t)n->runs);
+    ebpo_sort_with(n->order, n->count, sizeof *n->order, compare_runs, (void *)(uintptr_t)n->runs);
     for (uint64_t i = 0; i < n->count; i++) {
         uint32_t run = n->order[i], before = i ? n->order[i - 1] : run;
         bool same = i && compare_names(&n->runs[run], &n->runs[before]) == 0;

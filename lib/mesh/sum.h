@@ -9,10 +9,10 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "base/wide.h"
+
 /* From 2^-1074 to 2^1024, and 2^62 terms. */
 enum { EBPO_SUM_LIMBS = (1074 + 1024 + 63) / 32 + 2, EBPO_SUM_CARRY = 1 << 29 };
-
-__extension__ typedef unsigned __int128 ebpo_wide;
 
 typedef struct ebpo_sum {
     int64_t limb[EBPO_SUM_LIMBS]; /* [i] counts 2^(32 i - 1074) */
@@ -77,27 +77,27 @@ static inline double ebpo_sum_value(const ebpo_sum *sum)
     while (top > 0 && s.limb[top] == 0)
         top--;
     /* The leading 64 bits and more, then whether anything follows. */
-    ebpo_wide head = (ebpo_wide)(uint64_t)s.limb[top] << 64;
-    head |= top > 0 ? (ebpo_wide)(uint64_t)s.limb[top - 1] << 32 : 0;
-    head |= top > 1 ? (ebpo_wide)(uint64_t)s.limb[top - 2] : 0;
+    ebpo_wide head = { (uint64_t)s.limb[top], top > 0 ? (uint64_t)s.limb[top - 1] << 32 : 0 };
+    head.low |= top > 1 ? (uint64_t)s.limb[top - 2] : 0;
     bool rest = false;
     for (int i = 0; i < top - 2; i++)
         rest |= s.limb[i] != 0;
     int unit = 32 * (top - 2) - 1074; /* head counts 2^unit */
-    uint64_t high = (uint64_t)(head >> 64), low = (uint64_t)head;
-    int bits = high  ? 128 - __builtin_clzll(high)
-               : low ? 64 - __builtin_clzll(low)
-                     : 0,
+    int bits = head.high  ? 128 - __builtin_clzll(head.high)
+               : head.low ? 64 - __builtin_clzll(head.low)
+                          : 0,
         drop = bits - 53;
     if (unit + drop < -1074)
         drop = -1074 - unit; /* a denormal result */
     if (drop > 0) {
-        ebpo_wide half = (ebpo_wide)1 << (drop - 1), below = head & ((half << 1) - 1);
-        head >>= drop;
+        /* what is dropped, its first bit at the top: half of a unit */
+        ebpo_wide below = ebpo_wide_left(head, 128 - drop), half = { UINT64_C(1) << 63, 0 };
+        head = ebpo_wide_right(head, drop);
         unit += drop;
-        head += below > half || (below == half && (rest || (head & 1)));
+        bool tie = below.high == half.high && below.low == half.low;
+        head.low += ebpo_wide_less(half, below) || (tie && (rest || (head.low & 1)));
     }
-    double value = ldexp((double)(uint64_t)head, unit);
+    double value = ldexp((double)head.low, unit);
     return negative ? -value : value;
 }
 

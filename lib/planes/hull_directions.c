@@ -239,7 +239,7 @@ int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
                      ebpo_hull_facet *facets, int capacity)
 {
     hull h;
-    int corner[4], ways[WAYS];
+    int corner[4] = { 0 }, ways[WAYS];
     h.sweep = ebpo_sweep_best();
     h.p = points;
     h.count = 0;

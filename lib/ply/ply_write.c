@@ -73,7 +73,7 @@ static void put_position(writing *w, const ply_out_property *p, uint64_t row)
     float narrow = w->mesh->xyz32 ? w->mesh->xyz32[at] : (float)w->mesh->xyz64[at];
     if (p->type == PLY_FLOAT32) {
         memcpy(&bits, &narrow, sizeof narrow);
-        bits = __BYTE_ORDER == __LITTLE_ENDIAN ? bits : bits >> 32;
+        bits = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? bits : bits >> 32;
     } else if (p->type == PLY_FLOAT64) {
         memcpy(&bits, &w->mesh->xyz64[at], sizeof bits);
     } else {

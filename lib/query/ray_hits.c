@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/sort_with.h"
 #include "geom/ray_triangle.h"
 
 bool ebpo_casting_meets(const ebpo_casting *c, int facing, ebpo_met *m)
@@ -58,7 +59,7 @@ void ebpo_casting_keep(ebpo_casting *c, const ebpo_met *m)
 static void sort_met(ebpo_met *met, uint64_t count, ebpo_segment *ray)
 {
     if (count > 16) {
-        qsort_r(met, count, sizeof *met, compare_met, ray);
+        ebpo_sort_with(met, count, sizeof *met, compare_met, ray);
         return;
     }
     for (uint64_t i = 1; i < count; i++) {

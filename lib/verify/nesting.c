@@ -3,12 +3,11 @@
 #include "verify/nesting.h"
 
 #include "base/arrays.h"
+#include "base/wide.h"
 
 #include "geom/plane_code.h"
 
 enum { NODES_PER_LEVEL = 256, POINTS_PER_NODE = 8, POINT_BITS = 16 };
-
-__extension__ typedef __int128 wide;
 
 static void check_codes(ebpo_tally *tally, const ebpo_twin_tree *view, int l, ebpo_node_type type,
                         const uint8_t *counts)
@@ -60,12 +59,14 @@ static bool keeps_above(const ebpo_cell *above, const ebpo_cell *at, const int64
                         const int32_t n[3], int64_t d)
 {
     int down = at->level - above->level;
-    wide sum = 0;
+    ebpo_wide sum = { 0, 0 };
     for (int k = 0; k < 3; k++) {
         int64_t offset = (int64_t)at->at[k] - ((int64_t)above->at[k] << down);
-        sum += (wide)n[k] * (point[k] + offset * (1 << POINT_BITS));
+        sum = ebpo_wide_plus(sum,
+                             ebpo_wide_signed_product(n[k], point[k] + offset * (1 << POINT_BITS)));
     }
-    return 4096 * sum <= (wide)d * ((wide)1 << (POINT_BITS + down));
+    return ebpo_wide_signed_at_most(ebpo_wide_left(sum, 12),
+                                    ebpo_wide_signed_product(d, INT64_C(1) << (POINT_BITS + down)));
 }
 
 /* The same, with the plane taken down level by level as readers do. */
@@ -74,10 +75,11 @@ static bool keeps_below(const chain *c, int from, int to, const int64_t point[3]
 {
     for (int l = from + 1; l <= to; l++)
         d = ebpo_plane_to_child(n, d, c->node[l].octant);
-    wide sum = 0;
+    ebpo_wide sum = { 0, 0 };
     for (int k = 0; k < 3; k++)
-        sum += (wide)n[k] * point[k];
-    return 4096 * sum <= (wide)d * (1 << POINT_BITS);
+        sum = ebpo_wide_plus(sum, ebpo_wide_signed_product(n[k], point[k]));
+    return ebpo_wide_signed_at_most(ebpo_wide_left(sum, 12),
+                                    ebpo_wide_signed_product(d, 1 << POINT_BITS));
 }
 
 static void check_point(ebpo_tally *tally, const ebpo_twin_tree *view, const chain *c,
@@ -164,7 +166,8 @@ void ebpo_check_nesting(ebpo_tally *tally, const ebpo_twin_tree *view)
         for (uint64_t i = 0; l > 0 && i < NODES_PER_LEVEL && i < cells; i++) {
             uint64_t cell = cells <= NODES_PER_LEVEL
                                 ? i
-                                : (uint64_t)((wide)cells * i / NODES_PER_LEVEL) + i % 8;
+                                : cells / NODES_PER_LEVEL * i +
+                                      cells % NODES_PER_LEVEL * i / NODES_PER_LEVEL + i % 8;
             ebpo_twin_node node = ebpo_twin_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
             check_node(tally, view, &node);
         }

@@ -11,14 +11,13 @@
 #include <ebpo/colours.h>
 
 #include "base/arrays.h"
+#include "base/wide.h"
 #include "mesh/mesh_parts.h"
-
-__extension__ typedef unsigned __int128 wide;
 
 enum { NODES_A_TIME = 128 };
 
 typedef struct totals {
-    wide of[4]; /* weights times colours, and weights; all three times */
+    ebpo_wide of[4]; /* weights times colours, and weights; all three times */
 } totals;
 
 typedef struct judging {
@@ -33,8 +32,8 @@ typedef struct judging {
 static void add_corner(uint64_t weight, const uint8_t *rgba, totals *sum)
 {
     for (int k = 0; k < 3; k++)
-        sum->of[k] += (wide)weight * rgba[k];
-    sum->of[3] += weight;
+        sum->of[k] = ebpo_wide_plus(sum->of[k], ebpo_wide_product(weight, rgba[k]));
+    sum->of[3] = ebpo_wide_plus(sum->of[3], (ebpo_wide){ 0, weight });
 }
 
 static void add_listed(const judging *j, uint64_t face, totals *sum)
@@ -79,15 +78,16 @@ static void add_list(judging *j, const ebpo_twin_node *leaf, totals *sum)
 /* byte - 1/2 <= mean < byte + 1/2 */
 static bool is_nearest(const totals *sum, int channel, uint32_t byte)
 {
-    wide mean = 2 * sum->of[channel], one = sum->of[3];
-    return mean + one >= 2 * (wide)byte * one && mean + one < (2 * (wide)byte + 2) * one;
+    ebpo_wide one = sum->of[3], above = ebpo_wide_plus(ebpo_wide_left(sum->of[channel], 1), one);
+    return !ebpo_wide_less(above, ebpo_wide_times(one, 2 * (uint64_t)byte)) &&
+           ebpo_wide_less(above, ebpo_wide_times(one, 2 * (uint64_t)byte + 2));
 }
 
 static void check_node(const judging *j, const ebpo_twin_node *node, const totals *sum)
 {
     uint32_t colour = j->view->tree->level[node->cell.level].gray_colours[node->rank];
     bool right = true;
-    for (int k = 0; k < 3 && sum->of[3]; k++)
+    for (int k = 0; k < 3 && (sum->of[3].high || sum->of[3].low); k++)
         right = right && is_nearest(sum, k, colour >> 8 * k & 255);
     j->tally->checks[EBPO_VERIFY_STRUCTURE]++;
     if (!right)
@@ -98,7 +98,7 @@ static void check_node(const judging *j, const ebpo_twin_node *node, const total
 
 static void judge(judging *j, const ebpo_twin_node *node, totals *above)
 {
-    totals sum = { { 0 } };
+    totals sum = { { { 0, 0 } } };
     if (node->type == EBPO_LEAF)
         add_list(j, node, &sum);
     for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY; octant++) {
@@ -108,7 +108,7 @@ static void judge(judging *j, const ebpo_twin_node *node, totals *above)
     if (node->type == EBPO_GRAY)
         check_node(j, node, &sum);
     for (int i = 0; i < 4; i++)
-        above->of[i] += sum.of[i];
+        above->of[i] = ebpo_wide_plus(above->of[i], sum.of[i]);
 }
 
 static bool vertices_differ(const judging *j)
@@ -132,7 +132,7 @@ ebpo_status ebpo_check_colours(ebpo_tally *tally, const ebpo_twin_tree *view, eb
     j.by_face = j.colours.face && !vertices_differ(&j);
     for (int k = 0; k < 3; k++)
         j.longest = fmax(j.longest, view->box.size[k]);
-    totals all = { { 0 } };
+    totals all = { { { 0, 0 } } };
     ebpo_twin_node root = ebpo_twin_root(view);
     judge(&j, &root, &all);
     ebpo_colours_free(&j.colours);

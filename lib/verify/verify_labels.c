@@ -5,13 +5,12 @@
 #include <inttypes.h>
 
 #include "base/arrays.h"
+#include "base/wide.h"
 #include "verify/winding.h"
 
 enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };
 /* Points looked at by faces, in all: some seconds. */
 static const double ray_work_affordable = 4e8;
-
-__extension__ typedef unsigned __int128 wide;
 
 static uint64_t usual_samples(const ebpo_twin_tree *view, uint64_t cells)
 {
@@ -58,7 +57,8 @@ static bool planned(const ebpo_label_plan *plan, const ebpo_twin_node *node)
              take = plan->take[node->cell.level][node->type];
     if (take >= cells)
         return true;
-    return (wide)(node->rank + 1) * take / cells != (wide)node->rank * take / cells;
+    /* (rank + 1) * take / cells is another integer than rank * take / cells */
+    return ebpo_wide_modulo(ebpo_wide_product(node->rank, take), cells) >= cells - take;
 }
 
 static void corner_position(const ebpo_frame *frame, unsigned corner, double out[3])

@@ -9,6 +9,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/arrays.h"
+#include "base/sort_with.h"
 #include "container/reader.h"
 #include "mesh/mesh_parts.h"
 
@@ -206,7 +207,7 @@ static uint32_t *sorted(const ebpo_mesh *mesh, uint64_t count,
         return NULL;
     EBPO_FOR_ITEMS(mesh->workspace, i, 0, count)
         order[i] = (uint32_t)i;
-    qsort_r(order, count, sizeof *order, compare, (void *)(uintptr_t)mesh);
+    ebpo_sort_with(order, count, sizeof *order, compare, (void *)(uintptr_t)mesh);
     return order;
 }
 

@@ -127,14 +127,6 @@ ebpo_status bench_ask(const bench_job *job, ebpo_context *context, uint64_t numb
     return ask_into(job, context, number, job->answers, error);
 }
 
-/* Sleeps, as one who asks at a fixed rate does: others use the core meanwhile. */
-static void wait_until(uint64_t when)
-{
-    struct timespec t = { (time_t)(when / 1000000000), (long)(when % 1000000000) };
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR)
-        ;
-}
-
 /* Of ascending times: the least one that no more than 1 - thousandths / 1000 of them exceed. */
 static uint64_t quantile(const uint64_t *sorted, uint64_t count, unsigned thousandths)
 {
@@ -150,7 +142,7 @@ ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t c
     uint64_t begin = tool_clock();
     for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++) {
         if (job->rate > 0)
-            wait_until(begin + (uint64_t)((double)i / job->rate * 1e9));
+            tool_wait_until(begin + (uint64_t)((double)i / job->rate * 1e9));
         uint64_t start = tool_clock();
         status = bench_ask(job, context, i, error);
         uint64_t took = tool_clock() - start;
@@ -232,7 +224,7 @@ uint64_t bench_peak_memory(void)
 
 void bench_reset_peak(void)
 {
-#ifdef __GLIBC__
+#ifdef EBPO_HAVE_MALLOC_TRIM
     malloc_trim(0);
 #endif
     FILE *f = fopen("/proc/self/clear_refs", "w");

@@ -83,12 +83,23 @@ static void keep_rest(points *p, points_block *b, size_t from)
     b->count = from;
 }
 
+static const char *last_line_end(const char *text, size_t bytes)
+{
+#ifdef EBPO_HAVE_MEMRCHR
+    return memrchr(text, '\n', bytes);
+#else
+    while (bytes > 0 && text[bytes - 1] != '\n')
+        bytes--;
+    return bytes ? text + bytes - 1 : NULL;
+#endif
+}
+
 /* Whole lines, as many as are there; the last one may lack its end. */
 static void take_lines(points *p, points_block *b)
 {
     size_t whole = 0, looked = 0;
     for (;;) {
-        const char *last = memrchr(b->bytes + looked, '\n', b->count - looked);
+        const char *last = last_line_end(b->bytes + looked, b->count - looked);
         whole = last ? (size_t)(last - b->bytes) + 1 : whole;
         looked = b->count;
         if (p->ended || b->count == POINTS_LINE ||

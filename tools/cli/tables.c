@@ -62,7 +62,7 @@ const char *table_scaled(char out[TABLE_CELL], int digits, double x, int64_t exp
         whole += 1;
     }
     size_t length = strlen(mantissa); /* no zeros behind, as %g has it */
-    while (digits > 1 && mantissa[length - 1] == '0')
+    while (length > 1 && digits > 1 && mantissa[length - 1] == '0')
         mantissa[--length] = 0;
     if (mantissa[length - 1] == '.')
         mantissa[--length] = 0;

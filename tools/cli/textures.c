@@ -264,6 +264,17 @@ static bool write_all(int fd, span bytes)
     return true;
 }
 
+/* Less than 0: here are no files without a name, or /proc is missing, by which they get one. */
+static int open_nameless(int folder)
+{
+#ifdef EBPO_HAVE_O_TMPFILE
+    if (access("/proc/self/fd", X_OK) == 0)
+        return openat(folder, ".", O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
+#endif
+    (void)folder;
+    return -1;
+}
+
 /* The name comes last, so that it never stands for a part of the image. */
 static bool give_name(int fd, int folder, const char *name)
 {
@@ -279,8 +290,8 @@ static bool write_file(int top, char *name, span bytes)
     int folder = open_folder(top, name, &last);
     if (folder < 0)
         return false;
-    int fd = openat(folder, ".", O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
-    bool named = fd < 0; /* a file system without files that have no name */
+    int fd = open_nameless(folder);
+    bool named = fd < 0;
     if (named)
         fd = openat(folder, last, O_CREAT | O_EXCL | O_WRONLY | O_NOFOLLOW | O_CLOEXEC, 0666);
     bool good = fd >= 0 && write_all(fd, bytes) && (fsync(fd) == 0 || errno == EINVAL),

@@ -3,7 +3,6 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
-#include <sys/eventfd.h>
 #include <unistd.h>
 
 #include "cli/command.h"
@@ -34,6 +33,7 @@ typedef struct pipe_line {
     const query_job *job;
     query_holding *holding;
     points *in;
+    int waker; /* a byte written here ends its waiting; -1: nobody waits beside others */
     progress_line *progress;
     unsigned threads; /* at most */
     atomic_uint working;
@@ -55,8 +55,8 @@ typedef struct pipe_line {
 static void stop(pipe_line *p)
 {
     p->stopped = true;
-    if (p->in->wake >= 0)
-        (void)eventfd_write(p->in->wake, 1);
+    if (p->waker >= 0)
+        (void)!write(p->waker, "", 1);
     pthread_cond_broadcast(&p->moved);
 }
 
@@ -254,6 +254,16 @@ static void *work(void *user)
 
 /* --- all of it --- */
 
+/* By which who waits for input is told to stop. */
+static void make_waker(pipe_line *p)
+{
+    int ends[2];
+    if (pipe(ends) != 0)
+        return; /* it is told when the next input comes */
+    p->in->wake = ends[0];
+    p->waker = ends[1];
+}
+
 static bool make(pipe_line *p)
 {
     p->slot = calloc(p->slots, sizeof *p->slot);
@@ -269,7 +279,8 @@ static bool make(pipe_line *p)
     }
     for (unsigned i = 0; i < p->threads; i++)
         p->crew[i].pipe = p;
-    p->in->wake = p->threads > 1 ? eventfd(0, EFD_CLOEXEC) : -1;
+    if (p->threads > 1)
+        make_waker(p);
     return true;
 }
 
@@ -283,8 +294,10 @@ static void unmake(pipe_line *p)
         points_block_free(&p->slot[i].block);
         answer_text_free(&p->slot[i].text);
     }
-    if (p->in->wake >= 0)
+    if (p->waker >= 0) {
+        close(p->waker);
         close(p->in->wake);
+    }
     p->in->wake = -1;
     free(p->slot);
     free(p->crew);
@@ -310,7 +323,7 @@ static int ask_nothing(pipe_line *p, query_worker *w)
 int query_pipe_run(const query_job *job, query_holding *holding, points *in, unsigned threads,
                    progress_line *progress)
 {
-    pipe_line p = { .job = job, .holding = holding, .in = in, .progress = progress };
+    pipe_line p = { .job = job, .holding = holding, .in = in, .waker = -1, .progress = progress };
     p.threads = threads;
     p.slots = threads > 1 ? (uint64_t)threads * BLOCKS_EACH : 1;
     pthread_mutex_init(&p.taking, NULL);

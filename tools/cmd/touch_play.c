@@ -13,9 +13,13 @@
 const char *touch_play_first(void)
 {
     bool kept = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+#ifdef EBPO_HAVE_SCHED_SETSCHEDULER
     struct sched_param first = { .sched_priority = sched_get_priority_max(SCHED_FIFO) / 2 };
     /* of this thread; the loading one was made before and stays behind */
     bool ahead = sched_setscheduler(0, SCHED_FIFO, &first) == 0;
+#else
+    bool ahead = false;
+#endif
     return ahead  ? kept ? "SCHED_FIFO, memory locked" : "SCHED_FIFO, memory not locked"
            : kept ? "as other threads, memory locked"
                   : "as other threads, memory not locked";
@@ -23,7 +27,9 @@ const char *touch_play_first(void)
 
 void touch_play_behind(void)
 {
+#ifdef EBPO_HAVE_SCHED_SETSCHEDULER
     (void)sched_setscheduler(0, SCHED_OTHER, &(struct sched_param){ 0 });
+#endif
     (void)munlockall();
 }
 
@@ -68,17 +74,15 @@ static void sum_up(const spans *s, uint64_t count, touch_times *out)
     out->cpu_most = s->cpu[count - 1];
 }
 
-static void wait_until(uint64_t due)
-{
-    const struct timespec t = { (time_t)(due / 1000000000), (long)(due % 1000000000) };
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) != 0)
-        ;
-}
-
 static uint64_t page_faults(void)
 {
     struct rusage r;
-    return getrusage(RUSAGE_THREAD, &r) == 0 ? (uint64_t)(r.ru_minflt + r.ru_majflt) : 0;
+#ifdef EBPO_HAVE_RUSAGE_THREAD
+    bool known = getrusage(RUSAGE_THREAD, &r) == 0;
+#else
+    bool known = getrusage(RUSAGE_SELF, &r) == 0;
+#endif
+    return known ? (uint64_t)(r.ru_minflt + r.ru_majflt) : 0;
 }
 
 static uint64_t thread_clock(void)
@@ -160,7 +164,7 @@ static uint64_t play_all(const touch_play *p, uint64_t count, const spans *s, to
     uint64_t begin = tool_clock() + (uint64_t)(2 * period), faults = page_faults(), i = 0;
     for (; i < count; i++) {
         uint64_t due = begin + (uint64_t)((double)i * period);
-        wait_until(due);
+        tool_wait_until(due);
         uint64_t worked = thread_clock(), began = tool_clock();
         if (!play_tick(p, i, out))
             break;

@@ -227,10 +227,13 @@ bool output_commit(const char *place, const char *folder)
         length--;
     snprintf(target, sizeof target, "%.*s", (int)length, place);
     /* At once, so that there is no moment without a report; not all file systems can. */
+    errno = 0;
+#ifdef EBPO_HAVE_RENAMEAT2
     if (renameat2(AT_FDCWD, folder, AT_FDCWD, target, RENAME_EXCHANGE) == 0) {
         being_made[0] = 0;
         return tell_rest(folder);
     }
+#endif
     snprintf(older, sizeof older, "%s.old", folder);
     moved = errno != ENOENT && rename(target, older) == 0;
     if (rename(folder, target) != 0) {
