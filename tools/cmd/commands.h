@@ -16,6 +16,7 @@ extern const command command_convert, command_check, command_info, command_level
     command_export, command_measure, command_render, command_verify;
 extern const command command_inside, command_distance, command_ray, command_box, command_bench,
     command_subset, command_fetch, command_view, command_report, command_repack, command_repair,
-    command_scene, command_boolean, command_collide, command_map, command_touch, command_paint;
+    command_scene, command_boolean, command_collide, command_map, command_touch, command_paint,
+    command_catalogue;
 
 #endif

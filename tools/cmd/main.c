@@ -13,12 +13,12 @@
 #include "cmd/version_facts.h"
 
 static const command *const commands[] = {
-    &command_convert,  &command_check,   &command_info,    &command_levels, &command_view,
-    &command_extract,  &command_export,  &command_subset,  &command_repack, &command_repair,
-    &command_fetch,    &command_measure, &command_render,  &command_verify, &command_inside,
-    &command_distance, &command_ray,     &command_box,     &command_bench,  &command_report,
-    &command_scene,    &command_boolean, &command_collide, &command_map,    &command_touch,
-    &command_paint
+    &command_convert,  &command_check,    &command_info,    &command_levels, &command_view,
+    &command_extract,  &command_export,   &command_subset,  &command_repack, &command_repair,
+    &command_fetch,    &command_measure,  &command_render,  &command_verify, &command_inside,
+    &command_distance, &command_ray,      &command_box,     &command_bench,  &command_report,
+    &command_scene,    &command_boolean,  &command_collide, &command_map,    &command_touch,
+    &command_paint,    &command_catalogue
 };
 enum { COMMANDS = sizeof commands / sizeof *commands };
 
@@ -42,7 +42,8 @@ static void usage(FILE *out)
             "library and the HDF5 plugin are\n\nexit codes: 0 success, 1 bad data "
             "or input/output, 2 wrong usage, 3 not a solid where one is required, 4 (repack) "
             "the content "
-            "would differ, (repair) it does, (paint) the model is another one\n");
+            "would differ, (repair) it does, (paint) the model is another one, (catalogue) files "
+            "were left out\n");
 }
 
 static int unknown_command(const char *name)
