@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Catalogues from Python: many models against each of them by itself, the parts of one against the whole."""
+import contextlib
 import importlib.util
+import io
 import json
 import os
 import pathlib
@@ -195,7 +197,8 @@ class Parts(Case):
         spec.loader.exec_module(cls.cut)
         model("scan")
         sys.argv, kept = ["cut", "scan.ebpo.h5", "cut"], sys.argv
-        cls.cut.main()
+        with contextlib.redirect_stdout(io.StringIO()) as cls.printed:
+            cls.cut.main()
         sys.argv = kept
         cls.whole, cls.catalogue = ebpo.open("scan.ebpo.h5"), Catalogue.open("cut/catalogue.json")
         vertices, faces = cls.whole.mesh(order="source")
@@ -216,6 +219,8 @@ class Parts(Case):
         numbers = np.concatenate([np.load(entry.numbers) for entry in self.catalogue.entries])
         np.testing.assert_array_equal(np.sort(numbers), np.arange(self.whole.info.face_count))
         self.assertGreater(len(self.caps), 100)
+        told = [int(line.split()[-2]) for line in self.printed.getvalue().splitlines() if line.endswith("caps")]
+        self.assertEqual(sum(told), len(self.caps))
         balance = {}
         for face in self.caps:
             key = tuple(sorted(map(tuple, face)))

@@ -13,6 +13,7 @@ from ._declared import (MeetingKind, NodeType, PairKind, Part, Relation, Rule, W
 from ._library import lib as _lib
 from .adapters import from_trimesh
 from .asking import bar
+from .catalogue import Catalogue
 from .collide import Collider, pose
 from .converting import convert
 from .errors import (AbsentError, ArgumentError, Cancelled, Error, FormatError, IOFailure, LimitError, NoMemory,
@@ -37,7 +38,7 @@ def library() -> str:
 __all__ = [
     "open", "Model", "Info", "Located", "Nearest", "Bounds", "Hits", "AllHits", "Where",
     "Mesh", "Maps", "Level", "Subtree", "Attributes", "Mass", "NodeType", "Part", "Rule", "half_spaces",
-    "Collider", "pose", "Relation", "PairKind", "Scene", "open_scene", "MeetingKind",
+    "Catalogue", "Collider", "pose", "Relation", "PairKind", "Scene", "open_scene", "MeetingKind",
     "Touch", "Touched", "Sensed",
     "convert", "from_trimesh", "bar", "library",
     "Error", "ArgumentError", "IOFailure", "FormatError", "VersionError", "UnsupportedError", "NotSolidError",
