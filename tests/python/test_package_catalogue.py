@@ -64,6 +64,9 @@ class Many(Case):
         np.testing.assert_array_equal(near["face"] == -1, every.min(axis=0) > .3)
         twice = Catalogue.of(self.names[:1] * 3).distance(P[:500])
         self.assertEqual(set(twice["model"]), {0}, "of equal ones the first")
+        entry = self.catalogue.entries[0]
+        wider = Catalogue([entry, entry._replace(low=(-9, -9, -9), high=(9, 9, 9))]).distance(P[:500])
+        self.assertEqual(set(wider["model"]), {0}, "also where another one is asked before it")
 
     def test_rays(self):
         d = points(len(P), seed=6)
