@@ -140,6 +140,7 @@ def write_part(pieces, vertices, code, folder):
     closed = write(faces, vertices, paths[0])
     if not closed.solid:
         sys.exit("cut_along_octcodes.py: the mesh is not closed")
+    print(f"{code:o}: {real.sum()} faces, {(~real).sum()} caps", flush=True)
     corners = vertices[np.unique(faces)].astype(np.float64)
     entry = Entry(str(paths[0]), closed.content_sha256, True, tuple(corners.min(axis=0).tolist()),
                   tuple(corners.max(axis=0).tolist()), surface=None)

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Catalogues from Python: many models against each of them by itself, the parts of one against the whole."""
+import contextlib
 import importlib.util
+import io
 import json
 import os
 import pathlib
@@ -62,6 +64,9 @@ class Many(Case):
         np.testing.assert_array_equal(near["face"] == -1, every.min(axis=0) > .3)
         twice = Catalogue.of(self.names[:1] * 3).distance(P[:500])
         self.assertEqual(set(twice["model"]), {0}, "of equal ones the first")
+        entry = self.catalogue.entries[0]
+        wider = Catalogue([entry, entry._replace(low=(-9, -9, -9), high=(9, 9, 9))]).distance(P[:500])
+        self.assertEqual(set(wider["model"]), {0}, "also where another one is asked before it")
 
     def test_rays(self):
         d = points(len(P), seed=6)
@@ -195,7 +200,8 @@ class Parts(Case):
         spec.loader.exec_module(cls.cut)
         model("scan")
         sys.argv, kept = ["cut", "scan.ebpo.h5", "cut"], sys.argv
-        cls.cut.main()
+        with contextlib.redirect_stdout(io.StringIO()) as cls.printed:
+            cls.cut.main()
         sys.argv = kept
         cls.whole, cls.catalogue = ebpo.open("scan.ebpo.h5"), Catalogue.open("cut/catalogue.json")
         vertices, faces = cls.whole.mesh(order="source")
@@ -216,6 +222,8 @@ class Parts(Case):
         numbers = np.concatenate([np.load(entry.numbers) for entry in self.catalogue.entries])
         np.testing.assert_array_equal(np.sort(numbers), np.arange(self.whole.info.face_count))
         self.assertGreater(len(self.caps), 100)
+        told = [int(line.split()[-2]) for line in self.printed.getvalue().splitlines() if line.endswith("caps")]
+        self.assertEqual(sum(told), len(self.caps))
         balance = {}
         for face in self.caps:
             key = tuple(sorted(map(tuple, face)))

@@ -9,15 +9,17 @@ docs/guide/python.md shows all of it; `open` and `Model` are where to begin.
 """
 from __future__ import annotations
 
-from ._declared import (MeetingKind, NodeType, PairKind, Part, Relation, Rule, Where)
+from ._declared import (MeetingKind, NodeType, PaintKind, PairKind, Part, Relation, Rule, Where)
 from ._library import lib as _lib
 from .adapters import from_trimesh
 from .asking import bar
+from .catalogue import Catalogue
 from .collide import Collider, pose
 from .converting import convert
 from .errors import (AbsentError, ArgumentError, Cancelled, Error, FormatError, IOFailure, LimitError, NoMemory,
                      NotSolidError, UnsupportedError, VersionError)
 from .model import AllHits, Bounds, Hits, Located, Model, Nearest, open
+from .painting import Areas, Paint, Stroke
 from .parts import Attributes, Info, Level, Maps, Mass, Mesh, Subtree, half_spaces
 from .scenes import Scene, open_scene
 from .touching import Sensed, Touch, Touched
@@ -37,8 +39,8 @@ def library() -> str:
 __all__ = [
     "open", "Model", "Info", "Located", "Nearest", "Bounds", "Hits", "AllHits", "Where",
     "Mesh", "Maps", "Level", "Subtree", "Attributes", "Mass", "NodeType", "Part", "Rule", "half_spaces",
-    "Collider", "pose", "Relation", "PairKind", "Scene", "open_scene", "MeetingKind",
-    "Touch", "Touched", "Sensed",
+    "Catalogue", "Collider", "pose", "Relation", "PairKind", "Scene", "open_scene", "MeetingKind",
+    "Touch", "Touched", "Sensed", "Paint", "Stroke", "Areas", "PaintKind",
     "convert", "from_trimesh", "bar", "library",
     "Error", "ArgumentError", "IOFailure", "FormatError", "VersionError", "UnsupportedError", "NotSolidError",
     "LimitError", "Cancelled", "AbsentError", "NoMemory",

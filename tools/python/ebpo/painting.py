@@ -1,0 +1,205 @@
+"""Strokes, layers and notes on a model, in a file of their own beside it."""
+from __future__ import annotations
+
+import ctypes
+import os
+from typing import Any, Callable, NamedTuple
+
+import numpy as np
+
+from . import _declared as c
+from ._library import Handle, Reporter, call, copied, lib, made, text
+from .model import Model
+
+POINT = np.dtype(c.ebpo_paint_point)
+FACE = np.dtype(c.ebpo_paint_face)
+AREA = np.dtype(c.ebpo_paint_area)
+
+
+class Stroke(NamedTuple):
+    """layer: its number; kind: a PaintKind; colour: 0xRRGGBBAA; radius: of points of full size, in the
+    model's unit; time: milliseconds since 1970, 0: not known; points: structured as ebpo_paint_point."""
+
+    layer: int
+    kind: Any
+    colour: int
+    radius: float
+    time: int
+    points: np.ndarray
+
+
+class Areas(NamedTuple):
+    """In the model's unit, squared, each as lo, value, hi: the area is from lo to hi.
+
+    all: of all layers, (). layers, strokes: of each, structured arrays.
+    """
+
+    all: np.ndarray
+    layers: np.ndarray
+    strokes: np.ndarray
+
+
+class Paint:
+    """Paint on a model, which is never changed. Made by `Paint(model)`, or `Paint.open` of a file.
+
+    The rules are those of ebpo/paint.h. Several threads may read it while none changes it.
+
+    >>> paint = Paint(cube)
+    >>> layer = paint.add_layer(title="Cracks", colour=0x3366ffff)
+    >>> paint.lay(cube, [[.2, .5, 1, 1], [.8, .5, 1, 1]], layer=layer, radius=.1)["strokes"]
+    1
+    >>> area = paint.measure(cube).all
+    >>> bool(area["lo"] <= .12 + .01 * np.pi <= area["hi"] * 1.1)
+    True
+    """
+
+    def __init__(self, model: Model | None = None, *, _handle: Handle | None = None) -> None:
+        if _handle is None:
+            if model is None:
+                raise TypeError("Paint() takes the model that it is on")
+            _handle = Handle.made("ebpo_paint_new", model.file, free="ebpo_paint_free")
+        self._handle = _handle
+
+    @classmethod
+    def open(cls, source: Any) -> Paint:
+        """Of a path, or the bytes of a file. FormatError, VersionError, IOFailure."""
+        if isinstance(source, (str, os.PathLike)):
+            return cls(_handle=Handle.made("ebpo_paint_open", os.fsencode(source), free="ebpo_paint_free"))
+        data = np.frombuffer(source, np.uint8)
+        return cls(_handle=Handle.made("ebpo_paint_open_memory", data.ctypes.data, data.nbytes, None,
+                                       free="ebpo_paint_free"))
+
+    def save(self, path: Any) -> None:
+        """Whole or not at all. UnsupportedError: the library is one without libhdf5."""
+        call("ebpo_paint_save", self._handle, os.fsencode(path))
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """Members of ebpo_paint_info: layer_count, stroke_count, note_count, point_count, model_sha256, ..."""
+        return facts(self._got("ebpo_paint_get_info", c.ebpo_paint_info))
+
+    def check(self, model: Model) -> None:
+        """Raises ArgumentError if it is paint of another model."""
+        call("ebpo_paint_check_model", self._handle, model.file)
+
+    def _got(self, function: str, kind: Any, *number: int) -> Any:
+        struct = made(kind)
+        if getattr(lib, function)(self._handle, *number, ctypes.byref(struct)) != 0:
+            raise IndexError(f"there is no number {number[0]}")
+        return struct
+
+    # ---- layers, notes, strokes ----
+
+    @property
+    def layers(self) -> list[dict]:
+        """Of each: title, author, date, description, colour (0xRRGGBBAA), opacity (0 to 255), visible (0, 1)."""
+        return [facts(self._got("ebpo_paint_get_layer", c.ebpo_paint_layer, i)) for i in range(self.info["layer_count"])]
+
+    def add_layer(self, **members: Any) -> int:
+        """A layer above all others; its number."""
+        number = ctypes.c_uint64()
+        call("ebpo_paint_add_layer", self._handle, ctypes.byref(of_members(c.ebpo_paint_layer, members)),
+             ctypes.byref(number))
+        return number.value
+
+    def remove_layer(self, number: int) -> None:
+        """With its strokes and notes."""
+        call("ebpo_paint_remove_layer", self._handle, number)
+
+    @property
+    def notes(self) -> list[dict]:
+        """Of each: title, author, date, body, layer, and `at`, structured as ebpo_paint_point."""
+        return [facts(self._got("ebpo_paint_get_note", c.ebpo_paint_note, i)) for i in range(self.info["note_count"])]
+
+    def add_note(self, model: Model, place: Any, *, layer: int = 0, **texts: Any) -> None:
+        """At the point of the surface nearest to a place. texts: title, author, date, body."""
+        note = of_members(c.ebpo_paint_note, {**texts, "layer": layer})
+        at = np.ascontiguousarray(place, np.float64)
+        if at.shape != (3,):
+            raise ValueError("a place has three numbers")
+        with model._context() as context:
+            call("ebpo_paint_place", self._handle, context, at.ctypes.data, ctypes.byref(note.at))
+        call("ebpo_paint_add_note", self._handle, ctypes.byref(note))
+
+    def remove_note(self, number: int) -> None:
+        """Later ones get the next lower numbers."""
+        call("ebpo_paint_remove_note", self._handle, number)
+
+    @property
+    def strokes(self) -> list[Stroke]:
+        """In the order in which they were made."""
+        out = []
+        for i in range(self.info["stroke_count"]):
+            s = self._got("ebpo_paint_get_stroke", c.ebpo_paint_stroke, i)
+            out.append(Stroke(s.layer, c.PaintKind(s.kind), s.colour, s.radius, s.time,
+                              copied(s.points, (s.point_count,), POINT)))
+        return out
+
+    def remove_stroke(self, number: int) -> None:
+        """Of the last one: undo."""
+        call("ebpo_paint_remove_stroke", self._handle, number)
+
+    def lay(self, model: Model, hand: Any, *, progress: Callable | None = None, **pen: Any) -> dict[str, int]:
+        """Strokes along a hand's way.
+
+        hand: (n, 4), places and pressures of 0 to 1, or (n, 5), with milliseconds.
+        pen: members of ebpo_paint_pen: radius, which is needed, layer, colour, spread, density, seed, ...
+
+        Returns members of ebpo_paint_laid: strokes, points, steps, lifted, strayed.
+        """
+        rows = np.array(hand, np.float64)
+        if rows.ndim != 2 or rows.shape[1] not in (4, 5):
+            raise ValueError(f"a hand's way has the shape (n, 4) or (n, 5), not {rows.shape}")
+        way = np.zeros((len(rows), 5))
+        way[:, :rows.shape[1]] = rows
+        laid = made(c.ebpo_paint_laid)
+        with Reporter(progress) as reported, model._context() as context:
+            given = of_members(c.ebpo_paint_pen, {**pen, "progress": reported})
+            call("ebpo_paint_lay", self._handle, context, way.ctypes.data, len(way), ctypes.byref(given),
+                 ctypes.byref(laid))
+        return facts(laid)
+
+    # ---- answers ----
+
+    def cover(self, model: Model, stroke: int) -> np.ndarray:
+        """The faces of a stroke's reach: structured as ebpo_paint_face, in the order of the file."""
+        found = bytearray()
+
+        def take(_user: int, face: int) -> bool:
+            found.extend(ctypes.string_at(face, FACE.itemsize))
+            return True
+
+        with model._context() as context:
+            call("ebpo_paint_cover", self._handle, context, stroke, c.ebpo_paint_face_fn(take), None, None)
+        return np.frombuffer(bytes(found), FACE)
+
+    def measure(self, model: Model, *, fineness: int = 256, progress: Callable | None = None) -> Areas:
+        """How much of the surface is painted; see ebpo_paint_measure."""
+        areas = made(c.ebpo_paint_areas)
+        with Reporter(progress) as reported, model._context() as context:
+            options = made(c.ebpo_paint_options, fineness=fineness, threads=model._threads, progress=reported)
+            call("ebpo_paint_measure", self._handle, context, ctypes.byref(options), ctypes.byref(areas))
+        info = self.info
+        out = Areas(np.array(areas.all), copied(areas.layers, (info["layer_count"],), AREA),
+                    copied(areas.strokes, (info["stroke_count"],), AREA))
+        lib.ebpo_paint_areas_free(ctypes.byref(areas))
+        return out
+
+
+def of_members(kind: Any, members: dict) -> Any:
+    """A struct with these; texts become UTF-8, and stay as long as it does."""
+    known = {name for name, _ in kind._fields_} - {"struct_size", "reserved"}
+    for name in members:
+        if name not in known:
+            raise TypeError(f"there is no {name!r} here, but {', '.join(sorted(known))}")
+    return made(kind, **{name: value.encode() if isinstance(value, str) else value for name, value in members.items()})
+
+
+def facts(struct: Any) -> dict[str, Any]:
+    out = {}
+    for name, _ in struct._fields_:
+        value = getattr(struct, name)
+        if name not in ("struct_size", "reserved"):
+            out[name] = text(value) if isinstance(value, bytes) else \
+                np.array(value) if isinstance(value, ctypes.Structure) else value
+    return out
