@@ -63,7 +63,7 @@ struct ebpo_touch {
     uint32_t found[EBPO_TOUCH_FACES];
     ebpo_near_node looking[EBPO_TOUCH_VISITS + 2];
     double gap[EBPO_TOUCH_FACES];
-    double away[3]; /* from the nearest face, if one was found */
+    double away[3];       /* from the nearest face, if one was found */
     ebpo_context *asking; /* for places */
     ebpo_side side;
     unsigned answer; /* number of a known place */
