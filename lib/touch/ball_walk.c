@@ -1,7 +1,7 @@
-/* The tree's nodes are taken in the order in which the ball may come to touch them, and no more when
- * the next one is touched after a face that is known. The distance from a box is convex along a
- * line, as that from a face is: Newton's steps towards the ball's radius never go too far. Of those
- * that it may touch already the closest are first: if it is held there, that is known soon.
+/* The tree's nodes are taken in the order in which the ball may come to touch them, and no more
+ * when the next one is touched after a face that is known. The distance from a box is convex along
+ * a line, as that from a face is: Newton's steps towards the ball's radius never go too far. Of
+ * those that it may touch already the closest are first: if it is held there, that is known soon.
  *
  * Where a tick's work ends before, the ball goes as far as the next node allows, if that is worth
  * it; it is held by what is known if it is held where it is; else the next tick goes on. */

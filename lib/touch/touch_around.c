@@ -11,8 +11,8 @@ typedef struct around {
     ebpo_touch *t;
     const ebpo_face_box *box;
     ebpo_near_queue queue;
-    double look;      /* all faces that are closer to the ball are found */
-    double nearest;   /* centre to face */
+    double look;    /* all faces that are closer to the ball are found */
+    double nearest; /* centre to face */
     uint32_t looked;
     uint32_t count; /* of t->found */
     ebpo_touch_result *out;
@@ -98,7 +98,8 @@ static bool no_face_close(const ebpo_touch *t)
     return false;
 }
 
-/* Of a ball with so many faces around it that hardly any are known to be all, away from the nearest. */
+/* Of a ball with so many faces around it that hardly any are known to be all, away from the
+ * nearest. */
 static void tell_normal(const around *a, double out[3])
 {
     double sum[3] = { 0 };

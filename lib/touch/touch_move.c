@@ -10,32 +10,6 @@
 #include "touch/touch_parts.h"
 #include "touch/vectors.h"
 
-static void swap_boxes(ebpo_touch *t)
-{
-    unsigned before = t->at;
-    t->at = t->seen;
-    t->seen = before;
-}
-
-bool ebpo_touch_take_box(ebpo_touch *t)
-{
-    if (!(atomic_load_explicit(&t->between, memory_order_relaxed) & EBPO_TOUCH_FRESH))
-        return false;
-    unsigned got = atomic_exchange_explicit(&t->between, t->seen, memory_order_acq_rel);
-    t->seen = got & ~(unsigned)EBPO_TOUCH_FRESH;
-    if (!ebpo_extent_holds(&t->box[t->seen].centres, t->proxy))
-        return false; /* it was made for another place */
-    swap_boxes(t);
-    t->stats.taken++;
-    return true;
-}
-
-void ebpo_touch_try_other(ebpo_touch *t)
-{
-    if (ebpo_extent_holds(&t->box[t->seen].centres, t->proxy))
-        swap_boxes(t);
-}
-
 void ebpo_touch_tell(ebpo_touch *t, const double hand[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -80,11 +54,11 @@ static void find_depth(const ebpo_touch *t, const double hand[3], uint32_t flags
 }
 
 /* The way from hand to proxy is not quite along the faces' normals: by what the proxy has still to
- * go, by rounding far from 0, and by friction, which puts it askew. Damping across that way may pull
- * towards faces, and huge damping with all force: what does so is taken out, and the force no
+ * go, by rounding far from 0, and by friction, which puts it askew. Damping across that way may
+ * pull towards faces, and huge damping with all force: what does so is taken out, and the force no
  * greater. What was touched first may be the edge of a face that the ball is beside, by next to
- * nothing: so the nearest face counts, too. A face that the spring itself pulls to is another one of
- * a narrow corner. */
+ * nothing: so the nearest face counts, too. A face that the spring itself pulls to is another one
+ * of a narrow corner. */
 static void keep_from_faces(const ebpo_touch *t, bool near, const double depth[3], double force[3])
 {
     ebpo_held_planes off = { .count = 0 };
@@ -167,6 +141,8 @@ ebpo_status ebpo_touch_get_stats(const ebpo_touch *t, ebpo_touch_stats *out)
     s.memory = EBPO_TOUCH_BOXES * ebpo_face_box_bytes(t->options.faces);
     s.given = t->passive.given;
     s.step_most = t->passive.step_most;
+    if (t->options.kind == EBPO_TOUCH_BALL)
+        s.memory += ebpo_ball_walk_bytes(t->options.faces);
     if (t->tool)
         s.memory += ebpo_tool_bytes(t->tool);
     return EBPO_GIVE(ebpo_touch_stats, out, &s);

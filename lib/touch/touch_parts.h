@@ -63,7 +63,7 @@ struct ebpo_touch {
     uint32_t found[EBPO_TOUCH_FACES];
     ebpo_near_node looking[EBPO_TOUCH_VISITS + 2];
     double gap[EBPO_TOUCH_FACES];
-    double away[3]; /* from the nearest face, if one was found */
+    double away[3];       /* from the nearest face, if one was found */
     ebpo_context *asking; /* for places */
     ebpo_side side;
     unsigned answer; /* number of a known place */
@@ -120,11 +120,13 @@ const ebpo_known_place *ebpo_touch_known(ebpo_touch *t);
 EBPO_MUST_USE ebpo_status ebpo_touch_loader_start(ebpo_touch *t, ebpo_error *error);
 void ebpo_touch_loader_stop(ebpo_touch *t);
 
-/* touch_move.c: a box that is fresh and holds the proxy becomes the one at hand. True: one did. */
+/* touch_boxes.c: a box that is fresh and holds the proxy becomes the one at hand. True: one did. */
 bool ebpo_touch_take_box(ebpo_touch *t);
-void ebpo_touch_tell(ebpo_touch *t, const double hand[3]);
 /* The box before, if it holds the proxy: perhaps that one reaches further. */
 void ebpo_touch_try_other(ebpo_touch *t);
+
+/* touch_move.c */
+void ebpo_touch_tell(ebpo_touch *t, const double hand[3]);
 void ebpo_touch_count(ebpo_touch *t, uint32_t flags, uint64_t work);
 
 #endif

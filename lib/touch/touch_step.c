@@ -1,7 +1,7 @@
 /* The proxy's way of a tick: straight on until a ball touches, then along what it touches, a few
  * times. Each straight piece is decided twice: by distances, which say where the ball stops, and by
- * exact arithmetic, which says that the centre went through nothing. A piece may take several ticks,
- * if very many faces are around. */
+ * exact arithmetic, which says that the centre went through nothing. A piece may take several
+ * ticks, if very many faces are around. */
 #include "geom/strict_fp.h"
 
 #include <math.h>
@@ -143,8 +143,8 @@ static void add_planes(ebpo_touch *t)
     copy(t->proxy, t->along_at);
 }
 
-/* The proxy is at the piece's end. What the ball touches there is what it slides along; after a way,
- * only that. False: it touches nothing, and goes no farther in this tick. */
+/* The proxy is at the piece's end. What the ball touches there is what it slides along; after a
+ * way, only that. False: it touches nothing, and goes no farther in this tick. */
 static bool settle(step *s)
 {
     ebpo_touch *t = s->t;

@@ -1,7 +1,7 @@
-/* A ball that is large beside the faces: thousands are around it, and in a cavity of nearly its size
- * all of them nearly touch it. It must be held when it touches and not before, as a plain twin says
- * that measures the distance from every face; come to rest where no way leads nearer to the hand; and
- * look at no more in a tick than a ball in the open may. */
+/* A ball that is large beside the faces: thousands are around it, and in a cavity of nearly its
+ * size all of them nearly touch it. It must be held when it touches and not before, as a plain twin
+ * says that measures the distance from every face; come to rest where no way leads nearer to the
+ * hand; and look at no more in a tick than a ball in the open may. */
 #include <ebpo/touch.h>
 #include <math.h>
 #include <stdio.h>
@@ -149,8 +149,8 @@ static void ball_rest(ball *b, const double hand[3], uint32_t most)
     } while (apart(before, b->r.proxy) > 1e-3 * b->options.skin);
 }
 
-/* At rest: as near to a face as it may be, pushed away from the hand; and where it would be nearer to
- * the hand, it would be too near to a face. */
+/* At rest: as near to a face as it may be, pushed away from the hand; and where it would be nearer
+ * to the hand, it would be too near to a face. */
 static void judge_rest(const ball *b, const double hand[3], uint64_t *state)
 {
     double radius = b->options.radius, skin = b->options.skin, back[3];

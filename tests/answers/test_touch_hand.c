@@ -406,8 +406,9 @@ START_TEST(what_makes_no_sense_is_refused)
 END_TEST
 
 /* However strong damping is, and however much rounding turns the way from hand to proxy, as it does
- * far from 0 and as friction does: no force towards a face that the spring pushes away from. Whether
- * a face or an edge of it is the nearest is known to the root of what rounding does, 1e-7. */
+ * far from 0 and as friction does: no force towards a face that the spring pushes away from.
+ * Whether a face or an edge of it is the nearest is known to the root of what rounding does, 1e-7.
+ */
 START_TEST(damping_never_pulls_towards_faces)
 {
     static const double offsets[] = { 0, 1e7, 1e13 }, factors[] = { 1, 1e3, 1e6 };

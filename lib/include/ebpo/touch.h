@@ -51,14 +51,15 @@ typedef enum ebpo_touch_kind {
 typedef struct ebpo_touch_options {
     size_t struct_size; /* EBPO_TOUCH_OPTIONS_INIT sets it */
 
-    /* Of the hand, in the model's unit, at least 0. 0: a point. A tick looks at 384 faces around
-     * the ball at most. Where more are in its box, as the radius is many edges of the mesh, the
-     * ball does not come (EBPO_TOUCH_SHORT); begun there, it stays until it is put elsewhere. */
+    /* Of the hand, in the model's unit, at least 0. 0: a point. All faces within the radius and
+     * `look` must find room in a box (`faces`). A tick looks at 512 of them at most, in the order
+     * in which the ball may touch them; where that does not do, the next ones go on. */
     double radius;
 
     /*
      * So far beyond its radius the proxy keeps away from faces, in the model's unit: what rounding
-     * needs. 0: 2^-20 of the diagonal of the model's root cell. Else at least 2^-30 of it.
+     * needs. 0: 2^-20 of the diagonal of the model's root cell. Else at least 2^-30 of it,
+     * and 2^-42 of the coordinates and the radius.
      */
     double skin;
 
@@ -135,11 +136,12 @@ typedef enum ebpo_touch_flag {
     /* The proxy waits at the wall of what is loaded; there is no force from that. */
     EBPO_TOUCH_WAITS = 2,
 
-    /* A tick's work was done before the way was: the proxy goes on in the next one. */
+    /* A tick's work was done before the way was: the proxy goes on in the next one. A ball that was
+     * held is held meanwhile by the faces that were. */
     EBPO_TOUCH_SHORT = 4,
 
-    /* Not all faces within `look` were looked at, or not all of them are loaded: nearest face,
-     * distance and normal are those of the others. */
+    /* Not all faces within `look` were looked at, which are the farthest ones then, or not all of
+     * them are loaded: nearest face, distance and normal are those of the others. */
     EBPO_TOUCH_PARTLY = 8,
 
     /* The hand was not finite: it was taken to be where it was before. */
@@ -189,9 +191,9 @@ typedef struct ebpo_touch_result {
  * the proxy has come where it waited or was short depends on when boxes were loaded.
  *
  * Force: stiffness times the way from hand to proxy, less damping times the hand's speed; never
- * towards the faces. It is made weaker where the hand would be given more energy in sum than was
- * taken from it and stiffness times the square of the longest step that it ever made in a tick,
- * however it is moved.
+ * towards faces that the spring pushes away from, but for 1e-7 of itself. It is made weaker where
+ * the hand would be given more energy in sum than was taken from it and stiffness times the square
+ * of the longest step that it ever made in a tick, however it is moved.
  *
  * Threads: one per object.
  */
