@@ -37,7 +37,8 @@ static bool read_shard(query_shard *s, const char *text)
         return true;
     s->of = 0;
     command_usage(s->command,
-                  "--shard: '%s' is not I/N, shard I of N; the first is 0, the last is N - 1", text);
+                  "--shard: '%s' is not I/N, shard I of N; the first is 0, the last is N - 1",
+                  text);
     return false;
 }
 
@@ -245,7 +246,8 @@ static int look_again(const query_shard *s, const query_job *job)
     return code;
 }
 
-/* The note of the answers that were there goes first, and comes last: it never stands beside others.
+/* The note of the answers that were there goes first, and comes last: it never stands beside
+ * others.
  */
 static int put_in_place(query_shard *s, uint64_t bytes)
 {
