@@ -1,4 +1,7 @@
 /* The public face of publish.h: whole files, and giving up. */
+#include <stdlib.h>
+
+#include "base/alloc.h"
 #include "base/error.h"
 #include "base/unnamed_file.h"
 #include "io/publish.h"
@@ -18,6 +21,41 @@ ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebp
         status = ebpo_publish_commit(&out, error);
     ebpo_publish_abort(&out);
     return status;
+}
+
+struct ebpo_output {
+    ebpo_publish publish;
+};
+
+ebpo_status ebpo_output_begin(const char *path, ebpo_output **out, int *descriptor,
+                              ebpo_error *error)
+{
+    *descriptor = -1;
+    *out = ebpo_alloc(1, sizeof **out);
+    if (!*out)
+        return ebpo_fail_memory(error, sizeof **out);
+    ebpo_status status = ebpo_publish_begin(&(*out)->publish, path, error);
+    if (status != EBPO_OK) {
+        free(*out);
+        *out = NULL;
+        return status;
+    }
+    *descriptor = (*out)->publish.fd;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_output_end(ebpo_output *out, ebpo_error *error)
+{
+    ebpo_status status = ebpo_publish_commit(&out->publish, error);
+    free(out);
+    return status;
+}
+
+void ebpo_output_abandon(ebpo_output *out)
+{
+    if (out)
+        ebpo_publish_abort(&out->publish);
+    free(out);
 }
 
 ebpo_status ebpo_check_output(const char *path, ebpo_error *error)

@@ -55,6 +55,16 @@ static ebpo_status call_outputs(every_call_env *e)
     ebpo_status status = ebpo_check_output(scratch("text"), e->error);
     if (status == EBPO_OK)
         status = ebpo_write_file(scratch("text"), "text", 4, e->error);
+    ebpo_output *out = NULL;
+    int descriptor;
+    if (status == EBPO_OK)
+        status = ebpo_output_begin(scratch("text"), &out, &descriptor, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_output_end(out, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_output_begin(scratch("text"), &out, &descriptor, e->error);
+    if (status == EBPO_OK)
+        ebpo_output_abandon(out);
     ebpo_abandon_outputs();
     return status;
 }

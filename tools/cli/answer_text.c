@@ -10,7 +10,7 @@ enum { FIRST = 1 << 16 };
 
 bool answer_text_init(answer_text *t)
 {
-    *t = (answer_text){ .bytes = malloc(FIRST), .capacity = FIRST };
+    *t = (answer_text){ .bytes = malloc(FIRST), .capacity = FIRST, .spill_at = ANSWER_SPILL };
     return t->bytes != NULL;
 }
 
@@ -39,7 +39,7 @@ void answer_text_forget(answer_text *t, size_t count)
 
 char *answer_text_grow(answer_text *t)
 {
-    if (t->count >= ANSWER_SPILL && t->spill) {
+    if (t->count >= t->spill_at && t->spill) {
         t->spilled = true;
         t->spill(t, t->user);
     }

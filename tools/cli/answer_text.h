@@ -10,6 +10,7 @@ typedef struct answer_text answer_text;
 struct answer_text {
     char *bytes;
     size_t count, capacity;
+    size_t spill_at;      /* so much is kept before it spills */
     size_t answer, piece; /* where the last answer ended, and the last piece */
     size_t *cuts;         /* [cut_count] ends of pieces: answers together, at most 4096 bytes */
     size_t cut_count, cut_capacity;
@@ -30,15 +31,15 @@ void answer_text_free(answer_text *t);
 
 /* What answer_text_room does where there is too little room, or too much in it. */
 char *answer_text_grow(answer_text *t);
-/* A pipe takes so many bytes at once, or nothing; so much is kept before it spills. */
+/* A pipe takes so many bytes at once, or nothing; so much is usually kept before it spills. */
 enum { ANSWER_PIECE = 4096, ANSWER_SPILL = 1 << 20 };
 
 /* Where ANSWER_MOST bytes may be written; answer_text_end tells how far they go. Never NULL: where
  * there is no memory, what is there is lost, and `failed` says so. */
 static inline char *answer_text_room(answer_text *t)
 {
-    return t->count < ANSWER_SPILL && t->count + ANSWER_MOST <= t->capacity ? t->bytes + t->count
-                                                                            : answer_text_grow(t);
+    return t->count < t->spill_at && t->count + ANSWER_MOST <= t->capacity ? t->bytes + t->count
+                                                                           : answer_text_grow(t);
 }
 static inline void answer_text_end(answer_text *t, const char *end)
 {

@@ -38,6 +38,7 @@ bool points_open(points *p, const char *by, const char *path, points_kind kind, 
                    .layout = { points_raw_width(kind), 8, false },
                    .fd = STDIN_FILENO,
                    .wake = -1,
+                   .together = POINTS_BATCH,
                    .rest_capacity = POINTS_LINE };
     if (!standard && points_is_dataset(path))
         return points_open_dataset(p, path);
@@ -136,7 +137,7 @@ static void check_rows(points *p, points_block *b, uint64_t more)
 /* Whole rows, as many as are there. */
 static void take_numbers(points *p, points_block *b)
 {
-    size_t each = (size_t)(p->layout.per_row * p->layout.bytes), most = POINTS_BATCH * each;
+    size_t each = (size_t)(p->layout.per_row * p->layout.bytes), most = p->together * each;
     while (!p->ended && b->count < most && (b->count < each || points_more_is_there(p))) {
         ssize_t got = points_read_some(p, b, b->bytes + b->count, most - b->count);
         b->count += got > 0 ? (size_t)got : 0;
@@ -157,7 +158,7 @@ static void take_numbers(points *p, points_block *b)
 static void take_held(points *p, points_block *b)
 {
     uint64_t left = p->rows_total - p->held_at;
-    b->row_count = left < POINTS_BATCH ? left : POINTS_BATCH;
+    b->row_count = left < p->together ? left : p->together;
     b->rows = p->held + p->held_at * (uint64_t)points_width(p->kind);
     p->held_at += b->row_count;
 }
@@ -181,7 +182,7 @@ bool points_take(points *p, points_block *b)
     b->lines = b->row_count = b->fault_at = 0;
     b->rows = NULL;
     b->failed = false;
-    b->first = !p->taken;
+    b->first = !p->taken && !p->line_from;
     p->taken = true;
     begin(p, b);
     if (b->failed || p->failed)
@@ -191,7 +192,7 @@ bool points_take(points *p, points_block *b)
         return b->row_count > 0;
     }
     size_t bytes =
-        p->raw ? (size_t)(POINTS_BATCH * p->layout.per_row * p->layout.bytes) : (size_t)POINTS_LINE;
+        p->raw ? p->together * (size_t)(p->layout.per_row * p->layout.bytes) : (size_t)POINTS_LINE;
     if (!block_room(b, bytes > p->rest_count ? bytes : p->rest_count))
         return p->ended = true;
     memcpy(b->bytes, p->rest, p->rest_count);
@@ -217,6 +218,9 @@ static void say(const points *p, const points_block *b)
     if (b->fault_at && (p->raw || p->held))
         fprintf(stderr, "%s %" PRIu64 ": ", p->from_zero ? "vertex" : names[p->kind],
                 p->row + b->fault_at - p->from_zero);
+    else if (b->fault_at && p->line_from)
+        fprintf(stderr, "line %" PRIu64 " behind byte %" PRIu64 ": ", p->line + b->fault_at,
+                p->line_from);
     else if (b->fault_at)
         fprintf(stderr, "line %" PRIu64 ": ", p->line + b->fault_at);
     fprintf(stderr, "%s\n", b->fault);

@@ -150,6 +150,16 @@ bool points_is_dataset(const char *path)
     return dataset_colon(path) && stat(path, &st) != 0;
 }
 
+bool points_file(const char *path, struct stat *st, const char **dataset)
+{
+    const char *colon = points_is_dataset(path) ? dataset_colon(path) : path + strlen(path);
+    char *file = strndup(path, (size_t)(colon - path));
+    bool found = file && stat(file, st) == 0;
+    free(file);
+    *dataset = colon;
+    return found;
+}
+
 bool points_open_dataset(points *p, const char *path)
 {
     const char *colon = dataset_colon(path);

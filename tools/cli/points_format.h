@@ -10,6 +10,9 @@ bool points_recognise(points *p, points_block *b);
 /* The same for "FILE.h5:/path" where FILE.h5 is a file. False after an error, which has been said.
  */
 bool points_is_dataset(const char *path);
+/* The file that holds them. False: there is none. *dataset: what follows the file's name, or "". */
+struct stat;
+bool points_file(const char *path, struct stat *st, const char **dataset);
 bool points_open_dataset(points *p, const char *path);
 
 #endif

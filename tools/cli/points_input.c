@@ -43,7 +43,9 @@ static bool wait_for_more(const points *p)
 ssize_t points_read_some(points *p, points_block *b, char *to, size_t most)
 {
     ssize_t got;
-    if (!wait_for_more(p)) {
+    if (p->limited && p->bytes_left < most)
+        most = (size_t)p->bytes_left;
+    if (most == 0 || !wait_for_more(p)) {
         p->ended = true;
         return 0;
     }
@@ -54,6 +56,7 @@ ssize_t points_read_some(points *p, points_block *b, char *to, size_t most)
         points_fault(b, 0, "cannot be read: %s", strerror(errno));
     p->ended |= got <= 0;
     p->bytes_taken += got > 0 ? (uint64_t)got : 0;
+    p->bytes_left -= p->limited && got > 0 ? (uint64_t)got : 0;
     return got;
 }
 

@@ -52,11 +52,15 @@ typedef struct points {
     int fd;
     int wake; /* when this can be read, waiting ends, as at the end of the input; -1: nothing */
     uint64_t bytes_total, bytes_taken; /* of a file; 0: not known how many */
-    char *rest;                        /* [rest_capacity] what was read and is not taken */
+    bool limited;                      /* only so many bytes more are read: */
+    uint64_t bytes_left;
+    char *rest; /* [rest_capacity] what was read and is not taken */
     size_t rest_count, rest_capacity;
     bool begun, taken, ended;
     _Atomic bool failed; /* said on stderr, the command shall end with EXIT_FAILED */
     uint64_t line, row;  /* that have passed */
+    uint64_t line_from;  /* lines are counted from this byte of the file on */
+    uint64_t together;   /* rows of a block, of input that is no text */
     points_layout layout;
     bool rows_known;          /* how many there are in all: */
     uint64_t rows_total;      /* may be cut short */

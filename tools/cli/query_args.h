@@ -10,11 +10,11 @@
 #include "cli/remote_args.h"
 
 typedef struct query_values {
-    const char *memory, *deadline, *attribute;
-    int64_t cut_level, threads, level, nearest;
+    const char *memory, *deadline, *attribute, *out, *shard;
+    int64_t cut_level, threads, level, nearest, together;
     double max_distance, tmax, within;
     int inside_mode, distance_mode, ray_sides; /* indices into the words below */
-    bool prefetch, raw, json, unsigned_distance, no_warm, all, any, header, csv, npy;
+    bool prefetch, raw, json, unsigned_distance, no_warm, all, any, header, csv, npy, force;
     remote_values remote;
 } query_values;
 #define QUERY_VALUES_INIT                                                         \

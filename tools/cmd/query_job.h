@@ -32,6 +32,7 @@ struct query_job {
     ebpo_distance_options distance;
     answer_form form;
     const ebpo_sampler *sampler; /* of --attribute; NULL: none */
+    bool continues;              /* answers go on behind those of another run: without names */
 };
 
 #endif

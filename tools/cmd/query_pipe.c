@@ -8,8 +8,11 @@
 #include "cli/command.h"
 #include "cli/points_parse.h"
 
-/* Blocks under way for each thread: while the oldest one is waited for, others are done. */
-enum { BLOCKS_EACH = 4, FIRST_PIECE = 16 };
+/* Blocks under way for each thread: while the oldest one is waited for, others are done. Of large
+ * ones fewer. */
+enum { BLOCKS_EACH = 4, LARGE_EACH = 2, FIRST_PIECE = 16 };
+/* Answers to a block that are kept, for each of its rows. */
+enum { KEPT_EACH = 128 };
 
 /* A block of questions, and its answers. */
 typedef struct slot {
@@ -274,6 +277,8 @@ static bool make(pipe_line *p)
         if (!answer_text_init(&p->slot[i].text))
             return false;
         p->slot[i].pipe = p;
+        if (p->in->together > POINTS_BATCH)
+            p->slot[i].text.spill_at = KEPT_EACH * p->in->together;
         p->slot[i].text.spill = spill;
         p->slot[i].text.user = &p->slot[i];
     }
@@ -315,7 +320,8 @@ static int ask_nothing(pipe_line *p, query_worker *w)
     }
     if (status != EBPO_OK)
         return command_failed(p->job->command, &error);
-    if (p->job->values->header && p->job->form != ANSWERS_JSON && p->job->form != ANSWERS_RAW)
+    if (p->job->values->header && !p->job->continues && p->job->form != ANSWERS_JSON &&
+        p->job->form != ANSWERS_RAW)
         answers_header(w->text, p->job->form, p->job->columns(p->job), p->job->values->attribute);
     return EXIT_FINE;
 }
@@ -325,7 +331,9 @@ int query_pipe_run(const query_job *job, query_holding *holding, points *in, uns
 {
     pipe_line p = { .job = job, .holding = holding, .in = in, .waker = -1, .progress = progress };
     p.threads = threads;
-    p.slots = threads > 1 ? (uint64_t)threads * BLOCKS_EACH : 1;
+    p.slots = threads > 1
+                  ? (uint64_t)threads * (in->together > POINTS_BATCH ? LARGE_EACH : BLOCKS_EACH)
+                  : 1;
     pthread_mutex_init(&p.taking, NULL);
     pthread_mutex_init(&p.state, NULL);
     pthread_cond_init(&p.moved, NULL);

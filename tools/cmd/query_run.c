@@ -9,8 +9,10 @@
 #include "cli/json.h"
 #include "cli/model_sums.h"
 #include "cli/npy_answers.h"
+#include "cli/points_cut.h"
 #include "cmd/query_holding.h"
 #include "cmd/query_pipe.h"
+#include "cmd/query_shard.h"
 
 static void tell_stats(const query_job *job, const query_holding *holding)
 {
@@ -71,7 +73,6 @@ static int ask(query_job *job, query_holding *holding, points *in,
     progress_line line;
     /* the line stands between answers where both go to one terminal */
     (void)progress_start(&line, job->command, isatty(STDOUT_FILENO));
-    in->header = job->values->header;
     npy_answers npy = { .command = job->command };
     bool as_npy = job->values->npy;
     if (as_npy)
@@ -106,34 +107,84 @@ static bool fits(const query_job *job)
     return false;
 }
 
-int query_run(query_job *job, const char *model, const char *path)
+static answer_form form_of(const query_values *v)
 {
-    const query_values *v = job->values;
-    ebpo_model_options options;
+    return v->json  ? ANSWERS_JSON
+           : v->npy ? ANSWERS_RAW
+           : v->csv ? ANSWERS_CSV
+           : v->raw ? ANSWERS_RAW
+                    : ANSWERS_TEXT;
+}
+
+/* Nobody waits for answers that go to a file: where the model is held in parts, so many points are
+ * asked about together, in the order in which subtrees come, that few are loaded again. */
+enum { TOGETHER_IN_PARTS = 1 << 20 };
+
+static uint64_t together(const query_values *v, const query_holding *holding)
+{
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    if (v->together)
+        return (uint64_t)v->together;
+    bool parts = v->out && !holding->waiting &&
+                 ebpo_model_get_stats(holding->session.model, &stats) == EBPO_OK && !stats.resident;
+    return parts ? TOGETHER_IN_PARTS : POINTS_BATCH;
+}
+
+/* With the model, of what is in `in`. */
+static int run(query_job *job, const char *model, points *in, const ebpo_model_options *options,
+               query_shard *shard)
+{
     query_holding holding;
     ebpo_sampler *sampler = NULL;
+    int code =
+        query_holding_open(&holding, job->command, model, job->values, options, job->parts_share);
+    if (code == EXIT_FINE)
+        code = open_sampler(job, &holding, &sampler);
+    if (code == EXIT_FINE)
+        code = query_shard_begin(shard);
+    if (code == EXIT_FINE) {
+        in->together = together(job->values, &holding);
+        code = ask(job, &holding, in, options);
+        code = query_shard_end(shard, job, code);
+    }
+    ebpo_sampler_free(sampler);
+    if (holding.session.model && job->values->remote.stats)
+        tell_stats(job, &holding);
+    query_holding_close(&holding);
+    return code;
+}
+
+static int open_and_run(query_job *job, const char *model, const char *path,
+                        const ebpo_model_options *options, query_shard *shard)
+{
+    const query_values *v = job->values;
+    int code;
     points in;
-    if (!query_options_from(job->command, v, &options, &job->inside, &job->distance))
+    if (query_shard_done(shard, job, &code))
+        return code;
+    bool fine = points_open(&in, job->command, path, job->kind, v->raw, v->tmax);
+    in.header = v->header;
+    if (fine && shard->of)
+        fine = points_cut(&in, shard->number, shard->of);
+    code = fine ? run(job, model, &in, options, shard) : EXIT_FAILED;
+    points_close(&in);
+    return code;
+}
+
+int query_run(query_job *job, const char *model, const char *path)
+{
+    ebpo_model_options options;
+    query_shard shard;
+    if (!query_options_from(job->command, job->values, &options, &job->inside, &job->distance))
         return EXIT_USAGE;
     if (!fits(job))
         return EXIT_USAGE;
-    job->form = v->json  ? ANSWERS_JSON
-                : v->npy ? ANSWERS_RAW
-                : v->csv ? ANSWERS_CSV
-                : v->raw ? ANSWERS_RAW
-                         : ANSWERS_TEXT;
-    int code = EXIT_FAILED;
-    if (points_open(&in, job->command, path, job->kind, v->raw, v->tmax)) {
-        code = query_holding_open(&holding, job->command, model, v, &options, job->parts_share);
-        if (code == EXIT_FINE)
-            code = open_sampler(job, &holding, &sampler);
-        if (code == EXIT_FINE)
-            code = ask(job, &holding, &in, &options);
-        ebpo_sampler_free(sampler);
-        if (holding.session.model && v->remote.stats)
-            tell_stats(job, &holding);
-        query_holding_close(&holding);
+    job->form = form_of(job->values);
+    int code = EXIT_USAGE;
+    if (query_shard_fits(&shard, job, model, path)) {
+        job->continues = shard.of && shard.number > 0;
+        code = open_and_run(job, model, path, &options, &shard);
     }
-    points_close(&in);
+    query_shard_free(&shard);
     return code;
 }

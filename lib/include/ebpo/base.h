@@ -5,7 +5,7 @@
  *   Structs    those that begin with their size, and EBPO_..._INIT
  *   Errors     ebpo_status, ebpo_error
  *   Progress   ebpo_progress
- *   Outputs    ebpo_write_file, ebpo_check_output, ebpo_abandon_outputs,
+ *   Outputs    ebpo_write_file, ebpo_output_begin, ebpo_check_output, ebpo_abandon_outputs,
  *              ebpo_folder_begin, ebpo_folder_publish
  *
  * Rules that hold for every function:
@@ -204,6 +204,41 @@ typedef struct ebpo_progress {
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_write_file(const char *path, const void *data, size_t size,
                                                    ebpo_error *error);
+
+/* A file in the making. */
+typedef struct ebpo_output ebpo_output;
+
+/*
+ * The same for what is too long for memory: begins a file that appears at `path` when it
+ * is ended, and leaves nothing behind otherwise. What killed programs have left for the
+ * same path is removed.
+ *
+ * out          ended by ebpo_output_end, or ebpo_output_abandon. On failure NULL.
+ * descriptor   to write to, and to read what was written; closed with the output
+ *
+ * EBPO_E_IO: as ebpo_check_output. EBPO_E_LIMIT: more than 32 outputs at a time.
+ * EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_output_begin(const char *path, ebpo_output **out,
+                                                     int *descriptor, ebpo_error *error);
+
+/*
+ * Syncs it and gives it its name; frees `out` in any case.
+ *
+ * EBPO_E_IO: it could not be written; `path` is as it was.
+ *
+ * Threads: one per output.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_output_end(ebpo_output *out, ebpo_error *error);
+
+/*
+ * Removes it. NULL is fine.
+ *
+ * Threads: one per output.
+ */
+EBPO_API void ebpo_output_abandon(ebpo_output *out);
 
 /*
  * Whether an output could be begun at `path` now. Worth asking before hours of

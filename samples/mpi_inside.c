@@ -1,0 +1,146 @@
+/* Which points are inside, on all processes of an MPI program, as simulation codes ask it:
+ *
+ *     mpirun -n 4 mpi_inside MODEL.ebpo.h5 POINTS.raw ANSWERS.raw [MEGABYTES]
+ *
+ * POINTS.raw holds three doubles for each point, ANSWERS.raw gets two int32 for each: where (0 out, 1
+ * inside, 2 on the surface) and the winding number, as `ebpo inside --raw` prints them. The bytes do not
+ * depend on the number of processes. Each process opens the model itself, within MEGABYTES (default
+ * 256). An error of one ends all, and no answers are left.
+ */
+#include <ebpo/ebpo.h>
+#include <mpi.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { TOGETHER = 1 << 18 }; /* points of a process between two reads of all */
+
+static int rank, ranks;
+
+/* Who has an error says it; all end. Every process must come here. */
+static int all_fine(int fine, const char *what)
+{
+    int every;
+    if (!fine)
+        fprintf(stderr, "mpi_inside: process %d of %d: %s\n", rank, ranks, what);
+    MPI_Allreduce(&fine, &every, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
+    return every;
+}
+
+/* The file's errors as text. */
+static int mpi_fine(int code, const char *path)
+{
+    char why[MPI_MAX_ERROR_STRING] = "", what[MPI_MAX_ERROR_STRING + 512];
+    int length;
+    if (code != MPI_SUCCESS)
+        MPI_Error_string(code, why, &length);
+    snprintf(what, sizeof what, "%s: %s", path, why);
+    return all_fine(code == MPI_SUCCESS, what);
+}
+
+/* Points from `first` on, `count` of them: read, asked and written with those of all others. */
+static int ask_stretch(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
+                       MPI_Offset first, int count, double *points, ebpo_inside_result *results,
+                       int *answers)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    MPI_Status got;
+    int doubles = 0;
+    int code = MPI_File_read_at_all(in, first * 24, points, 3 * count, MPI_DOUBLE, &got);
+    if (!mpi_fine(code, paths[0]))
+        return 0;
+    MPI_Get_count(&got, MPI_DOUBLE, &doubles);
+    if (!all_fine(doubles == 3 * count, "the points became fewer while they were read"))
+        return 0;
+    ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
+    ebpo_status status =
+        ebpo_inside_many(context, points, (uint64_t)count, &options, results, &error);
+    if (!all_fine(status == EBPO_OK, error.message))
+        return 0;
+    for (int i = 0; i < count; i++) {
+        answers[2 * i] = (int)results[i].where;
+        answers[2 * i + 1] = results[i].winding;
+    }
+    code = MPI_File_write_at_all(out, first * 8, answers, 2 * count, MPI_INT, &got);
+    return mpi_fine(code, paths[1]);
+}
+
+/* All take stretches in turn, as many of them as each other: reading together needs everyone. */
+static int ask_all(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
+                   MPI_Offset rows)
+{
+    double *points = malloc(sizeof *points * 3 * TOGETHER);
+    ebpo_inside_result *results = malloc(sizeof *results * TOGETHER);
+    int *answers = malloc(sizeof *answers * 2 * TOGETHER);
+    int fine = all_fine(points && results && answers, "not enough memory");
+    for (MPI_Offset at = 0; fine && at < rows; at += (MPI_Offset)TOGETHER * ranks) {
+        MPI_Offset first = at + (MPI_Offset)TOGETHER * rank, left = first < rows ? rows - first : 0;
+        fine = ask_stretch(context, in, out, paths, first, left < TOGETHER ? (int)left : TOGETHER,
+                           points, results, answers);
+    }
+    free(points);
+    free(results);
+    free(answers);
+    return fine;
+}
+
+static int ask_files(ebpo_context *context, const char *points, const char *answers)
+{
+    const char *const paths[] = { points, answers };
+    MPI_File in, out;
+    MPI_Offset bytes = 0;
+    if (!mpi_fine(MPI_File_open(MPI_COMM_WORLD, points, MPI_MODE_RDONLY, MPI_INFO_NULL, &in), points))
+        return 0;
+    int fine = mpi_fine(MPI_File_get_size(in, &bytes), points) &&
+               all_fine(bytes % 24 == 0, "the points are no rows of three doubles");
+    if (fine && mpi_fine(MPI_File_open(MPI_COMM_WORLD, answers, MPI_MODE_WRONLY | MPI_MODE_CREATE,
+                                       MPI_INFO_NULL, &out),
+                         answers)) {
+        fine = mpi_fine(MPI_File_set_size(out, bytes / 3), answers) &&
+               ask_all(context, in, out, paths, bytes / 24);
+        fine = mpi_fine(MPI_File_close(&out), answers) && fine;
+        if (!fine && rank == 0)
+            MPI_File_delete(answers, MPI_INFO_NULL);
+    } else {
+        fine = 0;
+    }
+    MPI_File_close(&in);
+    return fine;
+}
+
+static int ask_model(const char *const *path, double megabytes)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ebpo_model *model = NULL;
+    ebpo_context *context = NULL;
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    options.memory = (uint64_t)(megabytes * 1e6);
+    options.threads = 1;
+    ebpo_status status = ebpo_open(path[0], &file, &error);
+    if (status == EBPO_OK)
+        status = ebpo_model_new(file, &options, &model, &error);
+    if (status == EBPO_OK)
+        status = ebpo_context_new(model, &context, &error);
+    int fine = all_fine(status == EBPO_OK, error.message) && ask_files(context, path[1], path[2]);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    ebpo_close(file);
+    return fine;
+}
+
+int main(int argc, char **argv)
+{
+    MPI_Init(&argc, &argv);
+    MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+    MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+    double megabytes = argc == 5 ? atof(argv[4]) : 256;
+    int fine = 0;
+    if ((argc == 4 || argc == 5) && megabytes > 0 && megabytes < 1e9) {
+        const char *const path[] = { argv[1], argv[2], argv[3] };
+        fine = ask_model(path, megabytes);
+    } else if (rank == 0) {
+        fprintf(stderr, "usage: mpi_inside MODEL.ebpo.h5 POINTS.raw ANSWERS.raw [MEGABYTES]\n");
+    }
+    MPI_Finalize();
+    return fine ? 0 : 1;
+}

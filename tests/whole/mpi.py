@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+"""mpi.py EBPO GENERATE MPIRUN MPI_INSIDE: the sample with MPI answers as the command, on 1, 2 and 4
+processes, byte for byte; an error ends all of them with its message, and leaves no answers."""
+import os
+import random
+import struct
+import subprocess
+import sys
+import tempfile
+
+ROWS = 600_001  # more than two processes take at a time
+
+
+def main():
+    ebpo, generate, mpirun, inside = (os.path.abspath(path) for path in sys.argv[1:])
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        subprocess.run([generate, "--subdivide", "4", "m.ply"], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([ebpo, "convert", "-q", "m.ply", "m.ebpo.h5"], check=True)
+        numbers = random.Random(1)
+        some = b"".join(struct.pack("<3d", *(numbers.uniform(-1, 1) for _ in range(3))) for _ in range(5000))
+        with open("p.raw", "wb") as file:
+            file.write((some * (ROWS // 5000 + 1))[:24 * ROWS])
+        want = subprocess.run([ebpo, "inside", "--raw", "m.ebpo.h5", "p.raw"], check=True,
+                              capture_output=True).stdout
+        wrong = []
+
+        def run(processes, *arguments):
+            return subprocess.run([mpirun, "--oversubscribe", "--allow-run-as-root", "-n", str(processes),
+                                   inside, *arguments], capture_output=True, text=True, timeout=120)
+
+        for processes in (1, 2, 4):
+            done = run(processes, "m.ebpo.h5", "p.raw", "a.raw")
+            with open("a.raw", "rb") as file:
+                if done.returncode or file.read() != want:
+                    wrong.append(f"{processes} processes: {done.returncode} {done.stderr}")
+            os.remove("a.raw")
+        with open("cut.raw", "wb") as file:
+            file.write(some[:30])
+        for arguments, message in ((("no.ebpo.h5", "p.raw", "a.raw"), "no.ebpo.h5: "),
+                                   (("m.ebpo.h5", "cut.raw", "a.raw"), "no rows of three doubles"),
+                                   (("m.ebpo.h5", "no.raw", "a.raw"), "no.raw: ")):
+            done = run(2, *arguments)
+            if not done.returncode or message not in done.stderr or os.path.exists("a.raw"):
+                wrong.append(f"{arguments}: {done.returncode} {done.stderr}")
+        print("\n".join(wrong) or "fine")
+        os.chdir("/")
+    return 1 if wrong else 0
+
+
+sys.exit(main())

@@ -1,0 +1,137 @@
+#include "cli/points_cut.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/points.h"
+#include "cli/points_header.h"
+
+static bool wrong(points *p, const char *what)
+{
+    fprintf(stderr, "ebpo %s: %s: %s\n", p->command, p->name, what);
+    p->failed = true;
+    return false;
+}
+
+/* total * number / of; without overflow, as `of` is at most 10^9. */
+static uint64_t share(uint64_t total, uint64_t number, uint64_t of)
+{
+    return total / of * number + total % of * number / of;
+}
+
+/* From here on only bytes `from` to `to` of the file are taken. */
+static bool limit(points *p, uint64_t from, uint64_t to)
+{
+    p->rest_count = 0;
+    p->limited = true;
+    p->bytes_left = p->bytes_total = to - from;
+    p->bytes_taken = 0;
+    p->ended = false;
+    return lseek(p->fd, (off_t)from, SEEK_SET) >= 0 || wrong(p, strerror(errno));
+}
+
+/* --- numbers --- */
+
+static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t number, uint64_t of)
+{
+    uint64_t each = (uint64_t)(p->layout.per_row * p->layout.bytes), rows = (size - begin) / each;
+    if (p->rows_told && (size - begin) / each != p->rows_total)
+        return wrong(p, rows > p->rows_total
+                            ? "holds more rows than its shape tells; it is something else"
+                            : "holds fewer rows than its shape tells; it is cut short");
+    uint64_t first = share(rows, number, of), end = share(rows, number + 1, of);
+    p->row = first;
+    p->rows_told = false; /* that was looked at here */
+    p->rows_known = true;
+    p->rows_total = end - first;
+    /* what is left over behind the last row is told by the last part */
+    return limit(p, begin + first * each, number + 1 < of ? begin + end * each : size);
+}
+
+static bool cut_held(points *p, uint64_t number, uint64_t of)
+{
+    uint64_t rows = p->rows_total;
+    p->row = p->held_at = share(rows, number, of);
+    p->rows_total = share(rows, number + 1, of);
+    return true;
+}
+
+/* --- text --- */
+
+/* The beginning of the first line that begins at `at` or behind it, of a file of `size` bytes;
+ * UINT64_MAX after an error (said on stderr). `begin`: of the first line. */
+static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
+{
+    char piece[1 << 14];
+    if (at <= begin)
+        return begin;
+    for (uint64_t from = at - 1; from < size;) {
+        ssize_t got = pread(p->fd, piece, sizeof piece, (off_t)from);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got < 0)
+            return wrong(p, strerror(errno)), UINT64_MAX;
+        const char *end = memchr(piece, '\n', (size_t)got);
+        if (end)
+            return from + (uint64_t)(end - piece) + 1;
+        if (got == 0)
+            break;
+        from += (uint64_t)got;
+    }
+    return size;
+}
+
+/* All parts need the names of columns, and lines after them are what is shared. `begin`: of the
+ * first line; *out is that of the first one behind the names. */
+static bool take_names(points *p, uint64_t begin, uint64_t *out)
+{
+    points_block b = { .bytes = malloc(POINTS_LINE + 1), .first = true };
+    ssize_t got = b.bytes ? pread(p->fd, b.bytes, POINTS_LINE, (off_t)begin) : -1;
+    bool fine = got >= 0 || wrong(p, b.bytes ? strerror(errno) : "not enough memory");
+    b.count = got > 0 ? (size_t)got : 0;
+    if (fine && b.count > 0) {
+        fine = points_take_header(p, &b);
+        if (!fine)
+            (void)points_pass(p, &b);
+        else if (!p->fields && got == POINTS_LINE)
+            fine = wrong(p, "holds no line of names in its first bytes");
+    }
+    *out = begin + b.begin;
+    points_block_free(&b);
+    return fine;
+}
+
+static bool cut_text(points *p, uint64_t begin, uint64_t size, uint64_t number, uint64_t of)
+{
+    uint64_t first = begin;
+    if (p->header && !take_names(p, begin, &first))
+        return false;
+    uint64_t from = next_line(p, first, first + share(size - first, number, of), size),
+             to = from == UINT64_MAX
+                      ? from
+                      : next_line(p, first, first + share(size - first, number + 1, of), size);
+    if (to == UINT64_MAX)
+        return false;
+    p->line_from = from;
+    return limit(p, from, number + 1 < of ? to : size);
+}
+
+/* --- all of them --- */
+
+bool points_cut(points *p, uint64_t number, uint64_t of)
+{
+    struct stat st = { .st_size = 0 };
+    if (!p->held && (p->fd < 0 || fstat(p->fd, &st) != 0 || !S_ISREG(st.st_mode)))
+        return wrong(p, "is no file, of which a shard could take its part");
+    if (!points_begin(p))
+        return false;
+    if (p->held)
+        return cut_held(p, number, of);
+    uint64_t begin = p->bytes_taken - p->rest_count, size = (uint64_t)st.st_size;
+    return (p->raw ? cut_numbers : cut_text)(p, begin, size, number, of);
+}
