@@ -22,7 +22,11 @@ APART = ("tests/fuzz/seeds/", "lib/include/")
 
 
 def tracked(root):
-    names = subprocess.run(["git", "ls-files", "-z"], cwd=root, capture_output=True, check=True)
+    try:
+        names = subprocess.run(["git", "ls-files", "-z"], cwd=root, capture_output=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        print("skipped: this is no git repository")
+        sys.exit(77)
     return [n for n in names.stdout.decode().split("\0") if n and (root / n).is_file()]
 
 

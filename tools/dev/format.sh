@@ -16,7 +16,7 @@ if [ -z "$program" ]; then
     echo "skipped: clang-format $version is needed, found: $found" >&2
     exit 77
 fi
-sources=$(git ls-files '*.c' '*.h' '*.cpp' '*.hpp' '*.inc')
+sources=$(git ls-files '*.c' '*.h' '*.cpp' '*.hpp' '*.inc' 2>/dev/null || true)
 [ -n "$sources" ] || { echo "skipped: this is no git repository" >&2; exit 77; }
 how=-i
 [ "${1:-}" = --check ] && how="--dry-run -Werror --ferror-limit=3"

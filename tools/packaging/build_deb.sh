@@ -4,8 +4,8 @@
 #   OUT     folder for the packages and the source package
 #   SUITE   of Debian, bookworm unless named
 # As root, with debootstrap. The root is made in $TMPDIR, of the mirror $EBPO_DEBIAN_MIRROR, and goes away
-# afterwards; with $EBPO_DEB_ROOT=FOLDER it is kept there, for the next time. apt's sources in it are the
-# machine's where those are Debian's.
+# afterwards; with $EBPO_DEB_ROOT=FOLDER it is kept there, for the next time. $EBPO_DEB_FOLDER: where in it
+# below /build it is built (the packages do not depend on that), ebpo by default.
 set -eu
 look=no
 [ "${1:-}" != -l ] || { look=yes && shift; }
@@ -15,7 +15,8 @@ out=$(cd "$1" && pwd) suite=${2:-bookworm}
 source=$(cd "$(dirname "$0")/../.." && pwd)
 mirror=${EBPO_DEBIAN_MIRROR:-http://deb.debian.org/debian}
 [ "$(id -u)" = 0 ] || { echo "build_deb.sh: making a root of Debian's needs root (or sudo)" >&2 && exit 1; }
-command -v debootstrap >/dev/null || { echo "build_deb.sh: debootstrap is missing: apt install debootstrap" >&2 && exit 1; }
+command -v debootstrap >/dev/null ||
+    { echo "build_deb.sh: debootstrap is missing: apt install debootstrap" >&2 && exit 1; }
 
 made=
 root=${EBPO_DEB_ROOT:-}
@@ -29,7 +30,9 @@ trap 'exit 1' INT TERM HUP
 [ -e "$root/etc/debian_version" ] || debootstrap --variant=minbase "$suite" "$root" "$mirror"
 cp /etc/resolv.conf "$root/etc/"
 mount -t proc proc "$root/proc"
-within() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
+within() {
+    chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"
+}
 
 # The source package: a tarball of what is committed, and debian/ beside meson.build.
 version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$source/meson.build")
@@ -44,7 +47,7 @@ cp -R "$root$work/$name/tools/packaging/debian" "$root$work/$name/debian"
 within apt-get update -qq
 within apt-get install -y -qq --no-install-recommends build-essential fakeroot >/dev/null
 within sh -c "cd $work/$name && apt-get build-dep -y -qq --no-install-recommends ./" >/dev/null
-within sh -c "cd $work/$name && dpkg-buildpackage -us -uc ${EBPO_DEB_OPTIONS:-}"
+within sh -c "cd $work/$name && dpkg-buildpackage -us -uc"
 find "$root$work" -maxdepth 1 -type f -exec cp -p {} "$out/" \;
 if [ $look = yes ]; then
     within apt-get install -y -qq --no-install-recommends lintian >/dev/null

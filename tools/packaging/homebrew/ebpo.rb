@@ -32,7 +32,7 @@ class Ebpo < Formula
   end
 
   test do
-    (testpath/"cube.off").write <<~OFF
+    (testpath/"cube.off").write <<~CUBE
       OFF
       8 12 0
       0 0 0
@@ -55,7 +55,7 @@ class Ebpo < Formula
       3 2 7 6
       3 3 0 4
       3 3 4 7
-    OFF
+    CUBE
     system bin/"ebpo", "convert", "cube.off", "cube.ebpo.h5"
     assert_equal "IN 1", pipe_output("#{bin}/ebpo inside cube.ebpo.h5", "0.5 0.5 0.5").strip
   end
