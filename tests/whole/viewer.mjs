@@ -718,7 +718,8 @@ async function together(browser, address) {
   const again = await serve(), scene = await show(browser, `${again}?scene=models/move.scene.json&time=1`);
   await settled(scene);
   assert.deepEqual(await scene.evaluate(() => window.ebpoViewer.together.assembly.inWorld(window.ebpoViewer.together.assembly.instances[1], [0, 0, 0])), [3, 0, 2]);
-  assert.deepEqual(await scene.evaluate(() => { const { models, stats } = window.ebpoViewer.together.assembly; return [models.length, models[0].shown.length, stats.triangles, stats.requests]; }), [1, 3, 36, 1]);
+  assert.deepEqual(await scene.evaluate(() => { const { models, stats } = window.ebpoViewer.together.assembly; return [models.length, models[0].shown.length, stats.triangles,
+    stats.requests]; }), [1, 3, 36, 1]);
   await scene.locator('#time').fill('500');
   await scene.waitForFunction(() => location.search.includes('time=2.000'));
   await scene.close();
