@@ -654,6 +654,35 @@ async function embeds(browser, address) {
   await page.close();
 }
 
+// Saved views go into a file, and come out of it in another browser; those of another model do not.
+async function viewsAsFiles(browser, address) {
+  const page = await show(browser, `${address}?file=models/red.ebpo.h5`), file = join(work, 'views.json');
+  await settled(page);
+  await page.waitForFunction(() => window.ebpoViewer.state.idle && document.getElementById('viewSave'));
+  page.on('dialog', (dialog) => dialog.accept('From above'));
+  const clickIn = (id) => page.evaluate((name) => document.getElementById(name).click(), id); // in a section that is folded
+  await page.evaluate(() => (window.ebpoViewer.scene.place = { eye: [0, 2, 0.1], target: [0, 0, 0] }));
+  await clickIn('viewSave');
+  await page.waitForFunction(() => document.querySelectorAll('#views li').length === 1);
+  const [download] = await Promise.all([page.waitForEvent('download'), clickIn('viewsOut')]);
+  await download.saveAs(file);
+  await page.evaluate(() => localStorage.clear());
+  await page.goto(`${address}?file=models/red.ebpo.h5`);
+  await settled(page);
+  await page.waitForSelector('#viewsFile', { state: 'attached' });
+  assert.equal(await page.locator('#views li').count(), 0);
+  await page.locator('#viewsFile').setInputFiles(file);
+  await page.waitForFunction(() => document.querySelector('#views li .link')?.textContent === 'From above');
+  await page.evaluate(() => document.querySelector('#views li .link').click());
+  assert.ok((await page.evaluate(() => window.ebpoViewer.scene.place.eye[1])) > 1.9);
+  await page.goto(`${address}?file=models/ring.ebpo.h5`);
+  await settled(page);
+  await page.waitForSelector('#viewsFile', { state: 'attached' });
+  await page.locator('#viewsFile').setInputFiles(file);
+  await page.waitForFunction(() => /these views are of "red"/.test(document.getElementById('errorWhat').textContent));
+  await page.close();
+}
+
 // Paint on one of two plates with a crack between them, whose ball meets the other: the picture has it where ebpo paint has it.
 async function paintsByReach(browser) {
   const { plates } = await load('test/plates.js'), at = (name) => join(models, name);
@@ -718,7 +747,8 @@ async function together(browser, address) {
   const again = await serve(), scene = await show(browser, `${again}?scene=models/move.scene.json&time=1`);
   await settled(scene);
   assert.deepEqual(await scene.evaluate(() => window.ebpoViewer.together.assembly.inWorld(window.ebpoViewer.together.assembly.instances[1], [0, 0, 0])), [3, 0, 2]);
-  assert.deepEqual(await scene.evaluate(() => { const { models, stats } = window.ebpoViewer.together.assembly; return [models.length, models[0].shown.length, stats.triangles, stats.requests]; }), [1, 3, 36, 1]);
+  assert.deepEqual(await scene.evaluate(() => { const { models, stats } = window.ebpoViewer.together.assembly; return [models.length, models[0].shown.length, stats.triangles,
+    stats.requests]; }), [1, 3, 36, 1]);
   await scene.locator('#time').fill('500');
   await scene.waitForFunction(() => location.search.includes('time=2.000'));
   await scene.close();
@@ -797,6 +827,7 @@ async function main() {
   await step('an address says what is shown, and back goes back', () => shares(browser, address));
   await step('distances and sections are those of the faces', () => measures(browser, address));
   await step('what is painted is kept, and shown again', () => paints(browser, address));
+  await step('saved views go from browser to browser as files', () => viewsAsFiles(browser, address));
   await step('paint is seen on what hangs together with it', () => paintsByReach(browser));
   await step('several models and scenes are shown together', () => together(browser, address));
   const quiet = complaints.length;

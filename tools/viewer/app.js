@@ -464,7 +464,7 @@ on('complaint', (message) => showError({ message }));
 
 let coming;
 function more() {
-  coming ??= import('./more.js').then((m) => m.begin({ scene, worker, ask, cutChanged, changed, address, shownAs, layout, query: boot.query }),
+  coming ??= import('./more.js').then((m) => m.begin({ scene, worker, ask, cutChanged, changed, address, shownAs: (query) => shownAs(said(query)), layout, query: boot.query }),
     (error) => showError({ message: `The page's tools could not be loaded (${error.message}); reload the page` }));
   return coming;
 }

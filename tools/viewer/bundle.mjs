@@ -1,5 +1,6 @@
 // node bundle.mjs FOLDER: the page in seven files and an icon: index.html with its style and boot.js, app.js with three.js, worker.js with the reader and zstd, and what the page loads
-// when its picture is there, more.js and more.css, or for several models together.js; smaller, and each again with .gz behind its name for servers that send such (nginx: gzip_static). Writes FOLDER, nothing else.
+// when its picture is there, more.js and more.css, or for several models together.js; smaller, and each again with .gz behind its name for servers that send such (nginx: gzip_static).
+// Writes FOLDER, nothing else.
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { gzipSync } from 'node:zlib';

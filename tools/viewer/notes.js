@@ -1,8 +1,9 @@
-// Notes on places of the model, which are kept with what is painted; and saved views, which are kept by this browser.
-import { complain, make, mark, placesOf, section, take, taken } from './parts.js';
+// Notes on places of the model, which are kept with what is painted; and saved views, which are kept by this browser, and as files.
+import { complain, make, mark, modelName, save, section, take, taken } from './parts.js';
 import { MOST, cleanText } from './paint/paint_file.js';
 import { today } from './paint/document.js';
 import { $, on, state, toScene } from './state.js';
+import { mergedViews, readViews, viewOf, writeViews } from './views.js';
 
 const KEPT = 'Saved with the paint.';
 const HTML = `
@@ -13,7 +14,9 @@ const HTML = `
     <div class="row"><button class="small">Keep</button><button type="button" class="small" id="noteCancel">Cancel</button></div></form>
   <ol id="notes" class="list"></ol>
   <div class="row"><span>Views</span><button id="viewSave" class="small">Save this view</button></div>
-  <ul id="views" class="list"></ul>`;
+  <ul id="views" class="list"></ul>
+  <div class="buttons"><button id="viewsOut" class="small" hidden>Save as a file</button><button id="viewsIn" class="small">Open a file …</button></div>
+  <input type="file" id="viewsFile" accept=".json" hidden>`;
 const NEAR = 0.35; // how far from a note the camera goes, at least
 
 export function addNotes({ scene, changed, shownAs }, drawing) {
@@ -118,8 +121,7 @@ export function addNotes({ scene, changed, shownAs }, drawing) {
 function savedViews({ shownAs }) {
   const key = () => `ebpo:views:${state.info.content_sha256}`, read = () => {
     try {
-      const list = JSON.parse(localStorage.getItem(key()) ?? '[]');
-      return Array.isArray(list) ? list.filter((v) => typeof v?.name === 'string' && typeof v?.query === 'string') : [];
+      return mergedViews([], JSON.parse(localStorage.getItem(key()) ?? '[]'));
     } catch {
       return [];
     }
@@ -132,17 +134,30 @@ function savedViews({ shownAs }) {
     }
     show();
   };
-  const show = () => $('views').replaceChildren(...(state.info ? read() : []).map(({ name, query }, i, all) => {
+  const showFiles = () => ($('viewsOut').hidden = !state.info || !read().length);
+  const show = () => showFiles($('views').replaceChildren(...(state.info ? read() : []).map(({ name, query }, i, all) => {
     const li = make('li', ''), go = make('button', name, { className: 'link' }), remove = make('button', 'Remove', { className: 'small' });
     go.onclick = () => shownAs(new URLSearchParams(query));
     remove.onclick = () => write(all.filter((_, k) => k !== i));
     li.append(go, remove);
     return li;
-  }));
+  })));
+  $('viewsOut').onclick = () => save(`${modelName()}.views.json`, writeViews(read(), state.info.content_sha256, modelName()), 'application/json');
+  $('viewsIn').onclick = () => $('viewsFile').click();
+  $('viewsFile').onchange = async () => {
+    const [file] = $('viewsFile').files;
+    $('viewsFile').value = '';
+    try {
+      if (file && state.info)
+        write(mergedViews(read(), readViews(await file.text(), state.info.content_sha256)));
+    } catch (error) {
+      complain(`${file.name}: ${error.message}`);
+    }
+  };
   $('viewSave').onclick = () => {
     const name = prompt('A name for this view', `View ${read().length + 1}`);
     if (name?.trim())
-      write([...read(), { name: name.trim().slice(0, 100), query: new URL(state.address()).search }]);
+      write([...read(), { name: name.trim().slice(0, 100), query: viewOf(state.address()) }]);
   };
   on('opened', show);
   on('closed', show);

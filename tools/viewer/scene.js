@@ -5,7 +5,8 @@ import { Tiles, lookOf, makeLook, setCut, setTheme } from './shade.js';
 
 /** For code that is loaded later: it must not bring another three.js along. */
 export const kit = { InstancedBufferAttribute: THREE.InstancedBufferAttribute, InstancedBufferGeometry: THREE.InstancedBufferGeometry, BufferAttribute: THREE.BufferAttribute,
-  BufferGeometry: THREE.BufferGeometry, Color: THREE.Color, DepthTexture: THREE.DepthTexture, Frustum: THREE.Frustum, Group: THREE.Group, InstancedMesh: THREE.InstancedMesh, Matrix4: THREE.Matrix4, Mesh: THREE.Mesh, Scene: THREE.Scene, ShaderMaterial: THREE.ShaderMaterial, Sphere: THREE.Sphere,
+  BufferGeometry: THREE.BufferGeometry, Color: THREE.Color, DepthTexture: THREE.DepthTexture, Frustum: THREE.Frustum, Group: THREE.Group, InstancedMesh: THREE.InstancedMesh,
+    Matrix4: THREE.Matrix4, Mesh: THREE.Mesh, Scene: THREE.Scene, ShaderMaterial: THREE.ShaderMaterial, Sphere: THREE.Sphere,
   Vector2: THREE.Vector2, Vector3: THREE.Vector3, WebGLRenderTarget: THREE.WebGLRenderTarget };
 
 const TURN = Math.PI / 24, MOVE = 0.06; // of keys: radians, and shares of the distance

@@ -125,7 +125,8 @@ export class Decals {
 
   // The faces of points whose balls meet others, too: undefined if there is none.
   #reach({ strokes, erases }) {
-    const { kit } = this, all = strokes.flatMap(({ colour, radius, points }) => points.filter((p) => p.faces?.length).map((p) => ({ ...p, tint: [...colour.slice(0, 3).map((c) => c / 255), radius * p.share] })));
+    const { kit } = this, all = strokes.flatMap(({ colour, radius, points }) => points.filter((p) => p.faces?.length).map((p) => ({ ...p, tint: [...colour.slice(0,
+      3).map((c) => c / 255), radius * p.share] })));
     const corners = all.reduce((sum, p) => sum + p.faces.length / 3, 0), position = new Float32Array(3 * corners), centre = new Float32Array(3 * corners), tint = new Float32Array(4 * corners);
     if (!corners)
       return undefined;

@@ -80,8 +80,10 @@ test('the reach is what ebpo paint colours', { skip: process.env.EBPO_TOOL ? fal
     assert.deepEqual([...mine].sort(), [...red].sort(), `at ${place} with ${radius}`);
   }
   // On the face that is named, although another one is as near: on an edge; and not on one that is elsewhere.
-  const all = await file.facesByNumber(Uint32Array.from({ length: file.info.face_count }, (_, i) => i)), numbers = await file.sourceFaces(Uint32Array.from({ length: file.info.face_count }, (_, i) => i));
-  const place = [0, 1, 2].map((k) => (all[k] + all[3 + k]) / 2), holders = [...numbers].filter((_, f) => [0, 3, 6].filter((c) => [0, 3].some((d) => [0, 1, 2].every((k) => all[9 * f + c + k] === all[d + k]))).length === 2);
+  const all = await file.facesByNumber(Uint32Array.from({ length: file.info.face_count }, (_, i) => i)),
+    numbers = await file.sourceFaces(Uint32Array.from({ length: file.info.face_count }, (_, i) => i));
+  const place = [0, 1, 2].map((k) => (all[k] + all[3 + k]) / 2), holders = [...numbers].filter((_, f) => [0, 3, 6].filter((c) => [0, 3].some((d) => [0, 1,
+    2].every((k) => all[9 * f + c + k] === all[d + k]))).length === 2);
   assert.equal(holders.length, 2);
   const [one, other, wrong] = await reachOf(file, tree, [...holders, numbers.find((n) => !holders.includes(n))].map((face) => ({ face, place, radius: 0 })));
   assert.deepEqual([one.here, other.here, wrong.here, (await reachOf(file, tree, [{ face: holders[0], place: [5, 5, 5], radius: 0 }]))[0].here], ['yes', 'yes', 'no', 'no']);

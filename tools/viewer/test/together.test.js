@@ -53,12 +53,15 @@ test('poses go both ways, and one after the other', () => {
 });
 
 const REFUSED = {
-  'another version': [(s) => (s.ebpo_scene = '2.0'), /ebpo_scene/], 'an unknown member': [(s) => (s.colour = 1), /"colour"/], 'no such model': [(s) => (s.instances[1].model = 'leg'), /instances\[1\]\.model: "leg"/],
+  'another version': [(s) => (s.ebpo_scene = '2.0'), /ebpo_scene/], 'an unknown member': [(s) => (s.colour = 1), /"colour"/], 'no such model': [(s) => (s.instances[1].model = 'leg'),
+    /instances\[1\]\.model: "leg"/],
   'a way out': [(s) => (s.models.wall.file = '../wall.ebpo.h5'), /models\.wall\.file.*leads out/], 'a way from the root': [(s) => (s.models.wall.file = '/etc/x'), /leads out/],
   'another scheme': [(s) => (s.models.wall.file = 'data:x'), /leads out/], 'a server without a digest': [(s) => (s.models.wall.file = 'https://example.org/x.ebpo.h5'), /content_sha256/],
   'a mirror': [(s) => (s.instances[0].pose.rotation = [-1, 0, 0, 0, 1, 0, 0, 0, 1]), /mirror/], 'no rotation': [(s) => (s.instances[0].pose.rotation = [1, 0, 0, 0, 2, 0, 0, 0, 1]), /no rotation/],
-  'no quaternion': [(s) => (s.routes.reach.keys[1].pose.quaternion = [0, 0, 0, 0]), /is 0/], 'times that fall': [(s) => (s.routes.reach.keys[1].time = 0), /ascend/], 'fixed and moving': [(s) => (s.instances[1].fixed = true), /fixed/],
-  'two of a name': [(s) => (s.instances[1].name = 'north'), /twice/], 'a scale of 0': [(s) => (s.instances[1].pose.scale = 0), /scale/], 'a text for a number': [(s) => (s.instances[1].pose.scale = '1'), /scale/],
+  'no quaternion': [(s) => (s.routes.reach.keys[1].pose.quaternion = [0, 0, 0, 0]), /is 0/], 'times that fall': [(s) => (s.routes.reach.keys[1].time = 0), /ascend/],
+    'fixed and moving': [(s) => (s.instances[1].fixed = true), /fixed/],
+  'two of a name': [(s) => (s.instances[1].name = 'north'), /twice/], 'a scale of 0': [(s) => (s.instances[1].pose.scale = 0), /scale/],
+    'a text for a number': [(s) => (s.instances[1].pose.scale = '1'), /scale/],
 };
 for (const [what, [spoil, says]] of Object.entries(REFUSED))
   test(`a scene with ${what} is refused`, async () => {

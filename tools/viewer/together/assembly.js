@@ -44,7 +44,8 @@ export class Assembly {
   }
 
   #model({ name, file, digest, colour }, number) {
-    const look = makeLook(), model = { name, file, digest, number, colour: colour ?? COLOURS[number % COLOURS.length], visible: true, instances: [], shown: [], look, idle: false, content: new kit.Group() };
+    const look = makeLook(), model = { name, file, digest, number, colour: colour ?? COLOURS[number % COLOURS.length], visible: true, instances: [], shown: [], look,
+      idle: false, content: new kit.Group() };
     model.content.matrixAutoUpdate = false;
     this.group.add(model.content);
     model.matrices = new kit.InstancedBufferAttribute(new Float32Array(16), 16);

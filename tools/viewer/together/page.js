@@ -54,7 +54,8 @@ class Together {
       return;
     }
     state.scene = assembly.scene;
-    state.info = { box_origin: assembly.box.origin, box_size: assembly.box.size, unit: asked.unit ?? assembly.models.find((m) => m.info?.unit)?.info.unit, parts: new Set(), levels: [], level_count: 0 };
+    const unit = asked.unit ?? assembly.models.find((m) => m.info?.unit)?.info.unit;
+    state.info = { box_origin: assembly.box.origin, box_size: assembly.box.size, unit, parts: new Set(), levels: [], level_count: 0 };
     this.#build();
     this.#takeAddress();
     this.#soon();
@@ -228,7 +229,8 @@ class Together {
     $('chosenName').textContent = instance.name;
     $('chosenModel').textContent = instance.name === name ? '' : name;
     const rows = info ? [['Faces', count(info.face_count)], ['Kind', info.solid ? 'solid' : 'surface'], ['Levels', `0–${info.level_count - 1}`], ['File', bytes(size)],
-      ...(instance.layer ? [['Layer', instance.layer]] : []), ...(instance.now?.scale === 1 ? [] : [['Scale', String(Number(instance.now?.scale.toPrecision(5)))]])] : [['Problem', error?.message ?? '']];
+      ...(instance.layer ? [['Layer', instance.layer]] : []), ...(instance.now?.scale === 1 ? [] :
+        [['Scale', String(Number(instance.now?.scale.toPrecision(5)))]])] : [['Problem', error?.message ?? '']];
     $('chosenFacts').replaceChildren(...rows.flatMap(([dt, dd]) => [make('dt', dt), make('dd', dd)]));
     $('chosenWhere').textContent = $('chosenNote').textContent = '';
     $('chosenOpen').hidden = typeof file !== 'string';
@@ -334,7 +336,8 @@ class Together {
 
   /** The address of what is shown now. */
   address() {
-    const { assembly, scene } = this, view = cameraText(scene.place), diagonal = Math.hypot(...assembly.box.size), hidden = [...assembly.models.filter((m) => !m.visible).map((m) => m.name), ...this.hiddenLayers];
+    const { assembly, scene } = this, view = cameraText(scene.place), diagonal = Math.hypot(...assembly.box.size);
+    const hidden = [...assembly.models.filter((m) => !m.visible).map((m) => m.name), ...this.hiddenLayers];
     const colours = assembly.models.filter((m, i) => m.colour !== COLOURS[i % COLOURS.length]).map((m) => `${m.name}:${m.colour.slice(1)}`);
     return withQuery(location.href, [['view', view === this.homeView ? undefined : view], ['time', assembly.time === assembly.from ? undefined : assembly.time.toFixed(3)],
       ['hide', hidden.join('|')], ['colours', colours.join('|')], ['box', boxText(state.box)], ['measure', state.measured?.length ? pointsText(state.measured, diagonal) : undefined]]);

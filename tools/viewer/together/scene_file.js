@@ -70,7 +70,8 @@ function csvKeys(csv, where) {
   must(head !== undefined, where, 'is empty');
   const columns = cells(head), needed = ['time', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw'];
   unique(columns, where);
-  must(needed.every((c) => columns.includes(c)) && columns.every((c) => [...needed, 'scale'].includes(c)), `${where}: line 1`, 'does not name the columns time, x, y, z, qx, qy, qz, qw and perhaps scale');
+  must(needed.every((c) => columns.includes(c)) && columns.every((c) => [...needed, 'scale'].includes(c)), `${where}: line 1`,
+    'does not name the columns time, x, y, z, qx, qy, qz, qw and perhaps scale');
   return lines.slice(1).map((line, i) => {
     const at = `${where}: line ${i + 2}`, row = cells(line).map((cell) => number(cell === '' ? NaN : Number(cell), at)), of = (c) => row[columns.indexOf(c)];
     must(row.length === columns.length, at, `has not ${columns.length} numbers`);
