@@ -25,8 +25,8 @@ static inline ebpo_wide ebpo_wide_product(uint64_t a, uint64_t b)
 #else
     uint64_t al = (uint32_t)a, ah = a >> 32, bl = (uint32_t)b, bh = b >> 32;
     uint64_t one = al * bh, two = ah * bl;
-    ebpo_wide p = ebpo_wide_plus((ebpo_wide){ ah * bh, al * bl },
-                                 (ebpo_wide){ one >> 32, one << 32 });
+    ebpo_wide p =
+        ebpo_wide_plus((ebpo_wide){ ah * bh, al * bl }, (ebpo_wide){ one >> 32, one << 32 });
     return ebpo_wide_plus(p, (ebpo_wide){ two >> 32, two << 32 });
 #endif
 }
@@ -72,7 +72,8 @@ static inline bool ebpo_wide_less(ebpo_wide a, ebpo_wide b)
 static inline bool ebpo_wide_signed_at_most(ebpo_wide a, ebpo_wide b)
 {
     const uint64_t sign = UINT64_C(1) << 63;
-    return !ebpo_wide_less((ebpo_wide){ b.high ^ sign, b.low }, (ebpo_wide){ a.high ^ sign, a.low });
+    return !ebpo_wide_less((ebpo_wide){ b.high ^ sign, b.low },
+                           (ebpo_wide){ a.high ^ sign, a.low });
 }
 
 /* a modulo m, unsigned; m in 1 .. 2^63. */

@@ -11,13 +11,18 @@
 #include "base/sha256.h"
 
 /* Long arrays by their SHA-256, as little-endian integers and floats of the widths in ebpo_tree. */
-static void tj_digest(FILE *out, const void *values, size_t bytes)
+static void tj_digest(FILE *out, const void *values, uint64_t count, size_t size)
 {
-    uint8_t digest[32];
+    const uint8_t *from = values;
+    uint8_t digest[32], item[8];
     char hex[65];
     ebpo_sha256 state;
     ebpo_sha256_begin(&state);
-    ebpo_sha256_add(&state, values, bytes);
+    for (uint64_t i = 0; i < count; i++, from += size) {
+        for (size_t k = 0; k < size; k++)
+            item[k] = from[__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? k : size - 1 - k];
+        ebpo_sha256_add(&state, item, size);
+    }
     ebpo_sha256_end(&state, digest);
     ebpo_sha256_hex(digest, hex);
     fprintf(out, "\"sha256 %s\"", hex);
@@ -31,7 +36,7 @@ static void tj_digest(FILE *out, const void *values, size_t bytes)
             break;                                                      \
         }                                                               \
         if ((count) > 1000) {                                           \
-            tj_digest(out, values, (count) * sizeof *(values));         \
+            tj_digest(out, values, count, sizeof *(values));       \
             break;                                                      \
         }                                                               \
         fprintf(out, "[");                                              \
