@@ -28,18 +28,18 @@ from ebpo.catalogue import Catalogue, Entry
 
 STRETCH = 1 << 20  # faces that are in memory at a time
 CAP = -1  # instead of a face's number
+NO_EDGES = np.empty((0, 3), np.int64)
 
 
-def open_edges(faces, others=None):
-    """Rows (from, to, times) of the edges whose directions do not cancel, with those of before."""
+def open_edges(faces, others=NO_EDGES):
+    """Rows (low, high, times) of the edges whose directions do not cancel, with those of before."""
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     low, high = directed.min(axis=1), directed.max(axis=1)
     times = np.where(directed[:, 0] < directed[:, 1], 1, -1)
     times[low == high] = 0
-    if others is not None:
-        low, high, times = (np.concatenate(pair) for pair in zip((low, high, times), others.T))
+    low, high, times = (np.concatenate(pair) for pair in zip((low, high, times), others.T))
     if not len(low):
-        return np.empty((0, 3), np.int64)
+        return NO_EDGES
     order = np.lexsort((high, low))
     low, high, times = low[order], high[order], times[order]
     begins = np.flatnonzero(np.append(True, (np.diff(low) != 0) | (np.diff(high) != 0)))
@@ -112,15 +112,14 @@ class Pieces:
 
 def halve(pieces, vertices, axis, middle, folder):
     """Two Pieces: the faces below the middle and those above, with caps."""
-    sides, edges = (Pieces(folder), Pieces(folder)), None
+    sides, edges = (Pieces(folder), Pieces(folder)), NO_EDGES
     for faces, numbers in pieces.stretches():
         corners = np.asarray(vertices[faces.ravel(), axis], np.float64).reshape(-1, 3)
         above = corners.sum(axis=1) >= 3 * middle
         edges = open_edges(faces[~above], edges)
         for side, these in zip(sides, (~above, above)):
             side.add(faces[these], numbers[these])
-    edges[:, 2] *= -1  # caps go the other way
-    for chain in cycles(edges):
+    for chain in cycles(edges * [1, 1, -1]):  # caps go the other way
         cap = filled(chain)
         sides[0].add(cap, np.full(len(cap), CAP))
         sides[1].add(cap[:, ::-1], np.full(len(cap), CAP))

@@ -91,17 +91,29 @@ class Many(Case):
         again = Catalogue.open("moved/catalogue.json")
         self.assertEqual(again.entries, self.catalogue.entries)
         told["of later"] = told["models"][0]["of later"] = 1
+
+        def damaged(**members):
+            return {"models": [{**told["models"][0], **members}]}
+
         for change, kind, message in (({}, None, ""), ({"version": 2}, ebpo.VersionError, "version 2"),
                                       ({"format": "x"}, ebpo.FormatError, "ebpo-catalogue"),
                                       ({"models": [{"path": "a"}]}, ebpo.FormatError, "box_min"),
                                       ({"models": []}, ebpo.FormatError, "one model"),
-                                      ({"models": 5}, ebpo.FormatError, "catalogue")):
+                                      ({"models": 5}, ebpo.FormatError, "catalogue"),
+                                      ({"parts": "false"}, ebpo.FormatError, "parts is true or false"),
+                                      (damaged(box_min=[9, 9, 9]), ebpo.FormatError, "lower corner is above"),
+                                      (damaged(box_max=[10**400, 1, 1]), ebpo.FormatError, "OverflowError"),
+                                      (damaged(solid="no"), ebpo.FormatError, "solid is true or false"),
+                                      (damaged(path="a\0b"), ebpo.FormatError, "no path")):
             pathlib.Path("moved/changed.json").write_text(json.dumps({**told, **change}))
             if kind is None:
                 self.assertEqual(len(Catalogue.open("moved/changed.json")), 27)
                 continue
             with self.assertRaisesRegex(kind, message):
                 Catalogue.open("moved/changed.json")
+        pathlib.Path("moved/changed.json").write_text("[" * 200_000)
+        with self.assertRaisesRegex(ebpo.FormatError, "RecursionError"):
+            Catalogue.open("moved/changed.json")
 
     def test_errors(self):
         bad = P.copy()
@@ -114,6 +126,7 @@ class Many(Case):
             surface.winding(P)
         self.same([surface.distance(P)["distance"]], [model("open_box").distance(P).distance])
         self.assertEqual(len(self.catalogue.distance(np.zeros((0, 3)))), 0)
+        self.assertEqual(len(self.catalogue.ray(np.zeros((0, 3)), [0, 0, 1])), 0)
         ebpo.convert("scan.ply", "other.ebpo.h5")
         one = Catalogue.of(["other.ebpo.h5"])
         one.inside(P[:9])
@@ -199,10 +212,7 @@ class Parts(Case):
         cls.cut = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(cls.cut)
         model("scan")
-        sys.argv, kept = ["cut", "scan.ebpo.h5", "cut"], sys.argv
-        with contextlib.redirect_stdout(io.StringIO()) as cls.printed:
-            cls.cut.main()
-        sys.argv = kept
+        cls.printed = cls.cut_to("cut", "scan.ebpo.h5")
         cls.whole, cls.catalogue = ebpo.open("scan.ebpo.h5"), Catalogue.open("cut/catalogue.json")
         vertices, faces = cls.whole.mesh(order="source")
         cls.corners = vertices.astype(float)[faces]
@@ -216,6 +226,28 @@ class Parts(Case):
             assert (~capped).sum() == shown
             cls.caps.append(corners[capped])
         cls.caps = np.concatenate(cls.caps)
+
+    @classmethod
+    def cut_to(cls, folder, whole, *level):
+        """What the sample prints."""
+        sys.argv, kept = ["cut", whole, folder, *level], sys.argv
+        with contextlib.redirect_stdout(io.StringIO()) as printed:
+            cls.cut.main()
+        sys.argv = kept
+        return printed
+
+    def test_cells_of_which_a_half_is_empty(self):
+        ring = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # a rod: all along x, nothing between its sides
+        vertices = np.array([[x, y, z] for x in range(21) for y, z in ring], float)
+        sides = [[[a, b, b + 4], [a, b + 4, a + 4]] for x in range(20) for k in range(4)
+                 for a, b in [(4 * x + k, 4 * x + (k + 1) % 4)]]
+        faces = np.array(sum(sides, []) + [[0, 2, 1], [0, 3, 2], [80, 81, 82], [80, 82, 83]])[:, ::-1]
+        ebpo.convert((vertices, faces), "rod.ebpo.h5")
+        self.cut_to("rod", "rod.ebpo.h5", "2")
+        whole, parts = ebpo.open("rod.ebpo.h5"), Catalogue.open("rod/catalogue.json")
+        p = np.random.default_rng(8).uniform([-1, -.2, -.2], [21, 1.2, 1.2], (3000, 3))
+        np.testing.assert_array_equal(parts.winding(p), whole.winding(p))
+        np.testing.assert_array_equal(parts.distance(p)["distance"], whole.distance(p).distance)
 
     def test_faces_are_dealt_out_and_caps_cancel(self):
         self.assertEqual(len(self.catalogue), 8)

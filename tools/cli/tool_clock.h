@@ -4,7 +4,6 @@
 
 #include <errno.h>
 #include <stdint.h>
-#include <errno.h>
 #include <time.h>
 
 /* Nanoseconds since some time. */

@@ -1,9 +1,9 @@
 /* ebpo catalogue: which models are below a folder, and where they are. Reads heads only. */
+#include <errno.h>
 #include <float.h>
 #include <inttypes.h>
 #include <math.h>
 #include <pthread.h>
-#include <sched.h>
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -14,6 +14,7 @@
 #include "cli/json.h"
 #include "cli/progress.h"
 #include "cli/remote_args.h"
+#include "cli/usable_cores.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 #include "cmd/folder_files.h"
@@ -32,7 +33,8 @@ static const values usual = { .out = NULL };
 typedef struct entry {
     bool known;
     char *why;
-    char *path; /* as the catalogue has it */
+    char *path;  /* as the catalogue has it */
+    char *shown; /* below the folder, as messages have it */
     ebpo_rule rule;
     bool solid, mesh, pruned;
     uint64_t bytes, faces, vertices;
@@ -112,7 +114,8 @@ static void look_at(catalogue *c, size_t number)
         name = NULL;
     if (asprintf(&e->path, "%s%s", c->from, path) < 0)
         e->path = NULL;
-    if (!name || !e->path) {
+    e->shown = folder_files_shown(path);
+    if (!name || !e->path || !e->shown) {
         c->no_memory = true;
     } else if (!is_utf8(e->path)) {
         leave_out(c, e, "its name is not UTF-8; give it another one");
@@ -144,9 +147,7 @@ static void *work(void *user)
 
 static size_t threads_for(const catalogue *c)
 {
-    cpu_set_t set;
-    size_t cores = sched_getaffinity(0, sizeof set, &set) == 0 ? (size_t)CPU_COUNT(&set) : 1,
-           wanted = c->v->threads ? (size_t)c->v->threads : cores;
+    size_t wanted = c->v->threads ? (size_t)c->v->threads : usable_cores();
     wanted = wanted < THREADS_MOST ? wanted : THREADS_MOST;
     return wanted < c->files.count ? wanted : c->files.count;
 }
@@ -227,13 +228,18 @@ static char *way_between(const char *a, const char *b)
     return way;
 }
 
-static bool find_way(catalogue *c)
+/* Returns the exit code. */
+static int find_way(catalogue *c)
 {
-    char *a = real_folder(c->out), *b = realpath(c->folder, NULL);
-    c->from = a && b ? way_between(a, b) : NULL;
+    char *a = real_folder(c->out), *b = a ? realpath(c->folder, NULL) : NULL;
+    bool reached = b || errno == ENOMEM;
+    if (!reached)
+        fprintf(stderr, "ebpo catalogue: %s: %s\n", a ? c->folder : c->out, strerror(errno));
+    c->from = b ? way_between(a, b) : NULL;
+    int code = c->from ? EXIT_FINE : reached ? command_no_memory("catalogue") : EXIT_FAILED;
     free(a);
     free(b);
-    return c->from != NULL;
+    return code;
 }
 
 /* --- the file --- */
@@ -292,11 +298,14 @@ static uint64_t left_out(const catalogue *c)
 
 static void tell_left_out(const catalogue *c)
 {
-    for (size_t i = 0; i < c->files.count; i++)
-        if (!c->entry[i].known)
-            fprintf(stderr, "ebpo catalogue: left out: %s%s%s\n",
-                    strstr(c->entry[i].why, c->files.path[i]) ? "" : c->files.path[i],
-                    strstr(c->entry[i].why, c->files.path[i]) ? "" : ": ", c->entry[i].why);
+    for (size_t i = 0; i < c->files.count; i++) {
+        const entry *e = &c->entry[i];
+        if (e->known)
+            continue;
+        bool named = strstr(e->why, e->shown) != NULL;
+        fprintf(stderr, "ebpo catalogue: left out: %s%s%s\n", named ? "" : e->shown,
+                named ? "" : ": ", e->why);
+    }
 }
 
 static void print_json(const catalogue *c)
@@ -345,7 +354,10 @@ static int make(catalogue *c)
         return c->files.no_memory ? command_no_memory("catalogue") : EXIT_FAILED;
     if (ebpo_check_output(c->out, &error) != EBPO_OK)
         return command_failed("catalogue", &error);
-    if (!find_way(c) || !look_at_all(c))
+    int code = find_way(c);
+    if (code != EXIT_FINE)
+        return code;
+    if (!look_at_all(c))
         return command_no_memory("catalogue");
     add_up(c);
     tell_left_out(c);
@@ -356,7 +368,7 @@ static int make(catalogue *c)
                 c->folder);
         return EXIT_FAILED;
     }
-    int code = write_all(c);
+    code = write_all(c);
     if (code != EXIT_FINE)
         return code;
     if (c->v->json)
@@ -383,6 +395,7 @@ static int run(void *given, const char **operand)
     for (size_t i = 0; c.entry && i < c.files.count; i++) {
         free(c.entry[i].why);
         free(c.entry[i].path);
+        free(c.entry[i].shown);
     }
     free(c.entry);
     free(c.from);

@@ -44,6 +44,32 @@ static char *joined(const char *a, const char *b)
     return text;
 }
 
+char *folder_files_shown(const char *path)
+{
+    char *text = strdup(path);
+    for (char *c = text; c && *c; c++)
+        if ((unsigned char)*c < 0x20 || *c == 0x7f)
+            *c = ' ';
+    return text;
+}
+
+/* folder/below/name, or what of it is not ""; why is in errno. False: `no_memory`. */
+static bool tell_unread(folder_files *f, const char *folder, const char *below, const char *name)
+{
+    const char *why = strerror(errno);
+    char *within = *name ? joined(below, name) : strdup(below);
+    char *path = !within ? NULL : *within ? joined(folder, within) : strdup(folder);
+    char *shown = path ? folder_files_shown(path) : NULL;
+    if (shown)
+        fprintf(stderr, "ebpo %s: %s: cannot be read: %s\n", f->command, shown, why);
+    f->unread++;
+    f->no_memory |= !shown;
+    free(within);
+    free(path);
+    free(shown);
+    return !f->no_memory;
+}
+
 static bool look_into(folder_files *f, const char *folder, const char *below);
 
 /* Folders by links are not entered: links may go round in circles. */
@@ -51,20 +77,20 @@ static bool look_at(folder_files *f, DIR *dir, const char *folder, const char *b
                     const char *name)
 {
     struct stat st;
-    if (fstatat(dirfd(dir), name, &st, AT_SYMLINK_NOFOLLOW) != 0)
+    bool known = fstatat(dirfd(dir), name, &st, AT_SYMLINK_NOFOLLOW) == 0;
+    if (!known && errno == ENOENT)
         return true; /* it went meanwhile */
-    bool enter = S_ISDIR(st.st_mode);
+    bool enter = known && S_ISDIR(st.st_mode);
+    if (!known && !is_of_model(name)) /* it may be a folder */
+        return tell_unread(f, folder, below, name);
     if (!enter && !is_of_model(name))
         return true;
+    /* a link that leads nowhere is told when it is opened; one to a folder is none of ours */
+    if (!enter && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISDIR(st.st_mode))
+        return true;
     char *path = joined(below, name);
-    if (!path || !enter) {
-        /* a link that leads nowhere is told when it is opened; one to a folder is none of ours */
-        if (path && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISDIR(st.st_mode)) {
-            free(path);
-            return true;
-        }
+    if (!path || !enter)
         return add(f, path);
-    }
     bool fine = look_into(f, folder, path);
     free(path);
     return fine;
@@ -76,8 +102,7 @@ static DIR *open_folder(folder_files *f, const char *folder, const char *below)
     DIR *dir = path ? opendir(path) : NULL;
     f->no_memory |= !path;
     if (path && !dir)
-        fprintf(stderr, "ebpo %s: %s: cannot be read: %s\n", f->command, path, strerror(errno));
-    f->unread += path && !dir;
+        (void)tell_unread(f, folder, below, "");
     free(path);
     return dir;
 }
@@ -88,9 +113,11 @@ static bool look_into(folder_files *f, const char *folder, const char *below)
     if (!dir)
         return !f->no_memory && *below;
     bool fine = true;
-    for (const struct dirent *entry; fine && (entry = readdir(dir));)
+    for (const struct dirent *entry; fine && (errno = 0, entry = readdir(dir));)
         if (entry->d_name[0] != '.')
             fine = look_at(f, dir, folder, below, entry->d_name);
+    if (fine && errno != 0)
+        fine = tell_unread(f, folder, below, "");
     closedir(dir);
     return fine;
 }

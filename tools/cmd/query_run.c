@@ -1,6 +1,5 @@
 #include "cmd/query_run.h"
 
-#include <sched.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -10,6 +9,7 @@
 #include "cli/model_sums.h"
 #include "cli/npy_answers.h"
 #include "cli/points_cut.h"
+#include "cli/usable_cores.h"
 #include "cmd/query_holding.h"
 #include "cmd/query_pipe.h"
 #include "cmd/query_shard.h"
@@ -32,17 +32,6 @@ static void tell_stats(const query_job *job, const query_holding *holding)
     query_holding_json(holding, &j);
     remote_json(&j, &t, &job->values->remote);
     json_finish(&j);
-}
-
-static unsigned usable_cores(void)
-{
-#ifdef EBPO_HAVE_SCHED_GETAFFINITY
-    cpu_set_t set;
-    return sched_getaffinity(0, sizeof set, &set) == 0 ? (unsigned)CPU_COUNT(&set) : 1;
-#else
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    return cores < 1 ? 1 : (unsigned)cores;
-#endif
 }
 
 /* Cores that this process may use, unless a number was given. Ways of loading that keep nothing
@@ -119,12 +108,15 @@ static answer_form form_of(const query_values *v)
 /* Nobody waits for answers that go to a file: where the model is held in parts, so many points are
  * asked about together, in the order in which subtrees come, that few are loaded again. */
 enum { TOGETHER_IN_PARTS = 1 << 20 };
+/* What is kept of one of them in one array, at most. */
+enum { TOGETHER_BYTES = 1024 };
 
 static uint64_t together(const query_values *v, const query_holding *holding)
 {
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    const uint64_t most = SIZE_MAX / TOGETHER_BYTES; /* on machines of 32 bits */
     if (v->together)
-        return (uint64_t)v->together;
+        return (uint64_t)v->together < most ? (uint64_t)v->together : most;
     bool parts = v->out && !holding->waiting &&
                  ebpo_model_get_stats(holding->session.model, &stats) == EBPO_OK && !stats.resident;
     return parts ? TOGETHER_IN_PARTS : POINTS_BATCH;

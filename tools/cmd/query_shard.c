@@ -246,8 +246,19 @@ static int look_again(const query_shard *s, const query_job *job)
     return code;
 }
 
-/* The note of the answers that were there goes first, and comes last: it never stands beside
- * others.
+static int write_note(const query_shard *s, uint64_t bytes)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    char *text = note_text(s->facts, bytes);
+    if (!text)
+        return command_no_memory(s->command);
+    ebpo_status status = ebpo_write_file(s->note, text, strlen(text), &error);
+    free(text);
+    return status == EBPO_OK ? EXIT_FINE : command_failed(s->command, &error);
+}
+
+/* The note of the answers that were there goes first, and comes last: whenever this is killed, it
+ * stands beside no others.
  */
 static int put_in_place(query_shard *s, uint64_t bytes)
 {
@@ -258,10 +269,8 @@ static int put_in_place(query_shard *s, uint64_t bytes)
     }
     ebpo_status status = ebpo_output_end(s->out, &error);
     s->out = NULL;
-    char *text = s->of && status == EBPO_OK ? note_text(s->facts, bytes) : NULL;
-    if (text)
-        status = ebpo_write_file(s->note, text, strlen(text), &error);
-    free(text);
+    if (status == EBPO_OK && s->of)
+        return write_note(s, bytes);
     return status == EBPO_OK ? EXIT_FINE : command_failed(s->command, &error);
 }
 
@@ -270,8 +279,10 @@ int query_shard_end(query_shard *s, const query_job *job, int code)
     struct stat st = { .st_size = 0 };
     if (s->kept < 0)
         return code;
-    if (code == EXIT_FINE && fstat(STDOUT_FILENO, &st) != 0)
+    if (code == EXIT_FINE && fstat(STDOUT_FILENO, &st) != 0) {
+        fprintf(stderr, "ebpo %s: %s: %s\n", s->command, s->v->out, strerror(errno));
         code = EXIT_FAILED;
+    }
     dup2(s->kept, STDOUT_FILENO);
     close(s->kept);
     s->kept = -1;

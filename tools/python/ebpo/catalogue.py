@@ -89,10 +89,10 @@ class Catalogue:
                 raise VersionError(f"{path}: a catalogue of version {told.get('version')!r}; this package reads "
                                    f"{VERSION}", "EBPO_E_VERSION", str(path))
             entries = [read_entry(model, str(path.parent)) for model in told["models"]]
-            return cls(entries, parts=bool(told.get("parts", False)), rule=told.get("rule", "nonzero"), **options)
+            return cls(entries, parts=truth(told, "parts", False), rule=told.get("rule", "nonzero"), **options)
         except VersionError:
             raise
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise FormatError(f"{path}: not a catalogue: {type(error).__name__}: {error}", "EBPO_E_FORMAT",
                               str(path)) from None
 
@@ -314,7 +314,7 @@ class Catalogue:
         """The first face that each ray meets: (n,) structured as `Model.ray`, with `model`."""
         held = ours(memory)
         o, d = Rows(origins, "origins"), Rows(directions, "directions")
-        count = max(o.count, d.count)
+        count = d.count if o.single else o.count
         if o.count != d.count and not (o.single or d.single):
             raise ValueError(f"{o.count} origins and {d.count} directions")
         o_rows = np.broadcast_to(o[0:o.count], (count, 3))
@@ -363,15 +363,24 @@ def relative(path: str, folder: pathlib.Path) -> str:
     return path[len(str(folder)) + 1:] if path.startswith(f"{folder}{os.sep}") else path
 
 
+def truth(told: dict, name: str, usual: bool | None = None) -> bool:
+    value = told[name] if usual is None else told.get(name, usual)
+    if not isinstance(value, bool):
+        raise ValueError(f"{name} is true or false, not {value!r}")
+    return value
+
+
 def read_entry(model: dict, folder: str) -> Entry:
     corners = [tuple(map(float, model[name])) for name in ("box_min", "box_max")]
     if not all(len(corner) == 3 and np.isfinite(corner).all() for corner in corners):
         raise ValueError("a box has two corners of three numbers")
+    if any(low > high for low, high in zip(*corners)):
+        raise ValueError("a box's lower corner is above its upper one")
     texts = {name: model.get(name) or "" for name in ("path", "content_sha256", "surface", "surface_sha256",
                                                   "numbers")}
-    if not all(isinstance(text, str) for text in texts.values()) or not texts["path"]:
-        raise ValueError("a model has no path")
+    if not all(isinstance(text, str) and "\0" not in text for text in texts.values()) or not texts["path"]:
+        raise ValueError("a model has no path, or a path or digest that is no text")
     for name in ("path", "surface", "numbers"):
         texts[name] = texts[name] and absolute(texts[name], folder)
-    return Entry(texts["path"], texts["content_sha256"], bool(model["solid"]), corners[0], corners[1],
+    return Entry(texts["path"], texts["content_sha256"], truth(model, "solid"), corners[0], corners[1],
                  texts["surface"] if model.get("surface", "") is not None else None, texts["surface_sha256"], texts["numbers"])
