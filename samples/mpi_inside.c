@@ -2,10 +2,10 @@
  *
  *     mpirun -n 4 mpi_inside MODEL.ebpo.h5 POINTS.raw ANSWERS.raw [MEGABYTES]
  *
- * POINTS.raw holds three doubles for each point, ANSWERS.raw gets two int32 for each: where (0 out, 1
- * inside, 2 on the surface) and the winding number, as `ebpo inside --raw` prints them. The bytes do not
- * depend on the number of processes. Each process opens the model itself, within MEGABYTES (default
- * 256). An error of one ends all, and no answers are left.
+ * POINTS.raw holds three doubles for each point, ANSWERS.raw gets two int32 for each: where (0 out,
+ * 1 inside, 2 on the surface) and the winding number, as `ebpo inside --raw` prints them. The bytes
+ * do not depend on the number of processes. Each process opens the model itself, within MEGABYTES
+ * (default 256). An error of one ends all, and no answers are left.
  */
 #include <ebpo/ebpo.h>
 #include <mpi.h>
@@ -88,7 +88,8 @@ static int ask_files(ebpo_context *context, const char *points, const char *answ
     const char *const paths[] = { points, answers };
     MPI_File in, out;
     MPI_Offset bytes = 0;
-    if (!mpi_fine(MPI_File_open(MPI_COMM_WORLD, points, MPI_MODE_RDONLY, MPI_INFO_NULL, &in), points))
+    if (!mpi_fine(MPI_File_open(MPI_COMM_WORLD, points, MPI_MODE_RDONLY, MPI_INFO_NULL, &in),
+                  points))
         return 0;
     int fine = mpi_fine(MPI_File_get_size(in, &bytes), points) &&
                all_fine(bytes % 24 == 0, "the points are no rows of three doubles");
