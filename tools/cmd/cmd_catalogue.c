@@ -3,7 +3,6 @@
 #include <inttypes.h>
 #include <math.h>
 #include <pthread.h>
-#include <sched.h>
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -144,9 +143,7 @@ static void *work(void *user)
 
 static size_t threads_for(const catalogue *c)
 {
-    cpu_set_t set;
-    size_t cores = sched_getaffinity(0, sizeof set, &set) == 0 ? (size_t)CPU_COUNT(&set) : 1,
-           wanted = c->v->threads ? (size_t)c->v->threads : cores;
+    size_t wanted = c->v->threads ? (size_t)c->v->threads : command_cores();
     wanted = wanted < THREADS_MOST ? wanted : THREADS_MOST;
     return wanted < c->files.count ? wanted : c->files.count;
 }
@@ -338,6 +335,22 @@ static void print_words(const catalogue *c)
 
 /* --- all of it --- */
 
+/* A catalogue does not take the place of a model that it would name. */
+static bool overwrites_one(catalogue *c)
+{
+    bool does = false;
+    for (size_t i = 0; i < c->files.count && !does; i++) {
+        char *name = NULL;
+        if (asprintf(&name, "%s/%s", c->folder, c->files.path[i]) < 0) {
+            c->no_memory = true; /* which is told when heads are looked at */
+            return false;
+        }
+        does = command_overwrites("catalogue", name, c->out);
+        free(name);
+    }
+    return does;
+}
+
 static int make(catalogue *c)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -345,6 +358,8 @@ static int make(catalogue *c)
         return c->files.no_memory ? command_no_memory("catalogue") : EXIT_FAILED;
     if (ebpo_check_output(c->out, &error) != EBPO_OK)
         return command_failed("catalogue", &error);
+    if (overwrites_one(c))
+        return EXIT_USAGE;
     if (!find_way(c) || !look_at_all(c))
         return command_no_memory("catalogue");
     add_up(c);

@@ -1,6 +1,5 @@
 #include "cmd/query_run.h"
 
-#include <sched.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -34,22 +33,11 @@ static void tell_stats(const query_job *job, const query_holding *holding)
     json_finish(&j);
 }
 
-static unsigned usable_cores(void)
-{
-#ifdef EBPO_HAVE_SCHED_GETAFFINITY
-    cpu_set_t set;
-    return sched_getaffinity(0, sizeof set, &set) == 0 ? (unsigned)CPU_COUNT(&set) : 1;
-#else
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    return cores < 1 ? 1 : (unsigned)cores;
-#endif
-}
-
 /* Cores that this process may use, unless a number was given. Ways of loading that keep nothing
  * have one thread: each would drop what the other one has. */
 static unsigned threads_for(const query_values *v, const ebpo_model_options *holding)
 {
-    unsigned wanted = v->threads ? (unsigned)v->threads : usable_cores();
+    unsigned wanted = v->threads ? (unsigned)v->threads : command_cores();
     wanted = wanted < QUERY_THREADS_MOST ? wanted : QUERY_THREADS_MOST;
     return holding->loading == EBPO_LOAD_CACHE && wanted ? wanted : 1;
 }
