@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <sched.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -38,6 +39,17 @@ int command_no_memory(const char *name)
     process_memory_why(why, sizeof why);
     fprintf(stderr, "ebpo %s: not enough memory%s\n", name, why);
     return EXIT_FAILED;
+}
+
+unsigned command_cores(void)
+{
+#ifdef EBPO_HAVE_SCHED_GETAFFINITY
+    cpu_set_t set;
+    return sched_getaffinity(0, sizeof set, &set) == 0 ? (unsigned)CPU_COUNT(&set) : 1;
+#else
+    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    return cores < 1 ? 1 : (unsigned)cores;
+#endif
 }
 
 bool command_same_file(const char *a, const char *b)

@@ -15,6 +15,9 @@ int command_usage(const char *name, const char *format, ...) EBPO_PRINTF(2, 3);
 /* Says that there was not enough memory; EXIT_FAILED. */
 int command_no_memory(const char *name);
 
+/* Cores that this process may use; at least 1. */
+unsigned command_cores(void);
+
 /* True when both paths lead to one existing file. */
 bool command_same_file(const char *a, const char *b);
 

@@ -14,7 +14,6 @@
 #include "cli/json.h"
 #include "cli/progress.h"
 #include "cli/remote_args.h"
-#include "cli/usable_cores.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 #include "cmd/folder_files.h"
@@ -147,7 +146,7 @@ static void *work(void *user)
 
 static size_t threads_for(const catalogue *c)
 {
-    size_t wanted = c->v->threads ? (size_t)c->v->threads : usable_cores();
+    size_t wanted = c->v->threads ? (size_t)c->v->threads : command_cores();
     wanted = wanted < THREADS_MOST ? wanted : THREADS_MOST;
     return wanted < c->files.count ? wanted : c->files.count;
 }
@@ -347,6 +346,22 @@ static void print_words(const catalogue *c)
 
 /* --- all of it --- */
 
+/* A catalogue does not take the place of a model that it would name. */
+static bool overwrites_one(catalogue *c)
+{
+    bool does = false;
+    for (size_t i = 0; i < c->files.count && !does; i++) {
+        char *name = NULL;
+        if (asprintf(&name, "%s/%s", c->folder, c->files.path[i]) < 0) {
+            c->no_memory = true; /* which is told when heads are looked at */
+            return false;
+        }
+        does = command_overwrites("catalogue", name, c->out);
+        free(name);
+    }
+    return does;
+}
+
 static int make(catalogue *c)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -354,6 +369,8 @@ static int make(catalogue *c)
         return c->files.no_memory ? command_no_memory("catalogue") : EXIT_FAILED;
     if (ebpo_check_output(c->out, &error) != EBPO_OK)
         return command_failed("catalogue", &error);
+    if (overwrites_one(c))
+        return EXIT_USAGE;
     int code = find_way(c);
     if (code != EXIT_FINE)
         return code;

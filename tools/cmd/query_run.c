@@ -9,7 +9,6 @@
 #include "cli/model_sums.h"
 #include "cli/npy_answers.h"
 #include "cli/points_cut.h"
-#include "cli/usable_cores.h"
 #include "cmd/query_holding.h"
 #include "cmd/query_pipe.h"
 #include "cmd/query_shard.h"
@@ -38,7 +37,7 @@ static void tell_stats(const query_job *job, const query_holding *holding)
  * have one thread: each would drop what the other one has. */
 static unsigned threads_for(const query_values *v, const ebpo_model_options *holding)
 {
-    unsigned wanted = v->threads ? (unsigned)v->threads : usable_cores();
+    unsigned wanted = v->threads ? (unsigned)v->threads : command_cores();
     wanted = wanted < QUERY_THREADS_MOST ? wanted : QUERY_THREADS_MOST;
     return holding->loading == EBPO_LOAD_CACHE && wanted ? wanted : 1;
 }

@@ -42,6 +42,21 @@ static bool read_shard(query_shard *s, const char *text)
     return false;
 }
 
+/* Of a dataset its file is what may not be written. */
+static bool overwrites_points(const query_shard *s)
+{
+    struct stat in, out;
+    const char *dataset;
+    if (!s->points || command_overwrites(s->command, s->points, s->v->out))
+        return s->points != NULL;
+    if (stat(s->v->out, &out) != 0 || !points_file(s->points, &in, &dataset) ||
+        in.st_dev != out.st_dev || in.st_ino != out.st_ino)
+        return false;
+    fprintf(stderr, "ebpo %s: %s: is both input and output; choose another output\n", s->command,
+            s->v->out);
+    return true;
+}
+
 bool query_shard_fits(query_shard *s, const query_job *job, const char *model, const char *asked)
 {
     const query_values *v = job->values;
@@ -65,8 +80,7 @@ bool query_shard_fits(query_shard *s, const query_job *job, const char *model, c
     else if (v->out && strcmp(v->out, "-") == 0)
         command_usage(s->command, "answers go to standard output without -o; leave it out");
     else
-        return !v->out || (!command_overwrites(s->command, model, v->out) &&
-                           !(asked && command_overwrites(s->command, asked, v->out)));
+        return !v->out || (!command_overwrites(s->command, model, v->out) && !overwrites_points(s));
     return false;
 }
 
@@ -178,6 +192,28 @@ static bool file_is(const char *path, const char *text)
     return same;
 }
 
+/* What stands in the note's place and is none, such as an input, stays: it is said before all the
+ * work is done. */
+static bool note_is_free(const query_shard *s)
+{
+    static const char begins[] = "{\n  \"format\": \"ebpo-shard\",\n";
+    struct stat st;
+    char there[sizeof begins - 1];
+    if (lstat(s->note, &st) != 0)
+        return true; /* what else is wrong is told of the answers, which are in the same folder */
+    FILE *in = S_ISREG(st.st_mode) ? fopen(s->note, "re") : NULL;
+    bool is_note = in && fread(there, 1, sizeof there, in) == sizeof there &&
+                   memcmp(there, begins, sizeof there) == 0;
+    if (in)
+        fclose(in);
+    if (!is_note)
+        fprintf(stderr,
+                "ebpo %s: %s: is there and no note of a shard, and would be replaced by one; "
+                "choose another output\n",
+                s->command, s->note);
+    return is_note;
+}
+
 /* Whether the answers are there, of these inputs. */
 static bool is_there(const query_shard *s)
 {
@@ -209,6 +245,8 @@ bool query_shard_done(query_shard *s, const query_job *job, int *code)
         s->note = NULL;
         *code = command_no_memory(s->command);
     }
+    if (*code == EXIT_FINE && !note_is_free(s))
+        *code = EXIT_FAILED;
     return *code != EXIT_FINE || (!s->v->force && is_there(s));
 }
 
