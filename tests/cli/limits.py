@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""limits.py TOOL INPUTS LITTLE FEATURES: what commands may take of a machine.
+"""limits.py TOOL INPUTS LITTLE FEATURES [CAIRO]: what commands may take of a machine.
 
 Each keeps to its limit of memory, given or not, or ends with an error and without output; a mesh that
-is shortened while it is read is an error. LITTLE is preloaded where a machine has little memory left.
+is shortened while it is read is an error. LITTLE is preloaded where a machine has little memory left. CAIRO
+is found instead of libcairo.
 """
 import json
 import math
@@ -17,6 +18,7 @@ sys.dont_write_bytecode = True
 HERE = os.path.dirname(os.path.abspath(__file__))
 TOOL, INPUTS, LITTLE = map(os.path.abspath, sys.argv[1:4])
 FEATURES = sys.argv[4].split(",")
+CAIRO = os.path.abspath(sys.argv[5]) if len(sys.argv) > 5 else ""
 failures = []
 
 
@@ -31,9 +33,9 @@ def small_stacks():
     resource.setrlimit(resource.RLIMIT_STACK, (160 << 10, 160 << 10))
 
 
-def run(*words, free=None, given="", before=None):
-    """Exit code, both outputs, peak of resident bytes."""
-    environment = dict(os.environ, LC_ALL="C.UTF-8")
+def run(*words, free=None, given="", before=None, **more):
+    """Exit code, both outputs, peak of resident bytes. What is more is set in the environment."""
+    environment = dict(os.environ, LC_ALL="C.UTF-8", **more)
     if free is not None:
         environment.update(LD_PRELOAD=LITTLE, EBPO_TEST_FREE=str(free))
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as said, \
@@ -132,6 +134,30 @@ def what_the_caller_allows():
         check(code == 1 and "not enough memory" in said,
               f"what the caller allows holds with {limit} ({code}: {said.strip()})")
     check(not os.path.exists("large.png"), "no output is left")
+
+
+# What libcairo's memory does not suffice for: EBPO_TEST_CAIRO of CAIRO.
+UNDRAWN = {"nothing": "", "drawing": "out of memory for a picture's captions",
+           "surface": "out of memory for a picture's captions"}
+
+
+def captions_are_never_left_out():
+    """A picture without the captions that were asked for is an error, and not a picture."""
+    words = ["render", "--size", "64x64", "--levels", "0,1", "b.ebpo.h5", "captions.png"]
+    for lacks, told in UNDRAWN.items() if CAIRO else ():
+        code, _, said, _ = run(*words, LD_LIBRARY_PATH=os.path.dirname(CAIRO), EBPO_TEST_CAIRO=lacks)
+        check(code == (1 if told else 0) and told in said, f"lacks {lacks}: {code}, {said.strip()}")
+        check(os.path.exists("captions.png") == (not told), f"lacks {lacks}: no output")
+        if not told:
+            os.remove("captions.png")
+    os.mkdir("damaged")
+    with open("damaged/libcairo.so.2", "w", encoding="ascii") as f:
+        f.write("no library")
+    if CAIRO:
+        code, _, said, _ = run(*words, LD_LIBRARY_PATH=os.path.abspath("damaged"))
+        check(code == 1 and "libcairo, which draws captions, cannot be loaded" in said,
+              f"a damaged libcairo: {code}, {said.strip()}")
+        check(not os.path.exists("captions.png"), "a damaged libcairo: no output")
 
 
 def models_are_held_in_parts():
@@ -241,6 +267,7 @@ def main():
         holding_is_limited()
         limits_of_others_stay()
         what_the_caller_allows()
+        captions_are_never_left_out()
         models_are_held_in_parts()
         if "h5py" in FEATURES:
             verify_keeps_its_budget()

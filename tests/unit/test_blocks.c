@@ -1,5 +1,6 @@
 /* Blocks hold the faces of the mesh they were made from, bit for bit, however they are read: one by
  * one and as kernels do on any processor. An accel takes no more memory than was said before. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -183,6 +184,73 @@ START_TEST(blocks_hold_the_faces_of_random_meshes)
 }
 END_TEST
 
+/* --- faces that are so far from their leaf that their squares overflow --- */
+
+/* Each vertex of a child is in its slab, as accel.h says what that is. */
+static void check_slab(const ebpo_accel *s, const ebpo_bound *b, const ebpo_bound_slab *slab,
+                       int lane, uint32_t child)
+{
+    if (!(child & EBPO_IS_BLOCK)) {
+        for (int i = 0; i < s->bound[child].count; i++)
+            check_slab(s, b, slab, lane, s->bound[child].child[i]);
+        return;
+    }
+    uint32_t block = child & ~EBPO_IS_BLOCK;
+    for (uint32_t slot = 0; slot < ebpo_accel_meshlet(s, block)->faces; slot++) {
+        double t[3][3];
+        ebpo_accel_triangle(s, block * EBPO_BLOCK + slot, t);
+        for (int i = 0; i < 3; i++) {
+            double along = 0, square = 0, aside = (double)slab->aside_step * slab->radius[lane];
+            for (int k = 0; k < 3; k++) {
+                ebpo_bound_sides side = ebpo_bound_side(b, lane, k);
+                double x = (t[i][k] - s->centre[k]) * s->scale - (side.low + side.high) / 2;
+                along += x * (slab->axis[k][lane] * 0x1p-15);
+                square += x * x;
+            }
+            ck_assert_double_le((double)slab->along_step * slab->from[lane], along);
+            ck_assert_double_ge((double)slab->along_step * slab->to[lane], along);
+            ck_assert_double_le(square - along * along, aside * aside);
+        }
+    }
+}
+
+static void check_slabs(const ebpo_accel *s)
+{
+    for (uint64_t n = 0; n < s->bound_count; n++) {
+        const ebpo_bound_slab *slab = &s->slab[n];
+        ck_assert(isfinite(slab->along_step) && isfinite(slab->aside_step));
+        for (int lane = 0; lane < s->bound[n].count; lane++)
+            check_slab(s, &s->bound[n], slab, lane, s->bound[n].child[lane]);
+    }
+}
+
+/* In files of others: the leaf is 1 wide, its faces are up to 10^25 away, and single precision
+ * holds squares up to 10^38. */
+START_TEST(slabs_hold_faces_whose_squares_overflow)
+{
+    static const double far[] = { 1, 1e15, 1e25 };
+    enum { FARS = sizeof far / sizeof far[0] };
+    bool doubles = _i >= FARS;
+    uint64_t state = 5 + (uint64_t)_i;
+    ebpo_mesh mesh = random_mesh(&state, 24, doubles);
+    for (uint64_t i = 0; i < 3 * mesh.vertex_count; i++)
+        if (doubles)
+            mesh.xyz64[i] *= far[_i % FARS];
+        else
+            mesh.xyz32[i] *= (float)far[_i % FARS];
+    ebpo_info *info = calloc(1, sizeof *info);
+    info->box_size[0] = info->box_size[1] = info->box_size[2] = 1;
+    info->double_coordinates = doubles;
+    ebpo_slice slice = one_leaf(&mesh);
+    ebpo_accel *s = NULL;
+    ASSERT_OK(ebpo_accel_make(&s, &slice, info, false, 1, error));
+    check_slabs(s);
+    ebpo_accel_free(s);
+    ebpo_mesh_free(&mesh);
+    free(info);
+}
+END_TEST
+
 /* --- 512 leaves of one face and of nine in turns: hardly any two share a block --- */
 
 enum { LEVELS = 4, LEAVES = 512, NINES = LEAVES / 2 * 10 };
@@ -283,6 +351,7 @@ Suite *test_suite(void)
     TCase *blocks = tcase_create("blocks");
     tcase_set_timeout(blocks, 600);
     tcase_add_loop_test(blocks, blocks_hold_the_faces_of_random_meshes, 0, 2 * POOLS);
+    tcase_add_loop_test(blocks, slabs_hold_faces_whose_squares_overflow, 0, 6);
     tcase_add_loop_test(blocks, an_accel_takes_no_more_than_was_said, 0, 2);
     tcase_add_loop_test(blocks, blocks_hold_the_faces_of_files, 0, query_solid_count());
     suite_add_tcase(suite, blocks);
