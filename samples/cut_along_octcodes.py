@@ -173,17 +173,17 @@ def cut(pieces, vertices, box, code, levels, folder, scratch):
 
 
 def read_whole(name):
-    """Vertices, faces (both perhaps on the disk), and the root cell."""
+    """Vertices, faces (both perhaps on the disk), the root cell, and the rule of what is inside."""
     if pathlib.Path(name).is_dir():
         vertices, faces = (np.load(pathlib.Path(name) / f"{what}.npy", mmap_mode="r") for what in ("vertices", "faces"))
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for at in range(0, len(vertices), STRETCH):
             low = np.minimum(low, vertices[at:at + STRETCH].min(axis=0))
             high = np.maximum(high, vertices[at:at + STRETCH].max(axis=0))
-        return vertices, faces, np.array([low, high], np.float64)
+        return vertices, faces, np.array([low, high], np.float64), "nonzero"
     model = ebpo.open(name)
     mesh = model.mesh(order="source" if "maps" in model.info.parts else "file")
-    return mesh.vertices, mesh.faces, model.info.box
+    return mesh.vertices, mesh.faces, model.info.box, model.info.rule.name.lower()
 
 
 def main():
@@ -191,7 +191,7 @@ def main():
         sys.exit("usage: cut_along_octcodes.py WHOLE FOLDER [LEVEL]")
     folder, level = pathlib.Path(sys.argv[2]).absolute(), int((sys.argv[3:] or ["1"])[0])
     try:
-        vertices, faces, box = read_whole(sys.argv[1])
+        vertices, faces, box, rule = read_whole(sys.argv[1])
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
             pieces = Pieces(scratch)
@@ -199,7 +199,7 @@ def main():
                 some = faces[at:at + STRETCH]
                 pieces.add(some, np.arange(at, at + len(some)))
             entries = cut(pieces, vertices, box, 1, level, folder, scratch)
-        Catalogue(entries, parts=True).save(folder / "catalogue.json")
+        Catalogue(entries, parts=True, rule=rule).save(folder / "catalogue.json")
     except (ebpo.Error, OSError) as error:
         sys.exit(f"cut_along_octcodes.py: {error}")
     print(f"{len(entries)} parts of {len(faces)} faces in {folder}")

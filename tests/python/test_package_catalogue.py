@@ -176,6 +176,61 @@ class Holdings(Case):
         self.assertEqual(small.counts()["models"], 0)
 
 
+def cut_by_sample(whole, folder, *level):
+    """The sample as a module, its catalogue, and what it printed."""
+    spec = importlib.util.spec_from_file_location("cut_along_octcodes", CUT)
+    cut = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(cut)
+    sys.argv, kept = ["cut", whole, folder, *level], sys.argv
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        cut.main()
+    sys.argv = kept
+    return cut, Catalogue.open(folder + "/catalogue.json"), printed.getvalue()
+
+
+class Hostile(Case):
+    """A catalogue is from others: what it says wrongly is noticed, not answered from."""
+
+    def setUp(self):
+        model("cube")
+        Catalogue.of(["cube.ebpo.h5"]).save("told.json")
+        self.told = json.loads(pathlib.Path("told.json").read_bytes())
+
+    def ask(self, told):
+        pathlib.Path("hostile.json").write_text(told if isinstance(told, str) else json.dumps(told))
+        catalogue = Catalogue.open("hostile.json")
+        catalogue.inside([[.5, .5, .5]])
+        return catalogue.distance([[.5, .5, .5]])
+
+    def test_what_is_refused(self):
+        row = self.told["models"][0]
+        np.save("few.npy", np.arange(3))
+        np.save("halves.npy", np.arange(12) + .5)
+        for wrong in (dict(box_min=row["box_max"], box_max=row["box_min"]), dict(box_min=[10**400, 0, 0]),
+                      dict(box_min="123"), dict(box_min=[False, 0, 0]), dict(box_min=[float("nan")] * 3),
+                      dict(box_min=[.4] * 3, box_max=[.6] * 3), dict(box_min=[5] * 3, box_max=[6] * 3),
+                      dict(content_sha256=""), dict(content_sha256=None), dict(content_sha256="0" * 64),
+                      dict(path="\ud800"), dict(solid="false"), dict(surface="cube.ebpo.h5"),
+                      dict(numbers="few.npy"), dict(numbers="halves.npy"), dict(numbers="nowhere.npy")):
+            with self.subTest(wrong), self.assertRaises(ebpo.FormatError):
+                self.ask(dict(self.told, models=[dict(row, **wrong)]))
+        for wrong in ("[" * 100000, dict(self.told, parts="false"), dict(self.told, models=["a"]),
+                      dict(self.told, models={"a": 1})):
+            with self.subTest(str(wrong)[:40]), self.assertRaises(ebpo.FormatError):
+                self.ask(wrong)
+        self.assertLess(self.ask(self.told)["distance"][0], 0)
+
+    def test_questions_are_checked_wherever_boxes_are(self):
+        c, p = Catalogue.open("told.json"), [9.0, 9, 9]
+        for asked in (lambda: c.distance(p, max_distance=-1), lambda: c.distance(p, max_distance=float("nan")),
+                      lambda: c.ray(p, [0, 0, 0]), lambda: c.ray(p, [1, float("nan"), 0]),
+                      lambda: c.ray([float("inf"), 0, 0], [1, 0, 0]), lambda: c.ray(p, [1, 0, 0], t_max=-1),
+                      lambda: c.ray(p, [1, 0, 0], t_max=float("nan"))):
+            with self.assertRaises(ebpo.ArgumentError):
+                asked()
+        self.assertEqual(len(c.ray(np.zeros((0, 3)), [1, 0, 0])), 0)
+
+
 class Trees(Case):
     def test_against_all_pairs(self):
         rng = np.random.default_rng(1)
@@ -208,12 +263,9 @@ class Parts(Case):
 
     @classmethod
     def setUpClass(cls):
-        spec = importlib.util.spec_from_file_location("cut_along_octcodes", CUT)
-        cls.cut = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(cls.cut)
         model("scan")
-        cls.printed = cls.cut_to("cut", "scan.ebpo.h5")
-        cls.whole, cls.catalogue = ebpo.open("scan.ebpo.h5"), Catalogue.open("cut/catalogue.json")
+        cls.cut, cls.catalogue, cls.printed = cut_by_sample("scan.ebpo.h5", "cut")
+        cls.whole = ebpo.open("scan.ebpo.h5")
         vertices, faces = cls.whole.mesh(order="source")
         cls.corners = vertices.astype(float)[faces]
         cls.caps = []
@@ -227,15 +279,6 @@ class Parts(Case):
             cls.caps.append(corners[capped])
         cls.caps = np.concatenate(cls.caps)
 
-    @classmethod
-    def cut_to(cls, folder, whole, *level):
-        """What the sample prints."""
-        sys.argv, kept = ["cut", whole, folder, *level], sys.argv
-        with contextlib.redirect_stdout(io.StringIO()) as printed:
-            cls.cut.main()
-        sys.argv = kept
-        return printed
-
     def test_cells_of_which_a_half_is_empty(self):
         ring = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # a rod: all along x, nothing between its sides
         vertices = np.array([[x, y, z] for x in range(21) for y, z in ring], float)
@@ -243,8 +286,7 @@ class Parts(Case):
                  for a, b in [(4 * x + k, 4 * x + (k + 1) % 4)]]
         faces = np.array(sum(sides, []) + [[0, 2, 1], [0, 3, 2], [80, 81, 82], [80, 82, 83]])[:, ::-1]
         ebpo.convert((vertices, faces), "rod.ebpo.h5")
-        self.cut_to("rod", "rod.ebpo.h5", "2")
-        whole, parts = ebpo.open("rod.ebpo.h5"), Catalogue.open("rod/catalogue.json")
+        whole, parts = ebpo.open("rod.ebpo.h5"), cut_by_sample("rod.ebpo.h5", "rod", "2")[1]
         p = np.random.default_rng(8).uniform([-1, -.2, -.2], [21, 1.2, 1.2], (3000, 3))
         np.testing.assert_array_equal(parts.winding(p), whole.winding(p))
         np.testing.assert_array_equal(parts.distance(p)["distance"], whole.distance(p).distance)
@@ -254,7 +296,7 @@ class Parts(Case):
         numbers = np.concatenate([np.load(entry.numbers) for entry in self.catalogue.entries])
         np.testing.assert_array_equal(np.sort(numbers), np.arange(self.whole.info.face_count))
         self.assertGreater(len(self.caps), 100)
-        told = [int(line.split()[-2]) for line in self.printed.getvalue().splitlines() if line.endswith("caps")]
+        told = [int(line.split()[-2]) for line in self.printed.splitlines() if line.endswith("caps")]
         self.assertEqual(sum(told), len(self.caps))
         balance = {}
         for face in self.caps:
@@ -301,6 +343,17 @@ class Parts(Case):
         faces = np.arange(9).reshape(3, 3)
         with self.assertRaises(SystemExit):
             list(self.cut.cycles(self.cut.open_edges(faces)[:-1]))
+
+    def test_rule_of_the_whole(self):
+        vertices, faces = model("cube").mesh(order="source")
+        two = np.concatenate([vertices, vertices * .5 + .3]), np.concatenate([faces, faces + len(vertices)])
+        for rule, inner in (("evenodd", 0), ("nonzero", 1)):
+            ebpo.convert(two, f"{rule}.ebpo.h5", rule=rule)
+            told = cut_by_sample(f"{rule}.ebpo.h5", f"cut_{rule}")[1].locate(P)
+            expected = ebpo.open(f"{rule}.ebpo.h5").locate(P)
+            np.testing.assert_array_equal(told["where"], expected.where)
+            np.testing.assert_array_equal(told["winding"], expected.winding)
+            self.assertEqual(set(told["where"][told["winding"] == 2].tolist()), {inner})
 
     def test_chains(self):
         for count in range(3, 40):

@@ -1,10 +1,13 @@
 """Catalogues: any number of models that are asked as one, or the parts of one that is too large for a file."""
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
+import math
 import os
 import pathlib
+import re
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Iterator, NamedTuple
 
@@ -72,7 +75,9 @@ class Catalogue:
             name = absolute(os.fspath(path), os.getcwd())
             with open_model(name, **for_source(name, options)) as model:
                 info = model.info
-                return Entry(name, info.content_sha256, bool(info.solid), *map(tuple, info.box.tolist()))
+                return Entry(name, info.content_sha256, bool(info.solid),
+                             tuple(np.minimum(info.box[0], info.report["min"]).tolist()),
+                             tuple(np.maximum(info.box[1], info.report["max"]).tolist()))
 
         with ThreadPoolExecutor(8) as pool:
             return cls(list(pool.map(entry, paths)), parts=parts, rule=rule, **options)
@@ -89,7 +94,7 @@ class Catalogue:
                 raise VersionError(f"{path}: a catalogue of version {told.get('version')!r}; this package reads "
                                    f"{VERSION}", "EBPO_E_VERSION", str(path))
             entries = [read_entry(model, str(path.parent)) for model in told["models"]]
-            return cls(entries, parts=truth(told, "parts", False), rule=told.get("rule", "nonzero"), **options)
+            return cls(entries, parts=flag(told.get("parts", False)), rule=told.get("rule", "nonzero"), **options)
         except VersionError:
             raise
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
@@ -116,7 +121,7 @@ class Catalogue:
             file.write(json.dumps(told, indent=1).encode() + b"\n")
 
     def __getstate__(self) -> dict:
-        return {name: value for name, value in self.__dict__.items() if name not in ("boxes", "seen", "numbers")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("boxes", "seen", "numbers", "looked_at")}
 
     def __dask_tokenize__(self) -> tuple:
         """What answers depend on: equal in every process."""
@@ -146,17 +151,35 @@ class Catalogue:
     @functools.cached_property
     def numbers(self) -> list:
         """Of each model an array of numbers in the whole, or None."""
-        return [np.load(entry.numbers, mmap_mode="r") if entry.numbers else None for entry in self.entries]
+        return [read_numbers(entry.numbers) if entry.numbers else None for entry in self.entries]
+
+    @functools.cached_property
+    def looked_at(self) -> set:
+        """Which models have been found to be within their boxes."""
+        return set()
 
     # ---- asking ----
 
-    def _model(self, number: int, held: Holding, surface: bool) -> Any:
-        """surface: what rays and distances see."""
+    @contextlib.contextmanager
+    def _model(self, number: int, held: Holding, surface: bool) -> Iterator[Any]:
+        """surface: what rays and distances see. FormatError: it is not what the catalogue tells."""
+        entry, surface = self.entries[number], bool(surface and self.entries[number].surface)
+        path, digest = (entry.surface, entry.surface_sha256) if surface else (entry.path, entry.content_sha256)
+        with held.model(path, digest, len(self), **for_source(path, self.options)) as model:
+            if (number, surface) not in self.looked_at:
+                self._look_at(number, surface, path, model.info)
+                self.looked_at.add((number, surface))
+            yield model
+
+    def _look_at(self, number: int, surface: bool, path: str, info: Any) -> None:
         entry = self.entries[number]
-        if surface and entry.surface:
-            return held.model(entry.surface, entry.surface_sha256, len(self),
-                              **for_source(entry.surface, self.options))
-        return held.model(entry.path, entry.content_sha256, len(self), **for_source(entry.path, self.options))
+        low, high = info.report["min"], info.report["max"]
+        if not ((entry.low <= low) & (high <= entry.high)).all():
+            raise FormatError(f"{path}: is not within the box that the catalogue tells; make the catalogue anew",
+                              "EBPO_E_FORMAT", path)
+        if (surface or not entry.surface) and entry.numbers and len(self.numbers[number]) != info.face_count:
+            raise FormatError(f"{entry.numbers}: {len(self.numbers[number])} numbers of {info.face_count} faces",
+                              "EBPO_E_FORMAT", entry.numbers)
 
     def _stretches(self, points: Any, held: Holding) -> tuple[Rows, np.ndarray, Iterator[np.ndarray]]:
         """Rows, all of them as doubles, and numbers of points by stretches of the Morton curve, which do not
@@ -269,6 +292,8 @@ class Catalogue:
         Negative inside (`inside`; not of catalogues in which there is a surface). Of models at the same
         rounded distance the first is taken.
         """
+        if not max_distance >= 0:
+            raise ArgumentError(f"maximum distance {max_distance}: give 0 or more", "EBPO_E_ARGUMENT")
         held = ours(memory)
         rows, all_points, stretches = self._stretches(points, held)
         out = np.zeros(rows.count, NEAREST)
@@ -319,6 +344,7 @@ class Catalogue:
             raise ValueError(f"{o.count} origins and {d.count} directions")
         o_rows = np.broadcast_to(o[0:o.count], (count, 3))
         d_rows = np.broadcast_to(d[0:d.count], (count, 3))
+        check_rays(o_rows, d_rows, t_max)
         out = np.zeros(count, HIT)
         out["t"], out["face"], out["model"] = np.inf, -1, -1
         for at in range(0, count, STRETCH):
@@ -331,6 +357,16 @@ class Catalogue:
                 out["t"][rows], out["side"][rows] = hits.t[nearer], hits.side[nearer]
                 out["face"][rows], out["model"][rows] = self._faces(number, hits.face[nearer]), number
         return out[0] if o.single and d.single else out
+
+
+def check_rays(origins: np.ndarray, directions: np.ndarray, t_max: float) -> None:
+    """As each model would, also of rays that meet no box."""
+    finite = np.isfinite(origins).all(axis=1) & np.isfinite(directions).all(axis=1)
+    for fine, what in ((finite, "has a coordinate that is not a finite number"),
+                       (directions.any(axis=1), "needs a direction other than (0, 0, 0)"),
+                       (np.broadcast_to(t_max >= 0, len(origins)), "needs a t_max of 0 or more")):
+        if not fine.all():
+            raise ArgumentError(f"ray {int(fine.argmin())} {what}", "EBPO_E_ARGUMENT")
 
 
 def by_model(points: np.ndarray, models: np.ndarray) -> Pairs:
@@ -363,24 +399,51 @@ def relative(path: str, folder: pathlib.Path) -> str:
     return path[len(str(folder)) + 1:] if path.startswith(f"{folder}{os.sep}") else path
 
 
-def truth(told: dict, name: str, usual: bool | None = None) -> bool:
-    value = told[name] if usual is None else told.get(name, usual)
+def read_entry(model: dict, folder: str) -> Entry:
+    """ValueError, KeyError, TypeError, OverflowError: it is none."""
+    if not isinstance(model, dict):
+        raise TypeError("a model is an object")
+    low, high = read_box(model)
+    texts = {name: model.get(name) or "" for name in ("path", "content_sha256", "surface", "surface_sha256", "numbers")}
+    for name, text in texts.items():
+        if not isinstance(text, str):
+            raise ValueError(f"{name} is no text")
+        if "\0" in text:
+            raise ValueError(f"{name} has a character that no path has")
+        text.encode()  # not every text of JSON is one
+    if not texts["path"]:
+        raise ValueError("a model has no path")
+    for name, of in (("content_sha256", "path"), ("surface_sha256", "surface")):
+        if texts[of] and not re.fullmatch("[0-9a-f]{64}", texts[name]):
+            raise ValueError(f"{name} is no digest, without which another file would be taken for the model")
+    for name in ("path", "surface", "numbers"):
+        texts[name] = texts[name] and absolute(texts[name], folder)
+    return Entry(texts["path"], texts["content_sha256"], flag(model["solid"]), low, high,
+                 texts["surface"] if model.get("surface", "") is not None else None, texts["surface_sha256"],
+                 texts["numbers"])
+
+
+def read_box(model: dict) -> list:
+    corners = [[float(x) for x in model[name] if type(x) in (int, float)] for name in ("box_min", "box_max")]
+    if not all(len(corner) == 3 and all(map(math.isfinite, corner)) for corner in corners):
+        raise ValueError("a box has two corners of three numbers")
+    if not all(low <= high for low, high in zip(*corners)):
+        raise ValueError("box_min is above box_max")
+    return list(map(tuple, corners))
+
+
+def flag(value: Any) -> bool:
     if not isinstance(value, bool):
-        raise ValueError(f"{name} is true or false, not {value!r}")
+        raise ValueError(f"{value!r} is neither true nor false")
     return value
 
 
-def read_entry(model: dict, folder: str) -> Entry:
-    corners = [tuple(map(float, model[name])) for name in ("box_min", "box_max")]
-    if not all(len(corner) == 3 and np.isfinite(corner).all() for corner in corners):
-        raise ValueError("a box has two corners of three numbers")
-    if any(low > high for low, high in zip(*corners)):
-        raise ValueError("a box's lower corner is above its upper one")
-    texts = {name: model.get(name) or "" for name in ("path", "content_sha256", "surface", "surface_sha256",
-                                                  "numbers")}
-    if not all(isinstance(text, str) and "\0" not in text for text in texts.values()) or not texts["path"]:
-        raise ValueError("a model has no path, or a path or digest that is no text")
-    for name in ("path", "surface", "numbers"):
-        texts[name] = texts[name] and absolute(texts[name], folder)
-    return Entry(texts["path"], texts["content_sha256"], truth(model, "solid"), corners[0], corners[1],
-                 texts["surface"] if model.get("surface", "") is not None else None, texts["surface_sha256"], texts["numbers"])
+def read_numbers(path: str) -> np.ndarray:
+    """FormatError: it is no array of integers."""
+    try:
+        numbers = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (ValueError, EOFError, OSError) as error:
+        raise FormatError(f"{path}: cannot be read as a .npy: {error}", "EBPO_E_FORMAT", path) from None
+    if not isinstance(numbers, np.ndarray) or numbers.ndim != 1 or numbers.dtype.kind not in "iu":
+        raise FormatError(f"{path}: is no array of integers with one dimension", "EBPO_E_FORMAT", path)
+    return numbers
