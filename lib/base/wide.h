@@ -16,6 +16,16 @@ static inline ebpo_wide ebpo_wide_plus(ebpo_wide a, ebpo_wide b)
     return (ebpo_wide){ a.high + b.high + (low < a.low), low };
 }
 
+/* Exact; for compilers that have nothing better. */
+static inline ebpo_wide ebpo_wide_product_by_halves(uint64_t a, uint64_t b)
+{
+    uint64_t al = (uint32_t)a, ah = a >> 32, bl = (uint32_t)b, bh = b >> 32;
+    uint64_t one = al * bh, two = ah * bl;
+    ebpo_wide p =
+        ebpo_wide_plus((ebpo_wide){ ah * bh, al * bl }, (ebpo_wide){ one >> 32, one << 32 });
+    return ebpo_wide_plus(p, (ebpo_wide){ two >> 32, two << 32 });
+}
+
 /* Exact. */
 static inline ebpo_wide ebpo_wide_product(uint64_t a, uint64_t b)
 {
@@ -23,11 +33,7 @@ static inline ebpo_wide ebpo_wide_product(uint64_t a, uint64_t b)
     __extension__ unsigned __int128 p = (unsigned __int128)a * b;
     return (ebpo_wide){ (uint64_t)(p >> 64), (uint64_t)p };
 #else
-    uint64_t al = (uint32_t)a, ah = a >> 32, bl = (uint32_t)b, bh = b >> 32;
-    uint64_t one = al * bh, two = ah * bl;
-    ebpo_wide p =
-        ebpo_wide_plus((ebpo_wide){ ah * bh, al * bl }, (ebpo_wide){ one >> 32, one << 32 });
-    return ebpo_wide_plus(p, (ebpo_wide){ two >> 32, two << 32 });
+    return ebpo_wide_product_by_halves(a, b);
 #endif
 }
 

@@ -96,6 +96,7 @@ START_TEST(products_are_those_of_gmp)
         set_number(y, b);
         mpz_mul(z, x, y);
         expect(ebpo_wide_product(a, b), z);
+        expect(ebpo_wide_product_by_halves(a, b), z);
         set_signed(x, (ebpo_wide){ a >> 63 ? UINT64_MAX : 0, a });
         set_signed(y, (ebpo_wide){ b >> 63 ? UINT64_MAX : 0, b });
         mpz_mul(z, x, y);
