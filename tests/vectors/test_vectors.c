@@ -112,8 +112,19 @@ START_TEST(failed_vectors_are_refused_with_their_text)
 }
 END_TEST
 
-/* Compressors may change their output from version to version: bytes are compared only where the
- * vectors were made. */
+/* What compressors may choose to do elsewhere: the texts are the same, and the files made are read
+ * as those texts say. */
+static void check_made(const char *folder)
+{
+    const char *committed = vectors;
+    vectors = folder;
+    ck_assert_uint_ge(each("passed", ".json", check_passed), 32);
+    ck_assert_uint_ge(each("failed", ".txt", check_failed), 80);
+    vectors = committed;
+}
+
+/* Compressors may change their output from version to version, and zstd has another one where bytes
+ * stand the other way round: bytes are compared only where the vectors were made. */
 START_TEST(vectors_are_what_make_vectors_makes)
 {
     unsigned major, minor, release;
@@ -121,13 +132,16 @@ START_TEST(vectors_are_what_make_vectors_makes)
     if (ZSTD_versionNumber() != 10504 || strcmp(zlibVersion(), "1.2.13") != 0 || major != 1 ||
         minor != 10 || release != 8)
         return;
+    bool little = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
+    const char *how = little ? "-r" : "-r -x '*.ebpo.h5'", *folder = scratch(NULL);
     char command[4096];
-    const char *folder = scratch(NULL);
     snprintf(command, sizeof command,
-             "'%s' %s 2>/dev/null && diff -r %s/passed '%s/passed' && diff -r %s/failed "
+             "'%s' %s 2>/dev/null && diff %s %s/passed '%s/passed' && diff %s %s/failed "
              "'%s/failed'",
-             maker, folder, folder, vectors, folder, vectors);
+             maker, folder, how, folder, vectors, how, folder, vectors);
     ck_assert_int_eq(system(command), 0);
+    if (!little)
+        check_made(folder);
 }
 END_TEST
 
