@@ -615,12 +615,18 @@ async function embeds(browser, address) {
     window.probe = () => model.probe(new THREE.Vector3(0.5, 0.5, 0.5));`);
   const { outputFiles: [main] } = await build({ entryPoints: [join(folder, 'main.js')], bundle: true, format: 'esm', write: false });
   const html = `<body style="margin:0;display:flex"><canvas></canvas>
-    <ebpo-viewer style="width:300px;height:300px" theme="light" level="3" view="10,20,2.5" src="${address}models/ring.ebpo.h5"></ebpo-viewer>
-    <script>window.heard = []; for (const name of ['load', 'idle', 'view', 'point', 'error']) document.querySelector('ebpo-viewer').addEventListener(name, (e) => heard.push([name,
-      e.detail]));</script>
+    <ebpo-viewer id="one" style="width:300px;height:300px" theme="light" level="3" view="10,20,2.5" src="${address}models/ring.ebpo.h5"></ebpo-viewer>
+    <ebpo-viewer id="many" style="width:200px;height:200px" view="0,0,2.5"><ebpo-part src="${address}models/red.ebpo.h5" name="left"></ebpo-part>
+      <ebpo-part src="${address}models/red.ebpo.h5" pose="4,0,0"></ebpo-part></ebpo-viewer>
+    <script>window.heard = []; window.of = {};
+      for (const element of document.querySelectorAll('ebpo-viewer')) for (const name of ['load', 'idle', 'view', 'point', 'error'])
+        element.addEventListener(name, (e) => (element.id === 'one' ? heard : (of[element.id] ??= [])).push([name, e.detail]));</script>
     <script type="module" src="main.js"></script>`;
+  const { info } = await openEbpo(readFileSync(join(models, 'red.ebpo.h5')));
+  const scene = { ebpo_scene: '1.0', models: { red: { file: `${address}models/red.ebpo.h5`, content_sha256: info.content_sha256 } }, routes: { up: { keys: [{ time: 0, pose: {} },
+    { time: 2, pose: { translation: [0, 0, 4] } }] } }, instances: [{ name: 'a', model: 'red' }, { name: 'b', model: 'red', route: 'up' }] };
   const server = createHttp((question, answer) => {
-    const file = { '/': ['text/html', html], '/main.js': ['text/javascript', main.text], '/worker.js': ['text/javascript', readFileSync(join(own,
+    const file = { '/': ['text/html', html], '/main.js': ['text/javascript', main.text], '/pair.scene.json': ['application/json', JSON.stringify(scene)], '/worker.js': ['text/javascript', readFileSync(join(own,
       'worker.js'))] }[question.url] ?? ['image/x-icon', ''];
     answer.writeHead(200, { 'content-type': file[0] });
     answer.end(file[1]);
@@ -629,7 +635,7 @@ async function embeds(browser, address) {
   cleanup.push(() => server.closeAllConnections() ?? server.close());
   const page = await show(browser, `http://127.0.0.1:${server.address().port}/`);
   await page.waitForFunction(() => window.done && window.heard?.some(([name]) => name === 'idle'), undefined, { timeout: 60000 });
-  const [faces, low, high] = await page.evaluate(() => window.loaded), { info } = await openEbpo(readFileSync(join(models, 'red.ebpo.h5')));
+  const [faces, low, high] = await page.evaluate(() => window.loaded);
   assert.deepEqual([faces, low, high], [info.face_count, info.box_origin, info.box_origin.map((x, k) => x + info.box_size[k])]);
   const { where, distance } = await page.evaluate(() => window.probe());
   assert.deepEqual([where, distance], ['in', 0.5]);
@@ -641,7 +647,7 @@ async function embeds(browser, address) {
     return [...pixel];
   });
   assert.ok(r > 60 && r > 2 * Math.max(g, b), `a red box: ${[r, g, b]}`);
-  const element = page.locator('ebpo-viewer');
+  const element = page.locator('#one');
   assert.equal(await element.evaluate((e) => e.view), '10,20,2.5');
   await element.evaluate((e) => e.shadowRoot.querySelector('canvas').focus());
   await page.keyboard.press('ArrowLeft');
@@ -651,7 +657,48 @@ async function embeds(browser, address) {
   await element.evaluate((e) => (e.src = e.src.replace('ring', 'none')));
   await page.waitForFunction(() => window.heard.some(([name, detail]) => name === 'error' && /404/.test(detail.message)));
   await element.evaluate((e) => e.remove());
+  await embedsSeveral(page, address);
   await page.close();
+}
+
+// The element with parts in it: asked, clicked, moved; then a scene, and one model again.
+async function embedsSeveral(page, address) {
+  const many = page.locator('#many'), heard = (name, count = 1) => page.waitForFunction(([event, n]) => window.of.many?.filter(([one]) => one === event).length >= n, [name, count],
+    { timeout: 60000 });
+  await heard('idle');
+  const { box_size: size, instances, models: files } = await many.evaluate((e) => e.info);
+  assert.ok(size.every((x, k) => Math.abs(x - [5, 1, 1][k]) < 0.01), `${size}`); // cells are a little larger than what is in them
+  assert.deepEqual([files.length, instances.map((i) => [i.name, i.model])], [1, [['left', 'red'], ['red', 'red']]]);
+  const answer = await many.evaluate((e) => e.ask([4.5, 0.5, 3], 'red'));
+  assert.deepEqual([answer.where, answer.distance, answer.nearest, answer.instance], ['out', 2, [4.5, 0.5, 1], 'red']);
+  assert.match(await many.evaluate((e) => e.ask([0, 0, 0], 'none').catch((error) => error.message)), /"none" is no instance/);
+  // A click on the right one, seen from the front: its middle is 2 of the 5 (whose diagonal is as long as 2 in the picture) right of the picture's middle.
+  const { x, y, width, height } = await many.boundingBox(), right = 2 * 2 / Math.hypot(5, 1, 1) / (2.5 - 1 / Math.hypot(5, 1, 1)) * height / 2 / Math.tan(19 * Math.PI / 180);
+  await page.mouse.click(x + width / 2 + right, y + height / 2);
+  await page.waitForFunction(() => window.of.many.some(([name, { instance, exact }]) => name === 'point' && exact && instance === 'red'));
+  await many.evaluate((e) => e.lastElementChild.setAttribute('pose', '8,0,0')); // moves without being opened again
+  await page.waitForFunction(() => document.querySelector('#many').ask([8.5, 0.5, 3], 'red').then((a) => a.nearest[0] === 8.5));
+  assert.equal(await page.evaluate(() => window.of.many.filter(([name]) => name === 'load').length), 1);
+  await many.evaluate((e) => e.append(Object.assign(document.createElement('ebpo-part'), { innerHTML: '' }), e.firstElementChild.cloneNode())); // one without src, one more
+  await heard('load', 2);
+  assert.deepEqual(await many.evaluate((e) => e.info.instances.map((i) => i.name)), ['left', 'red', 'left (2)']);
+  await many.evaluate((e) => {
+    e.setAttribute('time', '1');
+    e.setAttribute('scene', 'pair.scene.json');
+  });
+  await page.waitForFunction(() => window.of.many.some(([name, { message }]) => name === 'error' && /on another server/.test(message)));
+  await many.evaluate((e) => e.setAttribute('remote', ''));
+  await heard('load', 3);
+  assert.deepEqual(await many.evaluate(async (e) => [e.info.to, e.info.models.map((m) => m.name), (await e.ask([0.5, 0.5, 5], 'b')).distance]), [2, ['red'], 2]);
+  await many.evaluate((e) => {
+    e.removeAttribute('scene');
+    e.replaceChildren();
+    e.src = `${e.ownerDocument.location.origin}/none.ebpo.h5`;
+    return e.load(new Blob([])).catch(() => {});
+  });
+  await many.evaluate((e, src) => e.load(src), `${address}models/red.ebpo.h5`);
+  assert.equal(await many.evaluate((e) => e.info.face_count), 12);
+  await many.evaluate((e) => e.remove());
 }
 
 // Saved views go into a file, and come out of it in another browser; those of another model do not.
@@ -744,7 +791,9 @@ async function together(browser, address) {
 
   writeFileSync(join(models, 'move.scene.json'), JSON.stringify({ ebpo_scene: '1.0', title: 'Moving', models: { red: { file: 'red.ebpo.h5' } }, routes: { up: { keys: [{ time: 0, pose: {} },
     { time: 4, pose: { translation: [0, 0, 8] } }] } }, instances: [0, 3, 6].map((x) => ({ name: `cube ${x}`, model: 'red', pose: { translation: [x, 0, 0] }, ...(x === 3 && { route: 'up' }) })) }));
-  const again = await serve(), scene = await show(browser, `${again}?scene=models/move.scene.json&time=1`);
+  const again = await serve();
+  assert.equal((await fetch(`${again}models/move.scene.json`)).headers.get('access-control-allow-origin'), '*');
+  const scene = await show(browser, `${again}?scene=models/move.scene.json&time=1`);
   await settled(scene);
   assert.deepEqual(await scene.evaluate(() => window.ebpoViewer.together.assembly.inWorld(window.ebpoViewer.together.assembly.instances[1], [0, 0, 0])), [3, 0, 2]);
   assert.deepEqual(await scene.evaluate(() => { const { models, stats } = window.ebpoViewer.together.assembly; return [models.length, models[0].shown.length, stats.triangles,

@@ -13,6 +13,7 @@ const MORE_MS = 5000; // after the first picture the tools are loaded, or when n
 const TRIANGLES_MOST = 2_000_000; // about; a tile more does no harm
 
 let timer; // until the worker hears of the camera
+let coming; // more.js, once it has been asked for
 
 const boot = window.ebpoBoot, { worker } = boot; // boot.js has begun, perhaps with a file
 const scene = new Scene($('canvas'), boot, { changed: cameraMoved, drawn: frameDrawn });
@@ -64,6 +65,10 @@ function openFile(file, { step = true } = {}) {
 
 // Several models or a scene: a page of another kind, until it is left.
 async function openTogether(asked) {
+  if (state.info || coming || state.together) { // whose panel and tools are there already
+    showError({ message: 'other models are or were shown on this page; reload it, and open these files together then' });
+    return;
+  }
   try {
     const together = await import('./together.js');
     await together.begin({ scene, layout }, await asked(together));
@@ -327,7 +332,7 @@ $('openForm').onsubmit = (e) => {
 };
 $('file').onchange = () => openFiles($('file').files);
 $('close').onclick = close;
-$('stallRetry').onclick = () => worker.postMessage({ type: 'retry' });
+$('stallRetry').onclick = () => (state.together ? state.together.retry() : worker.postMessage({ type: 'retry' }));
 $('errorClose').onclick = () => showError();
 $('level').oninput = levelChanged;
 $('detail').onchange = () => {
@@ -462,7 +467,6 @@ on('complaint', (message) => showError({ message }));
 
 // --- what comes later: measuring, notes, the pen, sharing ---
 
-let coming;
 function more() {
   coming ??= import('./more.js').then((m) => m.begin({ scene, worker, ask, cutChanged, changed, address, shownAs: (query) => shownAs(said(query)), layout, query: boot.query }),
     (error) => showError({ message: `The page's tools could not be loaded (${error.message}); reload the page` }));

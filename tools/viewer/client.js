@@ -30,15 +30,13 @@ export class Crew {
     const own = this.workers.length < this.most ? this.#another() : fewest();
     own.members.set(file, { heard, failed });
     return {
-      post: (message, transfer = []) => own.worker.postMessage({ file, ...message }, transfer),
+      post: (message, transfer = []) => own.members.has(file) && own.worker.postMessage({ file, ...message }, transfer),
       leave: () => {
-        own.members.delete(file);
-        if (own.members.size) {
-          own.worker.postMessage({ file, type: 'end' });
+        if (!own.members.delete(file))
           return;
-        }
-        own.worker.terminate();
-        this.workers.splice(this.workers.indexOf(own), 1);
+        own.worker.postMessage({ file, type: 'end' });
+        if (!own.members.size)
+          this.#dismiss(own);
       },
     };
   }
@@ -46,12 +44,23 @@ export class Crew {
   #another() {
     const own = { worker: start(this.address), members: new Map() };
     own.worker.onmessage = ({ data }) => own.members.get(data.file)?.heard(data);
-    own.worker.onerror = (e) => [...own.members.values()].forEach(({ failed }) => failed({ code: 'FAULT',
-      message: `${this.address}: the worker failed (${e.message ?? 'it could not be loaded'}); give the address of worker.js` }));
+    own.worker.onerror = (e) => { // files that come later get another one
+      const members = [...own.members.values()];
+      own.members.clear();
+      this.#dismiss(own);
+      members.forEach(({ failed }) => failed({ code: 'FAULT', message: `${this.address}: the worker failed (${e.message ?? 'it could not be loaded'}); give the address of worker.js` }));
+    };
     this.workers.push(own);
     return own;
   }
+
+  #dismiss(own) {
+    own.worker.terminate();
+    this.workers = this.workers.filter((other) => other !== own);
+  }
 }
+
+const problemOf = ({ code, message }) => Object.assign(new Error(message), { name: 'EbpoError', code });
 
 export class Client {
   /** `worker`: as of a Crew, for a worker of its own; or `crew`, to share some. `heard(type, news)` gets tiles, idle, line, failed, loaded, located. */
@@ -75,35 +84,35 @@ export class Client {
       if (data.done)
         this.asked?.done(data);
     } else if (data.type === 'places') {
-      this.waiting.get(data.id)?.done(data.places);
+      const asked = this.waiting.get(data.id);
+      data.error ? asked?.fail(problemOf(data.error)) : asked?.done(data.places);
       this.waiting.delete(data.id);
     } else if (data.type === 'failed') {
-      this.#failed(data.error);
+      this.#failed(data.error, data.late);
       return;
     }
     this.heard(data.type, data);
   }
 
-  #failed(error) {
-    const problem = Object.assign(new Error(error.message), { name: 'EbpoError', code: error.code });
-    const waiting = this.opened ?? this.asked;
-    this.opened = this.asked = undefined;
-    waiting?.fail(problem);
-    this.#forget(problem);
+  // `late`: of what is drawn, not of a question.
+  #failed(error, late) {
+    const problem = problemOf(error);
+    if (!late)
+      this.#forget(problem);
     this.heard('failed', { error: problem });
   }
 
-  // Questions that get no answer any more.
+  // What gets no answer any more.
   #forget(problem) {
-    this.waiting.forEach(({ fail }) => fail(problem));
+    const all = [this.opened, this.asked, ...this.waiting.values()];
+    this.opened = this.asked = undefined;
     this.waiting.clear();
+    all.forEach((one) => one?.fail(problem));
   }
 
   /** An address, a File or a Blob; `ahead`: bytes of the first request, `cacheBytes`: of decoded chunks that are kept. Resolves when its head is there: { info, scene: { center, scale }, size }. */
   open(what, { ahead = AHEAD, cacheBytes } = {}) {
-    const over = new DOMException('another file was opened', 'AbortError');
-    this.opened?.fail(over);
-    this.#forget(over);
+    this.#forget(new DOMException('another file was opened', 'AbortError'));
     this.info = this.sent = undefined;
     const url = typeof what === 'string' || what instanceof URL ? new URL(what, document.baseURI).href : what;
     const promise = new Promise((done, fail) => (this.opened = { done, fail }));
@@ -112,10 +121,8 @@ export class Client {
   }
 
   close() {
-    const over = new DOMException('the file was closed', 'AbortError');
-    this.opened?.fail(over);
-    this.#forget(over);
-    this.opened = this.info = undefined;
+    this.#forget(new DOMException('the file was closed', 'AbortError'));
+    this.info = undefined;
     this.worker.post({ type: 'close', opening: ++this.opening });
   }
 
@@ -153,7 +160,9 @@ export class Client {
     return promise;
   }
 
+  /** Asks again for what has not come. What is seen is told anew by the next look(). */
   retry() {
+    this.sent = undefined;
     this.worker.post({ type: 'retry' });
   }
 

@@ -1,8 +1,13 @@
-// <ebpo-viewer src="statue.ebpo.h5">: the picture and its camera as an element for other people's pages. Importing this file defines it.
+// <ebpo-viewer src="statue.ebpo.h5">: the picture and its camera as an element for other people's pages; with <ebpo-part>s in it, or a scene, several models. Importing this file
+// defines it.
 import { boxOf, cameraOf, cameraText, clipOf, cutOf, pointsOf } from './address.js';
 import { Client } from './client.js';
 import { Scene } from './scene.js';
+import { fromPicture, toPicture } from './state.js';
+import { ofParts, poseFrom, wanted } from './together/asked.js';
+import { Several } from './together/several.js';
 
+const OPENS = ['src', 'scene', 'remote', 'up'], PART = 'ebpo-part';
 const FIELD_OF_VIEW = 38, TRIANGLES_MOST = 2_000_000, PIXELS = 12, LATER_MS = 200;
 const STYLE = `
   :host { display: block; position: relative; min-height: 200px; --text: #e6e9ef; --back: radial-gradient(ellipse at 45% 38%, #1b2028, #101318 72%); --plate: rgba(22, 26, 33, .86); }
@@ -18,11 +23,14 @@ const STYLE = `
 const STEER = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1], '+': 0.8, '=': 0.8, '-': 1.25 };
 
 export class EbpoViewerElement extends HTMLElement {
-  static observedAttributes = ['src', 'view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'theme', 'walls'];
+  static observedAttributes = [...OPENS, 'view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'theme', 'walls', 'time', 'hide', 'colours'];
   /** Where worker.js is, if it does not lie beside this file. To be set before the first element is there. */
   static worker = undefined;
 
-  #client;
+  #client;   // of one model
+  #several;  // in its place: several
+  #parts = ''; // as they were when they were opened
+  #changes = new MutationObserver((all) => this.#partsChanged(all));
   #scene;
   #timer;
 
@@ -41,13 +49,12 @@ export class EbpoViewerElement extends HTMLElement {
     const canvas = this.#part('canvas');
     canvas.ariaLabel = this.getAttribute('alt') ?? 'A model in three dimensions: drag or arrow keys turn it, wheel, + and - go nearer and farther';
     this.#scene = new Scene(canvas, { contextOptions: { antialias: true }, fieldOfView: FIELD_OF_VIEW }, { changed: () => this.#moved(), drawn() {} });
-    this.#client = new Client({ worker: EbpoViewerElement.worker, heard: (type, news) => this.#hear(type, news) });
     this.#listen(canvas);
-    EbpoViewerElement.observedAttributes.filter((name) => name !== 'src' && this.hasAttribute(name)).forEach((name) => this.#apply(name));
+    EbpoViewerElement.observedAttributes.filter((name) => !OPENS.includes(name) && this.hasAttribute(name)).forEach((name) => this.#apply(name));
     if (!this.hasAttribute('theme'))
       this.#apply('theme');
-    if (this.hasAttribute('src'))
-      this.#apply('src');
+    this.#changes.observe(this, { childList: true, subtree: true, attributes: true, attributeFilter: ['src', 'pose', 'name', 'colour', 'hidden'] });
+    this.#open();
   }
 
   // An element that is moved within its page is taken out of it for a moment.
@@ -55,9 +62,12 @@ export class EbpoViewerElement extends HTMLElement {
     queueMicrotask(() => {
       if (this.isConnected || !this.#scene)
         return;
-      this.#client.end();
+      clearTimeout(this.#timer);
+      this.#changes.disconnect();
+      this.#client?.end();
+      this.#several?.end();
       this.#scene.end();
-      this.#scene = this.#client = undefined;
+      this.#scene = this.#client = this.#several = undefined;
       this.#part('canvas').replaceWith(Object.assign(document.createElement('canvas'), { tabIndex: 0, role: 'img' })); // a lost context does not come back
     });
   }
@@ -72,8 +82,9 @@ export class EbpoViewerElement extends HTMLElement {
     canvas.addEventListener('pointerdown', (e) => (down = e.button === 0 ? [e.clientX, e.clientY] : undefined));
     canvas.addEventListener('pointerup', (e) => {
       const at = down && Math.hypot(e.clientX - down[0], e.clientY - down[1]) <= 4 && this.info ? this.#scene.pick(e.clientX, e.clientY) : undefined;
-      if (at)
-        this.ask(at.map((x, k) => x / this.#client.scene.scale + this.#client.scene.center[k])).catch(() => {});
+      const { point, instance } = (at && (this.#several ? this.#several.pickedAt(at) : { point: fromPicture(at, this.#client.scene) })) ?? {};
+      if (point)
+        this.ask(point, instance).catch(() => {});
     });
     canvas.addEventListener('keydown', (e) => {
       if (!STEER[e.key] || e.ctrlKey || e.metaKey || e.altKey)
@@ -85,28 +96,40 @@ export class EbpoViewerElement extends HTMLElement {
 
   #apply(name) {
     const text = this.getAttribute(name), scene = this.#scene;
-    if (name === 'src')
-      text ? this.load(text).catch(() => {}) : this.#close();
+    if (OPENS.includes(name))
+      this.#open();
+    else if (name === 'time')
+      this.#several?.setTime(Number(text) || 0);
+    else if (name === 'hide')
+      this.#several?.hide(text);
+    else if (name === 'colours')
+      this.#several?.assembly.setColours(text);
     else if (name === 'view')
       this.#look();
     else if (name === 'clip' || name === 'box')
       this.#cut();
-    else if (name === 'point' && this.info && pointsOf(text)?.length === 1)
+    else if (name === 'point' && this.info && !this.#several && pointsOf(text)?.length === 1)
       this.ask(pointsOf(text)[0]).catch(() => {});
     else if (name === 'point' && !text)
       scene.showProbe();
     else if (name === 'colour')
-      scene.setColouring(['level', 'type'].includes(text) ? text : 'plain');
+      this.#both((it) => it.setColouring(['level', 'type'].includes(text) ? text : 'plain'));
     else if (name === 'walls')
-      scene.setWalls(text !== '0');
+      this.#both((it) => it.setWalls(text !== '0'));
     else if (name === 'theme')
       this.#dress(text ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark'));
     this.#want();
   }
 
+  #both(change) {
+    change(this.#scene);
+    if (this.#several)
+      change(this.#several.assembly);
+  }
+
   #dress(theme) {
     this.#part('#stage').className = theme === 'light' ? 'light' : '';
-    this.#scene.setTheme(theme !== 'light');
+    this.#both((it) => it.setTheme(theme !== 'light'));
   }
 
   #look() {
@@ -118,21 +141,29 @@ export class EbpoViewerElement extends HTMLElement {
   }
 
   #cut() {
-    if (!this.info)
+    if (this.#several?.assembly.box)
+      this.#scene.cut = this.#several.assembly.setBox(boxOf(this.getAttribute('box')));
+    if (!this.info || this.#several)
       return;
     const cut = cutOf(this.info.box_size, this.#client.scene.scale, clipOf(this.getAttribute('clip')), boxOf(this.getAttribute('box')));
     this.#scene.setCut(cut?.low, cut?.high);
   }
 
+  #number(name) {
+    return /^\d+$/.test(this.getAttribute(name) ?? '') ? Number(this.getAttribute(name)) : undefined;
+  }
+
   #want() {
-    const number = (name) => (/^\d+$/.test(this.getAttribute(name) ?? '') ? Number(this.getAttribute(name)) : undefined);
-    const level = number('level') ?? 99, pixels = number('detail') ?? PIXELS, { info } = this;
+    const level = this.#number('level') ?? 99, pixels = this.#number('detail') ?? PIXELS, { info } = this;
+    this.#several?.moved();
+    if (this.#several || !this.#client)
+      return;
     this.#client.look(this.#scene.view(), { level, mesh: Boolean(info?.parts.has('mesh')) && level >= info.level_count, pixels, triangles: pixels === 0 ? Infinity : TRIANGLES_MOST,
       black: this.#scene.cut !== undefined, lines: false, cells: false });
   }
 
   #moved() {
-    if (!this.#client)
+    if (!this.#client && !this.#several)
       return;
     this.#want();
     clearTimeout(this.#timer);
@@ -157,7 +188,7 @@ export class EbpoViewerElement extends HTMLElement {
       this.#tell('idle', { traffic: news.traffic });
     } else if (type === 'failed') {
       this.#say(news.error.message);
-      this.#tell('error', { code: news.error.code, message: news.error.message });
+      this.#tell('error', { code: news.error.code, message: news.error.message, ...(news.model && { model: news.model }) });
     }
   }
 
@@ -166,21 +197,80 @@ export class EbpoViewerElement extends HTMLElement {
       this.#part('#say').textContent = text;
   }
 
+  // What has been open goes; what opens next says which kind it is.
   #close() {
-    this.#client.close();
+    this.#client?.close();
+    this.#several?.end();
+    this.#several = undefined;
     this.#scene.clear();
+    this.#scene.setCut();
+    this.#say('');
+  }
+
+  // --- what the attributes and the parts say is opened ---
+
+  #open() {
+    const parts = this.parts, src = this.getAttribute('src'), scene = this.getAttribute('scene');
+    this.#parts = JSON.stringify(parts.map(({ src: file, colour, name }) => [file, colour, name]));
+    if (scene)
+      this.#openSeveral(() => wanted(new URLSearchParams([['scene', scene], ...['up', 'remote'].filter((n) => this.hasAttribute(n)).map((n) => [n, this.getAttribute(n) || '1'])]),
+        document.baseURI)).catch(() => {});
+    else if (parts.length || src)
+      this.load(parts.length ? parts : src).catch(() => {});
+    else
+      this.#close();
+  }
+
+  // Parts that come while the page is being read come together.
+  #partsChanged(all) {
+    if (!all.some(({ type, target }) => type === 'childList' || target.localName === PART) || !this.#scene)
+      return;
+    const { parts } = this;
+    if (JSON.stringify(parts.map(({ src, colour, name }) => [src, colour, name])) !== this.#parts) {
+      this.#open();
+      return;
+    }
+    try { // the same ones, elsewhere
+      parts.forEach(({ pose, hidden }, i) => this.#several?.place(i, poseFrom(pose), hidden));
+      this.#apply('hide');
+    } catch (error) {
+      this.#hear('failed', { error: { code: 'ARGUMENT', message: error.message } });
+    }
+  }
+
+  async #openSeveral(asking) {
+    this.#close();
+    const several = this.#several = new Several(this.#scene, { worker: EbpoViewerElement.worker, heard: (type, news) => this.#hear(type, news),
+      want: () => ({ pixels: this.#number('detail') ?? PIXELS, triangles: TRIANGLES_MOST }) });
+    try {
+      const facts = await several.open(await asking());
+      ['time', 'hide', 'colours', 'colour', 'walls', 'theme', 'view', 'box'].forEach((name) => this.#apply(name));
+      this.#tell('load', facts);
+      return facts;
+    } catch (error) {
+      if (error.name !== 'AbortError')
+        this.#hear('failed', { error: { code: error.code ?? 'ARGUMENT', message: error.message } });
+      throw error;
+    }
   }
 
   // --- for the page ---
 
-  /** The open file's facts, by the format's names. */
+  /** The open file's facts, by the format's names; of several models { box_origin, box_size, from, to, models, instances }. */
   get info() {
-    return this.#client?.info;
+    return this.#several ? this.#several.assembly.box && this.#several.facts : this.#client?.info;
+  }
+
+  /** What the <ebpo-part>s in it say: [{ src, pose, name, colour, hidden }], texts as they are written. */
+  get parts() {
+    const text = (part, name) => part.getAttribute(name) ?? undefined;
+    return [...this.children].filter((part) => part.localName === PART && part.hasAttribute('src')).map((part) => ({ src: text(part, 'src'), pose: text(part, 'pose'),
+      name: text(part, 'name'), colour: text(part, 'colour'), hidden: part.hasAttribute('hidden') }));
   }
 
   /** The view, as in the viewer's address. */
   get view() {
-    return cameraText(this.#scene.place);
+    return this.#scene && cameraText(this.#scene.place);
   }
 
   set view(text) {
@@ -195,10 +285,12 @@ export class EbpoViewerElement extends HTMLElement {
     this.setAttribute('src', text);
   }
 
-  /** Opens an address, a File or a Blob (`src` does so, too). Resolves to the facts. */
+  /** Opens an address, a File or a Blob (`src` does so, too), or a list of parts, as `parts` has them; their `src` may be Files or Blobs. Resolves to the facts. */
   async load(what) {
-    this.#scene.clear();
-    this.#say('');
+    if (Array.isArray(what))
+      return this.#openSeveral(async () => ofParts(what.map((part) => ({ ...part, pose: poseFrom(part.pose) })), document.baseURI));
+    this.#close();
+    this.#client ??= new Client({ worker: EbpoViewerElement.worker, heard: (type, news) => this.#hear(type, news) });
     const { info } = await this.#client.open(what);
     this.#look();
     this.#cut();
@@ -215,14 +307,24 @@ export class EbpoViewerElement extends HTMLElement {
     this.#scene.home();
   }
 
-  /** Asks about a point of the model and marks it: { point, where, distance, nearest, lo, hi, exact }; the event `point` has the same. */
-  async ask(point) {
-    const { center, scale } = this.#client.scene, inScene = (p) => p.map((x, k) => (x - center[k]) * scale);
+  /**
+   * Asks about a point of the model and marks it: { point, where, distance, nearest, lo, hi, exact }; the event `point` has the same. Of several models: in the scene's coordinates,
+   * about the instance of this name.
+   */
+  async ask(point, instance) {
+    if (!this.info)
+      throw new Error('nothing is open; ask after the event load');
+    const several = this.#several, inScene = several?.inPicture ?? ((p) => toPicture(p, this.#client.scene));
     this.#scene.showProbe(inScene(point));
-    const { where, distance, nearest, lo, hi, exact } = await this.#client.probe(point), answer = { point, where, distance, nearest, lo, hi, exact };
+    const answer = several ? await several.ask(point, instance) : await this.#askOne(point), { where, nearest } = answer;
     this.#scene.showProbe(inScene(point), nearest && inScene(nearest), where === 'in' ? '#4cc38a' : where === 'out' ? '#ff6b6b' : '#ffb020');
     this.#tell('point', answer);
     return answer;
+  }
+
+  async #askOne(point) {
+    const { where, distance, nearest, lo, hi, exact } = await this.#client.probe(point);
+    return { point, where, distance, nearest, lo, hi, exact };
   }
 }
 

@@ -88,6 +88,7 @@ export class EbpoModel extends Object3D {
   /** Opens an address, a File or a Blob. Resolves to its facts when its head is there; errors have a `code`, and a sentence that says what next. */
   async load(what) {
     this.tiles.clear();
+    this.info = undefined;
     const { info, scene } = await this.client.open(what);
     this.info = info;
     this.content.matrix.makeScale(1 / scene.scale, 1 / scene.scale, 1 / scene.scale).setPosition(...scene.center);

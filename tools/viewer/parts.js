@@ -106,8 +106,8 @@ function ask(worker, type, points) {
   worker.postMessage({ type, opening: state.opening, id, points });
   return new Promise((done, fail) => waiting.set(id, { done, fail, opening: state.opening }));
 }
-on('places', ({ id, places }) => {
-  waiting.get(id)?.done(places);
+on('places', ({ id, places, error }) => {
+  error ? waiting.get(id)?.fail(new Error(error.message)) : waiting.get(id)?.done(places);
   waiting.delete(id);
 });
 on('closed', () => {

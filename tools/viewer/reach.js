@@ -2,29 +2,33 @@
 import { GRAY, LEAF, cellNear, growForQuestion, nearestOnTriangle } from './reader/index.js';
 
 const FACES_MOST = 100_000;   // around a point; beyond that the picture shows its ball
-const LEAVES_AT_ONCE = 1024;
+const LEAVES_MOST = 20_000, LEAVES_AT_ONCE = 1024; // a ball may be as large as the model, which is not fetched for it
 const OFF = 2 ** -20;         // of the diagonal: so far a place may be from its face
 
-// The leaves whose cells come within a distance of a point; undefined if a subset has left out some of them.
+// The leaves whose cells come within a distance of a point; 'elsewhere' if a subset has left out some of them, 'many' if they are too many.
 async function leavesAround(file, tree, point, distance) {
   const leaves = [], meets = (node) => (node.type === GRAY || node.type === LEAF) && cellNear(tree, node, point) <= distance;
   for (let nodes = [tree.root].filter(meets); nodes.length;) {
     leaves.push(...nodes.filter((node) => node.type === LEAF));
+    if (Math.max(leaves.length, nodes.length) > LEAVES_MOST)
+      return 'many';
     const gray = nodes.filter((node) => node.type === GRAY), missing = gray.filter((node) => !tree.children(node));
     if (missing.some((node) => tree.isPruned(node)))
-      return undefined;
+      return 'elsewhere';
     if (missing.length)
       await growForQuestion(file, tree, missing);
     if (gray.some((node) => !tree.children(node)))
-      return undefined;
+      return 'elsewhere';
     nodes = gray.flatMap((node) => tree.children(node)).filter(meets);
   }
   return leaves;
 }
 
-// All faces of some leaves that may meet a ball, each once: { numbers, corners: [nine numbers each] }; undefined if they are too many.
-async function facesAround(file, leaves, point, radius) {
-  const corners = new Map();
+// All faces that may meet a ball, each once: { numbers, corners: [nine numbers each] }; or 'elsewhere' or 'many', as above.
+async function facesAround(file, tree, point, radius) {
+  const corners = new Map(), leaves = await leavesAround(file, tree, point, radius);
+  if (!Array.isArray(leaves))
+    return leaves;
   for (let i = 0; i < leaves.length; i += LEAVES_AT_ONCE)
     for (const faces of await file.leafFaces(leaves.slice(i, i + LEAVES_AT_ONCE))) {
       faces.numbers.forEach((number, k) => {
@@ -33,7 +37,7 @@ async function facesAround(file, leaves, point, radius) {
           corners.set(number, nine);
       });
       if (corners.size > FACES_MOST)
-        return undefined;
+        return 'many';
     }
   return { numbers: [...corners.keys()], corners: [...corners.values()] };
 }
@@ -88,13 +92,11 @@ export function hangTogether(faces, own, centre, radius) {
 export async function reachOf(file, tree, points) {
   const { info } = file, tolerance = OFF * Math.hypot(...info.box_size), subset = Boolean(info.subset_of), bySource = info.parts.has('maps'), out = [];
   for (const { face, place, radius } of points) {
-    const leaves = await leavesAround(file, tree, place, Math.max(radius, tolerance));
-    let around = leaves && await facesAround(file, leaves, place, Math.max(radius, tolerance)), crowded = false;
-    if (leaves && !around) { // the face is near its place, whatever else the ball meets
-      crowded = true;
-      around = await facesAround(file, await leavesAround(file, tree, place, tolerance), place, tolerance) ?? { numbers: [], corners: [] };
-    }
-    const names = !around?.numbers.length ? [] : bySource ? await file.sourceFaces(Uint32Array.from(around.numbers)) : around.numbers, own = names.indexOf(face);
+    let around = await facesAround(file, tree, place, Math.max(radius, tolerance));
+    const crowded = around === 'many';
+    if (crowded) // the face is near its place, whatever else the ball meets
+      around = await facesAround(file, tree, place, tolerance);
+    const names = !around.numbers?.length ? [] : bySource ? await file.sourceFaces(Uint32Array.from(around.numbers)) : around.numbers, own = names.indexOf(face);
     if (own < 0 || !(nearestOnTriangle(place, around.corners[own], 0)[0] <= tolerance)) {
       out.push({ here: subset && own < 0 ? 'elsewhere' : 'no' });
       continue;

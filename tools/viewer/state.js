@@ -18,8 +18,10 @@ export const length = (x, digits = 5, power = 1) => `${Number(x.toPrecision(digi
 // The picture's y is upwards; `up` 2: the model's z is.
 export const upright = ([x, y, z], up) => (up === 2 ? [x, z, -y] : [x, y, z]);
 export const laid = ([x, y, z], up) => (up === 2 ? [x, -z, y] : [x, y, z]);
-export const toModel = (p) => laid(p, state.scene.up).map((x, k) => x / state.scene.scale + state.scene.center[k]);
-export const toScene = (p) => upright(p.map((x, k) => (x - state.scene.center[k]) * state.scene.scale), state.scene.up);
+export const fromPicture = (p, { center, scale, up }) => laid(p, up).map((x, k) => x / scale + center[k]);
+export const toPicture = (p, { center, scale, up }) => upright(p.map((x, k) => (x - center[k]) * scale), up);
+export const toModel = (p) => fromPicture(p, state.scene);
+export const toScene = (p) => toPicture(p, state.scene);
 
 // --- news: frame, opened, closed, cut, theme, point, view (the user moved on), and what the worker says to parts that came later ---
 

@@ -34,6 +34,7 @@ class OpenFile {
     this.busy = { level: undefined, nodes: false, mesh: false };
     this.running = this.again = false;
     this.probes = 0;
+    this.rooted = new Promise((done) => (this.root = done)); // when questions can be answered
   }
 
   get ended() {
@@ -51,6 +52,7 @@ class OpenFile {
     post(this.slot, { type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene, coloured: this.file.colours !== undefined || info.parts.has('colours'),
       bytesTo: this.#bytesTo(), traffic: this.file.traffic, ms: performance.now() - this.began });
     await this.load(Math.min(FIRST_LEVELS, info.level_count) - 1);
+    this.root();
     if (!this.file.located) {
       await this.file.locate();
       if (!this.ended)
@@ -197,10 +199,14 @@ async function answer(data, slot, mine) {
     await sectionOf(mine.file, mine.tree.lean(), data.axis, data.at, tell, over);
     return;
   }
-  const tree = (mine.asked ??= mine.tree.lean()), places = await (data.type === 'reach' ? reachOf : placesOf)(mine.file, tree, data.points);
+  const tell = (news) => mine.ended || post(slot, { type: 'places', opening: mine.number, id: data.id, ...news });
+  try {
+    tell({ places: await (data.type === 'reach' ? reachOf : placesOf)(mine.file, mine.asked ??= mine.tree.lean(), data.points) });
+  } catch (error) {
+    tell({ error: describe(error) });
+  }
   if ((mine.places = (mine.places ?? 0) + data.points.length) > PLACES_A_TREE)
     mine.asked = mine.places = undefined; // what it has gathered goes
-  post(slot, { type: 'places', opening: mine.number, id: data.id, places });
 }
 
 // What is under way, for the page; and that nothing is any more.
@@ -244,10 +250,11 @@ async function heed(data, slot) {
     Object.assign(slot, { view: data.view, want: data.want });
     if (ready)
       await current.pump();
-  } else if (data.type === 'probe' && ready) {
-    await current.probe(data.point);
-  } else if (['places', 'reach', 'section'].includes(data.type) && ready && data.opening === current.number) {
-    await answer(data, slot, current);
+  } else if (['probe', 'places', 'reach', 'section'].includes(data.type) && data.opening === current?.number) {
+    await current.rooted; // asked as soon as the head was there
+    if (current.ended)
+      return;
+    await (data.type === 'probe' ? current.probe(data.point) : answer(data, slot, current));
   }
 }
 

@@ -88,3 +88,11 @@ test('the reach is what ebpo paint colours', { skip: process.env.EBPO_TOOL ? fal
   const [one, other, wrong] = await reachOf(file, tree, [...holders, numbers.find((n) => !holders.includes(n))].map((face) => ({ face, place, radius: 0 })));
   assert.deepEqual([one.here, other.here, wrong.here, (await reachOf(file, tree, [{ face: holders[0], place: [5, 5, 5], radius: 0 }]))[0].here], ['yes', 'yes', 'no', 'no']);
 });
+
+test('a ball as large as the model does not have all of it fetched', async () => {
+  let looked = 0;
+  const node = { type: 3 }, endless = { root: node, wall: (_, k, upper) => upper, children: () => (looked++, Array(8).fill(node)), isPruned: () => false };
+  const file = { info: { box_size: [1, 1, 1], parts: new Set() }, leafFaces: () => assert.fail('faces are fetched') };
+  assert.deepEqual(await reachOf(file, endless, [{ face: 0, place: [0.5, 0.5, 0.5], radius: 1e300 }]), [{ here: 'no' }]);
+  assert.ok(looked < 100_000, `${looked} nodes`);
+});

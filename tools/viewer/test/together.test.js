@@ -7,7 +7,9 @@ import { join } from 'node:path';
 import { test } from 'node:test';
 import { openEbpo } from '../reader/index.js';
 import { sharesOf, weightOf } from '../together/budget.js';
-import { after, matrixOf, placed, poseAt, quaternionOf, unitQuaternion, unplaced } from '../together/poses.js';
+import { boundsOf } from '../together/bounds.js';
+import { parseStrict } from '../together/strict_json.js';
+import { after, matrixOf, placed, poseAt, quaternionOf, routeAt, unitQuaternion, unplaced } from '../together/poses.js';
 import { poseFrom, wanted } from '../together/asked.js';
 import { cameraAt, poseOf, readScene } from '../together/scene_file.js';
 
@@ -62,6 +64,9 @@ const REFUSED = {
     'fixed and moving': [(s) => (s.instances[1].fixed = true), /fixed/],
   'two of a name': [(s) => (s.instances[1].name = 'north'), /twice/], 'a scale of 0': [(s) => (s.instances[1].pose.scale = 0), /scale/],
     'a text for a number': [(s) => (s.instances[1].pose.scale = '1'), /scale/],
+  'no pose but null': [(s) => (s.instances[1].pose = null), /pose: is not an object/], 'a rotation that is false': [(s) => (s.instances[1].pose.rotation = false), /9 numbers/],
+  'null for models': [(s) => (s.models = null), /models: is not an object/], 'poses of another server': [(s) => (s.routes.steps.csv = 'https://elsewhere.example/steps.csv'), /files of poses/],
+  'too many instances': [(s) => (s.instances = Array.from({ length: 100_001 }, () => null)), /more than 100000 instances/],
 };
 for (const [what, [spoil, says]] of Object.entries(REFUSED))
   test(`a scene with ${what} is refused`, async () => {
@@ -69,6 +74,36 @@ for (const [what, [spoil, says]] of Object.entries(REFUSED))
     spoil(scene);
     await assert.rejects(read(scene), says);
   });
+
+test('members twice, however they are written, and brackets without end are refused', async () => {
+  const text = JSON.stringify(SCENE), twice = text.replace('"title":"Two"', '"title":"Two","t\\u0069tle":"Three"');
+  assert.notEqual(text, twice);
+  await assert.rejects(readScene(twice), /"t\\u0069tle" is there twice/);
+  await assert.rejects(readScene(text.replace('"x-price":12', '"x-price":[{"a":1,"b":"a","a":2}]')), /"a" is there twice/);
+  await assert.rejects(readScene(`{"x-deep":${'['.repeat(40)}${']'.repeat(40)}}`), /32 levels/);
+  for (const good of [text, '{"a":"a","b":{"a":["a","a",{"a":"}"}]},"c\\"{":1}', '["a",{"b":[]},"b",{"b":{}}]', '"a"', '{}'])
+    assert.deepEqual(parseStrict(good), JSON.parse(good));
+});
+
+test('many routes and instances do not take forever, and numbers that do not suffice are told', async () => {
+  const keys = Array.from({ length: 5000 }, (_, time) => ({ time, pose: { translation: [time, 0, 0] } })), scene = { ...SCENE, cameras: [], ignore: [], routes: { long: { keys } },
+    instances: Array.from({ length: 20_000 }, (_, i) => ({ name: `${i}`, model: 'arm', route: 'long' })) };
+  const { instances, from, to } = await read(scene), boxes = instances.map((instance) => ({ instance, origin: [0, 0, 0], size: [1, 1, 1] }));
+  assert.deepEqual([from, to], [0, 4999]);
+  assert.deepEqual(boundsOf(boxes, { from, to }), { origin: [0, 0, 0], size: [5000, 1, 1] });
+  assert.equal(boundsOf([], { from, to }), undefined);
+  for (const poses of [[{ translation: [1e308, 0, 0] }, { translation: [-1e308, 0, 0] }], [{ scale: 2 ** 300 }], [{ scale: 2 ** -300 }]])
+    assert.throws(() => boundsOf(poses.map((pose) => ({ instance: { pose: poseOf(pose, 'pose') }, origin: [0, 0, 0], size: [poses[0].scale < 1 ? 1e-220 : 1e220, 0, 0] })), { from: 0, to: 0 }),
+      /correct their poses/);
+});
+
+test('a key is found among many', () => {
+  const keys = Array.from({ length: 1000 }, (_, i) => ({ time: i * i, turn: [0, 0, 0, 1], scale: 1, translation: [i, 0, 0] }));
+  for (const time of [-1, 0, 0.5, 1, 8, 9, 10, 998 * 998, 999 * 999, 1e9]) {
+    const last = Math.max(0, keys.findLastIndex((key) => key.time <= time));
+    assert.equal(routeAt({ keys, jumps: true }, time).translation[0], last, `at ${time}`);
+  }
+});
 
 test('a file of poses that is wrong is refused with its line', async () => {
   await assert.rejects(read(SCENE, 'time,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,a,0,0,0,0,1\n'), /steps\.csv: line 3/);
@@ -83,14 +118,20 @@ test('addresses name models and poses', async () => {
   near(asked.instances[1].pose.rotation, [-1, 0, 0, 0, -1, 0, 0, 0, 1]);
   assert.equal(await wanted(new URLSearchParams('file=x'), 'https://example.org/'), undefined);
   await assert.rejects(async () => wanted(new URLSearchParams('model=x&pose=1,2'), 'https://example.org/'), /pose=1,2/);
-  const get = async (url) => ({ ok: true, headers: new Map(), text: async () => (url.pathname.endsWith('.csv') ? CSV : JSON.stringify(SCENE)) });
+  for (const bad of ['model=javascript:alert(1)', 'model=http://[', 'scene=data:,x', 'scene=file:///s.json', new URLSearchParams(Array.from({ length: 101 }, () => ['model', 'x']))])
+    await assert.rejects(async () => wanted(new URLSearchParams(bad), 'https://example.org/'), /no address of a file|at most 100/);
+  const get = async (url) => new Response(url.pathname.endsWith('.csv') ? CSV : JSON.stringify(SCENE));
   const scene = await wanted(new URLSearchParams('scene=p/plant.scene.json'), 'https://example.org/v/', get);
   assert.deepEqual([scene.title, scene.up, scene.models[1].file], ['Two', 2, 'https://example.org/v/p/parts/arm.ebpo.h5']);
   const far = structuredClone(SCENE);
   far.models.wall = { file: 'https://elsewhere.example/x.ebpo.h5', content_sha256: '0'.repeat(64) };
-  const getFar = async (url) => ({ ...await get(url), text: async () => (url.pathname.endsWith('.csv') ? CSV : JSON.stringify(far)) });
+  const getFar = async (url) => (url.pathname.endsWith('.csv') ? get(url) : new Response(JSON.stringify(far)));
   await assert.rejects(wanted(new URLSearchParams('scene=p/s.scene.json'), 'https://example.org/', getFar), /another server/);
   assert.ok(await wanted(new URLSearchParams('scene=p/s.scene.json&remote=1'), 'https://example.org/', getFar));
+  let sent = 0;
+  const endless = async () => new Response(new ReadableStream({ pull: (c) => c.enqueue(new Uint8Array(sent++ < 1000 ? 1 << 20 : 0)) }));
+  await assert.rejects(wanted(new URLSearchParams('scene=p/s.scene.json'), 'https://example.org/', endless), /larger than 64 MiB/);
+  assert.ok(sent < 70, `${sent} MiB were read`);
 });
 
 test('who fills more of the picture gets more triangles, and what one cannot use the others get', () => {

@@ -1,19 +1,24 @@
 // Several models in one picture, some of them in many places: each file is read once, drawn once for all instances of it, and refined for those that are largest.
+import { cutOf } from '../address.js';
 import { Client, Crew } from '../client.js';
 import { kit } from '../scene.js';
 import { Tiles, lookOf, makeLook, setCut, setTheme } from '../shade.js';
 import { upright } from '../state.js';
 import { sharesOf, weightOf } from './budget.js';
+import { boundsOf } from './bounds.js';
 import { placed, poseAt, unplaced } from './poses.js';
 
 const VIEWS_MOST = 8;                    // of a model at the same time: its instances that are largest in the picture
 const SEEN_PIXELS = 0.5;                 // smaller instances are not drawn
 const WHOLE_FILES = 4, FEW_BYTES = 1 << 17, MANY_BYTES = 1 << 20; // of first requests, with more files and with fewer
 const CACHE_BYTES = 64 << 20, CACHE_LEAST = 4 << 20;              // of decoded chunks, of all files and of one
-const TIMES = 32;                        // of a route, besides its keys, at which its box is taken
+const OPENING_MOST = 16;                 // files at the same time; a browser asks a server for few at once, and the others would wait until they are given up
 
 // Far apart in hue, neither dark nor pale: beside each other on both themes.
 export const COLOURS = ['#8fb3d9', '#e0a96d', '#8cc084', '#c792c9', '#d98c8c', '#6dbfb8', '#c9bd6a', '#a6a3dc', '#b9bfca', '#d9a0b8'];
+
+// All meshes of a model share one array of places, which the renderer frees when one of them says that it is over; the others get theirs anew.
+const freeMatrices = ({ tiles }) => tiles.byKey.values().next().value?.mesh.dispose();
 
 export class Assembly {
   /** `crew`: a Crew, if not one of its own; `news(model)` is called when something of a model changed, `failed(model, error)`, `changed()` when the picture is another. */
@@ -34,10 +39,11 @@ export class Assembly {
   async open({ models, instances, up = 1, from = 0, to = 0 }) {
     Object.assign(this, { up, from, to, time: from });
     this.models = models.map((m, i) => this.#model(m, i));
-    this.instances = instances.map((instance, number) => ({ ...instance, number, visible: true }));
+    this.instances = instances.map((instance, number) => ({ ...instance, number, visible: !instance.hidden }));
     this.instances.forEach((instance) => this.models[instance.model].instances.push(instance));
     const ahead = models.length > WHOLE_FILES ? FEW_BYTES : MANY_BYTES, cacheBytes = Math.max(CACHE_LEAST, Math.floor(CACHE_BYTES / models.length));
-    await Promise.all(this.models.filter((m) => m.instances.length).map((m) => this.#openModel(m, { ahead, cacheBytes })));
+    this.options = { ahead, cacheBytes };
+    await this.#openAll(this.models.filter((m) => m.instances.length));
     this.#measure();
     this.setTime(from);
     return this.box !== undefined;
@@ -62,13 +68,23 @@ export class Assembly {
     return model;
   }
 
-  async #openModel(model, options) {
+  async #openAll(models) {
+    const rest = models.values(); // which all take from
+    await Promise.all(Array.from({ length: OPENING_MOST }, async () => {
+      for (const model of rest)
+        await this.#openModel(model);
+    }));
+  }
+
+  async #openModel(model) {
     try {
-      const { info, size } = await model.client.open(model.file, options);
+      const { info, size } = await model.client.open(model.file, this.options);
       if (model.digest && model.digest !== info.content_sha256)
         throw new Error('it is another one than the scene names (its digest differs); get the file that belongs to the scene');
       Object.assign(model, { info, size });
     } catch (error) {
+      if (!this.models.includes(model)) // all was ended meanwhile
+        return;
       model.error = error;
       model.client.close();
       this.failed(model, error);
@@ -94,28 +110,28 @@ export class Assembly {
     this.news(model);
   }
 
-  // The box of all instances at all times of their routes (at keys, and between): what is looked at, not a promise.
+  /** What failed is asked for again: files that could not be opened, too. */
+  async retry() {
+    const failed = this.models.filter((m) => m.error);
+    failed.forEach((m) => (m.error = undefined));
+    failed.filter((m) => m.info).forEach((m) => m.client.retry());
+    const fresh = failed.filter((m) => !m.info);
+    await this.#openAll(fresh);
+    if (fresh.some((m) => m.info)) {
+      this.#measure();
+      this.instances.forEach((instance) => (instance.matrix = undefined));
+      this.setTime(this.time);
+    }
+    this.changed();
+  }
+
   #measure() {
-    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-    for (const instance of this.instances) {
-      const { info } = this.models[instance.model], { route } = instance;
-      if (!info)
-        continue;
-      const between = route && this.to > this.from ? Array.from({ length: TIMES }, (_, i) => this.from + (this.to - this.from) * i / (TIMES - 1)) : [];
-      for (const time of [...(route?.keys ?? [{ time: 0 }]).slice(0, 1000).map((key) => key.time), ...between])
-        for (let c = 0; c < 8; c++)
-          placed(poseAt(instance, time), info.box_origin.map((o, k) => o + (c >> k & 1) * info.box_size[k])).forEach((x, k) => {
-            low[k] = Math.min(low[k], x);
-            high[k] = Math.max(high[k], x);
-          });
-    }
-    if (low[0] > high[0]) {
-      this.box = undefined;
-      return;
-    }
-    const size = high.map((x, k) => x - low[k]);
-    this.box = { origin: low, size };
-    this.scene = { center: low.map((x, k) => x + size[k] / 2), scale: 2 / Math.hypot(...size), up: this.up };
+    this.box = boundsOf(this.instances.flatMap((instance) => {
+      const { info } = this.models[instance.model];
+      return info ? [{ instance, origin: info.box_origin, size: info.box_size }] : [];
+    }), this);
+    if (this.box)
+      this.scene = { center: this.box.origin.map((x, k) => x + this.box.size[k] / 2), scale: 2 / Math.hypot(...this.box.size), up: this.up };
   }
 
   setTime(time) {
@@ -123,6 +139,13 @@ export class Assembly {
     for (const instance of this.instances)
       if (!instance.matrix || instance.route)
         this.#place(instance);
+    this.changed();
+  }
+
+  /** Puts an instance elsewhere. The box of all stays what it was. */
+  setPose(instance, pose) {
+    instance.pose = pose;
+    this.#place(instance);
     this.changed();
   }
 
@@ -162,6 +185,7 @@ export class Assembly {
   #fill(model) {
     const { shown } = model;
     if (model.matrices.count < shown.length) {
+      freeMatrices(model);
       model.matrices = new kit.InstancedBufferAttribute(new Float32Array(16 * Math.max(shown.length, 2 * model.matrices.count)), 16);
       model.tiles.byKey.forEach(({ mesh }) => (mesh.instanceMatrix = model.matrices));
     }
@@ -222,10 +246,22 @@ export class Assembly {
     this.models.forEach(({ look }) => (look.uniforms.own.value = own));
   }
 
-  /** Shows what lies between two corners of the picture's coordinates; everything without them. */
-  setCut(low, high) {
-    this.cut = low && { low, high };
+  /** As an address has them: NAME:RRGGBB of models, with a bar between. */
+  setColours(text) {
+    for (const pair of (text ?? '').split('|')) {
+      const [, name, hex] = /^(.*):([0-9a-f]{6})$/i.exec(pair) ?? [], model = this.models.find((m) => m.name === name);
+      if (model)
+        this.setColour(model, `#${hex.toLowerCase()}`);
+    }
+  }
+
+  /** Shows what lies within shares of the box's sides, [x, y, z, x, y, z] of the world; everything without them. Gives corners of the picture's coordinates, if something is left out. */
+  setBox(box) {
+    // An axis of the picture that is turned over counts from the world's other end.
+    const turned = box && this.up === 2 ? [box[0], box[2], 1 - box[4], box[3], box[5], 1 - box[1]] : box;
+    this.cut = cutOf(upright(this.box.size, this.up).map(Math.abs), this.scene.scale, undefined, turned);
     this.models.forEach((model) => this.#paint(model));
+    return this.cut;
   }
 
   setWalls(walls) {
@@ -257,9 +293,17 @@ export class Assembly {
     return out;
   }
 
+  /** What is under way, of all files together, as showLine() of line.js tells it. */
+  get line() {
+    const all = this.models.map((m) => m.line).filter((line) => line?.want > 0), sum = (of) => all.reduce((total, line) => total + of(line), 0);
+    return { got: sum((l) => l.got), want: sum((l) => l.want), quiet: all.length ? Math.min(...all.map((l) => l.quiet)) : 0, what: 'the models', trouble: all.find((l) => l.trouble)?.trouble };
+  }
+
   end() {
-    for (const { client, tiles, look } of this.models) {
+    for (const model of this.models) {
+      const { client, tiles, look } = model;
       client.end();
+      freeMatrices(model);
       tiles.clear();
       [look.faces, look.wire, look.cells].forEach((material) => material.dispose());
     }

@@ -1,15 +1,15 @@
 // The page with several models or a scene in it: who is there, where, in which colour; the time; what is clicked. What one model has (levels, paint, notes) is not here.
 import { Assembly, COLOURS } from './assembly.js';
-import { boxText, cameraOf, cameraText, boxOf, cutOf, pointsOf, pointsText, withQuery } from '../address.js';
+import { boxText, cameraOf, cameraText, boxOf, pointsOf, pointsText, withQuery } from '../address.js';
 import { addCompass } from '../compass.js';
-import { bytes, showError } from '../line.js';
+import { busy, bytes, showError, showLine } from '../line.js';
 import { addDistances } from '../measure.js';
 import { complain, make, markOn, section } from '../parts.js';
 import { Pipeline } from '../pipeline.js';
 import { kit } from '../scene.js';
 import { addSectionBox } from '../section_box.js';
 import { addShading, styled } from '../shading.js';
-import { $, count, length, on, state, tell, toScene, upright } from '../state.js';
+import { $, count, length, on, state, tell, toScene } from '../state.js';
 import { cameraAt } from './scene_file.js';
 
 const TRIANGLES_MOST = 2_000_000, PIXELS = 12, LATER_MS = 300, NAMES_MOST = 300;
@@ -25,7 +25,6 @@ const CHOSEN = `<p class="hint" id="chosenHint">Click a model to choose it and t
 export async function begin(page, asked) {
   const { scene } = page;
   await styled();
-  markOn(scene);
   return new Together(page, asked, scene).open();
 }
 
@@ -33,7 +32,7 @@ class Together {
   constructor(page, asked, scene) {
     Object.assign(this, { page, asked, scene, hidden: new Set(), hiddenLayers: new Set() });
     this.query = new URLSearchParams(location.search);
-    this.assembly = new Assembly({ changed: () => this.#soon(), news: () => this.#news(), failed: (model, error) => showError({ message: `${model.name}: ${error.message}` }) });
+    this.assembly = new Assembly({ changed: () => this.#soon(), news: () => this.#news(), failed: (model, error) => this.#failed(model, error) });
     this.assembly.setTheme(document.documentElement.dataset.theme !== 'light');
     state.together = this;
   }
@@ -47,19 +46,55 @@ class Together {
     $('openingText').textContent = `${count(asked.models.length)} models`;
     scene.scene.add(assembly.group);
     scene.others = assembly;
-    const there = await assembly.open(asked);
-    document.documentElement.classList.remove('opening');
-    if (!there) {
-      $('start').hidden = false;
-      return;
+    let there = false;
+    try {
+      there = await assembly.open(asked);
+    } finally {
+      document.documentElement.classList.remove('opening');
+      if (!there)
+        this.#leave();
     }
-    state.scene = assembly.scene;
-    const unit = asked.unit ?? assembly.models.find((m) => m.info?.unit)?.info.unit;
-    state.info = { box_origin: assembly.box.origin, box_size: assembly.box.size, unit, parts: new Set(), levels: [], level_count: 0 };
+    if (!there)
+      return;
+    this.#opened();
     this.#build();
     this.#takeAddress();
     this.#soon();
     tell('opened');
+    assembly.models.filter((m) => m.error).forEach((m) => this.#failed(m, m.error)); // now with a way to try again
+  }
+
+  // What the rest of the page knows of it.
+  #opened() {
+    const { asked, assembly: { box, models, scene } } = this, unit = asked.unit ?? models.find((m) => m.info?.unit)?.info.unit;
+    state.scene = scene;
+    state.info = { box_origin: box.origin, box_size: box.size, unit, parts: new Set(), levels: [], level_count: 0 };
+  }
+
+  // Nothing can be shown: the first page is there again, for other files.
+  #leave() {
+    this.assembly.end();
+    this.scene.others = state.together = undefined;
+    document.documentElement.classList.remove('together');
+    busy(false);
+    $('start').hidden = false;
+  }
+
+  #failed(model, error) {
+    const again = async () => {
+      await this.assembly.retry();
+      this.#opened();
+      this.#rows();
+      this.#marks();
+      this.moved();
+    };
+    showError({ message: `${model.name}: ${error.message}` }, error.code === 'NETWORK' && state.info ? again : undefined);
+  }
+
+  /** Asks again for what has not come. */
+  retry() {
+    this.assembly.models.forEach((model) => model.client.retry());
+    this.moved();
   }
 
   // --- panel ---
@@ -71,6 +106,7 @@ class Together {
     $('facts').textContent = `${count(assembly.models.length)} models · ${count(assembly.instances.length)} instances · ${count(faces)} faces`;
     for (const id of ['panel', 'bar', 'tools'])
       $(id).hidden = id === 'panel' && innerWidth <= 760;
+    markOn(scene);
     section('Models', HTML, { open: true });
     section('Chosen', CHOSEN, { open: true });
     addSectionBox({ cutChanged: () => this.#cut() });
@@ -163,6 +199,7 @@ class Together {
     $('timePlay').onclick = () => {
       this.playing = !this.playing;
       $('timePlay').ariaPressed = String(this.playing);
+      this.changed();
       let last = performance.now();
       const step = (now) => {
         if (!this.playing)
@@ -271,12 +308,7 @@ class Together {
   // --- the picture ---
 
   #cut() {
-    const { size } = this.assembly.box, turned = (p) => upright(p, this.assembly.up).map(Math.abs);
-    // Shares of the world's axes as shares of the picture's: an axis that is turned over counts from its other end.
-    const box = state.box && this.assembly.up === 2 ? [state.box[0], state.box[2], 1 - state.box[4], state.box[3], state.box[5], 1 - state.box[1]] : state.box;
-    const cut = cutOf(turned(size), this.assembly.scene.scale, { axis: undefined }, box);
-    this.assembly.setCut(cut?.low, cut?.high);
-    this.scene.cut = cut;
+    this.scene.cut = this.assembly.setBox(state.box);
     this.moved();
     this.changed();
   }
@@ -302,7 +334,9 @@ class Together {
   #news() {
     const idle = this.assembly.idle, s = this.assembly.stats;
     state.idle = Boolean(state.info) && idle;
-    $('progress').classList.toggle('on', !idle);
+    busy(!idle);
+    if (!idle)
+      showLine(this.assembly.line);
     Object.entries({ sRequests: count(s.requests), sBytes: `${bytes(s.bytes)} of ${bytes(s.size)}`, sNodes: count(s.nodes), sTriangles: count(s.triangles), sMesh: count(s.meshTriangles) })
       .forEach(([id, text]) => ($(id).textContent = text));
   }
@@ -318,11 +352,7 @@ class Together {
       if (this.asked.layers?.includes(name))
         this.hiddenLayers.add(name);
     }
-    names('colours').forEach((pair) => {
-      const [, name, hex] = /^(.*):([0-9a-f]{6})$/i.exec(pair) ?? [], model = assembly.models.find((m) => m.name === name);
-      if (model)
-        assembly.setColour(model, `#${hex.toLowerCase()}`);
-    });
+    assembly.setColours(query.get('colours'));
     this.#rows();
     this.#layers();
     this.#applyLayers();
@@ -344,7 +374,7 @@ class Together {
   }
 
   changed() {
-    if (!state.info || this.asked.local)
+    if (!state.info || this.asked.local || this.playing) // browsers refuse an address that changes all the time
       return;
     this.later ??= setTimeout(() => {
       this.later = undefined;

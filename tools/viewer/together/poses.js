@@ -41,8 +41,11 @@ function turnBetween(from, to, share) {
 
 /** Where a route is at a time. `route`: { keys: [{ time, turn (a quaternion of length 1), scale, translation }], jumps }. */
 export function routeAt({ keys, jumps }, time) {
-  let n = keys.findLastIndex((key) => key.time <= time);
-  n = Math.max(n, 0);
+  let n = 0; // the last key that is not later, or the first one
+  for (let end = keys.length; end - n > 1;) {
+    const middle = (n + end) >> 1;
+    keys[middle].time <= time ? (n = middle) : (end = middle);
+  }
   const a = keys[n], b = keys[n + 1] ?? a, pose = (turn, scale, translation) => ({ rotation: matrixOf(turn), scale, translation });
   if (a === b || jumps || time <= a.time)
     return pose(a.turn, a.scale, a.translation);

@@ -1,8 +1,9 @@
 // A scene file (format-spec/scene.md) as the page shows it: models, instances, routes, cameras. What only questions are about (ignore, clearance) is checked to be
-// there in form and not used. JSON.parse() does not tell of members that are there twice; the last one holds.
+// there in form and not used.
 import { AT_HOME, placed, quaternionOf, routeAt, unitQuaternion } from './poses.js';
+import { parseStrict } from './strict_json.js';
 
-export const MOST = { bytes: 64 << 20, instances: 100_000, models: 1000 };
+export const MOST = { bytes: 64 << 20, instances: 100_000, models: 1000, keys: 1_000_000 }; // bytes: of the scene, and of all files of poses together
 const SCALE_MOST = 2 ** 300, TIME_MOST = 2 ** 1000, LIKE_ROTATION = 2 ** -20;
 
 const refuse = (where, what) => {
@@ -52,12 +53,12 @@ function rotationOf(r, where) {
 
 /** A pose of a file: with `turn`, a quaternion of length 1, beside its rotation. */
 export function poseOf(value, where) {
-  const p = members(value ?? {}, where, ['translation', 'scale', 'rotation', 'quaternion']);
-  must(!(p.rotation && p.quaternion), where, 'has both a rotation and a quaternion');
+  const p = members(value === undefined ? {} : value, where, ['translation', 'scale', 'rotation', 'quaternion']);
+  must(p.rotation === undefined || p.quaternion === undefined, where, 'has both a rotation and a quaternion');
   const scale = p.scale === undefined ? 1 : number(p.scale, `${where}.scale`);
   must(scale >= 1 / SCALE_MOST && scale <= SCALE_MOST, `${where}.scale`, 'is not from 2^-300 to 2^300');
-  const rotation = p.rotation && rotationOf(numbers(p.rotation, `${where}.rotation`, 9), `${where}.rotation`);
-  const turn = rotation ? quaternionOf(rotation) : unitQuaternion(p.quaternion ? numbers(p.quaternion, `${where}.quaternion`, 4) : [0, 0, 0, 1]);
+  const rotation = p.rotation === undefined ? undefined : rotationOf(numbers(p.rotation, `${where}.rotation`, 9), `${where}.rotation`);
+  const turn = rotation ? quaternionOf(rotation) : unitQuaternion(p.quaternion === undefined ? [0, 0, 0, 1] : numbers(p.quaternion, `${where}.quaternion`, 4));
   must(turn !== undefined, `${where}.quaternion`, 'is 0');
   const translation = p.translation === undefined ? [0, 0, 0] : numbers(p.translation, `${where}.translation`, 3);
   return { ...routeAt({ keys: [{ time: 0, turn, scale, translation }] }, 0), ...(rotation && { rotation }), turn };
@@ -79,6 +80,13 @@ function csvKeys(csv, where) {
   });
 }
 
+// Files of poses have no digests, so they are never those of another server.
+function nearPath(value, where) {
+  const path = pathOf(value, where);
+  must(!isFar(path), where, 'is on a server: files of poses lie in the scene\'s folder');
+  return path;
+}
+
 async function routeOf(value, where, fetchText) {
   const r = members(value, where, ['keys', 'poses', 'csv', 'begin', 'step', 'between']);
   must([r.keys, r.poses, r.csv].filter((x) => x !== undefined).length === 1, where, 'needs one of keys, poses, csv');
@@ -86,9 +94,9 @@ async function routeOf(value, where, fetchText) {
   must(r.poses !== undefined || (r.begin === undefined && r.step === undefined), where, 'has begin or step without poses');
   let keys;
   if (r.csv !== undefined)
-    keys = csvKeys(await fetchText(pathOf(r.csv, `${where}.csv`)), r.csv);
+    keys = csvKeys(await fetchText(nearPath(r.csv, `${where}.csv`)), r.csv);
   else if (r.poses !== undefined)
-    keys = list(r.poses, `${where}.poses`).map((pose, i) => ({ time: number(r.begin ?? 0, `${where}.begin`) + i * number(r.step, `${where}.step`), pose: poseOf(pose, `${where}.poses[${i}]`) }));
+    keys = list(r.poses, `${where}.poses`).map((pose, i) => ({ time: number(r.begin === undefined ? 0 : r.begin, `${where}.begin`) + i * number(r.step, `${where}.step`), pose: poseOf(pose, `${where}.poses[${i}]`) }));
   else
     keys = list(r.keys, `${where}.keys`).map((key, i) => {
       const at = `${where}.keys[${i}]`, { time, pose } = members(key, at, ['time', 'pose']);
@@ -99,16 +107,64 @@ async function routeOf(value, where, fetchText) {
   return { jumps: r.between === 'jump', keys: keys.map(({ time, pose: { turn, scale, translation } }) => ({ time, turn, scale, translation })) };
 }
 
+/** Whether it is an address, and no path within the scene's folder. */
+export const isFar = (path) => /^https?:\/\//i.test(path);
+
 /** A path within the scene's folder, or an address; `where` it stands. */
 function pathOf(value, where) {
   const path = text(value, where);
-  if (/^https?:\/\//i.test(path))
+  if (isFar(path))
     return path;
   must(path !== '' && !/^([/\\]|[a-z][a-z0-9+.-]*:)/i.test(path) && !path.split(/[/\\]/).includes('..'), where, `"${path}" leads out of the scene's folder`);
   return path;
 }
 
 // --- the whole ---
+
+const named = (value, where) => members(value === undefined ? {} : value, where, Object.keys(value ?? {})); // whatever its members are called
+const declared = (value, where, known, kind) => must(known.has(value), where, `"${value}" is no ${kind} of this scene`);
+
+function modelOf(key, value) {
+  const where = `models.${name(key, 'models')}`, m = members(value, where, ['file', 'content_sha256', 'subset_of']), file = pathOf(m.file, `${where}.file`);
+  must(m.content_sha256 === undefined || /^[0-9a-f]{64}$/.test(m.content_sha256), `${where}.content_sha256`, 'is not 64 digits');
+  must(m.content_sha256 !== undefined || !isFar(file), where, 'is on a server, and has no content_sha256');
+  return { name: key, file, digest: m.content_sha256 };
+}
+
+async function routesOf(value, fetchText) {
+  const routes = new Map();
+  let keys = 0;
+  for (const [key, route] of Object.entries(named(value, 'routes'))) {
+    routes.set(name(key, 'routes'), await routeOf(route, `routes.${key}`, fetchText));
+    keys += routes.get(key).keys.length;
+    must(keys <= MOST.keys, 'routes', `have more than ${MOST.keys} keys, which is more than this page shows`);
+  }
+  return routes;
+}
+
+function instanceOf(value, where, { models, layers, groups, routes }) {
+  const one = members(value, where, ['name', 'model', 'pose', 'route', 'layer', 'groups', 'fixed']);
+  must(one.fixed === undefined || typeof one.fixed === 'boolean', `${where}.fixed`, 'is neither true nor false');
+  must(!(one.fixed && one.route !== undefined), where, 'is fixed and has a route');
+  declared(one.model, `${where}.model`, models, 'model');
+  if (one.route !== undefined)
+    declared(one.route, `${where}.route`, routes, 'route');
+  if (one.layer !== undefined)
+    declared(one.layer, `${where}.layer`, layers, 'layer');
+  list(one.groups, `${where}.groups`).forEach((n) => declared(n, `${where}.groups`, groups, 'group'));
+  return { name: name(one.name, `${where}.name`), model: models.get(one.model), layer: one.layer, pose: poseOf(one.pose, `${where}.pose`), route: routes.get(one.route) };
+}
+
+// From the first key of all routes to the last.
+function timesOf(instances) {
+  const routes = new Set(instances.map(({ route }) => route).filter(Boolean));
+  let from = Infinity, to = -Infinity;
+  for (const { keys } of routes) {
+    from = Math.min(from, keys[0].time);
+    to = Math.max(to, keys.at(-1).time);
+  }
+  return routes.size ? { from, to } : { from: 0, to: 0 };
+}
 
 /**
  * From a file's text: { title, unit, models: [{ name, file, digest }], layers, instances: [{ name, model (its number), layer, pose, route }], cameras, from, to (the times of the
@@ -118,42 +174,21 @@ export async function readScene(source, fetchText) {
   must(source.length <= MOST.bytes, 'the scene', 'is larger than 64 MiB');
   let json;
   try {
-    json = JSON.parse(source.replace(/^\ufeff/, ''));
+    json = parseStrict(source.replace(/^\ufeff/, ''));
   } catch (error) {
-    throw new Error(`this is no JSON (${error.message}); give a scene file`);
+    throw new Error(`this is no JSON as scenes have it (${error.message}); give a scene file`);
   }
   const s = members(json, 'the scene', ['ebpo_scene', 'title', 'unit', 'models', 'layers', 'groups', 'routes', 'instances', 'cameras', 'ignore', 'clearance']);
   must(typeof s.ebpo_scene === 'string' && /^1\.\d+$/.test(s.ebpo_scene), 'ebpo_scene', 'is not 1.0: this is no scene, or one that is newer than this page');
-  const models = Object.entries(members(s.models ?? {}, 'models', Object.keys(s.models ?? {}))).map(([key, value]) => {
-    const where = `models.${name(key, 'models')}`, m = members(value, where, ['file', 'content_sha256', 'subset_of']), file = pathOf(m.file, `${where}.file`);
-    must(m.content_sha256 === undefined || /^[0-9a-f]{64}$/.test(m.content_sha256), `${where}.content_sha256`, 'is not 64 digits');
-    must(m.content_sha256 !== undefined || !/^https?:/i.test(file), where, 'is on a server, and has no content_sha256');
-    return { name: key, file, digest: m.content_sha256 };
-  });
-  const [layers, groups] = ['layers', 'groups'].map((kind) => list(s[kind], kind).map((n, i) => name(n, `${kind}[${i}]`)));
+  const files = Object.entries(named(s.models, 'models')), all = list(s.instances, 'instances');
+  must(all.length <= MOST.instances && files.length <= MOST.models, 'the scene', `has more than ${MOST.instances} instances or ${MOST.models} models, which is more than this page shows`);
+  const models = files.map(([key, value]) => modelOf(key, value)), [layers, groups] = ['layers', 'groups'].map((kind) => list(s[kind], kind).map((n, i) => name(n, `${kind}[${i}]`)));
   unique(layers, 'layers');
   unique(groups, 'groups');
-  const routes = new Map();
-  for (const [key, value] of Object.entries(members(s.routes ?? {}, 'routes', Object.keys(s.routes ?? {}))))
-    routes.set(name(key, 'routes'), await routeOf(value, `routes.${key}`, fetchText));
-  const numberOf = new Map(models.map((m, i) => [m.name, i])), declared = (value, where, known, kind) => must(known(value), where, `"${value}" is no ${kind} of this scene`);
-  const instances = list(s.instances, 'instances').map((value, i) => {
-    const where = `instances[${i}]`, one = members(value, where, ['name', 'model', 'pose', 'route', 'layer', 'groups', 'fixed']);
-    must(one.fixed === undefined || typeof one.fixed === 'boolean', `${where}.fixed`, 'is neither true nor false');
-    must(!(one.fixed && one.route !== undefined), where, 'is fixed and has a route');
-    declared(one.model, `${where}.model`, (n) => numberOf.has(n), 'model');
-    if (one.route !== undefined)
-      declared(one.route, `${where}.route`, (n) => routes.has(n), 'route');
-    if (one.layer !== undefined)
-      declared(one.layer, `${where}.layer`, (n) => layers.includes(n), 'layer');
-    list(one.groups, `${where}.groups`).forEach((n) => declared(n, `${where}.groups`, (g) => groups.includes(g), 'group'));
-    return { name: name(one.name, `${where}.name`), model: numberOf.get(one.model), layer: one.layer, pose: poseOf(one.pose, `${where}.pose`), route: routes.get(one.route) };
-  });
+  const routes = await routesOf(s.routes, fetchText), known = { models: new Map(models.map((m, i) => [m.name, i])), layers: new Set(layers), groups: new Set(groups), routes };
+  const instances = all.map((value, i) => instanceOf(value, `instances[${i}]`, known)), cameras = list(s.cameras, 'cameras').map((value, i) => cameraOf(value, `cameras[${i}]`, routes));
   unique(instances.map((i) => i.name), 'instances');
-  must(instances.length <= MOST.instances && models.length <= MOST.models, 'the scene', `has more than ${MOST.instances} instances or ${MOST.models} models, which is more than this page shows`);
-  const cameras = list(s.cameras, 'cameras').map((value, i) => cameraOf(value, `cameras[${i}]`, routes));
-  const times = instances.flatMap(({ route }) => (route ? [route.keys[0].time, route.keys.at(-1).time] : [])), span = times.length ? [Math.min(...times), Math.max(...times)] : [0, 0];
-  return { title: s.title === undefined ? '' : text(s.title, 'title'), unit: s.unit === undefined ? '' : text(s.unit, 'unit'), models, layers, instances, cameras, from: span[0], to: span[1] };
+  return { title: s.title === undefined ? '' : text(s.title, 'title'), unit: s.unit === undefined ? '' : text(s.unit, 'unit'), models, layers, instances, cameras, ...timesOf(instances) };
 }
 
 function cameraOf(value, where, routes) {

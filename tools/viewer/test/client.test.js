@@ -1,0 +1,79 @@
+// A page's side of workers: who gets which answer, what is told to those who get none, and what becomes of a worker that fails.
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+Object.assign(globalThis, { location: new URL('https://example.org/v/'), document: { baseURI: 'https://example.org/v/' } });
+const workers = [];
+globalThis.Worker = class {
+  constructor() {
+    workers.push(Object.assign(this, { posted: [], over: false }));
+  }
+
+  postMessage(message) {
+    this.posted.push(message);
+  }
+
+  terminate() {
+    this.over = true;
+  }
+};
+const { Client, Crew } = await import('../client.js');
+
+const client = (crew, heard = () => {}) => new Client({ crew, heard });
+const answer = (worker, file, opening, news) => worker.onmessage({ data: { file, opening, ...news } });
+const OPENED = { type: 'opened', info: {}, scene: {}, size: 1 };
+
+test('files are shared among workers, and a worker ends with its last file', () => {
+  workers.length = 0;
+  const crew = new Crew({ most: 2 }), [a, b, c] = [0, 1, 2].map(() => client(crew));
+  assert.equal(workers.length, 2);
+  b.end();
+  assert.deepEqual([workers[0].over, workers[1].over], [false, true]);
+  a.end();
+  a.end();
+  assert.deepEqual([workers[0].over, workers[0].posted], [false, [{ file: 0, type: 'end' }]]);
+  a.close();
+  a.retry();
+  assert.equal(workers[0].posted.length, 1, 'the worker hears no more of what has ended');
+  c.end();
+  assert.equal(workers[0].over, true);
+  assert.equal(crew.workers.length, 0);
+});
+
+test('a worker that fails is told to all its files, and later ones get another', async () => {
+  workers.length = 0;
+  const crew = new Crew({ most: 1 }), told = [], one = client(crew, (type) => told.push(type)), opening = one.open('a.ebpo.h5');
+  const two = client(crew, (type) => told.push(type));
+  workers[0].onerror({ message: 'gone' });
+  await assert.rejects(opening, /the worker failed \(gone\)/);
+  assert.deepEqual([told, workers[0].over], [['failed', 'failed'], true]);
+  const three = client(crew), there = three.open('b.ebpo.h5');
+  assert.equal(workers.length, 2);
+  one.end();
+  two.end();
+  assert.equal(crew.workers.length, 1, 'the new one stays');
+  answer(workers[1], 2, 1, OPENED);
+  await there;
+});
+
+test('who asks gets an answer or an error: nobody waits forever', async () => {
+  workers.length = 0;
+  const crew = new Crew({ most: 1 }), it = client(crew), open = async () => {
+    const there = it.open('a.ebpo.h5');
+    answer(workers[0], 0, it.opening, OPENED);
+    await there;
+    return [it.probe([0, 0, 0]), it.places([[0, 0, 0]])];
+  };
+  let asked = await open();
+  answer(workers[0], 0, it.opening, { type: 'failed', late: true, error: { message: 'of the picture' } });
+  answer(workers[0], 0, it.opening, { type: 'places', id: it.asks, error: { code: 'NETWORK', message: 'no line' } });
+  answer(workers[0], 0, it.opening, { type: 'probed', done: true, where: 'in' });
+  assert.equal((await asked[0]).where, 'in');
+  await assert.rejects(asked[1], { code: 'NETWORK', message: 'no line' });
+  for (const over of [() => it.open('b.ebpo.h5').catch(() => {}), () => it.close(), () => it.end()]) {
+    asked = await open();
+    over();
+    for (const one of asked)
+      await assert.rejects(one, { name: 'AbortError' });
+  }
+});
