@@ -46,6 +46,15 @@ def play(ebpo, model, words):
     return got
 
 
+def sums_beside(folder, seconds):
+    """A loop that does the same sums each tick, on whatever core is free: what the machine alone adds
+    to as much work; a loop that does nothing is hardly ever met by that."""
+    program = folder + "/tick_alone"
+    subprocess.run(["cc", "-O2", os.path.join(os.path.dirname(os.path.abspath(__file__)), "tick_alone.c"),
+                    "-o", program, "-lm"], check=True)
+    return program, subprocess.Popen([program, str(int(seconds))], text=True, stdout=subprocess.PIPE)
+
+
 def main(ebpo, model, seconds="600"):
     info = json.loads(subprocess.run([ebpo, "info", "--json", model], check=True, text=True,
                                      stdout=subprocess.PIPE).stdout)
@@ -60,7 +69,10 @@ def main(ebpo, model, seconds="600"):
         ("probe", ["--memory", "256M", "--sense", "--seconds", short]),
         ("tool of 10,000", ["--memory", "256M", "--tool", tool, "--faces", "262144", "--seconds", short]),
     ]
-    rows = [(name, words, play(ebpo, model, words)) for name, words in runs]
+    program, beside = sums_beside(folder, long)
+    rows = [(*runs[0], play(ebpo, model, runs[0][1]))]
+    sums = beside.communicate()[0].strip()
+    rows += [(name, words, play(ebpo, model, words)) for name, words in runs[1:]]
     print(f"""# How late a hand is
 
 Made by `python3 tests/bench/touch_page.py EBPO {os.path.basename(model)} {seconds}` on {os.cpu_count()} cores.
@@ -98,7 +110,11 @@ a tenth of the time.
 wall of what was loaded (of a probe: the distance was known by bounds alone); *short*: more was close
 than a tick does, the next one went on. The probe's bounds were {probe["between_mean"]:.3g} apart on
 average and {probe["between_most"]:.3g} at most, in the unit of the model, whose root cell is
-{" x ".join(f"{s:.4g}" for s in info.get("box_size", []))}.""")
+{" x ".join(f"{s:.4g}" for s in info.get("box_size", []))}.
+
+Beside the first row, the same sums in each tick at 1 kHz, and nothing of the library
+(`tests/bench/tick_alone.c`, SCHED_FIFO): {sums}.""")
+    os.remove(program)
     os.remove(tool)
     os.rmdir(folder)
 
