@@ -11,6 +11,7 @@
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <sys/stat.h>
 
 enum { TOGETHER = 1 << 18 }; /* points of a process between two reads of all */
 
@@ -83,6 +84,14 @@ static int ask_all(ebpo_context *context, MPI_File in, MPI_File out, const char 
     return fine;
 }
 
+/* Answers are written in place: an input would be gone. */
+static int is_input(const char *input, const char *answers)
+{
+    struct stat a, b;
+    return stat(input, &a) == 0 && stat(answers, &b) == 0 && a.st_dev == b.st_dev &&
+           a.st_ino == b.st_ino;
+}
+
 static int ask_files(ebpo_context *context, const char *points, const char *answers)
 {
     const char *const paths[] = { points, answers };
@@ -122,7 +131,10 @@ static int ask_model(const char *const *path, double megabytes)
         status = ebpo_model_new(file, &options, &model, &error);
     if (status == EBPO_OK)
         status = ebpo_context_new(model, &context, &error);
-    int fine = all_fine(status == EBPO_OK, error.message) && ask_files(context, path[1], path[2]);
+    int fine = all_fine(status == EBPO_OK, error.message) &&
+               all_fine(!is_input(path[0], path[2]) && !is_input(path[1], path[2]),
+                        "the answers would replace what is asked; name another file") &&
+               ask_files(context, path[1], path[2]);
     ebpo_context_free(context);
     ebpo_model_free(model);
     ebpo_close(file);

@@ -258,6 +258,19 @@ class Trees(Case):
         self.assertTrue((np.diff(told)[same] >= 0).all() and (np.diff(point) >= 0).all())
 
 
+    def test_models_of_any_size(self):
+        """Squares of lengths are 0, or beyond doubles."""
+        vertices, faces = model("cube").mesh(order="source")
+        for size in (3e-162, 1e155, 1e300):
+            names, p = [f"sized{i}.ebpo.h5" for i in range(9)], points(200, seed=3, reach=3) * size
+            for name, at in zip(names, points(9, seed=4, reach=2)):
+                ebpo.convert(((vertices * .3 + at) * size, faces), name)
+            told = [ebpo.open(name).distance(p, signed=False).distance for name in names]
+            found = Catalogue.of(names).distance(p)
+            np.testing.assert_array_equal(np.abs(found["distance"]), np.min(told, axis=0))
+            np.testing.assert_array_equal(found["model"], np.argmin(told, axis=0))
+
+
 class Parts(Case):
     """A model cut into eight files answers as the whole does, on its faces and on caps as well."""
 

@@ -141,6 +141,34 @@ class Files(Case):
         self.assertEqual([str(p) for p in pathlib.Path(".").glob("*.parts")], [])
         self.assertEqual([str(p) for p in pathlib.Path(".").glob(".*")], [], "no temporary files stay")
 
+    def test_what_is_no_chunk_is_not_joined(self):
+        inside = ed.inside("scan.ebpo.h5", P[:300], chunk=100)
+        self.addCleanup(shutil.rmtree, "joined.npy.parts", ignore_errors=True)
+        folder = pathlib.Path("joined.npy.parts")
+        ed.begin_parts(folder, inside)
+        for wrong in (np.zeros(99, bool), np.zeros(100, np.int8), None):
+            if wrong is None:
+                (folder / "000001.npy").write_bytes(b"none")
+            else:
+                np.save(folder / "000001.npy", wrong)
+            with self.assertRaisesRegex(ValueError, "000001.npy.*made anew"):
+                ed.to_file(inside, "joined.npy")
+        os.remove(folder / "000001.npy")
+        ed.to_file(inside, "joined.npy")
+        np.testing.assert_array_equal(np.load("joined.npy"), model("scan").inside(P[:300]))
+
+    def test_points_that_are_none(self):
+        np.save("complex.npy", np.zeros((3, 3), complex))
+        np.save("text.npy", np.full((3, 3), "1"))
+        pathlib.Path("cut.npy").write_bytes(pathlib.Path("text.npy").read_bytes()[:140])
+        for name in ("complex.npy", "text.npy", "cut.npy"):
+            with self.subTest(name), self.assertRaises(ebpo.FormatError):
+                ed.inside("scan.ebpo.h5", name)
+        for chunk in (0, -1):
+            with self.subTest(chunk), self.assertRaisesRegex(ValueError, "1 point or more"):
+                ed.inside("scan.ebpo.h5", P, chunk=chunk)
+        self.assertEqual(ed.inside("scan.ebpo.h5", P[:5], chunk=1).numblocks, (5,))
+
     def test_a_killed_client_goes_on(self):
         """It is killed after some chunks; what is there then is not asked again."""
         script = (f"import sys, time; sys.argv[1:] = []\nimport ebpo.dask as ed, ebpo.catalogue as cat\n"

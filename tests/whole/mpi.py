@@ -43,6 +43,11 @@ def main():
             done = run(2, *arguments)
             if not done.returncode or message not in done.stderr or os.path.exists("a.raw"):
                 wrong.append(f"{arguments}: {done.returncode} {done.stderr}")
+        os.link("p.raw", "same.raw")
+        for name in ("p.raw", "same.raw", "m.ebpo.h5"):
+            size, done = os.path.getsize(name), run(2, "m.ebpo.h5", "p.raw", name)
+            if not done.returncode or "replace what is asked" not in done.stderr or os.path.getsize(name) != size:
+                wrong.append(f"{name}: {done.returncode} {done.stderr}")
         print("\n".join(wrong) or "fine")
         os.chdir("/")
     return 1 if wrong else 0

@@ -39,9 +39,9 @@ def greatest_lengths(low: np.ndarray, high: np.ndarray, other_low: np.ndarray, o
 
 
 def length(rows: np.ndarray) -> np.ndarray:
-    """Of vectors; inf where squares are beyond doubles."""
+    """Of vectors, also where squares are beyond doubles; inf where it is itself."""
     with np.errstate(over="ignore"):
-        return np.sqrt((rows * rows).sum(axis=1))
+        return np.hypot(np.hypot(rows[:, 0], rows[:, 1]), rows[:, 2])
 
 
 class Boxes:

@@ -72,6 +72,8 @@ def points(source: Any, dataset: str | None = None, *, chunk: int = CHUNK, colum
     """
     import dask.array as da
     from dask.base import tokenize
+    if chunk < 1:
+        raise ValueError(f"chunk={chunk}: give 1 point or more")
     if isinstance(source, da.Array):
         return source.rechunk({1: source.shape[1]}) if source.ndim == 2 else source
     if not isinstance(source, (str, os.PathLike)):
@@ -209,6 +211,7 @@ def to_file(answers: Any, path: Any, *, dataset: str = "answers", **compute: Any
     missing = [name for name in names if not name.exists()]
     if missing:
         raise FileNotFoundError(f"{missing[0]}: workers have written it elsewhere; the folder has to be shared")
+    check_parts(names, answers)
     if is_file:
         join_parts(path, names, dataset)
         shutil.rmtree(folder)
@@ -231,6 +234,18 @@ def begin_parts(folder: pathlib.Path, answers: Any) -> None:
 
 def save_part(name: str, block: np.ndarray) -> None:
     save_array(name, block)
+
+
+def check_parts(names: list, answers: Any) -> None:
+    """ValueError: a chunk that was there is not one of these answers. Of some Dask knows no rows (NaN)."""
+    for name, rows in zip(names, answers.chunks[0]):
+        try:
+            part = np.load(name, mmap_mode="r", allow_pickle=False)
+        except (ValueError, EOFError) as error:
+            raise ValueError(f"{name}: no chunk of answers ({error}); remove it, and it is made anew") from None
+        if part.dtype != answers.dtype or (rows == rows and len(part) != rows):
+            raise ValueError(f"{name}: {len(part)} rows of {part.dtype}, not {rows} of {answers.dtype}; remove it, and "
+                             "it is made anew")
 
 
 def join_parts(path: pathlib.Path, names: list, dataset: str) -> None:

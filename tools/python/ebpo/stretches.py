@@ -45,17 +45,22 @@ class PointFile(NamedTuple):
     def at(cls, path: Any, dataset: str | None = None, columns: int = 3) -> PointFile:
         """Looks at a .npy, an HDF5 dataset, or raw doubles of this machine's byte order.
 
-        FormatError: it has not so many columns.
+        FormatError: it has not so many columns, or holds no numbers.
         """
+        dtype = np.dtype(np.float64)
         path = os.path.abspath(os.fspath(path))
         if is_hdf5(path, dataset):
             with h5py_of(path).File(path, "r") as file:
                 dataset = dataset or only_dataset(file, path, columns)
                 if dataset not in file or not hasattr(file[dataset], "shape"):
                     raise FormatError(f"{path}: there is no dataset {dataset}", "EBPO_E_FORMAT", path)
-                shape = file[dataset].shape
+                shape, dtype = file[dataset].shape, file[dataset].dtype
         elif path.endswith(".npy"):
-            shape = np.load(path, mmap_mode="r", allow_pickle=False).shape
+            try:
+                array = np.load(path, mmap_mode="r", allow_pickle=False)
+            except (ValueError, EOFError) as error:
+                raise FormatError(f"{path}: cannot be read as a .npy: {error}", "EBPO_E_FORMAT", path) from None
+            shape, dtype = array.shape, array.dtype
         else:
             size = os.path.getsize(path)
             if size % (8 * columns):
@@ -63,6 +68,8 @@ class PointFile(NamedTuple):
             shape = (size // (8 * columns), columns)
         if len(shape) != 2 or shape[1] != columns:
             raise FormatError(f"{path}: points have the shape (n, {columns}), not {shape}", "EBPO_E_FORMAT", path)
+        if dtype.kind not in "fiu":
+            raise FormatError(f"{path}: points are numbers, not {dtype}", "EBPO_E_FORMAT", path)
         return cls(path, dataset or "", int(shape[0]), columns, stamp_of(path))
 
     def read(self, begin: int, end: int) -> np.ndarray:
