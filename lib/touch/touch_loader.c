@@ -123,6 +123,7 @@ static void *run(void *user)
         pthread_mutex_lock(&t->mutex);
         t->failure = error;
         pthread_mutex_unlock(&t->mutex);
+        atomic_store(&t->stopped, true);
     }
     return NULL;
 }

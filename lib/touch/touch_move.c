@@ -18,6 +18,11 @@ void ebpo_touch_tell(ebpo_touch *t, const double hand[3])
     }
 }
 
+uint32_t ebpo_touch_stopped(const ebpo_touch *t)
+{
+    return atomic_load_explicit(&t->stopped, memory_order_acquire) ? EBPO_TOUCH_STOPPED : 0;
+}
+
 static bool stands(const ebpo_touch *t) { return t->walk.stage == EBPO_BALL_STANDS; }
 
 /* Coulomb: the proxy, which slid from `from` without friction, follows only as far as the
@@ -80,6 +85,7 @@ void ebpo_touch_count(ebpo_touch *t, uint32_t flags, uint64_t work)
     s->waits += (flags & EBPO_TOUCH_WAITS) != 0;
     s->shorts += (flags & EBPO_TOUCH_SHORT) != 0;
     s->partly += (flags & EBPO_TOUCH_PARTLY) != 0;
+    s->stopped += (flags & EBPO_TOUCH_STOPPED) != 0;
     s->work_most = work > s->work_most ? work : s->work_most;
     s->given_most = fmax(s->given_most, t->passive.given);
 }
@@ -110,7 +116,7 @@ void ebpo_touch_move(ebpo_touch *t, const double hand[3], ebpo_touch_result *out
         flags |= rub(t, from, at, &work);
     }
     out->work = work.faces;
-    out->flags |= flags;
+    out->flags |= flags | ebpo_touch_stopped(t);
     ebpo_touch_look(t, out);
     t->touching = (flags & EBPO_TOUCH_CONTACT) != 0;
     if (t->touching) {

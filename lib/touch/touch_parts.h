@@ -74,8 +74,8 @@ struct ebpo_touch {
     _Atomic double proxy_told[3]; /* each for itself: what the loader makes of a mixture is */
     _Atomic double hand_told[3];  /* a box like any other, and the tick looks whether it fits */
     ebpo_known_place known[3];
-    atomic_uint known_between; /* as `between` */
-    _Atomic bool stop;
+    atomic_uint known_between;  /* as `between` */
+    _Atomic bool stop, stopped; /* stopped: by a failure, which is there before */
     atomic_uint_fast64_t loads, too_many, load_ns, load_ns_most;
 
     /* of the loading thread */
@@ -125,7 +125,8 @@ bool ebpo_touch_take_box(ebpo_touch *t);
 /* The box before, if it holds the proxy: perhaps that one reaches further. */
 void ebpo_touch_try_other(ebpo_touch *t);
 
-/* touch_move.c */
+/* touch_move.c: EBPO_TOUCH_STOPPED, or 0. */
+uint32_t ebpo_touch_stopped(const ebpo_touch *t);
 void ebpo_touch_tell(ebpo_touch *t, const double hand[3]);
 void ebpo_touch_count(ebpo_touch *t, uint32_t flags, uint64_t work);
 

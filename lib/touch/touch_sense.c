@@ -129,7 +129,7 @@ void ebpo_touch_sense(ebpo_touch *t, const double place[3], ebpo_touch_sensed *o
     for (int i = 0; i < 3; i++)
         astray |= !(fabs(place[i]) <= 0x1p200);
     copy(astray ? t->hand : place, at);
-    out->flags = astray ? EBPO_TOUCH_ASTRAY : 0;
+    out->flags = (astray ? EBPO_TOUCH_ASTRAY : 0) | ebpo_touch_stopped(t);
     copy(at, t->proxy);
     copy(at, t->hand);
     (void)ebpo_touch_take_box(t);

@@ -136,7 +136,7 @@ void ebpo_touch_turn(ebpo_touch *t, const double place[3], const double turn[4],
     copy(tool->proxy.place, out->proxy);
     for (int k = 0; k < 4; k++)
         out->turn[k] = tool->proxy.turn[k];
-    out->flags = flags | (astray ? EBPO_TOUCH_ASTRAY : 0);
+    out->flags = flags | (astray ? EBPO_TOUCH_ASTRAY : 0) | ebpo_touch_stopped(t);
     if ((flags & EBPO_TOUCH_WAITS) && tool->stage == EBPO_TOOL_STANDS)
         ebpo_touch_try_other(t);
     ebpo_touch_count(t, out->flags, out->work);

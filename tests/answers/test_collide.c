@@ -526,6 +526,28 @@ START_TEST(levels_tell_what_is_apart_and_what_meets)
 }
 END_TEST
 
+/* A small box within a large one: their boxes meet, and of what was found nothing is put together.
+ * Clang's sanitizer sees what is sorted where nothing was allocated. */
+START_TEST(faces_need_not_meet_where_boxes_do)
+{
+    static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    query_model large, small;
+    ebpo_pose here = EBPO_POSE_INIT, within = EBPO_POSE_INIT;
+    query_model_make(&large, "large", ebpo_test_box(low, high, 6), &query_variants[0]);
+    query_model_make(&small, "small", ebpo_test_box(low, high, 6), &query_variants[0]);
+    within.scale = 0.5;
+    for (int k = 0; k < 3; k++)
+        within.translation[k] = 0.25;
+    for (uint64_t memory = 0; memory < 2; memory++) {
+        pair_list none = ask_all(large.model, &here, small.model, &within, 1, memory << 20);
+        ck_assert_uint_eq(none.count, 0);
+        free(none.pair);
+    }
+    query_model_free(&large);
+    query_model_free(&small);
+}
+END_TEST
+
 START_TEST(poses_are_refused_and_questions_end_early)
 {
     query_model m;
@@ -556,16 +578,20 @@ END_TEST
 
 Suite *test_suite(void)
 {
-    TCase *tests = tcase_create("collide"), *threads = tcase_create("threads");
+    TCase *tests = tcase_create("collide"), *threads = tcase_create("threads"),
+          *nested = tcase_create("nested");
     tcase_set_timeout(tests, 900);
     tcase_set_timeout(threads, 900);
+    tcase_set_timeout(nested, 900);
     tcase_add_test(threads, threads_find_the_same);
     tcase_add_loop_test(tests, all_pairs_are_those_of_brute_force, 0, NAMES * NAMES);
     tcase_add_loop_test(tests, faces_that_cross_within_a_model_are_found, 0, NAMES);
+    tcase_add_test(nested, faces_need_not_meet_where_boxes_do);
     tcase_add_test(tests, levels_tell_what_is_apart_and_what_meets);
     tcase_add_test(tests, poses_are_refused_and_questions_end_early);
     Suite *suite = suite_create("collide");
     suite_add_tcase(suite, tests);
     suite_add_tcase(suite, threads);
+    suite_add_tcase(suite, nested);
     return suite;
 }

@@ -3,9 +3,11 @@
  * and nothing is called in a tick that could make it late. */
 #include <ebpo/touch.h>
 #include <math.h>
+#include <string.h>
 
 #include "check_main.h"
 #include "query_kit.h"
+#include "touch/touch_parts.h"
 #include "touch_watch.h"
 
 static void tick(ebpo_touch *touch, const double hand[3], ebpo_touch_result *out)
@@ -464,6 +466,90 @@ START_TEST(a_crowd_of_faces_is_refused)
 }
 END_TEST
 
+/* --- loading that has failed --- */
+
+static uint32_t tick_of(ebpo_touch *touch, uint64_t kind, const double at[3], double proxy[3])
+{
+    static const double turn[4] = { 0, 0, 0, 1 };
+    ebpo_touch_result ball;
+    ebpo_touch_sensed probe;
+    ebpo_touch_turned tool;
+    in_tick = true;
+    ebpo_touch_move(touch, at, &ball);
+    ebpo_touch_sense(touch, at, &probe);
+    ebpo_touch_turn(touch, at, turn, &tool);
+    in_tick = false;
+    memcpy(proxy, kind == EBPO_TOUCH_TOOL ? tool.proxy : ball.proxy, sizeof ball.proxy);
+    return kind == EBPO_TOUCH_BALL    ? ball.flags
+           : kind == EBPO_TOUCH_PROBE ? probe.flags
+                                      : tool.flags;
+}
+
+/* Far away all is well; around where the hand goes then, there are more faces than a box has room
+ * for. Each tick tells it from then on, and what is there is kept to. */
+START_TEST(a_hand_is_told_that_loading_has_stopped)
+{
+    static const double zero[3] = { 0, 0, 0 }, points[2][3] = { { 0.6, 0, 0 }, { -0.6, 0, 0 } };
+    const double far[3] = { 0, 0, 5 }, near[3] = { 0, 0, 1.05 };
+    uint64_t kind = (uint64_t)_i, told = 0;
+    query_model m;
+    ebpo_touch *touch;
+    ebpo_touch_stats stats = EBPO_TOUCH_STATS_INIT;
+    ebpo_error why = EBPO_ERROR_INIT;
+    double proxy[3];
+    query_model_make(&m, "sphere", ebpo_test_sphere(zero, 1, 4), &query_variants[0]);
+    ebpo_touch_options o = EBPO_TOUCH_OPTIONS_INIT;
+    o.kind = kind;
+    o.faces = 64;
+    o.look = 1;
+    o.radius = kind == EBPO_TOUCH_BALL ? 0.5 : 0;
+    o.points = kind == EBPO_TOUCH_TOOL ? points : NULL;
+    o.point_count = kind == EBPO_TOUCH_TOOL ? 2 : 0;
+    ASSERT_OK(ebpo_touch_new(m.model, &o, far, &touch, error));
+    ck_assert_uint_eq(tick_of(touch, kind, far, proxy) & EBPO_TOUCH_STOPPED, 0);
+    for (int i = 0; told < 3; i++) {
+        ck_assert_msg(i < 20000, "nothing is told");
+        uint32_t flags = tick_of(touch, kind, near, proxy);
+        ck_assert(told == 0 || flags & EBPO_TOUCH_STOPPED);
+        told += (flags & EBPO_TOUCH_STOPPED) != 0;
+        if (kind == EBPO_TOUCH_BALL)
+            ck_assert_double_ge(hypot(hypot(proxy[0], proxy[1]), proxy[2]), 1.49);
+        pause_a_little();
+    }
+    ck_assert_int_eq(ebpo_touch_check(touch, &why), EBPO_E_LIMIT);
+    ck_assert_ptr_nonnull(strstr(why.message, "more than 64 faces around one place"));
+    ck_assert_int_eq(ebpo_touch_get_stats(touch, &stats), EBPO_OK);
+    ck_assert_uint_eq(stats.stopped, told);
+    ck_assert_uint_eq(forbidden, 0);
+    ebpo_touch_free(touch);
+    query_model_free(&m);
+}
+END_TEST
+
+/* The last box that was loaded may be the one before, when a tick has laid it aside; as the hand is
+ * put there again, no other is loaded for it. What lays it aside takes a loader that is slow: so it
+ * is done by hand here. */
+START_TEST(a_hand_is_put_where_the_box_before_is)
+{
+    cube_hand c;
+    const double beside[3] = { 0.5, 0.5, 1.6 };
+    cube_begin(&c, 0, 0);
+    ASSERT_OK(ebpo_touch_place(c.touch, beside, error));
+    for (int quiet = 0; quiet < 300; quiet++) { /* until nothing is being loaded any more */
+        if (ebpo_touch_take_box(c.touch))
+            quiet = 0;
+        pause_a_little();
+    }
+    unsigned last = c.touch->at;
+    c.touch->at = c.touch->seen;
+    c.touch->seen = last;
+    c.touch->box[c.touch->at].centres.min[0] = INFINITY;
+    ASSERT_OK(ebpo_touch_place(c.touch, beside, error));
+    ck_assert_uint_eq(c.touch->at, last);
+    cube_end(&c);
+}
+END_TEST
+
 /* Around which there are more faces than a tick looks at; and so it is put elsewhere. */
 START_TEST(a_ball_goes_away_from_many_faces)
 {
@@ -509,6 +595,11 @@ Suite *test_suite(void)
     tcase_add_test(hand, what_makes_no_sense_is_refused);
     tcase_add_test(hand, a_crowd_of_faces_is_refused);
     tcase_add_test(hand, a_ball_goes_away_from_many_faces);
+    tcase_add_loop_test(hand, a_hand_is_told_that_loading_has_stopped, 0, 3);
     suite_add_tcase(suite, hand);
+    TCase *placed = tcase_create("placed"); /* without the mend it would wait for ever */
+    tcase_set_timeout(placed, 60);
+    tcase_add_test(placed, a_hand_is_put_where_the_box_before_is);
+    suite_add_tcase(suite, placed);
     return suite;
 }

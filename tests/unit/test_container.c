@@ -10,6 +10,8 @@
 #include "read_by.h"
 #include "codec/chunk.h"
 #include "codec/coding.h"
+#include "container/content.h"
+#include "container/reader.h"
 #include "h5/h5.h"
 #include "random_tree.h"
 #include "scratch.h"
@@ -719,6 +721,20 @@ START_TEST(planes_of_bytes_are_compressed_each_by_itself)
 }
 END_TEST
 
+/* Where nothing was allocated, nothing is sorted: of that sanitizers tell. */
+START_TEST(nothing_can_be_summed_up)
+{
+    static const uint8_t of_nothing[4] = { 0xe3, 0xb0, 0xc4, 0x42 }; /* SHA-256 begins with it */
+    ebpo_content content = { 0 };
+    ebpo_expected expected = EBPO_EXPECTED_INIT(NULL);
+    uint8_t digest[32];
+    ck_assert_int_eq(ebpo_content_end(&content, digest, NULL), EBPO_OK);
+    ck_assert_mem_eq(digest, of_nothing, sizeof of_nothing);
+    ebpo_content_free(&content);
+    ck_assert_uint_eq(ebpo_expected_bytes(&expected), 0);
+}
+END_TEST
+
 START_TEST(codings_return_every_bit_pattern)
 {
     uint32_t bits[12] = { 0,           1,           0x80000000u, 0x7fffffffu,
@@ -741,7 +757,7 @@ END_TEST
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("container");
-    TCase *tests = tcase_create("container");
+    TCase *tests = tcase_create("container"), *empty = tcase_create("empty");
     tcase_set_timeout(tests, 300);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_loop_test(tests, trees_come_back_bit_for_bit, 0, SHAPES);
@@ -766,7 +782,9 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, unused_bits_of_a_frame_are_refused, 0, 2);
     tcase_add_test(tests, planes_of_bytes_are_compressed_each_by_itself);
     tcase_add_test(tests, chunks_come_back_from_every_pipeline);
+    tcase_add_test(empty, nothing_can_be_summed_up);
     tcase_add_test(tests, codings_return_every_bit_pattern);
     suite_add_tcase(suite, tests);
+    suite_add_tcase(suite, empty);
     return suite;
 }

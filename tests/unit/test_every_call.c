@@ -215,7 +215,10 @@ START_TEST(a_call_leaves_nothing)
 }
 END_TEST
 
-enum { MEMORY = FAULT_MALLOC | FAULT_MMAP | FAULT_THREAD };
+enum {
+    MEMORY = FAULT_MALLOC | FAULT_MMAP | FAULT_THREAD,
+    IN_PART = FAULT_SHORT_READ | FAULT_SHORT_WRITE /* no failures: all goes on */
+};
 
 /* What fails: the n-th call of these kinds, or all from it on. True: there are more than that. */
 static bool call_with_failure(const every_call *c, every_call_env *e, unsigned kinds, uint64_t n,
@@ -228,6 +231,8 @@ static bool call_with_failure(const every_call *c, every_call_env *e, unsigned k
     ebpo_status status = c->call(e);
     bool more = faults_end() >= n;
     ck_assert_msg(more || status == EBPO_OK, "%s: %s", c->name, error.message);
+    ck_assert_msg(status == EBPO_OK || !(kinds & IN_PART), "%s: %#x, %llu: %s", c->name, kinds,
+                  number, error.message);
     ck_assert_msg(status == EBPO_OK || error.message[0], "%s: %#x, %llu: no message", c->name,
                   kinds, number);
     ck_assert_msg(status != EBPO_E_FORMAT, "%s: %#x, %llu: called damaged: %s", c->name, kinds,
@@ -263,6 +268,19 @@ START_TEST(a_call_survives_any_file_that_fails)
                                       FAULT_RENAME, FAULT_TRUNCATE, FAULT_OPEN };
     for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++)
         survive(_i, false, kinds[k]);
+}
+END_TEST
+
+/* All that is read or written comes and goes in halves. */
+START_TEST(a_call_goes_on_with_what_comes_in_part)
+{
+    every_call_env e;
+    begin(&e, false);
+    (void)call_with_failure(call_number(_i), &e, FAULT_SHORT_READ, 1, true);
+    (void)call_with_failure(call_number(_i), &e, FAULT_SHORT_WRITE, 1, true);
+    finish(&e);
+    survive(_i, false, FAULT_CLOSE);
+    survive(_i, false, FAULT_ALLOCATE);
 }
 END_TEST
 
@@ -337,7 +355,8 @@ Suite *test_suite(void)
 {
     enum { SECONDS = 600 };
     Suite *suite = suite_create("every_call");
-    TCase *all = tcase_create("all"), *failing = tcase_create("failing");
+    TCase *all = tcase_create("all"), *failing = tcase_create("failing"),
+          *in_part = tcase_create("in_part");
     tcase_set_timeout(all, SECONDS);
     tcase_add_unchecked_fixture(all, write_large, remove_all);
     tcase_add_loop_test(all, a_call_leaves_nothing, 0, 2 * call_count());
@@ -346,6 +365,10 @@ Suite *test_suite(void)
     tcase_add_unchecked_fixture(failing, write_small, remove_all);
     tcase_add_loop_test(failing, a_call_survives_any_allocation_that_fails, 0, 2 * call_count());
     tcase_add_loop_test(failing, a_call_survives_any_file_that_fails, 0, call_count());
+    tcase_set_timeout(in_part, SECONDS);
+    tcase_add_unchecked_fixture(in_part, write_small, remove_all);
+    tcase_add_loop_test(in_part, a_call_goes_on_with_what_comes_in_part, 0, call_count());
+    suite_add_tcase(suite, in_part);
     tcase_add_loop_test(failing, a_weld_that_fails_changes_nothing, 0, 4);
     suite_add_tcase(suite, failing);
     return suite;

@@ -40,6 +40,7 @@ typedef struct job {
     const char *scheduling;
     touch_times empty, times;
     ebpo_touch_stats stats;
+    ebpo_error stopped; /* EBPO_OK, or what has ended loading */
     ebpo_model_stats memory;
 } job;
 
@@ -88,6 +89,8 @@ static void print_report(const job *j)
            (unsigned long long)s->loads, (unsigned long long)s->taken,
            (unsigned long long)s->too_many, s->load_seconds, s->load_seconds_most,
            (unsigned long long)s->memory);
+    if (j->stopped.status != EBPO_OK)
+        printf("  loading has stopped: so it was in %llu ticks\n", (unsigned long long)s->stopped);
     printf("  model: %llu bytes at most, %llu subtrees loaded\n",
            (unsigned long long)j->memory.memory_peak, (unsigned long long)j->memory.loads);
     print_bins(&j->times);
@@ -145,6 +148,9 @@ static void json_report(const job *j)
     json_uint(&out, "box_bytes", s->memory);
     json_uint(&out, "model_bytes_most", j->memory.memory_peak);
     json_uint(&out, "subtrees_loaded", j->memory.loads);
+    json_uint(&out, "stopped", s->stopped);
+    if (j->stopped.status != EBPO_OK)
+        json_text(&out, "failure", j->stopped.message);
     json_finish(&out);
 }
 
@@ -288,7 +294,8 @@ static ebpo_status play(job *j, ebpo_error *error)
         return no_memory(error, "the times of ticks");
     ebpo_touch_get_stats(j->touch, &j->stats);
     ebpo_model_get_stats(j->model, &j->memory);
-    return ebpo_touch_check(j->touch, error);
+    j->stopped.status = ebpo_touch_check(j->touch, &j->stopped);
+    return EBPO_OK;
 }
 
 /* As --path reads it: each number to the last bit. */
@@ -333,7 +340,7 @@ static int run_job(job *j, uint64_t memory)
         json_report(j);
     else
         print_report(j);
-    return EXIT_FINE;
+    return j->stopped.status == EBPO_OK ? EXIT_FINE : command_failed("touch", &j->stopped);
 }
 
 /* 0: nothing is wrong with them. */

@@ -25,7 +25,8 @@
  * A tick works on what is in memory: the faces in a box around the hand, at most so many. A thread
  * of the object's own loads the next box ahead of the hand and hands it over by one atomic
  * exchange. A tick takes no lock, no memory and reads no file. Where the hand leaves the box before
- * the next one is there, the proxy waits at its wall (EBPO_TOUCH_WAITS): early, never late.
+ * the next one is there, the proxy waits at its wall (EBPO_TOUCH_WAITS): early, never late. If none
+ * will come, as reading failed or too many faces are around, that is told (EBPO_TOUCH_STOPPED).
  *
  * Sources of the methods: EBP 2017, section 4.5; Zilles and Salisbury 1995 (god-object); Ruspini,
  * Kolarov and Khatib 1997 (proxy of a size).
@@ -151,7 +152,11 @@ typedef enum ebpo_touch_flag {
     EBPO_TOUCH_OTHER = 32,
 
     /* Of ebpo_touch_sense: the distance is known to rounding. */
-    EBPO_TOUCH_CLOSE = 64
+    EBPO_TOUCH_CLOSE = 64,
+
+    /* Nothing more is loaded, for good: ebpo_touch_check tells why. The hand goes on in what is
+     * there, and waits at its wall. From the tick on that comes after the failure. */
+    EBPO_TOUCH_STOPPED = 128
 } ebpo_touch_flag;
 
 typedef struct ebpo_touch_result {
@@ -333,8 +338,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_touch_place(ebpo_touch *touch, const dou
                                                     ebpo_error *error);
 
 /*
- * What has kept the thread from loading: it has stopped, and the hand stays in what is there. Takes
- * a lock: not for a tick.
+ * What has kept the thread from loading: it has stopped, and the hand stays in what is there. Ticks
+ * tell that it has by EBPO_TOUCH_STOPPED. Takes a lock: not for a tick.
  *
  * EBPO_OK; else the errors of reading, EBPO_E_LIMIT, EBPO_E_MEMORY.
  *
@@ -366,6 +371,9 @@ typedef struct ebpo_touch_stats {
 
     /* Seconds that loading took in all, and one box at most. */
     double load_seconds, load_seconds_most;
+
+    /* Ticks with EBPO_TOUCH_STOPPED. */
+    uint64_t stopped;
 } ebpo_touch_stats;
 
 #define EBPO_TOUCH_STATS_INIT EBPO_SIZED(ebpo_touch_stats)

@@ -9,6 +9,8 @@ import numpy as np
 from . import _declared as c
 from ._library import Handle, call, lib, made
 
+_STOPPED = 128 # EBPO_TOUCH_STOPPED
+
 
 class Touched(NamedTuple):
     """What a tick tells of a ball or a tool; see ebpo/touch.h. face: -1 if none is near."""
@@ -22,6 +24,11 @@ class Touched(NamedTuple):
     face: int
     flags: int
 
+    @property
+    def stopped(self) -> bool:
+        """No more faces will be loaded: `Touch.check` raises why."""
+        return bool(self.flags & _STOPPED)
+
 
 class Sensed(NamedTuple):
     """What a tick tells of a probe: the distance (NaN if only its bounds are known), from lo to hi."""
@@ -33,6 +40,11 @@ class Sensed(NamedTuple):
     face: int
     where: int
     flags: int
+
+    @property
+    def stopped(self) -> bool:
+        """No more faces will be loaded: `Touch.check` raises why."""
+        return bool(self.flags & _STOPPED)
 
 
 def _vector(values: Any, count: int) -> Any:
@@ -50,14 +62,15 @@ class Touch:
     """A hand at `place`: a ball of `radius`, or with `points` (n, 3) a tool, or with `probe` a point that
     nothing stops. Other options are those of ebpo_touch_options. One thread at a time.
 
-    Loading goes on beside it; where `flags` has EBPO_TOUCH_WAITS (2), the hand is ahead of that.
+    Loading goes on beside it; where `flags` has EBPO_TOUCH_WAITS (2), the hand is ahead of that; where
+    a tick is `stopped`, no more will come.
 
     >>> hand = Touch(cube, [.5, .5, 2], radius=.1, stiffness=100, damping=0)
     >>> for step in range(200):
     ...     felt = hand.move([.5, .5, 2 - .006 * step])
     >>> hand.check()
-    >>> bool(felt.proxy[2] > 1.0999)
-    True
+    >>> bool(felt.proxy[2] > 1.0999), felt.stopped
+    (True, False)
     """
 
     def __init__(self, model: Any, place: Any, *, points: Any = None, probe: bool = False, **options: Any) -> None:
