@@ -202,7 +202,7 @@ class Catalogue:
             return bool(model.stats["resident"])
 
     def locate(self, points: Any, *, memory: int | str | None = None, threads: int | None = None) -> np.ndarray:
-        """Where points are: (n,) structured, `where` as of `Model.locate`, `winding` the sum.
+        """Where points are: a structured array (n,), `where` as of `Model.locate`, `winding` the sum.
 
         Of parts, exactly what the whole would say, also on caps. Of others, `where` is IN where any says so,
         else ON where any does; a model adds 0 to the sum at points on its faces.
@@ -287,7 +287,9 @@ class Catalogue:
 
     def distance(self, points: Any, *, max_distance: float = float("inf"), signed: bool = True,
                  memory: int | str | None = None, threads: int | None = None) -> np.ndarray:
-        """The nearest face of any model: (n,) structured as `Model.distance`, with `model`, its number here.
+        """The nearest face of any model: a structured array (n,), `["distance"]` and so on.
+
+        Its fields are those of `Model.distance`, and `model`, the number here.
 
         Negative inside (`inside`; not of catalogues in which there is a surface). Of models at the same
         rounded distance the first is taken.
@@ -336,7 +338,7 @@ class Catalogue:
 
     def ray(self, origins: Any, directions: Any, *, t_max: float = float("inf"), memory: int | str | None = None,
             threads: int | None = None) -> np.ndarray:
-        """The first face that each ray meets: (n,) structured as `Model.ray`, with `model`."""
+        """The first face that each ray meets: a structured array (n,), the fields of `Model.ray`, and `model`."""
         held = ours(memory)
         o, d = Rows(origins, "origins"), Rows(directions, "directions")
         count = d.count if o.single else o.count
