@@ -5,6 +5,7 @@
 set -eu
 arch=$1 tests=$2 failed=
 export EBPO_VECTORS=/ebpo/format-spec/vectors EBPO_TEST_SCALE="${EBPO_TEST_SCALE:-0.02}"
+export CK_TIMEOUT_MULTIPLIER=20 # qemu takes its time
 qemu='' cross=''
 case $arch in
 s390x) triplet=s390x-linux-gnu qemu=qemu-s390x-static family=s390x endian=big ;;
@@ -62,7 +63,8 @@ fi
     tail /build.log
     exit 1
 }
-units="dialects ply head container predicates face_gates chunk_sums source import number slice wide"
+units="dialects ply head container predicates face_gates chunk_sums source import number slice wide
+    far_offsets"
 programs="tools/ebpo samples/ebpo-generate tests/vectors/make_vectors tests/vectors/test_vectors \
     tests/flags/fp_hash_usual tests/flags/predicates_hash_small"
 targets=$(ninja -C /build -t targets all | sed -n 's/: c_LINKER$//p')
