@@ -96,7 +96,7 @@ START_TEST(ply_elements_behind_4_gib_are_read)
     char wanted[64];
     snprintf(wanted, sizeof wanted, "byte %llu:", (unsigned long long)size - 4);
     ck_assert_msg(strstr(error.message, wanted) != NULL, "%s lacks %s", error.message, wanted);
-    munmap(data, skipped + 4096);
+    munmap(data, (size_t)(skipped + 4096));
 }
 END_TEST
 
@@ -116,7 +116,7 @@ static ebpo_status claims(const char *vertices, const char *faces, uint64_t size
     ebpo_status status = ebpo_ply_parse_memory(&mesh, data, size ? size : (uint64_t)header + 40,
                                                "huge.ply", NULL, 0, NULL, error);
     ck_assert_ptr_null(mesh.faces);
-    munmap(data, room);
+    munmap(data, (size_t)(room));
     return status;
 }
 
@@ -168,7 +168,7 @@ START_TEST(stl_corners_beyond_the_limit_are_refused_before_anything_is_allocated
                                         &error),
                      EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "split") != NULL, "%s", error.message);
-    munmap(data, size);
+    munmap(data, (size_t)size);
 }
 END_TEST
 
@@ -491,7 +491,7 @@ START_TEST(references_beyond_2_to_the_32_are_encoded_where_they_are)
     free(first);
     free(news);
     free(counts);
-    munmap(refs, (before + ROWS) * sizeof *refs);
+    munmap(refs, (size_t)((before + ROWS) * sizeof *refs));
 }
 END_TEST
 
