@@ -38,9 +38,8 @@ plan() { # build
     esac
 }
 
-# Publishing, temporary files, sources, sorting, threads, wide integers, the clock of a hand.
-without_linux="io workspace source far_offsets import number number_text predicates wide vectors
-    many_threads touch_hand touch_probe cli_files cli_touch cli_export cli_scene"
+# Publishing, temporary files, sources of bytes.
+without_linux="io workspace source"
 
 jobs=$(nproc)
 configure() { # build, meson options...

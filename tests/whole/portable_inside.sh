@@ -94,7 +94,7 @@ for unit in $chosen; do check "${unit##*/}" "bin/${unit##*/}"; done
 check golden python3 /ebpo/tests/whole/golden.py bin/ebpo bin/ebpo-generate \
     /ebpo/tests/whole/golden.json
 
-# The same file, whole, on all machines.
+# The same mesh on all machines, converted and brought back.
 for selection in greedy leaf-planes; do
     bin/ebpo-generate --base torus --faces 30000 --seed 7 torus.ply
     case $selection in
@@ -107,6 +107,7 @@ done
 check extract bin/ebpo extract --mesh greedy.ebpo.h5 back.ply
 check same-mesh cmp torus.ply back.ply
 bin/predicates_hash_small >predicates.txt
-sha256sum predicates.txt torus.ply ./*.ebpo.h5 >sums
+# Not of the .ebpo.h5: zstd has other bytes on machines of 32 bits and on big-endian ones.
+sha256sum predicates.txt torus.ply back.ply >sums
 cat sums
 [ -z "$failed" ] || exit 1
