@@ -215,8 +215,8 @@ START_TEST(lists_longer_than_arrays_may_be_are_refused)
         uint8_t *stored = NULL, none = 0;
         size_t bytes = 0;
         const char *why = "";
-        ck_assert_int_eq(ebpo_long_chunk_decode(&none, 1, EBPO_PIPELINE_CHECKSUM, counts[i], &values,
-                                                &why, &error),
+        ck_assert_int_eq(ebpo_long_chunk_decode(&none, 1, EBPO_PIPELINE_CHECKSUM, counts[i],
+                                                &values, &why, &error),
                          EBPO_E_MEMORY);
         ck_assert_ptr_null(values);
         ck_assert_int_eq(ebpo_long_chunk_encode(NULL, counts[i], EBPO_PIPELINE_CHECKSUM, 0, &stored,
