@@ -2,16 +2,21 @@
 # The tests, in three tiers. Each installs what it needs, builds (warnings are errors) and tests:
 #   tests/run.sh           medium, what CI runs: gcc, clang, sanitize, thread, memory (< 1 h)
 #   tests/run.sh short     gcc alone, few inputs and nothing costly: while one works
-#   tests/run.sh long      every check in every build, all inputs with gcc: before a release
+#   tests/run.sh long      every check in every build, all inputs with gcc; posix: before a release
 #   tests/run.sh [TIER] BUILD...    only these of its builds; sanitize: address and undefined;
-#                          memory: fuzz targets alone, whose corpora MemorySanitizer looks at
+#                          memory: fuzz targets alone, whose corpora MemorySanitizer looks at;
+#                          posix: without what Linux has beyond POSIX, the tests of what serves then
 # What a tier leaves out is in the table below, nowhere else. Needs no model files; with
 # ../shared/models or $EBPO_MODELS the real ones are tested too.
 set -eu
 cd "$(dirname "$0")/.."
 tier=medium
 case "${1:-}" in short | medium | long) tier=$1 && shift ;; esac
-[ $# -gt 0 ] || case $tier in short) set -- gcc ;; *) set -- gcc clang sanitize thread memory ;; esac
+[ $# -gt 0 ] || case $tier in
+short) set -- gcc ;;
+medium) set -- gcc clang sanitize thread memory ;;
+long) set -- gcc clang sanitize thread memory posix ;;
+esac
 
 # The share of repeated inputs (EBPO_TEST_SCALE), and the suites that are left out:
 #   once     not compiled: one build is enough
@@ -29,8 +34,12 @@ plan() { # build
     long-sanitize) echo "0.2" ;;
     *-thread) echo "1" ;; # only the suite threads, all of it
     *-memory) echo "1" ;; # only the suite fuzz
+    *-posix) echo "0.1" ;; # only the tests that are named below
     esac
 }
+
+# Publishing, temporary files, sources of bytes.
+without_linux="io workspace source"
 
 jobs=$(nproc)
 configure() { # build, meson options...
@@ -48,6 +57,7 @@ run() { # build
     gcc | clang) CC=$1 configure "$1" ;;
     sanitize) CC=gcc configure "$1" $(sanitized address,undefined) ;;
     thread) CC=gcc configure "$1" $(sanitized thread) ;;
+    posix) CC=gcc configure "$1" -Dposix_only=true ;;
     # without what is not instrumented, as far as that goes; msan_outside.c tells of the rest
     memory)
         CC=clang configure "$1" $(sanitized memory) -Dtests=disabled -Dfuzzing=true \
@@ -62,6 +72,7 @@ EOF
     case $1 in
     thread) suites="--suite threads" ;;
     memory) suites="--suite fuzz" ;;
+    posix) suites=$without_linux ;;
     esac
     for suite in $left_out; do suites="$suites --no-suite $suite"; done
     # Everything where everything is tested; else meson builds what the chosen tests need.
@@ -75,8 +86,12 @@ EOF
 
 for build in "$@"; do
     case $build in
-    gcc | clang | sanitize | thread | memory) ;;
-    *) echo "usage: tests/run.sh [short|medium|long] [gcc] [clang] [sanitize] [thread] [memory]" >&2; exit 2 ;;
+    gcc | clang | sanitize | thread | memory | posix) ;;
+    *)
+        echo "usage: tests/run.sh [short|medium|long]" \
+            "[gcc] [clang] [sanitize] [thread] [memory] [posix]" >&2
+        exit 2
+        ;;
     esac
 done
 sh tools/install-deps.sh --tests

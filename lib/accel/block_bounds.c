@@ -432,11 +432,15 @@ static ebpo_status make_room(job *j, ebpo_error *error)
 {
     uint64_t count = j->layout->bound_count;
     ebpo_accel *s = j->s;
-    s->bound = aligned_alloc(64, (count + 1) * sizeof *s->bound);
-    s->slab = aligned_alloc(64, (count + 1) * sizeof *s->slab);
+    if (count >= PTRDIFF_MAX / (sizeof *s->bound + sizeof *s->slab))
+        return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->slab));
+    size_t bounds = (size_t)(count + 1) * sizeof *s->bound,
+           slabs = (size_t)(count + 1) * sizeof *s->slab;
+    s->bound = aligned_alloc(64, bounds);
+    s->slab = aligned_alloc(64, slabs);
     j->of_block = ebpo_alloc(j->layout->block_count, sizeof *j->of_block);
-    ebpo_prefer_huge_pages(s->bound, (count + 1) * sizeof *s->bound);
-    ebpo_prefer_huge_pages(s->slab, (count + 1) * sizeof *s->slab);
+    ebpo_prefer_huge_pages(s->bound, bounds);
+    ebpo_prefer_huge_pages(s->slab, slabs);
     j->of_node = ebpo_alloc(count, sizeof *j->of_node);
     if (s->bound && s->slab && j->of_block && j->of_node)
         return EBPO_OK;

@@ -170,10 +170,12 @@ static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned wo
 static ebpo_status make_room(ebpo_accel *s, ebpo_error *error)
 {
     uint64_t bytes = s->units * EBPO_MESHLET_UNIT;
-    s->meshlets = aligned_alloc(EBPO_MESHLET_UNIT, bytes + EBPO_MESHLET_UNIT);
+    if (bytes > PTRDIFF_MAX - EBPO_MESHLET_UNIT)
+        return ebpo_fail_memory(error, bytes);
+    s->meshlets = aligned_alloc(EBPO_MESHLET_UNIT, (size_t)bytes + EBPO_MESHLET_UNIT);
     if (!s->meshlets)
         return ebpo_fail_memory(error, bytes);
-    ebpo_prefer_huge_pages(s->meshlets, bytes);
+    ebpo_prefer_huge_pages(s->meshlets, (size_t)bytes);
     memset(s->meshlets + bytes, 0, EBPO_MESHLET_UNIT);
     return EBPO_OK;
 }

@@ -38,9 +38,10 @@ static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
 {
     uint64_t size = (uint64_t)FIRST_PAGE << k->pages, left = k->rows_most - k->rows;
     size = size < left ? size : left;
-    if (size < least || k->pages == EBPO_KIND_PAGES)
+    if (size < least || k->pages == EBPO_KIND_PAGES ||
+        size > (PTRDIFF_MAX - PAGE_BYTES) / sizeof **k->page)
         return false;
-    size_t bytes = (size * sizeof **k->page + PAGE_BYTES - 1) / PAGE_BYTES * PAGE_BYTES;
+    size_t bytes = ((size_t)size * sizeof **k->page + PAGE_BYTES - 1) / PAGE_BYTES * PAGE_BYTES;
     k->page[k->pages] = aligned_alloc(PAGE_BYTES, bytes);
     if (!k->page[k->pages])
         return false;

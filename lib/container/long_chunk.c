@@ -6,6 +6,9 @@
 #include "base/endian.h"
 #include "base/error.h"
 
+/* Its bytes are three times in memory, coded and plain. */
+static const uint64_t LONGEST = PTRDIFF_MAX / 8 / 3;
+
 /* The elements' size as the pipeline sees it: the coder's scratch is too small for shuffling a long
  * list, which is done here. */
 static bool shuffled(ebpo_pipeline pipeline)
@@ -17,7 +20,10 @@ ebpo_status ebpo_long_chunk_encode(const uint64_t *values, uint64_t count, ebpo_
                                    int codec_level, uint8_t **stored, size_t *bytes,
                                    ebpo_error *error)
 {
-    size_t size = count * 8;
+    *stored = NULL;
+    if (count > LONGEST)
+        return ebpo_fail_memory(error, count * 8);
+    size_t size = (size_t)count * 8;
     ebpo_chunk_coder *coder = ebpo_alloc_zero(1, sizeof *coder);
     uint8_t *raw = ebpo_alloc(size, 1), *turned = ebpo_alloc(size, 1);
     *stored = ebpo_alloc(ebpo_chunk_bound(size), 1);
@@ -45,7 +51,10 @@ ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t stored_bytes,
                                    ebpo_pipeline pipeline, uint64_t count, uint64_t **values,
                                    const char **why, ebpo_error *error)
 {
-    size_t size = count * 8;
+    *values = NULL;
+    if (count > LONGEST)
+        return ebpo_fail_memory(error, count * 8);
+    size_t size = (size_t)count * 8;
     ebpo_chunk_coder *coder = ebpo_alloc_zero(1, sizeof *coder);
     uint8_t *raw = ebpo_alloc(size, 1), *turned = ebpo_alloc(size, 1);
     *values = ebpo_alloc(count, sizeof **values);

@@ -2,6 +2,8 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -102,6 +104,11 @@ ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspac
     file->data = (const uint8_t *)"";
     if (file->size == 0)
         return EBPO_OK;
+    if (file->size > PTRDIFF_MAX)
+        return ebpo_fail_file(error, EBPO_E_LIMIT, path,
+                              "has %" PRIu64 " bytes, more than a program of %d bits can hold in "
+                              "one piece; read it with one of 64 bits",
+                              file->size, (int)sizeof(size_t) * CHAR_BIT);
     file->workspace = workspace;
     file->buffer = ebpo_array_alloc(workspace, file->size, 1);
     if (!file->buffer)

@@ -36,7 +36,8 @@ EBPO_MUST_USE ebpo_status ebpo_whole_file_take(ebpo_whole_file *out, int fd, con
 
 /* Reads all bytes, into an array of `workspace` (NULL: into memory) that is freed with the file;
  * `data` is not NULL then. Stage "reading" of `progress`, which may be NULL. EBPO_E_IO when the
- * file has become shorter. */
+ * file has become shorter; EBPO_E_LIMIT when it is longer than an array may be, which on machines
+ * of 32 bits is 2 GiB. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspace,
                                                unsigned threads, const ebpo_progress *progress,
                                                const char *path, ebpo_error *error);

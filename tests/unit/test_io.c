@@ -190,6 +190,9 @@ START_TEST(replaced_output_keeps_extended_attributes_and_mode)
     ck_assert(ebpo_publish_commit(&out, NULL) == EBPO_OK);
     check_content(target, "new");
     ck_assert(stat(target, &st) == 0 && (st.st_mode & 07777) == 0604);
+#ifndef EBPO_HAVE_XATTR
+    has = false; /* nor do all systems: then they are lost */
+#endif
     ck_assert(!has || (getxattr(target, "user.ebpo", value, sizeof value) == 4 &&
                        memcmp(value, "kept", 4) == 0));
 }

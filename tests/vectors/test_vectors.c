@@ -124,7 +124,8 @@ static void check_made(const char *folder)
 }
 
 /* Compressors may change their output from version to version, and zstd has another one where bytes
- * stand the other way round: bytes are compared only where the vectors were made. */
+ * stand the other way round or addresses have 32 bits: bytes are compared only where the vectors
+ * were made. */
 START_TEST(vectors_are_what_make_vectors_makes)
 {
     unsigned major, minor, release;
@@ -132,15 +133,15 @@ START_TEST(vectors_are_what_make_vectors_makes)
     if (ZSTD_versionNumber() != 10504 || strcmp(zlibVersion(), "1.2.13") != 0 || major != 1 ||
         minor != 10 || release != 8)
         return;
-    bool little = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
-    const char *how = little ? "-r" : "-r -x '*.ebpo.h5'", *folder = scratch(NULL);
+    bool here = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ && sizeof(size_t) == 8;
+    const char *how = here ? "-r" : "-r -x '*.ebpo.h5'", *folder = scratch(NULL);
     char command[4096];
     snprintf(command, sizeof command,
              "'%s' %s 2>/dev/null && diff %s %s/passed '%s/passed' && diff %s %s/failed "
              "'%s/failed'",
              maker, folder, how, folder, vectors, how, folder, vectors);
     ck_assert_int_eq(system(command), 0);
-    if (!little)
+    if (!here)
         check_made(folder);
 }
 END_TEST
