@@ -632,8 +632,8 @@ async function embeds(browser, address) {
   const scene = { ebpo_scene: '1.0', models: { red: { file: `${address}models/red.ebpo.h5`, content_sha256: info.content_sha256 } }, routes: { up: { keys: [{ time: 0, pose: {} },
     { time: 2, pose: { translation: [0, 0, 4] } }] } }, instances: [{ name: 'a', model: 'red' }, { name: 'b', model: 'red', route: 'up' }] };
   const server = createHttp((question, answer) => {
-    const file = { '/': ['text/html', html], '/main.js': ['text/javascript', main.text], '/pair.scene.json': ['application/json', JSON.stringify(scene)], '/worker.js': ['text/javascript', readFileSync(join(own,
-      'worker.js'))] }[question.url] ?? ['image/x-icon', ''];
+    const file = { '/': ['text/html', html], '/main.js': ['text/javascript', main.text], '/pair.scene.json': ['application/json', JSON.stringify(scene)],
+      '/worker.js': ['text/javascript', readFileSync(join(own, 'worker.js'))] }[question.url] ?? ['image/x-icon', ''];
     answer.writeHead(200, { 'content-type': file[0] });
     answer.end(file[1]);
   });

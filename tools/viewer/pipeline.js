@@ -46,6 +46,7 @@ const FRAGMENT = `
     gl_FragColor *= c.a; // the page's background shows through
   }`;
 const STRENGTH = 9;
+const UNIFORMS = ['picture', 'depths', 'paint', 'size', 'nearFar', 'strength', 'plain', 'painted', 'ambient', 'surrounded'];
 
 export class Pipeline {
   /** `kit`: of scene.js. */
@@ -53,8 +54,8 @@ export class Pipeline {
     this.kit = kit;
     this.dome = this.surroundings = false; // what is asked for: shading by depth, ambient occlusion
     this.layers = undefined; // { render(renderer, camera, depths, size) -> texture or undefined }
-    this.material = new kit.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, depthTest: false, depthWrite: false, transparent: true, blending: 0, premultipliedAlpha: true,
-      defines: { RADIUS: '1.6' }, uniforms: Object.fromEntries(['picture', 'depths', 'paint', 'size', 'nearFar', 'strength', 'plain', 'painted', 'ambient', 'surrounded'].map((name) => [name, { value: null }])) });
+    this.material = new kit.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, depthTest: false, depthWrite: false, transparent: true, blending: 0,
+      premultipliedAlpha: true, defines: { RADIUS: '1.6' }, uniforms: Object.fromEntries(UNIFORMS.map((name) => [name, { value: null }])) });
     this.last = this.#over(this.material);
     this.ambient = new Ambient(kit, (material) => this.#over(material));
   }
