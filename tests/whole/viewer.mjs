@@ -819,6 +819,12 @@ async function together(browser, address) {
     stats.requests]; }), [1, 3, 36, 1]);
   await scene.locator('#time').fill('500');
   await scene.waitForFunction(() => location.search.includes('time=2.000'));
+  const left = await scene.evaluate(() => { // what ends leaves nothing on the graphics card, and no worker
+    const { scene: { renderer: { info: { memory } } }, together: { assembly } } = window.ebpoViewer, tiles = assembly.meshes.length, before = memory.geometries;
+    assembly.end();
+    return [tiles > 0, before - memory.geometries - tiles, assembly.crew.workers.length, assembly.group.parent];
+  });
+  assert.deepEqual(left, [true, 0, 0, null]);
   await scene.close();
   const wrong = await show(browser, `${address}?scene=models/index.json`);
   await wrong.waitForSelector('#error', { state: 'visible' });
