@@ -696,6 +696,8 @@ async function embedsSeveral(page, address) {
   await many.evaluate((e) => e.setAttribute('remote', ''));
   await heard('load', 3);
   assert.deepEqual(await many.evaluate(async (e) => [e.info.to, e.info.models.map((m) => m.name), (await e.ask([0.5, 0.5, 5], 'b')).distance]), [2, ['red'], 2]);
+  await many.evaluate((e) => e.firstElementChild.setAttribute('pose', '0,0,90')); // of a part, where a scene is shown
+  assert.deepEqual(await many.evaluate(async (e) => (await e.ask([0.5, 0.5, 2], 'a')).nearest), [0.5, 0.5, 1]);
   await many.evaluate((e) => {
     e.removeAttribute('scene');
     e.replaceChildren();
