@@ -19,7 +19,7 @@ if (!chromium || !nginx || !existsSync(join(viewer, 'node_modules/playwright-cor
 const load = (path) => import(pathToFileURL(join(viewer, path)));
 const { chromium: playwright } = await load('node_modules/playwright-core/index.mjs');
 const { openEbpo } = await load('reader/index.js');
-const { cutFaces, measureOf } = await load('answers.js'), { readPaint } = await load('paint/paint_file.js');
+const { cutFaces, measureOf } = await load('answers.js'), { plates } = await load('test/plates.js'), { readPaint } = await load('paint/paint_file.js');
 
 const work = mkdtempSync(join(tmpdir(), 'ebpo-viewer-')), models = join(work, 'models'), log = join(work, 'access.log'), model = join(models, 'ring.ebpo.h5');
 const run = (program, args, input, env) => execFileSync(program, args, { encoding: 'utf8', input, env, stdio: ['pipe', 'pipe', 'pipe'], maxBuffer: 1 << 26 });
@@ -41,6 +41,12 @@ function makeModels() {
   const damaged = Buffer.from(readFileSync(model));
   damaged[damaged.length >> 1] ^= 1;
   writeFileSync(join(models, 'damaged.ebpo.h5'), damaged);
+  const at = (name) => join(models, name);
+  plates(join(work, 'plates.ply'));
+  run(ebpo, ['convert', '-q', join(work, 'plates.ply'), at('plates.ebpo.h5')]);
+  run(ebpo, ['paint', at('plates.paint.h5'), at('plates.ebpo.h5'), '--new-layer', 'x', '--colour', 'ff0000', '--path', '-', '--radius', '0.4'], '-0.2 0.5 0.05\n');
+  writeFileSync(at('move.scene.json'), JSON.stringify({ ebpo_scene: '1.0', title: 'Moving', models: { red: { file: 'red.ebpo.h5' } }, routes: { up: { keys: [{ time: 0, pose: {} },
+    { time: 4, pose: { translation: [0, 0, 8] } }] } }, instances: [0, 3, 6].map((x) => ({ name: `cube ${x}`, model: 'red', pose: { translation: [x, 0, 0] }, ...(x === 3 && { route: 'up' }) })) }));
 }
 
 async function serve(...options) {
@@ -626,8 +632,8 @@ async function embeds(browser, address) {
   const scene = { ebpo_scene: '1.0', models: { red: { file: `${address}models/red.ebpo.h5`, content_sha256: info.content_sha256 } }, routes: { up: { keys: [{ time: 0, pose: {} },
     { time: 2, pose: { translation: [0, 0, 4] } }] } }, instances: [{ name: 'a', model: 'red' }, { name: 'b', model: 'red', route: 'up' }] };
   const server = createHttp((question, answer) => {
-    const file = { '/': ['text/html', html], '/main.js': ['text/javascript', main.text], '/pair.scene.json': ['application/json', JSON.stringify(scene)], '/worker.js': ['text/javascript', readFileSync(join(own,
-      'worker.js'))] }[question.url] ?? ['image/x-icon', ''];
+    const file = { '/': ['text/html', html], '/main.js': ['text/javascript', main.text], '/pair.scene.json': ['application/json', JSON.stringify(scene)],
+      '/worker.js': ['text/javascript', readFileSync(join(own, 'worker.js'))] }[question.url] ?? ['image/x-icon', ''];
     answer.writeHead(200, { 'content-type': file[0] });
     answer.end(file[1]);
   });
@@ -690,6 +696,8 @@ async function embedsSeveral(page, address) {
   await many.evaluate((e) => e.setAttribute('remote', ''));
   await heard('load', 3);
   assert.deepEqual(await many.evaluate(async (e) => [e.info.to, e.info.models.map((m) => m.name), (await e.ask([0.5, 0.5, 5], 'b')).distance]), [2, ['red'], 2]);
+  await many.evaluate((e) => e.firstElementChild.setAttribute('pose', '0,0,90')); // of a part, where a scene is shown
+  assert.deepEqual(await many.evaluate(async (e) => (await e.ask([0.5, 0.5, 2], 'a')).nearest), [0.5, 0.5, 1]);
   await many.evaluate((e) => {
     e.removeAttribute('scene');
     e.replaceChildren();
@@ -731,12 +739,8 @@ async function viewsAsFiles(browser, address) {
 }
 
 // Paint on one of two plates with a crack between them, whose ball meets the other: the picture has it where ebpo paint has it.
-async function paintsByReach(browser) {
-  const { plates } = await load('test/plates.js'), at = (name) => join(models, name);
-  plates(join(work, 'plates.ply'));
-  run(ebpo, ['convert', '-q', join(work, 'plates.ply'), at('plates.ebpo.h5')]);
-  run(ebpo, ['paint', at('plates.paint.h5'), at('plates.ebpo.h5'), '--new-layer', 'x', '--colour', 'ff0000', '--path', '-', '--radius', '0.4'], '-0.2 0.5 0.05\n');
-  const page = await show(browser, `${await serve()}?file=models/plates.ebpo.h5&paint=models/plates.paint.h5&view=0,0,1.6`);
+async function paintsByReach(browser, address) {
+  const page = await show(browser, `${address}?file=models/plates.ebpo.h5&paint=models/plates.paint.h5&view=0,0,1.6`);
   await settled(page);
   await page.waitForFunction(() => window.ebpoViewer.paint?.file.strokes.length === 1 && window.ebpoViewer.paint.pending === 0);
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
@@ -752,6 +756,26 @@ async function paintsByReach(browser) {
   });
   assert.ok(left > 2000, `${left} red pixels on the painted plate`);
   assert.ok(right < left / 100, `${right} red pixels on the other plate`);
+  await page.close();
+}
+
+// A step of two cubes: its inner edge is darker with ambient occlusion, what has nothing over it is not.
+async function occludes(browser, address) {
+  const page = await show(browser, `${address}?model=models/red.ebpo.h5&model=models/red.ebpo.h5&pose=0,0,0&pose=1,-0.5,0&view=50,40,2.5`);
+  await settled(page);
+  const brightness = () => page.evaluate(async (points) => {
+    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+    const { scene, together: { assembly: { scene: s } } } = window.ebpoViewer, canvas = document.getElementById('canvas'), gl = canvas.getContext('webgl2'), pixel = new Uint8Array(4);
+    return points.map((p) => {
+      const [x, y] = scene.project(p.map((q, k) => (q - s.center[k]) * s.scale)), share = gl.drawingBufferWidth / canvas.clientWidth;
+      gl.readPixels(Math.round(x * share), gl.drawingBufferHeight - Math.round(y * share), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+      return pixel[0];
+    });
+  }, [[1.03, 0.5, 0.5], [1.75, 0.5, 0.5], [0.5, 1, 0.5]]);
+  const before = await brightness();
+  await page.keyboard.press('a');
+  const after = await brightness();
+  assert.ok(before.every((x) => x > 40) && after[0] < 0.85 * before[0] && [1, 2].every((i) => Math.abs(after[i] - before[i]) <= 3), `${before} and ${after}`);
   await page.close();
 }
 
@@ -789,19 +813,22 @@ async function together(browser, address) {
   assert.deepEqual([await page.locator('#models input[type=checkbox]').nth(1).isChecked(), await page.locator('#measures li').count()], [false, 1]);
   await page.close();
 
-  writeFileSync(join(models, 'move.scene.json'), JSON.stringify({ ebpo_scene: '1.0', title: 'Moving', models: { red: { file: 'red.ebpo.h5' } }, routes: { up: { keys: [{ time: 0, pose: {} },
-    { time: 4, pose: { translation: [0, 0, 8] } }] } }, instances: [0, 3, 6].map((x) => ({ name: `cube ${x}`, model: 'red', pose: { translation: [x, 0, 0] }, ...(x === 3 && { route: 'up' }) })) }));
-  const again = await serve();
-  assert.equal((await fetch(`${again}models/move.scene.json`)).headers.get('access-control-allow-origin'), '*');
-  const scene = await show(browser, `${again}?scene=models/move.scene.json&time=1`);
+  assert.equal((await fetch(`${address}models/move.scene.json`)).headers.get('access-control-allow-origin'), '*');
+  const scene = await show(browser, `${address}?scene=models/move.scene.json&time=1`);
   await settled(scene);
   assert.deepEqual(await scene.evaluate(() => window.ebpoViewer.together.assembly.inWorld(window.ebpoViewer.together.assembly.instances[1], [0, 0, 0])), [3, 0, 2]);
   assert.deepEqual(await scene.evaluate(() => { const { models, stats } = window.ebpoViewer.together.assembly; return [models.length, models[0].shown.length, stats.triangles,
     stats.requests]; }), [1, 3, 36, 1]);
   await scene.locator('#time').fill('500');
   await scene.waitForFunction(() => location.search.includes('time=2.000'));
+  const left = await scene.evaluate(() => { // what ends leaves nothing on the graphics card, and no worker
+    const { scene: { renderer: { info: { memory } } }, together: { assembly } } = window.ebpoViewer, tiles = assembly.meshes.length, before = memory.geometries;
+    assembly.end();
+    return [tiles > 0, before - memory.geometries - tiles, assembly.crew.workers.length, assembly.group.parent];
+  });
+  assert.deepEqual(left, [true, 0, 0, null]);
   await scene.close();
-  const wrong = await show(browser, `${again}?scene=models/index.json`);
+  const wrong = await show(browser, `${address}?scene=models/index.json`);
   await wrong.waitForSelector('#error', { state: 'visible' });
   assert.match(await wrong.textContent('#errorWhat'), /index\.json: the scene: is not an object/);
   await wrong.close();
@@ -877,8 +904,9 @@ async function main() {
   await step('distances and sections are those of the faces', () => measures(browser, address));
   await step('what is painted is kept, and shown again', () => paints(browser, address));
   await step('saved views go from browser to browser as files', () => viewsAsFiles(browser, address));
-  await step('paint is seen on what hangs together with it', () => paintsByReach(browser));
+  await step('paint is seen on what hangs together with it', () => paintsByReach(browser, address));
   await step('several models and scenes are shown together', () => together(browser, address));
+  await step('ambient occlusion darkens what has something over it', () => occludes(browser, address));
   const quiet = complaints.length;
   await step('the element and the three.js object work in a page of another origin', () => embeds(browser, address));
   complaints.length = quiet; // the browser logs the 404

@@ -22,6 +22,9 @@ const STYLE = `
   #say:empty { display: none; }`;
 const STEER = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1], '+': 0.8, '=': 0.8, '-': 1.25 };
 
+// What of parts cannot change without opening them again.
+const filesOf = (parts) => JSON.stringify(parts.map(({ src, colour, name }) => [src, colour, name]));
+
 export class EbpoViewerElement extends HTMLElement {
   static observedAttributes = [...OPENS, 'view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'theme', 'walls', 'time', 'hide', 'colours'];
   /** Where worker.js is, if it does not lie beside this file. To be set before the first element is there. */
@@ -29,7 +32,7 @@ export class EbpoViewerElement extends HTMLElement {
 
   #client;   // of one model
   #several;  // in its place: several
-  #parts = ''; // as they were when they were opened
+  #parts;    // as they were when they were opened; undefined if something else is shown than the attributes and parts say
   #changes = new MutationObserver((all) => this.#partsChanged(all));
   #scene;
   #timer;
@@ -211,7 +214,6 @@ export class EbpoViewerElement extends HTMLElement {
 
   #open() {
     const parts = this.parts, src = this.getAttribute('src'), scene = this.getAttribute('scene');
-    this.#parts = JSON.stringify(parts.map(({ src: file, colour, name }) => [file, colour, name]));
     if (scene)
       this.#openSeveral(() => wanted(new URLSearchParams([['scene', scene], ...['up', 'remote'].filter((n) => this.hasAttribute(n)).map((n) => [n, this.getAttribute(n) || '1'])]),
         document.baseURI)).catch(() => {});
@@ -219,14 +221,15 @@ export class EbpoViewerElement extends HTMLElement {
       this.load(parts.length ? parts : src).catch(() => {});
     else
       this.#close();
+    this.#parts = scene ? undefined : filesOf(parts);
   }
 
   // Parts that come while the page is being read come together.
   #partsChanged(all) {
-    if (!all.some(({ type, target }) => type === 'childList' || target.localName === PART) || !this.#scene)
+    if (!all.some(({ type, target }) => type === 'childList' || target.localName === PART) || !this.#scene || this.#parts === undefined)
       return;
     const { parts } = this;
-    if (JSON.stringify(parts.map(({ src, colour, name }) => [src, colour, name])) !== this.#parts) {
+    if (filesOf(parts) !== this.#parts) {
       this.#open();
       return;
     }
@@ -287,6 +290,7 @@ export class EbpoViewerElement extends HTMLElement {
 
   /** Opens an address, a File or a Blob (`src` does so, too), or a list of parts, as `parts` has them; their `src` may be Files or Blobs. Resolves to the facts. */
   async load(what) {
+    this.#parts = undefined;
     if (Array.isArray(what))
       return this.#openSeveral(async () => ofParts(what.map((part) => ({ ...part, pose: poseFrom(part.pose) })), document.baseURI));
     this.#close();

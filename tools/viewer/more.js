@@ -1,4 +1,4 @@
-// What the page loads when the picture is there: measuring, a section box, notes, the pen, sharing, shading by depth, cube and scale.
+// What the page loads when the picture is there: measuring, a section box, notes, the pen, sharing, shading, cube and scale.
 import { addCompass } from './compass.js';
 import { addMeasuring } from './measure.js';
 import { addNotes } from './notes.js';
@@ -32,5 +32,5 @@ export async function begin(page) {
 // Keys of what has come along; keys without meaning would be worse than none.
 function addHelp() {
   $('help').querySelector('dl').insertAdjacentHTML('beforeend', `<dt><kbd>D</kbd> <kbd>N</kbd></dt><dd>measure distances, add a note</dd>
-    <dt><kbd>B</kbd> <kbd>R</kbd></dt><dd>pen, eraser; <kbd>Ctrl Z</kbd> undo</dd><dt><kbd>E</kbd> <kbd>L</kbd></dt><dd>shade by depth, share</dd>`);
+    <dt><kbd>B</kbd> <kbd>R</kbd></dt><dd>pen, eraser; <kbd>Ctrl Z</kbd> undo</dd><dt><kbd>E</kbd> <kbd>A</kbd> <kbd>L</kbd></dt><dd>shade by depth, ambient occlusion, share</dd>`);
 }

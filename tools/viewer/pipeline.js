@@ -1,4 +1,7 @@
-// A picture in two steps: the scene with its depths first, then what is made of these: shading by depth ("eye-dome lighting", Boucheny 2009), and paint.
+// A picture in two steps: the scene with its depths first, then what is made of these: shading by depth ("eye-dome lighting", Boucheny 2009), ambient
+// occlusion, and paint.
+import { Ambient, SMOOTHED } from './ambient.js';
+
 const FLOAT = 1015, HALF_FLOAT = 1016; // three.js' constants
 const SAMPLES = 4; // of a pixel; without a graphics card they would cost most of the time
 
@@ -12,11 +15,12 @@ const FRAGMENT = `
   uniform sampler2D picture, depths, paint;
   uniform vec2 size, nearFar;
   uniform float strength, plain; // of the shading; luminance of the model's plain colour
-  uniform bool painted;
+  uniform bool painted, surrounded;
   float away(vec2 at) {
     float z = texture2D(depths, at).r;
     return z >= 1.0 ? -1.0 : log2(nearFar.x * nearFar.y / (nearFar.y - z * (nearFar.y - nearFar.x)));
   }
+  ${SMOOTHED}
   vec3 light(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c)); }
   void main() {
     vec2 at = gl_FragCoord.xy / size;
@@ -36,37 +40,44 @@ const FRAGMENT = `
       }
       colour *= max(0.4, exp(-strength * behind));
     }
+    if (surrounded && here > -1.0e3 && c.a > 0.0) colour *= open(at, here);
     gl_FragColor = vec4(colour, 1.0);
     #include <colorspace_fragment>
     gl_FragColor *= c.a; // the page's background shows through
   }`;
 const STRENGTH = 9;
+const UNIFORMS = ['picture', 'depths', 'paint', 'size', 'nearFar', 'strength', 'plain', 'painted', 'ambient', 'surrounded'];
 
 export class Pipeline {
   /** `kit`: of scene.js. */
   constructor(kit) {
     this.kit = kit;
-    this.dome = false;
+    this.dome = this.surroundings = false; // what is asked for: shading by depth, ambient occlusion
     this.layers = undefined; // { render(renderer, camera, depths, size) -> texture or undefined }
-    const geometry = new kit.BufferGeometry();
-    geometry.setAttribute('position', new kit.BufferAttribute(Float32Array.of(-1, -1, 0, 3, -1, 0, -1, 3, 0), 3));
-    this.material = new kit.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, depthTest: false, depthWrite: false, transparent: true, blending: 0, premultipliedAlpha: true,
-      defines: { RADIUS: '1.6' }, uniforms: Object.fromEntries(['picture', 'depths', 'paint', 'size', 'nearFar', 'strength', 'plain', 'painted'].map((name) => [name, { value: null }])) });
-    const triangle = new kit.Mesh(geometry, this.material);
+    this.material = new kit.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, depthTest: false, depthWrite: false, transparent: true, blending: 0,
+      premultipliedAlpha: true, defines: { RADIUS: '1.6' }, uniforms: Object.fromEntries(UNIFORMS.map((name) => [name, { value: null }])) });
+    this.last = this.#over(this.material);
+    this.ambient = new Ambient(kit, (material) => this.#over(material));
+  }
+
+  // A scene of one triangle that covers the picture.
+  #over(material) {
+    const { kit } = this, scene = new kit.Scene(), geometry = (this.geometry ??= new kit.BufferGeometry().setAttribute('position',
+      new kit.BufferAttribute(Float32Array.of(-1, -1, 0, 3, -1, 0, -1, 3, 0), 3))), triangle = new kit.Mesh(geometry, material);
     triangle.frustumCulled = false;
-    this.last = new kit.Scene();
-    this.last.add(triangle);
+    return scene.add(triangle);
   }
 
   /** Whether the plain way would show the same. */
   get idle() {
-    return !this.dome && !this.layers?.any;
+    return !this.dome && !this.surroundings && !this.layers?.any;
   }
 
   resize() {
     this.target?.dispose();
     this.target?.depthTexture.dispose();
     this.target = undefined;
+    this.ambient.resize();
     this.layers?.resize();
   }
 
@@ -85,9 +96,11 @@ export class Pipeline {
     renderer.clear();
     renderer.render(scene.scene, camera);
     const paint = this.layers?.any ? this.layers.render(renderer, camera, this.target.depthTexture, size) : undefined, { uniforms } = this.material;
+    const ambient = this.surroundings ? this.ambient.render(renderer, camera, this.target.depthTexture, size) : null;
     const linear = scene.uniforms.plain.value;
     Object.entries({ picture: this.target.texture, depths: this.target.depthTexture, paint: paint ?? null, size, nearFar: new kit.Vector2(camera.near, camera.far),
-      strength: this.dome ? STRENGTH : 0, plain: 0.2126 * linear.r + 0.7152 * linear.g + 0.0722 * linear.b, painted: Boolean(paint) }).forEach(([name, value]) => (uniforms[name].value = value));
+      strength: this.dome ? STRENGTH : 0, plain: 0.2126 * linear.r + 0.7152 * linear.g + 0.0722 * linear.b, painted: Boolean(paint), ambient,
+      surrounded: this.surroundings }).forEach(([name, value]) => (uniforms[name].value = value));
     renderer.setRenderTarget(null);
     renderer.clear();
     renderer.render(this.last, camera);

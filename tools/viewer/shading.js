@@ -7,15 +7,17 @@ export const styled = () => new Promise((done) => {
   document.head.append(link);
 });
 
-/** The switch of shading by depth; `pipeline` draws it. */
+/** The switches of shading by depth and of ambient occlusion; `pipeline` draws them. */
 export function addShading(scene, pipeline) {
-  const label = document.createElement('label');
-  label.className = 'switch';
-  label.innerHTML = '<input type="checkbox" id="dome"><span>Shade by depth</span><kbd>E</kbd>';
-  $('cells').closest('label').after(label);
-  $('dome').onchange = () => {
-    pipeline.dome = $('dome').checked;
-    scene.redraw();
-  };
-  on('key', (e) => e.key.toLowerCase() === 'e' && $('dome').click());
+  let last = $('cells').closest('label');
+  for (const [id, name, key, member] of [['dome', 'Shade by depth', 'E', 'dome'], ['ambient', 'Ambient occlusion', 'A', 'surroundings']]) {
+    const label = Object.assign(document.createElement('label'), { className: 'switch', innerHTML: `<input type="checkbox" id="${id}"><span>${name}</span><kbd>${key}</kbd>` });
+    last.after(label);
+    last = label;
+    $(id).onchange = () => {
+      pipeline[member] = $(id).checked;
+      scene.redraw();
+    };
+    on('key', (e) => e.key.toUpperCase() === key && $(id).click());
+  }
 }

@@ -17,8 +17,8 @@ const OPENING_MOST = 16;                 // files at the same time; a browser as
 // Far apart in hue, neither dark nor pale: beside each other on both themes.
 export const COLOURS = ['#8fb3d9', '#e0a96d', '#8cc084', '#c792c9', '#d98c8c', '#6dbfb8', '#c9bd6a', '#a6a3dc', '#b9bfca', '#d9a0b8'];
 
-// All meshes of a model share one array of places, which the renderer frees when one of them says that it is over; the others get theirs anew.
-const freeMatrices = ({ tiles }) => tiles.byKey.values().next().value?.mesh.dispose();
+// All meshes of a model share one array of places, which the renderer frees when one that it has drawn says that it is over.
+const freeMatrices = ({ tiles }) => tiles.byKey.forEach(({ mesh }) => mesh.dispose());
 
 export class Assembly {
   /** `crew`: a Crew, if not one of its own; `news(model)` is called when something of a model changed, `failed(model, error)`, `changed()` when the picture is another. */

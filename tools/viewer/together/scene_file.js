@@ -96,7 +96,8 @@ async function routeOf(value, where, fetchText) {
   if (r.csv !== undefined)
     keys = csvKeys(await fetchText(nearPath(r.csv, `${where}.csv`)), r.csv);
   else if (r.poses !== undefined)
-    keys = list(r.poses, `${where}.poses`).map((pose, i) => ({ time: number(r.begin === undefined ? 0 : r.begin, `${where}.begin`) + i * number(r.step, `${where}.step`), pose: poseOf(pose, `${where}.poses[${i}]`) }));
+    keys = list(r.poses, `${where}.poses`).map((pose, i) => ({ time: number(r.begin === undefined ? 0 : r.begin, `${where}.begin`) + i * number(r.step, `${where}.step`),
+      pose: poseOf(pose, `${where}.poses[${i}]`) }));
   else
     keys = list(r.keys, `${where}.keys`).map((key, i) => {
       const at = `${where}.keys[${i}]`, { time, pose } = members(key, at, ['time', 'pose']);

@@ -1,0 +1,57 @@
+// The worker, with the page's side of it played here: several files in one, questions that come as soon as a file's head is there, and files that go.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+
+const listeners = [];
+globalThis.self = { addEventListener() {}, postMessage: (message) => [...listeners].forEach((listener) => listener(message)) };
+const { setInterval: usual } = globalThis;
+globalThis.setInterval = () => {}; // what is under way is not told here, and nothing keeps node from ending
+await import('../worker.js');
+globalThis.setInterval = usual;
+
+const file = new Blob([readFileSync(fileURLToPath(new URL('../../../format-spec/vectors/passed/16_many_subtrees.ebpo.h5', import.meta.url)))]);
+const tell = (data) => self.onmessage({ data });
+/** The first message that fits. */
+const heard = (fits) => new Promise((done) => listeners.push(function listener(message) {
+  if (!fits(message))
+    return;
+  listeners.splice(listeners.indexOf(listener), 1);
+  done(message);
+}));
+
+test('questions that come with the head are answered, each about its file', async () => {
+  const point = [100, 100, 100], answers = [1, 2].map((number) => heard((m) => m.file === number && m.type === 'probed' && m.done));
+  const places = heard((m) => m.file === 2 && m.type === 'places');
+  for (const number of [1, 2]) {
+    listeners.push((m) => { // at once, while the worker still waits for the first levels
+      if (m.file === number && m.type === 'opened')
+        tell({ file: number, type: 'probe', opening: 5, point });
+      if (m.file === 2 && number === 2 && m.type === 'opened')
+        tell({ file: 2, type: 'places', opening: 5, id: 9, points: [point] });
+    });
+    tell({ file: number, type: 'open', opening: 5, what: file, ahead: 1 << 16 });
+  }
+  const [one, two] = await Promise.all(answers), { id, places: [place] } = await places;
+  listeners.length = 0;
+  assert.deepEqual([one.opening, two.opening, one.where, id], [5, 5, 'out', 9]);
+  assert.equal(one.distance, two.distance);
+  assert.ok(Math.abs(place.distance - one.distance) <= 1e-12 * one.distance);
+});
+
+test('what fails of a question is told to who asked, and a file that is gone says no more', async () => {
+  const wrong = heard((m) => m.file === 1 && m.type === 'places');
+  tell({ file: 1, type: 'places', opening: 5, id: 10, points: [undefined] });
+  const { id, error } = await wrong;
+  assert.equal(id, 10);
+  assert.ok(error.message);
+  const late = [];
+  listeners.push((m) => m.file === 2 && late.push(m));
+  const going = tell({ file: 2, type: 'places', opening: 5, id: 11, points: [[0, 0, 0], [1e5, 0, 0], [0, 1e5, 0]] });
+  for (let i = 0; i < 5; i++)
+    await undefined; // it has begun
+  tell({ file: 2, type: 'end' });
+  await going;
+  assert.deepEqual(late, []);
+});
