@@ -55,7 +55,7 @@ class PointFile(NamedTuple):
                     raise FormatError(f"{path}: there is no dataset {dataset}", "EBPO_E_FORMAT", path)
                 shape = file[dataset].shape
         elif path.endswith(".npy"):
-            shape = np.load(path, mmap_mode="r", allow_pickle=False).shape
+            shape = shape_of_npy(path)
         else:
             size = os.path.getsize(path)
             if size % (8 * columns):
@@ -76,6 +76,16 @@ class PointFile(NamedTuple):
             return np.array(np.load(self.path, mmap_mode="r", allow_pickle=False)[begin:end], dtype=np.float64)
         rows = np.fromfile(self.path, np.float64, (end - begin) * self.columns, offset=begin * 8 * self.columns)
         return rows.reshape(-1, self.columns)
+
+
+def shape_of_npy(path: str) -> tuple[int, ...]:
+    try:
+        values = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        raise FormatError(f"{path}: not a whole .npy of numbers: {error}", "EBPO_E_FORMAT", path) from None
+    if values.dtype.kind not in "fiu":
+        raise FormatError(f"{path}: points are real numbers, not {values.dtype}", "EBPO_E_FORMAT", path)
+    return values.shape
 
 
 def is_hdf5(path: str, dataset: str | None) -> bool:
