@@ -42,6 +42,22 @@ static bool read_shard(query_shard *s, const char *text)
     return false;
 }
 
+/* True, said on stderr: `path` is the model, or the file of the points, which may be asked for as
+ * FILE.h5:/path. */
+static bool overwrites_input(const query_shard *s, const char *path)
+{
+    struct stat in, out;
+    const char *dataset;
+    if (command_overwrites(s->command, s->model, path))
+        return true;
+    if (!s->points || !points_file(s->points, &in, &dataset) || stat(path, &out) != 0 ||
+        in.st_dev != out.st_dev || in.st_ino != out.st_ino)
+        return false;
+    fprintf(stderr, "ebpo %s: %s: is both input and output; choose another output\n", s->command,
+            path);
+    return true;
+}
+
 bool query_shard_fits(query_shard *s, const query_job *job, const char *model, const char *asked)
 {
     const query_values *v = job->values;
@@ -65,8 +81,7 @@ bool query_shard_fits(query_shard *s, const query_job *job, const char *model, c
     else if (v->out && strcmp(v->out, "-") == 0)
         command_usage(s->command, "answers go to standard output without -o; leave it out");
     else
-        return !v->out || (!command_overwrites(s->command, model, v->out) &&
-                           !(asked && command_overwrites(s->command, asked, v->out)));
+        return !v->out || !overwrites_input(s, v->out);
     return false;
 }
 
@@ -209,6 +224,8 @@ bool query_shard_done(query_shard *s, const query_job *job, int *code)
         s->note = NULL;
         *code = command_no_memory(s->command);
     }
+    if (*code == EXIT_FINE && overwrites_input(s, s->note))
+        *code = EXIT_USAGE;
     return *code != EXIT_FINE || (!s->v->force && is_there(s));
 }
 
