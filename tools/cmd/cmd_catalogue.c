@@ -347,6 +347,26 @@ static void print_words(const catalogue *c)
 
 /* --- all of it --- */
 
+/* True, said on stderr: the catalogue would take the place of a file that it lists. `code` is then
+ * set. */
+static bool overwrites_model(const catalogue *c, int *code)
+{
+    for (size_t i = 0; i < c->files.count; i++) {
+        char *path = NULL;
+        if (asprintf(&path, "%s/%s", c->folder, c->files.path[i]) < 0) {
+            *code = command_no_memory("catalogue");
+            return true;
+        }
+        bool same = command_overwrites("catalogue", path, c->out);
+        free(path);
+        if (same) {
+            *code = EXIT_USAGE;
+            return true;
+        }
+    }
+    return false;
+}
+
 static int make(catalogue *c)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -355,7 +375,7 @@ static int make(catalogue *c)
     if (ebpo_check_output(c->out, &error) != EBPO_OK)
         return command_failed("catalogue", &error);
     int code = find_way(c);
-    if (code != EXIT_FINE)
+    if (code != EXIT_FINE || overwrites_model(c, &code))
         return code;
     if (!look_at_all(c))
         return command_no_memory("catalogue");
