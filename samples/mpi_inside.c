@@ -38,6 +38,14 @@ static int mpi_fine(int code, const char *path)
     return all_fine(code == MPI_SUCCESS, what);
 }
 
+/* The library numbers the points that it was given together. */
+static int asked_fine(ebpo_status status, MPI_Offset first, const char *message)
+{
+    char what[sizeof(ebpo_error) + 64];
+    snprintf(what, sizeof what, "of the points from number %lld on: %s", (long long)first, message);
+    return all_fine(status == EBPO_OK, what);
+}
+
 /* Points from `first` on, `count` of them: read, asked and written with those of all others. */
 static int ask_stretch(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
                        MPI_Offset first, int count, double *points, ebpo_inside_result *results,
@@ -55,7 +63,7 @@ static int ask_stretch(ebpo_context *context, MPI_File in, MPI_File out, const c
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
     ebpo_status status =
         ebpo_inside_many(context, points, (uint64_t)count, &options, results, &error);
-    if (!all_fine(status == EBPO_OK, error.message))
+    if (!asked_fine(status, first, error.message))
         return 0;
     for (int i = 0; i < count; i++) {
         answers[2 * i] = (int)results[i].where;
@@ -117,6 +125,12 @@ static int ask_files(ebpo_context *context, const char *points, const char *answ
     return fine;
 }
 
+static int same_file(const char *a, const char *b)
+{
+    struct stat x, y;
+    return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+}
+
 static int ask_model(const char *const *path, double megabytes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -126,6 +140,9 @@ static int ask_model(const char *const *path, double megabytes)
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     options.memory = (uint64_t)(megabytes * 1e6);
     options.threads = 1;
+    if (!all_fine(!same_file(path[0], path[2]) && !same_file(path[1], path[2]),
+                  "the answers would overwrite the model or the points"))
+        return 0;
     ebpo_status status = ebpo_open(path[0], &file, &error);
     if (status == EBPO_OK)
         status = ebpo_model_new(file, &options, &model, &error);
@@ -146,9 +163,10 @@ int main(int argc, char **argv)
     MPI_Init(&argc, &argv);
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
     MPI_Comm_size(MPI_COMM_WORLD, &ranks);
-    double megabytes = argc == 5 ? atof(argv[4]) : 256;
+    char none[] = "", *end = none;
+    double megabytes = argc == 5 ? strtod(argv[4], &end) : 256;
     int fine = 0;
-    if ((argc == 4 || argc == 5) && megabytes > 0 && megabytes < 1e9) {
+    if ((argc == 4 || argc == 5) && !*end && megabytes > 0 && megabytes < 1e9) {
         const char *const path[] = { argv[1], argv[2], argv[3] };
         fine = ask_model(path, megabytes);
     } else if (rank == 0) {

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """killed_shard.py MODEL: a shard that is killed while it answers leaves no answers, and the same
-command makes them afterwards; of SIGTERM nothing stays at all.
+command makes them afterwards; of SIGTERM nothing stays at all. Nor of one whose points change meanwhile.
 
 Points are zeros, in a file without blocks on the disk; more of them when the shard was done too early.
 """
@@ -27,14 +27,14 @@ def begun(model, points):
     return None
 
 
-def end_by(number, model, rows):
+def end_by(act, code, model, rows):
     while True:
         with open("zeros.raw", "wb") as file:
             file.truncate(24 * rows)
         running = begun(model, "zeros.raw")
         if running:
-            running.send_signal(number)
-            if running.wait() == -number:
+            act(running)
+            if running.wait() == code:
                 return rows
             os.remove(OUT)
             os.remove(OUT + ".shard")
@@ -45,9 +45,11 @@ def end_by(number, model, rows):
 
 def main():
     model = sys.argv[1]
-    rows = end_by(signal.SIGTERM, model, 1 << 20)
+    rows = end_by(lambda running: os.utime("zeros.raw", (1, 1)), 1, model, 1 << 20)
     wrong = glob.glob("killed.out*") + glob.glob(HIDDEN)
-    rows = end_by(signal.SIGKILL, model, rows)
+    rows = end_by(subprocess.Popen.terminate, -signal.SIGTERM, model, rows)
+    wrong += glob.glob("killed.out*") + glob.glob(HIDDEN)
+    rows = end_by(subprocess.Popen.kill, -signal.SIGKILL, model, rows)
     wrong += glob.glob("killed.out*") + ["no hidden file"] * (len(glob.glob(HIDDEN)) != 1)
     again = ["ebpo", "inside", "--raw", "--shard", "1/2", "-o", OUT, model, "zeros.raw"]
     subprocess.run(again, check=True)

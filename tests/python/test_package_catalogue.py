@@ -292,6 +292,12 @@ class Parts(Case):
             cls.caps.append(corners[capped])
         cls.caps = np.concatenate(cls.caps)
 
+    def test_numbers_of_another_part(self):
+        np.save("few.npy", np.arange(3))
+        entries = [entry._replace(numbers=os.path.abspath("few.npy")) for entry in self.catalogue.entries]
+        with self.assertRaisesRegex(ebpo.FormatError, "few.npy: does not have a number"):
+            Catalogue(entries, parts=True).distance(P[:99])
+
     def test_cells_of_which_a_half_is_empty(self):
         ring = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # a rod: all along x, nothing between its sides
         vertices = np.array([[x, y, z] for x in range(21) for y, z in ring], float)

@@ -82,7 +82,9 @@ class Answers(Case):
     def test_what_cannot_be_asked(self):
         pathlib.Path("odd.raw").write_bytes(b"x" * 100)
         np.save("wide.npy", np.zeros((5, 4)))
-        for wrong in ("odd.raw", "wide.npy"):
+        np.save("complex.npy", np.zeros((5, 3), complex))
+        pathlib.Path("cut.npy").write_bytes(INPUT.read_bytes()[:2000])
+        for wrong in ("odd.raw", "wide.npy", "complex.npy", "cut.npy"):
             with self.assertRaisesRegex(ebpo.FormatError, wrong):
                 ed.points(wrong)
         with self.assertRaisesRegex(ValueError, "shape"):

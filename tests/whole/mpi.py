@@ -37,9 +37,16 @@ def main():
             os.remove("a.raw")
         with open("cut.raw", "wb") as file:
             file.write(some[:30])
+        with open("nan.raw", "wb") as file:  # found when answers are written already
+            file.write(some * (ROWS // 5000) + struct.pack("<3d", 0, 0, float("nan")))
         for arguments, message in ((("no.ebpo.h5", "p.raw", "a.raw"), "no.ebpo.h5: "),
                                    (("m.ebpo.h5", "cut.raw", "a.raw"), "no rows of three doubles"),
-                                   (("m.ebpo.h5", "no.raw", "a.raw"), "no.raw: ")):
+                                   (("m.ebpo.h5", "no.raw", "a.raw"), "no.raw: "),
+                                   (("m.ebpo.h5", "nan.raw", "a.raw"),
+                                    f"points from number {2 << 18} on: point {ROWS - 1 - (2 << 18)} has"),
+                                   (("m.ebpo.h5", "p.raw", "p.raw"), "would overwrite"),
+                                   (("m.ebpo.h5", "p.raw", "m.ebpo.h5"), "would overwrite"),
+                                   (("m.ebpo.h5", "p.raw", "a.raw", "2x"), "usage: ")):
             done = run(2, *arguments)
             if not done.returncode or message not in done.stderr or os.path.exists("a.raw"):
                 wrong.append(f"{arguments}: {done.returncode} {done.stderr}")
@@ -48,6 +55,8 @@ def main():
             size, done = os.path.getsize(name), run(2, "m.ebpo.h5", "p.raw", name)
             if not done.returncode or "replace what is asked" not in done.stderr or os.path.getsize(name) != size:
                 wrong.append(f"{name}: {done.returncode} {done.stderr}")
+        if os.path.getsize("p.raw") != 24 * ROWS or not os.path.getsize("m.ebpo.h5"):
+            wrong.append("an input was changed")
         print("\n".join(wrong) or "fine")
         os.chdir("/")
     return 1 if wrong else 0

@@ -346,20 +346,24 @@ static void print_words(const catalogue *c)
 
 /* --- all of it --- */
 
-/* A catalogue does not take the place of a model that it would name. */
-static bool overwrites_one(catalogue *c)
+/* True, said on stderr: the catalogue would take the place of a file that it lists. `code` is then
+ * set. */
+static bool overwrites_model(const catalogue *c, int *code)
 {
-    bool does = false;
-    for (size_t i = 0; i < c->files.count && !does; i++) {
-        char *name = NULL;
-        if (asprintf(&name, "%s/%s", c->folder, c->files.path[i]) < 0) {
-            c->no_memory = true; /* which is told when heads are looked at */
-            return false;
+    for (size_t i = 0; i < c->files.count; i++) {
+        char *path = NULL;
+        if (asprintf(&path, "%s/%s", c->folder, c->files.path[i]) < 0) {
+            *code = command_no_memory("catalogue");
+            return true;
         }
-        does = command_overwrites("catalogue", name, c->out);
-        free(name);
+        bool same = command_overwrites("catalogue", path, c->out);
+        free(path);
+        if (same) {
+            *code = EXIT_USAGE;
+            return true;
+        }
     }
-    return does;
+    return false;
 }
 
 static int make(catalogue *c)
@@ -369,10 +373,8 @@ static int make(catalogue *c)
         return c->files.no_memory ? command_no_memory("catalogue") : EXIT_FAILED;
     if (ebpo_check_output(c->out, &error) != EBPO_OK)
         return command_failed("catalogue", &error);
-    if (overwrites_one(c))
-        return EXIT_USAGE;
     int code = find_way(c);
-    if (code != EXIT_FINE)
+    if (code != EXIT_FINE || overwrites_model(c, &code))
         return code;
     if (!look_at_all(c))
         return command_no_memory("catalogue");

@@ -42,18 +42,19 @@ static bool read_shard(query_shard *s, const char *text)
     return false;
 }
 
-/* Of a dataset its file is what may not be written. */
-static bool overwrites_points(const query_shard *s)
+/* True, said on stderr: `path` is the model, or the file of the points, which may be asked for as
+ * FILE.h5:/path. */
+static bool overwrites_input(const query_shard *s, const char *path)
 {
     struct stat in, out;
     const char *dataset;
-    if (!s->points || command_overwrites(s->command, s->points, s->v->out))
-        return s->points != NULL;
-    if (stat(s->v->out, &out) != 0 || !points_file(s->points, &in, &dataset) ||
+    if (command_overwrites(s->command, s->model, path))
+        return true;
+    if (!s->points || !points_file(s->points, &in, &dataset) || stat(path, &out) != 0 ||
         in.st_dev != out.st_dev || in.st_ino != out.st_ino)
         return false;
     fprintf(stderr, "ebpo %s: %s: is both input and output; choose another output\n", s->command,
-            s->v->out);
+            path);
     return true;
 }
 
@@ -80,7 +81,7 @@ bool query_shard_fits(query_shard *s, const query_job *job, const char *model, c
     else if (v->out && strcmp(v->out, "-") == 0)
         command_usage(s->command, "answers go to standard output without -o; leave it out");
     else
-        return !v->out || (!command_overwrites(s->command, model, v->out) && !overwrites_points(s));
+        return !v->out || !overwrites_input(s, v->out);
     return false;
 }
 
@@ -245,6 +246,8 @@ bool query_shard_done(query_shard *s, const query_job *job, int *code)
         s->note = NULL;
         *code = command_no_memory(s->command);
     }
+    if (*code == EXIT_FINE && overwrites_input(s, s->note))
+        *code = EXIT_USAGE;
     if (*code == EXIT_FINE && !note_is_free(s))
         *code = EXIT_FAILED;
     return *code != EXIT_FINE || (!s->v->force && is_there(s));

@@ -334,7 +334,12 @@ class Catalogue:
 
     def _faces(self, number: int, faces: np.ndarray) -> np.ndarray:
         numbers = self.numbers[number]
-        return faces if numbers is None else numbers[faces]
+        if numbers is None:
+            return faces
+        if numbers.ndim != 1 or numbers.dtype.kind not in "iu" or faces.max(initial=-1) >= len(numbers):
+            name = self.entries[number].numbers
+            raise FormatError(f"{name}: does not have a number for each face of the part", "EBPO_E_FORMAT", name)
+        return numbers[faces]
 
     def ray(self, origins: Any, directions: Any, *, t_max: float = float("inf"), memory: int | str | None = None,
             threads: int | None = None) -> np.ndarray:

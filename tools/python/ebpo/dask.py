@@ -122,6 +122,8 @@ def ask(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk: 
     threads: so many work at a chunk; Dask's workers have threads of their own.
     http: options of URLs, such as headers.
     options: those of the method of Catalogue, such as boundary=False, max_distance, signed, t_max.
+
+    Numbers of points in errors are those within a chunk.
     """
     import dask.array as da
     if what not in DTYPES:

@@ -62,9 +62,11 @@ class Holding:
 
     def _opened(self, source: str, digest: str, share: int, options: dict) -> Model:
         model = open_model(source, memory=share, **options)
-        if digest and model.info.content_sha256 != digest:
-            raise FormatError(f"{source}: the file has changed: its content is {model.info.content_sha256[:16]}..., and "
-                              f"the question is about {digest[:16]}...; ask anew", "EBPO_E_FORMAT", source)
+        found = model.info.content_sha256
+        if digest and found != digest:
+            model.close()
+            raise FormatError(f"{source}: the file has changed: its content is {found[:16]}..., and the question is about "
+                              f"{digest[:16]}...; ask anew", "EBPO_E_FORMAT", source)
         with self._changed:
             self._gone["opened"] += 1
         return model

@@ -56,11 +56,7 @@ class PointFile(NamedTuple):
                     raise FormatError(f"{path}: there is no dataset {dataset}", "EBPO_E_FORMAT", path)
                 shape, dtype = file[dataset].shape, file[dataset].dtype
         elif path.endswith(".npy"):
-            try:
-                array = np.load(path, mmap_mode="r", allow_pickle=False)
-            except (ValueError, EOFError) as error:
-                raise FormatError(f"{path}: cannot be read as a .npy: {error}", "EBPO_E_FORMAT", path) from None
-            shape, dtype = array.shape, array.dtype
+            shape, dtype = shape_of_npy(path)
         else:
             size = os.path.getsize(path)
             if size % (8 * columns):
@@ -69,7 +65,7 @@ class PointFile(NamedTuple):
         if len(shape) != 2 or shape[1] != columns:
             raise FormatError(f"{path}: points have the shape (n, {columns}), not {shape}", "EBPO_E_FORMAT", path)
         if dtype.kind not in "fiu":
-            raise FormatError(f"{path}: points are numbers, not {dtype}", "EBPO_E_FORMAT", path)
+            raise FormatError(f"{path}: points are real numbers, not {dtype}", "EBPO_E_FORMAT", path)
         return cls(path, dataset or "", int(shape[0]), columns, stamp_of(path))
 
     def read(self, begin: int, end: int) -> np.ndarray:
@@ -83,6 +79,14 @@ class PointFile(NamedTuple):
             return np.array(np.load(self.path, mmap_mode="r", allow_pickle=False)[begin:end], dtype=np.float64)
         rows = np.fromfile(self.path, np.float64, (end - begin) * self.columns, offset=begin * 8 * self.columns)
         return rows.reshape(-1, self.columns)
+
+
+def shape_of_npy(path: str) -> tuple[tuple[int, ...], np.dtype]:
+    try:
+        values = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        raise FormatError(f"{path}: not a whole .npy of numbers: {error}", "EBPO_E_FORMAT", path) from None
+    return values.shape, values.dtype
 
 
 def is_hdf5(path: str, dataset: str | None) -> bool:
