@@ -44,8 +44,6 @@ def main():
                                    (("m.ebpo.h5", "no.raw", "a.raw"), "no.raw: "),
                                    (("m.ebpo.h5", "nan.raw", "a.raw"),
                                     f"points from number {2 << 18} on: point {ROWS - 1 - (2 << 18)} has"),
-                                   (("m.ebpo.h5", "p.raw", "p.raw"), "would overwrite"),
-                                   (("m.ebpo.h5", "p.raw", "m.ebpo.h5"), "would overwrite"),
                                    (("m.ebpo.h5", "p.raw", "a.raw", "2x"), "usage: ")):
             done = run(2, *arguments)
             if not done.returncode or message not in done.stderr or os.path.exists("a.raw"):
@@ -53,10 +51,8 @@ def main():
         os.link("p.raw", "same.raw")
         for name in ("p.raw", "same.raw", "m.ebpo.h5"):
             size, done = os.path.getsize(name), run(2, "m.ebpo.h5", "p.raw", name)
-            if not done.returncode or "replace what is asked" not in done.stderr or os.path.getsize(name) != size:
+            if not done.returncode or "would overwrite" not in done.stderr or os.path.getsize(name) != size:
                 wrong.append(f"{name}: {done.returncode} {done.stderr}")
-        if os.path.getsize("p.raw") != 24 * ROWS or not os.path.getsize("m.ebpo.h5"):
-            wrong.append("an input was changed")
         print("\n".join(wrong) or "fine")
         os.chdir("/")
     return 1 if wrong else 0
