@@ -36,7 +36,7 @@ static void tj_digest(FILE *out, const void *values, uint64_t count, size_t size
             break;                                                      \
         }                                                               \
         if ((count) > 1000) {                                           \
-            tj_digest(out, values, count, sizeof *(values));       \
+            tj_digest(out, values, count, sizeof *(values));            \
             break;                                                      \
         }                                                               \
         fprintf(out, "[");                                              \

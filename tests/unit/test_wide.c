@@ -8,10 +8,7 @@
 
 enum { ROUNDS = 20000 };
 
-static void set_number(mpz_t out, uint64_t v)
-{
-    mpz_import(out, 1, 1, sizeof v, 0, 0, &v);
-}
+static void set_number(mpz_t out, uint64_t v) { mpz_import(out, 1, 1, sizeof v, 0, 0, &v); }
 
 static void set_wide(mpz_t out, ebpo_wide v)
 {
