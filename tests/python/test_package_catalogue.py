@@ -295,7 +295,7 @@ class Parts(Case):
     def test_numbers_of_another_part(self):
         np.save("few.npy", np.arange(3))
         entries = [entry._replace(numbers=os.path.abspath("few.npy")) for entry in self.catalogue.entries]
-        with self.assertRaisesRegex(ebpo.FormatError, "few.npy: does not have a number"):
+        with self.assertRaisesRegex(ebpo.FormatError, "few.npy: 3 numbers of"):
             Catalogue(entries, parts=True).distance(P[:99])
 
     def test_cells_of_which_a_half_is_empty(self):

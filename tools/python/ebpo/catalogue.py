@@ -94,7 +94,7 @@ class Catalogue:
                 raise VersionError(f"{path}: a catalogue of version {told.get('version')!r}; this package reads "
                                    f"{VERSION}", "EBPO_E_VERSION", str(path))
             entries = [read_entry(model, str(path.parent)) for model in told["models"]]
-            return cls(entries, parts=flag(told.get("parts", False)), rule=told.get("rule", "nonzero"), **options)
+            return cls(entries, parts=flag(told.get("parts", False), "parts"), rule=told.get("rule", "nonzero"), **options)
         except VersionError:
             raise
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
@@ -334,12 +334,7 @@ class Catalogue:
 
     def _faces(self, number: int, faces: np.ndarray) -> np.ndarray:
         numbers = self.numbers[number]
-        if numbers is None:
-            return faces
-        if numbers.ndim != 1 or numbers.dtype.kind not in "iu" or faces.max(initial=-1) >= len(numbers):
-            name = self.entries[number].numbers
-            raise FormatError(f"{name}: does not have a number for each face of the part", "EBPO_E_FORMAT", name)
-        return numbers[faces]
+        return faces if numbers is None else numbers[faces]
 
     def ray(self, origins: Any, directions: Any, *, t_max: float = float("inf"), memory: int | str | None = None,
             threads: int | None = None) -> np.ndarray:
@@ -425,7 +420,7 @@ def read_entry(model: dict, folder: str) -> Entry:
             raise ValueError(f"{name} is no digest, without which another file would be taken for the model")
     for name in ("path", "surface", "numbers"):
         texts[name] = texts[name] and absolute(texts[name], folder)
-    return Entry(texts["path"], texts["content_sha256"], flag(model["solid"]), low, high,
+    return Entry(texts["path"], texts["content_sha256"], flag(model["solid"], "solid"), low, high,
                  texts["surface"] if model.get("surface", "") is not None else None, texts["surface_sha256"],
                  texts["numbers"])
 
@@ -439,9 +434,9 @@ def read_box(model: dict) -> list:
     return list(map(tuple, corners))
 
 
-def flag(value: Any) -> bool:
+def flag(value: Any, name: str) -> bool:
     if not isinstance(value, bool):
-        raise ValueError(f"{value!r} is neither true nor false")
+        raise ValueError(f"{name} is true or false, not {value!r}")
     return value
 
 
