@@ -101,7 +101,7 @@ class Many(Case):
                                       ({"models": []}, ebpo.FormatError, "one model"),
                                       ({"models": 5}, ebpo.FormatError, "catalogue"),
                                       ({"parts": "false"}, ebpo.FormatError, "parts is true or false"),
-                                      (damaged(box_min=[9, 9, 9]), ebpo.FormatError, "lower corner is above"),
+                                      (damaged(box_min=[9, 9, 9]), ebpo.FormatError, "box_min is above box_max"),
                                       (damaged(box_max=[10**400, 1, 1]), ebpo.FormatError, "OverflowError"),
                                       (damaged(solid="no"), ebpo.FormatError, "solid is true or false"),
                                       (damaged(path="a\0b"), ebpo.FormatError, "no path")):
