@@ -13,7 +13,7 @@
 set -eu
 source=$(cd "$(dirname "$0")/../.." && pwd)
 roots=${EBPO_PORTABLE:-/var/tmp/ebpo-portable}
-mirror=${EBPO_MIRROR:-http://deb.debian.org/debian}
+mirror=${EBPO_DEBIAN_MIRROR:-} # empty: the one that debootstrap knows
 tests=chosen
 [ "${1:-}" != --all ] || { tests=all && shift; }
 [ $# -gt 0 ] || set -- s390x i386 armhf arm64
@@ -43,7 +43,7 @@ make_base() {
     mkdir -p "$roots"
     debootstrap --variant=minbase \
         --include=gcc,g++,dpkg-dev,pkg-config,meson,ninja-build,python3,ccache,qemu-user-static \
-        bookworm "$roots/base" "$mirror"
+        bookworm "$roots/base" ${mirror:+"$mirror"}
     touch "$roots/base.made"
 }
 make_root() { # arch

@@ -13,7 +13,7 @@ look=no
 mkdir -p "$1"
 out=$(cd "$1" && pwd) suite=${2:-bookworm}
 source=$(cd "$(dirname "$0")/../.." && pwd)
-mirror=${EBPO_DEBIAN_MIRROR:-http://deb.debian.org/debian}
+mirror=${EBPO_DEBIAN_MIRROR:-} # empty: the one that debootstrap knows
 [ "$(id -u)" = 0 ] || { echo "build_deb.sh: making a root of Debian's needs root (or sudo)" >&2 && exit 1; }
 command -v debootstrap >/dev/null ||
     { echo "build_deb.sh: debootstrap is missing: apt install debootstrap" >&2 && exit 1; }
@@ -27,7 +27,7 @@ ended() {
 }
 trap ended EXIT
 trap 'exit 1' INT TERM HUP
-[ -e "$root/etc/debian_version" ] || debootstrap --variant=minbase "$suite" "$root" "$mirror"
+[ -e "$root/etc/debian_version" ] || debootstrap --variant=minbase "$suite" "$root" ${mirror:+"$mirror"}
 cp /etc/resolv.conf "$root/etc/"
 mount -t proc proc "$root/proc"
 within() {
