@@ -5,7 +5,7 @@
 #   SUITE   of Debian, bookworm unless named
 # As root, with debootstrap. The root is made in $TMPDIR, of the mirror $EBPO_DEBIAN_MIRROR, and goes away
 # afterwards; with $EBPO_DEB_ROOT=FOLDER it is kept there, for the next time. $EBPO_DEB_FOLDER: where in it
-# below /build it is built (the packages do not depend on that), ebpo by default.
+# below /build it is built, ebpo by default: to see whether the packages depend on that.
 set -eu
 look=no
 [ "${1:-}" != -l ] || { look=yes && shift; }
