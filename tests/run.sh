@@ -21,13 +21,14 @@ esac
 # The share of repeated inputs (EBPO_TEST_SCALE), and the suites that are left out:
 #   once     not compiled: one build is enough
 #   costly   compiled, but no compiler's business: with gcc, and in the long tier with sanitizers
+#   calls    each public call, its allocations and files failing: gcc, and sanitizers
 #   viewer   the web viewer in node and a browser
 #   flags    the sources once more with four sets of flags, which is more than half of what is compiled
 plan() { # build
     case $tier-$1 in
     short-*) echo "0.05 costly viewer flags" ;;
     medium-gcc) echo "0.15" ;;
-    medium-clang) echo "0.1 once costly viewer flags" ;;
+    medium-clang) echo "0.1 once costly calls viewer flags" ;;
     medium-sanitize) echo "0.05 once costly viewer" ;;
     long-gcc) echo "1" ;;
     long-clang) echo "0.2" ;;
