@@ -1,0 +1,25 @@
+"""clean_root_dask.py MODEL FOLDER SCHEDULER: the points of clean_root_ask.py once more, on Dask."""
+import os
+import sys
+
+import numpy as np
+from dask.distributed import Client
+
+import ebpo.dask
+
+
+def main(path, folder, scheduler):
+    with Client(scheduler) as client:
+        client.wait_for_workers(2, timeout=60)
+        points = ebpo.dask.points(os.path.join(folder, "points.npy"))
+        asked = ebpo.dask.inside(path, points, chunk=50_000)
+        ebpo.dask.to_file(asked, os.path.join(folder, "dask.npy"))
+        for worker, did in ebpo.dask.counts(client).items():
+            print(worker, did)
+    told = np.load(os.path.join(folder, "dask.npy"))
+    assert (told == np.load(os.path.join(folder, "inside.npy"))).all()
+    os.remove(os.path.join(folder, "dask.npy"))
+    print(len(told), "answers of two workers, as of one process")
+
+
+main(*sys.argv[1:])
