@@ -1,15 +1,24 @@
 #!/bin/sh
-# Builds the Debian packages of what is committed, in a clean root: build_deb.sh [-l] OUT [SUITE]
-#   -l      lintian looks at them, too
+# Builds the Debian packages of what is committed, in a clean root: build_deb.sh [-l] [-r] OUT [SUITE]
+#   -l      lintian looks at them, too, and its errors and warnings are a failure
+#   -r      builds a second time where all is otherwise that may be, and compares every .deb
 #   OUT     folder for the packages and the source package
 #   SUITE   of Debian, bookworm unless named
 # As root, with debootstrap. The root is made in $TMPDIR, of the mirror $EBPO_DEBIAN_MIRROR, and goes away
-# afterwards; with $EBPO_DEB_ROOT=FOLDER it is kept there, for the next time. $EBPO_DEB_FOLDER: where in it
-# below /build it is built, ebpo by default: to see whether the packages depend on that.
+# afterwards; with $EBPO_DEB_ROOT=FOLDER it is kept there, for the next time. $EBPO_DEB_ARCH: another
+# architecture whose programs run here, as i386 on amd64.
 set -eu
-look=no
-[ "${1:-}" != -l ] || { look=yes && shift; }
-[ $# = 1 ] || [ $# = 2 ] || { echo "usage: build_deb.sh [-l] OUT [SUITE]" >&2 && exit 2; }
+usage() { echo "usage: build_deb.sh [-l] [-r] OUT [SUITE]" >&2 && exit 2; }
+look=no twice=no
+while getopts lr option; do
+    case $option in
+    l) look=yes ;;
+    r) twice=yes ;;
+    *) usage ;;
+    esac
+done
+shift $((OPTIND - 1))
+[ $# = 1 ] || [ $# = 2 ] || usage
 mkdir -p "$1"
 out=$(cd "$1" && pwd) suite=${2:-bookworm}
 source=$(cd "$(dirname "$0")/../.." && pwd)
@@ -22,35 +31,65 @@ made=
 root=${EBPO_DEB_ROOT:-}
 [ -n "$root" ] || { root=$(mktemp -d) && made=$root; }
 ended() {
-    umount "$root/proc" 2>/dev/null || true
+    umount "$root/proc" "$root/dev/shm" 2>/dev/null || true
     [ -z "$made" ] || rm -rf "$made"
 }
 trap ended EXIT
 trap 'exit 1' INT TERM HUP
-[ -e "$root/etc/debian_version" ] || debootstrap --variant=minbase "$suite" "$root" ${mirror:+"$mirror"}
+[ -e "$root/etc/debian_version" ] ||
+    debootstrap --variant=minbase ${EBPO_DEB_ARCH:+--arch="$EBPO_DEB_ARCH"} "$suite" "$root" ${mirror:+"$mirror"}
 cp /etc/resolv.conf "$root/etc/"
 mount -t proc proc "$root/proc"
+mount -t tmpfs -o mode=1777 tmpfs "$root/dev/shm" # for faketime
 within() {
     chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"
 }
+install() { within apt-get install -y -qq -o Dpkg::Use-Pty=0 --no-install-recommends "$@" >/dev/null; }
 
-# The source package: a tarball of what is committed, and debian/ beside meson.build.
 version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$source/meson.build")
 name=ebpo-octree-$version
-work=/build/${EBPO_DEB_FOLDER:-ebpo}
-rm -rf "${root:?}$work" && mkdir -p "$root$work"
-git -C "$source" -c tar.umask=022 archive --format=tar --prefix="$name/" HEAD |
-    xz -T1 >"$root$work/ebpo-octree_$version.orig.tar.xz"
-tar -C "$root$work" -xf "$root$work/ebpo-octree_$version.orig.tar.xz"
-cp -R "$root$work/$name/tools/packaging/debian" "$root$work/$name/debian"
+# The source package: a tarball of what is committed, and debian/ beside meson.build.
+unpack() { # folder in the root
+    rm -rf "${root:?}$1" && mkdir -p "$root$1"
+    git -C "$source" -c tar.umask=022 archive --format=tar --prefix="$name/" HEAD |
+        xz -T1 >"$root$1/ebpo-octree_$version.orig.tar.xz"
+    tar -C "$root$1" -xf "$root$1/ebpo-octree_$version.orig.tar.xz"
+    cp -R "$root$1/$name/tools/packaging/debian" "$root$1/$name/debian"
+}
+build() { # folder in the root, a command before dpkg-buildpackage...
+    folder=$1
+    shift
+    within "$@" sh -c "cd $folder/$name && dpkg-buildpackage -us -uc"
+}
+sums() { (cd "$1" && sha256sum ./*.deb); }
 
+unpack /build/ebpo
 within apt-get update -qq
-within apt-get install -y -qq --no-install-recommends build-essential fakeroot >/dev/null
-within sh -c "cd $work/$name && apt-get build-dep -y -qq --no-install-recommends ./" >/dev/null
-within sh -c "cd $work/$name && dpkg-buildpackage -us -uc"
-find "$root$work" -maxdepth 1 -type f -exec cp -p {} "$out/" \;
+install build-essential fakeroot
+within sh -c "cd /build/ebpo/$name && apt-get build-dep -y -qq -o Dpkg::Use-Pty=0 --no-install-recommends ./" >/dev/null
+build /build/ebpo
+find "$root/build/ebpo" -maxdepth 1 -type f -exec cp -p {} "$out/" \;
 if [ $look = yes ]; then
-    within apt-get install -y -qq --no-install-recommends lintian >/dev/null
-    within sh -c "cd $work && lintian --allow-root -i -I --pedantic ./*.changes"
+    install lintian
+    within sh -c "cd /build/ebpo && lintian --allow-root --fail-on error,warning -i -I --pedantic ./*.changes"
 fi
-(cd "$out" && sha256sum ./*.deb)
+if [ $twice = yes ]; then
+    # Another path, user, host, umask, year, zone, language (its i has a capital of its own) and number of jobs.
+    install faketime locales
+    within localedef -i tr_TR -f UTF-8 tr_TR.UTF-8
+    (umask 027 && unpack /build/else/where)
+    chown -R 1234:1234 "$root/build/else" && chmod 755 "$root/build/else" "$root/build/else/where"
+    build /build/else/where \
+        unshare --uts sh -c 'hostname another && umask 027 && exec "$@"' sh \
+        setpriv --reuid 1234 --regid 1234 --clear-groups \
+        env HOME=/nonexistent USER=another TZ=XYZ+11 LC_ALL=tr_TR.UTF-8 DEB_BUILD_OPTIONS=parallel=1 \
+        NO_FAKE_STAT=1 faketime -f +400d
+    sums "$root/build/ebpo" >"$root/build/first"
+    sums "$root/build/else/where" >"$root/build/second"
+    diff "$root/build/first" "$root/build/second" || {
+        echo "build_deb.sh: built twice, the packages differ; with EBPO_DEB_ROOT kept, diffoscope compares" \
+            "those in build/ebpo and build/else/where there" >&2 && exit 1
+    }
+    echo "build_deb.sh: built twice, all $(wc -l <"$root/build/first") packages are equal"
+fi
+sums "$out"
