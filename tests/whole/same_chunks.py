@@ -25,7 +25,7 @@ def undone(stored):
     size = library.ZSTD_decompress(room, MOST, stored, len(stored))
     if library.ZSTD_isError(ctypes.c_size_t(size)):
         raise ValueError("a chunk is not a frame of zstd")
-    return room.raw[:size] if size < 1 << 16 else ctypes.string_at(room, size)
+    return ctypes.string_at(room, size)
 
 
 def attributes(thing):
