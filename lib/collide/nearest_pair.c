@@ -128,6 +128,16 @@ static bool go_on(ebpo_gap_search *g)
     return !g->ended;
 }
 
+/* Of those that nobody will look at. Not by fmin: gcc 12 for ARM fails to compile such loops. */
+static double least_waiting(const ebpo_gap_search *g, unsigned first)
+{
+    double least = INFINITY;
+    for (unsigned i = first; i < g->waits; i++)
+        if ((double)g->waiting[i].low < least)
+            least = (double)g->waiting[i].low;
+    return fmax(least / g->posing[0].unit * (1 - 0x1p-20), 0);
+}
+
 /* Many may be at nearly the same distance, where models have flat parts. */
 static bool judge(ebpo_gap_search *g)
 {
@@ -137,8 +147,8 @@ static bool judge(ebpo_gap_search *g)
     for (; i < g->waits && more; i++)
         if (!(g->waiting[i].low > g->limit))
             more = take(g, n, g->waiting[i].slot) && (++judged % 16 || go_on(g));
-    for (; !more && i < g->waits; i++) /* nobody will look at them */
-        n->lo = fmin(n->lo, fmax((double)g->waiting[i].low / g->posing[0].unit * (1 - 0x1p-20), 0));
+    if (!more)
+        n->lo = fmin(n->lo, least_waiting(g, i));
     g->waits = 0;
     return more;
 }
@@ -150,8 +160,9 @@ static double left_over(const ebpo_gap_search *g)
 {
     double least = INFINITY;
     for (uint64_t i = 0; i < g->count; i++)
-        least = fmin(least, fmax((double)g->stack[i].key, 0));
-    return sqrt(least) / g->posing[0].unit * (1 - 0x1p-18);
+        if ((double)g->stack[i].key < least)
+            least = (double)g->stack[i].key;
+    return sqrt(fmax(least, 0)) / g->posing[0].unit * (1 - 0x1p-18);
 }
 
 static void end_exact(ebpo_nearest_pair *n)

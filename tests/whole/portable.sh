@@ -5,7 +5,7 @@
 #   s390x   big-endian, 64 bits            armhf   32 bits, ARM
 #   i386    32 bits, x86 with SSE2         arm64   ARM, 64 bits
 #
-# On Debian 12 with root and debootstrap; by hand, as it takes from ten minutes to an hour. Each
+# On Debian 12 with root, debootstrap and python3-h5py; by hand, as each takes half an hour. Each
 # gets a root folder of its own below $EBPO_PORTABLE (/var/tmp/ebpo-portable, 1.5 GB each), with a
 # cross compiler, Debian's libraries for it and qemu-user: this system is left as it is. What is
 # built is asked for: vectors, golden hashes, dialects of PLY, reading of heads, a model converted
@@ -26,6 +26,11 @@ done
 [ "$(id -u)" = 0 ] || { echo "portable.sh: makes root folders, so run it as root" >&2; exit 2; }
 command -v debootstrap >/dev/null || {
     echo "portable.sh: apt-get install debootstrap" >&2
+    exit 2
+}
+python=/usr/bin/python3
+"$python" -c 'import h5py' 2>/dev/null || {
+    echo "portable.sh: apt-get install python3-h5py" >&2
     exit 2
 }
 
@@ -91,6 +96,12 @@ for arch in "$@"; do
         failed="$failed $arch"
     ! [ -e "$roots/$arch/made/sums" ] || cmp "$roots/amd64/made/sums" "$roots/$arch/made/sums" ||
         failed="$failed $arch:bytes"
+    # In 37 and 38 a list is false on purpose; libhdf5 turns a number out of range otherwise there.
+    differs=
+    [ "$arch" != s390x ] || differs="--differs 37 38"
+    # shellcheck disable=SC2086
+    "$python" "$source/tests/whole/same_chunks.py" "$source/format-spec/vectors/passed" \
+        "$roots/$arch/made/vectors/passed" $differs || failed="$failed $arch:chunks"
 done
 [ -z "$failed" ] || { echo "portable.sh: failed:$failed" >&2; exit 1; }
 echo "portable.sh: all is well on $*"
