@@ -43,8 +43,7 @@ bool ebpo_box_tree_build(box_tree *tree, box_of_fn box_of, const void *user)
         return true;
     if (!ebpo_point_tree_build(points))
         return false;
-    tree->filled =
-        ebpo_array_alloc(points->workspace, points->node_capacity, sizeof *tree->filled);
+    tree->filled = ebpo_array_alloc(points->workspace, points->node_capacity, sizeof *tree->filled);
     if (!tree->filled)
         return false;
     fill(&f, 0, points->point, points->count);

@@ -1,4 +1,5 @@
-/* Things with boxes in a tree: a point tree over a point of each, and what each node's boxes fill. */
+/* Things with boxes in a tree: a point tree over a point of each, and what each node's boxes fill.
+ */
 #ifndef EBPO_MESH_BOX_TREE_H
 #define EBPO_MESH_BOX_TREE_H
 

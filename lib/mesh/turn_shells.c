@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
-#include "mesh/nesting.h"
+#include "mesh/shell_nesting.h"
 
 static bool looks_inwards(const nesting *n, const shell *one)
 {

@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "geom/predicates.h"
-#include "mesh/nesting.h"
+#include "mesh/shell_probes.h"
 
 /* Of one thread: what may be within the host that it looks at. */
 typedef struct seeker {
@@ -48,7 +48,8 @@ static bool list_inner(void *user, mesh_point *points, uint64_t count)
     seeker *w = user;
     for (uint64_t i = 0; i < count; i++) {
         const shell *one = &w->all->n->shells[points[i].number];
-        if (one != w->host && ebpo_shell_box_within(one, w->host) && !add_probes(w, points[i].number))
+        if (one != w->host && ebpo_shell_box_within(one, w->host) &&
+            !add_probes(w, points[i].number))
             return false;
     }
     return true;
@@ -177,8 +178,8 @@ ebpo_status ebpo_nesting_probe(nesting *n, ebpo_error *error)
         return ebpo_fail_memory(error, n->threads * sizeof *all.seeker);
     for (unsigned t = 0; t < n->threads; t++)
         all.seeker[t] = (seeker){ .probes = { .workspace = workspace }, .all = &all };
-    ebpo_status status = ebpo_parallel_for(n->threads, workspace, n->count, 1, find_inner, &all,
-                                           NULL, "", error);
+    ebpo_status status =
+        ebpo_parallel_for(n->threads, workspace, n->count, 1, find_inner, &all, NULL, "", error);
     for (unsigned t = 0; t < n->threads; t++)
         ebpo_point_tree_free(&all.seeker[t].probes);
     free(all.seeker);

@@ -1,13 +1,15 @@
 /* Closed components, what is known of each, and how many each is within. */
 #include "geom/strict_fp.h"
 
-#include "mesh/nesting.h"
+#include "mesh/shell_nesting.h"
 
 #include <string.h>
 
 #include "base/arrays.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "mesh/shell_probes.h"
+#include "mesh/shell_rays.h"
 
 /* A host is crowded from so many samples for each of its faces on. */
 enum { CROWD = 8, GRAIN = 64 };
@@ -56,22 +58,6 @@ static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, un
 
 /* ---- which may be within which ---- */
 
-bool ebpo_shell_box_within(const shell *inner, const shell *outer)
-{
-    for (int k = 0; k < 3; k++)
-        if (inner->min[k] < outer->min[k] || inner->max[k] > outer->max[k])
-            return false;
-    return true;
-}
-
-bool ebpo_shell_may_hold(const shell *host, const box_node *node)
-{
-    for (int k = 0; k < 3; k++)
-        if (node->points->min[k] > host->max[k] || node->points->max[k] < host->min[k])
-            return false;
-    return true;
-}
-
 typedef struct crowd {
     const nesting *n;
     const shell *host;
@@ -86,7 +72,8 @@ static bool count_node(void *user, const box_node *node)
     if (!ebpo_shell_may_hold(c->host, node))
         return false;
     for (int k = 0; k < 3; k++)
-        within &= node->filled->min[k] >= c->host->min[k] && node->filled->max[k] <= c->host->max[k];
+        within &=
+            node->filled->min[k] >= c->host->min[k] && node->filled->max[k] <= c->host->max[k];
     c->inner += within ? node->count : 0;
     return !within;
 }

@@ -11,7 +11,8 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "geom/predicates.h"
-#include "mesh/nesting.h"
+#include "mesh/shell_probes.h"
+#include "mesh/shell_rays.h"
 
 enum { GRAIN = 16 };
 
