@@ -43,7 +43,7 @@ def pipe(radius, length, sides=48, rings=24):
         for s in range(sides):
             corner = (end * sides + s, end * sides + (s + 1) % sides)
             faces.append((len(vertices) - 1, *(corner[::-1] if end == 0 else corner)))
-    return vertices, [f[::-1] for f in faces]
+    return vertices, faces
 
 
 def chance(state=1):

@@ -4,8 +4,6 @@
 
 #include "base/arrays.h"
 
-enum { LEAF = 8 };
-
 mesh_point *ebpo_point_tree_add(point_tree *tree)
 {
     if (!ebpo_array_grow_late(tree->workspace, &tree->point, &tree->capacity, tree->count + 1,
@@ -79,7 +77,7 @@ static void split(mesh_point *p, uint64_t count, uint64_t middle, int axis)
 static void build(const point_tree *tree, uint64_t node, mesh_point *p, uint64_t count)
 {
     tree->node[node] = box_of(p, count);
-    if (count <= LEAF)
+    if (count <= POINT_TREE_LEAF)
         return;
     split(p, count, count / 2, longest_axis(&tree->node[node]));
     build(tree, 2 * node + 1, p, count / 2);
@@ -89,7 +87,7 @@ static void build(const point_tree *tree, uint64_t node, mesh_point *p, uint64_t
 bool ebpo_point_tree_build(point_tree *tree)
 {
     uint64_t nodes = 1;
-    for (uint64_t most = tree->count; most > LEAF; most -= most / 2)
+    for (uint64_t most = tree->count; most > POINT_TREE_LEAF; most -= most / 2)
         nodes = 2 * nodes + 1;
     if (tree->count == 0)
         return true;
@@ -111,7 +109,7 @@ static bool walk(const walking *w, uint64_t node, mesh_point *p, uint64_t count)
 {
     if (!w->wanted(w->user, &w->tree->node[node]))
         return true;
-    if (count <= LEAF)
+    if (count <= POINT_TREE_LEAF)
         return w->visit(w->user, p, count);
     return walk(w, 2 * node + 1, p, count / 2) &&
            walk(w, 2 * node + 2, p + count / 2, count - count / 2);

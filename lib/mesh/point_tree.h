@@ -4,6 +4,8 @@
 
 #include <ebpo/workspace.h>
 
+enum { POINT_TREE_LEAF = 8 }; /* at most so many points in a node without halves */
+
 typedef struct mesh_point {
     double at[3];
     uint32_t number; /* whose it is */
@@ -19,7 +21,7 @@ typedef struct point_tree {
     ebpo_workspace *workspace;
     mesh_point *point; /* added in any order; building sorts them */
     uint64_t count, capacity;
-    point_box *node; /* 2 i + 1 and 2 i + 2 are the halves of i */
+    point_box *node; /* 2 i + 1 and 2 i + 2 are the halves of i, the first of count / 2 points */
     uint64_t node_capacity;
 } point_tree;
 

@@ -153,12 +153,52 @@ START_TEST(shells_are_nested_as_the_plain_twin_has_it)
 }
 END_TEST
 
+/* So many in each other that every host is crowded; each with a small one beside its inner ones. */
+START_TEST(chains_are_as_deep_as_they_were_made)
+{
+    enum { CHAIN = 150 };
+    uint64_t state = 99;
+    ebpo_mesh m = { 0 };
+    ebpo_shells made = EBPO_SHELLS_INIT, s = EBPO_SHELLS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    for (int i = 0; i < 2 * CHAIN; i++) {
+        double size = 1 + i / 2, low[3] = { -size, -size, -size }, high[3] = { size, size, size };
+        int depth = CHAIN - 1 - i / 2;
+        bool turn = ebpo_test_random(&state) % 2;
+        if (i % 2) { /* between this box and the next smaller one */
+            for (int k = 0; k < 3; k++)
+                low[k] = size - 0.75, high[k] = size - 0.25;
+            depth++;
+        }
+        ebpo_mesh part = ebpo_test_box(low, high, 1);
+        if (turn)
+            ebpo_test_reverse(&part);
+        made.inside_out += turn && depth % 2 == 0;
+        made.cavities += turn && depth % 2;
+        made.nested += !turn && depth % 2;
+        if (i)
+            ebpo_test_append(&m, &part);
+        else
+            m = part;
+        if (i)
+            ebpo_mesh_free(&part);
+    }
+    ck_assert(ebpo_mesh_count_shells(&m, 2, (ebpo_progress){ NULL, NULL }, &s, &error) == EBPO_OK);
+    ck_assert_uint_eq(s.closed, 2 * CHAIN);
+    ck_assert_uint_eq(s.inside_out, made.inside_out);
+    ck_assert_uint_eq(s.cavities, made.cavities);
+    ck_assert_uint_eq(s.nested, made.nested);
+    ebpo_mesh_free(&m);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("shells");
     TCase *tests = tcase_create("all");
     tcase_set_timeout(tests, 300);
     tcase_add_test(tests, shells_are_nested_as_the_plain_twin_has_it);
+    tcase_add_test(tests, chains_are_as_deep_as_they_were_made);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -94,6 +94,7 @@ done
 # Scenes: of many parts, and of a robot, which packed is answered the same.
 PATH=$(dirname "$ebpo"):$(dirname "$generate"):$PATH
 python3 "$samples/many_parts.py" "$work/plant" 300 >"$work/out" 2>&1 || fail many_parts.py
+! grep WARNING "$work/out" || fail "many_parts.py: a part is not the solid that was meant"
 "$ebpo" scene report -q --time 5 "$work/plant/plant.scene.json" >"$work/out" 2>&1 || fail "plant"
 grep -q '^5	crossing	' "$work/out" || fail "parts meet"
 "$ebpo" scene pairs --from 0 --to 10 "$work/plant/plant.scene.json" >"$work/out" 2>&1 || fail pairs
