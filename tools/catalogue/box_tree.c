@@ -24,7 +24,8 @@ static uint64_t code_of(const double p[3], const double min[3], const double max
 {
     uint64_t code = 0;
     for (int k = 0; k < 3; k++) {
-        double size = max[k] / 2 - min[k] / 2, share = size > 0 ? (p[k] / 2 - min[k] / 2) / size : 0;
+        double size = max[k] / 2 - min[k] / 2,
+               share = size > 0 ? (p[k] / 2 - min[k] / 2) / size : 0;
         uint32_t step = (uint32_t)(fmin(fmax(share, 0), 1) * ((1 << BITS) - 1));
         for (int bit = 0; bit < BITS; bit++)
             code |= (uint64_t)(step >> bit & 1) << (3 * bit + k);
@@ -217,8 +218,7 @@ static bool comes_nearer(walk *w, const closed_box *b, double *least)
     return true;
 }
 
-bool box_tree_near(const box_tree *t, const double p[3], double most, uint32_t item,
-                   box_pairs *out)
+bool box_tree_near(const box_tree *t, const double p[3], double most, uint32_t item, box_pairs *out)
 {
     walk w = { .t = t, .p = p, .reach = most, .item = item, .keep = comes_nearer };
     (void)go(&w);

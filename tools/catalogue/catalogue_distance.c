@@ -28,7 +28,8 @@ static ebpo_status take(const search *s, const model_run *run, const held_model 
     for (size_t i = 0; i < run->count && status == EBPO_OK; i++) {
         uint32_t item = run->pair[i].item;
         double now = s->out[item].distance, new = told[i].distance;
-        if (told[i].face == EBPO_NO_FACE || !(new < now || (new == now && run->model < s->model[item])))
+        if (told[i].face == EBPO_NO_FACE ||
+            !(new < now || (new == now && run->model < s->model[item])))
             continue;
         status = held_face(model, &told[i].face, error);
         s->out[item] = told[i];
@@ -103,8 +104,8 @@ static ebpo_status stretch(search *s, uint64_t *at, uint64_t count, ebpo_error *
                            &s->near))
             status = catalogue_no_memory(error);
         if (s->near.count > begin[points])
-            qsort(s->near.pair + begin[points], s->near.count - begin[points],
-                  sizeof *s->near.pair, nearest_first);
+            qsort(s->near.pair + begin[points], s->near.count - begin[points], sizeof *s->near.pair,
+                  nearest_first);
     }
     s->asks.pair = status == EBPO_OK ? malloc(points * sizeof *s->asks.pair + 1) : NULL;
     if (status == EBPO_OK && !s->asks.pair)
@@ -123,8 +124,8 @@ static ebpo_status sign(catalogue_models *m, const double *points, uint64_t coun
                         ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_inside_result *where = malloc(count * sizeof *where);
-    ebpo_status status = where ? catalogue_inside(m, points, count, where, error)
-                               : catalogue_no_memory(error);
+    ebpo_status status =
+        where ? catalogue_inside(m, points, count, where, error) : catalogue_no_memory(error);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         if (where[i].where == EBPO_IN && isfinite(out[i].distance))
             out[i].distance = -out[i].distance;
@@ -142,7 +143,8 @@ ebpo_status catalogue_distance(catalogue_models *m, const double *points, uint64
         return catalogue_fail(error, EBPO_E_ABSENT, m->c->path,
                               "tells of caps alone, and of no surface");
     for (uint64_t i = 0; i < count; i++) {
-        out[i] = (ebpo_distance_result){ .distance = INFINITY, .point = { NAN, NAN, NAN },
+        out[i] = (ebpo_distance_result){ .distance = INFINITY,
+                                         .point = { NAN, NAN, NAN },
                                          .face = EBPO_NO_FACE };
         model[i] = CATALOGUE_NO_MODEL;
     }

@@ -11,16 +11,15 @@
 typedef struct catalogue_models {
     const catalogue *c;
     held_models *held;
-    box_tree all, seen;              /* of all models; of those that rays and distances see */
-    const catalogue_entry *surface;  /* the first that has no inside; NULL: all have */
+    box_tree all, seen;             /* of all models; of those that rays and distances see */
+    const catalogue_entry *surface; /* the first that has no inside; NULL: all have */
 } catalogue_models;
 
 /* As a number of a model in the catalogue, the first is 0: none. */
 #define CATALOGUE_NO_MODEL UINT64_MAX
 
 /* False: not enough memory. catalogue_models_free in any case, before the catalogue's. */
-bool catalogue_models_make(catalogue_models *m, const catalogue *c,
-                           const holding_options *options);
+bool catalogue_models_make(catalogue_models *m, const catalogue *c, const holding_options *options);
 void catalogue_models_free(catalogue_models *m);
 
 /* Each: EBPO_E_MEMORY, and the errors of opening models and of asking them. Points are finite,

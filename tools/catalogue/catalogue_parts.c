@@ -44,9 +44,8 @@ static ebpo_status ask_box(ebpo_context *context, const held_model *model, void 
     return status;
 }
 
-ebpo_status catalogue_on_surface(catalogue_models *m, const double *points,
-                                 const uint32_t *numbers, size_t count, bool *out,
-                                 ebpo_error *error)
+ebpo_status catalogue_on_surface(catalogue_models *m, const double *points, const uint32_t *numbers,
+                                 size_t count, bool *out, ebpo_error *error)
 {
     box_pairs pairs = { NULL, 0, 0 };
     double *rows = rows_of(points, numbers, count, 3);

@@ -209,8 +209,8 @@ static ebpo_status parse(reader *r, const char *text, size_t size)
     json_error_t why;
     json_t *root = json_loadb(text, size, JSON_DECODE_INT_AS_REAL, &why);
     if (!root)
-        return catalogue_fail(r->error, EBPO_E_FORMAT, r->c->path,
-                              "not a catalogue: line %d: %s", why.line, why.text);
+        return catalogue_fail(r->error, EBPO_E_FORMAT, r->c->path, "not a catalogue: line %d: %s",
+                              why.line, why.text);
     ebpo_status status = read_root(r, root);
     json_decref(root);
     return status;

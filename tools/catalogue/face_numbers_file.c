@@ -69,8 +69,7 @@ static ebpo_status read_head(face_numbers_file *f, ebpo_error *error)
         !read_shape(f, value_of(text + first, "'shape'")))
         return bad(f, error, "its head tells something else");
     f->begin = (off_t)(first + length);
-    if (fstat(f->fd, &st) != 0 ||
-        f->count > (uint64_t)(st.st_size - f->begin) / f->bytes)
+    if (fstat(f->fd, &st) != 0 || f->count > (uint64_t)(st.st_size - f->begin) / f->bytes)
         return bad(f, error, "it is shorter than its head tells");
     return EBPO_OK;
 }

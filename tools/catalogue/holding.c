@@ -54,12 +54,14 @@ static ebpo_status look_at(const held_models *h, held_model *m, const catalogue_
     if (strcmp(found, surface ? e->surface_digest : e->digest) != 0)
         return catalogue_fail(error, EBPO_E_FORMAT, path,
                               "is not the file that %.150s tells of, by its content_sha256; make "
-                              "the catalogue anew", h->c->path);
+                              "the catalogue anew",
+                              h->c->path);
     for (int k = 0; k < 3; k++)
         if (!(e->min[k] <= info->report.min[k] && info->report.max[k] <= e->max[k]))
             return catalogue_fail(error, EBPO_E_FORMAT, path,
                                   "is not within the box that %.150s tells; make the catalogue "
-                                  "anew", h->c->path);
+                                  "anew",
+                                  h->c->path);
     if (!e->numbers || (e->surface && !surface))
         return EBPO_OK;
     ebpo_status status = face_numbers_open(&m->numbers, e->numbers, error);
@@ -310,8 +312,7 @@ ebpo_status held_face(const held_model *m, uint64_t *face, ebpo_error *error)
 static unsigned may_be_open(void)
 {
     struct rlimit most;
-    if (getrlimit(RLIMIT_NOFILE, &most) != 0 ||
-        most.rlim_cur / (2 * DESCRIPTORS_EACH) >= OPEN_MOST)
+    if (getrlimit(RLIMIT_NOFILE, &most) != 0 || most.rlim_cur / (2 * DESCRIPTORS_EACH) >= OPEN_MOST)
         return OPEN_MOST;
     unsigned fit = (unsigned)most.rlim_cur / (2 * DESCRIPTORS_EACH);
     return fit ? fit : 1;

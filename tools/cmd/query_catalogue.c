@@ -15,20 +15,20 @@
 static const char *refused(const query_job *job)
 {
     const query_values *v = job->values;
-    return job->kind == POINTS_BOXES      ? "ebpo box"
-           : v->nearest                   ? "--nearest"
-           : isfinite(v->within)          ? "--within"
-           : v->all                       ? "--all"
-           : v->any                       ? "--any"
-           : v->attribute                 ? "--attribute"
-           : v->level >= 0                ? "--level"
-           : v->deadline                  ? "--deadline"
-           : v->inside_mode               ? "--mode"
-           : v->distance_mode             ? "--mode"
-           : v->no_warm                   ? "--no-warm"
-           : v->cut_level >= 0            ? "--cut-level"
-           : v->prefetch                  ? "--prefetch"
-                                          : NULL;
+    return job->kind == POINTS_BOXES ? "ebpo box"
+           : v->nearest              ? "--nearest"
+           : isfinite(v->within)     ? "--within"
+           : v->all                  ? "--all"
+           : v->any                  ? "--any"
+           : v->attribute            ? "--attribute"
+           : v->level >= 0           ? "--level"
+           : v->deadline             ? "--deadline"
+           : v->inside_mode          ? "--mode"
+           : v->distance_mode        ? "--mode"
+           : v->no_warm              ? "--no-warm"
+           : v->cut_level >= 0       ? "--cut-level"
+           : v->prefetch             ? "--prefetch"
+                                     : NULL;
 }
 
 bool query_catalogue_fits(const query_job *job)
