@@ -6,10 +6,11 @@ import io
 import json
 import os
 import pathlib
+import subprocess
 import sys
 import threading
 
-from package_kit import Case, answers, model, np, points, run
+from package_kit import COMMAND, Case, answers, model, np, points, run
 
 import ebpo
 from ebpo.boxes import Boxes, morton_order
@@ -31,6 +32,25 @@ def spheres(count=27):
     return names
 
 
+RAW = {"inside": np.dtype([("where", "<i4"), ("winding", "<i4")]),
+       "distance": np.dtype([("distance", "<f8"), ("point", "<f8", 3), ("normal", "<f8", 3), ("face", "<i8"), ("model", "<i8")]),
+       "ray": np.dtype([("t", "<f8"), ("face", "<i8"), ("side", "<i8"), ("model", "<i8")])}
+
+
+def by_command(command, catalogue, rows, *options):
+    """What the command answers of a catalogue that was saved."""
+    catalogue.save("asked.json")
+    np.ascontiguousarray(rows, float).tofile("asked.raw")
+    done = subprocess.run([COMMAND, command, "--raw", *options, "asked.json", "asked.raw"], capture_output=True)
+    assert done.returncode == 0, done.stderr
+    return np.frombuffer(done.stdout, RAW[command])
+
+
+def same(told, expected):
+    for name in expected.dtype.names:
+        np.testing.assert_array_equal(told[name], expected[name], name)
+
+
 class Many(Case):
     def setUp(self):
         self.names = spheres()
@@ -49,6 +69,16 @@ class Many(Case):
         buried = np.any([m.locate(on).where == Where.IN for m in self.models], axis=0)
         np.testing.assert_array_equal(where, np.where(buried, Where.IN, Where.ON))
         np.testing.assert_array_equal(self.catalogue.inside(on, boundary=False), buried)
+
+    def test_the_command_answers_the_same(self):
+        rays = np.concatenate([P[:3000], P[3000:] - P[:3000]], axis=1)
+        expected = self.catalogue.locate(P), self.catalogue.distance(P), self.catalogue.ray(rays[:, :3], rays[:, 3:])
+        for options in ([], ["--memory", "8M", "--threads", "4"], ["--memory", "0", "--threads", "1"]):
+            for command, rows, told in zip(("inside", "distance", "ray"), (P, P, rays), expected):
+                same(by_command(command, self.catalogue, rows, *options), told)
+        near = by_command("distance", self.catalogue, P, "--max-distance", ".1")
+        same(near, self.catalogue.distance(P, max_distance=.1))
+        self.assertTrue(np.isposinf(near["distance"][near["face"] < 0]).all())
 
     def test_distance_is_the_least(self):
         told = [m.distance(P, signed=False) for m in self.models]
@@ -340,12 +370,14 @@ class Parts(Case):
             for entry in self.catalogue.entries:
                 on_parts |= ebpo.open(entry.path).locate(p).where == Where.ON
             np.testing.assert_array_equal(self.catalogue.inside(p), self.whole.inside(p))
+            same(by_command("inside", self.catalogue, p), told)
             self.caps_met = (on_parts & (expected.where != Where.ON)).sum()
         self.assertGreater(self.caps_met, least, "points on caps, which are no faces of the whole")
 
     def test_distance_and_rays_do_not_see_caps(self):
         for p in self.points():
             told, expected = self.catalogue.distance(p), self.whole.distance(p)
+            same(by_command("distance", self.catalogue, p), told)
             np.testing.assert_array_equal(told["distance"], expected.distance)
             np.testing.assert_allclose(told["point"], expected.point, rtol=0, atol=1e-14)
             only = told["face"] == expected.face
@@ -369,6 +401,7 @@ class Parts(Case):
         for rule, inner in (("evenodd", 0), ("nonzero", 1)):
             ebpo.convert(two, f"{rule}.ebpo.h5", rule=rule)
             told = cut_by_sample(f"{rule}.ebpo.h5", f"cut_{rule}")[1].locate(P)
+            same(by_command("inside", Catalogue.open(f"cut_{rule}/catalogue.json"), P), told)
             expected = ebpo.open(f"{rule}.ebpo.h5").locate(P)
             np.testing.assert_array_equal(told["where"], expected.where)
             np.testing.assert_array_equal(told["winding"], expected.winding)

@@ -99,6 +99,23 @@ static char *put_attributes(char *at, answer_form form, const ebpo_sampler *samp
     return count && form == ANSWERS_JSON && !none ? put_text(at, "]") : at;
 }
 
+/* --- the model of a catalogue --- */
+
+/* NULL: there is but one. UINT64_MAX: none. */
+static char *put_model(char *at, answer_form form, const uint64_t *model)
+{
+    if (!model)
+        return at;
+    if (form == ANSWERS_RAW)
+        return put_u64(at, *model);
+    if (form == ANSWERS_JSON)
+        at = put_text(at, ", \"model\": ");
+    else
+        *at++ = between(form);
+    return *model != UINT64_MAX ? number_write_uint(at, *model)
+                                : put_text(at, form == ANSWERS_JSON ? "null" : "-");
+}
+
 /* --- inside --- */
 
 static char *inside_json(char *at, const ebpo_inside_result *r)
@@ -188,23 +205,24 @@ static char *put_limited(char *at, answer_form form, const ebpo_distance_result 
 }
 
 static char *put_distance(char *at, answer_form form, const ebpo_distance_result *r,
-                          const ebpo_sampler *sampler)
+                          const ebpo_sampler *sampler, const uint64_t *model)
 {
     at = form == ANSWERS_RAW    ? distance_raw(at, r)
          : form == ANSWERS_JSON ? distance_json(at, r)
                                 : distance_line(at, between(form), r);
+    at = put_model(at, form, model);
     at = put_attributes(at, form, sampler, r->point, r->face);
     return form == ANSWERS_JSON ? put_text(at, "}") : at;
 }
 
 void answers_distance(answer_text *t, answer_form form, bool limited,
                       const ebpo_distance_result *results, uint64_t count,
-                      const ebpo_sampler *sampler)
+                      const ebpo_sampler *sampler, const uint64_t *model)
 {
     for (uint64_t i = 0; i < count; i++) {
         char *at = answer_text_room(t);
         at = limited ? put_limited(at, form, &results[i])
-                     : put_distance(at, form, &results[i], sampler);
+                     : put_distance(at, form, &results[i], sampler, model ? &model[i] : NULL);
         end(t, form, at);
     }
 }
@@ -220,7 +238,7 @@ void answers_near(answer_text *t, answer_form form, const ebpo_near_face *face, 
     memcpy(r.normal, face->normal, sizeof r.normal);
     if (form == ANSWERS_JSON)
         at = put_text(at, first ? "[" : ", ");
-    at = put_distance(at, form, &r, sampler);
+    at = put_distance(at, form, &r, sampler, NULL);
     if (form == ANSWERS_TEXT || form == ANSWERS_CSV)
         end(t, form, at);
     else
@@ -234,7 +252,7 @@ void answers_near_end(answer_text *t, answer_form form, bool none, const ebpo_sa
                                                   .face = EBPO_NO_FACE };
     char *at = answer_text_room(t);
     if (form == ANSWERS_RAW)
-        at = put_distance(at, form, &nothing, sampler);
+        at = put_distance(at, form, &nothing, sampler, NULL);
     else if (form == ANSWERS_JSON)
         at = put_text(at, none ? "[]" : "]");
     end(t, form, at);
@@ -255,26 +273,30 @@ static char *put_hit(char *at, answer_form form, const ebpo_ray_hit *hit)
 
 /* A hit with its attributes, where it is as far as doubles tell, and within them. */
 static char *put_met(char *at, answer_form form, const ebpo_ray *ray, const ebpo_ray_hit *hit,
-                     const ebpo_sampler *sampler)
+                     const ebpo_sampler *sampler, const uint64_t *model)
 {
     double point[3];
     for (int k = 0; k < 3; k++)
         point[k] = fmax(-DBL_MAX, fmin(ray->origin[k] + hit->t * ray->direction[k], DBL_MAX));
-    at = put_attributes(put_hit(at, form, hit), form, sampler, point, hit->face);
+    at = put_model(put_hit(at, form, hit), form, model);
+    at = put_attributes(at, form, sampler, point, hit->face);
     return put_text(at, form == ANSWERS_JSON ? "}" : "");
 }
 
 void answers_ray_first(answer_text *t, answer_form form, const ebpo_ray *rays,
-                       const ebpo_ray_hit *hits, uint64_t count, const ebpo_sampler *sampler)
+                       const ebpo_ray_hit *hits, uint64_t count, const ebpo_sampler *sampler,
+                       const uint64_t *model)
 {
     static const char *const nothing[] = { "-", "null", "", "-,-,-" };
     for (uint64_t i = 0; i < count; i++) {
         bool none = hits[i].face == EBPO_NO_FACE && form != ANSWERS_RAW;
         char *at = answer_text_room(t);
         if (!none)
-            at = put_met(at, form, &rays[i], &hits[i], sampler);
+            at = put_met(at, form, &rays[i], &hits[i], sampler, model ? &model[i] : NULL);
         else
             at = put_text(at, nothing[form]);
+        if (none && form == ANSWERS_CSV && model)
+            at = put_model(at, form, &model[i]);
         if (none && form == ANSWERS_CSV)
             at = put_attributes(at, form, sampler, rays[i].origin, EBPO_NO_FACE);
         end(t, form, at);
@@ -322,7 +344,7 @@ void answers_ray_all(answer_text *t, answer_form form, const ebpo_ray *ray,
 {
     begin_list(t, form, count);
     for (uint64_t i = 0; i < count; i++)
-        answer_text_end(t, put_met(next_item(t, form, i == 0), form, ray, &hits[i], sampler));
+        answer_text_end(t, put_met(next_item(t, form, i == 0), form, ray, &hits[i], sampler, NULL));
     end_list(t, form);
 }
 

@@ -45,29 +45,49 @@ static ebpo_status answer_lists(const query_job *job, query_worker *w, const dou
     return status;
 }
 
+static ebpo_status answer_models(const query_job *job, query_worker *w, const double *rows,
+                                 uint64_t count, ebpo_error *error)
+{
+    ebpo_distance_result *results = w->results;
+    uint64_t *model = (uint64_t *)(void *)(results + count);
+    ebpo_status status = catalogue_distance(job->models, rows, count, job->distance.max_distance,
+                                            job->distance.unsigned_distance, results, model, error);
+    if (status == EBPO_OK)
+        answers_distance(w->text, job->form, false, results, count, NULL, model);
+    return status;
+}
+
 static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
                           ebpo_error *error)
 {
+    if (job->models)
+        return answer_models(job, w, rows, count, error);
     if (count && query_lists(job->values))
         return answer_lists(job, w, rows, count, error);
     ebpo_status status =
         ebpo_distance_many(w->context, rows, count, &job->distance, w->results, error);
     if (status == EBPO_OK)
         answers_distance(w->text, job->form, limited(&job->distance), w->results, count,
-                         job->sampler);
+                         job->sampler, NULL);
     return status;
 }
 
 static const char *columns(const query_job *job)
 {
-    return limited(&job->distance) && !query_lists(job->values) ? "lo,hi"
-                                                                : "distance,x,y,z,nx,ny,nz,face";
+    return job->models ? "distance,x,y,z,nx,ny,nz,face,model"
+           : limited(&job->distance) && !query_lists(job->values) ? "lo,hi"
+                                                                  : "distance,x,y,z,nx,ny,nz,face";
 }
 
 static const char *dtype(const query_job *job, unsigned *bytes)
 {
     if (query_lists(job->values))
         return NULL;
+    if (job->models) {
+        *bytes = 72;
+        return "[('distance', '<f8'), ('point', '<f8', (3,)), ('normal', '<f8', (3,)), ('face', "
+               "'<u8'), ('model', '<u8')]";
+    }
     *bytes = limited(&job->distance) ? 16 : 64;
     return limited(&job->distance)
                ? "[('lo', '<f8'), ('hi', '<f8')]"

@@ -10,7 +10,9 @@
 static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
                           ebpo_error *error)
 {
-    ebpo_status status = ebpo_inside_many(w->context, rows, count, &job->inside, w->results, error);
+    ebpo_status status =
+        job->models ? catalogue_inside(job->models, rows, count, w->results, error)
+                    : ebpo_inside_many(w->context, rows, count, &job->inside, w->results, error);
     if (status == EBPO_OK)
         answers_inside(w->text, job->form, w->results, count);
     return status;

@@ -23,6 +23,18 @@ static ebpo_status answer_all(const query_job *job, query_worker *w, const ebpo_
     return status;
 }
 
+static ebpo_status answer_models(const query_job *job, query_worker *w, const ebpo_ray *rays,
+                                 uint64_t count, ebpo_error *error)
+{
+    ebpo_ray_hit *hits = w->results;
+    uint64_t *model = (uint64_t *)(void *)(hits + count);
+    ebpo_status status = catalogue_ray(job->models, rays, count,
+                                       (ebpo_ray_sides)job->values->ray_sides, hits, model, error);
+    if (status == EBPO_OK)
+        answers_ray_first(w->text, job->form, rays, hits, count, NULL, model);
+    return status;
+}
+
 static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
                           ebpo_error *error)
 {
@@ -31,6 +43,8 @@ static ebpo_status answer(const query_job *job, query_worker *w, const double *r
     ebpo_status status;
     how.sides = (ebpo_ray_sides)job->values->ray_sides;
     how.threads = 1; /* others ask about other rays */
+    if (job->models)
+        return answer_models(job, w, rays, count, error);
     if (job->values->all)
         return answer_all(job, w, rays, count, &how, error);
     if (job->values->any) {
@@ -41,18 +55,25 @@ static ebpo_status answer(const query_job *job, query_worker *w, const double *r
     }
     status = ebpo_ray_first_many(w->context, rays, count, &how, w->results, error);
     if (status == EBPO_OK)
-        answers_ray_first(w->text, job->form, rays, w->results, count, job->sampler);
+        answers_ray_first(w->text, job->form, rays, w->results, count, job->sampler, NULL);
     return status;
 }
 
 static const char *columns(const query_job *job)
 {
-    return job->values->any ? "hit" : job->values->all ? "hits,t,face,side" : "t,face,side";
+    return job->values->any   ? "hit"
+           : job->values->all ? "hits,t,face,side"
+           : job->models      ? "t,face,side,model"
+                              : "t,face,side";
 }
 
 static const char *dtype(const query_job *job, unsigned *bytes)
 {
     *bytes = job->values->any ? 8 : 24;
+    if (job->models) {
+        *bytes = 32;
+        return "[('t', '<f8'), ('face', '<u8'), ('side', '<i8'), ('model', '<u8')]";
+    }
     return job->values->all   ? NULL
            : job->values->any ? "'<u8'"
                               : "[('t', '<f8'), ('face', '<u8'), ('side', '<i8')]";

@@ -82,6 +82,12 @@ int query_holding_open(query_holding *h, const char *command, const char *path,
     return query_open_model(&h->session, command, &h->options);
 }
 
+void query_holding_elsewhere(query_holding *h, const char *command)
+{
+    *h = (query_holding){ .command = command, .elsewhere = true };
+    init_lock(h);
+}
+
 void query_holding_close(query_holding *h)
 {
     query_close(&h->session);
@@ -183,6 +189,8 @@ static ebpo_status change(query_holding *h, ebpo_error *error)
 static ebpo_status enter(query_holding *h, ebpo_context **context, ebpo_error *error)
 {
     pthread_rwlock_rdlock(&h->lock);
+    if (h->elsewhere)
+        return EBPO_OK;
     ebpo_status status =
         h->session.model ? ready(h, context, error) : EBPO_E_CANCELLED; /* another one failed */
     if (status != EBPO_OK)
@@ -205,7 +213,7 @@ bool query_holding_enter_alone(query_holding *h, ebpo_context **context)
 {
     pthread_rwlock_wrlock(&h->lock);
     drop_contexts(h);
-    if (h->session.model && ready(h, context, NULL) == EBPO_OK)
+    if (!h->elsewhere && h->session.model && ready(h, context, NULL) == EBPO_OK)
         return true;
     pthread_rwlock_unlock(&h->lock);
     return false;

@@ -20,6 +20,7 @@ typedef struct query_holding {
     ebpo_context **context[QUERY_THREADS_MOST]; /* those that there are; under `books` */
     unsigned contexts;
     pthread_mutex_t books;
+    bool elsewhere; /* the job holds what it asks: nothing is done here */
     /* what is decided */
     bool automatic;      /* nobody said how much memory there may be */
     atomic_bool waiting; /* it may still bring in all of the model */
@@ -41,6 +42,8 @@ typedef struct query_holding {
 int query_holding_open(query_holding *h, const char *command, const char *path,
                        const query_values *values, const ebpo_model_options *options,
                        double parts_share);
+/* For a job that holds what it asks itself. */
+void query_holding_elsewhere(query_holding *h, const char *command);
 void query_holding_close(query_holding *h);
 
 /* Before a thread asks: *context (NULL at first) is then one of the model as it is held now.

@@ -2,6 +2,7 @@
 #ifndef EBPO_TOOLS_QUERY_JOB_H
 #define EBPO_TOOLS_QUERY_JOB_H
 
+#include "catalogue/catalogue_models.h"
 #include "cli/answers.h"
 #include "cli/points.h"
 #include "cli/query_args.h"
@@ -32,6 +33,7 @@ struct query_job {
     ebpo_distance_options distance;
     answer_form form;
     const ebpo_sampler *sampler; /* of --attribute; NULL: none */
+    catalogue_models *models;    /* a catalogue is asked in place of a model; NULL: a model */
     bool continues;              /* answers go on behind those of another run: without names */
 };
 

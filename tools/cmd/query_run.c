@@ -9,6 +9,7 @@
 #include "cli/model_sums.h"
 #include "cli/npy_answers.h"
 #include "cli/points_cut.h"
+#include "cmd/query_catalogue.h"
 #include "cmd/query_holding.h"
 #include "cmd/query_pipe.h"
 #include "cmd/query_shard.h"
@@ -116,9 +117,22 @@ static uint64_t together(const query_values *v, const query_holding *holding)
     const uint64_t most = SIZE_MAX / TOGETHER_BYTES; /* on machines of 32 bits */
     if (v->together)
         return (uint64_t)v->together < most ? (uint64_t)v->together : most;
-    bool parts = v->out && !holding->waiting &&
-                 ebpo_model_get_stats(holding->session.model, &stats) == EBPO_OK && !stats.resident;
+    bool parts =
+        v->out && !holding->waiting &&
+        (holding->elsewhere ||
+         (ebpo_model_get_stats(holding->session.model, &stats) == EBPO_OK && !stats.resident));
     return parts ? TOGETHER_IN_PARTS : POINTS_BATCH;
+}
+
+static int open_asked(query_job *job, const char *model, const ebpo_model_options *options,
+                      query_holding *holding)
+{
+    if (!catalogue_is(model))
+        return query_holding_open(holding, job->command, model, job->values, options,
+                                  job->parts_share);
+    query_holding_elsewhere(holding, job->command);
+    job->result_bytes += sizeof(uint64_t); /* the model's number, behind all results */
+    return query_catalogue_open(job, model);
 }
 
 /* With the model, of what is in `in`. */
@@ -127,8 +141,7 @@ static int run(query_job *job, const char *model, points *in, const ebpo_model_o
 {
     query_holding holding;
     ebpo_sampler *sampler = NULL;
-    int code =
-        query_holding_open(&holding, job->command, model, job->values, options, job->parts_share);
+    int code = open_asked(job, model, options, &holding);
     if (code == EXIT_FINE)
         code = open_sampler(job, &holding, &sampler);
     if (code == EXIT_FINE)
@@ -141,6 +154,9 @@ static int run(query_job *job, const char *model, points *in, const ebpo_model_o
     ebpo_sampler_free(sampler);
     if (holding.session.model && job->values->remote.stats)
         tell_stats(job, &holding);
+    if (job->models && job->values->remote.stats)
+        query_catalogue_tell(job);
+    query_catalogue_close(job);
     query_holding_close(&holding);
     return code;
 }
@@ -168,7 +184,7 @@ int query_run(query_job *job, const char *model, const char *path)
     query_shard shard;
     if (!query_options_from(job->command, job->values, &options, &job->inside, &job->distance))
         return EXIT_USAGE;
-    if (!fits(job))
+    if (!fits(job) || (catalogue_is(model) && !query_catalogue_fits(job)))
         return EXIT_USAGE;
     job->form = form_of(job->values);
     int code = EXIT_USAGE;

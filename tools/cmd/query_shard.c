@@ -13,6 +13,7 @@
 #include "cli/json.h"
 #include "cli/points_format.h"
 #include "cli/words.h"
+#include "cmd/query_catalogue.h"
 
 enum { SHARDS_MOST = 1000000000 };
 
@@ -116,15 +117,34 @@ static void tell_file(json *j, const char *key, const struct stat *st)
     json_text(j, "modified", time);
 }
 
-/* How the model is held and how many ask changes no answer, and is not in it. */
-static char *tell_facts(const query_shard *s, const query_job *job, const ebpo_info *info,
-                        const struct stat *st, const char *dataset)
+static int tell_model(json *j, const query_shard *s)
 {
-    char hex[65], *text = NULL;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    char hex[65];
+    if (catalogue_is(s->model))
+        return query_catalogue_facts(j, s->command, s->model);
+    if (remote_open(&file, s->model, &s->v->remote, &error) != EBPO_OK)
+        return command_failed(s->command, &error);
+    words_hex(ebpo_file_info(file)->content_sha256, hex);
+    json_object(j, "model");
+    json_text(j, "content_sha256", hex);
+    json_uint(j, "bytes", ebpo_file_info(file)->file_bytes);
+    json_end(j);
+    ebpo_close(file);
+    return EXIT_FINE;
+}
+
+/* How the model is held and how many ask changes no answer, and is not in it. Returns an exit
+ * code. */
+static int tell_facts(const query_shard *s, const query_job *job, const struct stat *st,
+                      const char *dataset, char **facts)
+{
+    char *text = NULL;
     size_t size;
     FILE *out = open_memstream(&text, &size);
     if (!out)
-        return NULL;
+        return command_no_memory(s->command);
     json j;
     json_begin(&j, out);
     json_object(&j, NULL);
@@ -134,42 +154,35 @@ static char *tell_facts(const query_shard *s, const query_job *job, const ebpo_i
     json_text(&j, "command", s->command);
     json_uint(&j, "shard", s->number);
     json_uint(&j, "of", s->of);
-    words_hex(info->content_sha256, hex);
-    json_object(&j, "model");
-    json_text(&j, "content_sha256", hex);
-    json_uint(&j, "bytes", info->file_bytes);
-    json_end(&j);
+    int code = tell_model(&j, s);
     tell_file(&j, "points", st);
     json_text(&j, "dataset", dataset);
     json_end(&j);
     json_object(&j, "question");
     tell_question(&j, job);
     json_finish(&j);
-    if (fclose(out) == 0)
-        return text;
-    free(text);
-    return NULL;
+    if (fclose(out) != 0 && code == EXIT_FINE)
+        code = command_no_memory(s->command);
+    if (code == EXIT_FINE)
+        *facts = text;
+    else
+        free(text);
+    return code;
 }
 
 /* The head of the model and the file of points, as they are now. */
 static int look_at_inputs(const query_shard *s, const query_job *job, char **facts)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_file *file = NULL;
     struct stat st;
     const char *dataset;
-    if (!command_wants_hdf5(s->command, s->model))
+    if (!catalogue_is(s->model) && !command_wants_hdf5(s->command, s->model))
         return EXIT_FAILED;
     if (!points_file(s->points, &st, &dataset)) {
         fprintf(stderr, "ebpo %s: %s: cannot be opened: %s\n", s->command, s->points,
                 strerror(errno));
         return EXIT_FAILED;
     }
-    if (remote_open(&file, s->model, &s->v->remote, &error) != EBPO_OK)
-        return command_failed(s->command, &error);
-    *facts = tell_facts(s, job, ebpo_file_info(file), &st, dataset);
-    ebpo_close(file);
-    return *facts ? EXIT_FINE : command_no_memory(s->command);
+    return tell_facts(s, job, &st, dataset, facts);
 }
 
 /* --- the note --- */

@@ -303,7 +303,7 @@ class Catalogue:
             out[order] = self._nearest(all_points[order], max_distance, held, threads)
         if signed and rows.count and all(entry.solid for entry in self.entries):
             inner = self.locate(all_points, memory=memory, threads=threads)["where"] == Where.IN
-            out["distance"][inner] *= -1
+            out["distance"][inner & np.isfinite(out["distance"])] *= -1  # what is too far is inf
         return out[0] if rows.single else out
 
     def _nearest(self, p: np.ndarray, max_distance: float, held: Holding, threads: int | None) -> np.ndarray:
