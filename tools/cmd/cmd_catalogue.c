@@ -401,6 +401,9 @@ static int run(void *given, const char **operand)
 {
     const values *v = given;
     progress_line line;
+    if (v->out && strcmp(v->out, "-") == 0)
+        return command_usage("catalogue", "--output: '-': a file's name is needed here, in whose "
+                                          "folder paths begin");
     char *folder = strdup(operand[0]);
     catalogue c = { .v = v, .folder = folder, .progress = &line };
     for (size_t end = folder ? strlen(folder) : 0; end > 1 && folder[end - 1] == '/';)
