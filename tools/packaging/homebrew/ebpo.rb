@@ -2,14 +2,14 @@
 #   HOMEBREW_EBPO_TARBALL=/path/ebpo-octree-0.1.0.tar.xz brew install --formula ./ebpo.rb
 class Ebpo < Formula
   desc "Octree of convex envelopes of triangle meshes, in one HDF5 file"
-  version "0.1.0"
   url "file://#{ENV.fetch("HOMEBREW_EBPO_TARBALL", "/nonexistent/ebpo-octree-0.1.0.tar.xz")}"
+  version "0.1.0"
   license "MIT"
 
   depends_on "meson" => :build
   depends_on "ninja" => :build
   depends_on "pkgconf" => :build
-  depends_on "python@3.13" => [:build, :test]
+  depends_on "python@3.13" => :build
   depends_on "assimp"
   depends_on "cairo"
   depends_on "curl"
