@@ -5,7 +5,8 @@
 #   OUT     folder for the packages and the source package
 #   SUITE   of Debian, bookworm unless named
 # As root, with debootstrap. The root is made in $TMPDIR, of the mirror $EBPO_DEBIAN_MIRROR, and goes away
-# afterwards; with $EBPO_DEB_ROOT=FOLDER it is kept there, for the next time.
+# afterwards; with $EBPO_DEB_ROOT=FOLDER it is kept there, for the next time. $EBPO_DEB_ARCH: another
+# architecture whose programs run here, as i386 on amd64.
 set -eu
 usage() { echo "usage: build_deb.sh [-l] [-r] OUT [SUITE]" >&2 && exit 2; }
 look=no twice=no
@@ -36,7 +37,7 @@ ended() {
 trap ended EXIT
 trap 'exit 1' INT TERM HUP
 [ -e "$root/etc/debian_version" ] ||
-    debootstrap --variant=minbase "$suite" "$root" ${mirror:+"$mirror"}
+    debootstrap --variant=minbase ${EBPO_DEB_ARCH:+--arch="$EBPO_DEB_ARCH"} "$suite" "$root" ${mirror:+"$mirror"}
 cp /etc/resolv.conf "$root/etc/"
 mount -t proc proc "$root/proc"
 mount -t tmpfs -o mode=1777 tmpfs "$root/dev/shm" # for faketime
