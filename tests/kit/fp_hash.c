@@ -1,5 +1,6 @@
 /* Calls the library from the environment that is asked for, and hashes what comes back. */
 #include "fp_hash.h"
+#include "base/endian.h"
 #include "scratch.h"
 
 #include <fenv.h>
@@ -72,15 +73,31 @@ static void bytes(hashing *h, const void *data, size_t size)
         *h->hash = (*h->hash ^ p[i]) * 0x100000001b3;
 }
 
-static void number(hashing *h, uint64_t x) { bytes(h, &x, sizeof x); }
+/* As little-endian machines have it. */
+static void number(hashing *h, uint64_t x)
+{
+    x = ebpo_little64(x);
+    bytes(h, &x, sizeof x);
+}
+
+static void words(hashing *h, const uint32_t *x, uint64_t count)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        uint32_t word = ebpo_little32(x[i]);
+        bytes(h, &word, sizeof word);
+    }
+}
 
 /* All NaNs are one: their bits are the compiler's. */
 static void real(hashing *h, double x)
 {
     if (isnan(x))
         number(h, 0x7ff8);
-    else
-        bytes(h, &x, sizeof x);
+    else {
+        uint64_t bits;
+        memcpy(&bits, &x, sizeof bits);
+        number(h, bits);
+    }
 }
 
 static void reals(hashing *h, const double *x, int count)
@@ -137,7 +154,7 @@ static void hash_levels(hashing *h, const stiff_case *c, ebpo_file *file)
         real(h, volume);
         for (uint64_t i = 0; i < 3 * mesh.vertex_count; i++)
             real(h, mesh.xyz64 ? mesh.xyz64[i] : (double)mesh.xyz32[i]);
-        bytes(h, mesh.faces, 3 * mesh.face_count * sizeof *mesh.faces);
+        words(h, mesh.faces, 3 * mesh.face_count);
         ebpo_mesh_free(&mesh);
     }
 }
@@ -217,7 +234,8 @@ static void hash_ray(hashing *h, const stiff_case *c, ebpo_context *context, con
     if (status != EBPO_OK)
         fail(c, "box", &error);
     number(h, count);
-    bytes(h, faces, count * sizeof *faces);
+    for (uint64_t i = 0; i < count; i++)
+        number(h, faces[i]);
 }
 
 /* How far levels reach, and a subset by need. */
@@ -335,8 +353,8 @@ static void hash_selections(hashing *h, const stiff_case *c)
         number(h, (uint64_t)status);
         for (int level = 0; status == EBPO_OK && level < tree.info.level_count; level++) {
             const ebpo_level *l = &tree.level[level];
-            bytes(h, l->planes, l->plane_count * sizeof *l->planes);
-            bytes(h, l->leaf_planes, l->leaf_plane_count * sizeof *l->leaf_planes);
+            words(h, l->planes, l->plane_count);
+            words(h, l->leaf_planes, l->leaf_plane_count);
             real(h, l->gray_volume);
             real(h, l->leaf_volume);
         }

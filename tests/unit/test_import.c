@@ -107,7 +107,11 @@ START_TEST(stl_of_both_kinds_is_welded)
         strcat(ascii, "facet normal 0 0 1\nouter loop\n");
         for (int k = 0; k < 3; k++) {
             const float *p = corner[face[i][k]];
-            memcpy(binary + 84 + 50 * i + 12 + 12 * k, p, 12);
+            for (int a = 0; a < 3; a++) {
+                uint32_t bits;
+                memcpy(&bits, p + a, sizeof bits);
+                ebpo_store32(binary + 84 + 50 * i + 12 + 12 * k + 4 * a, bits);
+            }
             sprintf(ascii + strlen(ascii), "vertex %g %g %g\n", (double)p[0], (double)p[1],
                     (double)p[2]);
         }
