@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include <ebpo/colours.h>
 
@@ -238,8 +237,7 @@ static const tile *coarsest(const job *j)
 
 static unsigned thread_count(const job *j)
 {
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    return j->v.threads ? (unsigned)j->v.threads : cores > 0 ? (unsigned)cores : 1;
+    return j->v.threads ? (unsigned)j->v.threads : command_cores();
 }
 
 static int caption_height(const job *j, int width)

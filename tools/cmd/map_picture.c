@@ -4,10 +4,10 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <unistd.h>
 
 #include <ebpo/colours.h>
 
+#include "cli/command.h"
 #include "cli/words.h"
 #include "cmd/map_job.h"
 #include "render/picture.h"
@@ -100,8 +100,7 @@ ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *p
     picture p = { 0 };
     camera view;
     ebpo_colours colours = { 0 };
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    unsigned threads = j->options.threads ? j->options.threads : cores > 0 ? (unsigned)cores : 1;
+    unsigned threads = j->options.threads ? j->options.threads : command_cores();
     if (!picture_make(&p, j->width + LEGEND, j->height, white))
         return no_memory(error);
     ebpo_status status = ebpo_mesh_colours(mesh, &colours, error);

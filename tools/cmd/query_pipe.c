@@ -1,5 +1,6 @@
 #include "cmd/query_pipe.h"
 
+#include <fcntl.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -263,6 +264,8 @@ static void make_waker(pipe_line *p)
     int ends[2];
     if (pipe(ends) != 0)
         return; /* it is told when the next input comes */
+    for (int i = 0; i < 2; i++)
+        (void)fcntl(ends[i], F_SETFD, FD_CLOEXEC);
     p->in->wake = ends[0];
     p->waker = ends[1];
 }

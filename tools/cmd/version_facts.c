@@ -51,9 +51,10 @@ static void print(const installation *i)
     printf("program: %s\nlibrary: %s (%s)\nHDF5 plugin: %s\n", i->program,
            i->library[0] ? i->library : "unknown", ebpo_version(),
            i->plugin[0] ? i->plugin : "none was installed with this program");
-    printf("built with:%s%s%s%s%s\n", EBPO_HAVE_ASSIMP ? " assimp" : "",
+    printf("built with:%s%s%s%s%s%s\n", EBPO_HAVE_ASSIMP ? " assimp" : "",
            EBPO_HAVE_HTTP ? " libcurl" : "", EBPO_HAVE_PNG ? " libpng" : "",
-           EBPO_HAVE_CAIRO ? " cairo" : "", EBPO_HAVE_CHART_JS ? " Chart.js" : "");
+           EBPO_HAVE_CAIRO ? " cairo" : "", EBPO_HAVE_CHART_JS ? " Chart.js" : "",
+           EBPO_HAVE_QHULL ? " qhull" : "");
 }
 
 /* Not printed with the rest: whoever asks for the version alone is told, too. */

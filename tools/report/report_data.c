@@ -3,7 +3,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
+
+#include "cli/command.h"
 
 const unsigned deadlines_us[DEADLINES] = { 1, 2, 5, 10, 20, 50, 100, 1000 };
 const unsigned budget_parts[BUDGETS] = { 1, 2, 4, 8, 16 };
@@ -285,8 +286,4 @@ const char *machine_processor(void)
     return name;
 }
 
-unsigned machine_cores(void)
-{
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    return cores > 0 ? (unsigned)cores : 1;
-}
+unsigned machine_cores(void) { return command_cores(); }

@@ -247,6 +247,7 @@ const char *report_page_missing(void);
 
 /* "Intel(R) Xeon(R) Processor @ 2.50GHz", "" where the system does not tell; lent. */
 const char *machine_processor(void);
+/* Those that this process may use. */
 unsigned machine_cores(void);
 
 #endif
