@@ -595,7 +595,7 @@ Suite *test_suite(void)
     tcase_add_test(hand, what_makes_no_sense_is_refused);
     tcase_add_test(hand, a_crowd_of_faces_is_refused);
     tcase_add_test(hand, a_ball_goes_away_from_many_faces);
-    tcase_add_loop_test(hand, a_hand_is_told_that_loading_has_stopped, 0, 2);
+    tcase_add_loop_test(hand, a_hand_is_told_that_loading_has_stopped, 0, 3);
     suite_add_tcase(suite, hand);
     TCase *placed = tcase_create("placed"); /* without the mend it would wait for ever */
     tcase_set_timeout(placed, 60);
