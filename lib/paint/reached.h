@@ -1,4 +1,4 @@
-/* Inside lib/paint: the reaches of many points, found on all cores and given one after the other. */
+/* Inside lib/paint: the reaches of many points, found on all cores, given one after the other. */
 #ifndef EBPO_PAINT_REACHED_H
 #define EBPO_PAINT_REACHED_H
 
@@ -18,7 +18,7 @@ typedef struct ebpo_reached {
 
 typedef struct ebpo_reacher ebpo_reacher;
 
-/* `threads`: 0: all cores. The context is used, and others are made of its model. On failure NULL. */
+/* `threads`: 0: all cores. Uses the context, and makes others of its model. On failure NULL. */
 EBPO_MUST_USE ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context,
                                            unsigned threads, ebpo_reacher **out, ebpo_error *error);
 void ebpo_reacher_free(ebpo_reacher *r);
