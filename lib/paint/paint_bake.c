@@ -13,7 +13,7 @@
 #include "base/parallel.h"
 #include "base/sized.h"
 #include "paint/paint_parts.h"
-#include "paint/paint_reach.h"
+#include "paint/reached.h"
 #include "query/query_model.h"
 
 /* A vertex that something covers. */
@@ -29,7 +29,8 @@ typedef struct bake {
     const ebpo_mesh *mesh;
     const ebpo_progress *progress;
     uint8_t *rgba;
-    ebpo_reach reach;
+    ebpo_context *context;
+    ebpo_reacher *reacher;
     uint32_t *numbers; /* the source's of the mesh's faces, ascending; NULL: 0, 1, 2, ... */
     uint32_t *slot;    /* [vertex_count] in `dyed`, and 1; 0: none */
     dyed *dyed;
@@ -48,8 +49,8 @@ static int by_value(const void *a, const void *b)
 /* Of a mesh in the source's order whose numbers have gaps, or go beyond the source. */
 static ebpo_status read_numbers(bake *b, ebpo_error *error)
 {
-    const ebpo_file *file = b->reach.context->model->file;
-    const ebpo_info *info = b->reach.context->model->info;
+    const ebpo_file *file = b->context->model->file;
+    const ebpo_info *info = b->context->model->info;
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     ebpo_maps maps;
     if (!b->p->source_numbers || info->face_count == info->source_face_count)
@@ -113,7 +114,7 @@ static void apply(dyed *d, const ebpo_stroke_held *s, uint32_t number)
     d->a = erases ? 0 : d->a * (1 - share) + share;
 }
 
-static ebpo_status dye_face(bake *b, const ebpo_reach_face *f, const ebpo_stroke_held *s,
+static ebpo_status dye_face(bake *b, const ebpo_reached_face *f, const ebpo_stroke_held *s,
                             uint32_t number, bool *any, ebpo_error *error)
 {
     uint64_t row = row_of(b, f->face);
@@ -140,16 +141,19 @@ static ebpo_status dye_stroke(bake *b, uint32_t number, ebpo_error *error)
     const ebpo_stroke_held *s = &b->p->stroke[number];
     ebpo_status status = EBPO_OK;
     for (uint32_t i = 0; i < s->count && status == EBPO_OK; i++, b->done++) {
-        bool here, any = false;
+        ebpo_reached reached;
+        bool any = false;
         if (b->done % 256 == 0 &&
             !ebpo_progress_step(b->progress, "bake", b->done, b->p->point_count, error))
             return EBPO_E_CANCELLED;
-        status = ebpo_paint_reach(&b->reach, b->p, number, i, &here, error);
-        for (uint64_t k = 0; status == EBPO_OK && here && k < b->reach.count; k++)
-            status = dye_face(b, &b->reach.face[k], s, number, &any, error);
+        status = ebpo_reacher_find(b->reacher, number, i, &reached, error);
+        if (status != EBPO_OK)
+            return status;
+        for (uint64_t k = 0; status == EBPO_OK && k < reached.count; k++)
+            status = dye_face(b, &reached.face[k], s, number, &any, error);
         b->baked.points++;
-        b->baked.elsewhere += status == EBPO_OK && !here;
-        b->baked.between += status == EBPO_OK && here && !any;
+        b->baked.elsewhere += !reached.here;
+        b->baked.between += status == EBPO_OK && reached.here && !any;
     }
     return status;
 }
@@ -205,7 +209,9 @@ ebpo_status ebpo_paint_bake(const ebpo_paint *p, ebpo_context *context, const eb
 {
     EBPO_DEFAULT_FP;
     ebpo_paint_options wanted = EBPO_PAINT_OPTIONS_INIT;
-    bake b = { .p = p, .mesh = mesh, .progress = &wanted.progress, .rgba = rgba };
+    bake b = {
+        .p = p, .mesh = mesh, .context = context, .progress = &wanted.progress, .rgba = rgba
+    };
     b.baked.struct_size = sizeof b.baked;
     ebpo_status status = EBPO_TAKE(ebpo_paint_options, &wanted, options, error);
     if (status == EBPO_OK && baked)
@@ -216,10 +222,11 @@ ebpo_status ebpo_paint_bake(const ebpo_paint *p, ebpo_context *context, const eb
         status = check_mesh(context, mesh, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_reach_begin(&b.reach, context);
     b.slot = ebpo_alloc_zero(mesh->vertex_count, sizeof *b.slot);
     status = b.slot ? read_numbers(&b, error)
                     : ebpo_fail_memory(error, mesh->vertex_count * sizeof *b.slot);
+    if (status == EBPO_OK)
+        status = ebpo_reacher_new(p, context, wanted.threads, &b.reacher, error);
     if (status == EBPO_OK)
         status = dye_layers(&b, error);
     if (status == EBPO_OK)
@@ -227,7 +234,7 @@ ebpo_status ebpo_paint_bake(const ebpo_paint *p, ebpo_context *context, const eb
     b.baked.vertices = b.count;
     if (status == EBPO_OK && baked)
         EBPO_GIVE(ebpo_paint_baked, baked, &b.baked);
-    ebpo_reach_end(&b.reach);
+    ebpo_reacher_free(b.reacher);
     free(b.numbers);
     free(b.slot);
     free(b.dyed);

@@ -54,15 +54,9 @@ static uint32_t tick_of(ebpo_touch *touch, uint64_t kind, const double at[3])
     ebpo_touch_sensed probe;
     ebpo_touch_turned tool;
     switch (kind) {
-    case EBPO_TOUCH_BALL:
-        ebpo_touch_move(touch, at, &ball);
-        return ball.flags;
-    case EBPO_TOUCH_PROBE:
-        ebpo_touch_sense(touch, at, &probe);
-        return probe.flags;
-    default:
-        ebpo_touch_turn(touch, at, turn, &tool);
-        return tool.flags;
+    case EBPO_TOUCH_BALL: ebpo_touch_move(touch, at, &ball); return ball.flags;
+    case EBPO_TOUCH_PROBE: ebpo_touch_sense(touch, at, &probe); return probe.flags;
+    default: ebpo_touch_turn(touch, at, turn, &tool); return tool.flags;
     }
 }
 

@@ -235,6 +235,7 @@ ebpo_status paint_bake(paint_job *j, ebpo_error *error)
     ebpo_mesh mesh;
     read.threads = (unsigned)j->v->threads;
     read.attributes = 1;
+    options.threads = (unsigned)j->v->threads;
     options.progress = j->progress;
     ebpo_status status = ebpo_check_output(j->v->bake, error);
     if (status == EBPO_OK)

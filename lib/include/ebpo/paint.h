@@ -465,7 +465,7 @@ typedef struct ebpo_paint_options {
      */
     unsigned fineness;
 
-    /* Of areas. 0: all cores. The result does not depend on it. */
+    /* Of areas and of baking. 0: all cores. The result does not depend on it. */
     unsigned threads;
 
     ebpo_progress progress;
