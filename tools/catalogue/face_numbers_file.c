@@ -77,7 +77,7 @@ static ebpo_status read_head(face_numbers_file *f, ebpo_error *error)
 ebpo_status face_numbers_open(face_numbers_file *f, const char *path, ebpo_error *error)
 {
     struct stat st;
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY); /* pipes are not waited for */
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY); /* no pipe is waited for */
     *f = (face_numbers_file){ .path = path, .fd = fd };
     if (f->fd < 0 || fstat(f->fd, &st) != 0 || !S_ISREG(st.st_mode)) {
         const char *why = f->fd < 0 ? strerror(errno) : "is no file";
