@@ -31,7 +31,8 @@ static ebpo_status ask(ebpo_context *context, const held_model *model, void *use
         status = ebpo_ray_first_many(context, rays, run->count, &how, told, error);
     for (size_t i = 0; i < run->count && status == EBPO_OK; i++) {
         uint32_t item = run->pair[i].item;
-        if (told[i].face == EBPO_NO_FACE || !(told[i].t < s->out[item].t))
+        bool first = s->out[item].face == EBPO_NO_FACE; /* t may be beyond doubles: inf */
+        if (told[i].face == EBPO_NO_FACE || !(first || told[i].t < s->out[item].t))
             continue;
         status = held_face(model, &told[i].face, error);
         s->out[item] = told[i];

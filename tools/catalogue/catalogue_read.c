@@ -1,4 +1,5 @@
 #include <errno.h>
+#include <fcntl.h>
 #include <inttypes.h>
 #include <jansson.h>
 #include <math.h>
@@ -7,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "catalogue/catalogue.h"
 #include "cli/words.h"
@@ -227,11 +229,13 @@ static uint64_t fnv1a(const char *text, size_t size)
 static ebpo_status read_text(catalogue *c, char **text, ebpo_error *error)
 {
     struct stat st;
-    FILE *in = fopen(c->path, "re");
-    if (!in || fstat(fileno(in), &st) != 0 || !S_ISREG(st.st_mode)) {
-        const char *why = in ? "is no file" : strerror(errno);
-        if (in)
-            fclose(in);
+    int fd = open(c->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY); /* pipes are not read */
+    bool fine = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
+    FILE *in = fine ? fdopen(fd, "r") : NULL;
+    if (!in) {
+        const char *why = fd < 0 || fine ? strerror(errno) : "is no file";
+        if (fd >= 0)
+            close(fd);
         return catalogue_fail(error, EBPO_E_IO, c->path, "cannot be read: %s", why);
     }
     ebpo_status status = EBPO_OK;

@@ -26,11 +26,11 @@ static const char *value_of(const char *head, const char *key)
     return at ? at + 1 + strspn(at + 1, " ") : NULL;
 }
 
-/* '<i8' and the like. */
+/* '<i8' and the like; where the head ends earlier, nothing behind its end is looked at. */
 static bool read_type(face_numbers_file *f, const char *at)
 {
-    if (!at || (*at != '\'' && *at != '"') || !strchr("<>|=", at[1]) || !strchr("iu", at[2]) ||
-        !strchr("1248", at[3]) || at[4] != *at)
+    if (!at || (*at != '\'' && *at != '"') || strlen(at) < sizeof "'<i8'" - 1 ||
+        !strchr("<>|=", at[1]) || !strchr("iu", at[2]) || !strchr("1248", at[3]) || at[4] != *at)
         return false;
     f->big_endian = at[1] == '>';
     f->is_signed = at[2] == 'i';
@@ -76,10 +76,14 @@ static ebpo_status read_head(face_numbers_file *f, ebpo_error *error)
 
 ebpo_status face_numbers_open(face_numbers_file *f, const char *path, ebpo_error *error)
 {
-    *f = (face_numbers_file){ .path = path, .fd = open(path, O_RDONLY | O_CLOEXEC) };
-    if (f->fd < 0)
-        return catalogue_fail(error, EBPO_E_FORMAT, path, "cannot be read as a .npy: %s",
-                              strerror(errno));
+    struct stat st;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY); /* no pipe is waited for */
+    *f = (face_numbers_file){ .path = path, .fd = fd };
+    if (f->fd < 0 || fstat(f->fd, &st) != 0 || !S_ISREG(st.st_mode)) {
+        const char *why = f->fd < 0 ? strerror(errno) : "is no file";
+        face_numbers_close(f);
+        return catalogue_fail(error, EBPO_E_FORMAT, path, "cannot be read as a .npy: %s", why);
+    }
     ebpo_status status = read_head(f, error);
     if (status != EBPO_OK)
         face_numbers_close(f);

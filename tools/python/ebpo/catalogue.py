@@ -354,7 +354,8 @@ class Catalogue:
             for number, some in runs(self.seen.on_rays(o_rows[rays], d_rows[rays])):
                 with self._model(number, held, True) as model:
                     hits = model.ray(o_rows[rays][some], d_rows[rays][some], t_max=t_max, threads=threads)
-                nearer = hits.t < out["t"][rays][some]  # models come in order: of equal ones the first stays
+                now = out[rays][some]  # models come in order: of equal ones the first stays; t may be inf
+                nearer = (hits.face >= 0) & ((hits.t < now["t"]) | (now["face"] < 0))
                 rows = at + some[nearer]
                 out["t"][rows], out["side"][rows] = hits.t[nearer], hits.side[nearer]
                 out["face"][rows], out["model"][rows] = self._faces(number, hits.face[nearer]), number
