@@ -128,6 +128,7 @@ class Many(Case):
             return {"models": [{**told["models"][0], **members}]}
 
         for change, kind, message in (({}, None, ""), ({"version": 2}, ebpo.VersionError, "version 2"),
+                                      ({"version": True}, ebpo.VersionError, "version True"),
                                       ({"format": "x"}, ebpo.FormatError, "ebpo-catalogue"),
                                       ({"models": [{"path": "a"}]}, ebpo.FormatError, "box_min"),
                                       ({"models": []}, ebpo.FormatError, "one model"),
@@ -146,6 +147,9 @@ class Many(Case):
         pathlib.Path("moved/changed.json").write_text("[" * 200_000)
         with self.assertRaisesRegex(ebpo.FormatError, "RecursionError"):
             Catalogue.open("moved/changed.json")
+        os.mkfifo("moved/pipe")
+        with self.assertRaisesRegex(ebpo.FormatError, "is no file"):
+            Catalogue.open("moved/pipe")
 
     def test_errors(self):
         bad = P.copy()

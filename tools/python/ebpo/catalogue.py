@@ -87,10 +87,10 @@ class Catalogue:
         """Of what `ebpo catalogue` or `save` has written. FormatError, VersionError: it is not that."""
         path = pathlib.Path(path).absolute()
         try:
-            told = json.loads(path.read_bytes())
+            told = json.loads(regular(path).read_bytes())
             if not isinstance(told, dict) or told.get("format") != FORMAT:
                 raise ValueError(f'there is no "format": "{FORMAT}"')
-            if told.get("version") != VERSION:
+            if told.get("version") != VERSION or told["version"] is True:
                 raise VersionError(f"{path}: a catalogue of version {told.get('version')!r}; this package reads "
                                    f"{VERSION}", "EBPO_E_VERSION", str(path))
             entries = [read_entry(model, str(path.parent)) for model in told["models"]]
@@ -441,10 +441,17 @@ def flag(value: Any, name: str) -> bool:
     return value
 
 
+def regular(path: pathlib.Path) -> pathlib.Path:
+    """Not a pipe, which might be waited for without end."""
+    if path.exists() and not path.is_file():
+        raise ValueError("is no file")
+    return path
+
+
 def read_numbers(path: str) -> np.ndarray:
     """FormatError: it is no array of integers."""
     try:
-        numbers = np.load(path, mmap_mode="r", allow_pickle=False)
+        numbers = np.load(regular(pathlib.Path(path)), mmap_mode="r", allow_pickle=False)
     except (ValueError, EOFError, OSError) as error:
         raise FormatError(f"{path}: cannot be read as a .npy: {error}", "EBPO_E_FORMAT", path) from None
     if not isinstance(numbers, np.ndarray) or numbers.ndim != 1 or numbers.dtype.kind not in "iu":
