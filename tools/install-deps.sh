@@ -42,16 +42,32 @@ if [ -n "$missing" ]; then
         'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@"' sh $missing
 fi
 # The viewer's packages, as package-lock.json pins them.
-if [ $modules != no ] && ! cmp -s "$here/viewer/package-lock.json" \
-    "$here/viewer/node_modules/.installed"; then
-    limit=${EBPO_NPM_SECONDS:-600}
-    echo "install-deps.sh: npm fetches the viewer's packages, for at most $limit s" >&2
-    # npm alone waits for a silent server for many minutes, and says nothing
+limit=${EBPO_NPM_SECONDS:-600}
+# npm alone waits for a silent server for many minutes, and says nothing.
+npm_ci() { # options...
     (cd "$here/viewer" && timeout --foreground "$limit" npm ci --silent --no-audit --no-fund \
-        --fetch-timeout=60000 --fetch-retries=1 && cp package-lock.json node_modules/.installed) || {
+        --fetch-timeout=60000 --fetch-retries=1 "$@" && cp package-lock.json node_modules/.installed)
+}
+# Whether the registry says anything at all, be it "no such page"; asking takes no longer than a minute.
+registry_answers() {
+    told=$(timeout 60 npm ping --fetch-timeout=25000 --fetch-retries=1 --fetch-retry-mintimeout=1000 2>&1) &&
+        return 0
+    ! echo "$told" | grep -q 'code E[0-9][0-9][0-9]$' || return 0
+    why=$(echo "$told" | sed -n 's/.* code //p')
+    echo "install-deps.sh: npm's registry cannot be reached (${why:-no answer}; npm ping says more)" >&2
+    return 1
+}
+fetched() {
+    echo "install-deps.sh: npm fetches the viewer's packages, for at most $limit s" >&2
+    npm_ci || {
         echo "install-deps.sh: npm could not install the viewer's packages within $limit s" \
             "(npm ci in tools/viewer says why; more seconds: EBPO_NPM_SECONDS)" >&2
-        [ $modules = tests ] || exit 1
-        echo "install-deps.sh: the viewer's tests will be skipped" >&2
+        return 1
     }
+}
+# Without network they come of npm's cache, if it has them all.
+if [ $modules != no ] && ! cmp -s "$here/viewer/package-lock.json" "$here/viewer/node_modules/.installed" &&
+    ! npm_ci --offline && { ! registry_answers || ! fetched; }; then
+    [ $modules = tests ] || exit 1
+    echo "install-deps.sh: the viewer's tests will be skipped" >&2
 fi

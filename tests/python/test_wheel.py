@@ -2,7 +2,7 @@
 """The wheel, in an environment with numpy and nothing else: test_wheel.py SOURCE_ROOT BUILD EBPO EBPO_INPUTS
 
 It is packed from the library of this build. Of what that library needs, only what the reading library of
-the real wheel needs goes in; the rest is the system's here. Exit code 77: pip or patchelf is missing.
+the real wheel needs goes in; the rest is the system's here. Exit code 77: pip, patchelf or binutils is missing.
 """
 import base64
 import csv
@@ -23,6 +23,10 @@ sys.dont_write_bytecode = True
 import ebpo_wheel  # noqa: E402
 
 OTHERS = re.compile(r"^(?!lib(zstd|z|gmp|nettle|jansson)\.so)")
+
+# What manylinux lets a wheel take from the system, of what C and C++ need.
+ALLOWED = {"libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "librt.so.1", "libgcc_s.so.1", "libstdc++.so.6",
+           "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
 
 ASK = """
 import os, sys
@@ -64,16 +68,37 @@ def check_record(path):
         assert len(licences) >= 1 + (len([n for n in names if ".so" in n]) - 1) * bool(shutil.which("dpkg-query"))
 
 
+def check_platform(path, left_out):
+    """The tag names the newest glibc that a library in the wheel asks for; all else they need is in it."""
+    with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(path) as archive:
+        libraries = [name for name in archive.namelist() if ".so" in name]
+        names = {os.path.basename(name) for name in libraries}
+        newest = (2, 17)
+        for name in libraries:
+            told = run("objdump", "-p", archive.extract(name, folder), env=dict(os.environ, LC_ALL="C"))
+            needed = set(re.findall(r"^ +NEEDED +(\S+)", told, re.M))
+            others = needed - names - ALLOWED
+            assert not [other for other in others if not left_out.match(other)], (name, others)
+            assert re.findall(r"^ +R(?:UN)?PATH +(\S+)", told, re.M) == ["$ORIGIN"], (name, "looks elsewhere")
+            for version in re.findall(r"^ +0x\w+ 0x\w+ \d+ GLIBC_(\d+\.\d+)", told, re.M):
+                newest = max(newest, tuple(map(int, version.split("."))))
+            if " GLIBC_ABI_DT_RELR" in told:
+                newest = max(newest, (2, 36))
+        found = re.search(r"-manylinux_(\d+)_(\d+)_", os.path.basename(path))
+        assert not found or tuple(map(int, found.groups())) == newest, (path, newest)
+
+
 def main():
     pip = subprocess.run([sys.executable, "-m", "pip", "--version"], capture_output=True).returncode == 0
-    if not pip or not shutil.which("patchelf"):
-        print("pip or patchelf is not installed (tools/install-deps.sh --tests)")
+    if not pip or not all(map(shutil.which, ["patchelf", "readelf", "objdump"])):
+        print("pip, patchelf or binutils is not installed (tools/install-deps.sh --tests)")
         return 77
     with tempfile.TemporaryDirectory() as name:
         os.chdir(name)
         wheel = ebpo_wheel.pack(build, "dist", OTHERS)
         assert re.fullmatch(r"ebpo-[0-9.]+-py3-none-(manylinux|linux)_\w+\.whl", wheel), wheel
         check_record(pathlib.Path("dist", wheel))
+        check_platform(pathlib.Path("dist", wheel), OTHERS)
         first = pathlib.Path("dist", wheel).read_bytes()
         ebpo_wheel.pack(build, "again", OTHERS)
         assert pathlib.Path("again", wheel).read_bytes() == first, "equal inputs give equal bytes"

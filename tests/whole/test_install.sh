@@ -8,21 +8,23 @@ trap 'rm -rf "$work"' EXIT
 fail() { echo "FAILED: $1"; cat "$work/out"; exit 1; }
 unset LD_LIBRARY_PATH HDF5_PLUGIN_PATH
 
-# What `ninja uninstall` reads is of the user's own installation.
+# What `ninja uninstall` reads is of the user's own installation. The prefix has another program already.
+mkdir -p "$work/all$prefix/bin" && echo other >"$work/all$prefix/bin/other" || exit 1
+(cd "$work/all" && find . | sort) >"$work/before"
 log=$build/meson-logs/install-log.txt
 [ -f "$log" ] && cp -p "$log" "$work/log"
 DESTDIR="$work/all" "$meson" install -C "$build" --no-rebuild >"$work/out" 2>&1
 installed=$?
-# Uninstalled, nothing is left, not even a folder.
+# Uninstalled, there is what was there before, and not even a folder more.
 if [ $installed = 0 ]; then
     cp -a "$work/all" "$work/again"
     (cd "$build" && "$meson" --internal uninstall) >"$work/uninstalled" 2>&1
-    [ ! -d "$work/all" ] || find "$work/all" -mindepth 1 >"$work/left"
+    (cd "$work/all" && find . | sort | diff "$work/before" -) >"$work/left"
     rm -rf "$work/all" && mv "$work/again" "$work/all"
 fi
 if [ -f "$work/log" ]; then cp -p "$work/log" "$log"; else rm -f "$log"; fi
 [ $installed = 0 ] || fail "meson install"
-if [ -s "$work/left" ]; then cp "$work/left" "$work/out"; fail "left after uninstall"; fi
+if [ -s "$work/left" ]; then cp "$work/left" "$work/out"; fail "before and after uninstall"; fi
 
 # Nothing lies beside the prefix.
 find "$work/all" ! -type d ! -path "$work/all$prefix/*" >"$work/out"
@@ -40,12 +42,27 @@ case $library in "$own"/*/libebpo.so.*) ;; *) fail "which library runs" ;; esac
 case $plugin in "$own"/*) ;; *) fail "where the plugin is" ;; esac
 [ -f "$plugin/libebpo_h5zstd.so" ] || fail "the plugin is not where it is said to be"
 
+# A page of the manual for every command, and what each shell completes by, where shells look.
+commands=$("$ebpo" --help | sed -n '/^commands:/,/^$/s/^  \([a-z]*\) .*/\1/p' | grep -vx help)
+[ -n "$commands" ] || fail "no commands in --help"
+for command in $commands; do
+    [ -s "$own/share/man/man1/ebpo-$command.1" ] || { echo "$command" >"$work/out" && fail "a command's page"; }
+done
+bash -c '. "$1/share/bash-completion/completions/ebpo.bash" && complete -p ebpo' bash "$own" >"$work/out" 2>&1 ||
+    fail "completions for bash"
+grep -q '^#compdef ebpo' "$own/share/zsh/site-functions/_ebpo" || fail "completions for zsh"
+grep -q '^complete -c ebpo' "$own/share/fish/vendor_completions.d/ebpo.fish" || fail "completions for fish"
+
 # A file, and HDF5's own tools with the plugin.
 "$inputs" "$work" >"$work/out" 2>&1 || fail inputs
 "$ebpo" convert -q "$work/sphere.ply" "$work/s.ebpo.h5" >"$work/out" 2>&1 || fail convert
 "$ebpo" verify -q "$work/s.ebpo.h5" --against "$work/sphere.ply" >"$work/out" 2>&1 || fail verify
 if command -v h5dump >/dev/null; then
     HDF5_PLUGIN_PATH=$plugin h5dump -d /mesh/faces "$work/s.ebpo.h5" >"$work/out" 2>&1 || fail h5dump
+    grep -q '^ *(0,0): [0-9]' "$work/out" || fail "h5dump shows no numbers"
+    # which it has from this plugin
+    HDF5_PLUGIN_PATH=$work/old h5dump -d /mesh/faces "$work/s.ebpo.h5" >"$work/out" 2>&1
+    ! grep -q '^ *(0,0): [0-9]' "$work/out" || fail "h5dump reads without the plugin"
 fi
 
 # The package for Python finds the library that it was installed with.

@@ -4,7 +4,7 @@
     pip wheel tools/python --no-deps -w dist --config-settings setup-args=-Dhttp=enabled
     python3 tools/python/backend/ebpo_wheel.py BUILD_FOLDER DIST    # packs what has been built
 
-It needs meson, ninja, a C compiler and patchelf, and fetches nothing. The library is built without
+It needs meson, ninja, a C compiler, binutils and patchelf, and fetches nothing. The library is built without
 libhdf5, libcurl, assimp and qhull. Libraries that it still needs (zstd, zlib, GMP, nettle, jansson) go
 into the wheel beside it under names of their own, so that no other package's copy is taken for them;
 so do their licences. There is no code for a version of Python in it: one wheel is for all of them. Its
@@ -101,14 +101,21 @@ def licences(names):
             yield f"licenses/{package}.txt", path.read_bytes()
 
 
+def glibc(file):
+    """Versions of glibc that a library's symbols are of, as its table of needed versions has them."""
+    told = run("env", "LC_ALL=C", "readelf", "--wide", "--version-info", file).partition("Version needs section")[2]
+    names = re.findall(r"Name: GLIBC_(\S+)", told)
+    relative = [(2, 36)] if "ABI_DT_RELR" in names else []  # packed relocations, which that one reads first
+    return relative + [tuple(map(int, name.split(".")[:2])) for name in names if name[0].isdigit()]
+
+
 def tag(files):
-    """py3-none-PLATFORM, by the glibc that the libraries ask for."""
+    """py3-none-PLATFORM, by the glibc that the libraries ask for; not below that of manylinux2014."""
     machine = sysconfig.get_platform().rpartition("-")[2].replace("-", "_")
     if platform.libc_ver()[0] != "glibc":
         return f"py3-none-linux_{machine}"
-    asked = [tuple(map(int, found)) for file in files
-             for found in re.findall(rb"GLIBC_(\d+)\.(\d+)", file.read_bytes())]
-    return "py3-none-manylinux_%d_%d_%s" % (*max(asked, default=(2, 17)), machine)
+    asked = [(2, 17)] + [version for file in files for version in glibc(file)]
+    return "py3-none-manylinux_%d_%d_%s" % (*max(asked), machine)
 
 
 METADATA = """Metadata-Version: 2.1
