@@ -39,8 +39,9 @@ plan() { # build
     esac
 }
 
-# Publishing, temporary files, sources of bytes.
-without_linux="io workspace source"
+# Publishing, temporary files, sources of bytes; threads; the clock of a hand; the command.
+without_linux="io workspace source many_threads touch_hand touch_probe touch_udp
+    cli_convert cli_files cli_query cli_touch cli_usage"
 
 jobs=$(nproc)
 configure() { # build, meson options...

@@ -197,16 +197,21 @@ static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *in
     unsigned seen = 0;
     for (int required = 1; required >= 0; required--) {
         const char *name = required ? "required_parts" : "optional_parts";
-        char words[1024], *rest = words, *word;
+        char words[1024], *rest = words;
         ebpo_status status = ebpo_head_get_text(in, root, "/", name, words, sizeof words, error);
         if (status == EBPO_E_ABSENT)
             return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, "/", -1,
                                 "attribute %s is missing; get a fresh copy of the file", name);
         if (status == EBPO_OK && !*words)
             rest = NULL; /* no words */
-        while (status == EBPO_OK && (word = strsep(&rest, " ")) != NULL)
+        while (status == EBPO_OK && rest) {
+            char *word = rest, *space = strchr(rest, ' ');
+            rest = space ? space + 1 : NULL;
+            if (space)
+                *space = 0;
             status = *word ? take_part(in, word, required, &seen, error)
                            : wrong_value(in, "/", name, error);
+        }
         if (status != EBPO_OK)
             return status;
     }

@@ -53,11 +53,15 @@ static uint64_t far_tetrahedron(uint8_t *data, uint64_t bytes, const char *encod
                           "element face 4\nproperty list uchar uint vertex_indices\nend_header\n",
                           encoding, (unsigned long long)bytes) +
                   bytes;
-    memcpy(at, xyz, sizeof xyz);
-    at += sizeof xyz;
+    for (int i = 0; i < 12; i++, at += 4) {
+        uint32_t bits;
+        memcpy(&bits, &xyz[i / 3][i % 3], sizeof bits);
+        ebpo_store32(at, bits);
+    }
     for (int f = 0; f < 4; f++, at += 13) {
         at[0] = 3;
-        memcpy(at + 1, faces[f], 12);
+        for (int k = 0; k < 3; k++)
+            ebpo_store32(at + 1 + 4 * k, faces[f][k]);
     }
     return (uint64_t)(at - data);
 }
@@ -290,7 +294,8 @@ static void sum_metadata_again(shifted *s)
             continue;
         unsigned flags = b[i + 5], wide = 1u << (flags & 3);
         uint64_t size = 0, head = 6 + (flags & 0x20 ? 16 : 0) + (flags & 0x10 ? 4 : 0);
-        memcpy(&size, b + i + head, wide);
+        for (unsigned k = 0; k < wide; k++)
+            size |= (uint64_t)b[i + head + k] << 8 * k;
         sum_again(b + i, head + wide + size);
     }
 }
@@ -478,6 +483,8 @@ START_TEST(references_beyond_2_to_the_32_are_encoded_where_they_are)
                                  .rows = before + ROWS, .chunk_rows = ROWS, .element_size = 4 } };
     uint32_t *rows = malloc(4 * ROWS);
     ebpo_plan_encode(&plan, &array, before, ROWS, (uint8_t *)rows);
+    for (uint32_t i = 0; i < ROWS; i++)
+        rows[i] = ebpo_load32(rows + i); /* a file is little-endian */
     ck_assert(ebpo_refs_decode(rows, ROWS, first[LEAVES - 1]));
     for (uint32_t i = 0; i < ROWS; i++)
         ck_assert_uint_eq(rows[i], 3 * i);

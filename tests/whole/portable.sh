@@ -9,7 +9,8 @@
 # gets a root folder of its own below $EBPO_PORTABLE (/var/tmp/ebpo-portable, 1.5 GB each), with a
 # cross compiler, Debian's libraries for it and qemu-user: this system is left as it is. What is
 # built is asked for: vectors, golden hashes, dialects of PLY, reading of heads, a model converted
-# and verified, and its bytes. --all: every program of tests/unit and tests/answers, too.
+# and verified, and its bytes. EBPO_JOBS and EBPO_TEST_SCALE are passed on. --all: every program of
+# tests/unit and tests/answers, too.
 set -eu
 source=$(cd "$(dirname "$0")/../.." && pwd)
 roots=${EBPO_PORTABLE:-/var/tmp/ebpo-portable}
@@ -40,7 +41,8 @@ inside() { # root, command...
     shift
     unshare --mount --fork sh -c 'mount -t proc proc "$0/proc" && mount --rbind /dev "$0/dev" &&
         exec chroot "$0" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 \
-        DEBIAN_FRONTEND=noninteractive "$@"' "$root" "$@"
+        DEBIAN_FRONTEND=noninteractive ${EBPO_JOBS:+EBPO_JOBS="$EBPO_JOBS"} \
+        ${EBPO_TEST_SCALE:+EBPO_TEST_SCALE="$EBPO_TEST_SCALE"} "$@"' "$root" "$@"
 }
 make_base() {
     [ -e "$roots/base.made" ] && return

@@ -1,8 +1,10 @@
 #include "cli/memory_args.h"
 
-#include <malloc.h>
 #include <stddef.h>
 #include <stdio.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include "cli/command.h"
 #include "cli/words.h"

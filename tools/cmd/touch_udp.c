@@ -183,7 +183,7 @@ static void write_answer(void *self, const touch_answer *a)
     at = put(at, a->flags, 4);
     memcpy(at, a->rgb, 3);
     at[3] = a->where;
-    (void)sendto(u->socket, bytes, sizeof bytes, MSG_DONTWAIT | MSG_NOSIGNAL,
+    (void)sendto(u->socket, bytes, sizeof bytes, MSG_DONTWAIT,
                  (const struct sockaddr *)&u->device, sizeof u->device);
 }
 
@@ -238,8 +238,9 @@ bool touch_udp_open(touch_device *out, const char *name)
     u->socket = -1;
     if (!read_name(name, &at))
         return false;
-    u->socket = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    if (u->socket < 0 || bind(u->socket, (const struct sockaddr *)&at, sizeof at) != 0) {
+    u->socket = socket(AF_INET, SOCK_DGRAM, 0);
+    if (u->socket < 0 || fcntl(u->socket, F_SETFD, FD_CLOEXEC) != 0 ||
+        bind(u->socket, (const struct sockaddr *)&at, sizeof at) != 0) {
         fprintf(stderr, "ebpo touch: %s: %s\n", name, strerror(errno));
         return false;
     }
