@@ -1,23 +1,18 @@
 #!/usr/bin/env python3
 """Catalogues from Python: many models against each of them by itself, the parts of one against the whole."""
-import contextlib
-import importlib.util
-import io
 import json
 import os
 import pathlib
-import subprocess
-import sys
 import threading
 
-from package_kit import COMMAND, Case, answers, model, np, points, run
+from package_kit import Case, answers, model, np, points, run
 
 import ebpo
+from catalogue_kit import by_command, caps_of, cut_by_sample, on_triangles, same
 from ebpo.boxes import Boxes, morton_order
 from ebpo.catalogue import Catalogue, Where
 from ebpo.holding import Holding, ours
 
-CUT = pathlib.Path(sys.argv[4]) / "samples/cut_along_octcodes.py"
 P = points(6000, seed=5, reach=3)
 
 
@@ -30,25 +25,6 @@ def spheres(count=27):
         for name, at in zip(names, points(count, seed=9, reach=2.5)):
             ebpo.convert((mesh.vertices[:, :3] * .4 + at, mesh.faces), name)
     return names
-
-
-RAW = {"inside": np.dtype([("where", "<i4"), ("winding", "<i4")]),
-       "distance": np.dtype([("distance", "<f8"), ("point", "<f8", 3), ("normal", "<f8", 3), ("face", "<i8"), ("model", "<i8")]),
-       "ray": np.dtype([("t", "<f8"), ("face", "<i8"), ("side", "<i8"), ("model", "<i8")])}
-
-
-def by_command(command, catalogue, rows, *options):
-    """What the command answers of a catalogue that was saved."""
-    catalogue.save("asked.json")
-    np.ascontiguousarray(rows, float).tofile("asked.raw")
-    done = subprocess.run([COMMAND, command, "--raw", *options, "asked.json", "asked.raw"], capture_output=True)
-    assert done.returncode == 0, done.stderr
-    return np.frombuffer(done.stdout, RAW[command])
-
-
-def same(told, expected):
-    for name in expected.dtype.names:
-        np.testing.assert_array_equal(told[name], expected[name], name)
 
 
 class Many(Case):
@@ -212,18 +188,6 @@ class Holdings(Case):
         self.assertEqual(small.counts()["models"], 0)
 
 
-def cut_by_sample(whole, folder, *level):
-    """The sample as a module, its catalogue, and what it printed."""
-    spec = importlib.util.spec_from_file_location("cut_along_octcodes", CUT)
-    cut = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(cut)
-    sys.argv, kept = ["cut", whole, folder, *level], sys.argv
-    with contextlib.redirect_stdout(io.StringIO()) as printed:
-        cut.main()
-    sys.argv = kept
-    return cut, Catalogue.open(folder + "/catalogue.json"), printed.getvalue()
-
-
 class Hostile(Case):
     """A catalogue is from others: what it says wrongly is noticed, not answered from."""
 
@@ -317,16 +281,7 @@ class Parts(Case):
         cls.whole = ebpo.open("scan.ebpo.h5")
         vertices, faces = cls.whole.mesh(order="source")
         cls.corners = vertices.astype(float)[faces]
-        cls.caps = []
-        for entry in cls.catalogue.entries:
-            vertices, faces = ebpo.open(entry.path).mesh(order="source")
-            shown = len(np.load(entry.numbers))
-            real = set(map(bytes, cls.corners[np.load(entry.numbers)]))
-            corners = np.ascontiguousarray(vertices.astype(float)[faces])
-            capped = np.array([bytes(face) not in real for face in corners])
-            assert (~capped).sum() == shown
-            cls.caps.append(corners[capped])
-        cls.caps = np.concatenate(cls.caps)
+        cls.caps = caps_of(cls.catalogue, cls.corners)
 
     def test_numbers_of_another_part(self):
         np.save("few.npy", np.arange(3))
@@ -345,6 +300,23 @@ class Parts(Case):
         p = np.random.default_rng(8).uniform([-1, -.2, -.2], [21, 1.2, 1.2], (3000, 3))
         np.testing.assert_array_equal(parts.winding(p), whole.winding(p))
         np.testing.assert_array_equal(parts.distance(p)["distance"], whole.distance(p).distance)
+
+    def test_folders_of_arrays(self):
+        """They stay on the disk; faces may have numbers of any kind, and more than one stretch."""
+        vertices, faces = self.whole.mesh(order="source")
+        os.makedirs("arrays", exist_ok=True)
+        np.save("arrays/vertices.npy", vertices.astype(np.float64))
+        p = np.concatenate([points(2000, seed=12), on_triangles(self.corners[::9])])
+        for kind in (np.int64, np.uint32):
+            np.save("arrays/faces.npy", faces.astype(kind))
+            parts = cut_by_sample("arrays", f"cut_{np.dtype(kind).name}")[1]
+            same(parts.locate(p), self.catalogue.locate(p))
+            np.testing.assert_array_equal(parts.distance(p)["distance"], self.whole.distance(p).distance)
+            numbers = np.concatenate([np.load(entry.numbers) for entry in parts.entries])
+            np.testing.assert_array_equal(np.sort(numbers), np.arange(len(faces)))
+        np.save("arrays/faces.npy", faces[:-1])
+        with self.assertRaisesRegex(SystemExit, "not closed"):
+            cut_by_sample("arrays", "cut_open")
 
     def test_faces_are_dealt_out_and_caps_cancel(self):
         self.assertEqual(len(self.catalogue), 8)
@@ -365,7 +337,7 @@ class Parts(Case):
         """At random; and on faces and caps, at places that doubles have exactly."""
         yield points(5000, seed=8)
         for k in (self.corners[::3], self.caps):
-            yield np.concatenate([k[:, 0], (k[:, 0] + k[:, 1]) / 2, (2 * k[:, 0] + k[:, 1] + k[:, 2]) / 4])
+            yield on_triangles(k)
 
     def test_inside_and_winding(self):
         for p, least in zip(self.points(), (1, 1, 100)):

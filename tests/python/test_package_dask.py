@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 
 try:
     import dask.array
@@ -97,6 +98,19 @@ class Answers(Case):
             model("open_box")
             ed.inside("open_box.ebpo.h5", P).compute()
 
+    def test_errors_number_points_in_the_whole(self):
+        bad, rays = P.copy(), np.concatenate([2 * P, D], axis=1)
+        bad[12_345, 1], rays[7777, 3:] = np.nan, 0
+        with self.assertRaisesRegex(ebpo.ArgumentError, "number 12345 "):
+            ed.inside("scan.ebpo.h5", bad, chunk=1000).compute(scheduler="sync")
+        with self.assertRaisesRegex(ebpo.ArgumentError, "ray 7777 "):
+            ed.ask("ray", "scan.ebpo.h5", rays, chunk=1000).compute(scheduler="sync")
+        with self.assertRaisesRegex(ebpo.ArgumentError, "ray 0 needs a t_max"):
+            ed.ask("ray", "scan.ebpo.h5", rays, chunk=1000, t_max=-1).compute(scheduler="sync")
+        some = dask.array.from_array(bad, chunks=(1000, 3))
+        with self.assertRaisesRegex(ebpo.ArgumentError, "number 345 "):
+            ed.inside("scan.ebpo.h5", some[some[:, 0] != 9]).compute(scheduler="sync")
+
     def test_files_that_change(self):
         shutil.copy(INPUT, "changing.npy")
         asked = ed.inside("scan.ebpo.h5", "changing.npy")
@@ -142,6 +156,22 @@ class Files(Case):
             ed.to_file(inside, "inside.npy")
         self.assertEqual([str(p) for p in pathlib.Path(".").glob("*.parts")], [])
         self.assertEqual([str(p) for p in pathlib.Path(".").glob(".*")], [], "no temporary files stay")
+
+    def test_few_chunks_are_mapped_at_a_time(self):
+        opened, load, most = [], np.load, [0]
+
+        def counted(*arguments, **options):
+            opened[:] = [part for part in opened if part() is not None]
+            part = load(*arguments, **options)
+            opened.append(weakref.ref(part))
+            most[0] = max(most[0], len(opened))
+            return part
+
+        self.addCleanup(setattr, np, "load", load)
+        np.load = counted
+        ed.to_file(ed.inside("scan.ebpo.h5", P[:1000], chunk=4), "many.npy", scheduler="sync")
+        np.testing.assert_array_equal(load("many.npy"), model("scan").inside(P[:1000]))
+        self.assertTrue(1 <= most[0] <= 3, most)
 
     def test_what_is_no_chunk_is_not_joined(self):
         inside = ed.inside("scan.ebpo.h5", P[:300], chunk=100)

@@ -186,10 +186,7 @@ class Catalogue:
         matter where there is one model and it is in memory as a whole."""
         rows = Rows(points)
         all_points = rows[0:rows.count]
-        finite = np.isfinite(all_points).all(axis=1)
-        if not finite.all():
-            raise ArgumentError(f"points: number {int(finite.argmin())} has a coordinate that is not a finite number",
-                                "EBPO_E_ARGUMENT")
+        check_points(all_points)
         order = np.arange(rows.count)
         if not self._resident(held):
             order = morton_order(all_points, self.boxes.low.min(axis=0), self.boxes.high.max(axis=0))
@@ -362,14 +359,22 @@ class Catalogue:
         return out[0] if o.single and d.single else out
 
 
-def check_rays(origins: np.ndarray, directions: np.ndarray, t_max: float) -> None:
-    """As each model would, also of rays that meet no box."""
+def check_points(points: np.ndarray, first: int = 0) -> None:
+    """As each model would, also of points in no box. first: the number of the first one."""
+    finite = np.isfinite(points).all(axis=1)
+    if not finite.all():
+        raise ArgumentError(f"points: number {first + int(finite.argmin())} has a coordinate that is not a finite "
+                            "number", "EBPO_E_ARGUMENT")
+
+
+def check_rays(origins: np.ndarray, directions: np.ndarray, t_max: float, first: int = 0) -> None:
+    """As each model would, also of rays that meet no box. first: the number of the first one."""
     finite = np.isfinite(origins).all(axis=1) & np.isfinite(directions).all(axis=1)
     for fine, what in ((finite, "has a coordinate that is not a finite number"),
                        (directions.any(axis=1), "needs a direction other than (0, 0, 0)"),
                        (np.broadcast_to(t_max >= 0, len(origins)), "needs a t_max of 0 or more")):
         if not fine.all():
-            raise ArgumentError(f"ray {int(fine.argmin())} {what}", "EBPO_E_ARGUMENT")
+            raise ArgumentError(f"ray {first + int(fine.argmin())} {what}", "EBPO_E_ARGUMENT")
 
 
 def by_model(points: np.ndarray, models: np.ndarray) -> Pairs:

@@ -24,8 +24,9 @@ import numpy as np
 
 from . import catalogue as cat
 from .catalogue import Catalogue
+from .errors import ArgumentError
 from .holding import ours
-from .stretches import HDF5, PointFile, h5py_of, published, save_array
+from .stretches import HDF5, PointFile, h5py_of, published, save_array, shape_of_npy
 
 CHUNK = 1 << 18  # points of a task
 DTYPES = {"inside": np.dtype(bool), "winding": np.dtype("i4"), "locate": cat.LOCATED, "distance": cat.NEAREST,
@@ -104,11 +105,19 @@ class Means:
         return "ebpo-means"
 
 
-def answer_block(block: np.ndarray, what: str, asked: Catalogue, means: Means, options: tuple) -> np.ndarray:
-    """Of a chunk, in the worker."""
-    block, ask = np.asarray(block), getattr(asked, what)
-    rest = {**dict(options), **means.options}
-    return ask(block[:, :3], block[:, 3:], **rest) if what == "ray" else ask(block, **rest)
+def answer_block(block: np.ndarray, what: str, asked: Catalogue, means: Means, options: tuple,
+                 block_info: Any = None) -> np.ndarray:
+    """Of a chunk, in the worker. block_info: Dask's, where the chunk is in the whole."""
+    block, ask, rest = np.asarray(block), getattr(asked, what), dict(options)
+    rows = (block[:, :3], block[:, 3:]) if what == "ray" else (block,)
+    try:
+        return ask(*rows, **rest, **means.options)
+    except ArgumentError:
+        begin = block_info[0]["array-location"][0][0] if block_info else np.nan
+        if begin == begin:  # of some chunks Dask does not know where they begin
+            check = cat.check_rays if what == "ray" else cat.check_points
+            check(*rows, *([rest.get("t_max", np.inf)] if what == "ray" else []), first=int(begin))
+        raise
 
 
 def ask(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk: int = CHUNK,
@@ -123,7 +132,7 @@ def ask(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk: 
     http: options of URLs, such as headers.
     options: those of the method of Catalogue, such as boundary=False, max_distance, signed, t_max.
 
-    Numbers of points in errors are those within a chunk.
+    Numbers of points in errors are those among `rows`; within a chunk, where Dask does not know the chunks' sizes.
     """
     import dask.array as da
     if what not in DTYPES:
@@ -251,17 +260,19 @@ def check_parts(names: list, answers: Any) -> None:
 
 
 def join_parts(path: pathlib.Path, names: list, dataset: str) -> None:
-    parts = [np.load(name, mmap_mode="r", allow_pickle=False) for name in names]
-    shape = (sum(len(part) for part in parts), *parts[0].shape[1:])
+    """Of chunks that are whole; one at a time is open, however many there are."""
+    heads = [shape_of_npy(str(name)) for name in names]
+    shape, dtype = (sum(rows for (rows, *_), _ in heads), *heads[0][0][1:]), heads[0][1]
+    parts = (np.load(name, mmap_mode="r", allow_pickle=False) for name in names)
     if path.suffix == ".npy":
         with published(path) as file:
-            np.lib.format.write_array_header_1_0(file, {"descr": np.lib.format.dtype_to_descr(parts[0].dtype),
+            np.lib.format.write_array_header_1_0(file, {"descr": np.lib.format.dtype_to_descr(dtype),
                                                         "fortran_order": False, "shape": shape})
             for part in parts:
                 file.write(np.ascontiguousarray(part).data)
         return
     with published(path) as file, h5py_of(str(path)).File(file, "w") as out:
-        made, at = out.create_dataset(dataset, shape, parts[0].dtype), 0
+        made, at = out.create_dataset(dataset, shape, dtype), 0
         for part in parts:
             made[at:at + len(part)] = part
             at += len(part)
