@@ -183,8 +183,8 @@ static void write_answer(void *self, const touch_answer *a)
     at = put(at, a->flags, 4);
     memcpy(at, a->rgb, 3);
     at[3] = a->where;
-    (void)sendto(u->socket, bytes, sizeof bytes, MSG_DONTWAIT,
-                 (const struct sockaddr *)&u->device, sizeof u->device);
+    (void)sendto(u->socket, bytes, sizeof bytes, MSG_DONTWAIT, (const struct sockaddr *)&u->device,
+                 sizeof u->device);
 }
 
 static uint64_t ticks(void *self)
