@@ -100,8 +100,8 @@ static ebpo_status stretch(search *s, uint64_t *at, uint64_t count, ebpo_error *
     for (; points < most && s->near.count < CATALOGUE_PAIRS && status == EBPO_OK; points++) {
         uint64_t item = *at + points;
         begin[points] = s->near.count;
-        if (!box_tree_near(&s->m->seen, s->points + 3 * item, s->max_distance, (uint32_t)item,
-                           &s->near))
+        if (!catalogue_boxes_near(&s->m->seen, s->points + 3 * item, s->max_distance,
+                                  (uint32_t)item, &s->near))
             status = catalogue_no_memory(error);
         if (s->near.count > begin[points])
             qsort(s->near.pair + begin[points], s->near.count - begin[points], sizeof *s->near.pair,
@@ -138,10 +138,9 @@ ebpo_status catalogue_distance(catalogue_models *m, const double *points, uint64
                                ebpo_distance_result *out, uint64_t *model, ebpo_error *error)
 {
     search s = { m, points, max_distance, out, model, { NULL, 0, 0 }, { NULL, 0, 0 } };
-    ebpo_status status = EBPO_OK;
-    if (!m->seen.levels)
-        return catalogue_fail(error, EBPO_E_ABSENT, m->c->path,
-                              "tells of caps alone, and of no surface");
+    ebpo_status status = catalogue_need_surface(m, error);
+    if (status != EBPO_OK)
+        return status;
     for (uint64_t i = 0; i < count; i++) {
         out[i] = (ebpo_distance_result){ .distance = INFINITY,
                                          .point = { NAN, NAN, NAN },

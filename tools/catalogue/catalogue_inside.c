@@ -35,7 +35,7 @@ static ebpo_status ask_all(catalogue_models *m, const double *points, uint64_t c
     ebpo_status status = EBPO_OK;
     for (uint64_t at = 0; at < count && status == EBPO_OK; pairs.count = 0) {
         for (; at < count && pairs.count < CATALOGUE_PAIRS && status == EBPO_OK; at++)
-            if (!box_tree_holding(&m->all, points + 3 * at, (uint32_t)at, &pairs))
+            if (!catalogue_boxes_holding(&m->all, points + 3 * at, (uint32_t)at, &pairs))
                 status = catalogue_no_memory(error);
         if (status == EBPO_OK)
             status = catalogue_runs(m, &pairs, points, 3, false, ask, all, error);

@@ -8,9 +8,17 @@ ebpo_status catalogue_no_memory(ebpo_error *error)
     return catalogue_fail(error, EBPO_E_MEMORY, NULL, "not enough memory");
 }
 
+ebpo_status catalogue_need_surface(const catalogue_models *m, ebpo_error *error)
+{
+    return m->seen.levels ? EBPO_OK
+                          : catalogue_fail(error, EBPO_E_ABSENT, m->c->path,
+                                           "tells of caps alone, and of no surface; ask inside, or "
+                                           "the catalogue of all parts");
+}
+
 /* --- the models --- */
 
-static bool make_tree(box_tree *t, const catalogue *c, bool seen)
+static bool make_tree(catalogue_boxes *t, const catalogue *c, bool seen)
 {
     closed_box *box = malloc(c->count * sizeof *box);
     uint32_t *number = malloc(c->count * sizeof *number);
@@ -23,7 +31,7 @@ static bool make_tree(box_tree *t, const catalogue *c, bool seen)
         memcpy(box[count].max, e->max, sizeof e->max);
         number[count++] = (uint32_t)i;
     }
-    bool fine = box && number && box_tree_make(t, box, number, count);
+    bool fine = box && number && catalogue_boxes_make(t, box, number, count);
     free(box);
     free(number);
     return fine;
@@ -40,8 +48,8 @@ bool catalogue_models_make(catalogue_models *m, const catalogue *c, const holdin
 void catalogue_models_free(catalogue_models *m)
 {
     holding_free(m->held);
-    box_tree_free(&m->all);
-    box_tree_free(&m->seen);
+    catalogue_boxes_free(&m->all);
+    catalogue_boxes_free(&m->seen);
     *m = (catalogue_models){ .c = NULL };
 }
 

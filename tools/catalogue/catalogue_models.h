@@ -5,13 +5,13 @@
 
 #include <ebpo/query.h>
 
-#include "catalogue/box_tree.h"
+#include "catalogue/catalogue_boxes.h"
 #include "catalogue/holding.h"
 
 typedef struct catalogue_models {
     const catalogue *c;
     held_models *held;
-    box_tree all, seen;             /* of all models; of those that rays and distances see */
+    catalogue_boxes all, seen;      /* of all models; of those that rays and distances see */
     const catalogue_entry *surface; /* the first that has no inside; NULL: all have */
 } catalogue_models;
 
@@ -61,6 +61,8 @@ EBPO_MUST_USE ebpo_status catalogue_runs(catalogue_models *m, box_pairs *pairs, 
                                          size_t width, bool surface, holding_question ask,
                                          void *user, ebpo_error *error);
 ebpo_status catalogue_no_memory(ebpo_error *error);
+/* EBPO_E_ABSENT: the catalogue tells of caps alone. */
+EBPO_MUST_USE ebpo_status catalogue_need_surface(const catalogue_models *m, ebpo_error *error);
 
 /* Of parts: which of points[count] are on faces of the whole; and winding numbers at points that
  * are on none, though on caps. numbers[count]: the points. */

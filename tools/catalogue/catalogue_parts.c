@@ -8,13 +8,6 @@
 /* Rays that are tried before a point is given up. */
 enum { DIRECTIONS = 64 };
 
-static ebpo_status need_surface(const catalogue_models *m, ebpo_error *error)
-{
-    return m->seen.levels ? EBPO_OK
-                          : catalogue_fail(error, EBPO_E_ABSENT, m->c->path,
-                                           "tells of caps alone, and of no surface");
-}
-
 static double *rows_of(const double *points, const uint32_t *numbers, size_t count, size_t width)
 {
     double *rows = calloc(count * width + 1, sizeof *rows);
@@ -49,10 +42,10 @@ ebpo_status catalogue_on_surface(catalogue_models *m, const double *points, cons
 {
     box_pairs pairs = { NULL, 0, 0 };
     double *rows = rows_of(points, numbers, count, 3);
-    ebpo_status status = rows ? need_surface(m, error) : catalogue_no_memory(error);
+    ebpo_status status = rows ? catalogue_need_surface(m, error) : catalogue_no_memory(error);
     for (size_t at = 0; at < count && status == EBPO_OK; pairs.count = 0) {
         for (; at < count && pairs.count < CATALOGUE_PAIRS && status == EBPO_OK; at++)
-            if (!box_tree_holding(&m->seen, rows + 3 * at, (uint32_t)at, &pairs))
+            if (!catalogue_boxes_holding(&m->seen, rows + 3 * at, (uint32_t)at, &pairs))
                 status = catalogue_no_memory(error);
         if (status == EBPO_OK)
             status = catalogue_runs(m, &pairs, rows, 3, true, ask_box, out, error);
@@ -113,7 +106,7 @@ static ebpo_status cast_all(catalogue_models *m, double *rows, size_t count, con
             row[6] = INFINITY;
             c->sum[at] = 0;
             c->plain[at] = true;
-            if (!box_tree_on_ray(&m->seen, row, d, (uint32_t)at, &pairs))
+            if (!catalogue_boxes_on_ray(&m->seen, row, d, (uint32_t)at, &pairs))
                 status = catalogue_no_memory(error);
         }
         if (status == EBPO_OK)
@@ -145,7 +138,7 @@ ebpo_status catalogue_crossings(catalogue_models *m, const double *points, const
     uint32_t *place = malloc(count * sizeof *place);
     cast c = { malloc(count * sizeof *c.sum), malloc(count * sizeof *c.plain) };
     bool fine = rows && place && c.sum && c.plain;
-    ebpo_status status = fine ? need_surface(m, error) : catalogue_no_memory(error);
+    ebpo_status status = fine ? catalogue_need_surface(m, error) : catalogue_no_memory(error);
     size_t left = count;
     uint64_t state = 20;
     for (size_t i = 0; fine && i < count; i++)

@@ -49,16 +49,15 @@ ebpo_status catalogue_ray(catalogue_models *m, const ebpo_ray *rays, uint64_t co
 {
     search s = { sides, out, model };
     box_pairs pairs = { NULL, 0, 0 };
-    ebpo_status status = EBPO_OK;
-    if (!m->seen.levels)
-        return catalogue_fail(error, EBPO_E_ABSENT, m->c->path,
-                              "tells of caps alone, and of no surface");
+    ebpo_status status = catalogue_need_surface(m, error);
+    if (status != EBPO_OK)
+        return status;
     for (uint64_t at = 0; at < count && status == EBPO_OK; pairs.count = 0) {
         for (; at < count && pairs.count < CATALOGUE_PAIRS && status == EBPO_OK; at++) {
             out[at] = (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
             model[at] = CATALOGUE_NO_MODEL;
-            if (!box_tree_on_ray(&m->seen, rays[at].origin, rays[at].direction, (uint32_t)at,
-                                 &pairs))
+            if (!catalogue_boxes_on_ray(&m->seen, rays[at].origin, rays[at].direction, (uint32_t)at,
+                                        &pairs))
                 status = catalogue_no_memory(error);
         }
         if (status == EBPO_OK)

@@ -1,4 +1,4 @@
-#include "catalogue/box_tree.h"
+#include "catalogue/catalogue_boxes.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -33,7 +33,8 @@ static uint64_t code_of(const double p[3], const double min[3], const double max
     return code;
 }
 
-bool morton_order(const double (*points)[3], size_t count, uint32_t *numbers)
+/* numbers[count] of points, along the curve of a box around them. False: not enough memory. */
+static bool morton_order(const double (*points)[3], size_t count, uint32_t *numbers)
 {
     double min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
     coded *all = malloc(count * sizeof *all + 1);
@@ -65,7 +66,8 @@ static closed_box around(const closed_box *boxes, size_t count)
     return all;
 }
 
-static bool make_lowest(box_tree *t, const closed_box *boxes, const uint32_t *numbers, size_t count)
+static bool make_lowest(catalogue_boxes *t, const closed_box *boxes, const uint32_t *numbers,
+                        size_t count)
 {
     double(*centre)[3] = malloc(count * sizeof *centre);
     uint32_t *order = malloc(count * sizeof *order);
@@ -85,9 +87,10 @@ static bool make_lowest(box_tree *t, const closed_box *boxes, const uint32_t *nu
     return fine;
 }
 
-bool box_tree_make(box_tree *t, const closed_box *boxes, const uint32_t *numbers, size_t count)
+bool catalogue_boxes_make(catalogue_boxes *t, const closed_box *boxes, const uint32_t *numbers,
+                          size_t count)
 {
-    *t = (box_tree){ .levels = 0 };
+    *t = (catalogue_boxes){ .levels = 0 };
     if (!count)
         return true;
     if (!make_lowest(t, boxes, numbers, count))
@@ -106,18 +109,18 @@ bool box_tree_make(box_tree *t, const closed_box *boxes, const uint32_t *numbers
     return true;
 }
 
-void box_tree_free(box_tree *t)
+void catalogue_boxes_free(catalogue_boxes *t)
 {
     free(t->number);
     for (int level = 0; level < BOX_LEVELS; level++)
         free(t->box[level]);
-    *t = (box_tree){ .levels = 0 };
+    *t = (catalogue_boxes){ .levels = 0 };
 }
 
 /* --- going down --- */
 
 typedef struct walk {
-    const box_tree *t;
+    const catalogue_boxes *t;
     const double *p, *d; /* the point, or the ray's origin and direction */
     double reach;        /* near: what is farther is not wanted */
     double pad;          /* ray: more than what is rounded */
@@ -178,7 +181,8 @@ static bool holds(walk *w, const closed_box *b, double *least)
     return true;
 }
 
-bool box_tree_holding(const box_tree *t, const double p[3], uint32_t item, box_pairs *out)
+bool catalogue_boxes_holding(const catalogue_boxes *t, const double p[3], uint32_t item,
+                             box_pairs *out)
 {
     walk w = { .t = t, .p = p, .item = item, .out = out, .keep = holds };
     return go(&w);
@@ -218,7 +222,8 @@ static bool comes_nearer(walk *w, const closed_box *b, double *least)
     return true;
 }
 
-bool box_tree_near(const box_tree *t, const double p[3], double most, uint32_t item, box_pairs *out)
+bool catalogue_boxes_near(const catalogue_boxes *t, const double p[3], double most, uint32_t item,
+                          box_pairs *out)
 {
     walk w = { .t = t, .p = p, .reach = most, .item = item, .keep = comes_nearer };
     (void)go(&w);
@@ -247,8 +252,8 @@ static bool may_be_met(walk *w, const closed_box *b, double *least)
     return !(near > far + BOX_SLACK * fabs(far)) && !(far < 0);
 }
 
-bool box_tree_on_ray(const box_tree *t, const double o[3], const double d[3], uint32_t item,
-                     box_pairs *out)
+bool catalogue_boxes_on_ray(const catalogue_boxes *t, const double o[3], const double d[3],
+                            uint32_t item, box_pairs *out)
 {
     walk w = { .t = t, .p = o, .d = d, .item = item, .out = out, .keep = may_be_met };
     for (int k = 0; t->levels && k < 3; k++) {
