@@ -31,6 +31,7 @@ typedef struct dataset {
     unsigned least, most;
     uint64_t bytes_most; /* of all rows */
     double fill;
+    uint64_t first, end; /* the rows that are wanted */
     hid_t file, set, space, type;
     hsize_t size[2];
 } dataset;
@@ -122,8 +123,12 @@ static ebpo_status copy_rows(const dataset *d, ebpo_error *error)
     static double rows[ROWS_AT_ONCE * COLUMNS_MOST];
     for (hsize_t i = 0; i < ROWS_AT_ONCE * (hsize_t)d->most; i++)
         rows[i] = d->fill;
-    for (hsize_t first = 0; first < d->size[0]; first += ROWS_AT_ONCE) {
-        hsize_t count = d->size[0] - first < ROWS_AT_ONCE ? d->size[0] - first : ROWS_AT_ONCE;
+    hsize_t end = d->end < d->size[0] ? d->end : d->size[0];
+    uint64_t total = d->size[0];
+    if (!ebpo_apart_write(d->to, &total, sizeof total))
+        return ebpo_fail_errno(error, d->path, "its rows could not be written to TMPDIR");
+    for (hsize_t first = d->first; first < end; first += ROWS_AT_ONCE) {
+        hsize_t count = end - first < ROWS_AT_ONCE ? end - first : ROWS_AT_ONCE;
         bool short_of_memory;
         if (!read_piece(d, first, count, rows, &short_of_memory))
             return short_of_memory ? ebpo_fail_memory(error, d->size[0] * d->size[1] * sizeof *rows)
@@ -143,24 +148,32 @@ static ebpo_status read_apart(void *user, ebpo_error *error)
     return status == EBPO_OK ? copy_rows(d, error) : status;
 }
 
-/* What the other process has left. */
-static ebpo_status take_rows(const dataset *d, double **rows, uint64_t *count, ebpo_error *error)
+static bool take_bytes(const dataset *d, uint64_t from, void *to, uint64_t bytes)
 {
-    struct stat facts;
-    if (fstat(d->to, &facts) != 0)
-        return ebpo_fail_errno(error, d->path, "its rows in TMPDIR cannot be read");
-    uint64_t bytes = (uint64_t)facts.st_size, at = 0;
-    *rows = ebpo_alloc(bytes, 1);
-    if (!*rows)
-        return ebpo_fail_memory(error, bytes);
-    while (at < bytes) {
-        ssize_t done = pread(d->to, (char *)*rows + at, (size_t)(bytes - at), (off_t)at);
+    for (uint64_t at = 0; at < bytes;) {
+        ssize_t done = pread(d->to, (char *)to + at, (size_t)(bytes - at), (off_t)(from + at));
         if (done < 0 && errno == EINTR)
             continue;
         if (done <= 0)
-            return ebpo_fail_errno(error, d->path, "its rows in TMPDIR cannot be read");
+            return false;
         at += (uint64_t)done;
     }
+    return true;
+}
+
+/* What the other process has left: how many rows there are in all, and those that are wanted. */
+static ebpo_status take_rows(const dataset *d, double **rows, uint64_t *count, uint64_t *total,
+                             ebpo_error *error)
+{
+    struct stat facts;
+    if (fstat(d->to, &facts) != 0 || !take_bytes(d, 0, total, sizeof *total))
+        return ebpo_fail_errno(error, d->path, "its rows in TMPDIR cannot be read");
+    uint64_t bytes = (uint64_t)facts.st_size - sizeof *total;
+    *rows = ebpo_alloc(bytes, 1);
+    if (!*rows)
+        return ebpo_fail_memory(error, bytes);
+    if (!take_bytes(d, sizeof *total, *rows, bytes))
+        return ebpo_fail_errno(error, d->path, "its rows in TMPDIR cannot be read");
     *count = bytes / (d->most * sizeof **rows);
     return EBPO_OK;
 }
@@ -184,28 +197,38 @@ static ebpo_status make_ready(dataset *d, ebpo_error *error)
 ebpo_status ebpo_rows_read(const char *path, const char *name, unsigned least, unsigned most,
                            double fill, double **rows, uint64_t *count, ebpo_error *error)
 {
+    uint64_t total;
+    return ebpo_rows_read_part(path, name, least, most, fill, 0, UINT64_MAX, rows, count, &total,
+                               error);
+}
+
+ebpo_status ebpo_rows_read_part(const char *path, const char *name, unsigned least, unsigned most,
+                                double fill, uint64_t first, uint64_t most_rows, double **rows,
+                                uint64_t *count, uint64_t *total, ebpo_error *error)
+{
     EBPO_DEFAULT_FP;
     ebpo_apart_limits limits = { UINT64_C(1) << 30, 0, 600 };
-    dataset d = { path, name, -1, least, most, 0, fill, -1, -1, -1, -1, { 0, 0 } };
+    uint64_t end = most_rows > UINT64_MAX - first ? UINT64_MAX : first + most_rows;
+    dataset d = { path, name, -1, least, most, 0, fill, first, end, -1, -1, -1, -1, { 0, 0 } };
     *rows = NULL;
-    *count = 0;
+    *count = *total = 0;
     if (least < 1 || most < least || most > COLUMNS_MOST)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "rows: 1 to %d columns can be asked for",
                          COLUMNS_MOST);
     ebpo_status status = ebpo_h5_register(error); /* our own files have such datasets, too */
     if (status == EBPO_OK)
         status = make_ready(&d, error);
-    limits.file_bytes = d.bytes_most;
+    limits.file_bytes = d.bytes_most + sizeof *total;
     if (status == EBPO_OK)
         status = ebpo_apart(read_apart, &d, path, &limits, error);
     if (status == EBPO_OK)
-        status = take_rows(&d, rows, count, error);
+        status = take_rows(&d, rows, count, total, error);
     if (d.to >= 0)
         close(d.to);
     if (status != EBPO_OK) {
         free(*rows);
         *rows = NULL;
-        *count = 0;
+        *count = *total = 0;
     }
     return status;
 }

@@ -189,6 +189,15 @@ ebpo_status ebpo_rows_read(const char *path, const char *name, unsigned least, u
     return unsupported(path, error);
 }
 
+ebpo_status ebpo_rows_read_part(const char *path, const char *name, unsigned least, unsigned most,
+                                double fill, uint64_t first, uint64_t most_rows, double **rows,
+                                uint64_t *count, uint64_t *total, ebpo_error *error)
+{
+    (void)first, (void)most_rows;
+    *total = 0;
+    return ebpo_rows_read(path, name, least, most, fill, rows, count, error);
+}
+
 ebpo_status ebpo_h5_make_volume(ebpo_h5_out *out, const char *path, const uint64_t dims[3],
                                 ebpo_h5_id *id, ebpo_error *error)
 {

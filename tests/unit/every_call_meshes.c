@@ -55,6 +55,16 @@ static ebpo_status call_rows(every_call_env *e)
     return status;
 }
 
+static ebpo_status call_rows_part(every_call_env *e)
+{
+    double *rows;
+    uint64_t count, total;
+    ebpo_status status = ebpo_rows_read_part(scratch(EVERY_CALL_MODEL), "/mesh/vertices", 3, 3, 0,
+                                             1, 2, &rows, &count, &total, e->error);
+    free(rows);
+    return status;
+}
+
 static ebpo_status call_write_ply(every_call_env *e)
 {
     ebpo_mesh mesh;
@@ -331,6 +341,7 @@ const every_call every_call_meshes[] = {
     { "import", call_import },
     { "parse_points", call_parse_points },
     { "rows", call_rows },
+    { "rows_part", call_rows_part },
     { "write_ply", call_write_ply },
     { "colours", call_colours },
     { "check", call_check },

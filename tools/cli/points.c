@@ -28,6 +28,12 @@ static bool cannot(points *p, const char *what, int number)
 bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw,
                  double tmax)
 {
+    return points_open_shard(p, by, path, kind, raw, tmax, 0, 1);
+}
+
+bool points_open_shard(points *p, const char *by, const char *path, points_kind kind, bool raw,
+                       double tmax, uint64_t number, uint64_t of)
+{
     bool standard = !path || strcmp(path, "-") == 0;
     struct stat st;
     *p = (points){ .command = by,
@@ -41,7 +47,7 @@ bool points_open(points *p, const char *by, const char *path, points_kind kind, 
                    .together = POINTS_BATCH,
                    .rest_capacity = POINTS_LINE };
     if (!standard && points_is_dataset(path))
-        return points_open_dataset(p, path);
+        return points_open_dataset(p, path, number, of);
     if (!standard)
         p->fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
     if (p->fd < 0)

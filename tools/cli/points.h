@@ -11,6 +11,9 @@
  * stderr). points_close in any case. */
 bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw,
                  double tmax);
+/* The same for points_cut(p, number, of), which must follow: of a dataset that part is read. */
+bool points_open_shard(points *p, const char *by, const char *path, points_kind kind, bool raw,
+                       double tmax, uint64_t number, uint64_t of);
 void points_close(points *p);
 
 /* Looks at the first bytes, for which it may wait: whether all is well so far; what is wrong is

@@ -18,12 +18,6 @@ static bool wrong(points *p, const char *what)
     return false;
 }
 
-/* total * number / of; without overflow, as `of` is at most 10^9. */
-static uint64_t share(uint64_t total, uint64_t number, uint64_t of)
-{
-    return total / of * number + total % of * number / of;
-}
-
 /* From here on only bytes `from` to `to` of the file are taken. */
 static bool limit(points *p, uint64_t from, uint64_t to)
 {
@@ -44,7 +38,7 @@ static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t numbe
         return wrong(p, rows > p->rows_total
                             ? "holds more rows than its shape tells; it is something else"
                             : "holds fewer rows than its shape tells; it is cut short");
-    uint64_t first = share(rows, number, of), end = share(rows, number + 1, of);
+    uint64_t first = points_share(rows, number, of), end = points_share(rows, number + 1, of);
     p->row = first;
     p->rows_told = false; /* that was looked at here */
     p->rows_known = true;
@@ -56,8 +50,10 @@ static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t numbe
 static bool cut_held(points *p, uint64_t number, uint64_t of)
 {
     uint64_t rows = p->rows_total;
-    p->row = p->held_at = share(rows, number, of);
-    p->rows_total = share(rows, number + 1, of);
+    if (p->held_part)
+        return true;
+    p->row = p->held_at = points_share(rows, number, of);
+    p->rows_total = points_share(rows, number + 1, of);
     return true;
 }
 
@@ -111,10 +107,11 @@ static bool cut_text(points *p, uint64_t begin, uint64_t size, uint64_t number, 
     uint64_t first = begin;
     if (p->header && !take_names(p, begin, &first))
         return false;
-    uint64_t from = next_line(p, first, first + share(size - first, number, of), size),
+    uint64_t from = next_line(p, first, first + points_share(size - first, number, of), size),
              to = from == UINT64_MAX
                       ? from
-                      : next_line(p, first, first + share(size - first, number + 1, of), size);
+                      : next_line(p, first, first + points_share(size - first, number + 1, of),
+                                  size);
     if (to == UINT64_MAX)
         return false;
     p->line_from = from;

@@ -160,15 +160,41 @@ bool points_file(const char *path, struct stat *st, const char **dataset)
     return found;
 }
 
-bool points_open_dataset(points *p, const char *path)
+/* Rows from `first` to `end`, and how many there are in all. */
+static ebpo_status read_dataset(points *p, const char *file, const char *name, uint64_t first,
+                                uint64_t end, uint64_t *total, ebpo_error *error)
+{
+    free(p->held);
+    return ebpo_rows_read_part(file, name, (unsigned)points_raw_width(p->kind),
+                               (unsigned)points_width(p->kind), p->tmax, first, end - first,
+                               &p->held, &p->rows_total, total, error);
+}
+
+static ebpo_status read_part(points *p, const char *file, const char *name, uint64_t number,
+                             uint64_t of, ebpo_error *error)
+{
+    uint64_t first = 0, end = 0, total, now;
+    ebpo_status status = read_dataset(p, file, name, 0, of > 1 ? 0 : UINT64_MAX, &total, error);
+    if (status != EBPO_OK || of == 1)
+        return status;
+    p->held_part = true;
+    p->row = first = points_share(total, number, of);
+    end = points_share(total, number + 1, of);
+    status = read_dataset(p, file, name, first, end, &now, error);
+    if (status == EBPO_OK && (now != total || p->rows_total != end - first)) {
+        snprintf(error->message, sizeof error->message, "%s: was changed while it was read", file);
+        status = EBPO_E_IO;
+    }
+    return status;
+}
+
+bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t of)
 {
     const char *colon = dataset_colon(path);
     char *file = strndup(path, (size_t)(colon - path));
     ebpo_error error = { .status = EBPO_E_MEMORY };
     p->begun = p->rows_known = true;
-    p->failed = !file || ebpo_rows_read(file, colon + 1, (unsigned)points_raw_width(p->kind),
-                                        (unsigned)points_width(p->kind), p->tmax, &p->held,
-                                        &p->rows_total, &error) != EBPO_OK;
+    p->failed = !file || read_part(p, file, colon + 1, number, of, &error) != EBPO_OK;
     free(file);
     if (p->failed)
         fprintf(stderr, "ebpo %s: %s\n", p->command,

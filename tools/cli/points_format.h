@@ -13,6 +13,7 @@ bool points_is_dataset(const char *path);
 /* The file that holds them. False: there is none. *dataset: what follows the file's name, or "". */
 struct stat;
 bool points_file(const char *path, struct stat *st, const char **dataset);
-bool points_open_dataset(points *p, const char *path);
+/* Part `number` of `of`, as points_cut takes them. */
+bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t of);
 
 #endif

@@ -23,6 +23,11 @@ bool points_fault(points_block *b, uint64_t at, const char *format, ...)
     return false;
 }
 
+uint64_t points_share(uint64_t total, uint64_t number, uint64_t of)
+{
+    return total / of * number + total % of * number / of;
+}
+
 void points_block_free(points_block *b)
 {
     free(b->bytes);

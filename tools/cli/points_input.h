@@ -69,6 +69,7 @@ typedef struct points {
     bool from_zero;           /* rows are told as "vertex 0" */
     double *held;             /* all rows, of what is read as a whole; or NULL */
     uint64_t held_at;         /* those that have been taken */
+    bool held_part;           /* they are the part that points_cut would take */
     int field[POINTS_WIDEST]; /* with a header: where each number stands; -1: nowhere */
     int fields;               /* and how many fields a line has; 0: not known yet */
     char separator;           /* between them; 0: blanks */
@@ -85,6 +86,10 @@ enum { POINTS_LINE = 1 << 18, POINTS_TEXT = 1 << 17, POINTS_FIELDS = 256 };
 /* What is wrong with a block, behind its last row; `at` as in `fault_at`. False. */
 __attribute__((format(printf, 3, 4))) bool points_fault(points_block *b, uint64_t at,
                                                         const char *format, ...);
+
+/* total * number / of: where part `number` of `of` begins; without overflow, as `of` is at most
+ * 10^9. */
+uint64_t points_share(uint64_t total, uint64_t number, uint64_t of);
 
 /* Reads on, behind the `rest`, once or to the end; false after an error, which the block tells. */
 bool points_fill(points *p, points_block *b);

@@ -169,7 +169,8 @@ static int open_and_run(query_job *job, const char *model, const char *path,
     points in;
     if (query_shard_done(shard, job, &code))
         return code;
-    bool fine = points_open(&in, job->command, path, job->kind, v->raw, v->tmax);
+    bool fine = points_open_shard(&in, job->command, path, job->kind, v->raw, v->tmax,
+                                  shard->number, shard->of ? shard->of : 1);
     in.header = v->header;
     if (fine && shard->of)
         fine = points_cut(&in, shard->number, shard->of);

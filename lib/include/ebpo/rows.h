@@ -33,6 +33,19 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_rows_read(const char *path, const char *
                                                   double **rows, uint64_t *count,
                                                   ebpo_error *error);
 
+/*
+ * The same for a part of the rows; of a dataset in chunks those are read that it meets.
+ *
+ * first, most_rows   from row `first` on, at most so many; 0: none, to learn *total
+ * count              the rows that were there
+ * total              the rows of the dataset, as the file says; 0 on failure
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_rows_read_part(const char *path, const char *dataset,
+                                                       unsigned least, unsigned most, double fill,
+                                                       uint64_t first, uint64_t most_rows,
+                                                       double **rows, uint64_t *count,
+                                                       uint64_t *total, ebpo_error *error);
+
 #ifdef __cplusplus
 }
 #endif
