@@ -39,6 +39,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_rows_read(const char *path, const char *
  * first, most_rows   from row `first` on, at most so many; 0: none, to learn *total
  * count              the rows that were there
  * total              the rows of the dataset, as the file says; 0 on failure
+ *
+ * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_rows_read_part(const char *path, const char *dataset,
                                                        unsigned least, unsigned most, double fill,
