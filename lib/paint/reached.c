@@ -64,6 +64,7 @@ static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsign
         atomic_fetch_add(&r->faces, f->count);
         f->done = status == EBPO_OK;
     }
+    ebpo_context_let_go(reach->context); /* who waits here shall not keep others from room */
     return status;
 }
 
