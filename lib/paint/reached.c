@@ -17,6 +17,9 @@
 /* Points that are looked at together: so many, or fewer when they reach so many faces already. */
 enum { TOGETHER = 1024, FACES_TOGETHER = 1 << 20, GRAIN = 8 };
 
+/* Of a budget, for each thread: more of them load what the others have just dropped. */
+enum { THREAD_ROOM = 1 << 20 };
+
 typedef struct found {
     ebpo_reached_face *face;
     uint64_t count, capacity;
@@ -64,6 +67,7 @@ static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsign
         atomic_fetch_add(&r->faces, f->count);
         f->done = status == EBPO_OK;
     }
+    ebpo_context_let_go(reach->context); /* who waits here shall not keep others from room */
     return status;
 }
 
@@ -110,7 +114,9 @@ ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context, unsigne
     if (!r)
         return ebpo_fail_memory(error, sizeof *r);
     r->p = p;
-    uint64_t most = p->point_count / GRAIN + 1;
+    uint64_t most = p->point_count / GRAIN + 1, memory = context->model->options.memory;
+    if (memory && memory / THREAD_ROOM < most)
+        most = memory / THREAD_ROOM + 1;
     r->threads = ebpo_thread_count(threads);
     r->threads = r->threads < most ? r->threads : (unsigned)most;
     ebpo_status status = EBPO_OK;

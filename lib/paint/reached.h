@@ -18,7 +18,8 @@ typedef struct ebpo_reached {
 
 typedef struct ebpo_reacher ebpo_reacher;
 
-/* `threads`: 0: all cores. Uses the context, and makes others of its model. On failure NULL. */
+/* `threads`: 0: all cores; fewer where the model's budget is small. Uses the context, and makes
+ * others of its model. On failure NULL. */
 EBPO_MUST_USE ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context,
                                            unsigned threads, ebpo_reacher **out, ebpo_error *error);
 void ebpo_reacher_free(ebpo_reacher *r);

@@ -62,15 +62,27 @@ static int by_model(const void *a, const void *b)
                             : (x->item > y->item) - (x->item < y->item);
 }
 
+/* Pairs of one model, of which there are the most. They are sorted. */
+static size_t longest_run(const box_pairs *pairs)
+{
+    size_t longest = 0;
+    for (size_t at = 0, begin = 0; at < pairs->count; at++) {
+        if (pairs->pair[at].box != pairs->pair[begin].box)
+            begin = at;
+        longest = at + 1 - begin > longest ? at + 1 - begin : longest;
+    }
+    return longest;
+}
+
 ebpo_status catalogue_runs(catalogue_models *m, box_pairs *pairs, const double *rows, size_t width,
                            bool surface, holding_question ask, void *user, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    double *some = malloc(pairs->count * width * sizeof *some + 1);
-    if (!some)
-        return catalogue_no_memory(error);
     if (pairs->count)
         qsort(pairs->pair, pairs->count, sizeof *pairs->pair, by_model);
+    double *some = malloc(longest_run(pairs) * width * sizeof *some + 1);
+    if (!some)
+        return catalogue_no_memory(error);
     for (size_t at = 0; at < pairs->count && status == EBPO_OK;) {
         const box_pair *pair = pairs->pair + at;
         model_run run = { .model = pair->box, .pair = pair, .rows = some, .user = user };

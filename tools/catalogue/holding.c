@@ -98,7 +98,7 @@ static ebpo_status open_model(const held_models *h, held_model *m, ebpo_error *e
         status = ebpo_model_new(m->file, &o, &m->model, error);
     if (status == EBPO_E_LIMIT && h->c->count > 1) {
         ebpo_error why = *error;
-        status = catalogue_fail(error, why.status, NULL,
+        status = catalogue_fail(error, why.status, path,
                                 "%.380s (of --memory each model may take one part in %d)",
                                 why.message, h->c->count < SHARES ? (int)h->c->count : SHARES);
     }

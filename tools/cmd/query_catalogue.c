@@ -9,7 +9,6 @@
 
 #include "cli/command.h"
 #include "cli/model_sums.h"
-#include "cli/words.h"
 
 /* What a catalogue is not asked, in the order in which it is said. */
 static const char *refused(const query_job *job)
@@ -39,16 +38,14 @@ bool query_catalogue_fits(const query_job *job)
     return !what;
 }
 
-int query_catalogue_open(query_job *job, const char *path)
+int query_catalogue_open(query_job *job, const char *path, const ebpo_model_options *options)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const query_values *v = job->values;
     catalogue *c = NULL;
-    holding_options o = { .memory = ebpo_free_memory() / 2,
-                          .threads = (unsigned)v->threads,
+    holding_options o = { .memory = v->memory ? options->memory : ebpo_free_memory() / 2,
+                          .threads = options->threads,
                           .remote = &v->remote };
-    if (v->memory && !words_read_size(v->memory, &o.memory))
-        return command_usage(job->command, "--memory: '%s' is not a size", v->memory);
     if (catalogue_read(path, &c, &error) != EBPO_OK)
         return command_failed(job->command, &error);
     job->models = calloc(1, sizeof *job->models);

@@ -6,9 +6,10 @@
 
 /* Whether the question can be asked of one. False: said on stderr (exit with EXIT_USAGE). */
 bool query_catalogue_fits(const query_job *job);
-/* Opens the catalogue, no model; job->models is then what is asked. Returns an exit code;
- * query_catalogue_close in any case. */
-int query_catalogue_open(query_job *job, const char *path);
+/* Opens the catalogue, no model; job->models is then what is asked. The options' memory, where the
+ * command was told any, is for all models. Returns an exit code; query_catalogue_close in any
+ * case. */
+int query_catalogue_open(query_job *job, const char *path, const ebpo_model_options *options);
 void query_catalogue_close(query_job *job);
 /* With --stats. */
 void query_catalogue_tell(const query_job *job);

@@ -132,7 +132,7 @@ static int open_asked(query_job *job, const char *model, const ebpo_model_option
                                   job->parts_share);
     query_holding_elsewhere(holding, job->command);
     job->result_bytes += sizeof(uint64_t); /* the model's number, behind all results */
-    return query_catalogue_open(job, model);
+    return query_catalogue_open(job, model, options);
 }
 
 /* With the model, of what is in `in`. */
