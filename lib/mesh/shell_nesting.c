@@ -11,7 +11,7 @@
 #include "mesh/shell_probes.h"
 #include "mesh/shell_rays.h"
 
-/* A host is crowded from so many samples for each of its faces on. */
+/* A host is crowded with more than so many samples for each of its faces. */
 enum { CROWD = 8, GRAIN = 64 };
 
 /* ---- what is known of each ---- */
