@@ -21,7 +21,7 @@ void answer_text_free(answer_text *t)
     *t = (answer_text){ .bytes = NULL };
 }
 
-static void empty(answer_text *t) { t->count = t->answer = t->piece = t->cut_count = 0; }
+static void empty(answer_text *t) { t->count = t->answer = t->piece = t->row = t->cut_count = 0; }
 
 void answer_text_lose(answer_text *t)
 {
@@ -29,20 +29,29 @@ void answer_text_lose(answer_text *t)
     empty(t);
 }
 
-void answer_text_forget(answer_text *t, size_t count)
+/* Drops what is behind the last complete row. */
+static void cut_row(answer_text *t)
 {
-    while (t->cut_count > 0 && t->cuts[t->cut_count - 1] > count)
+    while (t->cut_count > 0 && t->cuts[t->cut_count - 1] > t->row)
         t->cut_count--;
     t->piece = t->cut_count ? t->cuts[t->cut_count - 1] : 0;
-    t->count = t->answer = count;
+    t->count = t->answer = t->row;
+}
+
+void answer_text_retry(answer_text *t)
+{
+    cut_row(t);
+    t->full = false;
+    t->again = t->gone;
+    t->gone = 0;
 }
 
 char *answer_text_grow(answer_text *t)
 {
-    if (t->count >= t->spill_at && t->spill) {
-        t->spilled = true;
+    if (t->count >= t->spill_at && t->spill && !t->full)
         t->spill(t, t->user);
-    }
+    if (t->full)
+        cut_row(t);
     if (t->count + ANSWER_MOST > t->capacity) {
         char *wider = realloc(t->bytes, 2 * t->capacity);
         if (wider) {
@@ -74,13 +83,17 @@ bool answer_text_leave(answer_text *t, const char *command)
     struct stat st;
     bool fine = !t->failed && !t->refused,
          file = fstat(STDOUT_FILENO, &st) == 0 && S_ISREG(st.st_mode);
-    size_t at = 0;
+    size_t at = t->again < t->count ? t->again : t->count;
+    t->again -= at;
     for (size_t i = 0; fine && !file && i < t->cut_count; i++) {
+        if (t->cuts[i] <= at)
+            continue;
         fine = command_write(command, t->bytes + at, t->cuts[i] - at);
         at = t->cuts[i];
     }
     if (fine && at < t->count)
         fine = command_write(command, t->bytes + at, t->count - at);
+    t->gone = (t->row ? 0 : t->gone) + t->count - t->row;
     empty(t);
     t->refused |= !fine;
     return fine;

@@ -14,10 +14,14 @@ struct answer_text {
     size_t answer, piece; /* where the last answer ended, and the last piece */
     size_t *cuts;         /* [cut_count] ends of pieces: answers together, at most 4096 bytes */
     size_t cut_count, cut_capacity;
-    bool failed;  /* for want of memory; what was there is lost */
-    bool refused; /* it could not be written, which has been said */
-    bool spilled; /* some has left; set and never reset here */
-    /* What is there leaves early, as it is too long to be kept; empties the text. */
+    uint64_t rows; /* whose answers are complete, since it was last set to 0 */
+    size_t row;    /* where the last one of these ended */
+    size_t gone;   /* bytes behind it that have left */
+    size_t again;  /* bytes that have left before, and are not written again */
+    bool failed;   /* for want of memory; what was there is lost */
+    bool refused;  /* it could not be written, which has been said */
+    bool full; /* what comes behind the last complete row is lost; answer_text_retry ends that */
+    /* Called when the text is too long to be kept: lets it leave, loses it, or sets `full`. */
     void (*spill)(answer_text *t, void *user);
     void *user;
 };
@@ -55,8 +59,25 @@ static inline void answer_text_close(answer_text *t)
     t->answer = t->count;
 }
 
-/* What came behind the first `count` bytes, of a text that has not spilled since. */
-void answer_text_forget(answer_text *t, size_t count);
+/* Ends the answer to a row of the input. */
+static inline void answer_text_end_row(answer_text *t)
+{
+    answer_text_close(t);
+    if (t->full)
+        return;
+    t->rows++;
+    t->row = t->count;
+    t->gone = 0;
+}
+/* Whether more answers would be lost. */
+static inline bool answer_text_is_over(const answer_text *t)
+{
+    return t->failed || t->refused || t->full;
+}
+
+/* Drops what is behind the last complete row. The same bytes must come again: those of them that
+ * have left are not written a second time. */
+void answer_text_retry(answer_text *t);
 /* Loses all of it; what comes is lost, too, when it leaves. */
 void answer_text_lose(answer_text *t);
 

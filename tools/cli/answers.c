@@ -50,13 +50,13 @@ static char *put_json_reals(char *at, const char *lead, const double v[3])
     return put_text(at, "]");
 }
 
-/* What ends an answer in each form, and the answer with it. */
+/* Ends the answer to a row of the input. */
 static void end(answer_text *t, answer_form form, char *at)
 {
     if (form != ANSWERS_RAW)
         *at++ = '\n';
     answer_text_end(t, at);
-    answer_text_close(t);
+    answer_text_end_row(t);
 }
 
 void raw_u64(FILE *out, uint64_t v)
@@ -239,10 +239,10 @@ void answers_near(answer_text *t, answer_form form, const ebpo_near_face *face, 
     if (form == ANSWERS_JSON)
         at = put_text(at, first ? "[" : ", ");
     at = put_distance(at, form, &r, sampler, NULL);
-    if (form == ANSWERS_TEXT || form == ANSWERS_CSV)
-        end(t, form, at);
-    else
-        answer_text_end(t, at); /* such lists leave when they are whole, or too long for that */
+    bool line = form == ANSWERS_TEXT || form == ANSWERS_CSV;
+    answer_text_end(t, put_text(at, line ? "\n" : ""));
+    if (line) /* other lists leave when they are complete, or too long for that */
+        answer_text_close(t);
 }
 
 void answers_near_end(answer_text *t, answer_form form, bool none, const ebpo_sampler *sampler)

@@ -11,7 +11,7 @@ static ebpo_status answer(const query_job *job, query_worker *w, const double *r
                           ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+    for (uint64_t i = 0; i < count && status == EBPO_OK && !answer_text_is_over(w->text); i++) {
         const uint64_t *faces;
         uint64_t found;
         status =
@@ -44,7 +44,6 @@ static int run(void *given, const char **operand)
                       .values = v,
                       .kind = POINTS_BOXES,
                       .parts_share = 0.25, /* docs/measured/asking.md */
-
                       .answer = answer,
                       .columns = columns,
                       .dtype = dtype };

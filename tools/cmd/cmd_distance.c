@@ -26,7 +26,7 @@ static bool list(void *user, const ebpo_near_face *face)
     listing *l = user;
     answers_near(l->text, l->form, face, !l->begun, l->sampler);
     l->begun = true;
-    return !l->text->failed && !l->text->refused;
+    return !answer_text_is_over(l->text);
 }
 
 static ebpo_status answer_lists(const query_job *job, query_worker *w, const double *rows,
@@ -36,7 +36,7 @@ static ebpo_status answer_lists(const query_job *job, query_worker *w, const dou
     ebpo_status status = EBPO_OK;
     o.radius = job->values->within;
     o.most = (uint64_t)job->values->nearest;
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+    for (uint64_t i = 0; i < count && status == EBPO_OK && !answer_text_is_over(w->text); i++) {
         listing l = { job->sampler, w->text, job->form, false };
         status = ebpo_distance_within(w->context, rows + 3 * i, &o, list, &l, error);
         if (status == EBPO_OK)
@@ -45,31 +45,30 @@ static ebpo_status answer_lists(const query_job *job, query_worker *w, const dou
     return status;
 }
 
-static ebpo_status answer_models(const query_job *job, query_worker *w, const double *rows,
-                                 uint64_t count, ebpo_error *error)
+/* The numbers of a catalogue's models, behind the results. */
+static uint64_t *models_of(const query_worker *w, uint64_t count)
 {
-    ebpo_distance_result *results = w->results;
-    uint64_t *model = (uint64_t *)(void *)(results + count);
-    ebpo_status status = catalogue_distance(job->models, rows, count, job->distance.max_distance,
-                                            job->distance.unsigned_distance, results, model, error);
-    if (status == EBPO_OK)
-        answers_distance(w->text, job->form, false, results, count, NULL, model);
-    return status;
+    return (uint64_t *)(void *)((ebpo_distance_result *)w->results + count);
 }
 
 static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
                           ebpo_error *error)
 {
     if (job->models)
-        return answer_models(job, w, rows, count, error);
+        return catalogue_distance(job->models, rows, count, job->distance.max_distance,
+                                  job->distance.unsigned_distance, w->results, models_of(w, count),
+                                  error);
     if (count && query_lists(job->values))
         return answer_lists(job, w, rows, count, error);
-    ebpo_status status =
-        ebpo_distance_many(w->context, rows, count, &job->distance, w->results, error);
-    if (status == EBPO_OK)
-        answers_distance(w->text, job->form, limited(&job->distance), w->results, count,
-                         job->sampler, NULL);
-    return status;
+    return ebpo_distance_many(w->context, rows, count, &job->distance, w->results, error);
+}
+
+static void print(const query_job *job, query_worker *w, const double *rows, uint64_t count)
+{
+    (void)rows;
+    if (!query_lists(job->values))
+        answers_distance(w->text, job->form, !job->models && limited(&job->distance), w->results,
+                         count, job->sampler, job->models ? models_of(w, count) : NULL);
 }
 
 static const char *columns(const query_job *job)
@@ -114,6 +113,7 @@ static int run(void *given, const char **operand)
                       .result_bytes = sizeof(ebpo_distance_result),
                       .parts_share = 0.65, /* docs/measured/asking.md */
                       .answer = answer,
+                      .print = print,
                       .columns = columns,
                       .dtype = dtype };
     return query_run(&job, operand[0], operand[1]);

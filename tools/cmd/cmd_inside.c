@@ -10,12 +10,14 @@
 static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
                           ebpo_error *error)
 {
-    ebpo_status status =
-        job->models ? catalogue_inside(job->models, rows, count, w->results, error)
-                    : ebpo_inside_many(w->context, rows, count, &job->inside, w->results, error);
-    if (status == EBPO_OK)
-        answers_inside(w->text, job->form, w->results, count);
-    return status;
+    return job->models ? catalogue_inside(job->models, rows, count, w->results, error)
+                       : ebpo_inside_many(w->context, rows, count, &job->inside, w->results, error);
+}
+
+static void print(const query_job *job, query_worker *w, const double *rows, uint64_t count)
+{
+    (void)rows;
+    answers_inside(w->text, job->form, w->results, count);
 }
 
 static const char *columns(const query_job *job)
@@ -44,6 +46,7 @@ static int run(void *given, const char **operand)
                       .result_bytes = sizeof(ebpo_inside_result),
                       .parts_share = 0.05, /* docs/measured/asking.md */
                       .answer = answer,
+                      .print = print,
                       .columns = columns,
                       .dtype = dtype };
     return query_run(&job, operand[0], operand[1]);

@@ -17,22 +17,16 @@ static ebpo_status answer_all(const query_job *job, query_worker *w, const ebpo_
     const ebpo_ray_hit *hits;
     const uint64_t *begin;
     ebpo_status status = ebpo_ray_all_many(w->context, rays, count, how, &hits, &begin, error);
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+    for (uint64_t i = 0; i < count && status == EBPO_OK && !answer_text_is_over(w->text); i++)
         answers_ray_all(w->text, job->form, &rays[i], hits + begin[i], begin[i + 1] - begin[i],
                         job->sampler);
     return status;
 }
 
-static ebpo_status answer_models(const query_job *job, query_worker *w, const ebpo_ray *rays,
-                                 uint64_t count, ebpo_error *error)
+/* The numbers of a catalogue's models, behind the results. */
+static uint64_t *models_of(const query_worker *w, uint64_t count)
 {
-    ebpo_ray_hit *hits = w->results;
-    uint64_t *model = (uint64_t *)(void *)(hits + count);
-    ebpo_status status = catalogue_ray(job->models, rays, count,
-                                       (ebpo_ray_sides)job->values->ray_sides, hits, model, error);
-    if (status == EBPO_OK)
-        answers_ray_first(w->text, job->form, rays, hits, count, NULL, model);
-    return status;
+    return (uint64_t *)(void *)((ebpo_ray_hit *)w->results + count);
 }
 
 static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
@@ -40,23 +34,26 @@ static ebpo_status answer(const query_job *job, query_worker *w, const double *r
 {
     const ebpo_ray *rays = (const ebpo_ray *)(const void *)rows;
     ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
-    ebpo_status status;
     how.sides = (ebpo_ray_sides)job->values->ray_sides;
     how.threads = 1; /* others ask about other rays */
     if (job->models)
-        return answer_models(job, w, rays, count, error);
+        return catalogue_ray(job->models, rays, count, how.sides, w->results, models_of(w, count),
+                             error);
     if (job->values->all)
         return answer_all(job, w, rays, count, &how, error);
-    if (job->values->any) {
-        status = ebpo_ray_any_many(w->context, rays, count, &how, w->results, error);
-        if (status == EBPO_OK)
-            answers_ray_any(w->text, job->form, w->results, count);
-        return status;
-    }
-    status = ebpo_ray_first_many(w->context, rays, count, &how, w->results, error);
-    if (status == EBPO_OK)
-        answers_ray_first(w->text, job->form, rays, w->results, count, job->sampler, NULL);
-    return status;
+    if (job->values->any)
+        return ebpo_ray_any_many(w->context, rays, count, &how, w->results, error);
+    return ebpo_ray_first_many(w->context, rays, count, &how, w->results, error);
+}
+
+static void print(const query_job *job, query_worker *w, const double *rows, uint64_t count)
+{
+    const ebpo_ray *rays = (const ebpo_ray *)(const void *)rows;
+    if (job->values->any)
+        answers_ray_any(w->text, job->form, w->results, count);
+    else if (!job->values->all)
+        answers_ray_first(w->text, job->form, rays, w->results, count, job->sampler,
+                          job->models ? models_of(w, count) : NULL);
 }
 
 static const char *columns(const query_job *job)
@@ -94,6 +91,7 @@ static int run(void *given, const char **operand)
                       .result_bytes = sizeof(ebpo_ray_hit),
                       .parts_share = 0.6, /* docs/measured/asking.md */
                       .answer = answer,
+                      .print = print,
                       .columns = columns,
                       .dtype = dtype };
     return query_run(&job, operand[0], operand[1]);

@@ -22,10 +22,13 @@ struct query_job {
     points_kind kind;
     size_t result_bytes; /* of the answer to one row */
     double parts_share;  /* as query_holding_open takes it */
-    /* Answers rows[count][points_width(kind)] and prints. Asked with no rows first, so that what
-     * cannot be asked at all is said before input is waited for. */
+    /* Answers rows[count][points_width(kind)], while the model is held: answers of one size go to
+     * the results, lists are printed, until the text is over. Called with no rows first, so that
+     * what cannot be answered at all is reported before the command waits for input. */
     ebpo_status (*answer)(const query_job *job, query_worker *worker, const double *rows,
                           uint64_t count, ebpo_error *error);
+    /* Prints the results of these rows, without the model; NULL: all answers are lists. */
+    void (*print)(const query_job *job, query_worker *worker, const double *rows, uint64_t count);
     const char *(*columns)(const query_job *job); /* names of what a line of answers holds */
     /* What --raw prints for an answer, as a NumPy type; NULL: lists have none. */
     const char *(*dtype)(const query_job *job, unsigned *bytes);

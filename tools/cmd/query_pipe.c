@@ -21,6 +21,7 @@ typedef struct slot {
     points_block block;
     answer_text text;
     uint64_t number;
+    bool holds; /* its thread holds the model */
     bool done;
     ebpo_status status;
     ebpo_error error;
@@ -30,9 +31,12 @@ typedef struct crew {
     struct pipe_line *pipe;
     query_worker worker;
     pthread_t thread;
-    bool started;
 } crew;
 
+/* Two locks: the model's (query_holding.h), which is held while rows are answered, and `lock`. No
+ * thread waits for `moved` while it holds the model, and none does anything else while it holds
+ * `lock`. So whoever holds the model lets it go, and the oldest block never waits for another one.
+ */
 typedef struct pipe_line {
     const query_job *job;
     query_holding *holding;
@@ -40,17 +44,19 @@ typedef struct pipe_line {
     int waker; /* a byte written here ends its waiting; -1: nobody waits beside others */
     progress_line *progress;
     unsigned threads; /* at most */
-    atomic_uint working;
     uint64_t slots;
-    slot *slot; /* [slots] block i is in slot i % slots */
-    crew *crew; /* [threads] */
-    pthread_mutex_t taking;
-    uint64_t taken;        /* blocks; under `taking` */
-    pthread_mutex_t state; /* of all below */
-    pthread_cond_t moved;  /* `left` or `stopped` has changed */
-    uint64_t left;         /* blocks whose answers have left */
-    uint64_t rows_left, bytes_left;
-    bool leaving, stopped;
+    slot *slot;           /* [slots] block i is in slot i % slots */
+    crew *crew;           /* [threads] the first `working` of them have begun */
+    atomic_uint working;  /* changed by the thread that takes */
+    pthread_mutex_t lock; /* of all below */
+    pthread_cond_t moved; /* any of these has changed */
+    bool taking;          /* a thread takes a block; no other one does */
+    uint64_t taken;       /* blocks */
+    uint64_t left;        /* blocks whose answers have left */
+    bool leaving;         /* a thread lets block `left` leave; no other one does */
+    bool stopped;
+    uint64_t rows_left,
+        bytes_left; /* these and `code` belong to the thread that lets blocks leave */
     int code;
 } pipe_line;
 
@@ -64,20 +70,30 @@ static void stop(pipe_line *p)
     pthread_cond_broadcast(&p->moved);
 }
 
-/* A block with very long answers does not keep them: it waits for its turn. */
+/* Returns whether all blocks before this one have left; waits for that unless it holds the model.
+ */
+static bool has_turn(slot *s)
+{
+    pipe_line *p = s->pipe;
+    pthread_mutex_lock(&p->lock);
+    while (!s->holds && p->left != s->number && !p->stopped)
+        pthread_cond_wait(&p->moved, &p->lock);
+    bool turn = p->left == s->number;
+    if (p->stopped)
+        answer_text_lose(&s->text);
+    pthread_mutex_unlock(&p->lock);
+    return turn;
+}
+
+/* Long answers leave in the block's turn. Before it they stop at a row, behind which they go on
+ * when the model has been let go. */
 static void spill(answer_text *t, void *user)
 {
     slot *s = user;
-    pipe_line *p = s->pipe;
-    pthread_mutex_lock(&p->state);
-    while (p->left != s->number && !p->stopped)
-        pthread_cond_wait(&p->moved, &p->state);
-    bool gone = p->stopped;
-    pthread_mutex_unlock(&p->state);
-    if (gone)
-        answer_text_lose(t);
+    if (has_turn(s))
+        (void)answer_text_leave(t, s->pipe->job->command);
     else
-        (void)answer_text_leave(t, p->job->command);
+        t->full = !t->failed;
 }
 
 /* Of a file it is known how much there is, so that the number of questions can be estimated. */
@@ -112,23 +128,23 @@ static bool leave(pipe_line *p, slot *s)
 /* Who finishes the oldest block lets it leave, with all those behind it that are done. */
 static void finish(pipe_line *p, slot *s)
 {
-    pthread_mutex_lock(&p->state);
+    pthread_mutex_lock(&p->lock);
     s->done = true;
     for (;;) {
         slot *oldest = &p->slot[p->left % p->slots];
         if (p->leaving || p->stopped || !oldest->done || oldest->number != p->left)
             break;
         p->leaving = true;
-        pthread_mutex_unlock(&p->state);
+        pthread_mutex_unlock(&p->lock);
         bool go_on = leave(p, oldest);
-        pthread_mutex_lock(&p->state);
+        pthread_mutex_lock(&p->lock);
         p->leaving = oldest->done = false;
         p->left++;
         if (!go_on)
             stop(p);
         pthread_cond_broadcast(&p->moved);
     }
-    pthread_mutex_unlock(&p->state);
+    pthread_mutex_unlock(&p->lock);
 }
 
 /* --- one block --- */
@@ -143,20 +159,6 @@ static bool results_room(query_worker *w, size_t each, uint64_t rows)
     return !each || w->row_room >= rows;
 }
 
-/* Of questions that fail together, those before the first one that fails are answered. */
-static ebpo_status answer_rows(const query_job *job, query_worker *w, const double *rows,
-                               uint64_t count, ebpo_error *error)
-{
-    size_t before = w->text->count;
-    ebpo_status status = job->answer(job, w, rows, count, error);
-    if (status == EBPO_OK || count == 1 || w->text->count != before || w->text->spilled)
-        return status;
-    status = EBPO_OK;
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        status = job->answer(job, w, rows + i * (uint64_t)points_width(job->kind), 1, error);
-    return status;
-}
-
 /* How many questions there will be; 0: not known. */
 static double total_of(const points *in, const points_block *b)
 {
@@ -165,47 +167,66 @@ static double total_of(const points *in, const points_block *b)
     return (double)in->bytes_total * (double)b->row_count / (double)(b->count ? b->count : 1);
 }
 
-/* Rows of a block. Others may hold what these need: they are asked again where nobody else asks. */
-static ebpo_status answer_piece(pipe_line *p, query_worker *w, const double *rows, uint64_t count,
-                                double total, ebpo_error *error)
+/* Answers the rows behind text->rows, with the model as it has been entered. */
+static void answer_rest(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count)
 {
-    size_t before = w->text->count;
-    ebpo_status status = query_holding_enter(p->holding, &w->context, total, error);
-    if (status != EBPO_OK)
-        return status;
+    uint64_t done = s->text.rows, width = (uint64_t)points_width(p->job->kind);
     double begin = progress_now();
-    status = answer_rows(p->job, w, rows, count, error);
-    query_holding_leave(p->holding, count, progress_now() - begin);
-    if (status == EBPO_E_LIMIT && p->working > 1 && !w->text->spilled &&
+    s->holds = true;
+    s->status = p->job->answer(p->job, w, rows + done * width, count - done, &s->error);
+    s->holds = false;
+    query_holding_leave(p->holding, count - done, progress_now() - begin);
+}
+
+/* Answers rows of a block, or the first ones of them: text->rows. Other threads may hold what these
+ * need: then they are answered while no other thread holds the model. False: nothing may follow. */
+static bool answer_piece(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count,
+                         double total)
+{
+    s->text.rows = 0;
+    s->status = query_holding_enter(p->holding, &w->context, total, &s->error);
+    if (s->status != EBPO_OK)
+        return false;
+    answer_rest(p, w, s, rows, count);
+    if (s->status == EBPO_E_LIMIT && p->working > 1 &&
         query_holding_enter_alone(p->holding, &w->context)) {
-        answer_text_forget(w->text, before);
-        status = answer_rows(p->job, w, rows, count, error);
-        query_holding_leave(p->holding, count, 0);
+        answer_text_retry(&s->text);
+        answer_rest(p, w, s, rows, count);
     }
-    return status;
+    if (s->status != EBPO_OK)
+        return count > 1 && s->text.rows == 0; /* those before the one that fails are answered */
+    if (p->job->print)
+        p->job->print(p->job, w, rows, count);
+    if (s->text.full) {
+        answer_text_retry(&s->text);
+        (void)has_turn(s);
+    }
+    return !answer_text_is_over(&s->text);
 }
 
 /* The first questions come in small pieces, each as large as all before it: after each it may be
- * decided to bring in all of the model. */
+ * decided to bring in all of the model. Questions that fail together are answered one by one. */
 static void answer(pipe_line *p, query_worker *w, slot *s)
 {
     const points_block *b = &s->block;
-    uint64_t width = (uint64_t)points_width(p->job->kind), piece = b->row_count;
+    uint64_t width = (uint64_t)points_width(p->job->kind), most = b->row_count;
     double total = total_of(p->in, b);
     ebpo_error none = EBPO_ERROR_INIT;
     s->error = none;
     s->status = EBPO_OK;
     w->text = &s->text;
-    w->text->spilled = false;
     if (!results_room(w, p->job->result_bytes, b->row_count)) {
-        s->text.failed = true;
+        answer_text_lose(&s->text);
         return;
     }
-    for (uint64_t at = 0; at < b->row_count && s->status == EBPO_OK; at += piece) {
+    for (uint64_t at = 0; at < b->row_count; at += s->text.rows) {
         bool first = s->number == 0 && p->holding->waiting;
-        piece = !first ? b->row_count : at ? at : FIRST_PIECE;
+        uint64_t piece = !first ? most : at ? at : FIRST_PIECE;
+        most = s->status == EBPO_OK ? most : 1;
+        piece = piece < most ? piece : most;
         piece = piece < b->row_count - at ? piece : b->row_count - at;
-        s->status = answer_piece(p, w, b->rows + at * width, piece, total, &s->error);
+        if (!answer_piece(p, w, s, b->rows + at * width, piece, total))
+            break;
     }
 }
 
@@ -217,31 +238,46 @@ static void *work(void *user);
 static void call_another(pipe_line *p)
 {
     crew *next = &p->crew[p->working];
-    if (p->working < p->threads && pthread_create(&next->thread, NULL, work, next) == 0) {
-        next->started = true;
+    if (p->working < p->threads && pthread_create(&next->thread, NULL, work, next) == 0)
         p->working++;
-    }
+}
+
+/* Waits until this thread may take a block and there is a slot for it. False: nothing more is
+ * taken. */
+static bool begin_to_take(pipe_line *p)
+{
+    pthread_mutex_lock(&p->lock);
+    while (!p->stopped && (p->taking || p->taken - p->left >= p->slots))
+        pthread_cond_wait(&p->moved, &p->lock);
+    bool may = !p->stopped;
+    p->taking |= may;
+    pthread_mutex_unlock(&p->lock);
+    return may;
+}
+
+static void end_taking(pipe_line *p, bool took)
+{
+    pthread_mutex_lock(&p->lock);
+    p->taking = false;
+    p->taken += took;
+    pthread_cond_broadcast(&p->moved);
+    pthread_mutex_unlock(&p->lock);
 }
 
 /* NULL: there is no more. */
 static slot *take(pipe_line *p)
 {
-    pthread_mutex_lock(&p->taking);
-    pthread_mutex_lock(&p->state);
-    while (!p->stopped && p->taken - p->left >= p->slots)
-        pthread_cond_wait(&p->moved, &p->state);
-    bool gone = p->stopped;
-    pthread_mutex_unlock(&p->state);
+    if (!begin_to_take(p))
+        return NULL;
     slot *s = &p->slot[p->taken % p->slots];
-    if (gone || !points_take(p->in, &s->block)) {
-        s = NULL;
-    } else {
-        s->number = p->taken++;
+    bool took = points_take(p->in, &s->block);
+    if (took) {
+        s->number = p->taken;
         if (s->number > 0 || s->block.count > POINTS_BATCH * 8)
             call_another(p);
     }
-    pthread_mutex_unlock(&p->taking);
-    return s;
+    end_taking(p, took);
+    return took ? s : NULL;
 }
 
 static void *work(void *user)
@@ -337,8 +373,7 @@ int query_pipe_run(const query_job *job, query_holding *holding, points *in, uns
     p.slots = threads > 1
                   ? (uint64_t)threads * (in->together > POINTS_BATCH ? LARGE_EACH : BLOCKS_EACH)
                   : 1;
-    pthread_mutex_init(&p.taking, NULL);
-    pthread_mutex_init(&p.state, NULL);
+    pthread_mutex_init(&p.lock, NULL);
     pthread_cond_init(&p.moved, NULL);
     p.code = make(&p) ? EXIT_FINE : command_no_memory(job->command);
     if (p.code == EXIT_FINE)
@@ -346,22 +381,16 @@ int query_pipe_run(const query_job *job, query_holding *holding, points *in, uns
     if (p.code == EXIT_FINE) {
         p.working = 1;
         work(&p.crew[0]);
-        /* a thread that joins late may call another one: none is called after the last take */
-        for (unsigned i = 1; i < threads; i++) {
-            pthread_mutex_lock(&p.taking);
-            bool started = p.crew[i].started;
-            pthread_mutex_unlock(&p.taking);
-            if (started)
-                pthread_join(p.crew[i].thread, NULL);
-        }
+        /* threads are called by those before them, which have ended here */
+        for (unsigned i = 1; i < p.working; i++)
+            pthread_join(p.crew[i].thread, NULL);
         if (p.code == EXIT_FINE && !answer_text_leave(&p.slot[0].text, job->command))
             p.code = EXIT_FAILED; /* a line of names without answers */
         if (p.code == EXIT_FINE && in->failed)
             p.code = EXIT_FAILED;
     }
     unmake(&p);
-    pthread_mutex_destroy(&p.taking);
-    pthread_mutex_destroy(&p.state);
+    pthread_mutex_destroy(&p.lock);
     pthread_cond_destroy(&p.moved);
     return p.code;
 }
