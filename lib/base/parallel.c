@@ -1,6 +1,5 @@
 #include "base/parallel.h"
 
-#include <pthread.h>
 #include <stdatomic.h>
 
 #include "base/clock.h"
@@ -9,7 +8,8 @@
 #include "base/fp_env.h"
 #include "base/release_pages.h"
 
-enum { MAX_THREADS = 256 };
+/* No work of the library takes a quarter of this stack; sanitizers take some times as much. */
+enum { MAX_THREADS = 256, STACK_BYTES = 4 << 20 };
 
 typedef struct run {
     ebpo_workspace *workspace;
@@ -31,6 +31,19 @@ typedef struct worker {
     unsigned number;
     pthread_t thread;
 } worker;
+
+int ebpo_thread_start(pthread_t *thread, void *(*body)(void *), void *argument)
+{
+    pthread_attr_t attributes;
+    int failed = pthread_attr_init(&attributes);
+    if (failed)
+        return failed;
+    failed = pthread_attr_setstacksize(&attributes, STACK_BYTES);
+    if (!failed)
+        failed = pthread_create(thread, &attributes, body, argument);
+    pthread_attr_destroy(&attributes);
+    return failed;
+}
 
 unsigned ebpo_thread_count(unsigned requested)
 {
@@ -136,7 +149,7 @@ ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint6
     unsigned started = 1;
     for (; started < threads; started++) {
         workers[started] = (worker){ .r = &r, .number = started };
-        if (pthread_create(&workers[started].thread, NULL, run_worker, &workers[started]) != 0)
+        if (ebpo_thread_start(&workers[started].thread, run_worker, &workers[started]) != 0)
             break; /* fewer threads give the same result */
     }
     work(&r, 0);

@@ -4,6 +4,12 @@
 
 #include <ebpo/base.h>
 #include <ebpo/workspace.h>
+#include <pthread.h>
+
+/* Starts a thread as pthread_create does, with a stack of a fixed size instead of what RLIMIT_STACK
+ * or the C library gives. All threads of the library start here. 0: it runs; else an error number.
+ */
+int ebpo_thread_start(pthread_t *thread, void *(*body)(void *), void *argument);
 
 /* One piece: items [begin, end). `worker` is 0 .. threads - 1, for per-thread scratch. Anything but
  * EBPO_OK stops the whole run after the pieces that are under way; `error` belongs to this worker.

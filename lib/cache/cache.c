@@ -9,6 +9,7 @@
 #include "base/alloc.h"
 #include "base/clock.h"
 #include "base/error.h"
+#include "base/parallel.h"
 #include "cache/cache_room.h"
 
 static void pin(ebpo_cache *c, ebpo_cache_slot *s)
@@ -320,7 +321,7 @@ static bool start_ahead(ebpo_cache *c)
     sigset_t all, before;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    bool started = pthread_create(&c->ahead_thread, NULL, run_ahead, c) == 0;
+    bool started = ebpo_thread_start(&c->ahead_thread, run_ahead, c) == 0;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     return started;
 }

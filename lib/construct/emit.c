@@ -21,6 +21,7 @@ struct ebpo_emit_scratch {
     ebpo_triangle *faces; /* of one leaf */
     uint64_t faces_capacity;
     ebpo_workspace *workspace;
+    ebpo_polytope half[EBPO_LEVELS_MAX][3]; /* of envelopes on the path to a node; along z, y, x */
 };
 
 typedef struct emitter {
@@ -170,15 +171,15 @@ static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t wi
                           const int32_t offset[8], const ebpo_polytope *envelope)
 {
     unsigned filled = filled_children(e->s, child);
-    ebpo_polytope z, y, x;
+    ebpo_polytope *z = e->scratch->half[cell.level], *y = z + 1, *x = z + 2;
     for (unsigned o = 0; o < 8; o++) {
         if (o % 4 == 0 && filled >> o & 15)
-            ebpo_polytope_half(envelope, 2, o >> 2 & 1, &z);
+            ebpo_polytope_half(envelope, 2, o >> 2 & 1, z);
         if (o % 2 == 0 && filled >> o & 3)
-            ebpo_polytope_half(&z, 1, o >> 1 & 1, &y);
+            ebpo_polytope_half(z, 1, o >> 1 & 1, y);
         if (filled >> o & 1)
-            ebpo_polytope_half(&y, 0, o & 1, &x);
-        if (!emit(e, child + o, ebpo_cell_child(cell, o), winding + offset[o], &x))
+            ebpo_polytope_half(y, 0, o & 1, x);
+        if (!emit(e, child + o, ebpo_cell_child(cell, o), winding + offset[o], x))
             return false;
     }
     return true;

@@ -40,6 +40,7 @@ struct ebpo_envelope_scratch {
     double core[EBPO_HULL_POINTS][3]; /* extreme points of the solid in the cell */
     int core_count;
     ebpo_hull_facet facet[EBPO_HULL_FACETS];
+    ebpo_candidates_scratch of_faces;
 };
 
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error)
@@ -231,8 +232,8 @@ static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
                               const ebpo_polytope *envelope, double volume, double epsilon)
 {
     bool top = level <= TOP_LEVELS;
-    ebpo_candidate faces[EBPO_PLANES_CANDIDATES];
-    int count = ebpo_build_candidates(b, branch, detail, FACES_BELOW, faces);
+    ebpo_candidate faces[FACES_BELOW];
+    int count = ebpo_build_candidates(b, &s->of_faces, branch, detail, FACES_BELOW, faces);
     s->core_count = 0;
     try_all_around(s);
     for (int i = 0; i < count; i++) {

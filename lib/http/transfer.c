@@ -7,6 +7,7 @@
 #include "base/alloc.h"
 #include "base/clock.h"
 #include "base/error.h"
+#include "base/parallel.h"
 #include "base/random.h"
 #include "http/slot.h"
 
@@ -50,7 +51,7 @@ static bool set_up(ebpo_transfers *t)
         if (!t->slots[i].easy || !ebpo_slot_set_up(&t->slots[i]))
             return false;
     }
-    t->running = pthread_create(&t->thread, NULL, drive, t) == 0;
+    t->running = ebpo_thread_start(&t->thread, drive, t) == 0;
     return t->running;
 }
 

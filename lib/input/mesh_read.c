@@ -41,7 +41,7 @@ static void *hash_file(void *argument)
 /* Hashing runs beside parsing: it takes about as long, and both read the same pages. */
 static void hash_begin(hashing *h)
 {
-    h->threaded = pthread_create(&h->thread, NULL, hash_file, h) == 0;
+    h->threaded = ebpo_thread_start(&h->thread, hash_file, h) == 0;
     if (!h->threaded)
         hash_file(h);
 }

@@ -8,6 +8,7 @@
 
 #include "base/clock.h"
 #include "base/error.h"
+#include "base/parallel.h"
 #include "touch/touch_parts.h"
 #include "touch/vectors.h"
 
@@ -136,7 +137,7 @@ ebpo_status ebpo_touch_loader_start(ebpo_touch *t, ebpo_error *error)
         t->hand_before[i] = atomic_load(&t->hand_told[i]);
     }
     t->when_before = ebpo_clock();
-    int failed = pthread_create(&t->thread, NULL, run, t);
+    int failed = ebpo_thread_start(&t->thread, run, t);
     t->has_thread = failed == 0;
     return failed ? ebpo_fail(error, EBPO_E_MEMORY, "no thread to load in: %s", strerror(failed))
                   : EBPO_OK;

@@ -41,6 +41,19 @@ int command_no_memory(const char *name)
     return EXIT_FAILED;
 }
 
+int command_thread(pthread_t *thread, void *(*body)(void *), void *argument)
+{
+    pthread_attr_t attributes;
+    int failed = pthread_attr_init(&attributes);
+    if (failed)
+        return failed;
+    failed = pthread_attr_setstacksize(&attributes, COMMAND_STACK);
+    if (!failed)
+        failed = pthread_create(thread, &attributes, body, argument);
+    pthread_attr_destroy(&attributes);
+    return failed;
+}
+
 unsigned command_cores(void)
 {
 #ifdef EBPO_HAVE_SCHED_GETAFFINITY

@@ -3,6 +3,7 @@
 #define EBPO_TOOLS_COMMAND_H
 
 #include <ebpo/ebpo.h>
+#include <pthread.h>
 
 enum { EXIT_FINE = 0, EXIT_FAILED = 1, EXIT_USAGE = 2, EXIT_NOT_SOLID = 3, EXIT_DIFFERS = 4 };
 
@@ -17,6 +18,11 @@ int command_no_memory(const char *name);
 
 /* Cores that this process may use; at least 1. */
 unsigned command_cores(void);
+
+/* Starts a thread as pthread_create does, with a stack of COMMAND_STACK bytes instead of what
+ * RLIMIT_STACK or the C library gives. All threads of the command start here. */
+enum { COMMAND_STACK = 4 << 20 };
+int command_thread(pthread_t *thread, void *(*body)(void *), void *argument);
 
 /* True when both paths lead to one existing file. */
 bool command_same_file(const char *a, const char *b);

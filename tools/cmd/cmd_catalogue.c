@@ -159,7 +159,7 @@ static bool look_at_all(catalogue *c)
     if (!c->entry)
         return false;
     pthread_mutex_init(&c->lock, NULL);
-    while (started + 1 < wanted && pthread_create(&thread[started], NULL, work, c) == 0)
+    while (started + 1 < wanted && command_thread(&thread[started], work, c) == 0)
         started++;
     work(c);
     while (started > 0)

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 
 #include "cli/command.h"
 #include "cli/process_memory.h"
@@ -71,6 +72,33 @@ static int help(int argc, char **argv)
     return EXIT_FINE;
 }
 
+typedef struct command_call {
+    const command *c;
+    void *values;
+    const char **operand;
+    int code;
+} command_call;
+
+static void *run_command(void *user)
+{
+    command_call *call = user;
+    call->code = call->c->run(call->values, call->operand);
+    return NULL;
+}
+
+/* Runs the command on a thread with enough stack, where RLIMIT_STACK gives the main thread less. */
+static int run_with_stack(command_call *call)
+{
+    struct rlimit stack;
+    pthread_t thread;
+    bool little = getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur < COMMAND_STACK;
+    if (little && command_thread(&thread, run_command, call) == 0)
+        pthread_join(thread, NULL);
+    else
+        run_command(call);
+    return call->code;
+}
+
 static int run(const command *c, int argc, char **argv)
 {
     const char *operand[ARGS_OPERANDS_MAX];
@@ -81,7 +109,7 @@ static int run(const command *c, int argc, char **argv)
     arg_result parsed = args_parse(c->spec, argc, argv, values, operand);
     int code = parsed == ARGS_WRONG ? EXIT_USAGE : EXIT_FINE;
     if (parsed == ARGS_RUN && (code = standard_files_begin(c->spec, operand)) == EXIT_FINE)
-        code = standard_files_end(c->spec, c->run(values, operand));
+        code = standard_files_end(c->spec, run_with_stack(&(command_call){ c, values, operand, 0 }));
     free(values);
     return code;
 }

@@ -238,7 +238,7 @@ static void *work(void *user);
 static void call_another(pipe_line *p)
 {
     crew *next = &p->crew[p->working];
-    if (p->working < p->threads && pthread_create(&next->thread, NULL, work, next) == 0)
+    if (p->working < p->threads && command_thread(&next->thread, work, next) == 0)
         p->working++;
 }
 

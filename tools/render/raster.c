@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cli/command.h"
+
 enum { OCCLUSION_STEPS = 10, THREADS_MAX = 64 };
 #define EDGE UINT32_C(0x80000000)
 
@@ -388,7 +390,7 @@ static void resolve(const raster *r, picture *out, int x, int y, int width, int 
                              .number = i,
                              .threads = count };
     while (started < count &&
-           pthread_create(&shares[started].thread, NULL, resolve_rows, &shares[started]) == 0)
+           command_thread(&shares[started].thread, resolve_rows, &shares[started]) == 0)
         started++;
     resolve_rows(&shares[0]);
     for (unsigned i = started; i < count; i++) /* threads that could not be had */

@@ -1,0 +1,114 @@
+#!/usr/bin/env python3
+"""query_threads.py EBPO EBPO-GENERATE [few]: every query gives the same bytes on 1 to 8 threads, with all of
+the model in memory, with parts of it, and where the command decides; nothing waits for ever. A block's answers
+are longer than what is kept of them, or a row's are. `few`: fewer ways, as for ThreadSanitizer."""
+import os
+import random
+import subprocess
+import sys
+import tempfile
+
+FINE, COARSE, CATALOGUE = "fine.ebpo.h5", "models/coarse.ebpo.h5", "models/catalogue.json"
+# The first: the command begins with parts of FINE and may bring in all of it on its way. Numbers: so many times
+# the least that is possible.
+MEMORY = {FINE: ["", "1G"], COARSE: [1.02, 1.5], CATALOGUE: ["", 1.02]}
+HUNG = 240
+
+
+def rows_of(count, width, seed):
+    """Points near the torus, with a direction (6 numbers) or as boxes."""
+    r = random.Random(seed)
+    for _ in range(count):
+        p = [r.uniform(-1.4, 1.4), r.uniform(-1.4, 1.4), r.uniform(-0.4, 0.4)]
+        yield p if width == 3 else p + [r.uniform(-1, 1) for _ in range(3)] if width == 7 else p + [
+            x + 0.3 for x in p]
+
+
+def write(name, rows):
+    with open(name, "w") as file:
+        file.writelines(" ".join(f"{x:.17g}" for x in row) + "\n" for row in rows)
+
+
+def make_inputs(ebpo, generate):
+    def run(*command):
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+    run(generate, "--base", "torus", "--faces", "10000", "torus.ply")
+    # so many nodes that the command does not bring in all of it at once
+    run(ebpo, "convert", "-q", "--leaf-faces", "1", "--max-level", "8", "--without", "planes", "torus.ply", FINE)
+    os.mkdir("models")
+    run(ebpo, "convert", "-q", "torus.ply", COARSE)
+    run(generate, "--base", "sphere", "--faces", "4000", "sphere.ply")
+    run(ebpo, "convert", "-q", "sphere.ply", "models/sphere.ebpo.h5")
+    run(ebpo, "catalogue", "-q", "models")
+    write("points.txt", rows_of(8000, 3, 1))
+    write("few.txt", rows_of(3000, 3, 2))
+    write("rays.txt", rows_of(6000, 7, 3))
+    write("boxes.txt", rows_of(4000, 6, 4))
+    write("rows.txt", rows_of(6, 3, 5))  # all faces of each, more than 1 MB of text
+    write("one_place.txt", ([0.1, 0.2, 0.3] for _ in range(10000)))  # long answers of one size
+
+
+LISTS = [
+    (["distance", "-k", "40"], "few.txt"),
+    (["distance", "--within", "0.2", "--json"], "few.txt"),
+    (["distance", "--within", "9"], "rows.txt"),
+    (["ray", "--all", "--json"], "rays.txt"),
+    (["box"], "boxes.txt"),
+]
+QUERIES = [
+    (["inside"], "points.txt"),
+    (["distance", "--json"], "one_place.txt"),
+    (["ray"], "rays.txt"),
+]
+
+
+def least_memory(ebpo, model):
+    """Bytes that the command says the model needs."""
+    command = [ebpo, "inside", "--memory", "1", model, "points.txt"]
+    said = subprocess.run(command, capture_output=True, text=True).stderr
+    return int(said.split("give at least")[1].split()[0])
+
+
+def answers_of(command, path):
+    """Exit code, answers and messages; 'hung' after a time."""
+    with open(path) as rows:
+        try:
+            done = subprocess.run(command, stdin=rows, capture_output=True, timeout=HUNG)
+        except subprocess.TimeoutExpired:
+            return "hung", b"", b""
+    return done.returncode, done.stdout, done.stderr
+
+
+def compare(ebpo, model, query, path, threads):
+    """What is wrong with the answers to the rows of `path`, a line each."""
+    command = [ebpo, query[0], model, *query[1:]]
+    right = answers_of(command + ["--threads", "1", "--memory", "1G"], path)
+    if right[0] != 0 or right[2]:
+        yield f"{' '.join(command)}: {right[0]}, {right[2].decode()}"
+    for memory in MEMORY[model]:
+        if memory and memory != "1G":
+            memory = str(int(memory * least_memory(ebpo, model)))
+        for n in threads:
+            how = ["--threads", str(n)] + (["--memory", memory] if memory else [])
+            found = answers_of(command + how, path)
+            if found != right:
+                yield (f"{' '.join(command + how)} <{path}: {found[0]}, {len(found[1])} bytes of answers, "
+                       f"expected {len(right[1])}; {found[2].decode()[-2000:]}")
+
+
+def main():
+    ebpo, generate = (os.path.abspath(path) for path in sys.argv[1:3])
+    threads = [2, 8] if "few" in sys.argv[3:] else range(1, 9)
+    wrong = []
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        make_inputs(ebpo, generate)
+        for model in MEMORY:
+            for query, path in QUERIES + (LISTS if model != CATALOGUE else []):
+                wrong += compare(ebpo, model, query, path, threads)
+        os.chdir("/")
+    sys.exit("\n".join(wrong) or 0)
+
+
+main()
