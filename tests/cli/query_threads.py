@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """query_threads.py EBPO EBPO-GENERATE [few]: every query gives the same bytes on 1 to 8 threads, with all of
-the model in memory, with parts of it, and where the command decides; nothing waits for ever. A block's answers
-are longer than what is kept of them, or a row's are. `few`: fewer ways, as for ThreadSanitizer."""
+the model in memory, with parts of it, and where the command decides; nothing waits for ever. The answers to a
+block, or to a row, are longer than what is kept of them. `few`: on 2 and 8 threads."""
 import os
 import random
 import subprocess
@@ -10,8 +10,8 @@ import tempfile
 
 FINE, COARSE, CATALOGUE = "fine.ebpo.h5", "models/coarse.ebpo.h5", "models/catalogue.json"
 # The first: the command begins with parts of FINE and may bring in all of it on its way. Numbers: so many times
-# the least that is possible.
-MEMORY = {FINE: ["", "1G"], COARSE: [1.02, 1.5], CATALOGUE: ["", 1.02]}
+# the least that is possible for the model.
+MEMORY = {FINE: ["", "1G"], COARSE: [1.02, 1.5], CATALOGUE: ["", 2.1]}
 HUNG = 240
 
 
@@ -50,7 +50,7 @@ def make_inputs(ebpo, generate):
 
 
 LISTS = [
-    (["distance", "-k", "40"], "few.txt"),
+    (["distance", "-k", "40"], "points.txt"),
     (["distance", "--within", "0.2", "--json"], "few.txt"),
     (["distance", "--within", "9"], "rows.txt"),
     (["ray", "--all", "--json"], "rays.txt"),
@@ -87,9 +87,9 @@ def compare(ebpo, model, query, path, threads):
     if right[0] != 0 or right[2]:
         yield f"{' '.join(command)}: {right[0]}, {right[2].decode()}"
     for memory in MEMORY[model]:
-        if memory and memory != "1G":
+        if isinstance(memory, float):
             memory = str(int(memory * least_memory(ebpo, model)))
-        for n in threads:
+        for n in threads if memory == "" else (2, 8):
             how = ["--threads", str(n)] + (["--memory", memory] if memory else [])
             found = answers_of(command + how, path)
             if found != right:
@@ -99,7 +99,7 @@ def compare(ebpo, model, query, path, threads):
 
 def main():
     ebpo, generate = (os.path.abspath(path) for path in sys.argv[1:3])
-    threads = [2, 8] if "few" in sys.argv[3:] else range(1, 9)
+    threads = (2, 8) if "few" in sys.argv[3:] else range(1, 9)
     wrong = []
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
