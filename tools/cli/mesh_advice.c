@@ -62,15 +62,29 @@ static void warn_of_surface(FILE *out, const ebpo_mesh_report *r)
         name_finding(out, &any, &r->unbalanced_edges, "unbalanced edges");
 }
 
+static const char *volume_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
+{
+    ebpo_solid_volume solid = findings_solid(&t->report, rule, NULL, NULL);
+    return findings_volume(text, &solid, &t->report, "");
+}
+
+/* Writes what solid a repair leaves. */
+static const char *left_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
+{
+    char volume[FINDINGS_VOLUME];
+    volume_text(volume, t, rule);
+    snprintf(text, FINDINGS_VOLUME, "a solid %s %.200s", volume[0] == 'v' ? "of" : "with", volume);
+    return text;
+}
+
 /* What was tried; else where that is done. */
 static void say_remedy(FILE *out, const mesh_input *p)
 {
-    char steps[64], volume[40];
+    char steps[64], left[FINDINGS_VOLUME];
     if (p->tried && p->repairs.chosen >= 0) {
         const ebpo_repair_try *best = &p->repairs.tries[p->repairs.chosen];
-        fprintf(out, "; %s, which --repair does, leaves a solid of volume %s",
-                steps_text(steps, sizeof steps, &best->record),
-                findings_extent(volume, sizeof volume, best->report.volume, 3, &best->report));
+        fprintf(out, "; %s, which --repair does, leaves %s",
+                steps_text(steps, sizeof steps, &best->record), left_text(left, best, p->rule));
     } else if (p->tried)
         fputs("; no repair of ours leaves a plausible solid: use a mesh editor", out);
     else
@@ -105,7 +119,7 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
 {
     const ebpo_finding *f = &p->prepared.report.repeated_faces;
     const ebpo_repair_try *t = dropping_alone(p);
-    char text[80], steps[64], volume[40];
+    char text[80], steps[64], left[FINDINGS_VOLUME];
     fprintf(out, "ebpo %s: %s: warning: %s of the same three vertices as an earlier one (face %llu",
             command, path, words_plural(text, sizeof text, f->count, "face is", "faces are"),
             (unsigned long long)f->place[0]);
@@ -123,8 +137,7 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
                 (unsigned long long)(f->count - t->record.dropped_opposite));
     fputs(steps_text(steps, sizeof steps, &t->record), out);
     if (t->report.balanced)
-        fprintf(out, " leaves a solid of volume %s\n",
-                findings_extent(volume, sizeof volume, t->report.volume, 3, &t->report));
+        fprintf(out, " leaves %s\n", left_text(left, t, p->rule));
     else
         fprintf(out, " alone leaves a surface, %llu edges of which do not balance\n",
                 (unsigned long long)t->report.unbalanced_edges.count);
@@ -165,14 +178,14 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
 
 /* ---- what was tried ---- */
 
-static void print_try(FILE *out, const ebpo_repair_try *t)
+static void print_try(FILE *out, const ebpo_repair_try *t, ebpo_rule rule)
 {
-    char steps[64], text[80];
+    char steps[64], text[80], volume[FINDINGS_VOLUME];
     const ebpo_mesh_report *r = &t->report;
     fprintf(out, "    %s: %s, ", steps_text(steps, sizeof steps, &t->record),
             words_plural(text, sizeof text, r->components, "component", "components"));
     if (r->balanced)
-        fprintf(out, "volume %s", findings_extent(text, sizeof text, r->volume, 3, r));
+        fputs(volume_text(volume, t, rule), out);
     else
         fprintf(out, "%llu edges do not balance", (unsigned long long)r->unbalanced_edges.count);
     if (t->record.filled_holes) {
@@ -213,7 +226,7 @@ void advice_print(FILE *out, const mesh_input *p)
         return;
     fputs("  repairs tried, of each what it would leave:\n", out);
     for (uint64_t i = 0; i < p->repairs.count; i++)
-        print_try(out, &p->repairs.tries[i]);
+        print_try(out, &p->repairs.tries[i], p->rule);
 }
 
 /* ---- JSON ---- */
@@ -227,8 +240,9 @@ static void json_doubts(json *j, uint32_t set)
     json_end(j);
 }
 
-static void json_try(json *j, const ebpo_repair_try *t)
+static void json_try(json *j, const ebpo_repair_try *t, ebpo_rule rule)
 {
+    ebpo_solid_volume solid = findings_solid(&t->report, rule, NULL, NULL);
     json_object(j, NULL);
     json_array(j, "steps");
     if (t->record.weld)
@@ -246,7 +260,7 @@ static void json_try(json *j, const ebpo_repair_try *t)
     json_uint(j, "filled_holes", t->record.filled_holes);
     json_uint(j, "added_faces", t->record.added_faces);
     json_real(j, "area", t->report.area);
-    json_real(j, "volume", t->report.volume);
+    findings_volume_json(j, &solid);
     json_doubts(j, t->doubts);
     json_end(j);
 }
@@ -276,7 +290,7 @@ void advice_json(json *j, const mesh_input *p)
     json_object(j, "repairs");
     json_array(j, "tried");
     for (uint64_t i = 0; i < p->repairs.count; i++)
-        json_try(j, &p->repairs.tries[i]);
+        json_try(j, &p->repairs.tries[i], p->rule);
     json_end(j);
     if (p->repairs.chosen >= 0)
         json_int(j, "chosen", p->repairs.chosen);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cli/command.h"
+#include "cli/mesh_findings.h"
 
 static bool steps_given(mending asked)
 {
@@ -75,6 +76,13 @@ static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *how, 
     p->shells = (ebpo_shells)EBPO_SHELLS_INIT;
     p->counted = true;
     return ebpo_mesh_count_shells(&p->mesh, how->threads, how->progress, &p->shells, error);
+}
+
+ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
+{
+    bool counted = p->counted && (after || !p->prepared.mended);
+    return findings_solid(after ? &p->prepared.report : &p->prepared.before, p->rule,
+                          counted ? &p->shells : NULL, NULL);
 }
 
 ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending asked,
