@@ -9,8 +9,6 @@ import random
 import subprocess
 import sys
 
-EBPO = sys.argv[1]
-ROUNDS = int(sys.argv[2]) if len(sys.argv) > 2 else 4
 SIZE = 12
 INSIDE = {"nonzero": lambda w: w != 0, "positive": lambda w: w > 0, "evenodd": lambda w: w % 2 == 1}
 SIDES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
@@ -50,7 +48,7 @@ def are_apart(boxes):
 
 
 def run(*args):
-    done = subprocess.run([EBPO, *args], capture_output=True, text=True)
+    done = subprocess.run([sys.argv[1], *args], capture_output=True, text=True)
     if done.returncode:
         sys.exit(f"{args}: {done.stderr}")
     return json.loads(done.stdout)
@@ -123,7 +121,8 @@ def main():
              [box(0, 10), box(3, 7)], [box(0, 10), box(3, 7, -1)], [box(0, 10, -1), box(3, 7)],
              [box(0, 4), box(2, 6)], [box(0, 4), box(4, 8)], [box(0, 4), box(5, 9)],
              [box(0, 10), box(1, 9, -1), box(2, 8)], [box(0, 10), box(1, 9), box(2, 8, -1), box(3, 7, -1)]]
-    cases += [nested_boxes(chance) for _ in range(ROUNDS)] + [random_boxes(chance) for _ in range(3 * ROUNDS)]
+    rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 4
+    cases += [nested_boxes(chance) for _ in range(rounds)] + [random_boxes(chance) for _ in range(3 * rounds)]
     known = 0
     for i, boxes in enumerate(cases):
         for rule in INSIDE:

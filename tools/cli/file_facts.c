@@ -150,13 +150,13 @@ static void print_model(FILE *out, const ebpo_info *info)
     if (!(info->parts & EBPO_PART_MESH))
         fputs(" (not in this file)", out);
     if (info->solid) {
-        char text[FINDINGS_VOLUME];
+        char text[FINDINGS_VOLUME], extent[40];
         ebpo_solid_volume solid = facts_solid(info, NULL);
-        double v = info->report.volume;
-        bool measured = findings_knows(&solid) && (isnormal(v) || !solid.lo == !v);
-        findings_volume(text, &solid, &info->report, info->unit);
-        fprintf(out, "\n  solid     %s%s, by winding number, rule %s", text,
-                measured ? "" : " (see ebpo measure)", words_rule(info->rule));
+        findings_extent(extent, sizeof extent, solid.integral, 3, &info->report);
+        bool printed = findings_knows(&solid) && (isnormal(solid.integral) || extent[0] == '0');
+        fprintf(out, "\n  solid     %s%s, by winding number, rule %s",
+                findings_volume(text, &solid, &info->report, info->unit),
+                printed ? "" : " (see ebpo measure)", words_rule(info->rule));
     }
     if (facts_inside_out(info))
         fprintf(out, "\n  warning   %s", facts_inside_out(info));

@@ -17,9 +17,9 @@ static const struct doubt_text {
     { EBPO_DOUBT_MOSTLY_FILLED, "mostly_filled", "filling holes added as much area as was given" },
     { EBPO_DOUBT_NO_VOLUME, "no_volume", "it has hardly any volume" },
     { EBPO_DOUBT_INSIDE_OUT, "inside_out",
-      "it is turned inside out: normals look inwards, the volume is negative, and a point within "
-      "has winding number -1, which is inside by the rules nonzero and evenodd but outside by "
-      "positive; --orient turns it" },
+      "it is turned inside out: normals look inwards, so a point within has winding number -1, "
+      "which is inside by the rules nonzero and evenodd but outside by positive; --orient turns "
+      "it" },
 };
 enum { DOUBTS = sizeof doubts / sizeof *doubts };
 
@@ -104,6 +104,31 @@ static void warn_of_inside_out(FILE *out, const char *command, const char *path,
             s->inside_out == 1 ? "is" : "are");
 }
 
+static void warn_of_nested(FILE *out, const char *command, const char *path, const ebpo_shells *s)
+{
+    fprintf(out,
+            "ebpo %s: %s: warning: %llu of %llu closed components %s within another and %s outwards "
+            "like it: winding numbers there are greater by 1, so the rules nonzero and positive "
+            "leave no cavity, and evenodd does; --orient turns them into cavities\n",
+            command, path, (unsigned long long)s->nested, (unsigned long long)s->closed,
+            s->nested == 1 ? "is" : "are", s->nested == 1 ? "looks" : "look");
+}
+
+/* Warns of faces that share positions, but not vertices, with an earlier face and its
+ * orientation. */
+static void warn_of_repeated_positions(FILE *out, const char *command, const char *path,
+                                       const mesh_input *p)
+{
+    char text[80];
+    uint64_t same = p->repeated.count - p->repeated_opposite;
+    fprintf(out,
+            "ebpo %s: %s: warning: %s at the positions of an earlier one with the same orientation "
+            "(face %llu%s), which counts twice in winding numbers; --weld with --drop-duplicates "
+            "drops such\n",
+            command, path, words_plural(text, sizeof text, same, "face is", "faces are"),
+            (unsigned long long)p->repeated.place[0], p->repeated.count > 1 ? ", ..." : "");
+}
+
 /* What dropping them was found to leave, if it was tried. */
 static const ebpo_repair_try *dropping_alone(const mesh_input *p)
 {
@@ -158,8 +183,13 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
     char text[1024];
     if (p->counted && p->shells.inside_out && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
         warn_of_inside_out(out, command, path, &p->shells);
+    if (p->counted && p->shells.nested && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
+        warn_of_nested(out, command, path, &p->shells);
     if (p->prepared.report.repeated_faces.count)
         warn_of_repeated(out, command, path, p);
+    if (p->repeated.count > p->prepared.report.repeated_faces.count &&
+        p->repeated.count > p->repeated_opposite)
+        warn_of_repeated_positions(out, command, path, p);
     if (p->prepared.record.dropped_faces && p->prepared.before.balanced &&
         p->doubts & EBPO_DOUBT_OPEN)
         warn_of_opened(out, command, path, &p->prepared.record);
@@ -206,6 +236,10 @@ void advice_print_shells(FILE *out, const mesh_input *p)
 {
     char text[80];
     const ebpo_shells *s = &p->shells;
+    if (p->repeated.count > p->prepared.report.repeated_faces.count)
+        fprintf(out, "  %s at the positions of an earlier one, %llu with the opposite orientation\n",
+                words_plural(text, sizeof text, p->repeated.count, "face", "faces"),
+                (unsigned long long)p->repeated_opposite);
     if (!p->counted || !(s->inside_out || s->nested || s->cavities))
         return;
     fprintf(out, "  %s",
@@ -265,6 +299,19 @@ static void json_try(json *j, const ebpo_repair_try *t, ebpo_rule rule)
     json_end(j);
 }
 
+/* Writes null where no vertices are at one position: the report has all repeated faces then. */
+static void json_repeated(json *j, const mesh_input *p)
+{
+    if (!p->prepared.report.repeated_positions.count) {
+        json_null(j, "repeated_by_position");
+        return;
+    }
+    json_object(j, "repeated_by_position");
+    json_uint(j, "faces", p->repeated.count);
+    json_uint(j, "opposite", p->repeated_opposite);
+    json_end(j);
+}
+
 static void json_shells(json *j, const mesh_input *p)
 {
     if (!p->counted) {
@@ -276,12 +323,14 @@ static void json_shells(json *j, const mesh_input *p)
     json_uint(j, "inside_out", p->shells.inside_out);
     json_uint(j, "cavities", p->shells.cavities);
     json_uint(j, "nested", p->shells.nested);
+    json_bool(j, "apart", p->shells.apart);
     json_end(j);
 }
 
 void advice_json(json *j, const mesh_input *p)
 {
     json_doubts(j, p->doubts);
+    json_repeated(j, p);
     json_shells(j, p);
     if (!p->tried) {
         json_null(j, "repairs");

@@ -21,6 +21,10 @@ typedef struct mesh_input {
     ebpo_prepared prepared; /* what was found and mended */
     bool tried;             /* repairs, which `repairs` tells of */
     ebpo_repairs repairs;
+    /* faces at the positions of an earlier one, of the mesh as mended; of these, where vertices are
+     * at one position, those that look the other way */
+    ebpo_finding repeated;
+    uint64_t repeated_opposite;
     bool counted; /* closed components, which `shells` tells of */
     ebpo_shells shells;
     uint32_t doubts; /* ebpo_doubt, of the mesh as mended */
