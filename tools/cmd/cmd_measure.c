@@ -147,16 +147,6 @@ static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass 
 
 /* --- JSON --- */
 
-/* A number; beyond the range of a double a text. */
-static void json_scaled(json *j, const char *key, double x, int64_t exponent)
-{
-    char cell[TABLE_CELL];
-    if (table_in_range(x, exponent))
-        json_real(j, key, ldexp(x, (int)exponent));
-    else
-        json_text(j, key, table_scaled(cell, 9, x, exponent));
-}
-
 static void json_deviation(json *j, const ebpo_deviation *d)
 {
     json_object(j, "deviation");
@@ -189,21 +179,21 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
     json_text(j, "kind", info->solid ? "solid" : "surface");
     json_bool(j, "inside_out", facts_inside_out(info) != NULL);
     json_text(j, "unit", info->unit);
-    json_scaled(j, "area", mass->scaled_area, 2 * mass->exponent);
+    table_json(j, "area", mass->scaled_area, 2 * mass->exponent);
     if (info->solid) {
         if (isnan(mass->scaled_volume))
             json_null(j, "volume");
         else
-            json_scaled(j, "volume", mass->scaled_volume, 3 * mass->exponent);
+            table_json(j, "volume", mass->scaled_volume, 3 * mass->exponent);
         json_real(j, "volume_lo", mass->volume_lo);
         json_real(j, "volume_hi", mass->volume_hi);
-        json_scaled(j, "winding_integral", mass->scaled_integral, 3 * mass->exponent);
+        table_json(j, "winding_integral", mass->scaled_integral, 3 * mass->exponent);
         json_reals(j, "centroid", mass->centroid, 3);
         json_array(j, "inertia");
         for (int k = 0; k < 3; k++) {
             json_array(j, NULL);
             for (int i = 0; i < 3; i++)
-                json_scaled(j, NULL, mass->scaled_inertia[k][i], 5 * mass->exponent);
+                table_json(j, NULL, mass->scaled_inertia[k][i], 5 * mass->exponent);
             json_end(j);
         }
         json_end(j);
