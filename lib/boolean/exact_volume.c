@@ -367,9 +367,14 @@ static ebpo_status add_operands(measuring *m, ebpo_error *error)
     }
     for (unsigned i = 1; i < threads; i++)
         ebpo_volume_sum_merge(&m->sum[0], &m->sum[i]);
-    double volume = ebpo_volume_sum_value(&m->sum[0]);
-    if (status == EBPO_OK && !m->out->doubt)
+    double scaled, volume;
+    int64_t exponent;
+    volume = ebpo_volume_sum_value(&m->sum[0], &scaled, &exponent);
+    if (status == EBPO_OK && !m->out->doubt) {
         m->out->volume = ebpo_certain_of(volume, volume);
+        m->out->scaled = scaled;
+        m->out->exponent = exponent;
+    }
     for (unsigned i = 0; i < threads; i++)
         ebpo_volume_sum_end(&m->sum[i]);
     free(m->sum);

@@ -94,7 +94,7 @@ static void to_integer(mpz_t out, const ebpo_sum *sum)
     }
 }
 
-double ebpo_volume_sum_value(const ebpo_volume_sum *s)
+double ebpo_volume_sum_value(const ebpo_volume_sum *s, double *scaled, int64_t *exponent)
 {
     mpz_t all, six;
     mpz_init(all);
@@ -103,6 +103,9 @@ double ebpo_volume_sum_value(const ebpo_volume_sum *s)
     mpz_mul_2exp(all, all, -1074 - EBPO_VOLUME_UNIT);
     mpz_add(all, all, s->other);
     double value = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
+    int bits = mpz_sgn(all) ? (int)mpz_sizeinbase(all, 2) : -EBPO_VOLUME_UNIT;
+    *scaled = ebpo_round_quotient(all, six, -bits);
+    *exponent = EBPO_VOLUME_UNIT + bits;
     mpz_clears(all, six, NULL);
     return value;
 }

@@ -23,7 +23,8 @@ void ebpo_volume_sum_end(ebpo_volume_sum *sum);
 void ebpo_volume_sum_add(ebpo_volume_sum *sum, const double t[3][3], int times);
 void ebpo_volume_sum_merge(ebpo_volume_sum *sum, const ebpo_volume_sum *more);
 
-/* The double nearest to the volume, ties to even; infinite beyond doubles. */
-double ebpo_volume_sum_value(const ebpo_volume_sum *sum);
+/* Returns the double nearest to the volume, ties to even; infinite beyond doubles. In *scaled and
+ * *exponent the volume in units of 2^exponent, in which it is about 1, rounded likewise. */
+double ebpo_volume_sum_value(const ebpo_volume_sum *sum, double *scaled, int64_t *exponent);
 
 #endif

@@ -20,6 +20,14 @@ static ebpo_status fail_place(const double box[6], int level, ebpo_error *error)
                      fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2])), level);
 }
 
+static ebpo_status fail_range(double most, ebpo_error *error)
+{
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the result is up to %g long, and volumes of cells are doubles from 2^-%d to "
+                     "2^%d only; scale the models by their poses",
+                     most, MOST_POWER, MOST_POWER);
+}
+
 ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, ebpo_error *error)
 {
     double boxes[EBPO_BOOLEAN_OPERANDS_MAX][6], box[6];
@@ -33,7 +41,7 @@ ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, e
     double most = fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
     frexp(1.07 * most, &power); /* 16 / 15 and its rounding: the origin is on a grid of 1 / 16 */
     if (most == 0 || power < -MOST_POWER || power > MOST_POWER)
-        return fail_place(box, level, error);
+        return fail_range(most, error);
     out->edge = ldexp(1, power);
     double grid = out->edge / 16, finest = ldexp(out->edge, -(level > 4 ? level : 4) - 1);
     for (int k = 0; k < 3; k++) {

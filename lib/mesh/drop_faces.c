@@ -1,4 +1,4 @@
-/* Faces that repeat another one are removed. */
+/* Faces that repeat another one are removed, or counted by position. */
 #include "geom/strict_fp.h"
 
 #include <stdlib.h>
@@ -9,6 +9,9 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "mesh/component_parts.h"
+#include "mesh/mesh_check_parts.h"
+#include "mesh/positions.h"
 #include "mesh/same_faces.h"
 
 enum { GRAIN = 1 << 13, WORD = 64 };
@@ -107,9 +110,9 @@ static void close_ranks(const dropping *d)
     mesh->face_count = to;
 }
 
-static ebpo_status run(dropping *d, ebpo_error *error)
+static ebpo_status find_all(dropping *d, ebpo_error *error)
 {
-    ebpo_mesh *mesh = d->mesh;
+    const ebpo_mesh *mesh = d->mesh;
     uint64_t words = mesh->face_count / WORD + 1;
     d->scratch = ebpo_alloc_zero(d->threads, sizeof *d->scratch);
     if (!d->scratch)
@@ -120,8 +123,14 @@ static ebpo_status run(dropping *d, ebpo_error *error)
     d->gone = ebpo_array_zero(mesh->workspace, words, sizeof *d->gone);
     if (!d->gone)
         return ebpo_workspace_fail(mesh->workspace, words * sizeof *d->gone, error);
-    status = ebpo_parallel_for(d->threads, mesh->workspace, mesh->vertex_count, GRAIN,
-                               find_repeated, d, NULL, "", error);
+    return ebpo_parallel_for(d->threads, mesh->workspace, mesh->vertex_count, GRAIN, find_repeated,
+                             d, NULL, "", error);
+}
+
+static ebpo_status drop(dropping *d, ebpo_error *error)
+{
+    ebpo_mesh *mesh = d->mesh;
+    ebpo_status status = find_all(d, error);
     if (status != EBPO_OK || d->count == 0)
         return status;
     status = ebpo_mesh_check_whole(mesh, error);
@@ -132,6 +141,15 @@ static ebpo_status run(dropping *d, ebpo_error *error)
     return status;
 }
 
+static void free_dropping(dropping *d)
+{
+    ebpo_stars_free(&d->stars);
+    ebpo_array_free(d->mesh->workspace, d->gone);
+    for (unsigned t = 0; d->scratch && t < d->threads; t++)
+        ebpo_same_faces_free(&d->scratch[t]);
+    free(d->scratch);
+}
+
 ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
@@ -139,16 +157,52 @@ ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh, ebpo_mend_record *record,
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)
         return status;
-    status = run(&d, error);
+    status = drop(&d, error);
     if (status == EBPO_OK && record) {
         record->drop_duplicates = true;
         record->dropped_faces += d.count;
         record->dropped_opposite += d.opposite;
     }
-    ebpo_stars_free(&d.stars);
-    ebpo_array_free(mesh->workspace, d.gone);
-    for (unsigned t = 0; d.scratch && t < d.threads; t++)
-        ebpo_same_faces_free(&d.scratch[t]);
-    free(d.scratch);
+    free_dropping(&d);
+    return status;
+}
+
+/* ---- by position ---- */
+
+/* Sets corners to the first vertex at their position. */
+static ebpo_status name_positions(const ebpo_mesh *mesh, unsigned threads, uint32_t *corner,
+                                  ebpo_error *error)
+{
+    ebpo_positions positions = { .mesh = NULL };
+    ebpo_status status = ebpo_positions_build(&positions, mesh, threads, NULL, error);
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, status == EBPO_OK ? 3 * mesh->face_count : 0)
+        corner[i] = ebpo_positions_first(&positions, mesh->faces[i]);
+    ebpo_positions_free(&positions);
+    return status;
+}
+
+ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mesh, unsigned threads, ebpo_finding *out,
+                                     uint64_t *opposite, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_mesh welded = *mesh;
+    dropping d = { .mesh = &welded, .threads = ebpo_thread_count(threads) };
+    *out = (ebpo_finding){ 0 };
+    *opposite = 0;
+    ebpo_status status = ebpo_components_check(mesh, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t bytes = 3 * mesh->face_count * sizeof *welded.faces;
+    welded.faces = ebpo_array_alloc(mesh->workspace, 3 * mesh->face_count, sizeof *welded.faces);
+    status = welded.faces ? name_positions(mesh, threads, welded.faces, error)
+                          : ebpo_workspace_fail(mesh->workspace, bytes, error);
+    if (status == EBPO_OK)
+        status = find_all(&d, error);
+    EBPO_FOR_ITEMS(mesh->workspace, f, 0, status == EBPO_OK ? mesh->face_count : 0)
+        if (goes(&d, f))
+            ebpo_finding_add(out, ebpo_mesh_source_face(mesh, f));
+    *opposite = d.opposite;
+    free_dropping(&d);
+    ebpo_array_free(mesh->workspace, welded.faces);
     return status;
 }

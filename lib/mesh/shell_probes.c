@@ -121,8 +121,7 @@ static void cross_host(seeker *w)
     EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[w->host->component],
                              c->faces.begin[w->host->component + (uint64_t)1]) {
         double t[3][3];
-        for (uint64_t k = 0; k < 3; k++)
-            ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)c->faces.of[i] + k], t[k]);
+        ebpo_face_corners(c->mesh, c->faces.of[i], t);
         w->face = (const double(*)[3])t;
         (void)ebpo_point_tree_walk(&w->probes, near_face, cross_face, w);
     }
@@ -142,8 +141,11 @@ static void count_inner(const seeker *w)
         bool within = true;
         for (uint64_t d = 0; d < SHELL_SAMPLES; d++)
             within &= p[i + d].value != 0;
-        if (within)
-            __atomic_fetch_add(&w->all->n->shells[p[i].number].depth, 1, __ATOMIC_RELAXED);
+        if (!within)
+            continue;
+        shell *inner = &w->all->n->shells[p[i].number];
+        __atomic_fetch_add(&inner->depth, 1, __ATOMIC_RELAXED);
+        __atomic_fetch_sub(&inner->around, p[i].value, __ATOMIC_RELAXED); /* it ends outside */
     }
 }
 

@@ -41,12 +41,6 @@ typedef struct caster {
     point_box at; /* that sample: a box without extent */
 } caster;
 
-static void corners(const ebpo_mesh *mesh, uint64_t face, double t[3][3])
-{
-    for (uint64_t k = 0; k < 3; k++)
-        ebpo_mesh_position(mesh, mesh->faces[3 * face + k], t[k]);
-}
-
 static bool on_ray(void *user, const box_node *node)
 {
     const caster *w = user;
@@ -74,7 +68,7 @@ static bool cross_faces(void *user, mesh_point *points, uint64_t count)
         double t[3][3];
         if (w->all->host[points[i].value] == w->shell)
             continue;
-        corners(n->components->mesh, points[i].number, t);
+        ebpo_face_corners(n->components->mesh, points[i].number, t);
         if (!ebpo_face_may_meet_lines((const double(*)[3])t, &w->at))
             continue;
         int crossing = ebpo_axis_crossing(w->at.min, INFINITY, 0, t[0], t[1], t[2]);
@@ -84,15 +78,17 @@ static bool cross_faces(void *user, mesh_point *points, uint64_t count)
     return true;
 }
 
-/* Hosts that all samples up to now are within. */
-static uint32_t count_hosts(const caster *w)
+/* Counts the hosts that all samples up to now are within, and adds up their winding numbers. */
+static uint32_t count_hosts(const caster *w, int32_t *around)
 {
     uint32_t count = 0;
+    *around = 0;
     for (uint64_t i = 0; i < w->seen_count; i++) {
         bool within = true;
         for (int d = 0; d <= w->sample; d++)
             within &= w->of[w->seen[i]].winding[d] != 0;
         count += within;
+        *around += within ? w->of[w->seen[i]].winding[0] : 0;
     }
     return count;
 }
@@ -107,6 +103,7 @@ static ebpo_status cast_rays(void *context, uint64_t begin, uint64_t end, unsign
     (void)error;
     for (uint64_t i = begin; i < end; i++) {
         uint32_t hosts = 1;
+        int32_t around = 0;
         w->shell = (uint32_t)i;
         w->seen_count = 0;
         for (w->sample = 0; hosts && w->sample < SHELL_SAMPLES; w->sample++) {
@@ -114,21 +111,12 @@ static ebpo_status cast_rays(void *context, uint64_t begin, uint64_t end, unsign
             memcpy(w->at.min, at, sizeof w->at.min);
             memcpy(w->at.max, at, sizeof w->at.max);
             (void)ebpo_box_tree_walk(&all->faces, on_ray, cross_faces, w);
-            hosts = count_hosts(w);
+            hosts = count_hosts(w, &around);
         }
         all->n->shells[i].depth += hosts;
+        all->n->shells[i].around -= around; /* rays end outside */
     }
     return EBPO_OK;
-}
-
-static void box_of_face(const void *user, const mesh_point *p, point_box *out)
-{
-    double t[3][3];
-    corners(user, p->number, t);
-    for (int k = 0; k < 3; k++) {
-        out->min[k] = fmin(fmin(t[0][k], t[1][k]), t[2][k]);
-        out->max[k] = fmax(fmax(t[0][k], t[1][k]), t[2][k]);
-    }
 }
 
 static ebpo_status add_faces(casting *all, uint64_t host, ebpo_error *error)
@@ -137,15 +125,9 @@ static ebpo_status add_faces(casting *all, uint64_t host, ebpo_error *error)
     uint64_t component = all->n->shells[all->host[host]].component;
     EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[component],
                              c->faces.begin[component + 1]) {
-        point_box box;
-        mesh_point *p = ebpo_point_tree_add(&all->faces.points);
-        if (!p)
+        if (!ebpo_face_add(&all->faces, c->mesh, c->faces.of[i], (int32_t)host))
             return ebpo_workspace_fail(c->mesh->workspace,
-                                       (all->faces.points.count + 1) * sizeof *p, error);
-        *p = (mesh_point){ .number = c->faces.of[i], .value = (int32_t)host };
-        box_of_face(c->mesh, p, &box);
-        for (int k = 0; k < 3; k++)
-            p->at[k] = box.min[k] / 2 + box.max[k] / 2;
+                                       (all->faces.points.count + 1) * sizeof(mesh_point), error);
     }
     return EBPO_OK;
 }
@@ -156,7 +138,7 @@ static ebpo_status plant(casting *all, ebpo_error *error)
     ebpo_status status = EBPO_OK;
     for (uint64_t h = 0; h < all->host_count && status == EBPO_OK; h++)
         status = add_faces(all, h, error);
-    if (status != EBPO_OK || ebpo_box_tree_build(&all->faces, box_of_face, mesh))
+    if (status != EBPO_OK || ebpo_box_tree_build(&all->faces, ebpo_face_box, mesh))
         return status;
     return ebpo_workspace_fail(mesh->workspace, 2 * all->faces.points.count * sizeof(point_box),
                                error);

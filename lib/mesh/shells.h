@@ -2,6 +2,8 @@
 #ifndef EBPO_MESH_SHELLS_H
 #define EBPO_MESH_SHELLS_H
 
+#include <math.h>
+
 #include "mesh/box_tree.h"
 #include "mesh/component_parts.h"
 
@@ -14,6 +16,7 @@ typedef struct shell {
     double min[3], max[3];
     uint32_t component;
     uint32_t depth; /* closed components that it is within */
+    int32_t around; /* the sum of their winding numbers there */
     bool crowded;   /* a host to many for the faces that it has: rays lead to it */
 } shell;
 
@@ -24,6 +27,45 @@ typedef struct nesting {
     box_tree tree; /* of shells' boxes; the points are sample[0] */
     unsigned threads;
 } nesting;
+
+static inline bool ebpo_shell_looks_inwards(const nesting *n, const shell *one)
+{
+    return n->components->list[one->component].volume < 0;
+}
+
+static inline bool ebpo_shell_is_cavity(const shell *one) { return one->depth % 2 != 0; }
+
+static inline void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, double t[3][3])
+{
+    for (uint64_t k = 0; k < 3; k++)
+        ebpo_mesh_position(mesh, mesh->faces[3 * face + k], t[k]);
+}
+
+/* Gives the box of a face to a box tree over faces of the mesh `user`. */
+static inline void ebpo_face_box(const void *user, const mesh_point *p, point_box *out)
+{
+    double t[3][3];
+    ebpo_face_corners(user, p->number, t);
+    for (int k = 0; k < 3; k++) {
+        out->min[k] = fmin(fmin(t[0][k], t[1][k]), t[2][k]);
+        out->max[k] = fmax(fmax(t[0][k], t[1][k]), t[2][k]);
+    }
+}
+
+/* Adds a face to such a tree. False when memory is short. */
+static inline bool ebpo_face_add(box_tree *tree, const ebpo_mesh *mesh, uint32_t face,
+                                 int32_t value)
+{
+    point_box box;
+    mesh_point *p = ebpo_point_tree_add(&tree->points);
+    if (!p)
+        return false;
+    *p = (mesh_point){ .number = face, .value = value };
+    ebpo_face_box(mesh, p, &box);
+    for (int k = 0; k < 3; k++)
+        p->at[k] = box.min[k] / 2 + box.max[k] / 2;
+    return true;
+}
 
 static inline bool ebpo_shell_box_within(const shell *inner, const shell *outer)
 {

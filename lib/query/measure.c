@@ -3,7 +3,8 @@
  * With det = a . (b x c), s = a + b + c for corners a, b, c relative to the middle: volume det / 6,
  * first moments det s / 24,   second moments det (s s' + a a' + b b' + c c') / 120. All of it in
  * double-double arithmetic, on coordinates scaled by a power of two to about 1, in blocks of faces
- * that do not depend on threads. Source of the moments: Tonon 2004, "Explicit exact formulas for
+ * that do not depend on threads. A face counts as often as its component bounds the solid, where that
+ * is known (arrange/solid_shells.h), else once. Source of the moments: Tonon 2004, "Explicit exact formulas for
  * the 3-D tetrahedron inertia tensor in terms of its vertex coordinates". */
 #include "geom/strict_fp.h"
 
@@ -12,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "arrange/solid_shells.h"
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
@@ -20,6 +22,7 @@
 #include "container/reader.h"
 #include "geom/double_double.h"
 #include "mesh/mesh_parts.h"
+#include "octree/rule.h"
 
 enum { BLOCK_FACES = 16384 };
 
@@ -35,12 +38,15 @@ typedef struct frame {
 
 typedef struct moments {
     ebpo_pair area2, volume6, first24[3], second120[6]; /* second: xx, yy, zz, yz, zx, xy */
+    ebpo_pair integral6; /* with each face counted once */
     /* the sum of absolute values behind volume6 */
     double absolute6;
 } moments;
 
 typedef struct pass {
     const ebpo_mesh *mesh;
+    const uint32_t *component; /* [vertices]; NULL: all faces count once */
+    int8_t *times;             /* [components] how often its faces count */
     frame frame;
     moments *blocks;
 } pass;
@@ -91,6 +97,7 @@ static void merge(moments *sum, const moments *m)
 {
     accumulate(&sum->area2, m->area2);
     accumulate(&sum->volume6, m->volume6);
+    accumulate(&sum->integral6, m->integral6);
     for (int k = 0; k < 3; k++)
         accumulate(&sum->first24[k], m->first24[k]);
     for (int k = 0; k < 6; k++)
@@ -130,7 +137,7 @@ static ebpo_pair mixed_product(ebpo_pair r[3][3], const ebpo_pair s[3], int u, i
     return sum;
 }
 
-static void add_face(moments *m, const double corner[3][3], const double middle[3])
+static void add_face(moments *m, const double corner[3][3], const double middle[3], int times)
 {
     ebpo_pair n[3], r[3][3], s[3], det = { 0, 0 };
     normal_of(corner, n);
@@ -143,6 +150,8 @@ static void add_face(moments *m, const double corner[3][3], const double middle[
         accumulate(&det, product);
         m->absolute6 += fabs(product.head);
     }
+    accumulate(&m->integral6, det);
+    det = (ebpo_pair){ times * det.head, times * det.tail };
     accumulate(&m->volume6, det);
     for (int k = 0; k < 3; k++) {
         accumulate(&m->first24[k], ebpo_pair_multiply(det, s[k]));
@@ -150,6 +159,11 @@ static void add_face(moments *m, const double corner[3][3], const double middle[
         accumulate(&m->second120[3 + k],
                    ebpo_pair_multiply(det, mixed_product(r, s, (k + 1) % 3, (k + 2) % 3)));
     }
+}
+
+static int times_of(const pass *p, uint64_t face)
+{
+    return p->component ? p->times[p->component[p->mesh->faces[3 * face]]] : 1;
 }
 
 static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -165,7 +179,7 @@ static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, u
         for (uint64_t f = b * BLOCK_FACES; f < last; f++) {
             double corner[3][3];
             scaled_corners(p, f, corner);
-            add_face(&m, (const double(*)[3])corner, p->frame.middle);
+            add_face(&m, (const double(*)[3])corner, p->frame.middle, times_of(p, f));
         }
         p->blocks[b] = m;
     }
@@ -193,11 +207,13 @@ static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid
     out->exponent = f->exponent;
     out->scaled_area = .5 * m->area2.head;
     out->area = ldexp(out->scaled_area, 2 * f->exponent);
+    if (solid && fabs(m->integral6.head) > nothing * m->absolute6)
+        out->scaled_integral = ebpo_pair_divide(m->integral6, ebpo_pair_of(6)).head;
+    out->integral = ldexp(out->scaled_integral, 3 * f->exponent);
     if (!solid || fabs(m->volume6.head) <= nothing * m->absolute6)
         return;
     ebpo_pair volume = ebpo_pair_divide(m->volume6, ebpo_pair_of(6)), centre[3], central[6];
     out->scaled_volume = volume.head;
-    out->volume = ldexp(volume.head, 3 * f->exponent);
     for (int k = 0; k < 3; k++) {
         centre[k] =
             ebpo_pair_divide(m->first24[k], ebpo_pair_multiply(m->volume6, ebpo_pair_of(4)));
@@ -213,6 +229,62 @@ static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid
     inertia_of(out, central, f->exponent);
 }
 
+/* --- which faces count --- */
+
+static ebpo_status count_components(pass *p, const ebpo_solid_shells *s, ebpo_rule rule,
+                                    ebpo_error *error)
+{
+    const ebpo_components *c = s->nesting.components;
+    p->times = ebpo_alloc(c->count, sizeof *p->times);
+    if (!p->times)
+        return ebpo_fail_memory(error, c->count * sizeof *p->times);
+    for (uint64_t i = 0; i < c->count; i++)
+        p->times[i] = (int8_t)ebpo_component_times(s, (uint32_t)i, rule);
+    p->component = c->number;
+    return EBPO_OK;
+}
+
+/* Finds out whether the volume is known; then sets how often faces count. */
+static ebpo_status decide(pass *p, const ebpo_info *info, unsigned threads, ebpo_solid_shells *s,
+                          ebpo_solid_volume *volume, ebpo_error *error)
+{
+    ebpo_shells shells;
+    bool several = info->solid && info->report.manifold && info->report.components > 1;
+    ebpo_status status =
+        several ? ebpo_solid_shells_find(s, p->mesh, threads, NULL, error) : EBPO_OK;
+    if (status == EBPO_OK && several)
+        ebpo_solid_shells_count(s, &shells);
+    if (status == EBPO_OK)
+        status = ebpo_solid_volume_of(&info->report, info->rule, several ? &shells : NULL, info,
+                                      volume, error);
+    if (status == EBPO_OK && several && volume->lo == volume->hi)
+        status = count_components(p, s, info->rule, error);
+    return status;
+}
+
+/* Faces of a single component that look inwards count -1 times, or do not count. */
+static void count_inwards(moments *m, ebpo_rule rule)
+{
+    int times = ebpo_rule_inside(rule, -1) ? -1 : 0;
+    ebpo_pair *sum[] = { &m->volume6, m->first24, m->first24 + 1, m->first24 + 2,
+                         m->second120, m->second120 + 1, m->second120 + 2, m->second120 + 3,
+                         m->second120 + 4, m->second120 + 5 };
+    for (size_t i = 0; i < sizeof sum / sizeof *sum; i++)
+        *sum[i] = (ebpo_pair){ times * sum[i]->head, times * sum[i]->tail };
+}
+
+static void set_volume(ebpo_mass *mass, const ebpo_solid_volume *known)
+{
+    if (known->lo != known->hi) {
+        mass->scaled_volume = mass->volume = NAN;
+        mass->volume_lo = known->lo;
+        mass->volume_hi = known->hi;
+        return;
+    }
+    mass->volume = ldexp(mass->scaled_volume, 3 * (int)mass->exponent);
+    mass->volume_lo = mass->volume_hi = mass->volume;
+}
+
 ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
@@ -221,16 +293,21 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
     moments sum = { .absolute6 = 0 };
     uint64_t block_count = 0;
     ebpo_mass mass = EBPO_MASS_INIT;
+    ebpo_solid_shells shells = { .mesh = &mesh };
+    ebpo_solid_volume volume = EBPO_SOLID_VOLUME_INIT;
+    const ebpo_info *info = ebpo_file_info(file);
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_mass, out, error);
     if (status != EBPO_OK)
         return status;
-    if (ebpo_file_info(file)->pruned)
+    if (info->pruned)
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
                               "the file is a subset, of whose mesh a part was left out: it cannot "
                               "be measured; measure the original");
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     read.threads = threads;
     status = ebpo_file_read_mesh(file, &read, &mesh, error);
+    if (status == EBPO_OK)
+        status = decide(&p, info, threads, &shells, &volume, error);
     if (status != EBPO_OK)
         goto done;
     block_count = mesh.face_count / BLOCK_FACES + (mesh.face_count % BLOCK_FACES != 0);
@@ -246,10 +323,15 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
         goto done;
     for (uint64_t b = 0; b < block_count; b++)
         merge(&sum, &p.blocks[b]);
-    mass_of(&mass, &sum, &p.frame, ebpo_file_info(file)->solid);
+    if (!p.component && volume.lo == volume.hi && sum.volume6.head < 0)
+        count_inwards(&sum, info->rule);
+    mass_of(&mass, &sum, &p.frame, info->solid);
+    set_volume(&mass, &volume);
     EBPO_GIVE(ebpo_mass, out, &mass);
 done:
     free(p.blocks);
+    free(p.times);
+    ebpo_solid_shells_free(&shells);
     ebpo_mesh_free(&mesh);
     return status;
 }

@@ -423,19 +423,33 @@ static void distance_to(mpq_t out, const mpq_t truth, double x)
     mpq_abs(out, out);
 }
 
-/* No other double is nearer. */
+/* No other double is nearer to the truth, in units of 2^exponent. */
+static void check_nearest_double(double x, const mpq_t truth, int64_t exponent)
+{
+    mpq_t units, here, other;
+    mpq_inits(units, here, other, NULL);
+    if (exponent >= 0)
+        mpq_div_2exp(units, truth, (mp_bitcnt_t)exponent);
+    else
+        mpq_mul_2exp(units, truth, (mp_bitcnt_t)-exponent);
+    distance_to(here, units, x);
+    distance_to(other, units, nextafter(x, INFINITY));
+    ck_assert_msg(mpq_cmp(here, other) <= 0, "%.17g is too little", x);
+    distance_to(other, units, nextafter(x, -INFINITY));
+    ck_assert_msg(mpq_cmp(here, other) <= 0, "%.17g is too much", x);
+    mpq_clears(units, here, other, NULL);
+}
+
 static void check_nearest(const ebpo_exact_volume *v, const mpq_t truth)
 {
-    mpq_t here, other;
-    mpq_inits(here, other, NULL);
     ck_assert_int_eq(v->doubt, EBPO_VOLUME_CERTAIN);
     ck_assert(v->volume.figure == EBPO_FIGURE_EXACT && v->volume.lo == v->volume.hi);
-    distance_to(here, truth, v->volume.lo);
-    distance_to(other, truth, nextafter(v->volume.lo, INFINITY));
-    ck_assert_msg(mpq_cmp(here, other) <= 0, "%.17g is too little", v->volume.lo);
-    distance_to(other, truth, nextafter(v->volume.lo, -INFINITY));
-    ck_assert_msg(mpq_cmp(here, other) <= 0, "%.17g is too much", v->volume.lo);
-    mpq_clears(here, other, NULL);
+    ck_assert(v->scaled == 0 || (fabs(v->scaled) > 0x1p-5 && fabs(v->scaled) < 0x1p5));
+    check_nearest_double(v->scaled, truth, v->exponent);
+    if (isfinite(v->volume.lo))
+        check_nearest_double(v->volume.lo, truth, 0);
+    else
+        ck_assert(v->exponent > 1000);
 }
 
 /* Of a ball and a smaller one in it. */
@@ -491,6 +505,19 @@ START_TEST(very_large_and_very_small)
                      pose_of(1.5, scales[i], 0, 0.1 * scales[i], 0));
     query_model_free(&small);
     query_model_free(&ball);
+}
+END_TEST
+
+/* Volumes that doubles do not hold. */
+START_TEST(volumes_beyond_the_range_of_doubles)
+{
+    const double sizes[] = { 1e-150, 1e-110, 1e110, 1e150, 1e290 };
+    for (int i = 0; i < 5; i++) {
+        query_model ball = make_ball(sizes[i]), small = make_ball(0.3 * sizes[i]);
+        check_nested(&ball, pose_of(0, 1, 0, 0, 0), &small, pose_of(0, 1, 0, 0.1 * sizes[i], 0));
+        query_model_free(&small);
+        query_model_free(&ball);
+    }
 }
 END_TEST
 
@@ -729,6 +756,7 @@ Suite *test_suite(void)
     tcase_add_test(c, faces_that_cross_end_exactness);
     tcase_add_test(c, models_in_parts_are_not_measured);
     tcase_add_test(c, it_can_be_cancelled);
+    tcase_add_test(c, volumes_beyond_the_range_of_doubles);
     suite_add_tcase(s, c);
     return s;
 }

@@ -166,15 +166,15 @@ static void run_volumes(const stiff_case *c, query_model *m, stiff_result *r)
         fault(r, "the mesh's volume is %.17g, by the formula %.17g", r->volume, c->volume);
     if (!isnormal(r->volume)) {
         if (r->volume == 0 || isinf(r->volume)
-                ? mass.volume != r->volume
-                : !(fabs(mass.volume - r->volume) <= DBL_MIN * DBL_EPSILON))
-            fault(r, "the measured volume is %.17g, exactly %.17g", mass.volume, r->volume);
+                ? mass.integral != r->volume
+                : !(fabs(mass.integral - r->volume) <= DBL_MIN * DBL_EPSILON))
+            fault(r, "the measured volume is %.17g, exactly %.17g", mass.integral, r->volume);
         return;
     }
     r->has_volume = true;
-    r->volume_error = relative(mass.volume, r->volume);
+    r->volume_error = relative(mass.integral, r->volume);
     if (!(r->volume_error <= (c->measure > 0 ? c->measure : STIFF_MEASURE)))
-        fault(r, "the measured volume is %.17g, exactly %.17g", mass.volume, r->volume);
+        fault(r, "the measured volume is %.17g, exactly %.17g", mass.integral, r->volume);
     if (r->volume > 0)
         run_levels(c, m, r);
 }

@@ -583,7 +583,12 @@ static ebpo_status call_touch(every_call_env *e)
 static ebpo_status call_measure(every_call_env *e)
 {
     ebpo_mass mass = EBPO_MASS_INIT;
-    return ebpo_measure(e->file, 1, &mass, e->error);
+    const ebpo_info *info = ebpo_file_info(e->file);
+    ebpo_solid_volume volume = EBPO_SOLID_VOLUME_INIT;
+    ebpo_status status = ebpo_measure(e->file, 1, &mass, e->error);
+    return status == EBPO_OK ? ebpo_solid_volume_of(&info->report, info->rule, NULL, info, &volume,
+                                                    e->error)
+                             : status;
 }
 
 static ebpo_status call_deviation(every_call_env *e)

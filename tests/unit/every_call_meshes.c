@@ -186,6 +186,18 @@ static ebpo_status call_shells(every_call_env *e)
     return status;
 }
 
+static ebpo_status call_repeated(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_finding repeated;
+    uint64_t opposite;
+    ebpo_status status = read_mesh(e, EVERY_CALL_CROSSING, &mesh);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_count_repeated(&mesh, 1, &repeated, &opposite, e->error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
 /* Of a file that has no names. */
 static ebpo_status call_groups(every_call_env *e)
 {
@@ -353,6 +365,7 @@ const every_call every_call_meshes[] = {
     { "flip", call_flip },
     { "fill_holes", call_fill_holes },
     { "shells", call_shells },
+    { "repeated", call_repeated },
     { "components", call_components },
     { "groups", call_groups },
     { "prepare", call_prepare },

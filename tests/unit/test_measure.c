@@ -37,6 +37,8 @@ static ebpo_mesh copy_of(const ebpo_mesh *mesh)
 }
 
 /* A file made of the mesh, which stays the caller's. */
+static ebpo_rule file_rule;
+
 static ebpo_file *file_of(const ebpo_mesh *mesh, uint32_t parts)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -48,6 +50,7 @@ static ebpo_file *file_of(const ebpo_mesh *mesh, uint32_t parts)
     ebpo_file *file = NULL;
     ebpo_mesh copy = copy_of(mesh);
     options.parts = parts;
+    options.rule = file_rule;
     ck_assert_msg(ebpo_mesh_check(mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
                   error.message);
     ck_assert_msg(ebpo_build(&copy, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
@@ -68,6 +71,10 @@ static ebpo_mass mass_on(const ebpo_mesh *mesh, unsigned threads)
     ck_assert_msg(ebpo_measure(file, threads, &mass, &error) == EBPO_OK, "%s", error.message);
     ck_assert(same(mass.area, ldexp(mass.scaled_area, 2 * (int)mass.exponent)));
     ck_assert(same(mass.volume, ldexp(mass.scaled_volume, 3 * (int)mass.exponent)));
+    ck_assert(same(mass.integral, ldexp(mass.scaled_integral, 3 * (int)mass.exponent)));
+    ck_assert(isnan(mass.volume)
+                  ? mass.volume_lo < mass.volume_hi
+                  : same(mass.volume_lo, mass.volume) && same(mass.volume_hi, mass.volume));
     for (int k = 0; k < 9; k++)
         ck_assert(same(mass.inertia[k / 3][k % 3],
                        ldexp(mass.scaled_inertia[k / 3][k % 3], 5 * (int)mass.exponent)));
@@ -342,9 +349,12 @@ START_TEST(masses_are_the_exact_integrals_of_the_mesh)
         ebpo_mesh mesh = ebpo_test_solids[i].make();
         if (mesh.face_count && mesh.face_count <= 6000) {
             ebpo_mass m = mass_of(&mesh), expected = twin_of(&mesh);
-            if (m.volume != 0)
+            assert_near(m.integral, expected.volume, fabs(expected.volume), "integral");
+            if (isnan(m.volume)) /* the rest is of the winding number as a density */
+                m.volume = m.integral;
+            if (same(m.volume, m.integral) && m.volume != 0)
                 assert_masses_near(&m, &expected, 1);
-            else
+            else if (m.volume == 0)
                 ck_assert_msg(expected.volume == 0 || isnan(expected.volume), "%s",
                               ebpo_test_solids[i].name);
         }
@@ -449,11 +459,56 @@ START_TEST(shells_within_shells_add_up)
 }
 END_TEST
 
-START_TEST(solids_inside_out_have_negative_volume)
+/* Returns the mass of the cube from 0 to 4 in which there is one from 1 to 2, each turned or not. */
+static ebpo_mass mass_of_two(bool turn_outer, bool turn_inner, ebpo_rule rule)
+{
+    static const double low[3] = { 0, 0, 0 }, high[3] = { 4, 4, 4 }, low_in[3] = { 1, 1, 1 },
+                        high_in[3] = { 2, 2, 2 };
+    ebpo_mesh mesh = ebpo_test_box(low, high, 2), inner = ebpo_test_box(low_in, high_in, 1);
+    if (turn_outer)
+        ebpo_test_reverse(&mesh);
+    if (turn_inner)
+        ebpo_test_reverse(&inner);
+    ebpo_test_append(&mesh, &inner);
+    file_rule = rule;
+    ebpo_mass m = mass_of(&mesh);
+    file_rule = EBPO_RULE_NONZERO;
+    ebpo_mesh_free(&inner);
+    ebpo_mesh_free(&mesh);
+    return m;
+}
+
+/* By outer and inner as they are or turned, and by rule: winding numbers are 1, 2; 1, 0; -1, 0;
+ * -1, -2. */
+START_TEST(masses_are_those_of_the_points_that_the_rule_puts_inside)
+{
+    static const double volumes[4][3] = {
+        { 64, 63, 64 }, { 63, 63, 63 }, { 63, 63, 0 }, { 64, 63, 0 }
+    };
+    static const double integrals[4] = { 65, 63, -63, -65 };
+    for (int i = 0; i < 4; i++)
+        for (int rule = 0; rule < 3; rule++) {
+            double volume = volumes[i][rule];
+            ebpo_mass m = mass_of_two(i >= 2, i == 1 || i == 3, (ebpo_rule)rule);
+            assert_near(m.volume, volume, 64, "volume");
+            assert_near(m.integral, integrals[i], 64, "integral");
+            for (int k = 0; k < 3; k++) /* the inner cube's middle is at 1.5 */
+                assert_near(m.centroid[k],
+                            volume == 0    ? 0
+                            : volume == 63 ? (64 * 2 - 1.5) / 63
+                                           : 2,
+                            4, "centroid");
+            ck_assert(volume == 0 ? m.inertia[0][0] == 0 : m.inertia[0][0] > 0);
+        }
+}
+END_TEST
+
+START_TEST(solids_inside_out_have_the_volume_of_what_is_inside)
 {
     ebpo_mesh mesh = ebpo_test_make("inside_out_cube");
     ebpo_mass m = mass_of(&mesh);
-    ck_assert(m.area > 0 && m.volume < 0 && m.inertia[0][0] < 0);
+    ck_assert(m.area > 0 && m.integral < 0 && m.inertia[0][0] > 0);
+    assert_near(m.volume, -m.integral, 1, "volume");
     ebpo_mesh_free(&mesh);
 }
 END_TEST
@@ -523,7 +578,8 @@ Suite *test_suite(void)
     tcase_add_test(tests, powers_of_two_scale_masses_exactly);
     tcase_add_test(tests, what_does_not_fit_becomes_infinite_or_zero);
     tcase_add_test(tests, shells_within_shells_add_up);
-    tcase_add_test(tests, solids_inside_out_have_negative_volume);
+    tcase_add_test(tests, solids_inside_out_have_the_volume_of_what_is_inside);
+    tcase_add_test(tests, masses_are_those_of_the_points_that_the_rule_puts_inside);
     tcase_add_test(tests, surfaces_have_an_area_only);
     tcase_add_test(tests, solids_without_volume_have_no_centroid);
     tcase_add_test(tests, masses_do_not_depend_on_threads);

@@ -39,29 +39,65 @@ ebpo_status facts_derived(ebpo_file *file, int level, unsigned threads, ebpo_pro
     return ebpo_lod_level(file, level, &options, NULL, volume, error);
 }
 
-double facts_share(const ebpo_info *info, double volume)
+ebpo_solid_volume facts_solid(const ebpo_info *info, const ebpo_shells *shells)
 {
-    double whole = info->solid ? fabs(info->report.volume) : cell_volume(info, 0);
+    return findings_solid(&info->report, info->rule, shells, info);
+}
+
+ebpo_solid_volume facts_measured(const ebpo_info *info, const ebpo_mass *mass)
+{
+    ebpo_solid_volume solid = facts_solid(info, NULL);
+    if (!findings_knows(&solid)) {
+        solid.lo = mass->volume_lo;
+        solid.hi = mass->volume_hi;
+    }
+    return solid;
+}
+
+const char *facts_whole(const ebpo_info *info, const ebpo_solid_volume *solid)
+{
+    return !info->solid ? "box" : findings_knows(solid) ? "solid" : "integral";
+}
+
+double facts_share(const ebpo_info *info, const ebpo_solid_volume *solid, double volume)
+{
+    double whole = !info->solid            ? cell_volume(info, 0)
+                   : findings_knows(solid) ? solid->lo
+                                           : fabs(solid->integral);
     double percent = 100 * volume / whole;
     return isfinite(percent) ? percent : NAN; /* without a sign that means nothing */
 }
 
-double facts_percent(const ebpo_info *info, int level)
+double facts_percent(const ebpo_info *info, const ebpo_solid_volume *solid, int level)
 {
-    return facts_share(info, facts_volume(info, level));
+    return facts_share(info, solid, facts_volume(info, level));
 }
 
-double facts_excess(const ebpo_info *info, double volume)
+double facts_excess(const ebpo_info *info, const ebpo_solid_volume *solid, double volume)
 {
-    double solid = fabs(info->report.volume); /* negative: turned inside out */
-    return info->solid && solid > 0 ? 100 * (volume - solid) / solid : NAN;
+    return info->solid && findings_knows(solid) && solid->lo > 0
+               ? 100 * (volume - solid->lo) / solid->lo
+               : NAN;
 }
 
-double facts_excess_ratio(const ebpo_info *info, double volume, double limit)
+double facts_excess_ratio(const ebpo_info *info, const ebpo_solid_volume *solid, double volume,
+                          double limit)
 {
-    double least = facts_excess(info, limit);
+    double least = facts_excess(info, solid, limit);
     /* 1e-9 of the volume: what rounding may do to it */
-    return least > 1e-7 ? facts_excess(info, volume) / least : NAN;
+    return least > 1e-7 ? facts_excess(info, solid, volume) / least : NAN;
+}
+
+void facts_print_whole(FILE *out, const ebpo_info *info, const ebpo_solid_volume *solid)
+{
+    if (info->solid && !findings_knows(solid))
+        fputs("% integral: of the integral of the winding number, as the solid's volume is not "
+              "known\n",
+              out);
+    else
+        fputs(info->solid ? "% solid: of the solid's volume\n"
+                          : "% box: of the volume of the root's box\n",
+              out);
 }
 
 /* A volume too small for a double keeps its sign. */
@@ -113,13 +149,15 @@ static void print_model(FILE *out, const ebpo_info *info)
             info->double_coordinates ? "double" : "float");
     if (!(info->parts & EBPO_PART_MESH))
         fputs(" (not in this file)", out);
-    char volume[40], unit[TABLE_CELL];
-    double v = info->report.volume;
-    if (info->solid)
-        fprintf(out, "\n  solid     volume %s%s%s, by winding number, rule %s",
-                findings_extent(volume, sizeof volume, v, 3, &info->report),
-                isnormal(v) || volume[0] == '0' ? "" : " (ebpo measure tells it)",
-                table_unit(unit, info->unit, 3), words_rule(info->rule));
+    if (info->solid) {
+        char text[FINDINGS_VOLUME], extent[40];
+        ebpo_solid_volume solid = facts_solid(info, NULL);
+        findings_extent(extent, sizeof extent, solid.integral, 3, &info->report);
+        bool printed = findings_knows(&solid) && (isnormal(solid.integral) || extent[0] == '0');
+        fprintf(out, "\n  solid     %s%s, by winding number, rule %s",
+                findings_volume(text, &solid, &info->report, info->unit),
+                printed ? "" : " (see ebpo measure)", words_rule(info->rule));
+    }
     if (facts_inside_out(info))
         fprintf(out, "\n  warning   %s", facts_inside_out(info));
     fprintf(out, "\n  box       %.6g %.6g %.6g, size %.6g %.6g %.6g%s%s\n", info->box_origin[0],
@@ -238,26 +276,27 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info,
 
 void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stored)
 {
-    fprintf(out, "%5s %9s %9s %9s %9s %9s %10s %12s %9s %10s %9s\n", "level", "gray", "leaf",
+    char whole[TABLE_CELL];
+    ebpo_solid_volume solid = facts_solid(info, NULL);
+    snprintf(whole, sizeof whole, "%% %s", facts_whole(info, &solid));
+    fprintf(out, "%5s %9s %9s %9s %9s %9s %10s %12s %9s %10s %10s\n", "level", "gray", "leaf",
             "white", "black", "planes", "faces new", "faces again", "stored", "cumulative",
-            info->solid ? "% solid" : "% box");
+            whole);
     for (int i = 0; i < info->level_count; i++) {
         const ebpo_level_summary *l = &info->level[i];
         char taken[32], sum[32], percent[TABLE_CELL];
-        fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %12llu %9s %10s %9s\n", i,
+        fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %12llu %9s %10s %10s\n", i,
                 (unsigned long long)l->gray_count, (unsigned long long)l->leaf_count,
                 (unsigned long long)facts_white(info, i), (unsigned long long)l->black_count,
                 (unsigned long long)(l->plane_count + l->leaf_plane_count),
                 (unsigned long long)l->new_count, (unsigned long long)l->ref_count,
                 words_bytes(taken, sizeof taken, stored->level_bytes[i]),
                 words_bytes(sum, sizeof sum, facts_cumulative(info, stored, i)),
-                table_cell(percent, "%.2f", facts_percent(info, i)));
+                table_cell(percent, "%.2f", facts_percent(info, &solid, i)));
     }
     table_legend(out);
-    fputs(info->solid ? "% solid: volume of the level's envelopes, of the solid's\n"
-                      : "% box: volume of the level's envelopes, of the root's box\n",
-          out);
-    if (!isfinite(facts_percent(info, 0)))
+    facts_print_whole(out, info, &solid);
+    if (!isfinite(facts_percent(info, &solid, 0)))
         table_beyond(out);
 }
 
@@ -334,8 +373,10 @@ void facts_arrays_json(json *j, const ebpo_file *file)
     json_end(j);
 }
 
-static void json_level(json *j, const ebpo_info *info, const ebpo_stored_sizes *stored, int number)
+static void json_level(json *j, const ebpo_info *info, const ebpo_stored_sizes *stored,
+                       const ebpo_solid_volume *solid, int number)
 {
+    char percent[32];
     const ebpo_level_summary *l = &info->level[number];
     json_object(j, NULL);
     json_int(j, "level", number);
@@ -354,7 +395,8 @@ static void json_level(json *j, const ebpo_info *info, const ebpo_stored_sizes *
     json_real(j, "gray_volume", l->gray_volume);
     json_real(j, "leaf_volume", l->leaf_volume);
     json_real(j, "envelope_volume", facts_volume(info, number));
-    json_real(j, info->solid ? "percent_of_solid" : "percent_of_box", facts_percent(info, number));
+    snprintf(percent, sizeof percent, "percent_of_%s", facts_whole(info, solid));
+    json_real(j, percent, facts_percent(info, solid, number));
     json_end(j);
 }
 
@@ -452,8 +494,10 @@ static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes
     json_end(j);
 }
 
-void facts_json(json *j, const char *path, const ebpo_info *info, const ebpo_stored_sizes *stored)
+void facts_json(json *j, const char *path, const ebpo_info *info, const ebpo_stored_sizes *stored,
+                const ebpo_shells *shells)
 {
+    ebpo_solid_volume solid = facts_solid(info, shells);
     char version[32];
     json_text(j, "file", path);
     json_text(j, "format",
@@ -462,10 +506,10 @@ void facts_json(json *j, const char *path, const ebpo_info *info, const ebpo_sto
     json_source(j, info);
     json_model(j, info);
     findings_json_mending(j, "mend", &info->mend);
-    findings_json(j, "report", &info->report);
+    findings_json(j, "report", &info->report, &solid);
     json_storage(j, info, stored);
     json_array(j, "levels");
     for (int i = 0; i < info->level_count; i++)
-        json_level(j, info, stored, i);
+        json_level(j, info, stored, &solid, i);
     json_end(j);
 }

@@ -17,9 +17,9 @@ static const struct doubt_text {
     { EBPO_DOUBT_MOSTLY_FILLED, "mostly_filled", "filling holes added as much area as was given" },
     { EBPO_DOUBT_NO_VOLUME, "no_volume", "it has hardly any volume" },
     { EBPO_DOUBT_INSIDE_OUT, "inside_out",
-      "it is turned inside out: normals look inwards, the volume is negative, and a point within "
-      "has winding number -1, which is inside by the rules nonzero and evenodd but outside by "
-      "positive; --orient turns it" },
+      "it is turned inside out: normals look inwards, so a point within has winding number -1, "
+      "which is inside by the rules nonzero and evenodd but outside by positive; --orient turns "
+      "it" },
 };
 enum { DOUBTS = sizeof doubts / sizeof *doubts };
 
@@ -62,15 +62,29 @@ static void warn_of_surface(FILE *out, const ebpo_mesh_report *r)
         name_finding(out, &any, &r->unbalanced_edges, "unbalanced edges");
 }
 
+static const char *volume_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
+{
+    ebpo_solid_volume solid = findings_solid(&t->report, rule, NULL, NULL);
+    return findings_volume(text, &solid, &t->report, "");
+}
+
+/* Writes what solid a repair leaves. */
+static const char *left_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
+{
+    char volume[FINDINGS_VOLUME];
+    volume_text(volume, t, rule);
+    snprintf(text, FINDINGS_VOLUME, "a solid %s %.200s", volume[0] == 'v' ? "of" : "with", volume);
+    return text;
+}
+
 /* What was tried; else where that is done. */
 static void say_remedy(FILE *out, const mesh_input *p)
 {
-    char steps[64], volume[40];
+    char steps[64], left[FINDINGS_VOLUME];
     if (p->tried && p->repairs.chosen >= 0) {
         const ebpo_repair_try *best = &p->repairs.tries[p->repairs.chosen];
-        fprintf(out, "; %s, which --repair does, leaves a solid of volume %s",
-                steps_text(steps, sizeof steps, &best->record),
-                findings_extent(volume, sizeof volume, best->report.volume, 3, &best->report));
+        fprintf(out, "; %s, which --repair does, leaves %s",
+                steps_text(steps, sizeof steps, &best->record), left_text(left, best, p->rule));
     } else if (p->tried)
         fputs("; no repair of ours leaves a plausible solid: use a mesh editor", out);
     else
@@ -90,6 +104,31 @@ static void warn_of_inside_out(FILE *out, const char *command, const char *path,
             s->inside_out == 1 ? "is" : "are");
 }
 
+static void warn_of_nested(FILE *out, const char *command, const char *path, const ebpo_shells *s)
+{
+    fprintf(out,
+            "ebpo %s: %s: warning: %llu of %llu closed components %s within another and %s outwards "
+            "like it: winding numbers there are greater by 1, so the rules nonzero and positive "
+            "leave no cavity, and evenodd does; --orient turns them into cavities\n",
+            command, path, (unsigned long long)s->nested, (unsigned long long)s->closed,
+            s->nested == 1 ? "is" : "are", s->nested == 1 ? "looks" : "look");
+}
+
+/* Warns of faces that share positions, but not vertices, with an earlier face and its
+ * orientation. */
+static void warn_of_repeated_positions(FILE *out, const char *command, const char *path,
+                                       const mesh_input *p)
+{
+    char text[80];
+    uint64_t same = p->repeated.count - p->repeated_opposite;
+    fprintf(out,
+            "ebpo %s: %s: warning: %s at the positions of an earlier one with the same orientation "
+            "(face %llu%s), which counts twice in winding numbers; --weld with --drop-duplicates "
+            "drops such\n",
+            command, path, words_plural(text, sizeof text, same, "face is", "faces are"),
+            (unsigned long long)p->repeated.place[0], p->repeated.count > 1 ? ", ..." : "");
+}
+
 /* What dropping them was found to leave, if it was tried. */
 static const ebpo_repair_try *dropping_alone(const mesh_input *p)
 {
@@ -105,7 +144,7 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
 {
     const ebpo_finding *f = &p->prepared.report.repeated_faces;
     const ebpo_repair_try *t = dropping_alone(p);
-    char text[80], steps[64], volume[40];
+    char text[80], steps[64], left[FINDINGS_VOLUME];
     fprintf(out, "ebpo %s: %s: warning: %s of the same three vertices as an earlier one (face %llu",
             command, path, words_plural(text, sizeof text, f->count, "face is", "faces are"),
             (unsigned long long)f->place[0]);
@@ -123,8 +162,7 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
                 (unsigned long long)(f->count - t->record.dropped_opposite));
     fputs(steps_text(steps, sizeof steps, &t->record), out);
     if (t->report.balanced)
-        fprintf(out, " leaves a solid of volume %s\n",
-                findings_extent(volume, sizeof volume, t->report.volume, 3, &t->report));
+        fprintf(out, " leaves %s\n", left_text(left, t, p->rule));
     else
         fprintf(out, " alone leaves a surface, %llu edges of which do not balance\n",
                 (unsigned long long)t->report.unbalanced_edges.count);
@@ -145,8 +183,13 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
     char text[1024];
     if (p->counted && p->shells.inside_out && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
         warn_of_inside_out(out, command, path, &p->shells);
+    if (p->counted && p->shells.nested && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
+        warn_of_nested(out, command, path, &p->shells);
     if (p->prepared.report.repeated_faces.count)
         warn_of_repeated(out, command, path, p);
+    if (p->repeated.count > p->prepared.report.repeated_faces.count &&
+        p->repeated.count > p->repeated_opposite)
+        warn_of_repeated_positions(out, command, path, p);
     if (p->prepared.record.dropped_faces && p->prepared.before.balanced &&
         p->doubts & EBPO_DOUBT_OPEN)
         warn_of_opened(out, command, path, &p->prepared.record);
@@ -165,14 +208,14 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
 
 /* ---- what was tried ---- */
 
-static void print_try(FILE *out, const ebpo_repair_try *t)
+static void print_try(FILE *out, const ebpo_repair_try *t, ebpo_rule rule)
 {
-    char steps[64], text[80];
+    char steps[64], text[80], volume[FINDINGS_VOLUME];
     const ebpo_mesh_report *r = &t->report;
     fprintf(out, "    %s: %s, ", steps_text(steps, sizeof steps, &t->record),
             words_plural(text, sizeof text, r->components, "component", "components"));
     if (r->balanced)
-        fprintf(out, "volume %s", findings_extent(text, sizeof text, r->volume, 3, r));
+        fputs(volume_text(volume, t, rule), out);
     else
         fprintf(out, "%llu edges do not balance", (unsigned long long)r->unbalanced_edges.count);
     if (t->record.filled_holes) {
@@ -193,6 +236,10 @@ void advice_print_shells(FILE *out, const mesh_input *p)
 {
     char text[80];
     const ebpo_shells *s = &p->shells;
+    if (p->repeated.count > p->prepared.report.repeated_faces.count)
+        fprintf(out, "  %s at the positions of an earlier one, %llu with the opposite orientation\n",
+                words_plural(text, sizeof text, p->repeated.count, "face", "faces"),
+                (unsigned long long)p->repeated_opposite);
     if (!p->counted || !(s->inside_out || s->nested || s->cavities))
         return;
     fprintf(out, "  %s",
@@ -213,7 +260,7 @@ void advice_print(FILE *out, const mesh_input *p)
         return;
     fputs("  repairs tried, of each what it would leave:\n", out);
     for (uint64_t i = 0; i < p->repairs.count; i++)
-        print_try(out, &p->repairs.tries[i]);
+        print_try(out, &p->repairs.tries[i], p->rule);
 }
 
 /* ---- JSON ---- */
@@ -227,8 +274,9 @@ static void json_doubts(json *j, uint32_t set)
     json_end(j);
 }
 
-static void json_try(json *j, const ebpo_repair_try *t)
+static void json_try(json *j, const ebpo_repair_try *t, ebpo_rule rule)
 {
+    ebpo_solid_volume solid = findings_solid(&t->report, rule, NULL, NULL);
     json_object(j, NULL);
     json_array(j, "steps");
     if (t->record.weld)
@@ -246,8 +294,21 @@ static void json_try(json *j, const ebpo_repair_try *t)
     json_uint(j, "filled_holes", t->record.filled_holes);
     json_uint(j, "added_faces", t->record.added_faces);
     json_real(j, "area", t->report.area);
-    json_real(j, "volume", t->report.volume);
+    findings_volume_json(j, &solid);
     json_doubts(j, t->doubts);
+    json_end(j);
+}
+
+/* Writes null where no vertices are at one position: the report has all repeated faces then. */
+static void json_repeated(json *j, const mesh_input *p)
+{
+    if (!p->prepared.report.repeated_positions.count) {
+        json_null(j, "repeated_by_position");
+        return;
+    }
+    json_object(j, "repeated_by_position");
+    json_uint(j, "faces", p->repeated.count);
+    json_uint(j, "opposite", p->repeated_opposite);
     json_end(j);
 }
 
@@ -262,12 +323,14 @@ static void json_shells(json *j, const mesh_input *p)
     json_uint(j, "inside_out", p->shells.inside_out);
     json_uint(j, "cavities", p->shells.cavities);
     json_uint(j, "nested", p->shells.nested);
+    json_bool(j, "apart", p->shells.apart);
     json_end(j);
 }
 
 void advice_json(json *j, const mesh_input *p)
 {
     json_doubts(j, p->doubts);
+    json_repeated(j, p);
     json_shells(j, p);
     if (!p->tried) {
         json_null(j, "repairs");
@@ -276,7 +339,7 @@ void advice_json(json *j, const mesh_input *p)
     json_object(j, "repairs");
     json_array(j, "tried");
     for (uint64_t i = 0; i < p->repairs.count; i++)
-        json_try(j, &p->repairs.tries[i]);
+        json_try(j, &p->repairs.tries[i], p->rule);
     json_end(j);
     if (p->repairs.chosen >= 0)
         json_int(j, "chosen", p->repairs.chosen);

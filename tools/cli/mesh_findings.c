@@ -3,8 +3,10 @@
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "cli/tables.h"
 #include "cli/words.h"
 
 /* Findings in the order in which people want to read them. */
@@ -124,20 +126,61 @@ const char *findings_extent(char *text, size_t size, double x, int power,
     return text;
 }
 
-static void print_extent(FILE *out, const char *what, double x, int power,
-                         const ebpo_mesh_report *report)
+ebpo_solid_volume findings_solid(const ebpo_mesh_report *report, ebpo_rule rule,
+                                 const ebpo_shells *shells, const ebpo_info *info)
 {
-    char text[40];
-    bool told = isfinite(x) && fabs(x) >= DBL_MIN;
-    findings_extent(text, sizeof text, x, power, report);
-    fprintf(out, ", %s %s%s", what, text,
-            told || text[0] == '0' ? "" : " (ebpo measure tells it, of the converted file)");
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_solid_volume solid = EBPO_SOLID_VOLUME_INIT;
+    /* which fails for another size of the struct only */
+    if (ebpo_solid_volume_of(report, rule, shells, info, &solid, &error) != EBPO_OK)
+        solid.hi = INFINITY;
+    return solid;
+}
+
+/* Writes a bound with six digits, rounded away from what it bounds. */
+static const char *bound_text(char text[40], double x, bool up)
+{
+    double step = x > 0 ? pow(10, floor(log10(x)) - 5) : 0;
+    snprintf(text, 40, "%.6g", x);
+    if (up ? strtod(text, NULL) < x : strtod(text, NULL) > x)
+        snprintf(text, 40, "%.6g", up ? x + step : x - step);
+    return text;
+}
+
+const char *findings_volume(char text[FINDINGS_VOLUME], const ebpo_solid_volume *solid,
+                            const ebpo_mesh_report *report, const char *unit)
+{
+    char lo[40], hi[40], integral[40], cubed[TABLE_CELL];
+    bool known = findings_knows(solid), none = known && solid->lo == 0 && solid->integral != 0;
+    findings_extent(integral, sizeof integral, solid->integral, 3, report);
+    findings_extent(lo, sizeof lo, solid->lo, 3, report);
+    table_unit(cubed, unit, 3);
+    if (known && solid->lo == solid->integral)
+        snprintf(text, FINDINGS_VOLUME, "volume %s%s", lo, cubed);
+    else if (known)
+        snprintf(text, FINDINGS_VOLUME, "volume %s%s (integral of the winding number %s)",
+                 none ? "0" : lo, cubed, integral);
+    else if (isfinite(solid->hi))
+        snprintf(text, FINDINGS_VOLUME, "volume %s to %s%s (integral of the winding number %s)",
+                 bound_text(lo, solid->lo, false), bound_text(hi, solid->hi, true), cubed,
+                 integral);
+    else
+        snprintf(text, FINDINGS_VOLUME, "integral of the winding number %s%s", integral, cubed);
+    return text;
+}
+
+/* Returns what to print behind a measure that is beyond the range of doubles. */
+static const char *beyond_text(double x, const char *text)
+{
+    bool printed = (isfinite(x) && fabs(x) >= DBL_MIN) || text[0] == '0';
+    return printed ? "" : " (see ebpo measure, of the converted file)";
 }
 
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
-                    const ebpo_mesh_report *report, bool crossings_follow)
+                    const ebpo_mesh_report *report, const ebpo_solid_volume *solid,
+                    bool crossings_follow)
 {
-    char bytes[32], parts[64];
+    char bytes[32], parts[64], volume[FINDINGS_VOLUME];
     fprintf(out, "%s: %llu vertices, %llu faces", path, (unsigned long long)mesh->vertex_count,
             (unsigned long long)mesh->face_count);
     if (mesh->source_format[0])
@@ -152,9 +195,12 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                 words_plural(parts, sizeof parts, report->boundary_loops, "hole", "holes"));
     if (report->genus_known)
         fprintf(out, ", genus %lld", (long long)report->genus);
-    print_extent(out, "area", report->area, 2, report);
+    findings_extent(parts, sizeof parts, report->area, 2, report);
+    fprintf(out, ", area %s%s", parts, beyond_text(report->area, parts));
+    findings_extent(parts, sizeof parts, report->volume, 3, report);
     if (report->balanced)
-        print_extent(out, "volume", report->volume, 3, report);
+        fprintf(out, ", %s%s", findings_volume(volume, solid, report, ""),
+                beyond_text(report->volume, parts));
     fprintf(out, ", mean edge %.4g\n  box %.6g %.6g %.6g to %.6g %.6g %.6g\n", report->mean_edge,
             report->min[0], report->min[1], report->min[2], report->max[0], report->max[1],
             report->max[2]);
@@ -215,7 +261,16 @@ static void json_finding(json *j, const char *key, const ebpo_finding *f)
     json_end(j);
 }
 
-void findings_json(json *j, const char *key, const ebpo_mesh_report *report)
+void findings_volume_json(json *j, const ebpo_solid_volume *solid)
+{
+    json_real(j, "volume", findings_knows(solid) ? solid->lo : NAN);
+    json_real(j, "volume_lo", solid->lo);
+    json_real(j, "volume_hi", solid->hi);
+    json_real(j, "winding_integral", solid->integral);
+}
+
+void findings_json(json *j, const char *key, const ebpo_mesh_report *report,
+                   const ebpo_solid_volume *solid)
 {
     json_object(j, key);
     json_bool(j, "balanced", report->balanced);
@@ -230,7 +285,7 @@ void findings_json(json *j, const char *key, const ebpo_mesh_report *report)
     else
         json_null(j, "genus");
     json_real(j, "area", report->area);
-    json_real(j, "volume", report->volume);
+    findings_volume_json(j, solid);
     json_real(j, "mean_edge", report->mean_edge);
     json_reals(j, "min", report->min, 3);
     json_reals(j, "max", report->max, 3);

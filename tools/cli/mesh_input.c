@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cli/command.h"
+#include "cli/mesh_findings.h"
 
 static bool steps_given(mending asked)
 {
@@ -67,6 +68,15 @@ static ebpo_status try_and_repair(mesh_input *p, mending asked, ebpo_prepare_opt
     return p->tried && asked.repair && p->repairs.chosen >= 0 ? do_chosen(p, how, error) : status;
 }
 
+/* Where no vertices are at one position, the check has counted them. */
+static ebpo_status count_repeated(mesh_input *p, unsigned threads, ebpo_error *error)
+{
+    p->repeated = p->prepared.report.repeated_faces;
+    if (!p->prepared.report.repeated_positions.count)
+        return EBPO_OK;
+    return ebpo_mesh_count_repeated(&p->mesh, threads, &p->repeated, &p->repeated_opposite, error);
+}
+
 /* Of a single component the volume's sign tells which way it looks. */
 static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *how, ebpo_error *error)
 {
@@ -75,6 +85,13 @@ static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *how, 
     p->shells = (ebpo_shells)EBPO_SHELLS_INIT;
     p->counted = true;
     return ebpo_mesh_count_shells(&p->mesh, how->threads, how->progress, &p->shells, error);
+}
+
+ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
+{
+    bool counted = p->counted && (after || !p->prepared.mended);
+    return findings_solid(after ? &p->prepared.report : &p->prepared.before, p->rule,
+                          counted ? &p->shells : NULL, NULL);
 }
 
 ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending asked,
@@ -109,6 +126,8 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     status = ebpo_mesh_prepare(&out->mesh, &wanted, &out->prepared, error);
     if (status == EBPO_OK)
         status = try_and_repair(out, asked, &wanted, error);
+    if (status == EBPO_OK)
+        status = count_repeated(out, threads, error);
     if (status == EBPO_OK)
         status = count_shells(out, &wanted, error);
     out->doubts =

@@ -3,6 +3,7 @@
 #define EBPO_TOOLS_MESH_INPUT_H
 
 #include <ebpo/groups.h>
+#include <ebpo/query.h>
 #include <ebpo/repair.h>
 
 #include "cli/args.h"
@@ -20,9 +21,14 @@ typedef struct mesh_input {
     ebpo_prepared prepared; /* what was found and mended */
     bool tried;             /* repairs, which `repairs` tells of */
     ebpo_repairs repairs;
+    /* faces at the positions of an earlier one, of the mesh as mended; of these, where vertices are
+     * at one position, those that look the other way */
+    ebpo_finding repeated;
+    uint64_t repeated_opposite;
     bool counted; /* closed components, which `shells` tells of */
     ebpo_shells shells;
     uint32_t doubts; /* ebpo_doubt, of the mesh as mended */
+    ebpo_rule rule;  /* of the solid; set by the caller, else nonzero */
 } mesh_input;
 
 /* EXIT_USAGE with a message when --repair is given with what it chooses from. */
@@ -46,6 +52,9 @@ EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *pa
                                                  mesh_reading more, ebpo_mesh_groups **groups,
                                                  ebpo_workspace *workspace, unsigned threads,
                                                  ebpo_progress progress, ebpo_error *error);
+
+/* Returns what is known of the solid's volume, before or after mending. */
+ebpo_solid_volume mesh_input_solid(const mesh_input *input, bool after);
 
 /* A warning where the file holds or names what reading it left out. */
 void mesh_input_warn(const char *command, const char *path, const mesh_input *input);

@@ -70,6 +70,15 @@ const char *table_scaled(char out[TABLE_CELL], int digits, double x, int64_t exp
     return out;
 }
 
+void table_json(json *j, const char *key, double x, int64_t exponent)
+{
+    char cell[TABLE_CELL];
+    if (table_in_range(x, exponent))
+        json_real(j, key, ldexp(x, (int)exponent));
+    else
+        json_text(j, key, table_scaled(cell, 9, x, exponent));
+}
+
 const char *table_unit(char out[TABLE_CELL], const char *unit, int power)
 {
     out[0] = 0;

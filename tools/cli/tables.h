@@ -7,6 +7,8 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#include "cli/json.h"
+
 enum { TABLE_CELL = 40 };
 
 /* Which nodes are gray, leaf, white and black; below a table that counts them. */
@@ -24,6 +26,9 @@ void table_beyond(FILE *out);
 /* x * 2^exponent with so many significant digits, 1 to 17, as %g has them; beyond the range of a
  * double with at most 9, such as 4.2e+901. */
 const char *table_scaled(char out[TABLE_CELL], int digits, double x, int64_t exponent);
+
+/* Writes x * 2^exponent as a number; beyond the range of a double the same text. */
+void table_json(json *j, const char *key, double x, int64_t exponent);
 
 /* Whether a double holds x * 2^exponent, neither infinite nor rounded to 0 or near it. */
 bool table_in_range(double x, int64_t exponent);

@@ -14,6 +14,7 @@
 #include "cli/progress.h"
 #include "cli/query_args.h"
 #include "cli/remote_args.h"
+#include "cli/tables.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 
@@ -70,7 +71,9 @@ typedef struct cell_answer {
     const char **models; /* as they were given */
     ebpo_exact_volume exact;
     ebpo_boolean_volume cells;
-    bool volume; /* is asked for */
+    bool no_cells;            /* none can be made, and the volume is exact without them: */
+    char why_no_cells[1024];  /* why */
+    bool volume;              /* is asked for */
     uint64_t faces_written;
 } cell_answer;
 
@@ -112,11 +115,19 @@ static const char *const figure_words[] = { "exact", "interval", "bound" };
 static void print_volume(const cell_answer *a)
 {
     const ebpo_boolean_volume *b = &a->cells;
-    char why[1024], exact[32], lo[32], hi[32];
+    char why[1024], exact[32], lo[32], hi[32], cell[TABLE_CELL];
     say_why(a, why, sizeof why);
     if (is_exact(a))
-        printf("volume    %s, exact but for one rounding\nby cells  %s to %s\n",
-               words_real(a->exact.volume.lo, exact), words_real(b->lo, lo), words_real(b->hi, hi));
+        printf("volume    %s, exact but for one rounding\n",
+               table_in_range(a->exact.scaled, a->exact.exponent)
+                   ? words_real(a->exact.volume.lo, exact)
+                   : table_scaled(cell, 9, a->exact.scaled, a->exact.exponent));
+    if (a->no_cells) {
+        printf("by cells  not known: %s\n", a->why_no_cells);
+        return;
+    }
+    if (is_exact(a))
+        printf("by cells  %s to %s\n", words_real(b->lo, lo), words_real(b->hi, hi));
     else
         printf("volume    %s to %s, %s: %s\n", words_real(b->lo, lo), words_real(b->hi, hi),
                b->figure == EBPO_FIGURE_BOUND ? "a bound" : "an interval", why);
@@ -132,13 +143,20 @@ static void volume_to_json(json *j, const cell_answer *a)
     const ebpo_boolean_volume *b = &a->cells;
     char why[1024];
     say_why(a, why, sizeof why);
-    json_real(j, "volume_lo", is_exact(a) ? a->exact.volume.lo : b->lo);
-    json_real(j, "volume_hi", is_exact(a) ? a->exact.volume.hi : b->hi);
+    for (int i = 0; i < 2; i++)
+        if (is_exact(a))
+            table_json(j, i ? "volume_hi" : "volume_lo", a->exact.scaled, a->exact.exponent);
+        else
+            json_real(j, i ? "volume_hi" : "volume_lo", i ? b->hi : b->lo);
     json_text(j, "volume_figure", figure_words[figure_of(a)]);
     if (is_exact(a))
         json_null(j, "not_exact");
     else
         json_text(j, "not_exact", why);
+    if (a->no_cells) {
+        json_text(j, "no_cells", a->why_no_cells);
+        return;
+    }
     json_real(j, "cells_lo", b->lo);
     json_real(j, "cells_hi", b->hi);
     json_int(j, "level", a->v->level);
@@ -291,6 +309,11 @@ static ebpo_status answer_cells(cell_answer *a, ebpo_boolean *b, ebpo_progress p
         status = ebpo_boolean_exact_volume(b, &measuring, &a->exact, error);
     if (status == EBPO_OK)
         status = ebpo_boolean_cells_new(b, &how, &cells, error);
+    if (status == EBPO_E_LIMIT && is_exact(a) && !a->v->out) {
+        a->no_cells = true;
+        snprintf(a->why_no_cells, sizeof a->why_no_cells, "%s", error->message);
+        return EBPO_OK;
+    }
     if (status == EBPO_OK)
         status = ebpo_boolean_cells_volume(cells, &a->cells);
     if (status == EBPO_OK && a->v->out)

@@ -26,26 +26,28 @@ typedef struct values {
 /* The outermost object is left open. */
 static void print_json(json *j, const mesh_input *p, const char *path)
 {
+    ebpo_solid_volume before = mesh_input_solid(p, false), after = mesh_input_solid(p, true);
     json_begin(j, stdout);
     json_object(j, NULL);
     json_text(j, "file", path);
     findings_json_source(j, "source", &p->as_read, p->unread);
-    findings_json(j, "report", &p->prepared.before);
+    findings_json(j, "report", &p->prepared.before, &before);
     if (p->prepared.mended) {
         findings_json_mending(j, "mend", &p->prepared.record);
-        findings_json(j, "report_after_mending", &p->prepared.report);
+        findings_json(j, "report_after_mending", &p->prepared.report, &after);
     }
     advice_json(j, p);
 }
 
 static void print_reports(const values *v, const mesh_input *p, const char *path)
 {
-    findings_print(stdout, path, &p->as_read, &p->prepared.before, v->crossings);
+    ebpo_solid_volume before = mesh_input_solid(p, false), after = mesh_input_solid(p, true);
+    findings_print(stdout, path, &p->as_read, &p->prepared.before, &before, v->crossings);
     advice_print(stdout, p);
     if (!p->prepared.mended)
         return;
     findings_print_mending(stdout, &p->prepared.record);
-    findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, v->crossings);
+    findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, &after, v->crossings);
 }
 
 static void print_words(const values *v, const mesh_input *p, const char *path)

@@ -320,6 +320,7 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;
+    p.rule = (ebpo_rule)v->rule;
     convert_told told = told_of(v, in, out);
     convert_tell_mesh(&told, &p);
     status = refuse(v, &p, in, workspace, error);

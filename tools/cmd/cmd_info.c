@@ -53,7 +53,7 @@ static void print_json(const values *v, const char *path, const ebpo_file *file,
     json j;
     json_begin(&j, stdout);
     json_object(&j, NULL);
-    facts_json(&j, path, ebpo_file_info(file), stored);
+    facts_json(&j, path, ebpo_file_info(file), stored, NULL);
     if (v->memory)
         memory_facts_json(&j, "memory", plan);
     facts_attributes_json(&j, file);

@@ -7,10 +7,12 @@
 
 #include "cli/command.h"
 #include "cli/file_facts.h"
+#include "cli/mesh_findings.h"
 #include "cli/process_memory.h"
 #include "cli/progress.h"
 #include "cli/remote_args.h"
 #include "cli/tables.h"
+#include "cli/words.h"
 #include "cmd/commands.h"
 
 typedef struct values {
@@ -27,51 +29,55 @@ typedef struct values {
 
 /* What is measured of levels, as wished; [level_count], or NULL. */
 typedef struct measures {
+    ebpo_solid_volume solid;
     const double *derived; /* with limit: always */
     const ebpo_deviation *deviation;
     const ebpo_limit *limit;
 } measures;
 
-static void print_limit(const ebpo_info *info, double volume, const ebpo_limit *limit)
+static void print_limit(const ebpo_info *info, const ebpo_solid_volume *solid, double volume,
+                        const ebpo_limit *limit)
 {
     char cell[TABLE_CELL];
     printf(" %24s", table_cell(cell, "%.16g", limit->volume));
     if (info->solid)
-        printf(" %17s", table_cell(cell, "%.4f", facts_excess_ratio(info, volume, limit->volume)));
+        printf(" %17s",
+               table_cell(cell, "%.4f", facts_excess_ratio(info, solid, volume, limit->volume)));
 }
 
 static void print_levels(const ebpo_info *info, const measures *m)
 {
     const ebpo_deviation *deviation = m->deviation;
-    printf("%5s %24s %9s", "level", "envelopes' volume", info->solid ? "% solid" : "% box");
+    char whole[TABLE_CELL];
+    snprintf(whole, sizeof whole, "%% %s", facts_whole(info, &m->solid));
+    printf("%5s %24s %10s", "level", "envelopes' volume", whole);
     if (deviation)
         printf(" %13s %13s %13s %13s", "reaches", "at most", "mean", "rms");
     if (m->derived)
-        printf(" %24s %9s", "leaves' planes derived", info->solid ? "% solid" : "% box");
+        printf(" %24s %10s", "leaves' planes derived", whole);
     if (m->limit)
         printf(" %24s%s", "hulls' volume", info->solid ? "   excess to limit" : "");
     putchar('\n');
     for (int i = 0; i < info->level_count; i++) {
         char volume[TABLE_CELL], percent[TABLE_CELL];
-        printf("%5d %24s %9s", i, table_cell(volume, "%.16g", facts_volume(info, i)),
-               table_cell(percent, "%.2f", facts_percent(info, i)));
+        printf("%5d %24s %10s", i, table_cell(volume, "%.16g", facts_volume(info, i)),
+               table_cell(percent, "%.2f", facts_percent(info, &m->solid, i)));
         if (deviation)
             printf(" %13.6g %13.6g %13.6g %13.6g", deviation[i].lo, deviation[i].hi,
                    deviation[i].mean, deviation[i].rms);
         if (m->derived)
-            printf(" %24s %9s", table_cell(volume, "%.16g", m->derived[i]),
-                   table_cell(percent, "%.2f", facts_share(info, m->derived[i])));
+            printf(" %24s %10s", table_cell(volume, "%.16g", m->derived[i]),
+                   table_cell(percent, "%.2f", facts_share(info, &m->solid, m->derived[i])));
         if (m->limit)
-            print_limit(info, m->derived[i], &m->limit[i]);
+            print_limit(info, &m->solid, m->derived[i], &m->limit[i]);
         putchar('\n');
     }
 }
 
 static void print_legend(const ebpo_info *info, const measures *m)
 {
-    printf("volumes in the model's unit%s%s cubed; %s\n", info->unit[0] ? " " : "", info->unit,
-           info->solid ? "% solid: of the solid's volume"
-                       : "% box: of the volume of the root's box");
+    printf("volumes in the model's unit%s%s cubed; ", info->unit[0] ? " " : "", info->unit);
+    facts_print_whole(stdout, info, &m->solid);
     if (m->deviation)
         puts("reaches, at most: bounds of how far the farthest point is beyond the model;\n"
              "mean, rms: over the envelopes' surface");
@@ -93,6 +99,28 @@ static void print_inertia(const ebpo_info *info, const ebpo_mass *mass)
     }
 }
 
+static void print_volume(const ebpo_info *info, const ebpo_mass *mass)
+{
+    char cell[TABLE_CELL], lo[32], hi[32], unit[TABLE_CELL];
+    bool known = !isnan(mass->scaled_volume);
+    table_unit(unit, info->unit, 3);
+    if (known)
+        printf("  volume    %s%s\n",
+               table_scaled(cell, 16, mass->scaled_volume, 3 * mass->exponent), unit);
+    else if (isfinite(mass->volume_hi))
+        printf("  volume    %s to %s%s\n", words_real(mass->volume_lo, lo),
+               words_real(mass->volume_hi, hi), unit);
+    else
+        puts("  volume    not known");
+    if (known && mass->scaled_volume == mass->scaled_integral)
+        return;
+    printf("  integral  of the winding number: %s%s%s\n",
+           table_scaled(cell, 16, mass->scaled_integral, 3 * mass->exponent), unit,
+           known ? ""
+                 : "; centroid and inertia are those of the winding number as a density: shells\n"
+                   "            meet or repeat each other, or the mesh is no 2-manifold");
+}
+
 static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass,
                        const measures *m)
 {
@@ -105,9 +133,7 @@ static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass 
            table_unit(unit, info->unit, 2));
     if (info->solid) {
         const double *c = mass->centroid;
-        printf("  volume    %s%s\n",
-               table_scaled(cell, 16, mass->scaled_volume, 3 * mass->exponent),
-               table_unit(unit, info->unit, 3));
+        print_volume(info, mass);
         printf("  centroid  %.16g %.16g %.16g%s\n", c[0], c[1], c[2],
                table_unit(unit, info->unit, 1));
         print_inertia(info, mass);
@@ -120,16 +146,6 @@ static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass 
 }
 
 /* --- JSON --- */
-
-/* A number; beyond the range of a double a text. */
-static void json_scaled(json *j, const char *key, double x, int64_t exponent)
-{
-    char cell[TABLE_CELL];
-    if (table_in_range(x, exponent))
-        json_real(j, key, ldexp(x, (int)exponent));
-    else
-        json_text(j, key, table_scaled(cell, 9, x, exponent));
-}
 
 static void json_deviation(json *j, const ebpo_deviation *d)
 {
@@ -144,11 +160,12 @@ static void json_deviation(json *j, const ebpo_deviation *d)
     json_end(j);
 }
 
-static void json_limit(json *j, const ebpo_info *info, double volume, const ebpo_limit *limit)
+static void json_limit(json *j, const ebpo_info *info, const ebpo_solid_volume *solid,
+                       double volume, const ebpo_limit *limit)
 {
     json_real(j, "limit_volume", limit->volume);
     if (info->solid)
-        json_real(j, "excess_to_limit", facts_excess_ratio(info, volume, limit->volume));
+        json_real(j, "excess_to_limit", facts_excess_ratio(info, solid, volume, limit->volume));
     json_uint(j, "hulls", limit->hulls);
     json_uint(j, "flat_hulls", limit->flat);
 }
@@ -156,19 +173,27 @@ static void json_limit(json *j, const ebpo_info *info, double volume, const ebpo
 static void json_mass(json *j, const char *path, const ebpo_info *info, const ebpo_mass *mass,
                       const measures *m)
 {
+    char percent[32];
+    snprintf(percent, sizeof percent, "percent_of_%s", facts_whole(info, &m->solid));
     json_text(j, "file", path);
     json_text(j, "kind", info->solid ? "solid" : "surface");
     json_bool(j, "inside_out", facts_inside_out(info) != NULL);
     json_text(j, "unit", info->unit);
-    json_scaled(j, "area", mass->scaled_area, 2 * mass->exponent);
+    table_json(j, "area", mass->scaled_area, 2 * mass->exponent);
     if (info->solid) {
-        json_scaled(j, "volume", mass->scaled_volume, 3 * mass->exponent);
+        if (isnan(mass->scaled_volume))
+            json_null(j, "volume");
+        else
+            table_json(j, "volume", mass->scaled_volume, 3 * mass->exponent);
+        json_real(j, "volume_lo", mass->volume_lo);
+        json_real(j, "volume_hi", mass->volume_hi);
+        table_json(j, "winding_integral", mass->scaled_integral, 3 * mass->exponent);
         json_reals(j, "centroid", mass->centroid, 3);
         json_array(j, "inertia");
         for (int k = 0; k < 3; k++) {
             json_array(j, NULL);
             for (int i = 0; i < 3; i++)
-                json_scaled(j, NULL, mass->scaled_inertia[k][i], 5 * mass->exponent);
+                table_json(j, NULL, mass->scaled_inertia[k][i], 5 * mass->exponent);
             json_end(j);
         }
         json_end(j);
@@ -178,13 +203,13 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
         json_object(j, NULL);
         json_int(j, "level", i);
         json_real(j, "envelope_volume", facts_volume(info, i));
-        json_real(j, info->solid ? "percent_of_solid" : "percent_of_box", facts_percent(info, i));
+        json_real(j, percent, facts_percent(info, &m->solid, i));
         if (m->deviation)
             json_deviation(j, &m->deviation[i]);
         if (m->derived)
             json_real(j, "derived_volume", m->derived[i]);
         if (m->limit)
-            json_limit(j, info, m->derived[i], &m->limit[i]);
+            json_limit(j, info, &m->solid, m->derived[i], &m->limit[i]);
         json_end(j);
     }
     json_end(j);
@@ -239,8 +264,9 @@ static int measure(const char *path, const values *v)
     ebpo_limit limits[EBPO_LEVELS_MAX];
     double volumes[EBPO_LEVELS_MAX];
     bool derived = v->derived || v->limit;
-    measures m = { derived ? volumes : NULL, v->deviation ? levels : NULL,
-                   v->limit ? limits : NULL };
+    measures m = { .derived = derived ? volumes : NULL,
+                   .deviation = v->deviation ? levels : NULL,
+                   .limit = v->limit ? limits : NULL };
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
@@ -256,6 +282,7 @@ static int measure(const char *path, const values *v)
         return EXIT_FAILED;
     }
     ebpo_status status = ebpo_measure(file, (unsigned)v->threads, &mass, &error);
+    m.solid = facts_measured(ebpo_file_info(file), &mass);
     ebpo_progress progress = progress_start(&line, "measure", v->json);
     if (status == EBPO_OK && v->deviation)
         status = measure_levels(file, v, progress, levels, &error);

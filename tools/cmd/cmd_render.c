@@ -10,6 +10,7 @@
 
 #include "cli/command.h"
 #include "cli/file_facts.h"
+#include "cli/mesh_findings.h"
 #include "cli/json.h"
 #include "cli/process_memory.h"
 #include "cli/progress.h"
@@ -157,10 +158,13 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
     if (status == EBPO_OK)
         status = level_normals(info, &t->mesh, &nodes, &t->normals, error);
     ebpo_lod_nodes_free(&nodes);
+    ebpo_solid_volume solid = facts_solid(info, NULL);
     if (status == EBPO_OK)
-        snprintf(t->caption, sizeof t->caption,
-                 info->solid ? "level %d: %.1f %%" : "level %d: %.1f %% of box", t->level,
-                 facts_percent(info, t->level));
+        snprintf(t->caption, sizeof t->caption, "level %d: %.1f %%%s", t->level,
+                 facts_percent(info, &solid, t->level),
+                 !info->solid             ? " of box"
+                 : findings_knows(&solid) ? ""
+                                          : " of winding integral");
     return status;
 }
 

@@ -70,7 +70,7 @@ static void print_json(const values *v, const ebpo_info *info, const ebpo_stored
     json j;
     json_begin(&j, stdout);
     json_object(&j, NULL);
-    facts_json(&j, out, info, stored);
+    facts_json(&j, out, info, stored, NULL);
     json_uint(&j, "source_bytes", from->file_bytes);
     json_bool(&j, "same_content", true);
     json_real(&j, "seconds", seconds);

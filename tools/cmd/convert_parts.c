@@ -356,7 +356,8 @@ static void print_json(const writing *w, double seconds)
     json_end(&j);
     json_object(&j, "input");
     findings_json_source(&j, "mesh", &w->whole->as_read, w->whole->unread);
-    findings_json(&j, "report", &w->whole->prepared.before);
+    ebpo_solid_volume before = mesh_input_solid(w->whole, false);
+    findings_json(&j, "report", &w->whole->prepared.before, &before);
     json_end(&j);
     json_real(&j, "seconds", seconds);
     json_finish(&j);

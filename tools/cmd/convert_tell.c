@@ -15,12 +15,13 @@
 
 void convert_tell_mesh(const convert_told *t, const mesh_input *p)
 {
+    ebpo_solid_volume before = mesh_input_solid(p, false), after = mesh_input_solid(p, true);
     if (!t->json && !t->quiet) {
-        findings_print(stdout, t->in, &p->as_read, &p->prepared.before, false);
+        findings_print(stdout, t->in, &p->as_read, &p->prepared.before, &before, false);
         advice_print(stdout, p);
         findings_print_mending(stdout, &p->prepared.record);
         if (p->prepared.mended)
-            findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, false);
+            findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, &after, false);
         advice_print_shells(stdout, p);
     }
     command_flush("convert");
@@ -43,18 +44,16 @@ static void print_what(const char *out, const ebpo_info *info)
            words_plural(parts, sizeof parts, info->report.components, "component", "components"));
 }
 
-static void print_sound(const ebpo_info *info, const mesh_input *p)
+static void print_sound(const ebpo_info *info, const ebpo_solid_volume *solid, const mesh_input *p)
 {
-    char text[1024], unit[TABLE_CELL];
+    char text[1024], volume[FINDINGS_VOLUME];
     if (p->doubts) {
         printf("  sound     no: %s\n", advice_doubts(text, sizeof text, p));
         return;
     }
-    printf("  sound     yes: %s, ",
-           info->report.manifold ? "a closed 2-manifold" : "its edges balance");
-    printf("volume %s%s; faces that cross were not looked for\n",
-           findings_extent(text, sizeof text, info->report.volume, 3, &info->report),
-           table_unit(unit, info->unit, 3));
+    printf("  sound     yes: %s, %s; faces that cross were not looked for\n",
+           info->report.manifold ? "a closed 2-manifold" : "its edges balance",
+           findings_volume(volume, solid, &info->report, info->unit));
 }
 
 static void print_size(const ebpo_info *info, bool chosen, double seconds)
@@ -69,16 +68,19 @@ static void print_size(const ebpo_info *info, bool chosen, double seconds)
     printf(", in %.1f s\n", seconds);
 }
 
-static void print_levels(const ebpo_info *info)
+static void print_levels(const ebpo_info *info, const ebpo_solid_volume *solid)
 {
     char first[TABLE_CELL], last[TABLE_CELL];
     int deepest = info->level_count - 1;
+    bool known = findings_knows(solid);
     printf("  levels    0 to %d", deepest);
-    if (isfinite(facts_percent(info, 0)) && info->parts & EBPO_PART_PLANES)
-        printf(": envelopes of %s%s%s %% of the %s's volume",
-               table_cell(first, "%.4g", facts_percent(info, 0)), deepest ? " to " : "",
-               deepest ? table_cell(last, "%.4g", facts_percent(info, deepest)) : "",
-               info->solid ? "solid" : "box");
+    if (isfinite(facts_percent(info, solid, 0)) && info->parts & EBPO_PART_PLANES)
+        printf(": envelopes of %s%s%s %% of the %s",
+               table_cell(first, "%.4g", facts_percent(info, solid, 0)), deepest ? " to " : "",
+               deepest ? table_cell(last, "%.4g", facts_percent(info, solid, deepest)) : "",
+               !info->solid ? "box's volume"
+               : known      ? "solid's volume"
+                            : "integral of the winding number");
     putchar('\n');
 }
 
@@ -124,12 +126,13 @@ static void print_json(const convert_told *t, const mesh_input *p, const ebpo_in
                        const stage_facts *stages, double seconds)
 {
     json j;
+    ebpo_solid_volume before = mesh_input_solid(p, false);
     json_begin(&j, stdout);
     json_object(&j, NULL);
-    facts_json(&j, t->out, info, stored);
+    facts_json(&j, t->out, info, stored, p->counted ? &p->shells : NULL);
     json_object(&j, "input");
     findings_json_source(&j, "mesh", &p->as_read, p->unread);
-    findings_json(&j, "report", &p->prepared.before);
+    findings_json(&j, "report", &p->prepared.before, &before);
     advice_json(&j, p);
     json_end(&j);
     json_real(&j, "seconds", seconds);
@@ -151,12 +154,13 @@ ebpo_status convert_tell_file(const convert_told *t, const mesh_input *p, const 
         print_json(t, p, ebpo_file_info(file), &stored, line, stages, seconds);
     } else if (status == EBPO_OK) {
         const ebpo_info *info = ebpo_file_info(file);
+        ebpo_solid_volume solid = facts_solid(info, p->counted ? &p->shells : NULL);
         if (t->timings)
             stages_print(stdout, line, stages, seconds);
         print_what(t->out, info);
-        print_sound(info, p);
+        print_sound(info, &solid, p);
         print_size(info, t->chosen, seconds);
-        print_levels(info);
+        print_levels(info, &solid);
         print_next(t, info, p);
     }
     ebpo_close(file);

@@ -214,7 +214,7 @@ ebpo_status subset_tell(const subset_values *v, const char *out_path, const ebpo
         json j;
         json_begin(&j, stdout);
         json_object(&j, NULL);
-        facts_json(&j, out_path, ebpo_file_info(file), &stored);
+        facts_json(&j, out_path, ebpo_file_info(file), &stored, NULL);
         json_uint(&j, "source_bytes", from->file_bytes);
         if (t->far) {
             json_uint(&j, "fetched_requests", t->http.requests);

@@ -139,6 +139,7 @@ typedef struct round_times {
 typedef struct method {
     char name[64], path[4096];
     ebpo_info info;
+    ebpo_solid_volume solid; /* what is known of its volume */
     /* where volumes are beyond the range of a double: what the solid fills of the root cell, by
      * which excess is taken; else 0 */
     double solid_share;

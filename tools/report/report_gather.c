@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "cli/file_facts.h"
+#include "cli/mesh_findings.h"
 #include "report/report_data.h"
 
 static void from_head(const comparison *c, method *m)
@@ -60,7 +61,8 @@ static ebpo_status solid_in_root(const comparison *c, method *m, ebpo_file *file
 {
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     ebpo_mesh mesh = { 0 };
-    if (!m->info.solid || !is_out_of_range(&m->info))
+    if (!m->info.solid || !is_out_of_range(&m->info) || m->info.report.components > 1 ||
+        !findings_knows(&m->solid))
         return EBPO_OK;
     read.threads = (unsigned)c->v->threads;
     ebpo_status status = ebpo_file_read_mesh(file, &read, &mesh, error);
@@ -86,14 +88,30 @@ static ebpo_status excess_in_root(const comparison *c, method *m, ebpo_file *fil
     return status;
 }
 
+/* Finds out the solid's volume: from the head, or else from the mesh. */
+static ebpo_status solid_volume(const comparison *c, method *m, const ebpo_file *file,
+                                ebpo_error *error)
+{
+    ebpo_mass mass = EBPO_MASS_INIT;
+    m->solid = facts_solid(&m->info, NULL);
+    if (findings_knows(&m->solid) || !(m->info.parts & EBPO_PART_MESH) || m->info.pruned)
+        return EBPO_OK;
+    ebpo_status status = ebpo_measure(file, (unsigned)c->v->threads, &mass, error);
+    if (status == EBPO_OK)
+        m->solid = facts_measured(&m->info, &mass);
+    return status;
+}
+
 /* With all that the file holds. */
 static ebpo_status volumes(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
-    ebpo_status status = solid_in_root(c, m, file, error);
+    ebpo_status status = solid_volume(c, m, file, error);
+    if (status == EBPO_OK)
+        status = solid_in_root(c, m, file, error);
     for (int i = c->first; i <= method_last(c, m) && status == EBPO_OK; i++) {
         double *f = m->level[i];
         status = facts_derived(file, i, (unsigned)c->v->threads, c->progress, &f[OF_VOLUME], error);
-        f[OF_EXCESS] = facts_excess(&m->info, f[OF_VOLUME]);
+        f[OF_EXCESS] = facts_excess(&m->info, &m->solid, f[OF_VOLUME]);
         if (status == EBPO_OK && m->solid_share > 0)
             status = excess_in_root(c, m, file, i, error);
     }
@@ -115,7 +133,7 @@ static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_
             m->level[i][OF_LEVELS_VOLUME] = told.volume;
             /* with leaf planes in the file, the levels alone are all that is known */
             m->level[i][OF_LEVELS_EXCESS] =
-                !(m->solid_share > 0)                   ? facts_excess(&m->info, told.volume)
+                !(m->solid_share > 0)                   ? facts_excess(&m->info, &m->solid, told.volume)
                 : m->info.parts & EBPO_PART_LEAF_PLANES ? m->level[i][OF_EXCESS]
                                                         : NAN;
         }
@@ -138,8 +156,8 @@ static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error 
         if (status != EBPO_OK)
             return method_without(m, "limit", status, error);
         f[OF_LIMIT_VOLUME] = limit.volume;
-        f[OF_LIMIT_EXCESS] = facts_excess(&m->info, limit.volume);
-        f[OF_EXCESS_TO_LIMIT] = facts_excess_ratio(&m->info, f[OF_VOLUME], limit.volume);
+        f[OF_LIMIT_EXCESS] = facts_excess(&m->info, &m->solid, limit.volume);
+        f[OF_EXCESS_TO_LIMIT] = facts_excess_ratio(&m->info, &m->solid, f[OF_VOLUME], limit.volume);
         if (!(m->solid_share > 0))
             continue;
         options.in_root_cells = 1;

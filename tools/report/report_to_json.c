@@ -1,6 +1,7 @@
 /* report.json: the same figures as report.csv, with what the quantities are, the model and the
  * machine. */
 #include "cli/json.h"
+#include "cli/mesh_findings.h"
 #include "report/report_data.h"
 #include "cli/words.h"
 
@@ -96,7 +97,7 @@ static void model(json *j, const comparison *c)
     json_uint(j, "faces", info->face_count);
     json_uint(j, "vertices", info->vertex_count);
     json_text(j, "unit", info->unit);
-    json_real(j, "volume", info->report.volume);
+    findings_volume_json(j, &c->methods->solid);
     json_real(j, "area", info->report.area);
     json_reals(j, "min", info->report.min, 3);
     json_reals(j, "max", info->report.max, 3);

@@ -202,8 +202,8 @@ typedef struct ebpo_exact_volume {
 
     /*
      * The result's volume, in the unit of the world, cubed. EBPO_FIGURE_EXACT: lo and hi are the
-     * double nearest to that of posed coordinates, ties to even (INFINITY beyond doubles); 0: the
-     * result is empty. EBPO_FIGURE_BOUND: from 0 to a box around the result; cells tell more.
+     * double nearest to that of posed coordinates, ties to even (INFINITY beyond doubles, 0 below
+     * them); `scaled` of 0: the result is empty. EBPO_FIGURE_BOUND: from 0 to a box around the result; cells tell more.
      */
     ebpo_certain volume;
 
@@ -223,6 +223,10 @@ typedef struct ebpo_exact_volume {
 
     /* The same faces by their numbers in the sources, as ebpo_face_pair has them. */
     uint64_t face[2];
+
+    /* An exact volume once more, rounded likewise but within any range: scaled * 2^exponent. */
+    double scaled;
+    int64_t exponent;
 } ebpo_exact_volume;
 
 #define EBPO_EXACT_VOLUME_INIT EBPO_SIZED(ebpo_exact_volume)
@@ -285,7 +289,8 @@ typedef struct ebpo_boolean_cells ebpo_boolean_cells;
  * where its own boundary is, cells are mixed.
  *
  * EBPO_E_ARGUMENT: the level. EBPO_E_LIMIT: too many cells (`most`), or the result is so small or
- * so far from the origin that corners of cells are no doubles. EBPO_E_CANCELLED, EBPO_E_MEMORY, and
+ * so far from the origin that corners of cells are no doubles, or larger than 2^300 or smaller than
+ * 2^-300, so that volumes of cells are none. EBPO_E_CANCELLED, EBPO_E_MEMORY, and
  * the errors of ebpo_boolean_inside.
  *
  * The cells stay as they are when the expression is freed.

@@ -417,6 +417,23 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh,
                                                              ebpo_error *error);
 
 /*
+ * Counts the faces that ebpo_mesh_drop_duplicates would remove if vertices at one
+ * position were one: those at the three positions of an earlier face. Where a report
+ * has no `repeated_positions`, these are its `repeated_faces`.
+ *
+ * threads    0: all cores. The result does not depend on it.
+ * out        how many, and the first ones
+ * opposite   of these, those that look the other way than the face that would stay
+ *
+ * Errors are those of ebpo_mesh_weld. On failure both are 0.
+ *
+ * Threads: any, while nobody changes the mesh.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mesh,
+                                                            unsigned threads, ebpo_finding *out,
+                                                            uint64_t *opposite, ebpo_error *error);
+
+/*
  * Makes neighbouring faces agree, component by component, across edges that are
  * used twice, and closed components look outwards, or inwards where they bound a
  * cavity.

@@ -9,7 +9,7 @@
  *   Rays             ebpo_ray_first, ebpo_ray_any, ebpo_ray_all, and each of these for many
  *   Attributes       ebpo_sampler_new, ebpo_sample: of points on faces
  *   Boxes            ebpo_faces_in_box, ebpo_triangles_in_box
- *   Mass             ebpo_measure
+ *   Mass             ebpo_measure, ebpo_solid_volume_of
  *
  *     ebpo_file *file = NULL;
  *     ebpo_model *model = NULL;
@@ -31,6 +31,7 @@
 #define EBPO_QUERY_H
 
 #include <ebpo/file.h>
+#include <ebpo/repair.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -841,6 +842,49 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_triangles_in_box(ebpo_context *context, 
 
 /* ---- mass ---- */
 
+/*
+ * What is known of the volume of a solid: of the points that the rule puts inside.
+ * In the model's unit, cubed.
+ */
+typedef struct ebpo_solid_volume {
+    size_t struct_size; /* EBPO_SOLID_VOLUME_INIT sets it */
+
+    /*
+     * The volume is certainly within. lo == hi: it is known but for rounding,
+     * provided that no component crosses itself, which is not looked for. Else
+     * components meet or repeat each other, or the mesh is no 2-manifold; without
+     * `info` these are 0 and INFINITY then. 0 for a surface.
+     */
+    double lo, hi;
+
+    /*
+     * The integral of the winding number: the volume if winding numbers are 0 and 1
+     * only. A part with winding number 2 counts twice, one with -1 is subtracted.
+     */
+    double integral;
+} ebpo_solid_volume;
+
+#define EBPO_SOLID_VOLUME_INIT EBPO_SIZED(ebpo_solid_volume)
+
+/*
+ * Decides whether the volume of the solid is known. Takes no time worth mentioning.
+ *
+ * report    of the mesh (ebpo_mesh_check); &info->report, of a file
+ * rule      info->rule, of a file
+ * shells    of the mesh (ebpo_mesh_count_shells); NULL: not counted, and the volume
+ *           of several components is not known
+ * info      of the mesh's file, whose black cells and envelopes bound the volume;
+ *           NULL: there is none
+ *
+ * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_solid_volume_of(const ebpo_mesh_report *report,
+                                                        ebpo_rule rule, const ebpo_shells *shells,
+                                                        const ebpo_info *info,
+                                                        ebpo_solid_volume *out, ebpo_error *error);
+
 /* In the model's unit, squared, cubed and so on. */
 typedef struct ebpo_mass {
     size_t struct_size; /* EBPO_MASS_INIT sets it */
@@ -848,11 +892,12 @@ typedef struct ebpo_mass {
     double area;
 
     /*
-     * The integral of the winding number, which is the volume of the solid if
-     * that is 0 and 1 only. 0 for a surface. If it is 0, so is all below.
+     * The volume of the solid, as ebpo_solid_volume_of has it; NAN where that is not
+     * known. 0 for a surface. If it is 0, so is what follows.
      */
     double volume;
 
+    /* Of the solid; where its volume is not known, of the winding number as a density. */
     double centroid[3];
 
     /* About the centroid, for density 1. */
@@ -864,12 +909,19 @@ typedef struct ebpo_mass {
      */
     double scaled_area, scaled_volume, scaled_inertia[3][3];
     int64_t exponent;
+
+    /* The volume is certainly within; both are `volume` where it is known. */
+    double volume_lo, volume_hi;
+
+    /* Of the winding number, as ebpo_solid_volume has it; and in that other unit. */
+    double integral, scaled_integral;
 } ebpo_mass;
 
 #define EBPO_MASS_INIT EBPO_SIZED(ebpo_mass)
 
 /*
- * Area, volume, centroid and inertia of the file's mesh, by compensated sums.
+ * Area, volume, centroid and inertia of the file's mesh, by compensated sums. Of a
+ * mesh of several components ebpo_mesh_count_shells is a part of the work.
  * threads: 0 for all cores; the result does not depend on it.
  *
  * EBPO_E_ABSENT: the file has no mesh, or is a subset. EBPO_E_MEMORY, and the

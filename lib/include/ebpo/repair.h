@@ -115,12 +115,31 @@ typedef struct ebpo_shells {
 
     /* Within an odd number of others, and look outwards: a solid within another. */
     uint64_t nested;
+
+    /*
+     * 1: every component is closed, and no faces of two components have a common
+     * point; crossings within one component are not looked for. 0: not so, or too
+     * crowded to find out.
+     */
+    int32_t apart;
+
+    uint32_t reserved;
+
+    /*
+     * By ebpo_rule, of components that are apart: the volume of the solid less the
+     * integral of the winding number. 0 where each component looks outwards in the
+     * open and inwards in a solid. In the source's unit cubed.
+     */
+    double beyond[3];
 } ebpo_shells;
 
 #define EBPO_SHELLS_INIT EBPO_SIZED(ebpo_shells)
 
 /*
- * Counts them.
+ * Counts them, and finds out whether they are apart. Time: a few passes over the
+ * faces, and a search in trees of components and of faces near other components;
+ * the search stops after 64 boxes for each face (and 2^22) and then says that they
+ * are not apart.
  *
  * threads   0: all cores. The result does not depend on it.
  *
