@@ -77,7 +77,8 @@ static char *name_lock_file(const char *path)
     const char *name = ebpo_path_name(path);
     char *folder = strndup(path, (size_t)(name - path)), *lock = NULL;
     char *real = folder ? realpath(*folder ? folder : ".", NULL) : NULL;
-    if (real && asprintf(&lock, "%s/.%.*s.lock", real[1] ? real : "", EBPO_TARGET_NAME_KEPT, name) < 0) {
+    if (real &&
+        asprintf(&lock, "%s/.%.*s.lock", real[1] ? real : "", EBPO_TARGET_NAME_KEPT, name) < 0) {
         lock = NULL;
         errno = ENOMEM;
     }

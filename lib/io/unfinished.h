@@ -1,4 +1,5 @@
-/* Names of files that go when this process is ended by a signal: outputs in the making, and locks. */
+/* Names of files that go when this process is ended by a signal: outputs in the making, and locks.
+ */
 #ifndef EBPO_IO_UNFINISHED_H
 #define EBPO_IO_UNFINISHED_H
 

@@ -160,7 +160,7 @@ static uint64_t head_bytes(const ebpo_paint *p)
     return sum;
 }
 
-/* After a save: the file at `path` is the paint's. Nobody has to wait for it any more. */
+/* After a save: the file at `path` is the paint's. */
 static void take_version(ebpo_paint_file *f, char *path, int fd)
 {
     if (f->fd >= 0)
@@ -169,7 +169,6 @@ static void take_version(ebpo_paint_file *f, char *path, int fd)
     f->path = path;
     f->fd = fd;
     f->version = ebpo_file_version_of(fd);
-    ebpo_file_lock_release(&f->lock);
 }
 
 static ebpo_status save(const ebpo_paint *p, const char *path, ebpo_error *error)
@@ -179,8 +178,10 @@ static ebpo_status save(const ebpo_paint *p, const char *path, ebpo_error *error
     ebpo_publish publish = EBPO_PUBLISH_INIT;
     ebpo_h5_out out = EBPO_H5_OUT_INIT;
     ebpo_status status = ebpo_publish_begin(&publish, path, error);
-    if (status != EBPO_OK)
+    if (status != EBPO_OK) {
+        ebpo_file_lock_release(&f->lock);
         return status;
+    }
     bool own = f->path && strcmp(f->path, publish.target) == 0, first = !f->path;
     char *place = own || first ? strdup(publish.target) : NULL;
     int fd = place ? fcntl(publish.fd, F_DUPFD_CLOEXEC, 3) : -1;
@@ -199,6 +200,8 @@ static ebpo_status save(const ebpo_paint *p, const char *path, ebpo_error *error
     if (status == EBPO_OK)
         status = ebpo_publish_commit(&publish, error);
     ebpo_publish_abort(&publish);
+    if (own) /* also where it failed: others need not wait for a paint that is kept in memory */
+        ebpo_file_lock_release(&f->lock);
     if (status == EBPO_OK && fd >= 0) {
         take_version(f, place, fd);
     } else {

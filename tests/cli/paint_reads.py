@@ -3,6 +3,7 @@
 
 paint_reads.py vectors           all of format-spec/vectors/paint, read and refused
 paint_reads.py areas PAINT MODEL    each layer's area against points strewn over faces
+paint_reads.py moved PAINT OUT   writes a paint with a point of stroke 1 beside its face, and right checksums
 paint_reads.py baked PAINT MODEL PLY [GLB]    MODEL: without filters of one's own (convert --codec deflate)
 
 Baked colours are compared bit for bit with those that the reader finds by going from face to face, and
@@ -158,8 +159,18 @@ def baked(paint_path, model, out, glb=None):
     return wrong
 
 
+def moved(paint_path, out):
+    import h5py
+    pathlib.Path(out).write_bytes(pathlib.Path(paint_path).read_bytes())
+    with h5py.File(out, "r+") as file:
+        places = file["/points/place"][:]
+        places.view("<f8")[file["/strokes/points"][0], 0] += .25
+        file["/points/place"][:] = places
+    return []
+
+
 def main(words):
-    wrong = {"vectors": vectors, "areas": areas, "baked": baked}[words[0]](*words[1:])
+    wrong = {"vectors": vectors, "areas": areas, "baked": baked, "moved": moved}[words[0]](*words[1:])
     print("\n".join(wrong) or "fine")
 
 

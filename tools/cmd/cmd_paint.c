@@ -200,9 +200,15 @@ static ebpo_status work(paint_job *j, const ebpo_paint_hand *hand, uint64_t coun
                         ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    if (needs_model(j->v))
-        status = open_model(j, memory, error);
+    ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
     j->changed = changes(j->v);
+    ebpo_paint_get_info(j->paint, &info);
+    bool check =
+        j->file && (info.point_count || info.note_count) && (j->changed || needs_model(j->v));
+    if (needs_model(j->v) || check)
+        status = open_model(j, memory, error);
+    if (status == EBPO_OK && check) /* all of it, whatever is asked for */
+        status = ebpo_paint_check_points(j->paint, j->context, &j->progress, error);
     if (status == EBPO_OK && j->changed)
         status = paint_change(j, hand, count, error);
     if (status == EBPO_OK && j->v->bake)

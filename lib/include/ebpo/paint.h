@@ -3,7 +3,8 @@
  *
  *   Files      ebpo_paint_new, ebpo_paint_open, ebpo_paint_open_memory,
  *              ebpo_paint_open_to_change, ebpo_paint_save, ebpo_paint_free;
- *              ebpo_paint_get_info, ebpo_paint_check_model
+ *              ebpo_paint_get_info, ebpo_paint_check_model,
+ *              ebpo_paint_check_points
  *   Layers     ebpo_paint_get_layer, ebpo_paint_add_layer, ebpo_paint_set_layer,
  *              ebpo_paint_remove_layer
  *   Notes      ebpo_paint_get_note, ebpo_paint_add_note, ebpo_paint_remove_note
@@ -180,6 +181,24 @@ EBPO_API ebpo_status ebpo_paint_get_info(const ebpo_paint *paint, ebpo_paint_inf
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_model(const ebpo_paint *paint,
                                                           const ebpo_file *model,
                                                           ebpo_error *error);
+
+/*
+ * Checks that every point and note is on its face, or where a subset does not have the face or what
+ * is around it. That is not in the file's checksums: whatever made the file may have written
+ * other places. What asks the model of a point checks that point, too; this is for what is saved.
+ *
+ * context    of a model that fits
+ * progress   stage "checking"; or NULL
+ *
+ * EBPO_E_FORMAT: one is not; the message has its number. EBPO_E_ARGUMENT, EBPO_E_ABSENT: as
+ * ebpo_paint_check_model. EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: one per context; any, while nobody changes the paint.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_points(const ebpo_paint *paint,
+                                                           ebpo_context *context,
+                                                           const ebpo_progress *progress,
+                                                           ebpo_error *error);
 
 /* ---- layers ---- */
 
