@@ -74,7 +74,7 @@ class Painting(Case):
                 with ebpo.Paint.change("turns.paint.h5", wait=.1):
                     pass
             1 / 0
-        with self.assertRaisesRegex(ValueError, "abandoned"):
+        with self.assertRaisesRegex(ValueError, "ended with an exception"):
             changed.save("never.paint.h5")
         self.assertEqual(len(ebpo.Paint.open("turns.paint.h5").layers), 13)
         self.assertEqual([*pathlib.Path().glob(".*.lock")], [])

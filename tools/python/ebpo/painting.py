@@ -40,17 +40,6 @@ class Areas(NamedTuple):
     strokes: np.ndarray
 
 
-class Abandoned:
-    """In place of the handle of a paint whose change ended with an exception."""
-
-    @property
-    def _as_parameter_(self) -> Any:
-        raise ValueError("the change of this paint was abandoned; open it again")
-
-
-ABANDONED = Abandoned()
-
-
 class Paint:
     """Paint on a model, which is never changed. Made by `Paint(model)`, or `Paint.open` of a file.
 
@@ -70,7 +59,13 @@ class Paint:
             if model is None:
                 raise TypeError("Paint() takes the model that it is on")
             _handle = Handle.made("ebpo_paint_new", model.file, free="ebpo_paint_free")
-        self._handle = _handle
+        self._held: Handle | None = _handle
+
+    @property
+    def _handle(self) -> Handle:
+        if self._held is None:
+            raise ValueError("the change of this paint ended with an exception; open it again")
+        return self._held
 
     @classmethod
     def open(cls, source: Any) -> Paint:
@@ -105,8 +100,8 @@ class Paint:
                 paint.check(model, points=True)
             yield paint
         except BaseException:
-            handle, paint._handle = paint._handle, ABANDONED
-            handle._end()  # now, and not with the traceback: others wait
+            paint._handle._end()  # now, and not with the traceback: others wait
+            paint._held = None
             raise
         paint.save(path)
 
