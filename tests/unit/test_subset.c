@@ -469,8 +469,8 @@ START_TEST(threads_do_not_change_the_bytes)
 }
 END_TEST
 
-/* What another program has put in the place of a file that is open is not replaced by what is made of
- * the old one. */
+/* What another program has put in the place of a file that is open is not replaced by what is made
+ * of the old one. */
 START_TEST(files_made_in_place_of_another_are_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -491,7 +491,8 @@ START_TEST(files_made_in_place_of_another_are_refused)
                              : i == 2 ? ebpo_subset(file, path, &fit, &error)
                                       : ebpo_file_repack(file, path, NULL, NULL, &error);
         ck_assert_int_eq(status, EBPO_E_IO);
-        ck_assert(strstr(error.message, "another program has written it since it was read") != NULL);
+        ck_assert(strstr(error.message, "another program has written it since it was read") !=
+                  NULL);
         ebpo_close(file);
         fine(ebpo_open(path, &file, &error), &error);
         fine(ebpo_subset(file, path, i == 2 ? &fit : &o, &error), &error);

@@ -187,8 +187,8 @@ static int look_at_inputs(const query_shard *s, const query_job *job, char **fac
 
 /* --- the note --- */
 
-/* The facts, and which answers: how long they are, and when they were written, so that the note of one
- * of two commands is not taken for that of the other's answers. */
+/* The facts, and which answers: how long they are, and when they were written, so that the note of
+ * one of two commands is not taken for that of the other's answers. */
 static char *note_text(const char *facts, const struct stat *answers)
 {
     char *text = NULL;
@@ -323,7 +323,8 @@ static int write_note(const query_shard *s, const struct stat *answers)
 }
 
 /* The note of the answers that were there goes first, and comes last: whenever this is killed, it
- * stands beside no others. `answers` is their descriptor: another command may have replaced them. */
+ * stands beside no others. `answers` is their descriptor: another command may have replaced them.
+ */
 static int put_in_place(query_shard *s, int answers)
 {
     struct stat st;

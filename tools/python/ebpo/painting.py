@@ -93,8 +93,9 @@ class Paint:
         >>> len(Paint.open("cube.paint.h5").layers)
         2
         """
-        paint = cls(_handle=Handle.made("ebpo_paint_open_to_change", os.fsencode(path), model and model.file,
-                                        wait, None, free="ebpo_paint_free"))
+        path = os.path.abspath(path)  # the same at the end
+        paint = cls(_handle=Handle.made("ebpo_paint_open_to_change", os.fsencode(path),
+                                        None if model is None else model.file, wait, None, free="ebpo_paint_free"))
         try:
             if model is not None:
                 paint.check(model, points=True)
