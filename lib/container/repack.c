@@ -47,8 +47,10 @@ ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo
     wanted.parts = ~0u;
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&out, path, error); /* before what may take long */
-    if (status == EBPO_OK)
+    if (status == EBPO_OK) {
+        ebpo_publish_expect_input(&out, &file->in);
         status = ebpo_file_read_tree(file, read, &tree, error);
+    }
     if (status == EBPO_OK)
         status = ebpo_tree_write_into(&tree, ebpo_publish_path(&out), path, &wanted, error);
     ebpo_tree_free(&tree);

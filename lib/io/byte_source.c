@@ -97,6 +97,12 @@ ebpo_status ebpo_source_of_path(ebpo_source *out, const char *path, ebpo_error *
     return EBPO_OK;
 }
 
+int ebpo_input_descriptor(const ebpo_input *input)
+{
+    const path_source *s = input->source.user;
+    return input->source.read == path_read && strcmp(s->path, input->shown) == 0 ? s->fd : -1;
+}
+
 bool ebpo_input_hints(const ebpo_input *input)
 {
 #ifdef POSIX_FADV_WILLNEED

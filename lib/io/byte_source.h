@@ -34,6 +34,10 @@ void ebpo_input_close(ebpo_input *input);
 EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size,
                                           void *data, ebpo_error *error);
 
+/* Returns the descriptor of the file that it reads, which stays the input's; -1: it reads none, or
+ * a copy in place of the file that it is named after (open_compat.c). */
+int ebpo_input_descriptor(const ebpo_input *input);
+
 /* True when announcing is of use. */
 static inline bool ebpo_input_expects(const ebpo_input *input)
 {

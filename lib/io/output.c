@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "base/unnamed_file.h"
 #include "io/publish.h"
+#include "io/unfinished.h"
 
 ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebpo_error *error)
 {
@@ -68,6 +69,6 @@ ebpo_status ebpo_check_output(const char *path, ebpo_error *error)
 
 void ebpo_abandon_outputs(void)
 {
-    ebpo_publish_abandon_all();
+    ebpo_unfinished_remove();
     ebpo_workspace_abandon();
 }

@@ -12,45 +12,14 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "io/byte_source.h"
+#include "io/file_lock.h"
 #include "io/file_source.h"
 #include "io/replaced_facts.h"
 #include "io/stale_files.h"
-
-/* Names of the temporary files in the making. Fixed storage and lock-free states, because a signal
- * handler reads them. */
-enum { SLOT_FREE, SLOT_TAKEN, SLOT_LIVE };
-static struct slot {
-    atomic_int state;
-    char path[PATH_MAX];
-} slots[EBPO_PUBLISH_SLOTS];
+#include "io/unfinished.h"
 
 static atomic_uint name_counter;
-
-static int take_slot(void)
-{
-    for (int i = 0; i < EBPO_PUBLISH_SLOTS; i++) {
-        int expected = SLOT_FREE;
-        if (atomic_compare_exchange_strong(&slots[i].state, &expected, SLOT_TAKEN))
-            return i;
-    }
-    return -1;
-}
-
-static void release_slot(ebpo_publish *publish)
-{
-    if (publish->slot >= 0)
-        atomic_store(&slots[publish->slot].state, SLOT_FREE);
-    publish->slot = -1;
-}
-
-void ebpo_publish_abandon_all(void)
-{
-    int saved = errno;
-    for (int i = 0; i < EBPO_PUBLISH_SLOTS; i++)
-        if (atomic_load(&slots[i].state) == SLOT_LIVE)
-            unlink(slots[i].path);
-    errno = saved;
-}
 
 static ebpo_status check_target(ebpo_publish *publish, const char *path, ebpo_error *error)
 {
@@ -84,7 +53,7 @@ static ebpo_status resolve(ebpo_publish *publish, const char *path, ebpo_error *
     free(folder);
     if (!publish->folder)
         return ebpo_fail_errno(error, path, "the folder of the output cannot be used");
-    if (asprintf(&publish->target, "%s/%s", publish->folder, name) < 0) {
+    if (asprintf(&publish->target, "%s/%s", publish->folder[1] ? publish->folder : "", name) < 0) {
         publish->target = NULL;
         return ebpo_fail_memory(error, strlen(path));
     }
@@ -106,8 +75,7 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
                                   "the path is too long; write to a folder with a shorter one");
         /* Known to the signal handler before it exists, so that there is no moment in which it
          * would be left behind. */
-        strcpy(slots[publish->slot].path, publish->temporary);
-        atomic_store(&slots[publish->slot].state, SLOT_LIVE);
+        ebpo_unfinished_set(publish->slot, publish->temporary);
         /* What nobody else may read is not shown to others meanwhile. */
         publish->fd = open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW,
                            publish->mode < 0 ? 0666 : 0600);
@@ -115,7 +83,7 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
             (void)flock(publish->fd, LOCK_EX | LOCK_NB); /* for who looks for stale files */
             return EBPO_OK;
         }
-        atomic_store(&slots[publish->slot].state, SLOT_TAKEN);
+        ebpo_unfinished_unset(publish->slot);
         if (errno != EEXIST)
             break;
     }
@@ -133,10 +101,10 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
     ebpo_status status = check_target(&publish, path, error);
     if (status == EBPO_OK)
         status = resolve(&publish, path, error);
-    if (status == EBPO_OK && (publish.slot = take_slot()) < 0)
+    if (status == EBPO_OK && (publish.slot = ebpo_unfinished_reserve()) < 0)
         status =
             ebpo_fail_file(error, EBPO_E_LIMIT, path,
-                           "more than %d files are being written at a time", EBPO_PUBLISH_SLOTS);
+                           "more than %d files are being written at a time", EBPO_UNFINISHED_MOST);
     if (status == EBPO_OK) {
         ebpo_remove_stale_files(publish.folder, ebpo_path_name(publish.target));
         status = create_temporary(&publish, error);
@@ -147,6 +115,37 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
     }
     *out = publish;
     return EBPO_OK;
+}
+
+static ebpo_file_version version_of(const struct stat *st)
+{
+    return (ebpo_file_version){ true, st->st_dev, st->st_ino, st->st_size, st->st_mtim };
+}
+
+ebpo_file_version ebpo_file_version_of(int fd)
+{
+    struct stat st;
+    return fstat(fd, &st) == 0 ? version_of(&st) : (ebpo_file_version){ .there = false };
+}
+
+void ebpo_publish_expect(ebpo_publish *publish, const ebpo_file_version *expected, bool locked)
+{
+    publish->expects = true;
+    publish->locked = locked;
+    publish->expected = *expected;
+}
+
+void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input)
+{
+    struct stat st;
+    char *from = realpath(input->shown, NULL);
+    int fd = ebpo_input_descriptor(input);
+    bool in_place = from && strcmp(from, publish->target) == 0;
+    if (in_place && (fd >= 0 ? fstat(fd, &st) : lstat(publish->target, &st)) == 0) {
+        ebpo_file_version version = version_of(&st);
+        ebpo_publish_expect(publish, &version, false);
+    }
+    free(from);
 }
 
 const char *ebpo_publish_path(const ebpo_publish *publish) { return publish->temporary; }
@@ -220,8 +219,25 @@ static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
     return EBPO_OK;
 }
 
+/* Where nothing is at the target, nothing can be lost. */
+static bool is_expected(const ebpo_publish *publish)
+{
+    struct stat st;
+    const ebpo_file_version *e = &publish->expected;
+    if (!publish->expects || lstat(publish->target, &st) != 0)
+        return true;
+    ebpo_file_version now = version_of(&st);
+    return e->there && e->device == now.device && e->inode == now.inode && e->size == now.size &&
+           e->modified.tv_sec == now.modified.tv_sec && e->modified.tv_nsec == now.modified.tv_nsec;
+}
+
 static ebpo_status put_in_place(ebpo_publish *publish, ebpo_error *error)
 {
+    if (!is_expected(publish))
+        return ebpo_fail_file(
+            error, EBPO_E_IO, publish->shown,
+            "another program has written it since it was read, and it stays as it "
+            "is; read it again and repeat the change, or write to another file");
     if (rename(publish->temporary, publish->target) != 0)
         return ebpo_fail_errno(error, publish->shown,
                                "the finished temporary file could not be renamed to it");
@@ -240,9 +256,13 @@ static ebpo_status sync_name(const ebpo_publish *publish, ebpo_error *error)
 
 ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
 {
+    ebpo_file_lock lock = EBPO_FILE_LOCK_INIT;
     ebpo_status status = make_ready(publish, error);
+    if (status == EBPO_OK && publish->expects && !publish->locked)
+        status = ebpo_file_lock_take(&lock, publish->target, EBPO_FILE_LOCK_SAVING, NULL, error);
     if (status == EBPO_OK)
         status = put_in_place(publish, error);
+    ebpo_file_lock_release(&lock);
     if (status == EBPO_OK)
         status = sync_name(publish, error);
     ebpo_publish_abort(publish);
@@ -276,14 +296,18 @@ static ebpo_status take_back(ebpo_publish *first, bool exchanged, bool fresh, eb
 ebpo_status ebpo_publish_commit_pair(ebpo_publish *first, ebpo_publish *second, ebpo_error *error)
 {
     ebpo_error cause = EBPO_ERROR_INIT;
+    ebpo_file_lock lock = EBPO_FILE_LOCK_INIT;
     ebpo_status status = make_ready(first, error);
     if (status == EBPO_OK)
         status = make_ready(second, error);
+    if (status == EBPO_OK)
+        status = ebpo_file_lock_take(&lock, first->target, EBPO_FILE_LOCK_SAVING, NULL, error);
     bool exchanged = status == EBPO_OK && exchange(first), fresh = !exchanged && errno == ENOENT;
     if (status == EBPO_OK && !exchanged)
         status = put_in_place(first, error);
     if (status == EBPO_OK && put_in_place(second, &cause) != EBPO_OK)
         status = take_back(first, exchanged, fresh, &cause, error);
+    ebpo_file_lock_release(&lock);
     if (status == EBPO_OK)
         status = sync_name(first, error);
     if (status == EBPO_OK && strcmp(first->folder, second->folder) != 0)
@@ -298,7 +322,7 @@ void ebpo_publish_abort(ebpo_publish *publish)
     close_writer(publish);
     if (publish->temporary)
         unlink(publish->temporary);
-    release_slot(publish);
+    ebpo_unfinished_forget(publish->slot);
     free(publish->shown);
     free(publish->folder);
     free(publish->target);

@@ -12,6 +12,23 @@
 
 #include <ebpo/base.h>
 #include <stdio.h>
+#include <time.h>
+#include <sys/types.h>
+
+#include "io/byte_source.h"
+
+/* Which version of a file is at a path. */
+typedef struct ebpo_file_version {
+    bool there; /* false: no file; the rest does not count */
+    dev_t device;
+    ino_t inode;
+    off_t size;
+    struct timespec modified;
+} ebpo_file_version;
+
+/* Returns the version of an open file. While the descriptor is open, no later file can have the
+ * same inode. */
+ebpo_file_version ebpo_file_version_of(int fd);
 
 typedef struct ebpo_publish {
     char *shown;  /* the target as the caller named it, for messages */
@@ -23,11 +40,14 @@ typedef struct ebpo_publish {
     int fd;       /* of the temporary file */
     int slot;     /* in the registry of temporary files */
     int mode;     /* of the file that was there at the beginning; -1: there was none */
+    bool expects; /* that `expected` is still what is at the target when it is replaced */
+    bool locked;  /* by the caller */
+    ebpo_file_version expected;
 } ebpo_publish;
 
-#define EBPO_PUBLISH_INIT                              \
-    {                                                  \
-        NULL, NULL, NULL, NULL, NULL, NULL, -1, -1, -1 \
+#define EBPO_PUBLISH_INIT                                                       \
+    {                                                                           \
+        NULL, NULL, NULL, NULL, NULL, NULL, -1, -1, -1, false, false, { false } \
     }
 
 /* Creates the temporary file, exclusively. An existing regular file at `path` is replaced on
@@ -36,10 +56,18 @@ typedef struct ebpo_publish {
  * old file. Where there is none, the mode is 0666 less the umask. A folder, device or symbolic link
  * at `path` is EBPO_E_IO, so is a folder that cannot be written. On failure nothing is left behind.
  * Temporary files for the same target that killed processes have left are removed.
- * More than EBPO_PUBLISH_SLOTS at a time in one process: EBPO_E_LIMIT. */
+ * More than EBPO_UNFINISHED_MOST at a time in one process: EBPO_E_LIMIT. */
 EBPO_MUST_USE ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path,
                                              ebpo_error *error);
-enum { EBPO_PUBLISH_SLOTS = 32 };
+
+/* For an output that was made from what is at its target: the commit replaces that version, or
+ * nothing, and fails with EBPO_E_IO where another program has put another version there. The two
+ * steps are under the target's lock (io/file_lock.h), which the caller has if `locked`. */
+void ebpo_publish_expect(ebpo_publish *publish, const ebpo_file_version *expected, bool locked);
+
+/* The same for an output that takes the place of `input`; does nothing for others. What is there
+ * now counts as the version where the input reads a copy. */
+void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input);
 
 /* Absolute name of the temporary file, for libraries that open by name (truncating is fine). Lent
  * until commit or abort. */
@@ -56,15 +84,12 @@ EBPO_MUST_USE ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error 
 
 /* The same for two files that belong together: both, or, on failure, neither (but when only the
  * sync of the folder failed). Where one cannot be exchanged for the other at once, as on some file
- * systems, the first may be in place when the second cannot be. */
+ * systems, the first may be in place when the second cannot be. Two programs that do this at once
+ * take turns: the files that are then there are of one of them. */
 EBPO_MUST_USE ebpo_status ebpo_publish_commit_pair(ebpo_publish *first, ebpo_publish *second,
                                                    ebpo_error *error);
 
 /* Closes and removes the temporary file. Harmless on EBPO_PUBLISH_INIT and after a commit. */
 void ebpo_publish_abort(ebpo_publish *publish);
-
-/* Removes every temporary file of this process that is neither committed nor aborted. Only calls
- * unlink: allowed in a signal handler. */
-void ebpo_publish_abandon_all(void);
 
 #endif

@@ -1,4 +1,5 @@
-/* Which faces a stroke reaches, and which of their corners it covers. */
+/* Which faces a stroke reaches, and which of their corners it covers; whether points fit a model.
+ */
 #include "geom/strict_fp.h"
 
 #include <ebpo/paint.h>
@@ -9,9 +10,11 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/parallel.h"
 #include "paint/met_faces.h"
 #include "paint/paint_parts.h"
 #include "paint/paint_reach.h"
+#include "query/query_model.h"
 
 static int by_file_face(const void *a, const void *b)
 {
@@ -75,5 +78,47 @@ ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_
     if (status == EBPO_OK)
         give(&met, take, user);
     ebpo_met_faces_free(&met);
+    return status;
+}
+
+/* --- all points --- */
+
+static ebpo_status check_point(ebpo_reach *reach, const ebpo_paint_point *q, const char *what,
+                               uint64_t number, ebpo_error *error)
+{
+    bool fits;
+    ebpo_status status = ebpo_reach_check(reach, q->place, q->face, &fits, error);
+    return status != EBPO_OK || fits
+               ? status
+               : ebpo_fail_file(
+                     error, EBPO_E_FORMAT, reach->context->model->file->in.shown,
+                     "%s %llu of the paint is not on face %lu, where it says to be: the "
+                     "paint does not fit the model; give the one that it was made on, or "
+                     "remove that %s without naming a model",
+                     what, (unsigned long long)number, (unsigned long)q->face, what);
+}
+
+ebpo_status ebpo_paint_check_points(const ebpo_paint *p, ebpo_context *context,
+                                    const ebpo_progress *progress, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    enum { STEP = 1024 };
+    ebpo_reach reach;
+    uint64_t done = 0;
+    ebpo_status status = ebpo_paint_check_context(p, context, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_reach_begin(&reach, context);
+    for (uint64_t i = 0; i < p->stroke_count && status == EBPO_OK; i++)
+        for (uint32_t k = 0; k < p->stroke[i].count && status == EBPO_OK; k++, done++) {
+            if (done % STEP == 0 &&
+                !ebpo_progress_step(progress, "checking", done, p->point_count, error))
+                status = EBPO_E_CANCELLED;
+            else
+                status = check_point(&reach, &p->point[p->stroke[i].first + k], "stroke", i, error);
+        }
+    for (uint64_t i = 0; i < p->note_count && status == EBPO_OK; i++)
+        status = check_point(&reach, &p->note[i].at, "note", i, error);
+    ebpo_reach_end(&reach);
     return status;
 }

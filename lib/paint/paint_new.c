@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
@@ -37,13 +38,38 @@ static ebpo_status check_mesh(const ebpo_file *model, ebpo_error *error)
                                 "paint on; build it again with that part");
 }
 
+ebpo_paint *ebpo_paint_begin(void)
+{
+    ebpo_paint *p = ebpo_alloc_zero(1, sizeof *p);
+    ebpo_paint_file *file = p ? ebpo_alloc_zero(1, sizeof *file) : NULL;
+    if (!file) {
+        free(p);
+        return NULL;
+    }
+    file->fd = -1;
+    file->lock = (ebpo_file_lock)EBPO_FILE_LOCK_INIT;
+    pthread_mutex_init(&file->mutex, NULL);
+    p->file = file;
+    return p;
+}
+
+static void free_file(ebpo_paint_file *file)
+{
+    ebpo_file_lock_release(&file->lock);
+    if (file->fd >= 0)
+        close(file->fd);
+    pthread_mutex_destroy(&file->mutex);
+    free(file->path);
+    free(file);
+}
+
 ebpo_status ebpo_paint_new(const ebpo_file *model, ebpo_paint **out, ebpo_error *error)
 {
     *out = NULL;
     ebpo_status status = check_mesh(model, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_paint *p = ebpo_alloc_zero(1, sizeof *p);
+    ebpo_paint *p = ebpo_paint_begin();
     if (!p)
         return ebpo_fail_memory(error, sizeof *p);
     const char *name = strrchr(model->in.shown, '/');
@@ -66,6 +92,7 @@ void ebpo_paint_free(ebpo_paint *p)
         ebpo_paint_texts_free(p->layer[i].text);
     for (uint64_t i = 0; i < p->note_count; i++)
         ebpo_paint_texts_free(p->note[i].text);
+    free_file(p->file);
     free(p->layer);
     free(p->note);
     free(p->stroke);

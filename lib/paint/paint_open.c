@@ -3,10 +3,13 @@
 
 #include <ebpo/paint.h>
 
+#include <errno.h>
+#include <fcntl.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/alloc.h"
 #include "base/endian.h"
@@ -350,12 +353,28 @@ static ebpo_status read_all(reader *r, ebpo_error *error)
     return status == EBPO_OK ? read_strokes(r, strokes, points, error) : status;
 }
 
+/* Remembers which version of which file is read. */
+static ebpo_status keep_version(const reader *r, ebpo_error *error)
+{
+    ebpo_paint_file *f = r->p->file;
+    int fd = ebpo_input_descriptor(&r->input);
+    char *path = fd >= 0 ? realpath(r->input.shown, NULL) : NULL;
+    if (!path) /* memory, or a file without a name by now */
+        return EBPO_OK;
+    f->path = path;
+    f->fd = fcntl(fd, F_DUPFD_CLOEXEC, 3);
+    if (f->fd < 0)
+        return ebpo_fail_errno(error, r->input.shown, "cannot be opened");
+    f->version = ebpo_file_version_of(f->fd);
+    return EBPO_OK;
+}
+
 /* Takes the source over. */
 static ebpo_status open_source(const ebpo_source *source, const char *name, ebpo_paint **out,
                                ebpo_error *error)
 {
     reader *r = ebpo_alloc_zero(1, sizeof *r);
-    ebpo_paint *p = ebpo_alloc_zero(1, sizeof *p);
+    ebpo_paint *p = ebpo_paint_begin();
     ebpo_status status = r && p ? EBPO_OK : ebpo_fail_memory(error, sizeof *r + sizeof *p);
     if (status == EBPO_OK)
         status = ebpo_input_open(&r->input, source, name, error);
@@ -363,7 +382,9 @@ static ebpo_status open_source(const ebpo_source *source, const char *name, ebpo
         source->close(source->user);
     if (status == EBPO_OK) {
         r->p = p;
-        status = ebpo_head_open(&r->head, &r->input, error);
+        status = keep_version(r, error);
+        if (status == EBPO_OK)
+            status = ebpo_head_open(&r->head, &r->input, error);
         if (status == EBPO_OK)
             status = read_all(r, error);
         status = ebpo_head_close(&r->head, status, error);
@@ -377,13 +398,56 @@ static ebpo_status open_source(const ebpo_source *source, const char *name, ebpo
     return status;
 }
 
+static ebpo_status open_path(const char *path, ebpo_paint **out, ebpo_error *error)
+{
+    ebpo_source source;
+    ebpo_status status = ebpo_source_of_path(&source, path, error);
+    return status == EBPO_OK ? open_source(&source, path, out, error) : status;
+}
+
 ebpo_status ebpo_paint_open(const char *path, ebpo_paint **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_source source;
     *out = NULL;
-    ebpo_status status = ebpo_source_of_path(&source, path, error);
-    return status == EBPO_OK ? open_source(&source, path, out, error) : status;
+    return open_path(path, out, error);
+}
+
+/* Makes the paint of a file that is not there. Its path is known, so that saving it replaces no
+ * file that another program has made there meanwhile. */
+static ebpo_status make_at(const char *path, const ebpo_file *model, ebpo_paint **out,
+                           ebpo_error *error)
+{
+    ebpo_publish publish = EBPO_PUBLISH_INIT;
+    ebpo_status status = ebpo_publish_begin(&publish, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_new(model, out, error);
+    if (status == EBPO_OK) {
+        (*out)->file->path = publish.target;
+        publish.target = NULL;
+    }
+    ebpo_publish_abort(&publish);
+    return status;
+}
+
+ebpo_status ebpo_paint_open_to_change(const char *path, const ebpo_file *model, double wait,
+                                      const ebpo_progress *progress, ebpo_paint **out,
+                                      ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_file_lock lock = EBPO_FILE_LOCK_INIT;
+    *out = NULL;
+    if (!(wait >= 0))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the time to wait is negative or no number");
+    ebpo_status status = ebpo_file_lock_take(&lock, path, wait, progress, error);
+    if (status == EBPO_OK)
+        status = model && access(path, F_OK) != 0 && errno == ENOENT
+                     ? make_at(path, model, out, error)
+                     : open_path(path, out, error);
+    if (status == EBPO_OK)
+        (*out)->file->lock = lock;
+    else
+        ebpo_file_lock_release(&lock);
+    return status;
 }
 
 ebpo_status ebpo_paint_open_memory(const void *data, uint64_t size, const char *name,

@@ -4,6 +4,11 @@
 
 #include <ebpo/paint.h>
 
+#include <pthread.h>
+
+#include "io/file_lock.h"
+#include "io/publish.h"
+
 #define EBPO_PAINT_FORMAT "EBP-Octree paint 1"
 #define EBPO_PAINT_MOST   0x1p200 /* of places and radii */
 
@@ -46,7 +51,18 @@ typedef struct ebpo_stroke_held {
     uint8_t rgba[4];
 } ebpo_stroke_held;
 
+/* The file that a paint belongs to: which version of it the paint was read from, or saved as.
+ * Saving changes it, and not the paint. */
+typedef struct ebpo_paint_file {
+    pthread_mutex_t mutex; /* of the rest, while saving */
+    char *path;            /* absolute; NULL: none yet */
+    int fd;                /* of the version, so that no later one can get its inode; -1: no file */
+    ebpo_file_version version;
+    ebpo_file_lock lock; /* while it is open to change */
+} ebpo_paint_file;
+
 struct ebpo_paint {
+    ebpo_paint_file *file;
     char generator[64], model_sha256[65], model_name[256], unit[32];
     bool source_numbers;
     ebpo_layer_held *layer;
@@ -76,6 +92,9 @@ const char *ebpo_paint_stroke_wrong(const ebpo_stroke_held *stroke, uint64_t lay
 /* Empty texts for a layer or a note. False: no memory. */
 bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS]);
 void ebpo_paint_texts_free(char *text[EBPO_PAINT_TEXTS]);
+
+/* An empty paint, without a file. NULL: no memory. */
+ebpo_paint *ebpo_paint_begin(void);
 
 /* EBPO_E_ARGUMENT where the context's model is another one, or too far from 0. */
 EBPO_MUST_USE ebpo_status ebpo_paint_check_context(const ebpo_paint *paint,

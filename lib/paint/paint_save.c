@@ -3,10 +3,12 @@
 
 #include <ebpo/paint.h>
 
+#include <fcntl.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/alloc.h"
 #include "base/endian.h"
@@ -158,12 +160,33 @@ static uint64_t head_bytes(const ebpo_paint *p)
     return sum;
 }
 
-ebpo_status ebpo_paint_save(const ebpo_paint *p, const char *path, ebpo_error *error)
+/* After a save: the file at `path` is the paint's. */
+static void take_version(ebpo_paint_file *f, char *path, int fd)
+{
+    if (f->fd >= 0)
+        close(f->fd);
+    free(f->path);
+    f->path = path;
+    f->fd = fd;
+    f->version = ebpo_file_version_of(fd);
+}
+
+static ebpo_status save(const ebpo_paint *p, const char *path, ebpo_error *error)
 {
     enum { LINKS = 4 };
+    ebpo_paint_file *f = p->file;
     ebpo_publish publish = EBPO_PUBLISH_INIT;
     ebpo_h5_out out = EBPO_H5_OUT_INIT;
     ebpo_status status = ebpo_publish_begin(&publish, path, error);
+    if (status != EBPO_OK) {
+        ebpo_file_lock_release(&f->lock);
+        return status;
+    }
+    bool own = f->path && strcmp(f->path, publish.target) == 0, first = !f->path;
+    char *place = own || first ? strdup(publish.target) : NULL;
+    int fd = place ? fcntl(publish.fd, F_DUPFD_CLOEXEC, 3) : -1;
+    if ((own || first) && fd < 0)
+        status = ebpo_fail_errno(error, path, "could not be written");
     if (status == EBPO_OK)
         status =
             ebpo_h5_create(&out, ebpo_publish_path(&publish), path, head_bytes(p), LINKS, error);
@@ -172,8 +195,27 @@ ebpo_status ebpo_paint_save(const ebpo_paint *p, const char *path, ebpo_error *e
     if (status == EBPO_OK)
         status = ebpo_h5_finish(&out, error);
     ebpo_h5_discard(&out);
+    if (own)
+        ebpo_publish_expect(&publish, &f->version, f->lock.fd >= 0);
     if (status == EBPO_OK)
         status = ebpo_publish_commit(&publish, error);
     ebpo_publish_abort(&publish);
+    if (own) /* also where it failed: others need not wait for a paint that is kept in memory */
+        ebpo_file_lock_release(&f->lock);
+    if (status == EBPO_OK && fd >= 0) {
+        take_version(f, place, fd);
+    } else {
+        free(place);
+        if (fd >= 0)
+            close(fd);
+    }
+    return status;
+}
+
+ebpo_status ebpo_paint_save(const ebpo_paint *p, const char *path, ebpo_error *error)
+{
+    pthread_mutex_lock(&p->file->mutex);
+    ebpo_status status = save(p, path, error);
+    pthread_mutex_unlock(&p->file->mutex);
     return status;
 }

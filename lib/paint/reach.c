@@ -247,23 +247,49 @@ static ebpo_status fail_place(const ebpo_reach *r, uint64_t face, ebpo_error *er
                           (unsigned long long)face);
 }
 
-ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *here,
-                            ebpo_error *error)
+/* Gathers what is around, and finds the face among it. *on: the place is on it. */
+static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *here, bool *on,
+                             ebpo_error *error)
 {
     const bool subset = r->context->model->info->pruned;
     ebpo_face_near near;
     ebpo_error cause = EBPO_ERROR_INIT;
-    *here = false;
+    *here = *on = false;
     ebpo_status status = gather(r, ball, &cause);
     if (status == EBPO_E_ABSENT && subset) /* what hangs together is not known there */
         return EBPO_OK;
     if (status != EBPO_OK)
         return ebpo_fail_with(error, &cause);
-    if (!find_own(r, ball->face))
-        return subset ? EBPO_OK : fail_place(r, ball->face, error);
+    bool found = find_own(r, ball->face);
+    *here = found || !subset;
+    if (!found)
+        return EBPO_OK;
     ebpo_face_nearest(ball->place, (const double(*)[3])r->face[r->own].corner, &near);
-    if (!(near.distance <= r->tolerance))
+    *on = near.distance <= r->tolerance;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_reach_check(ebpo_reach *r, const double place[3], uint64_t face, bool *fits,
+                             ebpo_error *error)
+{
+    const ebpo_reach_ball ball = { { place[0], place[1], place[2] }, 0, face };
+    bool here, on;
+    ebpo_status status = find_face(r, &ball, &here, &on, error);
+    *fits = on || !here;
+    return status;
+}
+
+ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *here,
+                            ebpo_error *error)
+{
+    bool on;
+    ebpo_status status = find_face(r, ball, here, &on, error);
+    if (status != EBPO_OK || !*here)
+        return status;
+    if (!on) {
+        *here = false;
         return fail_place(r, ball->face, error);
+    }
     if (!make_room(r))
         return ebpo_fail_memory(error, r->count * 150);
     find_positions(r, ball);
@@ -271,6 +297,5 @@ ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *he
     memset(r->slot, 0, r->slots * sizeof *r->slot);
     join_at_edges(r, ball);
     keep_reach(r);
-    *here = true;
     return EBPO_OK;
 }

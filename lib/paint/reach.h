@@ -53,6 +53,10 @@ void ebpo_reach_end(ebpo_reach *reach);
 EBPO_MUST_USE ebpo_status ebpo_reach_find(ebpo_reach *reach, const ebpo_reach_ball *ball,
                                           bool *here, ebpo_error *error);
 
+/* Sets *fits to whether a place is on that face, or may be where a subset is pruned. */
+EBPO_MUST_USE ebpo_status ebpo_reach_check(ebpo_reach *reach, const double place[3], uint64_t face,
+                                           bool *fits, ebpo_error *error);
+
 /* Whether a place is within: section 4. */
 static inline bool ebpo_ball_holds(const double centre[3], double square, const double q[3])
 {

@@ -23,6 +23,7 @@ ebpo_status ebpo_subset(const ebpo_file *file, const char *path, const ebpo_subs
 {
     EBPO_DEFAULT_FP;
     ebpo_subset_options wanted = EBPO_SUBSET_OPTIONS_INIT;
+    ebpo_publish out = EBPO_PUBLISH_INIT;
     ebpo_tree tree;
     ebpo_status status = EBPO_TAKE(ebpo_subset_options, &wanted, options, error);
     if (status != EBPO_OK)
@@ -33,8 +34,15 @@ ebpo_status ebpo_subset(const ebpo_file *file, const char *path, const ebpo_subs
     if (status != EBPO_OK)
         return status;
     ebpo_write_options write = ebpo_subset_write_options(&wanted);
-    status = ebpo_tree_write(&tree, path, &write, error);
+    status = ebpo_publish_begin(&out, path, error);
+    if (status == EBPO_OK) {
+        ebpo_publish_expect_input(&out, &file->in);
+        status = ebpo_tree_write_into(&tree, ebpo_publish_path(&out), path, &write, error);
+    }
     ebpo_tree_free(&tree);
+    if (status == EBPO_OK)
+        status = ebpo_publish_commit(&out, error);
+    ebpo_publish_abort(&out);
     return status;
 }
 

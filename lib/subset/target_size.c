@@ -164,8 +164,10 @@ ebpo_status ebpo_subset_fit(const ebpo_file *file, const char *path, ebpo_subset
     if (status == EBPO_OK && !done)
         status = find_error(&f);
     ebpo_tolerance_close(f.need);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK) {
+        ebpo_publish_expect_input(&f.best, &file->in);
         status = ebpo_publish_commit(&f.best, error);
+    }
     ebpo_publish_abort(&f.best);
     ebpo_publish_abort(&f.trial);
     return status;

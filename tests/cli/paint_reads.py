@@ -3,6 +3,8 @@
 
 paint_reads.py vectors           all of format-spec/vectors/paint, read and refused
 paint_reads.py areas PAINT MODEL    each layer's area against points strewn over faces
+paint_reads.py moved PAINT OUT   writes a paint with a point of stroke 1 beside its face, and right checksums
+paint_reads.py waits PAINT       a change waits for another program's lock
 paint_reads.py baked PAINT MODEL PLY [GLB]    MODEL: without filters of one's own (convert --codec deflate)
 
 Baked colours are compared bit for bit with those that the reader finds by going from face to face, and
@@ -158,8 +160,33 @@ def baked(paint_path, model, out, glb=None):
     return wrong
 
 
+def moved(paint_path, out):
+    import h5py
+    pathlib.Path(out).write_bytes(pathlib.Path(paint_path).read_bytes())
+    with h5py.File(out, "r+") as file:
+        places = file["/points/place"][:]
+        places.view("<f8")[file["/strokes/points"][0], 0] += .25
+        file["/points/place"][:] = places
+    return []
+
+
+def waits(paint_path):
+    import fcntl
+    name, wrong = pathlib.Path(f".{paint_path}.lock"), []
+    with open(name, "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        change = subprocess.Popen(["ebpo", "paint", "-q", paint_path, "--layer", "0", "--title", "X"])
+        try:
+            wrong.append(f"it did not wait: {change.wait(0.5)}")
+        except subprocess.TimeoutExpired:
+            name.unlink()
+    if change.wait(60) != 0 or name.exists():
+        wrong.append(f"it has waited, and failed: {change.returncode}")
+    return wrong
+
+
 def main(words):
-    wrong = {"vectors": vectors, "areas": areas, "baked": baked}[words[0]](*words[1:])
+    wrong = {"vectors": vectors, "areas": areas, "baked": baked, "moved": moved, "waits": waits}[words[0]](*words[1:])
     print("\n".join(wrong) or "fine")
 
 

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+import unittest.mock
 import weakref
 
 try:
@@ -172,6 +173,23 @@ class Files(Case):
         ed.to_file(ed.inside("scan.ebpo.h5", P[:1000], chunk=4), "many.npy", scheduler="sync")
         np.testing.assert_array_equal(load("many.npy"), model("scan").inside(P[:1000]))
         self.assertTrue(1 <= most[0] <= 3, most)
+
+    def test_two_that_begin_one_folder(self):
+        """The question of the one that comes later is compared with the other's, and does not replace it."""
+        from ebpo.stretches import published
+        inside, other = (ed.inside("scan.ebpo.h5", P[:n], chunk=100) for n in (300, 200))
+        folder = pathlib.Path("begun.npy.parts")
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        ed.begin_parts(folder, inside)
+        before = (folder / "question.json").read_bytes()
+        with self.assertRaises(FileExistsError), published(folder / "question.json", new=True) as file:
+            file.write(b"{}")
+        with unittest.mock.patch.object(pathlib.Path, "exists", side_effect=[False]), \
+                unittest.mock.patch.object(pathlib.Path, "iterdir", return_value=[]):
+            with self.assertRaisesRegex(ValueError, "another question"):
+                ed.begin_parts(folder, other)
+        self.assertEqual((folder / "question.json").read_bytes(), before)
+        self.assertEqual(len([*folder.iterdir()]), 1)
 
     def test_what_is_no_chunk_is_not_joined(self):
         inside = ed.inside("scan.ebpo.h5", P[:300], chunk=100)

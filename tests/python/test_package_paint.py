@@ -3,6 +3,7 @@
 import json
 import pathlib
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 
 from package_kit import COMMAND, Case, model, np, run
 
@@ -40,6 +41,43 @@ class Painting(Case):
         self.assertIn('"First"', json.dumps(told))
         with self.assertRaises(ebpo.FormatError):
             ebpo.Paint.open(b"no such file" * 50)
+
+    def test_two_that_change_one_file(self):
+        """Two that were opened and saved: the second is refused. In turns, all changes are there."""
+        m, paint = self.painted()
+        paint.save("two.paint.h5")
+        one, other = ebpo.Paint.open("two.paint.h5"), ebpo.Paint.open("two.paint.h5")
+        one.add_layer(title="One")
+        other.add_layer(title="Other")
+        one.save("two.paint.h5")
+        for late in other, paint:
+            with self.assertRaisesRegex(ebpo.IOFailure, "another program has written it since it was read"):
+                late.save("two.paint.h5")
+        other.save("copy.paint.h5")
+        self.assertEqual([layer["title"] for layer in ebpo.Paint.open("two.paint.h5").layers][2:], ["One"])
+
+        def add(number):
+            with ebpo.Paint.change("turns.paint.h5", m) as changed:
+                changed.add_layer(title=f"L{number}")
+
+        with ThreadPoolExecutor(6) as pool:
+            list(pool.map(add, range(12)))
+        commands = [subprocess.Popen([COMMAND, "paint", "-q", "turns.paint.h5", "--layer", "0", "--title", f"C{i}"])
+                    for i in range(2)]
+        add(12)
+        self.assertEqual([command.wait() for command in commands], [0, 0])
+        titles = {layer["title"] for layer in ebpo.Paint.open("turns.paint.h5").layers}
+        self.assertEqual(len(titles), 13)
+        with self.assertRaises(ZeroDivisionError), ebpo.Paint.change("turns.paint.h5") as changed:
+            changed.add_layer(title="never")
+            with self.assertRaisesRegex(ebpo.IOFailure, "has been changing it"):
+                with ebpo.Paint.change("turns.paint.h5", wait=.1):
+                    pass
+            1 / 0
+        with self.assertRaisesRegex(ValueError, "ended with an exception"):
+            changed.save("never.paint.h5")
+        self.assertEqual(len(ebpo.Paint.open("turns.paint.h5").layers), 13)
+        self.assertEqual([*pathlib.Path().glob(".*.lock")], [])
 
     def test_answers(self):
         m, paint = self.painted()

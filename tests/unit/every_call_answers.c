@@ -516,6 +516,12 @@ static ebpo_status keep_paint(ebpo_paint *paint, ebpo_error *error)
     ebpo_paint_note note = EBPO_PAINT_NOTE_INIT;
     ebpo_status status = ebpo_paint_save(paint, scratch("every.paint.h5"), error);
     if (status == EBPO_OK)
+        status = ebpo_paint_open_to_change(scratch("every.paint.h5"), NULL, 0, NULL, &read, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_save(read, scratch("every.paint.h5"), error);
+    ebpo_paint_free(read);
+    read = NULL;
+    if (status == EBPO_OK)
         status = ebpo_paint_open(scratch("every.paint.h5"), &read, error);
     if (status != EBPO_OK)
         return status;
@@ -555,6 +561,8 @@ static ebpo_status call_paint(every_call_env *e)
         status = ebpo_paint_add_layer(paint, NULL, NULL, e->error);
     if (status == EBPO_OK)
         status = ask_paint(paint, context, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_check_points(paint, context, NULL, e->error);
     if (status == EBPO_OK)
         status = bake_paint(paint, e->file, context, e->error);
     if (status == EBPO_OK)

@@ -11,8 +11,10 @@
 #include <unistd.h>
 
 #include "check_main.h"
+#include "io/file_lock.h"
 #include "io/file_source.h"
 #include "io/publish.h"
+#include "io/unfinished.h"
 #include "scratch.h"
 
 static const char *folder, *target;
@@ -132,12 +134,12 @@ END_TEST
 
 START_TEST(more_outputs_than_slots_are_refused_and_slots_come_back)
 {
-    ebpo_publish out[EBPO_PUBLISH_SLOTS], last;
+    ebpo_publish out[EBPO_UNFINISHED_MOST], last;
     for (int round = 0; round < 2; round++) {
-        for (int i = 0; i < EBPO_PUBLISH_SLOTS; i++)
+        for (int i = 0; i < EBPO_UNFINISHED_MOST; i++)
             ck_assert(ebpo_publish_begin(&out[i], target, NULL) == EBPO_OK);
         ck_assert(ebpo_publish_begin(&last, target, NULL) == EBPO_E_LIMIT);
-        for (int i = 0; i < EBPO_PUBLISH_SLOTS; i++)
+        for (int i = 0; i < EBPO_UNFINISHED_MOST; i++)
             ebpo_publish_abort(&out[i]);
     }
     ck_assert(scratch_entries() == 0);
@@ -147,7 +149,7 @@ END_TEST
 static void on_signal(int number)
 {
     (void)number;
-    ebpo_publish_abandon_all();
+    ebpo_unfinished_remove();
     _exit(3);
 }
 
@@ -166,6 +168,101 @@ START_TEST(signal_handler_removes_what_is_unfinished)
     int status;
     ck_assert(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 3);
     ck_assert(scratch_entries() == 1);
+}
+END_TEST
+
+/* --- locks, and outputs made from what they replace --- */
+
+START_TEST(a_lock_is_waited_for_and_leaves_no_file)
+{
+    ebpo_file_lock lock, other;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert(ebpo_file_lock_take(&lock, target, 0, NULL, NULL) == EBPO_OK && lock.fd >= 0);
+    ck_assert(ebpo_file_lock_take(&other, target, 0.1, NULL, &error) == EBPO_E_IO);
+    ck_assert(other.fd == -1 && strstr(error.message, "has been changing it for 0.1 s") != NULL);
+    ebpo_file_lock_release(&lock);
+    ck_assert(scratch_entries() == 0);
+    ck_assert(ebpo_file_lock_take(&other, target, 0, NULL, NULL) == EBPO_OK && other.fd >= 0);
+    ebpo_file_lock_release(&other);
+}
+END_TEST
+
+static bool stop(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    (void)done, (void)total;
+    ++*(int *)user;
+    return strcmp(stage, "waiting") != 0;
+}
+
+START_TEST(waiting_for_a_lock_can_be_cancelled)
+{
+    ebpo_file_lock lock, other;
+    int calls = 0;
+    const ebpo_progress progress = { stop, &calls };
+    ck_assert(ebpo_file_lock_take(&lock, target, 0, &progress, NULL) == EBPO_OK);
+    ck_assert(ebpo_file_lock_take(&other, target, 60, &progress, NULL) == EBPO_E_CANCELLED);
+    ck_assert(calls == 1);
+    ebpo_file_lock_release(&lock);
+}
+END_TEST
+
+/* The number in the file, one more by each of many: all of them are there in the end. */
+static int count_up(void)
+{
+    for (int i = 0; i < 25; i++) {
+        ebpo_file_lock lock;
+        char text[16] = "0";
+        if (ebpo_file_lock_take(&lock, target, 60, NULL, NULL) != EBPO_OK || lock.fd < 0)
+            return 1;
+        FILE *f = fopen(target, "r");
+        if (!f || !fgets(text, sizeof text, f) || fclose(f) != 0)
+            return 2;
+        snprintf(text, sizeof text, "%d", atoi(text) + 1);
+        if (ebpo_write_file(target, text, strlen(text), NULL) != EBPO_OK)
+            return 3;
+        ebpo_file_lock_release(&lock);
+    }
+    return 0;
+}
+
+START_TEST(processes_with_a_lock_take_turns)
+{
+    enum { PROCESSES = 4 };
+    pid_t child[PROCESSES];
+    int status;
+    write_file(target, "0");
+    for (int i = 0; i < PROCESSES; i++)
+        if ((child[i] = fork()) == 0)
+            _exit(count_up());
+    for (int i = 0; i < PROCESSES; i++)
+        ck_assert(waitpid(child[i], &status, 0) == child[i] && status == 0);
+    check_content(target, "100");
+    ck_assert(scratch_entries() == 1);
+}
+END_TEST
+
+START_TEST(an_output_replaces_only_what_it_was_made_from)
+{
+    ebpo_publish out;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_whole_file read;
+    write_file(target, "old");
+    ck_assert(ebpo_whole_file_open(&read, target, NULL) == EBPO_OK);
+    ebpo_file_version version = ebpo_file_version_of(read.fd);
+    for (int changed = 0; changed < 2; changed++) {
+        ck_assert(ebpo_publish_begin(&out, target, NULL) == EBPO_OK);
+        ebpo_publish_expect(&out, &version, false);
+        fputs("new", ebpo_publish_stream(&out));
+        if (changed)
+            ck_assert(ebpo_write_file(target, "her", 3, NULL) == EBPO_OK);
+        else
+            ck_assert(ebpo_publish_commit(&out, NULL) == EBPO_OK);
+    }
+    ck_assert(ebpo_publish_commit(&out, &error) == EBPO_E_IO);
+    ck_assert(strstr(error.message, "another program has written it since it was read") != NULL);
+    check_content(target, "her");
+    ck_assert(scratch_entries() == 1);
+    ebpo_whole_file_close(&read);
 }
 END_TEST
 
@@ -273,6 +370,10 @@ Suite *test_suite(void)
     tcase_add_test(tests, targets_that_cannot_be_replaced_are_refused);
     tcase_add_test(tests, more_outputs_than_slots_are_refused_and_slots_come_back);
     tcase_add_test(tests, signal_handler_removes_what_is_unfinished);
+    tcase_add_test(tests, a_lock_is_waited_for_and_leaves_no_file);
+    tcase_add_test(tests, waiting_for_a_lock_can_be_cancelled);
+    tcase_add_test(tests, processes_with_a_lock_take_turns);
+    tcase_add_test(tests, an_output_replaces_only_what_it_was_made_from);
     tcase_add_test(tests, empty_file_is_read_as_no_bytes);
     tcase_add_test(tests, replaced_output_keeps_extended_attributes_and_mode);
     tcase_add_test(tests, change_while_reading_is_noticed);

@@ -1,8 +1,10 @@
 /* Paint: what a file keeps, what a ball reaches, areas against closed forms, strokes from a hand's
  * way. How vertices are coloured is compared with a twin in Python by tests/cli/paint.tests. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <ebpo/ebpo.h>
 
@@ -173,6 +175,133 @@ START_TEST(files_give_back_what_they_hold)
     model_must(ebpo_paint_open(scratch("p.paint.h5"), &read, &error), "reading", &error);
     same_paint(o.paint, read);
     ebpo_paint_free(read);
+    close_model(&o);
+}
+END_TEST
+
+/* --- two that have the same file open --- */
+
+static ebpo_paint *opened_paint(void)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint *p = NULL;
+    model_must(ebpo_paint_open(scratch("p.paint.h5"), &p, &error), "reading", &error);
+    return p;
+}
+
+static uint64_t layers_of(const ebpo_paint *p)
+{
+    ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
+    ck_assert(ebpo_paint_get_info(p, &info) == EBPO_OK);
+    return info.layer_count;
+}
+
+START_TEST(the_second_of_two_that_save_one_file_is_refused)
+{
+    opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
+    ebpo_error error = EBPO_ERROR_INIT;
+    model_must(ebpo_paint_save(o.paint, scratch("p.paint.h5"), &error), "saving", &error);
+    ebpo_paint *one = opened_paint(), *other = opened_paint();
+    ck_assert(ebpo_paint_add_layer(one, NULL, NULL, NULL) == EBPO_OK);
+    model_must(ebpo_paint_save(one, scratch("p.paint.h5"), &error), "saving", &error);
+    /* so is the one that made the file, which has not read it again either */
+    ck_assert(ebpo_paint_save(other, scratch("p.paint.h5"), &error) == EBPO_E_IO);
+    ck_assert(strstr(error.message, "another program has written it") != NULL);
+    ck_assert(ebpo_paint_save(o.paint, scratch("p.paint.h5"), NULL) == EBPO_E_IO);
+    /* who has saved it may save it again, and copies go everywhere */
+    model_must(ebpo_paint_save(one, scratch("p.paint.h5"), &error), "saving", &error);
+    model_must(ebpo_paint_save(other, scratch("q.paint.h5"), &error), "saving", &error);
+    model_must(ebpo_paint_save(other, scratch("q.paint.h5"), &error), "saving", &error);
+    ck_assert(ebpo_paint_save(other, scratch("p.paint.h5"), NULL) == EBPO_E_IO);
+    ebpo_paint_free(one);
+    ebpo_paint_free(other);
+    one = opened_paint();
+    ck_assert(layers_of(one) == 2);
+    /* a file that is gone is made anew */
+    ck_assert(unlink(scratch("p.paint.h5")) == 0);
+    model_must(ebpo_paint_save(one, scratch("p.paint.h5"), &error), "saving", &error);
+    ebpo_paint_free(one);
+    close_model(&o);
+}
+END_TEST
+
+START_TEST(a_file_that_is_changed_in_its_place_is_not_replaced)
+{
+    opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
+    ebpo_error error = EBPO_ERROR_INIT;
+    model_must(ebpo_paint_save(o.paint, scratch("p.paint.h5"), &error), "saving", &error);
+    ebpo_paint *p = opened_paint();
+    FILE *f = fopen(scratch("p.paint.h5"), "ab");
+    ck_assert(f && fputc(0, f) == 0 && fclose(f) == 0);
+    ck_assert(ebpo_paint_save(p, scratch("p.paint.h5"), NULL) == EBPO_E_IO);
+    ebpo_paint_free(p);
+    close_model(&o);
+}
+END_TEST
+
+START_TEST(one_at_a_time_has_a_file_open_to_change)
+{
+    opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint *one = NULL, *other = NULL;
+    const char *path = scratch("p.paint.h5");
+    ck_assert(ebpo_paint_open_to_change(path, NULL, 0, NULL, &one, &error) == EBPO_E_IO);
+    ck_assert(ebpo_paint_open_to_change(path, NULL, NAN, NULL, &one, NULL) == EBPO_E_ARGUMENT);
+    /* a new one: others wait for it, too */
+    model_must(ebpo_paint_open_to_change(path, o.file, 0, NULL, &one, &error), "new", &error);
+    ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, &error) == EBPO_E_IO);
+    ck_assert(strstr(error.message, "another program has been changing it") && !other);
+    ck_assert(ebpo_paint_add_layer(one, NULL, NULL, NULL) == EBPO_OK);
+    model_must(ebpo_paint_save(one, path, &error), "saving", &error);
+    /* saved: the next one has its turn, and reads what was saved */
+    model_must(ebpo_paint_open_to_change(path, o.file, 0, NULL, &other, &error), "next", &error);
+    ck_assert(layers_of(other) == 1 && ebpo_paint_add_layer(other, NULL, NULL, NULL) == EBPO_OK);
+    ebpo_paint_free(other); /* without saving */
+    model_must(ebpo_paint_open_to_change(path, NULL, 0, NULL, &other, &error), "next", &error);
+    model_must(ebpo_paint_save(other, path, &error), "saving", &error);
+    ck_assert(ebpo_paint_save(one, path, &error) == EBPO_E_IO);
+    ebpo_paint_free(one);
+    ebpo_paint_free(other);
+    close_model(&o);
+}
+END_TEST
+
+START_TEST(a_new_paint_does_not_replace_one_that_was_made_meanwhile)
+{
+    opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint *p = NULL;
+    model_must(ebpo_paint_open_to_change(scratch("p.paint.h5"), o.file, 0, NULL, &p, &error), "new",
+               &error);
+    /* by a program that knows of no locks */
+    ck_assert(ebpo_write_file(scratch("p.paint.h5"), "x", 1, NULL) == EBPO_OK);
+    ck_assert(ebpo_paint_save(p, scratch("p.paint.h5"), &error) == EBPO_E_IO);
+    ebpo_paint_free(p);
+    close_model(&o);
+}
+END_TEST
+
+START_TEST(points_are_checked_against_the_model)
+{
+    opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint_stroke s = EBPO_PAINT_STROKE_INIT;
+    ebpo_paint_note n = EBPO_PAINT_NOTE_INIT;
+    fill(&o);
+    model_must(ebpo_paint_check_points(o.paint, o.context, NULL, &error), "checking", &error);
+    ck_assert(ebpo_paint_get_stroke(o.paint, 0, &s) == EBPO_OK);
+    ebpo_paint_point q = s.points[0], far = q;
+    far.place[0] += 0.1;
+    s.points = &far;
+    ck_assert(ebpo_paint_add_stroke(o.paint, &s, NULL) == EBPO_OK);
+    ck_assert(ebpo_paint_check_points(o.paint, o.context, NULL, &error) == EBPO_E_FORMAT);
+    ck_assert(strstr(error.message, "stroke 12 of the paint is not on face") != NULL);
+    ck_assert(ebpo_paint_remove_stroke(o.paint, 12, NULL) == EBPO_OK);
+    n.at = q;
+    n.at.face = 1 << 20; /* which there is not */
+    ck_assert(ebpo_paint_add_note(o.paint, &n, NULL) == EBPO_OK);
+    ck_assert(ebpo_paint_check_points(o.paint, o.context, NULL, &error) == EBPO_E_FORMAT);
+    ck_assert(strstr(error.message, "note 3 of the paint is not on face 1048576") != NULL);
     close_model(&o);
 }
 END_TEST
@@ -536,6 +665,11 @@ Suite *test_suite(void)
     tcase_set_timeout(c, 600);
     tcase_add_checked_fixture(c, scratch_enter, scratch_leave);
     tcase_add_test(c, files_give_back_what_they_hold);
+    tcase_add_test(c, the_second_of_two_that_save_one_file_is_refused);
+    tcase_add_test(c, a_file_that_is_changed_in_its_place_is_not_replaced);
+    tcase_add_test(c, one_at_a_time_has_a_file_open_to_change);
+    tcase_add_test(c, a_new_paint_does_not_replace_one_that_was_made_meanwhile);
+    tcase_add_test(c, points_are_checked_against_the_model);
     tcase_add_test(c, what_is_removed_is_gone);
     tcase_add_test(c, what_is_wrong_is_refused);
     tcase_add_test(c, a_paint_of_another_model_is_refused);

@@ -469,6 +469,39 @@ START_TEST(threads_do_not_change_the_bytes)
 }
 END_TEST
 
+/* What another program has put in the place of a file that is open is not replaced by what is made
+ * of the old one. */
+START_TEST(files_made_in_place_of_another_are_refused)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT, fit = EBPO_SUBSET_OPTIONS_INIT;
+    query_model m;
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &usual);
+    char path[120], link[120];
+    snprintf(path, sizeof path, "%s/a.ebpo.h5", m.folder);
+    snprintf(link, sizeof link, "%s/link.ebpo.h5", m.folder);
+    fit.target_bytes = 1 << 30;
+    ck_assert(symlink("a.ebpo.h5", link) == 0);
+    for (int i = 0; i < 4; i++) {
+        ebpo_file *file;
+        fine(ebpo_file_repack(m.file, path, NULL, NULL, &error), &error);
+        fine(ebpo_open(i == 3 ? link : path, &file, &error), &error);
+        fine(ebpo_file_repack(file, path, NULL, NULL, &error), &error); /* from here on it is old */
+        ebpo_status status = i == 1   ? ebpo_subset(file, path, &o, &error)
+                             : i == 2 ? ebpo_subset(file, path, &fit, &error)
+                                      : ebpo_file_repack(file, path, NULL, NULL, &error);
+        ck_assert_int_eq(status, EBPO_E_IO);
+        ck_assert(strstr(error.message, "another program has written it since it was read") !=
+                  NULL);
+        ebpo_close(file);
+        fine(ebpo_open(path, &file, &error), &error);
+        fine(ebpo_subset(file, path, i == 2 ? &fit : &o, &error), &error);
+        ebpo_close(file);
+    }
+    query_model_free(&m);
+}
+END_TEST
+
 START_TEST(boxes_that_keep_nothing_are_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -681,6 +714,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, everything_kept_is_the_same_content);
     tcase_add_test(tests, a_subset_of_a_subset_is_the_subset);
     tcase_add_test(tests, threads_do_not_change_the_bytes);
+    tcase_add_test(tests, files_made_in_place_of_another_are_refused);
     tcase_add_test(tests, boxes_that_keep_nothing_are_refused);
     tcase_add_test(tests, a_subset_cannot_be_measured);
     tcase_add_test(tests, damaged_subsets_do_no_harm);

@@ -16,6 +16,23 @@ enum { PATH_MOST = 4096, PIECE = 1 << 16 };
 static char folder[PATH_MOST], input[PATH_MOST], output[PATH_MOST];
 static int printed_to = -1; /* standard output, while it stands aside */
 
+/* Files that are opened get the lowest free descriptors: without this, one of 0 to 2, and what is
+ * printed goes into them. What is put there cannot be read in place of input, nor written in place
+ * of output, so that using it is an error as it is with a closed stream (EBADF). */
+bool standard_files_occupy(void)
+{
+    for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {
+        if (fcntl(fd, F_GETFD) >= 0)
+            continue;
+        int got = open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+        if (got < 0) /* there may be no /dev */
+            got = open("/", O_RDONLY | O_DIRECTORY);
+        if (got != fd)
+            return false;
+    }
+    return true;
+}
+
 static void clean_up(void)
 {
     if (*input)

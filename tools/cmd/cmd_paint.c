@@ -147,12 +147,19 @@ static int overwrites(const paint_job *j)
 
 /* --- running --- */
 
-/* One that is not there is made where a layer is added. */
+/* Seconds to wait for other commands that change the same paint. */
+static const double WAIT = 600;
+
+/* Opens the paint; one that is to be changed once no other command changes it. One that is not
+ * there is made where a layer is added. */
 static ebpo_status open_paint(paint_job *j, ebpo_error *error)
 {
-    bool absent = access(j->paint_path, F_OK) != 0 && errno == ENOENT;
-    j->made = absent && j->v->new_layer && j->file;
-    if (absent && !j->made) {
+    const paint_values *v = j->v;
+    bool absent = access(j->paint_path, F_OK) != 0 && errno == ENOENT,
+         make = v->new_layer && j->file,
+         in_place = changes(v) && (!v->out || strcmp(v->out, j->paint_path) == 0 ||
+                                   command_same_file(v->out, j->paint_path));
+    if (absent && !make) {
         *error = (ebpo_error){ .status = EBPO_E_IO, .offset = -1 };
         snprintf(
             error->message, sizeof error->message,
@@ -161,8 +168,11 @@ static ebpo_status open_paint(paint_job *j, ebpo_error *error)
             j->paint_path);
         return error->status;
     }
-    return j->made ? ebpo_paint_new(j->file, &j->paint, error)
-                   : ebpo_paint_open(j->paint_path, &j->paint, error);
+    if (in_place)
+        return ebpo_paint_open_to_change(j->paint_path, make ? j->file : NULL, WAIT, &j->progress,
+                                         &j->paint, error);
+    return absent ? ebpo_paint_new(j->file, &j->paint, error)
+                  : ebpo_paint_open(j->paint_path, &j->paint, error);
 }
 
 static ebpo_status open_model(paint_job *j, uint64_t memory, ebpo_error *error)
@@ -190,9 +200,15 @@ static ebpo_status work(paint_job *j, const ebpo_paint_hand *hand, uint64_t coun
                         ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    if (needs_model(j->v))
-        status = open_model(j, memory, error);
+    ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
     j->changed = changes(j->v);
+    ebpo_paint_get_info(j->paint, &info);
+    bool check =
+        j->file && (info.point_count || info.note_count) && (j->changed || needs_model(j->v));
+    if (needs_model(j->v) || check)
+        status = open_model(j, memory, error);
+    if (status == EBPO_OK && check) /* all of it, whatever is asked for */
+        status = ebpo_paint_check_points(j->paint, j->context, &j->progress, error);
     if (status == EBPO_OK && j->changed)
         status = paint_change(j, hand, count, error);
     if (status == EBPO_OK && j->v->bake)

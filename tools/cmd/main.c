@@ -131,6 +131,8 @@ static int dispatch(int argc, char **argv)
 
 int main(int argc, char **argv)
 {
+    if (!standard_files_occupy())
+        return EXIT_FAILED;
     /* whatever a preloaded library has set: numbers are parsed and printed here, too */
     fesetenv(FE_DFL_ENV);
     signals_install();

@@ -24,7 +24,7 @@ typedef struct paint_job {
     ebpo_model *model;
     ebpo_context *context;
     ebpo_progress progress;
-    bool made, changed;      /* PAINT was not there; something was changed in memory */
+    bool changed;            /* in memory */
     ebpo_paint_laid laid;    /* by --path */
     ebpo_paint_baked baked;  /* by --bake */
     ebpo_paint_areas areas;  /* by --area */

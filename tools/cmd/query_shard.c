@@ -187,11 +187,16 @@ static int look_at_inputs(const query_shard *s, const query_job *job, char **fac
 
 /* --- the note --- */
 
-/* The facts, and how long the answers are. */
-static char *note_text(const char *facts, uint64_t bytes)
+/* The facts, and which answers: how long they are, and when they were written, so that the note of
+ * one of two commands is not taken for that of the other's answers. */
+static char *note_text(const char *facts, const struct stat *answers)
 {
     char *text = NULL;
-    return asprintf(&text, "%sanswers: %" PRIu64 " bytes\n", facts, bytes) < 0 ? NULL : text;
+    return asprintf(&text, "%sanswers: %" PRIu64 " bytes, of %" PRId64 ".%09ld\n", facts,
+                    (uint64_t)answers->st_size, (int64_t)answers->st_mtim.tv_sec,
+                    (long)answers->st_mtim.tv_nsec) < 0
+               ? NULL
+               : text;
 }
 
 static bool file_is(const char *path, const char *text)
@@ -233,7 +238,7 @@ static bool is_there(const query_shard *s)
 {
     struct stat st, note;
     bool out = stat(s->v->out, &st) == 0 && S_ISREG(st.st_mode);
-    char *text = out ? note_text(s->facts, (uint64_t)st.st_size) : NULL;
+    char *text = out ? note_text(s->facts, &st) : NULL;
     bool same = text && file_is(s->note, text);
     free(text);
     if (same)
@@ -300,10 +305,16 @@ static int look_again(const query_shard *s, const query_job *job)
     return code;
 }
 
-static int write_note(const query_shard *s, uint64_t bytes)
+static int fail_answers(const query_shard *s)
+{
+    fprintf(stderr, "ebpo %s: %s: %s\n", s->command, s->v->out, strerror(errno));
+    return EXIT_FAILED;
+}
+
+static int write_note(const query_shard *s, const struct stat *answers)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    char *text = note_text(s->facts, bytes);
+    char *text = note_text(s->facts, answers);
     if (!text)
         return command_no_memory(s->command);
     ebpo_status status = ebpo_write_file(s->note, text, strlen(text), &error);
@@ -312,10 +323,11 @@ static int write_note(const query_shard *s, uint64_t bytes)
 }
 
 /* The note of the answers that were there goes first, and comes last: whenever this is killed, it
- * stands beside no others.
+ * stands beside no others. `answers` is their descriptor: another command may have replaced them.
  */
-static int put_in_place(query_shard *s, uint64_t bytes)
+static int put_in_place(query_shard *s, int answers)
 {
+    struct stat st;
     ebpo_error error = EBPO_ERROR_INIT;
     if (s->of && unlink(s->note) != 0 && errno != ENOENT) {
         fprintf(stderr, "ebpo %s: %s: %s\n", s->command, s->note, strerror(errno));
@@ -323,26 +335,30 @@ static int put_in_place(query_shard *s, uint64_t bytes)
     }
     ebpo_status status = ebpo_output_end(s->out, &error);
     s->out = NULL;
-    if (status == EBPO_OK && s->of)
-        return write_note(s, bytes);
-    return status == EBPO_OK ? EXIT_FINE : command_failed(s->command, &error);
+    if (status != EBPO_OK)
+        return command_failed(s->command, &error);
+    if (!s->of)
+        return EXIT_FINE;
+    return fstat(answers, &st) == 0 ? write_note(s, &st) : fail_answers(s);
 }
 
 int query_shard_end(query_shard *s, const query_job *job, int code)
 {
-    struct stat st = { .st_size = 0 };
     if (s->kept < 0)
         return code;
-    if (code == EXIT_FINE && fstat(STDOUT_FILENO, &st) != 0) {
-        fprintf(stderr, "ebpo %s: %s: %s\n", s->command, s->v->out, strerror(errno));
-        code = EXIT_FAILED;
-    }
+    int answers = code == EXIT_FINE ? fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3) : -1;
+    if (code == EXIT_FINE && answers < 0)
+        code = fail_answers(s);
     dup2(s->kept, STDOUT_FILENO);
     close(s->kept);
     s->kept = -1;
     if (code == EXIT_FINE && s->of)
         code = look_again(s, job);
-    return code == EXIT_FINE ? put_in_place(s, (uint64_t)st.st_size) : code;
+    if (code == EXIT_FINE)
+        code = put_in_place(s, answers);
+    if (answers >= 0)
+        close(answers);
+    return code;
 }
 
 void query_shard_free(query_shard *s)

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT
  * EBP-Octree in HDF5: paint and notes on a model, in a file of their own beside it.
  *
- *   Files      ebpo_paint_new, ebpo_paint_open, ebpo_paint_open_memory, ebpo_paint_save,
- *              ebpo_paint_free; ebpo_paint_get_info, ebpo_paint_check_model
+ *   Files      ebpo_paint_new, ebpo_paint_open, ebpo_paint_open_memory,
+ *              ebpo_paint_open_to_change, ebpo_paint_save, ebpo_paint_free;
+ *              ebpo_paint_get_info, ebpo_paint_check_model,
+ *              ebpo_paint_check_points
  *   Layers     ebpo_paint_get_layer, ebpo_paint_add_layer, ebpo_paint_set_layer,
  *              ebpo_paint_remove_layer
  *   Notes      ebpo_paint_get_note, ebpo_paint_add_note, ebpo_paint_remove_note
@@ -25,9 +27,9 @@
  * Strokes cover each other in the order in which they were made; undoing is removing the last one.
  * The model is never changed.
  *
- * A paint is in memory as a whole, 48 bytes a point. What asks the model keeps to the model's
- * budget, beside what each function says. Texts and arrays that are given out are the paint's,
- * until it is changed or freed.
+ * A paint is in memory as a whole, 48 bytes a point, and keeps a descriptor of its file open. What
+ * asks the model keeps to the model's budget, beside what each function says. Texts and arrays that
+ * are given out are the paint's, until it is changed or freed.
  *
  * Source of the task: EBP 2017, section 4.5 (painting by a haptic hand).
  */
@@ -89,9 +91,50 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_memory(const void *data, uint
                                                           ebpo_error *error);
 
 /*
- * Writes it, whole or not at all; it may take the place of the file it was read from.
+ * Opens a file for a change that is saved, and makes others wait who do the same: between this and
+ * the first ebpo_paint_save to `path`, or ebpo_paint_free, no other process or thread gets the file
+ * by this function, and no other ebpo_paint_save replaces it. Changes of several programs follow
+ * each other, and none is lost:
  *
- * EBPO_E_UNSUPPORTED: the library was built without libhdf5. EBPO_E_IO, EBPO_E_MEMORY.
+ *     ebpo_paint_open_to_change("model.paint.h5", model, 60, NULL, &paint, &error);
+ *     ebpo_paint_add_layer(paint, &layer, NULL, &error);
+ *     ebpo_paint_save(paint, "model.paint.h5", &error);
+ *     ebpo_paint_free(paint);
+ *
+ * model      where there is no file, the paint is a new one for this model; NULL: that is an error
+ * wait       seconds to wait for others
+ * progress   stage "waiting"; or NULL
+ *
+ * Two files that a thread opens so at once can make two programs wait for each other, until `wait`
+ * is over. The lock is an empty file ".NAME.lock" in the same folder while it is held. On a
+ * file system without locks (NFS without its lock service), and in a folder that cannot be written
+ * to, nobody waits; ebpo_paint_save still compares.
+ *
+ * EBPO_E_IO: also where others take longer than `wait`. EBPO_E_CANCELLED, EBPO_E_ARGUMENT, and the
+ * errors of ebpo_paint_open and ebpo_paint_new.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_to_change(const char *path,
+                                                             const ebpo_file *model, double wait,
+                                                             const ebpo_progress *progress,
+                                                             ebpo_paint **out, ebpo_error *error);
+
+/*
+ * Writes it, whole or not at all.
+ *
+ * A paint belongs to the file that it was read from, or else to the first that it was saved as. A
+ * save to that path replaces what this paint has read or saved there, and fails with EBPO_E_IO
+ * where another program, or another ebpo_paint, has changed or replaced it since: open the file
+ * again and repeat the change, or save to another path. A save to any other path replaces
+ * what is there.
+ *
+ * Comparing and replacing are under a lock, which binds all that use this library, in any process
+ * and thread; others may replace the file between the two. Without locks (as above) the time
+ * between the two is the shortest possible, but not none.
+ *
+ * EBPO_E_UNSUPPORTED: the library was built without libhdf5. EBPO_E_IO: also where another one has
+ * had the file open to change for 10 seconds. EBPO_E_MEMORY.
  *
  * Threads: any, while nobody changes the paint.
  */
@@ -138,6 +181,24 @@ EBPO_API ebpo_status ebpo_paint_get_info(const ebpo_paint *paint, ebpo_paint_inf
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_model(const ebpo_paint *paint,
                                                           const ebpo_file *model,
                                                           ebpo_error *error);
+
+/*
+ * Checks that every point and note is on its face, or where a subset does not have the face or what
+ * is around it. That is not in the file's checksums: whatever made the file may have written
+ * other places. What asks the model of a point checks that point, too; this is for what is saved.
+ *
+ * context    of a model that fits
+ * progress   stage "checking"; or NULL
+ *
+ * EBPO_E_FORMAT: one is not; the message has its number. EBPO_E_ARGUMENT, EBPO_E_ABSENT: as
+ * ebpo_paint_check_model. EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: one per context; any, while nobody changes the paint.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_points(const ebpo_paint *paint,
+                                                           ebpo_context *context,
+                                                           const ebpo_progress *progress,
+                                                           ebpo_error *error);
 
 /* ---- layers ---- */
 

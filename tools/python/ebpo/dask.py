@@ -14,6 +14,7 @@ for byte, whatever the number of workers and the size of chunks. Dask is importe
 """
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import pathlib
@@ -232,15 +233,15 @@ def begin_parts(folder: pathlib.Path, answers: Any) -> None:
     question = {"question": answers.name, "chunks": answers.numblocks[0], "dtype": repr(answers.dtype)}
     folder.mkdir(parents=True, exist_ok=True)
     stated = folder / "question.json"
-    if stated.exists():
-        if json.loads(stated.read_bytes()) != question:
-            raise ValueError(f"{folder} holds answers to another question, or of other chunks; remove it, or name "
-                             "another file")
-        return
-    if any(folder.iterdir()):
-        raise ValueError(f"{folder} is not empty, and does not say of what question it is; remove it, or name another")
-    with published(stated) as file:
-        file.write(json.dumps(question).encode())
+    if not stated.exists():
+        if any(name.name[0] != "." for name in folder.iterdir()) and not stated.exists():
+            raise ValueError(f"{folder} is not empty, and does not say of what question it is; remove it, or name "
+                             "another")
+        with contextlib.suppress(FileExistsError), published(stated, new=True) as file:
+            file.write(json.dumps(question).encode())
+    if json.loads(stated.read_bytes()) != question:  # also where another process has begun at the same time
+        raise ValueError(f"{folder} holds answers to another question, or of other chunks; remove it, or name another "
+                         "file")
 
 
 def save_part(name: str, block: np.ndarray) -> None:

@@ -1,9 +1,10 @@
 """Strokes, layers and notes on a model, in a file of their own beside it."""
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
-from typing import Any, Callable, NamedTuple
+from typing import Any, Callable, Iterator, NamedTuple
 
 import numpy as np
 
@@ -58,7 +59,13 @@ class Paint:
             if model is None:
                 raise TypeError("Paint() takes the model that it is on")
             _handle = Handle.made("ebpo_paint_new", model.file, free="ebpo_paint_free")
-        self._handle = _handle
+        self._held: Handle | None = _handle
+
+    @property
+    def _handle(self) -> Handle:
+        if self._held is None:
+            raise ValueError("the change of this paint ended with an exception; open it again")
+        return self._held
 
     @classmethod
     def open(cls, source: Any) -> Paint:
@@ -69,8 +76,42 @@ class Paint:
         return cls(_handle=Handle.made("ebpo_paint_open_memory", data.ctypes.data, data.nbytes, None,
                                        free="ebpo_paint_free"))
 
+    @classmethod
+    @contextlib.contextmanager
+    def change(cls, path: Any, model: Model | None = None, *, wait: float = 60) -> Iterator[Paint]:
+        """For `with`: opens a file, and saves it at the end, unless something was raised.
+
+        Others who open it so, in any process or thread, wait until then, up to `wait` seconds (IOFailure):
+        changes follow each other, and none is lost. See ebpo_paint_open_to_change.
+
+        model: where there is no file, the paint is a new one for this model; the paint of a file is checked
+        as by `check` with points.
+
+        >>> for title in "Cracks", "Repairs":
+        ...     with Paint.change("cube.paint.h5", cube) as paint:
+        ...         _ = paint.add_layer(title=title)
+        >>> len(Paint.open("cube.paint.h5").layers)
+        2
+        """
+        path = os.path.abspath(path)  # the same at the end
+        paint = cls(_handle=Handle.made("ebpo_paint_open_to_change", os.fsencode(path),
+                                        None if model is None else model.file, wait, None, free="ebpo_paint_free"))
+        try:
+            if model is not None:
+                paint.check(model, points=True)
+            yield paint
+        except BaseException:
+            paint._handle._end()  # now, and not with the traceback: others wait
+            paint._held = None
+            raise
+        paint.save(path)
+
     def save(self, path: Any) -> None:
-        """Whole or not at all. UnsupportedError: the library is one without libhdf5."""
+        """Whole or not at all. UnsupportedError: the library is one without libhdf5.
+
+        IOFailure: another program or Paint has changed the file that this one is of, since it was read
+        from it or saved there. Open it again and repeat the change, or save to another path.
+        """
         call("ebpo_paint_save", self._handle, os.fsencode(path))
 
     @property
@@ -78,9 +119,13 @@ class Paint:
         """Members of ebpo_paint_info: layer_count, stroke_count, note_count, point_count, model_sha256, ..."""
         return facts(self._got("ebpo_paint_get_info", c.ebpo_paint_info))
 
-    def check(self, model: Model) -> None:
-        """Raises ArgumentError if it is paint of another model."""
+    def check(self, model: Model, *, points: bool = False) -> None:
+        """Raises ArgumentError if it is paint of another model; with `points`, FormatError if a point or note is
+        not on its face."""
         call("ebpo_paint_check_model", self._handle, model.file)
+        if points:
+            with model._context() as context:
+                call("ebpo_paint_check_points", self._handle, context, None)
 
     def _got(self, function: str, kind: Any, *number: int) -> Any:
         struct = made(kind)

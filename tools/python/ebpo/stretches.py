@@ -15,8 +15,11 @@ HDF5 = (".h5", ".hdf5", ".hdf", ".nc")
 
 
 @contextlib.contextmanager
-def published(path: Any) -> Iterator[Any]:
-    """A file to write into, which takes the place of `path` when all has been written to the disk."""
+def published(path: Any, *, new: bool = False) -> Iterator[Any]:
+    """A file to write into, which takes the place of `path` when all has been written to the disk.
+
+    new: FileExistsError where `path` is there by then (file systems without hard links cannot say so).
+    """
     path = pathlib.Path(path)
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex[:12]}")
     try:
@@ -24,9 +27,22 @@ def published(path: Any) -> Iterator[Any]:
             yield file
             file.flush()
             os.fsync(file.fileno())
+        if new and links(temporary, path):
+            return
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def links(there: pathlib.Path, path: pathlib.Path) -> bool:
+    """Gives a file another name. False: the file system has no hard links."""
+    try:
+        os.link(there, path)
+    except FileExistsError:
+        raise
+    except OSError:
+        return False
+    return True
 
 
 class PointFile(NamedTuple):

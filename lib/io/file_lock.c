@@ -1,0 +1,135 @@
+#include "io/file_lock.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "io/file_source.h"
+#include "io/stale_files.h"
+#include "io/unfinished.h"
+
+/* Opens the lock file, which is made if need be. To write, which locks over NFS need, or else to
+ * read: another user's. */
+static int open_lock_file(const char *path)
+{
+    enum { HOW = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY };
+    int fd = open(path, O_RDWR | HOW);
+    if (fd < 0 && errno == ENOENT)
+        fd = open(path, O_RDWR | O_CREAT | O_EXCL | HOW, 0666);
+    if (fd < 0 && errno == EACCES && (fd = open(path, O_RDONLY | HOW)) < 0 && errno == ENOENT)
+        errno = EEXIST; /* it was there: try again */
+    return fd;
+}
+
+/* Returns true if the descriptor's file still has its name: who had the lock before removed it. */
+static bool has_its_name(int fd, const char *path)
+{
+    struct stat open_one, named;
+    return fstat(fd, &open_one) == 0 && lstat(path, &named) == 0 &&
+           open_one.st_dev == named.st_dev && open_one.st_ino == named.st_ino;
+}
+
+typedef enum attempt { TAKEN, BUSY, NO_LOCKS } attempt;
+
+/* Tries once, without waiting. */
+static attempt try_lock(ebpo_file_lock *lock)
+{
+    for (;;) {
+        int fd = open_lock_file(lock->path);
+        if (fd < 0 && (errno == EEXIST || errno == EINTR))
+            continue; /* another one has made or removed it just now */
+        if (fd < 0)
+            return NO_LOCKS;
+        if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
+            attempt why = errno == EWOULDBLOCK || errno == EINTR ? BUSY : NO_LOCKS;
+            if (why == NO_LOCKS && errno != EBADF) /* EBADF: it is another user's */
+                unlink(lock->path);
+            close(fd);
+            return why;
+        }
+        if (has_its_name(fd, lock->path)) {
+            lock->fd = fd;
+            return TAKEN;
+        }
+        close(fd);
+    }
+}
+
+static void pause_between(unsigned attempts)
+{
+    long ms = attempts < 20 ? 5 : 50;
+    nanosleep(&(struct timespec){ 0, ms * 1000000 }, NULL);
+}
+
+/* The name of the lock file; NULL: no memory, or errno says what is wrong with the folder. */
+static char *name_lock_file(const char *path)
+{
+    const char *name = ebpo_path_name(path);
+    char *folder = strndup(path, (size_t)(name - path)), *lock = NULL;
+    char *real = folder ? realpath(*folder ? folder : ".", NULL) : NULL;
+    if (real &&
+        asprintf(&lock, "%s/.%.*s.lock", real[1] ? real : "", EBPO_TARGET_NAME_KEPT, name) < 0) {
+        lock = NULL;
+        errno = ENOMEM;
+    }
+    free(folder);
+    free(real);
+    return lock;
+}
+
+ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path, double seconds,
+                                const ebpo_progress *progress, ebpo_error *error)
+{
+    double begun = ebpo_seconds();
+    attempt got;
+    *lock = (ebpo_file_lock)EBPO_FILE_LOCK_INIT;
+    lock->path = name_lock_file(path);
+    if (!lock->path)
+        return errno == ENOMEM ? ebpo_fail_memory(error, strlen(path)) : EBPO_OK;
+    for (unsigned i = 0; (got = try_lock(lock)) == BUSY; i++) {
+        if (!ebpo_progress_stage(progress, "waiting", error)) {
+            ebpo_file_lock_release(lock);
+            return EBPO_E_CANCELLED;
+        }
+        if (ebpo_seconds() - begun >= seconds) {
+            ebpo_file_lock_release(lock);
+            return ebpo_fail_file(error, EBPO_E_IO, path,
+                                  "another program has been changing it for %.3g s; try again when "
+                                  "that has ended, or write to another file",
+                                  seconds);
+        }
+        pause_between(i);
+    }
+    if (got == TAKEN) {
+        lock->process = (long)getpid();
+        lock->slot = strlen(lock->path) < PATH_MAX ? ebpo_unfinished_reserve() : -1;
+        if (lock->slot >= 0)
+            ebpo_unfinished_set(lock->slot, lock->path);
+    } else {
+        ebpo_file_lock_release(lock);
+    }
+    return EBPO_OK;
+}
+
+void ebpo_file_lock_release(ebpo_file_lock *lock)
+{
+    if (lock->fd >= 0 && lock->process == (long)getpid()) {
+        unlink(lock->path); /* first: who gets the lock later sees that the name is gone */
+        flock(lock->fd, LOCK_UN);
+    }
+    if (lock->fd >= 0)
+        close(lock->fd);
+    ebpo_unfinished_forget(lock->slot);
+    free(lock->path);
+    *lock = (ebpo_file_lock)EBPO_FILE_LOCK_INIT;
+}
