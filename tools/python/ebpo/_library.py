@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import ctypes
 import ctypes.util
+import fractions
 import os
 import pathlib
 import re
@@ -13,6 +14,7 @@ import weakref
 import numpy as np
 
 from . import _declared as c
+from ._checked import checked, index_of, is_own, within
 from .errors import BY_STATUS, Error
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -53,15 +55,17 @@ def load():
     if its[0] != ours[0] or (ours[0] == 0 and its[1] != ours[1]):
         raise ImportError(f"{name} is of version {its[0]}.{its[1]}, this package of {ours[0]}.{ours[1]}; "
                           "install both together, or name another library in EBPO_LIBRARY")
-    for function, (result, arguments, _) in c.FUNCTIONS.items():
+    for function, (result, arguments, names, _) in c.FUNCTIONS.items():
         entry = getattr(library, function, None)
         if entry is not None:
             entry.restype, entry.argtypes = result, arguments
+            setattr(library, function, checked(entry, arguments, names))
     library.path = name
     return library
 
 
 lib = load()
+BEGUN: dict = {}  # bytes of structs as their INIT macros begin them
 
 
 def fill(struct, values):
@@ -87,11 +91,23 @@ def set_items(array, values):
 
 def made(kind, **members):
     """A struct as its INIT macro begins it, and then with these members."""
-    struct = kind()
-    fill(struct, c.INIT.get(kind, []))
+    if kind not in BEGUN:
+        struct = kind()
+        fill(struct, c.INIT.get(kind, []))
+        BEGUN[kind] = bytes(struct)
+    struct = kind.from_buffer_copy(BEGUN[kind])
     for name, value in members.items():
         setattr(struct, name, value)
     return struct
+
+
+def of_members(kind, members, **own):
+    """A struct with members that a user names. TypeError: it has no such member, or one that is not a user's."""
+    known = {name for name, member in kind._fields_ if not is_own(member)} - {"struct_size", "reserved", *own}
+    for name in members:
+        if name not in known:
+            raise TypeError(f"there is no option {name!r}; the options are {', '.join(sorted(known))}")
+    return made(kind, **members, **own)
 
 
 def text(raw):
@@ -215,7 +231,5 @@ def size_in_bytes(size):
         if not found:
             raise ValueError(f"{size!r} is no size; 500000000, '500M' and '2GiB' are")
         power = " KMGT".index(found[2].upper() or " ")
-        return int(float(found[1]) * (1024 if found[3] else 1000) ** power)
-    if size < 0:
-        raise ValueError(f"a size of {size} bytes")
-    return int(size)
+        size = int(fractions.Fraction(found[1]) * (1024 if found[3] else 1000) ** power)
+    return within(index_of(size, "a size"), 0, 2**64 - 1, "a size")

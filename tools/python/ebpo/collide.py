@@ -9,6 +9,7 @@ from typing import Any, Callable, Iterator, NamedTuple
 import numpy as np
 
 from . import _declared as c
+from ._checked import doubles, nanoseconds
 from ._library import Handle, Reporter, call, copied, made, size_in_bytes
 
 PAIR = np.dtype(c.ebpo_face_pair)
@@ -69,11 +70,11 @@ def pose(rotation: Any = None, translation: Any = None, scale: float = 1.0, quat
     if rotation is not None and quaternion is not None:
         raise ValueError("a pose has a rotation or a quaternion")
     if rotation is not None:
-        np.ctypeslib.as_array(made_pose.rotation)[:] = np.asarray(rotation, dtype=np.float64).reshape(3, 3)
+        np.ctypeslib.as_array(made_pose.rotation)[:] = doubles(rotation, "rotation").reshape(3, 3)
     if translation is not None:
-        np.ctypeslib.as_array(made_pose.translation)[:] = np.asarray(translation, dtype=np.float64).reshape(3)
+        np.ctypeslib.as_array(made_pose.translation)[:] = doubles(translation, "translation").reshape(3)
     if quaternion is not None:
-        turn = np.ascontiguousarray(quaternion, dtype=np.float64).reshape(4)
+        turn = doubles(quaternion, "quaternion").reshape(4)
         call("ebpo_pose_turn", ctypes.byref(made_pose), turn.ctypes.data)
     return made_pose
 
@@ -83,7 +84,7 @@ def pose_of(value: Any) -> Any:
         return made(c.ebpo_pose)
     if isinstance(value, c.ebpo_pose):
         return value
-    matrix = np.asarray(value, dtype=np.float64)
+    matrix = doubles(value, "a pose")
     if matrix.shape != (4, 4) or not np.array_equal(matrix[3], [0, 0, 0, 1]):
         raise ValueError("a pose is what ebpo.pose gives, or a (4, 4) matrix whose last row is 0 0 0 1")
     scale = float(np.linalg.norm(matrix[:3, 0]))
@@ -143,7 +144,7 @@ class Collider:
                  level: int | None = None) -> Iterator[Any]:
         with self._lock, Reporter(progress) as reported:
             options = made(c.ebpo_collide_options, pose_a=pose_of(poses[0]), pose_b=pose_of(poses[1]),
-                           deadline_ns=int((deadline or 0) * 1e9), progress=reported)
+                           deadline_ns=nanoseconds(deadline or 0), progress=reported)
             if level is not None:
                 options.level = level
             yield ctypes.byref(options)
@@ -242,7 +243,7 @@ class Collider:
         >>> Collider(cube, cube).way_out([1, 0, 0], pose_b=pose(translation=[-.25, 0, 0])).hi
         0.75
         """
-        along, out = np.ascontiguousarray(direction, dtype=np.float64).reshape(3), c.ebpo_way_out()
+        along, out = doubles(direction, "direction").reshape(3), c.ebpo_way_out()
         with self._options((pose_a, pose_b)) as options:
             call("ebpo_collide_way_out", self._handle, options, along.ctypes.data, ctypes.byref(out))
         return WayOut(out.t.lo, out.t.hi, number(out.pair.face_a), number(out.pair.face_b))

@@ -10,6 +10,7 @@ from typing import Any, Callable, Iterator, NamedTuple
 import numpy as np
 
 from . import _declared as c
+from ._checked import doubles, integers, nanoseconds
 from ._library import Handle, Reporter, call, copied, lib, made, size_in_bytes
 from .asking import Rows, Told, share
 from .errors import ArgumentError
@@ -123,7 +124,7 @@ class Model:
         self._source, self._options = source, options
         self._threads = options["threads"] or 0
         self._model_options = made(c.ebpo_model_options, memory=size_in_bytes(options["memory"]),
-                                   prefetch=bool(options["prefetch"]), threads=self._threads)
+                                   prefetch=options["prefetch"], threads=self._threads)
         if options["cut_level"] is not None:
             self._model_options.cut_level = options["cut_level"]
         self._file: Handle | None = opened(source, http, options["storage_options"],
@@ -263,7 +264,7 @@ class Model:
         if level is not None:
             options.level = level
         if deadline is not None:
-            options.deadline_ns = int(deadline * 1e9)
+            options.deadline_ns = nanoseconds(deadline)
         return options
 
     def inside(self, points: Any, *, boundary: bool = True, threads: int | None = None,
@@ -348,7 +349,7 @@ class Model:
         if level is not None:
             options.level = level
         if deadline is not None:
-            options.deadline_ns = int(deadline * 1e9)
+            options.deadline_ns = nanoseconds(deadline)
         out = Bounds(np.empty(rows.count), np.empty(rows.count))
 
         def put(answers: np.ndarray, begin: int, end: int) -> None:
@@ -394,7 +395,7 @@ class Model:
         count = max(o.count, d.count)
         if o.count != d.count and not (o.single or d.single):
             raise ValueError(f"{o.count} origins and {d.count} directions")
-        most = np.asarray(t_max, dtype=np.float64)
+        most = doubles(t_max, "t_max")
         if most.ndim and most.shape != (count,):
             raise ValueError(f"t_max is a number, or has the shape ({count},), not {most.shape}")
 
@@ -504,7 +505,7 @@ class Model:
 
     @staticmethod
     def _box(low: Any, high: Any) -> tuple[np.ndarray, np.ndarray]:
-        corners = np.ascontiguousarray(low, dtype=np.float64), np.ascontiguousarray(high, dtype=np.float64)
+        corners = doubles(low, "a corner"), doubles(high, "a corner")
         if corners[0].shape != (3,) or corners[1].shape != (3,):
             raise ValueError("a box has two corners of three numbers")
         return corners
@@ -562,11 +563,11 @@ class Model:
         """
         with self._lock:
             if names not in self._samplers:
-                self._samplers[names] = Handle.made("ebpo_sampler_new", self.file, names.encode(), self._threads,
+                self._samplers[names] = Handle.made("ebpo_sampler_new", self.file, names, self._threads,
                                                     free="ebpo_sampler_free", keep=(self.file,))
             sampler = self._samplers[names]
         rows = Rows(points)
-        numbers = np.ascontiguousarray(faces, dtype=np.int64).reshape(-1)
+        numbers = integers(faces, np.int64, "faces").reshape(-1)
         if len(numbers) != rows.count:
             raise ValueError(f"{rows.count} points and {len(numbers)} faces")
         out = np.empty((rows.count, lib.ebpo_sampler_columns(sampler)))
@@ -627,7 +628,7 @@ class Model:
         >>> cube.octcode([.1, .1, .1], 1)
         8
         """
-        asked = np.ascontiguousarray(point, dtype=np.float64)
+        asked = doubles(point, "the point")
         if asked.shape != (3,):
             raise ValueError("octcode() takes one point of three numbers")
         return lib.ebpo_octcode_at(lib.ebpo_file_info(self.file), asked.ctypes.data, level)

@@ -2,13 +2,13 @@
 from __future__ import annotations
 
 import ctypes
-import os
 import threading
 from typing import Any, Callable, Iterator
 
 import numpy as np
 
 from . import _declared as c
+from ._checked import path as path_in_c
 from ._library import Handle, Reporter, call, lib, made, size_in_bytes, text
 from .collide import PAIR, Gathered, Pairs, matrix_of
 
@@ -25,7 +25,7 @@ def open_scene(path: Any, *, memory: int | str | None = None, outside: bool = Fa
     remote: models on web servers may be named.
     """
     options = made(c.ebpo_scene_options, outside=outside, remote=remote)
-    handle = Handle.made("ebpo_scene_open", os.fsencode(path), ctypes.byref(options), free="ebpo_scene_free")
+    handle = Handle.made("ebpo_scene_open", path_in_c(path), ctypes.byref(options), free="ebpo_scene_free")
     with Reporter(progress) as reported:
         load = made(c.ebpo_load_options, memory=size_in_bytes(memory), progress=reported)
         call("ebpo_scene_load", handle, ctypes.byref(load))
@@ -53,8 +53,8 @@ class Scene:
             getattr(lib, function)(self._handle, number, ctypes.byref(facts))
             yield text(facts.name)
 
-    def _number(self, instance: Any) -> int:
-        return self.instances.index(instance) if isinstance(instance, str) else int(instance)
+    def _number(self, instance: Any) -> Any:
+        return self.instances.index(instance) if isinstance(instance, str) else instance
 
     def pose(self, instance: Any, time: float = 0.0) -> np.ndarray:
         """Where an instance, a number or a name, is at a time: a (4, 4) matrix."""
