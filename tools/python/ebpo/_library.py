@@ -89,7 +89,7 @@ def set_items(array, values):
             array[i] = value
 
 
-def made(kind, **members):
+def made(kind, /, **members):
     """A struct as its INIT macro begins it, and then with these members."""
     if kind not in BEGUN:
         struct = kind()
@@ -101,7 +101,7 @@ def made(kind, **members):
     return struct
 
 
-def of_members(kind, members, **own):
+def of_members(kind, members, /, **own):
     """A struct with members that a user names. TypeError: it has no such member, or one that is not a user's."""
     known = {name for name, member in kind._fields_ if not is_own(member)} - {"struct_size", "reserved", *own}
     for name in members:
