@@ -608,15 +608,15 @@ class Model:
         Returns (n, columns) float64; nan for no face. It holds the attributes and the mesh until the
         model is closed. Raises AbsentError where there is no such attribute.
         """
+        rows = Rows(points)
+        numbers = integers(faces, np.int64, "faces").reshape(-1)
+        if len(numbers) != rows.count:
+            raise ValueError(f"{rows.count} points and {len(numbers)} faces")
         with self._lock:
             if names not in self._samplers:
                 self._samplers[names] = Handle.made("ebpo_sampler_new", self.file, names, self._threads,
                                                     free="ebpo_sampler_free", keep=(self.file,))
             sampler = self._samplers[names]
-        rows = Rows(points)
-        numbers = integers(faces, np.int64, "faces").reshape(-1)
-        if len(numbers) != rows.count:
-            raise ValueError(f"{rows.count} points and {len(numbers)} faces")
         out = np.empty((rows.count, lib.ebpo_sampler_columns(sampler)))
         asked = rows[0:rows.count].copy()
         asked[numbers < 0] = 0  # of no face there is no point either
