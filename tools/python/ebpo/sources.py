@@ -12,7 +12,7 @@ import numpy as np
 from . import _declared as c
 from ._checked import path, text
 from ._library import Handle, made, of_members, size_in_bytes
-from .errors import Error, UnsupportedError
+from .errors import Error, IOFailure, UnsupportedError
 from .ranges import CONNECTIONS, MEMORY, Ranges, read_whole
 from .web import Patience, Web
 
@@ -150,7 +150,7 @@ def by_url(url: str, http: dict, most_expansion: int) -> Handle:
     del keep
     memory, connections = struct.memory if "memory" in http else MEMORY, http.get("connections", CONNECTIONS)
     web = Web(url, **{name: value for name, value in http.items() if name not in ("memory", "connections")})
-    return by_ranges(Ranges(web, web.size, memory=memory, connections=connections), web.shown, most_expansion)
+    return by_ranges(far(web, web.size, web.shown, memory=memory, connections=connections), web.shown, most_expansion)
 
 
 def by_ranges(ranges: Any, name: str, most_expansion: int = 0) -> Handle:
@@ -169,15 +169,16 @@ def opened(source: Any, http: dict, storage_options: dict | None, most_expansion
             raise TypeError(f"{name} is no URL: there is nothing to do for {', '.join(http)}")
         if isinstance(name, str) and "://" in name:
             stored = Stored(name, storage_options)
-            return by_ranges(Ranges(stored, stored.size), name, most_expansion)
+            return by_ranges(far(stored, stored.size, name), name, most_expansion)
         return by_name(path(name), most_expansion)
     if http or storage_options is not None:
         raise TypeError("options of URLs are for URLs")
     name = str(getattr(source, "name", "") or type(source).__name__)
     if hasattr(source, "read_range") and hasattr(source, "size"):
-        return by_ranges(Ranges(source, source.size() if callable(source.size) else source.size), name, most_expansion)
+        return by_ranges(far(source, source.size() if callable(source.size) else source.size, name), name,
+                         most_expansion)
     if hasattr(source, "seek") and hasattr(source, "read") and not isinstance(source, _mmap()):
-        return by_ranges(of_file(source), name, most_expansion)
+        return by_ranges(of_file(source, name), name, most_expansion)
     try:
         data = np.frombuffer(source, np.uint8)
     except (TypeError, ValueError):
@@ -189,14 +190,24 @@ def opened(source: Any, http: dict, storage_options: dict | None, most_expansion
                        keep=(data, source))
 
 
-def of_file(file: Any) -> Any:
+def far(source: Any, size: Any, name: str, **options: Any) -> Ranges:
+    """The ranges of a source elsewhere, whose first bytes are read now. IOFailure: they cannot be."""
+    try:
+        return Ranges(source, size_in_bytes(size), **options)
+    except (Error, TypeError):
+        raise
+    except Exception as error:
+        raise IOFailure(f"{name}: reading failed: {type(error).__name__}: {error}", "EBPO_E_IO", name) from error
+
+
+def of_file(file: Any, name: str) -> Any:
     """What reads a file object: of this machine in its place, of others by ranges."""
     if Uncached.fits(file):
-        return Ranges(Uncached(file), file.size)
+        return far(Uncached(file), file.size, name)
     seekable = Seekable(file)
     if isinstance(file, io.BytesIO) or is_of_system(file):
         return seekable
-    return Ranges(seekable, seekable.size, connections=1)
+    return far(seekable, seekable.size, name, connections=1)
 
 
 def is_of_system(file: Any) -> bool:
