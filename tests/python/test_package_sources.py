@@ -349,6 +349,32 @@ class Sources(Case):
         self.assertEqual(set(took), set(cases))
         self.assertLess(max(took.values()), 10, took)
 
+    def test_npy_shapes(self):
+        """A .npy whose shape is negative, huge or overflows is refused, as points and as numbers of faces."""
+        from ebpo.catalogue import read_numbers
+        from ebpo.stretches import PointFile
+
+        def save(shape, descr="<f8", body=bytes(48)):
+            head = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+            pathlib.Path("x.npy").write_bytes(b"\x93NUMPY\x01\0" + bytes([len(head), 0]) + head.encode() + body)
+
+        save("(2, 3)")
+        self.assertEqual(PointFile.at("x.npy").read(0, 2).shape, (2, 3))
+        for shape in ("(-1, 3)", "(-2, 3)", "(-2, -3)", "(-8, 3)", "(2, -3)", "(3, 3)", "(9223372036854775807, 3)", "(0, -3)",
+                      "(99999999999999999999999, 3)", "(6148914691236517206, 3)", "(2.0, 3)", "(True, 3)", "(2, 3", "x"):
+            save(shape)
+            with self.assertRaises(ebpo.FormatError, msg=shape):
+                PointFile.at("x.npy")
+        save("(6,)", "<i8")
+        self.assertEqual(len(read_numbers("x.npy")), 6)
+        for shape in ("(-1,)", "(-6,)", "(7,)", "(2, 3)", "(4611686018427387910,)", "(99999999999999999999999,)"):
+            save(shape, "<i8")
+            with self.assertRaises(ebpo.FormatError, msg=shape):
+                read_numbers("x.npy")
+        save("(2, 3)", "<i8", np.full(6, 2**53 + 1).tobytes())
+        with self.assertRaisesRegex(ValueError, "no double"):
+            PointFile.at("x.npy").read(0, 2)
+
     def test_ranges_ahead(self):
         """Announced ranges are joined, fetched several at a time, and held within the memory."""
         data = np.random.default_rng(1).bytes(3 << 20)

@@ -352,7 +352,8 @@ class Model:
         max_distance: what is farther away does not matter.
         signed: of solids distances are negative inside; without, less work.
 
-        Returns distance: (n,) float64, correctly rounded, inf: nothing within max_distance; point:
+        Returns distance: (n,) float64, correctly rounded, inf: nothing within max_distance, or, where there is
+        a face, farther than every double; point:
         (n, 3) the nearest one, rounded, nan: none; normal: (n, 3) the face's unit normal, 0 of a face
         without area; face: (n,) int64, of several at the same distance the first in the file, -1: none.
 
@@ -494,7 +495,8 @@ class Model:
         t_max: a number, or (n,).
         sides: "both"; "front": faces that are met against their normals; "back": along them.
 
-        Returns t: (n,) float64, inf: nothing is met; face: (n,) int64, -1: none; side: (n,) int32, 1: the
+        Returns t: (n,) float64, inf: nothing is met, or, where there is a face, t is greater than every double
+        (a longer direction gives it a finite one); face: (n,) int64, -1: none; side: (n,) int32, 1: the
         ray goes in through the face's inner part, -1: out, 0: it meets an edge or a vertex, runs in the
         face's plane, or the face has no area.
 
