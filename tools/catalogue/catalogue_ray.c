@@ -26,8 +26,8 @@ static ebpo_ray longer(const ebpo_ray *ray)
     return out;
 }
 
-/* Returns true if a hit comes before the one that is kept. Of those beyond doubles a longer ray says
- * it. */
+/* Returns true if a hit comes before the one that is kept. Of those beyond doubles a longer ray
+ * says it. */
 static ebpo_status is_nearer(const search *s, ebpo_context *context, const ebpo_ray *ray,
                              const ebpo_ray_hit *hit, uint32_t item, bool *nearer,
                              ebpo_error *error)

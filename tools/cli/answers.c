@@ -277,8 +277,8 @@ static char *put_hit(char *at, answer_form form, const ebpo_ray_hit *hit)
     return number_write_int(put_text(at, json ? ", \"side\": " : lead), hit->side);
 }
 
-/* Writes a hit with its attributes, at the point that t gives, within the range of doubles. A t beyond
- * that range (inf) gives no point, and there are none. */
+/* Writes a hit with its attributes, at the point that t gives, within the range of doubles. A t
+ * beyond that range (inf) gives no point, and there are none. */
 static char *put_met(char *at, answer_form form, const ebpo_ray *ray, const ebpo_ray_hit *hit,
                      const ebpo_sampler *sampler, const uint64_t *model)
 {
