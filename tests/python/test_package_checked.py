@@ -7,10 +7,13 @@ the package itself, function by function.
 import ctypes
 import os
 import pathlib
+import unittest.mock
 
 from package_kit import Case, model, np, points, run
 
 import ebpo
+import ebpo.collide
+import ebpo.model
 from ebpo import _checked, _declared as declared
 from ebpo._library import lib, made, of_members
 
@@ -178,6 +181,24 @@ class Package(Case):
             self.refused((ValueError, TypeError), m.locate, p, deadline=seconds)
             self.refused((ValueError, TypeError), ebpo.Collider(m, m).relation, deadline=seconds)
         self.assertEqual(m.subtree(np.uint64(1)).node_count, m.subtree(True).node_count)
+
+    def test_callbacks_raise(self):
+        """What goes wrong while an answer is taken comes out of the call, which gives no half of it."""
+        m = model("cube")
+        paint = ebpo.Paint(m)
+        layer = paint.add_layer(title="x")
+        paint.lay(m, [[.2, .5, 1, 1], [.8, .5, 1, 1]], layer=layer, radius=.1)
+        collider, beside = ebpo.Collider(m, m), ebpo.pose(translation=[.5, .25, .25])
+        for module, name, ask in ((ebpo.model, "copied", lambda: m.triangles_in_box([0, 0, 0], [1, 1, 1])),
+                                  (ebpo.collide, "copied", lambda: collider.pairs(pose_b=beside)),
+                                  (ebpo.collide, "copied", lambda: collider.contacts(pose_b=beside)),
+                                  (ebpo.collide, "copied", lambda: collider.polylines(pose_b=beside)),
+                                  (ctypes, "string_at", lambda: m.near([0, 0, 0])),
+                                  (ctypes, "string_at", lambda: paint.cover(m, 0))):
+            with unittest.mock.patch.object(module, name, side_effect=KeyboardInterrupt):
+                with self.assertRaises(KeyboardInterrupt):
+                    ask()
+            ask()
 
     def test_arrays(self):
         m = model("cube")

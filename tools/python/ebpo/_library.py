@@ -196,30 +196,38 @@ class Struct:
         return ctypes.byref(self.c)
 
 
-class Reporter:
-    """A progress callback of Python for the library.
+class Callback:
+    """A function of Python for the library, which it calls in the thread that asked.
 
-    The callback is called by the thread that asked. What it raises comes out of the call.
+    What it raises stops the call and comes out of it, where ctypes would go on with half an answer.
     """
 
-    def __init__(self, progress):
-        self.progress, self.raised = progress, None
-        self.function = c.ebpo_progress_fn(self.report) if progress else c.ebpo_progress_fn()
-        self.struct = c.ebpo_progress(self.function, None)
+    def __init__(self, kind, function):
+        self.raised, self.function = None, function
+        self.given = kind(self.take)
 
-    def report(self, _user, stage, done, total):
+    def take(self, *arguments):
         try:
-            return self.progress(text(stage), done, total) is not False
+            return self.function(*arguments)
         except BaseException as error:
             self.raised = error
             return False
 
     def __enter__(self):
-        return self.struct
+        return self.given
 
     def __exit__(self, _kind, _error, _trace):
         if self.raised is not None:
             raise self.raised
+
+
+class Reporter(Callback):
+    """A progress callback of Python, as a struct of the library; or None."""
+
+    def __init__(self, progress):
+        super().__init__(c.ebpo_progress_fn, lambda _user, stage, done, total:
+                         progress(text(stage), done, total) is not False)
+        self.given = c.ebpo_progress(self.given if progress else c.ebpo_progress_fn(), None)
 
 
 def size_in_bytes(size):

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _declared as c
 from ._checked import doubles, nanoseconds
-from ._library import Handle, Reporter, call, copied, made, size_in_bytes
+from ._library import Callback, Handle, Reporter, call, copied, made, size_in_bytes
 
 PAIR = np.dtype(c.ebpo_face_pair)
 SEGMENT = np.dtype(c.ebpo_contact_segment)
@@ -101,12 +101,12 @@ def matrix_of(value: Any) -> np.ndarray:
     return matrix
 
 
-class Gathered:
+class Gathered(Callback):
     """Items that the library lends to a callback, kept as an array."""
 
     def __init__(self, function: Any, dtype: np.dtype) -> None:
+        super().__init__(function, self.keep)
         self.dtype, self.parts = dtype, [np.empty(0, dtype)]
-        self.take = function(self.keep)
 
     def keep(self, _user: int, items: int, count: int) -> bool:
         self.parts.append(copied(items, (count,), self.dtype))
@@ -170,8 +170,8 @@ class Collider:
 
     def _pairs(self, function: str, poses: tuple, progress: Callable | None) -> Pairs:
         found = Gathered(c.ebpo_pairs_fn, PAIR)
-        with self._options(poses, None, progress) as options:
-            call(function, self._handle, options, found.take, None)
+        with self._options(poses, None, progress) as options, found as taking:
+            call(function, self._handle, options, taking, None)
         pairs = found.array
         return Pairs(pairs["face_a"].astype(np.int64), pairs["face_b"].astype(np.int64), pairs["kind"].copy())
 
@@ -190,8 +190,8 @@ class Collider:
     def contacts(self, pose_a: Any = None, pose_b: Any = None, *, progress: Callable | None = None) -> Contacts:
         """Where they cross: a segment for each pair of crossing faces."""
         found = Gathered(c.ebpo_segments_fn, SEGMENT)
-        with self._options((pose_a, pose_b), None, progress) as options:
-            call("ebpo_collide_contacts", self._handle, options, found.take, None)
+        with self._options((pose_a, pose_b), None, progress) as options, found as taking:
+            call("ebpo_collide_contacts", self._handle, options, taking, None)
         all_of_them = found.array
         return Contacts(all_of_them["point"].copy(), all_of_them["face_a"].astype(np.int64),
                         all_of_them["face_b"].astype(np.int64))
@@ -209,8 +209,8 @@ class Collider:
             lines.append(copied(given.points, (given.count, 3), np.float64))
             return True
 
-        with self._options((pose_a, pose_b)) as options:
-            call("ebpo_collide_polylines", self._handle, options, c.ebpo_polylines_fn(take), None)
+        with self._options((pose_a, pose_b)) as options, Callback(c.ebpo_polylines_fn, take) as taking:
+            call("ebpo_collide_polylines", self._handle, options, taking, None)
         return lines
 
     def distance(self, pose_a: Any = None, pose_b: Any = None, *, tolerance: float = 0.0,

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _declared as c
 from ._checked import doubles, integers, nanoseconds
-from ._library import Handle, Reporter, call, copied, lib, made, size_in_bytes
+from ._library import Callback, Handle, Reporter, call, copied, lib, made, size_in_bytes
 from .asking import Rows, Told, share
 from .automatic import Automatic
 from .errors import ArgumentError, LimitError, NoMemory
@@ -424,9 +424,8 @@ class Model:
             found.extend(ctypes.string_at(face, NEAR.itemsize))
             return True
 
-        with self._context(1, 1, "distance") as context:
-            call("ebpo_distance_within", context, rows[0:1].ctypes.data, ctypes.byref(options),
-                 c.ebpo_near_fn(take), None)
+        with self._context(1, 1, "distance") as context, Callback(c.ebpo_near_fn, take) as taking:
+            call("ebpo_distance_within", context, rows[0:1].ctypes.data, ctypes.byref(options), taking, None)
         faces: Any = np.frombuffer(bytes(found), NEAR)
         return Nearest(faces["distance"].copy(), faces["point"].copy(), faces["normal"].copy(),
                        faces["face"].view(np.int64).copy())
@@ -593,9 +592,8 @@ class Model:
             faces.append(copied(some.faces, (some.count,), np.int64))
             return True
 
-        with self._context(1, 1, "box") as context:
-            call("ebpo_triangles_in_box", context, box[0].ctypes.data, box[1].ctypes.data,
-                 c.ebpo_triangles_fn(take), None)
+        with self._context(1, 1, "box") as context, Callback(c.ebpo_triangles_fn, take) as taking:
+            call("ebpo_triangles_in_box", context, box[0].ctypes.data, box[1].ctypes.data, taking, None)
         return np.concatenate(corners), np.concatenate(faces)
 
     # ---- attributes, mass ----

@@ -10,7 +10,7 @@ import numpy as np
 from . import _declared as c
 from ._checked import doubles
 from ._checked import path as path_in_c
-from ._library import Handle, Reporter, call, copied, lib, made, of_members, text
+from ._library import Callback, Handle, Reporter, call, copied, lib, made, of_members, text
 from .model import Model
 
 POINT = np.dtype(c.ebpo_paint_point)
@@ -171,8 +171,8 @@ class Paint:
             found.extend(ctypes.string_at(face, FACE.itemsize))
             return True
 
-        with model._context() as context:
-            call("ebpo_paint_cover", self._handle, context, stroke, c.ebpo_paint_face_fn(take), None, None)
+        with model._context() as context, Callback(c.ebpo_paint_face_fn, take) as taking:
+            call("ebpo_paint_cover", self._handle, context, stroke, taking, None, None)
         return np.frombuffer(bytes(found), FACE)
 
     def measure(self, model: Model, *, fineness: int = 256, progress: Callable | None = None) -> Areas:

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import bisect
 import collections
+import os
 import threading
 from typing import Any, Iterator
 
@@ -50,6 +51,7 @@ class Ranges:
         self.queue: collections.deque[Piece] = collections.deque()
         self.unasked: set[int] = set()  # begins of pieces that were announced and not asked for
         self.held = self.plan = self.clock = self.running = 0
+        self.process = os.getpid()
 
     # ---- pieces; the lock is held ----
 
@@ -95,6 +97,15 @@ class Ranges:
             if self.held + size <= self.memory:
                 break
             self._remove(piece)
+
+    def _check_process(self) -> None:
+        """A process that was forked has none of the threads: what they had under way is asked for again."""
+        if self.process != os.getpid():
+            self.process, self.running = os.getpid(), 0
+            self.queue.clear()
+            for piece in self.pieces.values():
+                if piece.state == COMING:
+                    self._drop(piece)
 
     def _start(self, piece: Piece, urgent: bool) -> None:
         piece.state = COMING
@@ -152,6 +163,7 @@ class Ranges:
             else:
                 joined.append([begin, end])
         with self.changed:
+            self._check_process()
             self.plan += 1
             for begin, end in joined:
                 self._cover(begin, end)
@@ -172,6 +184,7 @@ class Ranges:
         if end <= len(self.head):
             return parts[0]
         with self.changed:
+            self._check_process()
             self._cover(offset, end)
             pieces = list(self._over(max(offset, len(self.head)), end))
             for piece in pieces:

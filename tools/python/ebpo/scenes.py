@@ -77,8 +77,8 @@ class Scene:
         """Pairs whose boxes come within their clearance at some time: a structured array of a, b and
         clearance, ascending. No other pair comes that close."""
         found = Gathered(c.ebpo_scene_pairs_fn, CLOSE)
-        with self._lock:
-            call("ebpo_scene_pairs", self._handle, *self._times(begin, end), found.take, None)
+        with self._lock, found as taking:
+            call("ebpo_scene_pairs", self._handle, *self._times(begin, end), taking, None)
         return found.array
 
     def meet(self, time: float = 0.0, *, count: bool = False, places: bool = False, relate: bool = False,
@@ -92,18 +92,17 @@ class Scene:
         MeetingKind), relation (a Relation), face_a, face_b, distance, place ...
         """
         found = Gathered(c.ebpo_scene_meetings_fn, MEETING)
-        with self._lock, Reporter(progress) as reported:
+        with self._lock, Reporter(progress) as reported, found as taking:
             options = made(c.ebpo_scene_ask_options, progress=reported, threads=threads or 0, count=count,
                            places=places, relate=relate, depth=depth)
-            call("ebpo_scene_meet", self._handle, time, ctypes.byref(options), found.take, None, None)
+            call("ebpo_scene_meet", self._handle, time, ctypes.byref(options), taking, None, None)
         return found.array
 
     def collide(self, a: Any, b: Any, time: float = 0.0, *, threads: int | None = None) -> Pairs:
         """Every pair of faces of two instances that meet at a time."""
         found = Gathered(c.ebpo_pairs_fn, PAIR)
-        with self._lock:
-            call("ebpo_scene_collide", self._handle, self._number(a), self._number(b), time, threads or 0,
-                 found.take, None)
+        with self._lock, found as taking:
+            call("ebpo_scene_collide", self._handle, self._number(a), self._number(b), time, threads or 0, taking, None)
         pairs = found.array
         return Pairs(pairs["face_a"].astype(np.int64), pairs["face_b"].astype(np.int64), pairs["kind"].copy())
 
