@@ -213,7 +213,7 @@ class Web:
                     return bytes(data)
                 if at_once:
                     raise patience.failure("the server sends parts of the file, and no version of it; download the file")
-            except (urllib.error.URLError, TimeoutError, ConnectionError, http.client.HTTPException) as error:
+            except (urllib.error.URLError, TimeoutError, ConnectionError, ssl.SSLError, http.client.HTTPException) as error:
                 if isinstance(error, urllib.error.HTTPError):
                     error.close()
                 patience.wait(error)
