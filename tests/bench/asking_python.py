@@ -12,7 +12,6 @@ the exact ones, for points in the box of the model and for those within a millio
 faces: inside, distances that are off by more than a millionth of that size, rays that meet something.
 """
 import argparse
-import ctypes
 import statistics
 import threading
 import time
@@ -42,7 +41,7 @@ class Plain:
 
     def part(self, i):
         begin, end = (len(self.points) * k // len(self.contexts) for k in (i, i + 1))
-        call("ebpo_inside_many", self.contexts[i], self.points[begin:].ctypes.data, ctypes.c_uint64(end - begin),
+        call("ebpo_inside_many", self.contexts[i], self.points[begin:].ctypes.data, end - begin,
              None, self.out[begin:].ctypes.data)
 
     def __call__(self):

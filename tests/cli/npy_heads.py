@@ -38,6 +38,9 @@ REFUSED = {
     "has the shape (); points are rows of three": array(head(shape="()")),
     "has the shape (3, 2); points are rows of three": array(head(shape="(3, 2)")),
     "has the shape (1, 2, 3); points are rows of three": array(head(shape="(1, 2, 3)")),
+    **{f"has the shape {shape}; points are rows of three": array(head(shape=shape)) for shape in (
+        "(-1, 3)", "(-2, 3)", "(2, -3)", "(-3,)", "(+2, 3)", "(2, 4294967299)", "(4294967299,)", "(2, 3, -1)",
+        "(18446744073709551617, 3)", "(18446744073709551615, 3)", "(99999999999999999999999, 3)", "(2 3)")},
     "is a NumPy array of version 4.0; 1.0 to 3.0 are known": array(head(), version=4),
     "has a head that is no NumPy array's": array("{'descr': '<f8'}\n")}
 

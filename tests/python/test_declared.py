@@ -14,10 +14,10 @@ import tempfile
 include, package, compiler = sys.argv[1], sys.argv[2], sys.argv[3:]
 sys.path.insert(0, package)
 sys.dont_write_bytecode = True
-from ebpo import _declared as declared, _library  # noqa: E402
+from ebpo import _checked, _declared as declared, _library  # noqa: E402
 
 structs = [kind for kind in vars(declared).values()
-           if isinstance(kind, type) and issubclass(kind, ctypes.Structure) and kind is not ctypes.Structure]
+           if isinstance(kind, type) and issubclass(kind, _checked.Structure) and kind is not _checked.Structure]
 constants = [name for name, value in vars(declared).items() if name.startswith("EBPO_") and isinstance(value, int)]
 
 

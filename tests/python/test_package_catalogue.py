@@ -85,6 +85,27 @@ class Many(Case):
         np.testing.assert_array_equal(found["model"], np.where(np.isinf(t.min(axis=0)), -1, t.argmin(axis=0)))
         self.assertTrue(0 < np.isfinite(found["t"]).mean() < 1)
 
+    def test_rays_beyond_doubles(self):
+        """Hits at a t that is greater than every double have a face and t = inf, and are in order."""
+        def box(z):
+            x, y, k = np.array(np.meshgrid([0, 1], [0, 1], [z, z + 1], indexing="ij"), float).reshape(3, 8)
+            faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
+                     [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+            ebpo.convert((np.stack([x, y, k], axis=1), faces), f"box{z}.ebpo.h5")
+            return f"box{z}.ebpo.h5"
+
+        boxes = Catalogue.of([box(9), box(3), box(6)])
+        for z, direction, t, row in ((-1e308, 1e-308, np.inf, 0), (-1, 1e-320, np.inf, 1), (20, -1e-320, np.inf, 0),
+                                     (-1, 1e-300, 4 / 1e-300, 1), (-1, 5e-324, np.inf, 1)):
+            o, d = [.5, .25, z], [0, 0, direction]  # from 1e308 away all are at the same double: the first
+            found = boxes.ray(o, d)
+            self.assertEqual((found["t"], found["model"]), (t, row))
+            self.assertGreaterEqual(found["face"], 0)
+            told = by_command("ray", boxes, [o + d])[0]
+            self.assertEqual([told[name] for name in ("t", "face", "model")], [found[name] for name in ("t", "face", "model")])
+            hits = ebpo.open("box3.ebpo.h5").ray_all(o, d)
+            self.assertEqual((len(hits.t), hits.side.tolist()), (2, [1, -1]))
+
     def test_few_models_are_asked(self):
         p = points(50, seed=3, reach=.01) + (self.catalogue.entries[4].low + np.array(self.catalogue.entries[4].high)) / 2
         boxes = self.catalogue.boxes

@@ -1,17 +1,22 @@
 #!/usr/bin/env python3
 """Files from everywhere: paths, bytes, file objects, objects with ranges, fsspec, a web server."""
+import contextlib
 import http.server
 import io
 import mmap
 import pathlib
 import re
+import socket
+import subprocess
 import threading
 import time
 
-from package_kit import Case, model, np, points, run
+from package_kit import COMMAND, GENERATE, Case, model, np, points, run
 
 import ebpo
-from ebpo import sources
+from ebpo import automatic, sources
+from ebpo.ranges import Ranges as Far
+from ebpo.web import Patience
 
 P = points(500)
 
@@ -32,6 +37,10 @@ class Server(http.server.BaseHTTPRequestHandler):
     silent = False  # about ranges
     later = ""  # Retry-After
     cut = 0  # answers that end before their time
+    cap = 1 << 30  # bytes of an answer
+    plain = False  # no ranges
+    count, most_at_once, now = 0, 0, 0  # requests
+    lock = threading.Lock()
 
     def do_GET(self):
         if self.path.startswith("/to?"):
@@ -49,13 +58,21 @@ class Server(http.server.BaseHTTPRequestHandler):
             self.send_header("Content-Length", "0")
             self.end_headers()
             return
+        with Server.lock:
+            Server.count, Server.now = Server.count + 1, Server.now + 1
+            Server.most_at_once = max(Server.most_at_once, Server.now)
+        time.sleep(.005)
+        with Server.lock:
+            Server.now -= 1
         first, last = map(int, re.match(r"bytes=(\d+)-(\d+)", self.headers["Range"]).groups())
+        first, last = (0, len(Server.data)) if Server.plain else (first, min(last, first + Server.cap - 1))
         part = Server.data[first:last + 1]
-        self.send_response(206)
-        if not Server.silent:
+        self.send_response(200 if Server.plain else 206)
+        if not Server.silent and not Server.plain:
             self.send_header("Content-Range", f"bytes {first}-{first + len(part) - 1}/{len(Server.data)}")
         self.send_header("Content-Length", str(len(part)))
-        self.send_header("ETag", Server.etag)
+        if Server.etag:
+            self.send_header("ETag", Server.etag)
         self.end_headers()
         if Server.cut:
             Server.cut -= 1
@@ -91,12 +108,19 @@ class Sources(Case):
     def test_sources_that_fail(self):
         class Failing(Ranges):
             def read_range(self, offset, size):
-                if self.asked > 70_000:
+                if self.asked > 0:
                     raise KeyError("no such part")
                 return super().read_range(offset, size)
 
         with self.assertRaisesRegex(ebpo.IOFailure, "KeyError.*no such part") as caught:
-            ebpo.open(Failing(self.data)).mesh()
+            ebpo.open(Failing(large())).mesh()
+        with self.assertRaisesRegex(ebpo.IOFailure, "a name with"):
+            class Unencodable(Ranges):
+                def read_range(self, offset, size):
+                    if self.asked:
+                        raise OSError("a name with \udcff and \0")
+                    return super().read_range(offset, size)
+            ebpo.open(Unencodable(large())).mesh()
         self.assertIsInstance(caught.exception, OSError)
 
         class Short(Ranges):
@@ -135,12 +159,12 @@ class Sources(Case):
             file.write(self.data)
         self.same(ebpo.open("memory://scan.ebpo.h5").distance(P), self.expected)
 
-    def serve(self):
+    def serve(self, data=None):
         server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Server)
         threading.Thread(target=server.serve_forever, daemon=True).start()
         self.addCleanup(server.server_close)
         self.addCleanup(server.shutdown)
-        Server.data = self.data
+        Server.data = data or self.data
         return f"http://127.0.0.1:{server.server_port}"
 
     def test_headers_stay_with_their_server(self):
@@ -160,21 +184,21 @@ class Sources(Case):
             sources.Web(f"{one}/scan.ebpo.h5")
 
     def test_web(self):
-        url = f"{self.serve()}/scan.ebpo.h5?key=secret"
-        self.same(ebpo.open(url, headers={"X-Key": "1"}, retries=2).distance(P), self.expected)
+        data = large()
+        url = f"{self.serve(data)}/scan.ebpo.h5?key=secret"
+        self.same(ebpo.open(url, headers={"X-Key": "1"}, retries=2).locate(P), ebpo.open(data).locate(P))
 
         # where the library has no HTTP, Python's is taken
         Server.fail = [503, 500]
         web = sources.Web(url)
-        self.assertEqual((web.size, web.read_range(100, web.size - 200)), (len(self.data), self.data[100:-100]))
-        file = sources.by_ranges(web, "scan")
-        self.assertTrue(file.pointer)
+        self.assertEqual((web.size, web.read_range(100, web.size - 200)), (len(data), data[100:-100]))
+        Server.etag = 'W/"1"'
+        self.assertEqual(web.read_range(len(web.head), 10), data[len(web.head):][:10], "compared weakly")
         Server.etag = '"2"'
-        web.blocks.clear()
-        with self.assertRaisesRegex(OSError, "changed"):
-            web.read_range(len(self.data) - 10, 10)
+        with self.assertRaisesRegex(ebpo.IOFailure, "changed"):
+            web.read_range(len(data) - 10, 10)
         Server.etag, Server.fail = '"1"', [404]
-        with self.assertRaisesRegex(OSError, "404"):
+        with self.assertRaisesRegex(ebpo.IOFailure, "status 404"):
             sources.Web(url)
 
     def test_patience(self):
@@ -183,9 +207,9 @@ class Sources(Case):
         self.addCleanup(setattr, Server, "later", "")
         self.addCleanup(Server.fail.clear)
         waited = []
-        real, sources.Patience.FIRST = sources.Patience.FIRST, 0.001
-        self.addCleanup(setattr, sources.Patience, "FIRST", real)
-        Server.fail[:] = [503] * 7
+        real, Patience.FIRST = Patience.FIRST, 0.001
+        self.addCleanup(setattr, Patience, "FIRST", real)
+        Server.fail[:] = [503] * 5
         self.assertEqual(sources.Web(url).size, len(self.data))
         Server.cut = 2
         self.assertEqual(sources.Web(url).size, len(self.data), "short bodies are asked for again")
@@ -195,7 +219,7 @@ class Sources(Case):
         self.assertNotIn("secret", str(caught.exception))
         Server.fail[:] = [503] * 1000
         with self.assertRaisesRegex(OSError, "status 503; 0.3 s"):
-            sources.Web(url, time_limit=.3)
+            sources.Web(url, time_limit=.3, retries=None)
         Server.fail[:], Server.later = [429], "3600"
         with self.assertRaisesRegex(OSError, "after 1 requests.*status 429"):
             sources.Web(url)
@@ -204,7 +228,7 @@ class Sources(Case):
         sources.Web(url)
         self.assertGreaterEqual(time.monotonic() - begin, 1)
         for _ in range(20):  # doubling, and never together
-            patience = sources.Patience(1e9, None, "it")
+            patience = Patience(1e9, None, "it")
             patience.FIRST, patience.failures = 0.001, 3
             begin = time.monotonic()
             patience.wait(TimeoutError())
@@ -212,6 +236,266 @@ class Sources(Case):
         self.assertTrue(.004 <= min(waited) < max(waited))
         with self.assertRaisesRegex(OSError, "refused"):
             sources.Web("http://127.0.0.1:1/", time_limit=.01)
+
+
+    def changed(self, **server):
+        """The server is so for this test."""
+        for name, value in server.items():
+            self.addCleanup(setattr, Server, name, getattr(Server, name))
+            setattr(Server, name, value)
+
+    def by_web(self, url, **http):
+        """A model by Python's own HTTP, as where the library has none."""
+        real = sources.by_name
+
+        def without_http(*arguments, **members):
+            if "http" in members:
+                raise ebpo.UnsupportedError("without HTTP")
+            return real(*arguments, **members)
+
+        sources.by_name = without_http
+        try:
+            return ebpo.open(url, **http)
+        finally:
+            sources.by_name = real
+
+    def test_web_reads_parts(self):
+        """Only what a question needs is read, joined and several ranges at a time, as by the library."""
+        url = f"{self.serve(large())}/large.ebpo.h5"
+        self.changed(count=0, most_at_once=0)
+        library = ebpo.open(url)
+        expected = library.distance(P), library.inside(P[0])
+        counts = []
+        for open_it in (ebpo.open, self.by_web):
+            Server.count, Server.most_at_once = 0, 0
+            m = open_it(url)
+            self.same((m.inside(P[0]),), expected[1:])
+            counts.append(Server.count)
+            self.assertEqual((m.stats["budget"], m.stats["resident"]), (256 << 20, False))
+            self.same(m.distance(P), expected[0])
+            self.assertGreater(Server.most_at_once, 3)
+        self.assertLessEqual(counts[1], counts[0])
+        self.assertLess(counts[1], 10)
+
+    def test_server_that_caps_ranges(self):
+        self.changed(cap=40_000)
+        url = f"{self.serve(large())}/scan.ebpo.h5"
+        web = sources.Web(url)
+        self.assertEqual((web.read_range(0, web.size), len(web.head)), (large(), 1 << 17))
+        self.same(self.by_web(url).locate(P), ebpo.open(large()).locate(P))
+        self.changed(etag="")
+        with self.assertRaisesRegex(ebpo.IOFailure, "parts of the file"):
+            sources.Web(url)
+        self.assertEqual(sources.Web(url, unversioned=True).read_range(0, web.size), large())
+
+    def test_server_without_ranges_or_versions(self):
+        url = f"{self.serve(large())}/scan.ebpo.h5"
+        for server in ({"plain": True}, {"etag": ""}):
+            self.changed(**server)
+            self.same(self.by_web(url).locate(P), ebpo.open(large()).locate(P))
+            with self.assertRaisesRegex(ebpo.UnsupportedError, "download"):
+                self.by_web(url, whole_limit=1000)
+            self.changed(plain=False, etag='"1"')
+        with self.assertRaisesRegex(ValueError, "time-out"):
+            sources.Web(url, time_limit=0)
+        for bad in ({"A\n": "b"}, {"A": "b\r\nC: d"}):
+            with self.assertRaisesRegex(ValueError, "header"):
+                sources.Web(url, headers=bad)
+
+    def test_time_limit(self):
+        """Whatever comes and however slowly: an IOFailure after `time_limit`, and no other exception."""
+        good = b"HTTP/1.1 206 OK\r\nContent-Range: bytes 0-9/10\r\n"
+        cases = {"trickle": (good + b"Content-Length: 10\r\n\r\n", b"0", .5),
+                 "trailers": (good + b"Transfer-Encoding: chunked\r\n\r\na\r\n0123456789\r\n0\r\n", b"X: y\r\n", 0),
+                 "continues": (b"", b"HTTP/1.1 100 Continue\r\n\r\n", 0), "headers": (good, b"X: y\r\n", 0),
+                 "a header": (good + b"X: ", b"y" * 1000, 0), "status": (b"", b"x" * 1000, 0), "silence": (b"", b"", .1),
+                 "redirect": (b"HTTP/1.1 302 OK\r\nLocation: /\r\n\r\n", b"x" * 1000, 0),
+                 "slow redirect": (b"HTTP/1.1 302 OK\r\nX: ", b"x", .2), "garbage": (b"\0\xff\r\n\r\n", b"\0" * 1000, 0),
+                 "a chunk": (good + b"Transfer-Encoding: chunked\r\n\r\n-5\r\n", b"x" * 1000, 0),
+                 "chunks": (good + b"Transfer-Encoding: chunked\r\n\r\n", b"1;x=y\r\nx\r\n", .4),
+                 "a longer body": (good + b"Content-Length: 10\r\n\r\n", b"0123456789", 0)}
+        def ask(name, begin, rest, pause):
+            listening = socket.create_server(("127.0.0.1", 0), backlog=50)
+            self.addCleanup(listening.close)
+
+            def serve(listening=listening, begin=begin, rest=rest, pause=pause):
+                def answer(connection):
+                    with contextlib.suppress(OSError), connection:
+                        connection.recv(65536)
+                        connection.sendall(begin)
+                        while True:
+                            connection.sendall(rest)
+                            time.sleep(pause)
+                with contextlib.suppress(OSError):
+                    while True:
+                        threading.Thread(target=answer, args=(listening.accept()[0],), daemon=True).start()
+
+            threading.Thread(target=serve, daemon=True).start()
+            began = time.monotonic()
+            try:
+                web = sources.Web(f"http://127.0.0.1:{listening.getsockname()[1]}/x", time_limit=1.0, retries=3,
+                                  unversioned=True)
+                self.assertEqual((name, web.size), ("a longer body", 10))  # its end is known
+            except ebpo.IOFailure:
+                pass
+            took[name] = time.monotonic() - began
+
+        took: dict = {}
+        threads = [threading.Thread(target=ask, args=(name, *case)) for name, case in cases.items()]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(set(took), set(cases))
+        self.assertLess(max(took.values()), 10, took)
+
+    def test_npy_shapes(self):
+        """A .npy whose shape is negative, huge or overflows is refused, as points and as numbers of faces."""
+        from ebpo.catalogue import read_numbers
+        from ebpo.stretches import PointFile
+
+        def save(shape, descr="<f8", body=bytes(48)):
+            head = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+            pathlib.Path("x.npy").write_bytes(b"\x93NUMPY\x01\0" + bytes([len(head), 0]) + head.encode() + body)
+
+        save("(2, 3)")
+        self.assertEqual(PointFile.at("x.npy").read(0, 2).shape, (2, 3))
+        for shape in ("(-1, 3)", "(-2, 3)", "(-2, -3)", "(-8, 3)", "(2, -3)", "(3, 3)", "(9223372036854775807, 3)", "(0, -3)",
+                      "(99999999999999999999999, 3)", "(6148914691236517206, 3)", "(2.0, 3)", "(True, 3)", "(2, 3", "x"):
+            save(shape)
+            with self.assertRaises(ebpo.FormatError, msg=shape):
+                PointFile.at("x.npy")
+        save("(6,)", "<i8")
+        self.assertEqual(len(read_numbers("x.npy")), 6)
+        for shape in ("(-1,)", "(-6,)", "(7,)", "(2, 3)", "(4611686018427387910,)", "(99999999999999999999999,)"):
+            save(shape, "<i8")
+            with self.assertRaises(ebpo.FormatError, msg=shape):
+                read_numbers("x.npy")
+        save("(2, 3)", "<i8", np.full(6, 2**53 + 1).tobytes())
+        with self.assertRaisesRegex(ValueError, "no double"):
+            PointFile.at("x.npy").read(0, 2)
+
+    def test_ranges_ahead(self):
+        """Announced ranges are joined, fetched several at a time, and held within the memory."""
+        data = np.random.default_rng(1).bytes(3 << 20)
+        asked, gate = [], threading.Event()
+
+        class Slow:
+            def read_range(self, offset, size):
+                asked.append((offset, size))
+                if offset:
+                    gate.wait(10)
+                return data[offset:offset + size]
+
+        far = Far(Slow(), len(data), memory=1 << 20)
+        self.assertEqual(asked, [(0, 1 << 17)])
+        far.prefetch([(1 << 18, 1000), (300_000, 2000), ((1 << 18) + 2000, 1000), (1 << 20, 5000), (100, 200)])
+        for _ in range(500):
+            if len(asked) == 4:
+                break
+            time.sleep(.01)
+        self.assertEqual(sorted(asked[1:]), [(1 << 18, 3000), (300_000, 2000), (1 << 20, 5000)], "three at a time, joined")
+        gate.set()
+        self.assertEqual(far.read_range(300_500, 100), data[300_500:300_600])
+        self.assertEqual(len(asked), 4, "what has come is not asked for again")
+        far.prefetch([(begin, 100_000) for begin in range(1 << 18, 2 << 20, 120_000)])
+        for begin in range(1 << 18, 2 << 20, 120_000):
+            self.assertEqual(far.read_range(begin, 100_000), data[begin:begin + 100_000])
+            self.assertLessEqual(far.held, (1 << 20) + 100_000)
+        self.assertEqual(far.read_range(0, len(data)), data, "more than the memory, while it is read")
+        self.assertLessEqual(far.held, 1 << 20)
+        threads = [threading.Thread(target=lambda: [self.assertEqual(far.read_range(b, 999), data[b:b + 999])
+                                                    for b in range(1000, 3 << 20, 7777)]) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+
+    def test_ranges_that_fail_once(self):
+        data, fail = bytes(1 << 20), [1]
+
+        class Failing:
+            def read_range(self, offset, size):
+                if offset and fail:
+                    raise KeyError(fail.pop())
+                return data[offset:offset + size]
+
+        far = Far(Failing(), len(data))
+        far.prefetch([(1 << 18, 1000)])
+        while fail:
+            time.sleep(.01)
+        self.assertEqual(far.read_range(1 << 18, 1000), bytes(1000), "nobody waited for the one that failed")
+        fail.append(2)
+        with self.assertRaises(KeyError):
+            far.read_range(1 << 19, 1000)
+        self.assertEqual(far.read_range(1 << 19, 1000), bytes(1000))
+
+    def test_fsspec_files(self):
+        """File objects of fsspec are read around their cache, which reads ahead; others that are far by ranges."""
+        try:
+            from fsspec.spec import AbstractBufferedFile
+        except ImportError:
+            self.skipTest("fsspec is not installed")
+        data, read = large(), []
+
+        class Stored(AbstractBufferedFile):
+            def _fetch_range(self, start, end):
+                read.append(end - start)
+                return data[start:end]
+
+        class Unknown(io.RawIOBase):
+            def __init__(self):
+                self.file = io.BytesIO(data)
+                self.seek = self.file.seek
+
+            def read(self, size):
+                read.append(size)
+                return self.file.read(size)
+
+        expected = ebpo.open(data).inside(P[0])
+        for file, requests in ((Stored(None, "x", size=len(data)), 10), (Unknown(), 10)):
+            read.clear()
+            m = ebpo.open(file)
+            self.assertEqual((m.inside(P[0]), m.stats["budget"]), (expected, 256 << 20))
+            self.assertLess(len(read), requests)
+            self.assertLess(sum(read), len(data) // 4)
+
+    def test_local_files_are_held_in_parts(self):
+        """As in the command: one point loads no more than it needs, many all of the model; answers are equal."""
+        pathlib.Path("large.ebpo.h5").write_bytes(large())
+        q = points(20_000, 2)
+        whole = ebpo.open("large.ebpo.h5", memory="4G")
+        for small in (16 << 20, 0):
+            self.addCleanup(setattr, automatic, "SMALL", automatic.SMALL)
+            automatic.SMALL = small
+            m = ebpo.open("large.ebpo.h5")
+            self.assertEqual(m.inside(P[0]), whole.inside(P[0]))
+            self.assertEqual(m.stats["resident"], False, "one point")
+            self.assertLess(m.stats["memory_peak"], whole.stats["memory"] / 2)
+            self.same(m.distance(q), whole.distance(q))
+            self.assertTrue(m.stats["resident"], "many points")
+            self.same(m.ray(q[:99], q[:99]), whole.ray(q[:99], q[:99]))
+        for ask in (lambda m: m.ray(q, q + .1), lambda m: m.ray_all(q, q + .1), lambda m: m.locate(q),
+                    lambda m: m.faces_in_box([0, 0, 0], [.2, .2, 1])):
+            m = ebpo.open("large.ebpo.h5")
+            for a, b in zip(np.atleast_2d(ask(m)) if isinstance(ask(m), np.ndarray) else ask(m),
+                            np.atleast_2d(ask(whole)) if isinstance(ask(whole), np.ndarray) else ask(whole)):
+                np.testing.assert_array_equal(a, b)
+        m = ebpo.open("large.ebpo.h5")
+        ebpo.Collider(m, m)
+        self.assertTrue(m.stats["resident"], "what holds the model for long has all of it")
+
+
+def large():
+    """Bytes of a model of more than 2 MiB, made once."""
+    if not MADE:
+        subprocess.run([GENERATE, "--base", "sphere", "--faces", "300000", "large.ply"], check=True, capture_output=True)
+        subprocess.run([COMMAND, "convert", "-q", "large.ply", "large.ebpo.h5"], check=True)
+        MADE.append(pathlib.Path("large.ebpo.h5").read_bytes())
+    return MADE[0]
+
+
+MADE: list = []
 
 
 if __name__ == "__main__":

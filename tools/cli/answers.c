@@ -155,10 +155,16 @@ void answers_inside(answer_text *t, answer_form form, const ebpo_inside_result *
 
 /* --- distance --- */
 
+/* Returns true where there is a nearest point: also of a distance beyond doubles, which is inf. */
+static bool has_point(const ebpo_distance_result *r)
+{
+    return isfinite(r->distance) || r->face != EBPO_NO_FACE;
+}
+
 static char *distance_json(char *at, const ebpo_distance_result *r)
 {
     at = put_json_real(at, "{\"distance\": ", r->distance);
-    if (isfinite(r->distance)) {
+    if (has_point(r)) {
         at = put_json_reals(at, ", \"point\": [", r->point);
         at = put_json_reals(at, ", \"normal\": [", r->normal);
     } else {
@@ -173,7 +179,7 @@ static char *distance_line(char *at, char between, const ebpo_distance_result *r
     at = number_write(at, r->distance);
     for (int k = 0; k < 6; k++) {
         *at++ = between;
-        if (isfinite(r->distance))
+        if (has_point(r))
             at = number_write(at, k < 3 ? r->point[k] : r->normal[k - 3]);
         else
             *at++ = '-';
@@ -266,12 +272,13 @@ static char *put_hit(char *at, answer_form form, const ebpo_ray_hit *hit)
         return put_u64(put_u64(put_double(at, hit->t), hit->face), (uint64_t)(int64_t)hit->side);
     bool json = form == ANSWERS_JSON;
     char lead[2] = { json ? 0 : between(form), 0 };
-    at = number_write(put_text(at, json ? "{\"t\": " : ""), hit->t);
+    at = json ? put_json_real(at, "{\"t\": ", hit->t) : number_write(at, hit->t);
     at = number_write_uint(put_text(at, json ? ", \"face\": " : lead), hit->face);
     return number_write_int(put_text(at, json ? ", \"side\": " : lead), hit->side);
 }
 
-/* A hit with its attributes, where it is as far as doubles tell, and within them. */
+/* Writes a hit with its attributes, at the point that t gives, within the range of doubles. A t
+ * beyond that range (inf) gives no point, and there are none. */
 static char *put_met(char *at, answer_form form, const ebpo_ray *ray, const ebpo_ray_hit *hit,
                      const ebpo_sampler *sampler, const uint64_t *model)
 {
@@ -279,7 +286,7 @@ static char *put_met(char *at, answer_form form, const ebpo_ray *ray, const ebpo
     for (int k = 0; k < 3; k++)
         point[k] = fmax(-DBL_MAX, fmin(ray->origin[k] + hit->t * ray->direction[k], DBL_MAX));
     at = put_model(put_hit(at, form, hit), form, model);
-    at = put_attributes(at, form, sampler, point, hit->face);
+    at = put_attributes(at, form, sampler, point, isfinite(hit->t) ? hit->face : EBPO_NO_FACE);
     return put_text(at, form == ANSWERS_JSON ? "}" : "");
 }
 

@@ -56,20 +56,39 @@ static bool npy_type(points *p, const char *descr)
     return strchr("<>", descr[1]) && descr[2] == 'f' && strchr("48", descr[3]) && descr[4] == '\'';
 }
 
-/* "(N, 3)"; "(3,)" is one row. Blanks may be anywhere, a comma behind the last number. */
+/* Reads a count of at most 18 digits, so that it overflows nothing, and the blanks around it. */
+static bool npy_count(const char **at, uint64_t *count)
+{
+    enum { DIGITS_MOST = 18 };
+    *at += strspn(*at, " ");
+    size_t digits = strspn(*at, "0123456789");
+    if (digits == 0 || digits > DIGITS_MOST)
+        return false;
+    *count = strtoull(*at, NULL, 10);
+    *at += digits;
+    *at += strspn(*at, " ");
+    return true;
+}
+
+/* Reads "(N, 3)"; "(3,)" is one row. Blanks may be anywhere, a comma behind the last number. */
 static bool npy_shape(points *p, const char *shape)
 {
-    uint64_t rows = 1;
-    int columns = 0, length = 0;
-    int least = points_raw_width(p->kind), most = points_width(p->kind);
-    if (sscanf(shape, "( %" SCNu64 " , %d %n", &rows, &columns, &length) == 2)
-        length += shape[length] == ',' ? 1 : 0;
-    else if (sscanf(shape, "( %d , %n", &columns, &length) == 1)
-        rows = 1;
-    length += (int)strspn(shape + length, " ");
-    if (!length || shape[length] != ')' || columns < least || columns > most)
+    uint64_t rows = 1, columns = 0;
+    const char *at = shape + 1;
+    if (*shape != '(' || !npy_count(&at, &columns) || *at++ != ',')
         return false;
-    p->layout.per_row = columns;
+    at += strspn(at, " ");
+    if (*at != ')') {
+        rows = columns;
+        if (!npy_count(&at, &columns))
+            return false;
+        at += *at == ',';
+        at += strspn(at, " ");
+    }
+    if (*at != ')' || columns < (uint64_t)points_raw_width(p->kind) ||
+        columns > (uint64_t)points_width(p->kind))
+        return false;
+    p->layout.per_row = (int)columns;
     p->rows_total = rows;
     p->rows_known = p->rows_told = true;
     return true;

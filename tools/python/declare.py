@@ -13,9 +13,11 @@ import sys
 HEAD = '''"""The C interface as ctypes, made from the public headers by tools/python/declare.py."""
 # fmt: off
 import enum
-from ctypes import (CFUNCTYPE, Structure, c_bool, c_char, c_char_p, c_double, c_float, c_int,
-                    c_int16, c_int32, c_int64, c_int8, c_size_t, c_uint, c_uint16, c_uint32,
-                    c_uint64, c_uint8, c_void_p, sizeof)
+from ctypes import (CFUNCTYPE, c_bool, c_char, c_char_p, c_double, c_float, c_int, c_int16, c_int32,
+                    c_int64, c_int8, c_size_t, c_uint, c_uint16, c_uint32, c_uint64, c_uint8, c_void_p,
+                    sizeof)
+
+from ._checked import Structure
 
 INIT: dict = {}
 FUNCTIONS: dict = {}
@@ -153,13 +155,13 @@ class Headers:
         return name, kind
 
     def pointer_to_function(self, result, arguments):
-        kinds = [self.argument(a) for a in arguments.split(",")]
+        kinds = [self.argument(a)[1] for a in arguments.split(",")]
         result = "None" if result == "void" else self.types[result]
         return f"CFUNCTYPE({', '.join([result, *kinds])})"
 
     def argument(self, text):
         words = re.fullmatch(r"\s*((?:const\s+)?(?:struct\s+)?\w+(?:\s+const)?)\s*(.*?)\s*", text, flags=re.S)
-        return self.type_of(words[1], words[2], True)[1]
+        return self.type_of(words[1], words[2], True)
 
     def struct(self, name, text):
         fields = []
@@ -179,13 +181,14 @@ class Headers:
     def function(self, text):
         found = re.fullmatch(r"(.*?)(\w+)\((.*)\)", text)
         result, arguments = found[1].strip(), found[3]
-        kinds = [] if arguments == "void" else [self.argument(a) for a in arguments.split(",")]
+        taken = [] if arguments == "void" else [self.argument(a) for a in arguments.split(",")]
+        names, kinds = [name for name, _ in taken], [kind for _, kind in taken]
         if result.endswith("*"):
             result = "c_char_p" if result == "const char *" else "c_void_p"
         else:
             result = "None" if result == "void" else self.types[result]
         told = arguments.endswith("ebpo_error *error")
-        self.lines.append(f'FUNCTIONS["{found[2]}"] = ({result}, [{", ".join(kinds)}], {told})')
+        self.lines.append(f'FUNCTIONS["{found[2]}"] = ({result}, [{", ".join(kinds)}], {names}, {told})')
 
     def initial_values(self):
         for name, text in self.macros:

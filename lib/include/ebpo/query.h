@@ -468,7 +468,8 @@ typedef struct ebpo_distance_options {
 typedef struct ebpo_distance_result {
     /*
      * Correctly rounded. Of solids negative inside, unless unsigned (-0.0 if it
-     * underflows). INFINITY: nothing within max_distance. NAN: not determined, see
+     * underflows). INFINITY: nothing within max_distance, and no face; or, with a face,
+     * farther than every double. NAN: not determined, see
      * `lo` and `hi`.
      */
     double distance;
@@ -587,8 +588,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_within(ebpo_context *context,
 
 typedef struct ebpo_ray_hit {
     /*
-     * The hit is at origin + t direction. Correctly rounded; hits are in the order
-     * of the exact values.
+     * The hit is at origin + t direction. Correctly rounded: INFINITY if it is greater
+     * than every double, as along directions that are far too short. That is a hit: it has
+     * a face. A direction that is longer by a power of two has a finite t for the same face.
+     * Hits are in the order of the exact values.
      */
     double t;
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import ctypes
 import ctypes.util
+import fractions
 import os
 import pathlib
 import re
@@ -13,6 +14,7 @@ import weakref
 import numpy as np
 
 from . import _declared as c
+from ._checked import checked, index_of, is_own, within
 from .errors import BY_STATUS, Error
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -53,15 +55,17 @@ def load():
     if its[0] != ours[0] or (ours[0] == 0 and its[1] != ours[1]):
         raise ImportError(f"{name} is of version {its[0]}.{its[1]}, this package of {ours[0]}.{ours[1]}; "
                           "install both together, or name another library in EBPO_LIBRARY")
-    for function, (result, arguments, _) in c.FUNCTIONS.items():
+    for function, (result, arguments, names, _) in c.FUNCTIONS.items():
         entry = getattr(library, function, None)
         if entry is not None:
             entry.restype, entry.argtypes = result, arguments
+            setattr(library, function, checked(entry, arguments, names))
     library.path = name
     return library
 
 
 lib = load()
+BEGUN: dict = {}  # bytes of structs as their INIT macros begin them
 
 
 def fill(struct, values):
@@ -85,13 +89,25 @@ def set_items(array, values):
             array[i] = value
 
 
-def made(kind, **members):
+def made(kind, /, **members):
     """A struct as its INIT macro begins it, and then with these members."""
-    struct = kind()
-    fill(struct, c.INIT.get(kind, []))
+    if kind not in BEGUN:
+        struct = kind()
+        fill(struct, c.INIT.get(kind, []))
+        BEGUN[kind] = bytes(struct)
+    struct = kind.from_buffer_copy(BEGUN[kind])
     for name, value in members.items():
         setattr(struct, name, value)
     return struct
+
+
+def of_members(kind, members, /, **own):
+    """A struct with members that a user names. TypeError: it has no such member, or one that is not a user's."""
+    known = {name for name, member in kind._fields_ if not is_own(member)} - {"struct_size", "reserved", *own}
+    for name in members:
+        if name not in known:
+            raise TypeError(f"there is no option {name!r}; the options are {', '.join(sorted(known))}")
+    return made(kind, **members, **own)
 
 
 def text(raw):
@@ -180,30 +196,38 @@ class Struct:
         return ctypes.byref(self.c)
 
 
-class Reporter:
-    """A progress callback of Python for the library.
+class Callback:
+    """A function of Python for the library, which it calls in the thread that asked.
 
-    The callback is called by the thread that asked. What it raises comes out of the call.
+    What it raises stops the call and comes out of it, where ctypes would go on with half an answer.
     """
 
-    def __init__(self, progress):
-        self.progress, self.raised = progress, None
-        self.function = c.ebpo_progress_fn(self.report) if progress else c.ebpo_progress_fn()
-        self.struct = c.ebpo_progress(self.function, None)
+    def __init__(self, kind, function):
+        self.raised, self.function = None, function
+        self.given = kind(self.take)
 
-    def report(self, _user, stage, done, total):
+    def take(self, *arguments):
         try:
-            return self.progress(text(stage), done, total) is not False
+            return self.function(*arguments)
         except BaseException as error:
             self.raised = error
             return False
 
     def __enter__(self):
-        return self.struct
+        return self.given
 
     def __exit__(self, _kind, _error, _trace):
         if self.raised is not None:
             raise self.raised
+
+
+class Reporter(Callback):
+    """A progress callback of Python, as a struct of the library; or None."""
+
+    def __init__(self, progress):
+        super().__init__(c.ebpo_progress_fn, lambda _user, stage, done, total:
+                         progress(text(stage), done, total) is not False)
+        self.given = c.ebpo_progress(self.given if progress else c.ebpo_progress_fn(), None)
 
 
 def size_in_bytes(size):
@@ -215,7 +239,5 @@ def size_in_bytes(size):
         if not found:
             raise ValueError(f"{size!r} is no size; 500000000, '500M' and '2GiB' are")
         power = " KMGT".index(found[2].upper() or " ")
-        return int(float(found[1]) * (1024 if found[3] else 1000) ** power)
-    if size < 0:
-        raise ValueError(f"a size of {size} bytes")
-    return int(size)
+        size = int(fractions.Fraction(found[1]) * (1024 if found[3] else 1000) ** power)
+    return within(index_of(size, "a size"), 0, 2**64 - 1, "a size")

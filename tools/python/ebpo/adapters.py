@@ -142,7 +142,8 @@ class TrimeshRays:
             rays = np.flatnonzero(first.face >= 0)
             t, faces = first.t[rays], first.face[rays]
         o = np.asarray(ray_origins, dtype=np.float64)[rays]
-        return o + t[:, None] * np.asarray(ray_directions, dtype=np.float64)[rays], rays, faces
+        with np.errstate(invalid="ignore"):  # a t beyond doubles gives no point: nan
+            return o + t[:, None] * np.asarray(ray_directions, dtype=np.float64)[rays], rays, faces
 
     def contains_points(self, points: Any) -> np.ndarray:
         """(n,) bool."""

@@ -1,6 +1,7 @@
 """Many questions on all cores: blocks of rows, a context for each thread."""
 from __future__ import annotations
 
+import ctypes
 import itertools
 import os
 import threading
@@ -8,9 +9,12 @@ from typing import Any, Callable, Iterator
 
 import numpy as np
 
+from ._checked import doubles, integer_as
+
 # Rows whose answers stay in a core's cache until they have been put where they belong; and so many that
 # Python's lock, which is taken after each block, does not matter.
 BLOCK = 1 << 15
+thread_count = integer_as(ctypes.c_uint)
 
 
 def cores() -> int:
@@ -29,7 +33,7 @@ class Rows:
 
     def __init__(self, values: Any, what: str = "points") -> None:
         if not hasattr(values, "shape") or not hasattr(values, "dtype"):
-            values = np.asarray(values, dtype=np.float64)
+            values = np.asarray(values)
         shape = tuple(values.shape)
         if shape == (0,):
             values = np.zeros((0, 3))
@@ -39,11 +43,11 @@ class Rows:
         elif tuple(values.shape)[1:] != (3,):
             raise ValueError(f"{what} have the shape (n, 3), or (3,) for a single one, not {shape}")
         if np.dtype(values.dtype).kind not in "fiuO":
-            raise TypeError(f"{what} are numbers, not {values.dtype}")
+            raise TypeError(f"{what}: expected real numbers, got {values.dtype}")
         self.values, self.what, self.count = values, what, int(values.shape[0])
 
     def __getitem__(self, part: slice) -> np.ndarray:
-        return np.ascontiguousarray(self.values[part], dtype=np.float64)
+        return doubles(self.values[part], self.what)
 
     def check(self, begin: int, end: int) -> None:
         """The library numbers the points of a block; here the one that is not finite has its own number."""
@@ -79,7 +83,7 @@ def share(count: int, threads: int | None, worker: Callable[[], Any], progress: 
     worker() is a context manager that gives a function work(begin, end); each thread has its own. The
     calling thread is one of them. Of several failures the one of the first block is raised.
     """
-    threads = threads or cores()
+    threads = thread_count(threads or cores(), "threads")
     size = block_of(count, threads)
     blocks = -(-count // size)
     numbers: Iterator[int] = itertools.count()

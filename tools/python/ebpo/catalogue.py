@@ -346,14 +346,22 @@ class Catalogue:
         check_rays(o_rows, d_rows, t_max)
         out = np.zeros(count, HIT)
         out["t"], out["face"], out["model"] = np.inf, -1, -1
+        far = np.full(count, np.inf)  # of hits at a t beyond doubles (inf): t along the ray's longer direction
         for at in range(0, count, STRETCH):
             rays = slice(at, min(count, at + STRETCH))
             for number, some in runs(self.seen.on_rays(o_rows[rays], d_rows[rays])):
                 with self._model(number, held, True) as model:
                     hits = model.ray(o_rows[rays][some], d_rows[rays][some], t_max=t_max, threads=threads)
-                now = out[rays][some]  # models come in order: of equal ones the first stays; t may be inf
-                nearer = (hits.face >= 0) & ((hits.t < now["t"]) | (now["face"] < 0))
+                    beyond = np.flatnonzero((hits.face >= 0) & np.isinf(hits.t))
+                    there = np.full(len(some), np.inf)
+                    if len(beyond):
+                        where = some[beyond]
+                        there[beyond] = model.ray(o_rows[rays][where], longer(d_rows[rays][where]), threads=threads).t
+                now = out[rays][some]  # models come in order: of equal ones the first stays
+                nearer = (hits.face >= 0) & ((hits.t < now["t"]) | (now["face"] < 0) |
+                                             (np.isinf(now["t"]) & (there < far[rays][some])))
                 rows = at + some[nearer]
+                far[rows] = there[nearer]
                 out["t"][rows], out["side"][rows] = hits.t[nearer], hits.side[nearer]
                 out["face"][rows], out["model"][rows] = self._faces(number, hits.face[nearer]), number
         return out[0] if o.single and d.single else out
@@ -375,6 +383,12 @@ def check_rays(origins: np.ndarray, directions: np.ndarray, t_max: float, first:
                        (np.broadcast_to(t_max >= 0, len(origins)), "needs a t_max of 0 or more")):
         if not fine.all():
             raise ArgumentError(f"ray {first + int(fine.argmin())} {what}", "EBPO_E_ARGUMENT")
+
+
+def longer(directions: np.ndarray) -> np.ndarray:
+    """Directions that are longer by a power of two, exactly, so that every hit's t is finite."""
+    _, exponent = np.frexp(np.abs(directions).max(axis=1))
+    return np.ldexp(directions, np.maximum(0, 3 - exponent)[:, None])  # coordinates are at most 2^1025 apart
 
 
 def by_model(points: np.ndarray, models: np.ndarray) -> Pairs:
@@ -455,10 +469,11 @@ def regular(path: pathlib.Path) -> pathlib.Path:
 
 def read_numbers(path: str) -> np.ndarray:
     """FormatError: it is no array of integers."""
+    from .stretches import load_npy
     try:
-        numbers = np.load(regular(pathlib.Path(path)), mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
+        numbers = load_npy(str(regular(pathlib.Path(path))))
+    except (ValueError, OSError) as error:
         raise FormatError(f"{path}: cannot be read as a .npy: {error}", "EBPO_E_FORMAT", path) from None
-    if not isinstance(numbers, np.ndarray) or numbers.ndim != 1 or numbers.dtype.kind not in "iu":
+    if numbers.ndim != 1 or numbers.dtype.kind not in "iu":
         raise FormatError(f"{path}: is no array of integers with one dimension", "EBPO_E_FORMAT", path)
     return numbers

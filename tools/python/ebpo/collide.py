@@ -9,7 +9,8 @@ from typing import Any, Callable, Iterator, NamedTuple
 import numpy as np
 
 from . import _declared as c
-from ._library import Handle, Reporter, call, copied, made, size_in_bytes
+from ._checked import doubles, nanoseconds
+from ._library import Callback, Handle, Reporter, call, copied, made, size_in_bytes
 
 PAIR = np.dtype(c.ebpo_face_pair)
 SEGMENT = np.dtype(c.ebpo_contact_segment)
@@ -69,11 +70,11 @@ def pose(rotation: Any = None, translation: Any = None, scale: float = 1.0, quat
     if rotation is not None and quaternion is not None:
         raise ValueError("a pose has a rotation or a quaternion")
     if rotation is not None:
-        np.ctypeslib.as_array(made_pose.rotation)[:] = np.asarray(rotation, dtype=np.float64).reshape(3, 3)
+        np.ctypeslib.as_array(made_pose.rotation)[:] = doubles(rotation, "rotation").reshape(3, 3)
     if translation is not None:
-        np.ctypeslib.as_array(made_pose.translation)[:] = np.asarray(translation, dtype=np.float64).reshape(3)
+        np.ctypeslib.as_array(made_pose.translation)[:] = doubles(translation, "translation").reshape(3)
     if quaternion is not None:
-        turn = np.ascontiguousarray(quaternion, dtype=np.float64).reshape(4)
+        turn = doubles(quaternion, "quaternion").reshape(4)
         call("ebpo_pose_turn", ctypes.byref(made_pose), turn.ctypes.data)
     return made_pose
 
@@ -83,7 +84,7 @@ def pose_of(value: Any) -> Any:
         return made(c.ebpo_pose)
     if isinstance(value, c.ebpo_pose):
         return value
-    matrix = np.asarray(value, dtype=np.float64)
+    matrix = doubles(value, "a pose")
     if matrix.shape != (4, 4) or not np.array_equal(matrix[3], [0, 0, 0, 1]):
         raise ValueError("a pose is what ebpo.pose gives, or a (4, 4) matrix whose last row is 0 0 0 1")
     scale = float(np.linalg.norm(matrix[:3, 0]))
@@ -100,12 +101,12 @@ def matrix_of(value: Any) -> np.ndarray:
     return matrix
 
 
-class Gathered:
+class Gathered(Callback):
     """Items that the library lends to a callback, kept as an array."""
 
     def __init__(self, function: Any, dtype: np.dtype) -> None:
+        super().__init__(function, self.keep)
         self.dtype, self.parts = dtype, [np.empty(0, dtype)]
-        self.take = function(self.keep)
 
     def keep(self, _user: int, items: int, count: int) -> bool:
         self.parts.append(copied(items, (count,), self.dtype))
@@ -143,7 +144,7 @@ class Collider:
                  level: int | None = None) -> Iterator[Any]:
         with self._lock, Reporter(progress) as reported:
             options = made(c.ebpo_collide_options, pose_a=pose_of(poses[0]), pose_b=pose_of(poses[1]),
-                           deadline_ns=int((deadline or 0) * 1e9), progress=reported)
+                           deadline_ns=nanoseconds(deadline or 0), progress=reported)
             if level is not None:
                 options.level = level
             yield ctypes.byref(options)
@@ -169,8 +170,8 @@ class Collider:
 
     def _pairs(self, function: str, poses: tuple, progress: Callable | None) -> Pairs:
         found = Gathered(c.ebpo_pairs_fn, PAIR)
-        with self._options(poses, None, progress) as options:
-            call(function, self._handle, options, found.take, None)
+        with self._options(poses, None, progress) as options, found as taking:
+            call(function, self._handle, options, taking, None)
         pairs = found.array
         return Pairs(pairs["face_a"].astype(np.int64), pairs["face_b"].astype(np.int64), pairs["kind"].copy())
 
@@ -189,8 +190,8 @@ class Collider:
     def contacts(self, pose_a: Any = None, pose_b: Any = None, *, progress: Callable | None = None) -> Contacts:
         """Where they cross: a segment for each pair of crossing faces."""
         found = Gathered(c.ebpo_segments_fn, SEGMENT)
-        with self._options((pose_a, pose_b), None, progress) as options:
-            call("ebpo_collide_contacts", self._handle, options, found.take, None)
+        with self._options((pose_a, pose_b), None, progress) as options, found as taking:
+            call("ebpo_collide_contacts", self._handle, options, taking, None)
         all_of_them = found.array
         return Contacts(all_of_them["point"].copy(), all_of_them["face_a"].astype(np.int64),
                         all_of_them["face_b"].astype(np.int64))
@@ -208,8 +209,8 @@ class Collider:
             lines.append(copied(given.points, (given.count, 3), np.float64))
             return True
 
-        with self._options((pose_a, pose_b)) as options:
-            call("ebpo_collide_polylines", self._handle, options, c.ebpo_polylines_fn(take), None)
+        with self._options((pose_a, pose_b)) as options, Callback(c.ebpo_polylines_fn, take) as taking:
+            call("ebpo_collide_polylines", self._handle, options, taking, None)
         return lines
 
     def distance(self, pose_a: Any = None, pose_b: Any = None, *, tolerance: float = 0.0,
@@ -242,7 +243,7 @@ class Collider:
         >>> Collider(cube, cube).way_out([1, 0, 0], pose_b=pose(translation=[-.25, 0, 0])).hi
         0.75
         """
-        along, out = np.ascontiguousarray(direction, dtype=np.float64).reshape(3), c.ebpo_way_out()
+        along, out = doubles(direction, "direction").reshape(3), c.ebpo_way_out()
         with self._options((pose_a, pose_b)) as options:
             call("ebpo_collide_way_out", self._handle, options, along.ctypes.data, ctypes.byref(out))
         return WayOut(out.t.lo, out.t.hi, number(out.pair.face_a), number(out.pair.face_b))

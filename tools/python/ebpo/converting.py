@@ -8,6 +8,7 @@ from typing import Any, Callable
 import numpy as np
 
 from . import _declared as c
+from ._checked import doubles, integers, path
 from ._library import Handle, Reporter, Struct, call, made, size_in_bytes
 from .model import Model
 from .model import open as open_model
@@ -52,9 +53,9 @@ def convert(mesh: Any, output: Any, *, without: Any = (), rule: str = "nonzero",
         if not set(given) <= set(known):
             raise ValueError(f"{what}: {', '.join(map(repr, known))}, not {', '.join(map(repr, given))}")
     call("ebpo_register_filters")  # a library without libhdf5 says now, not after hours, that it cannot write
-    call("ebpo_check_output", os.fsencode(output))
+    call("ebpo_check_output", path(output, "output"))
     space = made(c.ebpo_workspace_options, memory=size_in_bytes(memory),
-                 temp_dir=None if temp_dir is None else os.fsencode(temp_dir))
+                 temp_dir=None if temp_dir is None else path(temp_dir, "temp_dir"))
     workspace = Handle.made("ebpo_workspace_new", ctypes.byref(space), free="ebpo_workspace_free")
     with Reporter(progress) as reported:
         common = {"threads": threads or 0, "progress": reported}
@@ -66,45 +67,40 @@ def convert(mesh: Any, output: Any, *, without: Any = (), rule: str = "nonzero",
         prepared = made(c.ebpo_prepared)
         call("ebpo_mesh_prepare", read, ctypes.byref(prepare), ctypes.byref(prepared))
         build = made(c.ebpo_build_options, parts=parts, rule=RULES[rule], **common,
-                     **{n: in_c(options[n]) for n in BUILD if options.get(n) is not None})
+                     **{n: options[n] for n in BUILD if options.get(n) is not None})
         tree = Struct(c.ebpo_tree, "ebpo_tree_free", workspace)
         call("ebpo_build", read, ctypes.byref(prepared.report), ctypes.byref(prepared.record),
              ctypes.byref(build), tree)
         write = made(c.ebpo_write_options, codec=CODECS[codec], codec_level=codec_level, **common)
-        call("ebpo_tree_write", tree, os.fsencode(output), ctypes.byref(write))
+        call("ebpo_tree_write", tree, path(output, "output"), ctypes.byref(write))
     return open_model(output)
-
-
-def in_c(value: Any) -> Any:
-    return value.encode() if isinstance(value, str) else value
 
 
 def read_mesh(mesh: Any, workspace: Handle, attributes: bool, common: dict) -> Struct:
     """An ebpo_mesh of a file, or of arrays."""
-    if isinstance(mesh, (str, os.PathLike)):
+    if isinstance(mesh, (str, bytes, os.PathLike)):
         options = made(c.ebpo_mesh_read_options, attributes=attributes, workspace=workspace.pointer, **common)
         read = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace)
-        call("ebpo_mesh_read", os.fsencode(mesh), ctypes.byref(options), read)
+        call("ebpo_mesh_read", path(mesh, "mesh"), ctypes.byref(options), read)
         return read
     vertices, faces = map(np.asarray, mesh)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         raise ValueError(f"vertices are (v, 3) and faces (f, 3), not {vertices.shape} and {faces.shape}")
-    if faces.dtype.kind not in "iu":
-        raise TypeError(f"faces are integers, not {faces.dtype}")
-    if faces.size and (faces.min() < 0 or faces.max() >= len(vertices)):
+    faces = integers(faces, np.uint32, "faces")
+    if faces.size and faces.max() >= len(vertices):
         raise ValueError("a face names a vertex that is not there")
     single = vertices.dtype == np.float32
     read = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace, vertex_count=len(vertices), face_count=len(faces))
-    xyz = of_malloc(vertices, np.float32 if single else np.float64)
+    xyz = of_malloc(vertices if single else doubles(vertices, "vertices"))
     setattr(read.c, "xyz32" if single else "xyz64", xyz)
-    read.c.faces = of_malloc(faces, np.uint32)
+    read.c.faces = of_malloc(faces)
     read.c.workspace = workspace.pointer
     return read
 
 
-def of_malloc(values: np.ndarray, dtype: Any) -> int:
+def of_malloc(values: np.ndarray) -> int:
     """A copy that free() frees."""
-    values = np.ascontiguousarray(values, dtype=dtype)
+    values = np.ascontiguousarray(values)
     malloc = ctypes.CDLL(None).malloc
     malloc.restype, malloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t]
     address = malloc(max(1, values.nbytes))

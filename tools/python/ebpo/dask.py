@@ -27,7 +27,7 @@ from . import catalogue as cat
 from .catalogue import Catalogue
 from .errors import ArgumentError
 from .holding import ours
-from .stretches import HDF5, PointFile, h5py_of, published, save_array, shape_of_npy
+from .stretches import HDF5, PointFile, h5py_of, load_npy, published, save_array, shape_of_npy
 
 CHUNK = 1 << 18  # points of a task
 DTYPES = {"inside": np.dtype(bool), "winding": np.dtype("i4"), "locate": cat.LOCATED, "distance": cat.NEAREST,
@@ -252,8 +252,8 @@ def check_parts(names: list, answers: Any) -> None:
     """ValueError: a chunk that was there is not one of these answers. Of some Dask knows no rows (NaN)."""
     for name, rows in zip(names, answers.chunks[0]):
         try:
-            part = np.load(name, mmap_mode="r", allow_pickle=False)
-        except (ValueError, EOFError) as error:
+            part = load_npy(str(name))
+        except ValueError as error:
             raise ValueError(f"{name}: no chunk of answers ({error}); remove it, and it is made anew") from None
         if part.dtype != answers.dtype or (rows == rows and len(part) != rows):
             raise ValueError(f"{name}: {len(part)} rows of {part.dtype}, not {rows} of {answers.dtype}; remove it, and "
@@ -264,7 +264,7 @@ def join_parts(path: pathlib.Path, names: list, dataset: str) -> None:
     """Of chunks that are whole; one at a time is open, however many there are."""
     heads = [shape_of_npy(str(name)) for name in names]
     shape, dtype = (sum(rows for (rows, *_), _ in heads), *heads[0][0][1:]), heads[0][1]
-    parts = (np.load(name, mmap_mode="r", allow_pickle=False) for name in names)
+    parts = (load_npy(str(name)) for name in names)
     if path.suffix == ".npy":
         with published(path) as file:
             np.lib.format.write_array_header_1_0(file, {"descr": np.lib.format.dtype_to_descr(dtype),

@@ -5,14 +5,17 @@ import collections
 import contextlib
 import ctypes
 import threading
+import time
 from typing import Any, Callable, Iterator, NamedTuple
 
 import numpy as np
 
 from . import _declared as c
-from ._library import Handle, Reporter, call, copied, lib, made, size_in_bytes
+from ._checked import doubles, integers, nanoseconds
+from ._library import Callback, Handle, Reporter, call, copied, lib, made, size_in_bytes
 from .asking import Rows, Told, share
-from .errors import ArgumentError
+from .automatic import Automatic
+from .errors import ArgumentError, LimitError, NoMemory
 from .parts import Attributes, Info, Level, Maps, Mass, Mesh, Subtree, read_level, read_maps, read_mesh
 from .sources import opened
 
@@ -23,6 +26,9 @@ INSIDE = np.dtype(c.ebpo_inside_result)
 DISTANCE = np.dtype(c.ebpo_distance_result)
 HIT = np.dtype(c.ebpo_ray_hit)
 NEAR = np.dtype(c.ebpo_near_face)
+
+# What of a question's time its model costs by being held in parts (docs/measured/asking.md).
+PARTS_SHARE = {"inside": 0.05, "distance": 0.65, "rays": 0.6, "box": 0.25}
 
 Progress = Callable[[str, int, int], Any]
 
@@ -78,8 +84,10 @@ def open(source: Any, *, memory: int | str | None = None, cut_level: int | None 
         are not copied; a file with seek and read; an object with `size` and `read_range(offset, size)`,
         which several threads call at once. It has to stay until the model is gone, and must itself not
         open .ebpo.h5 files while it is read.
-    memory: bytes that questions may hold of the model: 500000000, "500M", "2GiB". None: all of it; of a
-        large file on a server 256 MiB.
+    memory: bytes that questions may hold of the model: 500000000, "500M", "2GiB". None, as in the command: of
+        a file on this machine at most half of what is free, and of that only the subtrees that questions
+        come to, until all of the model at once is cheaper; of a file of more than 2 MiB that is elsewhere
+        (a URL, an object with ranges, a file object that the system does not read) 256 MiB.
     cut_level: levels that stay in memory; None: by the budget.
     prefetch: subtrees around the last questions are loaded in the background.
     threads: so many work at questions and at reading. None: all cores.
@@ -123,7 +131,7 @@ class Model:
         self._source, self._options = source, options
         self._threads = options["threads"] or 0
         self._model_options = made(c.ebpo_model_options, memory=size_in_bytes(options["memory"]),
-                                   prefetch=bool(options["prefetch"]), threads=self._threads)
+                                   prefetch=options["prefetch"], threads=self._threads)
         if options["cut_level"] is not None:
             self._model_options.cut_level = options["cut_level"]
         self._file: Handle | None = opened(source, http, options["storage_options"],
@@ -134,6 +142,7 @@ class Model:
         self._samplers: dict[str, Handle] = {}
         name = source if isinstance(source, (str, bytes)) else getattr(source, "name", type(source).__name__)
         struct = c.ebpo_info.from_address(lib.ebpo_file_info(self._file))
+        self._automatic = Automatic(self._file, self._model_options)
         #: The facts of the file.
         self.info: Info = Info(struct, name if isinstance(name, str) else type(source).__name__)
 
@@ -145,19 +154,48 @@ class Model:
             raise ValueError("the model has been closed")
         return self._file
 
-    @property
-    def model(self) -> Handle:
+    def _new_model(self, options: Any) -> Handle:
+        return Handle.made("ebpo_model_new", self.file, ctypes.byref(options), free="ebpo_model_free",
+                           keep=(self.file,))
+
+    def _current(self) -> Handle:
         """What questions are asked of, made when it is first needed."""
         with self._lock:
             if self._made is None:
-                self._made = Handle.made("ebpo_model_new", self.file, ctypes.byref(self._model_options),
-                                         free="ebpo_model_free", keep=(self.file,))
+                self._made = self._new_model(self._model_options)
             return self._made
 
+    @property
+    def model(self) -> Handle:
+        """For those who hold it for long, such as a `Collider`: without a budget all of it, if that fits."""
+        with self._lock:
+            if self._automatic.waiting:
+                self._bring_in_all()
+        return self._current()
+
+    def _bring_in_all(self) -> None:
+        """All of the model takes the place of its parts, which go first."""
+        with self._lock:
+            if not self._automatic.waiting:
+                return
+            self._automatic.waiting = False
+            self._contexts.clear()
+            self._made = None
+            try:
+                self._made = self._new_model(self._automatic.whole())
+            except (LimitError, NoMemory):  # more than its counts told
+                pass
+
     @contextlib.contextmanager
-    def _context(self) -> Iterator[Handle]:
-        """A context of the model for one thread."""
-        model = self.model
+    def _context(self, questions: int = 0, total: int = 0, kind: str = "") -> Iterator[Handle]:
+        """A context of the model for one thread.
+
+        questions: so many will be asked of `total` that are known to come; kind: of PARTS_SHARE.
+        """
+        model, waiting, began = self._current(), self._automatic.waiting and questions > 0, time.perf_counter()
+        if waiting and self._automatic.pays(model, total, PARTS_SHARE[kind]):
+            self._bring_in_all()
+            model, waiting = self._current(), False
         try:
             context = self._contexts.pop()
         except IndexError:
@@ -165,6 +203,8 @@ class Model:
         try:
             yield context
         finally:
+            if waiting:
+                self._automatic.asked(questions, time.perf_counter() - began)
             if self._made is model:
                 self._contexts.append(context)
 
@@ -192,7 +232,7 @@ class Model:
     def stats(self) -> dict[str, Any]:
         """What questions have cost so far: members of ebpo_model_stats in ebpo/query.h."""
         stats = made(c.ebpo_model_stats)
-        lib.ebpo_model_get_stats(self.model, ctypes.byref(stats))
+        lib.ebpo_model_get_stats(self._current(), ctypes.byref(stats))
         return {name: getattr(stats, name) if not isinstance(getattr(stats, name), ctypes.Array)
                 else list(getattr(stats, name)) for name, _ in stats._fields_[1:]}
 
@@ -205,23 +245,27 @@ class Model:
 
         @contextlib.contextmanager
         def worker() -> Iterator[Callable[[int, int], None]]:
-            with self._context() as context:
-                answers = np.empty(0, dtype)
+            answers = np.empty(0, dtype)
 
-                def work(begin: int, end: int) -> None:
-                    nonlocal answers
-                    if len(answers) < end - begin:
-                        answers = np.empty(end - begin, dtype)
-                    points = rows[begin:end]
+            def work(begin: int, end: int) -> None:
+                nonlocal answers
+                if len(answers) < end - begin:
+                    answers = np.empty(end - begin, dtype)
+                points = rows[begin:end]
+                at = 0
+                while at < end - begin:
+                    count = min(end - begin - at, self._automatic.piece())
                     try:
-                        call(entry, context, points.ctypes.data, end - begin, ctypes.byref(options),
-                             answers.ctypes.data)
+                        with self._context(count, rows.count, stage) as context:
+                            call(entry, context, points[at:].ctypes.data, count, ctypes.byref(options),
+                                 answers[at:].ctypes.data)
                     except ArgumentError:
                         rows.check(begin, end)
                         raise
-                    put(answers[:end - begin], begin, end)
+                    at += count
+                put(answers[:end - begin], begin, end)
 
-                yield work
+            yield work
 
         share(rows.count, threads or self._threads, worker, progress, stage)
         if rows.count == 0:  # says what a question would, such as that the model is a surface
@@ -263,7 +307,7 @@ class Model:
         if level is not None:
             options.level = level
         if deadline is not None:
-            options.deadline_ns = int(deadline * 1e9)
+            options.deadline_ns = nanoseconds(deadline)
         return options
 
     def inside(self, points: Any, *, boundary: bool = True, threads: int | None = None,
@@ -308,7 +352,8 @@ class Model:
         max_distance: what is farther away does not matter.
         signed: of solids distances are negative inside; without, less work.
 
-        Returns distance: (n,) float64, correctly rounded, inf: nothing within max_distance; point:
+        Returns distance: (n,) float64, correctly rounded, inf: nothing within max_distance, or, where there is
+        a face, farther than every double; point:
         (n, 3) the nearest one, rounded, nan: none; normal: (n, 3) the face's unit normal, 0 of a face
         without area; face: (n,) int64, of several at the same distance the first in the file, -1: none.
 
@@ -348,7 +393,7 @@ class Model:
         if level is not None:
             options.level = level
         if deadline is not None:
-            options.deadline_ns = int(deadline * 1e9)
+            options.deadline_ns = nanoseconds(deadline)
         out = Bounds(np.empty(rows.count), np.empty(rows.count))
 
         def put(answers: np.ndarray, begin: int, end: int) -> None:
@@ -379,9 +424,8 @@ class Model:
             found.extend(ctypes.string_at(face, NEAR.itemsize))
             return True
 
-        with self._context() as context:
-            call("ebpo_distance_within", context, rows[0:1].ctypes.data, ctypes.byref(options),
-                 c.ebpo_near_fn(take), None)
+        with self._context(1, 1, "distance") as context, Callback(c.ebpo_near_fn, take) as taking:
+            call("ebpo_distance_within", context, rows[0:1].ctypes.data, ctypes.byref(options), taking, None)
         faces: Any = np.frombuffer(bytes(found), NEAR)
         return Nearest(faces["distance"].copy(), faces["point"].copy(), faces["normal"].copy(),
                        faces["face"].view(np.int64).copy())
@@ -394,7 +438,7 @@ class Model:
         count = max(o.count, d.count)
         if o.count != d.count and not (o.single or d.single):
             raise ValueError(f"{o.count} origins and {d.count} directions")
-        most = np.asarray(t_max, dtype=np.float64)
+        most = doubles(t_max, "t_max")
         if most.ndim and most.shape != (count,):
             raise ValueError(f"t_max is a number, or has the shape ({count},), not {most.shape}")
 
@@ -412,24 +456,28 @@ class Model:
         count, _, block = rays
         options = made(c.ebpo_ray_options, threads=threads or self._threads, sides=self._sides(sides))
         told = Told(progress, "rays", count)
-        with self._context() as context:
-            for begin in range(0, count, RAYS):
-                end = min(count, begin + RAYS)
-                told(begin)
-                asked = block(begin, end)
-                if not np.isfinite(asked[:, :6]).all():
-                    bad = begin + int((~np.isfinite(asked[:, :6]).all(axis=1)).argmax())
-                    raise ArgumentError(f"ray {bad} has a coordinate that is not a finite number", "EBPO_E_ARGUMENT")
-                out = outputs(begin, end)
-                try:
+        begin = 0
+        while begin < count:
+            end = min(count, begin + RAYS, begin + self._automatic.piece())
+            told(begin)
+            asked = block(begin, end)
+            if not np.isfinite(asked[:, :6]).all():
+                bad = begin + int((~np.isfinite(asked[:, :6]).all(axis=1)).argmax())
+                raise ArgumentError(f"ray {bad} has a coordinate that is not a finite number", "EBPO_E_ARGUMENT")
+            out = outputs(begin, end)
+            try:
+                with self._context(end - begin, count, "rays") as context:
                     call(function, context, asked.ctypes.data, end - begin, ctypes.byref(options), *out)
-                except ArgumentError as error:
-                    if begin:
-                        error.args = (f"of rays from {begin} on: {error}",)
-                    raise
-                keep(begin, end, *out)
-            if count:
-                told(count)
+                    keep(begin, end, *out)  # lists of hits are the context's
+            except ArgumentError as error:
+                if begin:
+                    error.args = (f"of rays from {begin} on: {error}",)
+                raise
+            begin = end
+        if count:
+            told(count)
+        else:
+            self._current()  # says what a question would
 
     @staticmethod
     def _sides(sides: str) -> int:
@@ -446,7 +494,8 @@ class Model:
         t_max: a number, or (n,).
         sides: "both"; "front": faces that are met against their normals; "back": along them.
 
-        Returns t: (n,) float64, inf: nothing is met; face: (n,) int64, -1: none; side: (n,) int32, 1: the
+        Returns t: (n,) float64, inf: nothing is met, or, where there is a face, t is greater than every double
+        (a longer direction gives it a finite one); face: (n,) int64, -1: none; side: (n,) int32, 1: the
         ray goes in through the face's inner part, -1: out, 0: it meets an edge or a vertex, runs in the
         face's plane, or the face has no area.
 
@@ -504,7 +553,7 @@ class Model:
 
     @staticmethod
     def _box(low: Any, high: Any) -> tuple[np.ndarray, np.ndarray]:
-        corners = np.ascontiguousarray(low, dtype=np.float64), np.ascontiguousarray(high, dtype=np.float64)
+        corners = doubles(low, "a corner"), doubles(high, "a corner")
         if corners[0].shape != (3,) or corners[1].shape != (3,):
             raise ValueError("a box has two corners of three numbers")
         return corners
@@ -519,7 +568,7 @@ class Model:
         """
         corners = self._box(low, high)
         faces, count = ctypes.c_void_p(), ctypes.c_uint64()
-        with self._context() as context:
+        with self._context(1, 1, "box") as context:
             call("ebpo_faces_in_box", context, corners[0].ctypes.data, corners[1].ctypes.data,
                  ctypes.byref(faces), ctypes.byref(count))
             return copied(faces.value, (count.value,), np.int64)
@@ -543,9 +592,8 @@ class Model:
             faces.append(copied(some.faces, (some.count,), np.int64))
             return True
 
-        with self._context() as context:
-            call("ebpo_triangles_in_box", context, box[0].ctypes.data, box[1].ctypes.data,
-                 c.ebpo_triangles_fn(take), None)
+        with self._context(1, 1, "box") as context, Callback(c.ebpo_triangles_fn, take) as taking:
+            call("ebpo_triangles_in_box", context, box[0].ctypes.data, box[1].ctypes.data, taking, None)
         return np.concatenate(corners), np.concatenate(faces)
 
     # ---- attributes, mass ----
@@ -560,15 +608,15 @@ class Model:
         Returns (n, columns) float64; nan for no face. It holds the attributes and the mesh until the
         model is closed. Raises AbsentError where there is no such attribute.
         """
-        with self._lock:
-            if names not in self._samplers:
-                self._samplers[names] = Handle.made("ebpo_sampler_new", self.file, names.encode(), self._threads,
-                                                    free="ebpo_sampler_free", keep=(self.file,))
-            sampler = self._samplers[names]
         rows = Rows(points)
-        numbers = np.ascontiguousarray(faces, dtype=np.int64).reshape(-1)
+        numbers = integers(faces, np.int64, "faces").reshape(-1)
         if len(numbers) != rows.count:
             raise ValueError(f"{rows.count} points and {len(numbers)} faces")
+        with self._lock:
+            if names not in self._samplers:
+                self._samplers[names] = Handle.made("ebpo_sampler_new", self.file, names, self._threads,
+                                                    free="ebpo_sampler_free", keep=(self.file,))
+            sampler = self._samplers[names]
         out = np.empty((rows.count, lib.ebpo_sampler_columns(sampler)))
         asked = rows[0:rows.count].copy()
         asked[numbers < 0] = 0  # of no face there is no point either
@@ -627,7 +675,7 @@ class Model:
         >>> cube.octcode([.1, .1, .1], 1)
         8
         """
-        asked = np.ascontiguousarray(point, dtype=np.float64)
+        asked = doubles(point, "the point")
         if asked.shape != (3,):
             raise ValueError("octcode() takes one point of three numbers")
         return lib.ebpo_octcode_at(lib.ebpo_file_info(self.file), asked.ctypes.data, level)

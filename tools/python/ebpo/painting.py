@@ -9,7 +9,9 @@ from typing import Any, Callable, Iterator, NamedTuple
 import numpy as np
 
 from . import _declared as c
-from ._library import Handle, Reporter, call, copied, lib, made, text
+from ._checked import doubles
+from ._checked import path as path_in_c
+from ._library import Callback, Handle, Reporter, call, copied, lib, made, of_members, text
 from .model import Model
 
 POINT = np.dtype(c.ebpo_paint_point)
@@ -71,7 +73,7 @@ class Paint:
     def open(cls, source: Any) -> Paint:
         """Of a path, or the bytes of a file. FormatError, VersionError, IOFailure."""
         if isinstance(source, (str, os.PathLike)):
-            return cls(_handle=Handle.made("ebpo_paint_open", os.fsencode(source), free="ebpo_paint_free"))
+            return cls(_handle=Handle.made("ebpo_paint_open", path_in_c(source), free="ebpo_paint_free"))
         data = np.frombuffer(source, np.uint8)
         return cls(_handle=Handle.made("ebpo_paint_open_memory", data.ctypes.data, data.nbytes, None,
                                        free="ebpo_paint_free"))
@@ -94,7 +96,7 @@ class Paint:
         2
         """
         path = os.path.abspath(path)  # the same at the end
-        paint = cls(_handle=Handle.made("ebpo_paint_open_to_change", os.fsencode(path),
+        paint = cls(_handle=Handle.made("ebpo_paint_open_to_change", path_in_c(path),
                                         None if model is None else model.file, wait, None, free="ebpo_paint_free"))
         try:
             if model is not None:
@@ -112,7 +114,7 @@ class Paint:
         IOFailure: another program or Paint has changed the file that this one is of, since it was read
         from it or saved there. Open it again and repeat the change, or save to another path.
         """
-        call("ebpo_paint_save", self._handle, os.fsencode(path))
+        call("ebpo_paint_save", self._handle, path_in_c(path))
 
     @property
     def info(self) -> dict[str, Any]:
@@ -159,7 +161,7 @@ class Paint:
     def add_note(self, model: Model, place: Any, *, layer: int = 0, **texts: Any) -> None:
         """At the point of the surface nearest to a place. texts: title, author, date, body."""
         note = of_members(c.ebpo_paint_note, {**texts, "layer": layer})
-        at = np.ascontiguousarray(place, np.float64)
+        at = doubles(place, "a place")
         if at.shape != (3,):
             raise ValueError("a place has three numbers")
         with model._context() as context:
@@ -192,14 +194,14 @@ class Paint:
 
         Returns members of ebpo_paint_laid: strokes, points, steps, lifted, strayed.
         """
-        rows = np.array(hand, np.float64)
+        rows = doubles(hand, "a hand's way")
         if rows.ndim != 2 or rows.shape[1] not in (4, 5):
             raise ValueError(f"a hand's way has the shape (n, 4) or (n, 5), not {rows.shape}")
         way = np.zeros((len(rows), 5))
         way[:, :rows.shape[1]] = rows
         laid = made(c.ebpo_paint_laid)
         with Reporter(progress) as reported, model._context() as context:
-            given = of_members(c.ebpo_paint_pen, {**pen, "progress": reported})
+            given = of_members(c.ebpo_paint_pen, pen, progress=reported)
             call("ebpo_paint_lay", self._handle, context, way.ctypes.data, len(way), ctypes.byref(given),
                  ctypes.byref(laid))
         return facts(laid)
@@ -214,8 +216,8 @@ class Paint:
             found.extend(ctypes.string_at(face, FACE.itemsize))
             return True
 
-        with model._context() as context:
-            call("ebpo_paint_cover", self._handle, context, stroke, c.ebpo_paint_face_fn(take), None, None)
+        with model._context() as context, Callback(c.ebpo_paint_face_fn, take) as taking:
+            call("ebpo_paint_cover", self._handle, context, stroke, taking, None, None)
         return np.frombuffer(bytes(found), FACE)
 
     def measure(self, model: Model, *, fineness: int = 256, progress: Callable | None = None) -> Areas:
@@ -229,15 +231,6 @@ class Paint:
                     copied(areas.strokes, (info["stroke_count"],), AREA))
         lib.ebpo_paint_areas_free(ctypes.byref(areas))
         return out
-
-
-def of_members(kind: Any, members: dict) -> Any:
-    """A struct with these; texts become UTF-8, and stay as long as it does."""
-    known = {name for name, _ in kind._fields_} - {"struct_size", "reserved"}
-    for name in members:
-        if name not in known:
-            raise TypeError(f"there is no {name!r} here, but {', '.join(sorted(known))}")
-    return made(kind, **{name: value.encode() if isinstance(value, str) else value for name, value in members.items()})
 
 
 def facts(struct: Any) -> dict[str, Any]:

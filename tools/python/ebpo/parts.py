@@ -8,6 +8,7 @@ from typing import Any, Iterator, NamedTuple
 import numpy as np
 
 from . import _declared as c
+from ._checked import integers
 from ._library import Handle, Struct, array, call, copied, lib, made, text
 
 
@@ -327,7 +328,7 @@ def half_spaces(codes: Any) -> tuple[np.ndarray, np.ndarray]:
     >>> n.tolist()
     [[0, 511, 0]]
     """
-    codes = np.ascontiguousarray(codes, dtype=np.uint32).ravel()
+    codes = integers(codes, np.uint32, "codes").ravel()
     n, d = np.zeros((len(codes), 3), np.int32), np.zeros(len(codes), np.int32)
     for i, code in enumerate(codes.tolist()):
         if not lib.ebpo_plane_decode(code, n[i].ctypes.data, d[i:].ctypes.data):

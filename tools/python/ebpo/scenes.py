@@ -2,13 +2,13 @@
 from __future__ import annotations
 
 import ctypes
-import os
 import threading
 from typing import Any, Callable, Iterator
 
 import numpy as np
 
 from . import _declared as c
+from ._checked import path as path_in_c
 from ._library import Handle, Reporter, call, lib, made, size_in_bytes, text
 from .collide import PAIR, Gathered, Pairs, matrix_of
 
@@ -25,7 +25,7 @@ def open_scene(path: Any, *, memory: int | str | None = None, outside: bool = Fa
     remote: models on web servers may be named.
     """
     options = made(c.ebpo_scene_options, outside=outside, remote=remote)
-    handle = Handle.made("ebpo_scene_open", os.fsencode(path), ctypes.byref(options), free="ebpo_scene_free")
+    handle = Handle.made("ebpo_scene_open", path_in_c(path), ctypes.byref(options), free="ebpo_scene_free")
     with Reporter(progress) as reported:
         load = made(c.ebpo_load_options, memory=size_in_bytes(memory), progress=reported)
         call("ebpo_scene_load", handle, ctypes.byref(load))
@@ -53,8 +53,8 @@ class Scene:
             getattr(lib, function)(self._handle, number, ctypes.byref(facts))
             yield text(facts.name)
 
-    def _number(self, instance: Any) -> int:
-        return self.instances.index(instance) if isinstance(instance, str) else int(instance)
+    def _number(self, instance: Any) -> Any:
+        return self.instances.index(instance) if isinstance(instance, str) else instance
 
     def pose(self, instance: Any, time: float = 0.0) -> np.ndarray:
         """Where an instance, a number or a name, is at a time: a (4, 4) matrix."""
@@ -77,8 +77,8 @@ class Scene:
         """Pairs whose boxes come within their clearance at some time: a structured array of a, b and
         clearance, ascending. No other pair comes that close."""
         found = Gathered(c.ebpo_scene_pairs_fn, CLOSE)
-        with self._lock:
-            call("ebpo_scene_pairs", self._handle, *self._times(begin, end), found.take, None)
+        with self._lock, found as taking:
+            call("ebpo_scene_pairs", self._handle, *self._times(begin, end), taking, None)
         return found.array
 
     def meet(self, time: float = 0.0, *, count: bool = False, places: bool = False, relate: bool = False,
@@ -92,18 +92,17 @@ class Scene:
         MeetingKind), relation (a Relation), face_a, face_b, distance, place ...
         """
         found = Gathered(c.ebpo_scene_meetings_fn, MEETING)
-        with self._lock, Reporter(progress) as reported:
+        with self._lock, Reporter(progress) as reported, found as taking:
             options = made(c.ebpo_scene_ask_options, progress=reported, threads=threads or 0, count=count,
                            places=places, relate=relate, depth=depth)
-            call("ebpo_scene_meet", self._handle, time, ctypes.byref(options), found.take, None, None)
+            call("ebpo_scene_meet", self._handle, time, ctypes.byref(options), taking, None, None)
         return found.array
 
     def collide(self, a: Any, b: Any, time: float = 0.0, *, threads: int | None = None) -> Pairs:
         """Every pair of faces of two instances that meet at a time."""
         found = Gathered(c.ebpo_pairs_fn, PAIR)
-        with self._lock:
-            call("ebpo_scene_collide", self._handle, self._number(a), self._number(b), time, threads or 0,
-                 found.take, None)
+        with self._lock, found as taking:
+            call("ebpo_scene_collide", self._handle, self._number(a), self._number(b), time, threads or 0, taking, None)
         pairs = found.array
         return Pairs(pairs["face_a"].astype(np.int64), pairs["face_b"].astype(np.int64), pairs["kind"].copy())
 

@@ -2,26 +2,22 @@
 from __future__ import annotations
 
 import ctypes
-import datetime
-import email.utils
+import io
 import os
-import random
 import threading
-import time
-import urllib.error
-import urllib.parse
-import urllib.request
-from collections import OrderedDict
-from http.client import HTTPException
 from typing import Any
 
 import numpy as np
 
 from . import _declared as c
-from ._library import Handle, made, size_in_bytes
-from .errors import UnsupportedError
+from ._checked import path, text
+from ._library import Handle, made, of_members, size_in_bytes
+from .errors import Error, IOFailure, UnsupportedError
+from .ranges import CONNECTIONS, MEMORY, Ranges, read_whole
+from .web import Patience, Web
 
 FUNCTIONS: dict = {name: kind for name, kind in c.ebpo_source._fields_}
+RANGE = np.dtype(c.ebpo_range)
 IO, CANCELLED = -3, -9
 
 
@@ -61,144 +57,39 @@ class Stored:
         return self.fs.cat_file(self.path, start=offset, end=offset + size)
 
 
-class Redirects(urllib.request.HTTPRedirectHandler):
-    """As the library follows them: five, http and https alone, never from https to http; the caller's
-    headers, which may be secret, stay with the server that they were given for."""
+class Uncached:
+    """A file object of fsspec, read around its own cache, which reads ahead: several ranges at a time."""
 
-    max_redirections = 5
-
-    def redirect_request(self, request: Any, answer: Any, code: int, message: str, headers: Any, url: str) -> Any:
-        new = super().redirect_request(request, answer, code, message, headers, url)
-        before, after = urllib.parse.urlsplit(request.full_url), urllib.parse.urlsplit(url)
-        if after.scheme not in ("http", "https") or (before.scheme, after.scheme) == ("https", "http"):
-            raise OSError(f"the server leads from {before.scheme} to {after.scheme}, which is not followed")
-        if (before.scheme, before.netloc.lower()) != (after.scheme, after.netloc.lower()):
-            new.headers = {"Range": new.headers["Range"]}
-        return new
-
-
-OPENER = urllib.request.build_opener(Redirects)
-
-
-class Patience:
-    """How long a request is sent again: with pauses that double, by chance shorter, so that many clients do
-    not come back together; or as long as the server says (Retry-After)."""
-
-    FIRST, LONGEST, AGAIN = 0.2, 20.0, (408, 429, 500, 502, 503, 504)
-
-    def __init__(self, seconds: float, retries: int | None, what: str) -> None:
-        self.began, self.seconds, self.retries, self.what, self.failures = time.monotonic(), seconds, retries, what, 0
-
-    def wait(self, error: Exception) -> None:
-        """Before the next trial. Raises OSError if it would come too late, and `error` if it is no use."""
-        code = getattr(error, "code", None)
-        if code is not None and code not in self.AGAIN:
-            raise error
-        pause = min(self.LONGEST, self.FIRST * 2**min(self.failures, 16)) * random.uniform(0.5, 1)
-        pause = max(pause, self.told(error))
-        self.failures += 1
-        gone = time.monotonic() - self.began
-        if gone + pause > self.seconds or (self.retries is not None and self.failures > self.retries):
-            said = f"status {code}" if code is not None else str(getattr(error, "reason", error))
-            raise OSError(f"{self.what}: no answer after {self.failures} requests in {gone:.1f} s, the last one: "
-                          f"{said}; {self.seconds:g} s (time_limit) and "
-                          f"{'any number of' if self.retries is None else self.retries} retries are allowed") from error
-        threading.Event().wait(pause)
+    def __init__(self, file: Any) -> None:
+        self.file, self.size = file, file.size
 
     @staticmethod
-    def told(error: Exception) -> float:
-        """Seconds that a server asks for, as a number or a date; 0: none."""
-        text = (getattr(error, "headers", None) or {}).get("Retry-After") or ""
-        if text.strip().isdecimal():
-            return float(text)
-        try:
-            then = email.utils.parsedate_to_datetime(text)
-            return max(0.0, (then - datetime.datetime.now(datetime.timezone.utc)).total_seconds())
-        except (TypeError, ValueError):
-            return 0.0
-
-
-class Web:
-    """A URL by Python's own HTTP, where the library has none. Answers are of one version of the file.
-
-    time_limit: seconds for a request with all that repeat it; retries: how many do at most, None: any number.
-    One may be silent for SILENT seconds.
-    """
-
-    BLOCK, HELD, SILENT = 1 << 17, 384, 60.0
-
-    def __init__(self, url: str, headers: dict | None = None, time_limit: float = 120.0,
-                 retries: int | None = None) -> None:
-        self.url, self.headers, self.lock = url, dict(headers or {}), threading.Lock()
-        self.time_limit, self.retries = time_limit, retries
-        self.blocks: OrderedDict[int, bytes] = OrderedDict()
-        self.version: Any = None
-        self.size = 0
-        self.blocks[0] = self.fetch(0)
-
-    def fetch(self, number: int) -> bytes:
-        begin = number * self.BLOCK
-        end = begin + self.BLOCK - 1
-        if self.version is not None:
-            end = min(end, self.size - 1)
-        request = urllib.request.Request(self.url, headers={**self.headers, "Range": f"bytes={begin}-{end}"})
-        patience = Patience(self.time_limit, self.retries, self.url.partition("?")[0])
-        while True:
-            try:
-                with OPENER.open(request, timeout=min(self.SILENT, self.time_limit)) as answer:
-                    return self.checked(answer, begin)
-            except (urllib.error.URLError, TimeoutError, ConnectionError, HTTPException) as error:
-                patience.wait(error)
-
-    def checked(self, answer: Any, begin: int) -> bytes:
-        if answer.status != 206:
-            raise OSError(f"the server does not answer ranges (status {answer.status})")
-        first, _, whole = (answer.headers["Content-Range"] or "").partition(" ")[2].partition("/")
-        if not first.partition("-")[0].isdecimal() or not whole.isdecimal():
-            raise OSError("the server does not say which range it sent")
-        version = answer.headers["ETag"] or answer.headers["Last-Modified"], whole
-        if self.version not in (None, version):
-            raise OSError("the file on the server has changed since it was opened")
-        data = answer.read(self.BLOCK + 1)  # not more, however much a server sends
-        self.version, self.size = version, int(whole)
-        if int(first.partition("-")[0]) == begin and len(data) < min(self.BLOCK, self.size - begin):
-            raise ConnectionError(f"the connection ended after {len(data)} bytes")
-        if int(first.partition("-")[0]) != begin or len(data) != min(self.BLOCK, self.size - begin):
-            raise OSError("the server sent another range than was asked for")
-        return data
-
-    def block(self, number: int) -> bytes:
-        with self.lock:
-            if number in self.blocks:
-                self.blocks.move_to_end(number)
-                return self.blocks[number]
-        data = self.fetch(number)
-        with self.lock:
-            self.blocks[number] = data
-            while len(self.blocks) > self.HELD:
-                self.blocks.popitem(last=False)
-        return data
+    def fits(file: Any) -> bool:
+        return callable(getattr(getattr(file, "cache", None), "fetcher", None)) and isinstance(file.size, int)
 
     def read_range(self, offset: int, size: int) -> bytes:
-        first, last = offset // self.BLOCK, (offset + size - 1) // self.BLOCK
-        data = b"".join(map(self.block, range(first, last + 1)))
-        return data[offset - first * self.BLOCK:][:size]
+        return self.file.cache.fetcher(offset, offset + size)
 
 
 class Source:
-    """An object with ranges as the library wants it."""
+    """An object with `size` and `read_range` as the library wants it.
+
+    far: a Ranges, which is announced what will be read; of others the bytes are read where they are.
+    """
 
     def __init__(self, ranges: Any) -> None:
-        self.ranges = ranges
-        size = ranges.size
-        self.struct = made(c.ebpo_source, size=size() if callable(size) else size,
-                           read=FUNCTIONS["read"](self.read))
+        self.ranges, self.interrupted = ranges, False
+        far: Any = {}
+        if isinstance(ranges, Ranges):
+            far = {"prefetch": FUNCTIONS["prefetch"](self.prefetch), "prefetched": len(ranges.head)}
+        self.struct = made(c.ebpo_source, size=ranges.size, read=FUNCTIONS["read"](self.read),
+                           close=FUNCTIONS["close"](self.close), **far)
 
     def read(self, _user: int, offset: int, size: int, data: int, error: int) -> int:
         try:
-            told = memoryview(self.ranges.read_range(offset, size)).cast("B")
-            if len(told) != size:
-                raise OSError(f"{len(told)} bytes came instead of {size} at byte {offset}")
+            if self.interrupted:
+                raise KeyboardInterrupt
+            told = read_whole(self.ranges, offset, size)
             ctypes.memmove(data, np.frombuffer(told, np.uint8).ctypes.data, size)
             return 0
         except BaseException as raised:
@@ -206,30 +97,44 @@ class Source:
             if error:
                 out = c.ebpo_error.from_address(error)
                 out.status, out.offset = status, offset
-                out.message = f"reading failed: {type(raised).__name__}: {raised}".encode()[:400]
+                said = str(raised) if isinstance(raised, Error) else f"reading failed: {type(raised).__name__}: {raised}"
+                out.message = shown(said)[:400]
             return status
+
+    def prefetch(self, _user: int, ranges: int, count: int) -> None:
+        try:
+            self.ranges.prefetch(np.frombuffer(ctypes.string_at(ranges, count * RANGE.itemsize), RANGE).tolist())
+        except KeyboardInterrupt:
+            self.interrupted = True  # reading says so
+        except Exception:
+            pass  # nothing depends on it
+
+    def close(self, _user: int) -> None:
+        if isinstance(self.ranges, Ranges):
+            self.ranges.close()
+
+
+def shown(name: str) -> bytes:
+    """A text for messages, without what the library would take for its end."""
+    return name.encode("utf-8", "replace").replace(b"\0", b"?")
 
 
 def http_options(options: dict) -> tuple[Any, list]:
     """Options of URLs as the library takes them, and what must live as long."""
-    struct, keep = made(c.ebpo_http_options), []
+    given, keep, own = {}, [], {}
     for name, value in options.items():
         if name == "headers":
-            lines = [f"{key}: {text}".encode() for key, text in value.items()] + [None]
+            lines = [text(f"{key}: {value}", "headers") for key, value in value.items()] + [None]
             keep.append((ctypes.c_char_p * len(lines))(*lines))
-            value = ctypes.addressof(keep[-1])
+            own["headers"] = ctypes.addressof(keep[-1])
         elif name in ("memory", "whole_limit", "cache_bytes"):
-            value = size_in_bytes(value)
-        elif isinstance(value, (str, os.PathLike)):
-            value = os.fsencode(value)
-        known = dict(c.ebpo_http_options._fields_)
-        if name not in known or name in ("struct_size", "stop", "stop_user", "reserved"):
-            raise TypeError(f"there is no option {name!r} of URLs")
-        setattr(struct, name, value)
-    return struct, keep
+            given[name] = size_in_bytes(value)
+        else:
+            given[name] = path(value, name) if name in ("cache_folder", "ca_file") and value is not None else value
+    return of_members(c.ebpo_http_options, given, **own), keep
 
 
-def by_name(name: bytes, most_expansion: int, keep: tuple = (), **members: Any) -> Handle:
+def by_name(name: Any, most_expansion: int, keep: tuple = (), **members: Any) -> Handle:
     options = made(c.ebpo_open_options, most_expansion=most_expansion,
                    **{member: ctypes.addressof(struct) for member, struct in members.items()})
     return Handle.made("ebpo_open_with", name, ctypes.byref(options), free="ebpo_close", keep=keep)
@@ -238,17 +143,20 @@ def by_name(name: bytes, most_expansion: int, keep: tuple = (), **members: Any) 
 def by_url(url: str, http: dict, most_expansion: int) -> Handle:
     struct, keep = http_options(http)
     try:
-        return by_name(url.encode(), most_expansion, http=struct)
+        return by_name(url, most_expansion, http=struct)
     except UnsupportedError:
-        if set(http) - {"headers", "time_limit", "retries"}:
+        if set(http) - {"headers", "time_limit", "retries", "whole_limit", "unversioned", "memory", "connections"}:
             raise
     del keep
-    return by_ranges(Web(url, **http), url.partition("?")[0], most_expansion)
+    memory, connections = struct.memory if "memory" in http else MEMORY, http.get("connections", CONNECTIONS)
+    web = Web(url, **{name: value for name, value in http.items() if name not in ("memory", "connections")})
+    return by_ranges(far(web, web.size, web.shown, memory=memory, connections=connections), web.shown, most_expansion)
 
 
 def by_ranges(ranges: Any, name: str, most_expansion: int = 0) -> Handle:
+    """Of a Ranges, or of what is near."""
     source = Source(ranges)
-    return by_name(name.encode(), most_expansion, keep=(source,), source=source.struct)
+    return by_name(shown(name), most_expansion, keep=(source,), source=source.struct)
 
 
 def opened(source: Any, http: dict, storage_options: dict | None, most_expansion: int = 0) -> Handle:
@@ -260,15 +168,17 @@ def opened(source: Any, http: dict, storage_options: dict | None, most_expansion
         if http:
             raise TypeError(f"{name} is no URL: there is nothing to do for {', '.join(http)}")
         if isinstance(name, str) and "://" in name:
-            return by_ranges(Stored(name, storage_options), name, most_expansion)
-        return by_name(os.fsencode(name), most_expansion)
+            stored = Stored(name, storage_options)
+            return by_ranges(far(stored, stored.size, name), name, most_expansion)
+        return by_name(path(name), most_expansion)
     if http or storage_options is not None:
         raise TypeError("options of URLs are for URLs")
     name = str(getattr(source, "name", "") or type(source).__name__)
     if hasattr(source, "read_range") and hasattr(source, "size"):
-        return by_ranges(source, name, most_expansion)
+        return by_ranges(far(source, source.size() if callable(source.size) else source.size, name), name,
+                         most_expansion)
     if hasattr(source, "seek") and hasattr(source, "read") and not isinstance(source, _mmap()):
-        return by_ranges(Seekable(source), name, most_expansion)
+        return by_ranges(of_file(source, name), name, most_expansion)
     try:
         data = np.frombuffer(source, np.uint8)
     except (TypeError, ValueError):
@@ -276,8 +186,36 @@ def opened(source: Any, http: dict, storage_options: dict | None, most_expansion
                         "an object with size and read_range(offset, size)") from None
     if most_expansion:
         return by_ranges(Bytes(data), name, most_expansion)
-    return Handle.made("ebpo_open_memory", data.ctypes.data, data.nbytes, name.encode(), free="ebpo_close",
+    return Handle.made("ebpo_open_memory", data.ctypes.data, data.nbytes, shown(name), free="ebpo_close",
                        keep=(data, source))
+
+
+def far(source: Any, size: Any, name: str, **options: Any) -> Ranges:
+    """The ranges of a source elsewhere, whose first bytes are read now. IOFailure: they cannot be."""
+    try:
+        return Ranges(source, size_in_bytes(size), **options)
+    except (Error, TypeError):
+        raise
+    except Exception as error:
+        raise IOFailure(f"{name}: reading failed: {type(error).__name__}: {error}", "EBPO_E_IO", name) from error
+
+
+def of_file(file: Any, name: str) -> Any:
+    """What reads a file object: of this machine in its place, of others by ranges."""
+    if Uncached.fits(file):
+        return far(Uncached(file), file.size, name)
+    seekable = Seekable(file)
+    if isinstance(file, io.BytesIO) or is_of_system(file):
+        return seekable
+    return far(seekable, seekable.size, name, connections=1)
+
+
+def is_of_system(file: Any) -> bool:
+    """True for files that the system itself reads."""
+    try:
+        return isinstance(file.fileno(), int)
+    except (AttributeError, OSError):
+        return False
 
 
 class Bytes:

@@ -9,6 +9,7 @@ from typing import Any, Iterator, NamedTuple
 
 import numpy as np
 
+from ._checked import doubles
 from .errors import FormatError, IOFailure
 
 HDF5 = (".h5", ".hdf5", ".hdf", ".nc")
@@ -90,18 +91,29 @@ class PointFile(NamedTuple):
             raise IOFailure(f"{self.path} has changed since it was asked about; ask anew", "EBPO_E_IO", self.path)
         if self.dataset:
             with h5py_of(self.path).File(self.path, "r") as file:
-                return np.asarray(file[self.dataset][begin:end], dtype=np.float64)
+                return doubles(file[self.dataset][begin:end], self.path)
         if self.path.endswith(".npy"):
-            return np.array(np.load(self.path, mmap_mode="r", allow_pickle=False)[begin:end], dtype=np.float64)
+            return doubles(load_npy(self.path)[begin:end], self.path)
         rows = np.fromfile(self.path, np.float64, (end - begin) * self.columns, offset=begin * 8 * self.columns)
         return rows.reshape(-1, self.columns)
 
 
-def shape_of_npy(path: str) -> tuple[tuple[int, ...], np.dtype]:
+def load_npy(path: str) -> np.ndarray:
+    """A .npy as a memory map. FormatError: it is none of numbers, or has not as many as its shape says."""
     try:
-        values = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError) as error:
+        with np.errstate(over="ignore"):
+            values = np.load(path, mmap_mode="r", allow_pickle=False)
+    except OSError:
+        raise
+    except Exception as error:  # numpy has many, for shapes that are negative or overflow as well
         raise FormatError(f"{path}: not a whole .npy of numbers: {error}", "EBPO_E_FORMAT", path) from None
+    if not isinstance(values, np.ndarray):
+        raise FormatError(f"{path}: not a .npy, but an archive of some", "EBPO_E_FORMAT", path)
+    return values
+
+
+def shape_of_npy(path: str) -> tuple[tuple[int, ...], np.dtype]:
+    values = load_npy(path)
     return values.shape, values.dtype
 
 

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import _declared as c
-from ._library import Handle, call, lib, made
+from ._checked import doubles
+from ._library import Handle, call, lib, of_members
 
 _STOPPED = 128 # EBPO_TOUCH_STOPPED
 
@@ -48,7 +49,7 @@ class Sensed(NamedTuple):
 
 
 def _vector(values: Any, count: int) -> Any:
-    got = np.asarray(values, float)
+    got = doubles(values, "place")
     if got.shape != (count,):
         raise ValueError(f"expected {count} numbers, got an array of shape {got.shape}")
     return (ctypes.c_double * count)(*got)
@@ -74,9 +75,9 @@ class Touch:
     """
 
     def __init__(self, model: Any, place: Any, *, points: Any = None, probe: bool = False, **options: Any) -> None:
-        wanted = made(c.ebpo_touch_options, **options)
+        wanted = of_members(c.ebpo_touch_options, options, points=None, point_count=0, kind=0)
         if points is not None:
-            rows = np.ascontiguousarray(points, float)
+            rows = doubles(points, "points")
             if rows.ndim != 2 or rows.shape[1] != 3:
                 raise ValueError("points: expected an array of shape (n, 3)")
             wanted.points, wanted.point_count, wanted.kind = rows.ctypes.data, len(rows), 2

@@ -1,0 +1,225 @@
+"""Converts values of Python to values of C: the one place where that is done.
+
+Every argument of a function of the library, every member of a struct and every array that is given goes
+through here. Nothing is cut, wrapped or rounded silently:
+
+integers    Python's and numpy's, and bools as 0 and 1; out of the range of the C type: ArgumentError. A float
+            is a TypeError, whole or not.
+bools       True, False, 0 and 1; another integer: ArgumentError.
+reals       what float() takes but texts; an integer that no double equals: ArgumentError.
+texts       str as UTF-8, paths by os.fsencode, bytes; with a NUL, or a character that UTF-8 has not: ArgumentError.
+arrays      of numbers; integers as above, item by item.
+
+ArgumentError is a ValueError.
+"""
+from __future__ import annotations
+
+import ctypes
+import operator
+import os
+from typing import Any, Callable
+
+import numpy as np
+
+from .errors import ArgumentError
+
+INTEGERS = {getattr(ctypes, name) for name in
+            ("c_int8", "c_uint8", "c_int16", "c_uint16", "c_int32", "c_uint32", "c_int64", "c_uint64")}
+REALS = {ctypes.c_float, ctypes.c_double}
+
+
+def refused(what: str, why: str) -> ArgumentError:
+    return ArgumentError(f"{what}: {why}", "EBPO_E_ARGUMENT")
+
+
+def index_of(value: Any, what: str) -> int:
+    """The integer that a value is. TypeError: it is none."""
+    try:
+        return operator.index(bool(value) if isinstance(value, np.bool_) else value)
+    except TypeError:
+        raise TypeError(f"{what}: expected an integer, got {type(value).__name__}") from None
+
+
+def within(number: int, low: int, high: int, what: str) -> int:
+    if not low <= number <= high:
+        shown = str(number) if number.bit_length() <= 128 else f"an integer of {number.bit_length()} bits"
+        raise refused(what, f"{shown} is out of range; give {low} to {high}")
+    return number
+
+
+def integer_as(kind: Any) -> Callable:
+    """A function that checks integers of a C type."""
+    bits, signed = 8 * ctypes.sizeof(kind), kind(-1).value < 0
+    low, high = (-2**(bits - 1), 2**(bits - 1) - 1) if signed else (0, 2**bits - 1)
+
+    def convert(value: Any, what: str) -> int:
+        if type(value) is int and low <= value <= high:
+            return value
+        return within(index_of(value, what), low, high, what)
+
+    return convert
+
+
+def truth(value: Any, what: str) -> bool:
+    """A bool, or 0 or 1."""
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    return bool(within(index_of(value, what), 0, 1, what))
+
+
+def real(value: Any, what: str) -> float:
+    """A double that equals the value, if that is an integer; else the nearest one."""
+    if type(value) is float:
+        return value
+    if isinstance(value, (str, bytes, np.complexfloating)):
+        raise TypeError(f"{what}: expected a real number, got {type(value).__name__}")
+    try:
+        number = float(value)
+    except OverflowError:
+        raise refused(what, "the number is larger than every double") from None
+    except (TypeError, ValueError):
+        raise TypeError(f"{what}: expected a real number, got {type(value).__name__}") from None
+    if isinstance(value, (int, np.integer)) and int(number) != int(value):
+        raise refused(what, f"no double equals the integer {value}; give a float")
+    return number
+
+
+def text(value: Any, what: str) -> bytes | None:
+    """Bytes without a NUL: of a text in UTF-8, of a path as the system has it."""
+    if value is None:
+        return None
+    if isinstance(value, str):
+        try:
+            value = value.encode()
+        except UnicodeEncodeError as error:
+            raise refused(what, f"UTF-8 has no {value[error.start]!a} (character {error.start})") from None
+    elif isinstance(value, os.PathLike):
+        value = path(value, what)
+    if not isinstance(value, bytes):
+        raise TypeError(f"{what}: expected a text, got {type(value).__name__}")
+    if b"\0" in value:
+        raise refused(what, f"a NUL (byte {value.index(0)}) would end the text")
+    return value
+
+
+def path(value: Any, what: str = "path") -> bytes:
+    """The name of a file as the system has it. TypeError: neither str, bytes nor os.PathLike."""
+    try:
+        return text(os.fsencode(value), what) or b""
+    except UnicodeEncodeError as error:
+        raise refused(what, f"no file name has {error.object[error.start]!a} (character {error.start})") from None
+
+
+def texts_of(size: int) -> Callable:
+    """A function that checks texts of a member char[size], which end with a NUL."""
+    def convert(value: Any, what: str) -> bytes:
+        found = text(value, what) or b""
+        if len(found) >= size:
+            raise refused(what, f"the text has {len(found)} bytes; give at most {size - 1}")
+        return found
+
+    return convert
+
+
+def items_of(kind: Any) -> Callable:
+    """A function that checks the items of a member that is an array."""
+    def convert(values: Any, what: str) -> Any:
+        if isinstance(values, kind):
+            return values
+        values = tuple(values)
+        if len(values) != kind._length_:
+            raise refused(what, f"expected {kind._length_} items, got {len(values)}")
+        item = converter(kind._type_)
+        return kind(*(item(value, what) if item else value for value in values))
+
+    return convert
+
+
+def converter(kind: Any) -> Callable | None:
+    """What checks values of a C type. None: ctypes itself takes nothing but the right ones (structs), or
+    addresses, which come from this package only."""
+    if kind in INTEGERS:
+        return integer_as(kind)
+    if kind in REALS:
+        return real
+    if kind is ctypes.c_bool:
+        return truth
+    if kind is ctypes.c_char_p:
+        return text
+    if issubclass(kind, ctypes.Array):
+        return texts_of(kind._length_) if kind._type_ is ctypes.c_char else items_of(kind)
+    return None
+
+
+def is_own(kind: Any) -> bool:
+    """True for members that this package sets and no user: pointers and functions, and structs of these."""
+    if issubclass(kind, ctypes.Structure):
+        return any(is_own(member) for _, member in kind._fields_)
+    return kind is ctypes.c_void_p or issubclass(kind, ctypes._CFuncPtr)
+
+
+class Structure(ctypes.Structure):
+    """A struct of C whose members are checked when they are set."""
+
+    _checks: dict = {}
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls._checks = {name: converter(kind) for name, kind in cls._fields_}
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name not in self._checks:
+            raise TypeError(f"{type(self).__name__} has no member {name!r}")
+        check = self._checks[name]
+        super().__setattr__(name, check(value, name) if check else value)
+
+
+def checked(entry: Any, kinds: list, names: list) -> Any:
+    """A function of C whose arguments are checked; the others pass."""
+    checks = [(i, converter(kind), name) for i, (kind, name) in enumerate(zip(kinds, names)) if converter(kind)]
+    if not checks:
+        return entry
+
+    def function(*arguments: Any) -> Any:
+        values = list(arguments)
+        for i, check, name in checks:
+            values[i] = check(values[i], name)
+        return entry(*values)
+
+    return function
+
+
+def doubles(values: Any, what: str) -> np.ndarray:
+    """Numbers as contiguous doubles; what is that already is not copied. Floats of more digits are rounded."""
+    given = np.asarray(values)
+    if given.dtype.kind == "O":
+        given = np.array([real(value, what) for value in given.ravel()], np.float64).reshape(given.shape)
+    if given.dtype.kind not in "fiu":
+        raise TypeError(f"{what}: expected real numbers, got {given.dtype}")
+    out = np.asarray(given, np.float64, order="C")
+    if given.dtype.kind in "iu" and given.dtype.itemsize == 8 and given.size:
+        for value in given[np.abs(out) >= 2.0**53].tolist():
+            real(value, what)
+    return out
+
+
+def integers(values: Any, dtype: Any, what: str) -> np.ndarray:
+    """Integers as a contiguous array of a type that holds each of them. TypeError: they are floats or bools."""
+    given, range_ = np.asarray(values), np.iinfo(dtype)
+    if given.dtype.kind == "O":
+        flat = [within(index_of(value, what), int(range_.min), int(range_.max), what) for value in given.ravel()]
+        given = np.array(flat, dtype).reshape(given.shape)
+    if given.dtype.kind not in "iu" and given.size:
+        raise TypeError(f"{what}: expected integers, got {given.dtype}")
+    if given.size:
+        for value in (int(given.min()), int(given.max())):
+            within(value, int(range_.min), int(range_.max), what)
+    return np.ascontiguousarray(given, dtype=dtype)
+
+
+def nanoseconds(seconds: Any, what: str = "deadline") -> int:
+    """Returns a number of seconds as nanoseconds, which fit into 64 bits."""
+    number = real(seconds, what)
+    if not 0 <= number < 2**64 / 1e9:
+        raise refused(what, f"{number} is no number of seconds; give 0 or more")
+    return int(number * 1e9)

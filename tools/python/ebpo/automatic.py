@@ -1,0 +1,86 @@
+"""How much of a model is held where no budget is given: in parts, until all of it at once is cheaper."""
+from __future__ import annotations
+
+import ctypes
+import threading
+from typing import Any
+
+from . import _declared as c
+from ._library import Handle, call, lib, made
+
+SMALL = 16 << 20  # is loaded at once: some milliseconds
+# Loads after which their mean is believed; and what is foretold must exceed all subtrees so many times.
+BELIEVED, CERTAIN = 8, 4
+FIRST = 16  # questions after which it is looked at first; then after as many as before, at most
+
+
+class Automatic:
+    """What the command does without --memory (tools/cmd/query_holding.c): half of what is free is the most.
+
+    options: of the model; they are changed. waiting: it is held in parts, and all of it would fit.
+    """
+
+    def __init__(self, file: Handle, options: Any) -> None:
+        self.file, self.options, self.waiting = file, options, False
+        self.lock = threading.Lock()  # of the counts
+        self.questions, self.seconds, self.subtrees, self.next = 0, 0.0, 0, FIRST
+        wished = options.memory or options.cut_level >= 0 or options.prefetch
+        info = c.ebpo_info.from_address(lib.ebpo_file_info(file))
+        if not wished and info.parts & c.EBPO_PART_MESH:
+            self._decide(info)
+
+    def _plan(self) -> Any:
+        plan = made(c.ebpo_model_plan)
+        call("ebpo_model_memory", self.file, ctypes.byref(self.options), ctypes.byref(plan))
+        return plan
+
+    def _decide(self, info: Any) -> None:
+        plan = self._plan()
+        if plan.budget:  # of a file far away the library has decided
+            return
+        options = self.options
+        options.memory = most = max(lib.ebpo_free_memory() // 2, plan.least)
+        plan = self._plan()
+        if plan.resident and plan.whole <= SMALL:
+            return
+        options.cut_level = info.subtree_level or -1
+        if options.cut_level < 0:  # as if not all of it fitted
+            options.memory = plan.whole - 1 if plan.resident else most
+            options.cut_level = self._plan().cut_level
+            options.memory = most
+        self.subtrees = self._plan().subtrees
+        self.waiting = bool(plan.resident and self.subtrees)
+
+    def piece(self) -> int:
+        """So many questions at most before `pays` is asked again."""
+        return max(FIRST, self.questions) if self.waiting else 1 << 62
+
+    def asked(self, questions: int, seconds: float) -> None:
+        with self.lock:
+            self.questions += questions
+            self.seconds += seconds
+
+    def pays(self, model: Handle, total: int, parts_share: float) -> bool:
+        """Whether all at once has become cheaper: so much has been spent on parts, or certainly will be.
+
+        total: questions that are known to come; parts_share: of the time that questions take in parts.
+        """
+        if self.questions < self.next:
+            return False
+        self.next = self.questions + self.questions // 8
+        stats = made(c.ebpo_model_stats)
+        lib.ebpo_model_get_stats(model, ctypes.byref(stats))
+        if stats.loads < BELIEVED:
+            return False
+        with self.lock:
+            each = stats.load_seconds / stats.loads
+            spent = min(stats.evicted, stats.loads) * each + parts_share * max(0.0, self.seconds - stats.load_seconds)
+            foretold = stats.loads / self.questions * (total - self.questions)
+        return spent >= each * self.subtrees or (stats.loads < self.subtrees / CERTAIN and
+                                                 foretold >= CERTAIN * self.subtrees)
+
+    def whole(self) -> Any:
+        """Options of a model that is all in memory."""
+        options = c.ebpo_model_options.from_buffer_copy(self.options)
+        options.cut_level = -1
+        return options

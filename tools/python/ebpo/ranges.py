@@ -1,0 +1,240 @@
+"""Ranges of a source far away: joined, asked for in parallel and ahead of the reader, within bounded memory."""
+from __future__ import annotations
+
+import bisect
+import collections
+import os
+import threading
+from typing import Any, Iterator
+
+HEAD = 1 << 17  # bytes that are read at once when a source is opened
+MEMORY = 48 << 20  # bytes of what was read ahead and what was read last
+CONNECTIONS = 16  # ranges that are asked for at a time
+GAP, GAP_OF_MANY, MANY = 1 << 14, 1 << 15, 256  # between ranges: fetching it costs less than another request
+MOST = 4 << 20  # of a request
+STALE = 64  # announcements: what has not been read by then hardly will be
+NOTED, COMING, THERE, FAILED = range(4)
+
+
+class Piece:
+    """A range that is fetched by one request. wanted: bytes announced and not read yet; users: readers."""
+
+    __slots__ = ("begin", "end", "state", "wanted", "plan", "used", "users", "data", "error")
+
+    def __init__(self, begin: int, end: int, plan: int) -> None:
+        self.begin, self.end, self.state, self.plan = begin, end, NOTED, plan
+        self.wanted = self.used = self.users = 0
+        self.data: Any = None
+        self.error: BaseException | None = None
+
+    @property
+    def size(self) -> int:
+        return self.end - self.begin
+
+
+class Ranges:
+    """What is read of an object with `size` and `read_range(offset, size)`, which several threads call at once.
+
+    As the library reads URLs (lib/http/range_cache.c): announced ranges are joined over small gaps, cut into
+    requests of at most MOST bytes, and fetched ahead of the reader as long as they fit into `memory`.
+
+    connections: so many requests at a time.
+    """
+
+    def __init__(self, source: Any, size: int, *, memory: int = MEMORY, connections: int = CONNECTIONS) -> None:
+        self.source, self.size, self.memory, self.connections = source, size, memory, connections
+        head = getattr(source, "head", None)
+        self.head = read_whole(source, 0, min(HEAD, size)) if head is None else head
+        self.changed = threading.Condition()  # holds the lock of what follows
+        self.begins: list[int] = []  # of pieces, ascending, without overlaps
+        self.pieces: dict[int, Piece] = {}
+        self.queue: collections.deque[Piece] = collections.deque()
+        self.unasked: set[int] = set()  # begins of pieces that were announced and not asked for
+        self.held = self.plan = self.clock = self.running = 0
+        self.process = os.getpid()
+
+    # ---- pieces; the lock is held ----
+
+    def _over(self, begin: int, end: int) -> Iterator[Piece]:
+        """Pieces that have bytes of a range, in order."""
+        at = max(0, bisect.bisect_right(self.begins, begin) - 1)
+        for start in self.begins[at:bisect.bisect_left(self.begins, end)]:
+            if self.pieces[start].end > begin:
+                yield self.pieces[start]
+
+    def _cover(self, begin: int, end: int) -> None:
+        """Notes pieces for what of a range has none."""
+        begin = max(begin, len(self.head))
+        for piece in [*self._over(begin, end), None]:
+            stop = piece.begin if piece else end
+            if begin < stop:
+                count = -(-(stop - begin) // MOST)
+                cuts = [begin + (stop - begin) * i // count for i in range(count + 1)]
+                for low, high in zip(cuts, cuts[1:]):
+                    self.pieces[low] = Piece(low, high, self.plan)
+                    bisect.insort(self.begins, low)
+            begin = piece.end if piece else end
+
+    def _remove(self, piece: Piece) -> None:
+        self._drop(piece)
+        del self.pieces[piece.begin]
+        self.unasked.discard(piece.begin)
+        self.begins.pop(bisect.bisect_left(self.begins, piece.begin))
+
+    def _drop(self, piece: Piece) -> None:
+        """The piece's bytes go, or its failure does."""
+        if piece.state in (COMING, THERE):
+            self.held -= piece.size
+        piece.state, piece.data, piece.error = NOTED, None, None
+
+    def _make_room(self, size: int) -> None:
+        """Forgets what was read longest ago, then what was announced long ago, until so much more fits."""
+        if self.held + size <= self.memory:
+            return
+        idle = [piece for piece in self.pieces.values() if piece.state == THERE and not piece.users and
+                (not piece.wanted or piece.plan + STALE < self.plan)]
+        for piece in sorted(idle, key=lambda piece: (piece.wanted > 0, piece.used)):
+            if self.held + size <= self.memory:
+                break
+            self._remove(piece)
+
+    def _check_process(self) -> None:
+        """A process that was forked has none of the threads: what they had under way is asked for again."""
+        if self.process != os.getpid():
+            self.process, self.running = os.getpid(), 0
+            self.queue.clear()
+            for piece in self.pieces.values():
+                if piece.state == COMING:
+                    self._drop(piece)
+
+    def _start(self, piece: Piece, urgent: bool) -> None:
+        piece.state = COMING
+        self.unasked.discard(piece.begin)
+        self.held += piece.size
+        (self.queue.appendleft if urgent else self.queue.append)(piece)
+        if self.running < self.connections:
+            self.running += 1
+            threading.Thread(target=self._work, daemon=True).start()
+
+    def _ahead(self, begin: int) -> None:
+        """Asks for what was announced from an offset on, as far as it fits."""
+        for start in sorted(start for start in self.unasked if start >= begin):
+            piece = self.pieces[start]
+            self._make_room(piece.size)
+            if self.held + piece.size > self.memory:
+                return
+            self._start(piece, False)
+
+    # ---- other threads ----
+
+    def _work(self) -> None:
+        """Fetches pieces until none waits."""
+        while True:
+            with self.changed:
+                if not self.queue:
+                    self.running -= 1
+                    return
+                piece = self.queue.popleft()
+            data, error = None, None
+            try:
+                data = read_whole(self.source, piece.begin, piece.size)
+            except BaseException as raised:
+                error = raised
+            with self.changed:
+                if error is None:
+                    piece.state, piece.data = THERE, data
+                else:
+                    self._drop(piece)
+                    if piece.users:  # whom it concerns; nobody else: it is asked for again when it is read
+                        piece.state, piece.error = FAILED, error
+                self.changed.notify_all()
+
+    # ---- what the library calls ----
+
+    def prefetch(self, ranges: list) -> None:
+        """Announces (offset, size), each of which will be read about once. It does not wait."""
+        ranges = sorted((offset, offset + size) for offset, size in ranges if size)
+        if not ranges:
+            return
+        gap, joined = GAP_OF_MANY if len(ranges) > MANY else GAP, [list(ranges[0])]
+        for begin, end in ranges[1:]:
+            if begin - joined[-1][1] <= gap:
+                joined[-1][1] = max(joined[-1][1], end)
+            else:
+                joined.append([begin, end])
+        with self.changed:
+            self._check_process()
+            self.plan += 1
+            for begin, end in joined:
+                self._cover(begin, end)
+            anew = {piece.begin for piece in self._over(ranges[0][0], joined[-1][1]) if not piece.wanted}
+            for begin, end in ranges:
+                for piece in self._over(begin, end):
+                    piece.plan = self.plan
+                    if piece.begin in anew:  # of others it has been counted
+                        piece.wanted += min(end, piece.end) - max(begin, piece.begin)
+                        if piece.state == NOTED:
+                            self.unasked.add(piece.begin)
+            self._ahead(0)
+
+    def read_range(self, offset: int, size: int) -> bytes:
+        """Waits for bytes, of which several pieces come at the same time."""
+        end = offset + size
+        parts = [self.head[offset:end]] if offset < len(self.head) else []
+        if end <= len(self.head):
+            return parts[0]
+        with self.changed:
+            self._check_process()
+            self._cover(offset, end)
+            pieces = list(self._over(max(offset, len(self.head)), end))
+            for piece in pieces:
+                piece.users += 1
+            try:
+                for piece in pieces:
+                    self._await(piece, pieces)
+                    self._ahead(piece.end)
+                    low, high = max(offset, piece.begin), min(end, piece.end)
+                    parts.append(memoryview(piece.data)[low - piece.begin:high - piece.begin])
+                    piece.wanted = max(0, piece.wanted - (high - low))
+            finally:
+                self._release(pieces)
+        return b"".join(parts)
+
+    def _await(self, piece: Piece, pieces: list) -> None:
+        """Waits until a piece has come; it and those behind it are asked for. Raises what went wrong."""
+        while piece.state != THERE:
+            if piece.state == FAILED:
+                raise piece.error  # type: ignore[misc]
+            for other in pieces[pieces.index(piece):]:
+                if other.state == NOTED:
+                    self._make_room(other.size)
+                    if other is piece or self.held + other.size <= self.memory:
+                        self._start(other, True)
+            if piece in self.queue:  # nobody else is waited for
+                self.queue.remove(piece)
+                self.queue.appendleft(piece)
+            self.changed.wait()
+
+    def _release(self, pieces: list) -> None:
+        self.clock += 1
+        for piece in pieces:
+            piece.users -= 1
+            piece.used = self.clock
+            if not piece.users and piece.state == FAILED:
+                self._drop(piece)
+            if not piece.users and piece.state == NOTED and not piece.wanted:
+                self._remove(piece)
+        self._make_room(0)
+
+    def close(self) -> None:
+        """Nothing more is fetched; what is under way ends by itself."""
+        with self.changed:
+            self.queue.clear()
+
+
+def read_whole(source: Any, offset: int, size: int) -> Any:
+    """A range of a source, as bytes. OSError: it gave another number of them."""
+    data = memoryview(source.read_range(offset, size)).cast("B")
+    if len(data) != size:
+        raise OSError(f"{len(data)} bytes came instead of {size} at byte {offset}")
+    return data

@@ -1,0 +1,301 @@
+"""URLs by Python's own HTTP, where the library has none: each request within a time, answers of one version."""
+from __future__ import annotations
+
+import ctypes
+import datetime
+import email.utils
+import functools
+import http.client
+import io
+import random
+import re
+import ssl
+import threading
+import time
+import urllib.error
+import urllib.parse
+import urllib.request
+from typing import Any
+
+from ._checked import integer_as, real, refused
+from ._library import size_in_bytes
+from .errors import IOFailure, UnsupportedError
+from .ranges import HEAD
+
+SILENT = 20.0  # seconds without a byte, or for a connection; then the request is sent again
+
+
+class Timed(io.RawIOBase):
+    """What comes from a socket, until a time of time.monotonic. After it: TimeoutError."""
+
+    def __init__(self, raw: Any, sock: Any, end: float) -> None:
+        self.raw, self.sock, self.end = raw, sock, end
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, room: Any) -> int | None:
+        left = self.end - time.monotonic()
+        if left <= 0:
+            raise TimeoutError("the answer did not end in time")
+        self.sock.settimeout(min(SILENT, left))
+        return self.raw.readinto(room)
+
+    def close(self) -> None:
+        self.raw.close()
+        super().close()
+
+
+class Answer(http.client.HTTPResponse):
+    """An answer of which every byte comes before `end`: status, headers, body and trailers."""
+
+    def __init__(self, sock: Any, *rest: Any, end: float, **named: Any) -> None:
+        super().__init__(sock, *rest, **named)
+        self.fp: Any = io.BufferedReader(Timed(self.fp.detach(), sock, end))
+
+
+class Request(urllib.request.Request):
+    """A request that ends, with all redirects, before `end` of time.monotonic."""
+
+    end = 0.0
+
+
+def opened(handler: Any, kind: Any, request: Any, **options: Any) -> Any:
+    def connection(*host: Any, **given: Any) -> Any:
+        made = kind(*host, **given, **options)
+        made.response_class = functools.partial(Answer, end=request.end)
+        return made
+
+    request.timeout = max(0.001, min(SILENT, request.end - time.monotonic()))
+    return handler.do_open(connection, request)
+
+
+class Http(urllib.request.HTTPHandler):
+    def http_open(self, request: Any) -> Any:
+        return opened(self, http.client.HTTPConnection, request)
+
+
+class Https(urllib.request.HTTPSHandler):
+    def __init__(self) -> None:
+        self.certificates = ssl.create_default_context()
+        super().__init__(context=self.certificates)
+
+    def https_open(self, request: Any) -> Any:
+        return opened(self, http.client.HTTPSConnection, request, context=self.certificates)
+
+
+class Redirects(urllib.request.HTTPRedirectHandler):
+    """As the library follows them: five, http and https alone, never from https to http; the caller's
+    headers, which may be secret, stay with the server that they were given for."""
+
+    max_redirections = 5
+
+    def redirect_request(self, request: Any, answer: Any, code: int, message: str, headers: Any, url: str) -> Any:
+        answer.close()  # its body may have no end
+        new = super().redirect_request(request, answer, code, message, headers, url)
+        before, after = urllib.parse.urlsplit(request.full_url), urllib.parse.urlsplit(url)
+        if after.scheme not in ("http", "https") or (before.scheme, after.scheme) == ("https", "http"):
+            raise IOFailure(f"the server redirects from {before.scheme} to {after.scheme}, which is not followed",
+                            "EBPO_E_IO")
+        if new is not None:
+            new.end = request.end
+            if (before.scheme, before.netloc.lower()) != (after.scheme, after.netloc.lower()):
+                new.headers = {"Range": new.headers["Range"]}
+        return new
+
+
+@functools.lru_cache(1)
+def opener() -> Any:
+    """What sends requests; the system's certificates are read when it is first used."""
+    return urllib.request.build_opener(Redirects, Http, Https)
+
+
+class Patience:
+    """How long a request is sent again: with pauses that double, by chance shorter, so that many clients do
+    not come back together; or as long as the server says (Retry-After)."""
+
+    FIRST, LONGEST, AGAIN = 0.2, 20.0, (408, 429, 500, 502, 503, 504)
+
+    def __init__(self, seconds: float, retries: int | None, what: str) -> None:
+        self.began, self.seconds, self.retries, self.what, self.failures = time.monotonic(), seconds, retries, what, 0
+
+    def wait(self, error: Exception) -> None:
+        """Before the next trial. Raises IOFailure if it would come too late, or is no use."""
+        code, reason = getattr(error, "code", None), getattr(error, "reason", error)
+        if code is not None and code not in self.AGAIN:
+            raise self.failure(f"the server answered with status {code}") from error
+        if isinstance(reason, ssl.SSLCertVerificationError):
+            raise self.failure(f"the server's certificate is not trusted: {reason.verify_message}") from error
+        pause = min(self.LONGEST, self.FIRST * 2**min(self.failures, 16)) * random.uniform(0.5, 1)
+        pause = max(pause, self.told(error))
+        self.failures += 1
+        gone = time.monotonic() - self.began
+        if gone + pause > self.seconds or (self.retries is not None and self.failures > self.retries):
+            said = f"status {code}" if code is not None else str(reason)[:200]
+            raise self.failure(f"no answer after {self.failures} requests in {gone:.1f} s, the last one: "
+                               f"{said}; {self.seconds:g} s (time_limit) and "
+                               f"{'any number of' if self.retries is None else self.retries} retries are allowed"
+                               ) from error
+        threading.Event().wait(pause)
+
+    def failure(self, message: str) -> IOFailure:
+        return IOFailure(f"{self.what}: {message}", "EBPO_E_IO", self.what)
+
+    @staticmethod
+    def told(error: Exception) -> float:
+        """Seconds that a server asks for, as a number or a date; 0: none."""
+        text = (getattr(error, "headers", None) or {}).get("Retry-After") or ""
+        if text.strip().isdecimal():
+            return float(text)
+        try:
+            then = email.utils.parsedate_to_datetime(text)
+            return max(0.0, (then - datetime.datetime.now(datetime.timezone.utc)).total_seconds())
+        except (TypeError, ValueError, OverflowError):
+            return 0.0
+
+
+class Web:
+    """A URL by Python's own HTTP. Answers are of one version of the file. Any number of threads.
+
+    time_limit: seconds for a range with all requests that it takes; retries: how many may fail, None: any number.
+    whole_limit, unversioned: as in ebpo_http_options.
+
+    size: of the file. head: its first bytes; of a server without ranges or versions all of them.
+    """
+
+    def __init__(self, url: str, headers: dict | None = None, time_limit: float = 120.0, retries: int | None = 5,
+                 whole_limit: int | str = 64 << 20, unversioned: bool = False) -> None:
+        self.url, self.headers, self.shown = url, dict(headers or {}), url.partition("?")[0]
+        if re.search(r"[^\x21-\x7e]", url):
+            raise refused(self.shown, "a URL has printable ASCII characters alone; write others as %XX")
+        for name, text in self.headers.items():
+            if not re.fullmatch(r"[!-9;-~]+", name) or re.search(r"[^\t\x20-\x7e\x80-\xff]", text):
+                raise refused(self.shown, "a header to send is not 'Name: value' on one line")
+        self.time_limit, self.retries = real(time_limit, "time_limit"), retries
+        if not 0 < self.time_limit <= 1e6:
+            raise refused(self.shown, "a time-out is not above 0 and at most 1000000 seconds")
+        if retries is not None:
+            self.retries = integer_as(ctypes.c_uint)(retries, "retries")
+        self.whole_limit, self.unversioned = size_in_bytes(whole_limit), unversioned
+        self.version: Any = None
+        self.size = self.requests = self.received = 0
+        self.head = b""
+        self.lock = threading.Lock()  # of the counts
+        self.head = self.first()
+
+    def first(self) -> bytes:
+        """The first bytes, the size and the version; of a server without ranges or versions everything."""
+        data = self.get(0, HEAD)
+        if len(data) < self.size and self.version[0] is None and not self.unversioned:
+            if self.size > self.whole_limit:
+                raise UnsupportedError(f"{self.shown}: the server sends neither ETag nor Last-Modified, and "
+                                       f"{self.size} bytes are more than would be read at once; download the file, or "
+                                       "allow unversioned files (unversioned=True)", "EBPO_E_UNSUPPORTED", self.shown)
+            data = self.get(0, self.size, at_once=True)
+        return data
+
+    def read_range(self, offset: int, size: int) -> bytes:
+        """Raises IOFailure, whatever the server does."""
+        if offset + size <= len(self.head):
+            return self.head[offset:offset + size]
+        return self.get(offset, size)
+
+    def get(self, offset: int, size: int, at_once: bool = False) -> bytes:
+        """Bytes of a range, or all there are from a server without ranges. A server may send them in parts,
+        unless they must come at once."""
+        patience, data = Patience(self.time_limit, self.retries, self.shown), bytearray()
+        while True:
+            try:
+                self.ask(offset + len(data), offset + size, patience, data)
+                if self.size:
+                    size = min(size, max(self.size - offset, len(data)))
+                if len(data) >= size:
+                    return bytes(data)
+                if at_once:
+                    raise patience.failure("the server sends parts of the file, and no version of it; download the file")
+            except (urllib.error.URLError, TimeoutError, ConnectionError, ssl.SSLError, http.client.HTTPException) as error:
+                if isinstance(error, urllib.error.HTTPError):
+                    error.close()
+                patience.wait(error)
+            except (ValueError, OSError) as error:
+                if isinstance(error, IOFailure):
+                    raise
+                raise patience.failure(f"the answer cannot be read: {error}") from error
+            if at_once:
+                data.clear()
+
+    def ask(self, begin: int, end: int, patience: Patience, data: bytearray) -> None:
+        """Sends one request, and appends to `data` what comes of it, also before it fails."""
+        request = Request(self.url, headers={**self.headers, "Range": f"bytes={begin}-{end - 1}"})
+        request.end = patience.began + self.time_limit
+        with self.lock:
+            self.requests += 1
+        before = len(data)
+        try:
+            with opener().open(request) as answer:
+                if (answer.headers["Content-Encoding"] or "identity").lower() != "identity":
+                    raise patience.failure("the server sends the file in another encoding; download it")
+                if answer.status == 200 and self.version is None and begin == 0:
+                    self.take_whole(answer, patience, data)
+                else:
+                    self.take(answer, self.range_of(answer, begin, end, patience), patience, data)
+        finally:
+            with self.lock:
+                self.received += len(data) - before
+
+    def range_of(self, answer: Any, begin: int, end: int, patience: Patience) -> int:
+        """How many bytes of the range the server sends: all, or fewer. IOFailure: another range or version."""
+        if answer.status != 206:
+            raise patience.failure(f"the server does not answer ranges (status {answer.status})")
+        told = re.fullmatch(r"bytes (\d{1,18})-(\d{1,18})/(\d{1,18})", (answer.headers["Content-Range"] or "").strip())
+        if not told:
+            raise patience.failure("the server does not say which range it sent")
+        first, last, size = map(int, told.groups())
+        etag = answer.headers["ETag"] and re.sub(r"^\s*W/", "", answer.headers["ETag"])
+        version = etag or answer.headers["Last-Modified"], size
+        if self.version not in (None, version):
+            raise patience.failure("the file on the server has changed since it was opened; open it again")
+        length = answer.headers["Content-Length"]
+        if first != begin or not begin <= last < min(end, size) or (length and length.strip() != str(last + 1 - begin)):
+            raise patience.failure("the server sent another range than was asked for")
+        self.version, self.size = version, size
+        return last + 1 - begin
+
+    @staticmethod
+    def take(answer: Any, size: int, patience: Patience, data: bytearray) -> None:
+        """Appends a body of so many bytes. ConnectionError: it is shorter; IOFailure: longer."""
+        whole = len(data) + size
+        while len(data) < whole + 1:
+            some = answer.read1(min(1 << 16, whole + 1 - len(data)))
+            if not some:
+                break
+            data += some
+        if len(data) > whole:
+            raise patience.failure("the server sent more bytes than it said")
+        if len(data) < whole:
+            raise ConnectionError(f"the connection ended after {len(data) - whole + size} bytes")
+
+    def take_whole(self, answer: Any, patience: Patience, data: bytearray) -> None:
+        """Appends the body of an answer of status 200, which must have an end that is certain."""
+        try:
+            self.take_all(answer, patience, data)
+        except BaseException:
+            data.clear()  # what follows might be of another version
+            raise
+
+    def take_all(self, answer: Any, patience: Patience, data: bytearray) -> None:
+        size = answer.length
+        if size is None and not answer.chunked:
+            raise patience.failure("the server does not answer ranges, and does not say how long the file is")
+        if (size or 0) <= self.whole_limit:
+            while len(data) <= self.whole_limit:
+                some = answer.read1(1 << 16)
+                if not some:
+                    break
+                data += some
+        if max(size or 0, len(data)) > self.whole_limit:
+            raise UnsupportedError(f"{self.shown}: the server does not answer ranges, and the file has more than "
+                                   f"{self.whole_limit} bytes; download it", "EBPO_E_UNSUPPORTED", self.shown)
+        if size is not None and len(data) != size:
+            raise ConnectionError(f"the connection ended after {len(data)} of {size} bytes")
+        self.version, self.size = (None, len(data)), len(data)
