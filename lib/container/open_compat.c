@@ -147,8 +147,8 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
         status = ebpo_h5_clean_copy(from, fetched.fd >= 0, copy.name, shown,
                                     ebpo_rows_of_foreign_chunk, &limits, &left_out, error);
     if (status == EBPO_OK && open_copy(copy.fd, shown, o, out, &why) != EBPO_OK)
-        status = ebpo_fail_with(error, strcmp(why.object, left_out.object) == 0 && *left_out.object
-                                           ? &left_out /* it is missing, and here is why */
+        status = ebpo_fail_with(error, *left_out.message && strstr(why.message, "is missing")
+                                           ? &left_out /* it was there, and here is what it is */
                                            : &why);
     remove_temporary(&copy);
     remove_temporary(&fetched);
