@@ -156,7 +156,8 @@ class Web:
         first, _, whole = (answer.headers["Content-Range"] or "").partition(" ")[2].partition("/")
         if not first.partition("-")[0].isdecimal() or not whole.isdecimal():
             raise OSError("the server does not say which range it sent")
-        version = answer.headers["ETag"] or answer.headers["Last-Modified"], whole
+        tag = (answer.headers["ETag"] or "").removeprefix("W/")  # of weak ones, too
+        version = tag or answer.headers["Last-Modified"], whole
         if self.version not in (None, version):
             raise OSError("the file on the server has changed since it was opened")
         data = answer.read(self.BLOCK + 1)  # not more, however much a server sends
