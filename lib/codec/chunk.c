@@ -216,14 +216,6 @@ static ebpo_status broken(const char **why, const char *what)
     return EBPO_E_FORMAT;
 }
 
-/* zstd decodes frames without one as well, and does not notice damage then. RFC 8878, 3.1.1. */
-static bool has_checksum(const uint8_t *frame, size_t bytes)
-{
-    enum { DESCRIPTOR = 4, CONTENT_CHECKSUM = 1 << 2 };
-    return bytes > DESCRIPTOR && ebpo_load32(frame) == ZSTD_MAGICNUMBER &&
-           frame[DESCRIPTOR] & CONTENT_CHECKSUM;
-}
-
 static ZSTD_DCtx *zstd_reader(void)
 {
     ZSTD_DCtx *in = ZSTD_createDCtx();
@@ -243,7 +235,7 @@ static ebpo_status zstd_decode(ebpo_chunk_coder *coder, const uint8_t *stored, s
         return EBPO_E_MEMORY;
     if (ZSTD_getFrameContentSize(stored, stored_bytes) != raw_bytes)
         return broken(why, "the zstd frame does not state the chunk's size");
-    if (!has_checksum(stored, stored_bytes))
+    if (!ebpo_zstd_has_checksum(stored, stored_bytes))
         return broken(why, "the zstd frame has no checksum");
     const char *fault = ebpo_zstd_fault(stored, stored_bytes);
     if (fault)

@@ -1,9 +1,12 @@
 /* Source: RFC 8878, 3.1.1. */
 #include "codec/zstd_frame.h"
 
-#include <stdbool.h>
+#include <zstd.h>
+
+#include "base/endian.h"
 
 enum { RAW, RLE, COMPRESSED, RESERVED };
+enum { DESCRIPTOR = 4 };
 static const char unused_set[] = "an unused bit of the zstd frame is set";
 
 /* How many bytes the literals of a compressed block take, with their header; 0: it is cut short. */
@@ -48,7 +51,7 @@ static const char *block_fault(unsigned kind, const uint8_t *block, size_t state
 const char *ebpo_zstd_fault(const uint8_t *frame, size_t bytes)
 {
     static const uint8_t id_bytes[4] = { 0, 1, 2, 4 };
-    enum { DESCRIPTOR = 4, UNUSED = 1 << 4, BLOCK_HEADER = 3 };
+    enum { UNUSED = 1 << 4, BLOCK_HEADER = 3 };
     const char *fault = NULL;
     if (bytes <= DESCRIPTOR)
         return NULL;
@@ -69,4 +72,11 @@ const char *ebpo_zstd_fault(const uint8_t *frame, size_t bytes)
         at += size;
     }
     return fault;
+}
+
+bool ebpo_zstd_has_checksum(const uint8_t *frame, size_t bytes)
+{
+    enum { CONTENT_CHECKSUM = 1 << 2 };
+    return bytes > DESCRIPTOR && ebpo_load32(frame) == ZSTD_MAGICNUMBER &&
+           frame[DESCRIPTOR] & CONTENT_CHECKSUM;
 }

@@ -2,6 +2,7 @@
 #ifndef EBPO_CODEC_ZSTD_FRAME_H
 #define EBPO_CODEC_ZSTD_FRAME_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -10,5 +11,9 @@
  * sequences); a block repeats its byte once, which zstd writes as it is. NULL as well where the
  * frame cannot be followed, which decoding tells. */
 const char *ebpo_zstd_fault(const uint8_t *frame, size_t bytes);
+
+/* Returns true if a frame has a checksum of its content: zstd decodes frames without one as well,
+ * and does not notice damage then. RFC 8878, 3.1.1. */
+bool ebpo_zstd_has_checksum(const uint8_t *frame, size_t bytes);
 
 #endif

@@ -1,5 +1,7 @@
 #include "container/chunk_rows.h"
 
+#include <string.h>
+
 #include "base/wide.h"
 #include "codec/shape.h"
 
@@ -76,4 +78,32 @@ uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, 
         return most;
     uint64_t wanted = wanted_rows(info, id, level, rows, element_size * (cols ? cols : 1));
     return wanted < most ? (uint32_t)wanted : most;
+}
+
+uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, bool subtrees,
+                                    bool kept)
+{
+    static const struct {
+        const char *path;
+        uint32_t rows;
+        bool fixed;
+    } known[] = {
+        { "/mesh/faces", EBPO_FACE_BLOCK, true },
+        { "/mesh/vertices", EBPO_VERTEX_BLOCK, true },
+        { "/subtrees/counts", EBPO_SUBTREE_ROWS, true },
+        { "/maps/vertex_source", MAP_ROWS, false },
+        { "/maps/face_source", EBPO_FACE_BLOCK, false },
+        { "/attributes/", ATTRIBUTE_ROWS, false },
+    };
+    uint32_t full = ebpo_full_chunk_rows(stored->rows, stored->cols, stored->element_size),
+             rows = stored->chunk_rows;
+    if (!subtrees)
+        return full;
+    if (rows == 0 || rows & (rows - 1) || rows > full)
+        rows = full;
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        if ((known[i].fixed || !kept) && strncmp(path, known[i].path, strlen(known[i].path)) == 0 &&
+            (path[strlen(known[i].path)] == 0 || path[strlen(known[i].path) - 1] == '/'))
+            rows = known[i].rows < full ? known[i].rows : full;
+    return rows;
 }

@@ -5,6 +5,7 @@
 
 #include <ebpo/file.h>
 
+#include "codec/shape.h"
 #include "container/schema.h"
 
 /* With subtrees: levels up to the first one lie as they are, from the second one on they are deep.
@@ -15,5 +16,11 @@ int ebpo_first_deep_level(const ebpo_info *info);
 /* Rows of an array's chunks, all or a power of two; `rows` are those of the array. */
 uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
                             uint32_t cols, uint32_t element_size);
+
+/* The same of a file that another program has rewritten: as ebpo_h5_chunk_rows_fn says. The numbers
+ * of arrays start anew at chunks, so the right ones have to be found where that program changed
+ * them; arrays whose chunks nothing fixes keep theirs if the format takes them. */
+uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, bool subtrees,
+                                    bool kept);
 
 #endif

@@ -112,12 +112,11 @@ static ebpo_status open_group(ebpo_head *head, const char *path, bool wanted, eb
 
 static ebpo_status check_pipeline(const ebpo_file *file, const ebpo_array_in *a, ebpo_error *error)
 {
-    ebpo_check check = ebpo_reader_check(file, NULL);
     return !a->present || a->shape.pipeline == file->level_array[0][EBPO_A_TYPES].shape.pipeline
                ? EBPO_OK
-               : ebpo_check_fail(
-                     &check, -1, a->path,
-                     "the array's filters are other ones than the file's first array has", error);
+               : ebpo_fail_at(error, EBPO_E_UNSUPPORTED, file->in.shown, a->path, -1,
+                              "the array's filters are other ones than the file's first array "
+                              "has, " EBPO_HEAD_FOREIGN);
 }
 
 static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)

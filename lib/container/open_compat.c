@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
+#include "container/chunk_rows.h"
 #include "h5/compat.h"
 #include "http/http_source.h"
 #include "io/byte_source.h"
@@ -141,10 +142,14 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
     if (status == EBPO_OK)
         status = make_temporary(&copy, shown, error);
     limits.file_bytes += 2 * bytes;
+    ebpo_error left_out = EBPO_ERROR_INIT, why = EBPO_ERROR_INIT;
     if (status == EBPO_OK)
-        status = ebpo_h5_clean_copy(from, fetched.fd >= 0, copy.name, shown, &limits, error);
-    if (status == EBPO_OK)
-        status = open_copy(copy.fd, shown, o, out, error);
+        status = ebpo_h5_clean_copy(from, fetched.fd >= 0, copy.name, shown,
+                                    ebpo_rows_of_foreign_chunk, &limits, &left_out, error);
+    if (status == EBPO_OK && open_copy(copy.fd, shown, o, out, &why) != EBPO_OK)
+        status = ebpo_fail_with(error, *left_out.message && strstr(why.message, "is missing")
+                                           ? &left_out /* it was there, and here is what it is */
+                                           : &why);
     remove_temporary(&copy);
     remove_temporary(&fetched);
     return status;

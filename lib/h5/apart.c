@@ -163,5 +163,7 @@ ebpo_status ebpo_apart(ebpo_apart_fn work, void *user, const char *shown,
         r.error.object[sizeof r.error.object - 1] = 0;
     if (r.status != EBPO_OK && r.status != r.error.status)
         return judge_death(state, shown, error);
-    return r.status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &r.error);
+    if (r.status != EBPO_OK || *r.error.message)
+        (void)!ebpo_fail_with(error, &r.error);
+    return r.status;
 }

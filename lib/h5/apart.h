@@ -11,7 +11,8 @@
  * leaves in memory is gone; files that it writes stay. */
 typedef ebpo_status (*ebpo_apart_fn)(void *user, ebpo_error *error);
 
-/* Its status and error; EBPO_E_FORMAT when it died or took more than it may; `shown`: the file. */
+/* Its status and error, of which EBPO_OK may have one, too; EBPO_E_FORMAT when it died or took more
+ * than it may; `shown`: the file. */
 EBPO_MUST_USE ebpo_status ebpo_apart(ebpo_apart_fn work, void *user, const char *shown,
                                      const ebpo_apart_limits *limits, ebpo_error *error);
 

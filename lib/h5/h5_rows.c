@@ -5,6 +5,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -49,29 +50,15 @@ static herr_t follow_none(const char *parent_file, const char *parent_group, con
     return -1;
 }
 
-/* Whether the values lie in files that this one names. */
-static bool lies_elsewhere(hid_t set)
-{
-    hid_t made = H5Dget_create_plist(set);
-    bool elsewhere =
-        made >= 0 && (H5Pget_layout(made) == H5D_VIRTUAL || H5Pget_external_count(made) > 0);
-    if (made >= 0)
-        H5Pclose(made);
-    return elsewhere;
-}
-
 static ebpo_status open_set(dataset *d, ebpo_error *error)
 {
     bool elsewhere = false;
-    d->file = H5Fopen(d->path, H5F_ACC_RDONLY, H5P_DEFAULT);
-    if (d->file < 0)
-        return ebpo_h5_fail(error, EBPO_E_FORMAT, d->path, "", "not a whole HDF5 file");
     hid_t access = H5Pcreate(H5P_DATASET_ACCESS);
     if (access < 0 || H5Pset_elink_cb(access, follow_none, &elsewhere) < 0)
         return ebpo_fail_memory(error, sizeof *d);
     d->set = H5Dopen2(d->file, d->name, access);
     H5Pclose(access);
-    if (elsewhere || (d->set >= 0 && lies_elsewhere(d->set)))
+    if (elsewhere || (d->set >= 0 && ebpo_h5_is_elsewhere(d->set)))
         return fail(d, "its values lie in another file, which is not looked for; name that one",
                     error);
     if (d->set < 0)
@@ -81,23 +68,118 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
     return d->space < 0 || d->type < 0 ? fail(d, "the dataset is damaged", error) : EBPO_OK;
 }
 
-static ebpo_status check_set(dataset *d, unsigned least, unsigned most, ebpo_error *error)
+/* Returns what the values are if they are no real numbers, else NULL. */
+static const char *other_values(hid_t set, hid_t type)
 {
-    char what[96];
-    H5T_class_t class = H5Tget_class(d->type);
+    H5T_class_t class = H5Tget_class(type);
+    if (class == H5T_COMPOUND)
+        return "compound values, such as complex numbers or rows with named columns";
+    if (class == H5T_ENUM)
+        return "values of an enumeration, such as true and false";
+    if (class == H5T_ARRAY)
+        return "an array in each element";
     if (class != H5T_INTEGER && class != H5T_FLOAT)
-        return fail(d, "holds no numbers", error);
-    if (H5Sget_simple_extent_ndims(d->space) == 2 &&
-        H5Sget_simple_extent_dims(d->space, d->size, NULL) == 2 && d->size[1] >= least &&
-        d->size[1] <= most)
-        return d->size[0] <= d->bytes_most / (most * sizeof(double))
+        return "text, bits or references";
+    /* every array of an .ebpo.h5 file has this, and none of others */
+    return H5Aexists(set, "coding") > 0
+               ? "codes of the .ebpo.h5 format (`ebpo extract --mesh` writes "
+                 "the vertices as a PLY, which can be given instead)"
+               : NULL;
+}
+
+static bool has_rows(hid_t space, unsigned least, unsigned most, hsize_t size[2])
+{
+    return H5Sget_simple_extent_ndims(space) == 2 &&
+           H5Sget_simple_extent_dims(space, size, NULL) == 2 && size[1] >= least && size[1] <= most;
+}
+
+/* Writes "rows of 3 numbers", or of "6 to 7". */
+static void describe_rows(const dataset *d, char what[64])
+{
+    snprintf(what, 64, "rows of %u%s%.0u numbers", d->least, d->most > d->least ? " to " : "",
+             d->most > d->least ? d->most : 0);
+}
+
+/* Writes a shape as "2 x 3"; nothing for a single value. */
+static void describe_shape(hid_t space, char *text, size_t room)
+{
+    hsize_t size[H5S_MAX_RANK];
+    int rank = H5Sget_simple_extent_dims(space, size, NULL), at = 0;
+    *text = 0;
+    for (int i = 0; i < rank && at >= 0 && (size_t)at < room; i++)
+        at +=
+            snprintf(text + at, room - (size_t)at, "%s%" PRIu64, i ? " x " : "", (uint64_t)size[i]);
+}
+
+static ebpo_status check_set(dataset *d, ebpo_error *error)
+{
+    char what[256], wanted[64], shape[96];
+    const char *others = other_values(d->set, d->type);
+    describe_rows(d, wanted);
+    if (others) {
+        snprintf(what, sizeof what, "holds no numbers but %s; %s are expected", others, wanted);
+        return fail(d, what, error);
+    }
+    if (has_rows(d->space, d->least, d->most, d->size))
+        return d->size[0] <= d->bytes_most / (d->most * sizeof(double))
                    ? EBPO_OK
                    : ebpo_h5_fail(error, EBPO_E_LIMIT, d->path, d->name,
                                   "has so many more rows than its file has bytes that it may be "
                                   "made to exhaust memory; give its rows as a NumPy array");
-    snprintf(what, sizeof what, "rows of %u%s%.0u numbers are expected", least,
-             most > least ? " to " : "", most > least ? most : 0);
+    describe_shape(d->space, shape, sizeof shape);
+    snprintf(what, sizeof what, "%s are expected; this is %s%s", wanted,
+             *shape ? "an array of " : "a single value", shape);
     return fail(d, what, error);
+}
+
+/* The datasets that could be meant. */
+typedef struct candidates {
+    const dataset *d;
+    unsigned objects, found;
+    char names[384];
+} candidates;
+
+static herr_t look_at(hid_t file, const char *name, const H5O_info_t *info, void *user)
+{
+    enum { OBJECTS_MOST = 65536, SHOWN = 4 };
+    candidates *c = user;
+    hsize_t size[2];
+    if (++c->objects > OBJECTS_MOST)
+        return 1;
+    if (info->type != H5O_TYPE_DATASET)
+        return 0;
+    hid_t set = H5Dopen2(file, name, H5P_DEFAULT);
+    hid_t space = set >= 0 ? H5Dget_space(set) : -1, type = set >= 0 ? H5Dget_type(set) : -1;
+    size_t at = strlen(c->names);
+    if (space >= 0 && type >= 0 && has_rows(space, c->d->least, c->d->most, size) &&
+        !other_values(set, type) && !ebpo_h5_is_elsewhere(set)) {
+        if (c->found < SHOWN && at + strlen(c->d->path) + strlen(name) + 8 < sizeof c->names)
+            snprintf(c->names + at, sizeof c->names - at, "%s%s:/%s", at ? ", " : "", c->d->path,
+                     name);
+        c->found++;
+    }
+    if (type >= 0)
+        H5Tclose(type);
+    if (space >= 0)
+        H5Sclose(space);
+    if (set >= 0)
+        H5Dclose(set);
+    return 0;
+}
+
+/* Fails in any case: with the datasets that could be meant, or as there is none. */
+static ebpo_status name_sets(dataset *d, ebpo_error *error)
+{
+    candidates c = { .d = d };
+    char wanted[64];
+    describe_rows(d, wanted);
+    (void)H5Ovisit2(d->file, H5_INDEX_NAME, H5_ITER_INC, look_at, &c, H5O_INFO_BASIC);
+    H5Eclear2(H5E_DEFAULT);
+    if (!c.found)
+        return ebpo_fail_file(error, EBPO_E_ABSENT, d->path, "has no dataset of %s", wanted);
+    return ebpo_fail_file(error, EBPO_E_FORMAT, d->path,
+                          "is an HDF5 file; name a dataset of %s in it: %s%s", wanted,
+                          *c.names ? c.names : "FILE.h5:/path", c.found > 4 ? ", ..." : "");
 }
 
 /* Rows from `first` on, into the first columns of rows that are `most` wide. *short_of_memory: why
@@ -142,9 +224,13 @@ static ebpo_status copy_rows(const dataset *d, ebpo_error *error)
 static ebpo_status read_apart(void *user, ebpo_error *error)
 {
     dataset *d = user;
-    ebpo_status status = open_set(d, error);
+    ebpo_status status = ebpo_h5_open_to_read(d->path, d->path, true, &d->file, error);
+    if (status == EBPO_OK && (!d->name || !*d->name))
+        return name_sets(d, error);
     if (status == EBPO_OK)
-        status = check_set(d, d->least, d->most, error);
+        status = open_set(d, error);
+    if (status == EBPO_OK)
+        status = check_set(d, error);
     return status == EBPO_OK ? copy_rows(d, error) : status;
 }
 

@@ -1,5 +1,6 @@
 #include "h5/scope.h"
 
+#include <errno.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,20 +51,72 @@ bool ebpo_h5_short_of_memory(void)
     return found;
 }
 
+/* Returns the number of the system's error in libhdf5's reason, 0 if there is none. */
+static int system_error(const char *cause)
+{
+    const char *number = strstr(cause, "errno = ");
+    return number ? atoi(number + 8) : 0;
+}
+
 ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown,
                          const char *object, const char *what)
 {
     char cause[CAUSE_BYTES] = "";
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_first, cause);
     H5Eclear2(H5E_DEFAULT);
-    const char *number = strstr(cause, "errno = ");
-    if (number && atoi(number + 8) > 0)
-        return ebpo_fail_at(error, status, shown, object, -1, "%s: %s", what,
-                            strerror(atoi(number + 8)));
+    int number = system_error(cause);
+    if (number > 0)
+        return ebpo_fail_at(error, status, shown, object, -1, "%s: %s", what, strerror(number));
     if (*cause)
         return ebpo_fail_at(error, status, shown, object, -1, "%s (libhdf5: %.*s)", what,
                             CAUSE_SHOWN, cause);
     return ebpo_fail_at(error, status, shown, object, -1, "%s", what);
+}
+
+static hid_t open_with(const char *path, bool lock)
+{
+    hid_t fapl = H5Pcreate(H5P_FILE_ACCESS);
+    if (!lock)
+        H5Pset_file_locking(fapl, false, true);
+    hid_t file = H5Fopen(path, H5F_ACC_RDONLY, fapl);
+    if (fapl >= 0 && file >= 0) /* else closing wipes libhdf5's reason, of which one list is left */
+        H5Pclose(fapl);
+    return file;
+}
+
+ebpo_status ebpo_h5_open_to_read(const char *path, const char *shown, bool lock, hid_t *file,
+                                 ebpo_error *error)
+{
+    char cause[CAUSE_BYTES] = "";
+    *file = open_with(path, lock);
+    if (*file >= 0)
+        return EBPO_OK;
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_first, cause);
+    int number = strstr(cause, "unable to lock file") ? system_error(cause) : 0;
+    if (number == EAGAIN || number == EACCES)
+        return ebpo_fail_file(error, EBPO_E_IO, shown,
+                              "is open for writing in another program; close it there first");
+    if (strstr(cause, "already open for write"))
+        return ebpo_fail_file(error, EBPO_E_IO, shown,
+                              "is marked as open for writing; close it in the program that writes "
+                              "it, or remove the mark of one that ended early with `h5clear -s`");
+    if (number) {
+        H5Eclear2(H5E_DEFAULT);
+        *file = open_with(path, false);
+    }
+    return *file >= 0
+               ? EBPO_OK
+               : ebpo_h5_fail(error, EBPO_E_FORMAT, shown, "", "not a whole HDF5 file, or damaged");
+}
+
+bool ebpo_h5_is_elsewhere(hid_t set)
+{
+    hid_t made = H5Dget_create_plist(set);
+    bool elsewhere =
+        made >= 0 && (H5Pget_layout(made) == H5D_VIRTUAL || H5Pget_external_count(made) > 0);
+    if (made >= 0)
+        H5Pclose(made);
+    return elsewhere;
 }
 
 hid_t ebpo_h5_integer_type(unsigned size, bool is_signed)

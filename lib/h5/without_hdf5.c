@@ -174,9 +174,10 @@ ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path, ebpo_h5_number
 }
 
 ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to, const char *shown,
-                               const ebpo_apart_limits *limits, ebpo_error *error)
+                               ebpo_h5_chunk_rows_fn chunk_rows, const ebpo_apart_limits *limits,
+                               ebpo_error *left_out, ebpo_error *error)
 {
-    (void)from, (void)from_goes, (void)to, (void)limits;
+    (void)from, (void)from_goes, (void)to, (void)chunk_rows, (void)limits, (void)left_out;
     return unsupported(shown, error);
 }
 

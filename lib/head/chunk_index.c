@@ -46,11 +46,11 @@ const char *ebpo_head_read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool 
         return "the array's layout is of a version that is not known";
     if (kind == VIRTUAL)
         return "the array is virtual: its values lie in other arrays, which are never looked for";
+    *foreign = kind != CHUNKED || version == 3;
     if (kind != CHUNKED)
         return "the array is not stored in chunks";
     if (version == 4)
         return read_chunked(&c, l, foreign);
-    *foreign = true;
     return "the array's chunks are listed in a tree without checksums";
 }
 

@@ -22,6 +22,11 @@ typedef struct ebpo_head {
         NULL, 0, NULL  \
     }
 
+/* How the messages of that end. */
+#define EBPO_HEAD_FOREIGN                                                                \
+    "as other programs write it; read it with --compat, or write it anew: `ebpo repack " \
+    "--compat`"
+
 /* Where an object's header is. There is nothing to close. */
 typedef uint64_t ebpo_head_object;
 

@@ -91,6 +91,9 @@ static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type
 
 static ebpo_head_refusal refused(const char *what) { return (ebpo_head_refusal){ what, false }; }
 
+/* Not damaged, but rewritten by another program. */
+static ebpo_head_refusal foreign(const char *what) { return (ebpo_head_refusal){ what, true }; }
+
 static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape)
 {
     ebpo_head_refusal wrong = { NULL, false };
@@ -100,6 +103,10 @@ static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape
         return wrong;
     ebpo_head_type type = ebpo_head_read_type(ebpo_head_message_cursor(h, type_message));
     ebpo_head_space space = ebpo_head_read_space(ebpo_head_message_cursor(h, space_message));
+    bool grows = space.rank <= 2 && !space.fixed;
+    if (type.class == EBPO_CLASS_OTHER_INTEGER || grows)
+        return foreign(grows ? "the array does not have fixed dimensions"
+                             : "the array is not of little-endian integers");
     if (type.class != EBPO_CLASS_INTEGER ||
         (type.size != 1 && type.size != 2 && type.size != 4 && type.size != 8))
         return refused("the array is not of little-endian integers");
@@ -134,12 +141,12 @@ static ebpo_head_refusal read_storage(const ebpo_head_header *h, ebpo_head_rows 
                  layout->chunk[layout->rank] == shape->element_size &&
                  (!shape->cols || layout->chunk[1] == shape->cols);
     if (!whole || !rows_fit(shape, rule, layout->chunk[0]))
-        return refused("the array's chunks do not have the size that the format fixes");
+        return foreign("the array's chunks do not have the size that the format fixes");
     shape->chunk_rows = (uint32_t)layout->chunk[0];
     if (filter_message)
         filters = ebpo_head_read_filters(ebpo_head_message_cursor(h, filter_message));
     if (!find_pipeline(&filters, shape->element_size, &shape->pipeline))
-        return refused("the array's filters are none of the format's");
+        return foreign("the array's filters are none of the format's");
     return wrong;
 }
 

@@ -12,9 +12,7 @@ static ebpo_status fail_refused(const ebpo_head *head, const char *path, const c
 {
     if (why->foreign)
         return ebpo_fail_at(error, EBPO_E_UNSUPPORTED, head->shown, path, -1,
-                            "%s, as other programs write it; read it with --compat, or write it "
-                            "anew: `ebpo repack --compat`",
-                            why->what);
+                            "%s, " EBPO_HEAD_FOREIGN, why->what);
     return why->what && *what ? ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, path, -1, "%s: %s",
                                              what, why->what)
                               : ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, path, -1, "%s",

@@ -27,6 +27,8 @@ ebpo_head_type ebpo_head_read_type(ebpo_head_cursor c)
         return type;
     if ((kind & 15) == FIXED && is_integer(&c, bits, type.size))
         type = (ebpo_head_type){ EBPO_CLASS_INTEGER, type.size, bits != 0 };
+    else if ((kind & 15) == FIXED)
+        type.class = EBPO_CLASS_OTHER_INTEGER;
     else if ((kind & 15) == FLOAT && is_double(&c, bits, type.size))
         type.class = EBPO_CLASS_DOUBLE;
     else if ((kind & 15) == STRING)

@@ -5,9 +5,10 @@
 #include "head/head_cursor.h"
 
 typedef enum ebpo_head_class {
-    EBPO_CLASS_INTEGER, /* little-endian, all bits of it */
-    EBPO_CLASS_DOUBLE,  /* IEEE 754, little-endian, 64 bits */
-    EBPO_CLASS_TEXT,    /* of fixed length, however it is padded */
+    EBPO_CLASS_INTEGER,       /* little-endian, all bits of it */
+    EBPO_CLASS_DOUBLE,        /* IEEE 754, little-endian, 64 bits */
+    EBPO_CLASS_TEXT,          /* of fixed length, however it is padded */
+    EBPO_CLASS_OTHER_INTEGER, /* big-endian, say */
     EBPO_CLASS_OTHER
 } ebpo_head_class;
 

@@ -76,6 +76,24 @@ static bool content_range(ebpo_answer *a, const char *at, const char *end)
     return true;
 }
 
+/* Takes "text/html" of "Text/HTML; charset=utf-8". */
+static void keep_type(char out[EBPO_HTTP_TYPE_BYTES], const char *text, size_t length)
+{
+    size_t i = 0;
+    for (; i < length && i + 1 < EBPO_HTTP_TYPE_BYTES && isgraph((unsigned char)text[i]) &&
+           text[i] != ';' && text[i] != ',';
+         i++)
+        out[i] = (char)tolower((unsigned char)text[i]);
+    out[i] = 0;
+}
+
+bool ebpo_answer_is_text(const char *type)
+{
+    size_t length = strlen(type);
+    return strncmp(type, "text/", 5) == 0 || strcmp(type, "application/json") == 0 ||
+           (length >= 3 && strcmp(type + length - 3, "xml") == 0);
+}
+
 /* If it is too long, its digest is kept: it is only ever compared. */
 static void keep_text(char out[EBPO_HTTP_TAG_BYTES], const char *text, size_t length)
 {
@@ -124,7 +142,10 @@ void ebpo_answer_line(ebpo_answer *a, const char *line, size_t size)
     } else if (field(line, size, "transfer-encoding", &text, &length)) {
         a->chunked = length >= 7 && strncasecmp(text + length - 7, "chunked", 7) == 0;
     } else if (field(line, size, "etag", &text, &length)) {
-        keep_text(a->etag, text, length);
+        size_t weak = length > 2 && text[0] == 'W' && text[1] == '/' ? 2 : 0;
+        keep_text(a->etag, text + weak, length - weak);
+    } else if (field(line, size, "content-type", &text, &length)) {
+        keep_type(a->type, text, length);
     } else if (field(line, size, "last-modified", &text, &length)) {
         keep_text(a->modified, text, length);
     }
@@ -143,15 +164,22 @@ static bool may_pass(int code)
     return code == 408 || code == 429 || code == 500 || code == 502 || code == 503 || code == 504;
 }
 
-static const char *changed(const ebpo_answer *a, const ebpo_http_version *pinned, uint64_t size)
+/* Weak tags are compared as strong ones: servers and proxies add and drop the mark of one file. */
+static const char *changed(const ebpo_answer *a, const ebpo_asked *asked, uint64_t size)
 {
+    const ebpo_http_version *pinned = asked->pinned;
     if (size != pinned->size)
         return "has changed on the server while it was open (another size); open it again";
+    if (asked->unversioned)
+        return NULL;
     /* Mirrors of one file may report different times, but not different tags. */
     if (strcmp(a->etag, pinned->etag) != 0)
-        return "has changed on the server while it was open (another ETag); open it again";
+        return "has changed on the server while it was open (another ETag); open it again, or with "
+               "--http-unversioned if several servers answer there, each with its tag";
     if (!*pinned->etag && strcmp(a->modified, pinned->modified) != 0)
-        return "has changed on the server while it was open (another Last-Modified); open it again";
+        return "has changed on the server while it was open (another Last-Modified); open it "
+               "again, "
+               "or with --http-unversioned if several servers answer there, each with its time";
     return NULL;
 }
 
@@ -166,7 +194,7 @@ static ebpo_verdict judge_part(const ebpo_answer *a, const ebpo_asked *asked,
         return say(EBPO_ANSWER_REFUSED, why,
                    "the server does not tell the file's size (Content-Range ends with /*); such "
                    "files cannot be read by ranges");
-    const char *change = asked->pinned ? changed(a, asked->pinned, a->total) : NULL;
+    const char *change = asked->pinned ? changed(a, asked, a->total) : NULL;
     if (change)
         return say(EBPO_ANSWER_REFUSED, why, change);
     if (a->begin != asked->begin || a->last >= asked->end) {
@@ -182,8 +210,15 @@ static ebpo_verdict judge_part(const ebpo_answer *a, const ebpo_asked *asked,
 static ebpo_verdict judge_whole(const ebpo_answer *a, const ebpo_asked *asked, ebpo_status *status,
                                 char why[EBPO_WHY_BYTES])
 {
-    const char *change =
-        asked->pinned && a->has_length ? changed(a, asked->pinned, a->length) : NULL;
+    if (asked->pinned && ebpo_answer_is_text(a->type)) {
+        snprintf(
+            why, EBPO_WHY_BYTES,
+            "the server returned %s when asked for a part, after it had sent parts of a model; "
+            "open it again, in case a login or the address has expired",
+            a->type);
+        return EBPO_ANSWER_REFUSED;
+    }
+    const char *change = asked->pinned && a->has_length ? changed(a, asked, a->length) : NULL;
     if (change)
         return say(EBPO_ANSWER_REFUSED, why, change);
     if (asked->pinned)

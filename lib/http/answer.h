@@ -5,12 +5,13 @@
 
 #include <ebpo/base.h>
 
-enum { EBPO_HTTP_TAG_BYTES = 200, EBPO_HTTP_HEADERS_MAX = 1 << 18 };
+enum { EBPO_HTTP_TAG_BYTES = 200, EBPO_HTTP_TYPE_BYTES = 64, EBPO_HTTP_HEADERS_MAX = 1 << 18 };
 
 /* The version of a file. Texts are "" when the server does not send them. */
 typedef struct ebpo_http_version {
     uint64_t size;
-    char etag[EBPO_HTTP_TAG_BYTES], modified[EBPO_HTTP_TAG_BYTES];
+    char etag[EBPO_HTTP_TAG_BYTES]; /* without the mark of a weak one */
+    char modified[EBPO_HTTP_TAG_BYTES];
 } ebpo_http_version;
 
 typedef struct ebpo_answer {
@@ -23,12 +24,16 @@ typedef struct ebpo_answer {
     bool has_length, chunked, encoded;
     uint64_t begin, last, total, length;
     char etag[EBPO_HTTP_TAG_BYTES], modified[EBPO_HTTP_TAG_BYTES];
+    char type[EBPO_HTTP_TYPE_BYTES]; /* "text/html", in small letters */
     uint64_t header_bytes;
 } ebpo_answer;
 
 /* One line of the head, as it came. A status line begins anew: what came before was a redirect or
  * an interim answer. */
 void ebpo_answer_line(ebpo_answer *answer, const char *line, size_t size);
+
+/* Returns true for types of text, which pages about a login or an error have and no model has. */
+bool ebpo_answer_is_text(const char *type);
 
 typedef enum ebpo_verdict {
     EBPO_ANSWER_PART,  /* the body is the range, or its beginning */
@@ -42,6 +47,7 @@ typedef struct ebpo_asked {
     /* NULL: the first request, which learns the version; the file may end before `end` */
     const ebpo_http_version *pinned;
     uint64_t whole_limit;
+    bool unversioned; /* only sizes are compared */
 } ebpo_asked;
 
 enum { EBPO_WHY_BYTES = 240 };

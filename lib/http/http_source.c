@@ -192,6 +192,23 @@ static void pin(http_source *s)
     pthread_mutex_unlock(&s->pieces.lock);
 }
 
+/* Refuses a page, which servers send with a code of success where a login is wanted. */
+static ebpo_status check_type(const http_source *s, const ebpo_request *r, ebpo_error *error)
+{
+    static const char signature[] = "\211HDF", blanks[] = " \t\r\n\357\273\277";
+    uint64_t at = 0;
+    while (at < s->head_bytes && s->head[at] && strchr(blanks, s->head[at]))
+        at++;
+    bool is_page = at < s->head_bytes && s->head[at] == '<';
+    if (!is_page && (!ebpo_answer_is_text(r->type) ||
+                     (s->head_bytes >= 4 && memcmp(s->head, signature, 4) == 0)))
+        return EBPO_OK;
+    return ebpo_fail_file(error, EBPO_E_IO, s->shown,
+                          "the server returned %s, not a model; check the address, and whether it "
+                          "wants a login",
+                          *r->type ? r->type : "a page of HTML or XML");
+}
+
 /* The first bytes, the size and the version; from a server without ranges, everything. */
 static ebpo_status read_head(http_source *s, ebpo_error *error)
 {
@@ -211,7 +228,7 @@ static ebpo_status read_head(http_source *s, ebpo_error *error)
         s->head = r.whole;
     }
     pin(s);
-    return EBPO_OK;
+    return check_type(s, &r, error);
 }
 
 /* Without ETag and Last-Modified there is no telling whether two answers belong to one version; a
@@ -223,7 +240,7 @@ static ebpo_status read_whole(http_source *s, ebpo_error *error)
             error, EBPO_E_UNSUPPORTED, s->shown,
             "the server sends neither ETag nor Last-Modified, so a change under "
             "way could not be noticed, and %llu bytes are more than "
-            "would be read at once; download the file, or allow unversioned files",
+            "would be read at once; download the file, or read it with --http-unversioned",
             (unsigned long long)s->version.size);
     uint8_t *all = ebpo_alloc(s->version.size, 1);
     if (!all)

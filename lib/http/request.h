@@ -22,6 +22,7 @@ typedef struct ebpo_request {
      * then `data` is unused */
     uint8_t *whole;
     ebpo_http_version version; /* `first` */
+    char type[EBPO_HTTP_TYPE_BYTES];
     /* The transfers' own. */
     struct ebpo_request *next;
     unsigned failures;

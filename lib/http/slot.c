@@ -59,7 +59,7 @@ static size_t take_header(char *line, size_t size, size_t count, void *user)
 void ebpo_slot_judge(ebpo_slot *s)
 {
     ebpo_asked asked = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL,
-                         s->owner->options->whole_limit };
+                         s->owner->options->whole_limit, s->owner->options->unversioned };
     if (!s->judged)
         s->verdict = ebpo_answer_judge(&s->answer, &asked, &s->status, s->why);
     s->judged = true;

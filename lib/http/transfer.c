@@ -244,6 +244,7 @@ static bool passing(CURLcode code)
 static bool keep(ebpo_slot *s, CURLcode code)
 {
     ebpo_request *r = s->request;
+    memcpy(r->type, s->answer.type, sizeof r->type);
     if (s->verdict == EBPO_ANSWER_WHOLE) {
         if (code == CURLE_OK) {
             r->version = (ebpo_http_version){ .size = s->taken };
@@ -265,9 +266,19 @@ static bool keep(ebpo_slot *s, CURLcode code)
     return r->got == r->size;
 }
 
+/* Returns what went wrong in libcurl, which says that memory is short of lines that are too long
+ * for it. */
+static const char *trouble_of(const ebpo_slot *s, CURLcode code)
+{
+    if (code == CURLE_OUT_OF_MEMORY && !s->received)
+        return "the head of the server's answer, such as the address of a redirect, is too long "
+               "for libcurl, or memory is short; check the address";
+    return *s->trouble ? s->trouble : curl_easy_strerror(code);
+}
+
 static void describe(const ebpo_slot *s, CURLcode code, char *out, size_t capacity)
 {
-    const char *trouble = *s->trouble ? s->trouble : curl_easy_strerror(code);
+    const char *trouble = trouble_of(s, code);
     if (s->judged && s->verdict == EBPO_ANSWER_LATER)
         snprintf(out, capacity, "%s", s->why);
     else if (s->stalled)
@@ -353,7 +364,7 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
              (s->judged && s->verdict == EBPO_ANSWER_LATER))
         try_again(t, s, code, now);
     else
-        finish(t, r, EBPO_E_IO, *s->trouble ? s->trouble : curl_easy_strerror(code));
+        finish(t, r, EBPO_E_IO, trouble_of(s, code));
     s->request = NULL;
     pthread_mutex_unlock(t->lock);
 }

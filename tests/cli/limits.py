@@ -2,9 +2,11 @@
 """limits.py TOOL INPUTS LITTLE FEATURES [CAIRO]: what commands may take of a machine.
 
 Each keeps to its limit of memory, given or not, or ends with an error and without output; a mesh that
-is shortened while it is read is an error. LITTLE is preloaded where a machine has little memory left. CAIRO
-is found instead of libcairo.
+is shortened while it is read is an error. LITTLE is preloaded where a machine has little memory left, or
+no locks of files. CAIRO is found instead of libcairo.
 """
+import errno
+import fcntl
 import json
 import math
 import os
@@ -233,6 +235,22 @@ def pipes_are_refused():
         check(done.returncode == 1 and told, f"{words}: {done.returncode}, {done.stderr.strip()}")
 
 
+def hdf5_without_locks():
+    """Reading needs no lock; a lock that another program holds is named."""
+    subprocess.run([sys.executable, "-c", "import h5py; f = h5py.File('rows.h5', 'w'); f['p'] = [[.5, .5, .5]]; "
+                    "f['of/rays'] = [[5, .5, .5, -1, 0, 0]]"], check=True)
+    for number in (errno.EROFS, errno.ENOLCK, errno.EOPNOTSUPP, 524, errno.ENOSYS):
+        for words in (("inside", "cube.ebpo.h5", "rows.h5:/p"), ("ray", "cube.ebpo.h5", "rows.h5:/of/rays")):
+            code, out, said, _ = run(*words, LD_PRELOAD=LITTLE, EBPO_TEST_LOCK=str(number))
+            check(code == 0 and out and not said, f"{words[0]} where locks fail with {number}: {said}")
+        code, _, said, _ = run("inside", "cube.ebpo.h5", "rows.h5", LD_PRELOAD=LITTLE, EBPO_TEST_LOCK=str(number))
+        check(code == 1 and "rows.h5:/p" in said, f"datasets are named where locks fail with {number}: {said}")
+    with open("rows.h5", "rb") as writer:
+        fcntl.flock(writer, fcntl.LOCK_EX)
+        code, out, said, _ = run("inside", "cube.ebpo.h5", "rows.h5:/p")
+        check(code == 1 and not out and "rows.h5: is open for writing in another program" in said, f"locked: {said}")
+
+
 def changed_while_open():
     """An .ebpo.h5 file that is replaced goes on being the old one; shortened, it is an error."""
     for how in "replaced", "shortened":
@@ -271,6 +289,7 @@ def main():
         models_are_held_in_parts()
         if "h5py" in FEATURES:
             verify_keeps_its_budget()
+            hdf5_without_locks()
         shortened_while_read()
         pipes_are_refused()
         changed_while_open()

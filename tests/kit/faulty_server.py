@@ -107,6 +107,10 @@ class Handler(http.server.BaseHTTPRequestHandler):
         else:
             self.part()
 
+    def first_good(self, times, fault):
+        """The range for the first requests of this address, then the fault."""
+        (self.part if self.number <= times else fault)()
+
     def redirect(self, target):
         self.head(302, [("Location", target), ("Content-Length", 0)])
 
@@ -177,6 +181,17 @@ class Handler(http.server.BaseHTTPRequestHandler):
         body = b"<html><body>Please log in</body></html>"
         self.head(200, [("Content-Length", len(body)), ("Content-Type", "text/html")])
         self.wfile.write(body)
+
+    def fault_html_bare(self):
+        body = b"\r\n<!DOCTYPE html><html><body>Please log in</body></html>"
+        self.head(200, [("Content-Length", len(body))])
+        self.wfile.write(body)
+
+    def fault_html_later(self):
+        self.first_good(1, self.fault_html)
+
+    def fault_model_as_text(self):
+        self.part(data=b"\x89HDF\r\n\x1a\n" + self.data, extra=[("Content-Type", "text/plain")])
 
     def fault_short(self, times=1):
         self.first(times, lambda: self.part(cut=1000))
@@ -313,6 +328,9 @@ class Handler(http.server.BaseHTTPRequestHandler):
         """To a place that ignores ranges properly said, and says another one."""
         self.redirect("/wrong_range/elsewhere")
 
+    def fault_redirect_long(self, bytes):
+        self.redirect("/good/" + "x" * bytes)
+
     def fault_redirect_loop(self):
         self.redirect(self.path)
 
@@ -343,6 +361,15 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.fail(403)
         else:
             self.part()
+
+    def fault_weak_sometimes(self):
+        self.part(version=self.version(etag='W/"v1"' if self.number % 2 else '"v1"'))
+
+    def fault_etag_by_server(self):
+        self.part(version=self.version(etag=f'"v{self.number % 2}"'))
+
+    def fault_modified_by_server(self):
+        self.part(version=self.version(etag=None, modified=LATER if self.number % 2 else MODIFIED))
 
     def fault_change_etag(self, good=1):
         if self.number <= good:

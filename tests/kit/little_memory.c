@@ -1,6 +1,11 @@
-/* Preloaded: the machine has only so many bytes of memory left as the environment says. */
+/* Preloaded: a machine that lacks something, as the environment says: EBPO_TEST_FREE, bytes of
+ * memory that are left; EBPO_TEST_LOCK, the number of the error with which locking a file fails. */
+#include <errno.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <sys/file.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 uint64_t ebpo_free_memory(void);
 
@@ -8,4 +13,13 @@ __attribute__((visibility("default"))) uint64_t ebpo_free_memory(void)
 {
     const char *bytes = getenv("EBPO_TEST_FREE");
     return bytes ? strtoull(bytes, NULL, 10) : UINT64_C(1) << 40;
+}
+
+__attribute__((visibility("default"))) int flock(int file, int operation)
+{
+    const char *number = getenv("EBPO_TEST_LOCK");
+    if (!number)
+        return (int)syscall(SYS_flock, file, operation);
+    errno = atoi(number);
+    return -1;
 }

@@ -76,6 +76,8 @@ class Asking(Case):
             file["points"] = P
         with h5py.File("points.h5", "r") as file:
             np.testing.assert_array_equal(model("scan").inside(file["points"]), model("scan").inside(P))
+        with h5py.File("scan.ebpo.h5", "r") as file, self.assertRaisesRegex(TypeError, "codes.*mesh"):
+            model("scan").inside(file["mesh/vertices"])
 
     def test_threads_and_budgets(self):
         m = model("scan")

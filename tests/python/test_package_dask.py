@@ -3,6 +3,7 @@
 
 Exit code 77: dask or distributed is missing.
 """
+import errno
 import http.server
 import os
 import pathlib
@@ -80,6 +81,42 @@ class Answers(Case):
         some = some[some[:, 0] > 0]  # chunks of unknown sizes
         np.testing.assert_array_equal(ed.inside("scan.ebpo.h5", some).compute(), m.inside(P[P[:, 0] > 0]))
         self.assertEqual(ed.inside("scan.ebpo.h5", np.zeros((0, 3))).compute().shape, (0,))
+
+    def test_datasets_that_cannot_be_points(self):
+        h5py = h5py_or_none()
+        if not h5py:
+            self.skipTest("no h5py")
+        with h5py.File("several.h5", "w") as file:
+            file["a"], file["b/c"], file["complex"], file["empty"] = P, P, P.astype(complex), h5py.Empty("f8")
+        for path, dataset, says in (("several.h5", None, "name one .*: a, b/c$"), ("several.h5", "complex", "real"),
+                                    ("several.h5", "empty", "shape"), ("scan.ebpo.h5", "mesh/vertices", "codes.*mesh"),
+                                    ("scan.ebpo.h5", None, "0 datasets")):
+            with self.assertRaisesRegex(ebpo.FormatError, says):
+                model("scan")
+                ed.points(path, dataset)
+
+    def test_hdf5_without_locks(self):
+        """A file system that has no locks, as some of networks; and a file that another program writes."""
+        h5py = h5py_or_none()
+        if not h5py:
+            self.skipTest("no h5py")
+        with h5py.File("points.h5", "w") as file:
+            file["points"] = P
+        tried, number = [], errno.ENOLCK
+
+        class Locking(h5py.File):
+            def __init__(self, name, mode, **options):
+                tried.append(options)
+                if "locking" not in options:
+                    raise OSError(number, f"unable to lock file, errno = {number}")
+                super().__init__(name, mode, **options)
+
+        with unittest.mock.patch.object(h5py, "File", Locking):
+            np.testing.assert_array_equal(ed.points("points.h5").compute(), P)
+            number = errno.EAGAIN
+            with self.assertRaisesRegex(ebpo.IOFailure, "open for writing"):
+                ed.points("points.h5")
+        self.assertIn({"locking": False}, tried)
 
     def test_what_cannot_be_asked(self):
         pathlib.Path("odd.raw").write_bytes(b"x" * 100)

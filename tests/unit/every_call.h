@@ -21,14 +21,16 @@ typedef struct every_call {
 extern const every_call every_call_meshes[], every_call_files[], every_call_answers[];
 
 /* What the calls read, below the scratch folder. */
-#define EVERY_CALL_MODEL    "model.ebpo.h5"
-#define EVERY_CALL_PLY      "torus.ply"
-#define EVERY_CALL_SPLIT    "split.ply"    /* without shared vertices */
-#define EVERY_CALL_TURNED   "turned.ply"   /* some faces point the other way */
-#define EVERY_CALL_DOUBLE   "double.ply"   /* some faces are there twice */
-#define EVERY_CALL_HOLED    "holed.ply"    /* some faces are missing */
-#define EVERY_CALL_CROSSING "crossing.ply" /* faces pierce each other */
-#define EVERY_CALL_OBJ      "torus.obj"
+#define EVERY_CALL_MODEL     "model.ebpo.h5"
+#define EVERY_CALL_ROWS      "rows.h5" /* of coordinates, at EVERY_CALL_ROWS_PATH */
+#define EVERY_CALL_ROWS_PATH "/VTKHDF/Points"
+#define EVERY_CALL_PLY       "torus.ply"
+#define EVERY_CALL_SPLIT     "split.ply"    /* without shared vertices */
+#define EVERY_CALL_TURNED    "turned.ply"   /* some faces point the other way */
+#define EVERY_CALL_DOUBLE    "double.ply"   /* some faces are there twice */
+#define EVERY_CALL_HOLED     "holed.ply"    /* some faces are missing */
+#define EVERY_CALL_CROSSING  "crossing.ply" /* faces pierce each other */
+#define EVERY_CALL_OBJ       "torus.obj"
 
 /* A URL of the model; NULL: no server. */
 const char *every_call_url(void);

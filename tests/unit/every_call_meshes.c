@@ -49,8 +49,8 @@ static ebpo_status call_rows(every_call_env *e)
 {
     double *rows;
     uint64_t count;
-    ebpo_status status = ebpo_rows_read(scratch(EVERY_CALL_MODEL), "/mesh/vertices", 3, 3, 0, &rows,
-                                        &count, e->error);
+    ebpo_status status = ebpo_rows_read(scratch(EVERY_CALL_ROWS), EVERY_CALL_ROWS_PATH, 3, 3, 0,
+                                        &rows, &count, e->error);
     free(rows);
     return status;
 }
@@ -59,8 +59,8 @@ static ebpo_status call_rows_part(every_call_env *e)
 {
     double *rows;
     uint64_t count, total;
-    ebpo_status status = ebpo_rows_read_part(scratch(EVERY_CALL_MODEL), "/mesh/vertices", 3, 3, 0,
-                                             1, 2, &rows, &count, &total, e->error);
+    ebpo_status status = ebpo_rows_read_part(scratch(EVERY_CALL_ROWS), EVERY_CALL_ROWS_PATH, 3, 3,
+                                             0, 1, 2, &rows, &count, &total, e->error);
     free(rows);
     return status;
 }

@@ -97,6 +97,16 @@ static void write_obj(void)
     fine(ebpo_write_file(scratch(EVERY_CALL_OBJ), text, sizeof text - 1, &error));
 }
 
+/* An HDF5 file with rows of coordinates. */
+static void write_rows(void)
+{
+    ebpo_file *file;
+    ebpo_export_report report = { .struct_size = sizeof report };
+    fine(ebpo_open(scratch(EVERY_CALL_MODEL), &file, &error));
+    fine(ebpo_export(file, scratch(EVERY_CALL_ROWS), EBPO_EXPORT_VTKHDF, NULL, &report, &error));
+    ebpo_close(file);
+}
+
 static void write_model(uint32_t n)
 {
     ebpo_mesh mesh = ebpo_test_torus(3, 1, n, n);
@@ -110,6 +120,7 @@ static void write_model(uint32_t n)
     fine(ebpo_build(&mesh, &prepared.report, NULL, &options, &tree, &error));
     fine(ebpo_tree_write(&tree, scratch(EVERY_CALL_MODEL), NULL, &error));
     ebpo_tree_free(&tree);
+    write_rows();
 }
 
 static void serve(void)

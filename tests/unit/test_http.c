@@ -127,6 +127,7 @@ static const struct {
     { "code_later-503-1-2", 1 },
     { "wait-429-1-1", 1 },
     { "redirect", 0 },
+    { "weak_sometimes", 0 },
 };
 
 START_TEST(what_passes_or_does_no_harm_gives_the_same_bytes)
@@ -223,6 +224,11 @@ static const struct {
     { "garbage", EBPO_E_IO, "" },
     { "not_satisfiable", EBPO_E_IO, "416" },
     { "private", EBPO_E_IO, "answered 401" },
+    { "etag_by_server", EBPO_E_IO, "another ETag); open it again, or with --http-unversioned" },
+    { "html", EBPO_E_IO, "the server returned text/html, not a model" },
+    { "html_bare", EBPO_E_IO, "the server returned a page of HTML" },
+    { "html_later", EBPO_E_IO, "the server returned text/html when asked for a part" },
+    { "redirect_long-150000", EBPO_E_IO, "address of a redirect, is too long" },
 };
 
 START_TEST(what_is_wrong_is_a_clear_error_that_names_the_file)
@@ -257,14 +263,31 @@ START_TEST(final_codes_are_asked_for_once)
 }
 END_TEST
 
-START_TEST(a_page_with_200_is_not_taken_for_a_model)
+START_TEST(a_model_may_be_sent_as_text)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_file *file;
-    ck_assert_int_eq(ebpo_open_url(web_url("html"), &o, &file, &error), EBPO_E_FORMAT);
-    ck_assert_ptr_nonnull(strstr(error.message, "HDF5"));
-    ck_assert_ptr_null(file);
+    ebpo_source s = EBPO_SOURCE_INIT;
+    ck_assert_msg(ebpo_source_of_url(web_url("model_as_text"), &o, &s, &error) == EBPO_OK, "%s",
+                  error.message);
+    s.close(s.user);
+}
+END_TEST
+
+/* Where several servers answer for one address, each with its tag or its time. */
+START_TEST(versions_are_left_aside_on_demand)
+{
+    static const char *const faults[] = { "etag_by_server", "modified_by_server" };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    for (int i = 0; i < 2; i++) {
+        ck_assert_int_eq(visit(faults[i], &o, NULL, &error), EBPO_E_IO);
+        ck_assert_ptr_nonnull(strstr(error.message, "--http-unversioned"));
+    }
+    o.unversioned = true;
+    for (int i = 0; i < 2; i++)
+        ck_assert_msg(visit(faults[i], &o, NULL, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_int_eq(visit("change_size", &o, NULL, &error), EBPO_E_IO);
 }
 END_TEST
 
@@ -714,7 +737,7 @@ static ebpo_verdict judged(const char *const *lines, const ebpo_http_version *pi
                            char why[EBPO_WHY_BYTES])
 {
     ebpo_answer answer = { .code = 0 };
-    ebpo_asked asked = { 100, 200, pinned, 1000 };
+    ebpo_asked asked = { 100, 200, pinned, 1000, false };
     ebpo_status status;
     for (; *lines; lines++)
         ebpo_answer_line(&answer, *lines, strlen(*lines));
@@ -759,6 +782,8 @@ START_TEST(heads_are_judged_by_the_letter)
     ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000"),
                      EBPO_ANSWER_REFUSED); /* the tag has gone */
     ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000", "ETag: W/\"a\""),
+                     EBPO_ANSWER_PART);
+    ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000", "ETag: W/\"b\""),
                      EBPO_ANSWER_REFUSED);
     ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000", "ETag: \"a\"",
                             "Content-Encoding: br"),
@@ -792,7 +817,7 @@ START_TEST(ranges_beyond_4_gib_are_judged_by_all_their_digits)
     };
     for (size_t i = 0; i < sizeof answers / sizeof *answers; i++) {
         ebpo_answer answer = { .code = 0 };
-        ebpo_asked asked = { UINT64_C(8589934592), UINT64_C(8589934692), &pinned, 1000 };
+        ebpo_asked asked = { UINT64_C(8589934592), UINT64_C(8589934692), &pinned, 1000, false };
         ebpo_status status;
         const char *const lines[] = { "HTTP/1.1 206 Partial", "ETag: \"a\"", answers[i].line };
         for (int k = 0; k < 3; k++)
@@ -819,7 +844,7 @@ START_TEST(long_tags_are_told_apart_to_their_end)
     ebpo_answer second = {
         .code = 206, .has_range = true, .has_total = true, .begin = 100, .last = 199, .total = 5000
     };
-    ebpo_asked asked = { 100, 200, &pinned, 1000 };
+    ebpo_asked asked = { 100, 200, &pinned, 1000, false };
     ebpo_status status;
     ebpo_answer_line(&second, line, sizeof line);
     ck_assert_int_eq(ebpo_answer_judge(&second, &asked, &status, why), EBPO_ANSWER_PART);
@@ -855,7 +880,8 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, what_is_wrong_is_a_clear_error_that_names_the_file, 0,
                         sizeof unreadable / sizeof *unreadable);
     tcase_add_test(tests, final_codes_are_asked_for_once);
-    tcase_add_test(tests, a_page_with_200_is_not_taken_for_a_model);
+    tcase_add_test(tests, a_model_may_be_sent_as_text);
+    tcase_add_test(tests, versions_are_left_aside_on_demand);
     tcase_add_test(tests, without_ranges_or_version_only_small_files_are_read);
     tcase_add_test(tests, a_file_without_a_version_is_one_answer_or_none);
     tcase_add_test(tests, opening_is_one_request_and_what_was_announced_comes_in_few);

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "cli/points_format.h"
 
@@ -240,12 +241,28 @@ static bool begins_as_ply(const points *p)
     return true;
 }
 
-static bool recognise(points *p, points_block *b)
+/* Fails, and says which datasets could be meant. */
+static bool refuse_hdf5(points *p, points_block *b)
 {
-    if (begins(p, "\211HDF\r\n\032\n", HEAD))
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint64_t total;
+    if (p->fd == STDIN_FILENO)
+        return points_fault(b, 0,
+                            "is an HDF5 file, which cannot be read from a pipe; give a "
+                            "dataset by its name: FILE.h5:/path");
+    if (read_dataset(p, p->name, "", 0, UINT64_MAX, &total, &error) == EBPO_E_ABSENT)
         return points_fault(
             b, 0, "is an HDF5 file and holds no %s; the model comes first, then what to ask about",
             wanted[p->kind]);
+    fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
+    p->failed = true;
+    return false;
+}
+
+static bool recognise(points *p, points_block *b)
+{
+    if (begins(p, "\211HDF\r\n\032\n", HEAD))
+        return refuse_hdf5(p, b);
     if (begins(p, "\223NUMPY", 6))
         return read_npy(p, b);
     if (begins_as_ply(p) && !p->raw)

@@ -579,9 +579,10 @@ typedef struct ebpo_compat_options {
 
 /*
  * ebpo_open, and what it refuses with EBPO_E_UNSUPPORTED is read through libhdf5: in
- * a process of its own with limits on memory, time and what it writes, and without
- * plugins. That process writes the chunks as they are into a file without a name in
- * TMPDIR, as large as the original; a URL is fetched there as a whole before. The
+ * a separate process with limits on memory, time and what it writes, and without
+ * plugins. That process writes the chunks, as they are or, where their filters, size or
+ * byte order is none of this format, anew, into a file without a name in
+ * TMPDIR, about as large as the original; a URL is fetched there as a whole before. The
  * copy is opened as every other file, and its content checksum compared. That does
  * not count attributes, such as the root's box, and such files have no checksums for
  * their heads: ebpo_verify finds what is wrong there. ebpo_info tells the copy's bytes.

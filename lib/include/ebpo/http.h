@@ -14,7 +14,7 @@
  * read later is fetched ahead in requests of up to 4 MiB, several at a time.
  *
  * Every answer is checked: its range, its size, and that it is of the version of
- * the file that was opened (by ETag, else Last-Modified, and size).
+ * the file that was opened (by ETag, weak or not, else Last-Modified, and size).
  *
  * Without libcurl the library answers EBPO_E_UNSUPPORTED.
  */
@@ -67,8 +67,9 @@ typedef struct ebpo_http_options {
     uint64_t whole_limit;
 
     /*
-     * Read larger files too from servers that send neither ETag nor
-     * Last-Modified. A change under way may then go unnoticed.
+     * Of a file's version compare the size alone: for servers that send neither
+     * ETag nor Last-Modified, and for addresses where several servers answer, each
+     * with its ETag. A change under way may then go unnoticed.
      */
     bool unversioned;
 

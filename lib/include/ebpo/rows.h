@@ -14,17 +14,19 @@ extern "C" {
  * Reads a dataset of rows x columns, of integers or floats of any size and byte order, as doubles;
  * what a double cannot hold is rounded to the nearest. It is read as a whole.
  *
- * dataset        such as "/points"
+ * dataset        such as "/points"; NULL or "": none is read, and the error's message names
+ *                those that could be
  * least, most    how many columns it may have; 1 to 64
  * fill           the value of columns from the dataset's to `most`
  * rows           [*count][most] doubles. Freed by free(). On failure NULL.
  *
- * EBPO_E_IO: the file cannot be read. EBPO_E_FORMAT: it is no HDF5 file, has no such dataset, or
- * one of another shape or type, or whose values lie in another file. EBPO_E_LIMIT: the rows would
- * take more than 64 MiB and than 1,024 times the file. EBPO_E_ARGUMENT, EBPO_E_MEMORY.
- * EBPO_E_UNSUPPORTED: this library was built without libhdf5. That reads the file in a process of
- * its own, with limits on memory and time and without plugins; rows come by a file without a name
- * in TMPDIR.
+ * EBPO_E_IO: the file cannot be read, or is open for writing in another program. EBPO_E_FORMAT: it
+ * is no HDF5 file, has no such dataset, or one of another shape or type (complex numbers, say, or
+ * an array of an .ebpo.h5 file, which holds codes), or whose values lie in another file.
+ * EBPO_E_ABSENT: no dataset was named, and none could be. EBPO_E_LIMIT: the rows would take more
+ * than 64 MiB and than 1,024 times the file. EBPO_E_ARGUMENT, EBPO_E_MEMORY. EBPO_E_UNSUPPORTED:
+ * this library was built without libhdf5. That reads the file in a process of its own, with limits
+ * on memory and time and without plugins; rows come by a file without a name in TMPDIR.
  *
  * Threads: any.
  */

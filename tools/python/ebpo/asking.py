@@ -17,6 +17,14 @@ BLOCK = 1 << 15
 thread_count = integer_as(ctypes.c_uint)
 
 
+CODES = "codes of the .ebpo.h5 format; Model.mesh() gives the vertices"
+
+
+def holds_codes(values: Any) -> bool:
+    """Returns True for an array of an .ebpo.h5 file: each has an attribute `coding`, and none of others has."""
+    return "coding" in getattr(values, "attrs", ())
+
+
 def cores() -> int:
     """Processors that this process may use."""
     try:
@@ -44,6 +52,8 @@ class Rows:
             raise ValueError(f"{what} have the shape (n, 3), or (3,) for a single one, not {shape}")
         if np.dtype(values.dtype).kind not in "fiuO":
             raise TypeError(f"{what}: expected real numbers, got {values.dtype}")
+        if holds_codes(values):
+            raise TypeError(f"{what}: expected real numbers, got {CODES}")
         self.values, self.what, self.count = values, what, int(values.shape[0])
 
     def __getitem__(self, part: slice) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import Any, Iterator, NamedTuple
 import numpy as np
 
 from ._checked import doubles
+from .asking import CODES, holds_codes
 from .errors import FormatError, IOFailure
 
 HDF5 = (".h5", ".hdf5", ".hdf", ".nc")
@@ -67,11 +68,13 @@ class PointFile(NamedTuple):
         dtype = np.dtype(np.float64)
         path = os.path.abspath(os.fspath(path))
         if is_hdf5(path, dataset):
-            with h5py_of(path).File(path, "r") as file:
+            with opened_hdf5(path) as file:
                 dataset = dataset or only_dataset(file, path, columns)
                 if dataset not in file or not hasattr(file[dataset], "shape"):
                     raise FormatError(f"{path}: there is no dataset {dataset}", "EBPO_E_FORMAT", path)
                 shape, dtype = file[dataset].shape, file[dataset].dtype
+                if holds_codes(file[dataset]):
+                    raise FormatError(f"{path}: {dataset} holds {CODES}", "EBPO_E_FORMAT", path)
         elif path.endswith(".npy"):
             shape, dtype = shape_of_npy(path)
         else:
@@ -79,7 +82,7 @@ class PointFile(NamedTuple):
             if size % (8 * columns):
                 raise FormatError(f"{path}: {size} bytes are no rows of {columns} doubles", "EBPO_E_FORMAT", path)
             shape = (size // (8 * columns), columns)
-        if len(shape) != 2 or shape[1] != columns:
+        if len(shape or ()) != 2 or shape[1] != columns:
             raise FormatError(f"{path}: points have the shape (n, {columns}), not {shape}", "EBPO_E_FORMAT", path)
         if dtype.kind not in "fiu":
             raise FormatError(f"{path}: points are real numbers, not {dtype}", "EBPO_E_FORMAT", path)
@@ -90,7 +93,7 @@ class PointFile(NamedTuple):
         if stamp_of(self.path) != self.stamp:
             raise IOFailure(f"{self.path} has changed since it was asked about; ask anew", "EBPO_E_IO", self.path)
         if self.dataset:
-            with h5py_of(self.path).File(self.path, "r") as file:
+            with opened_hdf5(self.path) as file:
                 return doubles(file[self.dataset][begin:end], self.path)
         if self.path.endswith(".npy"):
             return doubles(load_npy(self.path)[begin:end], self.path)
@@ -129,17 +132,37 @@ def h5py_of(path: str) -> Any:
     return h5py
 
 
+def opened_hdf5(path: str) -> Any:
+    """An HDF5 file to read. Reading needs no lock: where the file system has none, it is opened without.
+
+    IOFailure: another program has it open for writing.
+    """
+    import errno
+    h5py = h5py_of(path)
+    try:
+        return h5py.File(path, "r")
+    except OSError as failure:
+        if "unable to lock file" not in str(failure):
+            raise
+        if failure.errno in (errno.EAGAIN, errno.EACCES):
+            raise IOFailure(f"{path} is open for writing in another program; close it there first", "EBPO_E_IO",
+                            path) from None
+        return h5py.File(path, "r", locking=False)
+
+
 def only_dataset(file: Any, path: str, columns: int) -> str:
     found: list[str] = []
 
     def look(name: str, item: Any) -> None:
-        if len(getattr(item, "shape", None) or ()) == 2 and item.shape[1] == columns:
+        if len(getattr(item, "shape", None) or ()) == 2 and item.shape[1] == columns \
+                and item.dtype.kind in "fiu" and not holds_codes(item):
             found.append(name)
 
     file.visititems(look)
     if len(found) != 1:
-        raise FormatError(f"{path}: {len(found)} datasets have {columns} columns; name one (dataset=)",
-                          "EBPO_E_FORMAT", path)
+        some = "; name one (dataset=): " + ", ".join(found[:4]) + ", ..." * (len(found) > 4) if found else ""
+        raise FormatError(f"{path}: {len(found)} datasets have {columns} columns of numbers{some}", "EBPO_E_FORMAT",
+                          path)
     return found[0]
 
 

@@ -287,7 +287,9 @@ export class UrlSource {
     }
   }
 
-  #refused({ status, statusText }, first) {
+  #refused({ status, statusText, headers }, first) {
+    if (/^text\/html\b/i.test(headers.get('content-type') ?? '') && status < 300)
+      throw this.#fail('the server returned text/html, not a model', 'check the address, and whether it wants a login');
     if (status === 206 || status === 200)
       return;
     const said = `the server answers ${status} ${statusText}`.trimEnd();
@@ -355,7 +357,8 @@ export class UrlSource {
   }
 }
 
-const versionOf = (response) => response.headers.get('etag') ?? response.headers.get('last-modified');
+// Servers and proxies add and drop the mark of weak tags.
+const versionOf = (response) => response.headers.get('etag')?.replace(/^W\//, '') ?? response.headers.get('last-modified');
 
 function joined(parts) {
   if (parts.length === 1)

@@ -102,6 +102,14 @@ test('a page in place of the file', () => fails((answer) => {
   answer.body = Buffer.from('<!doctype html><title>Not found</title> and so on, and so on');
   delete answer.headers['Content-Length'];
 }, 'FORMAT', /not a whole HDF5 file/));
+test('a page of a login, with its type', () => fails((answer) => {
+  whole(answer);
+  answer.body = Buffer.from('<!doctype html><title>Sign in</title>');
+  answer.headers = { 'Content-Type': 'text/html; charset=utf-8' };
+}, 'NETWORK', /returned text\/html, not a model/));
+test('a tag that is weak now and then', () => serve((answer, n) => {
+  answer.headers.ETag = n % 2 ? 'W/"1"' : '"1"';
+}, (url) => readAll(url)));
 test('always busy', () => fails((answer) => (answer.status = 503), 'NETWORK', /503/));
 test('busy now and then', () => serve((answer, n) => (n % 2 ? (answer.status = 503) : undefined), (url) => readAll(url)));
 test('connections that break now and then', () => serve((answer, n, response) => {
