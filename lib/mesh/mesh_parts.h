@@ -6,6 +6,7 @@
 #include <ebpo/mesh.h>
 
 #include "geom/cell.h"
+#include "geom/chain.h"
 
 #define EBPO_NO_INDEX UINT32_MAX
 
@@ -78,17 +79,6 @@ static inline void ebpo_mesh_position(const ebpo_mesh *mesh, uint64_t i, double 
 static inline bool ebpo_face_repeats_index(const uint32_t face[3])
 {
     return face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
-}
-
-/* (b - a) x (c - a), rounded. */
-static inline void ebpo_face_cross(const double a[3], const double b[3], const double c[3],
-                                   double out[3])
-{
-    double p[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
-    double q[3] = { c[0] - a[0], c[1] - a[1], c[2] - a[2] };
-    out[0] = p[1] * q[2] - p[2] * q[1];
-    out[1] = p[2] * q[0] - p[0] * q[2];
-    out[2] = p[0] * q[1] - p[1] * q[0];
 }
 
 /* Makes the face look the other way. */

@@ -91,6 +91,9 @@ static void print_reading(FILE *out, const ebpo_mesh *mesh)
                              "polygons"));
         if (mesh->polygons_concave)
             fprintf(out, " (%llu concave)", (unsigned long long)mesh->polygons_concave);
+        if (mesh->polygons_guessed)
+            fprintf(out, ", %llu of which by a guess: the outline crosses itself",
+                    (unsigned long long)mesh->polygons_guessed);
         fputc('\n', out);
     }
     if (mesh->strips)
@@ -268,6 +271,7 @@ void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh, const
     json_uint(j, "faces", mesh->face_count);
     json_uint(j, "polygons_triangulated", mesh->polygons_triangulated);
     json_uint(j, "polygons_concave", mesh->polygons_concave);
+    json_uint(j, "polygons_guessed", mesh->polygons_guessed);
     json_uint(j, "polygons_dropped", mesh->polygons_dropped);
     json_uint(j, "strips", mesh->strips);
     if (unread[0])

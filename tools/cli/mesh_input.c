@@ -136,4 +136,13 @@ void mesh_input_warn(const char *command, const char *path, const mesh_input *in
     if (input->unread[0])
         fprintf(stderr, "ebpo %s: %s: warning: left out in reading: %s\n", command, path,
                 input->unread);
+    const ebpo_mesh *m = &input->as_read;
+    if (m->polygons_guessed)
+        fprintf(stderr,
+                "ebpo %s: %s: warning: %llu of %llu polygons cross themselves and got the "
+                "triangles of least area, a guess (the first one begins at face %llu); triangulate "
+                "such polygons in the program that wrote them\n",
+                command, path, (unsigned long long)m->polygons_guessed,
+                (unsigned long long)m->polygons_triangulated,
+                (unsigned long long)m->first_guessed_face);
 }

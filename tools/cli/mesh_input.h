@@ -47,7 +47,8 @@ EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *pa
                                                  ebpo_workspace *workspace, unsigned threads,
                                                  ebpo_progress progress, ebpo_error *error);
 
-/* A warning where the file holds or names what reading it left out. */
+/* Warns where the file holds or names what reading it left out, and of triangles that are a guess.
+ */
 void mesh_input_warn(const char *command, const char *path, const mesh_input *input);
 
 #endif

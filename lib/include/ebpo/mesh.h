@@ -96,6 +96,13 @@ typedef struct ebpo_mesh {
      * NULL: nothing.
      */
     struct ebpo_attributes *attributes;
+
+    /*
+     * Of the triangulated polygons, those whose outline crosses itself: they got the
+     * triangles of least area, which is a guess. The first triangle of the first one.
+     */
+    uint64_t polygons_guessed;
+    uint64_t first_guessed_face;
 } ebpo_mesh;
 
 /*
@@ -169,9 +176,12 @@ typedef struct ebpo_mesh_read_options {
  * Reads a mesh: PLY, OBJ, STL or OFF. The format is recognised by the file's first
  * bytes, then by its name, then, as OBJ, by its first word.
  *
- * Polygons are triangulated, concave ones correctly. Strips are unrolled. Positions
- * keep every bit, and text is rounded correctly: of PLY to the type that its header
- * says, of the other formats to float. In these, vertices of one position are one,
+ * Polygons are triangulated, concave ones correctly, also those that touch themselves
+ * (slits, bridges to holes, pinched corners). Of outlines that cross themselves, folded
+ * quads among them, the triangles have the least area, up to 64 corners, and are
+ * counted in `polygons_guessed`. Strips are unrolled. Positions keep every bit, and
+ * text is rounded correctly: of PLY to the type that its header says, of the other
+ * formats to float. In these, vertices of one position are one,
  * and those that no face names are left out. ebpo_mesh_unread tells what could not
  * be read.
  *
