@@ -497,7 +497,8 @@ static void make_comb(void)
         memcpy(w.at[w.n++], ground, sizeof ground);
         memcpy(w.at[w.n++], tip, sizeof tip);
     }
-    const int64_t under[2] = { TEETH, -1 };
+    const int64_t end[2] = { 2 * TEETH, 0 }, under[2] = { TEETH, -1 };
+    memcpy(w.at[w.n++], end, sizeof end);
     memcpy(w.at[w.n++], under, sizeof under);
 }
 
