@@ -100,9 +100,10 @@ enum {
     EBPO_MEND_DROP = 32
 };
 
-/* Merges, drops, orients, flips, fills holes, and turns what these closed: as asked for. */
-EBPO_MUST_USE ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *record,
-                                         ebpo_error *error);
+/* Merges (within a distance, if it is above 0), drops, orients, flips, fills holes, and turns what
+ * these closed: as asked for. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance,
+                                         ebpo_mend_record *record, ebpo_error *error);
 
 /* The parts of ebpo_mesh_orient: neighbouring faces agree; closed components look outwards, or
  * inwards where they are within an odd number of others. */
@@ -110,6 +111,13 @@ EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_r
                                                     ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_mesh_turn_closed(ebpo_mesh *mesh, ebpo_mend_record *record,
                                                 ebpo_error *error);
+
+/* Decides which vertices stay and which they become, by the rule of ebpo_mesh_weld_within, in a mesh
+ * without vertices at one position. map [vertex_count]: the new number of each; from [vertex_count]:
+ * the *kept vertices that stay, ascending; *moved: the largest distance. */
+EBPO_MUST_USE ebpo_status ebpo_weld_group_within(const ebpo_mesh *mesh, double distance,
+                                                 uint32_t *map, uint32_t *from, uint64_t *kept,
+                                                 double *moved, ebpo_error *error);
 
 /* What messages call the mesh: its source's name, or "mesh". */
 const char *ebpo_mesh_label(const ebpo_mesh *mesh);

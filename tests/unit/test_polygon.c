@@ -537,8 +537,8 @@ START_TEST(large_outlines_take_bounded_time)
         make[_i]();
     else {
         state = 5;
-        grow_glued(400, 100000);
-        ck_assert_uint_gt(w.n, 99000);
+        grow_glued(400, 30000);
+        ck_assert_uint_gt(w.n, 29000);
     }
     for (int behind = 0; behind < 2; behind++) {
         place_in_space(1, behind);

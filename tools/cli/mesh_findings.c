@@ -170,9 +170,16 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
 void findings_print_mending(FILE *out, const ebpo_mend_record *r)
 {
     char text[80];
-    if (r->weld)
-        fprintf(out, "  welded: %s merged\n",
+    if (r->weld) {
+        fprintf(out, "  welded: %s merged",
                 words_plural(text, sizeof text, r->welded_vertices, "vertex", "vertices"));
+        if (r->weld_distance > 0)
+            fprintf(out, " within %.6g, moved by %.6g at most; %s", r->weld_distance, r->weld_moved,
+                    words_plural(text, sizeof text, r->collapsed_faces,
+                                 "face lost its area (it names a vertex twice)",
+                                 "faces lost their area (they name a vertex twice)"));
+        fputc('\n', out);
+    }
     if (r->drop_duplicates) {
         fprintf(out, "  dropped: %s",
                 words_plural(text, sizeof text, r->dropped_faces, "repeated face",
@@ -245,6 +252,9 @@ void findings_json_mending(json *j, const char *key, const ebpo_mend_record *r)
     json_object(j, key);
     json_bool(j, "weld", r->weld);
     json_uint(j, "welded_vertices", r->welded_vertices);
+    json_real(j, "weld_distance", r->weld_distance);
+    json_real(j, "weld_moved", r->weld_moved);
+    json_uint(j, "collapsed_faces", r->collapsed_faces);
     json_bool(j, "drop_duplicates", r->drop_duplicates);
     json_uint(j, "dropped_faces", r->dropped_faces);
     json_bool(j, "orient", r->orient);

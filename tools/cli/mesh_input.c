@@ -1,5 +1,6 @@
 #include "cli/mesh_input.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -16,6 +17,8 @@ int mending_check(const char *command, mending asked)
         return command_usage(command,
                              "--repair chooses from --weld, --drop-duplicates, --orient and "
                              "--fill-holes; leave these and --flip out");
+    if (asked.weld && asked.weld_distance > 0)
+        return command_usage(command, "--weld-distance merges what --weld does, too; choose one");
     if (asked.orient && asked.flip)
         return command_usage(command, "--orient says which way faces look; leave out --flip");
     return EXIT_FINE;
@@ -40,6 +43,9 @@ static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
     a->unfilled_holes += b->unfilled_holes;
     a->dropped_faces += b->dropped_faces;
     a->dropped_opposite += b->dropped_opposite;
+    a->weld_distance = fmax(a->weld_distance, b->weld_distance);
+    a->weld_moved = fmax(a->weld_moved, b->weld_moved);
+    a->collapsed_faces += b->collapsed_faces;
 }
 
 static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_error *error)
@@ -47,6 +53,7 @@ static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_erro
     const ebpo_mend_record *steps = &p->repairs.tries[p->repairs.chosen].record;
     ebpo_prepared again = EBPO_PREPARED_INIT;
     how->weld = steps->weld;
+    how->weld_distance = 0;
     how->drop_duplicates = steps->drop_duplicates;
     how->orient = steps->orient;
     how->fill_holes = steps->fill_holes;
@@ -90,6 +97,7 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     how.attributes = more != READ_MESH;
     how.embed_textures = more == READ_TEXTURES;
     wanted.weld = asked.weld;
+    wanted.weld_distance = asked.weld_distance;
     wanted.drop_duplicates = asked.drop_duplicates;
     wanted.orient = asked.orient;
     wanted.flip = asked.flip;
