@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "arrange/arrange.h"
+#include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/sized.h"
@@ -31,7 +32,7 @@ static ebpo_status mend(const preparation *p, bool weld, ebpo_error *error)
                      (o->drop_duplicates ? EBPO_MEND_DROP : 0);
     if (!ebpo_progress_stage(&o->progress, "mending", error))
         return EBPO_E_CANCELLED;
-    return ebpo_mesh_mend(p->mesh, steps, &p->out->record, error);
+    return ebpo_mesh_mend(p->mesh, steps, o->weld_distance, &p->out->record, error);
 }
 
 /* In the order of the curve before anything else, so that each step goes through memory in order,
@@ -51,8 +52,12 @@ static ebpo_status prepare(const preparation *p, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
     /* STL has no shared vertices */
-    bool weld = o->weld || strncmp(p->mesh->source_format, "stl", 3) == 0;
+    bool weld = o->weld || o->weld_distance > 0 || strncmp(p->mesh->source_format, "stl", 3) == 0;
     ebpo_status status = EBPO_OK;
+    if (!(o->weld_distance >= 0))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "weld_distance has to be 0, which is for equal positions, or above, not %g",
+                         o->weld_distance);
     p->out->mended = weld || o->orient || o->flip || o->fill_holes || o->drop_duplicates;
     if (p->out->mended)
         status = arrange_and_mend(p, weld, error);

@@ -97,7 +97,7 @@ static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     one->steps = steps;
-    status = ebpo_mesh_mend(&copy, steps, &one->record, error);
+    status = ebpo_mesh_mend(&copy, steps, 0, &one->record, error);
     if (status == EBPO_OK)
         status = ebpo_mesh_check(&copy, t->threads, silent, &one->report, error);
     ebpo_mesh_free(&copy);

@@ -313,6 +313,23 @@ static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *
     return status;
 }
 
+/* They say nothing about the file's other parts: values that cannot be are left aside. */
+static ebpo_status get_weld(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
+                            ebpo_error *error)
+{
+    ebpo_mend_record *m = &info->mend;
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < EBPO_WELD_FACTS && status == EBPO_OK; i++)
+        status = get_fact(in, root, "/", &ebpo_weld_facts[i], info, error);
+    bool known = status == EBPO_OK && m->weld && isfinite(m->weld_distance) &&
+                 m->weld_distance > 0 && isfinite(m->weld_moved) && m->weld_moved >= 0;
+    if (!known) {
+        m->weld_distance = m->weld_moved = 0;
+        m->collapsed_faces = 0;
+    }
+    return status == EBPO_E_ABSENT ? EBPO_OK : status;
+}
+
 ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info, ebpo_error *error)
 {
     ebpo_status status = get_version(in, root, info, error);
@@ -324,6 +341,8 @@ ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info
         status = get_selection(in, root, info, error);
     if (status == EBPO_OK)
         status = get_dropped(in, root, info, error);
+    if (status == EBPO_OK)
+        status = get_weld(in, root, info, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
         status = get_fact(in, root, "/", &ebpo_colours_fact, info, error);
     if (status == EBPO_OK && info->subtree_level)

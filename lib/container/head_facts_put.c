@@ -131,6 +131,8 @@ ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *i
         status = put_selection(out, root, info, error);
     if (status == EBPO_OK && info->mend.dropped_faces)
         status = put_fact(out, root, &ebpo_dropped_faces_fact, info, error);
+    for (int i = 0; i < EBPO_WELD_FACTS && status == EBPO_OK && info->mend.weld_distance > 0; i++)
+        status = put_fact(out, root, &ebpo_weld_facts[i], info, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
         status = put_fact(out, root, &ebpo_colours_fact, info, error);
     if (status == EBPO_OK && info->subtree_level)

@@ -105,6 +105,12 @@ const int ebpo_selection_fact_count = sizeof ebpo_selection_facts / sizeof ebpo_
 const ebpo_fact ebpo_dropped_faces_fact = { "mend_dropped_faces", EBPO_FACT_COUNT,
                                             EBPO_FACT_AT(mend.dropped_faces) };
 
+const ebpo_fact ebpo_weld_facts[EBPO_WELD_FACTS] = {
+    { "mend_weld_distance", EBPO_FACT_REAL, EBPO_FACT_AT(mend.weld_distance) },
+    { "mend_weld_moved", EBPO_FACT_REAL, EBPO_FACT_AT(mend.weld_moved) },
+    { "mend_collapsed_faces", EBPO_FACT_COUNT, EBPO_FACT_AT(mend.collapsed_faces) },
+};
+
 const ebpo_fact ebpo_subtree_level_fact = { "subtree_level", EBPO_FACT_NUMBER,
                                             EBPO_FACT_AT(subtree_level) },
                 ebpo_colours_fact = { "colours_sha256", EBPO_FACT_DIGEST,

@@ -45,6 +45,9 @@ extern const ebpo_fact ebpo_pruned_fact; /* left out when 0 */
 
 /* Of ebpo_info, left out when 0. */
 extern const ebpo_fact ebpo_dropped_faces_fact;
+/* where vertices were welded within a distance, which comes first */
+enum { EBPO_WELD_FACTS = 3 };
+extern const ebpo_fact ebpo_weld_facts[EBPO_WELD_FACTS];
 
 /* How planes were chosen, where that was not the usual way: told, and needed by no reader. */
 extern const ebpo_fact ebpo_selection_facts[];

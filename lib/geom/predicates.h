@@ -23,7 +23,7 @@ int ebpo_normal_sign(int axis, const double a[3], const double b[3], const doubl
 /* True when a, b, c are collinear or coincide: a face without area. */
 bool ebpo_zero_area(const double a[3], const double b[3], const double c[3]);
 
-/* Sign of the sum of n products factor[2i] * factor[2i+1], n <= 8, exactly. */
+/* Sign of the sum of n products factor[2i] * factor[2i+1], exactly; up to 8 are fastest. */
 int ebpo_sign_of_products(const double *factor, int n);
 
 /* Signed crossings of the face (a, b, c) with an axis-parallel segment, for winding numbers.

@@ -157,6 +157,8 @@ static ebpo_status cut(import_build *b, uint32_t n)
             position[i][k] = (double)b->xyz[3 * (uint64_t)b->corner[i].vertex + k];
     ebpo_polygon_kind kind =
         ebpo_polygon_triangulate(triangle, (const double(*)[3])position, n, scratch);
+    if (kind == EBPO_POLYGON_NO_MEMORY)
+        return ebpo_fail_memory(b->error, n * sizeof *position);
     if (kind == EBPO_POLYGON_TOO_LARGE)
         return ebpo_fail_file(
             b->error, EBPO_E_LIMIT, b->name,
@@ -165,6 +167,8 @@ static ebpo_status cut(import_build *b, uint32_t n)
             n);
     b->mesh->polygons_triangulated++;
     b->mesh->polygons_concave += kind == EBPO_POLYGON_CONCAVE;
+    if (kind == EBPO_POLYGON_GUESSED && b->mesh->polygons_guessed++ == 0)
+        b->mesh->first_guessed_face = b->mesh->face_count;
     for (uint32_t i = 0; i < n - 2; i++)
         put_triangle(b, triangle[i][0], triangle[i][1], triangle[i][2]);
     return EBPO_OK;

@@ -11,7 +11,6 @@
 #include "mesh/boundary.h"
 #include "mesh/mesh_parts.h"
 #include "mesh/stars.h"
-#include "mesh/triangulate.h"
 
 /* Vertices with more faces than this are not searched for existing edges: it keeps the work linear.
  */
@@ -128,6 +127,7 @@ static bool fill_loop(filling *f, scratch *s, uint64_t number)
     if (search)
         mark_taken(f, s, loop, n);
     ebpo_chain chain = { .n = n,
+                         .optimal = EBPO_OPTIMAL_CHAIN,
                          .point = (const double(*)[3])s->point,
                          .taken = search ? s->taken : NULL,
                          .workspace = workspace };

@@ -34,12 +34,14 @@ static ebpo_status orient(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *rec
                                      : ebpo_mesh_orient(mesh, record, error);
 }
 
-ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *record,
-                           ebpo_error *error)
+ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance,
+                           ebpo_mend_record *record, ebpo_error *error)
 {
     uint64_t filled = record->filled_holes;
     ebpo_status status = EBPO_OK;
-    if (steps & EBPO_MEND_WELD)
+    if (weld_distance > 0)
+        status = ebpo_mesh_weld_within(mesh, weld_distance, record, error);
+    else if (steps & EBPO_MEND_WELD)
         status = ebpo_mesh_weld(mesh, record, error);
     if (status == EBPO_OK && steps & EBPO_MEND_DROP)
         status = ebpo_mesh_drop_duplicates(mesh, record, error);

@@ -6,6 +6,7 @@
 #include <ebpo/mesh.h>
 
 #include "geom/cell.h"
+#include "geom/chain.h"
 
 #define EBPO_NO_INDEX UINT32_MAX
 
@@ -80,17 +81,6 @@ static inline bool ebpo_face_repeats_index(const uint32_t face[3])
     return face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
 }
 
-/* (b - a) x (c - a), rounded. */
-static inline void ebpo_face_cross(const double a[3], const double b[3], const double c[3],
-                                   double out[3])
-{
-    double p[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
-    double q[3] = { c[0] - a[0], c[1] - a[1], c[2] - a[2] };
-    out[0] = p[1] * q[2] - p[2] * q[1];
-    out[1] = p[2] * q[0] - p[0] * q[2];
-    out[2] = p[0] * q[1] - p[1] * q[0];
-}
-
 /* Makes the face look the other way. */
 static inline void ebpo_face_turn(uint32_t face[3])
 {
@@ -110,9 +100,10 @@ enum {
     EBPO_MEND_DROP = 32
 };
 
-/* Merges, drops, orients, flips, fills holes, and turns what these closed: as asked for. */
-EBPO_MUST_USE ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *record,
-                                         ebpo_error *error);
+/* Merges (within a distance, if it is above 0), drops, orients, flips, fills holes, and turns what
+ * these closed: as asked for. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance,
+                                         ebpo_mend_record *record, ebpo_error *error);
 
 /* The parts of ebpo_mesh_orient: neighbouring faces agree; closed components look outwards, or
  * inwards where they are within an odd number of others. */
@@ -120,6 +111,13 @@ EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_r
                                                     ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_mesh_turn_closed(ebpo_mesh *mesh, ebpo_mend_record *record,
                                                 ebpo_error *error);
+
+/* Decides which vertices stay and which they become, by the rule of ebpo_mesh_weld_within, in a mesh
+ * without vertices at one position. map [vertex_count]: the new number of each; from [vertex_count]:
+ * the *kept vertices that stay, ascending; *moved: the largest distance. */
+EBPO_MUST_USE ebpo_status ebpo_weld_group_within(const ebpo_mesh *mesh, double distance,
+                                                 uint32_t *map, uint32_t *from, uint64_t *kept,
+                                                 double *moved, ebpo_error *error);
 
 /* What messages call the mesh: its source's name, or "mesh". */
 const char *ebpo_mesh_label(const ebpo_mesh *mesh);

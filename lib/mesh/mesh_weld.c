@@ -16,6 +16,9 @@ enum { GRAIN = 1 << 15, WORD = 64 };
 
 typedef struct welding {
     ebpo_mesh *mesh;
+    double distance; /* 0: vertices at one position are merged */
+    double moved;
+    uint64_t collapsed; /* faces that name a vertex twice, and did not before */
     uint64_t kept;
     uint32_t *map;  /* [vertex_count] new number of each vertex */
     uint32_t *from; /* [kept] the vertex that stays, of those at one position */
@@ -115,14 +118,29 @@ static ebpo_status group_neighbours(welding *w, ebpo_error *error)
                              : status;
 }
 
+/* --- within a distance --- */
+
+static ebpo_status group_within(welding *w, ebpo_error *error)
+{
+    const ebpo_mesh *mesh = w->mesh;
+    w->from = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *w->from);
+    return w->from ? ebpo_weld_group_within(mesh, w->distance, w->map, w->from, &w->kept, &w->moved,
+                                            error)
+                   : ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * sizeof *w->from,
+                                         error);
+}
+
 /* --- what stays --- */
 
 /* Of each group the vertex that the source has first. Groups are numbered by their first vertices,
  * so a new number is met first as the next one. */
-static void choose(welding *w)
+static ebpo_status choose(welding *w, ebpo_error *error)
 {
     const ebpo_mesh *mesh = w->mesh;
     uint64_t met = 0;
+    w->from = ebpo_array_alloc(mesh->workspace, w->kept, sizeof *w->from);
+    if (!w->from)
+        return ebpo_workspace_fail(mesh->workspace, w->kept * sizeof *w->from, error);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count) {
         uint32_t group = w->map[v];
         if (group == met)
@@ -130,6 +148,7 @@ static void choose(welding *w)
         else if (ebpo_mesh_source_vertex(mesh, v) < ebpo_mesh_source_vertex(mesh, w->from[group]))
             w->from[group] = (uint32_t)v;
     }
+    return EBPO_OK;
 }
 
 static ebpo_status mark_sources(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -200,12 +219,17 @@ static ebpo_status list_rows(welding *w, ebpo_error *error)
 static ebpo_status rename_corners(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
-    const welding *w = context;
+    welding *w = context;
+    uint64_t collapsed = 0;
     (void)worker, (void)error;
     EBPO_FOR_ITEMS_SCATTERED(w->mesh->workspace, f, begin, end) {
-        for (uint64_t i = 3 * f; i < 3 * f + 3; i++)
-            w->mesh->faces[i] = w->map[w->mesh->faces[i]];
+        uint32_t *face = w->mesh->faces + 3 * f;
+        bool repeated = ebpo_face_repeats_index(face);
+        for (int k = 0; k < 3; k++)
+            face[k] = w->map[face[k]];
+        collapsed += !repeated && ebpo_face_repeats_index(face);
     }
+    __atomic_fetch_add(&w->collapsed, collapsed, __ATOMIC_RELAXED);
     return EBPO_OK;
 }
 
@@ -260,17 +284,18 @@ static ebpo_status run(welding *w, ebpo_error *error)
     w->map = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *w->map);
     if (!w->map)
         return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * sizeof *w->map, error);
-    status = mesh->arrangement && mesh->arrangement->grouped ? group_neighbours(w, error)
-                                                             : group_by_table(w, error);
+    if (w->distance > 0)
+        status = group_within(w, error);
+    else
+        status = mesh->arrangement && mesh->arrangement->grouped ? group_neighbours(w, error)
+                                                                 : group_by_table(w, error);
     if (status != EBPO_OK || w->kept == mesh->vertex_count)
         return status;
     status = ebpo_mesh_check_whole(mesh, error);
+    if (status == EBPO_OK && !w->from)
+        status = choose(w, error);
     if (status != EBPO_OK)
         return status;
-    w->from = ebpo_array_alloc(mesh->workspace, w->kept, sizeof *w->from);
-    if (!w->from)
-        return ebpo_workspace_fail(mesh->workspace, w->kept * sizeof *w->from, error);
-    choose(w);
     if (mesh->arrangement)
         status = number_sources(w, error);
     if (status == EBPO_OK)
@@ -285,10 +310,11 @@ static ebpo_status run(welding *w, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+/* Distance 0: by equal positions. */
+static ebpo_status weld(ebpo_mesh *mesh, double distance, ebpo_mend_record *record,
+                        ebpo_error *error)
 {
-    EBPO_DEFAULT_FP;
-    welding w = { .mesh = mesh };
+    welding w = { .mesh = mesh, .distance = distance };
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)
         return status;
@@ -297,6 +323,11 @@ ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error
     if (status == EBPO_OK && record) {
         record->weld = true;
         record->welded_vertices += count - mesh->vertex_count;
+        if (distance > 0) {
+            record->weld_distance = distance;
+            record->weld_moved = w.moved > record->weld_moved ? w.moved : record->weld_moved;
+            record->collapsed_faces += w.collapsed;
+        }
     }
     ebpo_array_free(mesh->workspace, w.map);
     ebpo_array_free(mesh->workspace, w.from);
@@ -305,4 +336,21 @@ ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error
     ebpo_array_free(mesh->workspace, w.before);
     free(w.heads);
     return status;
+}
+
+ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    return weld(mesh, 0, record, error);
+}
+
+ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double distance, ebpo_mend_record *record,
+                                  ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    if (!(distance > 0))
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
+                              "the distance to weld within has to be above 0, not %g", distance);
+    ebpo_status status = weld(mesh, 0, record, error);
+    return status == EBPO_OK ? weld(mesh, distance, record, error) : status;
 }

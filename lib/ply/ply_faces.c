@@ -86,6 +86,8 @@ static ebpo_status triangulate(ply_parser *p, uint32_t n, uint64_t row)
         corner_position(p->mesh, p->corners[i], position[i]);
     ebpo_polygon_kind kind =
         ebpo_polygon_triangulate(triangle, (const double(*)[3])position, n, scratch);
+    if (kind == EBPO_POLYGON_NO_MEMORY)
+        return ebpo_fail_memory(p->error, n * sizeof *position);
     if (kind == EBPO_POLYGON_TOO_LARGE)
         return ebpo_fail_file(
             p->error, EBPO_E_LIMIT, p->name,
@@ -94,6 +96,8 @@ static ebpo_status triangulate(ply_parser *p, uint32_t n, uint64_t row)
             row, n);
     p->mesh->polygons_triangulated++;
     p->mesh->polygons_concave += kind == EBPO_POLYGON_CONCAVE;
+    if (kind == EBPO_POLYGON_GUESSED && p->mesh->polygons_guessed++ == 0)
+        p->mesh->first_guessed_face = p->mesh->face_count;
     uint64_t first = p->mesh->face_count;
     for (uint32_t i = 0; i < n - 2; i++)
         add_triangle(p->mesh, p->corners[triangle[i][0]], p->corners[triangle[i][1]],

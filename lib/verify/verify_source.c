@@ -74,13 +74,14 @@ static ebpo_status mend_again(ebpo_mesh *mesh, const ebpo_mesh *source,
     const ebpo_mend_record fresh = *did;
     ebpo_status status = copy_mesh(mesh, source, workspace, error);
     if (status == EBPO_OK)
-        status = ebpo_mesh_mend(mesh, steps_of(asked), did, error);
+        status = ebpo_mesh_mend(mesh, steps_of(asked), asked->weld_distance, did, error);
     if (status != EBPO_OK || !asked->orient || did->flipped_faces == asked->flipped_faces)
         return status;
     *did = fresh;
     ebpo_mesh_free(mesh);
     status = copy_mesh(mesh, source, workspace, error);
-    return status == EBPO_OK ? ebpo_mesh_mend(mesh, steps_of(asked) | EBPO_MEND_EARLIER, did, error)
+    return status == EBPO_OK ? ebpo_mesh_mend(mesh, steps_of(asked) | EBPO_MEND_EARLIER,
+                                              asked->weld_distance, did, error)
                              : status;
 }
 
@@ -90,6 +91,9 @@ static void check_record(ebpo_tally *tally, const ebpo_mend_record *stored,
     CHECK(stored->welded_vertices == did->welded_vertices,
           "%" PRIu64 " welded vertices are recorded, doing it again welds %" PRIu64,
           stored->welded_vertices, did->welded_vertices);
+    CHECK(stored->weld_moved == did->weld_moved && stored->collapsed_faces == did->collapsed_faces,
+          "welding by up to %g is recorded, doing it again moves vertices by up to %g",
+          stored->weld_moved, did->weld_moved);
     CHECK(stored->dropped_faces == did->dropped_faces,
           "%" PRIu64 " dropped faces are recorded, doing it again drops %" PRIu64,
           stored->dropped_faces, did->dropped_faces);

@@ -11,7 +11,7 @@ KINDS = {"TEXT": ("text", "yes"), "NOTE": ("text", "no"), "DIGEST": ("text", "ye
          "INTEGER": ("i64", "yes"), "REAL": ("f64", "yes"), "REAL3": ("f64[3]", "yes")}
 # of some files only: the table says in words when
 SOME = ("selection_percent", "selection_k_root", "selection_seed", "subtree_level", "colours_sha256",
-        "mend_dropped_faces")
+        "mend_dropped_faces", "mend_weld_distance", "mend_weld_moved", "mend_collapsed_faces")
 
 root = pathlib.Path(sys.argv[1])
 section = re.search(r"^## 3\. .*?^## 4\. ", (root / "format-spec/README.md").read_text(),

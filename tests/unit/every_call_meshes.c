@@ -147,6 +147,11 @@ static ebpo_status weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *e
     return ebpo_mesh_weld(mesh, record, error);
 }
 
+static ebpo_status weld_within(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    return ebpo_mesh_weld_within(mesh, 1e-6, record, error);
+}
+
 static ebpo_status orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
 {
     return ebpo_mesh_orient(mesh, record, error);
@@ -168,6 +173,10 @@ static ebpo_status flip(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *e
 }
 
 static ebpo_status call_weld(every_call_env *e) { return mend(e, EVERY_CALL_SPLIT, weld); }
+static ebpo_status call_weld_within(every_call_env *e)
+{
+    return mend(e, EVERY_CALL_SPLIT, weld_within);
+}
 static ebpo_status call_orient(every_call_env *e) { return mend(e, EVERY_CALL_TURNED, orient); }
 static ebpo_status call_fill_holes(every_call_env *e) { return mend(e, EVERY_CALL_HOLED, fill); }
 
@@ -360,6 +369,7 @@ const every_call every_call_meshes[] = {
     { "places", call_places },
     { "arrange", call_arrange },
     { "weld", call_weld },
+    { "weld_within", call_weld_within },
     { "orient", call_orient },
     { "drop duplicates", call_drop },
     { "flip", call_flip },

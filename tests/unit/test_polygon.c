@@ -1,6 +1,7 @@
 /* Polygons become triangles that cover them: same area, all turning the polygon's way. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "check_main.h"
 #include "geom/polygon.h"
@@ -139,16 +140,411 @@ static void check_fan(const double (*at)[2], uint32_t n)
         ck_assert(s.triangle[i][0] == 0 && s.triangle[i][1] == i + 1 && s.triangle[i][2] == i + 2);
 }
 
-START_TEST(polygons_without_an_answer_become_fans)
+START_TEST(polygons_on_a_line_or_not_finite_become_fans)
 {
     static const double line[][2] = { { 0, 0 }, { 1, 1 }, { 2, 2 }, { 3, 3 } },
                         point[][2] = { { 1, 1 }, { 1, 1 }, { 1, 1 }, { 1, 1 } };
     static const double infinite[][2] = { { 0, 0 }, { 1, 0 }, { INFINITY, 1 }, { 0, NAN } };
-    static const double pentagram[][2] = { { 0, 3 }, { -2, -3 }, { 3, 1 }, { -3, 1 }, { 2, -3 } };
     check_fan(line, 4);
     check_fan(point, 4);
     check_fan(infinite, 4);
-    check_fan(pentagram, 5);
+}
+END_TEST
+
+/* ---- whole coordinates in space, for which areas are exact ---- */
+
+enum { LARGEST = 120000 };
+
+typedef struct solid_shape {
+    uint32_t n;
+    int64_t at[LARGEST][3];
+    double corner[LARGEST][3];
+    uint32_t triangle[LARGEST][3];
+} solid_shape;
+static solid_shape w;
+
+static uint64_t state;
+
+static uint32_t below(uint32_t n)
+{
+    state = state * UINT64_C(6364136223846793005) + 1442695040888963407u;
+    return (uint32_t)((state >> 33) % n);
+}
+
+static ebpo_polygon_kind cut_whole(int exponent)
+{
+    for (uint32_t i = 0; i < w.n; i++)
+        for (int k = 0; k < 3; k++)
+            w.corner[i][k] = ldexp((double)w.at[i][k], exponent);
+    void *scratch = malloc(ebpo_polygon_scratch_bytes(w.n));
+    ck_assert_ptr_nonnull(scratch);
+    ebpo_polygon_kind kind =
+        ebpo_polygon_triangulate(w.triangle, (const double(*)[3])w.corner, w.n, scratch);
+    free(scratch);
+    return kind;
+}
+
+/* Adds the cross product of two sides of a triangle: twice its area, as a vector. */
+static void add_area(const int64_t *a, const int64_t *b, const int64_t *c, int64_t sum[3])
+{
+    for (int k = 0; k < 3; k++) {
+        int u = (k + 1) % 3, v = (k + 2) % 3;
+        sum[k] += (b[u] - a[u]) * (c[v] - a[v]) - (b[v] - a[v]) * (c[u] - a[u]);
+    }
+}
+
+/* The vector areas add up to the outline's, exactly. Of a planar outline no triangle is turned
+ * against it: then each of its points is covered once. Returns how many have no area. */
+static uint32_t check_exactly(bool planar)
+{
+    int64_t outline[3] = { 0 }, sum[3] = { 0 };
+    uint32_t flat = 0;
+    for (uint32_t i = 1; i + 1 < w.n; i++)
+        add_area(w.at[0], w.at[i], w.at[i + 1], outline);
+    for (uint32_t i = 0; i + 2 < w.n; i++) {
+        int64_t own[3] = { 0 };
+        const uint32_t *t = w.triangle[i];
+        ck_assert(t[0] < w.n && t[1] < w.n && t[2] < w.n);
+        add_area(w.at[t[0]], w.at[t[1]], w.at[t[2]], own);
+        flat += own[0] == 0 && own[1] == 0 && own[2] == 0;
+        for (int k = 0; k < 3; k++) {
+            ck_assert_msg(!planar || own[k] == 0 || (own[k] > 0) == (outline[k] > 0),
+                          "triangle %u is turned", i);
+            sum[k] += own[k];
+        }
+    }
+    ck_assert(memcmp(sum, outline, sizeof sum) == 0);
+    return flat;
+}
+
+static void insert_corner(uint32_t before, const int64_t p[2])
+{
+    ck_assert(w.n < LARGEST);
+    memmove(w.at + before + 1, w.at + before, (w.n++ - before) * sizeof *w.at);
+    memcpy(w.at[before], p, 2 * sizeof *p);
+}
+
+/* Half squares of a grid, glued along the edges of a tree: an outline that touches itself in slits
+ * and corners, which these half squares cover. Squares are cut by the diagonal from low to high. */
+static void grow_glued(uint32_t side, uint32_t corners)
+{
+    static bool used[400 * 400 * 2];
+    memset(used, 0, sizeof used);
+    static const int64_t first[3][2] = { { 0, 0 }, { 1, 0 }, { 1, 1 } };
+    w.n = 0;
+    for (int i = 0; i < 3; i++)
+        insert_corner(w.n, first[i]);
+    for (int i = 0; i < 3; i++)
+        w.at[i][0] += side / 2, w.at[i][1] += side / 2;
+    used[(side / 2 * side + side / 2) * 2] = true;
+    for (uint32_t tries = 0; w.n < corners && tries < 60 * corners; tries++) {
+        uint32_t i = below(w.n), j = i + 1 < w.n ? i + 1 : 0;
+        const int64_t *a = w.at[i], *b = w.at[j];
+        int64_t dx = b[0] - a[0], dy = b[1] - a[1], apex[2], cell[2];
+        bool upper;
+        if (dx && dy) { /* to the right of the diagonal, when it goes up, is the lower half */
+            upper = dx < 0;
+            cell[0] = dx < 0 ? b[0] : a[0], cell[1] = dy < 0 ? b[1] : a[1];
+            apex[0] = cell[0] + !upper, apex[1] = cell[1] + upper;
+        } else if (dx) { /* to the right, below: an upper half; to the left: above, a lower one */
+            upper = dx > 0;
+            cell[0] = dx > 0 ? a[0] : b[0], cell[1] = a[1] - upper;
+            apex[0] = cell[0] + !upper, apex[1] = cell[1] + !upper;
+        } else {
+            upper = dy > 0;
+            cell[0] = a[0] - !upper, cell[1] = dy > 0 ? a[1] : b[1];
+            apex[0] = cell[0] + upper, apex[1] = cell[1] + upper;
+        }
+        if (cell[0] < 0 || cell[1] < 0 || cell[0] >= side || cell[1] >= side)
+            continue;
+        bool *mark = &used[((uint64_t)cell[1] * side + (uint64_t)cell[0]) * 2 + upper];
+        if (*mark)
+            continue;
+        *mark = true;
+        insert_corner(i + 1, apex);
+    }
+    int64_t twice[3] = { 0 };
+    for (uint32_t i = 1; i + 1 < w.n; i++)
+        add_area(w.at[0], w.at[i], w.at[i + 1], twice);
+    ck_assert_int_eq(twice[2], w.n - 2); /* half squares, each once */
+}
+
+/* Spikes without area, inwards and outwards. */
+static void add_spikes(uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t at = below(w.n);
+        const int64_t foot[2] = { w.at[at][0], w.at[at][1] };
+        const int64_t tip[2] = { foot[0] + below(3) - 1, foot[1] + below(3) - 1 };
+        insert_corner(at + 1, foot);
+        insert_corner(at + 1, tip);
+    }
+}
+
+/* Into the plane z = x + 2 y, begun at another corner, or seen from behind. */
+static void place_in_space(uint32_t begin, bool behind)
+{
+    static int64_t copy[LARGEST][3];
+    memcpy(copy, w.at, w.n * sizeof *copy);
+    for (uint32_t i = 0; i < w.n; i++) {
+        uint32_t from = (begin + i) % w.n;
+        memcpy(w.at[behind ? w.n - 1 - i : i], copy[from], sizeof *copy);
+    }
+    for (uint32_t i = 0; i < w.n; i++)
+        w.at[i][2] = w.at[i][0] + 2 * w.at[i][1];
+}
+
+START_TEST(outlines_that_touch_themselves_are_covered)
+{
+    state = 1 + (uint64_t)_i;
+    for (int round = 0; round < (_i < 30 ? 40 : 4); round++) {
+        grow_glued(2 + below(_i < 30 ? 6 : 40), 4 + (uint32_t)(_i * _i));
+        if (w.n < 4)
+            continue;
+        place_in_space(below(w.n), below(2));
+        ck_assert_int_le(cut_whole((int)below(3) * 300 - 300), EBPO_POLYGON_CONCAVE);
+        check_exactly(true);
+    }
+}
+END_TEST
+
+START_TEST(spikes_are_covered)
+{
+    state = 1 + (uint64_t)_i;
+    for (int round = 0; round < 40; round++) {
+        grow_glued(2 + below(6), 4 + (uint32_t)_i);
+        add_spikes(1 + below(3));
+        place_in_space(below(w.n), below(2));
+        ck_assert_int_le(cut_whole(0), EBPO_POLYGON_CONCAVE);
+        check_exactly(true);
+    }
+}
+END_TEST
+
+/* A plate with a slit of no width: no triangle is without area. */
+START_TEST(slits_need_no_empty_triangle)
+{
+    static const int64_t slit[][2] = { { 0, 0 }, { 10, 0 }, { 10, 10 }, { 5, 10 },
+                                       { 5, 5 }, { 5, 10 }, { 0, 10 } };
+    for (uint32_t begin = 0; begin < 7; begin++)
+        for (int behind = 0; behind < 2; behind++) {
+            w.n = 0;
+            for (int i = 0; i < 7; i++)
+                insert_corner(w.n, slit[i]);
+            place_in_space(begin, behind);
+            ck_assert_int_eq(cut_whole(0), EBPO_POLYGON_CONCAVE);
+            ck_assert_uint_eq(check_exactly(true), 0);
+        }
+}
+END_TEST
+
+/* ---- the plain way of cutting ears, which gives the same triangles where it gives any ---- */
+
+static uint32_t after[MOST], before[MOST];
+
+static int plain_turn(uint32_t a, uint32_t b, uint32_t c)
+{
+    return ebpo_orient2d(s.at[a], s.at[b], s.at[c]);
+}
+
+static bool plain_same(uint32_t a, uint32_t b)
+{
+    return s.at[a][0] == s.at[b][0] && s.at[a][1] == s.at[b][1];
+}
+
+static bool plain_ear(uint32_t a, uint32_t b, uint32_t c)
+{
+    if (plain_turn(a, b, c) <= 0)
+        return false;
+    for (uint32_t i = after[c]; i != a; i = after[i])
+        if (!plain_same(i, a) && !plain_same(i, b) && !plain_same(i, c) &&
+            plain_turn(a, b, i) >= 0 && plain_turn(b, c, i) >= 0 && plain_turn(c, a, i) >= 0)
+            return false;
+    return true;
+}
+
+/* False where it finds no ear. */
+static bool plain_cut(uint32_t (*triangle)[3])
+{
+    uint32_t left = s.n, done = 0, idle = 0, b = 0;
+    for (uint32_t i = 0; i < s.n; i++)
+        after[i] = (i + 1) % s.n, before[i] = (i + s.n - 1) % s.n;
+    while (left > 2) {
+        uint32_t a = before[b], c = after[b];
+        if (idle == left || (left == 3 && plain_turn(a, b, c) < 0))
+            return false;
+        if (left > 3 && !plain_ear(a, b, c)) {
+            b = c;
+            idle++;
+            continue;
+        }
+        triangle[done][0] = a, triangle[done][1] = b, triangle[done++][2] = c;
+        after[a] = c;
+        before[c] = a;
+        b = after[c];
+        idle = 0;
+        left--;
+    }
+    return true;
+}
+
+static void compare_with_plain(uint32_t *cut_by_both)
+{
+    static uint32_t plain[MOST][3];
+    ebpo_polygon_kind kind = cut(2, false);
+    if ((kind != EBPO_POLYGON_CONCAVE && kind != EBPO_POLYGON_FLAT) || !plain_cut(plain))
+        return;
+    ++*cut_by_both;
+    ck_assert(memcmp(s.triangle, plain, (s.n - 2) * sizeof *plain) == 0);
+}
+
+START_TEST(ears_are_cut_in_the_plain_order)
+{
+    uint32_t both = 0;
+    state = 7 + (uint64_t)_i;
+    for (int round = 0; round < 60; round++) {
+        s.n = 4 + below(round < 50 ? 100 : 3000);
+        for (uint32_t i = 0; i < s.n; i++) { /* a star, in coordinates of which many are equal */
+            double r = 20 + below(200), angle = 2 * M_PI * i / s.n;
+            s.at[i][0] = floor(r * cos(angle));
+            s.at[i][1] = floor(r * sin(angle));
+        }
+        compare_with_plain(&both);
+        grow_glued(4 + below(30), 4 + below(round < 50 ? 100 : 3000));
+        s.n = w.n;
+        for (uint32_t i = 0; i < s.n; i++)
+            for (int k = 0; k < 2; k++)
+                s.at[i][k] = (double)w.at[i][k];
+        compare_with_plain(&both);
+    }
+    ck_assert_uint_gt(both, 50);
+}
+END_TEST
+
+/* ---- outlines that cross themselves ---- */
+
+static double area_of(uint32_t a, uint32_t b, uint32_t c)
+{
+    int64_t n[3] = { 0 };
+    add_area(w.at[a], w.at[b], w.at[c], n);
+    return sqrt((double)n[0] * (double)n[0] + (double)n[1] * (double)n[1] +
+                (double)n[2] * (double)n[2]) /
+           2;
+}
+
+/* Over all triangulations of the corners from i to j. */
+static double least_area(uint32_t i, uint32_t j)
+{
+    double best = j - i < 2 ? 0 : INFINITY;
+    for (uint32_t k = i + 1; k < j; k++)
+        best = fmin(best, least_area(i, k) + area_of(i, k, j) + least_area(k, j));
+    return best;
+}
+
+static double cut_area(void)
+{
+    double sum = 0;
+    for (uint32_t i = 0; i + 2 < w.n; i++)
+        sum += area_of(w.triangle[i][0], w.triangle[i][1], w.triangle[i][2]);
+    return sum;
+}
+
+START_TEST(guesses_have_the_least_area)
+{
+    int guessed = 0;
+    state = 3;
+    for (int round = 0; round < 3000; round++) {
+        w.n = 4 + below(5);
+        for (uint32_t i = 0; i < w.n; i++)
+            for (int k = 0; k < 3; k++)
+                w.at[i][k] = below(9);
+        bool is_guess = cut_whole(-3) == EBPO_POLYGON_GUESSED;
+        check_exactly(false);
+        guessed += is_guess;
+        if (is_guess)
+            ck_assert_double_eq_tol(cut_area(), least_area(0, w.n - 1), 1e-9);
+    }
+    ck_assert_int_gt(guessed, 1000);
+}
+END_TEST
+
+START_TEST(folded_quads_and_stars_are_guesses)
+{
+    static const int64_t fold[][3] = { { -12, -27, 17 }, { -16, 9, -1 }, { 43, 9, -13 },
+                                       { -16, 9, -2 } };
+    static const int64_t star[][3] = { { 0, 3, 0 }, { -2, -3, 0 }, { 3, 1, 0 }, { -3, 1, 0 },
+                                       { 2, -3, 0 } };
+    w.n = 4;
+    memcpy(w.at, fold, sizeof fold);
+    ck_assert_int_eq(cut_whole(0), EBPO_POLYGON_GUESSED);
+    ck_assert_double_eq_tol(cut_area(), 47.6, 0.1);
+    w.n = 5;
+    memcpy(w.at, star, sizeof star);
+    ck_assert_int_eq(cut_whole(0), EBPO_POLYGON_GUESSED);
+    ck_assert_double_eq_tol(cut_area(), least_area(0, 4), 1e-9);
+}
+END_TEST
+
+/* ---- large outlines ---- */
+
+enum { TEETH = 8000, PETALS = 5000 };
+
+static void make_comb(void)
+{
+    w.n = 0;
+    for (uint32_t i = 0; i < TEETH; i++) {
+        const int64_t ground[2] = { 2 * (int64_t)i, 0 }, tip[2] = { 2 * (int64_t)i + 1, 40000 };
+        memcpy(w.at[w.n++], ground, sizeof ground);
+        memcpy(w.at[w.n++], tip, sizeof tip);
+    }
+    const int64_t end[2] = { 2 * TEETH, 0 }, under[2] = { TEETH, -1 };
+    memcpy(w.at[w.n++], end, sizeof end);
+    memcpy(w.at[w.n++], under, sizeof under);
+}
+
+/* Two arms side by side, inwards and out again. */
+static void make_spiral(void)
+{
+    w.n = 0;
+    for (int arm = 0; arm < 2; arm++)
+        for (int i = 0; i < 50000; i++) {
+            int step = arm ? 49999 - i : i;
+            double angle = step * 0.01, r = 400000 - 6 * step - arm * 1500;
+            w.at[w.n][0] = (int64_t)(r * cos(angle));
+            w.at[w.n++][1] = (int64_t)(r * sin(angle));
+        }
+}
+
+/* Triangles that have one corner in common. */
+static void make_petals(void)
+{
+    w.n = 0;
+    for (int i = 0; i < PETALS; i++) {
+        double angle = i * (2 * M_PI / PETALS);
+        w.at[w.n][0] = w.at[w.n][1] = 0;
+        w.n++;
+        for (int k = 0; k < 2; k++, angle += 0.0001) {
+            w.at[w.n][0] = (int64_t)(1e6 * cos(angle));
+            w.at[w.n++][1] = (int64_t)(1e6 * sin(angle));
+        }
+    }
+}
+
+START_TEST(large_outlines_take_bounded_time)
+{
+    void (*make[])(void) = { make_comb, make_spiral, make_petals };
+    if (_i < 3)
+        make[_i]();
+    else {
+        state = 5;
+        grow_glued(400, 30000);
+        ck_assert_uint_gt(w.n, 29000);
+    }
+    for (int behind = 0; behind < 2; behind++) {
+        place_in_space(1, behind);
+        ck_assert_int_eq(cut_whole(0), EBPO_POLYGON_CONCAVE);
+        check_exactly(true);
+    }
 }
 END_TEST
 
@@ -160,7 +556,14 @@ Suite *test_suite(void)
     tcase_add_test(tests, straight_corners_make_no_triangle_without_area);
     tcase_add_test(tests, concave_shapes_are_covered);
     tcase_add_loop_test(tests, random_star_shapes_are_covered, 0, 60);
-    tcase_add_test(tests, polygons_without_an_answer_become_fans);
+    tcase_add_test(tests, polygons_on_a_line_or_not_finite_become_fans);
+    tcase_add_loop_test(tests, outlines_that_touch_themselves_are_covered, 0, 60);
+    tcase_add_loop_test(tests, spikes_are_covered, 0, 60);
+    tcase_add_test(tests, slits_need_no_empty_triangle);
+    tcase_add_loop_test(tests, ears_are_cut_in_the_plain_order, 0, 20);
+    tcase_add_test(tests, guesses_have_the_least_area);
+    tcase_add_test(tests, folded_quads_and_stars_are_guesses);
+    tcase_add_loop_test(tests, large_outlines_take_bounded_time, 0, 4);
     Suite *suite = suite_create("polygon");
     suite_add_tcase(suite, tests);
     return suite;

@@ -93,6 +93,9 @@ static void print_reading(FILE *out, const ebpo_mesh *mesh)
                              "polygons"));
         if (mesh->polygons_concave)
             fprintf(out, " (%llu concave)", (unsigned long long)mesh->polygons_concave);
+        if (mesh->polygons_guessed)
+            fprintf(out, ", %llu of which by a guess: the outline crosses itself",
+                    (unsigned long long)mesh->polygons_guessed);
         fputc('\n', out);
     }
     if (mesh->strips)
@@ -213,9 +216,16 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
 void findings_print_mending(FILE *out, const ebpo_mend_record *r)
 {
     char text[80];
-    if (r->weld)
-        fprintf(out, "  welded: %s merged\n",
+    if (r->weld) {
+        fprintf(out, "  welded: %s merged",
                 words_plural(text, sizeof text, r->welded_vertices, "vertex", "vertices"));
+        if (r->weld_distance > 0)
+            fprintf(out, " within %.6g, moved by %.6g at most; %s", r->weld_distance, r->weld_moved,
+                    words_plural(text, sizeof text, r->collapsed_faces,
+                                 "face lost its area (it names a vertex twice)",
+                                 "faces lost their area (they name a vertex twice)"));
+        fputc('\n', out);
+    }
     if (r->drop_duplicates) {
         fprintf(out, "  dropped: %s",
                 words_plural(text, sizeof text, r->dropped_faces, "repeated face",
@@ -297,6 +307,9 @@ void findings_json_mending(json *j, const char *key, const ebpo_mend_record *r)
     json_object(j, key);
     json_bool(j, "weld", r->weld);
     json_uint(j, "welded_vertices", r->welded_vertices);
+    json_real(j, "weld_distance", r->weld_distance);
+    json_real(j, "weld_moved", r->weld_moved);
+    json_uint(j, "collapsed_faces", r->collapsed_faces);
     json_bool(j, "drop_duplicates", r->drop_duplicates);
     json_uint(j, "dropped_faces", r->dropped_faces);
     json_bool(j, "orient", r->orient);
@@ -323,6 +336,7 @@ void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh, const
     json_uint(j, "faces", mesh->face_count);
     json_uint(j, "polygons_triangulated", mesh->polygons_triangulated);
     json_uint(j, "polygons_concave", mesh->polygons_concave);
+    json_uint(j, "polygons_guessed", mesh->polygons_guessed);
     json_uint(j, "polygons_dropped", mesh->polygons_dropped);
     json_uint(j, "strips", mesh->strips);
     if (unread[0])

@@ -1,5 +1,6 @@
 #include "cli/mesh_input.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -17,6 +18,8 @@ int mending_check(const char *command, mending asked)
         return command_usage(command,
                              "--repair chooses from --weld, --drop-duplicates, --orient and "
                              "--fill-holes; leave these and --flip out");
+    if (asked.weld && asked.weld_distance > 0)
+        return command_usage(command, "--weld-distance merges what --weld does, too; choose one");
     if (asked.orient && asked.flip)
         return command_usage(command, "--orient says which way faces look; leave out --flip");
     return EXIT_FINE;
@@ -41,6 +44,9 @@ static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
     a->unfilled_holes += b->unfilled_holes;
     a->dropped_faces += b->dropped_faces;
     a->dropped_opposite += b->dropped_opposite;
+    a->weld_distance = fmax(a->weld_distance, b->weld_distance);
+    a->weld_moved = fmax(a->weld_moved, b->weld_moved);
+    a->collapsed_faces += b->collapsed_faces;
 }
 
 static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_error *error)
@@ -48,6 +54,7 @@ static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_erro
     const ebpo_mend_record *steps = &p->repairs.tries[p->repairs.chosen].record;
     ebpo_prepared again = EBPO_PREPARED_INIT;
     how->weld = steps->weld;
+    how->weld_distance = 0;
     how->drop_duplicates = steps->drop_duplicates;
     how->orient = steps->orient;
     how->fill_holes = steps->fill_holes;
@@ -107,6 +114,7 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     how.attributes = more != READ_MESH;
     how.embed_textures = more == READ_TEXTURES;
     wanted.weld = asked.weld;
+    wanted.weld_distance = asked.weld_distance;
     wanted.drop_duplicates = asked.drop_duplicates;
     wanted.orient = asked.orient;
     wanted.flip = asked.flip;
@@ -155,4 +163,13 @@ void mesh_input_warn(const char *command, const char *path, const mesh_input *in
     if (input->unread[0])
         fprintf(stderr, "ebpo %s: %s: warning: left out in reading: %s\n", command, path,
                 input->unread);
+    const ebpo_mesh *m = &input->as_read;
+    if (m->polygons_guessed)
+        fprintf(stderr,
+                "ebpo %s: %s: warning: %llu of %llu polygons cross themselves and got the "
+                "triangles of least area, a guess (the first one begins at face %llu); triangulate "
+                "such polygons in the program that wrote them\n",
+                command, path, (unsigned long long)m->polygons_guessed,
+                (unsigned long long)m->polygons_triangulated,
+                (unsigned long long)m->first_guessed_face);
 }

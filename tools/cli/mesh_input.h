@@ -11,6 +11,7 @@
 typedef struct mending {
     bool weld, drop_duplicates, orient, flip, fill_holes;
     bool repair; /* the shortest sequence of these that leaves a plausible solid */
+    double weld_distance; /* above 0: vertices are merged within it, before repairs are tried */
     bool advise; /* no option: without any of these, find out which one that is */
 } mending;
 
@@ -56,7 +57,8 @@ EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *pa
 /* Returns what is known of the solid's volume, before or after mending. */
 ebpo_solid_volume mesh_input_solid(const mesh_input *input, bool after);
 
-/* A warning where the file holds or names what reading it left out. */
+/* Warns where the file holds or names what reading it left out, and of triangles that are a guess.
+ */
 void mesh_input_warn(const char *command, const char *path, const mesh_input *input);
 
 #endif

@@ -104,7 +104,8 @@ static ebpo_status from_file(patient *p, remade *r, ebpo_error *error)
 static ebpo_status from_source(patient *p, remade *r, ebpo_error *error)
 {
     const ebpo_mend_record *m = &p->info->mend;
-    mending steps = { .weld = m->weld,
+    mending steps = { .weld = m->weld && !(m->weld_distance > 0),
+                      .weld_distance = m->weld_distance,
                       .drop_duplicates = m->dropped_faces > 0,
                       .orient = m->orient,
                       .flip = !m->orient && m->flipped_faces,

@@ -7,8 +7,8 @@
  *   build
  *   Checking   ebpo_mesh_check
  *   Order      ebpo_mesh_arrange
- *   Mending    ebpo_mesh_weld, ebpo_mesh_drop_duplicates, ebpo_mesh_orient,
- *              ebpo_mesh_flip, ebpo_mesh_fill_holes
+ *   Mending    ebpo_mesh_weld, ebpo_mesh_weld_within, ebpo_mesh_drop_duplicates,
+ *              ebpo_mesh_orient, ebpo_mesh_flip, ebpo_mesh_fill_holes
  *   Parts      ebpo_components_new, ebpo_components_count, ebpo_components_get,
  *              ebpo_components_mesh, ebpo_components_free
  */
@@ -96,6 +96,13 @@ typedef struct ebpo_mesh {
      * NULL: nothing.
      */
     struct ebpo_attributes *attributes;
+
+    /*
+     * Of the triangulated polygons, those whose outline crosses itself: they got the
+     * triangles of least area, which is a guess. The first triangle of the first one.
+     */
+    uint64_t polygons_guessed;
+    uint64_t first_guessed_face;
 } ebpo_mesh;
 
 /*
@@ -169,9 +176,12 @@ typedef struct ebpo_mesh_read_options {
  * Reads a mesh: PLY, OBJ, STL or OFF. The format is recognised by the file's first
  * bytes, then by its name, then, as OBJ, by its first word.
  *
- * Polygons are triangulated, concave ones correctly. Strips are unrolled. Positions
- * keep every bit, and text is rounded correctly: of PLY to the type that its header
- * says, of the other formats to float. In these, vertices of one position are one,
+ * Polygons are triangulated, concave ones correctly, also those that touch themselves
+ * (slits, bridges to holes, pinched corners). Of outlines that cross themselves, folded
+ * quads among them, the triangles have the least area, up to 64 corners, and are
+ * counted in `polygons_guessed`. Strips are unrolled. Positions keep every bit, and
+ * text is rounded correctly: of PLY to the type that its header says, of the other
+ * formats to float. In these, vertices of one position are one,
  * and those that no face names are left out. ebpo_mesh_unread tells what could not
  * be read.
  *
@@ -374,10 +384,20 @@ typedef struct ebpo_mend_record {
 
     /* Of these, those that looked the other way than the one that stays. */
     uint64_t dropped_opposite;
+
+    /*
+     * The distance that ebpo_mesh_weld_within was given, and the largest one that it
+     * moved a vertex by; 0: it was not called.
+     */
+    double weld_distance;
+    double weld_moved;
+
+    /* Faces that it left without area: they name a vertex twice. */
+    uint64_t collapsed_faces;
 } ebpo_mend_record;
 
 /*
- * The five functions below add their counts to `record`, which begins with zeros
+ * The six functions below add their counts to `record`, which begins with zeros
  * and may be NULL. They use all cores, and the result does not depend on how many.
  *
  * EBPO_E_FORMAT: a face names a vertex that is not there. EBPO_E_LIMIT: more than
@@ -393,6 +413,31 @@ typedef struct ebpo_mend_record {
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record,
                                                   ebpo_error *error);
+
+/*
+ * Merges vertices of one position as ebpo_mesh_weld does, then others that are within
+ * a distance. Positions are gone through ascending by x, then y, then z: one stays
+ * unless one that stays is within the distance of it. Every other vertex becomes the
+ * nearest of those that stay (of several at one distance, the first). Distances are
+ * compared exactly.
+ *
+ * So no vertex moves farther than the distance, chains of near vertices do not drift,
+ * no two that stay are within the distance of each other, and the result depends on
+ * positions alone, not on the order of vertices. A vertex that stays keeps its
+ * position, number and attributes. Faces that then name a vertex twice stay, and are
+ * counted in `collapsed_faces`.
+ *
+ * distance   in the mesh's unit, above 0, and less than the longest side of the box
+ *            around all vertices
+ *
+ * EBPO_E_ARGUMENT: another distance, also one below 2^-49 of that side.
+ * On failure the mesh is valid, and vertices of one position may have been merged.
+ *
+ * Threads: one per mesh.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double distance,
+                                                         ebpo_mend_record *record,
+                                                         ebpo_error *error);
 
 /*
  * Removes faces that repeat another one: of all faces of the same three distinct
@@ -498,11 +543,14 @@ typedef struct ebpo_prepare_options {
 
     /* 1: ebpo_mesh_drop_duplicates too. */
     uint64_t drop_duplicates;
+
+    /* Above 0: ebpo_mesh_weld_within this distance, in place of ebpo_mesh_weld. */
+    double weld_distance;
 } ebpo_prepare_options;
 
-#define EBPO_PREPARE_OPTIONS_INIT                                                  \
-    {                                                                              \
-        sizeof(ebpo_prepare_options), false, false, false, 0, { NULL, NULL }, 0, 0 \
+#define EBPO_PREPARE_OPTIONS_INIT                                                     \
+    {                                                                                 \
+        sizeof(ebpo_prepare_options), false, false, false, 0, { NULL, NULL }, 0, 0, 0 \
     }
 
 typedef struct ebpo_prepared {

@@ -13,7 +13,7 @@ from ._library import Handle, Reporter, Struct, call, made, size_in_bytes
 from .model import Model
 from .model import open as open_model
 
-PREPARE = ("weld", "orient", "fill_holes", "flip", "drop_duplicates")
+PREPARE = ("weld", "orient", "fill_holes", "flip", "drop_duplicates", "weld_distance")
 BUILD = ("max_level", "leaf_faces", "epsilon", "require_solid", "seed", "unit", "crs", "date")
 WITHOUT = {"planes": c.EBPO_PART_PLANES, "mesh": c.EBPO_PART_MESH, "maps": c.EBPO_PART_MAPS,
            "attributes": c.EBPO_PART_ATTRIBUTES | c.EBPO_PART_COLOURS, "colours": c.EBPO_PART_COLOURS}
@@ -33,8 +33,8 @@ def convert(mesh: Any, output: Any, *, without: Any = (), rule: str = "nonzero",
     codec: "zstd", "deflate" or "none".
     memory: bytes that the process may take; the rest goes to temporary files in temp_dir. None: half
         of the machine's.
-    options: weld, orient, fill_holes, flip, drop_duplicates: mend the mesh; max_level, leaf_faces, epsilon,
-        require_solid, seed, unit, crs, date as in ebpo_build_options, ebpo/build.h. Usual values are
+    options: weld, orient, fill_holes, flip, drop_duplicates, weld_distance: repair the mesh; max_level, leaf_faces,
+        epsilon, require_solid, seed, unit, crs, date as in ebpo_build_options, ebpo/build.h. Usual values are
         those of the command `ebpo convert`, and so are the bytes of the file.
 
     Raises NotSolidError with require_solid, UnsupportedError where the library is one without libhdf5,

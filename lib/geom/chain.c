@@ -1,13 +1,12 @@
 #include "geom/strict_fp.h"
 
-#include "mesh/triangulate.h"
+#include "geom/chain.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 #include "base/alloc.h"
 #include "base/arrays.h"
-#include "mesh/mesh_parts.h"
 
 static double triangle_area(const ebpo_chain *c, uint32_t i, uint32_t j, uint32_t k)
 {
@@ -188,6 +187,6 @@ static bool cut_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
 
 bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3])
 {
-    return chain->n <= EBPO_OPTIMAL_CHAIN ? least_area(chain, triangles)
+    return chain->n <= chain->optimal ? least_area(chain, triangles)
                                           : cut_ears(chain, triangles);
 }
