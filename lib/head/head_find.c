@@ -6,6 +6,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "io/foreign_bytes.h"
 
 static ebpo_status fail_refused(const ebpo_head *head, const char *path, const char *what,
                                 const ebpo_head_refusal *why, ebpo_error *error)
@@ -39,8 +40,9 @@ ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error
     ebpo_status status = ebpo_head_bytes_open(&s->bytes, input, error);
     if (status != EBPO_OK || ebpo_head_read_superblock(s))
         return status;
-    static const char foreign[] =
-        "not a whole HDF5 file; was it cut off in copying, or is it something else?";
+    const char *foreign = ebpo_foreign_bytes(s->bytes.first, s->bytes.first_bytes);
+    if (!foreign)
+        foreign = "not a whole HDF5 file; was it cut off in copying, or is it something else?";
     return ebpo_head_fail(head, "", s->refusal.what ? "" : foreign, error);
 }
 
