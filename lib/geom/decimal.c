@@ -83,8 +83,9 @@ static bool scan_foreign_word(double *out, const char *s, size_t n)
         const char *word;
         bool zeros;
         double value;
-    } words[] = { { "1.#inf", true, INFINITY }, { "1.#ind", true, NAN },  { "1.#qnan", true, NAN },
-                  { "1.#snan", true, NAN },     { "nan(ind)", false, NAN }, { "nan(snan)", false, NAN } };
+    } words[] = { { "1.#inf", true, INFINITY }, { "1.#ind", true, NAN },
+                  { "1.#qnan", true, NAN },     { "1.#snan", true, NAN },
+                  { "nan(ind)", false, NAN },   { "nan(snan)", false, NAN } };
     for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
         size_t length = strlen(words[i].word), k = length;
         if (n < length || strncasecmp(s, words[i].word, length) != 0)

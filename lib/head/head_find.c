@@ -40,10 +40,12 @@ ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error
     ebpo_status status = ebpo_head_bytes_open(&s->bytes, input, error);
     if (status != EBPO_OK || ebpo_head_read_superblock(s))
         return status;
+    static const char unknown[] =
+        "not a whole HDF5 file; was it cut off in copying, or is it something else?";
     const char *foreign = ebpo_foreign_bytes(s->bytes.first, s->bytes.first_bytes);
-    if (!foreign)
-        foreign = "not a whole HDF5 file; was it cut off in copying, or is it something else?";
-    return ebpo_head_fail(head, "", s->refusal.what ? "" : foreign, error);
+    if (foreign && !s->refusal.what && !ebpo_head_has_signature(s))
+        return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, "", 0, "%s", foreign);
+    return ebpo_head_fail(head, "", s->refusal.what ? "" : unknown, error);
 }
 
 void ebpo_head_expect_index(ebpo_head *head, ebpo_range index) { head->state->bytes.index = index; }

@@ -10,7 +10,8 @@ static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c ==
 
 obj_text ebpo_obj_text(const uint8_t *data, uint64_t size)
 {
-    return (obj_text){ (const char *)data + ebpo_text_mark(data, size), (const char *)data + size, 1, false };
+    return (obj_text){ (const char *)data + ebpo_text_mark(data, size), (const char *)data + size,
+                       1, false };
 }
 
 /* Past the end of a line. */

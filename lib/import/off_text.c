@@ -6,8 +6,8 @@ static bool ends_line(char c) { return c == '\n' || c == '\r'; }
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 
-/* A comment may follow a word without a blank; in 1.#INF and 1.#IND, as older programs write what is
- * not finite, no comment begins. */
+/* A comment may follow a word without a blank; in 1.#INF and 1.#IND, as older programs write what
+ * is not finite, no comment begins. */
 static bool begins_comment(const char *word, const char *at, const char *end)
 {
     return *at == '#' && !(at - word >= 2 && at[-2] == '1' && at[-1] == '.' && end - at > 1 &&

@@ -43,9 +43,9 @@ typedef struct stl_text {
     uint64_t line;
     uint64_t loops, corners; /* so far; of this loop */
     uint64_t next_release;   /* byte */
-    uint64_t solids; /* that have facets */
-    bool begun;      /* a solid without facets so far */
-    uint64_t odd, odd_line; /* words that mean nothing behind others; where the first one is */
+    uint64_t solids;         /* that have facets */
+    bool begun;              /* a solid without facets so far */
+    uint64_t odd, odd_line;  /* words that mean nothing behind others; where the first one is */
 } stl_text;
 
 typedef struct stl_word {
@@ -100,6 +100,23 @@ static ebpo_status read_vertex(stl_text *t)
     return ebpo_import_vertex(t->build, xyz);
 }
 
+/* Passes words behind one that takes none, and counts them. */
+static void pass_odd(stl_text *t)
+{
+    static const char *const words[] = {
+        "facet", "endfacet", "endloop", "solid", "endsolid", "end"
+    };
+    stl_text ahead = *t;
+    stl_word word;
+    while (next_word(&ahead, &word) && ahead.line == t->line) {
+        for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+            if (is(word, words[i]))
+                return;
+        t->odd_line = t->odd++ ? t->odd_line : t->line;
+        t->at = ahead.at;
+    }
+}
+
 /* outer loop, vertices, endloop; the normal's numbers before, of whatever kind, are passed. */
 static ebpo_status read_loop(stl_text *t)
 {
@@ -128,6 +145,7 @@ static ebpo_status read_loop(stl_text *t)
                                 " vertices, not three; repair the file",
                                 t->line, t->loops + 1, t->corners);
     t->loops++;
+    pass_odd(t);
     return status;
 }
 
@@ -153,21 +171,6 @@ static void pass_name(stl_text *t)
     while (next_word(&ahead, &word) && ahead.line == t->line &&
            !(is(word, "facet") && holds_facet(&ahead)))
         t->at = ahead.at;
-}
-
-/* Passes words behind one that takes none, and counts them. */
-static void pass_odd(stl_text *t)
-{
-    static const char *const words[] = { "facet", "endfacet", "endloop", "solid", "endsolid", "end" };
-    stl_text ahead = *t;
-    stl_word word;
-    while (next_word(&ahead, &word) && ahead.line == t->line) {
-        for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-            if (is(word, words[i]))
-                return;
-        t->odd_line = t->odd++ ? t->odd_line : t->line;
-        t->at = ahead.at;
-    }
 }
 
 /* Other lines before the first facet of a solid are its name, too. */

@@ -44,8 +44,8 @@ static uint64_t end_with_payload(ebpo_workspace *workspace, const uint8_t *data,
 {
     uint64_t at = HEAD;
     EBPO_FOR_ITEMS(workspace, i, 0, stated_faces(data)) {
-        uint64_t next = size - at < RECORD ? UINT64_MAX
-                                           : at + RECORD + ebpo_load16(data + at + WORD);
+        uint64_t next =
+            size - at < RECORD ? UINT64_MAX : at + RECORD + ebpo_load16(data + at + WORD);
         if (next > size)
             return UINT64_MAX;
         at = next;
@@ -55,10 +55,9 @@ static uint64_t end_with_payload(ebpo_workspace *workspace, const uint8_t *data,
 
 bool ebpo_stl_fits_binary(const uint8_t *data, uint64_t size)
 {
-    return size >= HEAD &&
-           (count_models(data, size) ||
-            (stated_size(data) < size && end_with_payload(NULL, data, size) == size &&
-             stated_faces(data)));
+    return size >= HEAD && (count_models(data, size) ||
+                            (stated_size(data) < size &&
+                             end_with_payload(NULL, data, size) == size && stated_faces(data)));
 }
 
 static ebpo_status fail_ambiguous(const import_build *b, const uint8_t *data, uint64_t size)
@@ -70,7 +69,8 @@ static ebpo_status fail_ambiguous(const import_build *b, const uint8_t *data, ui
                           stated_faces(data), stated_size(data), size);
 }
 
-/* Finds out what the bytes behind the stated facets are; EBPO_E_FORMAT where that is not certain. */
+/* Finds out what the bytes behind the stated facets are; EBPO_E_FORMAT where that is not certain.
+ */
 static ebpo_status explain(const import_build *b, const uint8_t *data, uint64_t size, stl_bytes *is)
 {
     uint64_t end = stated_size(data), held = (size - HEAD) / RECORD;

@@ -18,14 +18,17 @@ static const struct {
     { "\0\0\xfe\xff", 4, "is text of four bytes a character (UTF-32); save it as UTF-8" },
     { "\xff\xfe", 2, "is text of two bytes a character (UTF-16); save it as UTF-8" },
     { "\xfe\xff", 2, "is text of two bytes a character (UTF-16); save it as UTF-8" },
-    { "\x1f\x8b", 2, "is compressed by gzip; decompress it: gunzip" },
-    { "BZh", 3, "is compressed by bzip2; decompress it: bunzip2" },
-    { "\xfd\x37zXZ\0", 6, "is compressed by xz; decompress it: unxz" },
-    { "\x28\xb5\x2f\xfd", 4, "is compressed by zstd; decompress it: unzstd" },
+    { "\x1f\x8b", 2, "is compressed by gzip; decompress it: gunzip <FILE >NEW" },
+    { "BZh", 3, "is compressed by bzip2; decompress it: bunzip2 <FILE >NEW" },
+    { "\xfd\x37zXZ\0", 6, "is compressed by xz; decompress it: unxz <FILE >NEW" },
+    { "\x28\xb5\x2f\xfd", 4, "is compressed by zstd; decompress it: unzstd <FILE >NEW" },
     { "7z\xbc\xaf\x27\x1c", 6, "is a 7z archive; extract the file from it: 7z x" },
     { "PK\3\4", 4,
       "is a ZIP archive, as 3MF files are, too; extract the file from it (unzip), or save the mesh "
       "as PLY, OBJ, STL or OFF" },
+    { "\211HDF\r\n\032\n", 8,
+      "is an HDF5 file, not a mesh; 'ebpo extract --mesh' writes the mesh of an .ebpo.h5 file as a "
+      "PLY" },
     { "glTF", 4, "is a glTF file; save the mesh as PLY, OBJ, STL or OFF" },
 };
 
@@ -39,8 +42,8 @@ static bool is_wide(const uint8_t *data, uint64_t size)
         int good = 0;
         for (int i = 0; i < CHARACTERS; i++) {
             uint8_t c = data[2 * i + first];
-            good += data[2 * i + 1 - first] == 0 && c < 0x7f &&
-                    (c >= ' ' || (c >= '\t' && c <= '\r'));
+            good +=
+                data[2 * i + 1 - first] == 0 && c < 0x7f && (c >= ' ' || (c >= '\t' && c <= '\r'));
         }
         if (good == CHARACTERS)
             return true;
@@ -61,10 +64,10 @@ static const char *find_markup(const char *text, uint64_t size)
         text++;
     if (begins(text, size, "<!doctype html") || begins(text, size, "<html") ||
         begins(text, size, "<head"))
-        return "is an HTML page, as servers send it for errors and logins; download the file itself";
-    return begins(text, size, "<?xml")
-               ? "is an XML file; save the mesh as PLY, OBJ, STL or OFF"
-               : NULL;
+        return "is an HTML page, as servers send it for errors and logins; download the file "
+               "itself";
+    return begins(text, size, "<?xml") ? "is an XML file; save the mesh as PLY, OBJ, STL or OFF"
+                                       : NULL;
 }
 
 const char *ebpo_foreign_bytes(const uint8_t *data, uint64_t size)

@@ -111,8 +111,8 @@ ebpo_status ebpo_ply_leave_unused(ply_parser *p)
     leaving l = { .p = p };
     ebpo_mesh *mesh = p->mesh;
     uint64_t count = mesh->vertex_count;
-    ebpo_status status = ebpo_parallel_for(p->threads, mesh->workspace, count, GRAIN, find, &l,
-                                           NULL, "", p->error);
+    ebpo_status status =
+        ebpo_parallel_for(p->threads, mesh->workspace, count, GRAIN, find, &l, NULL, "", p->error);
     if (status == EBPO_OK && l.found)
         status = choose(&l);
     if (status == EBPO_OK && l.found && l.kept < count) {

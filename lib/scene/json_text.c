@@ -5,10 +5,7 @@
 #include "base/text.h"
 #include "scene/scene_parts.h"
 
-size_t scene_text_mark(const char *text, size_t size)
-{
-    return (size_t)ebpo_text_mark(text, size);
-}
+size_t scene_text_mark(const char *text, size_t size) { return (size_t)ebpo_text_mark(text, size); }
 
 bool scene_text_is_wide(const char *text, size_t size)
 {

@@ -213,7 +213,8 @@ static bool begins(const points *p, const char *with, size_t count)
  * is about 1e219 or 1e243. */
 static bool begins_as_ply(const points *p)
 {
-    if (!begins(p, "ply\n", 4) && !begins(p, "ply\r", 4))
+    if (!begins(p, "ply\n", 4) && !begins(p, "ply\r", 4) &&
+        (p->raw || (!begins(p, "ply ", 4) && !begins(p, "ply\t", 4))))
         return false;
     for (size_t i = 5; i < HEAD && p->raw; i++)
         if (i >= p->rest_count || p->rest[i] < 'a' || p->rest[i] > 'z')
@@ -229,6 +230,8 @@ static bool recognise(points *p, points_block *b)
             wanted[p->kind]);
     if (begins(p, "\223NUMPY", 6))
         return read_npy(p, b);
+    if (!p->raw && begins(p, "\xef\xbb\xbf", 3)) /* byte order mark */
+        points_drop(p, 3);
     if (begins_as_ply(p) && !p->raw)
         return read_ply(p, b);
     if (begins_as_ply(p) && p->kind == POINTS)
@@ -237,8 +240,6 @@ static bool recognise(points *p, points_block *b)
         return points_fault(b, 0,
                             "is a PLY file, which holds points; give %s as text or as raw doubles",
                             wanted[p->kind]);
-    if (!p->raw && begins(p, "\xef\xbb\xbf", 3)) /* byte order mark */
-        points_drop(p, 3);
     return true;
 }
 
@@ -246,7 +247,7 @@ static bool recognise(points *p, points_block *b)
 bool points_recognise(points *p, points_block *b)
 {
     for (;;) {
-        bool binary = p->rest_count && (uint8_t)p->rest[0] > 0x7f && (uint8_t)p->rest[0] != 0xef;
+        bool binary = p->rest_count && (uint8_t)p->rest[0] > 0x7f;
         if (p->rest_count >= (p->raw || binary ? HEAD : 4) || p->ended || b->failed)
             break;
         points_fill(p, b);
