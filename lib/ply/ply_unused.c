@@ -14,7 +14,8 @@ enum { GRAIN = 1 << 15, WORD = 64 };
 
 typedef struct leaving {
     ply_parser *p;
-    bool found;     /* some coordinate is not finite */
+    bool found;   /* some coordinate is not finite */
+    bool refused; /* such a vertex is used: the check will refuse the mesh, by the file's numbers */
     uint64_t *used; /* bit v: a face names vertex v */
     uint32_t *from; /* [kept] the vertices that stay */
     uint32_t *to;   /* [vertices] their new numbers */
@@ -58,8 +59,10 @@ static ebpo_status choose(leaving *l)
             l->used[mesh->faces[i] / WORD] |= UINT64_C(1) << mesh->faces[i] % WORD;
     }
     EBPO_FOR_ITEMS(workspace, v, 0, n) {
+        bool used = l->used[v / WORD] >> v % WORD & 1, finite = is_finite(mesh, v);
         l->to[v] = (uint32_t)l->kept;
-        if ((l->used[v / WORD] >> v % WORD & 1) || is_finite(mesh, v))
+        l->refused |= used && !finite;
+        if (used || finite)
             l->from[l->kept++] = (uint32_t)v;
     }
     return EBPO_OK;
@@ -115,7 +118,7 @@ ebpo_status ebpo_ply_leave_unused(ply_parser *p)
         ebpo_parallel_for(p->threads, mesh->workspace, count, GRAIN, find, &l, NULL, "", p->error);
     if (status == EBPO_OK && l.found)
         status = choose(&l);
-    if (status == EBPO_OK && l.found && l.kept < count) {
+    if (status == EBPO_OK && l.found && !l.refused && l.kept < count) {
         move(&l);
         move_attributes(&l);
         mesh->vertex_count = l.kept;

@@ -44,6 +44,11 @@ double number_read(const char *text, const char *end, const char **after)
     return stop > text ? pass_names(v, after) : v;
 }
 
+const char *number_skip_mark(const char *text)
+{
+    return text + (strncmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0);
+}
+
 /* --- printing --- */
 
 #ifndef EBPO_HAVE_CHARCONV
