@@ -14,7 +14,7 @@
 #include "import/stl_binary.h"
 #include "import/stl_colours.h"
 
-enum { RELEASE = 1 << 22, LOOK_AHEAD = 1 << 16 };
+enum { HEAD = 84, RELEASE = 1 << 22, LOOK_AHEAD = 1 << 16 };
 
 static bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
@@ -233,7 +233,8 @@ static bool is_text(const uint8_t *data, uint64_t size)
 {
     uint64_t look = size < LOOK_AHEAD ? size : LOOK_AHEAD;
     const uint8_t *at = data, *end = data + look;
-    if (!begins_solid(data, size) || ebpo_stl_fits_binary(data, size))
+    if (!begins_solid(data, size) || memchr(data, 0, size < HEAD ? size : HEAD) ||
+        ebpo_stl_fits_binary(data, size))
         return false;
     for (; at + 5 <= end; at++)
         if (strncasecmp((const char *)at, "facet", 5) == 0)

@@ -24,8 +24,8 @@ static const struct {
     { "\x28\xb5\x2f\xfd", 4, "is compressed by zstd; decompress it: unzstd <FILE >NEW" },
     { "7z\xbc\xaf\x27\x1c", 6, "is a 7z archive; extract the file from it: 7z x" },
     { "PK\3\4", 4,
-      "is a ZIP archive, as 3MF files are, too; extract the file from it (unzip), or save the mesh "
-      "as PLY, OBJ, STL or OFF" },
+      "is a ZIP archive, as 3MF and NPZ files are; extract the file from it (unzip), or save the "
+      "mesh as PLY, OBJ, STL or OFF" },
     { "\211HDF\r\n\032\n", 8,
       "is an HDF5 file, not a mesh; 'ebpo extract --mesh' writes the mesh of an .ebpo.h5 file as a "
       "PLY" },

@@ -9,6 +9,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "io/foreign_bytes.h"
 
 enum { MAX_WORDS = 6 }; /* no statement has more than five; a sixth shows that there are too many */
 
@@ -273,6 +274,9 @@ static ebpo_status check_magic(reader *r, uint64_t size)
 {
     ply_word line;
     const char *end = ebpo_ply_first_line((const uint8_t *)r->at, size, &r->header->line_end);
+    const char *foreign = end ? NULL : ebpo_foreign_bytes((const uint8_t *)r->at, size);
+    if (foreign)
+        return ebpo_fail_at(r->error, EBPO_E_FORMAT, r->name, "", 0, "%s", foreign);
     r->at = end ? end : r->at;
     if (!end || !next_line(r, &line))
         return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,

@@ -39,7 +39,8 @@ typedef struct dialect {
     FACET("0 0 0", "0 0 1", "0 1 0") FACET("1 0 0", "0 1 0", "0 0 1")
 
 /* Binary STL: four facets of a tetrahedron, and what is behind each. */
-#define HEAD75         "a head of 80 bytes, which are of any kind                                  "
+#define HEAD69         "a head of 80 bytes, which are of any kind                            "
+#define HEAD75         HEAD69 "      "
 #define HEAD80         HEAD75 "     "
 #define ZERO           "\0\0\0\0"
 #define ONE            "\0\0\x80\x3f"
@@ -133,7 +134,7 @@ static const dialect dialects[] = {
     { "by_its_size", FILE_OF(HEAD80 "\4\0\0\0" BINARY("\3\0abc")), 4, 4,
       "bytes that follow facets, by their attribute byte counts: 12" },
     { "html", FILE_OF("\n <!DOCTYPE html>\n<html>"), 0, 0, "is an HTML page" },
-    { "zip", FILE_OF("PK\3\4"), 0, 0, "is a ZIP archive, as 3MF files are" },
+    { "zip", FILE_OF("PK\3\4"), 0, 0, "is a ZIP archive, as 3MF and NPZ files are" },
     { "xml", FILE_OF("<?xml version='1.0'?>"), 0, 0, "is an XML file" },
     { "by_no_words", FILE_OF("version 1\n"), 0, 0, "expected PLY, OBJ, STL or OFF" },
     /* OFF */
@@ -273,6 +274,8 @@ static const dialect dialects[] = {
     { "less_payload.stl", FILE_OF(HEAD80 "\4\0\0\0" BINARY("\2\0ab") "c"), 0, 0,
       "states 4 faces, which take 284 of its 293 bytes" },
     { "spare.stl", FILE_OF(MODEL "0123456789abc"), 4, 4, "bytes behind the last facet: 13" },
+    { "solid_spare.stl", FILE_OF("solid facet" HEAD69 "\4\0\0\0" BINARY("\0\0") "?"), 4, 4,
+      "bytes behind the last facet: 1" },
     { "colours_and_spare.stl", FILE_OF(HEAD80 "\4\0\0\0" BINARY("\xff\xff") "\n"), 4, 4,
       "bytes behind the last facet: 1" },
     { "count_zero.stl", FILE_OF(HEAD80 ZERO BINARY("\0\0")), 0, 0,

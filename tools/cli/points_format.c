@@ -222,6 +222,19 @@ static bool begins_as_ply(const points *p)
     return true;
 }
 
+/* Files of other kinds, which the library names: text that is none, to say so. */
+static bool is_foreign(points *p)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    double *xyz = NULL;
+    uint64_t count;
+    if (ebpo_points_parse_ply(p->rest, p->rest_count, p->name, &xyz, &count, &error) == EBPO_OK ||
+        error.offset != 0)
+        return free(xyz), false;
+    fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
+    return p->failed = true;
+}
+
 static bool recognise(points *p, points_block *b)
 {
     if (begins(p, "\211HDF\r\n\032\n", HEAD))
@@ -240,7 +253,7 @@ static bool recognise(points *p, points_block *b)
         return points_fault(b, 0,
                             "is a PLY file, which holds points; give %s as text or as raw doubles",
                             wanted[p->kind]);
-    return true;
+    return p->raw || !is_foreign(p);
 }
 
 /* A short line of text is not kept waiting for more. */
