@@ -100,6 +100,8 @@ static ebpo_status read_vertex(stl_text *t)
     return ebpo_import_vertex(t->build, xyz);
 }
 
+static void note_odd(stl_text *t) { t->odd_line = t->odd++ ? t->odd_line : t->line; }
+
 /* Passes words behind one that takes none, and counts them. */
 static void pass_odd(stl_text *t)
 {
@@ -112,20 +114,24 @@ static void pass_odd(stl_text *t)
         for (size_t i = 0; i < sizeof words / sizeof *words; i++)
             if (is(word, words[i]))
                 return;
-        t->odd_line = t->odd++ ? t->odd_line : t->line;
+        note_odd(t);
         t->at = ahead.at;
     }
 }
 
-/* outer loop, vertices, endloop; the normal's numbers before, of whatever kind, are passed. */
+/* Reads outer loop, vertices, endloop; passes the word normal and its three values before. */
 static ebpo_status read_loop(stl_text *t)
 {
     stl_word word;
     ebpo_status status = EBPO_OK;
-    do {
+    for (int passed = 0;; passed++) {
         if (!next_word(t, &word))
             return fail_end(t);
-    } while (!is(word, "outer") && !is(word, "vertex") && !is(word, "endfacet"));
+        if (is(word, "outer") || is(word, "vertex") || is(word, "endfacet"))
+            break;
+        if (passed > 3)
+            note_odd(t);
+    }
     if (is(word, "endfacet"))
         return fail_word(t, "outer loop", word);
     if (is(word, "outer") && next_word(t, &word) && !is(word, "loop"))
@@ -173,7 +179,6 @@ static void pass_name(stl_text *t)
         t->at = ahead.at;
 }
 
-/* Other lines before the first facet of a solid are its name, too. */
 static bool begins_facet(stl_text *t, stl_word word)
 {
     stl_text ahead = *t;
@@ -184,7 +189,7 @@ static bool begins_facet(stl_text *t, stl_word word)
 
 static ebpo_status read_text(stl_text *t)
 {
-    bool named = true; /* words are a solid's name */
+    bool between = true; /* solids: words may be of any kind */
     stl_word word;
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK && next_word(t, &word)) {
@@ -194,12 +199,14 @@ static ebpo_status read_text(stl_text *t)
         }
         if (begins_facet(t, word)) {
             t->solids += t->begun;
-            named = t->begun = false;
+            between = t->begun = false;
             status = read_loop(t);
         } else if (is(word, "solid") || is(word, "endsolid")) {
-            named = t->begun = true;
+            between = t->begun = true;
             pass_name(t);
-        } else if (named || is(word, "end")) {
+        } else if (between) {
+            note_odd(t);
+        } else if (is(word, "end")) {
             continue;
         } else if (is(word, "endfacet") || is(word, "endloop") || is(word, "color")) {
             pass_odd(t);

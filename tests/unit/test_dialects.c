@@ -256,6 +256,11 @@ static const dialect dialects[] = {
       FILE_OF("solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
               "endloop of 1\nendfacet 1 red\ncolor 1 0 0\nendsolid a\n"),
       3, 1, "words that STL does not have: 7, the first in line 7" },
+    { "between.stl",
+      FILE_OF(
+          "solid a\nmade by hand\nfacet normal 0 0 0 1 2\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+          "vertex 0 1 0\nendloop\nendfacet\nendsolid a\nvertex\n"),
+      3, 1, "words that STL does not have: 6, the first in line 2" },
     { "ind.stl",
       FILE_OF(
           "solid a\nfacet normal -1.#IND -1.#IND -1.#IND\nouter loop\nvertex 3.1+e2 0 0\nvertex "
