@@ -1,6 +1,6 @@
 #include "base/text.h"
 
-#include <stdint.h>
+#include <string.h>
 
 bool ebpo_text_ok(const char *text)
 {
@@ -22,4 +22,9 @@ bool ebpo_text_ok(const char *text)
                 return false;
     }
     return true;
+}
+
+uint64_t ebpo_text_mark(const void *text, uint64_t size)
+{
+    return size >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
 }

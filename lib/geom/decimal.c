@@ -25,18 +25,23 @@ static const double tens[] = { 1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
 
 static bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-static bool scan_exponent(decimal *d, const char *s, const char *end)
+static bool is_sign(char c) { return c == '+' || c == '-'; }
+
+static bool scan_exponent_of(decimal *d, bool negative, const char *s, const char *end)
 {
-    bool negative = s < end && *s == '-';
-    if (s < end && (*s == '-' || *s == '+'))
-        s++;
-    if (s == end)
-        return false;
     int32_t e = 0;
     for (; s < end && is_digit(*s); s++)
         e = e < 100000 ? e * 10 + (*s - '0') : e;
     d->exponent += negative ? -e : e;
     return s == end;
+}
+
+static bool scan_exponent(decimal *d, const char *s, const char *end)
+{
+    bool negative = s < end && *s == '-';
+    if (s < end && is_sign(*s))
+        s++;
+    return s < end && scan_exponent_of(d, negative, s, end);
 }
 
 static bool scan(decimal *d, const char *s, const char *end)
@@ -64,7 +69,33 @@ static bool scan(decimal *d, const char *s, const char *end)
     }
     if (!seen)
         return false;
-    return s == end || ((*s == 'e' || *s == 'E') && scan_exponent(d, s + 1, end));
+    if (s == end || *s == 'e' || *s == 'E')
+        return s == end || scan_exponent(d, s + 1, end);
+    /* 3.1+e2, as some programs write 3.1e+2 */
+    return end - s > 2 && is_sign(*s) && (s[1] == 'e' || s[1] == 'E') && is_digit(s[2]) &&
+           scan_exponent_of(d, *s == '-', s + 2, end);
+}
+
+/* The names of infinite and undefined numbers of Microsoft's C library; precision adds zeros. */
+static bool scan_foreign_word(double *out, const char *s, size_t n)
+{
+    static const struct {
+        const char *word;
+        bool zeros;
+        double value;
+    } words[] = { { "1.#inf", true, INFINITY }, { "1.#ind", true, NAN },
+                  { "1.#qnan", true, NAN },     { "1.#snan", true, NAN },
+                  { "nan(ind)", false, NAN },   { "nan(snan)", false, NAN } };
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
+        size_t length = strlen(words[i].word), k = length;
+        if (n < length || strncasecmp(s, words[i].word, length) != 0)
+            continue;
+        while (k < n && words[i].zeros && s[k] == '0')
+            k++;
+        *out = words[i].value;
+        return k == n;
+    }
+    return false;
 }
 
 static bool scan_word(double *out, const char *s, size_t n)
@@ -80,7 +111,7 @@ static bool scan_word(double *out, const char *s, size_t n)
     else if ((n == 3 && strncasecmp(s, "inf", 3) == 0) ||
              (n == 8 && strncasecmp(s, "infinity", 8) == 0))
         value = INFINITY;
-    else
+    else if (!scan_foreign_word(&value, s, n))
         return false;
     *out = negative ? -value : value;
     return true;
@@ -143,6 +174,12 @@ static void copy_token(char buffer[EBPO_NUMBER_LONGEST + 1], const char *s, size
 {
     memcpy(buffer, s, n);
     buffer[n] = 0;
+    char *e = strpbrk(buffer, "eE");
+    if (e && e - buffer >= 2 && is_sign(e[-1])) { /* 3.1+e2 */
+        char sign = e[-1];
+        e[-1] = *e;
+        *e = sign;
+    }
 }
 
 bool ebpo_number_float(float *out, const char *s, size_t n, locale_t c_locale)

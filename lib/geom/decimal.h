@@ -6,7 +6,9 @@
 #include <locale.h>
 
 /* s[0 .. n) must be one number and nothing else: [+-] digits [. digits] [e [+-] digits], or nan,
- * inf, infinity in any case. Hexadecimal is refused. The result is the nearest float (double), ties
+ * inf, infinity in any case. Also what some programs write for these: 3.1+e2, and of Microsoft's C
+ * library 1.#INF, 1.#IND, 1.#QNAN, 1.#SNAN with zeros behind them, nan(ind) and nan(snan).
+ * Hexadecimal is refused. The result is the nearest float (double), ties
  * to even; beyond the range it is infinite. False: not a number, or longer than
  * EBPO_NUMBER_LONGEST. `c_locale`: from newlocale(LC_ALL_MASK, "C", 0); used for the few numbers
  * that the exact short ways do not decide. */

@@ -6,6 +6,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "io/foreign_bytes.h"
 
 static ebpo_status fail_refused(const ebpo_head *head, const char *path, const char *what,
                                 const ebpo_head_refusal *why, ebpo_error *error)
@@ -37,9 +38,12 @@ ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error
     ebpo_status status = ebpo_head_bytes_open(&s->bytes, input, error);
     if (status != EBPO_OK || ebpo_head_read_superblock(s))
         return status;
-    static const char foreign[] =
+    static const char unknown[] =
         "not a whole HDF5 file; was it cut off in copying, or is it something else?";
-    return ebpo_head_fail(head, "", s->refusal.what ? "" : foreign, error);
+    const char *foreign = ebpo_foreign_bytes(s->bytes.first, s->bytes.first_bytes);
+    if (foreign && !s->refusal.what && !ebpo_head_has_signature(s))
+        return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, "", 0, "%s", foreign);
+    return ebpo_head_fail(head, "", s->refusal.what ? "" : unknown, error);
 }
 
 void ebpo_head_expect_index(ebpo_head *head, ebpo_range index) { head->state->bytes.index = index; }

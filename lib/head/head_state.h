@@ -83,6 +83,8 @@ bool ebpo_head_sound(const uint8_t *block, uint64_t size);
 
 /* Reads the superblock: where the root group is. False: the refusal says why. */
 bool ebpo_head_read_superblock(ebpo_head_state *s);
+/* True for bytes that begin as those of any HDF5 file. */
+bool ebpo_head_has_signature(ebpo_head_state *s);
 
 /* The header at an address, until the next call. NULL: the refusal says why. */
 const ebpo_head_header *ebpo_head_header_at(ebpo_head_state *s, uint64_t address);

@@ -16,6 +16,12 @@ static bool has_user_block(ebpo_head_state *s)
     return false;
 }
 
+bool ebpo_head_has_signature(ebpo_head_state *s)
+{
+    const uint8_t *first = ebpo_head_bytes_at(&s->bytes, 0, sizeof signature);
+    return first && memcmp(first, signature, sizeof signature) == 0;
+}
+
 bool ebpo_head_read_superblock(ebpo_head_state *s)
 {
     enum { BYTES = EBPO_HEAD_SUPERBLOCK_BYTES, OPEN_FOR_WRITING = 1 };
@@ -23,7 +29,7 @@ bool ebpo_head_read_superblock(ebpo_head_state *s)
     s->refusal = (ebpo_head_refusal){ NULL, false };
     if (!block)
         return false;
-    if (memcmp(block, signature, sizeof signature) != 0)
+    if (!ebpo_head_has_signature(s))
         return has_user_block(s) ? ebpo_refuse(s, "the HDF5 file begins behind something else (a "
                                                   "user block), which this format does not allow")
                                  : false;

@@ -14,8 +14,8 @@
 #include "import/obj_text.h"
 #include "import/off.h"
 #include "import/stl.h"
-#include "import/stl_colours.h"
 #include "io/file_source.h"
+#include "io/foreign_bytes.h"
 
 void ebpo_import_clear(ebpo_mesh *mesh)
 {
@@ -28,15 +28,11 @@ void ebpo_import_clear(ebpo_mesh *mesh)
 static ebpo_status read_format(import_build *b, ebpo_import_format format, const uint8_t *data,
                                uint64_t size, ebpo_obj_runs *runs)
 {
-    ebpo_status status = EBPO_OK;
     switch (format) {
     case EBPO_IMPORT_OBJ: return ebpo_obj_read(b, data, size, runs);
     case EBPO_IMPORT_OFF: return ebpo_off_read(b, data, size);
-    default: status = ebpo_stl_read(b, data, size);
+    default: return ebpo_stl_read(b, data, size);
     }
-    return status == EBPO_OK && b->attributes
-               ? ebpo_import_stl_colours(b->mesh, data, size, b->error)
-               : status;
 }
 
 /* None that would say nothing. */
@@ -47,6 +43,36 @@ static void drop_empty(ebpo_mesh *mesh)
         return;
     ebpo_attributes_free(a);
     mesh->attributes = NULL;
+}
+
+/* An OBJ file has no mark: its first word is one of those that such files begin with. */
+static bool is_obj(const uint8_t *data, uint64_t size)
+{
+    static const char *const words[] = { "v", "vt", "vn", "vp",     "f",
+                                         "g", "o",  "s",  "mtllib", "usemtl" };
+    obj_text t = ebpo_obj_text(data, size);
+    obj_word word;
+    if (!ebpo_obj_next_statement(&t, &word))
+        return false;
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (ebpo_obj_word_is(word, words[i]))
+            return true;
+    return false;
+}
+
+/* OBJ has no mark, so a name that ends in .stl or .off hides one. */
+static ebpo_status check_name(const import_build *b, ebpo_import_format format, const uint8_t *data,
+                              uint64_t size)
+{
+    bool marked = format == EBPO_IMPORT_OFF   ? ebpo_off_recognise(data, size)
+                  : format == EBPO_IMPORT_STL ? ebpo_stl_recognise(data, size)
+                                              : true;
+    if (marked || !ebpo_bytes_are_text(data, size) || !is_obj(data, size))
+        return EBPO_OK;
+    return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
+                          "begins as an OBJ file does, but its name says %s; rename it to end in "
+                          ".obj",
+                          format == EBPO_IMPORT_OFF ? "OFF" : "STL");
 }
 
 static ebpo_status import(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
@@ -60,6 +86,8 @@ static ebpo_status import(ebpo_mesh *out, ebpo_import_format format, const uint8
     ebpo_status status = ebpo_import_begin(&b, &mesh, name, attributes, error);
     if (status == EBPO_OK && attributes && !(mesh.attributes = ebpo_attributes_make(workspace)))
         status = ebpo_fail_memory(error, sizeof *mesh.attributes);
+    if (status == EBPO_OK)
+        status = check_name(&b, format, data, size);
     if (status == EBPO_OK)
         status = read_format(&b, format, data, size, runs);
     ebpo_import_free(&b);
@@ -95,21 +123,6 @@ ebpo_status ebpo_import_groups(ebpo_mesh *out, const uint8_t *data, uint64_t siz
 }
 
 /* --- which format it is --- */
-
-/* An OBJ file has no mark: its first word is one of those that such files begin with. */
-static bool is_obj(const uint8_t *data, uint64_t size)
-{
-    static const char *const words[] = { "v", "vt", "vn", "vp",     "f",
-                                         "g", "o",  "s",  "mtllib", "usemtl" };
-    obj_text t = ebpo_obj_text(data, size);
-    obj_word word;
-    if (!ebpo_obj_next_statement(&t, &word))
-        return false;
-    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-        if (ebpo_obj_word_is(word, words[i]))
-            return true;
-    return false;
-}
 
 bool ebpo_import_recognise(ebpo_import_format *format, const uint8_t *data, uint64_t size,
                            const char *name)

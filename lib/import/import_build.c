@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "attributes/attributes.h"
 #include "base/alloc.h"
 #include "base/arrays.h"
 #include "base/error.h"
@@ -230,6 +231,22 @@ ebpo_status ebpo_import_end(import_build *b)
     if (status == EBPO_OK)
         trim(mesh);
     return status;
+}
+
+ebpo_status ebpo_import_notes(import_build *b)
+{
+    ebpo_mesh *mesh = b->mesh;
+    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
+        return ebpo_fail_memory(b->error, sizeof *mesh->attributes);
+    return EBPO_OK;
+}
+
+void ebpo_import_word_text(char text[IMPORT_WORD_TEXT], const char *s, size_t n)
+{
+    n = n < IMPORT_WORD_TEXT ? n : IMPORT_WORD_TEXT - 1;
+    for (size_t i = 0; i < n; i++)
+        text[i] = s[i] < ' ' || s[i] > '~' ? '?' : s[i];
+    text[n] = 0;
 }
 
 void ebpo_import_free(import_build *b)

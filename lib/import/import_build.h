@@ -82,6 +82,14 @@ EBPO_MUST_USE ebpo_status ebpo_import_end(import_build *b);
  * say the same; else to the faces, one for the face or as lists of its three corners'. */
 EBPO_MUST_USE ebpo_status ebpo_import_attributes(import_build *b);
 
+/* Gives the mesh attributes where it has none, so that what was left out can be noted.
+ * EBPO_E_MEMORY. */
+EBPO_MUST_USE ebpo_status ebpo_import_notes(import_build *b);
+
+/* Copies a word for a message: at most 40 characters, what is not printable becomes '?'. */
+enum { IMPORT_WORD_TEXT = 41 };
+void ebpo_import_word_text(char text[IMPORT_WORD_TEXT], const char *s, size_t n);
+
 /* Frees all but the mesh. */
 void ebpo_import_free(import_build *b);
 

@@ -15,7 +15,7 @@
 #include "import/obj_faces.h"
 #include "import/obj_state.h"
 
-enum { MOST_WORDS = 8, SHOWN = 40 };
+enum { MOST_WORDS = 8 };
 
 static int read_words(obj_reading *r, obj_word word[MOST_WORDS])
 {
@@ -38,10 +38,8 @@ static bool read_floats(const obj_reading *r, const obj_word *word, int n, float
 
 static ebpo_status fail_vertex(const obj_reading *r, obj_word word)
 {
-    char text[SHOWN + 1] = "";
-    size_t n = word.n < SHOWN ? word.n : SHOWN;
-    for (size_t i = 0; i < n; i++)
-        text[i] = word.s[i] < ' ' || word.s[i] > '~' ? '?' : word.s[i];
+    char text[IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, word.s, word.n);
     return ebpo_obj_fail(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text,
                          r->build->vertices + 1);
 }
@@ -91,8 +89,10 @@ static ebpo_status read_vertex(obj_reading *r)
     float xyz[3];
     int n = read_words(r, word), bad;
     if (n < 3)
-        return ebpo_obj_fail(r, "vertex %" PRIu64 " has no three coordinates; repair the file",
-                             r->build->vertices + 1);
+        return ebpo_obj_fail(r,
+                             "vertex %" PRIu64 " has %d coordinates, not three; write z as well "
+                             "(0 in a plane), or repair the file",
+                             r->build->vertices + 1, n);
     if (!read_floats(r, word, 3, xyz, &bad))
         return fail_vertex(r, word[bad]);
     ebpo_status status = n == 4 ? divide(r, word, xyz) : EBPO_OK;
@@ -190,9 +190,9 @@ static bool any_unread(const obj_losses *l)
 static ebpo_status note_all(obj_reading *r)
 {
     ebpo_mesh *mesh = r->build->mesh;
-    if (!mesh->attributes && any_unread(&r->losses) &&
-        !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
-        return ebpo_fail_memory(r->build->error, sizeof *mesh->attributes);
+    ebpo_status status = any_unread(&r->losses) ? ebpo_import_notes(r->build) : EBPO_OK;
+    if (status != EBPO_OK)
+        return status;
     if (mesh->attributes)
         note_unread(r, mesh->attributes);
     if (r->build->attributes)
@@ -200,21 +200,10 @@ static ebpo_status note_all(obj_reading *r)
     return EBPO_OK;
 }
 
-static ebpo_status check_text(const obj_reading *r)
-{
-    bool wide = r->size >= 2 &&
-                (memcmp(r->data, "\xff\xfe", 2) == 0 || memcmp(r->data, "\xfe\xff", 2) == 0);
-    return wide ? ebpo_fail_file(r->build->error, EBPO_E_FORMAT, r->build->name,
-                                 "is text of two bytes a character (UTF-16); save it as UTF-8")
-                : EBPO_OK;
-}
-
 static ebpo_status read_all(obj_reading *r)
 {
     import_build *b = r->build;
-    ebpo_status status = check_text(r);
-    if (status == EBPO_OK)
-        status = read_values(r);
+    ebpo_status status = read_values(r);
     if (status == EBPO_OK)
         status = ebpo_import_faces(b);
     if (status == EBPO_OK)

@@ -12,9 +12,8 @@ static const import_sort sort_of[2] = { IMPORT_TEXTURE, IMPORT_NORMALS };
 
 static ebpo_status fail_corner(const obj_reading *r, obj_word word)
 {
-    char text[41] = "";
-    for (size_t i = 0; i < word.n && i < sizeof text - 1; i++)
-        text[i] = word.s[i] < ' ' || word.s[i] > '~' ? '?' : word.s[i];
+    char text[IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, word.s, word.n);
     return ebpo_obj_fail(r,
                          "a face has the corner '%s', but it takes v, v/vt, v//vn or v/vt/vn; "
                          "repair the file",

@@ -2,14 +2,16 @@
 
 #include <string.h>
 
+#include "base/text.h"
+
 static bool ends_line(char c) { return c == '\n' || c == '\r'; }
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 
 obj_text ebpo_obj_text(const uint8_t *data, uint64_t size)
 {
-    uint64_t mark = size >= 3 && memcmp(data, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
-    return (obj_text){ (const char *)data + mark, (const char *)data + size, 1, false };
+    return (obj_text){ (const char *)data + ebpo_text_mark(data, size), (const char *)data + size,
+                       1, false };
 }
 
 /* Past the end of a line. */

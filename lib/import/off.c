@@ -11,10 +11,11 @@
 #include "attributes/attributes.h"
 #include "base/arrays.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "geom/decimal.h"
 #include "import/off_text.h"
 
-enum { MOST_REST = 16, RELEASE = 1 << 22, SHOWN = 40 };
+enum { MOST_REST = 16, RELEASE = 1 << 22 };
 
 /* How rows lie in lines, told from how many of each there are. */
 typedef enum rows_in { ROW_A_LINE, ROWS_OVER_LINES, ROWS_ANYHOW } rows_in;
@@ -51,8 +52,9 @@ static ebpo_status fail(const off_reading *r, const char *format, ...)
 
 /* --- head --- */
 
-/* ST, C, N, 4 and n in this order, then OFF. */
-static bool read_kind(off_word word, off_reading *r, bool *dimension)
+/* Reads ST, C, N, 4 and n in this order, then OFF, and returns their length; 0: they are not there.
+ * ModelNet's files have the first count behind them, without a blank: OFF8. */
+static size_t read_kind(off_word word, off_reading *r, bool *dimension)
 {
     const char *s = word.s, *end = s + word.n;
     bool texture = end - s > 2 && s[0] == 'S' && s[1] == 'T';
@@ -65,23 +67,25 @@ static bool read_kind(off_word word, off_reading *r, bool *dimension)
     s += weights;
     *dimension = s < end && *s == 'n';
     s += *dimension;
-    bool named = end - s == 3 && strncasecmp(s, "OFF", 3) == 0;
+    bool named = end - s >= 3 && strncasecmp(s, "OFF", 3) == 0;
+    for (const char *digit = s + 3; named && digit < end; digit++)
+        named = *digit >= '0' && *digit <= '9';
     if (r && named) {
         r->texture = texture;
         r->colours = colours;
         r->normals = normals;
         r->weights = weights;
     }
-    return named;
+    return named ? (size_t)(s + 3 - word.s) : 0;
 }
 
 bool ebpo_off_recognise(const uint8_t *data, uint64_t size)
 {
-    off_text t = { (const char *)data, (const char *)data + size, 1 };
+    off_text t = { (const char *)data + ebpo_text_mark(data, size), (const char *)data + size, 1 };
     off_word word;
-    bool dimension;
-    return ebpo_off_next(&t, &word) && t.at < t.end && read_kind(word, NULL, &dimension) &&
-           memcmp(word.s + word.n - 3, "OFF", 3) == 0;
+    bool dimension, found = ebpo_off_next(&t, &word) && t.at < t.end;
+    size_t length = found ? read_kind(word, NULL, &dimension) : 0;
+    return length && memcmp(word.s + length - 3, "OFF", 3) == 0;
 }
 
 static bool read_count(off_word word, uint64_t *value)
@@ -134,9 +138,10 @@ static ebpo_status read_head(off_reading *r)
     if (!ebpo_off_next(&r->text, &word))
         return fail(r, "the file is empty; there is no mesh in it");
     off_text behind = r->text;
-    bool named = read_kind(word, r, &dimension);
+    size_t named = read_kind(word, r, &dimension);
     if (named) {
         off_word next;
+        r->text.at = word.s + named;
         bool more = ebpo_off_next(&r->text, &next);
         if (more && next.n == 6 && strncasecmp(next.s, "BINARY", 6) == 0)
             return ebpo_fail_file(r->build->error, EBPO_E_UNSUPPORTED, r->build->name,
@@ -263,6 +268,13 @@ static ebpo_status take_rest_anyhow(off_reading *r, uint64_t row)
     return EBPO_OK;
 }
 
+static ebpo_status fail_number(const off_reading *r, off_word word, uint64_t row)
+{
+    char text[IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, word.s, word.n);
+    return fail(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text, row);
+}
+
 static ebpo_status read_vertex(off_reading *r, uint64_t row)
 {
     float xyz[3], w = 1;
@@ -274,7 +286,7 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
             return fail(r, "vertex %" PRIu64 " has no three coordinates; repair the file", row);
         }
         if (!read_float(r, word, k < 3 ? &xyz[k] : &w) || w == 0)
-            return fail(r, "vertex %" PRIu64 " has no three coordinates; repair the file", row);
+            return fail_number(r, word, row);
     }
     for (int k = 0; k < 3 && w != 1; k++)
         xyz[k] = (float)((double)xyz[k] / (double)w);
@@ -364,10 +376,9 @@ static ebpo_status note_unread(off_reading *r)
 {
     ebpo_mesh *mesh = r->build->mesh;
     bool any = r->divided || r->surplus_vertices || r->surplus_faces || r->more;
-    if (any && !mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
-        return ebpo_fail_memory(r->build->error, sizeof *mesh->attributes);
-    if (!any)
-        return EBPO_OK;
+    ebpo_status status = any ? ebpo_import_notes(r->build) : EBPO_OK;
+    if (!any || status != EBPO_OK)
+        return status;
     ebpo_attributes_count_unread(mesh->attributes,
                                  "weights of vertices, by which coordinates were divided",
                                  r->divided);
@@ -412,8 +423,7 @@ static ebpo_status read_rows(off_reading *r)
 ebpo_status ebpo_off_read(import_build *b, const uint8_t *data, uint64_t size)
 {
     off_reading r = { .build = b, .begin = (const char *)data, .size = size };
-    uint64_t mark = size >= 3 && memcmp(data, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
-    r.text = (off_text){ r.begin + mark, r.begin + size, 1 };
+    r.text = (off_text){ r.begin + ebpo_text_mark(data, size), r.begin + size, 1 };
     ebpo_status status = read_head(&r);
     if (status == EBPO_OK)
         status = read_rows(&r);

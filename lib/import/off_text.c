@@ -6,6 +6,14 @@ static bool ends_line(char c) { return c == '\n' || c == '\r'; }
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 
+/* A comment may follow a word without a blank; in 1.#INF and 1.#IND, as older programs write what
+ * is not finite, no comment begins. */
+static bool begins_comment(const char *word, const char *at, const char *end)
+{
+    return *at == '#' && !(at - word >= 2 && at[-2] == '1' && at[-1] == '.' && end - at > 1 &&
+                           strchr("IQS", at[1]));
+}
+
 bool ebpo_off_next_here(off_text *t, off_word *word)
 {
     while (t->at < t->end && is_blank(*t->at))
@@ -14,7 +22,8 @@ bool ebpo_off_next_here(off_text *t, off_word *word)
         while (t->at < t->end && !ends_line(*t->at))
             t->at++;
     const char *s = t->at;
-    while (t->at < t->end && !is_blank(*t->at) && !ends_line(*t->at) && *t->at != '#')
+    while (t->at < t->end && !is_blank(*t->at) && !ends_line(*t->at) &&
+           !begins_comment(s, t->at, t->end))
         t->at++;
     *word = (off_word){ s, (size_t)(t->at - s) };
     return word->n > 0;

@@ -8,21 +8,21 @@
 
 #include "attributes/attributes.h"
 #include "base/arrays.h"
-#include "base/endian.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "geom/decimal.h"
+#include "import/stl_binary.h"
+#include "import/stl_colours.h"
 
-enum { HEAD = 84, RECORD = 50, RELEASE = 1 << 22, LOOK_AHEAD = 1 << 16, SHOWN = 40 };
+enum { HEAD = 84, RELEASE = 1 << 22, LOOK_AHEAD = 1 << 16 };
 
 static bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-static bool fits_binary(const uint8_t *data, uint64_t size)
-{
-    return size >= HEAD && size == HEAD + RECORD * (uint64_t)ebpo_load32(data + HEAD - 4);
-}
-
 static bool begins_solid(const uint8_t *data, uint64_t size)
 {
+    uint64_t mark = ebpo_text_mark(data, size);
+    data += mark;
+    size -= mark;
     while (size && is_blank((char)*data)) {
         data++;
         size--;
@@ -32,39 +32,7 @@ static bool begins_solid(const uint8_t *data, uint64_t size)
 
 bool ebpo_stl_recognise(const uint8_t *data, uint64_t size)
 {
-    return fits_binary(data, size) || begins_solid(data, size);
-}
-
-/* --- binary --- */
-
-static ebpo_status read_binary(import_build *b, const uint8_t *data, uint64_t size)
-{
-    uint64_t faces = size < HEAD ? 0 : ebpo_load32(data + HEAD - 4);
-    if (size < HEAD)
-        return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
-                              "is no STL file: neither the word solid stands first, nor are there "
-                              "the 84 bytes that binary ones begin with");
-    if (faces > (size - HEAD) / RECORD)
-        return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
-                              "states %" PRIu64 " faces, but its %" PRIu64 " bytes hold %" PRIu64
-                              "; it is cut short or no STL file",
-                              faces, size, (size - HEAD) / RECORD);
-    if (3 * faces > IMPORT_MOST)
-        return ebpo_fail_file(b->error, EBPO_E_LIMIT, b->name,
-                              "states %" PRIu64 " faces of three corners each, more than 2^32 - 2 "
-                              "corners; split the model",
-                              faces);
-    ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < 3 * faces && status == EBPO_OK; i++) {
-        const uint8_t *at = data + HEAD + RECORD * (i / 3) + 12 + 12 * (i % 3);
-        uint32_t raw[3] = { ebpo_load32(at), ebpo_load32(at + 4), ebpo_load32(at + 8) };
-        float xyz[3];
-        memcpy(xyz, raw, sizeof xyz);
-        status = ebpo_import_vertex(b, xyz);
-        if (i % RELEASE == 0)
-            ebpo_release_pages(b->mesh->workspace);
-    }
-    return status;
+    return begins_solid(data, size) || ebpo_stl_fits_binary(data, size);
 }
 
 /* --- text --- */
@@ -75,7 +43,9 @@ typedef struct stl_text {
     uint64_t line;
     uint64_t loops, corners; /* so far; of this loop */
     uint64_t next_release;   /* byte */
-    uint64_t solids;
+    uint64_t solids;         /* that have facets */
+    bool begun;              /* a solid without facets so far */
+    uint64_t odd, odd_line;  /* words that mean nothing behind others; where the first one is */
 } stl_text;
 
 typedef struct stl_word {
@@ -101,9 +71,8 @@ static bool is(stl_word word, const char *text)
 
 static ebpo_status fail_word(const stl_text *t, const char *wanted, stl_word word)
 {
-    char text[SHOWN + 1] = "";
-    for (size_t i = 0; i < word.n && i < SHOWN; i++)
-        text[i] = word.s[i] < ' ' || word.s[i] > '~' ? '?' : word.s[i];
+    char text[IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, word.s, word.n);
     return ebpo_fail_file(t->build->error, EBPO_E_FORMAT, t->build->name,
                           "line %" PRIu64 ": '%s' where %s should stand, in facet %" PRIu64
                           "; repair the file",
@@ -131,15 +100,38 @@ static ebpo_status read_vertex(stl_text *t)
     return ebpo_import_vertex(t->build, xyz);
 }
 
-/* outer loop, vertices, endloop; the normal's numbers before, of whatever kind, are passed. */
+static void note_odd(stl_text *t) { t->odd_line = t->odd++ ? t->odd_line : t->line; }
+
+/* Passes words behind one that takes none, and counts them. */
+static void pass_odd(stl_text *t)
+{
+    static const char *const words[] = {
+        "facet", "endfacet", "endloop", "solid", "endsolid", "end"
+    };
+    stl_text ahead = *t;
+    stl_word word;
+    while (next_word(&ahead, &word) && ahead.line == t->line) {
+        for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+            if (is(word, words[i]))
+                return;
+        note_odd(t);
+        t->at = ahead.at;
+    }
+}
+
+/* Reads outer loop, vertices, endloop; passes the word normal and its three values before. */
 static ebpo_status read_loop(stl_text *t)
 {
     stl_word word;
     ebpo_status status = EBPO_OK;
-    do {
+    for (int passed = 0;; passed++) {
         if (!next_word(t, &word))
             return fail_end(t);
-    } while (!is(word, "outer") && !is(word, "vertex") && !is(word, "endfacet"));
+        if (is(word, "outer") || is(word, "vertex") || is(word, "endfacet"))
+            break;
+        if (passed > 3)
+            note_odd(t);
+    }
     if (is(word, "endfacet"))
         return fail_word(t, "outer loop", word);
     if (is(word, "outer") && next_word(t, &word) && !is(word, "loop"))
@@ -159,10 +151,34 @@ static ebpo_status read_loop(stl_text *t)
                                 " vertices, not three; repair the file",
                                 t->line, t->loops + 1, t->corners);
     t->loops++;
+    pass_odd(t);
     return status;
 }
 
-/* A solid's name goes up to the first facet, or to the end of this solid. */
+/* True where a facet follows `t` that cannot be words of a name: up to its first coordinate. */
+static bool holds_facet(const stl_text *t)
+{
+    stl_text ahead = *t;
+    stl_word word;
+    float x;
+    bool more = next_word(&ahead, &word);
+    for (int i = 0; more && i < 4 && !is(word, "outer") && (i || is(word, "normal")); i++)
+        more = next_word(&ahead, &word);
+    return more && is(word, "outer") && next_word(&ahead, &word) && is(word, "loop") &&
+           next_word(&ahead, &word) && is(word, "vertex") && next_word(&ahead, &word) &&
+           ebpo_number_float(&x, word.s, word.n, t->build->c_locale);
+}
+
+/* Passes the rest of a line that names a solid: any words, but files of one line exist. */
+static void pass_name(stl_text *t)
+{
+    stl_text ahead = *t;
+    stl_word word;
+    while (next_word(&ahead, &word) && ahead.line == t->line &&
+           !(is(word, "facet") && holds_facet(&ahead)))
+        t->at = ahead.at;
+}
+
 static bool begins_facet(stl_text *t, stl_word word)
 {
     stl_text ahead = *t;
@@ -173,7 +189,7 @@ static bool begins_facet(stl_text *t, stl_word word)
 
 static ebpo_status read_text(stl_text *t)
 {
-    bool named = true; /* words are a solid's name */
+    bool between = true; /* solids: words may be of any kind */
     stl_word word;
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK && next_word(t, &word)) {
@@ -182,14 +198,19 @@ static ebpo_status read_text(stl_text *t)
             t->next_release = (uint64_t)(t->at - t->begin) + RELEASE;
         }
         if (begins_facet(t, word)) {
-            named = false;
+            t->solids += t->begun;
+            between = t->begun = false;
             status = read_loop(t);
         } else if (is(word, "solid") || is(word, "endsolid")) {
-            named = true;
-            t->solids += is(word, "solid");
-        } else if (is(word, "endfacet") || is(word, "end") || is(word, "color") || named) {
+            between = t->begun = true;
+            pass_name(t);
+        } else if (between) {
+            note_odd(t);
+        } else if (is(word, "end")) {
             continue;
-        } else if (!is(word, "endloop")) {
+        } else if (is(word, "endfacet") || is(word, "endloop") || is(word, "color")) {
+            pass_odd(t);
+        } else {
             status = fail_word(t, "facet or endsolid", word);
         }
     }
@@ -219,7 +240,8 @@ static bool is_text(const uint8_t *data, uint64_t size)
 {
     uint64_t look = size < LOOK_AHEAD ? size : LOOK_AHEAD;
     const uint8_t *at = data, *end = data + look;
-    if (fits_binary(data, size) || !begins_solid(data, size))
+    if (!begins_solid(data, size) || memchr(data, 0, size < HEAD ? size : HEAD) ||
+        ebpo_stl_fits_binary(data, size))
         return false;
     for (; at + 5 <= end; at++)
         if (strncasecmp((const char *)at, "facet", 5) == 0)
@@ -229,11 +251,24 @@ static bool is_text(const uint8_t *data, uint64_t size)
 
 ebpo_status ebpo_stl_read(import_build *b, const uint8_t *data, uint64_t size)
 {
-    const char *text = (const char *)data;
-    stl_text t = { .build = b, .begin = text, .at = text, .end = text + size, .line = 1 };
-    ebpo_status status = is_text(data, size) ? read_text(&t) : read_binary(b, data, size);
+    const char *text = (const char *)data + ebpo_text_mark(data, size);
+    stl_text t = {
+        .build = b, .begin = text, .at = text, .end = (const char *)data + size, .line = 1
+    };
+    uint64_t plain = 0;
+    ebpo_status status =
+        is_text(data, size) ? read_text(&t) : ebpo_stl_read_binary(b, data, size, &plain);
     if (status == EBPO_OK)
         status = make_faces(b);
+    if (status == EBPO_OK && t.odd)
+        status = ebpo_import_notes(b);
+    if (status == EBPO_OK && t.odd)
+        ebpo_attributes_note_unread(b->mesh->attributes,
+                                    "words that STL does not have: %" PRIu64
+                                    ", the first in line %" PRIu64,
+                                    t.odd, t.odd_line);
+    if (status == EBPO_OK && b->attributes && plain)
+        status = ebpo_import_stl_colours(b->mesh, data, plain, b->error);
     if (status == EBPO_OK && b->attributes && t.solids > 1)
         ebpo_attributes_lose(b->mesh->attributes, "names of solids");
     return status;

@@ -5,8 +5,8 @@
 
 #include "import/import_build.h"
 
-/* Whether the bytes are of an STL file: binary if the size is that of the faces it states, whatever
- * stands first. */
+/* True for the bytes of an STL file: binary if all of them are those of the faces that it states,
+ * whatever it begins with; else text that begins with the word solid. */
 bool ebpo_stl_recognise(const uint8_t *data, uint64_t size);
 
 /* Makes the mesh. A file that is called STL is text if it says so and has the word facet. Normals

@@ -10,8 +10,10 @@
 #include "base/arrays.h"
 #include "base/sized.h"
 #include "import/import.h"
+#include "import/stl.h"
 #include "input/texture_files.h"
 #include "io/file_source.h"
+#include "io/foreign_bytes.h"
 #include "mesh/mesh_parts.h"
 #include "mesh/named_groups.h"
 #include "ply/ply.h"
@@ -80,9 +82,13 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char
                          ebpo_error *error)
 {
     const char *dot = strrchr(ebpo_path_name(path), '.');
+    const char *foreign;
     ebpo_import_format format;
     if (ebpo_ply_recognise(file->data, file->size))
         return parse_ply(out, file, path, wanted, error);
+    if (!ebpo_stl_recognise(file->data, file->size) &&
+        (foreign = ebpo_foreign_bytes(file->data, file->size)))
+        return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(path), "%s", foreign);
     if (ebpo_import_recognise(&format, file->data, file->size, path))
         return !ebpo_progress_stage(&wanted->progress, "reading", error) ? EBPO_E_CANCELLED
                : groups && format == EBPO_IMPORT_OBJ

@@ -6,6 +6,7 @@
 #include "attributes/textures.h"
 #include "base/alloc.h"
 #include "base/hash.h"
+#include "base/text.h"
 
 /* Text that does not end with a zero. */
 typedef struct span {
@@ -42,6 +43,13 @@ static bool is(span word, const char *text)
 static bool begins(span word, const char *text)
 {
     return word.n >= strlen(text) && memcmp(word.s, text, strlen(text)) == 0;
+}
+
+/* Text behind its mark of the order of bytes, if it has one. */
+static span whole_text(const uint8_t *text, uint64_t bytes)
+{
+    uint64_t mark = ebpo_text_mark(text, bytes);
+    return (span){ (const char *)text + mark, bytes - mark };
 }
 
 /* The next line; false: there is none. */
@@ -191,7 +199,7 @@ static span skip_options(span rest)
 
 void ebpo_texture_names_of_mtl(ebpo_texture_names *names, const uint8_t *text, uint64_t bytes)
 {
-    span rest = { (const char *)text, bytes }, line, material = { "", 0 };
+    span rest = whole_text(text, bytes), line, material = { "", 0 };
     while (next_line(&rest, &line)) {
         span word = take_word(&line);
         if (is(word, "newmtl"))
@@ -204,10 +212,13 @@ void ebpo_texture_names_of_mtl(ebpo_texture_names *names, const uint8_t *text, u
 void ebpo_obj_libraries(const uint8_t *text, uint64_t bytes,
                         void (*take)(void *context, const char *rest, size_t size), void *context)
 {
-    span rest = { (const char *)text, bytes }, line;
-    while (next_line(&rest, &line))
+    span rest = whole_text(text, bytes), line;
+    while (next_line(&rest, &line)) {
+        for (; line.n && is_blank(*line.s); line.n--)
+            line.s++;
         if (line.n > 6 && memcmp(line.s, "mtllib", 6) == 0 && is_blank(line.s[6])) {
             take_word(&line);
             take(context, line.s, line.n);
         }
+    }
 }

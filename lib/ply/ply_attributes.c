@@ -320,14 +320,17 @@ static bool is_plain(const ply_header *h)
     return true;
 }
 
-/* Lines as they are, each ended by one line feed. */
+/* Lines as they are, each ended by one line feed; the first is "ply" and no more. */
 static ebpo_status take_header(ply_parser *p)
 {
     ebpo_attributes *to = p->mesh->attributes;
     to->header = ebpo_alloc(p->header.body, 1);
     if (!to->header)
         return ebpo_fail_memory(p->error, p->header.body);
-    for (uint64_t i = 0; i < p->header.body; i++) {
+    memcpy(to->header, "ply", to->header_bytes = 3);
+    char unused;
+    const char *first = ebpo_ply_first_line(p->data, p->size, &unused);
+    for (uint64_t i = (uint64_t)(first - (const char *)p->data); i < p->header.body; i++) {
         char c = (char)p->data[i];
         bool end = c == p->header.line_end;
         if (end && p->header.line_end == '\n' && to->header_bytes &&

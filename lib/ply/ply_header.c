@@ -8,6 +8,8 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/text.h"
+#include "io/foreign_bytes.h"
 
 enum { MAX_WORDS = 6 }; /* no statement has more than five; a sixth shows that there are too many */
 
@@ -256,12 +258,27 @@ static ebpo_status statement(reader *r, ply_word line, bool *ended)
     return r->header->elements ? fail(r, "unknown statement", words[0]) : EBPO_OK;
 }
 
+const char *ebpo_ply_first_line(const uint8_t *data, uint64_t size, char *line_end)
+{
+    const char *at = (const char *)data + ebpo_text_mark(data, size),
+               *end = (const char *)data + size;
+    if (end - at < 4 || memcmp(at, "ply", 3) != 0)
+        return NULL;
+    for (at += 3; at < end && (*at == ' ' || *at == '\t');)
+        at++;
+    *line_end = end - at > 1 && at[0] == '\r' && at[1] != '\n' ? '\r' : '\n';
+    return at < end && (*at == '\n' || *at == '\r') ? at : NULL;
+}
+
 static ebpo_status check_magic(reader *r, uint64_t size)
 {
-    ply_word line = { "", 0 };
-    if (size >= 5 && memcmp(r->at, "ply\r", 4) == 0 && r->at[4] != '\n')
-        r->header->line_end = '\r';
-    if (size < 4 || memcmp(r->at, "ply", 3) != 0 || !next_line(r, &line) || line.n != 3)
+    ply_word line;
+    const char *end = ebpo_ply_first_line((const uint8_t *)r->at, size, &r->header->line_end);
+    const char *foreign = end ? NULL : ebpo_foreign_bytes((const uint8_t *)r->at, size);
+    if (foreign)
+        return ebpo_fail_at(r->error, EBPO_E_FORMAT, r->name, "", 0, "%s", foreign);
+    r->at = end ? end : r->at;
+    if (!end || !next_line(r, &line))
         return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
                               "line 1: no PLY file, it does not begin with a line 'ply'");
     return EBPO_OK;

@@ -74,6 +74,10 @@ EBPO_MUST_USE ebpo_status ebpo_ply_header_parse(ply_header *out, const uint8_t *
                                                 const char *name, ebpo_error *error);
 void ebpo_ply_header_free(ply_header *header);
 
+/* Returns the end of the line "ply" that the data begin with, where its line end is: it may follow
+ * a mark of the order of bytes, and have blanks behind it. NULL: there is no such line. */
+const char *ebpo_ply_first_line(const uint8_t *data, uint64_t size, char *line_end);
+
 /* A word for a message: at most 40 characters, what is not printable ASCII becomes '?'. */
 enum { PLY_WORD_TEXT = 41 };
 void ebpo_ply_word_text(char text[PLY_WORD_TEXT], ply_word word);

@@ -15,12 +15,14 @@
 #include "ply/ply_attributes.h"
 #include "ply/ply_binary.h"
 #include "ply/ply_state.h"
+#include "ply/ply_unused.h"
 
 #define MOST_VERTICES (UINT64_C(0xfffffffe))
 
 bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
 {
-    return size >= 4 && memcmp(data, "ply", 3) == 0 && (data[3] == '\n' || data[3] == '\r');
+    char line_end;
+    return ebpo_ply_first_line(data, size, &line_end) != NULL;
 }
 
 /* Least bytes of all rows; false when they exceed any file. */
@@ -181,16 +183,13 @@ static void describe(ply_parser *p)
 
 static ebpo_status note_surplus(ply_parser *p)
 {
-    ebpo_mesh *mesh = p->mesh;
-    if (!p->surplus_values)
-        return EBPO_OK;
-    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
-        return ebpo_fail_memory(p->error, sizeof *mesh->attributes);
-    ebpo_attributes_note_unread(mesh->attributes,
-                                "values that the header does not describe: %" PRIu64
-                                ", at the ends of %" PRIu64 " rows",
-                                p->surplus_values, p->surplus_rows);
-    return EBPO_OK;
+    ebpo_status status = p->surplus_values ? ebpo_ply_notes(p) : EBPO_OK;
+    if (p->surplus_values && status == EBPO_OK)
+        ebpo_attributes_note_unread(p->mesh->attributes,
+                                    "values that the header does not describe: %" PRIu64
+                                    ", at the ends of %" PRIu64 " rows",
+                                    p->surplus_values, p->surplus_rows);
+    return status;
 }
 
 /* All but the mesh. */
@@ -231,6 +230,8 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
         status = ebpo_ply_attributes_end(&p);
     if (status == EBPO_OK)
         status = note_surplus(&p);
+    if (status == EBPO_OK)
+        status = ebpo_ply_leave_unused(&p);
     if (status == EBPO_OK) {
         trim(&p);
         describe(&p);

@@ -24,6 +24,14 @@ ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...)
                         "byte %" PRIu64 ": %s", p->at, text);
 }
 
+ebpo_status ebpo_ply_notes(ply_parser *p)
+{
+    ebpo_mesh *mesh = p->mesh;
+    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
+        return ebpo_fail_memory(p->error, sizeof *mesh->attributes);
+    return EBPO_OK;
+}
+
 const char *ebpo_ply_row_name(const ply_element *element)
 {
     static const char *const names[] = { "element", "vertex", "face", "strip" };

@@ -40,6 +40,10 @@ ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...) EBPO_PRI
 /* The file ends within row `row` of `element`. */
 ebpo_status ebpo_ply_fail_end(const ply_parser *p, const ply_element *element, uint64_t row);
 
+/* Gives the mesh attributes where it has none, so that what was left out can be noted.
+ * EBPO_E_MEMORY. */
+EBPO_MUST_USE ebpo_status ebpo_ply_notes(ply_parser *p);
+
 /* "vertex", "face", "strip" or "element" for messages. */
 const char *ebpo_ply_row_name(const ply_element *element);
 

@@ -2,12 +2,10 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "scene/scene_parts.h"
 
-size_t scene_text_mark(const char *text, size_t size)
-{
-    return size >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
-}
+size_t scene_text_mark(const char *text, size_t size) { return (size_t)ebpo_text_mark(text, size); }
 
 bool scene_text_is_wide(const char *text, size_t size)
 {

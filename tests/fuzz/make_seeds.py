@@ -135,7 +135,15 @@ stl = b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nver
 faces = ((0, 0, 0, 0, 1, 0, 1, 0, 0), (0, 0, 0, 1, 0, 0, 0, 0, 1), (0, 0, 0, 0, 0, 1, 0, 1, 0), (1, 0, 0, 0, 1, 0, 0, 0, 1))
 binary = b"COLOR=\x80\x40\x20\xff".ljust(80, b"\0") + struct.pack("<I", 4) + b"".join(
     struct.pack("<12fH", 0, 0, 0, *face, 0x8000 | i * 99) for i, face in enumerate(faces))
+payload = bytes(80) + struct.pack("<I", 4) + b"".join(
+    struct.pack("<12fH", 0, 0, 0, *face, i) + bytes(i) for i, face in enumerate(faces))
 for flags in (0, 16):
+    put("import", f"stl_two_{flags}", bytes([1 | flags]) + binary + binary)
+    put("import", f"stl_payload_{flags}", bytes([1 | flags]) + payload)
+    put("import", f"stl_spare_{flags}", bytes([1 | flags]) + payload + b"behind")
+    put("import", f"stl_name_{flags}", bytes([1 | flags]) + b"\xef\xbb\xbf" + stl.replace(b"solid x", b"solid facet normal x")
+        .replace(b"endfacet", b"endfacet 1 2"))
+    put("import", f"off_glued_{flags}", bytes([(18 if flags else 2)]) + off.replace(b"OFF\n# a comment\n", b"\xef\xbb\xbf\t\fOFF"))
     put("import", f"obj_{flags}", bytes([flags]) + obj)
     put("import", f"stl_{flags}", bytes([1 | flags]) + stl)
     put("import", f"stl_binary_{flags}", bytes([1 | flags]) + binary)

@@ -21,9 +21,15 @@ typedef struct dialect {
 #define F4   "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 #define OFF4 "0 0 0\n1 0 0\n0 1 0\n0 0 1\n"
 #define OFFF "3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"
-#define PLY4                                                                                 \
-    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty " \
+#define HEAD_OF(vertices)                                                                          \
+    "format ascii 1.0\nelement vertex " vertices "\nproperty float x\nproperty float y\nproperty " \
     "float z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n"
+#define HEAD4 HEAD_OF("4")
+#define PLY4  "ply\n" HEAD4
+#define PLY5  "ply\n" HEAD_OF("5")
+#define LFS                                                                               \
+    "version https://git-lfs.github.com/spec/v1\noid sha256:5c4b3f3c3e8b1a3a1ed3e6f87ee3" \
+    "da8cbfd66e2c9e7b0a4d2b6a3ccd1f8a0d11\nsize 12345678\n"
 #define FACET(a, b, c)                                                                            \
     "facet normal 0 0 0\nouter loop\nvertex " a "\nvertex " b "\nvertex " c "\nendloop\nendfacet" \
     "\n"
@@ -31,6 +37,19 @@ typedef struct dialect {
     FACET("0 0 0", "0 1 0", "1 0 0") \
     FACET("0 0 0", "1 0 0", "0 0 1") \
     FACET("0 0 0", "0 0 1", "0 1 0") FACET("1 0 0", "0 1 0", "0 0 1")
+
+/* Binary STL: four facets of a tetrahedron, and what is behind each. */
+#define HEAD69         "a head of 80 bytes, which are of any kind                            "
+#define HEAD75         HEAD69 "      "
+#define HEAD80         HEAD75 "     "
+#define ZERO           "\0\0\0\0"
+#define ONE            "\0\0\x80\x3f"
+#define P0             ZERO ZERO ZERO
+#define PX             ONE ZERO ZERO
+#define PY             ZERO ONE ZERO
+#define PZ             ZERO ZERO ONE
+#define BINARY(behind) P0 P0 PY PX behind P0 P0 PX PZ behind P0 P0 PZ PY behind P0 PX PY PZ behind
+#define MODEL          HEAD80 "\4\0\0\0" BINARY("\0\0")
 
 static const dialect dialects[] = {
     /* OBJ */
@@ -77,13 +96,25 @@ static const dialect dialects[] = {
       "vertices' values beyond coordinates and colours: 1" },
     { "alpha.obj", FILE_OF("v 0 0 0 1 1 1 1\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 3, 1, NULL },
     { "xy.obj", FILE_OF("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n"), 0, 0,
-      "line 1: vertex 1 has no three coordinates" },
+      "line 1: vertex 1 has 2 coordinates, not three; write z as well (0 in a plane)" },
     { "comma.obj", FILE_OF("v 0,5 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 0, 0,
       "line 1: no number: '0,5' in vertex 1" },
     { "nan.obj", FILE_OF("v nan 0 -inf\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 3, 1, NULL },
-    { "ind.obj", FILE_OF("v -1.#IND 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 0, 0,
-      "line 1: no number: '-1.#IND' in vertex 1" },
+    { "ind.obj", FILE_OF("v -1.#IND 1.#QNAN 1.#INF00\nv 1 nan(ind) -nan(snan)\nv 0 1 0\nf 1 2 3\n"),
+      3, 1, NULL },
+    { "ind_0.obj", FILE_OF("v -1.#INDEX 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 0, 0,
+      "line 1: no number: '-1.#INDEX' in vertex 1" },
+    { "sign.obj", FILE_OF("v 3.1+e2 0 0\nv 310 0 0\nv 31-E-1 1 0\nv 0 1 0\nf 1 3 4\n"), 0, 0,
+      "line 3: no number: '31-E-1' in vertex 3" },
+    { "signs.obj", FILE_OF("v 3.1+e2 0 0\nv 310 0 0\nv 3100-E1 1 0\nv 0 1 0\nf 1 3 4\nf 2 4 3\n"),
+      3, 2, NULL },
     { "vn_ind.obj", FILE_OF(V4 "vn -nan(ind) 0 0\nvn 0\nf 1//1 2//1 3//2\n"), 3, 1, NULL },
+    { "lfs.obj", FILE_OF(LFS), 0, 0, "is a Git LFS pointer, not the file itself; fetch that: git" },
+    { "utf16_no_mark.obj", FILE_OF("v\0 \0001\0 \0002\0 \0003\0\n\0v\0"), 0, 0,
+      "(UTF-16); save it" },
+    { "utf16_be.obj", FILE_OF("\0v\0 \0001\0 \0002\0 \0003\0\n\0v"), 0, 0, "(UTF-16); save it" },
+    { "gzip.obj", FILE_OF("\x1f\x8b\10\0\0"), 0, 0,
+      "is compressed by gzip; decompress it: gunzip <FILE >NEW" },
     { "names.obj",
       FILE_OF("mtllib gone.mtl \xc3\xa9.mtl\ng \xe4\xb8\x89\xe8\xa7\x92 \\\no \nusemtl\n" V4 F4), 4,
       4, NULL },
@@ -100,10 +131,31 @@ static const dialect dialects[] = {
     { "points.obj", FILE_OF(V4), 0, 0, "has no faces" },
     { "pairs.obj", FILE_OF(V4 "f 1 2\n"), 0, 0, "none of its faces has three corners" },
     { "by_its_words", FILE_OF("# of a pipe\n\n" V4 F4), 4, 4, NULL },
+    { "by_its_size", FILE_OF(HEAD80 "\4\0\0\0" BINARY("\3\0abc")), 4, 4,
+      "bytes that follow facets, by their attribute byte counts: 12" },
+    { "html", FILE_OF("\n <!DOCTYPE html>\n<html>"), 0, 0, "is an HTML page" },
+    { "zip", FILE_OF("PK\3\4"), 0, 0, "is a ZIP archive, as 3MF and NPZ files are" },
+    { "xml", FILE_OF("<?xml version='1.0'?>"), 0, 0, "is an XML file" },
     { "by_no_words", FILE_OF("version 1\n"), 0, 0, "expected PLY, OBJ, STL or OFF" },
     /* OFF */
     { "a.off", FILE_OF("OFF\n4 4 6\n" OFF4 OFFF), 4, 4, NULL },
     { "counts.off", FILE_OF("OFF 4 4 6\n" OFF4 OFFF), 4, 4, NULL },
+    { "glued.off", FILE_OF("OFF4 4 6\n" OFF4 OFFF), 4, 4, NULL },
+    { "glued_alone.off", FILE_OF("OFF4\n4\n6\n" OFF4 OFFF), 4, 4, NULL },
+    { "glued_by_its_bytes", FILE_OF("OFF4 4 6\n" OFF4 OFFF), 4, 4, NULL },
+    { "glued_word.off", FILE_OF("OFF4x 4 6\n" OFF4 OFFF), 0, 0,
+      "neither the word OFF nor counts stand there" },
+    { "whitespace.off", FILE_OF("\t\t    \n  \f OFF4 4\v12 # or nah\n" OFF4 OFFF), 4, 4, NULL },
+    { "white.off",
+      FILE_OF("\f\n\r\n OFF\t4\f4\v6\t\n\t0\t0\v0\r\r\n1 0  0\f\r0 1 0\n\f\n 0 0 1 \n" OFFF "\f\n"),
+      4, 4, NULL },
+    { "mark", FILE_OF("\xef\xbb\xbfOFF\n4 4 6\n" OFF4 OFFF), 4, 4, NULL },
+    { "hash.off", FILE_OF("OFF\n3 1 0\n0 0 0#a\n1. 0 0.#IND\n0 1 0\n3 0 1 2\n"), 3, 1, NULL },
+    { "ind.off", FILE_OF("OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n1.#IND 0 0\n3 0 1 3\n"), 3, 1, NULL },
+    { "not_a_number.off", FILE_OF("OFF\n3 1 0\n0 0 0\n1 0,5 0\n0 1 0\n3 0 1 2\n"), 0, 0,
+      "line 4: no number: '0,5' in vertex 1" },
+    { "obj.off", FILE_OF("# a cube\n" V4 F4), 0, 0,
+      "begins as an OBJ file does, but its name says OFF; rename it to end in .obj" },
     { "lines.off", FILE_OF("OFF\n4\n4\n6\n" OFF4 OFFF), 4, 4, NULL },
     { "no_edges.off", FILE_OF("OFF\n4 4\n" OFF4 OFFF), 4, 4, NULL },
     { "no_word.off", FILE_OF("4 4 0\n" OFF4 OFFF), 4, 4, NULL },
@@ -183,6 +235,75 @@ static const dialect dialects[] = {
     { "unended.stl", FILE_OF("solid a\n" STL4), 4, 4, NULL },
     { "cut.stl", FILE_OF("solid a\n" STL4 "facet normal 0 0 0\nouter loop\nvertex 0 0"), 0, 0,
       "the file ends within facet 5; it is cut short" },
+    { "mark.stl", FILE_OF("\xef\xbb\xbfsolid a\n" STL4 "endsolid a\n"), 4, 4, NULL },
+    { "marked_stl", FILE_OF("\xef\xbb\xbfsolid a\n" STL4 "endsolid a\n"), 4, 4, NULL },
+    { "keyword.stl",
+      FILE_OF("solid facet normal of facet\n" STL4 "endsolid facet normal of facet\n"), 4, 4,
+      NULL },
+    { "keywords.stl",
+      FILE_OF("solid facet normal 0 0 0\n" STL4
+              "endsolid solid\nsolid endsolid facet outer loop\n" FACET(
+                  "5 0 0", "6 0 0", "5 1 0") "endsolid endsolid outer\n"),
+      7, 5, NULL },
+    { "facet.stl", FILE_OF("solid facet\n" STL4 "endsolid facet\n"), 4, 4, NULL },
+    { "one_line.stl",
+      FILE_OF(
+          "solid a facet normal 0 0 0 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop "
+          "endfacet endsolid a solid b facet outer loop vertex 5 0 0 vertex 6 0 0 vertex 5 1 0 "
+          "endloop endfacet endsolid b"),
+      6, 2, NULL },
+    { "behind.stl",
+      FILE_OF("solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+              "endloop of 1\nendfacet 1 red\ncolor 1 0 0\nendsolid a\n"),
+      3, 1, "words that STL does not have: 7, the first in line 7" },
+    { "between.stl",
+      FILE_OF(
+          "solid a\nmade by hand\nfacet normal 0 0 0 1 2\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+          "vertex 0 1 0\nendloop\nendfacet\nendsolid a\nvertex\n"),
+      3, 1, "words that STL does not have: 6, the first in line 2" },
+    { "ind.stl",
+      FILE_OF(
+          "solid a\nfacet normal -1.#IND -1.#IND -1.#IND\nouter loop\nvertex 3.1+e2 0 0\nvertex "
+          "1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n"),
+      3, 1, NULL },
+    { "binary.stl", FILE_OF(MODEL), 4, 4, NULL },
+    { "two_binary.stl", FILE_OF(MODEL MODEL), 4, 8, NULL },
+    { "payload.stl", FILE_OF(HEAD80 "\4\0\0\0" BINARY("\4\0abcd")), 4, 4,
+      "bytes that follow facets, by their attribute byte counts: 16" },
+    { "solid_payload.stl", FILE_OF("solid" HEAD75 "\4\0\0\0" BINARY("\4\0abcd")), 4, 4,
+      "bytes that follow facets, by their attribute byte counts: 16" },
+    { "some_payload.stl",
+      FILE_OF(HEAD80 "\4\0\0\0" P0 P0 PY PX "\1\0a" P0 P0 PX PZ "\0\0" P0 P0 PZ PY
+                     "\2\0ab" P0 PX PY PZ "\0\0"),
+      4, 4, "bytes that follow facets, by their attribute byte counts: 3" },
+    { "less_payload.stl", FILE_OF(HEAD80 "\4\0\0\0" BINARY("\2\0ab") "c"), 0, 0,
+      "states 4 faces, which take 284 of its 293 bytes" },
+    { "spare.stl", FILE_OF(MODEL "0123456789abc"), 4, 4, "bytes behind the last facet: 13" },
+    { "solid_spare.stl", FILE_OF("solid facet" HEAD69 "\4\0\0\0" BINARY("\0\0") "?"), 4, 4,
+      "bytes behind the last facet: 1" },
+    { "colours_and_spare.stl", FILE_OF(HEAD80 "\4\0\0\0" BINARY("\xff\xff") "\n"), 4, 4,
+      "bytes behind the last facet: 1" },
+    { "count_zero.stl", FILE_OF(HEAD80 ZERO BINARY("\0\0")), 0, 0,
+      "states 0 faces, but its 284 bytes hold 4; correct the count (bytes 80 to 83)" },
+    { "count_two.stl", FILE_OF(HEAD80 "\2\0\0\0" BINARY("\0\0")), 0, 0,
+      "states 2 faces, but its 284 bytes hold 4; correct the count" },
+    { "count_most.stl", FILE_OF(HEAD80 "\xff\xff\xff\xff" BINARY("\0\0")), 0, 0,
+      "states 4294967295 faces, but its 284 bytes hold 4" },
+    { "no_faces.stl", FILE_OF(HEAD80 ZERO), 0, 0, "has no faces" },
+    { "no_faces_spare.stl", FILE_OF(HEAD80 ZERO "abc"), 0, 0, "has no faces" },
+    { "models_or_payload.stl",
+      FILE_OF(HEAD80 "\1\0\0\0" P0 P0 PX PY "\206\0" HEAD80 "\1\0\0\0" P0 P0 PX PY "\0\0"), 0, 0,
+      "states 1 faces, which take 134 of its 268 bytes" },
+    { "obj.stl", FILE_OF(V4 F4), 0, 0,
+      "begins as an OBJ file does, but its name says STL; rename it to end in .obj" },
+    { "lfs.stl", FILE_OF(LFS), 0, 0, "is a Git LFS pointer" },
+    { "utf16.stl", FILE_OF("\xff\xfes\0o\0l\0i\0d\0"), 0, 0, "(UTF-16); save it as UTF-8" },
+    { "utf32.stl", FILE_OF("\xff\xfe\0\0s\0\0\0"), 0, 0, "(UTF-32); save it as UTF-8" },
+    { "gzip.stl", FILE_OF("\x1f\x8b\10\0" HEAD80 HEAD80), 0, 0, "is compressed by gzip" },
+    { "html.stl", FILE_OF("<html><head><title>404" HEAD80), 0, 0, "is an HTML page" },
+    { "comment.stl", FILE_OF("# made by x\nsolid x\n" STL4 "endsolid\n"), 0, 0,
+      "is no STL file, but text that begins with '#'; an STL file in text begins with the word "
+      "solid" },
     { "quad.stl",
       FILE_OF("solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex "
               "1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n"),
@@ -195,6 +316,20 @@ static const dialect dialects[] = {
     { "not.stl", FILE_OF("not an stl file at all"), 0, 0, "is no STL file" },
     /* PLY in text */
     { "a.ply", FILE_OF(PLY4 OFF4 OFFF), 4, 4, NULL },
+    { "mark.ply", FILE_OF("\xef\xbb\xbf" PLY4 OFF4 OFFF), 4, 4, NULL },
+    { "marked_ply", FILE_OF("\xef\xbb\xbf" PLY4 OFF4 OFFF), 4, 4, NULL },
+    { "blank.ply", FILE_OF("ply \t\r\n" HEAD4 OFF4 OFFF), 4, 4, NULL },
+    { "word.ply", FILE_OF("ply x\n" HEAD4 OFF4 OFFF), 0, 0, "it does not begin with a line 'ply'" },
+    { "lfs.ply", FILE_OF(LFS), 0, 0, "is a Git LFS pointer" },
+    { "float_count.ply",
+      FILE_OF("ply\nformat ascii 1.0\nelement face 4\nproperty list float int vertex_indices\n"), 0,
+      0, "line 4: no type for a list's length: 'float'" },
+    { "ind.ply", FILE_OF(PLY4 "3.1+e2 0 0\n1 0 1.#INF\n0 1 0\n0 0 -1.#IND\n" OFFF), 4, 4, NULL },
+    { "unused.ply", FILE_OF(PLY5 OFF4 "nan 0 0\n" OFFF), 4, 4,
+      "vertices whose coordinates are not finite, and that no face names: 1" },
+    { "unused_first.ply", FILE_OF(PLY5 "0 0 -inf\n" OFF4 "3 1 3 2\n3 1 2 4\n3 1 4 3\n3 2 3 4\n"), 4,
+      4, "vertices whose coordinates are not finite, and that no face names: 1" },
+    { "unused_finite.ply", FILE_OF(PLY5 OFF4 "9 9 9\n" OFFF), 5, 4, NULL },
     { "more.ply",
       FILE_OF(PLY4 "0 0 0 9\n1 0 0 9 \n0 1 0 9\n0 0 1 9\n3 0 2 1 8 8\n3 0 1 3\n3 0 3 2\n3 "
                    "1 2 3\n"),

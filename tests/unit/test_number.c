@@ -119,6 +119,52 @@ START_TEST(edges_of_the_range_are_read)
 }
 END_TEST
 
+static const struct {
+    const char *text, *standard;
+} foreign[] = {
+    { "3.1+e2", "3.1e2" },
+    { "-3.1-E02", "-3.1e-02" },
+    { "1234567890123456789012+e-1", NULL },
+    { "12345678901234567890123456789-e20", "12345678901234567890123456789e-20" },
+    { "1+e2", "1e2" },
+    { ".5+e300", ".5e300" },
+    { "+e2", NULL },
+    { "1+e", NULL },
+    { "1+e+2", NULL },
+    { "1+2", NULL },
+    { "1++e2", NULL },
+    { "1.#INF", "inf" },
+    { "-1.#inf00", "-inf" },
+    { "+1.#IND", "nan" },
+    { "1.#QNAN0", "nan" },
+    { "1.#SNAN", "nan" },
+    { "-nan(ind)", "nan" },
+    { "NaN(snan)", "nan" },
+    { "1.#", NULL },
+    { "1.#INF1", NULL },
+    { "1.#INDEX", NULL },
+    { "2.#INF", NULL },
+    { "nan()", NULL },
+    { "nan(ind)0", NULL },
+};
+
+START_TEST(numbers_of_other_programs_are_read_as_standard_ones)
+{
+    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    const char *s = foreign[_i].text, *standard = foreign[_i].standard;
+    float f = 1;
+    double d = 1;
+    bool read_f = ebpo_number_float(&f, s, strlen(s), c),
+         read_d = ebpo_number_double(&d, s, strlen(s), c);
+    ck_assert_msg(read_f == (standard != NULL) && read_d == read_f, "%s", s);
+    if (standard && strcmp(standard, "nan") == 0)
+        ck_assert_msg(isnan(f) && isnan(d), "%s", s);
+    else if (standard)
+        ck_assert_msg(f == strtof(standard, NULL) && d == strtod(standard, NULL), "%s", s);
+    freelocale(c);
+}
+END_TEST
+
 START_TEST(what_is_no_number_is_refused)
 {
     static const char *const cases[] = { "",     "-",     "+",   ".",    "e5",   "1e",
@@ -159,6 +205,8 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, random_decimals_are_rounded_as_by_the_c_library, 0, 3);
     tcase_add_test(tests, midpoints_between_floats_are_rounded_once);
     tcase_add_test(tests, edges_of_the_range_are_read);
+    tcase_add_loop_test(tests, numbers_of_other_programs_are_read_as_standard_ones, 0,
+                        (int)(sizeof foreign / sizeof *foreign));
     tcase_add_test(tests, what_is_no_number_is_refused);
     tcase_add_test(tests, integers_are_read_whole_or_not_at_all);
     Suite *suite = suite_create("number");

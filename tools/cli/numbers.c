@@ -14,6 +14,19 @@ static bool ends_number(char c)
            c == '#' || c == '\n';
 }
 
+/* Microsoft's C library writes 1.#INF, 1.#IND, 1.#QNAN and 1.#SNAN for what is not finite: the
+ * number does not end before the '#'. */
+static double pass_names(double v, const char **after)
+{
+    const char *at = *after;
+    if (at[0] != '#' || at[-1] != '.' || !at[1] || !strchr("IQS", at[1]))
+        return v;
+    while (!ends_number(at[1]))
+        at++;
+    *after = at + 1;
+    return NAN;
+}
+
 /* Hexadecimal numbers, those beyond the range and all that is wrong are strtod's. */
 double number_read(const char *text, const char *end, const char **after)
 {
@@ -21,15 +34,19 @@ double number_read(const char *text, const char *end, const char **after)
 #ifdef EBPO_HAVE_CHARCONV
     const char *digits = text + (*text == '+' && text + 1 < end && text[1] != '-');
     if (number_charconv_read(digits, end, after, &v) && (*after == end || ends_number(**after)))
-        return v;
+        return pass_names(v, after);
 #else
     (void)end;
-    (void)ends_number;
 #endif
     char *stop;
     v = strtod(text, &stop);
     *after = stop;
-    return v;
+    return stop > text ? pass_names(v, after) : v;
+}
+
+const char *number_skip_mark(const char *text)
+{
+    return text + (strncmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0);
 }
 
 /* --- printing --- */

@@ -14,6 +14,9 @@ enum { NUMBER_ROOM = 32 };
  * text ends. */
 double number_read(const char *text, const char *end, const char **after);
 
+/* Returns where a file's text begins: behind a mark of the order of bytes, if there is one. */
+const char *number_skip_mark(const char *text);
+
 /* Where it ends. The layout is that of printf's %.17g; not finite: inf, -inf, nan, -nan. */
 char *number_write(char *out, double v);
 char *number_write_uint(char *out, uint64_t v);

@@ -233,12 +233,26 @@ static bool begins(const points *p, const char *with, size_t count)
  * is about 1e219 or 1e243. */
 static bool begins_as_ply(const points *p)
 {
-    if (!begins(p, "ply\n", 4) && !begins(p, "ply\r", 4))
+    if (!begins(p, "ply\n", 4) && !begins(p, "ply\r", 4) &&
+        (p->raw || (!begins(p, "ply ", 4) && !begins(p, "ply\t", 4))))
         return false;
     for (size_t i = 5; i < HEAD && p->raw; i++)
         if (i >= p->rest_count || p->rest[i] < 'a' || p->rest[i] > 'z')
             return false;
     return true;
+}
+
+/* Files of other kinds, which the library names: text that is none, to say so. */
+static bool is_foreign(points *p)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    double *xyz = NULL;
+    uint64_t count;
+    if (ebpo_points_parse_ply(p->rest, p->rest_count, p->name, &xyz, &count, &error) == EBPO_OK ||
+        error.offset != 0)
+        return free(xyz), false;
+    fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
+    return p->failed = true;
 }
 
 /* Fails, and says which datasets could be meant. */
@@ -265,6 +279,8 @@ static bool recognise(points *p, points_block *b)
         return refuse_hdf5(p, b);
     if (begins(p, "\223NUMPY", 6))
         return read_npy(p, b);
+    if (!p->raw && begins(p, "\xef\xbb\xbf", 3)) /* byte order mark */
+        points_drop(p, 3);
     if (begins_as_ply(p) && !p->raw)
         return read_ply(p, b);
     if (begins_as_ply(p) && p->kind == POINTS)
@@ -273,16 +289,14 @@ static bool recognise(points *p, points_block *b)
         return points_fault(b, 0,
                             "is a PLY file, which holds points; give %s as text or as raw doubles",
                             wanted[p->kind]);
-    if (!p->raw && begins(p, "\xef\xbb\xbf", 3)) /* byte order mark */
-        points_drop(p, 3);
-    return true;
+    return p->raw || !is_foreign(p);
 }
 
 /* A short line of text is not kept waiting for more. */
 bool points_recognise(points *p, points_block *b)
 {
     for (;;) {
-        bool binary = p->rest_count && (uint8_t)p->rest[0] > 0x7f && (uint8_t)p->rest[0] != 0xef;
+        bool binary = p->rest_count && (uint8_t)p->rest[0] > 0x7f;
         if (p->rest_count >= (p->raw || binary ? HEAD : 4) || p->ended || b->failed)
             break;
         points_fill(p, b);

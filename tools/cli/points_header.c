@@ -114,6 +114,9 @@ bool points_take_header(points *p, points_block *b)
             return true;
     }
     *end = 0;
+    while (s < end && is_blank(*s))
+        s++;
+    s += s[0] == '/' && s[1] == '/' ? 2 : 0; /* as CloudCompare writes it */
     p->separator = (char)(memchr(s, ',', (size_t)(end - s))    ? ','
                           : memchr(s, ';', (size_t)(end - s))  ? ';'
                           : memchr(s, '\t', (size_t)(end - s)) ? '\t'

@@ -116,16 +116,20 @@ static char *skip_blanks(char *s)
     return s;
 }
 
-/* `at`: what is no number. */
-static bool wrong_count(const points *p, points_block *b, const char *at)
+/* `at`: what is no number; `more`: it follows as many numbers as a row may have. */
+static bool wrong_count(const points *p, points_block *b, const char *at, bool more)
 {
     static const char *const expected[] = {
         "expected three numbers", "expected six or seven numbers: origin, direction and tmax",
         "expected six numbers: the lower and the upper corner"
     };
-    bool names = b->first && !b->row_count && !p->headless && (isalpha((uint8_t)*at) || *at == '"');
-    return points_fault(b, b->lines, "%s%s", expected[p->kind],
-                        names ? "; --header takes the first line for names of columns" : "");
+    bool names = b->first && !b->row_count && !p->headless &&
+                 (isalpha((uint8_t)*at) || *at == '"' || (at[0] == '/' && at[1] == '/'));
+    return points_fault(b, b->lines, "%s%s%s", expected[p->kind], more ? ", but more follow" : "",
+                        names ? "; --header takes the first line for names of columns"
+                        : more && !p->headless
+                            ? "; name the columns in a line before the first, and give --header"
+                            : "");
 }
 
 static bool parse_blanks(const points *p, points_block *b, char *s, char *end, double *row,
@@ -134,10 +138,10 @@ static bool parse_blanks(const points *p, points_block *b, char *s, char *end, d
     while (*s && *s != '#') {
         const char *after;
         if (*count == points_width(p->kind))
-            return wrong_count(p, b, s);
+            return wrong_count(p, b, s, true);
         row[*count] = number_read(s, end, &after);
         if (after == s || !(is_blank(*after) || *after == ',' || *after == '#' || !*after))
-            return wrong_count(p, b, s);
+            return wrong_count(p, b, s, false);
         if (!isfinite(row[(*count)++]))
             return points_fault(b, b->lines, "number %d is not finite", *count);
         s = skip_blanks((char *)after);
@@ -180,7 +184,7 @@ static bool parse_line(const points *p, points_block *b, char *s, char *end)
     if (!(p->fields ? parse_fields : parse_blanks)(p, b, s, end, row, &count))
         return false;
     if (count < points_raw_width(p->kind))
-        return wrong_count(p, b, s);
+        return wrong_count(p, b, s, false);
     if (count < points_width(p->kind))
         row[count] = p->tmax;
     b->row_count++;

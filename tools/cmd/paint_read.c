@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cli/numbers.h"
 #include "cmd/paint_job.h"
 
 bool paint_read_colour(const char *text, uint32_t *out)
@@ -91,8 +92,8 @@ static int read_numbers(const char *text, double *out, int most)
         text += strspn(text, " \t\r\n,");
         if (*text == 0 || *text == '#')
             return count;
-        char *end;
-        double v = strtod(text, &end);
+        const char *end;
+        double v = number_read(text, text + strlen(text), &end);
         bool ends = *end == 0 || strchr(" \t\r\n,#", *end);
         if (end == text || !ends || count == most || !isfinite(v))
             return -1;
@@ -131,10 +132,11 @@ static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_hand **hand, 
     size_t room = 0;
     uint64_t number = 0, capacity = 0;
     const char *wrong = NULL;
-    while (!wrong && getline(&line, &room, in) >= 0) {
+    ssize_t length;
+    while (!wrong && (length = getline(&line, &room, in)) >= 0) {
         double row[5];
-        int found = read_numbers(line, row, 5);
-        number++;
+        const char *text = number++ ? line : number_skip_mark(line);
+        int found = strlen(line) == (size_t)length ? read_numbers(text, row, 5) : -1;
         if (found == 0)
             continue;
         if (*count == capacity) {

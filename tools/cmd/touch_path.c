@@ -68,7 +68,9 @@ static bool read_lines(path *p, FILE *in, const char *name)
     ssize_t length;
     for (uint64_t n = 1; fine && (length = getline(&line, &room, in)) >= 0; n++) {
         double v[7];
-        int count = strlen(line) == (size_t)length ? numbers(line, (size_t)length, v) : -1;
+        const char *text = n == 1 ? number_skip_mark(line) : line;
+        int count =
+            strlen(line) == (size_t)length ? numbers(text, (size_t)(line + length - text), v) : -1;
         fine = count == 0 || ((count == 3 || count == 7) && add(p, v, count));
         if (!fine)
             fprintf(stderr,

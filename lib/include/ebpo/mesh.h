@@ -183,7 +183,8 @@ typedef struct ebpo_mesh_read_options {
  * text is rounded correctly: of PLY to the type that its header says, of the other
  * formats to float. In these, vertices of one position are one,
  * and those that no face names are left out. ebpo_mesh_unread tells what could not
- * be read.
+ * be read. Vertices of a PLY that no face names are left out if their coordinates
+ * are not finite.
  *
  * Safe on untrusted files. They are read as a whole, into an array of `workspace`: one that
  * another program changes meanwhile is EBPO_E_IO.
