@@ -10,7 +10,6 @@
 #include "base/arrays.h"
 #include "base/endian.h"
 #include "base/error.h"
-#include "geom/decimal.h"
 
 enum { HEAD = 84, RECORD = 50, RELEASE = 1 << 22, LOOK_AHEAD = 1 << 16, SHOWN = 40 };
 
@@ -60,7 +59,7 @@ static ebpo_status read_binary(import_build *b, const uint8_t *data, uint64_t si
         uint32_t raw[3] = { ebpo_load32(at), ebpo_load32(at + 4), ebpo_load32(at + 8) };
         float xyz[3];
         memcpy(xyz, raw, sizeof xyz);
-        status = ebpo_import_vertex(b, xyz);
+        status = ebpo_import_vertex(b, (double[]){ xyz[0], xyz[1], xyz[2] });
         if (i % RELEASE == 0)
             ebpo_release_pages(b->mesh->workspace);
     }
@@ -119,12 +118,12 @@ static ebpo_status fail_end(const stl_text *t)
 
 static ebpo_status read_vertex(stl_text *t)
 {
-    float xyz[3];
+    double xyz[3];
     stl_word word;
     for (int k = 0; k < 3; k++) {
         if (!next_word(t, &word))
             return fail_end(t);
-        if (!ebpo_number_float(&xyz[k], word.s, word.n, t->build->c_locale))
+        if (!ebpo_import_coordinate(t->build, &xyz[k], word.s, word.n))
             return fail_word(t, "a coordinate", word);
     }
     t->corners++;
