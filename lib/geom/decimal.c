@@ -179,11 +179,11 @@ static void copy_token(char buffer[EBPO_NUMBER_LONGEST + 1], const char *s, size
     buffer[n] = 0;
 }
 
+/* The longer ways. */
 static float nearest_float(const decimal *d, const char *s, size_t n, locale_t c_locale)
 {
     double value;
-    /* Both short ways stay between 1e-27 and 1e38, where floats have all their bits. */
-    if ((one_operation(&value, d) && !is_float_tie(value)) || long_quotient(&value, d, 24))
+    if (long_quotient(&value, d, 24))
         return (float)(d->negative ? -value : value);
     char buffer[EBPO_NUMBER_LONGEST + 1];
     copy_token(buffer, s, n);
@@ -220,14 +220,22 @@ static bool prints_as(float value, const decimal *d, const char *s, size_t n)
            (power && count > 1 && prints_digits(value, digits, count - 1, first));
 }
 
-/* Returns whether a float keeps the text's digits. Where they are a number below 2^23, and floats
- * have all their bits, the last digit is worth more than the distance between floats. */
+/* Decides in doubles that the float nearest to digits * 10^exponent keeps the digits: it is less
+ * than half of 10^exponent away. That is so for digits below 2^23, whose last one is worth more
+ * than the distance between floats. Of digits below 2^40 the double is right to 2^-12 of the half.
+ */
+static inline bool surely_keeps(double nearest, float value, const decimal *d)
+{
+    return d->digits < UINT64_C(1) << 23 ||
+           (d->digits < UINT64_C(1) << 40 &&
+            2 * (double)d->digits * fabs(nearest - (double)value) < 0.999 * nearest);
+}
+
+/* Decides exactly whether a float keeps the text's digits. */
 static bool keeps_digits(float value, const decimal *d, const char *s, size_t n, locale_t c_locale)
 {
     bool keeps;
     double wide_value;
-    if (d->short_form && d->digits < UINT64_C(1) << 23 && d->exponent >= -22 && d->exponent <= 22)
-        return true;
     if (isinf(value)) /* a double may hold it */
         return ebpo_number_double(&wide_value, s, n, c_locale) && isinf(wide_value);
     return compare_scaled(&keeps, value, d) ? keeps : prints_as(value, d, s, n);
@@ -245,7 +253,15 @@ bool ebpo_number_float(float *out, bool *kept, const char *s, size_t n, locale_t
         *out = word ? (float)value : 0;
         return word;
     }
-    *out = nearest_float(&d, s, n, c_locale);
+    /* Both short ways stay between 1e-27 and 1e38, where floats have all their bits. */
+    if (one_operation(&value, &d) && !is_float_tie(value)) {
+        float nearest = (float)value;
+        *out = d.negative ? -nearest : nearest;
+        if (surely_keeps(value, nearest, &d))
+            return true;
+    } else {
+        *out = nearest_float(&d, s, n, c_locale);
+    }
     *kept = keeps_digits(*out, &d, s, n, c_locale);
     return true;
 }

@@ -82,11 +82,13 @@ ebpo_status ebpo_import_vertex(import_build *b, const double xyz[3])
     if (!ebpo_array_grow(b->mesh->workspace, &b->xyz, &b->vertex_capacity, b->vertices + 1,
                          b->position_size))
         return fail_memory(b, (b->vertices + 1) * b->position_size);
-    void *to = (char *)b->xyz + b->vertices++ * b->position_size;
-    float narrow[3];
-    for (int k = 0; k < 3 && !b->doubles; k++)
-        narrow[k] = (float)xyz[k];
-    memcpy(to, b->doubles ? (const void *)xyz : (const void *)narrow, b->position_size);
+    char *to = (char *)b->xyz + b->vertices++ * b->position_size;
+    if (b->doubles) {
+        memcpy(to, xyz, 3 * sizeof *xyz);
+    } else {
+        const float narrow[3] = { (float)xyz[0], (float)xyz[1], (float)xyz[2] };
+        memcpy(to, narrow, sizeof narrow);
+    }
     return EBPO_OK;
 }
 
@@ -126,11 +128,6 @@ import_corner *ebpo_import_corner(import_build *b)
     return &b->corner[b->corners++];
 }
 
-static const void *position(const import_build *b, uint64_t vertex)
-{
-    return (const char *)b->xyz + vertex * b->position_size;
-}
-
 static void *positions_of(const ebpo_mesh *mesh)
 {
     return mesh->xyz32 ? (void *)mesh->xyz32 : (void *)mesh->xyz64;
@@ -140,12 +137,15 @@ static void *positions_of(const ebpo_mesh *mesh)
 static void number_vertices(import_build *b)
 {
     ebpo_mesh *mesh = b->mesh;
-    char *xyz = positions_of(mesh);
     for (uint64_t i = 0; i < b->corners; i++) {
         uint32_t vertex = b->corner[i].vertex;
+        uint64_t from = 3 * (uint64_t)vertex, to = 3 * mesh->vertex_count;
         if (b->use[vertex] != IMPORT_NONE)
             continue;
-        memcpy(xyz + mesh->vertex_count * b->position_size, position(b, vertex), b->position_size);
+        if (b->doubles)
+            memcpy(mesh->xyz64 + to, (const double *)b->xyz + from, 3 * sizeof *mesh->xyz64);
+        else
+            memcpy(mesh->xyz32 + to, (const float *)b->xyz + from, 3 * sizeof *mesh->xyz32);
         b->use[vertex] = (uint32_t)mesh->vertex_count++;
     }
 }
@@ -205,10 +205,10 @@ static ebpo_status reserve_scratch(import_build *b, uint64_t n)
 
 static void load_position(const import_build *b, uint64_t vertex, double xyz[3])
 {
-    float narrow[3];
-    memcpy(b->doubles ? (void *)xyz : (void *)narrow, position(b, vertex), b->position_size);
-    for (int k = 0; k < 3 && !b->doubles; k++)
-        xyz[k] = (double)narrow[k];
+    const float *narrow = b->xyz;
+    const double *wide = b->xyz;
+    for (uint64_t k = 0; k < 3; k++)
+        xyz[k] = b->doubles ? wide[3 * vertex + k] : (double)narrow[3 * vertex + k];
 }
 
 static ebpo_status cut(import_build *b, uint32_t n)
@@ -286,8 +286,8 @@ ebpo_status ebpo_import_end(import_build *b)
     uint32_t *map = ebpo_array_alloc(workspace, mesh->vertex_count, sizeof *map);
     if (!map)
         return fail_memory(b, mesh->vertex_count * sizeof *map);
-    ebpo_status status = ebpo_import_weld(positions_of(mesh), b->position_size, mesh->vertex_count,
-                                          map, &mesh->vertex_count, b->error);
+    ebpo_status status = ebpo_import_weld(positions_of(mesh), b->doubles, mesh->vertex_count, map,
+                                          &mesh->vertex_count, b->error);
     if (status == EBPO_OK)
         EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, 3 * mesh->face_count)
             mesh->faces[i] = map[mesh->faces[i]];

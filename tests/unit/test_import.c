@@ -49,7 +49,7 @@ START_TEST(weld_keeps_the_first_of_each_position)
     float xyz[] = { 0, 1, 2, -0.0f, 1, 2, 3, 4, 5, 0, 1, 2, 6, 7, 8 };
     uint32_t map[5];
     uint64_t left;
-    ck_assert(ebpo_import_weld(xyz, 3 * sizeof *xyz, 5, map, &left, NULL) == EBPO_OK);
+    ck_assert(ebpo_import_weld(xyz, false, 5, map, &left, NULL) == EBPO_OK);
     ck_assert(left == 3 && map[0] == 0 && map[1] == 0 && map[2] == 1 && map[3] == 0 && map[4] == 2);
     ck_assert(xyz[3] == 3 && xyz[6] == 6 && xyz[8] == 8);
 }
