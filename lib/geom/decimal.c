@@ -241,7 +241,7 @@ static bool keeps_digits(float value, const decimal *d, const char *s, size_t n,
     return compare_scaled(&keeps, value, d) ? keeps : prints_as(value, d, s, n);
 }
 
-bool ebpo_number_float(float *out, bool *kept, const char *s, size_t n, locale_t c_locale)
+bool ebpo_number_float_kept(float *out, bool *kept, const char *s, size_t n, locale_t c_locale)
 {
     decimal d;
     double value;

@@ -48,7 +48,7 @@ bool ebpo_import_coordinate(import_build *b, double *value, const char *s, size_
     bool kept;
     if (b->doubles)
         return ebpo_number_double(value, s, n, b->c_locale);
-    if (!ebpo_number_float(&narrow, &kept, s, n, b->c_locale))
+    if (!ebpo_number_float_kept(&narrow, &kept, s, n, b->c_locale))
         return false;
     b->loses_digits |= !kept;
     *value = (double)narrow;
@@ -66,14 +66,14 @@ void ebpo_import_quotient(import_build *b, double *value, const char *s, size_t 
 bool ebpo_import_value(import_build *b, float *value, const char *s, size_t n)
 {
     bool kept;
-    bool good = ebpo_number_float(value, &kept, s, n, b->c_locale);
+    bool good = ebpo_number_float_kept(value, &kept, s, n, b->c_locale);
     b->rounded += !kept;
     return good;
 }
 
 /* --- vertices and rows --- */
 
-ebpo_status ebpo_import_vertex(import_build *b, const double xyz[3])
+ebpo_status ebpo_import_position(import_build *b, const double xyz[3])
 {
     if (b->loses_digits && !b->doubles)
         return EBPO_E_UNSUPPORTED;
@@ -90,6 +90,12 @@ ebpo_status ebpo_import_vertex(import_build *b, const double xyz[3])
         memcpy(to, narrow, sizeof narrow);
     }
     return EBPO_OK;
+}
+
+ebpo_status ebpo_import_vertex(import_build *b, const float xyz[3])
+{
+    const double wide[3] = { (double)xyz[0], (double)xyz[1], (double)xyz[2] };
+    return ebpo_import_position(b, wide);
 }
 
 ebpo_status ebpo_import_row(import_build *b, import_sort sort, const float *values)

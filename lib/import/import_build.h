@@ -75,7 +75,10 @@ bool ebpo_import_value(import_build *b, float *value, const char *s, size_t n);
 /* Adds a vertex of the file. EBPO_E_LIMIT, EBPO_E_MEMORY, EBPO_E_IO. EBPO_E_UNSUPPORTED, without a
  * message: floats do not keep its text (`loses_digits`); the file is to be read again with
  * doubles. */
-EBPO_MUST_USE ebpo_status ebpo_import_vertex(import_build *b, const double xyz[3]);
+EBPO_MUST_USE ebpo_status ebpo_import_position(import_build *b, const double xyz[3]);
+
+/* Likewise of a binary file, which holds floats. */
+EBPO_MUST_USE ebpo_status ebpo_import_vertex(import_build *b, const float xyz[3]);
 
 /* Adds a row to a table, of as many values as the sort has columns. Likewise. */
 EBPO_MUST_USE ebpo_status ebpo_import_row(import_build *b, import_sort sort, const float *values);

@@ -103,7 +103,7 @@ static ebpo_status read_vertex(obj_reading *r)
         return fail_vertex(r, word[bad]);
     ebpo_status status = n == 4 ? divide(r, word, xyz) : EBPO_OK;
     if (status == EBPO_OK)
-        status = ebpo_import_vertex(r->build, xyz);
+        status = ebpo_import_position(r->build, xyz);
     r->losses.surplus += n == 5 || n == 8;
     r->losses.alpha += n == 7;
     return status == EBPO_OK ? add_colour(r, word + 3, n >= 6) : status;

@@ -280,7 +280,7 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
     r->divided += w != 1;
     ebpo_status status = take_rest_anyhow(r, row);
     if (status == EBPO_OK)
-        status = ebpo_import_vertex(r->build, xyz);
+        status = ebpo_import_position(r->build, xyz);
     return status == EBPO_OK ? keep_rest(r) : status;
 }
 

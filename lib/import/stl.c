@@ -59,7 +59,7 @@ static ebpo_status read_binary(import_build *b, const uint8_t *data, uint64_t si
         uint32_t raw[3] = { ebpo_load32(at), ebpo_load32(at + 4), ebpo_load32(at + 8) };
         float xyz[3];
         memcpy(xyz, raw, sizeof xyz);
-        status = ebpo_import_vertex(b, (double[]){ xyz[0], xyz[1], xyz[2] });
+        status = ebpo_import_vertex(b, xyz);
         if (i % RELEASE == 0)
             ebpo_release_pages(b->mesh->workspace);
     }
@@ -127,7 +127,7 @@ static ebpo_status read_vertex(stl_text *t)
             return fail_word(t, "a coordinate", word);
     }
     t->corners++;
-    return ebpo_import_vertex(t->build, xyz);
+    return ebpo_import_position(t->build, xyz);
 }
 
 /* outer loop, vertices, endloop; the normal's numbers before, of whatever kind, are passed. */

@@ -63,7 +63,7 @@ static bool parse_float(ply_parser *p, ply_word token, double *value)
     float narrow;
     bool kept;
     double wide;
-    if (!ebpo_number_float(&narrow, &kept, token.s, token.n, p->c_locale))
+    if (!ebpo_number_float_kept(&narrow, &kept, token.s, token.n, p->c_locale))
         return false;
     *value = (double)narrow;
     if (kept || !ebpo_number_double(&wide, token.s, token.n, p->c_locale))

@@ -209,7 +209,7 @@ static bool text_bits(ply_parser *p, ply_type type, ply_word token, uint64_t *bi
     bool kept;
     switch (type) {
     case PLY_FLOAT32:
-        if (!ebpo_number_float(&narrow, &kept, token.s, token.n, p->c_locale))
+        if (!ebpo_number_float_kept(&narrow, &kept, token.s, token.n, p->c_locale))
             return false;
         p->rounded += !kept;
         memcpy(&narrow_bits, &narrow, sizeof narrow);
