@@ -51,17 +51,20 @@ def random_text(r):
         return f"{sign}{r.randrange(10 ** r.randint(1, 12))}"
     if kind == 2:  # with exponent
         digits = "".join(r.choice("0123456789") for _ in range(r.randint(1, 12)))
-        return f"{sign}{r.randrange(10)}.{digits}{r.choice('eE')}{r.choice(['', '-', '+'])}{r.randint(0, 30):0{r.randint(1, 3)}}"
+        exponent = r.choice(["", "-", "+"]) + f"{r.randint(0, 30):0{r.randint(1, 3)}}"
+        return f"{sign}{r.randrange(10)}.{digits}{r.choice('eE')}{exponent}"
     narrow = float_of(r.randrange(0x2f800000, 0x5f000000))
     if kind == 3:  # a float, as programs print it
         return f"{sign}{narrow:.{r.randint(0, 30)}f}"
     if kind == 4:
         return f"{sign}{narrow:.{r.randint(0, 25)}e}"
     if kind == 5:  # near the middle of two floats
-        return sign + f"{Decimal(narrow) + Decimal(float_of(struct.unpack('<I', struct.pack('<f', narrow))[0] + 1)):f}"[:40]
+        above = float_of(struct.unpack("<I", struct.pack("<f", narrow))[0] + 1)
+        return sign + f"{(Decimal(narrow) + Decimal(above)) / 2:f}"[:40]
     if kind == 6:  # quarters, of which two texts are one float
         return f"{sign}{r.randrange(2097152, 4194304)}.{r.randrange(10)}"
-    return f"{'0' * r.randint(0, 3)}{r.choice(['0.5', '691234.567', '5334567.891', '.000', '1e-45', '1.0e-44', '1.2e-45', '1e39', '3.4028235e38'])}"
+    edges = ["0.5", "691234.567", "5334567.891", ".000", "1e-45", "1.0e-44", "1.2e-45", "1e39", "3.4028235e38"]
+    return "0" * r.randint(0, 3) + r.choice(edges)
 
 
 def write(path, vertices):
