@@ -8,6 +8,7 @@
 #include "geom/decimal.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -129,6 +130,14 @@ static bool one_operation(double *out, const decimal *d)
 #ifdef EBPO_HAVE_INT128
 __extension__ typedef unsigned __int128 wide;
 
+static uint64_t power_of_five(int exponent)
+{
+    uint64_t five = 1;
+    for (int i = 0; i < exponent; i++)
+        five *= 5;
+    return five;
+}
+
 /* digits / 10^e to `bits` bits. The quotient has at least 65 bits, so what rounding needs to know
  * is the bits below and the remainder. */
 static bool long_quotient(double *out, const decimal *d, int bits)
@@ -136,9 +145,7 @@ static bool long_quotient(double *out, const decimal *d, int bits)
     if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)
         return false;
     int e = -d->exponent;
-    uint64_t five = 1;
-    for (int i = 0; i < e; i++)
-        five *= 5;
+    uint64_t five = power_of_five(e);
     int lift = __builtin_clzll(d->digits);
     wide n = (wide)(d->digits << lift) << 64;
     wide q = n / five;
@@ -153,11 +160,38 @@ static bool long_quotient(double *out, const decimal *d, int bits)
     return true;
 }
 
+/* Decides exactly whether the float nearest to digits / 10^e, rounded to the last digit (ties to
+ * even), gives the digits: value * 10^e is less than a half away from them. The value is of 1e-27
+ * to 1e20, where floats are normal. *keeps is set where true is returned. */
+static bool compare_scaled(bool *keeps, float value, const decimal *d)
+{
+    if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)
+        return false;
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    wide scaled = ((bits & 0x7fffff) | 0x800000) * (wide)power_of_five(-d->exponent);
+    int shift = (int)(bits >> 23 & 0xff) - 150 - d->exponent;
+    if (shift >= 0) {
+        *keeps = scaled << shift == d->digits;
+        return true;
+    }
+    wide wanted = (wide)d->digits << -shift, half = (wide)1 << (-shift - 1);
+    wide apart = scaled > wanted ? scaled - wanted : wanted - scaled;
+    *keeps = apart < half || (apart == half && d->digits % 2 == 0);
+    return true;
+}
+
 #else
 /* The C library decides. */
 static bool long_quotient(double *out, const decimal *d, int bits)
 {
     (void)out, (void)d, (void)bits;
+    return false;
+}
+
+static bool compare_scaled(bool *keeps, float value, const decimal *d)
+{
+    (void)keeps, (void)value, (void)d;
     return false;
 }
 #endif
@@ -182,10 +216,73 @@ static void copy_token(char buffer[EBPO_NUMBER_LONGEST + 1], const char *s, size
     }
 }
 
-bool ebpo_number_float(float *out, const char *s, size_t n, locale_t c_locale)
+/* The longer ways. */
+static float nearest_float(const decimal *d, const char *s, size_t n, locale_t c_locale)
+{
+    double value;
+    if (long_quotient(&value, d, 24))
+        return (float)(d->negative ? -value : value);
+    char buffer[EBPO_NUMBER_LONGEST + 1];
+    copy_token(buffer, s, n);
+    return strtof_l(buffer, NULL, c_locale);
+}
+
+/* Prints the value with `count` digits and compares: they, and the power of ten of the first. */
+static bool prints_digits(float value, const char *digits, size_t count, int32_t first)
+{
+    char printed[EBPO_NUMBER_LONGEST + 16];
+    snprintf(printed, sizeof printed, "%.*e", (int)count - 1, (double)fabsf(value));
+    const char *exponent = strrchr(printed, 'e');
+    if (printed[0] != digits[0] || !exponent || strtol(exponent + 1, NULL, 10) != first)
+        return false;
+    /* the point may be of several bytes, as the locale has it */
+    return count == 1 || memcmp(exponent - (count - 1), digits + 1, count - 1) == 0;
+}
+
+/* Decides by printing whether the float, rounded to the text's last digit, gives the text. A float
+ * below a power of ten has a digit less before that last one than the power has. */
+static bool prints_as(float value, const decimal *d, const char *s, size_t n)
+{
+    char digits[EBPO_NUMBER_LONGEST];
+    size_t count = 0, i = s[0] == '-' || s[0] == '+';
+    bool power = true;
+    for (; i < n && (is_digit(s[i]) || s[i] == '.'); i++) {
+        if (s[i] == '.' || (s[i] == '0' && !count))
+            continue;
+        power &= s[i] == (count ? '0' : '1');
+        digits[count++] = s[i];
+    }
+    int32_t first = d->exponent + (int32_t)count - 1;
+    return count == 0 || prints_digits(value, digits, count, first) ||
+           (power && count > 1 && prints_digits(value, digits, count - 1, first));
+}
+
+/* Decides in doubles that the float nearest to digits * 10^exponent keeps the digits: it is less
+ * than half of 10^exponent away. That is so for digits below 2^23, whose last one is worth more
+ * than the distance between floats. Of digits below 2^40 the double is right to 2^-12 of the half.
+ */
+static inline bool surely_keeps(double nearest, float value, const decimal *d)
+{
+    return d->digits < UINT64_C(1) << 23 ||
+           (d->digits < UINT64_C(1) << 40 &&
+            2 * (double)d->digits * fabs(nearest - (double)value) < 0.999 * nearest);
+}
+
+/* Decides exactly whether a float keeps the text's digits. */
+static bool keeps_digits(float value, const decimal *d, const char *s, size_t n, locale_t c_locale)
+{
+    bool keeps;
+    double wide_value;
+    if (isinf(value)) /* a double may hold it */
+        return ebpo_number_double(&wide_value, s, n, c_locale) && isinf(wide_value);
+    return compare_scaled(&keeps, value, d) ? keeps : prints_as(value, d, s, n);
+}
+
+bool ebpo_number_float_kept(float *out, bool *kept, const char *s, size_t n, locale_t c_locale)
 {
     decimal d;
     double value;
+    *kept = true;
     if (n > EBPO_NUMBER_LONGEST)
         return false;
     if (!scan(&d, s, s + n)) {
@@ -194,13 +291,15 @@ bool ebpo_number_float(float *out, const char *s, size_t n, locale_t c_locale)
         return word;
     }
     /* Both short ways stay between 1e-27 and 1e38, where floats have all their bits. */
-    if ((one_operation(&value, &d) && !is_float_tie(value)) || long_quotient(&value, &d, 24)) {
-        *out = (float)(d.negative ? -value : value);
-        return true;
+    if (one_operation(&value, &d) && !is_float_tie(value)) {
+        float nearest = (float)value;
+        *out = d.negative ? -nearest : nearest;
+        if (surely_keeps(value, nearest, &d))
+            return true;
+    } else {
+        *out = nearest_float(&d, s, n, c_locale);
     }
-    char buffer[EBPO_NUMBER_LONGEST + 1];
-    copy_token(buffer, s, n);
-    *out = strtof_l(buffer, NULL, c_locale);
+    *kept = keeps_digits(*out, &d, s, n, c_locale);
     return true;
 }
 

@@ -1,6 +1,7 @@
 /* Values at corners become attributes of vertices, of faces, or lists. */
 #include "geom/strict_fp.h"
 
+#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -138,5 +139,10 @@ ebpo_status ebpo_import_attributes(import_build *b)
         if (status == EBPO_OK && !fits)
             status = place_in_lists(&p);
     }
+    if (b->rounded)
+        ebpo_attributes_lose(b->mesh->attributes,
+                             "digits of %" PRIu64 " colours, normals or texture coordinates, which "
+                             "are floats",
+                             b->rounded);
     return status;
 }

@@ -9,51 +9,56 @@
 
 #define EMPTY UINT32_MAX
 
-static void key_of(const float xyz[3], uint32_t key[3])
+/* The bits of a coordinate of `size` bytes, those of -0 as those of 0. */
+static inline uint64_t bits_of(const char *at, size_t size)
 {
-    memcpy(key, xyz, 3 * sizeof *key);
-    for (int k = 0; k < 3; k++)
-        if (key[k] == UINT32_C(0x80000000))
-            key[k] = 0;
+    uint32_t narrow;
+    uint64_t wide;
+    if (size == sizeof narrow) {
+        memcpy(&narrow, at, sizeof narrow);
+        return narrow << 1 ? narrow : 0;
+    }
+    memcpy(&wide, at, sizeof wide);
+    return wide << 1 ? wide : 0;
 }
 
-static bool has_key(const float xyz[3], const uint32_t key[3])
+static inline bool has_key(const char *xyz, size_t size, const uint64_t key[3])
 {
-    uint32_t own[3];
-    key_of(xyz, own);
-    return memcmp(key, own, sizeof own) == 0;
+    return bits_of(xyz, size) == key[0] && bits_of(xyz + size, size) == key[1] &&
+           bits_of(xyz + 2 * size, size) == key[2];
 }
 
-/* Place of the key in the table: where an equal vertex is, or would go. */
-static uint64_t find(const uint32_t *table, uint64_t mask, const float *xyz, const uint32_t key[3])
+/* The size is a constant where this is called, and compiled as such. */
+static inline uint64_t weld(char *xyz, size_t size, uint64_t count, uint32_t *map, uint32_t *table,
+                            uint64_t slots)
 {
-    const uint64_t wide[3] = { key[0], key[1], key[2] };
-    uint64_t at;
-    EBPO_HASH_FIND(at, ebpo_hash_three(wide), mask,
-                   table[at] == EMPTY || has_key(xyz + 3 * (uint64_t)table[at], key));
-    return at;
+    uint32_t kept = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        const char *own = xyz + 3 * size * i;
+        const uint64_t key[3] = { bits_of(own, size), bits_of(own + size, size),
+                                  bits_of(own + 2 * size, size) };
+        uint64_t at; /* of an equal vertex, or where it would go */
+        EBPO_HASH_FIND(at, ebpo_hash_three(key), slots - 1,
+                       table[at] == EMPTY || has_key(xyz + 3 * size * table[at], size, key));
+        if (table[at] == EMPTY) {
+            memmove(xyz + 3 * size * kept, own, 3 * size);
+            table[at] = kept++;
+        }
+        map[i] = table[at];
+    }
+    return kept;
 }
 
-ebpo_status ebpo_import_weld(float *xyz, uint64_t count, uint32_t *map, uint64_t *welded,
-                             ebpo_error *error)
+ebpo_status ebpo_import_weld(void *xyz, bool doubles, uint64_t count, uint32_t *map,
+                             uint64_t *welded, ebpo_error *error)
 {
     uint64_t slots = ebpo_hash_slots(count + count / 2);
     uint32_t *table = ebpo_alloc(slots, sizeof *table);
     if (!table)
         return ebpo_fail_memory(error, slots * sizeof *table);
     memset(table, 0xff, (size_t)slots * sizeof *table);
-    uint32_t kept = 0;
-    for (uint64_t i = 0; i < count; i++) {
-        uint32_t key[3];
-        key_of(xyz + 3 * i, key);
-        uint64_t at = find(table, slots - 1, xyz, key);
-        if (table[at] == EMPTY) {
-            memmove(xyz + 3 * (uint64_t)kept, xyz + 3 * i, 3 * sizeof *xyz);
-            table[at] = kept++;
-        }
-        map[i] = table[at];
-    }
+    *welded = doubles ? weld(xyz, sizeof(double), count, map, table, slots)
+                      : weld(xyz, sizeof(float), count, map, table, slots);
     free(table);
-    *welded = kept;
     return EBPO_OK;
 }

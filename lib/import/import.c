@@ -20,6 +20,7 @@
 void ebpo_import_clear(ebpo_mesh *mesh)
 {
     ebpo_array_free(mesh->workspace, mesh->xyz32);
+    ebpo_array_free(mesh->workspace, mesh->xyz64);
     ebpo_array_free(mesh->workspace, mesh->faces);
     ebpo_attributes_free(mesh->attributes);
     *mesh = (ebpo_mesh){ 0 };
@@ -75,29 +76,51 @@ static ebpo_status check_name(const import_build *b, ebpo_import_format format, 
                           format == EBPO_IMPORT_OFF ? "OFF" : "STL");
 }
 
+/* Reads the file with positions of floats or doubles; *again: floats do not keep its text. On
+ * failure nothing is left but the mesh's workspace. */
+static ebpo_status read_once(ebpo_mesh *mesh, ebpo_import_format format, const uint8_t *data,
+                             uint64_t size, const char *name, bool attributes, bool doubles,
+                             ebpo_obj_runs *runs, bool *again, ebpo_error *error)
+{
+    ebpo_workspace *workspace = mesh->workspace;
+    import_build b;
+    ebpo_status status = ebpo_import_begin(&b, mesh, name, attributes, doubles, error);
+    if (status == EBPO_OK && attributes && !(mesh->attributes = ebpo_attributes_make(workspace)))
+        status = ebpo_fail_memory(error, sizeof *mesh->attributes);
+    if (status == EBPO_OK)
+        status = check_name(&b, format, data, size);
+    if (status == EBPO_OK)
+        status = read_format(&b, format, data, size, runs);
+    ebpo_import_free(&b);
+    *again = status != EBPO_OK && b.loses_digits && !doubles;
+    if (status != EBPO_OK) {
+        ebpo_import_clear(mesh);
+        mesh->workspace = workspace;
+        if (runs)
+            ebpo_obj_runs_free(runs);
+    }
+    return status;
+}
+
 static ebpo_status import(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
                           uint64_t size, const char *name, ebpo_workspace *workspace,
                           bool attributes, ebpo_obj_runs *runs, ebpo_error *error)
 {
     static const char *const formats[] = { "obj", "stl", "off" };
     ebpo_mesh mesh = { .workspace = workspace };
-    import_build b;
+    bool again;
     name = ebpo_path_name(name);
-    ebpo_status status = ebpo_import_begin(&b, &mesh, name, attributes, error);
-    if (status == EBPO_OK && attributes && !(mesh.attributes = ebpo_attributes_make(workspace)))
-        status = ebpo_fail_memory(error, sizeof *mesh.attributes);
-    if (status == EBPO_OK)
-        status = check_name(&b, format, data, size);
-    if (status == EBPO_OK)
-        status = read_format(&b, format, data, size, runs);
-    ebpo_import_free(&b);
+    ebpo_status status =
+        read_once(&mesh, format, data, size, name, attributes, false, runs, &again, error);
+    if (again)
+        status = read_once(&mesh, format, data, size, name, attributes, true, runs, &again, error);
     if (status == EBPO_OK) {
         drop_empty(&mesh);
         snprintf(mesh.source_name, sizeof mesh.source_name, "%s", name);
         snprintf(mesh.source_format, sizeof mesh.source_format, "%s", formats[format]);
         mesh.source_size = size;
     } else {
-        ebpo_import_clear(&mesh);
+        mesh.workspace = NULL;
     }
     *out = mesh;
     return status;
@@ -115,11 +138,7 @@ ebpo_status ebpo_import_groups(ebpo_mesh *out, const uint8_t *data, uint64_t siz
                                ebpo_error *error)
 {
     *runs = (ebpo_obj_runs){ 0 };
-    ebpo_status status =
-        import(out, EBPO_IMPORT_OBJ, data, size, name, workspace, attributes, runs, error);
-    if (status != EBPO_OK)
-        ebpo_obj_runs_free(runs);
-    return status;
+    return import(out, EBPO_IMPORT_OBJ, data, size, name, workspace, attributes, runs, error);
 }
 
 /* --- which format it is --- */

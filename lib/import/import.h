@@ -17,10 +17,11 @@ typedef enum ebpo_import_format {
 bool ebpo_import_recognise(ebpo_import_format *format, const uint8_t *data, uint64_t size,
                            const char *name);
 
-/* Parses a file that is in memory. Positions are float32, the nearest of what stands there.
- * source_size, source_name and source_format are set; `attributes`: and the mesh's attributes, if
- * the file has any. What the file holds or names and could not be read is noted in any case. The
- * arrays are in the workspace (which may be NULL).
+/* Parses a file that is in memory. Positions are the nearest floats where each of them, rounded to
+ * the last digit of its text, gives the text; else all are the nearest doubles. source_size,
+ * source_name and source_format are set; `attributes`: and the mesh's attributes, if the file has
+ * any. What the file holds or names and could not be read is noted in any case. The arrays are in
+ * the workspace (which may be NULL).
  *
  * No other file is opened (material libraries are not read). Faces keep the file's order; vertices
  * are numbered by first use, and those of one position are one.

@@ -10,6 +10,7 @@
 #include "base/alloc.h"
 #include "base/arrays.h"
 #include "base/error.h"
+#include "geom/decimal.h"
 #include "geom/polygon.h"
 #include "import/corner_weld.h"
 
@@ -28,22 +29,74 @@ static ebpo_status fail_memory(const import_build *b, uint64_t bytes)
 unsigned ebpo_import_columns(import_sort sort) { return sort == IMPORT_TEXTURE ? 2 : 3; }
 
 ebpo_status ebpo_import_begin(import_build *b, ebpo_mesh *mesh, const char *name, bool attributes,
-                              ebpo_error *error)
+                              bool doubles, ebpo_error *error)
 {
-    *b = (import_build){ .name = name, .error = error, .mesh = mesh, .attributes = attributes };
+    *b = (import_build){ .name = name,
+                         .error = error,
+                         .mesh = mesh,
+                         .attributes = attributes,
+                         .doubles = doubles,
+                         .position_size = 3 * (doubles ? sizeof(double) : sizeof(float)) };
     b->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     return b->c_locale ? EBPO_OK : ebpo_fail_memory(error, 0);
 }
 
-ebpo_status ebpo_import_vertex(import_build *b, const float xyz[3])
+/* --- numbers --- */
+
+bool ebpo_import_coordinate(import_build *b, double *value, const char *s, size_t n)
 {
+    float narrow;
+    bool kept;
+    if (b->doubles)
+        return ebpo_number_double(value, s, n, b->c_locale);
+    if (!ebpo_number_float_kept(&narrow, &kept, s, n, b->c_locale))
+        return false;
+    b->loses_digits |= !kept;
+    *value = (double)narrow;
+    return true;
+}
+
+void ebpo_import_quotient(import_build *b, double *value, const char *s, size_t n, double weight)
+{
+    double number = 0;
+    (void)ebpo_number_double(&number, s, n, b->c_locale);
+    *value = number / weight;
+    b->loses_digits |= (double)(float)*value != *value;
+}
+
+bool ebpo_import_value(import_build *b, float *value, const char *s, size_t n)
+{
+    bool kept;
+    bool good = ebpo_number_float_kept(value, &kept, s, n, b->c_locale);
+    b->rounded += !kept;
+    return good;
+}
+
+/* --- vertices and rows --- */
+
+ebpo_status ebpo_import_position(import_build *b, const double xyz[3])
+{
+    if (b->loses_digits && !b->doubles)
+        return EBPO_E_UNSUPPORTED;
     if (b->vertices == IMPORT_MOST)
         return fail_many(b);
     if (!ebpo_array_grow(b->mesh->workspace, &b->xyz, &b->vertex_capacity, b->vertices + 1,
-                         3 * sizeof *b->xyz))
-        return fail_memory(b, (b->vertices + 1) * 3 * sizeof *b->xyz);
-    memcpy(b->xyz + 3 * b->vertices++, xyz, 3 * sizeof *xyz);
+                         b->position_size))
+        return fail_memory(b, (b->vertices + 1) * b->position_size);
+    char *to = (char *)b->xyz + b->vertices++ * b->position_size;
+    if (b->doubles) {
+        memcpy(to, xyz, 3 * sizeof *xyz);
+    } else {
+        const float narrow[3] = { (float)xyz[0], (float)xyz[1], (float)xyz[2] };
+        memcpy(to, narrow, sizeof narrow);
+    }
     return EBPO_OK;
+}
+
+ebpo_status ebpo_import_vertex(import_build *b, const float xyz[3])
+{
+    const double wide[3] = { (double)xyz[0], (double)xyz[1], (double)xyz[2] };
+    return ebpo_import_position(b, wide);
 }
 
 ebpo_status ebpo_import_row(import_build *b, import_sort sort, const float *values)
@@ -62,9 +115,13 @@ ebpo_status ebpo_import_faces(import_build *b)
 {
     ebpo_mesh *mesh = b->mesh;
     b->use = ebpo_array_alloc(mesh->workspace, b->vertices, sizeof *b->use);
-    mesh->xyz32 = ebpo_array_alloc(mesh->workspace, b->vertices, 3 * sizeof *mesh->xyz32);
-    if (!b->use || !mesh->xyz32)
-        return fail_memory(b, b->vertices * 3 * sizeof *mesh->xyz32);
+    void *xyz = ebpo_array_alloc(mesh->workspace, b->vertices, b->position_size);
+    if (b->doubles)
+        mesh->xyz64 = xyz;
+    else
+        mesh->xyz32 = xyz;
+    if (!b->use || !xyz)
+        return fail_memory(b, b->vertices * b->position_size);
     ebpo_array_fill(mesh->workspace, b->use, 0xff, b->vertices * sizeof *b->use);
     return EBPO_OK;
 }
@@ -78,16 +135,24 @@ import_corner *ebpo_import_corner(import_build *b)
     return &b->corner[b->corners++];
 }
 
+static void *positions_of(const ebpo_mesh *mesh)
+{
+    return mesh->xyz32 ? (void *)mesh->xyz32 : (void *)mesh->xyz64;
+}
+
 /* The first polygon that names a vertex gives it its number. */
 static void number_vertices(import_build *b)
 {
     ebpo_mesh *mesh = b->mesh;
     for (uint64_t i = 0; i < b->corners; i++) {
         uint32_t vertex = b->corner[i].vertex;
+        uint64_t from = 3 * (uint64_t)vertex, to = 3 * mesh->vertex_count;
         if (b->use[vertex] != IMPORT_NONE)
             continue;
-        memcpy(mesh->xyz32 + 3 * mesh->vertex_count, b->xyz + 3 * (uint64_t)vertex,
-               3 * sizeof *b->xyz);
+        if (b->doubles)
+            memcpy(mesh->xyz64 + to, (const double *)b->xyz + from, 3 * sizeof *mesh->xyz64);
+        else
+            memcpy(mesh->xyz32 + to, (const float *)b->xyz + from, 3 * sizeof *mesh->xyz32);
         b->use[vertex] = (uint32_t)mesh->vertex_count++;
     }
 }
@@ -145,21 +210,28 @@ static ebpo_status reserve_scratch(import_build *b, uint64_t n)
     return EBPO_OK;
 }
 
+static void load_position(const import_build *b, uint64_t vertex, double xyz[3])
+{
+    const float *narrow = b->xyz;
+    const double *wide = b->xyz;
+    for (uint64_t k = 0; k < 3; k++)
+        xyz[k] = b->doubles ? wide[3 * vertex + k] : (double)narrow[3 * vertex + k];
+}
+
 static ebpo_status cut(import_build *b, uint32_t n)
 {
     ebpo_status status = reserve_scratch(b, n);
     if (status != EBPO_OK)
         return status;
-    double(*position)[3] = b->scratch;
-    uint32_t(*triangle)[3] = (uint32_t(*)[3])(position + n);
+    double(*corner)[3] = b->scratch;
+    uint32_t(*triangle)[3] = (uint32_t(*)[3])(corner + n);
     void *scratch = triangle + n + (n & 1); /* stays aligned for doubles */
     for (uint32_t i = 0; i < n; i++)
-        for (uint64_t k = 0; k < 3; k++)
-            position[i][k] = (double)b->xyz[3 * (uint64_t)b->corner[i].vertex + k];
+        load_position(b, b->corner[i].vertex, corner[i]);
     ebpo_polygon_kind kind =
-        ebpo_polygon_triangulate(triangle, (const double(*)[3])position, n, scratch);
+        ebpo_polygon_triangulate(triangle, (const double(*)[3])corner, n, scratch);
     if (kind == EBPO_POLYGON_NO_MEMORY)
-        return ebpo_fail_memory(b->error, n * sizeof *position);
+        return ebpo_fail_memory(b->error, n * sizeof *corner);
     if (kind == EBPO_POLYGON_TOO_LARGE)
         return ebpo_fail_file(
             b->error, EBPO_E_LIMIT, b->name,
@@ -196,13 +268,16 @@ ebpo_status ebpo_import_polygon(import_build *b)
 /* --- the end --- */
 
 /* Arrays grew by halves, and vertices may be fewer. */
-static void trim(ebpo_mesh *mesh)
+static void trim(ebpo_mesh *mesh, size_t position_size)
 {
     if (mesh->workspace)
         return;
-    float *xyz = ebpo_realloc(mesh->xyz32, mesh->vertex_count, 3 * sizeof *xyz);
+    void *xyz = ebpo_realloc(positions_of(mesh), mesh->vertex_count, position_size);
     uint32_t *faces = ebpo_realloc(mesh->faces, mesh->face_count, 3 * sizeof *faces);
-    mesh->xyz32 = xyz ? xyz : mesh->xyz32;
+    if (xyz && mesh->xyz32)
+        mesh->xyz32 = xyz;
+    else if (xyz)
+        mesh->xyz64 = xyz;
     mesh->faces = faces ? faces : mesh->faces;
 }
 
@@ -222,14 +297,14 @@ ebpo_status ebpo_import_end(import_build *b)
     uint32_t *map = ebpo_array_alloc(workspace, mesh->vertex_count, sizeof *map);
     if (!map)
         return fail_memory(b, mesh->vertex_count * sizeof *map);
-    ebpo_status status =
-        ebpo_import_weld(mesh->xyz32, mesh->vertex_count, map, &mesh->vertex_count, b->error);
+    ebpo_status status = ebpo_import_weld(positions_of(mesh), b->doubles, mesh->vertex_count, map,
+                                          &mesh->vertex_count, b->error);
     if (status == EBPO_OK)
         EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, 3 * mesh->face_count)
             mesh->faces[i] = map[mesh->faces[i]];
     ebpo_array_free(workspace, map);
     if (status == EBPO_OK)
-        trim(mesh);
+        trim(mesh, b->position_size);
     return status;
 }
 

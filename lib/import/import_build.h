@@ -42,7 +42,11 @@ typedef struct import_build {
     bool attributes; /* values are kept */
     locale_t c_locale;
 
-    float *xyz; /* [vertices][3] of the file */
+    bool doubles;         /* positions are doubles; else floats */
+    bool loses_digits;    /* floats do not keep the text of some coordinate */
+    uint64_t rounded;     /* values of tables whose text floats do not keep */
+    size_t position_size; /* bytes */
+    void *xyz;            /* [vertices][3] of the file */
     uint64_t vertices, vertex_capacity;
     uint32_t *use; /* [vertices] the number by first use; IMPORT_NONE: not yet used */
     uint64_t face_capacity;
@@ -54,11 +58,26 @@ typedef struct import_build {
     uint64_t scratch_capacity;
 } import_build;
 
-/* EBPO_E_MEMORY. On failure nothing is left to free. */
+/* Positions are floats, or doubles. EBPO_E_MEMORY. On failure nothing is left to free. */
 EBPO_MUST_USE ebpo_status ebpo_import_begin(import_build *b, ebpo_mesh *mesh, const char *name,
-                                            bool attributes, ebpo_error *error);
+                                            bool attributes, bool doubles, ebpo_error *error);
 
-/* Adds a vertex of the file. EBPO_E_LIMIT, EBPO_E_MEMORY, EBPO_E_IO. */
+/* Reads s[0 .. n) as a coordinate: the nearest float or double. False: it is no number. */
+bool ebpo_import_coordinate(import_build *b, double *value, const char *s, size_t n);
+
+/* Reads a number again and divides it by a weight. A float stands for the quotient where it equals
+ * it. */
+void ebpo_import_quotient(import_build *b, double *value, const char *s, size_t n, double weight);
+
+/* Reads a value of a row: the nearest float. False: it is no number. */
+bool ebpo_import_value(import_build *b, float *value, const char *s, size_t n);
+
+/* Adds a vertex of the file. EBPO_E_LIMIT, EBPO_E_MEMORY, EBPO_E_IO. EBPO_E_UNSUPPORTED, without a
+ * message: floats do not keep its text (`loses_digits`); the file is to be read again with
+ * doubles. */
+EBPO_MUST_USE ebpo_status ebpo_import_position(import_build *b, const double xyz[3]);
+
+/* Likewise of a binary file, which holds floats. */
 EBPO_MUST_USE ebpo_status ebpo_import_vertex(import_build *b, const float xyz[3]);
 
 /* Adds a row to a table, of as many values as the sort has columns. Likewise. */

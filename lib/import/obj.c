@@ -31,7 +31,15 @@ static int read_words(obj_reading *r, obj_word word[MOST_WORDS])
 static bool read_floats(const obj_reading *r, const obj_word *word, int n, float *value, int *bad)
 {
     for (*bad = 0; *bad < n; ++*bad)
-        if (!ebpo_number_float(&value[*bad], word[*bad].s, word[*bad].n, r->build->c_locale))
+        if (!ebpo_import_value(r->build, &value[*bad], word[*bad].s, word[*bad].n))
+            return false;
+    return true;
+}
+
+static bool read_position(const obj_reading *r, const obj_word *word, double xyz[3], int *bad)
+{
+    for (*bad = 0; *bad < 3; ++*bad)
+        if (!ebpo_import_coordinate(r->build, &xyz[*bad], word[*bad].s, word[*bad].n))
             return false;
     return true;
 }
@@ -45,15 +53,13 @@ static ebpo_status fail_vertex(const obj_reading *r, obj_word word)
 }
 
 /* Homogeneous coordinates, as w is where it is no 1. */
-static ebpo_status divide(obj_reading *r, const obj_word word[4], float xyz[3])
+static ebpo_status divide(obj_reading *r, const obj_word word[4], double xyz[3])
 {
-    double x, w;
+    double w;
     if (!ebpo_number_double(&w, word[3].s, word[3].n, r->build->c_locale) || w == 0)
         return fail_vertex(r, word[3]);
-    for (int k = 0; k < 3 && w != 1; k++) {
-        ebpo_number_double(&x, word[k].s, word[k].n, r->build->c_locale);
-        xyz[k] = (float)(x / w);
-    }
+    for (int k = 0; k < 3 && w != 1; k++)
+        ebpo_import_quotient(r->build, &xyz[k], word[k].s, word[k].n, w);
     r->losses.weights += w != 1;
     return EBPO_OK;
 }
@@ -86,18 +92,18 @@ static ebpo_status add_colour(obj_reading *r, const obj_word word[3], bool colou
 static ebpo_status read_vertex(obj_reading *r)
 {
     obj_word word[MOST_WORDS];
-    float xyz[3];
+    double xyz[3];
     int n = read_words(r, word), bad;
     if (n < 3)
         return ebpo_obj_fail(r,
                              "vertex %" PRIu64 " has %d coordinates, not three; write z as well "
                              "(0 in a plane), or repair the file",
                              r->build->vertices + 1, n);
-    if (!read_floats(r, word, 3, xyz, &bad))
+    if (!read_position(r, word, xyz, &bad))
         return fail_vertex(r, word[bad]);
     ebpo_status status = n == 4 ? divide(r, word, xyz) : EBPO_OK;
     if (status == EBPO_OK)
-        status = ebpo_import_vertex(r->build, xyz);
+        status = ebpo_import_position(r->build, xyz);
     r->losses.surplus += n == 5 || n == 8;
     r->losses.alpha += n == 7;
     return status == EBPO_OK ? add_colour(r, word + 3, n >= 6) : status;

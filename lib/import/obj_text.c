@@ -14,6 +14,10 @@ obj_text ebpo_obj_text(const uint8_t *data, uint64_t size)
                        1, false };
 }
 
+/* Characters at which a word may end. */
+static const bool may_end[256] = { [' '] = true,  ['\t'] = true, ['\v'] = true, ['\f'] = true,
+                                   ['\n'] = true, ['\r'] = true, ['\\'] = true };
+
 /* Past the end of a line. */
 static const char *past_end(const char *at, const char *end)
 {
@@ -53,9 +57,11 @@ bool ebpo_obj_next_word(obj_text *t, obj_word *word)
     const char *s = t->at;
     if (s == t->end || ends_line(*s) || *s == '#')
         return false;
-    while (t->at < t->end && !is_blank(*t->at) && !ends_line(*t->at) && !joined_end(t->at, t->end))
-        t->at++;
-    *word = (obj_word){ s, (size_t)(t->at - s) };
+    const char *at = s;
+    while (at < t->end && (!may_end[(uint8_t)*at] || (*at == '\\' && !joined_end(at, t->end))))
+        at++;
+    t->at = at;
+    *word = (obj_word){ s, (size_t)(at - s) };
     return true;
 }
 

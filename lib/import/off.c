@@ -198,11 +198,6 @@ static void take_rest(off_reading *r)
             r->rest[r->rest_count++] = word;
 }
 
-static bool read_float(const off_reading *r, off_word word, float *value)
-{
-    return ebpo_number_float(value, word.s, word.n, r->build->c_locale);
-}
-
 /* Numbers of the rest from `first` on, into a row of a table. */
 static ebpo_status keep(off_reading *r, import_sort sort, int first, bool *good)
 {
@@ -211,7 +206,7 @@ static ebpo_status keep(off_reading *r, import_sort sort, int first, bool *good)
     *good = first + columns <= r->rest_count;
     for (int k = 0; k < columns && *good; k++) {
         off_word word = r->rest[first + k];
-        *good = read_float(r, word, &value[k]);
+        *good = ebpo_import_value(r->build, &value[k], word.s, word.n);
         if (sort != IMPORT_COLOURS)
             continue;
         /* the range first, in this way: what is not a number has no int */
@@ -277,23 +272,27 @@ static ebpo_status fail_number(const off_reading *r, off_word word, uint64_t row
 
 static ebpo_status read_vertex(off_reading *r, uint64_t row)
 {
-    float xyz[3], w = 1;
-    off_word word;
+    double xyz[3], w = 1;
+    off_word word[4];
     for (int k = 0; k < 3 + r->weights; k++) {
-        if (!next_needed(r, k == 0, &word)) {
+        if (!next_needed(r, k == 0, &word[k])) {
             if (k == 0 || r->text.at == r->text.end)
                 return fail_end(r, "vertex", row + (k > 0));
             return fail(r, "vertex %" PRIu64 " has no three coordinates; repair the file", row);
         }
-        if (!read_float(r, word, k < 3 ? &xyz[k] : &w) || w == 0)
-            return fail_number(r, word, row);
+        const char *s = word[k].s;
+        size_t n = word[k].n;
+        bool good = k < 3 ? ebpo_import_coordinate(r->build, &xyz[k], s, n)
+                          : ebpo_number_double(&w, s, n, r->build->c_locale) && w != 0;
+        if (!good)
+            return fail_number(r, word[k], row);
     }
     for (int k = 0; k < 3 && w != 1; k++)
-        xyz[k] = (float)((double)xyz[k] / (double)w);
+        ebpo_import_quotient(r->build, &xyz[k], word[k].s, word[k].n, w);
     r->divided += w != 1;
     ebpo_status status = take_rest_anyhow(r, row);
     if (status == EBPO_OK)
-        status = ebpo_import_vertex(r->build, xyz);
+        status = ebpo_import_position(r->build, xyz);
     return status == EBPO_OK ? keep_rest(r) : status;
 }
 

@@ -88,16 +88,16 @@ static ebpo_status fail_end(const stl_text *t)
 
 static ebpo_status read_vertex(stl_text *t)
 {
-    float xyz[3];
+    double xyz[3];
     stl_word word;
     for (int k = 0; k < 3; k++) {
         if (!next_word(t, &word))
             return fail_end(t);
-        if (!ebpo_number_float(&xyz[k], word.s, word.n, t->build->c_locale))
+        if (!ebpo_import_coordinate(t->build, &xyz[k], word.s, word.n))
             return fail_word(t, "a coordinate", word);
     }
     t->corners++;
-    return ebpo_import_vertex(t->build, xyz);
+    return ebpo_import_position(t->build, xyz);
 }
 
 static void note_odd(stl_text *t) { t->odd_line = t->odd++ ? t->odd_line : t->line; }

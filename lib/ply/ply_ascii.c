@@ -4,6 +4,7 @@
 #include "geom/strict_fp.h"
 
 #include <inttypes.h>
+#include <math.h>
 
 #include "base/error.h"
 #include "geom/decimal.h"
@@ -55,20 +56,41 @@ static ebpo_status next_integer(rows *r, int64_t *value)
     return EBPO_OK;
 }
 
+/* Reads a coordinate that the header declares as a float. Where a float does not keep its text, a
+ * mesh notes by how much it is rounded; points, of which nothing can be noted, get the double. */
+static bool parse_float(ply_parser *p, ply_word token, double *value)
+{
+    float narrow;
+    bool kept;
+    double wide;
+    if (!ebpo_number_float_kept(&narrow, &kept, token.s, token.n, p->c_locale))
+        return false;
+    *value = (double)narrow;
+    if (kept || !ebpo_number_double(&wide, token.s, token.n, p->c_locale))
+        return true;
+    p->most_rounded = fmax(p->most_rounded, fabs(wide - *value));
+    if (p->strict)
+        *value = wide;
+    return true;
+}
+
 static bool parse_coordinate(const rows *r, const ply_property *property, ply_word token)
 {
     ply_parser *p = r->p;
+    ebpo_mesh *mesh = p->mesh;
     uint64_t place = 3 * r->row + (uint64_t)(property->role - PLY_ROLE_X);
-    if (p->mesh->xyz32)
-        return ebpo_number_float(&p->mesh->xyz32[place], token.s, token.n, p->c_locale);
-    if (property->type == PLY_FLOAT64)
-        return ebpo_number_double(&p->mesh->xyz64[place], token.s, token.n, p->c_locale);
-    float narrow = 0;
+    double value = 0;
     int64_t whole = 0;
-    bool good = property->type == PLY_FLOAT32
-                    ? ebpo_number_float(&narrow, token.s, token.n, p->c_locale)
+    bool good = property->type == PLY_FLOAT32 ? parse_float(p, token, &value)
+                : property->type == PLY_FLOAT64
+                    ? ebpo_number_double(&value, token.s, token.n, p->c_locale)
                     : ebpo_number_integer(&whole, token.s, token.n);
-    p->mesh->xyz64[place] = property->type == PLY_FLOAT32 ? (double)narrow : (double)whole;
+    if (property->type < PLY_FLOAT32)
+        value = (double)whole;
+    if (mesh->xyz32)
+        mesh->xyz32[place] = (float)value;
+    else
+        mesh->xyz64[place] = value;
     return good;
 }
 

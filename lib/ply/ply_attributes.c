@@ -200,16 +200,18 @@ static bool fits(int64_t value, ply_type type)
     return value >= least[type] && value <= most[type];
 }
 
-static bool text_bits(const ply_parser *p, ply_type type, ply_word token, uint64_t *bits)
+static bool text_bits(ply_parser *p, ply_type type, ply_word token, uint64_t *bits)
 {
     int64_t whole;
     float narrow;
     uint32_t narrow_bits = 0;
     double wide;
+    bool kept;
     switch (type) {
     case PLY_FLOAT32:
-        if (!ebpo_number_float(&narrow, token.s, token.n, p->c_locale))
+        if (!ebpo_number_float_kept(&narrow, &kept, token.s, token.n, p->c_locale))
             return false;
+        p->rounded += !kept;
         memcpy(&narrow_bits, &narrow, sizeof narrow);
         *bits = narrow_bits;
         return true;
@@ -349,6 +351,9 @@ ebpo_status ebpo_ply_attributes_end(ply_parser *p)
     ebpo_status status = is_plain(&p->header) ? EBPO_OK : take_header(p);
     if (p->header.encoding != PLY_ASCII && p->at < p->size)
         ebpo_attributes_lose(to, "%" PRIu64 " bytes behind the last element", p->size - p->at);
+    if (p->rounded)
+        ebpo_attributes_lose(to, "digits of %" PRIu64 " values that the header declares as float",
+                             p->rounded);
     for (uint64_t i = to->count; i-- > 0;) {
         ebpo_attribute *a = &to->array[i];
         if (ebpo_attribute_is_of(a, "face"))

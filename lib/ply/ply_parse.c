@@ -81,16 +81,18 @@ static ebpo_status check_parts(const ply_parser *p)
     return EBPO_OK;
 }
 
-/* Floats stay floats when all three coordinates are; doubles hold every other type exactly. */
-static bool all_float(const ply_header *h)
+/* Floats stay floats when all three coordinates are; doubles hold every other type exactly. Points
+ * are doubles. */
+static bool all_float(const ply_parser *p)
 {
+    const ply_header *h = &p->header;
     const ply_element *vertex = &h->element[h->vertex];
     for (uint64_t i = 0; i < vertex->properties; i++) {
         const ply_property *property = &h->property[vertex->first + i];
         if (property->role != PLY_ROLE_NONE && property->type != PLY_FLOAT32)
             return false;
     }
-    return true;
+    return !p->strict;
 }
 
 static ebpo_status allocate_vertices(ply_parser *p)
@@ -98,7 +100,7 @@ static ebpo_status allocate_vertices(ply_parser *p)
     const ply_header *h = &p->header;
     ebpo_mesh *mesh = p->mesh;
     mesh->vertex_count = h->element[h->vertex].count;
-    size_t width = all_float(h) ? sizeof(float) : sizeof(double);
+    size_t width = all_float(p) ? sizeof(float) : sizeof(double);
     void *coordinates = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, 3 * width);
     if (width == sizeof(float))
         mesh->xyz32 = coordinates;
@@ -181,15 +183,23 @@ static void describe(ply_parser *p)
     p->mesh->source_size = p->size;
 }
 
-static ebpo_status note_surplus(ply_parser *p)
+static ebpo_status note_unread(ply_parser *p)
 {
-    ebpo_status status = p->surplus_values ? ebpo_ply_notes(p) : EBPO_OK;
-    if (p->surplus_values && status == EBPO_OK)
+    ebpo_status status =
+        p->surplus_values || p->most_rounded > 0 ? ebpo_ply_notes(p) : EBPO_OK;
+    if (status != EBPO_OK)
+        return status;
+    if (p->surplus_values)
         ebpo_attributes_note_unread(p->mesh->attributes,
                                     "values that the header does not describe: %" PRIu64
                                     ", at the ends of %" PRIu64 " rows",
                                     p->surplus_values, p->surplus_rows);
-    return status;
+    if (p->most_rounded > 0)
+        ebpo_attributes_note_unread(p->mesh->attributes,
+                                    "digits of coordinates that the header declares as float: "
+                                    "rounded by up to %.3g; declare them as double",
+                                    p->most_rounded);
+    return EBPO_OK;
 }
 
 /* All but the mesh. */
@@ -229,7 +239,7 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
     if (status == EBPO_OK)
         status = ebpo_ply_attributes_end(&p);
     if (status == EBPO_OK)
-        status = note_surplus(&p);
+        status = note_unread(&p);
     if (status == EBPO_OK)
         status = ebpo_ply_leave_unused(&p);
     if (status == EBPO_OK) {
@@ -245,23 +255,6 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
     release(&p);
     *out = mesh;
     return status;
-}
-
-/* Gives the vertices away, widened. */
-static ebpo_status give_points(ply_parser *p, double **xyz, uint64_t *count)
-{
-    ebpo_mesh *mesh = p->mesh;
-    if (mesh->xyz32) {
-        mesh->xyz64 = ebpo_alloc(mesh->vertex_count, 3 * sizeof(double));
-        if (!mesh->xyz64)
-            return ebpo_fail_memory(p->error, mesh->vertex_count * 3 * sizeof(double));
-        for (uint64_t i = 0; i < 3 * mesh->vertex_count; i++)
-            mesh->xyz64[i] = (double)mesh->xyz32[i];
-    }
-    *xyz = mesh->xyz64;
-    *count = mesh->vertex_count;
-    mesh->xyz64 = NULL;
-    return EBPO_OK;
 }
 
 ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *name, double **xyz,
@@ -285,10 +278,12 @@ ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *n
     for (int64_t i = 0; status == EBPO_OK && i <= p.header.vertex;
          i++) /* what follows the vertices is not read */
         status = read_element(&p, &p.header.element[i], i == p.header.vertex);
-    if (status == EBPO_OK)
-        status = give_points(&p, xyz, count);
-    free(mesh.xyz32);
-    free(mesh.xyz64);
+    if (status == EBPO_OK) {
+        *xyz = mesh.xyz64;
+        *count = mesh.vertex_count;
+    } else {
+        free(mesh.xyz64);
+    }
     release(&p);
     return status;
 }

@@ -29,8 +29,10 @@ typedef struct ply_parser {
     uint64_t next_report; /* offset */
     /* ascii: values that the header does not describe, at the ends of how many rows */
     uint64_t surplus_values, surplus_rows;
-    bool strict; /* ascii: such are an error */
-    bool *lost;  /* [arrays of attributes] a value does not fit its type; NULL: none are read */
+    bool strict;         /* ascii: such are an error; coordinates are doubles */
+    double most_rounded; /* ascii: by which a float differs from its text, which it loses */
+    uint64_t rounded;    /* ascii: values of attributes whose text a float loses */
+    bool *lost; /* [arrays of attributes] a value does not fit its type; NULL: none are read */
     uint64_t faces_reserved; /* rows that faces' attributes have room for */
     ebpo_error *error;
 } ply_parser;

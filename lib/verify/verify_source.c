@@ -306,14 +306,21 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
     return status;
 }
 
-static void check_digest(ebpo_tally *tally, const ebpo_info *info, const ebpo_mesh *source)
+static bool check_digest(ebpo_tally *tally, const ebpo_info *info, const ebpo_mesh *source)
 {
     static const uint8_t none[32];
-    if (memcmp(source->source_sha256, none, 32) == 0)
-        return;
-    CHECK(memcmp(source->source_sha256, info->source_sha256, 32) == 0 &&
-              source->source_size == info->source_size,
-          "the source file's digest or size is not the recorded one");
+    return memcmp(source->source_sha256, none, 32) == 0 ||
+           CHECK(memcmp(source->source_sha256, info->source_sha256, 32) == 0 &&
+                     source->source_size == info->source_size,
+                 "the source file's digest or size is not the recorded one");
+}
+
+/* Returns whether an earlier version has made the file: it rounded the coordinates of OBJ, OFF and
+ * text STL to floats, although the text has more digits. */
+static bool was_rounded(const ebpo_info *info, const ebpo_mesh *source)
+{
+    return source->xyz64 && !info->double_coordinates && source->source_format[0] &&
+           strncmp(source->source_format, "ply", 3) != 0;
 }
 
 static ebpo_status compare(ebpo_tally *tally, const ebpo_mesh *mended, const ebpo_mesh *stored,
@@ -351,7 +358,12 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
                               ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
-    check_digest(tally, info, source);
+    if (check_digest(tally, info, source) && was_rounded(info, source)) {
+        /* vertices may have fallen together, and polygons have been cut in other ways */
+        CHECK(false, "coordinates were rounded to single precision by an earlier version; convert "
+                     "again");
+        return EBPO_OK;
+    }
     CHECK(info->source_vertex_count == source->vertex_count &&
               info->source_face_count == source->face_count,
           "the source has %" PRIu64 " vertices and %" PRIu64 " faces, recorded are %" PRIu64

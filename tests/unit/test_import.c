@@ -49,7 +49,7 @@ START_TEST(weld_keeps_the_first_of_each_position)
     float xyz[] = { 0, 1, 2, -0.0f, 1, 2, 3, 4, 5, 0, 1, 2, 6, 7, 8 };
     uint32_t map[5];
     uint64_t left;
-    ck_assert(ebpo_import_weld(xyz, 5, map, &left, NULL) == EBPO_OK);
+    ck_assert(ebpo_import_weld(xyz, false, 5, map, &left, NULL) == EBPO_OK);
     ck_assert(left == 3 && map[0] == 0 && map[1] == 0 && map[2] == 1 && map[3] == 0 && map[4] == 2);
     ck_assert(xyz[3] == 3 && xyz[6] == 6 && xyz[8] == 8);
 }
@@ -164,24 +164,27 @@ static const struct {
     { "t.stl", "solid x\nendsolid x\n", "t.stl: " },
 };
 
-/* A strip of so many squares, one after the other, each vertex with a colour. */
-static char *long_strip(unsigned squares)
+/* A strip of so many squares, one after the other, each vertex with a colour; the last one ends
+ * with these digits. */
+static char *long_strip(unsigned squares, const char *digits)
 {
     char *text = malloc(squares * 120 + 100), *at = text;
     for (unsigned i = 0; i <= squares; i++)
-        at += sprintf(at, "v %u 0 0.%u 1 0 0\nv %u 1 0 0 1 0\n", i, i % 7 + 1, i);
+        at += sprintf(at, "v %u 0 0.%u%s 1 0 0\nv %u 1 0 0 1 0\n", i, i % 7 + 1,
+                      i == squares ? digits : "", i);
     for (unsigned i = 0; i < squares; i++)
         at += sprintf(at, "f %u %u %u %u\n", 2 * i + 1, 2 * i + 3, 2 * i + 4, 2 * i + 2);
     return text;
 }
 
-/* Arrays that do not fit the budget go to files, and the mesh is the same. */
+/* Arrays that do not fit the budget go to files, and the mesh is the same: of floats, and of
+ * doubles, which the file needs at its last vertex. */
 START_TEST(a_budget_does_not_change_the_mesh)
 {
     ebpo_mesh mesh, within;
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
-    char *text = long_strip(20000);
+    char *text = long_strip(20000, _i ? "00000000001" : "");
     const uint8_t *data = (const uint8_t *)text;
     uint64_t size = strlen(text);
     ck_assert(ebpo_workspace_make_any(&w, 1 << 20, NULL, &error) == EBPO_OK);
@@ -193,7 +196,11 @@ START_TEST(a_budget_does_not_change_the_mesh)
     ck_assert(mesh.face_count == 40000 && mesh.vertex_count == 40002);
     ck_assert(within.face_count == 40000 && within.vertex_count == 40002);
     ck_assert_mem_eq(mesh.faces, within.faces, mesh.face_count * 12);
-    ck_assert_mem_eq(mesh.xyz32, within.xyz32, mesh.vertex_count * 12);
+    ck_assert(!mesh.xyz64 == !_i && !within.xyz64 == !_i);
+    if (_i)
+        ck_assert_mem_eq(mesh.xyz64, within.xyz64, mesh.vertex_count * 24);
+    else
+        ck_assert_mem_eq(mesh.xyz32, within.xyz32, mesh.vertex_count * 12);
     free(text);
     ebpo_mesh_free(&mesh);
     ebpo_mesh_free(&within);
@@ -204,13 +211,68 @@ END_TEST
 /* Decimals become the nearest floats: these are where others end up beside them. */
 START_TEST(numbers_are_rounded_correctly)
 {
-    static const char obj[] = "v 2.96502000e-01 5.30000000000000000e-31 16777217.0000000001\n"
-                              "v 0.296502 1e-45 3.5e38\nv .5 -5. +1E2\nf 1 2 3\n";
-    static const float right[] = { 0.296502f, 5.3e-31f, 16777218, 0.296502f, 1e-45f,
-                                   INFINITY,  0.5f,     -5,       100 };
+    static const char obj[] = "v 2.96501994e-01 5.3e-31 16777216.0000000000\n"
+                              "v 0.296502 1e-45 3.4028235e38\nv .5 -5. +1E2\nf 1 2 3\n";
+    static const float right[] = { 0.296502f,      5.3e-31f, 16777216, 0.296502f, 1e-45f,
+                                   3.4028235e+38f, 0.5f,     -5,       100 };
     ebpo_mesh mesh;
     ck_assert(import(&mesh, "t.obj", obj, sizeof obj - 1, NULL) == EBPO_OK);
     ck_assert_mem_eq(mesh.xyz32, right, sizeof right);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+#define UTM_FACET(a, b, c) "facet\nouter loop\nvertex " a "\nvertex " b "\nvertex " c "\nendloop\n"
+#define UTM_A              "691234.567 5334567.891 0.1"
+#define UTM_B              "691246.912 5334567.891 519.25"
+#define UTM_C              "691246.912 5334567.892 519.25"
+#define UTM_D              "1.1 -0.000 1e39"
+
+/* One coordinate that floats do not keep, wherever it is, makes all of them the nearest doubles,
+ * and vertices are one where these are equal. B and C are one float. */
+START_TEST(positions_are_doubles_where_floats_lose_digits)
+{
+    static const struct {
+        const char *name, *text;
+    } files[] = {
+        { "t.obj", "v 0 0 0\nv " UTM_A "\nv " UTM_B "\nv " UTM_C "\nv " UTM_D "\nv " UTM_A
+                   "\ng a\nf 2 3 4\nf 6 4 5\n" },
+        { "t.off",
+          "OFF 5 2 0\n" UTM_A "\n" UTM_B "\n" UTM_C "\n" UTM_D "\n" UTM_A "\n3 0 1 2\n3 4 2 3\n" },
+        { "t.stl", "solid\n" UTM_FACET(UTM_A, UTM_B, UTM_C) "endfacet\n" UTM_FACET(
+                       UTM_A, UTM_C, UTM_D) "endfacet\nendsolid\n" },
+    };
+    static const double right[] = { 691234.567,  5334567.891, 0.1,        691246.912,
+                                    5334567.891, 519.25,      691246.912, 5334567.892,
+                                    519.25,      1.1,         -0.0,       1e39 };
+    static const uint32_t corners[] = { 0, 1, 2, 0, 2, 3 };
+    ebpo_mesh mesh;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_msg(import(&mesh, files[_i].name, files[_i].text, strlen(files[_i].text), &error) ==
+                      EBPO_OK,
+                  "%s", error.message);
+    ck_assert(mesh.vertex_count == 4 && mesh.face_count == 2 && !mesh.xyz32);
+    ck_assert_mem_eq(mesh.xyz64, right, sizeof right);
+    ck_assert_mem_eq(mesh.faces, corners, sizeof corners);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
+/* Coordinates that were divided by a weight have no text: floats are kept where they are exact. */
+START_TEST(quotients_are_floats_where_these_are_exact)
+{
+    static const char exact[] = "v 0 0 0 1\nv 2 0 0 2.0\nv 0 0.1 0 1\nf 1 2 3\n",
+                      inexact[] = "v 0 0 0 1\nv 2 0 0 3\nv 0 0.1 0 1\nf 1 2 3\n",
+                      off[] = "4OFF 3 1 0\n0 0 0 1\n2 0 0 3\n0 0.1 0 1\n3 0 1 2\n";
+    ebpo_mesh mesh;
+    ck_assert(import(&mesh, "t.obj", exact, sizeof exact - 1, NULL) == EBPO_OK);
+    ck_assert(mesh.xyz32 && mesh.xyz32[3] == 1 && mesh.xyz32[7] == 0.1f);
+    ebpo_mesh_free(&mesh);
+    ck_assert(import(&mesh, "t.obj", inexact, sizeof inexact - 1, NULL) == EBPO_OK);
+    ck_assert(mesh.xyz64 && mesh.xyz64[3] == 2.0 / 3 && mesh.xyz64[7] == 0.1);
+    ebpo_mesh_free(&mesh);
+    ck_assert(import(&mesh, "t.off", off, sizeof off - 1, NULL) == EBPO_OK);
+    ck_assert(mesh.xyz64 && mesh.xyz64[3] == 2.0 / 3 && mesh.xyz64[7] == 0.1);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
@@ -253,8 +315,10 @@ Suite *test_suite(void)
     tcase_add_test(tests, off_keeps_faces_in_order);
     tcase_add_test(tests, stl_of_both_kinds_is_welded);
     tcase_add_test(tests, polygons_of_obj_are_cut_by_ears);
-    tcase_add_test(tests, a_budget_does_not_change_the_mesh);
+    tcase_add_loop_test(tests, a_budget_does_not_change_the_mesh, 0, 2);
     tcase_add_test(tests, numbers_are_rounded_correctly);
+    tcase_add_loop_test(tests, positions_are_doubles_where_floats_lose_digits, 0, 3);
+    tcase_add_test(tests, quotients_are_floats_where_these_are_exact);
     tcase_add_loop_test(tests, damaged_files_are_refused_by_name, 0,
                         (int)(sizeof bad / sizeof *bad));
     tcase_add_test(tests, bunny_of_glmark2_is_closed_when_it_is_there);

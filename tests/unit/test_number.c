@@ -82,6 +82,106 @@ START_TEST(midpoints_between_floats_are_rounded_once)
 }
 END_TEST
 
+/* Printed with as many digits behind the point as the text has: what the declaration says. */
+static bool prints_again(const char *s, float value)
+{
+    char text[400];
+    const char *point = strchr(s, '.');
+    snprintf(text, sizeof text, "%.*f", point ? (int)strlen(point + 1) : 0, (double)value);
+    return strcmp(text, s) == 0;
+}
+
+static void check_kept(const char *s, locale_t c)
+{
+    float f;
+    bool kept;
+    ck_assert(ebpo_number_float_kept(&f, &kept, s, strlen(s), c));
+    ck_assert_msg(kept == prints_again(s, f), "%s as float %.9g: %s", s, (double)f,
+                  kept ? "kept" : "not kept");
+}
+
+START_TEST(digits_are_kept_where_printing_gives_them_again)
+{
+    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    uint64_t state = 88172645463325252u + (uint64_t)_i;
+    char s[400];
+    for (int i = 0; i < 10000; i++) {
+        int digits = 1 + (int)(next(&state) % 10), decimals = (int)(next(&state) % 12);
+        char *at = s + sprintf(s, "%s%llu", next(&state) % 2 ? "-" : "",
+                               (unsigned long long)(next(&state) % 9000000000u) /
+                                   (unsigned long long)pow(10, digits));
+        at += sprintf(at, decimals ? "." : "");
+        for (int k = 0; k < decimals; k++)
+            *at++ = (char)('0' + next(&state) % 10);
+        *at = 0;
+        check_kept(s, c);
+        float f = strtof(s, NULL); /* as programs print floats: with digits enough, and too many */
+        for (int k = 5; k < 40; k += 1 + (int)(next(&state) % 5)) {
+            snprintf(s, sizeof s, "%.*f", k, (double)f);
+            check_kept(s, c);
+        }
+    }
+    /* floats of this size are multiples of a quarter: two texts, one float, ties to even */
+    check_kept("2097152.2", c);
+    check_kept("2097152.3", c);
+    freelocale(c);
+}
+END_TEST
+
+/* What printing with a point does not show: exponents, signs, zeros, ends of the range. */
+START_TEST(digits_with_exponents_are_kept_or_not)
+{
+    static const struct {
+        const char *text;
+        bool kept;
+    } cases[] = { { "1.5e3", true },
+                  { "+1.5E+03", true },
+                  { "007.50", true },
+                  { "-0.000", true },
+                  { "0e-500", true },
+                  { "1.00000e10", true },
+                  { "1.0000001e10", true },
+                  { "1.00000005e10", false },
+                  { "1.2345678e8", true },
+                  { "1.23456789e8", false },
+                  { "123456789e-3", true },
+                  { "123456787e-3", false },
+                  { "1000000000000e-15", false },
+                  { "1e-45", true },
+                  { "1.0e-44", true },
+                  { "1.2e-45", false },
+                  { "1.17549435e-38", true },
+                  { "1e-60", false },
+                  { "3.4028235e38", true },
+                  { "3.40282347e+38", true },
+                  { "3.402823466385288598117e38", true },
+                  { "3.402823466385288598118e38", false },
+                  { "340282346638528859811704183484516925440", true },
+                  { "1e39", false },
+                  { "1e400", true },
+                  { "nan", true },
+                  { "-inf", true },
+                  { "16777216", true },
+                  { "16777217", false },
+                  { "16777217.0000000001", false },
+                  { "0.100000001490116119384765625", true },
+                  { "0.100000001490116119384765626", false },
+                  { "0.1000000014901161193847656250000000000000000000000000000", true },
+                  { "8388607.5", true },
+                  { "9999999.5", false },
+                  { "99999999.9", false } };
+    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const char *s = cases[i].text;
+        float f;
+        bool kept;
+        ck_assert(ebpo_number_float_kept(&f, &kept, s, strlen(s), c));
+        ck_assert_msg(kept == cases[i].kept, "%s", s);
+    }
+    freelocale(c);
+}
+END_TEST
+
 START_TEST(edges_of_the_range_are_read)
 {
     static const char *const cases[] = { "0",
@@ -204,6 +304,8 @@ Suite *test_suite(void)
     tcase_set_timeout(tests, 120);
     tcase_add_loop_test(tests, random_decimals_are_rounded_as_by_the_c_library, 0, 3);
     tcase_add_test(tests, midpoints_between_floats_are_rounded_once);
+    tcase_add_loop_test(tests, digits_are_kept_where_printing_gives_them_again, 0, 3);
+    tcase_add_test(tests, digits_with_exponents_are_kept_or_not);
     tcase_add_test(tests, edges_of_the_range_are_read);
     tcase_add_loop_test(tests, numbers_of_other_programs_are_read_as_standard_ones, 0,
                         (int)(sizeof foreign / sizeof *foreign));

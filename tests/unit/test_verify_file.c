@@ -159,6 +159,28 @@ START_TEST(another_source_is_noticed_down_to_the_sign_of_zero)
 }
 END_TEST
 
+/* A file whose coordinates an earlier version rounded, which is no damage. */
+START_TEST(rounded_coordinates_of_an_earlier_version_are_named)
+{
+    ebpo_mesh source = ebpo_test_make("box_subdivided"), rounded = ebpo_test_make("box_subdivided");
+    rounded.xyz32 = malloc(rounded.vertex_count * 3 * sizeof *rounded.xyz32);
+    for (uint64_t i = 0; i < 3 * rounded.vertex_count; i++)
+        rounded.xyz32[i] = (float)rounded.xyz64[i];
+    free(rounded.xyz64);
+    rounded.xyz64 = NULL;
+    strcpy(source.source_format, "obj");
+    write_file(rounded, false, ~0u);
+    ck_assert(verify_against(&source));
+    ck_assert(report.source.violations == 1 && report.violations == 1);
+    ck_assert_str_eq(report.source.first, "coordinates were rounded to single precision by an "
+                                          "earlier version; convert again");
+    strcpy(source.source_format, "ply-ascii"); /* these kept what their header says */
+    ck_assert(verify_against(&source));
+    ck_assert(strstr(report.source.first, "different kinds of coordinates") != NULL);
+    ebpo_mesh_free(&source);
+}
+END_TEST
+
 /* Flips a bit of the arrays here and there (libhdf5 leaks memory of its own when its head is
  * damaged): a finding, or a byte that means nothing, but never a crash and never a failed call. */
 START_TEST(damaged_files_are_findings_and_not_failures)
@@ -250,6 +272,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, file_without_maps_equals_its_source_as_a_set);
     tcase_add_test(tests, files_without_parts_keep_what_they_promise);
     tcase_add_test(tests, another_source_is_noticed_down_to_the_sign_of_zero);
+    tcase_add_test(tests, rounded_coordinates_of_an_earlier_version_are_named);
     tcase_add_test(tests, damaged_files_are_findings_and_not_failures);
     tcase_add_test(tests, verifying_needs_a_file_and_may_be_stopped);
     tcase_add_test(tests, looking_at_unused_bytes_may_be_stopped);

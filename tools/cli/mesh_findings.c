@@ -87,6 +87,9 @@ static void print_findings(FILE *out, const ebpo_mesh_report *report)
 static void print_reading(FILE *out, const ebpo_mesh *mesh)
 {
     char text[80];
+    if (mesh->xyz64 && mesh->source_format[0] && strncmp(mesh->source_format, "ply", 3) != 0)
+        fputs("  coordinates are stored as double: float does not keep all digits of the text\n",
+              out);
     if (mesh->polygons_triangulated) {
         fprintf(out, "  %s cut into triangles",
                 words_plural(text, sizeof text, mesh->polygons_triangulated, "polygon",

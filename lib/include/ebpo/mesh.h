@@ -48,7 +48,8 @@ typedef struct ebpo_mesh {
 
     /*
      * [vertex_count][3] Exactly one of the two is set: xyz32 if the source holds
-     * floats, xyz64 if it holds doubles. The other is NULL.
+     * floats, or text that floats keep; xyz64 if it holds doubles, or text with more
+     * digits (ebpo_mesh_read). The other is NULL.
      */
     float *xyz32;
     double *xyz64;
@@ -180,11 +181,13 @@ typedef struct ebpo_mesh_read_options {
  * (slits, bridges to holes, pinched corners). Of outlines that cross themselves, folded
  * quads among them, the triangles have the least area, up to 64 corners, and are
  * counted in `polygons_guessed`. Strips are unrolled. Positions keep every bit, and
- * text is rounded correctly: of PLY to the type that its header says, of the other
- * formats to float. In these, vertices of one position are one,
- * and those that no face names are left out. ebpo_mesh_unread tells what could not
- * be read. Vertices of a PLY that no face names are left out if their coordinates
- * are not finite.
+ * text is rounded correctly: of PLY to the type in its header.
+ * Text of the other formats has no type: positions are floats if each nearest float,
+ * rounded to the last digit of its text, gives the text, else doubles, all of them. In
+ * these formats vertices of one position are one, and those that no face names are left
+ * out. Vertices of a PLY that no face names are left out if their coordinates are not
+ * finite. ebpo_mesh_unread tells what could not be read, and by how much floats differ
+ * from the text of a PLY at most.
  *
  * Safe on untrusted files. They are read as a whole, into an array of `workspace`: one that
  * another program changes meanwhile is EBPO_E_IO.
@@ -205,8 +208,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(const char *path,
  * Coordinates may be NaN or infinite. Safe on untrusted bytes.
  *
  * name    for messages
- * xyz     [*count][3] doubles, exact: floats and integers are widened. Freed by
- *         free(). On failure NULL.
+ * xyz     [*count][3] doubles, exact: floats and integers are widened. Text of a
+ *         float that does not keep its digits is the nearest double. Freed by free().
+ *         On failure NULL.
  *
  * EBPO_E_FORMAT, EBPO_E_LIMIT, EBPO_E_MEMORY.
  *
