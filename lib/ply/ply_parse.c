@@ -181,9 +181,14 @@ static void describe(ply_parser *p)
     p->mesh->source_size = p->size;
 }
 
-static ebpo_status note_surplus(ply_parser *p)
+static ebpo_status note_unread(ply_parser *p)
 {
-    ebpo_status status = p->surplus_values ? ebpo_ply_notes(p) : EBPO_OK;
+    bool more = p->header.encoding == PLY_ASCII && ebpo_ply_ascii_more(p);
+    ebpo_status status = p->surplus_values || more ? ebpo_ply_notes(p) : EBPO_OK;
+    if (more && status == EBPO_OK)
+        ebpo_attributes_note_unread(p->mesh->attributes,
+                                    "what follows the last element, from line %" PRIu64 " on",
+                                    p->line);
     if (p->surplus_values && status == EBPO_OK)
         ebpo_attributes_note_unread(p->mesh->attributes,
                                     "values that the header does not describe: %" PRIu64
@@ -229,7 +234,7 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
     if (status == EBPO_OK)
         status = ebpo_ply_attributes_end(&p);
     if (status == EBPO_OK)
-        status = note_surplus(&p);
+        status = note_unread(&p);
     if (status == EBPO_OK)
         status = ebpo_ply_leave_unused(&p);
     if (status == EBPO_OK) {
