@@ -313,6 +313,7 @@ static const dialect dialects[] = {
     { "word.stl", FILE_OF("solid a\n" STL4 "nonsense\nendsolid\n"), 0, 0,
       "line 30: 'nonsense' where facet or endsolid should stand" },
     { "empty.stl", FILE_OF("solid a\nendsolid a\n"), 0, 0, "has no faces" },
+    { "solid.stl", FILE_OF(" solid"), 0, 0, "has no faces" },
     { "not.stl", FILE_OF("not an stl file at all"), 0, 0, "is no STL file" },
     /* PLY in text */
     { "a.ply", FILE_OF(PLY4 OFF4 OFFF), 4, 4, NULL },
