@@ -232,7 +232,8 @@ static bool is_foreign(points *p)
         error.offset != 0)
         return free(xyz), false;
     fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
-    return p->failed = true;
+    p->failed = true;
+    return true;
 }
 
 static bool recognise(points *p, points_block *b)
