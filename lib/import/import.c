@@ -46,36 +46,6 @@ static void drop_empty(ebpo_mesh *mesh)
     mesh->attributes = NULL;
 }
 
-/* An OBJ file has no mark: its first word is one of those that such files begin with. */
-static bool is_obj(const uint8_t *data, uint64_t size)
-{
-    static const char *const words[] = { "v", "vt", "vn", "vp",     "f",
-                                         "g", "o",  "s",  "mtllib", "usemtl" };
-    obj_text t = ebpo_obj_text(data, size);
-    obj_word word;
-    if (!ebpo_obj_next_statement(&t, &word))
-        return false;
-    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-        if (ebpo_obj_word_is(word, words[i]))
-            return true;
-    return false;
-}
-
-/* OBJ has no mark, so a name that ends in .stl or .off hides one. */
-static ebpo_status check_name(const import_build *b, ebpo_import_format format, const uint8_t *data,
-                              uint64_t size)
-{
-    bool marked = format == EBPO_IMPORT_OFF   ? ebpo_off_recognise(data, size)
-                  : format == EBPO_IMPORT_STL ? ebpo_stl_recognise(data, size)
-                                              : true;
-    if (marked || !ebpo_bytes_are_text(data, size) || !is_obj(data, size))
-        return EBPO_OK;
-    return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
-                          "begins as an OBJ file does, but its name says %s; rename it to end in "
-                          ".obj",
-                          format == EBPO_IMPORT_OFF ? "OFF" : "STL");
-}
-
 /* Reads the file with positions of floats or doubles; *again: floats do not keep its text. On
  * failure nothing is left but the mesh's workspace. */
 static ebpo_status read_once(ebpo_mesh *mesh, ebpo_import_format format, const uint8_t *data,
@@ -87,8 +57,6 @@ static ebpo_status read_once(ebpo_mesh *mesh, ebpo_import_format format, const u
     ebpo_status status = ebpo_import_begin(&b, mesh, name, attributes, doubles, error);
     if (status == EBPO_OK && attributes && !(mesh->attributes = ebpo_attributes_make(workspace)))
         status = ebpo_fail_memory(error, sizeof *mesh->attributes);
-    if (status == EBPO_OK)
-        status = check_name(&b, format, data, size);
     if (status == EBPO_OK)
         status = read_format(&b, format, data, size, runs);
     ebpo_import_free(&b);
@@ -126,13 +94,6 @@ static ebpo_status import(ebpo_mesh *out, ebpo_import_format format, const uint8
     return status;
 }
 
-ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
-                               uint64_t size, const char *name, ebpo_workspace *workspace,
-                               bool attributes, ebpo_error *error)
-{
-    return import(out, format, data, size, name, workspace, attributes, NULL, error);
-}
-
 ebpo_status ebpo_import_groups(ebpo_mesh *out, const uint8_t *data, uint64_t size, const char *name,
                                ebpo_workspace *workspace, bool attributes, ebpo_obj_runs *runs,
                                ebpo_error *error)
@@ -142,6 +103,21 @@ ebpo_status ebpo_import_groups(ebpo_mesh *out, const uint8_t *data, uint64_t siz
 }
 
 /* --- which format it is --- */
+
+/* An OBJ file has no mark: its first word is one of those that such files begin with. */
+static bool is_obj(const uint8_t *data, uint64_t size)
+{
+    static const char *const words[] = { "v", "vt", "vn", "vp",     "f",
+                                         "g", "o",  "s",  "mtllib", "usemtl" };
+    obj_text t = ebpo_obj_text(data, size);
+    obj_word word;
+    if (!ebpo_obj_next_statement(&t, &word))
+        return false;
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (ebpo_obj_word_is(word, words[i]))
+            return true;
+    return false;
+}
 
 bool ebpo_import_recognise(ebpo_import_format *format, const uint8_t *data, uint64_t size,
                            const char *name)
@@ -157,4 +133,31 @@ bool ebpo_import_recognise(ebpo_import_format *format, const uint8_t *data, uint
     else
         return false;
     return true;
+}
+
+/* OBJ has no mark, so a name that ends in .stl or .off hides one. */
+static ebpo_status check_name(ebpo_import_format format, const uint8_t *data, uint64_t size,
+                              const char *name, ebpo_error *error)
+{
+    bool marked = format == EBPO_IMPORT_OFF   ? ebpo_off_recognise(data, size)
+                  : format == EBPO_IMPORT_STL ? ebpo_stl_recognise(data, size)
+                                              : true;
+    if (marked || !ebpo_bytes_are_text(data, size) || !is_obj(data, size))
+        return EBPO_OK;
+    return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(name),
+                          "begins as an OBJ file does, but its name says %s; rename it to end in "
+                          ".obj",
+                          format == EBPO_IMPORT_OFF ? "OFF" : "STL");
+}
+
+ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
+                               uint64_t size, const char *name, ebpo_workspace *workspace,
+                               bool attributes, ebpo_error *error)
+{
+    ebpo_status status = check_name(format, data, size, name, error);
+    if (status != EBPO_OK) {
+        *out = (ebpo_mesh){ 0 };
+        return status;
+    }
+    return import(out, format, data, size, name, workspace, attributes, NULL, error);
 }

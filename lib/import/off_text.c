@@ -11,7 +11,7 @@ static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c ==
 static bool begins_comment(const char *word, const char *at, const char *end)
 {
     return *at == '#' && !(at - word >= 2 && at[-2] == '1' && at[-1] == '.' && end - at > 1 &&
-                           strchr("IQS", at[1]));
+                           at[1] && strchr("IQS", at[1]));
 }
 
 bool ebpo_off_next_here(off_text *t, off_word *word)

@@ -27,7 +27,8 @@ static bool begins_solid(const uint8_t *data, uint64_t size)
         data++;
         size--;
     }
-    return size > 5 && strncasecmp((const char *)data, "solid", 5) == 0 && is_blank((char)data[5]);
+    return size >= 5 && strncasecmp((const char *)data, "solid", 5) == 0 &&
+           (size == 5 || is_blank((char)data[5]));
 }
 
 bool ebpo_stl_recognise(const uint8_t *data, uint64_t size)

@@ -27,8 +27,7 @@ static const struct {
       "is a ZIP archive, as 3MF and NPZ files are; extract the file from it (unzip), or save the "
       "mesh as PLY, OBJ, STL or OFF" },
     { "\211HDF\r\n\032\n", 8,
-      "is an HDF5 file, not a mesh; 'ebpo extract --mesh' writes the mesh of an .ebpo.h5 file as a "
-      "PLY" },
+      "is an HDF5 file; of an .ebpo.h5 file, 'ebpo extract --mesh' writes the mesh as a PLY" },
     { "glTF", 4, "is a glTF file; save the mesh as PLY, OBJ, STL or OFF" },
 };
 

@@ -238,6 +238,12 @@ static ebpo_status read_row(rows *r)
     return status;
 }
 
+bool ebpo_ply_ascii_more(ply_parser *p)
+{
+    ply_word token;
+    return next_token(p, &token);
+}
+
 ebpo_status ebpo_ply_ascii_element(ply_parser *p, const ply_element *element, bool store)
 {
     rows r = { .p = p,

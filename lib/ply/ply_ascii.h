@@ -8,4 +8,7 @@
  * over them. */
 ebpo_status ebpo_ply_ascii_element(ply_parser *p, const ply_element *element, bool store);
 
+/* Steps over blanks behind the last row: true where more text follows. */
+bool ebpo_ply_ascii_more(ply_parser *p);
+
 #endif

@@ -185,10 +185,15 @@ static void describe(ply_parser *p)
 
 static ebpo_status note_unread(ply_parser *p)
 {
+    bool more = p->header.encoding == PLY_ASCII && ebpo_ply_ascii_more(p);
     ebpo_status status =
-        p->surplus_values || p->most_rounded > 0 ? ebpo_ply_notes(p) : EBPO_OK;
+        p->surplus_values || more || p->most_rounded > 0 ? ebpo_ply_notes(p) : EBPO_OK;
     if (status != EBPO_OK)
         return status;
+    if (more)
+        ebpo_attributes_note_unread(p->mesh->attributes,
+                                    "what follows the last element, from line %" PRIu64 " on",
+                                    p->line);
     if (p->surplus_values)
         ebpo_attributes_note_unread(p->mesh->attributes,
                                     "values that the header does not describe: %" PRIu64

@@ -7,11 +7,6 @@
 
 size_t scene_text_mark(const char *text, size_t size) { return (size_t)ebpo_text_mark(text, size); }
 
-bool scene_text_is_wide(const char *text, size_t size)
-{
-    return size >= 2 && (memcmp(text, "\xff\xfe", 2) == 0 || memcmp(text, "\xfe\xff", 2) == 0);
-}
-
 /* Behind the string that begins at text[i], or `size`. */
 static size_t skip_string(const char *text, size_t size, size_t i)
 {

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "io/file_source.h"
+#include "io/foreign_bytes.h"
 #include "geom/decimal.h"
 #include "scene/scene_parts.h"
 
@@ -144,10 +145,10 @@ static ebpo_status read_text(const ebpo_whole_file *file, scene_route *route, co
                 0,
                 newlocale(LC_ALL_MASK, "C", (locale_t)0) };
     ebpo_status status;
+    const char *foreign = ebpo_foreign_bytes(file->data, file->size);
     l.at += scene_text_mark(l.at, file->size);
-    if (scene_text_is_wide(l.at, (size_t)(l.end - l.at)))
-        status = ebpo_fail_file(error, EBPO_E_FORMAT, path,
-                                "begins with a byte order mark (BOM) of UTF-16; save it as UTF-8");
+    if (foreign)
+        status = ebpo_fail_file(error, EBPO_E_FORMAT, path, "%s", foreign);
     else if (!l.c_locale)
         status = ebpo_fail_memory(error, 1);
     else

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "io/foreign_bytes.h"
 #include "scene/json_reader.h"
 #include "scene/json_routes.h"
 
@@ -311,9 +312,9 @@ ebpo_status scene_read_json(ebpo_scene *scene, const char *text, size_t size, co
     ebpo_error why = EBPO_ERROR_INIT;
     if (size > options->most_bytes)
         return scene_too_long(name, options, error);
-    if (scene_text_is_wide(text, size))
-        return ebpo_fail_file(error, EBPO_E_FORMAT, name,
-                              "begins with a byte order mark (BOM) of UTF-16; save it as UTF-8");
+    const char *foreign = ebpo_foreign_bytes((const uint8_t *)text, size);
+    if (foreign)
+        return ebpo_fail_file(error, EBPO_E_FORMAT, name, "%s", foreign);
     if (scene_text_fits(text, size, options->most_values, &why) != EBPO_OK)
         return ebpo_fail_file(error, EBPO_E_LIMIT, name, "%s", why.message);
     json_t *root =

@@ -190,8 +190,6 @@ char *scene_folder_of(const char *path);
 
 /* Bytes of a byte order mark of UTF-8 that a text begins with: 0 or 3. */
 size_t scene_text_mark(const char *text, size_t size);
-/* It begins with a byte order mark of UTF-16. */
-bool scene_text_is_wide(const char *text, size_t size);
 
 /* EBPO_E_LIMIT: more than so many values or 32 levels of them, seen without parsing. */
 EBPO_MUST_USE ebpo_status scene_text_fits(const char *text, size_t size, uint64_t most_values,

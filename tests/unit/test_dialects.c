@@ -313,6 +313,7 @@ static const dialect dialects[] = {
     { "word.stl", FILE_OF("solid a\n" STL4 "nonsense\nendsolid\n"), 0, 0,
       "line 30: 'nonsense' where facet or endsolid should stand" },
     { "empty.stl", FILE_OF("solid a\nendsolid a\n"), 0, 0, "has no faces" },
+    { "solid.stl", FILE_OF(" solid"), 0, 0, "has no faces" },
     { "not.stl", FILE_OF("not an stl file at all"), 0, 0, "is no STL file" },
     /* PLY in text */
     { "a.ply", FILE_OF(PLY4 OFF4 OFFF), 4, 4, NULL },
@@ -329,6 +330,8 @@ static const dialect dialects[] = {
       "vertices whose coordinates are not finite, and that no face names: 1" },
     { "unused_first.ply", FILE_OF(PLY5 "0 0 -inf\n" OFF4 "3 1 3 2\n3 1 2 4\n3 1 4 3\n3 2 3 4\n"), 4,
       4, "vertices whose coordinates are not finite, and that no face names: 1" },
+    { "follows.ply", FILE_OF(PLY4 OFF4 OFFF "\n 3 0 1 2\n"), 4, 4,
+      "what follows the last element, from line 19 on" },
     { "unused_finite.ply", FILE_OF(PLY5 OFF4 "9 9 9\n" OFFF), 5, 4, NULL },
     { "more.ply",
       FILE_OF(PLY4 "0 0 0 9\n1 0 0 9 \n0 1 0 9\n0 0 1 9\n3 0 2 1 8 8\n3 0 1 3\n3 0 3 2\n3 "

@@ -37,7 +37,8 @@ static const struct {
     { "", "line 1: is not JSON" },
     { "[]", "line 1: a scene is an object" },
     { "\xef\xbb\xbf[]", "line 1: a scene is an object" },
-    { "\xfe\xff\0[", "begins with a byte order mark (BOM) of UTF-16; save it as UTF-8" },
+    { "\xfe\xff\0[", "is text of two bytes a character (UTF-16); save it as UTF-8" },
+    { "version https://git-lfs.github.com/spec/v1", "is a Git LFS pointer, not the file itself" },
     { "{}", "line 1: has no member ebpo_scene" },
     { "{\"ebpo_scene\": \"2.0\"}", "version 2.0" },
     { "{\"ebpo_scene\": \"1.0\",\n\"instances\": 3}", "line 2: instances: is not an array" },
@@ -197,7 +198,7 @@ START_TEST(csv)
     } cases[] = {
         { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n\n2;2;3;5;0;0;0;-1\r\n", NULL },
         { "\xef\xbb\xbftime,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n2,2,3,5,0,0,0,-1\n", NULL },
-        { "\xff\xfet\0i\0", "byte order mark (BOM) of UTF-16" },
+        { "\xff\xfet\0i\0", "two bytes a character (UTF-16)" },
         { "\xef\xbb\xbf", "there are no poses" }, /* and nothing behind it */
         { "scale, qw ,qz,qy,qx,z,y,x,time\n 1 , 1,0,0,0,4,3,2,1\n1,1,0,0,0,5,3,2,2", NULL },
         { "time,x,y,z\n", "line 1: the first line names" },

@@ -252,7 +252,8 @@ static bool is_foreign(points *p)
         error.offset != 0)
         return free(xyz), false;
     fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
-    return p->failed = true;
+    p->failed = true;
+    return true;
 }
 
 /* Fails, and says which datasets could be meant. */
