@@ -127,16 +127,18 @@ static void print_properties(FILE *out, const ebpo_attributes *attributes, const
 }
 
 /* A header of PLY, as such files are written again. */
-static ebpo_status make_header(ebpo_attributes *attributes, const obj_names *names,
-                               ebpo_error *error)
+static ebpo_status make_header(const ebpo_mesh *mesh, const obj_names *names, ebpo_error *error)
 {
+    ebpo_attributes *attributes = mesh->attributes;
+    const char *type = mesh->xyz64 ? "double" : "float";
     ebpo_text_stream text;
     if (!ebpo_text_stream_begin(&text))
         return ebpo_fail_memory(error, BUFSIZ);
     FILE *out = text.file;
     fputs("ply\nformat binary_little_endian 1.0\n", out);
     print_names(out, names);
-    fputs("element vertex 0\nproperty float x\nproperty float y\nproperty float z\n", out);
+    fprintf(out, "element vertex 0\nproperty %s x\nproperty %s y\nproperty %s z\n", type, type,
+            type);
     print_properties(out, attributes, "vertex");
     fputs("element face 0\nproperty list uchar int vertex_indices\n", out);
     print_properties(out, attributes, "face");
@@ -170,7 +172,7 @@ ebpo_status ebpo_obj_keep_materials(obj_names *names, ebpo_mesh *mesh, ebpo_erro
                                    error);
     ebpo_array_copy(mesh->workspace, a->values, names->of_face,
                     mesh->face_count * sizeof *names->of_face);
-    return make_header(mesh->attributes, names, error);
+    return make_header(mesh, names, error);
 }
 
 void ebpo_obj_names_free(obj_names *names, ebpo_workspace *workspace)

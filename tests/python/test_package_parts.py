@@ -141,6 +141,12 @@ class Parts(Case):
         self.same(made.mesh(), model("scan").mesh())
         double = ebpo.convert((mesh.vertices.astype(float), mesh.faces.tolist()), "doubles.ebpo.h5", without="maps")
         self.assertEqual(double.mesh().vertices.dtype, np.float64)
+        text = "v 691234.567 5334567.891 0\nv 691235.567 5334567.891 0\nv 691234.567 5334568.902 1\nf 1 2 3\n"
+        pathlib.Path("utm.obj").write_text(text + "l 1 2\n")
+        with self.assertWarnsRegex(UserWarning, "^utm.obj: left out in reading: points, lines"):
+            utm = ebpo.convert("utm.obj", "utm.ebpo.h5")
+        self.assertEqual(sorted(utm.mesh().vertices.tolist()),
+                         sorted([float(x) for x in line.split()[1:]] for line in text.splitlines()[:3]))
         stages = []
         ebpo.convert("scan.ply", "told.ebpo.h5", progress=lambda stage, *_: stages.append(stage))
         self.assertGreater(len(set(stages)), 2)

@@ -3,13 +3,14 @@ from __future__ import annotations
 
 import ctypes
 import os
+import warnings
 from typing import Any, Callable
 
 import numpy as np
 
 from . import _declared as c
 from ._checked import doubles, integers, path
-from ._library import Handle, Reporter, Struct, call, made, size_in_bytes
+from ._library import Handle, Reporter, Struct, call, lib, made, size_in_bytes
 from .model import Model
 from .model import open as open_model
 
@@ -36,6 +37,8 @@ def convert(mesh: Any, output: Any, *, without: Any = (), rule: str = "nonzero",
     options: weld, orient, fill_holes, flip, drop_duplicates, weld_distance: repair the mesh; max_level, leaf_faces,
         epsilon, require_solid, seed, unit, crs, date as in ebpo_build_options, ebpo/build.h. Usual values are
         those of the command `ebpo convert`, and so are the bytes of the file.
+
+    Warns of what reading left out of a file, such as digits that a PLY's floats do not keep.
 
     Raises NotSolidError with require_solid, UnsupportedError where the library is one without libhdf5,
     FormatError, IOFailure.
@@ -82,6 +85,9 @@ def read_mesh(mesh: Any, workspace: Handle, attributes: bool, common: dict) -> S
         options = made(c.ebpo_mesh_read_options, attributes=attributes, workspace=workspace.pointer, **common)
         read = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace)
         call("ebpo_mesh_read", path(mesh, "mesh"), ctypes.byref(options), read)
+        unread = lib.ebpo_mesh_unread(read)
+        if unread:
+            warnings.warn(f"{os.fsdecode(mesh)}: left out in reading: {unread.decode()}", stacklevel=3)
         return read
     vertices, faces = map(np.asarray, mesh)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
