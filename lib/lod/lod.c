@@ -49,7 +49,7 @@ typedef struct walker {
     ebpo_polyhedra *out; /* [EBPO_LEVELS_MAX] */
     ebpo_leaf_scratch *scratch;
     ebpo_polytope (*half)[3]; /* [EBPO_LEVELS_MAX] */
-    int stop; /* gray nodes of this level are not descended into */
+    int stop;                 /* gray nodes of this level are not descended into */
     ebpo_error *error;
 } walker;
 

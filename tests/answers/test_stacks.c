@@ -15,7 +15,14 @@
 #include "solids.h"
 
 /* What ebpo/base.h promises, without what the C library keeps there. */
-enum { STACK = 1 << 20, PROMISED = 64 << 10, OTHERS = 256 << 10, BESIDE = 4 << 10, PAINT = 0xa5, NUMBERS = 40 };
+enum {
+    STACK = 1 << 20,
+    PROMISED = 64 << 10,
+    OTHERS = 256 << 10,
+    BESIDE = 4 << 10,
+    PAINT = 0xa5,
+    NUMBERS = 40
+};
 
 static const char *model_path(void) { return scratch("torus.ebpo.h5"); }
 
@@ -33,13 +40,15 @@ static ebpo_status ask_limited(const mix_asker *a, int kind, uint64_t number, eb
     ebpo_distance_result far;
     double point[3];
     for (int k = 0; k < 3; k++)
-        point[k] = info->box_origin[k] + info->box_size[k] * (double)(number * (7 + (unsigned)k) % 41) / 40;
+        point[k] = info->box_origin[k] +
+                   info->box_size[k] * (double)(number * (7 + (unsigned)k) % 41) / 40;
     distance.mode = kind == ENVELOPE ? EBPO_DISTANCE_ENVELOPE : EBPO_DISTANCE_EXACT;
     inside.level = distance.level = kind == DEADLINE ? -1 : 3;
     inside.deadline_ns = distance.deadline_ns = kind == DEADLINE ? 1000000 : 0;
     ebpo_status status = ebpo_distance(a->context, point, &distance, &far, error);
-    return status == EBPO_OK && kind != ENVELOPE ? ebpo_inside(a->context, point, &inside, &in, error)
-                                                 : status;
+    return status == EBPO_OK && kind != ENVELOPE
+               ? ebpo_inside(a->context, point, &inside, &in, error)
+               : status;
 }
 
 /* --- on a painted stack --- */
@@ -117,8 +126,8 @@ START_TEST(stack_of_queries)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    ebpo_tree tree = model_build_parts(ebpo_test_torus(3, 1, 120, 80), 4,
-                                       ebpo_profile_parts(EBPO_PROFILE_FULL));
+    ebpo_tree tree =
+        model_build_parts(ebpo_test_torus(3, 1, 120, 80), 4, ebpo_profile_parts(EBPO_PROFILE_FULL));
     model_write(&tree, model_path(), NULL);
     ebpo_file *file = model_open(model_path());
     options.memory = 1;
