@@ -39,14 +39,14 @@ static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_b
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++)
         total += b->sub[i].list_count;
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++)
-        sample_faces(b, &b->sub[i], NULL, 0, b->sub[i].list_count, &skip, total / EBPO_CANDIDATES_SAMPLE + 1,
-                     sample, &count);
+        sample_faces(b, &b->sub[i], NULL, 0, b->sub[i].list_count, &skip,
+                     total / EBPO_CANDIDATES_SAMPLE + 1, sample, &count);
     return count;
 }
 
 /* Fills the table with bins of `width` codes; false when more than `most` are occupied. */
-static bool fill_bins(ebpo_normal_bin *table, int *used, int *slots, const uint32_t *sample, int count,
-                      uint32_t width, int most)
+static bool fill_bins(ebpo_normal_bin *table, int *used, int *slots, const uint32_t *sample,
+                      int count, uint32_t width, int most)
 {
     for (int i = 0; i < *used; i++)
         table[slots[i]].key = 0;

@@ -375,25 +375,31 @@ void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from)
     memcpy(to->corner, from->corner, (size_t)from->corner_count * sizeof from->corner[0]);
 }
 
-bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out)
+/* Keeps one half, as ebpo_polytope_half does. */
+static bool halve(ebpo_polytope *p, int axis, int side)
 {
     double n[3] = { 0, 0, 0 };
     n[axis] = side ? -1 : 1;
-    ebpo_polytope_copy(out, p);
-    for (int i = 0; i < out->vertex_count; i++)
-        out->vertex[i][axis] = 2 * out->vertex[i][axis] - side;
-    if (ebpo_polytope_clip(out, n, side ? 0 : 1, -1 - (2 * axis + !side)) != EBPO_CLIP_REFUSED)
+    for (int i = 0; i < p->vertex_count; i++)
+        p->vertex[i][axis] = 2 * p->vertex[i][axis] - side;
+    if (ebpo_polytope_clip(p, n, side ? 0 : 1, -1 - (2 * axis + !side)) != EBPO_CLIP_REFUSED)
         return true;
-    ebpo_polytope_cube(out);
+    ebpo_polytope_cube(p);
     return false;
+}
+
+bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out)
+{
+    ebpo_polytope_copy(out, p);
+    return halve(out, axis, side);
 }
 
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out)
 {
-    ebpo_polytope z, y;
-    bool some = ebpo_polytope_half(p, 2, octant >> 2 & 1, &z);
-    some = ebpo_polytope_half(&z, 1, octant >> 1 & 1, &y) && some;
-    return ebpo_polytope_half(&y, 0, octant & 1, out) && some;
+    ebpo_polytope_copy(out, p);
+    bool some = halve(out, 2, octant >> 2 & 1);
+    some = halve(out, 1, octant >> 1 & 1) && some;
+    return halve(out, 0, octant & 1) && some;
 }
 
 void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES])

@@ -23,6 +23,9 @@
 
 enum { SEEDS_WANTED = 128 };
 
+/* Halves of the envelopes on the path to a node, along z, y, x: too large for the stack. */
+typedef ebpo_polytope path_halves[EBPO_LEVELS_MAX][3];
+
 /* A gray node at the split level: where a subtree's walk begins. */
 typedef struct seed {
     ebpo_cell cell;
@@ -38,13 +41,15 @@ typedef struct job {
     uint64_t seed_count;
     ebpo_polyhedra (*pieces)[EBPO_LEVELS_MAX]; /* [1 + seed_count]: of the top, then of each seed */
     ebpo_leaf_scratch *scratch;                /* [threads] */
+    path_halves *halves;                       /* [threads] */
 } job;
 
 typedef struct walker {
     job *j;
     ebpo_polyhedra *out; /* [EBPO_LEVELS_MAX] */
     ebpo_leaf_scratch *scratch;
-    int stop; /* gray nodes of this level are not descended into */
+    ebpo_polytope (*half)[3]; /* [EBPO_LEVELS_MAX] */
+    int stop;                 /* gray nodes of this level are not descended into */
     ebpo_error *error;
 } walker;
 
@@ -129,17 +134,17 @@ static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
 {
     uint16_t types = w->j->model->level[parent_cell.level + 1].types[group];
     unsigned filled = ebpo_group_filled(types);
-    ebpo_polytope z, y, x;
+    ebpo_polytope *z = w->half[parent_cell.level], *y = z + 1, *x = z + 2;
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         ebpo_cell cell = ebpo_cell_child(parent_cell, octant);
         if (octant % 4 == 0 && filled >> 2 * octant & 0xff)
-            (void)ebpo_polytope_half(parent, 2, octant >> 2 & 1, &z);
+            (void)ebpo_polytope_half(parent, 2, octant >> 2 & 1, z);
         if (octant % 2 == 0 && filled >> 2 * octant & 0xf)
-            (void)ebpo_polytope_half(&z, 1, octant >> 1 & 1, &y);
+            (void)ebpo_polytope_half(z, 1, octant >> 1 & 1, y);
         if (filled >> 2 * octant & 1) {
-            (void)ebpo_polytope_half(&y, 0, octant & 1, &x);
-            status = visit_node(w, group, octant, cell, &x);
+            (void)ebpo_polytope_half(y, 0, octant & 1, x);
+            status = visit_node(w, group, octant, cell, x);
         } else if (ebpo_group_type(types, octant) == EBPO_BLACK) {
             status = visit_black(w, cell);
         }
@@ -152,7 +157,7 @@ static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsig
 {
     job *j = context;
     for (uint64_t i = begin; i < end; i++) {
-        walker w = { j, j->pieces[1 + i], &j->scratch[worker], -1, error };
+        walker w = { j, j->pieces[1 + i], &j->scratch[worker], j->halves[worker], -1, error };
         seed *s = &j->seeds[i];
         /* Seeds are in octcode order, and all gray nodes of their level: the i-th has the i-th
          * group below it. */
@@ -181,14 +186,16 @@ static ebpo_status prepare(job *j, unsigned threads, ebpo_error *error)
     j->seeds = ebpo_alloc(seeds, sizeof *j->seeds);
     j->pieces = ebpo_alloc_zero(seeds + 1, sizeof *j->pieces);
     j->scratch = ebpo_alloc_zero(threads, sizeof *j->scratch);
-    if (!j->seeds || !j->pieces || !j->scratch)
-        return ebpo_fail_memory(error, seeds * (sizeof *j->seeds + sizeof *j->pieces));
+    j->halves = ebpo_alloc(threads, sizeof *j->halves);
+    if (!j->seeds || !j->pieces || !j->scratch || !j->halves)
+        return ebpo_fail_memory(error, seeds * (sizeof *j->seeds + sizeof *j->pieces) +
+                                           threads * sizeof *j->halves);
     return EBPO_OK;
 }
 
 static ebpo_status walk(job *j, unsigned threads, const ebpo_progress *progress, ebpo_error *error)
 {
-    walker top = { j, j->pieces[0], &j->scratch[0], j->split, error };
+    walker top = { j, j->pieces[0], &j->scratch[0], j->halves[0], j->split, error };
     ebpo_status status = visit_root(&top);
     if (status != EBPO_OK)
         return status;
@@ -226,6 +233,7 @@ static void job_free(job *j, unsigned threads)
         free(j->scratch[i].faces);
     free(j->pieces);
     free(j->scratch);
+    free(j->halves);
     free(j->seeds);
 }
 

@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#include "base/alloc.h"
+#include "base/error.h"
 #include "geom/plane_clip.h"
 #include "geom/polytope.h"
 #include "lod/lod_model.h"
@@ -146,11 +148,11 @@ static unsigned octant_of(ebpo_cell cell)
     return (cell.at[0] & 1) | (cell.at[1] & 1) << 1 | (cell.at[2] & 1) << 2;
 }
 
-/* The envelope of the last node that has any; its number in the chain. What a node's is cut from is
- * the one above, so that one that is kept stands for all above it. */
-static int cut_envelope(ebpo_context *c, const node_chain *chain, ebpo_polytope *out)
+/* Leaves the envelope of the last node that has any in cutting[0]; returns its number in the chain.
+ * What a node's is cut from is the one above, so that one that is kept stands for all above it. */
+static int cut_envelope(ebpo_context *c, const node_chain *chain)
 {
-    ebpo_polytope above;
+    ebpo_polytope *out = &c->cutting[0], *above = &c->cutting[1];
     int at = chain->count - 1;
     while (at >= 0 && !ebpo_kept_envelopes_get(c->envelopes, chain->node[at].cell, out))
         at--;
@@ -161,9 +163,9 @@ static int cut_envelope(ebpo_context *c, const node_chain *chain, ebpo_polytope 
         if (at == 0) {
             ebpo_polytope_cube(out);
         } else {
-            ebpo_polytope_copy(&above, out);
-            if (!ebpo_polytope_child(&above, octant_of(node->cell), out)) {
-                ebpo_polytope_copy(out, &above);
+            ebpo_polytope_copy(above, out);
+            if (!ebpo_polytope_child(above, octant_of(node->cell), out)) {
+                ebpo_polytope_copy(out, above);
                 break;
             }
         }
@@ -183,14 +185,15 @@ ebpo_status ebpo_distance_to_envelope(ebpo_context *c, const double p[3],
     if (!ebpo_locate(&box, c->model->info->level_count - 1, p, at))
         return EBPO_OK;
     node_chain chain;
-    ebpo_polytope envelope;
     ebpo_status status = follow(c, at, o->level, &chain, error);
     if (status != EBPO_OK)
         return status;
-    int last = cut_envelope(c, &chain, &envelope);
+    if (!c->cutting && !(c->cutting = ebpo_alloc(2, sizeof *c->cutting)))
+        return ebpo_fail_memory(error, 2 * sizeof *c->cutting);
+    int last = cut_envelope(c, &chain);
     if (chain.pruned && last == chain.count - 1)
         return ebpo_fail_pruned(c->model, chain.pruned->cell, error);
-    nearest_polygon(&envelope, &box, chain.node[last].cell, p, out);
+    nearest_polygon(&c->cutting[0], &box, chain.node[last].cell, p, out);
     out->lo = 0;
     out->hi = INFINITY;
     return EBPO_OK;

@@ -331,6 +331,7 @@ void ebpo_context_free(ebpo_context *c)
     free(c->seen);
     free(c->faces);
     ebpo_kept_envelopes_free(c->envelopes);
+    free(c->cutting);
     free(c);
 }
 

@@ -69,6 +69,7 @@ struct ebpo_context {
     uint32_t question;
     uint64_t searched, loaded; /* subtrees, by distances; that were not there, by all questions */
     ebpo_kept_envelopes *envelopes; /* of distances to them; or NULL */
+    ebpo_polytope *cutting;         /* [2] too large for a small stack; NULL before it is needed */
     bool has_prefetched;            /* from here, by a query that reached so far */
     double prefetched_from[3], prefetched_reach;
     /* The last nearest face: where ebpo_distance begins, if asked to. */

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """query_threads.py EBPO EBPO-GENERATE [few]: every query gives the same bytes on 1 to 8 threads, with all of
 the model in memory, with parts of it, and where the command decides; nothing waits for ever. The answers to a
-block, or to a row, are longer than what is kept of them. `few`: on 2 and 8 threads."""
+block, or to a row, are longer than what is kept of them. `few`: on 8 threads."""
 import os
 import random
 import subprocess
@@ -89,7 +89,7 @@ def compare(ebpo, model, query, path, threads):
     for memory in MEMORY[model]:
         if isinstance(memory, float):
             memory = str(int(memory * least_memory(ebpo, model)))
-        for n in threads if memory == "" else (2, 8):
+        for n in threads if memory == "" else (8,):
             how = ["--threads", str(n)] + (["--memory", memory] if memory else [])
             found = answers_of(command + how, path)
             if found != right:
@@ -99,7 +99,7 @@ def compare(ebpo, model, query, path, threads):
 
 def main():
     ebpo, generate = (os.path.abspath(path) for path in sys.argv[1:3])
-    threads = (2, 8) if "few" in sys.argv[3:] else range(1, 9)
+    threads = (8,) if "few" in sys.argv[3:] else range(1, 9)
     wrong = []
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)

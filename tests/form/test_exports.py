@@ -5,7 +5,7 @@ SOURCE_ROOT VERSION
 The library exports exactly what the headers declare; ebpo.h includes every header, and each is
 installed; whatever name a header, a page or a sample mentions is declared; each function says which
 threads may call it; each struct that begins with its size has its macro; the version is the
-project's.
+project's. What the library wants of every thread's stack (thread-local storage) is little.
 """
 import pathlib
 import re
@@ -64,11 +64,18 @@ def threads_of(text):
             yield name, comments
 
 
+def thread_local_bytes():
+    output = subprocess.run(["readelf", "-lW", library], capture_output=True, text=True).stdout
+    return sum(int(line.split()[5], 16) for line in output.splitlines() if line.split()[:1] == ["TLS"])
+
+
 functions, exported = declared_functions(), exported_functions()
 problems += [f"declared, not exported: {name}" for name in sorted(functions - exported)]
 problems += [f"exported, not declared: {name}" for name in sorted(exported - functions)]
 problems += [f"ebpo.h does not include {name}" for name in headers if name != "ebpo.h"
              and f"<ebpo/{name}>" not in headers["ebpo.h"]]
+if thread_local_bytes() > 256:
+    problems.append(f"{thread_local_bytes()} bytes of thread-local storage, which come off every thread's stack")
 build = (root / "lib/meson.build").read_text()
 problems += [f"not installed (lib/meson.build): {name}" for name in headers
              if f"'include/ebpo/{name}'" not in build]

@@ -109,7 +109,8 @@ static int run(const command *c, int argc, char **argv)
     arg_result parsed = args_parse(c->spec, argc, argv, values, operand);
     int code = parsed == ARGS_WRONG ? EXIT_USAGE : EXIT_FINE;
     if (parsed == ARGS_RUN && (code = standard_files_begin(c->spec, operand)) == EXIT_FINE)
-        code = standard_files_end(c->spec, run_with_stack(&(command_call){ c, values, operand, 0 }));
+        code =
+            standard_files_end(c->spec, run_with_stack(&(command_call){ c, values, operand, 0 }));
     free(values);
     return code;
 }

@@ -25,6 +25,10 @@
  *                 not matter to each other.
  * Freeing an object is for the last thread that uses it.
  *
+ * Stack: a query (query.h) takes less than 64 KiB of the calling thread's, building
+ * and verifying less than 256 KiB, everything else less than 1 MiB. The library's
+ * threads have stacks of 4 MiB, whatever the limit of the process is.
+ *
  * The caller's floating-point environment does not matter. Rounding mode,
  * flushing of denormals and traps are put aside while a function computes, and
  * are as they were when it returns. Callbacks run in the default environment.
