@@ -280,8 +280,7 @@ void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stor
     ebpo_solid_volume solid = facts_solid(info, NULL);
     snprintf(whole, sizeof whole, "%% %s", facts_whole(info, &solid));
     fprintf(out, "%5s %9s %9s %9s %9s %9s %10s %12s %9s %10s %10s\n", "level", "gray", "leaf",
-            "white", "black", "planes", "faces new", "faces again", "stored", "cumulative",
-            whole);
+            "white", "black", "planes", "faces new", "faces again", "stored", "cumulative", whole);
     for (int i = 0; i < info->level_count; i++) {
         const ebpo_level_summary *l = &info->level[i];
         char taken[32], sum[32], percent[TABLE_CELL];

@@ -71,9 +71,9 @@ typedef struct cell_answer {
     const char **models; /* as they were given */
     ebpo_exact_volume exact;
     ebpo_boolean_volume cells;
-    bool no_cells;            /* none can be made, and the volume is exact without them: */
-    char why_no_cells[1024];  /* why */
-    bool volume;              /* is asked for */
+    bool no_cells;           /* none can be made, and the volume is exact without them: */
+    char why_no_cells[1024]; /* why */
+    bool volume;             /* is asked for */
     uint64_t faces_written;
 } cell_answer;
 
