@@ -121,12 +121,12 @@ static void warn_of_repeated_positions(FILE *out, const char *command, const cha
                                        const mesh_input *p)
 {
     char text[80];
-    uint64_t same = p->repeated.count - p->repeated_opposite;
     fprintf(out,
             "ebpo %s: %s: warning: %s at the positions of an earlier one with the same orientation "
             "(face %llu%s), which counts twice in winding numbers; --weld with --drop-duplicates "
             "drops such\n",
-            command, path, words_plural(text, sizeof text, same, "face is", "faces are"),
+            command, path,
+            words_plural(text, sizeof text, p->repeated_same, "face is", "faces are"),
             (unsigned long long)p->repeated.place[0], p->repeated.count > 1 ? ", ..." : "");
 }
 
@@ -188,8 +188,7 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
         warn_of_nested(out, command, path, &p->shells);
     if (p->prepared.report.repeated_faces.count)
         warn_of_repeated(out, command, path, p);
-    if (p->repeated.count > p->prepared.report.repeated_faces.count &&
-        p->repeated.count > p->repeated_opposite)
+    if (p->repeated_same && p->repeated.count > p->prepared.report.repeated_faces.count)
         warn_of_repeated_positions(out, command, path, p);
     if (p->prepared.record.dropped_faces && p->prepared.before.balanced &&
         p->doubts & EBPO_DOUBT_OPEN)
