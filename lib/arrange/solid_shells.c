@@ -1,9 +1,9 @@
 /* Which closed components are apart. Where no faces of two components have a common point, each
- * component is as a whole in or out of every other one, and winding numbers on its sides follow from
- * the nesting. Faces are compared only where the boxes of their components do not settle it: a face
- * of a component whose box is not within another one's, and that comes to that other box. Both passes
- * stop after a number of steps that grows with the faces only; the components then count as not
- * apart. */
+ * component is as a whole in or out of every other one, and winding numbers on its sides follow
+ * from the nesting. Faces are compared only where the boxes of their components do not settle it: a
+ * face of a component whose box is not within another one's, and that comes to that other box. Both
+ * passes stop after a number of steps that grows with the faces only; the components then count as
+ * not apart. */
 #include "geom/strict_fp.h"
 
 #include "arrange/solid_shells.h"
@@ -160,8 +160,8 @@ static ebpo_status compare(comparing *c, ebpo_error *error)
         return ebpo_workspace_fail(workspace, count * sizeof *c->exposed, error);
     ebpo_array_fill(workspace, c->exposed, 0, count);
     ebpo_array_fill(workspace, c->reached, 0, n->count);
-    ebpo_status status = ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_exposed, c,
-                                           NULL, "", error);
+    ebpo_status status =
+        ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_exposed, c, NULL, "", error);
     if (status == EBPO_OK && c->apart)
         status = plant_faces(c, error);
     if (status == EBPO_OK && c->apart && c->faces.points.count)
@@ -227,7 +227,8 @@ int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, eb
         return 1;
     const shell *one = &shells->nesting.shells[shells->shell_of[component]];
     int sign = ebpo_shell_looks_inwards(&shells->nesting, one) ? -1 : 1;
-    return sign * (ebpo_rule_inside(rule, one->around + sign) - ebpo_rule_inside(rule, one->around));
+    return sign *
+           (ebpo_rule_inside(rule, one->around + sign) - ebpo_rule_inside(rule, one->around));
 }
 
 /* ---- counting ---- */

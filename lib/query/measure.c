@@ -3,9 +3,9 @@
  * With det = a . (b x c), s = a + b + c for corners a, b, c relative to the middle: volume det / 6,
  * first moments det s / 24,   second moments det (s s' + a a' + b b' + c c') / 120. All of it in
  * double-double arithmetic, on coordinates scaled by a power of two to about 1, in blocks of faces
- * that do not depend on threads. A face counts as often as its component bounds the solid, where that
- * is known (arrange/solid_shells.h), else once. Source of the moments: Tonon 2004, "Explicit exact formulas for
- * the 3-D tetrahedron inertia tensor in terms of its vertex coordinates". */
+ * that do not depend on threads. A face counts as often as its component bounds the solid, where
+ * that is known (arrange/solid_shells.h), else once. Source of the moments: Tonon 2004, "Explicit
+ * exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex coordinates". */
 #include "geom/strict_fp.h"
 
 #include <ebpo/query.h>
@@ -38,7 +38,7 @@ typedef struct frame {
 
 typedef struct moments {
     ebpo_pair area2, volume6, first24[3], second120[6]; /* second: xx, yy, zz, yz, zx, xy */
-    ebpo_pair integral6; /* with each face counted once */
+    ebpo_pair integral6;                                /* with each face counted once */
     /* the sum of absolute values behind volume6 */
     double absolute6;
 } moments;
@@ -266,8 +266,8 @@ static ebpo_status decide(pass *p, const ebpo_info *info, unsigned threads, ebpo
 static void count_inwards(moments *m, ebpo_rule rule)
 {
     int times = ebpo_rule_inside(rule, -1) ? -1 : 0;
-    ebpo_pair *sum[] = { &m->volume6, m->first24, m->first24 + 1, m->first24 + 2,
-                         m->second120, m->second120 + 1, m->second120 + 2, m->second120 + 3,
+    ebpo_pair *sum[] = { &m->volume6,      m->first24,       m->first24 + 1,   m->first24 + 2,
+                         m->second120,     m->second120 + 1, m->second120 + 2, m->second120 + 3,
                          m->second120 + 4, m->second120 + 5 };
     for (size_t i = 0; i < sizeof sum / sizeof *sum; i++)
         *sum[i] = (ebpo_pair){ times * sum[i]->head, times * sum[i]->tail };

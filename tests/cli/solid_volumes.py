@@ -54,16 +54,16 @@ def run(*args):
     return json.loads(done.stdout)
 
 
-def check(where, told, volume, integral, known):
+def check(where, printed, volume, integral, known):
     def near(a, b):
         return math.isclose(a, b, rel_tol=1e-12, abs_tol=1e-9)
-    if told["volume"] is not None and not near(told["volume"], volume):
-        sys.exit(f"{where}: printed volume {told['volume']}, the set has {volume}")
-    if told["volume_lo"] > volume + 1e-9 or (told["volume_hi"] or math.inf) < volume - 1e-9:
-        sys.exit(f"{where}: printed {told['volume_lo']} to {told['volume_hi']}, the set has {volume}")
-    if not near(told["winding_integral"], integral):
-        sys.exit(f"{where}: printed integral {told['winding_integral']}, it is {integral}")
-    if known and told["volume"] is None:
+    if printed["volume"] is not None and not near(printed["volume"], volume):
+        sys.exit(f"{where}: printed volume {printed['volume']}, the set has {volume}")
+    if printed["volume_lo"] > volume + 1e-9 or (printed["volume_hi"] or math.inf) < volume - 1e-9:
+        sys.exit(f"{where}: printed {printed['volume_lo']} to {printed['volume_hi']}, the set has {volume}")
+    if not near(printed["winding_integral"], integral):
+        sys.exit(f"{where}: printed integral {printed['winding_integral']}, it is {integral}")
+    if known and printed["volume"] is None:
         sys.exit(f"{where}: volume not known, though shells are apart: it is {volume}")
 
 
@@ -96,6 +96,34 @@ def judge(boxes, rule, name):
     return apart
 
 
+def twice_around(name):
+    """Writes the unit cube as one closed 2-manifold that runs around its sides twice."""
+    lap = [(0, 0), (1, 0), (1, 1), (0, 1)] * 2
+    vertices = [(x, y, z) for z in (0, 1) for x, y in lap] + [(0.5, 0.5, 0), (0.5, 0.5, 1)]
+    faces = []
+    for i in range(8):
+        k = (i + 1) % 8
+        faces += [(16, k, i), (17, 8 + i, 8 + k), (i, k, 8 + k), (i, 8 + k, 8 + i)]
+    with open(name, "w", encoding="ascii") as out:
+        out.write(f"ply\nformat ascii 1.0\nelement vertex {len(vertices)}\nproperty double x\nproperty double y\n"
+                  f"property double z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
+        out.writelines(" ".join(map(str, v)) + "\n" for v in vertices)
+        out.writelines("3 " + " ".join(map(str, f)) + "\n" for f in faces)
+
+
+def judge_twice_around():
+    twice_around("around.ply")
+    made = run("convert", "--json", "around.ply", "around.ebpo.h5")["report"]
+    for where, printed in (("convert", made), ("check", run("check", "--json", "around.ply")["report"]),
+                           ("info", run("info", "--json", "around.ebpo.h5")["report"]),
+                           ("measure", run("measure", "--json", "around.ebpo.h5"))):
+        check(f"{where} of a cube that runs around itself twice", printed, 1, 2, False)
+        if printed["volume"] is not None:
+            sys.exit(f"{where} of a cube that runs around itself twice: the volume cannot be known")
+    if made["components"] != 1 or not made["manifold"]:
+        sys.exit("the cube that runs around itself twice is no 2-manifold of one component")
+
+
 def box(low, high, sign=1):
     return ((low,) * 3, (high,) * 3, sign)
 
@@ -124,6 +152,7 @@ def main():
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 4
     cases += [nested_boxes(chance) for _ in range(rounds)] + [random_boxes(chance) for _ in range(3 * rounds)]
     known = 0
+    judge_twice_around()
     for i, boxes in enumerate(cases):
         for rule in INSIDE:
             known += judge(boxes, rule, f"voxels{i % 2}")

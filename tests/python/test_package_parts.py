@@ -21,6 +21,23 @@ MODULES = sorted(path.stem for path in PACKAGE.glob("*.py") if path.stem not in 
 
 
 class Parts(Case):
+    def test_volumes_are_of_what_the_rule_puts_inside(self):
+        """A box in a box, whose winding number is 2; and two boxes on each other."""
+        def measured(boxes, rule):
+            vertices = [[(low, high)[i >> k & 1] for k in range(3)] for low, high in boxes for i in range(8)]
+            sides = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+            faces = [[8 * n + a, 8 * n + b, 8 * n + c] for n in range(len(boxes)) for s in sides
+                     for a, b, c in (s[:3], (s[0], *s[2:]))]
+            return ebpo.convert((np.array(vertices, float), np.array(faces)), "boxes.ebpo.h5", rule=rule).measure()
+        for rule, volume in ("nonzero", 1000), ("positive", 1000), ("evenodd", 936):
+            mass = measured([(0, 10), (3, 7)], rule)
+            self.assertAlmostEqual(mass.volume, volume)
+            self.assertAlmostEqual(mass.integral, 1064)
+            self.assertEqual(mass.volume_bounds, (mass.volume, mass.volume))
+        mass = measured([(0, 1), (0, 1)], "nonzero")
+        self.assertTrue(np.isnan(mass.volume) and mass.volume_bounds[0] <= 1 <= mass.volume_bounds[1])
+        self.assertAlmostEqual(mass.integral, 2)
+
     def test_info(self):
         told = json.loads(subprocess.run([COMMAND, "info", "--json", "scan.ebpo.h5"], check=True,
                                          capture_output=True).stdout) if model("scan") else {}

@@ -594,9 +594,9 @@ static ebpo_status call_measure(every_call_env *e)
     const ebpo_info *info = ebpo_file_info(e->file);
     ebpo_solid_volume volume = EBPO_SOLID_VOLUME_INIT;
     ebpo_status status = ebpo_measure(e->file, 1, &mass, e->error);
-    return status == EBPO_OK ? ebpo_solid_volume_of(&info->report, info->rule, NULL, info, &volume,
-                                                    e->error)
-                             : status;
+    return status == EBPO_OK
+               ? ebpo_solid_volume_of(&info->report, info->rule, NULL, info, &volume, e->error)
+               : status;
 }
 
 static ebpo_status call_deviation(every_call_env *e)

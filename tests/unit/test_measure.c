@@ -459,7 +459,8 @@ START_TEST(shells_within_shells_add_up)
 }
 END_TEST
 
-/* Returns the mass of the cube from 0 to 4 in which there is one from 1 to 2, each turned or not. */
+/* Returns the mass of the cube from 0 to 4 in which there is one from 1 to 2, each turned or not.
+ */
 static ebpo_mass mass_of_two(bool turn_outer, bool turn_inner, ebpo_rule rule)
 {
     static const double low[3] = { 0, 0, 0 }, high[3] = { 4, 4, 4 }, low_in[3] = { 1, 1, 1 },

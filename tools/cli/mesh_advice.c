@@ -106,12 +106,13 @@ static void warn_of_inside_out(FILE *out, const char *command, const char *path,
 
 static void warn_of_nested(FILE *out, const char *command, const char *path, const ebpo_shells *s)
 {
-    fprintf(out,
-            "ebpo %s: %s: warning: %llu of %llu closed components %s within another and %s outwards "
-            "like it: winding numbers there are greater by 1, so the rules nonzero and positive "
-            "leave no cavity, and evenodd does; --orient turns them into cavities\n",
-            command, path, (unsigned long long)s->nested, (unsigned long long)s->closed,
-            s->nested == 1 ? "is" : "are", s->nested == 1 ? "looks" : "look");
+    fprintf(
+        out,
+        "ebpo %s: %s: warning: %llu of %llu closed components %s within another and %s outwards "
+        "like it: winding numbers there are greater by 1, so the rules nonzero and positive "
+        "leave no cavity, and evenodd does; --orient turns them into cavities\n",
+        command, path, (unsigned long long)s->nested, (unsigned long long)s->closed,
+        s->nested == 1 ? "is" : "are", s->nested == 1 ? "looks" : "look");
 }
 
 /* Warns of faces that share positions, but not vertices, with an earlier face and its
@@ -120,12 +121,12 @@ static void warn_of_repeated_positions(FILE *out, const char *command, const cha
                                        const mesh_input *p)
 {
     char text[80];
-    uint64_t same = p->repeated.count - p->repeated_opposite;
     fprintf(out,
             "ebpo %s: %s: warning: %s at the positions of an earlier one with the same orientation "
             "(face %llu%s), which counts twice in winding numbers; --weld with --drop-duplicates "
             "drops such\n",
-            command, path, words_plural(text, sizeof text, same, "face is", "faces are"),
+            command, path,
+            words_plural(text, sizeof text, p->repeated_same, "face is", "faces are"),
             (unsigned long long)p->repeated.place[0], p->repeated.count > 1 ? ", ..." : "");
 }
 
@@ -187,8 +188,7 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
         warn_of_nested(out, command, path, &p->shells);
     if (p->prepared.report.repeated_faces.count)
         warn_of_repeated(out, command, path, p);
-    if (p->repeated.count > p->prepared.report.repeated_faces.count &&
-        p->repeated.count > p->repeated_opposite)
+    if (p->repeated_same && p->repeated.count > p->prepared.report.repeated_faces.count)
         warn_of_repeated_positions(out, command, path, p);
     if (p->prepared.record.dropped_faces && p->prepared.before.balanced &&
         p->doubts & EBPO_DOUBT_OPEN)
@@ -237,7 +237,8 @@ void advice_print_shells(FILE *out, const mesh_input *p)
     char text[80];
     const ebpo_shells *s = &p->shells;
     if (p->repeated.count > p->prepared.report.repeated_faces.count)
-        fprintf(out, "  %s at the positions of an earlier one, %llu with the opposite orientation\n",
+        fprintf(out,
+                "  %s at the positions of an earlier one, %llu with the opposite orientation\n",
                 words_plural(text, sizeof text, p->repeated.count, "face", "faces"),
                 (unsigned long long)p->repeated_opposite);
     if (!p->counted || !(s->inside_out || s->nested || s->cavities))

@@ -7,13 +7,11 @@
 
 #include "cli/json.h"
 
-/* Returns what is known of the volume of the solid that a report is of, see ebpo_solid_volume_of. */
+/* Returns what is known of the volume of the solid that a report is of, see ebpo_solid_volume_of.
+ */
 ebpo_solid_volume findings_solid(const ebpo_mesh_report *report, ebpo_rule rule,
                                  const ebpo_shells *shells, const ebpo_info *info);
-static inline bool findings_knows(const ebpo_solid_volume *solid)
-{
-    return solid->lo >= solid->hi;
-}
+static inline bool findings_knows(const ebpo_solid_volume *solid) { return solid->lo >= solid->hi; }
 /* Writes "volume" and the volume; or between which values it is; or, and where it is another value,
  * "integral of the winding number". `unit`: as table_unit takes it. */
 enum { FINDINGS_VOLUME = 320 };

@@ -81,7 +81,10 @@ static ebpo_status count_repeated(mesh_input *p, unsigned threads, ebpo_error *e
     p->repeated = p->prepared.report.repeated_faces;
     if (!p->prepared.report.repeated_positions.count)
         return EBPO_OK;
-    return ebpo_mesh_count_repeated(&p->mesh, threads, &p->repeated, &p->repeated_opposite, error);
+    ebpo_status status =
+        ebpo_mesh_count_repeated(&p->mesh, threads, &p->repeated, &p->repeated_opposite, error);
+    p->repeated_same = p->repeated.count - p->repeated_opposite;
+    return status;
 }
 
 /* Of a single component the volume's sign tells which way it looks. */
@@ -96,9 +99,16 @@ static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *how, 
 
 ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
 {
-    bool counted = p->counted && (after || !p->prepared.mended);
-    return findings_solid(after ? &p->prepared.report : &p->prepared.before, p->rule,
-                          counted ? &p->shells : NULL, NULL);
+    bool same_mesh = after || !p->prepared.mended;
+    ebpo_solid_volume solid =
+        findings_solid(after ? &p->prepared.report : &p->prepared.before, p->rule,
+                       same_mesh && p->counted ? &p->shells : NULL, NULL);
+    /* a component that runs along itself counts twice there */
+    if (same_mesh && p->repeated_same) {
+        solid.lo = 0;
+        solid.hi = INFINITY;
+    }
+    return solid;
 }
 
 ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending asked,

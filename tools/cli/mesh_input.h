@@ -23,9 +23,9 @@ typedef struct mesh_input {
     bool tried;             /* repairs, which `repairs` tells of */
     ebpo_repairs repairs;
     /* faces at the positions of an earlier one, of the mesh as mended; of these, where vertices are
-     * at one position, those that look the other way */
+     * at one position, those that look the other way and those that look the same way */
     ebpo_finding repeated;
-    uint64_t repeated_opposite;
+    uint64_t repeated_opposite, repeated_same;
     bool counted; /* closed components, which `shells` tells of */
     ebpo_shells shells;
     uint32_t doubts; /* ebpo_doubt, of the mesh as mended */

@@ -71,9 +71,10 @@ typedef struct cell_answer {
     const char **models; /* as they were given */
     ebpo_exact_volume exact;
     ebpo_boolean_volume cells;
-    bool no_cells;            /* none can be made, and the volume is exact without them: */
-    char why_no_cells[1024];  /* why */
-    bool volume;              /* is asked for */
+    /* the volume is exact, but no cells can be made, and why */
+    bool no_cells;
+    char why_no_cells[1024];
+    bool volume; /* is asked for */
     uint64_t faces_written;
 } cell_answer;
 

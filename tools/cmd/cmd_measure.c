@@ -117,8 +117,9 @@ static void print_volume(const ebpo_info *info, const ebpo_mass *mass)
     printf("  integral  of the winding number: %s%s%s\n",
            table_scaled(cell, 16, mass->scaled_integral, 3 * mass->exponent), unit,
            known ? ""
-                 : "; centroid and inertia are those of the winding number as a density: shells\n"
-                   "            meet or repeat each other, or the mesh is no 2-manifold");
+                 : "; centroid and inertia are those of the winding number as a density:\n"
+                   "            components meet, repeat or cross themselves, or the mesh is no "
+                   "2-manifold");
 }
 
 static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass,
@@ -140,6 +141,8 @@ static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass 
     }
     if (!info->unit[0])
         puts("  (in the model's unit, which the file does not name, squared, cubed and so on)");
+    if (info->solid)
+        puts("  (faces of one component that cross were not looked for: ebpo check --crossings)");
     putchar('\n');
     print_levels(info, m);
     print_legend(info, m);

@@ -10,7 +10,8 @@ const unsigned deadlines_us[DEADLINES] = { 1, 2, 5, 10, 20, 50, 100, 1000 };
 const unsigned budget_parts[BUDGETS] = { 1, 2, 4, 8, 16 };
 
 #define NO_VOLUME                                                                            \
-    "a surface, or a solid without volume, has none that could be exceeded; or volumes are " \
+    "a surface, or a solid without volume, has none that could be exceeded; or the solid's " \
+    "volume is not known, as components meet or the mesh is no 2-manifold; or volumes are "  \
     "beyond the range of a double, and there is nothing that they are taken by instead"
 #define OUT_OF_RANGE "in the model's unit cubed it is beyond the range of a double"
 #define NO_MESH      "the file has no mesh, see below"

@@ -133,7 +133,7 @@ static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_
             m->level[i][OF_LEVELS_VOLUME] = told.volume;
             /* with leaf planes in the file, the levels alone are all that is known */
             m->level[i][OF_LEVELS_EXCESS] =
-                !(m->solid_share > 0)                   ? facts_excess(&m->info, &m->solid, told.volume)
+                !(m->solid_share > 0) ? facts_excess(&m->info, &m->solid, told.volume)
                 : m->info.parts & EBPO_PART_LEAF_PLANES ? m->level[i][OF_EXCESS]
                                                         : NAN;
         }

@@ -43,10 +43,11 @@ export function showLevel() {
   showLevels();
 }
 
-// The stated volumes: envelopes of the level's gray nodes, leaves and black cells so far, against the model.
+// The stated volumes: envelopes of the level's gray nodes, leaves and black cells so far, against the model. The file
+// states the integral of the winding number, which is the model's volume where there is a single shell.
 function volumeExcess(level) {
   const i = state.info;
-  if (!i.solid || !(i.mesh_volume > 0) || i.winding_rule !== 'nonzero')
+  if (!i.solid || !(i.mesh_volume > 0) || !i.mesh_manifold || i.mesh_components !== 1)
     return undefined;
   let sum = i.levels[level].gray_volume;
   for (let l = 0; l <= level; l++)

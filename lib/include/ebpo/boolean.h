@@ -203,7 +203,8 @@ typedef struct ebpo_exact_volume {
     /*
      * The result's volume, in the unit of the world, cubed. EBPO_FIGURE_EXACT: lo and hi are the
      * double nearest to that of posed coordinates, ties to even (INFINITY beyond doubles, 0 below
-     * them); `scaled` of 0: the result is empty. EBPO_FIGURE_BOUND: from 0 to a box around the result; cells tell more.
+     * them); `scaled` of 0: the result is empty. EBPO_FIGURE_BOUND: from 0 to a box around the
+     * result; cells tell more.
      */
     ebpo_certain volume;
 

@@ -318,8 +318,8 @@ typedef struct ebpo_mesh_report {
     double area;
 
     /*
-     * In its unit cubed, signed: the integral of the winding number. 0 for a
-     * surface.
+     * In its unit cubed, signed: the integral of the winding number, see
+     * ebpo_solid_volume_of (query.h). 0 for a surface.
      */
     double volume;
 
@@ -479,9 +479,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh,
  *
  * Threads: any, while nobody changes the mesh.
  */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mesh,
-                                                            unsigned threads, ebpo_finding *out,
-                                                            uint64_t *opposite, ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mesh, unsigned threads,
+                                                            ebpo_finding *out, uint64_t *opposite,
+                                                            ebpo_error *error);
 
 /*
  * Makes neighbouring faces agree, component by component, across edges that are

@@ -631,7 +631,8 @@ class Model:
         """
         mass = made(c.ebpo_mass)
         call("ebpo_measure", self.file, threads or self._threads, ctypes.byref(mass))
-        return Mass(mass.area, mass.volume, np.array(mass.centroid), np.array(np.ctypeslib.as_array(mass.inertia)))
+        return Mass(mass.area, mass.volume, np.array(mass.centroid), np.array(np.ctypeslib.as_array(mass.inertia)),
+                    (mass.volume_lo, mass.volume_hi), mass.integral)
 
     # ---- parts ----
 

@@ -59,14 +59,20 @@ class Level(NamedTuple):
 class Mass(NamedTuple):
     """In the model's unit, squared, cubed and so on; of density 1.
 
-    area, volume: float; the volume of a surface is 0, and so is what follows.
-    centroid: (3,); inertia: (3, 3) about it.
+    area, volume: float; the volume of a surface is 0, and so is what follows. The volume is that of the points which
+    the file's rule puts inside; nan: it is not known, as components meet or repeat each other, or the mesh is no
+    2-manifold.
+    centroid: (3,); inertia: (3, 3) about it. Where the volume is nan, of the winding number as a density.
+    volume_bounds: (2,) the volume is certainly within.
+    integral: of the winding number; the volume if winding numbers are 0 and 1 only.
     """
 
     area: float
     volume: float
     centroid: np.ndarray
     inertia: np.ndarray
+    volume_bounds: tuple[float, float]
+    integral: float
 
 
 class Info:
