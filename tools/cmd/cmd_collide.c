@@ -62,29 +62,6 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 /* -1 .. 1 */
 static const char *const truths[] = { "null", "false", "true" };
 
-static const char *const relations[] = { "DISJOINT",   "TOUCHING", "INTERSECTING", "A_INSIDE_B",
-                                         "B_INSIDE_A", "EQUAL",    "not known" };
-
-ebpo_status collide_unmet(ebpo_collider *c, const ebpo_collide_options *how, const char **relation,
-                          ebpo_error *error)
-{
-    ebpo_relation_result r;
-    *relation = NULL;
-    ebpo_status status = ebpo_collide_relation(c, how, &r, error);
-    if (status == EBPO_OK && r.relation != EBPO_DISJOINT && r.contact != 1)
-        *relation = relations[r.relation];
-    return status;
-}
-
-void collide_print_unmet(bool as_json, const char *relation)
-{
-    bool open = relation == relations[EBPO_RELATION_OPEN];
-    if (relation && as_json)
-        printf(open ? ", \"relation\": null" : ", \"relation\": \"%s\"", relation);
-    else if (relation)
-        printf(" %s", relation);
-}
-
 /* Prints the line of models whose faces do not meet. Of all pairs JSON has an object for each, and
  * one where there is none but more to say. */
 static ebpo_status print_none(const collide_values *v, ebpo_collider *c,
@@ -126,11 +103,11 @@ static ebpo_status ask_relation(const collide_values *v, ebpo_collider *c,
     if (status != EBPO_OK)
         return status;
     if (!v->query.json)
-        puts(relations[r.relation]);
+        puts(collide_relations[r.relation]);
     else if (r.relation == EBPO_RELATION_OPEN)
         printf("{\"relation\": null, \"contact\": %s}\n", truths[r.contact + 1]);
     else
-        printf("{\"relation\": \"%s\", \"contact\": %s}\n", relations[r.relation],
+        printf("{\"relation\": \"%s\", \"contact\": %s}\n", collide_relations[r.relation],
                truths[r.contact + 1]);
     return EBPO_OK;
 }

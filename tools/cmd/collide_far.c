@@ -9,6 +9,33 @@
 #include "cli/json.h"
 #include "cli/words.h"
 
+/* --- how models lie to each other --- */
+
+const char *const collide_relations[] = { "DISJOINT",   "TOUCHING", "INTERSECTING", "A_INSIDE_B",
+                                          "B_INSIDE_A", "EQUAL",    "not known" };
+
+ebpo_status collide_unmet(ebpo_collider *c, const ebpo_collide_options *how, const char **relation,
+                          ebpo_error *error)
+{
+    ebpo_relation_result r;
+    *relation = NULL;
+    ebpo_status status = ebpo_collide_relation(c, how, &r, error);
+    if (status == EBPO_OK && r.relation != EBPO_DISJOINT && r.contact != 1)
+        *relation = collide_relations[r.relation];
+    return status;
+}
+
+void collide_print_unmet(bool as_json, const char *relation)
+{
+    bool open = relation == collide_relations[EBPO_RELATION_OPEN];
+    if (relation && as_json)
+        printf(open ? ", \"relation\": null" : ", \"relation\": \"%s\"", relation);
+    else if (relation)
+        printf(" %s", relation);
+}
+
+/* --- options --- */
+
 /* Three numbers with blanks or commas between. */
 static bool read_direction(const char *text, double out[3])
 {

@@ -1,4 +1,5 @@
-/* ebpo collide --distance, --depth and --way-out: asking and printing. */
+/* ebpo collide --distance, --depth and --way-out: asking and printing; and relations of models
+ * whose faces do not meet. */
 #ifndef EBPO_TOOLS_COLLIDE_FAR_H
 #define EBPO_TOOLS_COLLIDE_FAR_H
 
@@ -16,6 +17,9 @@ typedef struct collide_far {
     {                                              \
         false, false, 0.0, -1.0, NULL, { 0, 0, 0 } \
     }
+
+/* By ebpo_relation. */
+extern const char *const collide_relations[];
 
 /* How models whose faces do not meet lie to each other: *relation is an ebpo_relation as its name;
  * NULL: they are DISJOINT, or faces meet after all. */
