@@ -137,12 +137,14 @@ void ebpo_publish_expect(ebpo_publish *publish, const ebpo_file_version *expecte
 
 void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input)
 {
-    struct stat st;
+    struct stat there, read;
     char *from = realpath(input->shown, NULL);
     int fd = ebpo_input_descriptor(input);
-    bool in_place = from && strcmp(from, publish->target) == 0;
-    if (in_place && (fd >= 0 ? fstat(fd, &st) : lstat(publish->target, &st)) == 0) {
-        ebpo_file_version version = version_of(&st);
+    bool named = from && strcmp(from, publish->target) == 0,
+         is_there = lstat(publish->target, &there) == 0, known = fd >= 0 && fstat(fd, &read) == 0,
+         same = is_there && known && there.st_dev == read.st_dev && there.st_ino == read.st_ino;
+    if ((named || same) && (known || is_there)) {
+        ebpo_file_version version = version_of(known ? &read : &there);
         ebpo_publish_expect(publish, &version, false);
     }
     free(from);

@@ -45,11 +45,13 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS])
     return copy_texts(none, text);
 }
 
-/* Checks texts before anything is changed, and copies them. */
+/* Checks texts before anything is changed, and copies them. `known` is a date that need not be one:
+ * what other programs have written stays. */
 static ebpo_status take_texts(const char *const from[EBPO_PAINT_TEXTS],
-                              const ebpo_paint_text_kind *kinds, const char *of,
+                              const ebpo_paint_text_kind *kinds, const char *of, const char *known,
                               char *to[EBPO_PAINT_TEXTS], ebpo_error *error)
 {
+    const char *date = from[EBPO_PAINT_DATE];
     size_t bytes = 0;
     for (int i = 0; i < EBPO_PAINT_TEXTS; i++) {
         size_t length = from[i] ? strlen(from[i]) : 0;
@@ -63,6 +65,11 @@ static ebpo_status take_texts(const char *const from[EBPO_PAINT_TEXTS],
                              "separated by U+2028",
                              of, kinds[i].name);
     }
+    if (date && *date && strcmp(date, known) != 0 && !ebpo_is_date(date))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "%s: the date is not one as in ISO 8601 and in the calendar, such as "
+                         "2026-11-26 or 2026-11-26T21:43:05Z",
+                         of);
     return copy_texts(from, to) ? EBPO_OK : ebpo_fail_memory(error, bytes);
 }
 
@@ -75,8 +82,8 @@ static ebpo_status no_layer(const ebpo_paint *p, uint64_t number, ebpo_error *er
                      (unsigned long long)number, (unsigned long long)p->layer_count);
 }
 
-static ebpo_status take_layer(const ebpo_paint_layer *given, ebpo_layer_held *out,
-                              ebpo_error *error)
+static ebpo_status take_layer(const ebpo_paint_layer *given, const char *known,
+                              ebpo_layer_held *out, ebpo_error *error)
 {
     ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_paint_layer, &layer, given, error);
@@ -90,7 +97,7 @@ static ebpo_status take_layer(const ebpo_paint_layer *given, ebpo_layer_held *ou
     *out = (ebpo_layer_held){ .colour = layer.colour,
                               .opacity = layer.opacity,
                               .visible = layer.visible };
-    return take_texts(texts, ebpo_paint_layer_texts, "a layer", out->text, error);
+    return take_texts(texts, ebpo_paint_layer_texts, "a layer", known, out->text, error);
 }
 
 ebpo_status ebpo_paint_get_layer(const ebpo_paint *p, uint64_t number, ebpo_paint_layer *out)
@@ -117,7 +124,7 @@ ebpo_status ebpo_paint_add_layer(ebpo_paint *p, const ebpo_paint_layer *layer, u
         return ebpo_fail(error, EBPO_E_LIMIT, "a paint has at most %d layers", EBPO_PAINT_LAYERS);
     if (!ebpo_grow(&p->layer, &p->layer_capacity, p->layer_count + 1, sizeof *p->layer))
         return ebpo_fail_memory(error, sizeof *p->layer);
-    ebpo_status status = take_layer(layer, &p->layer[p->layer_count], error);
+    ebpo_status status = take_layer(layer, "", &p->layer[p->layer_count], error);
     if (status != EBPO_OK)
         return status;
     if (number)
@@ -132,7 +139,7 @@ ebpo_status ebpo_paint_set_layer(ebpo_paint *p, uint64_t number, const ebpo_pain
     ebpo_layer_held held;
     if (number >= p->layer_count)
         return no_layer(p, number, error);
-    ebpo_status status = take_layer(layer, &held, error);
+    ebpo_status status = take_layer(layer, p->layer[number].text[EBPO_PAINT_DATE], &held, error);
     if (status != EBPO_OK)
         return status;
     ebpo_paint_texts_free(p->layer[number].text);
@@ -224,7 +231,7 @@ ebpo_status ebpo_paint_add_note(ebpo_paint *p, const ebpo_paint_note *given, ebp
     const char *texts[EBPO_PAINT_TEXTS] = { note.title, note.author, note.date, note.body };
     ebpo_note_held *held = &p->note[p->note_count];
     *held = (ebpo_note_held){ .layer = note.layer, .at = note.at };
-    status = take_texts(texts, ebpo_paint_note_texts, "a note", held->text, error);
+    status = take_texts(texts, ebpo_paint_note_texts, "a note", "", held->text, error);
     if (status == EBPO_OK)
         p->note_count++;
     return status;

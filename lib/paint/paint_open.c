@@ -359,6 +359,8 @@ static ebpo_status keep_version(const reader *r, ebpo_error *error)
     ebpo_paint_file *f = r->p->file;
     int fd = ebpo_input_descriptor(&r->input);
     char *path = fd >= 0 ? realpath(r->input.shown, NULL) : NULL;
+    if (fd >= 0 && !path && errno == ENOMEM)
+        return ebpo_fail_memory(error, strlen(r->input.shown));
     if (!path) /* memory, or a file without a name by now */
         return EBPO_OK;
     f->path = path;

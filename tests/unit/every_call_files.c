@@ -30,7 +30,7 @@ static ebpo_status call_facts(every_call_env *e)
     (void)ebpo_export_second_file(EBPO_EXPORT_XDMF, "x.xdmf", second, sizeof second);
     bool good = arrays && ebpo_version() && ebpo_free_memory() > 0 &&
                 ebpo_version_number() == EBPO_VERSION_NUMBER && ebpo_status_name(EBPO_OK) &&
-                ebpo_export_format_name(EBPO_EXPORT_OBJ) &&
+                ebpo_is_date("2026-11-26") && ebpo_export_format_name(EBPO_EXPORT_OBJ) &&
                 ebpo_is_url(ebpo_url_redact("http://a:b@c/", redacted, sizeof redacted)) &&
                 ebpo_attribute_type_text(0) && ebpo_profile_parts(EBPO_PROFILE_LOD) &&
                 ebpo_subset_memory(1000, 16) && ebpo_file_info(e->file)->level_count > 0;

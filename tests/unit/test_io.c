@@ -266,6 +266,41 @@ START_TEST(an_output_replaces_only_what_it_was_made_from)
 }
 END_TEST
 
+static int write_pair(const char *second_path)
+{
+    ebpo_publish first, second;
+    if (ebpo_publish_begin(&first, target, NULL) || ebpo_publish_begin(&second, second_path, NULL))
+        return 1;
+    fputs("new", ebpo_publish_stream(&first));
+    fputs("new", ebpo_publish_stream(&second));
+    return ebpo_publish_commit_pair(&first, &second, NULL) != EBPO_OK;
+}
+
+/* Of two programs that write the same two files at once, one waits: no file of one stays beside one
+ * of the other. */
+START_TEST(pairs_of_outputs_are_put_in_place_in_turn)
+{
+    ebpo_file_lock lock;
+    const char *other = scratch("other.bin");
+    int status;
+    write_file(target, "old");
+    write_file(other, "old");
+    ck_assert(ebpo_file_lock_take(&lock, target, 0, NULL, NULL) == EBPO_OK);
+    pid_t child = fork();
+    if (child == 0)
+        _exit(write_pair(other));
+    usleep(300000);
+    ck_assert(waitpid(child, &status, WNOHANG) == 0);
+    check_content(target, "old");
+    check_content(other, "old");
+    ebpo_file_lock_release(&lock);
+    ck_assert(waitpid(child, &status, 0) == child && status == 0);
+    check_content(target, "new");
+    check_content(other, "new");
+    unlink(other);
+}
+END_TEST
+
 START_TEST(empty_file_is_read_as_no_bytes)
 {
     write_file(target, "");
@@ -374,6 +409,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, waiting_for_a_lock_can_be_cancelled);
     tcase_add_test(tests, processes_with_a_lock_take_turns);
     tcase_add_test(tests, an_output_replaces_only_what_it_was_made_from);
+    tcase_add_test(tests, pairs_of_outputs_are_put_in_place_in_turn);
     tcase_add_test(tests, empty_file_is_read_as_no_bytes);
     tcase_add_test(tests, replaced_output_keeps_extended_attributes_and_mode);
     tcase_add_test(tests, change_while_reading_is_noticed);

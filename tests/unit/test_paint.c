@@ -346,6 +346,15 @@ START_TEST(what_is_wrong_is_refused)
     layer.title = NULL;
     layer.date = "a date that is longer than any date";
     ck_assert(ebpo_paint_add_layer(o.paint, &layer, NULL, NULL) == EBPO_E_ARGUMENT);
+    for (int i = 0; i < 4; i++) {
+        static const char *const dates[] = { "2026-02-30", "2100-02-29", "2026-11-31T10:00Z",
+                                             "May" };
+        layer.date = dates[i];
+        ck_assert(ebpo_paint_add_layer(o.paint, &layer, NULL, NULL) == EBPO_E_ARGUMENT);
+        ck_assert(ebpo_paint_set_layer(o.paint, 0, &layer, NULL) == EBPO_E_ARGUMENT);
+    }
+    layer.date = "2096-02-29";
+    ck_assert(ebpo_paint_set_layer(o.paint, 0, &layer, NULL) == EBPO_OK);
     layer.date = NULL;
     layer.opacity = 256;
     ck_assert(ebpo_paint_add_layer(o.paint, &layer, NULL, NULL) == EBPO_E_ARGUMENT);

@@ -59,6 +59,25 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return command_flush("collide");
 }
 
+/* -1 .. 1 */
+static const char *const truths[] = { "null", "false", "true" };
+
+/* Prints the line of models whose faces do not meet. Of all pairs JSON has an object for each, and
+ * one where there is none but more to say. */
+static ebpo_status print_none(const collide_values *v, ebpo_collider *c,
+                              const ebpo_collide_options *how, ebpo_error *error)
+{
+    const char *relation;
+    bool as_json = v->query.json;
+    ebpo_status status = collide_unmet(c, how, &relation, error);
+    if (status != EBPO_OK || (as_json && v->query.all && !relation))
+        return status;
+    printf(as_json ? "{\"kind\": \"APART\"" : "none");
+    collide_print_unmet(as_json, relation);
+    puts(as_json ? "}" : "");
+    return EBPO_OK;
+}
+
 static ebpo_status ask_first(const collide_values *v, ebpo_collider *c,
                              const ebpo_collide_options *how, ebpo_error *error)
 {
@@ -67,20 +86,14 @@ static ebpo_status ask_first(const collide_values *v, ebpo_collider *c,
     ebpo_status status = ebpo_collide_first(c, how, &pair, &found, error);
     if (status != EBPO_OK)
         return status;
+    if (found == 0)
+        return print_none(v, c, how, error);
     if (found == 1)
         print_pair(v->query.json, &pair);
-    else if (v->query.json)
-        printf("{\"kind\": %s}\n", found ? "null" : "\"APART\"");
     else
-        puts(found ? "not known" : "none");
+        puts(v->query.json ? "{\"kind\": null}" : "not known");
     return EBPO_OK;
 }
-
-/* -1 .. 1 */
-static const char *const truths[] = { "null", "false", "true" };
-
-static const char *const relations[] = { "DISJOINT",   "TOUCHING", "INTERSECTING", "A_INSIDE_B",
-                                         "B_INSIDE_A", "EQUAL",    "not known" };
 
 static ebpo_status ask_relation(const collide_values *v, ebpo_collider *c,
                                 const ebpo_collide_options *how, ebpo_error *error)
@@ -90,11 +103,11 @@ static ebpo_status ask_relation(const collide_values *v, ebpo_collider *c,
     if (status != EBPO_OK)
         return status;
     if (!v->query.json)
-        puts(relations[r.relation]);
+        puts(collide_relations[r.relation]);
     else if (r.relation == EBPO_RELATION_OPEN)
         printf("{\"relation\": null, \"contact\": %s}\n", truths[r.contact + 1]);
     else
-        printf("{\"relation\": \"%s\", \"contact\": %s}\n", relations[r.relation],
+        printf("{\"relation\": \"%s\", \"contact\": %s}\n", collide_relations[r.relation],
                truths[r.contact + 1]);
     return EBPO_OK;
 }
@@ -125,15 +138,19 @@ static ebpo_status ask_levels(const collide_values *v, ebpo_collider *c,
     return status;
 }
 
-/* Every pair, and a word if there is none; JSON is an object for each pair. */
+/* Prints every pair, or that there is none. */
 static ebpo_status ask_pairs(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
                              ebpo_error *error)
 {
     ebpo_status status = v->self ? ebpo_collide_self(c, how, take_pairs, v, error)
                                  : ebpo_collide_all(c, how, take_pairs, v, error);
-    if (status == EBPO_OK && !v->printed && !v->query.json)
+    if (status != EBPO_OK || v->printed)
+        return status;
+    if (!v->self)
+        return print_none(v, c, how, error);
+    if (!v->query.json)
         puts("none");
-    return status;
+    return EBPO_OK;
 }
 
 /* Said on standard error, as answers are on the other. */
@@ -141,12 +158,18 @@ static ebpo_status write_pairs(const collide_values *v, ebpo_collider *c,
                                const ebpo_collide_options *how, ebpo_error *error)
 {
     bool ply = words_end_with(v->out, ".ply");
+    const char *relation = NULL;
     ebpo_status status =
         ebpo_collide_write(c, how, ply ? EBPO_PAIRS_PLY : EBPO_PAIRS_HDF5, v->out, error);
-    if (status == EBPO_OK && !v->quiet)
-        fprintf(stderr, "%s: %s\n", v->out,
+    if (v->quiet)
+        return status;
+    if (status == EBPO_OK)
+        status = collide_unmet(c, how, &relation, error);
+    if (status == EBPO_OK)
+        fprintf(stderr, "%s: %s%s%s\n", v->out,
                 ply ? "both models, in which the faces that meet are red"
-                    : "all pairs of faces that meet, and where they cross");
+                    : "all pairs of faces that meet, and where they cross",
+                relation ? "; none meet: " : "", relation ? relation : "");
     return status;
 }
 

@@ -68,6 +68,8 @@ static int check_values(const values *v, const char *in, const char *out)
     if (v->split_groups && (v->mend.fill_holes || v->mend.repair))
         return command_usage("convert", "--fill-holes and --repair do not go with --split-groups: "
                                         "what they add is in no group");
+    if (v->date && !ebpo_is_date(v->date))
+        return command_usage("convert", "--date '%s': expected " WORDS_DATE_EXPECTED, v->date);
     uint64_t subtree_faces;
     if (!subtree_faces_read("convert", v->subtree_faces, &subtree_faces) ||
         command_overwrites("convert", in, out))

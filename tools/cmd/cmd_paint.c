@@ -82,11 +82,8 @@ static int check_texts(const paint_values *v)
         return command_usage("paint", "--base '%s': expected RRGGBB in hexadecimal", v->base);
     if (v->at && !paint_read_place(v->at, place))
         return command_usage("paint", "--at '%s': expected X,Y,Z", v->at);
-    if (v->date && !paint_is_date(v->date))
-        return command_usage("paint",
-                             "--date '%s': expected a date as in ISO 8601, such as 2026-11-26 or "
-                             "2026-11-26T21:43:05Z",
-                             v->date);
+    if (v->date && !ebpo_is_date(v->date))
+        return command_usage("paint", "--date '%s': expected " WORDS_DATE_EXPECTED, v->date);
     if ((v->at != NULL) != (v->note != NULL))
         return command_usage("paint", "--note and --at belong together");
     if (v->bake && !words_end_with(v->bake, ".ply") && !words_end_with(v->bake, ".glb") &&

@@ -9,6 +9,33 @@
 #include "cli/json.h"
 #include "cli/words.h"
 
+/* --- how models lie to each other --- */
+
+const char *const collide_relations[] = { "DISJOINT",   "TOUCHING", "INTERSECTING", "A_INSIDE_B",
+                                          "B_INSIDE_A", "EQUAL",    "not known" };
+
+ebpo_status collide_unmet(ebpo_collider *c, const ebpo_collide_options *how, const char **relation,
+                          ebpo_error *error)
+{
+    ebpo_relation_result r;
+    *relation = NULL;
+    ebpo_status status = ebpo_collide_relation(c, how, &r, error);
+    if (status == EBPO_OK && r.relation != EBPO_DISJOINT && r.contact != 1)
+        *relation = collide_relations[r.relation];
+    return status;
+}
+
+void collide_print_unmet(bool as_json, const char *relation)
+{
+    bool open = relation == collide_relations[EBPO_RELATION_OPEN];
+    if (relation && as_json)
+        printf(open ? ", \"relation\": null" : ", \"relation\": \"%s\"", relation);
+    else if (relation)
+        printf(" %s", relation);
+}
+
+/* --- options --- */
+
 /* Three numbers with blanks or commas between. */
 static bool read_direction(const char *text, double out[3])
 {
@@ -76,21 +103,28 @@ static void print_pair(bool as_json, const ebpo_clearance *c)
         printf(" %" PRIu64 " %" PRIu64, c->pair.face_a, c->pair.face_b);
 }
 
-static void print_distance(bool as_json, const ebpo_clearance *c)
+/* The end of the line, with how models lie to each other that are not apart as sets of points. */
+static void print_end(bool as_json, const char *relation)
+{
+    collide_print_unmet(as_json, relation);
+    puts(as_json ? "}" : "");
+}
+
+static void print_distance(bool as_json, const ebpo_clearance *c, const char *relation)
 {
     printf("%s", as_json ? "{" : "");
     print_bounds(as_json, &c->distance);
     print_pair(as_json, c);
-    puts(as_json ? "}" : "");
+    print_end(as_json, relation);
 }
 
-static void print_at_least(bool as_json, const ebpo_clearance *c)
+static void print_at_least(bool as_json, const ebpo_clearance *c, const char *relation)
 {
     static const char *const words[2][3] = { { "not known", "no", "yes" },
                                              { "null", "false", "true" } };
     printf("%s%s", as_json ? "{\"at_least\": " : "", words[as_json][c->at_least + 1]);
     print_pair(as_json, c);
-    puts(as_json ? "}" : "");
+    print_end(as_json, relation);
 }
 
 static ebpo_status ask_distance(const collide_far *f, bool as_json, ebpo_collider *c,
@@ -103,10 +137,17 @@ static ebpo_status ask_distance(const collide_far *f, bool as_json, ebpo_collide
     ebpo_status status = ebpo_collide_distance(c, how, &wanted, &got, error);
     if (status != EBPO_OK)
         return status;
+    /* where faces meet, or nothing is known of them, the line says so already */
+    bool apart = got.distance.lo > 0 || (got.at_least >= 0 && got.distance.hi > 0);
+    const char *relation = NULL;
+    if (apart)
+        status = collide_unmet(c, how, &relation, error);
+    if (status != EBPO_OK)
+        return status;
     if (f->at_least >= 0)
-        print_at_least(as_json, &got);
+        print_at_least(as_json, &got, relation);
     else
-        print_distance(as_json, &got);
+        print_distance(as_json, &got, relation);
     return EBPO_OK;
 }
 

@@ -33,8 +33,6 @@ typedef struct paint_job {
 
 /* "RRGGBB" or "RRGGBBAA" as 0xRRGGBBAA. False: it is not that. */
 bool paint_read_colour(const char *text, uint32_t *out);
-/* Whether it is a date as in ISO 8601: YYYY, YYYY-MM, YYYY-MM-DD, or that, a T and a time. */
-bool paint_is_date(const char *text);
 /* Three numbers with commas. False: it is not that. */
 bool paint_read_place(const char *text, double out[3]);
 /* The hand's way; the caller frees it. False: what is wrong was said. */

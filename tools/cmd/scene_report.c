@@ -188,8 +188,10 @@ static void finish(report *r, double seconds)
         char times[40], asked[40];
         words_plural(times, sizeof times, r->frames, "time", "times");
         words_plural(asked, sizeof asked, r->asked, "pair", "pairs");
-        fprintf(stderr, "%s, %llu with meetings; %s asked, %llu meet; %.3g s\n", times,
-                (unsigned long long)r->frames_met, asked, (unsigned long long)r->meetings, seconds);
+        fprintf(stderr, "%s, %llu with meetings; %s asked, %llu meet%s; %.3g s\n", times,
+                (unsigned long long)r->frames_met, asked, (unsigned long long)r->meetings,
+                r->how.relate ? "" : " (one within another is not looked for without --solids)",
+                seconds);
     }
 }
 

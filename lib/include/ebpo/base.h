@@ -4,6 +4,7 @@
  *   Versions   EBPO_VERSION_NUMBER, ebpo_version
  *   Structs    those that begin with their size, and EBPO_..._INIT
  *   Errors     ebpo_status, ebpo_error
+ *   Dates      ebpo_is_date
  *   Progress   ebpo_progress
  *   Outputs    ebpo_write_file, ebpo_output_begin, ebpo_check_output, ebpo_abandon_outputs,
  *              ebpo_folder_begin, ebpo_folder_publish
@@ -177,6 +178,17 @@ typedef struct ebpo_error {
  * Threads: any.
  */
 EBPO_API const char *ebpo_status_name(ebpo_status status);
+
+/* ---- dates ---- */
+
+/*
+ * Returns true for a date as in ISO 8601 that the calendar has: YYYY, YYYY-MM, YYYY-MM-DD, or the
+ * last with a T and a time: HH:MM, HH:MM:SS, or that with decimals, and behind it Z, +HH:MM, -HH:MM
+ * or nothing.
+ *
+ * Threads: any.
+ */
+EBPO_API bool ebpo_is_date(const char *text);
 
 /* ---- progress ---- */
 

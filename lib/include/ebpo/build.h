@@ -152,7 +152,8 @@ typedef struct ebpo_build_options {
     /* Of EBPO_SELECT_KMEDOIDS and EBPO_SELECT_RANDOM: equal seeds, equal files. */
     uint64_t seed;
 
-    /* Notes for the file: UTF-8 without control characters, or NULL. */
+    /* Notes for the file: UTF-8 without control characters, or NULL. `ebpo convert` takes a date by
+     * ebpo_is_date only. */
     const char *unit, *crs, *date;
 
     ebpo_progress progress;

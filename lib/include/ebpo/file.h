@@ -953,8 +953,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(const ebpo_file *file
  *
  * EBPO_E_FORMAT: the content of `file` is not what its checksum says.
  * EBPO_E_UNSUPPORTED: it is, but this library would write other arrays (another program
- * has chosen wider types than needed, say); nothing is written. EBPO_E_ARGUMENT,
- * EBPO_E_IO, EBPO_E_CANCELLED, EBPO_E_MEMORY, as reading and writing give them.
+ * has chosen wider types than needed, say); nothing is written. EBPO_E_IO: also where
+ * `path` is that of `file`, and another program has replaced it since it was opened.
+ * EBPO_E_ARGUMENT, EBPO_E_CANCELLED, EBPO_E_MEMORY, as reading and writing give them.
  *
  * Threads: any.
  */

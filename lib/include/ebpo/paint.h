@@ -209,7 +209,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_points(const ebpo_paint *pai
 typedef struct ebpo_paint_layer {
     size_t struct_size; /* EBPO_PAINT_LAYER_INIT sets it */
 
-    /* At most 255, 255, 31 and 4,095 bytes. The date as in ISO 8601. */
+    /* At most 255, 255, 31 and 4,095 bytes. The date is "" or one as in ISO 8601 (ebpo_is_date);
+     * that which a file has may be any text, and may be kept. */
     const char *title, *author, *date, *description;
 
     /* For lists, and for pens to begin with: 0xRRGGBBAA. */

@@ -134,7 +134,8 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
  * the model's root cell or the box that an earlier subset has kept; or a
  * target_bytes below what can be reached, which the message tells. EBPO_E_ABSENT:
  * max_error or target_bytes, and the file has no mesh or is a subset.
- * EBPO_E_CANCELLED, EBPO_E_IO, EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_E_IO: also where `path` is that of `file`, and another program has replaced
+ * it since it was opened. EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
  *
  * Threads: any.
  */
