@@ -10,6 +10,7 @@ import socket
 import subprocess
 import threading
 import time
+import unittest.mock
 
 from package_kit import COMMAND, GENERATE, Case, model, np, points, run
 
@@ -410,6 +411,23 @@ class Sources(Case):
             thread.start()
         for thread in threads:
             thread.join()
+
+    def test_ranges_without_threads(self):
+        """Where the system gives no thread, and in a process that was forked, a reader fetches by itself."""
+        data = np.random.default_rng(1).bytes(1 << 20)
+        for start in (RuntimeError, threading.Thread.start):
+            far = Far(Ranges(data), len(data), memory=1 << 18)
+            with unittest.mock.patch.object(threading.Thread, "start", side_effect=start, autospec=True):
+                far.prefetch([(1 << 18, 1000), (1 << 19, 1000)])
+                self.assertEqual(far.read_range(1000, 1 << 19), data[1000:][:1 << 19])
+                far.running, far.process = 16, -1
+                self.assertEqual(far.read_range(1 << 19, 1 << 19), data[1 << 19:])
+
+    def test_local_model_without_subtrees(self):
+        self.addCleanup(setattr, automatic, "SMALL", automatic.SMALL)
+        automatic.SMALL = 0
+        for name in ("scan", "cube"):
+            self.same(model(name).locate(P), model(name, memory="1G").locate(P))
 
     def test_ranges_that_fail_once(self):
         data, fail = bytes(1 << 20), [1]

@@ -1,12 +1,14 @@
 """How much of a model is held where no budget is given: in parts, until all of it at once is cheaper."""
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import threading
 from typing import Any
 
 from . import _declared as c
 from ._library import Handle, call, lib, made
+from .errors import LimitError
 
 SMALL = 16 << 20  # is loaded at once: some milliseconds
 # Loads after which their mean is believed; and what is foretold must exceed all subtrees so many times.
@@ -46,7 +48,8 @@ class Automatic:
         options.cut_level = info.subtree_level or -1
         if options.cut_level < 0:  # as if not all of it fitted
             options.memory = plan.whole - 1 if plan.resident else most
-            options.cut_level = self._plan().cut_level
+            with contextlib.suppress(LimitError):  # as small as the least: at once
+                options.cut_level = self._plan().cut_level
             options.memory = most
         self.subtrees = self._plan().subtrees
         self.waiting = bool(plan.resident and self.subtrees)

@@ -114,7 +114,10 @@ class Ranges:
         (self.queue.appendleft if urgent else self.queue.append)(piece)
         if self.running < self.connections:
             self.running += 1
-            threading.Thread(target=self._work, daemon=True).start()
+            try:
+                threading.Thread(target=self._work, daemon=True).start()
+            except RuntimeError:  # the system gives no more threads: readers fetch for themselves
+                self.running -= 1
 
     def _ahead(self, begin: int) -> None:
         """Asks for what was announced from an offset on, as far as it fits."""
@@ -213,7 +216,15 @@ class Ranges:
             if piece in self.queue:  # nobody else is waited for
                 self.queue.remove(piece)
                 self.queue.appendleft(piece)
-            self.changed.wait()
+            if self.running:
+                self.changed.wait()
+                continue
+            self.running += 1
+            self.changed.release()
+            try:
+                self._work()
+            finally:
+                self.changed.acquire()
 
     def _release(self, pieces: list) -> None:
         self.clock += 1
