@@ -64,7 +64,9 @@ def truth(value: Any, what: str) -> bool:
     """A bool, or 0 or 1."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
-    return bool(within(index_of(value, what), 0, 1, what))
+    if not isinstance(value, (int, np.integer)):
+        raise TypeError(f"{what}: expected True or False, got {type(value).__name__}")
+    return bool(within(int(value), 0, 1, what))
 
 
 def real(value: Any, what: str) -> float:

@@ -11,7 +11,7 @@ from typing import Any, Callable, Iterator, NamedTuple
 import numpy as np
 
 from . import _declared as c
-from ._checked import doubles, integers, nanoseconds
+from ._checked import doubles, index_of, integers, nanoseconds, within
 from ._library import Callback, Handle, Reporter, call, copied, lib, made, size_in_bytes
 from .asking import Rows, Told, share
 from .automatic import Automatic
@@ -678,6 +678,7 @@ class Model:
         asked = doubles(point, "the point")
         if asked.shape != (3,):
             raise ValueError("octcode() takes one point of three numbers")
+        level = within(index_of(level, "level"), 0, c.EBPO_LEVELS_MAX - 1, "level")
         return lib.ebpo_octcode_at(lib.ebpo_file_info(self.file), asked.ctypes.data, level)
 
     def subtree(self, octcode: int = 1, *, levels: int | None = None, memory: int | str | None = None,
