@@ -42,6 +42,11 @@ class Server(http.server.BaseHTTPRequestHandler):
     plain = False  # no ranges
     count, most_at_once, now = 0, 0, 0  # requests
     lock = threading.Lock()
+    connections, kind = 0, "application/octet-stream"
+
+    def setup(self):
+        Server.connections += 1
+        super().setup()
 
     def do_GET(self):
         if self.path.startswith("/to?"):
@@ -72,6 +77,7 @@ class Server(http.server.BaseHTTPRequestHandler):
         if not Server.silent and not Server.plain:
             self.send_header("Content-Range", f"bytes {first}-{first + len(part) - 1}/{len(Server.data)}")
         self.send_header("Content-Length", str(len(part)))
+        self.send_header("Content-Type", Server.kind)
         if Server.etag:
             self.send_header("ETag", Server.etag)
         self.end_headers()
@@ -278,6 +284,19 @@ class Sources(Case):
         self.assertLessEqual(counts[1], counts[0])
         self.assertLess(counts[1], 10)
 
+    def test_connections_are_used_again(self):
+        url = f"{self.serve(large())}/large.ebpo.h5"
+        self.changed(connections=0, timeout=.3)
+        web = sources.Web(f"{url[:-14]}/to?{url}")
+        for at in range(200_000, 201_000, 100):
+            self.assertEqual(web.read_range(at, 1000), large()[at:at + 1000])
+        self.assertEqual(Server.connections, 1)
+        time.sleep(.6)  # the server closes it
+        self.assertEqual(web.read_range(200_000, 1000), large()[200_000:201_000])
+        Server.cut = 1
+        self.assertEqual(web.read_range(200_000, 1000), large()[200_000:201_000])
+        self.assertEqual(Server.connections, 3)
+
     def test_server_that_caps_ranges(self):
         self.changed(cap=40_000)
         url = f"{self.serve(large())}/scan.ebpo.h5"
@@ -297,6 +316,9 @@ class Sources(Case):
             with self.assertRaisesRegex(ebpo.UnsupportedError, "download"):
                 self.by_web(url, whole_limit=1000)
             self.changed(plain=False, etag='"1"')
+        self.changed(plain=True, kind="text/html; charset=utf-8")
+        with self.assertRaisesRegex(ebpo.IOFailure, "sends text/html"):
+            sources.Web(url)
         with self.assertRaisesRegex(ValueError, "time-out"):
             sources.Web(url, time_limit=0)
         for bad in ({"A\n": "b"}, {"A": "b\r\nC: d"}):
