@@ -101,8 +101,8 @@ class Many(Case):
             found = boxes.ray(o, d)
             self.assertEqual((found["t"], found["model"]), (t, row))
             self.assertGreaterEqual(found["face"], 0)
-            told = by_command("ray", boxes, [o + d])[0]
-            self.assertEqual([told[name] for name in ("t", "face", "model")], [found[name] for name in ("t", "face", "model")])
+            printed = by_command("ray", boxes, [o + d])[0]
+            self.assertEqual([printed[name] for name in ("t", "face", "model")], [found[name] for name in ("t", "face", "model")])
             hits = ebpo.open("box3.ebpo.h5").ray_all(o, d)
             self.assertEqual((len(hits.t), hits.side.tolist()), (2, [1, -1]))
 

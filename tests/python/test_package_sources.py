@@ -326,7 +326,7 @@ class Sources(Case):
                 sources.Web(url, headers=bad)
 
     def test_time_limit(self):
-        """Whatever comes and however slowly: an IOFailure after `time_limit`, and no other exception."""
+        """Every answer without an end is an IOFailure after `time_limit`, and no other exception."""
         good = b"HTTP/1.1 206 OK\r\nContent-Range: bytes 0-9/10\r\n"
         cases = {"trickle": (good + b"Content-Length: 10\r\n\r\n", b"0", .5),
                  "trailers": (good + b"Transfer-Encoding: chunked\r\n\r\na\r\n0123456789\r\n0\r\n", b"X: y\r\n", 0),

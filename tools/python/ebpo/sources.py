@@ -115,7 +115,7 @@ class Source:
 
 
 def shown(name: str) -> bytes:
-    """A text for messages, without what the library would take for its end."""
+    """Returns a text for messages, without NULs."""
     return name.encode("utf-8", "replace").replace(b"\0", b"?")
 
 
@@ -154,7 +154,7 @@ def by_url(url: str, http: dict, most_expansion: int) -> Handle:
 
 
 def by_ranges(ranges: Any, name: str, most_expansion: int = 0) -> Handle:
-    """Of a Ranges, or of what is near."""
+    """Opens a Ranges, or an object with `size` and `read_range` on this machine."""
     source = Source(ranges)
     return by_name(shown(name), most_expansion, keep=(source,), source=source.struct)
 
@@ -191,7 +191,7 @@ def opened(source: Any, http: dict, storage_options: dict | None, most_expansion
 
 
 def far(source: Any, size: Any, name: str, **options: Any) -> Ranges:
-    """The ranges of a source elsewhere, whose first bytes are read now. IOFailure: they cannot be."""
+    """Reads the first bytes of a source elsewhere, and returns its ranges. IOFailure: they cannot be read."""
     try:
         return Ranges(source, size_in_bytes(size), **options)
     except (Error, TypeError):
@@ -201,7 +201,7 @@ def far(source: Any, size: Any, name: str, **options: Any) -> Ranges:
 
 
 def of_file(file: Any, name: str) -> Any:
-    """What reads a file object: of this machine in its place, of others by ranges."""
+    """Returns what reads a file object: itself if it is on this machine, else its ranges."""
     if Uncached.fits(file):
         return far(Uncached(file), file.size, name)
     seekable = Seekable(file)
@@ -211,7 +211,7 @@ def of_file(file: Any, name: str) -> Any:
 
 
 def is_of_system(file: Any) -> bool:
-    """True for files that the system itself reads."""
+    """Returns True for files that the operating system reads."""
     try:
         return isinstance(file.fileno(), int)
     except (AttributeError, OSError):

@@ -1,4 +1,4 @@
-"""URLs by Python's own HTTP, where the library has none: each request within a time, answers of one version."""
+"""Reads URLs by Python's own HTTP, where the library has none: each range within a time, of one version."""
 from __future__ import annotations
 
 import collections
@@ -29,7 +29,7 @@ SILENT = 20.0  # seconds without a byte, or for a connection; then the request i
 
 
 class Timed(io.RawIOBase):
-    """What comes from a socket, until a time of time.monotonic. After it: TimeoutError."""
+    """Reads a socket until a time of time.monotonic. After it: TimeoutError."""
 
     def __init__(self, raw: Any, sock: Any, end: float) -> None:
         self.raw, self.sock, self.end = raw, sock, end
@@ -245,7 +245,7 @@ class Web:
         self.head = self.first()
 
     def first(self) -> bytes:
-        """The first bytes, the size and the version; of a server without ranges or versions everything."""
+        """Reads the first bytes, the size and the version; from a server without ranges or versions the whole file."""
         data = self.get(0, HEAD)
         if len(data) < self.size and self.version[0] is None and not self.unversioned:
             if self.size > self.whole_limit:
@@ -256,14 +256,14 @@ class Web:
         return data
 
     def read_range(self, offset: int, size: int) -> bytes:
-        """Raises IOFailure, whatever the server does."""
+        """Returns bytes. IOFailure: the server does not send them in time."""
         if offset + size <= len(self.head):
             return self.head[offset:offset + size]
         return self.get(offset, size)
 
     def get(self, offset: int, size: int, at_once: bool = False) -> bytes:
-        """Bytes of a range, or all there are from a server without ranges. A server may send them in parts,
-        unless they must come at once."""
+        """Requests a range, or the whole file from a server without ranges. A server may send it in parts,
+        unless it must come at once."""
         patience, data = Patience(self.time_limit, self.retries, self.shown), bytearray()
         while True:
             try:
@@ -307,13 +307,13 @@ class Web:
                 self.received += len(data) - before
 
     def range_of(self, answer: Any, begin: int, end: int, patience: Patience) -> int:
-        """How many bytes of the range the server sends: all, or fewer. IOFailure: another range or version."""
+        """Returns how many bytes of the range the server sends: all, or fewer. IOFailure: another range or version."""
         if answer.status != 206:
             raise patience.failure(f"the server does not answer ranges (status {answer.status})")
-        told = re.fullmatch(r"bytes (\d{1,18})-(\d{1,18})/(\d{1,18})", (answer.headers["Content-Range"] or "").strip())
-        if not told:
+        stated = re.fullmatch(r"bytes (\d{1,18})-(\d{1,18})/(\d{1,18})", (answer.headers["Content-Range"] or "").strip())
+        if not stated:
             raise patience.failure("the server does not say which range it sent")
-        first, last, size = map(int, told.groups())
+        first, last, size = map(int, stated.groups())
         etag = answer.headers["ETag"] and re.sub(r"^\s*W/", "", answer.headers["ETag"])
         version = etag or answer.headers["Last-Modified"], size
         if self.version not in (None, version):
