@@ -503,7 +503,7 @@ class Sources(Case):
     def test_local_files_are_held_in_parts(self):
         """As in the command: one point loads no more than it needs, many all of the model; answers are equal."""
         pathlib.Path("large.ebpo.h5").write_bytes(large())
-        q = points(20_000, 2)
+        q = points(5_000, 2)
         whole = ebpo.open("large.ebpo.h5", memory="4G")
         for small in (16 << 20, 0):
             self.addCleanup(setattr, automatic, "SMALL", automatic.SMALL)

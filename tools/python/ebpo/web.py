@@ -144,7 +144,7 @@ class Redirects(urllib.request.HTTPRedirectHandler):
 
     def redirect_request(self, request: Any, answer: Any, code: int, message: str, headers: Any, url: str) -> Any:
         answer.close()  # its body may have no end
-        new = super().redirect_request(request, answer, code, message, headers, url)
+        new: Any = super().redirect_request(request, answer, code, message, headers, url)
         before, after = urllib.parse.urlsplit(request.full_url), urllib.parse.urlsplit(url)
         if after.scheme not in ("http", "https") or (before.scheme, after.scheme) == ("https", "http"):
             raise IOFailure(f"the server redirects from {before.scheme} to {after.scheme}, which is not followed",
