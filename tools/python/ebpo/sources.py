@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import io
 import os
 import threading
@@ -11,8 +12,8 @@ import numpy as np
 
 from . import _declared as c
 from ._checked import path, text
-from ._library import Handle, made, of_members, size_in_bytes
-from .errors import Error, IOFailure, UnsupportedError
+from ._library import Handle, call, made, of_members, size_in_bytes
+from .errors import ArgumentError, Error, IOFailure, UnsupportedError
 from .ranges import CONNECTIONS, MEMORY, Ranges, read_whole
 from .web import Patience, Web
 
@@ -140,13 +141,23 @@ def by_name(name: Any, most_expansion: int, keep: tuple = (), **members: Any) ->
     return Handle.made("ebpo_open_with", name, ctypes.byref(options), free="ebpo_close", keep=keep)
 
 
+@functools.lru_cache(1)
+def has_http() -> bool:
+    """Returns whether the library has HTTP. Without, it refuses every name (UnsupportedError); with, only this one."""
+    try:
+        call("ebpo_source_of_url", "no URL", None, ctypes.byref(made(c.ebpo_source)))
+    except UnsupportedError:
+        return False
+    except ArgumentError:
+        pass
+    return True
+
+
 def by_url(url: str, http: dict, most_expansion: int) -> Handle:
     struct, keep = http_options(http)
-    try:
+    own = {"headers", "time_limit", "retries", "whole_limit", "unversioned", "memory", "connections"}
+    if has_http() or set(http) - own:  # other options it takes, or refuses without HTTP
         return by_name(url, most_expansion, http=struct)
-    except UnsupportedError:
-        if set(http) - {"headers", "time_limit", "retries", "whole_limit", "unversioned", "memory", "connections"}:
-            raise
     del keep
     memory, connections = struct.memory if "memory" in http else MEMORY, http.get("connections", CONNECTIONS)
     web = Web(url, **{name: value for name, value in http.items() if name not in ("memory", "connections")})
