@@ -310,6 +310,9 @@ class Sources(Case):
         self.changed(plain=True, kind="text/html; charset=utf-8")
         with self.assertRaisesRegex(ebpo.IOFailure, "sends text/html"):
             sources.Web(url)
+        for connections in (0, 33, -1):
+            with self.assertRaisesRegex(ValueError, "connections"):
+                self.by_web(url, connections=connections)
         with self.assertRaisesRegex(ValueError, "time-out"):
             sources.Web(url, time_limit=0)
         for bad in ({"A\n": "b"}, {"A": "b\r\nC: d"}):

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from . import _declared as c
-from ._checked import path, text
+from ._checked import path, text, within
 from ._library import Handle, call, made, of_members, size_in_bytes
 from .errors import ArgumentError, Error, IOFailure, UnsupportedError
-from .ranges import CONNECTIONS, MEMORY, Ranges, read_whole
+from .ranges import CONNECTIONS, Ranges, read_whole
 from .web import Patience, Web
 
 FUNCTIONS: dict = {name: kind for name, kind in c.ebpo_source._fields_}
@@ -155,13 +155,13 @@ def has_http() -> bool:
 
 def by_url(url: str, http: dict, most_expansion: int) -> Handle:
     struct, keep = http_options(http)
-    own = {"headers", "time_limit", "retries", "whole_limit", "unversioned", "memory", "connections"}
+    own = {"headers", "time_limit", "retries", "whole_limit", "unversioned", "connections"}
     if has_http() or set(http) - own:  # other options it takes, or refuses without HTTP
         return by_name(url, most_expansion, http=struct)
     del keep
-    memory, connections = struct.memory if "memory" in http else MEMORY, http.get("connections", CONNECTIONS)
-    web = Web(url, **{name: value for name, value in http.items() if name not in ("memory", "connections")})
-    return by_ranges(far(web, web.size, web.shown, memory=memory, connections=connections), web.shown, most_expansion)
+    connections = within(struct.connections if "connections" in http else CONNECTIONS, 1, 32, "connections")
+    web = Web(url, **{name: value for name, value in http.items() if name != "connections"})
+    return by_ranges(far(web, web.size, web.shown, connections=connections), web.shown, most_expansion)
 
 
 def by_ranges(ranges: Any, name: str, most_expansion: int = 0) -> Handle:
