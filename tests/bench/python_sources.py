@@ -62,15 +62,6 @@ class Server(http.server.BaseHTTPRequestHandler):
         pass
 
 
-def without_http(real):
-    """The library's function as one without libcurl answers."""
-    def by_name(*arguments, **members):
-        if "http" in members:
-            raise UnsupportedError("without HTTP")
-        return real(*arguments, **members)
-    return by_name
-
-
 def fsspec_file(url):
     import aiohttp  # noqa: F401
     import fsspec
@@ -107,13 +98,13 @@ def main():
     Server.path_of_file, Server.latency = options.model.absolute(), options.latency
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Server)
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    url, real = f"http://127.0.0.1:{server.server_port}/model", sources.by_name
+    url, has_http = f"http://127.0.0.1:{server.server_port}/model", sources.has_http
     print(f"{options.model.stat().st_size:,} bytes, {options.latency:g} s before each answer\n")
     print("| one point, by | requests to open | bytes | requests of the query | bytes | s |\n|---|---:|---:|---:|---:|---:|")
     for what, query in (("inside", lambda m: m.inside(options.point)), ("distance", lambda m: m.distance(options.point))):
         for name, open_it in (("URL, libcurl", lambda: ebpo.open(url)), ("URL, without libcurl", lambda: ebpo.open(url)),
                               ("fsspec, URL", lambda: fsspec_url(url)), ("fsspec, file object", lambda: fsspec_file(url))):
-            sources.by_name = without_http(real) if "without" in name else real
+            sources.has_http = (lambda: False) if "without" in name else has_http
             try:
                 row(f"{what}, {name}", open_it, query)
             except (ImportError, UnsupportedError) as error:

@@ -101,8 +101,8 @@ class Many(Case):
             found = boxes.ray(o, d)
             self.assertEqual((found["t"], found["model"]), (t, row))
             self.assertGreaterEqual(found["face"], 0)
-            told = by_command("ray", boxes, [o + d])[0]
-            self.assertEqual([told[name] for name in ("t", "face", "model")], [found[name] for name in ("t", "face", "model")])
+            printed = by_command("ray", boxes, [o + d])[0]
+            self.assertEqual([printed[name] for name in ("t", "face", "model")], [found[name] for name in ("t", "face", "model")])
             hits = ebpo.open("box3.ebpo.h5").ray_all(o, d)
             self.assertEqual((len(hits.t), hits.side.tolist()), (2, [1, -1]))
 
@@ -306,6 +306,11 @@ class Parts(Case):
 
     def test_numbers_of_another_part(self):
         np.save("few.npy", np.arange(3))
+        for wrong in (np.full(99_999, -1), np.full(99_999, 2**63, np.uint64)):
+            np.save("negative.npy", wrong[:ebpo.open(self.catalogue.entries[0].path).info.face_count])
+            entry = self.catalogue.entries[0]._replace(numbers=os.path.abspath("negative.npy"), surface="")
+            with self.assertRaisesRegex(ebpo.FormatError, "negative"):
+                Catalogue([entry]).distance([entry.low])
         entries = [entry._replace(numbers=os.path.abspath("few.npy")) for entry in self.catalogue.entries]
         with self.assertRaisesRegex(ebpo.FormatError, "few.npy: 3 numbers of"):
             Catalogue(entries, parts=True).distance(P[:99])

@@ -163,6 +163,8 @@ class Package(Case):
             self.refused(ValueError, ebpo.open, "cube.ebpo.h5", threads=number)
             self.refused(ValueError, ebpo.Collider, m, m, threads=number)
             self.refused(ValueError, ebpo.convert, mesh, "o.ebpo.h5", threads=number)
+        for number in (-1, 21):
+            self.refused(ValueError, m.octcode, p[0], number)
         for number in (2**32, -2**40, 2**31):
             self.refused(ValueError, m.locate, p, level=number)
             self.refused(ValueError, m.octcode, p[0], number)

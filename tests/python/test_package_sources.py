@@ -10,6 +10,7 @@ import socket
 import subprocess
 import threading
 import time
+import unittest.mock
 
 from package_kit import COMMAND, GENERATE, Case, model, np, points, run
 
@@ -41,6 +42,11 @@ class Server(http.server.BaseHTTPRequestHandler):
     plain = False  # no ranges
     count, most_at_once, now = 0, 0, 0  # requests
     lock = threading.Lock()
+    connections, kind = 0, "application/octet-stream"
+
+    def setup(self):
+        Server.connections += 1
+        super().setup()
 
     def do_GET(self):
         if self.path.startswith("/to?"):
@@ -71,6 +77,7 @@ class Server(http.server.BaseHTTPRequestHandler):
         if not Server.silent and not Server.plain:
             self.send_header("Content-Range", f"bytes {first}-{first + len(part) - 1}/{len(Server.data)}")
         self.send_header("Content-Length", str(len(part)))
+        self.send_header("Content-Type", Server.kind)
         if Server.etag:
             self.send_header("ETag", Server.etag)
         self.end_headers()
@@ -246,18 +253,9 @@ class Sources(Case):
 
     def by_web(self, url, **http):
         """A model by Python's own HTTP, as where the library has none."""
-        real = sources.by_name
-
-        def without_http(*arguments, **members):
-            if "http" in members:
-                raise ebpo.UnsupportedError("without HTTP")
-            return real(*arguments, **members)
-
-        sources.by_name = without_http
-        try:
+        self.assertTrue(sources.has_http())
+        with unittest.mock.patch.object(sources, "has_http", return_value=False):
             return ebpo.open(url, **http)
-        finally:
-            sources.by_name = real
 
     def test_web_reads_parts(self):
         """Only what a question needs is read, joined and several ranges at a time, as by the library."""
@@ -276,6 +274,19 @@ class Sources(Case):
             self.assertGreater(Server.most_at_once, 3)
         self.assertLessEqual(counts[1], counts[0])
         self.assertLess(counts[1], 10)
+
+    def test_connections_are_used_again(self):
+        url = f"{self.serve(large())}/large.ebpo.h5"
+        self.changed(connections=0, timeout=.3)
+        web = sources.Web(f"{url[:-14]}/to?{url}")
+        for at in range(200_000, 201_000, 100):
+            self.assertEqual(web.read_range(at, 1000), large()[at:at + 1000])
+        self.assertEqual(Server.connections, 1)
+        time.sleep(.6)  # the server closes it
+        self.assertEqual(web.read_range(200_000, 1000), large()[200_000:201_000])
+        Server.cut = 1
+        self.assertEqual(web.read_range(200_000, 1000), large()[200_000:201_000])
+        self.assertEqual(Server.connections, 3)
 
     def test_server_that_caps_ranges(self):
         self.changed(cap=40_000)
@@ -296,6 +307,12 @@ class Sources(Case):
             with self.assertRaisesRegex(ebpo.UnsupportedError, "download"):
                 self.by_web(url, whole_limit=1000)
             self.changed(plain=False, etag='"1"')
+        self.changed(plain=True, kind="text/html; charset=utf-8")
+        with self.assertRaisesRegex(ebpo.IOFailure, "sends text/html"):
+            sources.Web(url)
+        for connections in (0, 33, -1):
+            with self.assertRaisesRegex(ValueError, "connections"):
+                self.by_web(url, connections=connections)
         with self.assertRaisesRegex(ValueError, "time-out"):
             sources.Web(url, time_limit=0)
         for bad in ({"A\n": "b"}, {"A": "b\r\nC: d"}):
@@ -303,7 +320,7 @@ class Sources(Case):
                 sources.Web(url, headers=bad)
 
     def test_time_limit(self):
-        """Whatever comes and however slowly: an IOFailure after `time_limit`, and no other exception."""
+        """Every answer without an end is an IOFailure after `time_limit`, and no other exception."""
         good = b"HTTP/1.1 206 OK\r\nContent-Range: bytes 0-9/10\r\n"
         cases = {"trickle": (good + b"Content-Length: 10\r\n\r\n", b"0", .5),
                  "trailers": (good + b"Transfer-Encoding: chunked\r\n\r\na\r\n0123456789\r\n0\r\n", b"X: y\r\n", 0),
@@ -411,6 +428,23 @@ class Sources(Case):
         for thread in threads:
             thread.join()
 
+    def test_ranges_without_threads(self):
+        """Where the system gives no thread, and in a process that was forked, a reader fetches by itself."""
+        data = np.random.default_rng(1).bytes(1 << 20)
+        for start in (RuntimeError, threading.Thread.start):
+            far = Far(Ranges(data), len(data), memory=1 << 18)
+            with unittest.mock.patch.object(threading.Thread, "start", side_effect=start, autospec=True):
+                far.prefetch([(1 << 18, 1000), (1 << 19, 1000)])
+                self.assertEqual(far.read_range(1000, 1 << 19), data[1000:][:1 << 19])
+                far.running, far.process = 16, -1
+                self.assertEqual(far.read_range(1 << 19, 1 << 19), data[1 << 19:])
+
+    def test_local_model_without_subtrees(self):
+        self.addCleanup(setattr, automatic, "SMALL", automatic.SMALL)
+        automatic.SMALL = 0
+        for name in ("scan", "cube"):
+            self.same(model(name).locate(P), model(name, memory="1G").locate(P))
+
     def test_ranges_that_fail_once(self):
         data, fail = bytes(1 << 20), [1]
 
@@ -463,18 +497,14 @@ class Sources(Case):
     def test_local_files_are_held_in_parts(self):
         """As in the command: one point loads no more than it needs, many all of the model; answers are equal."""
         pathlib.Path("large.ebpo.h5").write_bytes(large())
-        q = points(20_000, 2)
-        whole = ebpo.open("large.ebpo.h5", memory="4G")
-        for small in (16 << 20, 0):
-            self.addCleanup(setattr, automatic, "SMALL", automatic.SMALL)
-            automatic.SMALL = small
-            m = ebpo.open("large.ebpo.h5")
-            self.assertEqual(m.inside(P[0]), whole.inside(P[0]))
-            self.assertEqual(m.stats["resident"], False, "one point")
-            self.assertLess(m.stats["memory_peak"], whole.stats["memory"] / 2)
-            self.same(m.distance(q), whole.distance(q))
-            self.assertTrue(m.stats["resident"], "many points")
-            self.same(m.ray(q[:99], q[:99]), whole.ray(q[:99], q[:99]))
+        q, whole = points(20_000, 2), ebpo.open("large.ebpo.h5", memory="4G")
+        m = ebpo.open("large.ebpo.h5")
+        self.assertEqual(m.inside(P[0]), whole.inside(P[0]))
+        self.assertEqual(m.stats["resident"], False, "one point")
+        self.assertLess(m.stats["memory_peak"], whole.stats["memory"] / 2)
+        self.same(m.distance(q)[:3], whole.distance(q)[:3])
+        self.assertTrue(m.stats["resident"], "so many that they need all of it")
+        q = q[:2000]
         for ask in (lambda m: m.ray(q, q + .1), lambda m: m.ray_all(q, q + .1), lambda m: m.locate(q),
                     lambda m: m.faces_in_box([0, 0, 0], [.2, .2, 1])):
             m = ebpo.open("large.ebpo.h5")

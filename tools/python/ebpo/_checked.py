@@ -1,13 +1,13 @@
-"""Converts values of Python to values of C: the one place where that is done.
+"""Converts values of Python to values of C, for the whole package.
 
-Every argument of a function of the library, every member of a struct and every array that is given goes
-through here. Nothing is cut, wrapped or rounded silently:
+Every argument of a library function, every struct member and every array passes through this module. Nothing is
+cut, wrapped or rounded silently:
 
 integers    Python's and numpy's, and bools as 0 and 1; out of the range of the C type: ArgumentError. A float
             is a TypeError, whole or not.
 bools       True, False, 0 and 1; another integer: ArgumentError.
-reals       what float() takes but texts; an integer that no double equals: ArgumentError.
-texts       str as UTF-8, paths by os.fsencode, bytes; with a NUL, or a character that UTF-8 has not: ArgumentError.
+reals       what float() takes, except texts; an integer that no double equals: ArgumentError.
+texts       str as UTF-8, paths by os.fsencode, bytes; a NUL, or a character that UTF-8 does not have: ArgumentError.
 arrays      of numbers; integers as above, item by item.
 
 ArgumentError is a ValueError.
@@ -29,11 +29,12 @@ REALS = {ctypes.c_float, ctypes.c_double}
 
 
 def refused(what: str, why: str) -> ArgumentError:
+    """Returns the exception for an argument or option, `what`."""
     return ArgumentError(f"{what}: {why}", "EBPO_E_ARGUMENT")
 
 
 def index_of(value: Any, what: str) -> int:
-    """The integer that a value is. TypeError: it is none."""
+    """Returns the integer that a value is. TypeError: it is none."""
     try:
         return operator.index(bool(value) if isinstance(value, np.bool_) else value)
     except TypeError:
@@ -41,6 +42,7 @@ def index_of(value: Any, what: str) -> int:
 
 
 def within(number: int, low: int, high: int, what: str) -> int:
+    """Returns a number that is in a range. ArgumentError: it is not."""
     if not low <= number <= high:
         shown = str(number) if number.bit_length() <= 128 else f"an integer of {number.bit_length()} bits"
         raise refused(what, f"{shown} is out of range; give {low} to {high}")
@@ -48,7 +50,7 @@ def within(number: int, low: int, high: int, what: str) -> int:
 
 
 def integer_as(kind: Any) -> Callable:
-    """A function that checks integers of a C type."""
+    """Returns a function that checks integers of a C type."""
     bits, signed = 8 * ctypes.sizeof(kind), kind(-1).value < 0
     low, high = (-2**(bits - 1), 2**(bits - 1) - 1) if signed else (0, 2**bits - 1)
 
@@ -61,14 +63,16 @@ def integer_as(kind: Any) -> Callable:
 
 
 def truth(value: Any, what: str) -> bool:
-    """A bool, or 0 or 1."""
+    """Converts a bool, or 0 or 1."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
-    return bool(within(index_of(value, what), 0, 1, what))
+    if not isinstance(value, (int, np.integer)):
+        raise TypeError(f"{what}: expected True or False, got {type(value).__name__}")
+    return bool(within(int(value), 0, 1, what))
 
 
 def real(value: Any, what: str) -> float:
-    """A double that equals the value, if that is an integer; else the nearest one."""
+    """Converts a number to the nearest double; an integer must equal it."""
     if type(value) is float:
         return value
     if isinstance(value, (str, bytes, np.complexfloating)):
@@ -85,7 +89,7 @@ def real(value: Any, what: str) -> float:
 
 
 def text(value: Any, what: str) -> bytes | None:
-    """Bytes without a NUL: of a text in UTF-8, of a path as the system has it."""
+    """Converts a text to UTF-8, and a path to the bytes of the system."""
     if value is None:
         return None
     if isinstance(value, str):
@@ -103,7 +107,7 @@ def text(value: Any, what: str) -> bytes | None:
 
 
 def path(value: Any, what: str = "path") -> bytes:
-    """The name of a file as the system has it. TypeError: neither str, bytes nor os.PathLike."""
+    """Converts the name of a file to the bytes of the system. TypeError: neither str, bytes nor os.PathLike."""
     try:
         return text(os.fsencode(value), what) or b""
     except UnicodeEncodeError as error:
@@ -111,7 +115,7 @@ def path(value: Any, what: str = "path") -> bytes:
 
 
 def texts_of(size: int) -> Callable:
-    """A function that checks texts of a member char[size], which end with a NUL."""
+    """Returns a function that checks texts of a member char[size], where a NUL ends them."""
     def convert(value: Any, what: str) -> bytes:
         found = text(value, what) or b""
         if len(found) >= size:
@@ -122,7 +126,7 @@ def texts_of(size: int) -> Callable:
 
 
 def items_of(kind: Any) -> Callable:
-    """A function that checks the items of a member that is an array."""
+    """Returns a function that checks the items of an array member."""
     def convert(values: Any, what: str) -> Any:
         if isinstance(values, kind):
             return values
@@ -136,8 +140,8 @@ def items_of(kind: Any) -> Callable:
 
 
 def converter(kind: Any) -> Callable | None:
-    """What checks values of a C type. None: ctypes itself takes nothing but the right ones (structs), or
-    addresses, which come from this package only."""
+    """Returns a function that checks values of a C type. None: for structs, whose type ctypes checks, and for
+    addresses, which only this package sets."""
     if kind in INTEGERS:
         return integer_as(kind)
     if kind in REALS:
@@ -152,7 +156,7 @@ def converter(kind: Any) -> Callable | None:
 
 
 def is_own(kind: Any) -> bool:
-    """True for members that this package sets and no user: pointers and functions, and structs of these."""
+    """Returns True for members that only this package sets: pointers, functions, and structs of these."""
     if issubclass(kind, ctypes.Structure):
         return any(is_own(member) for _, member in kind._fields_)
     return kind is ctypes.c_void_p or issubclass(kind, ctypes._CFuncPtr)
@@ -175,7 +179,7 @@ class Structure(ctypes.Structure):
 
 
 def checked(entry: Any, kinds: list, names: list) -> Any:
-    """A function of C whose arguments are checked; the others pass."""
+    """Returns a function of C that checks its integers, reals, bools and texts."""
     checks = [(i, converter(kind), name) for i, (kind, name) in enumerate(zip(kinds, names)) if converter(kind)]
     if not checks:
         return entry
@@ -190,7 +194,7 @@ def checked(entry: Any, kinds: list, names: list) -> Any:
 
 
 def doubles(values: Any, what: str) -> np.ndarray:
-    """Numbers as contiguous doubles; what is that already is not copied. Floats of more digits are rounded."""
+    """Converts numbers to contiguous doubles, without a copy where they are. Wider floats are rounded."""
     given = np.asarray(values)
     if given.dtype.kind == "O":
         given = np.array([real(value, what) for value in given.ravel()], np.float64).reshape(given.shape)
@@ -204,7 +208,7 @@ def doubles(values: Any, what: str) -> np.ndarray:
 
 
 def integers(values: Any, dtype: Any, what: str) -> np.ndarray:
-    """Integers as a contiguous array of a type that holds each of them. TypeError: they are floats or bools."""
+    """Converts integers to a contiguous array of a type that must hold each. TypeError: they are floats or bools."""
     given, range_ = np.asarray(values), np.iinfo(dtype)
     if given.dtype.kind == "O":
         flat = [within(index_of(value, what), int(range_.min), int(range_.max), what) for value in given.ravel()]

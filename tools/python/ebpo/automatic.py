@@ -1,21 +1,23 @@
-"""How much of a model is held where no budget is given: in parts, until all of it at once is cheaper."""
+"""Decides how much of a model is held without a budget: parts, until the whole model is cheaper."""
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import threading
 from typing import Any
 
 from . import _declared as c
 from ._library import Handle, call, lib, made
+from .errors import LimitError
 
-SMALL = 16 << 20  # is loaded at once: some milliseconds
-# Loads after which their mean is believed; and what is foretold must exceed all subtrees so many times.
+SMALL = 16 << 20  # a model that is loaded at once: some milliseconds
+# The mean of so many loads is believed; estimated loads must exceed all subtrees so many times.
 BELIEVED, CERTAIN = 8, 4
-FIRST = 16  # questions after which it is looked at first; then after as many as before, at most
+FIRST = 16  # queries before the first decision
 
 
 class Automatic:
-    """What the command does without --memory (tools/cmd/query_holding.c): half of what is free is the most.
+    """Decides as the command does without --memory (tools/cmd/query_holding.c): at most half of the free memory.
 
     options: of the model; they are changed. waiting: it is held in parts, and all of it would fit.
     """
@@ -36,7 +38,7 @@ class Automatic:
 
     def _decide(self, info: Any) -> None:
         plan = self._plan()
-        if plan.budget:  # of a file far away the library has decided
+        if plan.budget:  # the library has decided for a file elsewhere
             return
         options = self.options
         options.memory = most = max(lib.ebpo_free_memory() // 2, plan.least)
@@ -46,13 +48,14 @@ class Automatic:
         options.cut_level = info.subtree_level or -1
         if options.cut_level < 0:  # as if not all of it fitted
             options.memory = plan.whole - 1 if plan.resident else most
-            options.cut_level = self._plan().cut_level
+            with contextlib.suppress(LimitError):  # the whole model is as small as the least budget
+                options.cut_level = self._plan().cut_level
             options.memory = most
         self.subtrees = self._plan().subtrees
         self.waiting = bool(plan.resident and self.subtrees)
 
     def piece(self) -> int:
-        """So many questions at most before `pays` is asked again."""
+        """Returns how many queries at most come before the next decision."""
         return max(FIRST, self.questions) if self.waiting else 1 << 62
 
     def asked(self, questions: int, seconds: float) -> None:
@@ -61,9 +64,9 @@ class Automatic:
             self.seconds += seconds
 
     def pays(self, model: Handle, total: int, parts_share: float) -> bool:
-        """Whether all at once has become cheaper: so much has been spent on parts, or certainly will be.
+        """Returns whether the whole model has become cheaper: parts have cost as much, or certainly will.
 
-        total: questions that are known to come; parts_share: of the time that questions take in parts.
+        total: queries that are known to come; parts_share: of the time of queries, the cost of parts.
         """
         if self.questions < self.next:
             return False
@@ -80,7 +83,7 @@ class Automatic:
                                                  foretold >= CERTAIN * self.subtrees)
 
     def whole(self) -> Any:
-        """Options of a model that is all in memory."""
+        """Returns the options of a model that is all in memory."""
         options = c.ebpo_model_options.from_buffer_copy(self.options)
         options.cut_level = -1
         return options

@@ -331,7 +331,13 @@ class Catalogue:
 
     def _faces(self, number: int, faces: np.ndarray) -> np.ndarray:
         numbers = self.numbers[number]
-        return faces if numbers is None else numbers[faces]
+        if numbers is None:
+            return faces
+        found = numbers[faces]
+        if len(found) and not 0 <= int(found.min()) <= int(found.max()) < 2**63:
+            raise FormatError(f"{self.entries[number].numbers}: a number of a face is negative or beyond 2^63",
+                              "EBPO_E_FORMAT", self.entries[number].numbers)
+        return found
 
     def ray(self, origins: Any, directions: Any, *, t_max: float = float("inf"), memory: int | str | None = None,
             threads: int | None = None) -> np.ndarray:

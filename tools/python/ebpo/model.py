@@ -11,7 +11,7 @@ from typing import Any, Callable, Iterator, NamedTuple
 import numpy as np
 
 from . import _declared as c
-from ._checked import doubles, integers, nanoseconds
+from ._checked import doubles, index_of, integers, nanoseconds, within
 from ._library import Callback, Handle, Reporter, call, copied, lib, made, size_in_bytes
 from .asking import Rows, Told, share
 from .automatic import Automatic
@@ -27,7 +27,7 @@ DISTANCE = np.dtype(c.ebpo_distance_result)
 HIT = np.dtype(c.ebpo_ray_hit)
 NEAR = np.dtype(c.ebpo_near_face)
 
-# What of a question's time its model costs by being held in parts (docs/measured/asking.md).
+# The share of a query's time that parts cost (docs/measured/asking.md).
 PARTS_SHARE = {"inside": 0.05, "distance": 0.65, "rays": 0.6, "box": 0.25}
 
 Progress = Callable[[str, int, int], Any]
@@ -159,7 +159,7 @@ class Model:
                            keep=(self.file,))
 
     def _current(self) -> Handle:
-        """What questions are asked of, made when it is first needed."""
+        """Returns the model that is queried, made when it is first needed."""
         with self._lock:
             if self._made is None:
                 self._made = self._new_model(self._model_options)
@@ -167,14 +167,14 @@ class Model:
 
     @property
     def model(self) -> Handle:
-        """For those who hold it for long, such as a `Collider`: without a budget all of it, if that fits."""
+        """Returns the model for objects that keep it, such as a `Collider`: without a budget all of it, if that fits."""
         with self._lock:
             if self._automatic.waiting:
                 self._bring_in_all()
         return self._current()
 
     def _bring_in_all(self) -> None:
-        """All of the model takes the place of its parts, which go first."""
+        """Replaces the parts by the whole model."""
         with self._lock:
             if not self._automatic.waiting:
                 return
@@ -183,7 +183,7 @@ class Model:
             self._made = None
             try:
                 self._made = self._new_model(self._automatic.whole())
-            except (LimitError, NoMemory):  # more than its counts told
+            except (LimitError, NoMemory):  # it takes more than estimated
                 pass
 
     @contextlib.contextmanager
@@ -679,6 +679,7 @@ class Model:
         asked = doubles(point, "the point")
         if asked.shape != (3,):
             raise ValueError("octcode() takes one point of three numbers")
+        level = within(index_of(level, "level"), 0, c.EBPO_LEVELS_MAX - 1, "level")
         return lib.ebpo_octcode_at(lib.ebpo_file_info(self.file), asked.ctypes.data, level)
 
     def subtree(self, octcode: int = 1, *, levels: int | None = None, memory: int | str | None = None,

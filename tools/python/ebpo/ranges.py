@@ -33,7 +33,7 @@ class Piece:
 
 
 class Ranges:
-    """What is read of an object with `size` and `read_range(offset, size)`, which several threads call at once.
+    """Reads an object with `size` and `read_range(offset, size)`, which several threads call at once.
 
     As the library reads URLs (lib/http/range_cache.c): announced ranges are joined over small gaps, cut into
     requests of at most MOST bytes, and fetched ahead of the reader as long as they fit into `memory`.
@@ -56,14 +56,14 @@ class Ranges:
     # ---- pieces; the lock is held ----
 
     def _over(self, begin: int, end: int) -> Iterator[Piece]:
-        """Pieces that have bytes of a range, in order."""
+        """Yields the pieces that overlap a range, in order."""
         at = max(0, bisect.bisect_right(self.begins, begin) - 1)
         for start in self.begins[at:bisect.bisect_left(self.begins, end)]:
             if self.pieces[start].end > begin:
                 yield self.pieces[start]
 
     def _cover(self, begin: int, end: int) -> None:
-        """Notes pieces for what of a range has none."""
+        """Adds pieces for those bytes of a range that have none."""
         begin = max(begin, len(self.head))
         for piece in [*self._over(begin, end), None]:
             stop = piece.begin if piece else end
@@ -82,13 +82,13 @@ class Ranges:
         self.begins.pop(bisect.bisect_left(self.begins, piece.begin))
 
     def _drop(self, piece: Piece) -> None:
-        """The piece's bytes go, or its failure does."""
+        """Forgets the bytes of a piece, or its failure."""
         if piece.state in (COMING, THERE):
             self.held -= piece.size
         piece.state, piece.data, piece.error = NOTED, None, None
 
     def _make_room(self, size: int) -> None:
-        """Forgets what was read longest ago, then what was announced long ago, until so much more fits."""
+        """Forgets what was read longest ago, then what was announced long ago, until `size` more bytes fit."""
         if self.held + size <= self.memory:
             return
         idle = [piece for piece in self.pieces.values() if piece.state == THERE and not piece.users and
@@ -99,7 +99,7 @@ class Ranges:
             self._remove(piece)
 
     def _check_process(self) -> None:
-        """A process that was forked has none of the threads: what they had under way is asked for again."""
+        """Forgets, in a process that was forked, what the threads of the other process have under way."""
         if self.process != os.getpid():
             self.process, self.running = os.getpid(), 0
             self.queue.clear()
@@ -114,10 +114,13 @@ class Ranges:
         (self.queue.appendleft if urgent else self.queue.append)(piece)
         if self.running < self.connections:
             self.running += 1
-            threading.Thread(target=self._work, daemon=True).start()
+            try:
+                threading.Thread(target=self._work, daemon=True).start()
+            except RuntimeError:  # the system gives no more threads: readers fetch for themselves
+                self.running -= 1
 
     def _ahead(self, begin: int) -> None:
-        """Asks for what was announced from an offset on, as far as it fits."""
+        """Requests announced pieces from an offset on, as far as they fit."""
         for start in sorted(start for start in self.unasked if start >= begin):
             piece = self.pieces[start]
             self._make_room(piece.size)
@@ -145,7 +148,7 @@ class Ranges:
                     piece.state, piece.data = THERE, data
                 else:
                     self._drop(piece)
-                    if piece.users:  # whom it concerns; nobody else: it is asked for again when it is read
+                    if piece.users:  # they raise it; without readers it is requested again when it is read
                         piece.state, piece.error = FAILED, error
                 self.changed.notify_all()
 
@@ -178,7 +181,7 @@ class Ranges:
             self._ahead(0)
 
     def read_range(self, offset: int, size: int) -> bytes:
-        """Waits for bytes, of which several pieces come at the same time."""
+        """Returns bytes; their pieces are requested at the same time."""
         end = offset + size
         parts = [self.head[offset:end]] if offset < len(self.head) else []
         if end <= len(self.head):
@@ -201,7 +204,7 @@ class Ranges:
         return b"".join(parts)
 
     def _await(self, piece: Piece, pieces: list) -> None:
-        """Waits until a piece has come; it and those behind it are asked for. Raises what went wrong."""
+        """Requests a piece and those behind it, and waits for it. Raises what went wrong."""
         while piece.state != THERE:
             if piece.state == FAILED:
                 raise piece.error  # type: ignore[misc]
@@ -210,10 +213,18 @@ class Ranges:
                     self._make_room(other.size)
                     if other is piece or self.held + other.size <= self.memory:
                         self._start(other, True)
-            if piece in self.queue:  # nobody else is waited for
+            if piece in self.queue:  # before those that only are announced
                 self.queue.remove(piece)
                 self.queue.appendleft(piece)
-            self.changed.wait()
+            if self.running:
+                self.changed.wait()
+                continue
+            self.running += 1
+            self.changed.release()
+            try:
+                self._work()
+            finally:
+                self.changed.acquire()
 
     def _release(self, pieces: list) -> None:
         self.clock += 1
@@ -227,13 +238,13 @@ class Ranges:
         self._make_room(0)
 
     def close(self) -> None:
-        """Nothing more is fetched; what is under way ends by itself."""
+        """Stops fetching; requests under way end by themselves."""
         with self.changed:
             self.queue.clear()
 
 
 def read_whole(source: Any, offset: int, size: int) -> Any:
-    """A range of a source, as bytes. OSError: it gave another number of them."""
+    """Reads a range of a source. OSError: it returned another number of bytes."""
     data = memoryview(source.read_range(offset, size)).cast("B")
     if len(data) != size:
         raise OSError(f"{len(data)} bytes came instead of {size} at byte {offset}")

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import io
 import os
 import threading
@@ -10,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from . import _declared as c
-from ._checked import path, text
-from ._library import Handle, made, of_members, size_in_bytes
-from .errors import Error, IOFailure, UnsupportedError
-from .ranges import CONNECTIONS, MEMORY, Ranges, read_whole
+from ._checked import path, text, within
+from ._library import Handle, call, made, of_members, size_in_bytes
+from .errors import ArgumentError, Error, IOFailure, UnsupportedError
+from .ranges import CONNECTIONS, Ranges, read_whole
 from .web import Patience, Web
 
 FUNCTIONS: dict = {name: kind for name, kind in c.ebpo_source._fields_}
@@ -115,7 +116,7 @@ class Source:
 
 
 def shown(name: str) -> bytes:
-    """A text for messages, without what the library would take for its end."""
+    """Returns a text for messages, without NULs."""
     return name.encode("utf-8", "replace").replace(b"\0", b"?")
 
 
@@ -140,21 +141,31 @@ def by_name(name: Any, most_expansion: int, keep: tuple = (), **members: Any) ->
     return Handle.made("ebpo_open_with", name, ctypes.byref(options), free="ebpo_close", keep=keep)
 
 
+@functools.lru_cache(1)
+def has_http() -> bool:
+    """Returns whether the library has HTTP. Without, it refuses every name (UnsupportedError); with, only this one."""
+    try:
+        call("ebpo_source_of_url", "no URL", None, ctypes.byref(made(c.ebpo_source)))
+    except UnsupportedError:
+        return False
+    except ArgumentError:
+        pass
+    return True
+
+
 def by_url(url: str, http: dict, most_expansion: int) -> Handle:
     struct, keep = http_options(http)
-    try:
+    own = {"headers", "time_limit", "retries", "whole_limit", "unversioned", "connections"}
+    if has_http() or set(http) - own:  # other options it takes, or refuses without HTTP
         return by_name(url, most_expansion, http=struct)
-    except UnsupportedError:
-        if set(http) - {"headers", "time_limit", "retries", "whole_limit", "unversioned", "memory", "connections"}:
-            raise
     del keep
-    memory, connections = struct.memory if "memory" in http else MEMORY, http.get("connections", CONNECTIONS)
-    web = Web(url, **{name: value for name, value in http.items() if name not in ("memory", "connections")})
-    return by_ranges(far(web, web.size, web.shown, memory=memory, connections=connections), web.shown, most_expansion)
+    connections = within(struct.connections if "connections" in http else CONNECTIONS, 1, 32, "connections")
+    web = Web(url, **{name: value for name, value in http.items() if name != "connections"})
+    return by_ranges(far(web, web.size, web.shown, connections=connections), web.shown, most_expansion)
 
 
 def by_ranges(ranges: Any, name: str, most_expansion: int = 0) -> Handle:
-    """Of a Ranges, or of what is near."""
+    """Opens a Ranges, or an object with `size` and `read_range` on this machine."""
     source = Source(ranges)
     return by_name(shown(name), most_expansion, keep=(source,), source=source.struct)
 
@@ -191,7 +202,7 @@ def opened(source: Any, http: dict, storage_options: dict | None, most_expansion
 
 
 def far(source: Any, size: Any, name: str, **options: Any) -> Ranges:
-    """The ranges of a source elsewhere, whose first bytes are read now. IOFailure: they cannot be."""
+    """Reads the first bytes of a source elsewhere, and returns its ranges. IOFailure: they cannot be read."""
     try:
         return Ranges(source, size_in_bytes(size), **options)
     except (Error, TypeError):
@@ -201,7 +212,7 @@ def far(source: Any, size: Any, name: str, **options: Any) -> Ranges:
 
 
 def of_file(file: Any, name: str) -> Any:
-    """What reads a file object: of this machine in its place, of others by ranges."""
+    """Returns what reads a file object: itself if it is on this machine, else its ranges."""
     if Uncached.fits(file):
         return far(Uncached(file), file.size, name)
     seekable = Seekable(file)
@@ -211,7 +222,7 @@ def of_file(file: Any, name: str) -> Any:
 
 
 def is_of_system(file: Any) -> bool:
-    """True for files that the system itself reads."""
+    """Returns True for files that the operating system reads."""
     try:
         return isinstance(file.fileno(), int)
     except (AttributeError, OSError):

@@ -1,12 +1,14 @@
-"""URLs by Python's own HTTP, where the library has none: each request within a time, answers of one version."""
+"""Reads URLs by Python's own HTTP, where the library has none: each range within a time, of one version."""
 from __future__ import annotations
 
+import collections
 import ctypes
 import datetime
 import email.utils
 import functools
 import http.client
 import io
+import os
 import random
 import re
 import ssl
@@ -15,6 +17,7 @@ import time
 import urllib.error
 import urllib.parse
 import urllib.request
+import weakref
 from typing import Any
 
 from ._checked import integer_as, real, refused
@@ -26,7 +29,7 @@ SILENT = 20.0  # seconds without a byte, or for a connection; then the request i
 
 
 class Timed(io.RawIOBase):
-    """What comes from a socket, until a time of time.monotonic. After it: TimeoutError."""
+    """Reads a socket until a time of time.monotonic. After it: TimeoutError."""
 
     def __init__(self, raw: Any, sock: Any, end: float) -> None:
         self.raw, self.sock, self.end = raw, sock, end
@@ -47,27 +50,76 @@ class Timed(io.RawIOBase):
 
 
 class Answer(http.client.HTTPResponse):
-    """An answer of which every byte comes before `end`: status, headers, body and trailers."""
+    """An answer of which every byte comes before `end`: status, headers, body and trailers.
+
+    connection: what it comes by; when it has been read to its end, `idle` gets it for the next request.
+    """
+
+    connection: Any = None
+    idle: Any = None
 
     def __init__(self, sock: Any, *rest: Any, end: float, **named: Any) -> None:
         super().__init__(sock, *rest, **named)
         self.fp: Any = io.BufferedReader(Timed(self.fp.detach(), sock, end))
 
+    def close(self) -> None:
+        read = self.fp is None or self.length == 0
+        super().close()
+        connection, self.connection = self.connection, None
+        if connection is not None and read and not self.will_close:
+            self.idle.append(connection)
+        elif connection is not None:
+            connection.close()
+
 
 class Request(urllib.request.Request):
-    """A request that ends, with all redirects, before `end` of time.monotonic."""
+    """A request that ends, with all redirects, before `end` of time.monotonic.
+
+    idle: for each kind of connection and host those that are open and not in use.
+    """
 
     end = 0.0
+    idle: Any = None
 
 
 def opened(handler: Any, kind: Any, request: Any, **options: Any) -> Any:
+    """Sends a request, by a connection that an earlier one has left, and returns its answer, read up to its body."""
     def connection(*host: Any, **given: Any) -> Any:
         made = kind(*host, **given, **options)
         made.response_class = functools.partial(Answer, end=request.end)
         return made
 
     request.timeout = max(0.001, min(SILENT, request.end - time.monotonic()))
-    return handler.do_open(connection, request)
+    if request.host != urllib.parse.urlsplit(request.full_url).netloc:  # by a proxy
+        return handler.do_open(connection, request)
+    idle = request.idle.setdefault((kind, request.host), collections.deque())
+    while True:
+        try:
+            used, again = idle.pop(), True
+            used.response_class = functools.partial(Answer, end=request.end)
+            used.sock.settimeout(request.timeout)
+        except IndexError:
+            used, again = connection(request.host, timeout=request.timeout), False
+        try:
+            headers = {name.title(): value for name, value in request.header_items()}
+            used.request(request.get_method(), request.selector, headers=headers)
+            answer = used.getresponse()
+        except (OSError, http.client.HTTPException) as error:
+            used.close()
+            if again and not isinstance(error, TimeoutError):
+                continue  # the server has closed it meanwhile
+            if isinstance(error, OSError) and not isinstance(error, http.client.HTTPException):
+                raise urllib.error.URLError(error) from error
+            raise
+        except BaseException:
+            used.close()
+            raise
+        if answer.will_close:
+            used.close()
+        else:
+            answer.connection, answer.idle = used, idle
+        answer.url, answer.msg = request.full_url, answer.reason
+        return answer
 
 
 class Http(urllib.request.HTTPHandler):
@@ -92,13 +144,13 @@ class Redirects(urllib.request.HTTPRedirectHandler):
 
     def redirect_request(self, request: Any, answer: Any, code: int, message: str, headers: Any, url: str) -> Any:
         answer.close()  # its body may have no end
-        new = super().redirect_request(request, answer, code, message, headers, url)
+        new: Any = super().redirect_request(request, answer, code, message, headers, url)
         before, after = urllib.parse.urlsplit(request.full_url), urllib.parse.urlsplit(url)
         if after.scheme not in ("http", "https") or (before.scheme, after.scheme) == ("https", "http"):
             raise IOFailure(f"the server redirects from {before.scheme} to {after.scheme}, which is not followed",
                             "EBPO_E_IO")
         if new is not None:
-            new.end = request.end
+            new.end, new.idle = request.end, request.idle
             if (before.scheme, before.netloc.lower()) != (after.scheme, after.netloc.lower()):
                 new.headers = {"Range": new.headers["Range"]}
         return new
@@ -154,6 +206,12 @@ class Patience:
             return 0.0
 
 
+def close_all(idle: dict) -> None:
+    for connections in idle.values():
+        while connections:
+            connections.pop().close()
+
+
 class Web:
     """A URL by Python's own HTTP. Answers are of one version of the file. Any number of threads.
 
@@ -181,10 +239,13 @@ class Web:
         self.size = self.requests = self.received = 0
         self.head = b""
         self.lock = threading.Lock()  # of the counts
+        self.idle: dict = {}
+        self.process = os.getpid()
+        weakref.finalize(self, close_all, self.idle)
         self.head = self.first()
 
     def first(self) -> bytes:
-        """The first bytes, the size and the version; of a server without ranges or versions everything."""
+        """Reads the first bytes, the size and the version; from a server without ranges or versions the whole file."""
         data = self.get(0, HEAD)
         if len(data) < self.size and self.version[0] is None and not self.unversioned:
             if self.size > self.whole_limit:
@@ -195,14 +256,14 @@ class Web:
         return data
 
     def read_range(self, offset: int, size: int) -> bytes:
-        """Raises IOFailure, whatever the server does."""
+        """Returns bytes. IOFailure: the server does not send them in time."""
         if offset + size <= len(self.head):
             return self.head[offset:offset + size]
         return self.get(offset, size)
 
     def get(self, offset: int, size: int, at_once: bool = False) -> bytes:
-        """Bytes of a range, or all there are from a server without ranges. A server may send them in parts,
-        unless they must come at once."""
+        """Requests a range, or the whole file from a server without ranges. A server may send it in parts,
+        unless it must come at once."""
         patience, data = Patience(self.time_limit, self.retries, self.shown), bytearray()
         while True:
             try:
@@ -227,7 +288,9 @@ class Web:
     def ask(self, begin: int, end: int, patience: Patience, data: bytearray) -> None:
         """Sends one request, and appends to `data` what comes of it, also before it fails."""
         request = Request(self.url, headers={**self.headers, "Range": f"bytes={begin}-{end - 1}"})
-        request.end = patience.began + self.time_limit
+        if self.process != os.getpid():  # a process that was forked: the connections are those of the other one
+            self.process, self.idle = os.getpid(), {}
+        request.end, request.idle = patience.began + self.time_limit, self.idle
         with self.lock:
             self.requests += 1
         before = len(data)
@@ -244,13 +307,13 @@ class Web:
                 self.received += len(data) - before
 
     def range_of(self, answer: Any, begin: int, end: int, patience: Patience) -> int:
-        """How many bytes of the range the server sends: all, or fewer. IOFailure: another range or version."""
+        """Returns how many bytes of the range the server sends: all, or fewer. IOFailure: another range or version."""
         if answer.status != 206:
             raise patience.failure(f"the server does not answer ranges (status {answer.status})")
-        told = re.fullmatch(r"bytes (\d{1,18})-(\d{1,18})/(\d{1,18})", (answer.headers["Content-Range"] or "").strip())
-        if not told:
+        stated = re.fullmatch(r"bytes (\d{1,18})-(\d{1,18})/(\d{1,18})", (answer.headers["Content-Range"] or "").strip())
+        if not stated:
             raise patience.failure("the server does not say which range it sent")
-        first, last, size = map(int, told.groups())
+        first, last, size = map(int, stated.groups())
         etag = answer.headers["ETag"] and re.sub(r"^\s*W/", "", answer.headers["ETag"])
         version = etag or answer.headers["Last-Modified"], size
         if self.version not in (None, version):
@@ -284,7 +347,10 @@ class Web:
             raise
 
     def take_all(self, answer: Any, patience: Patience, data: bytearray) -> None:
-        size = answer.length
+        size, content = answer.length, answer.headers["Content-Type"] or ""
+        if content.startswith("text/"):
+            raise patience.failure(f"the server sends {content[:60]} in place of the file; check the URL, and whether it "
+                                   "takes a login")
         if size is None and not answer.chunked:
             raise patience.failure("the server does not answer ranges, and does not say how long the file is")
         if (size or 0) <= self.whole_limit:
