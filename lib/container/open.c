@@ -12,6 +12,8 @@
 #include "container/head_facts.h"
 #include "container/stored_sizes.h"
 #include "http/http_source.h"
+#include "import/import.h"
+#include "ply/ply.h"
 
 /* The word says how the numbers are to be read: with another one they would be read wrong. In files
  * of 1.0, and in the first ones of 1.1, `delta` stands at leaf_skip, too. */
@@ -227,6 +229,34 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
                : EBPO_OK;
 }
 
+/* Says of a mesh what it is, which is a frequent mistake; *error says else what it said. */
+static ebpo_status name_mesh(ebpo_file *file, ebpo_status status, ebpo_error *error)
+{
+    enum { BEGIN = 4096 };
+    static const char *const names[] = {
+        [EBPO_IMPORT_OBJ] = "an OBJ", [EBPO_IMPORT_STL] = "an STL", [EBPO_IMPORT_OFF] = "an OFF"
+    };
+    uint64_t size = file->in.source.size < BEGIN ? file->in.source.size : BEGIN;
+    uint8_t begin[BEGIN];
+    ebpo_import_format format;
+    const char *name = NULL;
+    if (ebpo_input_read(&file->in, 0, size, begin, NULL) != EBPO_OK)
+        return status;
+    if (size == 0)
+        return ebpo_fail_file(error, status, file->in.shown, "is empty; get a fresh copy of it");
+    if (begin[0] == 0x89)
+        return status;
+    if (ebpo_ply_recognise(begin, size))
+        name = "a PLY";
+    else if (ebpo_import_recognise(&format, begin, size, file->in.shown))
+        name = names[format];
+    return name ? ebpo_fail_file(error, status, file->in.shown,
+                                 "is not an .ebpo.h5 file, but %s; make one of it with "
+                                 "'ebpo convert'",
+                                 name)
+                : status;
+}
+
 /* Takes the source over, whatever happens. */
 static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const char *name,
                                uint64_t most_expansion, ebpo_error *error)
@@ -243,11 +273,14 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     atomic_init(&file->located, true);
     atomic_init(&file->summed, false);
     ebpo_status status = ebpo_input_open(&file->in, source, name, error);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK) {
         status = ebpo_head_open(&head, &file->in, error);
-    if (status == EBPO_OK)
-        status = read_head(file, &head, error);
-    status = ebpo_head_close(&head, status, error);
+        if (status == EBPO_OK)
+            status = read_head(file, &head, error);
+        status = ebpo_head_close(&head, status, error);
+        if (status == EBPO_E_FORMAT)
+            status = name_mesh(file, status, error);
+    }
     if (status == EBPO_OK)
         status = ebpo_stored_check_expansion(file, most_expansion, error);
     if (status == EBPO_OK)
