@@ -229,31 +229,38 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
                : EBPO_OK;
 }
 
-/* Says of a mesh what it is, which is a frequent mistake; *error says else what it said. */
-static ebpo_status name_mesh(ebpo_file *file, ebpo_status status, ebpo_error *error)
+/* Returns what a file is that is no model but often given for one, and what to do with it; NULL: it
+ * is not known. */
+static const char *other_kind(const uint8_t *begin, uint64_t size, const char *name)
+{
+    static const char *const meshes[] = {
+        [EBPO_IMPORT_OBJ] = "an OBJ; make one of it with 'ebpo convert'",
+        [EBPO_IMPORT_STL] = "an STL; make one of it with 'ebpo convert'",
+        [EBPO_IMPORT_OFF] = "an OFF; make one of it with 'ebpo convert'"
+    };
+    ebpo_import_format format;
+    if (size && begin[0] == 0x89) /* HDF5 */
+        return NULL;
+    if (ebpo_ply_recognise(begin, size))
+        return "a PLY; make one of it with 'ebpo convert'";
+    if (ebpo_import_recognise(&format, begin, size, name))
+        return meshes[format];
+    return size == 0 ? "an empty file; get a fresh copy of it"
+           : begin[0] == '{'
+               ? "JSON; a scene is for 'ebpo scene', and some commands take a catalogue"
+               : NULL;
+}
+
+static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *error)
 {
     enum { BEGIN = 4096 };
-    static const char *const names[] = {
-        [EBPO_IMPORT_OBJ] = "an OBJ", [EBPO_IMPORT_STL] = "an STL", [EBPO_IMPORT_OFF] = "an OFF"
-    };
     uint64_t size = file->in.source.size < BEGIN ? file->in.source.size : BEGIN;
     uint8_t begin[BEGIN];
-    ebpo_import_format format;
-    const char *name = NULL;
     if (ebpo_input_read(&file->in, 0, size, begin, NULL) != EBPO_OK)
         return status;
-    if (size == 0)
-        return ebpo_fail_file(error, status, file->in.shown, "is empty; get a fresh copy of it");
-    if (begin[0] == 0x89)
-        return status;
-    if (ebpo_ply_recognise(begin, size))
-        name = "a PLY";
-    else if (ebpo_import_recognise(&format, begin, size, file->in.shown))
-        name = names[format];
-    return name ? ebpo_fail_file(error, status, file->in.shown,
-                                 "is not an .ebpo.h5 file, but %s; make one of it with "
-                                 "'ebpo convert'",
-                                 name)
+    const char *kind = other_kind(begin, size, file->in.shown);
+    return kind ? ebpo_fail_file(error, status, file->in.shown, "is not an .ebpo.h5 file, but %s",
+                                 kind)
                 : status;
 }
 
@@ -279,7 +286,7 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
             status = read_head(file, &head, error);
         status = ebpo_head_close(&head, status, error);
         if (status == EBPO_E_FORMAT)
-            status = name_mesh(file, status, error);
+            status = name_kind(file, status, error);
     }
     if (status == EBPO_OK)
         status = ebpo_stored_check_expansion(file, most_expansion, error);
