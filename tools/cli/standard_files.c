@@ -110,11 +110,10 @@ int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS
     int code = EXIT_FINE;
     for (int i = 0; i < ARGS_OPERANDS_MAX && operand[i] && code == EXIT_FINE; i++) {
         char how = args_dash(spec, i);
-        if (how == 'i' && is_pipe(operand[i])) {
-            fprintf(stderr,
-                    "ebpo %s: %s: is a pipe or device; give '-' in its place, and the mesh on "
-                    "standard input\n",
-                    spec->command, operand[i]);
+        if ((how == 'i' || how == 'o') && is_pipe(operand[i])) {
+            fprintf(stderr, "ebpo %s: %s: is a pipe or device; give '-' in its place, and %s\n",
+                    spec->command, operand[i],
+                    how == 'i' ? "the mesh on standard input" : "take standard output");
             code = EXIT_FAILED;
         }
         if (strcmp(operand[i], "-") != 0)
