@@ -12,6 +12,8 @@
 #include "container/head_facts.h"
 #include "container/stored_sizes.h"
 #include "http/http_source.h"
+#include "import/import.h"
+#include "ply/ply.h"
 
 /* The word says how the numbers are to be read: with another one they would be read wrong. In files
  * of 1.0, and in the first ones of 1.1, `delta` stands at leaf_skip, too. */
@@ -227,6 +229,41 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
                : EBPO_OK;
 }
 
+/* Returns what a file is that is no model but often given for one, and what to do with it; NULL: it
+ * is not known. */
+static const char *other_kind(const uint8_t *begin, uint64_t size, const char *name)
+{
+    static const char *const meshes[] = {
+        [EBPO_IMPORT_OBJ] = "an OBJ; make one of it with 'ebpo convert'",
+        [EBPO_IMPORT_STL] = "an STL; make one of it with 'ebpo convert'",
+        [EBPO_IMPORT_OFF] = "an OFF; make one of it with 'ebpo convert'"
+    };
+    ebpo_import_format format;
+    if (size && begin[0] == 0x89) /* HDF5 */
+        return NULL;
+    if (ebpo_ply_recognise(begin, size))
+        return "a PLY; make one of it with 'ebpo convert'";
+    if (ebpo_import_recognise(&format, begin, size, name))
+        return meshes[format];
+    return size == 0 ? "an empty file; get a fresh copy of it"
+           : begin[0] == '{'
+               ? "JSON; a scene is for 'ebpo scene', and some commands take a catalogue"
+               : NULL;
+}
+
+static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *error)
+{
+    enum { BEGIN = 4096 };
+    uint64_t size = file->in.source.size < BEGIN ? file->in.source.size : BEGIN;
+    uint8_t begin[BEGIN];
+    if (ebpo_input_read(&file->in, 0, size, begin, NULL) != EBPO_OK)
+        return status;
+    const char *kind = other_kind(begin, size, file->in.shown);
+    return kind ? ebpo_fail_file(error, status, file->in.shown, "is not an .ebpo.h5 file, but %s",
+                                 kind)
+                : status;
+}
+
 /* Takes the source over, whatever happens. */
 static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const char *name,
                                uint64_t most_expansion, ebpo_error *error)
@@ -243,11 +280,14 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     atomic_init(&file->located, true);
     atomic_init(&file->summed, false);
     ebpo_status status = ebpo_input_open(&file->in, source, name, error);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK) {
         status = ebpo_head_open(&head, &file->in, error);
-    if (status == EBPO_OK)
-        status = read_head(file, &head, error);
-    status = ebpo_head_close(&head, status, error);
+        if (status == EBPO_OK)
+            status = read_head(file, &head, error);
+        status = ebpo_head_close(&head, status, error);
+        if (status == EBPO_E_FORMAT)
+            status = name_kind(file, status, error);
+    }
     if (status == EBPO_OK)
         status = ebpo_stored_check_expansion(file, most_expansion, error);
     if (status == EBPO_OK)

@@ -18,7 +18,7 @@
 #include "http/http_source.h"
 #include "io/byte_source.h"
 
-enum { PIECE = 4 << 20 };
+enum { PIECE = 4 << 20, BYTES_A_SECOND = 4 << 20 };
 
 /* A file with a name for libhdf5, until that has opened it. */
 typedef struct temporary {
@@ -142,6 +142,8 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
     if (status == EBPO_OK)
         status = make_temporary(&copy, shown, error);
     limits.file_bytes += 2 * bytes;
+    if (!limits.seconds) /* decoding and encoding take about a twentieth of a second for a MiB */
+        limits.seconds = 60 + (unsigned)(bytes / BYTES_A_SECOND);
     ebpo_error left_out = EBPO_ERROR_INIT, why = EBPO_ERROR_INIT;
     if (status == EBPO_OK)
         status = ebpo_h5_clean_copy(from, fetched.fd >= 0, copy.name, shown,
@@ -166,7 +168,6 @@ ebpo_status ebpo_open_compat(const char *path, const ebpo_compat_options *option
     if (status != EBPO_OK)
         return status;
     own.memory_bytes = own.memory_bytes ? own.memory_bytes : UINT64_C(1) << 30;
-    own.seconds = own.seconds ? own.seconds : 60;
     ebpo_open_options open = EBPO_OPEN_OPTIONS_INIT;
     open.most_expansion = own.most_expansion;
     open.http = own.http;

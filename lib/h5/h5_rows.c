@@ -69,7 +69,7 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
 }
 
 /* Returns what the values are if they are no real numbers, else NULL. */
-static const char *other_values(hid_t set, hid_t type)
+static const char *other_values(const dataset *d, hid_t set, hid_t type)
 {
     H5T_class_t class = H5Tget_class(type);
     if (class == H5T_COMPOUND)
@@ -80,11 +80,11 @@ static const char *other_values(hid_t set, hid_t type)
         return "an array in each element";
     if (class != H5T_INTEGER && class != H5T_FLOAT)
         return "text, bits or references";
-    /* every array of an .ebpo.h5 file has this, and none of others */
-    return H5Aexists(set, "coding") > 0
-               ? "codes of the .ebpo.h5 format (`ebpo extract --mesh` writes "
-                 "the vertices as a PLY, which can be given instead)"
-               : NULL;
+    if (H5Aexists(set, "coding") <= 0) /* every array of an .ebpo.h5 file has it, and none else */
+        return NULL;
+    return d->most == 3 ? "codes of the .ebpo.h5 format (`ebpo extract --mesh` writes the vertices "
+                          "as a PLY, which can be given instead)"
+                        : "codes of the .ebpo.h5 format";
 }
 
 static bool has_rows(hid_t space, unsigned least, unsigned most, hsize_t size[2])
@@ -114,7 +114,7 @@ static void describe_shape(hid_t space, char *text, size_t room)
 static ebpo_status check_set(dataset *d, ebpo_error *error)
 {
     char what[256], wanted[64], shape[96];
-    const char *others = other_values(d->set, d->type);
+    const char *others = other_values(d, d->set, d->type);
     describe_rows(d, wanted);
     if (others) {
         snprintf(what, sizeof what, "holds no numbers but %s; %s are expected", others, wanted);
@@ -152,7 +152,7 @@ static herr_t look_at(hid_t file, const char *name, const H5O_info_t *info, void
     hid_t space = set >= 0 ? H5Dget_space(set) : -1, type = set >= 0 ? H5Dget_type(set) : -1;
     size_t at = strlen(c->names);
     if (space >= 0 && type >= 0 && has_rows(space, c->d->least, c->d->most, size) &&
-        !other_values(set, type) && !ebpo_h5_is_elsewhere(set)) {
+        !other_values(c->d, set, type) && !ebpo_h5_is_elsewhere(set)) {
         if (c->found < SHOWN && at + strlen(c->d->path) + strlen(name) + 8 < sizeof c->names)
             snprintf(c->names + at, sizeof c->names - at, "%s%s:/%s", at ? ", " : "", c->d->path,
                      name);

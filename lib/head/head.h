@@ -23,9 +23,9 @@ typedef struct ebpo_head {
     }
 
 /* How the messages of that end. */
-#define EBPO_HEAD_FOREIGN                                                                \
-    "as other programs write it; read it with --compat, or write it anew: `ebpo repack " \
-    "--compat`"
+#define EBPO_HEAD_FOREIGN                                                                     \
+    "as other programs write it; write it anew with `ebpo repack --compat`, or read it with " \
+    "--compat where a command has that"
 
 /* Where an object's header is. There is nothing to close. */
 typedef uint64_t ebpo_head_object;

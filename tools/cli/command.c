@@ -127,16 +127,15 @@ int command_is_hdf5(const char *name, const char *path)
 bool command_wants_hdf5(const char *name, const char *path)
 {
     int is_hdf5 = command_is_hdf5(name, path);
+    ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_file *file = NULL;
-    if (is_hdf5 == 0 && ebpo_open(path, &file, &error) != EBPO_OK && error.offset == 0)
-        (void)command_failed(name, &error); /* its first bytes are known */
-    else if (is_hdf5 == 0)
-        fprintf(stderr,
-                "ebpo %s: %s: is not an .ebpo.h5 file; make one from a mesh with 'ebpo convert'\n",
-                name, path);
+    if (is_hdf5 != 0)
+        return is_hdf5 > 0;
+    bool fine = ebpo_open(path, &file, &error) == EBPO_OK; /* else the library says what it is */
+    if (!fine)
+        fprintf(stderr, "ebpo %s: %s\n", name, error.message);
     ebpo_close(file);
-    return is_hdf5 > 0;
+    return fine;
 }
 
 bool command_has_level(const char *name, const ebpo_info *info, int64_t level)

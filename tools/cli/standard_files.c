@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "cli/command.h"
@@ -114,13 +115,26 @@ static int take_output(const char *command, const char **operand)
     return EXIT_FINE;
 }
 
+/* A pipe under a name, such as /dev/stdin or that of a shell's <(...), can only be read once. */
+static bool is_pipe(const char *path)
+{
+    struct stat st;
+    return stat(path, &st) == 0 && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode);
+}
+
 int standard_files_begin(const arg_spec *spec, const char *operand[ARGS_OPERANDS_MAX])
 {
     int code = EXIT_FINE;
     for (int i = 0; i < ARGS_OPERANDS_MAX && operand[i] && code == EXIT_FINE; i++) {
+        char how = args_dash(spec, i);
+        if ((how == 'i' || how == 'o') && is_pipe(operand[i])) {
+            fprintf(stderr, "ebpo %s: %s: is a pipe or device; give '-' in its place, and %s\n",
+                    spec->command, operand[i],
+                    how == 'i' ? "the mesh on standard input" : "take standard output");
+            code = EXIT_FAILED;
+        }
         if (strcmp(operand[i], "-") != 0)
             continue;
-        char how = args_dash(spec, i);
         if (how == 'i')
             code = take_input(spec->command, &operand[i]);
         else if (how == 'o')

@@ -562,7 +562,7 @@ typedef struct ebpo_compat_options {
     /* Bytes that the other process may take, beyond those that this one has; 0: 1 GiB. */
     uint64_t memory_bytes;
 
-    /* Seconds of processor time that it may take; 0: 60. */
+    /* Seconds of processor time that it may take; 0: 60, and one for each 4 MiB of the file. */
     unsigned seconds;
 
     /* For checking the content; 0: all cores. */
