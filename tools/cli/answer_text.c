@@ -42,7 +42,7 @@ void answer_text_retry(answer_text *t)
 {
     cut_row(t);
     t->full = false;
-    t->again = t->gone;
+    t->again += t->gone;
     t->gone = 0;
 }
 

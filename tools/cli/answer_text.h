@@ -17,7 +17,7 @@ struct answer_text {
     uint64_t rows; /* whose answers are complete, since it was last set to 0 */
     size_t row;    /* where the last one of these ended */
     size_t gone;   /* bytes behind it that have left */
-    size_t again;  /* bytes that have left before, and are not written again */
+    size_t again;  /* the first bytes of the text, which left before and are not written again */
     bool failed;   /* for want of memory; what was there is lost */
     bool refused;  /* it could not be written, which has been said */
     bool full; /* what comes behind the last complete row is lost; answer_text_retry ends that */

@@ -34,9 +34,8 @@ typedef struct crew {
 } crew;
 
 /* Two locks: the model's (query_holding.h), which is held while rows are answered, and `lock`. No
- * thread waits for `moved` while it holds the model, and none does anything else while it holds
- * `lock`. So whoever holds the model lets it go, and the oldest block never waits for another one.
- */
+ * thread waits for `moved` while it holds the model, and none takes another lock while it holds
+ * `lock`. So whoever holds the model lets it go, and the oldest block waits for nothing else. */
 typedef struct pipe_line {
     const query_job *job;
     query_holding *holding;
@@ -55,8 +54,8 @@ typedef struct pipe_line {
     uint64_t left;        /* blocks whose answers have left */
     bool leaving;         /* a thread lets block `left` leave; no other one does */
     bool stopped;
-    uint64_t rows_left,
-        bytes_left; /* these and `code` belong to the thread that lets blocks leave */
+    /* these belong to the thread that lets blocks leave */
+    uint64_t rows_left, bytes_left;
     int code;
 } pipe_line;
 
@@ -70,8 +69,8 @@ static void stop(pipe_line *p)
     pthread_cond_broadcast(&p->moved);
 }
 
-/* Returns whether all blocks before this one have left; waits for that unless it holds the model.
- */
+/* Returns whether all blocks before this one have left; waits for that unless the thread holds the
+ * model. */
 static bool has_turn(slot *s)
 {
     pipe_line *p = s->pipe;
