@@ -8,6 +8,7 @@
 #include "check_main.h"
 #include "geom/predicates.h"
 #include "mesh/mesh_parts.h"
+#include "pair/triangle_pair.h"
 #include "solids.h"
 
 enum { MOST = 60 };
@@ -65,6 +66,24 @@ static bool within(const ebpo_mesh *m, const parts *p, int inner, int outer)
     return true;
 }
 
+/* No faces of two components have a common point: all pairs are compared. */
+static bool apart(const ebpo_mesh *m, const parts *p)
+{
+    double a[3][3], b[3][3];
+    for (int part = 1; part < p->count; part++)
+        for (uint64_t f = p->begin[part]; f < p->begin[part + 1]; f++)
+            for (uint64_t g = 0; g < p->begin[part]; g++) {
+                for (uint64_t k = 0; k < 3; k++) {
+                    position(m, 3 * f + k, a[k]);
+                    position(m, 3 * g + k, b[k]);
+                }
+                if (ebpo_triangle_pair((const double(*)[3])a, (const double(*)[3])b) !=
+                    EBPO_PAIR_APART)
+                    return false;
+            }
+    return true;
+}
+
 static ebpo_shells twin(const ebpo_mesh *m, const parts *p)
 {
     ebpo_shells s = EBPO_SHELLS_INIT;
@@ -114,7 +133,8 @@ static double whole(uint64_t *state, uint64_t most)
 static ebpo_mesh many(uint64_t *state, parts *p)
 {
     ebpo_mesh m = { 0 };
-    int count = 2 + (int)(ebpo_test_random(state) % (MOST - 2));
+    uint64_t most = ebpo_test_random(state) % 2 ? MOST : 6;
+    int count = 2 + (int)(ebpo_test_random(state) % (most - 2));
     uint64_t range = 4 + ebpo_test_random(state) % 30;
     memset(p, 0, sizeof *p);
     for (int i = 0; i < count; i++) {
@@ -135,7 +155,7 @@ static ebpo_mesh many(uint64_t *state, parts *p)
 
 START_TEST(shells_are_nested_as_the_plain_twin_has_it)
 {
-    uint64_t state = 4711, rounds = ebpo_test_scaled(120);
+    uint64_t state = 4711, rounds = ebpo_test_scaled(120), known = 0;
     for (uint64_t i = 0; i < rounds; i++) {
         parts p;
         ebpo_mesh m = many(&state, &p);
@@ -148,8 +168,11 @@ START_TEST(shells_are_nested_as_the_plain_twin_has_it)
         ck_assert_uint_eq(s.inside_out, plain.inside_out);
         ck_assert_uint_eq(s.cavities, plain.cavities);
         ck_assert_uint_eq(s.nested, plain.nested);
+        ck_assert_int_eq(s.apart, apart(&m, &p));
+        known += s.apart;
         ebpo_mesh_free(&m);
     }
+    ck_assert_uint_gt(known, rounds / 20);
 }
 END_TEST
 
@@ -185,6 +208,7 @@ START_TEST(chains_are_as_deep_as_they_were_made)
     }
     ck_assert(ebpo_mesh_count_shells(&m, 2, (ebpo_progress){ NULL, NULL }, &s, &error) == EBPO_OK);
     ck_assert_uint_eq(s.closed, 2 * CHAIN);
+    ck_assert_int_eq(s.apart, 1);
     ck_assert_uint_eq(s.inside_out, made.inside_out);
     ck_assert_uint_eq(s.cavities, made.cavities);
     ck_assert_uint_eq(s.nested, made.nested);

@@ -1,9 +1,9 @@
-/* Volumes of envelopes and of the solid, and what percentages are of. */
+#include "cli/solid_facts.h"
+
 #include <math.h>
 
 #include <ebpo/lod.h>
 
-#include "cli/file_facts.h"
 #include "cli/mesh_findings.h"
 
 static double cell_volume(const ebpo_info *info, int level)
