@@ -3,7 +3,7 @@
 
 Every command of commands.py that writes is killed (SIGKILL) after times that are drawn between none
 and somewhat more than a run takes. Afterwards each output is the old one or the new one, whole;
-beside it lies at most one temporary file of its own, or a folder in the making, which the next run
+beside it is at most one temporary file, and a lock file, or a folder in the making, which the next run
 removes (and what fetch resumes from). 200 kills for each command, or N; where
 EBPO_TEST_SCALE is less than 1, two for each third one. Then two writers of one output, and two readers of one cache
 folder.
@@ -26,7 +26,7 @@ import ranges_server
 from commands import COMMANDS, OLD, is_new, make_inputs, old, put_old, read
 
 KILLS = 200
-LEFT = re.compile(r"\.OUT(\.[a-z0-9]+)*\.\d+-\d+\.tmp|OUT\.part(/.*)?|"
+LEFT = re.compile(r"\.OUT(\.[a-z0-9]+)*\.(\d+-\d+\.tmp|lock)|OUT\.part(/.*)?|"
                   r"(OUT|\.OUT\.new)\.part-[0-9a-f]{8}-\d+-\w+(\.old)?")
 NAMED = re.compile(r"\.ebpo-crossings\.\d+-\d+\.tmp") # until libhdf5 has opened it
 failures = []
