@@ -169,6 +169,9 @@ class Sources(Case):
         self.assertEqual((web.size, web.read_range(100, web.size - 200)), (len(self.data), self.data[100:-100]))
         file = sources.by_ranges(web, "scan")
         self.assertTrue(file.pointer)
+        Server.etag = 'W/"1"'  # the same, as a proxy hands it on
+        web.blocks.clear()
+        self.assertEqual(web.read_range(len(self.data) - 10, 10), self.data[-10:])
         Server.etag = '"2"'
         web.blocks.clear()
         with self.assertRaisesRegex(OSError, "changed"):
