@@ -129,7 +129,7 @@ def check(tool, folder, path, ply, asked, rays, site):
     # Errors: one line, code 1 or 2, no hang.
     for url, code, words, more in ((f"{site}/code-404/x", 1, "404", ()),
                                    (f"{site}/code-503/x", 1, "503", ("--http-retries", "1")),
-                                   (f"{site}/html/x", 1, "HDF5", ()),
+                                   (f"{site}/html/x", 1, "returned text/html, not a model", ()),
                                    (f"{site}/stall_head-9/x", 1, "s", ("--http-timeout", "1")),
                                    (f"{site}/change_etag/x", 1, "changed", ()),
                                    (good, 2, "--http-cache-size", ("--http-cache-size", "much")),
