@@ -105,12 +105,22 @@ enum {
 EBPO_MUST_USE ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance,
                                          ebpo_mend_record *record, ebpo_error *error);
 
-/* The parts of ebpo_mesh_orient: neighbouring faces agree; closed components look outwards, or
- * inwards where they are within an odd number of others. */
+/* The parts of ebpo_mesh_orient: neighbouring faces agree; shells look outwards, or inwards where
+ * they are within an odd number of others. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record,
                                                     ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_mesh_turn_closed(ebpo_mesh *mesh, ebpo_mend_record *record,
                                                 ebpo_error *error);
+
+/* The same, with the shells that are known. `closed`: see below. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed,
+                                                ebpo_mend_record *record, ebpo_error *error);
+
+/* Finds the shell of each face, closed [face_count]: a number that its faces alone have, or
+ * EBPO_NO_INDEX for a face that is in none. A shell is closed by itself: faces connected by edges
+ * with two faces, or around edges with more. The mesh's workspace owns it. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_find_shells(const ebpo_mesh *mesh, unsigned threads,
+                                                uint32_t **closed, ebpo_error *error);
 
 /* Decides which vertices stay and which they become, by the rule of ebpo_mesh_weld_within, in a mesh
  * without vertices at one position. map [vertex_count]: the new number of each; from [vertex_count]:

@@ -1,4 +1,4 @@
-/* Closed components look outwards, or inwards where they bound a cavity. */
+/* Shells look outwards, or inwards where they bound a cavity. */
 #include "geom/strict_fp.h"
 
 #include <ebpo/repair.h>
@@ -24,19 +24,30 @@ static uint64_t turn_shell(const ebpo_components *c, uint32_t component)
     return end - begin;
 }
 
-ebpo_status ebpo_mesh_turn_closed(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed, ebpo_mend_record *record,
+                                  ebpo_error *error)
 {
     nesting n = { .components = NULL };
     uint64_t turned = 0;
     if (mesh->face_count == 0)
         return EBPO_OK;
-    ebpo_status status = ebpo_nesting_find(&n, mesh, 0, NULL, error);
+    ebpo_status status = ebpo_nesting_find(&n, mesh, closed, 0, NULL, error);
     for (uint64_t i = 0; i < n.count && status == EBPO_OK; i++)
         if (looks_inwards(&n, &n.shells[i]) != is_cavity(&n.shells[i]))
             turned += turn_shell(n.components, n.shells[i].component);
     ebpo_nesting_free(&n, mesh);
     if (record)
         record->flipped_faces += turned;
+    return status;
+}
+
+ebpo_status ebpo_mesh_turn_closed(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    uint32_t *closed = NULL;
+    ebpo_status status = ebpo_mesh_find_shells(mesh, 0, &closed, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_turn_shells(mesh, closed, record, error);
+    ebpo_array_free(mesh->workspace, closed);
     return status;
 }
 
@@ -47,9 +58,14 @@ ebpo_status ebpo_mesh_count_shells(const ebpo_mesh *mesh, unsigned threads, ebpo
     static const ebpo_shells nothing = EBPO_SHELLS_INIT;
     ebpo_shells made = EBPO_SHELLS_INIT;
     nesting n = { .components = NULL };
+    uint32_t *closed = NULL;
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_shells, out, error);
     if (status == EBPO_OK)
-        status = ebpo_nesting_find(&n, mesh, threads, &progress, error);
+        status = ebpo_components_check(mesh, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_find_shells(mesh, threads, &closed, error);
+    if (status == EBPO_OK)
+        status = ebpo_nesting_find(&n, mesh, closed, threads, &progress, error);
     for (uint64_t i = 0; i < n.count && status == EBPO_OK; i++) {
         bool inwards = looks_inwards(&n, &n.shells[i]), cavity = is_cavity(&n.shells[i]);
         made.inside_out += inwards && !cavity;
@@ -58,6 +74,7 @@ ebpo_status ebpo_mesh_count_shells(const ebpo_mesh *mesh, unsigned threads, ebpo
     }
     made.closed = n.count;
     ebpo_nesting_free(&n, mesh);
+    ebpo_array_free(mesh->workspace, closed);
     EBPO_GIVE(ebpo_shells, out, status == EBPO_OK ? &made : &nothing);
     return status;
 }
