@@ -37,7 +37,7 @@ static ebpo_status orient(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *rec
 ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance,
                            ebpo_mend_record *record, ebpo_error *error)
 {
-    uint64_t filled = record->filled_holes;
+    uint64_t filled = record->filled_holes, unorientable = record->unorientable_components;
     ebpo_status status = EBPO_OK;
     if (weld_distance > 0)
         status = ebpo_mesh_weld_within(mesh, weld_distance, record, error);
@@ -53,7 +53,9 @@ ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance
         status = ebpo_mesh_fill_holes(mesh, record, error);
     /* what was open has an outside now */
     if (status == EBPO_OK && steps & EBPO_MEND_ORIENT && !(steps & EBPO_MEND_EARLIER) &&
-        record->filled_holes > filled)
-        status = ebpo_mesh_turn_closed(mesh, record, error);
+        record->filled_holes > filled) {
+        record->unorientable_components = unorientable;
+        status = ebpo_mesh_orient(mesh, record, error);
+    }
     return status;
 }

@@ -105,14 +105,11 @@ enum {
 EBPO_MUST_USE ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance,
                                          ebpo_mend_record *record, ebpo_error *error);
 
-/* The parts of ebpo_mesh_orient: neighbouring faces agree; shells look outwards, or inwards where
- * they are within an odd number of others. */
+/* The first part of ebpo_mesh_orient: neighbouring faces agree. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record,
                                                     ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_mesh_turn_closed(ebpo_mesh *mesh, ebpo_mend_record *record,
-                                                ebpo_error *error);
-
-/* The same, with the shells that are known. `closed`: see below. */
+/* The second part: shells look outwards, or inwards where they are within an odd number of others.
+ * `closed`: of ebpo_mesh_find_shells; it is changed. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed,
                                                 ebpo_mend_record *record, ebpo_error *error);
 

@@ -41,16 +41,6 @@ ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed, ebpo_mend_r
     return status;
 }
 
-ebpo_status ebpo_mesh_turn_closed(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
-{
-    uint32_t *closed = NULL;
-    ebpo_status status = ebpo_mesh_find_shells(mesh, 0, &closed, error);
-    if (status == EBPO_OK)
-        status = ebpo_mesh_turn_shells(mesh, closed, record, error);
-    ebpo_array_free(mesh->workspace, closed);
-    return status;
-}
-
 ebpo_status ebpo_mesh_count_shells(const ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
                                    ebpo_shells *out, ebpo_error *error)
 {

@@ -74,10 +74,11 @@ static ebpo_status try_and_repair(mesh_input *p, mending asked, ebpo_prepare_opt
     return p->tried && asked.repair && p->repairs.chosen >= 0 ? do_chosen(p, how, error) : status;
 }
 
-/* Of a single component the volume's sign tells which way it looks. */
+/* Counts shells. Of one that is a 2-manifold the volume's sign says which way it looks. */
 static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *how, ebpo_error *error)
 {
-    if (!p->prepared.report.balanced || p->prepared.report.components < 2)
+    const ebpo_mesh_report *r = &p->prepared.report;
+    if (!r->balanced || (r->manifold && r->components < 2))
         return EBPO_OK;
     p->shells = (ebpo_shells)EBPO_SHELLS_INIT;
     p->counted = true;
