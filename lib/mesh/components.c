@@ -222,9 +222,8 @@ static ebpo_status find(ebpo_components *c, ebpo_error *error)
         of_shell = ebpo_array_alloc(mesh->workspace, mesh->face_count, sizeof *of_shell);
         made = made && of_shell;
     }
-    ebpo_status status = made
-                             ? EBPO_OK
-                             : ebpo_workspace_fail(mesh->workspace, 2 * n * sizeof *above, error);
+    ebpo_status status =
+        made ? EBPO_OK : ebpo_workspace_fail(mesh->workspace, 2 * n * sizeof *above, error);
     if (status == EBPO_OK) {
         if (of_shell)
             ebpo_array_fill(mesh->workspace, of_shell, 0xff, mesh->face_count * sizeof *of_shell);

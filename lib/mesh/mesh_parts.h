@@ -119,9 +119,9 @@ EBPO_MUST_USE ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *close
 EBPO_MUST_USE ebpo_status ebpo_mesh_find_shells(const ebpo_mesh *mesh, unsigned threads,
                                                 uint32_t **closed, ebpo_error *error);
 
-/* Decides which vertices stay and which they become, by the rule of ebpo_mesh_weld_within, in a mesh
- * without vertices at one position. map [vertex_count]: the new number of each; from [vertex_count]:
- * the *kept vertices that stay, ascending; *moved: the largest distance. */
+/* Decides which vertices stay and which they become, by the rule of ebpo_mesh_weld_within, in a
+ * mesh without vertices at one position. map [vertex_count]: the new number of each; from
+ * [vertex_count]: the *kept vertices that stay, ascending; *moved: the largest distance. */
 EBPO_MUST_USE ebpo_status ebpo_weld_group_within(const ebpo_mesh *mesh, double distance,
                                                  uint32_t *map, uint32_t *from, uint64_t *kept,
                                                  double *moved, ebpo_error *error);

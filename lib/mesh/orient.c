@@ -360,8 +360,9 @@ static bool list_patches(orienting *o)
         if (!ebpo_array_grow(o->mesh->workspace, &o->patches, &o->patch_capacity,
                              o->patch_count + 1, sizeof *o->patches))
             return false;
-        o->patches[o->patch_count++] =
-            (patch){ .root = (uint32_t)f, .seed = (uint32_t)f, .closed = !(o->flags[f] & (OPEN | BOUNDARY)) };
+        o->patches[o->patch_count++] = (patch){ .root = (uint32_t)f,
+                                                .seed = (uint32_t)f,
+                                                .closed = !(o->flags[f] & (OPEN | BOUNDARY)) };
     }
     return true;
 }

@@ -160,7 +160,8 @@ ebpo_status ebpo_nesting_find(nesting *n, const ebpo_mesh *mesh, uint32_t *close
                               const ebpo_progress *progress, ebpo_error *error)
 {
     n->threads = ebpo_thread_count(threads);
-    ebpo_status status = ebpo_components_find(mesh, closed, threads, progress, &n->components, error);
+    ebpo_status status =
+        ebpo_components_find(mesh, closed, threads, progress, &n->components, error);
     return status == EBPO_OK ? nest(n, error) : status;
 }
 

@@ -104,11 +104,13 @@ static void check_cells(const bool filled[CELLS], uint32_t of_eight)
     ebpo_mesh_free(&m);
 }
 
-/* Two cubes that share an edge, a vertex, a face, and as many around an edge as there is room for. */
+/* Two cubes that share an edge, a vertex, a face, and as many around an edge as there is room for.
+ */
 START_TEST(neighbours_look_outwards_whatever_was_turned)
 {
-    static const int with_first[][3] = { { 4, -1, -1 }, { 13, -1, -1 }, { 1, -1, -1 },
-                                         { 1, 3, 4 } };
+    static const int with_first[][3] = {
+        { 4, -1, -1 }, { 13, -1, -1 }, { 1, -1, -1 }, { 1, 3, 4 }
+    };
     state = 2 + (uint64_t)_i;
     for (int round = 0; round < 40; round++) {
         bool filled[CELLS] = { true };
