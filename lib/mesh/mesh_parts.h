@@ -105,9 +105,11 @@ enum {
 EBPO_MUST_USE ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance,
                                          ebpo_mend_record *record, ebpo_error *error);
 
-/* The first part of ebpo_mesh_orient: neighbouring faces agree. */
+/* The first part of ebpo_mesh_orient: neighbouring faces agree. `closed`: NULL, or as for
+ * ebpo_mesh_find_shells. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record,
-                                                    ebpo_error *error);
+                                                    uint32_t **closed, ebpo_error *error);
+
 /* The second part: shells look outwards, or inwards where they are within an odd number of others.
  * `closed`: of ebpo_mesh_find_shells; it is changed. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed,

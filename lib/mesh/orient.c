@@ -5,7 +5,6 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/arrays.h"
 #include "mesh/edge_faces.h"
@@ -542,9 +541,8 @@ ebpo_status ebpo_mesh_find_shells(const ebpo_mesh *mesh, unsigned threads, uint3
     return status;
 }
 
-/* `closed`: NULL, or as for ebpo_mesh_find_shells. */
-static ebpo_status make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record, uint32_t **closed,
-                                   ebpo_error *error)
+ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record, uint32_t **closed,
+                                      ebpo_error *error)
 {
     orienting o = { .mesh = mesh, .lock = PTHREAD_MUTEX_INITIALIZER };
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
@@ -560,21 +558,5 @@ static ebpo_status make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record, ui
         record->unorientable_components += o.unorientable;
     }
     free_all(&o);
-    return status;
-}
-
-ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
-{
-    return make_consistent(mesh, record, NULL, error);
-}
-
-ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
-{
-    EBPO_DEFAULT_FP;
-    uint32_t *closed = NULL;
-    ebpo_status status = make_consistent(mesh, record, &closed, error);
-    if (status == EBPO_OK)
-        status = ebpo_mesh_turn_shells(mesh, closed, record, error);
-    ebpo_array_free(mesh->workspace, closed);
     return status;
 }
