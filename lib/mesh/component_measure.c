@@ -139,13 +139,19 @@ static ebpo_status sum_volumes(void *context, uint64_t begin, uint64_t end, unsi
     for (uint64_t n = begin; n < end; n++) {
         mesh_component *one = &c->list[n];
         ebpo_sum sum = { .adds = 0 };
-        double base[3];
+        double base[3], most = 0;
         ebpo_frame_position(&m->frame, c->mesh, c->mesh->faces[3 * (uint64_t)one->face], base);
         for (int k = 0; k < 3; k++)
             one->min[k] = INFINITY, one->max[k] = -INFINITY;
-        EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[n], c->faces.begin[n + 1])
-            ebpo_sum_add(&sum, term_of(m, one, c->faces.of[i], base));
+        EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[n], c->faces.begin[n + 1]) {
+            double term = term_of(m, one, c->faces.of[i], base);
+            most = fmax(most, fabs(term));
+            ebpo_sum_add(&sum, term);
+        }
         one->volume = one->open ? 0 : ebpo_sum_value(&sum) / 6;
+        if (c->of_face &&
+            ebpo_volume_is_noise(one->volume, c->faces.begin[n + 1] - c->faces.begin[n], most))
+            one->volume = 0;
     }
     return EBPO_OK;
 }

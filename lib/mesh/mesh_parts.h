@@ -81,6 +81,13 @@ static inline bool ebpo_face_repeats_index(const uint32_t face[3])
     return face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
 }
 
+/* Returns whether a sum of `count` rounded terms of a volume, the largest of which is `most`, may
+ * be rounding alone: sheets with two sides have no volume and no outside. */
+static inline bool ebpo_volume_is_noise(double sum, uint64_t count, double most)
+{
+    return (sum < 0 ? -sum : sum) <= 1e-12 * (double)count * most;
+}
+
 /* Makes the face look the other way. */
 static inline void ebpo_face_turn(uint32_t face[3])
 {

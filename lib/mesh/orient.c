@@ -1,5 +1,6 @@
 #include "geom/strict_fp.h"
 
+#include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 
@@ -40,6 +41,7 @@ typedef struct patch {
     bool turn_others;       /* the faces that run as the seed does are the ones to turn */
     uint64_t count, turned; /* faces; those that run against the root */
     ebpo_sum volume;        /* six times, with all faces running as the root does */
+    double most;            /* of its terms */
 } patch;
 
 typedef struct orienting orienting;
@@ -401,10 +403,11 @@ static void count_faces(orienting *o)
         o->patches[i].seed_turned = o->above[o->patches[i].seed] & 1;
 }
 
-static void add_volume(orienting *o, patch *p, const ebpo_sum *sum)
+static void add_volume(orienting *o, patch *p, const ebpo_sum *sum, double most)
 {
     pthread_mutex_lock(&o->lock);
     ebpo_sum_merge(&p->volume, sum);
+    p->most = fmax(p->most, most);
     pthread_mutex_unlock(&o->lock);
 }
 
@@ -417,15 +420,16 @@ static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned
     (void)worker, (void)error;
     ebpo_sum sum = { .adds = 0 };
     patch *last = NULL;
-    double base[3] = { 0, 0, 0 };
+    double base[3] = { 0, 0, 0 }, most = 0;
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, begin, end) {
         patch *p = patch_of(o, f, last);
         if (!p || !p->closed)
             continue;
         if (p != last) {
             if (last)
-                add_volume(o, last, &sum);
+                add_volume(o, last, &sum, most);
             sum = (ebpo_sum){ .adds = 0 };
+            most = 0;
             last = p;
             ebpo_frame_position(&o->frame, mesh, mesh->faces[3 * (uint64_t)p->seed], base);
         }
@@ -437,16 +441,18 @@ static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned
         ebpo_face_cross(a, b, c, cross);
         double term =
             (a[0] - base[0]) * cross[0] + (a[1] - base[1]) * cross[1] + (a[2] - base[2]) * cross[2];
+        most = fmax(most, fabs(term));
         ebpo_sum_add(&sum, o->above[f] & 1 ? -term : term);
     }
     if (last)
-        add_volume(o, last, &sum);
+        add_volume(o, last, &sum, most);
     return EBPO_OK;
 }
 
 static void decide(patch *p)
 {
     double volume = p->closed ? ebpo_sum_value(&p->volume) : 0;
+    volume = ebpo_volume_is_noise(volume, p->count, p->most) ? 0 : volume;
     volume = p->seed_turned ? -volume : volume;
     uint64_t against_seed = p->seed_turned ? p->count - p->turned : p->turned;
     p->turn_others = volume < 0 || (!(volume > 0) && against_seed > p->count - against_seed);
