@@ -55,9 +55,10 @@ static ebpo_status prepare(const preparation *p, ebpo_error *error)
     bool weld = o->weld || o->weld_distance > 0 || strncmp(p->mesh->source_format, "stl", 3) == 0;
     ebpo_status status = EBPO_OK;
     if (!(o->weld_distance >= 0))
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "weld_distance has to be 0, which is for equal positions, or above, not %g",
-                         o->weld_distance);
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "weld_distance has to be 0, which is for equal positions, or above, not %g",
+            o->weld_distance);
     p->out->mended = weld || o->orient || o->flip || o->fill_holes || o->drop_duplicates;
     if (p->out->mended)
         status = arrange_and_mend(p, weld, error);

@@ -43,7 +43,7 @@ typedef struct visitor {
 static uint32_t shell_of_face(const comparing *c, uint64_t face)
 {
     const ebpo_components *all = c->s->nesting.components;
-    return c->s->shell_of[all->number[c->s->mesh->faces[3 * face]]];
+    return c->s->shell_of[all->of_face[face]];
 }
 
 static bool boxes_meet(const point_box *a, const double min[3], const double max[3])
@@ -199,7 +199,11 @@ ebpo_status ebpo_solid_shells_find(ebpo_solid_shells *out, const ebpo_mesh *mesh
     bool simple = true;
     *out = (ebpo_solid_shells){ .mesh = mesh };
     nesting *n = &out->nesting;
-    ebpo_status status = ebpo_nesting_find(n, mesh, threads, progress, error);
+    ebpo_status status = ebpo_components_check(mesh, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_find_shells(mesh, threads, &out->closed, error);
+    if (status == EBPO_OK)
+        status = ebpo_nesting_find(n, mesh, out->closed, threads, progress, error);
     if (status != EBPO_OK)
         return status;
     uint64_t count = n->components->count;
@@ -219,6 +223,7 @@ void ebpo_solid_shells_free(ebpo_solid_shells *shells)
 {
     ebpo_array_free(shells->mesh->workspace, shells->shell_of);
     ebpo_nesting_free(&shells->nesting, shells->mesh);
+    ebpo_array_free(shells->mesh->workspace, shells->closed);
 }
 
 int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, ebpo_rule rule)

@@ -318,8 +318,11 @@ static ebpo_status get_weld(ebpo_head *in, ebpo_head_object root, ebpo_info *inf
                             ebpo_error *error)
 {
     ebpo_mend_record *m = &info->mend;
-    ebpo_status status = EBPO_OK;
-    for (int i = 0; i < EBPO_WELD_FACTS && status == EBPO_OK; i++)
+    ebpo_status status =
+        ebpo_head_get_real(in, root, "/", ebpo_weld_facts[0].name, &m->weld_distance, 0, error);
+    if (status == EBPO_E_ABSENT)
+        return EBPO_OK;
+    for (int i = 1; i < EBPO_WELD_FACTS && status == EBPO_OK; i++)
         status = get_fact(in, root, "/", &ebpo_weld_facts[i], info, error);
     bool known = status == EBPO_OK && m->weld && isfinite(m->weld_distance) &&
                  m->weld_distance > 0 && isfinite(m->weld_moved) && m->weld_moved >= 0;
@@ -327,7 +330,7 @@ static ebpo_status get_weld(ebpo_head *in, ebpo_head_object root, ebpo_info *inf
         m->weld_distance = m->weld_moved = 0;
         m->collapsed_faces = 0;
     }
-    return status == EBPO_E_ABSENT ? EBPO_OK : status;
+    return status;
 }
 
 ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info, ebpo_error *error)

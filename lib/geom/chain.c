@@ -187,6 +187,5 @@ static bool cut_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
 
 bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3])
 {
-    return chain->n <= chain->optimal ? least_area(chain, triangles)
-                                          : cut_ears(chain, triangles);
+    return chain->n <= chain->optimal ? least_area(chain, triangles) : cut_ears(chain, triangles);
 }

@@ -19,7 +19,8 @@ typedef struct polygon {
     const double (*corner)[3];
     double (*flat)[2]; /* so that it runs counter-clockwise */
     uint32_t n;
-    double scale; /* a power of two that makes products of differences neither overflow nor vanish */
+    double
+        scale; /* a power of two that makes products of differences neither overflow nor vanish */
     bool projected;
 } polygon;
 

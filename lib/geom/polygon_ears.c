@@ -415,8 +415,7 @@ uint64_t ebpo_ears_scratch_bytes(uint64_t n)
 {
     /* a corner has six numbers, and at most 4 / BLOCK boxes and counts; bits take less than one
      * byte */
-    const uint64_t each = 6 * sizeof(uint32_t) +
-                          4 * (sizeof(box) + sizeof(uint32_t)) / BLOCK + 1;
+    const uint64_t each = 6 * sizeof(uint32_t) + 4 * (sizeof(box) + sizeof(uint32_t)) / BLOCK + 1;
     uint64_t bytes;
     return ebpo_mul_ok(n + WORD, each, &bytes) ? bytes : 0;
 }

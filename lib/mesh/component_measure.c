@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "mesh/component_parts.h"
+#include "mesh/edge_faces.h"
 #include "mesh/mesh_frame.h"
 #include "mesh/stars.h"
 #include "mesh/sum.h"
@@ -19,7 +20,8 @@ typedef struct measuring {
     ebpo_components *components;
     ebpo_mesh_frame frame; /* of volumes */
     ebpo_stars stars;
-    ebpo_star *star; /* one for each thread */
+    ebpo_star *star;         /* one for each thread */
+    ebpo_edge_faces *around; /* one for each thread */
 } measuring;
 
 /* ---- edges ---- */
@@ -30,6 +32,32 @@ static bool balances(const ebpo_link *links, uint64_t uses)
     for (uint64_t i = 0; i < uses; i++)
         out += links[i].out;
     return 2 * out == uses;
+}
+
+static void set_open(ebpo_components *c, uint32_t component)
+{
+    __atomic_store_n(&c->list[component].open, true, __ATOMIC_RELAXED);
+}
+
+/* The faces of an edge may be in several components. */
+static bool visit_edge(ebpo_components *c, const ebpo_link *links, uint64_t uses,
+                       ebpo_edge_faces *e)
+{
+    e->count = 0;
+    for (uint64_t i = 0; i < uses; i++) {
+        uint32_t face = ebpo_link_face(&links[i]);
+        if (!ebpo_edge_faces_add(e, face, links[i].out, (uint64_t)c->of_face[face] << 1))
+            return false;
+    }
+    ebpo_edge_faces_sort(e);
+    for (uint64_t i = 0, next; i < e->count; i = next) {
+        int64_t sum = 0;
+        for (next = i; next < e->count && e->face[next].patch == e->face[i].patch; next++)
+            sum += e->face[next].out ? 1 : -1;
+        if (sum)
+            set_open(c, (uint32_t)(e->face[i].patch >> 1));
+    }
+    return true;
 }
 
 static ebpo_status visit_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -44,8 +72,14 @@ static ebpo_status visit_vertices(void *context, uint64_t begin, uint64_t end, u
                                        error);
         for (uint64_t i = 0, next; i < star->count; i = next) {
             next = ebpo_star_run_end(star, i);
-            if (ebpo_link_neighbour(&star->links[i]) > v && !balances(star->links + i, next - i))
-                __atomic_store_n(&c->list[c->number[v]].open, true, __ATOMIC_RELAXED);
+            const ebpo_link *links = star->links + i;
+            if (ebpo_link_neighbour(links) <= v)
+                continue;
+            if (c->of_face && next - i > 2) {
+                if (!visit_edge(c, links, next - i, &m->around[worker]))
+                    return ebpo_fail_memory(error, (next - i) * sizeof(ebpo_edge_face));
+            } else if (!balances(links, next - i))
+                set_open(c, c->of_face ? c->of_face[ebpo_link_face(links)] : c->number[v]);
         }
     }
     return EBPO_OK;
@@ -57,13 +91,17 @@ static ebpo_status look_at_edges(measuring *m, unsigned threads, const ebpo_prog
     const ebpo_mesh *mesh = m->components->mesh;
     ebpo_status status = ebpo_stars_build(&m->stars, mesh, threads, progress, error);
     m->star = ebpo_alloc_zero(threads, sizeof *m->star);
-    if (status == EBPO_OK && !m->star)
+    m->around = ebpo_alloc_zero(threads, sizeof *m->around);
+    if (status == EBPO_OK && (!m->star || !m->around))
         status = ebpo_fail_memory(error, threads * sizeof *m->star);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(threads, NULL, mesh->vertex_count, VERTEX_GRAIN, visit_vertices,
                                    m, progress, "components", error);
     for (unsigned t = 0; m->star && t < threads; t++)
         ebpo_star_free(&m->star[t]);
+    for (unsigned t = 0; m->around && t < threads; t++)
+        free(m->around[t].face);
+    free(m->around);
     free(m->star);
     ebpo_stars_free(&m->stars);
     return status;
@@ -101,13 +139,19 @@ static ebpo_status sum_volumes(void *context, uint64_t begin, uint64_t end, unsi
     for (uint64_t n = begin; n < end; n++) {
         mesh_component *one = &c->list[n];
         ebpo_sum sum = { .adds = 0 };
-        double base[3];
+        double base[3], most = 0;
         ebpo_frame_position(&m->frame, c->mesh, c->mesh->faces[3 * (uint64_t)one->face], base);
         for (int k = 0; k < 3; k++)
             one->min[k] = INFINITY, one->max[k] = -INFINITY;
-        EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[n], c->faces.begin[n + 1])
-            ebpo_sum_add(&sum, term_of(m, one, c->faces.of[i], base));
+        EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[n], c->faces.begin[n + 1]) {
+            double term = term_of(m, one, c->faces.of[i], base);
+            most = fmax(most, fabs(term));
+            ebpo_sum_add(&sum, term);
+        }
         one->volume = one->open ? 0 : ebpo_sum_value(&sum) / 6;
+        if (c->of_face &&
+            ebpo_volume_is_noise(one->volume, c->faces.begin[n + 1] - c->faces.begin[n], most))
+            one->volume = 0;
     }
     return EBPO_OK;
 }

@@ -27,6 +27,8 @@ struct ebpo_components {
     uint64_t count;                /* first all, then those that are no cavity of another one */
     mesh_component *list;          /* [all] */
     ebpo_component *facts;         /* [count] */
+    /* [face_count] the component of each face, borrowed; NULL: that of its vertices */
+    uint32_t *of_face;
     uint32_t *number; /* [vertex_count] the component; EBPO_NO_INDEX: no face names the vertex */
     uint32_t *place;  /* [vertex_count] among its component's vertices */
     mesh_groups faces, vertices;
@@ -40,10 +42,11 @@ EBPO_MUST_USE ebpo_status ebpo_components_group(const ebpo_components *c, bool f
                                                 mesh_groups *g, ebpo_error *error);
 
 /* Components, each with its faces, edges and volume, but no cavity joined to another one; freed by
- * ebpo_components_free. On failure as well. */
-EBPO_MUST_USE ebpo_status ebpo_components_find(const ebpo_mesh *mesh, unsigned threads,
-                                               const ebpo_progress *progress, ebpo_components **out,
-                                               ebpo_error *error);
+ * ebpo_components_free. On failure as well. `closed`: NULL, or of ebpo_mesh_find_shells: each shell
+ * is one, and other faces that share vertices; it becomes `of_face`. */
+EBPO_MUST_USE ebpo_status ebpo_components_find(const ebpo_mesh *mesh, uint32_t *closed,
+                                               unsigned threads, const ebpo_progress *progress,
+                                               ebpo_components **out, ebpo_error *error);
 
 /* The component of each vertex, [vertex_count]; EBPO_NO_INDEX: no face names it. The mesh's
  * workspace owns it. On failure NULL. */

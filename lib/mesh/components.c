@@ -49,12 +49,14 @@ ebpo_status ebpo_components_check(const ebpo_mesh *mesh, ebpo_error *error)
 }
 
 /* Each vertex' root, the lowest vertex of its component. */
-static void join_vertices(const ebpo_mesh *mesh, uint32_t *above)
+static void join_vertices(const ebpo_mesh *mesh, const uint32_t *closed, uint32_t *above)
 {
     EBPO_FOR_ITEMS(mesh->workspace, v, 0, mesh->vertex_count)
         above[v] = (uint32_t)v;
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
         const uint32_t *corner = mesh->faces + 3 * f;
+        if (closed && closed[f] != EBPO_NO_INDEX)
+            continue;
         join(above, corner[0], corner[1]);
         join(above, corner[0], corner[2]);
     }
@@ -68,31 +70,51 @@ static int compare_first(const void *x, const void *y)
     return a->first < b->first ? -1 : 1;
 }
 
+static ebpo_status add_face(ebpo_components *c, uint64_t f, uint32_t *number, uint64_t *capacity,
+                            ebpo_error *error)
+{
+    uint64_t source = ebpo_mesh_source_face(c->mesh, f);
+    if (*number == EBPO_NO_INDEX) {
+        if (!ebpo_array_grow(c->mesh->workspace, &c->list, capacity, c->count + 1, sizeof *c->list))
+            return ebpo_workspace_fail(c->mesh->workspace, (c->count + 1) * sizeof *c->list, error);
+        *number = (uint32_t)c->count;
+        c->list[c->count++] = (mesh_component){ .first = UINT64_MAX };
+    }
+    if (source < c->list[*number].first) {
+        c->list[*number].first = source;
+        c->list[*number].face = (uint32_t)f;
+    }
+    return EBPO_OK;
+}
+
+/* Where the number of the face's component is: at the lowest face of its shell, or at the root of
+ * its vertices. */
+static uint32_t *number_at(const ebpo_components *c, const uint32_t *above, uint32_t *of_shell,
+                           uint64_t f)
+{
+    return of_shell && c->of_face[f] != EBPO_NO_INDEX ? &of_shell[c->of_face[f]]
+                                                      : &c->number[above[c->mesh->faces[3 * f]]];
+}
+
 /* Numbered by their first faces in the source. */
-static ebpo_status list_components(ebpo_components *c, const uint32_t *above, ebpo_error *error)
+static ebpo_status list_components(ebpo_components *c, const uint32_t *above, uint32_t *of_shell,
+                                   ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->mesh;
     uint64_t capacity = 0;
+    ebpo_status status = EBPO_OK;
     ebpo_array_fill(mesh->workspace, c->number, 0xff, mesh->vertex_count * sizeof *c->number);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
-        uint32_t *number = &c->number[above[mesh->faces[3 * f]]];
-        uint64_t source = ebpo_mesh_source_face(mesh, f);
-        if (*number == EBPO_NO_INDEX) {
-            if (!ebpo_array_grow(mesh->workspace, &c->list, &capacity, c->count + 1,
-                                 sizeof *c->list))
-                return ebpo_workspace_fail(mesh->workspace, (c->count + 1) * sizeof *c->list,
-                                           error);
-            *number = (uint32_t)c->count;
-            c->list[c->count++] = (mesh_component){ .first = UINT64_MAX };
-        }
-        if (source < c->list[*number].first) {
-            c->list[*number].first = source;
-            c->list[*number].face = (uint32_t)f;
-        }
+        status = add_face(c, f, number_at(c, above, of_shell, f), &capacity, error);
+        if (status != EBPO_OK)
+            return status;
     }
     qsort(c->list, c->count, sizeof *c->list, compare_first);
     for (uint64_t i = 0; i < c->count; i++)
-        c->number[above[mesh->faces[3 * (uint64_t)c->list[i].face]]] = (uint32_t)i;
+        *number_at(c, above, of_shell, c->list[i].face) = (uint32_t)i;
+    if (of_shell)
+        EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count)
+            c->of_face[f] = *number_at(c, above, of_shell, f);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count)
         c->number[v] = c->number[above[v]];
     return EBPO_OK;
@@ -105,6 +127,8 @@ static uint32_t component_of(const ebpo_components *c, bool faces, uint64_t i)
 {
     if (c->named) /* only asked of faces */
         return ebpo_mesh_group_of(c->named, ebpo_mesh_source_face(c->mesh, i));
+    if (faces && c->of_face)
+        return c->of_face[i];
     return c->number[faces ? c->mesh->faces[3 * i] : i];
 }
 
@@ -192,13 +216,21 @@ static ebpo_status find(ebpo_components *c, ebpo_error *error)
     uint64_t n = mesh->vertex_count;
     uint32_t *above = ebpo_array_alloc(mesh->workspace, n, sizeof *above);
     c->number = ebpo_array_alloc(mesh->workspace, n, sizeof *c->number);
-    ebpo_status status = above && c->number
-                             ? EBPO_OK
-                             : ebpo_workspace_fail(mesh->workspace, 2 * n * sizeof *above, error);
-    if (status == EBPO_OK) {
-        join_vertices(mesh, above);
-        status = list_components(c, above, error);
+    uint32_t *of_shell = NULL;
+    bool made = above && c->number;
+    if (c->of_face) {
+        of_shell = ebpo_array_alloc(mesh->workspace, mesh->face_count, sizeof *of_shell);
+        made = made && of_shell;
     }
+    ebpo_status status =
+        made ? EBPO_OK : ebpo_workspace_fail(mesh->workspace, 2 * n * sizeof *above, error);
+    if (status == EBPO_OK) {
+        if (of_shell)
+            ebpo_array_fill(mesh->workspace, of_shell, 0xff, mesh->face_count * sizeof *of_shell);
+        join_vertices(mesh, c->of_face, above);
+        status = list_components(c, above, of_shell, error);
+    }
+    ebpo_array_free(mesh->workspace, of_shell);
     ebpo_array_free(mesh->workspace, above);
     return status == EBPO_OK ? ebpo_components_group(c, true, &c->faces, error) : status;
 }
@@ -223,7 +255,7 @@ static ebpo_status number_vertices(ebpo_components *c, ebpo_error *error)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_components_find(const ebpo_mesh *mesh, unsigned threads,
+ebpo_status ebpo_components_find(const ebpo_mesh *mesh, uint32_t *closed, unsigned threads,
                                  const ebpo_progress *progress, ebpo_components **out,
                                  ebpo_error *error)
 {
@@ -235,6 +267,7 @@ ebpo_status ebpo_components_find(const ebpo_mesh *mesh, unsigned threads,
     if (!c)
         return ebpo_fail_memory(error, sizeof *c);
     c->mesh = mesh;
+    c->of_face = closed;
     if (progress && !ebpo_progress_stage(progress, "components", error))
         return EBPO_E_CANCELLED;
     status = find(c, error);
@@ -275,7 +308,7 @@ ebpo_status ebpo_components_new(const ebpo_mesh *mesh, unsigned threads, ebpo_pr
                                 ebpo_components **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_status status = ebpo_components_find(mesh, threads, &progress, out, error);
+    ebpo_status status = ebpo_components_find(mesh, NULL, threads, &progress, out, error);
     if (status == EBPO_OK)
         status = group_all(*out, error);
     if (status == EBPO_OK)

@@ -1,7 +1,8 @@
 /* Mending in the one order that there is. */
 #include "geom/strict_fp.h"
 
-#include "base/array_loops.h"
+#include "base/arrays.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "mesh/mesh_parts.h"
 
@@ -27,17 +28,28 @@ ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error
     return status;
 }
 
+ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    uint32_t *closed = NULL;
+    ebpo_status status = ebpo_mesh_make_consistent(mesh, record, &closed, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_turn_shells(mesh, closed, record, error);
+    ebpo_array_free(mesh->workspace, closed);
+    return status;
+}
+
 static ebpo_status orient(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *record,
                           ebpo_error *error)
 {
-    return steps & EBPO_MEND_EARLIER ? ebpo_mesh_make_consistent(mesh, record, error)
+    return steps & EBPO_MEND_EARLIER ? ebpo_mesh_make_consistent(mesh, record, NULL, error)
                                      : ebpo_mesh_orient(mesh, record, error);
 }
 
 ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance,
                            ebpo_mend_record *record, ebpo_error *error)
 {
-    uint64_t filled = record->filled_holes;
+    uint64_t filled = record->filled_holes, unorientable = record->unorientable_components;
     ebpo_status status = EBPO_OK;
     if (weld_distance > 0)
         status = ebpo_mesh_weld_within(mesh, weld_distance, record, error);
@@ -53,7 +65,9 @@ ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance
         status = ebpo_mesh_fill_holes(mesh, record, error);
     /* what was open has an outside now */
     if (status == EBPO_OK && steps & EBPO_MEND_ORIENT && !(steps & EBPO_MEND_EARLIER) &&
-        record->filled_holes > filled)
-        status = ebpo_mesh_turn_closed(mesh, record, error);
+        record->filled_holes > filled) {
+        record->unorientable_components = unorientable;
+        status = ebpo_mesh_orient(mesh, record, error);
+    }
     return status;
 }

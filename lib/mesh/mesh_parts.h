@@ -81,6 +81,13 @@ static inline bool ebpo_face_repeats_index(const uint32_t face[3])
     return face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
 }
 
+/* Returns whether a sum of `count` rounded terms of a volume, the largest of which is `most`, may
+ * be rounding alone: sheets with two sides have no volume and no outside. */
+static inline bool ebpo_volume_is_noise(double sum, uint64_t count, double most)
+{
+    return (sum < 0 ? -sum : sum) <= 1e-12 * (double)count * most;
+}
+
 /* Makes the face look the other way. */
 static inline void ebpo_face_turn(uint32_t face[3])
 {
@@ -105,16 +112,25 @@ enum {
 EBPO_MUST_USE ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance,
                                          ebpo_mend_record *record, ebpo_error *error);
 
-/* The parts of ebpo_mesh_orient: neighbouring faces agree; closed components look outwards, or
- * inwards where they are within an odd number of others. */
+/* The first part of ebpo_mesh_orient: neighbouring faces agree. `closed`: NULL, or as for
+ * ebpo_mesh_find_shells. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record,
-                                                    ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_mesh_turn_closed(ebpo_mesh *mesh, ebpo_mend_record *record,
-                                                ebpo_error *error);
+                                                    uint32_t **closed, ebpo_error *error);
 
-/* Decides which vertices stay and which they become, by the rule of ebpo_mesh_weld_within, in a mesh
- * without vertices at one position. map [vertex_count]: the new number of each; from [vertex_count]:
- * the *kept vertices that stay, ascending; *moved: the largest distance. */
+/* The second part: shells look outwards, or inwards where they are within an odd number of others.
+ * `closed`: of ebpo_mesh_find_shells; it is changed. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed,
+                                                ebpo_mend_record *record, ebpo_error *error);
+
+/* Finds the shell of each face, closed [face_count]: a number that its faces alone have, or
+ * EBPO_NO_INDEX for a face that is in none. A shell is closed by itself: faces connected by edges
+ * with two faces, or around edges with more. The mesh's workspace owns it. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_find_shells(const ebpo_mesh *mesh, unsigned threads,
+                                                uint32_t **closed, ebpo_error *error);
+
+/* Decides which vertices stay and which they become, by the rule of ebpo_mesh_weld_within, in a
+ * mesh without vertices at one position. map [vertex_count]: the new number of each; from
+ * [vertex_count]: the *kept vertices that stay, ascending; *moved: the largest distance. */
 EBPO_MUST_USE ebpo_status ebpo_weld_group_within(const ebpo_mesh *mesh, double distance,
                                                  uint32_t *map, uint32_t *from, uint64_t *kept,
                                                  double *moved, ebpo_error *error);

@@ -124,10 +124,10 @@ static ebpo_status group_within(welding *w, ebpo_error *error)
 {
     const ebpo_mesh *mesh = w->mesh;
     w->from = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *w->from);
-    return w->from ? ebpo_weld_group_within(mesh, w->distance, w->map, w->from, &w->kept, &w->moved,
-                                            error)
-                   : ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * sizeof *w->from,
-                                         error);
+    return w->from
+               ? ebpo_weld_group_within(mesh, w->distance, w->map, w->from, &w->kept, &w->moved,
+                                        error)
+               : ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * sizeof *w->from, error);
 }
 
 /* --- what stays --- */

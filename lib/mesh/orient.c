@@ -1,13 +1,14 @@
 #include "geom/strict_fp.h"
 
+#include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/arrays.h"
+#include "mesh/edge_faces.h"
 #include "mesh/mesh_frame.h"
 #include "mesh/mesh_parts.h"
 #include "mesh/stars.h"
@@ -15,10 +16,23 @@
 
 enum { FACE_GRAIN = 1 << 14, VERTEX_GRAIN = 1 << 13 };
 
-/* What is found at faces, and in the end of their patch. */
-enum { OPEN = 1, INCONSISTENT = 2, TWISTED = 4 };
+/* What is found at faces, and in the end of their patch. OPEN: edges with more than two faces do
+ * not balance within it; BOUNDARY: it has an edge with one face. The others are of patches that
+ * are joined around edges with more than two faces: ROOT: was a patch before; CONTRADICTED: faces
+ * around its edges cannot alternate; SEPARATE: is to be a patch again. */
+enum {
+    OPEN = 1,
+    INCONSISTENT = 2,
+    TWISTED = 4,
+    BOUNDARY = 8,
+    ROOT = 16,
+    CONTRADICTED = 32,
+    UNBALANCED = 64,
+    SEPARATE = 128
+};
 
-/* A patch, faces connected by edges that are used exactly twice, that is to be made consistent. */
+/* A patch that is to be made consistent: faces connected by edges that are used exactly twice, or
+ * around edges that are used oftener, where that closes it (join_crowded). */
 typedef struct patch {
     uint32_t root;
     uint32_t seed;          /* its first face in the source, which decides when nothing else does */
@@ -27,13 +41,23 @@ typedef struct patch {
     bool turn_others;       /* the faces that run as the seed does are the ones to turn */
     uint64_t count, turned; /* faces; those that run against the root */
     ebpo_sum volume;        /* six times, with all faces running as the root does */
+    double most;            /* of its terms */
 } patch;
 
-typedef struct orienting {
-    ebpo_mesh *mesh;
+typedef struct orienting orienting;
+typedef ebpo_status (*edge_fn)(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
+                               unsigned worker, ebpo_error *error);
+
+struct orienting {
+    const ebpo_mesh *mesh; /* whose faces are turned in the end */
+    unsigned threads;
+    edge_fn visit; /* what is done at edges, or at those with more than two faces only */
+    bool crowded_only;
     ebpo_mesh_frame frame; /* of volumes, of which signs count */
     ebpo_stars stars;
-    ebpo_star *star; /* one for each thread */
+    ebpo_star *star;         /* one for each thread */
+    ebpo_edge_faces *around; /* one for each thread */
+    bool crowded;            /* edges with more than two faces were met */
     /* [face_count] a lower face of the patch, or itself: number << 1 | 1 when the two run against
      * each other */
     uint64_t *above;
@@ -42,7 +66,7 @@ typedef struct orienting {
     uint64_t patch_count, patch_capacity;
     uint64_t flipped, unorientable;
     pthread_mutex_t lock; /* of the patches' volumes */
-} orienting;
+};
 
 /* --- joining faces to patches --- */
 
@@ -87,9 +111,12 @@ static void flag(orienting *o, uint32_t face, uint8_t flags)
 static void visit_edge(orienting *o, const ebpo_link *links, uint64_t uses)
 {
     uint32_t a = ebpo_link_face(&links[0]), b = ebpo_link_face(&links[uses - 1]);
+    if (uses > 2) {
+        __atomic_store_n(&o->crowded, true, __ATOMIC_RELAXED);
+        return;
+    }
     if (uses != 2 || a == b) {
-        for (uint64_t i = 0; i < uses; i++)
-            flag(o, ebpo_link_face(&links[i]), OPEN);
+        flag(o, a, BOUNDARY);
         return;
     }
     uint64_t turned = links[0].out == links[1].out;
@@ -106,8 +133,16 @@ static ebpo_status begin_faces(void *context, uint64_t begin, uint64_t end, unsi
     (void)worker, (void)error;
     for (uint64_t f = begin; f < end; f++) {
         o->above[f] = f << 1;
-        o->flags[f] = ebpo_face_repeats_index(o->mesh->faces + 3 * f) ? OPEN : 0;
+        o->flags[f] = ebpo_face_repeats_index(o->mesh->faces + 3 * f) ? BOUNDARY : 0;
     }
+    return EBPO_OK;
+}
+
+static ebpo_status join_edge(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
+                             unsigned worker, ebpo_error *error)
+{
+    (void)v, (void)worker, (void)error;
+    visit_edge(o, links, uses);
     return EBPO_OK;
 }
 
@@ -116,36 +151,47 @@ static ebpo_status visit_vertices(void *context, uint64_t begin, uint64_t end, u
 {
     orienting *o = context;
     ebpo_star *star = &o->star[worker];
+    ebpo_status status = EBPO_OK;
     EBPO_FOR_ITEMS_SCATTERED(o->mesh->workspace, v, begin, end) {
         if (!ebpo_star_gather(star, &o->stars, o->mesh, (uint32_t)v))
             return ebpo_fail_memory(error, star->capacity * 2 * sizeof *star->links);
-        for (uint64_t i = 0, next; i < star->count; i = next) {
+        for (uint64_t i = 0, next; i < star->count && status == EBPO_OK; i = next) {
             next = ebpo_star_run_end(star, i);
-            if (ebpo_link_neighbour(&star->links[i]) > v)
-                visit_edge(o, star->links + i, next - i);
+            if (ebpo_link_neighbour(&star->links[i]) > v && (!o->crowded_only || next - i > 2))
+                status = o->visit(o, star->links + i, next - i, (uint32_t)v, worker, error);
         }
+        if (status != EBPO_OK)
+            return status;
     }
-    return EBPO_OK;
+    return status;
+}
+
+static ebpo_status visit_edges(orienting *o, edge_fn visit, bool crowded_only, ebpo_error *error)
+{
+    o->visit = visit;
+    o->crowded_only = crowded_only;
+    return ebpo_parallel_for(o->threads, NULL, o->mesh->vertex_count, VERTEX_GRAIN, visit_vertices,
+                             o, NULL, "", error);
 }
 
 static ebpo_status join_faces(orienting *o, ebpo_error *error)
 {
-    unsigned threads = ebpo_thread_count(0);
-    ebpo_status status = ebpo_stars_build(&o->stars, o->mesh, threads, NULL, error);
-    o->star = ebpo_alloc_zero(threads, sizeof *o->star);
+    ebpo_status status = ebpo_stars_build(&o->stars, o->mesh, o->threads, NULL, error);
+    o->star = ebpo_alloc_zero(o->threads, sizeof *o->star);
     if (status == EBPO_OK && !o->star)
-        status = ebpo_fail_memory(error, threads * sizeof *o->star);
+        status = ebpo_fail_memory(error, o->threads * sizeof *o->star);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, o->mesh->workspace, o->mesh->face_count, FACE_GRAIN,
+        status = ebpo_parallel_for(o->threads, o->mesh->workspace, o->mesh->face_count, FACE_GRAIN,
                                    begin_faces, o, NULL, "", error);
-    if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, o->mesh->vertex_count, VERTEX_GRAIN,
-                                   visit_vertices, o, NULL, "", error);
-    for (unsigned t = 0; o->star && t < threads; t++)
+    return status == EBPO_OK ? visit_edges(o, join_edge, false, error) : status;
+}
+
+static void free_stars(orienting *o)
+{
+    for (unsigned t = 0; o->star && t < o->threads; t++)
         ebpo_star_free(&o->star[t]);
     free(o->star);
     ebpo_stars_free(&o->stars);
-    return status;
 }
 
 /* Each face is put below its root directly, which learns what was found at it. Roots come before
@@ -157,6 +203,149 @@ static void gather_flags(orienting *o)
         o->above[f] = root;
         o->flags[root >> 1] |= o->flags[f];
     }
+}
+
+/* --- edges with more than two faces --- */
+
+/* Returns the patch of a face, shifted, and 1 when it runs against it. */
+static uint64_t patch_at(const orienting *o, uint32_t face)
+{
+    return __atomic_load_n(&o->flags[face], __ATOMIC_RELAXED) & ROOT
+               ? (uint64_t)face << 1
+               : __atomic_load_n(&o->above[face], __ATOMIC_RELAXED);
+}
+
+/* Lists the faces at an edge that may be used: `joined`: with the patch that theirs is in now. */
+static bool list_around(orienting *o, const ebpo_link *links, uint64_t uses, bool joined,
+                        ebpo_edge_faces *e)
+{
+    e->count = 0;
+    for (uint64_t i = 0; i < uses; i++) {
+        uint32_t face = ebpo_link_face(&links[i]);
+        uint64_t up = patch_at(o, face);
+        if (joined)
+            up = find_root(o->above, (uint32_t)(up >> 1)) ^ (up & 1);
+        if (!ebpo_edge_faces_add(e, face, links[i].out, up))
+            return false;
+    }
+    return true;
+}
+
+static void flag_unbalanced(orienting *o, ebpo_edge_faces *e, uint8_t flags)
+{
+    ebpo_edge_faces_sort(e);
+    for (uint64_t i = 0, next; i < e->count; i = next) {
+        int64_t sum = 0;
+        for (next = i; next < e->count && e->face[next].patch >> 1 == e->face[i].patch >> 1; next++)
+            sum += (e->face[next].out ^ (e->face[next].patch & 1)) ? 1 : -1;
+        if (sum)
+            flag(o, (uint32_t)(e->face[i].patch >> 1), flags);
+    }
+}
+
+static ebpo_status find_open(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
+                             unsigned worker, ebpo_error *error)
+{
+    ebpo_edge_faces *e = &o->around[worker];
+    (void)v;
+    if (!list_around(o, links, uses, false, e))
+        return ebpo_fail_memory(error, uses * sizeof *e->face);
+    flag_unbalanced(o, e, OPEN);
+    return EBPO_OK;
+}
+
+static ebpo_status find_unbalanced(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
+                                   unsigned worker, ebpo_error *error)
+{
+    ebpo_edge_faces *e = &o->around[worker];
+    (void)v;
+    if (!list_around(o, links, uses, true, e))
+        return ebpo_fail_memory(error, uses * sizeof *e->face);
+    flag_unbalanced(o, e, UNBALANCED);
+    return EBPO_OK;
+}
+
+/* Faces of patches that are not closed by themselves alternate around the edge, as the boundary of
+ * a solid does: what is within and what is outside take turns. */
+static ebpo_status join_around(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
+                               unsigned worker, ebpo_error *error)
+{
+    ebpo_edge_faces *e = &o->around[worker];
+    uint64_t kept = 0;
+    if (!list_around(o, links, uses, false, e))
+        return ebpo_fail_memory(error, uses * sizeof *e->face);
+    for (uint64_t i = 0; i < e->count; i++) {
+        uint8_t flags = __atomic_load_n(&o->flags[e->face[i].patch >> 1], __ATOMIC_RELAXED);
+        if (flags & OPEN && !(flags & (BOUNDARY | TWISTED)))
+            e->face[kept++] = e->face[i];
+    }
+    e->count = kept;
+    bool turns = kept % 2 == 0 && ebpo_edge_faces_turn(e, o->mesh, v, ebpo_link_neighbour(links));
+    if (!turns || !ebpo_edge_faces_alternate(e))
+        for (uint64_t i = 0; i < kept; i++)
+            flag(o, (uint32_t)(e->face[i].patch >> 1), INCONSISTENT);
+    for (uint64_t i = 0; turns && i + 1 < kept; i++) {
+        const ebpo_edge_face *a = &e->face[i], *b = a + 1;
+        uint64_t turned = a->out == b->out;
+        if (!join(o->above, (uint32_t)(a->patch >> 1), (uint32_t)(b->patch >> 1),
+                  (turned ^ a->patch ^ b->patch) & 1))
+            flag(o, (uint32_t)(a->patch >> 1), CONTRADICTED);
+    }
+    return EBPO_OK;
+}
+
+/* Patches whose joining did not close them are patches by themselves again. Those that alternate
+ * around every edge as they are stay joined, whatever order layers in one plane were given. */
+static void separate_patches(orienting *o)
+{
+    const uint8_t bad = CONTRADICTED | UNBALANCED;
+    ebpo_workspace *workspace = o->mesh->workspace;
+    EBPO_FOR_ITEMS_SCATTERED(workspace, f, 0, o->mesh->face_count) {
+        if (o->flags[f] & ROOT)
+            o->flags[find_root(o->above, (uint32_t)f) >> 1] |= o->flags[f] & (bad | INCONSISTENT);
+    }
+    EBPO_FOR_ITEMS_SCATTERED(workspace, f, 0, o->mesh->face_count) {
+        if (!(o->flags[f] & ROOT))
+            continue;
+        uint32_t root = (uint32_t)(find_root(o->above, (uint32_t)f) >> 1);
+        bool separate = o->flags[root] & INCONSISTENT && o->flags[root] & bad;
+        o->flags[f] |= separate ? SEPARATE : 0;
+        o->unorientable += separate && root == f && o->flags[f] & CONTRADICTED;
+    }
+    EBPO_FOR_ITEMS(workspace, f, 0, o->mesh->face_count) {
+        if (o->flags[f] & SEPARATE)
+            o->above[f] = f << 1;
+        else if (o->flags[f] & ROOT)
+            o->flags[f] &= (uint8_t)~OPEN;
+    }
+}
+
+/* Joins patches around edges with more than two faces, where that closes them. A patch that is
+ * closed by itself, such as a cube that shares an edge with another one, stays alone. */
+static ebpo_status join_crowded(orienting *o, ebpo_error *error)
+{
+    EBPO_FOR_ITEMS(o->mesh->workspace, f, 0, o->mesh->face_count)
+        o->flags[f] |= o->above[f] >> 1 == f ? ROOT : 0;
+    o->around = ebpo_alloc_zero(o->threads, sizeof *o->around);
+    if (!o->around)
+        return ebpo_fail_memory(error, o->threads * sizeof *o->around);
+    ebpo_status status = visit_edges(o, find_open, true, error);
+    if (status == EBPO_OK)
+        status = visit_edges(o, join_around, true, error);
+    if (status == EBPO_OK)
+        status = visit_edges(o, find_unbalanced, true, error);
+    for (unsigned t = 0; t < o->threads; t++)
+        free(o->around[t].face);
+    free(o->around);
+    if (status != EBPO_OK)
+        return status;
+    separate_patches(o);
+    EBPO_FOR_ITEMS_SCATTERED(o->mesh->workspace, f, 0, o->mesh->face_count) {
+        uint64_t root = find_root(o->above, (uint32_t)f);
+        o->above[f] = o->flags[root >> 1] & INCONSISTENT ? root : root & ~UINT64_C(1);
+        o->flags[root >> 1] |= o->flags[f] & (INCONSISTENT | BOUNDARY | TWISTED);
+    }
+    return EBPO_OK;
 }
 
 /* --- deciding --- */
@@ -172,8 +361,9 @@ static bool list_patches(orienting *o)
         if (!ebpo_array_grow(o->mesh->workspace, &o->patches, &o->patch_capacity,
                              o->patch_count + 1, sizeof *o->patches))
             return false;
-        o->patches[o->patch_count++] =
-            (patch){ .root = (uint32_t)f, .seed = (uint32_t)f, .closed = !(o->flags[f] & OPEN) };
+        o->patches[o->patch_count++] = (patch){ .root = (uint32_t)f,
+                                                .seed = (uint32_t)f,
+                                                .closed = !(o->flags[f] & (OPEN | BOUNDARY)) };
     }
     return true;
 }
@@ -213,10 +403,11 @@ static void count_faces(orienting *o)
         o->patches[i].seed_turned = o->above[o->patches[i].seed] & 1;
 }
 
-static void add_volume(orienting *o, patch *p, const ebpo_sum *sum)
+static void add_volume(orienting *o, patch *p, const ebpo_sum *sum, double most)
 {
     pthread_mutex_lock(&o->lock);
     ebpo_sum_merge(&p->volume, sum);
+    p->most = fmax(p->most, most);
     pthread_mutex_unlock(&o->lock);
 }
 
@@ -229,15 +420,16 @@ static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned
     (void)worker, (void)error;
     ebpo_sum sum = { .adds = 0 };
     patch *last = NULL;
-    double base[3] = { 0, 0, 0 };
+    double base[3] = { 0, 0, 0 }, most = 0;
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, begin, end) {
         patch *p = patch_of(o, f, last);
         if (!p || !p->closed)
             continue;
         if (p != last) {
             if (last)
-                add_volume(o, last, &sum);
+                add_volume(o, last, &sum, most);
             sum = (ebpo_sum){ .adds = 0 };
+            most = 0;
             last = p;
             ebpo_frame_position(&o->frame, mesh, mesh->faces[3 * (uint64_t)p->seed], base);
         }
@@ -249,16 +441,18 @@ static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned
         ebpo_face_cross(a, b, c, cross);
         double term =
             (a[0] - base[0]) * cross[0] + (a[1] - base[1]) * cross[1] + (a[2] - base[2]) * cross[2];
+        most = fmax(most, fabs(term));
         ebpo_sum_add(&sum, o->above[f] & 1 ? -term : term);
     }
     if (last)
-        add_volume(o, last, &sum);
+        add_volume(o, last, &sum, most);
     return EBPO_OK;
 }
 
 static void decide(patch *p)
 {
     double volume = p->closed ? ebpo_sum_value(&p->volume) : 0;
+    volume = ebpo_volume_is_noise(volume, p->count, p->most) ? 0 : volume;
     volume = p->seed_turned ? -volume : volume;
     uint64_t against_seed = p->seed_turned ? p->count - p->turned : p->turned;
     p->turn_others = volume < 0 || (!(volume > 0) && against_seed > p->count - against_seed);
@@ -282,25 +476,35 @@ static ebpo_status flip(void *context, uint64_t begin, uint64_t end, unsigned wo
     return EBPO_OK;
 }
 
-static ebpo_status run(orienting *o, ebpo_error *error)
+/* Finds the patches: `above` and `flags` say of each face what its patch is. */
+static ebpo_status find_patches(orienting *o, ebpo_error *error)
 {
-    ebpo_mesh *mesh = o->mesh;
+    const ebpo_mesh *mesh = o->mesh;
     uint64_t count = mesh->face_count;
+    o->threads = ebpo_thread_count(o->threads);
     o->above = ebpo_array_alloc(mesh->workspace, count, sizeof *o->above);
     o->flags = ebpo_array_alloc(mesh->workspace, count, 1);
     if (!o->above || !o->flags)
         return ebpo_workspace_fail(mesh->workspace, count * 9, error);
     ebpo_status status = join_faces(o, error);
-    if (status != EBPO_OK)
-        return status;
-    gather_flags(o);
+    if (status == EBPO_OK)
+        gather_flags(o);
+    if (status == EBPO_OK && o->crowded)
+        status = join_crowded(o, error);
+    free_stars(o);
+    return status;
+}
+
+static ebpo_status turn_patches(orienting *o, ebpo_error *error)
+{
+    uint64_t count = o->mesh->face_count;
     if (!list_patches(o))
-        return ebpo_workspace_fail(mesh->workspace, o->patch_count * sizeof *o->patches, error);
+        return ebpo_workspace_fail(o->mesh->workspace, o->patch_count * sizeof *o->patches, error);
     if (o->patch_count == 0)
         return EBPO_OK;
     count_faces(o);
-    o->frame = ebpo_mesh_frame_of(mesh);
-    status = ebpo_parallel_for(0, NULL, count, FACE_GRAIN, measure, o, NULL, "", error);
+    o->frame = ebpo_mesh_frame_of(o->mesh);
+    ebpo_status status = ebpo_parallel_for(0, NULL, count, FACE_GRAIN, measure, o, NULL, "", error);
     for (uint64_t i = 0; i < o->patch_count; i++)
         decide(&o->patches[i]);
     return status == EBPO_OK
@@ -308,28 +512,57 @@ static ebpo_status run(orienting *o, ebpo_error *error)
                : status;
 }
 
-ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+/* Writes each face's patch if that is closed, else EBPO_NO_INDEX. */
+static ebpo_status list_closed(const orienting *o, uint32_t **closed, ebpo_error *error)
+{
+    const ebpo_mesh *mesh = o->mesh;
+    *closed = ebpo_array_alloc(mesh->workspace, mesh->face_count, sizeof **closed);
+    if (!*closed)
+        return ebpo_workspace_fail(mesh->workspace, mesh->face_count * sizeof **closed, error);
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
+        uint64_t root = o->above[f] >> 1;
+        bool open = o->flags[root] & (OPEN | BOUNDARY | TWISTED);
+        (*closed)[f] = open ? EBPO_NO_INDEX : (uint32_t)root;
+    }
+    return EBPO_OK;
+}
+
+static void free_all(orienting *o)
+{
+    pthread_mutex_destroy(&o->lock);
+    ebpo_array_free(o->mesh->workspace, o->above);
+    ebpo_array_free(o->mesh->workspace, o->flags);
+    ebpo_array_free(o->mesh->workspace, o->patches);
+}
+
+ebpo_status ebpo_mesh_find_shells(const ebpo_mesh *mesh, unsigned threads, uint32_t **closed,
+                                  ebpo_error *error)
+{
+    orienting o = { .mesh = mesh, .threads = threads, .lock = PTHREAD_MUTEX_INITIALIZER };
+    *closed = NULL;
+    ebpo_status status = find_patches(&o, error);
+    if (status == EBPO_OK)
+        status = list_closed(&o, closed, error);
+    free_all(&o);
+    return status;
+}
+
+ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record, uint32_t **closed,
+                                      ebpo_error *error)
 {
     orienting o = { .mesh = mesh, .lock = PTHREAD_MUTEX_INITIALIZER };
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
-    if (status != EBPO_OK)
-        return status;
-    status = run(&o, error);
+    if (status == EBPO_OK)
+        status = find_patches(&o, error);
+    if (status == EBPO_OK && closed)
+        status = list_closed(&o, closed, error);
+    if (status == EBPO_OK)
+        status = turn_patches(&o, error);
     if (status == EBPO_OK && record) {
         record->orient = true;
         record->flipped_faces += o.flipped;
         record->unorientable_components += o.unorientable;
     }
-    pthread_mutex_destroy(&o.lock);
-    ebpo_array_free(mesh->workspace, o.above);
-    ebpo_array_free(mesh->workspace, o.flags);
-    ebpo_array_free(mesh->workspace, o.patches);
+    free_all(&o);
     return status;
-}
-
-ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
-{
-    EBPO_DEFAULT_FP;
-    ebpo_status status = ebpo_mesh_make_consistent(mesh, record, error);
-    return status == EBPO_OK ? ebpo_mesh_turn_closed(mesh, record, error) : status;
 }

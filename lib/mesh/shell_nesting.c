@@ -156,11 +156,12 @@ static ebpo_status nest(nesting *n, ebpo_error *error)
     return status == EBPO_OK ? ebpo_nesting_cast(n, error) : status;
 }
 
-ebpo_status ebpo_nesting_find(nesting *n, const ebpo_mesh *mesh, unsigned threads,
+ebpo_status ebpo_nesting_find(nesting *n, const ebpo_mesh *mesh, uint32_t *closed, unsigned threads,
                               const ebpo_progress *progress, ebpo_error *error)
 {
     n->threads = ebpo_thread_count(threads);
-    ebpo_status status = ebpo_components_find(mesh, threads, progress, &n->components, error);
+    ebpo_status status =
+        ebpo_components_find(mesh, closed, threads, progress, &n->components, error);
     return status == EBPO_OK ? nest(n, error) : status;
 }
 

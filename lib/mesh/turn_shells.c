@@ -1,4 +1,4 @@
-/* Closed components look outwards, or inwards where they bound a cavity. */
+/* Shells look outwards, or inwards where they bound a cavity. */
 #include "geom/strict_fp.h"
 
 #include <ebpo/repair.h>
@@ -15,13 +15,14 @@ static uint64_t turn_shell(const ebpo_components *c, uint32_t component)
     return end - begin;
 }
 
-ebpo_status ebpo_mesh_turn_closed(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed, ebpo_mend_record *record,
+                                  ebpo_error *error)
 {
     nesting n = { .components = NULL };
     uint64_t turned = 0;
     if (mesh->face_count == 0)
         return EBPO_OK;
-    ebpo_status status = ebpo_nesting_find(&n, mesh, 0, NULL, error);
+    ebpo_status status = ebpo_nesting_find(&n, mesh, closed, 0, NULL, error);
     for (uint64_t i = 0; i < n.count && status == EBPO_OK; i++)
         if (ebpo_shell_looks_inwards(&n, &n.shells[i]) != ebpo_shell_is_cavity(&n.shells[i]))
             turned += turn_shell(n.components, n.shells[i].component);

@@ -109,8 +109,9 @@ static int put_distance(double (*factor)[2], double sign, const double p[3], con
 {
     int n = 0;
     for (int k = 0; k < 3; k++) {
-        const double products[4][2] = { { p[k], p[k] }, { q[k], q[k] }, { p[k], -q[k] },
-                                        { p[k], -q[k] } };
+        const double products[4][2] = {
+            { p[k], p[k] }, { q[k], q[k] }, { p[k], -q[k] }, { p[k], -q[k] }
+        };
         for (int i = 0; i < 4; i++, n++) {
             factor[n][0] = sign * products[i][0];
             factor[n][1] = products[i][1];
@@ -302,8 +303,7 @@ static ebpo_status group(grouping *g, uint32_t *from, uint64_t *kept, double *mo
 }
 
 ebpo_status ebpo_weld_group_within(const ebpo_mesh *mesh, double distance, uint32_t *map,
-                                   uint32_t *from, uint64_t *kept, double *moved,
-                                   ebpo_error *error)
+                                   uint32_t *from, uint64_t *kept, double *moved, ebpo_error *error)
 {
     grouping g = { .mesh = mesh, .distance = distance, .map = map };
     ebpo_status status = group(&g, from, kept, moved, error);

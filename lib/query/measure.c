@@ -45,7 +45,7 @@ typedef struct moments {
 
 typedef struct pass {
     const ebpo_mesh *mesh;
-    const uint32_t *component; /* [vertices]; NULL: all faces count once */
+    const uint32_t *component; /* [faces]; NULL: all faces count once */
     int8_t *times;             /* [components] how often its faces count */
     frame frame;
     moments *blocks;
@@ -163,7 +163,7 @@ static void add_face(moments *m, const double corner[3][3], const double middle[
 
 static int times_of(const pass *p, uint64_t face)
 {
-    return p->component ? p->times[p->component[p->mesh->faces[3 * face]]] : 1;
+    return p->component ? p->times[p->component[face]] : 1;
 }
 
 static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -240,7 +240,7 @@ static ebpo_status count_components(pass *p, const ebpo_solid_shells *s, ebpo_ru
         return ebpo_fail_memory(error, c->count * sizeof *p->times);
     for (uint64_t i = 0; i < c->count; i++)
         p->times[i] = (int8_t)ebpo_component_times(s, (uint32_t)i, rule);
-    p->component = c->number;
+    p->component = c->of_face;
     return EBPO_OK;
 }
 

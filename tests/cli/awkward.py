@@ -248,6 +248,16 @@ known("touch_at_an_edge", lambda: welded(joined(box(), box((1, 1, 0), (2, 2, 1))
       [(0.5, 0.5, 0.5), (1.5, 1.5, 0.5)], [(0.5, 1.5, 0.5)], fine=True)
 known("touch_at_a_vertex", lambda: welded(joined(box(), box((1, 1, 1), (2, 2, 2)))), 2.0,
       [(0.5, 0.5, 0.5), (1.5, 1.5, 1.5)], [(0.5, 1.5, 0.5)], fine=True)
+at_edge, at_vertex = lambda: box((1, 1, 0), (2, 2, 1)), lambda: box((1, 1, 1), (2, 2, 2))
+CORNERS = [(0.5, 0.5, 0.5), (1.5, 1.5, 0.5)]
+known("two_at_edge", lambda: welded(joined(box(), turned(at_edge()))), 2.0, CORNERS, [(0.5, 1.5, 0.5)])
+known("two_at_edge_most_turned", lambda: welded(joined(box(), turned(at_edge(), lambda i: i > 1))), 2.0, CORNERS, [(0.5, 1.5, 0.5)])
+known("two_at_vertex", lambda: welded(joined(box(), turned(at_vertex()))), 2.0,
+      [(0.5, 0.5, 0.5), (1.5, 1.5, 1.5)], [(0.5, 1.5, 0.5)])
+known("two_at_face", lambda: welded(joined(box(), turned(second()))), 2.0, TWO, [FAR])
+known("two_at_face_some_turned", lambda: turned(welded(joined(box(), second())), lambda i: i % 5 == 1), 2.0, TWO, [FAR])
+known("four_around_an_edge", lambda: turned(welded(joined(box(), second(), at_edge(), box((0, 1, 0), (1, 2, 1)))),
+      lambda i: i % 7 == 3), 4.0, TWO + CORNERS, [FAR])
 cube("all_repeated", lambda: joined_faces(box(), box()))
 known("twice_at_one_place", lambda: joined(box(), box()), 2.0, [MIDDLE], [FAR])
 known("two_apart", lambda: joined(box(), box((3, 0, 0), (4, 1, 1))), 2.0,
@@ -288,6 +298,8 @@ known("tube", lambda: tube(), volume_of((lambda m: more(m, [(0, 0, 0), (0, 0, 2)
 known("tube_unwelded", lambda: unwelded(tube()), volume_of((lambda m: more(m, [(0, 0, 0), (0, 0, 2)],
       [(80, (j + 1) % 16, j) for j in range(16)] + [(81, 64 + j, 64 + (j + 1) % 16) for j in range(16)]))(tube())),
       [(0, 0, 1)], [(2, 0, 0)])
+known("noisy_soup", lambda: (lambda r, m: ([tuple(x + r.uniform(-0.003, 0.003) for x in p) for p in m[0]], m[1]))(
+      random.Random(5), unwelded(box())))
 known("tube_of_a_long_rim", lambda: tube(600, 1))
 known("moebius", moebius)
 known("moebius_unwelded", lambda: unwelded(moebius()))

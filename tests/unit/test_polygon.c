@@ -470,10 +470,12 @@ END_TEST
 
 START_TEST(folded_quads_and_stars_are_guesses)
 {
-    static const int64_t fold[][3] = { { -12, -27, 17 }, { -16, 9, -1 }, { 43, 9, -13 },
-                                       { -16, 9, -2 } };
-    static const int64_t star[][3] = { { 0, 3, 0 }, { -2, -3, 0 }, { 3, 1, 0 }, { -3, 1, 0 },
-                                       { 2, -3, 0 } };
+    static const int64_t fold[][3] = {
+        { -12, -27, 17 }, { -16, 9, -1 }, { 43, 9, -13 }, { -16, 9, -2 }
+    };
+    static const int64_t star[][3] = {
+        { 0, 3, 0 }, { -2, -3, 0 }, { 3, 1, 0 }, { -3, 1, 0 }, { 2, -3, 0 }
+    };
     w.n = 4;
     memcpy(w.at, fold, sizeof fold);
     ck_assert_int_eq(cut_whole(0), EBPO_POLYGON_GUESSED);

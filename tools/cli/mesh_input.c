@@ -87,10 +87,11 @@ static ebpo_status count_repeated(mesh_input *p, unsigned threads, ebpo_error *e
     return status;
 }
 
-/* Of a single component the volume's sign tells which way it looks. */
+/* Counts shells. Of one that is a 2-manifold the volume's sign says which way it looks. */
 static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *how, ebpo_error *error)
 {
-    if (!p->prepared.report.balanced || p->prepared.report.components < 2)
+    const ebpo_mesh_report *r = &p->prepared.report;
+    if (!r->balanced || (r->manifold && r->components < 2))
         return EBPO_OK;
     p->shells = (ebpo_shells)EBPO_SHELLS_INIT;
     p->counted = true;

@@ -10,9 +10,9 @@
 
 typedef struct mending {
     bool weld, drop_duplicates, orient, flip, fill_holes;
-    bool repair; /* the shortest sequence of these that leaves a plausible solid */
+    bool repair;          /* the shortest sequence of these that leaves a plausible solid */
     double weld_distance; /* above 0: vertices are merged within it, before repairs are tried */
-    bool advise; /* no option: without any of these, find out which one that is */
+    bool advise;          /* no option: without any of these, find out which one that is */
 } mending;
 
 typedef struct mesh_input {

@@ -259,8 +259,9 @@ static ebpo_status build_parts(part_build *build, mesh_input *p, const char *fol
 static stage_facts plan_stages(const values *v, const char *in)
 {
     const char *dot = strrchr(in, '.');
-    return (stage_facts){ .mended = v->mend.weld || v->mend.weld_distance > 0 || v->mend.drop_duplicates || v->mend.orient ||
-                                    v->mend.flip || v->mend.fill_holes || v->mend.repair ||
+    return (stage_facts){ .mended = v->mend.weld || v->mend.weld_distance > 0 ||
+                                    v->mend.drop_duplicates || v->mend.orient || v->mend.flip ||
+                                    v->mend.fill_holes || v->mend.repair ||
                                     (dot && strcasecmp(dot, ".stl") == 0),
                           .solid = true,
                           .from_leaves =

@@ -373,7 +373,7 @@ typedef struct ebpo_mend_record {
 
     uint64_t flipped_faces;
 
-    /* Components left as they were. */
+    /* Parts that cannot be oriented, or whose faces around an edge cannot alternate. */
     uint64_t unorientable_components;
 
     uint64_t filled_holes;
@@ -484,17 +484,23 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
                                                             ebpo_error *error);
 
 /*
- * Makes neighbouring faces agree, component by component, across edges that are
- * used twice, and closed components look outwards, or inwards where they bound a
- * cavity.
+ * Makes neighbouring faces agree across edges that are used twice, and shells look
+ * outwards, or inwards where they bound a cavity.
  *
- * A component that is closed (each edge is used as often in one direction as in
- * the other) is turned to have a positive volume, or a negative one if it is
- * within an odd number of other closed ones. It is within one if its least and
- * greatest vertices along each axis are, where the winding number is not zero,
- * which is decided exactly. An open component is turned so that most of its faces
- * stay as they were. A component that cannot be oriented is left alone and
- * counted. So do not orient a mesh in which solids are meant to be within others.
+ * A shell is a set of faces that is closed by itself (each edge is used by it as often
+ * in one direction as in the other): faces connected by edges that are used twice, as
+ * each of two cubes that share a vertex or an edge; else such sets joined around edges
+ * that are used oftener, where faces of alternating direction close them, as in stacked
+ * cubes. The order around an edge is decided exactly; of faces in one plane it is that
+ * of their numbers. What alternates already stays as it is.
+ *
+ * A shell is turned to have a positive volume, or a negative one if it is within an odd
+ * number of others. It is within one if its least and greatest vertices along each axis
+ * are, where the winding number is not zero, which is decided exactly. Open parts are
+ * turned so that most of their faces stay as they were. A part that cannot be oriented
+ * is left alone and counted; so is one whose faces around an edge cannot alternate,
+ * which is then turned without regard to that edge. So do not orient a mesh in which
+ * solids are meant to be within others.
  *
  * Threads: one per mesh.
  */

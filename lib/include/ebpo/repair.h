@@ -100,7 +100,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_try_repairs(const ebpo_mesh *mesh,
                                                          unsigned threads, ebpo_progress progress,
                                                          ebpo_repairs *out, ebpo_error *error);
 
-/* Closed components by what they bound; see ebpo_mesh_orient. */
+/* Shells, also those that share vertices or edges, by what they bound; see ebpo_mesh_orient. */
 typedef struct ebpo_shells {
     size_t struct_size; /* EBPO_SHELLS_INIT sets it */
 
