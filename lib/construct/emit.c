@@ -21,7 +21,9 @@ struct ebpo_emit_scratch {
     ebpo_triangle *faces; /* of one leaf */
     uint64_t faces_capacity;
     ebpo_workspace *workspace;
-    ebpo_polytope half[EBPO_LEVELS_MAX][3]; /* of envelopes on the path to a node; along z, y, x */
+    /* [a level][3] halves of the envelopes on the path to a node, along z, y, x; too large for the
+     * stack, and allocated when the first node of the level has children */
+    ebpo_polytope (*half[EBPO_LEVELS_MAX])[3];
 };
 
 typedef struct emitter {
@@ -51,6 +53,8 @@ void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch)
         return;
     ebpo_scratch_free(scratch->envelope);
     ebpo_array_free(scratch->workspace, scratch->faces);
+    for (int level = 0; level < EBPO_LEVELS_MAX; level++)
+        free(scratch->half[level]);
     free(scratch);
 }
 
@@ -171,7 +175,10 @@ static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t wi
                           const int32_t offset[8], const ebpo_polytope *envelope)
 {
     unsigned filled = filled_children(e->s, child);
-    ebpo_polytope *z = e->scratch->half[cell.level], *y = z + 1, *x = z + 2;
+    ebpo_polytope(**half)[3] = &e->scratch->half[cell.level];
+    if (!*half && !(*half = ebpo_alloc(1, sizeof **half)))
+        return false;
+    ebpo_polytope *z = **half, *y = z + 1, *x = z + 2;
     for (unsigned o = 0; o < 8; o++) {
         if (o % 4 == 0 && filled >> o & 15)
             ebpo_polytope_half(envelope, 2, o >> 2 & 1, z);
