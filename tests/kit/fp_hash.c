@@ -169,7 +169,7 @@ static void hash_measures(hashing *h, const stiff_case *c, ebpo_file *file)
     if (status != EBPO_OK)
         fail(c, "measure", &error);
     real(h, mass.area);
-    real(h, mass.volume);
+    real(h, mass.integral);
     reals(h, mass.centroid, 3);
     reals(h, mass.inertia[0], 9);
     CALL(status, ebpo_verify(file, NULL, &report, &error));
