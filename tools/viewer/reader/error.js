@@ -16,3 +16,8 @@ export class EbpoError extends Error {
 export function formatError(where, what, next = 'get a fresh copy of the file') {
   return new EbpoError('FORMAT', `${where ? where + ': ' : ''}${what}; ${next}`);
 }
+
+/** An array that another program has stored anew: not damaged, but not in the form that the format fixes. */
+export function foreignError(where, what) {
+  return new EbpoError('UNSUPPORTED', `${where}: ${what}; write the file anew with 'ebpo repack --compat'`);
+}

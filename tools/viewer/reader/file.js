@@ -1,6 +1,6 @@
 // An open EBP-Octree file: its facts, its levels, its mesh. Bytes are fetched when they are asked for, neighbours in one request.
 import { CHUNK_BYTES_MAX, chunkBound, pipelineOf } from './chunk.js';
-import { EbpoError, formatError } from './error.js';
+import { EbpoError, foreignError, formatError } from './error.js';
 import { chooseColours, columnPaths, describeColumns } from './colours.js';
 import { INDEX_ROWS, PLACES, arraysOf, attributesFacts, checkCoding, checkFacts, chunkRows, chunkRowsFit, isList, readFacts, readLevelFacts } from './facts.js';
 import { GATES_COLS } from './gates.js';
@@ -115,7 +115,7 @@ export class EbpoFile {
       this.colours = this.#findColours(hdf5, group('/attributes', root.links.get('attributes')), info, arrays);
     for (const array of arrays.values())
       if (array.pipeline !== arrays.get('/levels/00/types').pipeline)
-        throw formatError(array.path, "the array's filters are other ones than the file's first array has");
+        throw foreignError(array.path, "the array's filters are other ones than the file's first array has");
     const counts = arrays.get('/subtrees/counts');
     if (counts && arrays.get('/subtrees/index').rows !== counts.chunkCount)
       throw formatError('/subtrees/index', "the array's length contradicts the chunks of counts");
@@ -535,19 +535,27 @@ function describe(hdf5, wanted, linked, address, info) {
   const o = address === undefined ? undefined : hdf5.object(address, path);
   if (o?.kind !== 'array')
     throw formatError(path, 'this is not an array');
-  if (o.type.class !== 'integer' || !o.type.little || ![1, 2, 4, 8].includes(o.type.size))
+  if (o.type.class !== 'integer' || ![1, 2, 4, 8].includes(o.type.size))
     throw formatError(path, 'the array is not of little-endian integers');
+  if (!o.type.little)
+    throw foreignError(path, 'the array is not of little-endian integers');
+  if (o.space.rank <= 2 && !o.space.fixed)
+    throw foreignError(path, 'the array does not have fixed dimensions');
   if (o.space.rank < 1 || o.space.rank > 2 || !o.space.fixed || o.space.dims.includes(0))
     throw formatError(path, 'the array does not have one or two fixed dimensions');
+  if (o.external || o.layout.elsewhere)
+    throw formatError(path, "the array's values are in other files or arrays, which are never looked for");
   if (!o.layout.chunked)
-    throw formatError(path, 'the array is not stored in chunks');
+    throw foreignError(path, 'the array is not stored in chunks');
+  if (o.layout.grows)
+    throw foreignError(path, "the array's chunks have an index for arrays that grow");
   const elementSize = o.type.size, rows = wanted.rows ?? o.space.dims[0], [fit] = o.layout.chunk, chunk = [fit, ...o.space.dims.slice(1)];
   if (o.layout.elementSize !== elementSize || chunk.length !== o.layout.chunk.length || chunk.some((n, i) => n !== o.layout.chunk[i]) ||
       !chunkRowsFit(info, path, o.space.dims[0], o.space.dims[1] ?? 0, elementSize, fit))
-    throw formatError(path, "the array's chunks do not have the size that the format fixes");
+    throw foreignError(path, "the array's chunks do not have the size that the format fixes");
   const pipeline = pipelineOf(o.filters, elementSize);
   if (!pipeline)
-    throw formatError(path, "the array's filters are none of the format's");
+    throw foreignError(path, "the array's filters are none of the format's");
   if (o.space.dims[0] !== rows)
     throw formatError(path, "the array's length contradicts the counts in the head");
   if ((o.space.dims[1] ?? 0) !== (gates ? GATES_COLS : cols) || !(gates ? [1] : wanted.sizes).includes(elementSize) || o.type.signed !== wanted.signed)

@@ -9,7 +9,7 @@ const SIGNATURE = [0x89, 0x48, 0x44, 0x46, 0x0d, 0x0a, 0x1a, 0x0a];
 const MESSAGES_MOST = 8192, BLOCKS_MOST = 256; // of one object header: far above what is written, far below what hurts
 
 const NIL = 0x00, DATASPACE = 0x01, LINK_INFO = 0x02, DATATYPE = 0x03, FILL_OLD = 0x04, FILL = 0x05, LINK = 0x06, LAYOUT = 0x08, GROUP_INFO = 0x0a,
-  PIPELINE = 0x0b, ATTRIBUTE = 0x0c, CONTINUATION = 0x10, ATTRIBUTE_INFO = 0x15;
+  EXTERNAL = 0x07, PIPELINE = 0x0b, ATTRIBUTE = 0x0c, CONTINUATION = 0x10, ATTRIBUTE_INFO = 0x15;
 
 /** Thrown when bytes beyond the parts at hand are needed, from `at` to `end`. */
 export class NeedBytes extends Error {
@@ -215,6 +215,7 @@ export class Hdf5 {
         case DATATYPE: parts.type = datatype(cursor); break;
         case PIPELINE: parts.filters = pipeline(cursor); break;
         case LAYOUT: parts.layout = layout(cursor); break;
+        case EXTERNAL: parts.external = true; break;
         default: break; // times, comments, reference counts: nothing that changes what is read
       }
     }
@@ -364,7 +365,7 @@ function pipeline(c) {
 function layout(c) {
   const version = c.u8(), kind = c.u8();
   if (version !== 4 || kind !== 2)
-    return { chunked: false };
+    return { chunked: false, elsewhere: kind === 3 }; // virtual
   const flags = c.u8(), rank = c.u8(), size = c.u8();
   c.must(rank >= 2 && rank <= 3 && size >= 1 && size <= 8 && (flags & ~2) === 0, 'the array is stored in an unknown way');
   const chunk = [];
@@ -375,6 +376,8 @@ function layout(c) {
     out.single = { bytes: c.uint(8), mask: c.u32() };
   else if (index === 3)
     out.pageBits = c.u8();
+  else if (index > 3)
+    return { ...out, grows: true };
   else
     c.must(index === 1, "the array's chunks have an unknown index");
   out.address = c.address();
