@@ -1,5 +1,5 @@
-/* Answers as bytes (tools/cli/answer_text.h): what leaves early, is lost or comes again, in any order,
- * is in the end each row's bytes once. */
+/* Answers as bytes (tools/cli/answer_text.h): what leaves early, is lost or comes again, in any
+ * order, is in the end each row's bytes once. */
 #include <string.h>
 
 #include "check_main.h"
@@ -98,7 +98,6 @@ START_TEST(rows_once)
     answer_text_free(&t);
 }
 END_TEST
-
 
 Suite *test_suite(void)
 {

@@ -85,8 +85,11 @@ static void check_cells(const bool filled[CELLS], uint32_t of_eight)
     ebpo_prepare_options o = EBPO_PREPARE_OPTIONS_INIT;
     ebpo_prepared p = EBPO_PREPARED_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
-    if (!m.face_count)
+    if (!m.face_count) {
+        ebpo_mesh_free(&right);
+        ebpo_mesh_free(&m);
         return;
+    }
     ck_assert_uint_eq(orient(&right).flipped_faces, 0); /* what is right stays as it is */
     ebpo_mesh_free(&right);
     turn_some(&m, of_eight);
