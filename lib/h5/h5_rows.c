@@ -69,6 +69,24 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
 }
 
 /* Returns what the values are if they are no real numbers, else NULL. */
+/* Whether this format's name, or that of its paint files, is in the file's head. */
+static bool is_of_format(hid_t file)
+{
+    enum { MOST = 64 };
+    static const char begin[] = "EBP-Octree";
+    char text[MOST] = "";
+    hid_t attribute = H5Aexists(file, "format") > 0 ? H5Aopen(file, "format", H5P_DEFAULT) : -1,
+          type = attribute >= 0 ? H5Aget_type(attribute) : -1;
+    bool fits = type >= 0 && H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 &&
+                H5Tget_size(type) <= MOST && H5Aget_storage_size(attribute) <= MOST &&
+                H5Aread(attribute, type, text) >= 0 && strncmp(text, begin, sizeof begin - 1) == 0;
+    if (type >= 0)
+        H5Tclose(type);
+    if (attribute >= 0)
+        H5Aclose(attribute);
+    return fits;
+}
+
 static const char *other_values(const dataset *d, hid_t set, hid_t type)
 {
     H5T_class_t class = H5Tget_class(type);
@@ -80,7 +98,7 @@ static const char *other_values(const dataset *d, hid_t set, hid_t type)
         return "an array in each element";
     if (class != H5T_INTEGER && class != H5T_FLOAT)
         return "text, bits or references";
-    if (H5Aexists(set, "coding") <= 0) /* every array of an .ebpo.h5 file has it, and none else */
+    if (H5Aexists(set, "coding") <= 0 || !is_of_format(d->file))
         return NULL;
     return d->most == 3 ? "codes of the .ebpo.h5 format (`ebpo extract --mesh` writes the vertices "
                           "as a PLY, which can be given instead)"
