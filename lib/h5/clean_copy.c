@@ -178,10 +178,13 @@ static bool can_decode(copying *c, const array_copy *a)
 static const char *find_values(array_copy *a)
 {
     hsize_t dims[2] = { 0, 0 };
-    hid_t space = H5Dget_space(a->set), type = H5Dget_type(a->set);
-    int rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
+    if (ebpo_h5_is_elsewhere(a->set)) /* first: H5Dget_space opens a virtual dataset's files */
+        return "the array's values are stored in another file or in other arrays, which are never "
+               "looked for";
     bool plain = (rank == 1 || rank == 2) && H5Sget_simple_extent_dims(space, dims, NULL) == rank;
     unsigned size =
+    hid_t space = H5Dget_space(a->set), type = H5Dget_type(a->set);
+    int rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
         type >= 0 && H5Tget_class(type) == H5T_INTEGER ? (unsigned)H5Tget_size(type) : 0;
     bool is_signed = size && H5Tget_sign(type) == H5T_SGN_2;
     a->type = ebpo_h5_integer_type(size, is_signed);
@@ -193,9 +196,6 @@ static const char *find_values(array_copy *a)
         return "the array is not of integers of 1, 2, 4 or 8 bytes";
     if (!plain || dims[0] == 0 || (rank == 2 && (dims[1] == 0 || dims[1] > UINT16_MAX)))
         return "the array does not have one or two dimensions";
-    if (ebpo_h5_is_elsewhere(a->set))
-        return "the array's values are stored in another file or in other arrays, which are never "
-               "looked for";
     a->shape = (ebpo_shape){ .rows = dims[0],
                              .cols = rank == 2 ? (uint32_t)dims[1] : 0,
                              .element_size = (uint8_t)size,

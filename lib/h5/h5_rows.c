@@ -68,8 +68,7 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
     return d->space < 0 || d->type < 0 ? fail(d, "the dataset is damaged", error) : EBPO_OK;
 }
 
-/* Returns what the values are if they are no real numbers, else NULL. */
-/* Whether this format's name, or that of its paint files, is in the file's head. */
+/* Returns whether the file's root names this format, or that of paint files. */
 static bool is_of_format(hid_t file)
 {
     enum { MOST = 64 };
@@ -88,6 +87,7 @@ static bool is_of_format(hid_t file)
 }
 
 static const char *other_values(const dataset *d, hid_t set, hid_t type)
+/* Returns what the values are if they are no real numbers, else NULL. */
 {
     H5T_class_t class = H5Tget_class(type);
     if (class == H5T_COMPOUND)
@@ -167,10 +167,12 @@ static herr_t look_at(hid_t file, const char *name, const H5O_info_t *info, void
     if (info->type != H5O_TYPE_DATASET)
         return 0;
     hid_t set = H5Dopen2(file, name, H5P_DEFAULT);
-    hid_t space = set >= 0 ? H5Dget_space(set) : -1, type = set >= 0 ? H5Dget_type(set) : -1;
+    /* first: H5Dget_space opens a virtual dataset's files */
+    bool here = set >= 0 && !ebpo_h5_is_elsewhere(set);
+    hid_t space = here ? H5Dget_space(set) : -1, type = here ? H5Dget_type(set) : -1;
     size_t at = strlen(c->names);
     if (space >= 0 && type >= 0 && has_rows(space, c->d->least, c->d->most, size) &&
-        !other_values(c->d, set, type) && !ebpo_h5_is_elsewhere(set)) {
+        !other_values(c->d, set, type)) {
         if (c->found < SHOWN && at + strlen(c->d->path) + strlen(name) + 8 < sizeof c->names)
             snprintf(c->names + at, sizeof c->names - at, "%s%s:/%s", at ? ", " : "", c->d->path,
                      name);
