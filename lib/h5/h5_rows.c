@@ -12,6 +12,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/text.h"
 #include "base/unnamed_file.h"
 #include "h5/apart.h"
 #include "h5/h5.h"
@@ -86,8 +87,8 @@ static bool is_of_format(hid_t file)
     return fits;
 }
 
-static const char *other_values(const dataset *d, hid_t set, hid_t type)
 /* Returns what the values are if they are no real numbers, else NULL. */
+static const char *other_values(const dataset *d, hid_t set, hid_t type)
 {
     H5T_class_t class = H5Tget_class(type);
     if (class == H5T_COMPOUND)
@@ -164,7 +165,7 @@ static herr_t look_at(hid_t file, const char *name, const H5O_info_t *info, void
     hsize_t size[2];
     if (++c->objects > OBJECTS_MOST)
         return 1;
-    if (info->type != H5O_TYPE_DATASET)
+    if (info->type != H5O_TYPE_DATASET || !ebpo_text_ok(name)) /* it is shown */
         return 0;
     hid_t set = H5Dopen2(file, name, H5P_DEFAULT);
     /* first: H5Dget_space opens a virtual dataset's files */
