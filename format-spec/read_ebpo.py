@@ -708,6 +708,16 @@ def check_vectors(folder):
         print(path.name)
 
 
+def check_weld(file):
+    """The record of welding within a distance, in files that have it."""
+    if "mend_weld_distance" in file.attrs:
+        distance, moved, _ = (one(file.attrs[name]) for name in
+                              ("mend_weld_distance", "mend_weld_moved", "mend_collapsed_faces"))
+        assert 0 < distance < float("inf"), "mend_weld_distance is not finite and above 0"
+        assert one(file.attrs["mend_weld"]) == 1, "mend_weld is 0 beside mend_weld_distance"
+        assert 0 <= moved < float("inf"), "mend_weld_moved is negative or not finite"
+
+
 def read(path):
     with h5py.File(path, "r") as file:
         assert text(file.attrs["format"]) == "EBP-Octree in HDF5" and one(file.attrs["format_version_major"]) == 1
@@ -720,6 +730,7 @@ def read(path):
                                  ("source_face_count", "mend_added_faces", "mend_dropped_faces"))
         assert dropped <= given, "more faces were dropped than the source has"
         assert one(file.attrs["face_count"]) <= given + added - dropped, "more faces than the source's"
+        check_weld(file)
         check_frames(file)
         assert content_sha256(file) == text(file.attrs["content_sha256"]), "content_sha256 differs"
         if "colours" in parts:

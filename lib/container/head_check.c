@@ -32,6 +32,14 @@ static const char *check_mesh_counts(const ebpo_info *info)
     return NULL;
 }
 
+static const char *check_weld(const ebpo_mend_record *m)
+{
+    return m->weld_distance > 0 && !(m->weld && isfinite(m->weld_distance) && m->weld_moved >= 0 &&
+                                     isfinite(m->weld_moved))
+               ? "the record of welding within a distance has values that cannot be"
+               : NULL;
+}
+
 static const char *check_box(const ebpo_info *info)
 {
     ebpo_box box = { .grid_level = info->grid_level };
@@ -90,6 +98,8 @@ ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_stat
                              ebpo_error *error)
 {
     const char *wrong = check_mesh_counts(info);
+    if (!wrong)
+        wrong = check_weld(&info->mend);
     if (!wrong)
         wrong = check_box(info);
     uint64_t faces = 0;

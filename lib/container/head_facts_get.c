@@ -313,23 +313,19 @@ static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *
     return status;
 }
 
-/* They say nothing about the file's other parts: values that cannot be are left aside. */
+/* The record of welding within a distance, which most files lack: ebpo_facts_check has the rest. */
 static ebpo_status get_weld(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                             ebpo_error *error)
 {
-    ebpo_mend_record *m = &info->mend;
+    double distance = 0;
     ebpo_status status =
-        ebpo_head_get_real(in, root, "/", ebpo_weld_facts[0].name, &m->weld_distance, 0, error);
+        ebpo_head_get_real(in, root, "/", ebpo_weld_facts[0].name, &distance, 0, error);
     if (status == EBPO_E_ABSENT)
         return EBPO_OK;
-    for (int i = 1; i < EBPO_WELD_FACTS && status == EBPO_OK; i++)
+    if (status == EBPO_OK && !(distance > 0)) /* 0 would be none */
+        return wrong_value(in, "/", ebpo_weld_facts[0].name, error);
+    for (int i = 0; i < EBPO_WELD_FACTS && status == EBPO_OK; i++)
         status = get_fact(in, root, "/", &ebpo_weld_facts[i], info, error);
-    bool known = status == EBPO_OK && m->weld && isfinite(m->weld_distance) &&
-                 m->weld_distance > 0 && isfinite(m->weld_moved) && m->weld_moved >= 0;
-    if (!known) {
-        m->weld_distance = m->weld_moved = 0;
-        m->collapsed_faces = 0;
-    }
     return status;
 }
 

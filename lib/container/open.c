@@ -13,6 +13,8 @@
 #include "container/stored_sizes.h"
 #include "http/http_source.h"
 #include "import/import.h"
+#include "import/stl_binary.h"
+#include "io/foreign_bytes.h"
 #include "ply/ply.h"
 
 /* The word says how the numbers are to be read: with another one they would be read wrong. In files
@@ -229,9 +231,9 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
                : EBPO_OK;
 }
 
-/* Returns what a file is that is no model but often given for one, and what to do with it; NULL: it
- * is not known. */
-static const char *other_kind(const uint8_t *begin, uint64_t size, const char *name)
+/* Returns what a file is by its first bytes that is no model but often given for one, and what to
+ * do with it; NULL: it is not known, or the head's error says it. */
+static const char *other_kind(const uint8_t *begin, uint64_t size, uint64_t whole_size)
 {
     static const char *const meshes[] = {
         [EBPO_IMPORT_OBJ] = "an OBJ; make one of it with 'ebpo convert'",
@@ -239,11 +241,13 @@ static const char *other_kind(const uint8_t *begin, uint64_t size, const char *n
         [EBPO_IMPORT_OFF] = "an OFF; make one of it with 'ebpo convert'"
     };
     ebpo_import_format format;
-    if (size && begin[0] == 0x89) /* HDF5 */
-        return NULL;
     if (ebpo_ply_recognise(begin, size))
         return "a PLY; make one of it with 'ebpo convert'";
-    if (ebpo_import_recognise(&format, begin, size, name))
+    if (ebpo_stl_states_size(begin, size, whole_size)) /* which begins with any bytes */
+        return meshes[EBPO_IMPORT_STL];
+    if ((size && begin[0] == 0x89) || ebpo_foreign_bytes(begin, size)) /* HDF5; the head says it */
+        return NULL;
+    if (ebpo_import_recognise(&format, begin, size, ""))
         return meshes[format];
     return size == 0 ? "an empty file; get a fresh copy of it"
            : begin[0] == '{'
@@ -258,7 +262,7 @@ static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *er
     uint8_t begin[BEGIN];
     if (ebpo_input_read(&file->in, 0, size, begin, NULL) != EBPO_OK)
         return status;
-    const char *kind = other_kind(begin, size, file->in.shown);
+    const char *kind = other_kind(begin, size, file->in.source.size);
     return kind ? ebpo_fail_file(error, status, file->in.shown, "is not an .ebpo.h5 file, but %s",
                                  kind)
                 : status;

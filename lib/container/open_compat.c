@@ -15,6 +15,7 @@
 #include "base/sized.h"
 #include "container/chunk_rows.h"
 #include "h5/compat.h"
+#include "head/head.h"
 #include "http/http_source.h"
 #include "io/byte_source.h"
 
@@ -128,6 +129,24 @@ static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_option
     return status;
 }
 
+/* Returns whether the copy lacks what an error is about. */
+static bool lacks(int copy, const char *shown, const char *object)
+{
+    char name[32];
+    ebpo_source source = EBPO_SOURCE_INIT;
+    ebpo_input input;
+    ebpo_head head = EBPO_HEAD_INIT;
+    snprintf(name, sizeof name, "/dev/fd/%d", copy);
+    if (!*object || ebpo_source_of_path(&source, name, NULL) != EBPO_OK ||
+        ebpo_input_open(&input, &source, shown, NULL) != EBPO_OK)
+        return false;
+    ebpo_status status = ebpo_head_open(&head, &input, NULL);
+    bool absent = status == EBPO_OK && ebpo_head_look(&head, object) == EBPO_HEAD_ABSENT;
+    (void)!ebpo_head_close(&head, status, NULL);
+    ebpo_input_close(&input);
+    return absent;
+}
+
 static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, ebpo_file **out,
                                 ebpo_error *error)
 {
@@ -149,7 +168,7 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
         status = ebpo_h5_clean_copy(from, fetched.fd >= 0, copy.name, shown,
                                     ebpo_rows_of_foreign_chunk, &limits, &left_out, error);
     if (status == EBPO_OK && open_copy(copy.fd, shown, o, out, &why) != EBPO_OK)
-        status = ebpo_fail_with(error, *left_out.message && strstr(why.message, "is missing")
+        status = ebpo_fail_with(error, *left_out.message && lacks(copy.fd, shown, why.object)
                                            ? &left_out /* it was there, and here is what it is */
                                            : &why);
     remove_temporary(&copy);

@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/text.h"
 #include "codec/zstd_frame.h"
 #include "h5/apart.h"
 #include "h5/h5.h"
@@ -68,7 +69,8 @@ static herr_t copy_attribute(hid_t object, const char *name, const H5A_info_t *i
                   (class == H5T_STRING && H5Tis_variable_str(type) == 0)) &&
                  size > 0 && values > 0 && (uint64_t)values <= VALUE_MOST / size;
     if (++a->c->objects > OBJECTS_MOST)
-        return copy_fails(a->c, name, "the file has too many objects and attributes");
+        return copy_fails(a->c, ebpo_text_ok(name) ? name : "",
+                          "the file has too many objects and attributes");
     if (plain && H5Aread(attribute, type, value) >= 0) {
         hid_t own = H5Tcopy(type); /* in case that it is another object's */
         ebpo_status status = ebpo_h5_put_attribute(&a->c->to, a->to, name, own, H5Scopy(space), -1,
@@ -167,7 +169,7 @@ static bool can_decode(copying *c, const array_copy *a)
             what, sizeof what,
             "the array is compressed by HDF5's filter %d (%.40s), which is not built in; where "
             "its plugin is, write the file anew with `h5repack -f SHUF -f GZIP=6 -f FLET`",
-            id, *name ? name : "no name");
+            id, *name && ebpo_text_ok(name) ? name : "no name");
         leave_out(c, a->path, what);
         return false;
     }
@@ -178,6 +180,9 @@ static bool can_decode(copying *c, const array_copy *a)
 static const char *find_values(array_copy *a)
 {
     hsize_t dims[2] = { 0, 0 };
+    if (ebpo_h5_is_elsewhere(a->set)) /* first: H5Dget_space opens a virtual dataset's files */
+        return "the array's values are stored in another file or in other arrays, which are never "
+               "looked for";
     hid_t space = H5Dget_space(a->set), type = H5Dget_type(a->set);
     int rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
     bool plain = (rank == 1 || rank == 2) && H5Sget_simple_extent_dims(space, dims, NULL) == rank;
@@ -193,9 +198,6 @@ static const char *find_values(array_copy *a)
         return "the array is not of integers of 1, 2, 4 or 8 bytes";
     if (!plain || dims[0] == 0 || (rank == 2 && (dims[1] == 0 || dims[1] > UINT16_MAX)))
         return "the array does not have one or two dimensions";
-    if (ebpo_h5_is_elsewhere(a->set))
-        return "the array's values are stored in another file or in other arrays, which are never "
-               "looked for";
     a->shape = (ebpo_shape){ .rows = dims[0],
                              .cols = rank == 2 ? (uint32_t)dims[1] : 0,
                              .element_size = (uint8_t)size,
@@ -413,7 +415,7 @@ static herr_t copy_link(hid_t group, const char *name, const H5L_info_t *info, v
     bool ours = *g->path || c->depth > 0;
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
         ours = ours || strcmp(name, known[i]) == 0;
-    if (!ours || info->type != H5L_TYPE_HARD ||
+    if (!ours || info->type != H5L_TYPE_HARD || !ebpo_text_ok(name) ||
         snprintf(path, sizeof path, "%s/%s", g->path, name) >= PATH)
         return 0;
     if (++c->objects > OBJECTS_MOST)

@@ -22,8 +22,9 @@ typedef uint32_t (*ebpo_h5_chunk_rows_fn)(const char *path, const ebpo_shape *st
  * the empty file `to`, which loses its name as soon as libhdf5, which wants one, has opened it; so
  * does `from` with `from_goes`. Chunks that fit the format are copied as they are stored; of other
  * layouts, filters and byte orders, libhdf5 reads the values. What does not fit the format is left
- * out; *left_out, an error without a status, then says what and why of the first such array, and
- * has no message else. EBPO_E_FORMAT, EBPO_E_IO, EBPO_E_MEMORY; EBPO_E_UNSUPPORTED without libhdf5.
+ * out; *left_out then says what and why of the first such array (EBPO_E_FORMAT), and has no message
+ * else; on failure it is the failure. EBPO_E_FORMAT, EBPO_E_IO, EBPO_E_MEMORY; EBPO_E_UNSUPPORTED
+ * without libhdf5.
  */
 EBPO_MUST_USE ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to,
                                              const char *shown, ebpo_h5_chunk_rows_fn chunk_rows,

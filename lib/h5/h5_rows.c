@@ -12,6 +12,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/text.h"
 #include "base/unnamed_file.h"
 #include "h5/apart.h"
 #include "h5/h5.h"
@@ -68,6 +69,24 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
     return d->space < 0 || d->type < 0 ? fail(d, "the dataset is damaged", error) : EBPO_OK;
 }
 
+/* Returns whether the file's root names this format, or that of paint files. */
+static bool is_of_format(hid_t file)
+{
+    enum { MOST = 64 };
+    static const char begin[] = "EBP-Octree";
+    char text[MOST] = "";
+    hid_t attribute = H5Aexists(file, "format") > 0 ? H5Aopen(file, "format", H5P_DEFAULT) : -1,
+          type = attribute >= 0 ? H5Aget_type(attribute) : -1;
+    bool fits = type >= 0 && H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 &&
+                H5Tget_size(type) <= MOST && H5Aget_storage_size(attribute) <= MOST &&
+                H5Aread(attribute, type, text) >= 0 && strncmp(text, begin, sizeof begin - 1) == 0;
+    if (type >= 0)
+        H5Tclose(type);
+    if (attribute >= 0)
+        H5Aclose(attribute);
+    return fits;
+}
+
 /* Returns what the values are if they are no real numbers, else NULL. */
 static const char *other_values(const dataset *d, hid_t set, hid_t type)
 {
@@ -80,7 +99,7 @@ static const char *other_values(const dataset *d, hid_t set, hid_t type)
         return "an array in each element";
     if (class != H5T_INTEGER && class != H5T_FLOAT)
         return "text, bits or references";
-    if (H5Aexists(set, "coding") <= 0) /* every array of an .ebpo.h5 file has it, and none else */
+    if (H5Aexists(set, "coding") <= 0 || !is_of_format(d->file))
         return NULL;
     return d->most == 3 ? "codes of the .ebpo.h5 format (`ebpo extract --mesh` writes the vertices "
                           "as a PLY, which can be given instead)"
@@ -146,13 +165,15 @@ static herr_t look_at(hid_t file, const char *name, const H5O_info_t *info, void
     hsize_t size[2];
     if (++c->objects > OBJECTS_MOST)
         return 1;
-    if (info->type != H5O_TYPE_DATASET)
+    if (info->type != H5O_TYPE_DATASET || !ebpo_text_ok(name)) /* it is shown */
         return 0;
     hid_t set = H5Dopen2(file, name, H5P_DEFAULT);
-    hid_t space = set >= 0 ? H5Dget_space(set) : -1, type = set >= 0 ? H5Dget_type(set) : -1;
+    /* first: H5Dget_space opens a virtual dataset's files */
+    bool here = set >= 0 && !ebpo_h5_is_elsewhere(set);
+    hid_t space = here ? H5Dget_space(set) : -1, type = here ? H5Dget_type(set) : -1;
     size_t at = strlen(c->names);
     if (space >= 0 && type >= 0 && has_rows(space, c->d->least, c->d->most, size) &&
-        !other_values(c->d, set, type) && !ebpo_h5_is_elsewhere(set)) {
+        !other_values(c->d, set, type)) {
         if (c->found < SHOWN && at + strlen(c->d->path) + strlen(name) + 8 < sizeof c->names)
             snprintf(c->names + at, sizeof c->names - at, "%s%s:/%s", at ? ", " : "", c->d->path,
                      name);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "h5/h5.h"
 #include "h5/zstd_filter.h"
 
@@ -67,7 +68,7 @@ ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *show
     int number = system_error(cause);
     if (number > 0)
         return ebpo_fail_at(error, status, shown, object, -1, "%s: %s", what, strerror(number));
-    if (*cause)
+    if (*cause && ebpo_text_ok(cause)) /* names from the file may be in it */
         return ebpo_fail_at(error, status, shown, object, -1, "%s (libhdf5: %.*s)", what,
                             CAUSE_SHOWN, cause);
     return ebpo_fail_at(error, status, shown, object, -1, "%s", what);

@@ -53,6 +53,11 @@ static uint64_t end_with_payload(ebpo_workspace *workspace, const uint8_t *data,
     return at;
 }
 
+bool ebpo_stl_states_size(const uint8_t *data, uint64_t known, uint64_t size)
+{
+    return known >= HEAD && size > HEAD && stated_size(data) == size;
+}
+
 bool ebpo_stl_fits_binary(const uint8_t *data, uint64_t size)
 {
     return size >= HEAD && (count_models(data, size) ||

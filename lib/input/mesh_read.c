@@ -97,10 +97,6 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char
                                         wanted->workspace, wanted->attributes != 0, error);
     if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
         return parse_ply(out, file, path, wanted, error);
-    if (file->size >= 4 && memcmp(file->data, "\211HDF", 4) == 0)
-        return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(path),
-                              "is an HDF5 file, not a mesh; of a model, 'ebpo extract --mesh' "
-                              "writes the mesh");
     return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(path),
                           "unrecognised format; expected PLY, OBJ, STL or OFF");
 }

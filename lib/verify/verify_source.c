@@ -378,6 +378,12 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
                              .fill_holes = info->mend.fill_holes };
     ebpo_status status =
         as_it_is ? EBPO_OK : mend_again(&mended, source, asked, &did, read->workspace, error);
+    if (status == EBPO_E_ARGUMENT) { /* the record's, not the caller's */
+        CHECK(false, "welding within %g is recorded, and the source cannot be welded within it",
+              asked->weld_distance);
+        ebpo_mesh_free(&mended);
+        return EBPO_OK;
+    }
     const ebpo_mesh *made = as_it_is ? source : &mended;
     if (status == EBPO_OK)
         check_record(tally, &info->mend, &did);

@@ -31,6 +31,7 @@ static const char *folder;
 #define PAINTED   "42_colours_of_vertices"
 #define GATES     "47_gates_unfiltered"
 #define TEXTURED  "51_textures"
+#define WELDED    "58_welded_within_a_distance"
 #define SUMMED    "55_chunk_sums_of_subtrees"
 
 /* As the library writes it; elements of one byte are not shuffled. */
@@ -85,6 +86,11 @@ static void v_faces_huge(void) { set_count("/", "face_count", (int64_t)1 << 40);
 static void v_faces_more(void) { set_count("/", "source_face_count", 3); }
 static void v_dropped(void) { set_count("/", "mend_dropped_faces", 7); }
 static void v_dropped_kept(void) { set_count("/", "mend_dropped_faces", 4); }
+static void v_weld_none(void) { set_reals("mend_weld_distance", 0, 0, 0); }
+static void v_weld_infinite(void) { set_reals("mend_weld_distance", INFINITY, 0, 0); }
+static void v_weld_not_asked(void) { set_count("/", "mend_weld", 0); }
+static void v_weld_moved(void) { set_reals("mend_weld_moved", -1, 0, 0); }
+static void v_weld_moved_missing(void) { drop_attribute("/", "mend_weld_moved"); }
 static void v_source_less(void) { set_count("/", "source_vertex_count", 3); }
 /* In place of a leaf, so that there are eight nodes still. */
 static void v_gray_deep(void)
@@ -490,6 +496,14 @@ static const failed_vector failed[] = {
     { "dropped_faces_beyond_source", DROPPED, v_dropped, NONE, "3", "above `source_face_count`" },
     { "dropped_faces_still_there", DROPPED, v_dropped_kept, NONE, "3",
       "more `mend_dropped_faces`" },
+    { "weld_distance_0", WELDED, v_weld_none, NONE, "3", "not finite and above 0" },
+    { "weld_distance_infinite", WELDED, v_weld_infinite, NONE, "3", "not finite and above 0" },
+    { "weld_distance_without_welding", WELDED, v_weld_not_asked, NONE, "3",
+      "`mend_weld` is 0 beside it" },
+    { "weld_moved_negative", WELDED, v_weld_moved, NONE, "3",
+      "beside it only: negative or not finite" },
+    { "weld_moved_missing", WELDED, v_weld_moved_missing, NONE, "3",
+      "beside `mend_weld_distance`" },
     { "vertex_count_beyond_source", NO_MAPS, v_source_less, NONE, "3", "less than the mesh has" },
     { "gray_at_deepest_level", LEAVES, v_gray_deep, NONE, "4",
       "`gray` is 0 at the deepest level and there only" },

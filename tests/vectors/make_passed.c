@@ -49,6 +49,7 @@ typedef struct how {
     uint32_t leaf_faces, more_parts;
     ebpo_rule rule;
     bool fill_holes, drop_duplicates;
+    double weld_distance;
 } how;
 
 static void build_mesh(ebpo_tree *tree, ebpo_mesh mesh, how h)
@@ -60,6 +61,7 @@ static void build_mesh(ebpo_tree *tree, ebpo_mesh mesh, how h)
     prepare.threads = options.threads = 1;
     prepare.fill_holes = h.fill_holes;
     prepare.drop_duplicates = h.drop_duplicates;
+    prepare.weld_distance = h.weld_distance;
     options.max_level = h.max_level;
     options.leaf_faces = h.leaf_faces;
     options.parts |= h.more_parts;
@@ -74,7 +76,7 @@ static void build(ebpo_tree *tree, uint64_t faces, bool doubles, int max_level, 
                   uint32_t more_parts)
 {
     build_mesh(tree, make_mesh(faces, doubles),
-               (how){ max_level, leaf_faces, more_parts, 0, 0, 0 });
+               (how){ max_level, leaf_faces, more_parts, 0, 0, 0, 0 });
 }
 
 static void build_float(ebpo_tree *tree, ebpo_mesh mesh, how h)
@@ -229,9 +231,9 @@ static void make_small(void)
     write_vector("08_without_mesh", &tree, EBPO_CODEC_ZSTD, EBPO_PART_PLANES);
     build(&tree, 4, false, 2, 1, 0);
     write_vector("09_without_maps", &tree, EBPO_CODEC_ZSTD, EBPO_PART_PLANES | EBPO_PART_MESH);
-    build_float(&tree, nested(128, 1), (how){ 4, 130, 0, EBPO_RULE_EVENODD, 0, 0 });
+    build_float(&tree, nested(128, 1), (how){ 4, 130, 0, EBPO_RULE_EVENODD, 0, 0, 0 });
     write_vector("10_windings_of_two_bytes", &tree, EBPO_CODEC_ZSTD, ~0u);
-    build_float(&tree, ebpo_test_torus(1, 0.375, 80, 32), (how){ 4, 64, 0, 0, 0, 0 });
+    build_float(&tree, ebpo_test_torus(1, 0.375, 80, 32), (how){ 4, 64, 0, 0, 0, 0, 0 });
     write_vector("11_two_chunks_of_faces", &tree, EBPO_CODEC_ZSTD, EBPO_PART_MESH);
 }
 
@@ -258,9 +260,9 @@ static void make_subtrees(void)
     build(&tree, 4, false, 3, 1, EBPO_PART_LEAF_PLANES);
     write_laid_out("15_subtrees_unfiltered", &tree, EBPO_CODEC_NONE, ~0u, 1);
     build_float(&tree, ebpo_test_torus(1, 0.375, 80, 32),
-                (how){ 5, 6, EBPO_PART_LEAF_PLANES, 0, 0, 0 });
+                (how){ 5, 6, EBPO_PART_LEAF_PLANES, 0, 0, 0, 0 });
     write_laid_out("16_many_subtrees", &tree, EBPO_CODEC_ZSTD, ~0u, 10);
-    build_float(&tree, ebpo_test_torus(1, 0.375, 36, 30), (how){ 5, 16, 0, 0, 0, 0 });
+    build_float(&tree, ebpo_test_torus(1, 0.375, 36, 30), (how){ 5, 16, 0, 0, 0, 0, 0 });
     write_laid_out("17_chunks_of_subtrees_unfiltered", &tree, EBPO_CODEC_NONE,
                    EBPO_PART_PLANES | EBPO_PART_MESH, 10);
 }
@@ -386,7 +388,7 @@ static void make_derived(void)
 static void build_near(ebpo_tree *tree)
 {
     ebpo_mesh mesh = ebpo_test_tetrahedron(1);
-    build_mesh(tree, mesh, (how){ 1, 0, 0, 0, 0, 0 });
+    build_mesh(tree, mesh, (how){ 1, 0, 0, 0, 0, 0, 0 });
     double wall = tree->info.box_origin[2] + tree->info.box_size[2] / 2,
            z = wall - tree->info.box_size[2] / 2 / 1024;
     ebpo_tree_free(tree);
@@ -399,7 +401,7 @@ static void build_near(ebpo_tree *tree)
     ebpo_test_append_face(&mesh, a, c, d);
     ebpo_test_append_face(&mesh, a, d, b);
     ebpo_test_append_face(&mesh, b, d, c);
-    build_mesh(tree, mesh, (how){ 1, 0, 0, 0, 0, 0 });
+    build_mesh(tree, mesh, (how){ 1, 0, 0, 0, 0, 0, 0 });
     if (tree->info.box_origin[2] + tree->info.box_size[2] / 2 != wall)
         die("near", "the root cell depends on more than the outer faces");
     ebpo_level *l = &tree->level[1];
@@ -430,13 +432,13 @@ static void make_meshes(void)
     ebpo_tree tree;
     build(&tree, 4, true, 2, 1, EBPO_PART_LEAF_PLANES);
     write_vector("21_doubles_in_several_leaves", &tree, EBPO_CODEC_ZSTD, ~0u);
-    build_float(&tree, nested(-1, 2), (how){ 4, 1, 0, EBPO_RULE_POSITIVE, 0, 0 });
+    build_float(&tree, nested(-1, 2), (how){ 4, 1, 0, EBPO_RULE_POSITIVE, 0, 0, 0 });
     write_vector("22_rule_positive", &tree, EBPO_CODEC_ZSTD, ~0u);
-    build_mesh(&tree, make_mesh(3, false), (how){ 1, 0, 0, 0, true, 0 });
+    build_mesh(&tree, make_mesh(3, false), (how){ 1, 0, 0, 0, true, 0, 0 });
     write_vector("23_faces_added_by_mending", &tree, EBPO_CODEC_ZSTD, ~0u);
     ebpo_mesh mesh = make_mesh(4, true);
     (void)ebpo_test_append_vertex(&mesh, 0.1, 0.1, 0.1);
-    build_mesh(&tree, mesh, (how){ 1, 0, 0, 0, 0, 0 });
+    build_mesh(&tree, mesh, (how){ 1, 0, 0, 0, 0, 0, 0 });
     write_vector("24_unused_vertex", &tree, EBPO_CODEC_ZSTD, ~0u);
     build_near(&tree);
     write_vector("25_face_that_comes_near", &tree, EBPO_CODEC_ZSTD, ~0u);
@@ -445,7 +447,7 @@ static void make_meshes(void)
     close_enough.parts = EBPO_PART_PLANES;
     subset(&tree, "16_many_subtrees", &close_enough);
     write_vector("26_subset_error", &tree, EBPO_CODEC_ZSTD, ~0u);
-    build_float(&tree, nested(32768, 1), (how){ 4, 33000, 0, EBPO_RULE_EVENODD, 0, 0 });
+    build_float(&tree, nested(32768, 1), (how){ 4, 33000, 0, EBPO_RULE_EVENODD, 0, 0, 0 });
     write_vector("27_windings_of_four_bytes", &tree, EBPO_CODEC_ZSTD, EBPO_PART_PLANES);
 }
 
@@ -460,9 +462,9 @@ static void make_large(void)
     write_vector("29_types_and_gray_index", &tree, EBPO_CODEC_ZSTD, EBPO_PART_PLANES);
     build(&tree, 4, false, 7, 0, 0);
     write_vector("30_chunks_of_lists", &tree, EBPO_CODEC_ZSTD, EBPO_PART_MESH);
-    build_float(&tree, ebpo_test_sheet(64, 64), (how){ 3, 256, 0, 0, 0, 0 });
+    build_float(&tree, ebpo_test_sheet(64, 64), (how){ 3, 256, 0, 0, 0, 0, 0 });
     write_vector("31_chunks_of_vertices", &tree, EBPO_CODEC_ZSTD, EBPO_PART_MESH);
-    build_float(&tree, ebpo_test_sheet(128, 128), (how){ 3, 1024, 0, 0, 0, 0 });
+    build_float(&tree, ebpo_test_sheet(128, 128), (how){ 3, 1024, 0, 0, 0, 0, 0 });
     write_vector("32_chunks_of_maps", &tree, EBPO_CODEC_ZSTD, EBPO_PART_MESH | EBPO_PART_MAPS);
 }
 
@@ -503,9 +505,9 @@ static void make_attributes(void)
 {
     ebpo_tree tree;
     ebpo_subset_options box = EBPO_SUBSET_OPTIONS_INIT;
-    build_mesh(&tree, read_coloured(), (how){ 2, 1, 0, 0, 0, 0 });
+    build_mesh(&tree, read_coloured(), (how){ 2, 1, 0, 0, 0, 0, 0 });
     write_vector("39_attributes", &tree, EBPO_CODEC_ZSTD, ~(uint32_t)EBPO_PART_COLOURS);
-    build_mesh(&tree, read_coloured(), (how){ 3, 1, EBPO_PART_LEAF_PLANES, 0, 0, 0 });
+    build_mesh(&tree, read_coloured(), (how){ 3, 1, EBPO_PART_LEAF_PLANES, 0, 0, 0, 0 });
     write_laid_out("40_attributes_subtrees_unfiltered", &tree, EBPO_CODEC_NONE,
                    ~(uint32_t)EBPO_PART_COLOURS, 1);
     box.boxed = true;
@@ -532,11 +534,11 @@ static void make_colours(void)
 {
     ebpo_tree tree;
     ebpo_subset_options box = EBPO_SUBSET_OPTIONS_INIT, levels = EBPO_SUBSET_OPTIONS_INIT;
-    build_mesh(&tree, read_coloured(), (how){ 2, 1, 0, 0, 0, 0 });
+    build_mesh(&tree, read_coloured(), (how){ 2, 1, 0, 0, 0, 0, 0 });
     write_vector("42_colours_of_vertices", &tree, EBPO_CODEC_ZSTD, ~0u);
-    build_mesh(&tree, read_text(faces_coloured, "faces.ply"), (how){ 3, 1, 0, 0, 0, 0 });
+    build_mesh(&tree, read_text(faces_coloured, "faces.ply"), (how){ 3, 1, 0, 0, 0, 0, 0 });
     write_vector("43_colours_of_faces", &tree, EBPO_CODEC_ZSTD, ~0u);
-    build_mesh(&tree, read_coloured(), (how){ 3, 1, EBPO_PART_LEAF_PLANES, 0, 0, 0 });
+    build_mesh(&tree, read_coloured(), (how){ 3, 1, EBPO_PART_LEAF_PLANES, 0, 0, 0, 0 });
     write_laid_out("44_colours_subtrees_unfiltered", &tree, EBPO_CODEC_NONE, ~0u, 1);
     box.boxed = true;
     for (int k = 0; k < 3; k++)
@@ -581,9 +583,9 @@ static void make_gates(void)
     build(&tree, 4, false, 1, 1, 0);
     write_gates("47_gates_unfiltered", &tree, EBPO_CODEC_NONE, 0);
     derive("48_gates_as_codes", "47_gates_unfiltered", as_codes);
-    build_float(&tree, ebpo_test_sheet(64, 64), (how){ 3, 256, 0, 0, 0, 0 });
+    build_float(&tree, ebpo_test_sheet(64, 64), (how){ 3, 256, 0, 0, 0, 0, 0 });
     write_gates("49_gates", &tree, EBPO_CODEC_ZSTD, 0);
-    build_float(&tree, ebpo_test_torus(1, 0.375, 80, 32), (how){ 5, 6, 0, 0, 0, 0 });
+    build_float(&tree, ebpo_test_torus(1, 0.375, 80, 32), (how){ 5, 6, 0, 0, 0, 0, 0 });
     write_gates("50_gates_of_subtrees", &tree, EBPO_CODEC_DEFLATE, 10);
 }
 
@@ -621,7 +623,7 @@ static void make_textures(void)
                     "map_Kd red paint\nmap_Bump blue", "not really an image");
         if (!upwards)
             add_texture(mesh.attributes, "gone.png", "TextureFile", NULL);
-        build_mesh(&tree, mesh, (how){ 0, 16, 0, 0, 0, 0 });
+        build_mesh(&tree, mesh, (how){ 0, 16, 0, 0, 0, 0, 0 });
         write_vector(upwards ? "52_texture_upwards" : "51_textures", &tree, EBPO_CODEC_ZSTD, ~0u);
     }
 }
@@ -637,8 +639,27 @@ static void make_dropped(void)
                                           { 2, 0, 1 }, { 0, 3, 2 }, { 3, 0, 1 } };
     memcpy(mesh.faces, faces, sizeof faces);
     mesh.face_count = 6;
-    build_mesh(&tree, mesh, (how){ 1, 1, 0, 0, true, true });
+    build_mesh(&tree, mesh, (how){ 1, 1, 0, 0, true, true, 0 });
     write_vector("53_dropped_faces", &tree, EBPO_CODEC_ZSTD, ~0u);
+}
+
+/* The tetrahedron with a fifth vertex near the last one, which half of the faces there name; and a
+ * face between these two, which keeps two vertices. */
+static void make_welded(void)
+{
+    ebpo_tree tree;
+    ebpo_mesh mesh = make_mesh(4, false);
+    mesh.xyz32 = realloc(mesh.xyz32, 15 * sizeof *mesh.xyz32);
+    mesh.faces = realloc(mesh.faces, 15 * sizeof *mesh.faces);
+    static const float near[3] = { 0.0078125F, 0, 1 };
+    static const uint32_t faces[5][3] = {
+        { 0, 2, 1 }, { 0, 1, 4 }, { 0, 3, 2 }, { 1, 2, 3 }, { 3, 4, 1 }
+    };
+    memcpy(mesh.xyz32 + 12, near, sizeof near);
+    memcpy(mesh.faces, faces, sizeof faces);
+    mesh.vertex_count = mesh.face_count = 5;
+    build_mesh(&tree, mesh, (how){ 1, 1, 0, 0, 0, 0, 0.015625 });
+    write_vector("58_welded_within_a_distance", &tree, EBPO_CODEC_ZSTD, ~0u);
 }
 
 /* --- sums of chunks --- */
@@ -666,7 +687,7 @@ static void make_sums(void)
     write_file("54_chunk_sums", &tree, &options);
     options = laid_out(EBPO_CODEC_NONE, ~0u, 1);
     options.chunk_sums = EBPO_SUMS_USUAL;
-    build_mesh(&tree, read_coloured(), (how){ 3, 1, EBPO_PART_LEAF_PLANES, 0, 0, 0 });
+    build_mesh(&tree, read_coloured(), (how){ 3, 1, EBPO_PART_LEAF_PLANES, 0, 0, 0, 0 });
     write_file("55_chunk_sums_of_subtrees", &tree, &options);
     derive("56_chunk_sums_of_a_part_not_listed", "55_chunk_sums_of_subtrees",
            without_the_word_colours);
@@ -688,4 +709,5 @@ void make_passed(const char *to)
     make_textures();
     make_dropped();
     make_sums();
+    make_welded();
 }

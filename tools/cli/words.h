@@ -45,10 +45,11 @@ typedef struct word_levels {
 
 bool words_read_levels(const char *text, word_levels *out);
 
-/* What is said of texts that the two refuse. */
+/* What is said of texts that ebpo_is_date refuses. */
 #define WORDS_DATE_EXPECTED \
     "a date as in ISO 8601 and in the calendar, such as 2026-11-26 or 2026-11-26T21:43:05Z"
 
+/* What is said of texts that the two refuse. */
 #define WORDS_SIZE_EXPECTED   "a size such as 512M, 0.5G or 1GiB"
 #define WORDS_LEVELS_EXPECTED "levels such as 3, 0-5, 3- or 0,2,4; the deepest possible is 20"
 bool words_end_with(const char *text, const char *end);

@@ -143,6 +143,15 @@ export function readFacts(attributes) {
   for (const name of COUNTS)
     out[name] = facts.count(name);
   out.mend_dropped_faces = facts.has('mend_dropped_faces') ? facts.count('mend_dropped_faces') : 0;
+  if (facts.has('mend_weld_distance')) {
+    [out.mend_weld_distance] = facts.reals('mend_weld_distance', 1);
+    [out.mend_weld_moved] = facts.reals('mend_weld_moved', 1);
+    out.mend_collapsed_faces = facts.count('mend_collapsed_faces');
+    if (!(Number.isFinite(out.mend_weld_distance) && out.mend_weld_distance > 0 && out.mend_weld))
+      throw facts.fail('mend_weld_distance', 'it has a value that the format does not allow');
+    if (!(Number.isFinite(out.mend_weld_moved) && out.mend_weld_moved >= 0))
+      throw facts.fail('mend_weld_moved', 'it has a value that the format does not allow');
+  }
   for (const name of HINTS)
     out[name] = facts.hint(name);
   for (const name of NUMBERS)
