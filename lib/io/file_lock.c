@@ -25,10 +25,17 @@ static int open_lock_file(const char *path)
     enum { HOW = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY };
     int fd = open(path, O_RDWR | HOW);
     if (fd < 0 && errno == ENOENT)
-        fd = open(path, O_RDWR | O_CREAT | O_EXCL | HOW, 0666);
+        return open(path, O_RDWR | O_CREAT | O_EXCL | HOW, 0666);
     if (fd < 0 && errno == EACCES && (fd = open(path, O_RDONLY | HOW)) < 0 && errno == ENOENT)
         errno = EEXIST; /* it was there: try again */
     return fd;
+}
+
+/* Returns true for an empty regular file: another one is not ours, and is left alone. */
+static bool is_lock_file(int fd)
+{
+    struct stat st;
+    return fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && st.st_size == 0;
 }
 
 /* Returns true if the descriptor's file still has its name: who had the lock before removed it. */
@@ -41,15 +48,21 @@ static bool has_its_name(int fd, const char *path)
 
 typedef enum attempt { TAKEN, BUSY, NO_LOCKS } attempt;
 
-/* Tries once, without waiting. */
+/* Tries without waiting. Others may make and remove the file meanwhile, again and again: then the
+ * lock counts as busy. */
 static attempt try_lock(ebpo_file_lock *lock)
 {
-    for (;;) {
+    enum { TRIES = 100 };
+    for (int i = 0; i < TRIES; i++) {
         int fd = open_lock_file(lock->path);
         if (fd < 0 && (errno == EEXIST || errno == EINTR))
             continue; /* another one has made or removed it just now */
         if (fd < 0)
             return NO_LOCKS;
+        if (!is_lock_file(fd)) {
+            close(fd);
+            return NO_LOCKS;
+        }
         if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
             attempt why = errno == EWOULDBLOCK || errno == EINTR ? BUSY : NO_LOCKS;
             if (why == NO_LOCKS && errno != EBADF) /* EBADF: it is another user's */
@@ -63,6 +76,7 @@ static attempt try_lock(ebpo_file_lock *lock)
         }
         close(fd);
     }
+    return BUSY;
 }
 
 static void pause_between(unsigned attempts)

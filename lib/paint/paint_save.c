@@ -178,10 +178,8 @@ static ebpo_status save(const ebpo_paint *p, const char *path, ebpo_error *error
     ebpo_publish publish = EBPO_PUBLISH_INIT;
     ebpo_h5_out out = EBPO_H5_OUT_INIT;
     ebpo_status status = ebpo_publish_begin(&publish, path, error);
-    if (status != EBPO_OK) {
-        ebpo_file_lock_release(&f->lock);
+    if (status != EBPO_OK)
         return status;
-    }
     bool own = f->path && strcmp(f->path, publish.target) == 0, first = !f->path;
     char *place = own || first ? strdup(publish.target) : NULL;
     int fd = place ? fcntl(publish.fd, F_DUPFD_CLOEXEC, 3) : -1;

@@ -1,10 +1,11 @@
-/* Whether the volume of a solid follows from the integral of the winding number. */
+/* Decides whether the volume of a solid is known. */
 #include "geom/strict_fp.h"
 
 #include <ebpo/query.h>
 
 #include <math.h>
 
+#include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
 #include "octree/rule.h"
@@ -36,7 +37,7 @@ static double known_volume(const ebpo_mesh_report *report, ebpo_rule rule,
         return NAN;
     if (report->components == 1)
         return ebpo_rule_inside(rule, signbit(integral) ? -1 : 1) ? fabs(integral) : 0;
-    return shells && shells->apart ? integral + shells->beyond[rule] : NAN;
+    return shells->apart ? integral + shells->beyond[rule] : NAN;
 }
 
 ebpo_status ebpo_solid_volume_of(const ebpo_mesh_report *report, ebpo_rule rule,
@@ -45,12 +46,17 @@ ebpo_status ebpo_solid_volume_of(const ebpo_mesh_report *report, ebpo_rule rule,
 {
     EBPO_DEFAULT_FP;
     ebpo_solid_volume v = { .hi = INFINITY, .integral = report->volume };
+    ebpo_shells counted = EBPO_SHELLS_INIT;
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_solid_volume, out, error);
+    if (status == EBPO_OK)
+        status = EBPO_TAKE(ebpo_shells, &counted, shells, error);
+    if (status == EBPO_OK && (unsigned)rule > EBPO_RULE_POSITIVE)
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "rule %d is not known", (int)rule);
     if (status != EBPO_OK)
         return status;
     if (info)
         bound_by_cells(info, &v);
-    double volume = known_volume(report, rule, shells);
+    double volume = known_volume(report, rule, &counted);
     if (!report->balanced)
         v = (ebpo_solid_volume){ .integral = 0 };
     else if (volume >= v.lo && volume <= v.hi)

@@ -86,7 +86,9 @@ static void say_remedy(FILE *out, const mesh_input *p)
         fprintf(out, "; %s, which --repair does, leaves %s",
                 steps_text(steps, sizeof steps, &best->record), left_text(left, best, p->rule));
     } else if (p->tried)
-        fputs("; no repair of ours leaves a plausible solid: use a mesh editor", out);
+        fputs("; no repair that is tried leaves a plausible solid: try --weld-distance where "
+              "corners nearly coincide, or use a mesh editor",
+              out);
     else
         fputs(
             "; 'ebpo check' without options tries which repairs leave a solid, --repair does them",

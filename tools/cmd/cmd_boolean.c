@@ -308,9 +308,10 @@ static ebpo_status answer_cells(cell_answer *a, ebpo_boolean *b, ebpo_progress p
     ebpo_status status = EBPO_OK;
     if (a->volume)
         status = ebpo_boolean_exact_volume(b, &measuring, &a->exact, error);
+    bool exact = status == EBPO_OK && is_exact(a);
     if (status == EBPO_OK)
         status = ebpo_boolean_cells_new(b, &how, &cells, error);
-    if (status == EBPO_E_LIMIT && is_exact(a) && !a->v->out) {
+    if (status == EBPO_E_LIMIT && exact && !a->v->out) {
         a->no_cells = true;
         snprintf(a->why_no_cells, sizeof a->why_no_cells, "%s", error->message);
         return EBPO_OK;

@@ -22,7 +22,11 @@ ebpo_status collide_unmet(ebpo_collider *c, const ebpo_collide_options *how, con
     ebpo_status status = ebpo_collide_relation(c, how, &r, error);
     if (status == EBPO_OK && r.relation != EBPO_DISJOINT && r.contact != 1)
         *relation = collide_relations[r.relation];
-    return status;
+    if (status != EBPO_E_ABSENT && status != EBPO_E_LIMIT)
+        return status;
+    *error = (ebpo_error)EBPO_ERROR_INIT; /* a subset lacks what would tell */
+    *relation = collide_relations[EBPO_RELATION_OPEN];
+    return EBPO_OK;
 }
 
 void collide_print_unmet(bool as_json, const char *relation)

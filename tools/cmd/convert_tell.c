@@ -107,7 +107,8 @@ static void print_next(const convert_told *t, const ebpo_info *info, const mesh_
 {
     fputs("  next      ", stdout);
     if (p->doubts && t->repaired) {
-        puts("a mesh editor: no repair of ours leaves a plausible solid");
+        puts("--weld-distance where corners nearly coincide, or a mesh editor: no repair that is "
+             "tried leaves a plausible solid");
         return;
     }
     fputs(p->doubts ? "ebpo check" : "ebpo verify", stdout);

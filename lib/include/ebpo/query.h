@@ -879,7 +879,8 @@ typedef struct ebpo_solid_volume {
  * info      of the mesh's file, whose black cells and envelopes bound the volume;
  *           NULL: there is none
  *
- * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * EBPO_E_ARGUMENT: `out` or `shells` was not begun with its macro; a rule that is not
+ * known.
  *
  * Threads: any.
  */
