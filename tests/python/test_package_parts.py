@@ -154,6 +154,9 @@ class Parts(Case):
             self.assertEqual(pathlib.Path("by_python.ebpo.h5").read_bytes(),
                              pathlib.Path("by_command.ebpo.h5").read_bytes(), name)
         mesh = model("scan").mesh(order="source")
+        self.assertEqual(ebpo.convert(mesh, "dated.ebpo.h5", date="2026-03-01").info.face_count, len(mesh.faces))
+        with self.assertRaisesRegex(ValueError, "2026-02-30"):
+            ebpo.convert(mesh, "never.ebpo.h5", date="2026-02-30")
         made = ebpo.convert(mesh, "arrays.ebpo.h5")
         self.same(made.mesh(), model("scan").mesh())
         double = ebpo.convert((mesh.vertices.astype(float), mesh.faces.tolist()), "doubles.ebpo.h5", without="maps")
