@@ -19,13 +19,13 @@
 #include "io/unfinished.h"
 
 /* Opens the lock file, which is made if need be. To write, which locks over NFS need, or else to
- * read: another user's. */
+ * read: another user's. errno EACCES: it cannot be made, or not be read. */
 static int open_lock_file(const char *path)
 {
     enum { HOW = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY };
     int fd = open(path, O_RDWR | HOW);
     if (fd < 0 && errno == ENOENT)
-        fd = open(path, O_RDWR | O_CREAT | O_EXCL | HOW, 0666);
+        return open(path, O_RDWR | O_CREAT | O_EXCL | HOW, 0666);
     if (fd < 0 && errno == EACCES && (fd = open(path, O_RDONLY | HOW)) < 0 && errno == ENOENT)
         errno = EEXIST; /* it was there: try again */
     return fd;
@@ -41,10 +41,10 @@ static bool has_its_name(int fd, const char *path)
 
 typedef enum attempt { TAKEN, BUSY, NO_LOCKS } attempt;
 
-/* Tries once, without waiting. */
+/* Tries without waiting: again where others made or removed the lock file at the same moment. */
 static attempt try_lock(ebpo_file_lock *lock)
 {
-    for (;;) {
+    for (int tries = 0; tries < 100; tries++) {
         int fd = open_lock_file(lock->path);
         if (fd < 0 && (errno == EEXIST || errno == EINTR))
             continue; /* another one has made or removed it just now */
@@ -63,6 +63,7 @@ static attempt try_lock(ebpo_file_lock *lock)
         }
         close(fd);
     }
+    return BUSY;
 }
 
 static void pause_between(unsigned attempts)

@@ -206,6 +206,32 @@ START_TEST(waiting_for_a_lock_can_be_cancelled)
 }
 END_TEST
 
+/* Gives up root, who may write anywhere. */
+static int lock_as_nobody(void)
+{
+    enum { NOBODY = 65534 };
+    ebpo_file_lock lock;
+    if (geteuid() == 0 && setuid(NOBODY) != 0)
+        return 1;
+    alarm(3);
+    if (ebpo_file_lock_take(&lock, target, 0, NULL, NULL) != EBPO_OK || lock.fd != -1)
+        return 2;
+    ebpo_file_lock_release(&lock);
+    return 0;
+}
+
+START_TEST(nobody_waits_in_a_folder_that_cannot_be_written_to)
+{
+    int status;
+    ck_assert(chmod(folder, 0555) == 0);
+    pid_t child = fork();
+    if (child == 0)
+        _exit(lock_as_nobody());
+    ck_assert(waitpid(child, &status, 0) == child && status == 0);
+    ck_assert(chmod(folder, 0700) == 0 && scratch_entries() == 0);
+}
+END_TEST
+
 /* The number in the file, one more by each of many: all of them are there in the end. */
 static int count_up(void)
 {
@@ -407,6 +433,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, signal_handler_removes_what_is_unfinished);
     tcase_add_test(tests, a_lock_is_waited_for_and_leaves_no_file);
     tcase_add_test(tests, waiting_for_a_lock_can_be_cancelled);
+    tcase_add_test(tests, nobody_waits_in_a_folder_that_cannot_be_written_to);
     tcase_add_test(tests, processes_with_a_lock_take_turns);
     tcase_add_test(tests, an_output_replaces_only_what_it_was_made_from);
     tcase_add_test(tests, pairs_of_outputs_are_put_in_place_in_turn);
