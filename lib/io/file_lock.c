@@ -31,6 +31,13 @@ static int open_lock_file(const char *path)
     return fd;
 }
 
+/* Returns false for a file of other use that has the lock file's name: it must not be removed. */
+static bool is_lock_file(int fd)
+{
+    struct stat st;
+    return fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && st.st_size == 0;
+}
+
 /* Returns true if the descriptor's file still has its name: who had the lock before removed it. */
 static bool has_its_name(int fd, const char *path)
 {
@@ -50,6 +57,10 @@ static attempt try_lock(ebpo_file_lock *lock)
             continue; /* another one has made or removed it just now */
         if (fd < 0)
             return NO_LOCKS;
+        if (!is_lock_file(fd)) {
+            close(fd);
+            return NO_LOCKS;
+        }
         if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
             attempt why = errno == EWOULDBLOCK || errno == EINTR ? BUSY : NO_LOCKS;
             if (why == NO_LOCKS && errno != EBADF) /* EBADF: it is another user's */

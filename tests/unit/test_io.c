@@ -232,6 +232,25 @@ START_TEST(nobody_waits_in_a_folder_that_cannot_be_written_to)
 }
 END_TEST
 
+START_TEST(a_file_of_other_use_is_no_lock_and_stays)
+{
+    ebpo_file_lock lock;
+    const char *named = scratch(".out.bin.lock");
+    for (int pipe = 0; pipe < 2; pipe++) {
+        if (pipe)
+            ck_assert(unlink(named) == 0 && mkfifo(named, 0600) == 0);
+        else
+            write_file(named, "kept");
+        ck_assert(ebpo_file_lock_take(&lock, target, 0, NULL, NULL) == EBPO_OK && lock.fd == -1);
+        ebpo_file_lock_release(&lock);
+        if (!pipe)
+            check_content(named, "kept");
+        ck_assert(scratch_entries() == 1);
+    }
+    unlink(named);
+}
+END_TEST
+
 /* The number in the file, one more by each of many: all of them are there in the end. */
 static int count_up(void)
 {
@@ -434,6 +453,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, a_lock_is_waited_for_and_leaves_no_file);
     tcase_add_test(tests, waiting_for_a_lock_can_be_cancelled);
     tcase_add_test(tests, nobody_waits_in_a_folder_that_cannot_be_written_to);
+    tcase_add_test(tests, a_file_of_other_use_is_no_lock_and_stays);
     tcase_add_test(tests, processes_with_a_lock_take_turns);
     tcase_add_test(tests, an_output_replaces_only_what_it_was_made_from);
     tcase_add_test(tests, pairs_of_outputs_are_put_in_place_in_turn);
