@@ -32,8 +32,8 @@ ebpo_file_version ebpo_file_version_of(int fd);
 
 typedef struct ebpo_publish {
     char *shown;  /* the target as the caller named it, for messages */
-    char *folder; /* absolute, so that a change of the working folder does no harm */
-    char *target;
+    char *target; /* absolute, so that a change of the working folder does no harm */
+    char *folder; /* of the target; ends with '/' */
     char *temporary;
     FILE *stream; /* NULL until asked for */
     char *buffer; /* of the stream */
