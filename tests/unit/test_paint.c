@@ -252,6 +252,11 @@ START_TEST(one_at_a_time_has_a_file_open_to_change)
     model_must(ebpo_paint_open_to_change(path, o.file, 0, NULL, &one, &error), "new", &error);
     ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, &error) == EBPO_E_IO);
     ck_assert(strstr(error.message, "another program has been changing it") && !other);
+    /* a save to another path, even one that fails, is no end of it */
+    ck_assert(ebpo_paint_save(one, scratch("absent/q.paint.h5"), NULL) == EBPO_E_IO);
+    ck_assert(ebpo_paint_save(one, scratch(NULL), NULL) == EBPO_E_IO);
+    model_must(ebpo_paint_save(one, scratch("q.paint.h5"), &error), "saving", &error);
+    ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, &error) == EBPO_E_IO);
     ck_assert(ebpo_paint_add_layer(one, NULL, NULL, NULL) == EBPO_OK);
     model_must(ebpo_paint_save(one, path, &error), "saving", &error);
     /* saved: the next one has its turn, and reads what was saved */
