@@ -91,9 +91,9 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
     if (status == EBPO_OK)
         status = check_target(&publish, path, error);
     if (status == EBPO_OK && (publish.slot = ebpo_unfinished_reserve()) < 0)
-        status =
-            ebpo_fail_file(error, EBPO_E_LIMIT, path,
-                           "more than %d files are being written at a time", EBPO_UNFINISHED_MOST);
+        status = ebpo_fail_file(error, EBPO_E_LIMIT, path,
+                                "more than %d files are being written or locked at a time",
+                                EBPO_UNFINISHED_MOST);
     if (status == EBPO_OK) {
         ebpo_remove_stale_files(publish.folder, ebpo_path_name(publish.target));
         status = create_temporary(&publish, error);

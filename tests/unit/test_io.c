@@ -134,12 +134,19 @@ END_TEST
 
 START_TEST(more_outputs_than_slots_are_refused_and_slots_come_back)
 {
+    ebpo_file_lock lock;
+    ebpo_error error = EBPO_ERROR_INIT;
     ebpo_publish out[EBPO_UNFINISHED_MOST], last;
     for (int round = 0; round < 2; round++) {
         for (int i = 0; i < EBPO_UNFINISHED_MOST; i++)
             ck_assert(ebpo_publish_begin(&out[i], target, NULL) == EBPO_OK);
         ck_assert(ebpo_publish_begin(&last, target, NULL) == EBPO_E_LIMIT);
-        for (int i = 0; i < EBPO_UNFINISHED_MOST; i++)
+        ebpo_publish_abort(&out[0]);
+        ck_assert(ebpo_file_lock_take(&lock, target, 0, NULL, NULL) == EBPO_OK && lock.slot >= 0);
+        ck_assert(ebpo_publish_begin(&last, target, &error) == EBPO_E_LIMIT);
+        ck_assert(strstr(error.message, "32 files are being written or locked") != NULL);
+        ebpo_file_lock_release(&lock);
+        for (int i = 1; i < EBPO_UNFINISHED_MOST; i++)
             ebpo_publish_abort(&out[i]);
     }
     ck_assert(scratch_entries() == 0);
