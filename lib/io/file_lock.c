@@ -19,7 +19,7 @@
 #include "io/unfinished.h"
 
 /* Opens the lock file, which is made if need be. To write, which locks over NFS need, or else to
- * read: another user's. */
+ * read: another user's. errno EACCES: it cannot be made, or not be read. */
 static int open_lock_file(const char *path)
 {
     enum { HOW = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY };
@@ -31,7 +31,7 @@ static int open_lock_file(const char *path)
     return fd;
 }
 
-/* Returns true for an empty regular file: another one is not ours, and is left alone. */
+/* Returns false for a file of other use that has the lock file's name: it must not be removed. */
 static bool is_lock_file(int fd)
 {
     struct stat st;
@@ -48,12 +48,10 @@ static bool has_its_name(int fd, const char *path)
 
 typedef enum attempt { TAKEN, BUSY, NO_LOCKS } attempt;
 
-/* Tries without waiting. Others may make and remove the file meanwhile, again and again: then the
- * lock counts as busy. */
+/* Tries without waiting: again where others made or removed the lock file at the same moment. */
 static attempt try_lock(ebpo_file_lock *lock)
 {
-    enum { TRIES = 100 };
-    for (int i = 0; i < TRIES; i++) {
+    for (int tries = 0; tries < 100; tries++) {
         int fd = open_lock_file(lock->path);
         if (fd < 0 && (errno == EEXIST || errno == EINTR))
             continue; /* another one has made or removed it just now */
@@ -85,20 +83,21 @@ static void pause_between(unsigned attempts)
     nanosleep(&(struct timespec){ 0, ms * 1000000 }, NULL);
 }
 
-/* The name of the lock file; NULL: no memory, or errno says what is wrong with the folder. */
-static char *name_lock_file(const char *path)
+/* Names the lock file of the file at `path`, in its folder. */
+static ebpo_status name_lock_file(const char *path, char **out)
 {
-    const char *name = ebpo_path_name(path);
-    char *folder = strndup(path, (size_t)(name - path)), *lock = NULL;
-    char *real = folder ? realpath(*folder ? folder : ".", NULL) : NULL;
-    if (real &&
-        asprintf(&lock, "%s/.%.*s.lock", real[1] ? real : "", EBPO_TARGET_NAME_KEPT, name) < 0) {
-        lock = NULL;
-        errno = ENOMEM;
+    char *target;
+    ebpo_status status = ebpo_target_path(path, &target, NULL);
+    if (status != EBPO_OK)
+        return status;
+    const char *name = ebpo_path_name(target);
+    int folder = (int)(name - target);
+    if (asprintf(out, "%.*s.%.*s.lock", folder, target, EBPO_TARGET_NAME_KEPT, name) < 0) {
+        *out = NULL;
+        status = EBPO_E_MEMORY;
     }
-    free(folder);
-    free(real);
-    return lock;
+    free(target);
+    return status;
 }
 
 ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path, double seconds,
@@ -107,9 +106,9 @@ ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path, double s
     double begun = ebpo_seconds();
     attempt got;
     *lock = (ebpo_file_lock)EBPO_FILE_LOCK_INIT;
-    lock->path = name_lock_file(path);
-    if (!lock->path)
-        return errno == ENOMEM ? ebpo_fail_memory(error, strlen(path)) : EBPO_OK;
+    ebpo_status status = name_lock_file(path, &lock->path);
+    if (status != EBPO_OK)
+        return status == EBPO_E_MEMORY ? ebpo_fail_memory(error, strlen(path)) : EBPO_OK;
     for (unsigned i = 0; (got = try_lock(lock)) == BUSY; i++) {
         if (!ebpo_progress_stage(progress, "waiting", error)) {
             ebpo_file_lock_release(lock);

@@ -26,8 +26,9 @@ typedef struct ebpo_file_lock {
 
 /* Waits up to `seconds` for the lock of the file at `path`, which need not exist. Reports the stage
  * "waiting" to `progress`, which may be NULL. Also returns EBPO_OK, with fd = -1, where no lock
- * can be had: on file systems without locks, or in folders that cannot be written to. EBPO_E_IO:
- * another program has the lock still. EBPO_E_CANCELLED, EBPO_E_MEMORY. */
+ * can be had: on file systems without locks, in folders that cannot be written to, or where the
+ * lock file's name belongs to anything but an empty file. EBPO_E_IO: another program has the lock
+ * still. EBPO_E_CANCELLED, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path,
                                               double seconds, const ebpo_progress *progress,
                                               ebpo_error *error);

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <limits.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -171,4 +172,25 @@ const char *ebpo_path_name(const char *path)
 {
     const char *slash = strrchr(path, '/');
     return slash ? slash + 1 : path;
+}
+
+ebpo_status ebpo_target_path(const char *path, char **out, ebpo_error *error)
+{
+    const char *name = ebpo_path_name(path);
+    *out = NULL;
+    if (!*name)
+        return ebpo_fail_file(error, EBPO_E_IO, path, "names no file; give the output a file name");
+    char *folder = strndup(path, (size_t)(name - path));
+    if (!folder)
+        return ebpo_fail_memory(error, strlen(path));
+    char *real = realpath(*folder ? folder : ".", NULL);
+    free(folder);
+    if (!real)
+        return ebpo_fail_errno(error, path, "the folder of the output cannot be used");
+    bool made = asprintf(out, "%s/%s", real[1] ? real : "", name) >= 0;
+    free(real);
+    if (made)
+        return EBPO_OK;
+    *out = NULL;
+    return ebpo_fail_memory(error, strlen(path));
 }

@@ -59,4 +59,8 @@ void ebpo_whole_file_close(ebpo_whole_file *file);
 /* The part of `path` behind the last '/'; points into `path`. */
 const char *ebpo_path_name(const char *path);
 
+/* Finds the absolute path, without symbolic links to folders, of a file that need not exist; free()
+ * it. EBPO_E_IO: `path` ends with '/', or its folder cannot be used. EBPO_E_MEMORY. */
+EBPO_MUST_USE ebpo_status ebpo_target_path(const char *path, char **out, ebpo_error *error);
+
 #endif

@@ -23,8 +23,6 @@ static atomic_uint name_counter;
 
 static ebpo_status check_target(ebpo_publish *publish, const char *path, ebpo_error *error)
 {
-    if (!*ebpo_path_name(path))
-        return ebpo_fail_file(error, EBPO_E_IO, path, "names no file; give the output a file name");
     struct stat st;
     if (lstat(path, &st) != 0)
         return errno == ENOENT ? EBPO_OK : ebpo_fail_errno(error, path, "cannot be written");
@@ -42,29 +40,20 @@ static ebpo_status check_target(ebpo_publish *publish, const char *path, ebpo_er
 
 static ebpo_status resolve(ebpo_publish *publish, const char *path, ebpo_error *error)
 {
-    const char *name = ebpo_path_name(path);
-    char *folder = strndup(path, (size_t)(name - path));
+    ebpo_status status = ebpo_target_path(path, &publish->target, error);
+    if (status != EBPO_OK)
+        return status;
+    const char *name = ebpo_path_name(publish->target);
+    publish->folder = strndup(publish->target, (size_t)(name - publish->target));
     publish->shown = strdup(path);
-    if (!folder || !publish->shown) {
-        free(folder);
-        return ebpo_fail_memory(error, strlen(path));
-    }
-    publish->folder = realpath(*folder ? folder : ".", NULL);
-    free(folder);
-    if (!publish->folder)
-        return ebpo_fail_errno(error, path, "the folder of the output cannot be used");
-    if (asprintf(&publish->target, "%s/%s", publish->folder[1] ? publish->folder : "", name) < 0) {
-        publish->target = NULL;
-        return ebpo_fail_memory(error, strlen(path));
-    }
-    return EBPO_OK;
+    return publish->folder && publish->shown ? EBPO_OK : ebpo_fail_memory(error, strlen(path));
 }
 
 static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
 {
     for (int attempt = 0; attempt < 100; attempt++) {
         free(publish->temporary);
-        if (asprintf(&publish->temporary, "%s/.%.*s.%ld-%u.tmp", publish->folder,
+        if (asprintf(&publish->temporary, "%s.%.*s.%ld-%u.tmp", publish->folder,
                      EBPO_TARGET_NAME_KEPT, ebpo_path_name(publish->target), (long)getpid(),
                      atomic_fetch_add(&name_counter, 1)) < 0) {
             publish->temporary = NULL;
@@ -98,13 +87,13 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
 {
     *out = (ebpo_publish)EBPO_PUBLISH_INIT;
     ebpo_publish publish = EBPO_PUBLISH_INIT;
-    ebpo_status status = check_target(&publish, path, error);
+    ebpo_status status = resolve(&publish, path, error);
     if (status == EBPO_OK)
-        status = resolve(&publish, path, error);
+        status = check_target(&publish, path, error);
     if (status == EBPO_OK && (publish.slot = ebpo_unfinished_reserve()) < 0)
-        status =
-            ebpo_fail_file(error, EBPO_E_LIMIT, path,
-                           "more than %d files are being written at a time", EBPO_UNFINISHED_MOST);
+        status = ebpo_fail_file(error, EBPO_E_LIMIT, path,
+                                "more than %d files are being written or locked at a time",
+                                EBPO_UNFINISHED_MOST);
     if (status == EBPO_OK) {
         ebpo_remove_stale_files(publish.folder, ebpo_path_name(publish.target));
         status = create_temporary(&publish, error);

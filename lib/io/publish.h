@@ -32,8 +32,8 @@ ebpo_file_version ebpo_file_version_of(int fd);
 
 typedef struct ebpo_publish {
     char *shown;  /* the target as the caller named it, for messages */
-    char *folder; /* absolute, so that a change of the working folder does no harm */
-    char *target;
+    char *target; /* absolute, so that a change of the working folder does no harm */
+    char *folder; /* of the target; ends with '/' */
     char *temporary;
     FILE *stream; /* NULL until asked for */
     char *buffer; /* of the stream */
@@ -56,7 +56,7 @@ typedef struct ebpo_publish {
  * old file. Where there is none, the mode is 0666 less the umask. A folder, device or symbolic link
  * at `path` is EBPO_E_IO, so is a folder that cannot be written. On failure nothing is left behind.
  * Temporary files for the same target that killed processes have left are removed.
- * More than EBPO_UNFINISHED_MOST at a time in one process: EBPO_E_LIMIT. */
+ * EBPO_E_LIMIT: the process has EBPO_UNFINISHED_MOST outputs and locks (io/file_lock.h) already. */
 EBPO_MUST_USE ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path,
                                              ebpo_error *error);
 

@@ -18,6 +18,7 @@
 #include "base/sums.h"
 #include "head/head.h"
 #include "io/byte_source.h"
+#include "io/file_source.h"
 #include "paint/paint_columns.h"
 
 typedef struct reader {
@@ -419,15 +420,14 @@ ebpo_status ebpo_paint_open(const char *path, ebpo_paint **out, ebpo_error *erro
 static ebpo_status make_at(const char *path, const ebpo_file *model, ebpo_paint **out,
                            ebpo_error *error)
 {
-    ebpo_publish publish = EBPO_PUBLISH_INIT;
-    ebpo_status status = ebpo_publish_begin(&publish, path, error);
+    char *target;
+    ebpo_status status = ebpo_target_path(path, &target, error);
     if (status == EBPO_OK)
         status = ebpo_paint_new(model, out, error);
-    if (status == EBPO_OK) {
-        (*out)->file->path = publish.target;
-        publish.target = NULL;
-    }
-    ebpo_publish_abort(&publish);
+    if (status == EBPO_OK)
+        (*out)->file->path = target;
+    else
+        free(target);
     return status;
 }
 

@@ -14,6 +14,7 @@
 #include "base/endian.h"
 #include "base/error.h"
 #include "h5/h5.h"
+#include "io/file_source.h"
 #include "io/publish.h"
 #include "paint/paint_columns.h"
 
@@ -177,13 +178,13 @@ static ebpo_status save(const ebpo_paint *p, const char *path, ebpo_error *error
     ebpo_paint_file *f = p->file;
     ebpo_publish publish = EBPO_PUBLISH_INIT;
     ebpo_h5_out out = EBPO_H5_OUT_INIT;
-    ebpo_status status = ebpo_publish_begin(&publish, path, error);
-    if (status != EBPO_OK)
-        return status;
-    bool own = f->path && strcmp(f->path, publish.target) == 0, first = !f->path;
-    char *place = own || first ? strdup(publish.target) : NULL;
-    int fd = place ? fcntl(publish.fd, F_DUPFD_CLOEXEC, 3) : -1;
-    if ((own || first) && fd < 0)
+    char *place;
+    int fd = -1;
+    ebpo_status status = ebpo_target_path(path, &place, error);
+    bool own = place && f->path && strcmp(f->path, place) == 0, first = !f->path;
+    if (status == EBPO_OK)
+        status = ebpo_publish_begin(&publish, path, error);
+    if (status == EBPO_OK && (own || first) && (fd = fcntl(publish.fd, F_DUPFD_CLOEXEC, 3)) < 0)
         status = ebpo_fail_errno(error, path, "could not be written");
     if (status == EBPO_OK)
         status =

@@ -28,7 +28,8 @@ static void bound_by_cells(const ebpo_info *info, ebpo_solid_volume *out)
     out->hi = hi * (1 + OF_SUM) + root * OF_ROOT;
 }
 
-/* Returns the volume of components that do not meet; NAN: it is not known. */
+/* Returns the volume of components that do not meet; NAN: it is not known. Shells that were not
+ * counted are not apart. */
 static double known_volume(const ebpo_mesh_report *report, ebpo_rule rule,
                            const ebpo_shells *shells)
 {
@@ -46,17 +47,17 @@ ebpo_status ebpo_solid_volume_of(const ebpo_mesh_report *report, ebpo_rule rule,
 {
     EBPO_DEFAULT_FP;
     ebpo_solid_volume v = { .hi = INFINITY, .integral = report->volume };
-    ebpo_shells counted = EBPO_SHELLS_INIT;
+    ebpo_shells own = EBPO_SHELLS_INIT;
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_solid_volume, out, error);
     if (status == EBPO_OK)
-        status = EBPO_TAKE(ebpo_shells, &counted, shells, error);
-    if (status == EBPO_OK && (unsigned)rule > EBPO_RULE_POSITIVE)
-        status = ebpo_fail(error, EBPO_E_ARGUMENT, "rule %d is not known", (int)rule);
+        status = EBPO_TAKE(ebpo_shells, &own, shells, error);
     if (status != EBPO_OK)
         return status;
+    if ((unsigned)rule > EBPO_RULE_POSITIVE)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown winding rule %d", (int)rule);
     if (info)
         bound_by_cells(info, &v);
-    double volume = known_volume(report, rule, &counted);
+    double volume = known_volume(report, rule, &own);
     if (!report->balanced)
         v = (ebpo_solid_volume){ .integral = 0 };
     else if (volume >= v.lo && volume <= v.hi)

@@ -134,12 +134,19 @@ END_TEST
 
 START_TEST(more_outputs_than_slots_are_refused_and_slots_come_back)
 {
+    ebpo_file_lock lock;
+    ebpo_error error = EBPO_ERROR_INIT;
     ebpo_publish out[EBPO_UNFINISHED_MOST], last;
     for (int round = 0; round < 2; round++) {
         for (int i = 0; i < EBPO_UNFINISHED_MOST; i++)
             ck_assert(ebpo_publish_begin(&out[i], target, NULL) == EBPO_OK);
         ck_assert(ebpo_publish_begin(&last, target, NULL) == EBPO_E_LIMIT);
-        for (int i = 0; i < EBPO_UNFINISHED_MOST; i++)
+        ebpo_publish_abort(&out[0]);
+        ck_assert(ebpo_file_lock_take(&lock, target, 0, NULL, NULL) == EBPO_OK && lock.slot >= 0);
+        ck_assert(ebpo_publish_begin(&last, target, &error) == EBPO_E_LIMIT);
+        ck_assert(strstr(error.message, "32 files are being written or locked") != NULL);
+        ebpo_file_lock_release(&lock);
+        for (int i = 1; i < EBPO_UNFINISHED_MOST; i++)
             ebpo_publish_abort(&out[i]);
     }
     ck_assert(scratch_entries() == 0);
@@ -229,6 +236,51 @@ START_TEST(waiting_for_a_lock_can_be_cancelled)
     ck_assert(ebpo_file_lock_take(&other, target, 60, &progress, NULL) == EBPO_E_CANCELLED);
     ck_assert(calls == 1);
     ebpo_file_lock_release(&lock);
+}
+END_TEST
+
+/* Gives up root, who may write anywhere. */
+static int lock_as_nobody(void)
+{
+    enum { NOBODY = 65534 };
+    ebpo_file_lock lock;
+    if (geteuid() == 0 && setuid(NOBODY) != 0)
+        return 1;
+    alarm(3);
+    if (ebpo_file_lock_take(&lock, target, 0, NULL, NULL) != EBPO_OK || lock.fd != -1)
+        return 2;
+    ebpo_file_lock_release(&lock);
+    return 0;
+}
+
+START_TEST(nobody_waits_in_a_folder_that_cannot_be_written_to)
+{
+    int status;
+    ck_assert(chmod(folder, 0555) == 0);
+    pid_t child = fork();
+    if (child == 0)
+        _exit(lock_as_nobody());
+    ck_assert(waitpid(child, &status, 0) == child && status == 0);
+    ck_assert(chmod(folder, 0700) == 0 && scratch_entries() == 0);
+}
+END_TEST
+
+START_TEST(a_file_of_other_use_is_no_lock_and_stays)
+{
+    ebpo_file_lock lock;
+    const char *named = scratch(".out.bin.lock");
+    for (int pipe = 0; pipe < 2; pipe++) {
+        if (pipe)
+            ck_assert(unlink(named) == 0 && mkfifo(named, 0600) == 0);
+        else
+            write_file(named, "kept");
+        ck_assert(ebpo_file_lock_take(&lock, target, 0, NULL, NULL) == EBPO_OK && lock.fd == -1);
+        ebpo_file_lock_release(&lock);
+        if (!pipe)
+            check_content(named, "kept");
+        ck_assert(scratch_entries() == 1);
+    }
+    unlink(named);
 }
 END_TEST
 
@@ -434,6 +486,8 @@ Suite *test_suite(void)
     tcase_add_test(tests, a_lock_is_waited_for_and_leaves_no_file);
     tcase_add_test(tests, nobody_waits_where_no_lock_can_be_made);
     tcase_add_test(tests, waiting_for_a_lock_can_be_cancelled);
+    tcase_add_test(tests, nobody_waits_in_a_folder_that_cannot_be_written_to);
+    tcase_add_test(tests, a_file_of_other_use_is_no_lock_and_stays);
     tcase_add_test(tests, processes_with_a_lock_take_turns);
     tcase_add_test(tests, an_output_replaces_only_what_it_was_made_from);
     tcase_add_test(tests, pairs_of_outputs_are_put_in_place_in_turn);

@@ -543,6 +543,25 @@ START_TEST(solids_without_volume_have_no_centroid)
 }
 END_TEST
 
+START_TEST(volumes_by_unknown_rules_are_refused)
+{
+    static const int rules[] = { 3, 1 << 20, -1 };
+    ebpo_mesh_report report = { .balanced = true, .manifold = true, .components = 2, .volume = 1 };
+    ebpo_shells shells = EBPO_SHELLS_INIT;
+    ebpo_solid_volume v = EBPO_SOLID_VOLUME_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    shells.apart = 1;
+    shells.beyond[EBPO_RULE_POSITIVE] = 2;
+    ck_assert(ebpo_solid_volume_of(&report, EBPO_RULE_POSITIVE, &shells, NULL, &v, NULL) == 0);
+    ck_assert(v.lo == 3 && v.hi == 3);
+    for (int i = 0; i < 3; i++) {
+        ck_assert(ebpo_solid_volume_of(&report, (ebpo_rule)rules[i], &shells, NULL, &v, &error) ==
+                  EBPO_E_ARGUMENT);
+        ck_assert(strstr(error.message, "unknown winding rule") != NULL);
+    }
+}
+END_TEST
+
 START_TEST(masses_do_not_depend_on_threads)
 {
     ebpo_mesh mesh = ebpo_test_torus(2, 1, 300, 100);
@@ -584,6 +603,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, surfaces_have_an_area_only);
     tcase_add_test(tests, solids_without_volume_have_no_centroid);
     tcase_add_test(tests, masses_do_not_depend_on_threads);
+    tcase_add_test(tests, volumes_by_unknown_rules_are_refused);
     tcase_add_test(tests, files_without_mesh_cannot_be_measured);
     suite_add_tcase(suite, tests);
     return suite;

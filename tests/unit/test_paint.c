@@ -10,6 +10,7 @@
 
 #include "check_main.h"
 #include "expect.h"
+#include "io/unfinished.h"
 #include "model_file.h"
 #include "scratch.h"
 #include "solids.h"
@@ -251,6 +252,11 @@ START_TEST(one_at_a_time_has_a_file_open_to_change)
     model_must(ebpo_paint_open_to_change(path, o.file, 0, NULL, &one, &error), "new", &error);
     ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, &error) == EBPO_E_IO);
     ck_assert(strstr(error.message, "another program has been changing it") && !other);
+    /* a save to another path, even one that fails, is no end of it */
+    ck_assert(ebpo_paint_save(one, scratch("absent/q.paint.h5"), NULL) == EBPO_E_IO);
+    ck_assert(ebpo_paint_save(one, scratch(NULL), NULL) == EBPO_E_IO);
+    model_must(ebpo_paint_save(one, scratch("q.paint.h5"), &error), "saving", &error);
+    ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, &error) == EBPO_E_IO);
     ck_assert(ebpo_paint_add_layer(one, NULL, NULL, NULL) == EBPO_OK);
     model_must(ebpo_paint_save(one, path, &error), "saving", &error);
     /* saved: the next one has its turn, and reads what was saved */
@@ -277,6 +283,27 @@ START_TEST(a_new_paint_does_not_replace_one_that_was_made_meanwhile)
     ck_assert(ebpo_write_file(scratch("p.paint.h5"), "x", 1, NULL) == EBPO_OK);
     ck_assert(ebpo_paint_save(p, scratch("p.paint.h5"), &error) == EBPO_E_IO);
     ebpo_paint_free(p);
+    close_model(&o);
+}
+END_TEST
+
+START_TEST(a_new_paint_makes_no_file_before_it_is_saved)
+{
+    opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint *p = NULL;
+    int slots = 0;
+    while (ebpo_unfinished_reserve() >= 0) /* no output can be begun */
+        slots++;
+    ebpo_status status =
+        ebpo_paint_open_to_change(scratch("p.paint.h5"), o.file, 0, NULL, &p, &error);
+    while (slots > 0)
+        ebpo_unfinished_forget(--slots);
+    model_must(status, "new", &error);
+    ebpo_paint_free(p);
+    ck_assert(ebpo_paint_open_to_change(scratch("absent/p.paint.h5"), o.file, 0, NULL, &p,
+                                        &error) == EBPO_E_IO);
+    ck_assert(strstr(error.message, "the folder of the output cannot be used") != NULL);
     close_model(&o);
 }
 END_TEST
@@ -678,6 +705,7 @@ Suite *test_suite(void)
     tcase_add_test(c, a_file_that_is_changed_in_its_place_is_not_replaced);
     tcase_add_test(c, one_at_a_time_has_a_file_open_to_change);
     tcase_add_test(c, a_new_paint_does_not_replace_one_that_was_made_meanwhile);
+    tcase_add_test(c, a_new_paint_makes_no_file_before_it_is_saved);
     tcase_add_test(c, points_are_checked_against_the_model);
     tcase_add_test(c, what_is_removed_is_gone);
     tcase_add_test(c, what_is_wrong_is_refused);

@@ -169,6 +169,9 @@ START_TEST(structs_that_were_not_begun)
     REFUSED(ebpo_mass, ebpo_measure(m.file, 1, zeros(), error));
     REFUSED(ebpo_solid_volume, ebpo_solid_volume_of(&ebpo_file_info(m.file)->report,
                                                     EBPO_RULE_NONZERO, NULL, NULL, zeros(), error));
+    REFUSED(ebpo_shells,
+            ebpo_solid_volume_of(&ebpo_file_info(m.file)->report, EBPO_RULE_NONZERO, zeros(), NULL,
+                                 &(ebpo_solid_volume)EBPO_SOLID_VOLUME_INIT, error));
     REFUSED(ebpo_deviation, ebpo_deviation_level(m.model, m.file, 0, NULL, zeros(), error));
     REFUSED(ebpo_deviation_options,
             ebpo_deviation_level(m.model, m.file, 0, zeros(), &(ebpo_deviation)EBPO_DEVIATION_INIT,

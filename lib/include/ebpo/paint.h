@@ -107,8 +107,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_memory(const void *data, uint
  *
  * Two files that a thread opens so at once can make two programs wait for each other, until `wait`
  * is over. The lock is an empty file ".NAME.lock" in the same folder while it is held. On a
- * file system without locks (NFS without its lock service), and in a folder that cannot be written
- * to, nobody waits; ebpo_paint_save still compares.
+ * file system without locks (NFS without its lock service), in a folder that cannot be written
+ * to, and where ".NAME.lock" is anything but an empty file, nobody waits; ebpo_paint_save still
+ * compares.
  *
  * EBPO_E_IO: also where others take longer than `wait`. EBPO_E_CANCELLED, EBPO_E_ARGUMENT, and the
  * errors of ebpo_paint_open and ebpo_paint_new.

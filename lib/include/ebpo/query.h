@@ -879,8 +879,7 @@ typedef struct ebpo_solid_volume {
  * info      of the mesh's file, whose black cells and envelopes bound the volume;
  *           NULL: there is none
  *
- * EBPO_E_ARGUMENT: `out` or `shells` was not begun with its macro; a rule that is not
- * known.
+ * EBPO_E_ARGUMENT: `out` or `shells` was not begun with its macro, or `rule` is unknown.
  *
  * Threads: any.
  */
