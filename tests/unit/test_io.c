@@ -194,32 +194,6 @@ START_TEST(a_lock_is_waited_for_and_leaves_no_file)
 }
 END_TEST
 
-/* In a folder that cannot be written to, and where something else has the lock file's name. */
-START_TEST(nobody_waits_where_no_lock_can_be_made)
-{
-    ebpo_file_lock lock;
-    char name[4096];
-    snprintf(name, sizeof name, "%s/.%s.lock", folder, strrchr(target, '/') + 1);
-    FILE *other = fopen(name, "w");
-    ck_assert(other && fputs("of another program", other) >= 0 && fclose(other) == 0);
-    ck_assert(ebpo_file_lock_take(&lock, target, 60, NULL, NULL) == EBPO_OK && lock.fd == -1);
-    ebpo_file_lock_release(&lock);
-    ck_assert(scratch_entries() == 1 && unlink(name) == 0);
-    ck_assert(chmod(folder, 0555) == 0);
-    pid_t child = fork(); /* as somebody else, for root may write anywhere */
-    if (child == 0) {
-        bool dropped = geteuid() != 0 || setuid(65534) == 0;
-        _exit(dropped && ebpo_file_lock_take(&lock, target, 60, NULL, NULL) == EBPO_OK &&
-                      lock.fd == -1
-                  ? 3
-                  : 4);
-    }
-    int status;
-    ck_assert(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 3);
-    ck_assert(chmod(folder, 0700) == 0);
-}
-END_TEST
-
 static bool stop(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     (void)done, (void)total;
@@ -484,7 +458,6 @@ Suite *test_suite(void)
     tcase_add_test(tests, more_outputs_than_slots_are_refused_and_slots_come_back);
     tcase_add_test(tests, signal_handler_removes_what_is_unfinished);
     tcase_add_test(tests, a_lock_is_waited_for_and_leaves_no_file);
-    tcase_add_test(tests, nobody_waits_where_no_lock_can_be_made);
     tcase_add_test(tests, waiting_for_a_lock_can_be_cancelled);
     tcase_add_test(tests, nobody_waits_in_a_folder_that_cannot_be_written_to);
     tcase_add_test(tests, a_file_of_other_use_is_no_lock_and_stays);
