@@ -51,7 +51,7 @@ def convert(mesh: Any, output: Any, *, without: Any = (), rule: str = "nonzero",
     unknown = set(options) - {*PREPARE, *BUILD}
     if unknown:
         raise TypeError(f"convert() has no option {', '.join(sorted(unknown))}")
-    if options.get("date") and not lib.ebpo_is_date(in_c(options["date"])):
+    if options.get("date") and not lib.ebpo_is_date(options["date"]):
         raise ValueError(f"date: {options['date']!r} is not one as in ISO 8601 and in the calendar, such as 2026-11-26")
     left_out = [without] if isinstance(without, str) else list(without)
     for what, given, known in (("rule", [rule], RULES), ("codec", [codec], CODECS), ("without", left_out, WITHOUT)):
