@@ -74,8 +74,13 @@ class Asking(Case):
             self.skipTest("no h5py")
         with h5py.File("points.h5", "w") as file:
             file["points"] = P
-        with h5py.File("points.h5", "r") as file:
-            np.testing.assert_array_equal(model("scan").inside(file["points"]), model("scan").inside(P))
+        for name in (None, "NeXus", b"\xff", 7):
+            with h5py.File("points.h5", "a") as file:
+                file["points"].attrs["coding"] = "of another format"
+                if name is not None:
+                    file.attrs["format"] = name
+            with h5py.File("points.h5", "r") as file:
+                np.testing.assert_array_equal(model("scan").inside(file["points"]), model("scan").inside(P))
         with h5py.File("scan.ebpo.h5", "r") as file, self.assertRaisesRegex(TypeError, "codes.*mesh"):
             model("scan").inside(file["mesh/vertices"])
 

@@ -73,6 +73,7 @@ class Answers(Case):
         if h5py_or_none():
             with h5py_or_none().File("points.h5", "w") as file:
                 file["a/P"], file["other"] = P, np.zeros(3)
+                file["a/P"].attrs["coding"] = "of another format"
             given += [("points.h5", "a/P"), ("points.h5", None)]
         for source, dataset in given:
             told = ed.winding("scan.ebpo.h5", source, dataset=dataset, chunk=3333)

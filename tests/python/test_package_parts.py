@@ -181,6 +181,10 @@ class Parts(Case):
         for wrong in ({"rule": "none"}, {"codec": "none at all"}, {"without": "mess"}, {"without": ["maps", "mess"]}):
             with self.assertRaisesRegex(ValueError, "not '"):
                 ebpo.convert("scan.ply", "never.ebpo.h5", **wrong)
+        self.assertEqual(ebpo.convert("scan.ply", "dated.ebpo.h5", date="2026-03-01").info.date, "2026-03-01")
+        for wrong in ("2026-02-30", "1.3.2026"):
+            with self.assertRaisesRegex(ValueError, "^date: "):
+                ebpo.convert("scan.ply", "never.ebpo.h5", date=wrong)
         for wrong in ((mesh.vertices, mesh.faces + 10**6), (mesh.vertices, mesh.faces[:, :2])):
             with self.assertRaises(ValueError):
                 ebpo.convert(wrong, "never.ebpo.h5")

@@ -515,6 +515,34 @@ class Sources(Case):
         ebpo.Collider(m, m)
         self.assertTrue(m.stats["resident"], "what holds the model for long has all of it")
 
+    def test_parts_are_freed_before_all_is_loaded(self):
+        """The whole model and the parts that other threads ask are never in memory together."""
+        pathlib.Path("large.ebpo.h5").write_bytes(large())
+        for hold, waits in ((lambda m: m._context(1, 1, "box"), True), (lambda m: m._context(), False)):
+            m, alive = ebpo.open("large.ebpo.h5"), []
+            m.inside(P[0])
+            parts, make = [m._made, *m._contexts], m._new_model
+
+            def new(options, make=make, parts=parts, alive=alive):
+                alive.append([part._end.alive for part in parts])
+                return make(options)
+
+            m._new_model = new
+            other = threading.Thread(target=ebpo.Collider, args=(m, m), daemon=True)
+            with hold(m):
+                other.start()
+                other.join(.3 if waits else 30)
+                self.assertEqual((other.is_alive(), alive), (waits, []))
+            other.join(30)
+            self.assertFalse(other.is_alive())
+            self.assertEqual((alive, m.stats["resident"]), ([[False, False]], True) if waits else ([], False))
+        m = ebpo.open("large.ebpo.h5")
+        with m._context():  # as where a progress function asks the model that it reports of
+            m.distance(points(20_000, 2))
+            self.assertFalse(m.stats["resident"])
+        m.distance(points(20_000, 2), threads=4)
+        self.assertTrue(m.stats["resident"], "at a later question")
+
 
 def large():
     """Bytes of a model of more than 2 MiB, made once."""

@@ -171,6 +171,10 @@ class Handle:
         free(pointer)
         del keep
 
+    def end_now(self):
+        """Frees it before the last reference goes. Nothing may use it any more."""
+        self._end()
+
     @classmethod
     def made(cls, function, *arguments, free, keep=()):
         """Of functions whose last arguments are the object that is made, and the error."""

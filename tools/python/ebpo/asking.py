@@ -21,8 +21,14 @@ CODES = "codes of the .ebpo.h5 format; Model.mesh() gives the vertices"
 
 
 def holds_codes(values: Any) -> bool:
-    """Returns True for an array of an .ebpo.h5 file: each has an attribute `coding`, and none of others has."""
-    return "coding" in getattr(values, "attrs", ())
+    """Returns True for an array of an .ebpo.h5 file that has a coding; files of others may use that word too."""
+    if "coding" not in getattr(values, "attrs", ()):
+        return False
+    root = getattr(getattr(values, "file", None), "attrs", None)  # of a dataset of h5py
+    if root is None:
+        return True
+    name = root.get("format", "")
+    return (name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)).startswith("EBP-Octree")
 
 
 def cores() -> int:

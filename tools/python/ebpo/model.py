@@ -137,6 +137,9 @@ class Model:
         self._file: Handle | None = opened(source, http, options["storage_options"],
                                             options.get("most_expansion") or 0)
         self._lock = threading.RLock()
+        self._back = threading.Condition(self._lock)  # contexts are back, or the whole model is there
+        self._bringing = False
+        self._lent = [0, 0]  # contexts: of calls that may run functions of the caller; of questions, which do not
         self._made: Handle | None = None
         self._contexts: collections.deque[Handle] = collections.deque()
         self._samplers: dict[str, Handle] = {}
@@ -171,42 +174,70 @@ class Model:
         with self._lock:
             if self._automatic.waiting:
                 self._bring_in_all()
-        return self._current()
+                self._automatic.waiting = False  # parts stay where they are kept
+            return self._current()
 
     def _bring_in_all(self) -> None:
-        """Replaces the parts by the whole model."""
+        """Replaces the parts by the whole model, when no thread asks the parts: both may not fit into memory.
+
+        While functions of a caller may run within a context it returns with the parts: such a function may
+        itself wait for this thread, or be what asks here.
+        """
         with self._lock:
-            if not self._automatic.waiting:
+            while self._bringing:
+                self._back.wait()
+            if not self._automatic.waiting or self._lent[0]:
                 return
-            self._automatic.waiting = False
-            self._contexts.clear()
-            self._made = None
+            self._bringing = True
             try:
-                self._made = self._new_model(self._automatic.whole())
-            except (LimitError, NoMemory):  # it takes more than estimated
-                pass
+                while self._lent[1]:
+                    self._back.wait()
+                self._automatic.waiting = False
+                for context in self._contexts:  # now: variables of other threads may still name them
+                    context.end_now()
+                self._contexts.clear()
+                if self._made is not None:
+                    self._made.end_now()
+                self._made = None
+                with contextlib.suppress(LimitError, NoMemory):  # it takes more than estimated
+                    self._made = self._new_model(self._automatic.whole())
+            finally:
+                self._bringing = False
+                self._back.notify_all()
 
     @contextlib.contextmanager
     def _context(self, questions: int = 0, total: int = 0, kind: str = "") -> Iterator[Handle]:
         """A context of the model for one thread.
 
-        questions: so many will be asked of `total` that are known to come; kind: of PARTS_SHARE.
+        questions: so many will be asked of `total` that are known to come, without functions of the caller;
+        kind: of PARTS_SHARE.
         """
-        model, waiting, began = self._current(), self._automatic.waiting and questions > 0, time.perf_counter()
-        if waiting and self._automatic.pays(model, total, PARTS_SHARE[kind]):
-            self._bring_in_all()
-            model, waiting = self._current(), False
-        try:
-            context = self._contexts.pop()
-        except IndexError:
-            context = Handle.made("ebpo_context_new", model, free="ebpo_context_free", keep=(model,))
+        began, asking = time.perf_counter(), questions > 0
+        if asking and self._automatic.waiting:
+            with self._lock:
+                pays = self._automatic.waiting and self._automatic.pays(self._current(), total, PARTS_SHARE[kind])
+            if pays:
+                self._bring_in_all()
+        with self._lock:
+            while self._bringing:
+                self._back.wait()
+            model, waiting = self._current(), asking and self._automatic.waiting
+            try:
+                context = self._contexts.pop()
+            except IndexError:
+                context = Handle.made("ebpo_context_new", model, free="ebpo_context_free", keep=(model,))
+            self._lent[asking] += 1
         try:
             yield context
         finally:
             if waiting:
                 self._automatic.asked(questions, time.perf_counter() - began)
-            if self._made is model:
-                self._contexts.append(context)
+            with self._lock:
+                if self._made is model:
+                    self._contexts.append(context)
+                self._lent[asking] -= 1
+                if self._bringing:
+                    self._back.notify_all()
 
     def close(self) -> None:
         """Frees what the model holds; arrays that were given stay. The last reference does the same."""
@@ -232,7 +263,8 @@ class Model:
     def stats(self) -> dict[str, Any]:
         """What questions have cost so far: members of ebpo_model_stats in ebpo/query.h."""
         stats = made(c.ebpo_model_stats)
-        lib.ebpo_model_get_stats(self._current(), ctypes.byref(stats))
+        with self._lock:  # the parts may be freed by another thread
+            lib.ebpo_model_get_stats(self._current(), ctypes.byref(stats))
         return {name: getattr(stats, name) if not isinstance(getattr(stats, name), ctypes.Array)
                 else list(getattr(stats, name)) for name, _ in stats._fields_[1:]}
 
