@@ -2,7 +2,7 @@
 #ifndef EBPO_COLLIDE_NEIGHBOURS_H
 #define EBPO_COLLIDE_NEIGHBOURS_H
 
-#include "pair/pair_kind.h"
+#include <ebpo/pair.h>
 
 /* As ebpo_triangle_pair, but EBPO_PAIR_APART where the common points are the corner, or the edge
  * between corners, that both faces have (equal coordinates). Swapping changes nothing. */

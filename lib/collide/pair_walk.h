@@ -6,7 +6,7 @@
 #include "collide/accel_pair.h"
 #include "collide/posed_faces.h"
 #include "pair/pair_filter.h"
-#include "pair/pair_kind.h"
+#include <ebpo/pair.h>
 
 /* Children of nodes: the node's number << 3 | lane. */
 typedef struct ebpo_node_pair {

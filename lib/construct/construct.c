@@ -63,7 +63,7 @@ static ebpo_status check_options(const ebpo_build_options *o, const ebpo_info *i
         return ebpo_fail(error, EBPO_E_ARGUMENT, "epsilon %g is not in 0 .. 1", o->epsilon);
     if (o->rule > EBPO_RULE_POSITIVE)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown winding rule %d", (int)o->rule);
-    if (!ebpo_selection_of(o->select))
+    if (!ebpo_selection_function(o->select))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown selection %d", (int)o->select);
     if (!(o->percent > 0 && o->percent <= 100))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "percent %g is not above 0 and at most 100",
@@ -142,12 +142,12 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     info->max_level = b->max_level;
     info->leaf_faces = o->leaf_faces;
     info->epsilon = o->epsilon;
-    const ebpo_selection_method *method = ebpo_selection_of(o->select);
+    const ebpo_selection_traits *traits = ebpo_selection_describe(o->select);
     info->selection = o->select;
-    info->percent = method->traits.from_leaves && !(o->k_root > 0) ? o->percent : 0;
-    info->k_root = method->traits.from_leaves ? o->k_root : 0;
-    info->normals = method->traits.takes_normals ? o->normals : 0;
-    info->seed = method->traits.takes_seed ? o->seed : 0;
+    info->percent = traits->from_leaves && !(o->k_root > 0) ? o->percent : 0;
+    info->k_root = traits->from_leaves ? o->k_root : 0;
+    info->normals = traits->takes_normals ? o->normals : 0;
+    info->seed = traits->takes_seed ? o->seed : 0;
     if (mend)
         info->mend = *mend;
     info->report = *report;

@@ -150,7 +150,7 @@ static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
 
 ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
 {
-    if (!ebpo_selection_of(b->options->select)->traits.from_leaves ||
+    if (!ebpo_selection_describe(b->options->select)->from_leaves ||
         !(b->options->parts & (EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES)))
         return EBPO_OK;
     top_list t = { .b = b };

@@ -26,7 +26,7 @@ static const double rounded = 1e-9;
 typedef struct proposer {
     const ebpo_builder *b;
     ebpo_branch *s;
-    const ebpo_selection_method *method;
+    ebpo_select_fn select;
     ebpo_supports supports;
     ebpo_candidate *candidates;
     uint64_t candidate_capacity;
@@ -115,7 +115,7 @@ static bool choose(proposer *p, uint32_t detail, ebpo_cell cell, const ebpo_hand
                            .wanted = ebpo_selection_wanted((int)given->offer_count, cell.level,
                                                            o->percent, o->k_root),
                            .seed = o->seed ^ ebpo_octcode_of_cell(cell) * 0x9e3779b97f4a7c15u };
-    int count = p->method->select(&own, &choice, codes);
+    int count = p->select(&own, &choice, codes);
     if (count < 0 || !ebpo_grow(&all->codes, &all->code_capacity, all->code_count + (uint64_t)count,
                                 sizeof *all->codes))
         return false;
@@ -263,7 +263,7 @@ static void proposer_free(proposer *p)
 bool ebpo_propose_alone(const ebpo_builder *b, ebpo_branch *s, uint32_t detail, ebpo_cell cell,
                         int32_t winding, ebpo_handover *given, ebpo_handover *out)
 {
-    proposer p = { .b = b, .s = s, .method = ebpo_selection_of(b->options->select) };
+    proposer p = { .b = b, .s = s, .select = ebpo_selection_function(b->options->select) };
     bool good = propose_gray(&p, detail, cell, winding, given, out);
     proposer_free(&p);
     return good;
@@ -307,7 +307,7 @@ ebpo_status ebpo_propose_pieces(void *context, uint64_t first, uint64_t last, un
                                 ebpo_error *error)
 {
     ebpo_builder *b = context;
-    proposer p = { .b = b, .method = ebpo_selection_of(b->options->select) };
+    proposer p = { .b = b, .select = ebpo_selection_function(b->options->select) };
     ebpo_status status = EBPO_OK;
     (void)worker;
     for (uint64_t i = first; i < last && status == EBPO_OK; i++) {

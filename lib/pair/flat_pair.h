@@ -2,7 +2,7 @@
 #ifndef EBPO_PAIR_FLAT_PAIR_H
 #define EBPO_PAIR_FLAT_PAIR_H
 
-#include "pair/pair_kind.h"
+#include <ebpo/pair.h>
 
 /* One face has no area, or both are in one plane. */
 ebpo_pair_kind ebpo_flat_pair(const double a[3][3], const double b[3][3]);

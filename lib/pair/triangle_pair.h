@@ -6,7 +6,7 @@
 
 #include <stdbool.h>
 
-#include "pair/pair_kind.h"
+#include <ebpo/pair.h>
 
 ebpo_pair_kind ebpo_triangle_pair(const double a[3][3], const double b[3][3]);
 

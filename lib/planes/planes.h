@@ -48,15 +48,10 @@ typedef struct ebpo_choice {
  * down, anything from the leaves up. */
 typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
-/* With traits.from_leaves nodes come after their children, each from its cell alone (EBP 2017,
- * 3.4.1); else from the root down, each from its parent's envelope. */
-typedef struct ebpo_selection_method {
-    ebpo_selection_traits traits;
-    ebpo_select_fn select;
-} ebpo_selection_method;
-
-/* NULL for what is none. */
-const ebpo_selection_method *ebpo_selection_of(ebpo_selection selection);
+/* With from_leaves (ebpo_selection_describe) nodes come after their children, each from its cell
+ * alone (EBP 2017, 3.4.1); else from the root down, each from its parent's envelope. NULL for what is
+ * none. */
+ebpo_select_fn ebpo_selection_function(ebpo_selection selection);
 
 /* Greedy by removed volume, lazily re-evaluated, until the gain falls below epsilon * cell volume.
  */

@@ -1,33 +1,22 @@
-/* The table of selections. */
+/* The function of each selection; its name and settings: container/selection_traits.c. */
 #include "geom/strict_fp.h"
 
 #include <math.h>
 
 #include "planes/planes.h"
 
-static const ebpo_selection_method methods[] = {
-    [EBPO_SELECT_INHERIT] = { { .name = "inherit" }, ebpo_select_greedy },
-    [EBPO_SELECT_KMEDOIDS] = { { .name = "kmedoids",
-                                 .from_leaves = true,
-                                 .takes_normals = true,
-                                 .takes_seed = true },
-                               ebpo_select_kmedoids },
-    [EBPO_SELECT_OFFSET] = { { .name = "offset", .from_leaves = true }, ebpo_select_offset },
-    [EBPO_SELECT_RANDOM] = { { .name = "random", .from_leaves = true, .takes_seed = true },
-                             ebpo_select_random },
+static const ebpo_select_fn selection_functions[] = {
+    [EBPO_SELECT_INHERIT] = ebpo_select_greedy,
+    [EBPO_SELECT_KMEDOIDS] = ebpo_select_kmedoids,
+    [EBPO_SELECT_OFFSET] = ebpo_select_offset,
+    [EBPO_SELECT_RANDOM] = ebpo_select_random,
 };
-_Static_assert(sizeof methods / sizeof *methods == EBPO_SELECTION_COUNT,
+_Static_assert(sizeof selection_functions / sizeof *selection_functions == EBPO_SELECTION_COUNT,
                "each selection of ebpo/build.h needs a line in this table");
 
-const ebpo_selection_method *ebpo_selection_of(ebpo_selection selection)
+ebpo_select_fn ebpo_selection_function(ebpo_selection selection)
 {
-    return (unsigned)selection < EBPO_SELECTION_COUNT ? &methods[selection] : NULL;
-}
-
-const ebpo_selection_traits *ebpo_selection_describe(ebpo_selection selection)
-{
-    const ebpo_selection_method *method = ebpo_selection_of(selection);
-    return method ? &method->traits : NULL;
+    return (unsigned)selection < EBPO_SELECTION_COUNT ? selection_functions[selection] : NULL;
 }
 
 /* Equation 5, or BP's K. */

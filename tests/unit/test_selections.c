@@ -60,7 +60,7 @@ static int choose(ebpo_selection selection, const ebpo_choice *choice, bool *cho
     uint32_t codes[EBPO_PLANES_STORED];
     ebpo_polytope p;
     ebpo_polytope_cube(&p);
-    int count = ebpo_selection_of(selection)->select(&p, choice, codes);
+    int count = ebpo_selection_function(selection)(&p, choice, codes);
     ck_assert_int_ge(count, 0);
     for (int i = 0; i < choice->count; i++) {
         chosen[i] = false;
@@ -392,7 +392,7 @@ START_TEST(equal_seeds_give_equal_files_for_any_number_of_threads)
         digest_of((ebpo_selection)s, 5, 3, NULL, b);
         digest_of((ebpo_selection)s, 6, 2, NULL, c);
         ck_assert_mem_eq(a, b, 32);
-        ck_assert(!memcmp(a, c, 32) == !ebpo_selection_of((ebpo_selection)s)->traits.takes_seed);
+        ck_assert(!memcmp(a, c, 32) == !ebpo_selection_describe((ebpo_selection)s)->takes_seed);
     }
 }
 END_TEST

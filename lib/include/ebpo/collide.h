@@ -23,6 +23,7 @@
 #define EBPO_COLLIDE_H
 
 #include <ebpo/mesh.h>
+#include <ebpo/pair.h>
 #include <ebpo/pose.h>
 
 #ifdef __cplusplus
@@ -94,14 +95,6 @@ typedef struct ebpo_collide_options {
     }
 
 /* ---- do they meet ---- */
-
-/* How two faces lie to each other, as sets of points. */
-typedef enum ebpo_pair_kind {
-    EBPO_PAIR_APART = 0,
-    EBPO_PAIR_TOUCHING = 1, /* a common point; interiors do not meet */
-    EBPO_PAIR_CROSSING = 2, /* interiors meet, planes differ */
-    EBPO_PAIR_COPLANAR = 3  /* interiors meet in one plane */
-} ebpo_pair_kind;
 
 /* Numbers of faces as in ebpo_distance_result, and those in the files. */
 typedef struct ebpo_face_pair {

@@ -14,6 +14,7 @@
  *   file.h        files: writing, opening, reading
  *   http.h        files on web servers
  *   query.h       point in solid, distance, rays, boxes, mass
+ *   pair.h        how two faces lie to each other
  *   pose.h        where a model is in the world
  *   boolean.h     unions and differences of solids at poses, by query
  *   collide.h     two models that meet
@@ -48,6 +49,7 @@
 #include <ebpo/file.h>
 #include <ebpo/http.h>
 #include <ebpo/query.h>
+#include <ebpo/pair.h>
 #include <ebpo/pose.h>
 #include <ebpo/boolean.h>
 #include <ebpo/collide.h>
