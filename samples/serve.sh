@@ -8,7 +8,7 @@
 # a temporary folder; what is missing is said.
 set -eu
 here=$(cd "$(dirname "$0")/.." && pwd)
-viewer=$here/tools/viewer port=8080 folder=$here/samples/out log='' bundle=yes
+viewer=$here/tools/web port=8080 folder=$here/samples/out log='' bundle=yes
 usage() {
     echo "usage: serve.sh [--port N] [--folder DIR] [--log FILE] [--sources]" >&2
     exit 2
@@ -30,7 +30,7 @@ missing() {
 PATH=$PATH:/usr/sbin
 command -v nginx >/dev/null || missing nginx
 command -v node >/dev/null || missing node
-[ -d "$viewer/node_modules/three" ] || missing "tools/viewer/node_modules"
+[ -d "$viewer/node_modules/three" ] || missing "tools/web/node_modules"
 if ! ls "$folder"/*.ebpo.h5 >/dev/null 2>&1; then
     echo "serve.sh: $folder: no .ebpo.h5 file is there; name a folder with --folder, or run" \
         "sh $here/samples/quickstart.sh for a sample" >&2
@@ -44,7 +44,7 @@ trap 'exit 0' INT TERM
 mkdir -p "$work/www/models" "$work/tmp"
 if [ $bundle = yes ] && [ ! -d "$viewer/node_modules/esbuild" ]; then
     echo "serve.sh: esbuild is missing, so the page is served as it is written and loads slower;" \
-        "npm ci in tools/viewer installs it" >&2
+        "npm ci in tools/web installs it" >&2
     bundle=no
 fi
 if [ $bundle = yes ]; then

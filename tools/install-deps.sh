@@ -61,7 +61,7 @@ fetched() {
     echo "install-deps.sh: npm fetches the viewer's packages, for at most $limit s" >&2
     npm_ci || {
         echo "install-deps.sh: npm could not install the viewer's packages within $limit s" \
-            "(npm ci in tools/viewer says why; more seconds: EBPO_NPM_SECONDS)" >&2
+            "(npm ci in tools/web says why; more seconds: EBPO_NPM_SECONDS)" >&2
         return 1
     }
 }

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
+#include "core/alloc.h"
+#include "core/error.h"
 #include "construct/piece_levels.h"
 #include "construct/proposals.h"
 

@@ -15,12 +15,12 @@
 
 #include <ebpo/build.h>
 
-#include "base/arrays.h"
-#include "geom/cell.h"
+#include "core/arrays.h"
+#include "geometry/cell.h"
 #include "mesh/mesh_parts.h"
-#include "octree/cells.h"
-#include "octree/rule.h"
-#include "planes/planes.h"
+#include "geometry/cells.h"
+#include "geometry/rule.h"
+#include "construct/planes.h"
 
 #define EBPO_NO_NUMBER UINT32_MAX
 #define EBPO_NO_VERTEX UINT64_MAX

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/hash.h"
+#include "core/hash.h"
 
 /* Every `step`-th of the entries, or of the branch's whole list. */
 static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint32_t *entries,

@@ -1,19 +1,19 @@
 /* From a mesh to a tree: the stages in their order. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "arrange/arrange.h"
-#include "attributes/attributes.h"
-#include "attributes/colour_columns.h"
-#include "base/alloc.h"
-#include "base/clock.h"
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/parallel.h"
-#include "base/sized.h"
+#include "construct/arrange.h"
+#include "mesh/attributes.h"
+#include "mesh/colour_columns.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
 #include "construct/branch.h"
 #include "construct/construct_top.h"
 #include "construct/corner_windings.h"

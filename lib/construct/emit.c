@@ -1,20 +1,20 @@
 /* Subtrees to stretches of level arrays: a depth-first walk meets the nodes of each level in
  * octcode order. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "construct/emit.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
+#include "core/alloc.h"
+#include "core/error.h"
 #include "construct/corner_windings.h"
 #include "construct/envelopes.h"
 #include "construct/piece_levels.h"
 #include "construct/proposals.h"
-#include "geom/plane_clip.h"
-#include "octree/node_types.h"
+#include "geometry/plane_clip.h"
+#include "geometry/node_types.h"
 
 struct ebpo_emit_scratch {
     ebpo_envelope_scratch *envelope;

@@ -1,7 +1,7 @@
 /* The planes of a gray node, from the root down: candidates are the directions of the solid's hull
  * in the cell. Few points: their hull. Many, or none that span a volume: the hull of the extreme
  * ones, found by asking in its own directions, and normals of faces. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "construct/envelopes.h"
 
@@ -9,15 +9,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/hash.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hash.h"
 #include "construct/candidates.h"
 #include "construct/proposals.h"
 #include "construct/supports.h"
-#include "geom/plane_clip.h"
-#include "geom/plane_code.h"
-#include "planes/hull_directions.h"
+#include "geometry/plane_clip.h"
+#include "geometry/plane_code.h"
+#include "construct/hull_directions.h"
 
 enum {
     TOP_LEVELS = 4,   /* nearly free of bytes */

@@ -1,15 +1,15 @@
 /* Final numbers: faces by the first leaf, depth first, that they touch; vertices by first use. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "construct/face_numbers.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "attributes/attributes.h"
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
+#include "mesh/attributes.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
 
 static void number_leaf(ebpo_builder *b, const ebpo_branch *s, ebpo_build_detail *d, uint32_t *next)
 {

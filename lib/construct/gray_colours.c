@@ -1,19 +1,19 @@
 /* From the deepest level up: a group of eight gives the sums of the gray node above it. Nothing is
  * kept of faces; what they give is computed for each leaf that lists them, as leaves list few more
  * than there are. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "construct/gray_colours.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#include "attributes/colour_columns.h"
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
-#include "base/wide.h"
-#include "octree/node_types.h"
+#include "mesh/colour_columns.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/wide.h"
+#include "geometry/node_types.h"
 
 enum { GROUP_GRAIN = 1 << 12, GROUPS_A_TIME = 16 };
 

@@ -5,14 +5,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
 #include "construct/construct_top.h"
 #include "construct/corner_windings.h"
 #include "construct/pack.h"
 #include "construct/piece_levels.h"
-#include "octree/node_types.h"
+#include "geometry/node_types.h"
 
 typedef struct joiner {
     ebpo_builder *b;

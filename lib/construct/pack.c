@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
+#include "core/alloc.h"
+#include "core/error.h"
 #include "construct/piece_levels.h"
 
 enum { STORE_BYTES = 16 << 20, ALIGNMENT = 8 };

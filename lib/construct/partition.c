@@ -6,13 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/hash.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hash.h"
 #include "construct/branch.h"
 #include "construct/corner_windings.h"
 #include "construct/vertex_bounds.h"
-#include "planes/octants.h"
+#include "construct/octants.h"
 
 enum { RELEASE_FACES = 1 << 13 };
 

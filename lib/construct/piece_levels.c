@@ -1,10 +1,10 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "construct/piece_levels.h"
 
 #include <string.h>
 
-#include "base/arrays.h"
+#include "core/arrays.h"
 
 void ebpo_piece_levels_free(ebpo_piece_level *out)
 {

@@ -4,7 +4,7 @@
 
 #include <ebpo/build.h>
 
-#include "container/schema.h"
+#include "format/schema.h"
 
 /* Of one level. */
 typedef struct ebpo_piece_level {

@@ -1,12 +1,12 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "construct/proposals.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "geom/plane_code.h"
+#include "core/alloc.h"
+#include "geometry/plane_code.h"
 
 void ebpo_handover_free(ebpo_handover *h)
 {

@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
 #include "construct/corner_windings.h"
 #include "construct/propose_nodes.h"
 

@@ -1,5 +1,5 @@
 /* Planes from the leaves up, of the nodes of a piece. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "construct/propose_nodes.h"
 
@@ -7,17 +7,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
 #include "construct/branch.h"
 #include "construct/corner_windings.h"
 #include "construct/pack.h"
 #include "construct/partition.h"
 #include "construct/proposals.h"
 #include "construct/supports.h"
-#include "geom/plane_code.h"
-#include "octree/octcode.h"
+#include "geometry/plane_code.h"
+#include "geometry/octcode.h"
 
 /* Corners of a child's envelope are rounded: what that may be in a support, in cells, many times
  * over. */

@@ -2,22 +2,22 @@
  * depends on the model alone, never on the machine. What a piece must know of the others is
  * computed here: which of its faces no earlier piece lists, and the winding numbers at its corners.
  */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "construct/split.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
 #include "construct/branch.h"
 #include "construct/corner_windings.h"
 #include "construct/partition.h"
 #include "construct/vertex_bounds.h"
-#include "geom/ray_triangle.h"
-#include "planes/octants.h"
+#include "geometry/ray_triangle.h"
+#include "construct/octants.h"
 
 /* Pieces have at most this many faces, but there are no more than about PIECES_MOST pieces. */
 enum { PIECE_FACES = 4096, PIECES_MOST = 2048, SPLIT_GRAIN = 1 << 13 };

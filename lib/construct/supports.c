@@ -1,15 +1,15 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "construct/supports.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/hash.h"
+#include "core/alloc.h"
+#include "core/hash.h"
 #include "construct/corner_windings.h"
 #include "construct/vertex_bounds.h"
-#include "geom/plane_code.h"
+#include "geometry/plane_code.h"
 
 enum { FEW_VERTICES = 4096, TABLE_MOST = 1 << 16, MANY_POINTS = 1 << 15 };
 

@@ -4,7 +4,7 @@
 #define EBPO_CONSTRUCT_SUPPORTS_H
 
 #include "construct/builder.h"
-#include "planes/sweep.h"
+#include "construct/sweep.h"
 
 typedef struct ebpo_supports {
     const ebpo_builder *b;

@@ -1,16 +1,16 @@
 /* Support of runs of vertices by boxes of boxes. Rounding is monotone, so a box's bound computed in
  * the same order of operations is never below that of a point in it: skipping a box never loses the
  * greatest point. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "construct/vertex_bounds.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "octree/octcode.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "geometry/octcode.h"
 
 static void join(double (*box)[3], const double low[3], const double high[3])
 {

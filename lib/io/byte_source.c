@@ -8,8 +8,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
+#include "core/alloc.h"
+#include "core/error.h"
 
 /* No system reads more at once. */
 static const uint64_t PIECE_MAX = UINT64_C(1) << 30;

@@ -1,7 +1,7 @@
 /* Where the bytes of a file come from: regular files and memory as ebpo_source, and an input, which
  * is a source with a name and a count of its use. */
-#ifndef EBPO_IO_SOURCE_H
-#define EBPO_IO_SOURCE_H
+#ifndef EBPO_IO_BYTE_SOURCE_H
+#define EBPO_IO_BYTE_SOURCE_H
 
 #include <ebpo/file.h>
 #include <stdatomic.h>

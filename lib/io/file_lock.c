@@ -11,9 +11,9 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "base/clock.h"
-#include "base/error.h"
-#include "base/parallel.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/parallel.h"
 #include "io/file_source.h"
 #include "io/stale_files.h"
 #include "io/unfinished.h"

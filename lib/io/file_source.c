@@ -11,11 +11,11 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "base/alloc.h"
-#include "base/arrays.h"
-#include "base/error.h"
-#include "base/parallel.h"
-#include "base/workspace.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/workspace.h"
 
 enum { PIECE = 1 << 22, FRESH_NS = 100000000 };
 

@@ -1,7 +1,7 @@
 /* Whole files for reading. They are read and not mapped: a mapping of a file that another program
  * shortens ends the process. */
-#ifndef EBPO_IO_FILE_H
-#define EBPO_IO_FILE_H
+#ifndef EBPO_IO_FILE_SOURCE_H
+#define EBPO_IO_FILE_SOURCE_H
 
 #include <ebpo/base.h>
 #include <ebpo/workspace.h>

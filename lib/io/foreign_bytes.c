@@ -3,7 +3,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "base/text.h"
+#include "core/text.h"
 
 enum { LOOK = 512 };
 

@@ -7,7 +7,7 @@
 
 #include <ebpo/base.h>
 
-#include "base/error.h"
+#include "core/error.h"
 #include "io/stale_folders.h"
 
 ebpo_status ebpo_folder_begin(const char *folder, char **making, ebpo_error *error)

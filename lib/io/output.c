@@ -1,9 +1,9 @@
 /* The public face of publish.h: whole files, and giving up. */
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/unnamed_file.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/unnamed_file.h"
 #include "io/publish.h"
 #include "io/unfinished.h"
 

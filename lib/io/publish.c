@@ -10,8 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
+#include "core/alloc.h"
+#include "core/error.h"
 #include "io/byte_source.h"
 #include "io/file_lock.h"
 #include "io/file_source.h"

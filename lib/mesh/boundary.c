@@ -3,10 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/sort.h"
-#include "base/arrays.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/sort.h"
+#include "core/arrays.h"
 
 #define NONE UINT64_MAX
 

@@ -1,8 +1,8 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "mesh/box_tree.h"
 
-#include "base/arrays.h"
+#include "core/arrays.h"
 
 typedef struct filling {
     box_tree *tree;

@@ -1,12 +1,12 @@
 /* Which closed component a cavity is in. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <stdlib.h>
 
-#include "base/arrays.h"
-#include "base/error.h"
-#include "base/sort_with.h"
-#include "geom/predicates.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/sort_with.h"
+#include "geometry/predicates.h"
 #include "mesh/component_parts.h"
 
 /* A closed component of negative volume, seen as the first vertex of its first face. */

@@ -1,12 +1,12 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
-#include "base/arrays.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/arrays.h"
 #include "mesh/mesh_check_parts.h"
 #include "mesh/same_faces.h"
 

@@ -1,13 +1,13 @@
 /* Which components are closed, and their volumes. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/arrays.h"
-#include "base/error.h"
-#include "base/parallel.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/parallel.h"
 #include "mesh/component_parts.h"
 #include "mesh/edge_faces.h"
 #include "mesh/mesh_frame.h"

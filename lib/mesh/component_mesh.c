@@ -1,14 +1,14 @@
 /* A component as a mesh of its own, which knows the numbers of the source. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "attributes/attributes.h"
-#include "attributes/textures_named.h"
-#include "base/alloc.h"
-#include "base/arrays.h"
-#include "base/error.h"
+#include "mesh/attributes.h"
+#include "mesh/textures_named.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
 #include "mesh/component_parts.h"
 
 static void copy_vertices(const ebpo_components *c, uint64_t number, ebpo_mesh *out)

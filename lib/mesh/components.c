@@ -1,15 +1,15 @@
 /* Components of a mesh, cavities with what they are in, and each as a mesh of its own. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/arrays.h"
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/parallel.h"
-#include "base/sized.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
 #include "mesh/component_parts.h"
 
 /* ---- which faces share vertices ---- */

@@ -1,14 +1,14 @@
 /* Faces that repeat another one are removed, or counted by position. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/arrays.h"
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/parallel.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
 #include "mesh/component_parts.h"
 #include "mesh/mesh_check_parts.h"
 #include "mesh/positions.h"

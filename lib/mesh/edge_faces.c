@@ -1,12 +1,12 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "mesh/edge_faces.h"
 
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/sort_with.h"
-#include "geom/predicates.h"
+#include "core/alloc.h"
+#include "core/sort_with.h"
+#include "geometry/predicates.h"
 
 typedef struct edge {
     double v[3], w[3];

@@ -1,17 +1,17 @@
 /* Every place of what checking a mesh finds: noted while checking, then sorted, then told with the
  * faces around it. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/arrays.h"
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/parallel.h"
-#include "base/sized.h"
-#include "base/sort.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
+#include "core/sort.h"
 #include "mesh/component_parts.h"
 #include "mesh/mesh_check_parts.h"
 #include "mesh/places_ply.h"

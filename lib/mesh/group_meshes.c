@@ -2,9 +2,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/arrays.h"
-#include "base/error.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
 #include "mesh/component_parts.h"
 
 /* Each group's vertices once, as its faces name them; counted only where `of` is NULL. `seen`:

@@ -1,9 +1,9 @@
 /* Mending in the one order that there is. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
-#include "base/arrays.h"
-#include "base/fp_env.h"
-#include "base/parallel.h"
+#include "core/arrays.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
 #include "mesh/mesh_parts.h"
 
 enum { GRAIN = 1 << 14 };

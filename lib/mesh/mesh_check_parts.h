@@ -1,7 +1,7 @@
 /* The passes of ebpo_mesh_check. Each works on fixed blocks, whose results are joined in order: the
  * report does not depend on the number of threads. */
-#ifndef EBPO_MESH_CHECK_PARTS_H
-#define EBPO_MESH_CHECK_PARTS_H
+#ifndef EBPO_MESH_MESH_CHECK_PARTS_H
+#define EBPO_MESH_MESH_CHECK_PARTS_H
 
 #include <math.h>
 

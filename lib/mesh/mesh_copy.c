@@ -1,9 +1,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/arrays.h"
-#include "base/error.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
 #include "mesh/mesh_parts.h"
 
 /* NULL when there is no room. */

@@ -1,8 +1,8 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "mesh/mesh_frame.h"
 
-#include "base/arrays.h"
+#include "core/arrays.h"
 
 static void include(double most[3], const ebpo_mesh *mesh, uint64_t vertex)
 {

@@ -1,7 +1,7 @@
 /* Coordinates in units of powers of two, one for each axis, in which volumes of meshes far from 1
  * neither overflow nor vanish: their signs and order are the same. */
-#ifndef EBPO_MESH_FRAME_H
-#define EBPO_MESH_FRAME_H
+#ifndef EBPO_MESH_MESH_FRAME_H
+#define EBPO_MESH_MESH_FRAME_H
 
 #include <math.h>
 

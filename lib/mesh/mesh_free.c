@@ -1,8 +1,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "attributes/attributes.h"
-#include "base/arrays.h"
+#include "mesh/attributes.h"
+#include "core/arrays.h"
 #include "mesh/mesh_parts.h"
 
 void ebpo_arrangement_free(struct ebpo_arrangement *arrangement)

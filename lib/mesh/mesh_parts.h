@@ -1,12 +1,12 @@
 /* Internals shared by the parts of the mesh module. Other modules take ebpo_mesh_position from
  * here. */
-#ifndef EBPO_MESH_MESH_H
-#define EBPO_MESH_MESH_H
+#ifndef EBPO_MESH_MESH_PARTS_H
+#define EBPO_MESH_MESH_PARTS_H
 
 #include <ebpo/mesh.h>
 
-#include "geom/cell.h"
-#include "geom/chain.h"
+#include "geometry/cell.h"
+#include "geometry/chain.h"
 
 #define EBPO_NO_INDEX UINT32_MAX
 

@@ -2,8 +2,8 @@
 
 #include <stdlib.h>
 
-#include "base/error.h"
-#include "base/arrays.h"
+#include "core/error.h"
+#include "core/arrays.h"
 
 const char *ebpo_mesh_label(const ebpo_mesh *mesh)
 {

@@ -1,14 +1,14 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "attributes/attributes.h"
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/parallel.h"
-#include "base/arrays.h"
+#include "mesh/attributes.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/arrays.h"
 #include "mesh/mesh_parts.h"
 #include "mesh/positions.h"
 

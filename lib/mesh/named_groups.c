@@ -3,10 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/sized.h"
-#include "base/sort_with.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/sized.h"
+#include "core/sort_with.h"
 #include "mesh/mesh_parts.h"
 
 /* Of faces under no name, as the OBJ format has it. */

@@ -1,13 +1,13 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "mesh/places_ply.h"
 
 #include <inttypes.h>
 #include <string.h>
 
-#include "base/arrays.h"
-#include "base/endian.h"
-#include "base/error.h"
+#include "core/arrays.h"
+#include "core/endian.h"
+#include "core/error.h"
 
 enum { NOTHING = UINT8_MAX, VERTEX_BYTES = 3 * 8, FACE_BYTES = 1 + 3 * 4 + 3 };
 

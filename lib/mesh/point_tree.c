@@ -1,8 +1,8 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "mesh/point_tree.h"
 
-#include "base/arrays.h"
+#include "core/arrays.h"
 
 mesh_point *ebpo_point_tree_add(point_tree *tree)
 {

@@ -1,15 +1,15 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "mesh/positions.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
-#include "base/arrays.h"
-#include "base/hash.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/arrays.h"
+#include "core/hash.h"
 
 enum { VERTEX_GRAIN = 1 << 14 };
 

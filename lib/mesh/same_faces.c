@@ -2,7 +2,7 @@
 
 #include <stdlib.h>
 
-#include "base/arrays.h"
+#include "core/arrays.h"
 
 enum { INSERTION_LIMIT = 48 };
 

@@ -1,13 +1,13 @@
 /* Closed components, what is known of each, and how many each is within. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "mesh/shell_nesting.h"
 
 #include <string.h>
 
-#include "base/arrays.h"
-#include "base/error.h"
-#include "base/parallel.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/parallel.h"
 #include "mesh/shell_probes.h"
 #include "mesh/shell_rays.h"
 

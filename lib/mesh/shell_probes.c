@@ -1,15 +1,15 @@
 /* The samples of what may be within a host, in a tree, and each of its faces against it. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/arrays.h"
-#include "base/error.h"
-#include "base/parallel.h"
-#include "geom/predicates.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "geometry/predicates.h"
 #include "mesh/shell_probes.h"
 
 /* Of one thread: what may be within the host that it looks at. */

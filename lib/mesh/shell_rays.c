@@ -1,16 +1,16 @@
 /* Rays along x from the samples of all shells through one tree of the crowded hosts' faces: of each
  * host what a ray crosses of it is its winding number at the sample. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/arrays.h"
-#include "base/error.h"
-#include "base/parallel.h"
-#include "geom/predicates.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "geometry/predicates.h"
 #include "mesh/shell_probes.h"
 #include "mesh/shell_rays.h"
 

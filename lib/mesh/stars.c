@@ -2,10 +2,10 @@
 
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
-#include "base/arrays.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/arrays.h"
 
 enum { FACE_GRAIN = 1 << 15, INSERTION_LIMIT = 48 };
 

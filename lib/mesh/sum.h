@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "base/wide.h"
+#include "core/wide.h"
 
 /* From 2^-1074 to 2^1024, and 2^62 terms. */
 enum { EBPO_SUM_LIMBS = (1074 + 1024 + 63) / 32 + 2, EBPO_SUM_CARRY = 1 << 29 };

@@ -1,10 +1,10 @@
 /* Shells look outwards, or inwards where they bound a cavity. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <ebpo/repair.h>
 
-#include "base/arrays.h"
-#include "base/error.h"
+#include "core/arrays.h"
+#include "core/error.h"
 #include "mesh/shell_nesting.h"
 
 static uint64_t turn_shell(const ebpo_components *c, uint32_t component)

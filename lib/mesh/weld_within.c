@@ -1,15 +1,15 @@
 /* Which vertices are joined that are within a distance of each other. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "base/arrays.h"
-#include "base/error.h"
-#include "base/hash.h"
-#include "base/parallel.h"
-#include "base/sort.h"
-#include "geom/predicates.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/parallel.h"
+#include "core/sort.h"
+#include "geometry/predicates.h"
 #include "mesh/mesh_parts.h"
 
 enum { GRAIN = 1 << 12, KEY_SHIFT = 20 };

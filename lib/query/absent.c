@@ -1,11 +1,11 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/absent.h"
 
 #include <stdio.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "core/error.h"
 
 /* What the file was cut to, in words. */
 static void describe(const ebpo_info *info, char *out, size_t capacity)

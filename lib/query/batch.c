@@ -1,5 +1,5 @@
 /* Many questions at once: sorted along the curve, answered in the order in which they came. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/batch.h"
 
@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "container/reader.h"
-#include "octree/octcode.h"
+#include "core/alloc.h"
+#include "format/reader.h"
+#include "geometry/octcode.h"
 #include "query/nearest.h"
 #include "query/prefetch.h"
 #include "query/query_node.h"

@@ -1,14 +1,14 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/box_walk.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/eight.h"
-#include "base/error.h"
-#include "geom/ray_triangle.h"
+#include "core/alloc.h"
+#include "core/eight.h"
+#include "core/error.h"
+#include "geometry/ray_triangle.h"
 #include "query/options.h"
 #include "query/prefetch.h"
 #include "query/pruned.h"

@@ -1,10 +1,10 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/deep_bounds.h"
 
 #include <math.h>
 
-#include "container/reader.h"
+#include "format/reader.h"
 
 /* Each level takes four times the one above it; the third would save a tenth of the loads that two
  * leave: docs/develop/design.md. */

@@ -1,13 +1,13 @@
 /* Distance, nearest point and normal: EBP 2017, 4.4. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "base/clock.h"
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/sized.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
 #include "query/batch.h"
 #include "query/prefetch.h"
 #include "query/inside.h"

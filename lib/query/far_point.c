@@ -1,11 +1,11 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/far_point.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "geom/plane_code.h"
+#include "geometry/plane_code.h"
 
 /* In sizes of the model's box. */
 static const double far_away = 16;

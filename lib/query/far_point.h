@@ -8,8 +8,8 @@
 #ifndef EBPO_QUERY_FAR_POINT_H
 #define EBPO_QUERY_FAR_POINT_H
 
-#include "accel/accel.h"
-#include "octree/cells.h"
+#include "query/accel.h"
+#include "geometry/cells.h"
 
 typedef struct ebpo_far {
     bool far; /* else nothing of what follows is to be used */

@@ -1,12 +1,12 @@
 /* Point in solid, exact. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "geom/predicates.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "geometry/predicates.h"
 #include "query/inside.h"
 
 /* Adds the crossings that the filter left open; true when the point lies on one of these faces. */

@@ -1,10 +1,10 @@
 /* Point in solid, node by node: EBP 2017, 4.2. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
-#include "base/error.h"
-#include "base/clock.h"
-#include "octree/cursor.h"
-#include "octree/node_types.h"
+#include "core/error.h"
+#include "core/clock.h"
+#include "geometry/cursor.h"
+#include "geometry/node_types.h"
 #include "query/inside.h"
 #include "query/limited.h"
 #include "query/pruned.h"

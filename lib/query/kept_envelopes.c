@@ -1,12 +1,12 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/kept_envelopes.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/hash.h"
+#include "core/alloc.h"
+#include "core/hash.h"
 
 /* Most have 1 to 3 KB. */
 enum { SLOTS = 256 };

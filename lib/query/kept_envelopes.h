@@ -3,8 +3,8 @@
 #ifndef EBPO_QUERY_KEPT_ENVELOPES_H
 #define EBPO_QUERY_KEPT_ENVELOPES_H
 
-#include "geom/cell.h"
-#include "geom/polytope.h"
+#include "geometry/cell.h"
+#include "geometry/polytope.h"
 
 typedef struct ebpo_kept_envelopes ebpo_kept_envelopes;
 

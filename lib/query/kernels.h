@@ -4,7 +4,7 @@
 #ifndef EBPO_QUERY_KERNELS_H
 #define EBPO_QUERY_KERNELS_H
 
-#include "accel/accel.h"
+#include "query/accel.h"
 #include "query/near_kernel.h"
 #include "query/ray_kernel.h"
 

@@ -1,5 +1,5 @@
 /* Kernels for any processor. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/kernels.inc"
 #include "query/near_kernel.inc"

@@ -4,25 +4,25 @@
  * first moments det s / 24,   second moments det (s s' + a a' + b b' + c c') / 120. All of it in
  * double-double arithmetic, on coordinates scaled by a power of two to about 1, in blocks of faces
  * that do not depend on threads. A face counts as often as its component bounds the solid, where
- * that is known (arrange/solid_shells.h), else once. Source of the moments: Tonon 2004, "Explicit
+ * that is known (construct/solid_shells.h), else once. Source of the moments: Tonon 2004, "Explicit
  * exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex coordinates". */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <ebpo/query.h>
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "arrange/solid_shells.h"
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/parallel.h"
-#include "base/sized.h"
-#include "container/reader.h"
-#include "geom/double_double.h"
+#include "construct/solid_shells.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
+#include "format/reader.h"
+#include "geometry/double_double.h"
 #include "mesh/mesh_parts.h"
-#include "octree/rule.h"
+#include "geometry/rule.h"
 
 enum { BLOCK_FACES = 16384 };
 

@@ -1,15 +1,15 @@
 /* Which levels stay. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/model_budget.h"
 
 #include <inttypes.h>
 
-#include "accel/accel.h"
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/sized.h"
-#include "container/reader.h"
+#include "query/accel.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
+#include "format/reader.h"
 #include "query/query_top.h"
 #include "query/shared_budget.h"
 #include "query/skeleton.h"

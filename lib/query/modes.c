@@ -1,14 +1,14 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/modes.h"
 
 #include <math.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "geom/plane_clip.h"
-#include "geom/polytope.h"
-#include "lod/lod_model.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "geometry/plane_clip.h"
+#include "geometry/polytope.h"
+#include "levels/lod_model.h"
 #include "query/inside.h"
 #include "query/limited.h"
 #include "query/nearest.h"

@@ -1,6 +1,6 @@
 /* Depth first, nearest child first; what is certainly beyond the limit, or certainly was in a band
  * before, is passed over. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/near_band.h"
 
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
+#include "core/alloc.h"
 
 void ebpo_near_band_begin(ebpo_near_band *band, uint64_t most)
 {

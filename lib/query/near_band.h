@@ -3,7 +3,7 @@
 #ifndef EBPO_QUERY_NEAR_BAND_H
 #define EBPO_QUERY_NEAR_BAND_H
 
-#include "accel/accel.h"
+#include "query/accel.h"
 #include "query/near_order.h"
 
 typedef struct ebpo_near {

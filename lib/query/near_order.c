@@ -1,4 +1,4 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/near_order.h"
 

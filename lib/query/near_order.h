@@ -2,7 +2,7 @@
 #ifndef EBPO_QUERY_NEAR_ORDER_H
 #define EBPO_QUERY_NEAR_ORDER_H
 
-#include "geom/distance.h"
+#include "geometry/distance.h"
 
 /* Sign of distance(p, a) - distance(p, b), exact; with what their bounds tell it is rarely costly.
  */

@@ -1,7 +1,7 @@
 /* Depth first, nearest child first, with everything pruned that is certainly farther than something
  * already seen. Bounds and triangles in single precision, with errors bounded; what passes is
  * judged with certain bounds in double precision, and what these cannot tell apart exactly. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/nearest.h"
 
@@ -10,9 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/clock.h"
-#include "base/error.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
 #include "query/kernels.h"
 #include "query/near_order.h"
 

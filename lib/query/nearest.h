@@ -2,7 +2,7 @@
 #ifndef EBPO_QUERY_NEAREST_H
 #define EBPO_QUERY_NEAREST_H
 
-#include "geom/distance.h"
+#include "geometry/distance.h"
 #include "query/query_node.h"
 
 typedef struct ebpo_nearest {

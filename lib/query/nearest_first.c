@@ -1,16 +1,16 @@
 /* Distances under a budget: subtrees are loaded in the order in which they may matter. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/nearest_first.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/clock.h"
-#include "base/error.h"
-#include "geom/cell.h"
-#include "octree/octcode.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "geometry/cell.h"
+#include "geometry/octcode.h"
 #include "query/deep_bounds.h"
 #include "query/node_queue.h"
 

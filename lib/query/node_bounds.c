@@ -1,10 +1,10 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/node_bounds.h"
 
 #include <math.h>
 
-#include "geom/plane_code.h"
+#include "geometry/plane_code.h"
 
 /* A node may list a face that only comes near, within 1/256 of the cell's size on each axis
  * (format-spec, section 5); and some room for rounding. */

@@ -2,7 +2,7 @@
 #ifndef EBPO_QUERY_NODE_BOUNDS_H
 #define EBPO_QUERY_NODE_BOUNDS_H
 
-#include "octree/cells.h"
+#include "geometry/cells.h"
 
 /* Length of the cell's diagonal, rounded up so that it bounds the distance of any point of the cell
  * to a face that the node lists. */

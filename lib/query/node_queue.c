@@ -1,8 +1,8 @@
 /* Nodes that wait to be searched, the nearest first. */
 #include "query/node_queue.h"
 
-#include "base/alloc.h"
-#include "base/error.h"
+#include "core/alloc.h"
+#include "core/error.h"
 
 /* A heap. */
 static bool before(const ebpo_ranked *a, const ebpo_ranked *b)

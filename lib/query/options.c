@@ -1,14 +1,14 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/options.h"
 
 #include <inttypes.h>
 #include <math.h>
 
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/sized.h"
-#include "container/reader.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
+#include "format/reader.h"
 #include "query/batch.h"
 #include "query/prefetch.h"
 #include "query/inside.h"

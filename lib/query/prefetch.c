@@ -1,6 +1,6 @@
 /* What will be asked for next: the subtrees that queries about places around the last one may need.
  * EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that holds the position instead. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/prefetch.h"
 
@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "container/subtree_expect.h"
-#include "container/subtree_table.h"
+#include "core/alloc.h"
+#include "format/subtree_expect.h"
+#include "format/subtree_table.h"
 #include "query/query_node.h"
 
 typedef struct wanted {

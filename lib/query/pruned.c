@@ -1,11 +1,11 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/pruned.h"
 
 #include <string.h>
 
-#include "base/error.h"
-#include "container/reader.h"
+#include "core/error.h"
+#include "format/reader.h"
 
 typedef struct checking {
     ebpo_context *context;

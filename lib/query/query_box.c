@@ -1,11 +1,11 @@
 /* The faces in a box. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/fp_env.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
 #include "query/box_walk.h"
 #include "query/options.h"
 

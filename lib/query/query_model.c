@@ -1,5 +1,5 @@
 /* Opening a model: everything at once when that fits, else the top of the tree and a cache. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/query_model.h"
 
@@ -8,11 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/clock.h"
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/sized.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
 #include "query/model_budget.h"
 #include "query/shared_budget.h"
 

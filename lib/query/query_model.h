@@ -1,21 +1,21 @@
 /* A model's parts, and a context's. */
-#ifndef EBPO_QUERY_MODEL_H
-#define EBPO_QUERY_MODEL_H
+#ifndef EBPO_QUERY_QUERY_MODEL_H
+#define EBPO_QUERY_QUERY_MODEL_H
 
 #include <ebpo/query.h>
 #include <pthread.h>
 #include <stdatomic.h>
 
-#include "cache/cache.h"
-#include "container/reader.h"
-#include "container/slice.h"
-#include "octree/cells.h"
-#include "octree/rule.h"
+#include "core/cache.h"
+#include "format/reader.h"
+#include "format/slice.h"
+#include "geometry/cells.h"
+#include "geometry/rule.h"
 #include "query/kept_envelopes.h"
 #include "query/kernels.h"
 #include "query/query_top.h"
 #include "query/skeleton.h"
-#include "accel/accel.h"
+#include "query/accel.h"
 
 struct ebpo_model {
     const ebpo_file *file;

@@ -24,8 +24,8 @@ EBPO_MUST_USE ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *nod
 /* Child of a gray node that is not BELOW. */
 ebpo_node ebpo_model_child(const ebpo_model *model, const ebpo_node *gray, unsigned octant);
 
-/* For cursors (octree/cursor.h); the holder is an ebpo_context, which loads subtrees as the cursor
- * comes to them: one cursor at a time, and no other question while its nodes are used. */
+/* For cursors (geometry/cursor.h); the holder is an ebpo_context, which loads subtrees as the
+ * cursor comes to them: one cursor at a time, and no other question while its nodes are used. */
 extern const ebpo_node_source ebpo_context_source;
 
 /* Plane codes that the node itself has. */

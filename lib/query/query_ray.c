@@ -1,8 +1,8 @@
 /* One ray: what it meets first, whether it meets anything, all that it meets. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
-#include "base/error.h"
-#include "base/fp_env.h"
+#include "core/error.h"
+#include "core/fp_env.h"
 #include "query/options.h"
 #include "query/ray_walk.h"
 

@@ -3,11 +3,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/arrays.h"
-#include "container/reader.h"
-#include "octree/node_types.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/arrays.h"
+#include "format/reader.h"
+#include "geometry/node_types.h"
 
 /* Reading, level by level, with what the next level needs to know of the one before. */
 typedef struct reading {

@@ -1,10 +1,10 @@
 /* The top of a tree: levels 0 .. cut level without faces, and which nodes lie below.
  * Immutable; any thread. */
-#ifndef EBPO_QUERY_TOP_H
-#define EBPO_QUERY_TOP_H
+#ifndef EBPO_QUERY_QUERY_TOP_H
+#define EBPO_QUERY_QUERY_TOP_H
 
-#include "container/slice.h"
-#include "accel/accel.h"
+#include "format/slice.h"
+#include "query/accel.h"
 
 typedef struct ebpo_top_planes {
     uint32_t first;

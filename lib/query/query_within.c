@@ -1,13 +1,13 @@
 /* The nearest faces of a point, one after the other. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/sized.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
 #include "query/near_band.h"
 #include "query/node_queue.h"
 #include "query/options.h"

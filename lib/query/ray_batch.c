@@ -1,16 +1,16 @@
 /* Many rays: pieces of them on all cores, each thread with a context of its own. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/parallel.h"
-#include "base/sized.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
 #include "query/batch.h"
 #include "query/options.h"
 #include "query/ray_walk.h"

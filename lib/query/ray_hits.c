@@ -1,14 +1,14 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/ray_hits.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/sort_with.h"
-#include "geom/ray_triangle.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/sort_with.h"
+#include "geometry/ray_triangle.h"
 
 bool ebpo_casting_meets(const ebpo_casting *c, int facing, ebpo_met *m)
 {

@@ -2,8 +2,8 @@
 #ifndef EBPO_QUERY_RAY_KERNEL_H
 #define EBPO_QUERY_RAY_KERNEL_H
 
-#include "accel/accel.h"
-#include "geom/ray.h"
+#include "query/accel.h"
+#include "geometry/ray.h"
 
 typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL } ebpo_ray_wants;
 

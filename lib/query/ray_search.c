@@ -1,11 +1,11 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/ray_search.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "geom/double_double.h"
+#include "geometry/double_double.h"
 
 /* Origins farther from the box than this many times its reach are moved towards it. */
 static const double near_enough = 4;

@@ -1,10 +1,10 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/ray_walk.h"
 
 #include <math.h>
 
-#include "base/error.h"
+#include "core/error.h"
 #include "query/pruned.h"
 #include "query/query_node.h"
 #include "query/ray_search.h"

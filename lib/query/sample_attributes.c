@@ -1,6 +1,6 @@
 /* Attributes where points lie on faces: of vertices weighed by where the point is on its face, of
  * faces the face's own. How exactly is said in query.h. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <ebpo/query.h>
 
@@ -8,11 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "attributes/attributes.h"
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "container/file_in.h"
+#include "mesh/attributes.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "format/file_in.h"
 
 /* A column of an array. */
 typedef struct sampled {

@@ -4,9 +4,9 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/sized.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/sized.h"
 #include "query/budget_shares.h"
 
 struct ebpo_budget {

@@ -5,7 +5,7 @@
 
 #include <ebpo/query.h>
 
-#include "cache/cache.h"
+#include "core/cache.h"
 
 /* Of the caches of subtrees, and of those of chunks: what one loads needs room in the other. */
 ebpo_cache_pool *ebpo_budget_subtrees(const ebpo_budget *budget);

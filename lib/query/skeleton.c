@@ -1,5 +1,5 @@
 /* Bounds of the distance to subtrees that are not in memory: the upper nodes of each. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "query/skeleton.h"
 
@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
+#include "core/alloc.h"
 
 typedef struct kept_node {
     /* `child`: EBPO_IS_BLOCK; or kept, with the number here; or a number in the subtree's

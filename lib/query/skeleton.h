@@ -1,5 +1,5 @@
 /* What is kept in memory of each subtree that has ever been loaded: the upper nodes of its
- * hierarchy over faces (accel/accel.h), eight at first, 2 KB where the subtree takes hundreds. They
+ * hierarchy over faces (query/accel.h), eight at first, 2 KB where the subtree takes hundreds. They
  * bound the distance to its faces much better than its cell and its envelope do, so that searches
  * load it again only if it may matter. Made when it is loaded, kept when the cache drops it: works
  * for every file, and costs no reading. Whenever a search has loaded it for nothing, nodes are
@@ -11,8 +11,8 @@
 #ifndef EBPO_QUERY_SKELETON_H
 #define EBPO_QUERY_SKELETON_H
 
-#include "accel/accel.h"
-#include "cache/cache.h"
+#include "query/accel.h"
+#include "core/cache.h"
 #include "query/far_point.h"
 
 /* Any thread; one at a time where it is not const. */

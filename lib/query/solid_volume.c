@@ -1,14 +1,14 @@
 /* Decides whether the volume of a solid is known. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <ebpo/query.h>
 
 #include <math.h>
 
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/sized.h"
-#include "octree/rule.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
+#include "geometry/rule.h"
 
 /* What rounding may do to sums of envelopes: of the sum, and of the root cell's volume. */
 static const double OF_SUM = 1e-9, OF_ROOT = 1e-12;

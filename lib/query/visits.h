@@ -5,7 +5,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "accel/accel.h"
+#include "query/accel.h"
 
 /* The bits of a key that is not negative (so of the same order as integers), then the child's
  * number. */

@@ -3,7 +3,7 @@
  * unit cube of m . x, and some m makes it an equality: 0, or one that levels n on an edge of the
  * face by one wall, or on the face by two walls. So rounded m still give certain bounds, and
  * nothing has to be clipped. What stays undecided is clipped in rationals. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/containment.h"
 

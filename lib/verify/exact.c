@@ -1,7 +1,7 @@
 /* A triangle is clipped by the six walls, one after the other (Sutherland and Hodgman, "Reentrant
  * polygon clipping", 1974). With exact numbers and closed half-spaces the corners that remain span
  * the intersection, down to a single point of contact. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/exact.h"
 

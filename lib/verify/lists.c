@@ -1,11 +1,11 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/lists.h"
 
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/arrays.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
 #include "verify/touch.h"
 #include "verify/winding.h"
 

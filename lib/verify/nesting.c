@@ -1,11 +1,11 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/nesting.h"
 
-#include "base/arrays.h"
-#include "base/wide.h"
+#include "core/arrays.h"
+#include "core/wide.h"
 
-#include "geom/plane_code.h"
+#include "geometry/plane_code.h"
 
 enum { NODES_PER_LEVEL = 256, POINTS_PER_NODE = 8, POINT_BITS = 16 };
 

@@ -1,12 +1,12 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/structure.h"
 
 #include <inttypes.h>
 #include <math.h>
 
-#include "base/arrays.h"
-#include "container/schema.h"
+#include "core/arrays.h"
+#include "format/schema.h"
 #include "mesh/mesh_parts.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)

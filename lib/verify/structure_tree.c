@@ -1,13 +1,13 @@
 /* What a tree must be beyond fitting its arrays. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/structure.h"
 
 #include <inttypes.h>
 #include <math.h>
 
-#include "base/arrays.h"
-#include "base/random.h"
+#include "core/arrays.h"
+#include "core/random.h"
 #include "mesh/mesh_parts.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)

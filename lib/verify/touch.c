@@ -1,7 +1,7 @@
 /* Separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996): the box' normals, the face's
  * normal, and the products of their edges; for a box and a triangle, also one without area, these
  * are all that is needed. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/touch.h"
 

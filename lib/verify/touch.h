@@ -3,7 +3,7 @@
 #ifndef EBPO_VERIFY_TOUCH_H
 #define EBPO_VERIFY_TOUCH_H
 
-#include "geom/cell.h"
+#include "geometry/cell.h"
 #include "verify/exact.h"
 #include "verify/tally.h"
 

@@ -1,12 +1,12 @@
 /* Finding one's way in a tree held in memory: children by rank, and the counts that ranks rest on.
  */
-#ifndef EBPO_VERIFY_VIEW_H
-#define EBPO_VERIFY_VIEW_H
+#ifndef EBPO_VERIFY_TWIN_TREE_H
+#define EBPO_VERIFY_TWIN_TREE_H
 
 #include <ebpo/file.h>
 
-#include "geom/cell.h"
-#include "octree/octcode.h"
+#include "geometry/cell.h"
+#include "geometry/octcode.h"
 
 /* How many of each thing come before a group of siblings in its level. */
 typedef struct ebpo_twin_group {

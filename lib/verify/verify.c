@@ -2,9 +2,9 @@
  * half-spaces and clipping are done here in another way. */
 #include "verify/verify_parts.h"
 
-#include "base/error.h"
-#include "base/fp_env.h"
-#include "base/sized.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
 #include "mesh/mesh_parts.h"
 #include "verify/nesting.h"
 #include "verify/verify_colours.h"

@@ -1,6 +1,6 @@
 /* From the root down, node by node; no byte is computed: whether it is the right one is a question
  * of two products. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/verify_colours.h"
 
@@ -10,8 +10,8 @@
 
 #include <ebpo/colours.h>
 
-#include "base/arrays.h"
-#include "base/wide.h"
+#include "core/arrays.h"
+#include "core/wide.h"
 #include "mesh/mesh_parts.h"
 
 enum { NODES_A_TIME = 128 };

@@ -1,6 +1,6 @@
 /* Colours of gray nodes against those of the faces below. */
-#ifndef EBPO_VERIFY_COLOURS_H
-#define EBPO_VERIFY_COLOURS_H
+#ifndef EBPO_VERIFY_VERIFY_COLOURS_H
+#define EBPO_VERIFY_VERIFY_COLOURS_H
 
 #include "verify/tally.h"
 #include "verify/twin_tree.h"

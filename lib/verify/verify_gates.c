@@ -2,10 +2,10 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "codec/chunk.h"
-#include "container/reader.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "hdf5_read/chunk.h"
+#include "format/reader.h"
 #include "verify/plain_gates.h"
 #include "verify/verify_subtrees.h"
 

@@ -1,11 +1,11 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/verify_labels.h"
 
 #include <inttypes.h>
 
-#include "base/arrays.h"
-#include "base/wide.h"
+#include "core/arrays.h"
+#include "core/wide.h"
 #include "verify/winding.h"
 
 enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };

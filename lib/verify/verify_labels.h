@@ -8,8 +8,8 @@
  * is checked elsewhere). (2) By rays through the whole mesh, for all cells or a sample, without any
  * of that.
  */
-#ifndef EBPO_VERIFY_LABELS_H
-#define EBPO_VERIFY_LABELS_H
+#ifndef EBPO_VERIFY_VERIFY_LABELS_H
+#define EBPO_VERIFY_VERIFY_LABELS_H
 
 #include "verify/twin_tree.h"
 #include "verify/verify_rays.h"

@@ -1,6 +1,6 @@
 /* Verifying a tree in memory. */
-#ifndef EBPO_VERIFY_VERIFY_H
-#define EBPO_VERIFY_VERIFY_H
+#ifndef EBPO_VERIFY_VERIFY_PARTS_H
+#define EBPO_VERIFY_VERIFY_PARTS_H
 
 #include "verify/tally.h"
 

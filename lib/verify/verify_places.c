@@ -3,11 +3,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "container/long_chunk.h"
-#include "container/places.h"
-#include "container/reader.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "format/long_chunk.h"
+#include "format/places.h"
+#include "format/reader.h"
 #include "verify/verify_subtrees.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)

@@ -1,14 +1,14 @@
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/verify_rays.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
-#include "base/arrays.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/arrays.h"
 #include "verify/winding.h"
 
 enum { SIDE_MAX = 2048, FACE_GRAIN = 1 << 14 };

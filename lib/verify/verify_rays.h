@@ -1,12 +1,12 @@
 /* Winding numbers of many points by rays through the whole mesh: the points are sorted into columns
  * along x, and every face looks for those that it lies before. So the faces are gone through once,
  * in their order, and what is held is for the points alone. */
-#ifndef EBPO_VERIFY_RAYS_H
-#define EBPO_VERIFY_RAYS_H
+#ifndef EBPO_VERIFY_VERIFY_RAYS_H
+#define EBPO_VERIFY_VERIFY_RAYS_H
 
 #include <ebpo/mesh.h>
 
-#include "geom/cell.h"
+#include "geometry/cell.h"
 
 /* A point, and what the file says about it. */
 typedef struct ebpo_ray_point {

@@ -4,13 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "attributes/attributes.h"
-#include "attributes/textures.h"
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/arrays.h"
-#include "base/sort_with.h"
-#include "container/reader.h"
+#include "mesh/attributes.h"
+#include "mesh/textures.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/arrays.h"
+#include "core/sort_with.h"
+#include "format/reader.h"
 #include "mesh/mesh_parts.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_SOURCE, condition, __VA_ARGS__)

@@ -1,6 +1,6 @@
 /* The mesh in the file against the mesh that it was made from. */
-#ifndef EBPO_VERIFY_SOURCE_H
-#define EBPO_VERIFY_SOURCE_H
+#ifndef EBPO_VERIFY_VERIFY_SOURCE_H
+#define EBPO_VERIFY_VERIFY_SOURCE_H
 
 #include "verify/tally.h"
 

@@ -2,11 +2,11 @@
  * shall not go unseen. */
 #include <stdlib.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
-#include "container/long_chunk.h"
-#include "head/head.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "format/long_chunk.h"
+#include "hdf5_read/head.h"
 #include "verify/verify_subtrees.h"
 
 typedef struct survey {

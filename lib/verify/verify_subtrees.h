@@ -1,6 +1,6 @@
 /* The part `subtrees` (format-spec/README.md, section 9) against what it speaks of. */
-#ifndef EBPO_VERIFY_SUBTREES_H
-#define EBPO_VERIFY_SUBTREES_H
+#ifndef EBPO_VERIFY_VERIFY_SUBTREES_H
+#define EBPO_VERIFY_VERIFY_SUBTREES_H
 
 #include "verify/tally.h"
 #include "verify/twin_tree.h"

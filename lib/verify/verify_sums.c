@@ -2,9 +2,9 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-#include "base/endian.h"
-#include "base/error.h"
-#include "container/long_chunk.h"
+#include "core/endian.h"
+#include "core/error.h"
+#include "format/long_chunk.h"
 #include "verify/verify_subtrees.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)

@@ -1,17 +1,17 @@
 /* Nodes with many faces come first, one after the other, with their faces shared out to all
  * threads; what remains below are many smaller subtrees, each walked depth-first by one thread.
  * Every face is tested exactly against every cell that it comes near. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/verify_walk.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
-#include "base/arrays.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/arrays.h"
 #include "verify/containment.h"
 #include "verify/verify_labels.h"
 #include "verify/lists.h"

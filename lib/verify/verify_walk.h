@@ -1,6 +1,6 @@
 /* Walking down the tree with the faces that touch each node: containment, lists and labels. */
-#ifndef EBPO_VERIFY_WALK_H
-#define EBPO_VERIFY_WALK_H
+#ifndef EBPO_VERIFY_VERIFY_WALK_H
+#define EBPO_VERIFY_VERIFY_WALK_H
 
 #include "verify/tally.h"
 #include "verify/twin_tree.h"

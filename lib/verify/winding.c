@@ -2,11 +2,11 @@
  * half-line beside the point are counted. The half-line runs along the axis of the larger shift, so
  * that the smaller shift decides which end of an edge lies where, and the larger one every tie that
  * is left. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include "verify/winding.h"
 
-#include "geom/predicates.h"
+#include "geometry/predicates.h"
 #include "mesh/mesh_parts.h"
 
 void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out)

@@ -34,7 +34,7 @@ static const char usage[] =
     "The output is a closed manifold where the base is one. Sphere and torus never meet "
     "themselves: that is proved for each file\n"
     "before it is written. A file's shape may, where the base does or where its walls are closer "
-    "than the roughness; tests/whole/crossing_faces looks.\n";
+    "than the roughness; tests/integration/crossing_faces looks.\n";
 
 static bool parse_count(const char *name, const char *text, uint64_t most, uint64_t *out)
 {

@@ -10,9 +10,9 @@
 
 #include <ebpo/file.h>
 
-#include "base/endian.h"
-#include "codec/coding.h"
-#include "codec/face_gates.h"
+#include "core/endian.h"
+#include "hdf5_read/coding.h"
+#include "hdf5_read/face_gates.h"
 
 enum { ROOM = 1 << 20, STREAMS_MOST = 32, TURNS = 3, DICTIONARY = 16384 };
 
@@ -56,7 +56,7 @@ static double now(void)
 
 static void begin_frame(const effort *e, size_t size)
 {
-    bool small = e->blocks && size < 4096; /* as lib/codec/chunk.c has it */
+    bool small = e->blocks && size < 4096; /* as lib/hdf5_read/chunk.c has it */
     ZSTD_CCtx_reset(writer, ZSTD_reset_session_and_parameters);
     ZSTD_CCtx_setParameter(writer, ZSTD_c_compressionLevel, small ? 3 : e->level);
     ZSTD_CCtx_setParameter(writer, ZSTD_c_checksumFlag, 1);

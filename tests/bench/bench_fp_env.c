@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <time.h>
 
-#include "base/fp_env.h"
+#include "core/fp_env.h"
 
 enum { CALLS = 50000000 };
 

@@ -6,11 +6,11 @@
 #include <time.h>
 
 #include "exact_twin.h"
-#include "pair/contact.h"
-#include "pair/pair_distance.h"
-#include "pair/pair_filter.h"
-#include "pair/posed_block.h"
-#include "pair/triangle_pair.h"
+#include "extras/collide/contact.h"
+#include "extras/collide/pair_distance.h"
+#include "extras/collide/pair_filter.h"
+#include "extras/collide/posed_block.h"
+#include "geometry/triangle_pair.h"
 #include "pair_twin.h"
 
 enum { PAIRS = 4096, ROUNDS = 40 };

@@ -3,8 +3,8 @@
 #include <time.h>
 
 #include "exact_twin.h"
-#include "geom/predicates.h"
-#include "geom/predicates_exact.h"
+#include "geometry/predicates.h"
+#include "geometry/predicates_exact.h"
 
 enum { SETS = 4096, ROUNDS = 50 };
 

@@ -62,7 +62,7 @@ def octahedron(halvings):
          for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)}), float))
 
 
-# --- light, as tools/render/raster.c without occlusion ---
+# --- light, as tools/cli/render/raster.c without occlusion ---
 
 LINEAR = numpy.array([s / 12.92 if s <= .04045 else ((s + .055) / 1.055) ** 2.4
                       for s in numpy.arange(256) / 255])

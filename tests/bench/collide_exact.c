@@ -1,5 +1,5 @@
 /* What pairs of faces and distances of two models are worth: beside brute force in rational
- * arithmetic (tests/kit/models_twin.h), which takes seconds a pose from 30,000 faces on.
+ * arithmetic (tests/support/models_twin.h), which takes seconds a pose from 30,000 faces on.
  *
  *     collide_exact POSES A.ply|A.obj|... [...]
  *

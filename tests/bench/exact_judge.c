@@ -1,5 +1,5 @@
 /* What answers are worth: questions that are hard to decide, and answers to any beside those of
- * rational arithmetic (tests/kit/oracle.h, brute force), so of models that are not large.
+ * rational arithmetic (tests/support/oracle.h, brute force), so of models that are not large.
  *
  *     exact_judge ask FILE.ebpo.h5 points|rays COUNT OUT.raw
  *     exact_judge judge FILE.ebpo.h5 QUERY POINTS.raw TMAX TOLERANCE ANSWERS...
@@ -22,7 +22,7 @@
 #include <ebpo/query.h>
 
 #include "model_file.h"
-#include "octree/cells.h"
+#include "geometry/cells.h"
 #include "oracle.h"
 #include "solids.h"
 

@@ -60,7 +60,7 @@ def stacks():
 
 
 def is_threads(frame):
-    return frame[1] == "lib/base/parallel.c"
+    return frame[1] == "lib/core/parallel.c"
 
 
 def stage_of(stack):

@@ -79,7 +79,7 @@ def view(side, large, work):
         line = Line(port, ROUND_TRIP, RATE)
         eye, at = (",".join(map(repr, p)) for p in large.view(0))
         address = f"http://127.0.0.1:{line.port}/?file=models/{shown.name}"
-        done = subprocess.run(["node", HERE / "remote/viewed.mjs", drivers.ROOT / "tools/viewer",
+        done = subprocess.run(["node", HERE / "remote/viewed.mjs", drivers.ROOT / "tools/web",
                                address, log, shown.name, eye, at, work / side.name], check=True,
                               capture_output=True, text=True)
         return json.loads(done.stdout)
@@ -141,7 +141,7 @@ def links_of(sides, work):
     page = work / "bench.html"
     page.write_text("<!doctype html><title>bench</title>")
     links = {side.link(which): file for side in sides for which, file in side.files.items()}
-    return {**links, "viewer": drivers.ROOT / "tools/viewer", "modules": work / "node_modules",
+    return {**links, "viewer": drivers.ROOT / "tools/web", "modules": work / "node_modules",
             "worker.js": HERE / "remote/worker.js", "bench.html": page}
 
 

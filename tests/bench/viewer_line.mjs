@@ -21,7 +21,7 @@ for (let i = 2; i < process.argv.length; i++) {
   else
     options[name] = typeof options[name] === 'number' ? Number(process.argv[++i]) : process.argv[++i];
 }
-const root = resolve(options.viewer), viewer = join(root, 'tools/viewer'), work = mkdtempSync(join(tmpdir(), 'ebpo-bench-')), log = join(work, 'access.log');
+const root = resolve(options.viewer), viewer = join(root, 'tools/web'), work = mkdtempSync(join(tmpdir(), 'ebpo-bench-')), log = join(work, 'access.log');
 const { chromium } = await import(pathToFileURL(join(viewer, 'node_modules/playwright-core/index.mjs')));
 
 const PIECE = 4096, QUEUE = 65536; // what a turn sends, and what the line holds of a connection

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""man.py TOOL PAGES COMMANDS: what tools/options makes, and the tool itself, say the same.
+"""man.py TOOL PAGES COMMANDS: what tools/cli/options makes, and the tool itself, say the same.
 
-COMMANDS is tools/options, PAGES where the build has put what is made of it. The options of --help,
+COMMANDS is tools/cli/options, PAGES where the build has put what is made of it. The options of --help,
 of the manual and of bash's completion are the same; so are the words that options take and those
 that are completed; defaults that --help names are in the manual; --help fits on 80 columns; mandoc
 finds no error, and shells that are there none in their completions.

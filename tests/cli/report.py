@@ -2,7 +2,7 @@
 """report.py TOOL INPUTS FEATURES: the figures of `ebpo report`, against other commands, against
 figures made here, and against
 each other. The page holds the same data and nothing from elsewhere; what it draws of it:
-tests/whole/report_page.mjs."""
+tests/web/report_page.mjs."""
 import csv
 import html.parser
 import json

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """shown.py COMMANDS [--update]: which tests show what of each command.
 
-COMMANDS is tools/options. Lines of *.tests are sorted by what they run and expect into a table,
+COMMANDS is tools/cli/options. Lines of *.tests are sorted by what they run and expect into a table,
 command by behaviour, which docs/develop/command-line.md has; a cell without a test is a failure, and
 so is a page that is not this table (--update writes it).
 """
@@ -24,7 +24,7 @@ NONE = {
 }
 TEXT = """# What is shown of each command
 
-Made by `python3 tests/cli/shown.py tools/options --update` of the tests; the test `cli_shown` holds it
+Made by `python3 tests/cli/shown.py tools/cli/options --update` of the tests; the test `cli_shown` holds it
 to them, and fails where a cell has none. A cell names the files with tests of it:
 
 | column | a test |

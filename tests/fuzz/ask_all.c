@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "read_by.h"
-#include "subset/subset_parts.h"
+#include "derive/subset_parts.h"
 
 /* --- hashes; FNV-1a, eight bytes at a time where there are as many --- */
 

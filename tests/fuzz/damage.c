@@ -22,8 +22,8 @@
 #include <unistd.h>
 
 #include "ask_all.h"
-#include "base/sums.h"
-#include "container/file_in.h"
+#include "core/sums.h"
+#include "format/file_in.h"
 #include "known_leaks.h"
 
 typedef struct bytes {

@@ -16,8 +16,8 @@
 #include "cli/selection_args.h"
 #include "cli/subtree_args.h"
 #include "cli/words.h"
-#include "cmd/commands.h"
-#include "cmd/map_job.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/map_job.h"
 
 static const command *const commands[] = {
     &command_convert, &command_check,   &command_info,   &command_levels, &command_view,

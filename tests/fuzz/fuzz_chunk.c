@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "codec/chunk.h"
+#include "hdf5_read/chunk.h"
 #include "fuzz_kit.h"
 
 static ebpo_chunk_coder coder; /* one for all: what a chunk leaves in it must not matter */

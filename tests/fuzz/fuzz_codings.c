@@ -7,8 +7,8 @@
 
 #include <ebpo/file.h>
 
-#include "codec/coding.h"
-#include "codec/face_gates.h"
+#include "hdf5_read/coding.h"
+#include "hdf5_read/face_gates.h"
 #include "verify/plain_gates.h"
 
 static void points(const uint8_t *data, uint64_t rows, bool doubles)

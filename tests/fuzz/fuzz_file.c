@@ -8,7 +8,7 @@
 
 #include "known_leaks.h"
 #include "read_by.h"
-#include "subset/subset_parts.h"
+#include "derive/subset_parts.h"
 
 static void read_attributes(ebpo_file *file)
 {

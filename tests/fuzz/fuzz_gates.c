@@ -2,8 +2,8 @@
  * or refused by both. The first byte stands for how many vertices were seen before. */
 #include "fuzz_kit.h"
 
-#include "codec/coding.h"
-#include "codec/face_gates.h"
+#include "hdf5_read/coding.h"
+#include "hdf5_read/face_gates.h"
 #include "verify/plain_gates.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -1,10 +1,10 @@
 /* Any bytes as the head of a file: every object, attribute and array that the format has is asked
  * for. Refused or read, and what is read keeps its promises. Tests build it twice: as it is, and
- * with a reader that does not compare checksums (base/sums.h). */
+ * with a reader that does not compare checksums (core/sums.h). */
 #include "fuzz_kit.h"
 
-#include "container/schema.h"
-#include "head/head.h"
+#include "format/schema.h"
+#include "hdf5_read/head.h"
 
 static void ask_attributes(ebpo_head *head, ebpo_head_object object)
 {

@@ -6,8 +6,8 @@
 
 #include <ebpo/mesh.h>
 
-#include "import/import.h"
-#include "input/texture_names.h"
+#include "mesh/import.h"
+#include "mesh/texture_names.h"
 
 static void check(const ebpo_mesh *mesh)
 {

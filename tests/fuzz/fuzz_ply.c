@@ -5,7 +5,7 @@
 #include <ebpo/mesh.h>
 #include <math.h>
 
-#include "ply/ply.h"
+#include "mesh/ply.h"
 
 static bool is_vertex(const ebpo_mesh *mesh, uint64_t v, const double p[3])
 {

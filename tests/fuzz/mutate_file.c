@@ -9,10 +9,10 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include "base/endian.h"
-#include "base/sums.h"
-#include "codec/chunk.h"
-#include "container/file_in.h"
+#include "core/endian.h"
+#include "core/sums.h"
+#include "hdf5_read/chunk.h"
+#include "format/file_in.h"
 #include "read_by.h"
 
 size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned seed);

@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/sums.h"
-#include "codec/chunk.h"
-#include "container/file_in.h"
+#include "core/sums.h"
+#include "hdf5_read/chunk.h"
+#include "format/file_in.h"
 #include "read_by.h"
 
 static int wrong;

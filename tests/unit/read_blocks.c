@@ -1,6 +1,6 @@
-/* lib/accel/face_block.h as any processor reads with it, or as those with AVX2 do: READ_BLOCK names
+/* lib/query/face_block.h as any processor reads with it, or as those with AVX2 do: READ_BLOCK names
  * the function. */
-#include "accel/face_block.h"
+#include "query/face_block.h"
 #include "read_blocks.h"
 
 unsigned READ_BLOCK(const ebpo_accel *s, uint32_t block, double out[3][3][EBPO_BLOCK])

@@ -2,7 +2,7 @@
 #ifndef EBPO_TESTS_READ_BLOCKS_H
 #define EBPO_TESTS_READ_BLOCKS_H
 
-#include "accel/accel.h"
+#include "query/accel.h"
 
 unsigned read_block_base(const ebpo_accel *s, uint32_t block, double out[3][3][EBPO_BLOCK]);
 unsigned read_block_avx2(const ebpo_accel *s, uint32_t block, double out[3][3][EBPO_BLOCK]);

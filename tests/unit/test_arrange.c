@@ -6,11 +6,11 @@
 
 #include <ebpo/ebpo.h>
 
-#include "arrange/arrange.h"
+#include "construct/arrange.h"
 #include "check_main.h"
-#include "base/sort.h"
+#include "core/sort.h"
 #include "mesh/mesh_parts.h"
-#include "octree/octcode.h"
+#include "geometry/octcode.h"
 #include "solids.h"
 
 static const ebpo_progress silent = { NULL, NULL };

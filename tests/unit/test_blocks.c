@@ -4,10 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "accel/accel.h"
+#include "query/accel.h"
 #include "check_main.h"
-#include "container/chunks.h"
-#include "container/slice.h"
+#include "format/chunks.h"
+#include "format/slice.h"
 #include "query/query_model.h"
 #include "query_kit.h"
 #include "read_blocks.h"

@@ -6,9 +6,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/error.h"
+#include "core/error.h"
 #include "check_main.h"
-#include "cache/cache.h"
+#include "core/cache.h"
 #include "solids.h"
 
 enum { KEYS = 256 };

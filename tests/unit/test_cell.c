@@ -6,8 +6,8 @@
 
 #include "check_main.h"
 #include "exact_twin.h"
-#include "geom/cell.h"
-#include "octree/octcode.h"
+#include "geometry/cell.h"
+#include "geometry/octcode.h"
 
 /* --- boxes --- */
 

@@ -3,10 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/endian.h"
+#include "core/endian.h"
 #include "check_main.h"
-#include "container/long_chunk.h"
-#include "container/reader.h"
+#include "format/long_chunk.h"
+#include "format/reader.h"
 #include "model_file.h"
 #include "scratch.h"
 #include "solids.h"

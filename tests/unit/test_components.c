@@ -6,7 +6,7 @@
 #include <ebpo/ebpo.h>
 
 #include "check_main.h"
-#include "geom/predicates.h"
+#include "geometry/predicates.h"
 #include "mesh/mesh_parts.h"
 #include "solids.h"
 

@@ -5,14 +5,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/endian.h"
+#include "core/endian.h"
 #include "check_main.h"
 #include "read_by.h"
-#include "codec/chunk.h"
-#include "codec/coding.h"
-#include "container/content.h"
-#include "container/reader.h"
-#include "h5/h5.h"
+#include "hdf5_read/chunk.h"
+#include "hdf5_read/coding.h"
+#include "format/content.h"
+#include "format/reader.h"
+#include "hdf5_write/h5.h"
 #include "random_tree.h"
 #include "scratch.h"
 

@@ -6,7 +6,7 @@
 
 #include "check_main.h"
 #include "exact_twin.h"
-#include "geom/predicates.h"
+#include "geometry/predicates.h"
 
 /* --- the twin: a naive segment-face intersection in rationals --- */
 

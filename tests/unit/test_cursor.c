@@ -10,8 +10,8 @@
 #include <ebpo/subset.h>
 
 #include "model_file.h"
-#include "octree/cursor.h"
-#include "octree/level_nodes.h"
+#include "geometry/cursor.h"
+#include "geometry/level_nodes.h"
 #include "query/query_node.h"
 #include "random_tree.h"
 #include "solids.h"

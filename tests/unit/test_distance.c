@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "check_main.h"
-#include "geom/distance_pairs.h"
+#include "geometry/distance_pairs.h"
 
 typedef struct point {
     mpq_t x[3];

@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "attributes/attributes.h"
-#include "base/workspace.h"
+#include "mesh/attributes.h"
+#include "core/workspace.h"
 #include "check_main.h"
 #include "every_call.h"
 #include "faults.h"

@@ -3,12 +3,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/endian.h"
-#include "base/random.h"
-#include "codec/chunk.h"
-#include "codec/coding.h"
+#include "core/endian.h"
+#include "core/random.h"
+#include "hdf5_read/chunk.h"
+#include "hdf5_read/coding.h"
 #include "check_main.h"
-#include "codec/face_gates.h"
+#include "hdf5_read/face_gates.h"
 #include "solids.h"
 #include "verify/plain_gates.h"
 

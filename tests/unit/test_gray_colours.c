@@ -9,8 +9,8 @@
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 
-#include "attributes/attributes.h"
-#include "base/arrays.h"
+#include "mesh/attributes.h"
+#include "core/arrays.h"
 #include "check_main.h"
 #include "scratch.h"
 #include "solids.h"

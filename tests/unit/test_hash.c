@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/hash.h"
-#include "base/random.h"
+#include "core/hash.h"
+#include "core/random.h"
 
 enum { KEYS = 12288, SLOTS = 16384 }; /* three quarters full */
 

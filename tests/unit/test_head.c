@@ -5,8 +5,8 @@
 #include <stdlib.h>
 
 #include "check_main.h"
-#include "head/head.h"
-#include "head/lookup3.h"
+#include "hdf5_read/head.h"
+#include "hdf5_read/lookup3.h"
 #include "scratch.h"
 
 enum { NAME = 64 };

@@ -7,11 +7,11 @@
 
 #include <ebpo/mesh.h>
 
-#include "base/endian.h"
+#include "core/endian.h"
 #include "check_main.h"
-#include "base/arrays.h"
-#include "import/import.h"
-#include "import/corner_weld.h"
+#include "core/arrays.h"
+#include "mesh/import.h"
+#include "mesh/corner_weld.h"
 
 static ebpo_status import(ebpo_mesh *mesh, const char *name, const void *data, size_t size,
                           ebpo_error *error)

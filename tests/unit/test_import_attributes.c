@@ -5,10 +5,10 @@
 
 #include <ebpo/mesh.h>
 
-#include "attributes/attributes.h"
-#include "base/endian.h"
+#include "mesh/attributes.h"
+#include "core/endian.h"
 #include "check_main.h"
-#include "import/import.h"
+#include "mesh/import.h"
 
 static ebpo_mesh mesh;
 

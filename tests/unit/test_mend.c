@@ -6,9 +6,9 @@
 
 #include <ebpo/ebpo.h>
 
-#include "arrange/arrange.h"
+#include "construct/arrange.h"
 #include "check_main.h"
-#include "base/arrays.h"
+#include "core/arrays.h"
 #include "mesh/mesh_parts.h"
 #include "solids.h"
 

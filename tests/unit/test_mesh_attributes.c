@@ -8,12 +8,12 @@
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 
-#include "attributes/attributes.h"
+#include "mesh/attributes.h"
 #include "check_main.h"
-#include "container/attribute_read.h"
-#include "container/chunks.h"
-#include "container/pick.h"
-#include "ply/ply.h"
+#include "format/attribute_read.h"
+#include "format/chunks.h"
+#include "format/pick.h"
+#include "mesh/ply.h"
 #include "scratch.h"
 #include "solids.h"
 

@@ -3,7 +3,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 
-#include "accel/accel.h"
+#include "query/accel.h"
 #include "check_main.h"
 #include "query/query_model.h"
 #include "query_kit.h"

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "check_main.h"
-#include "geom/decimal.h"
+#include "geometry/decimal.h"
 
 static uint64_t next(uint64_t *state)
 {

@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "check_main.h"
-#include "octree/cells.h"
-#include "octree/node_types.h"
-#include "octree/octcode.h"
+#include "geometry/cells.h"
+#include "geometry/node_types.h"
+#include "geometry/octcode.h"
 
 static uint32_t random_below(uint64_t *state, uint32_t below)
 {

@@ -9,7 +9,7 @@
 
 #include <ebpo/ebpo.h>
 
-#include "base/workspace.h"
+#include "core/workspace.h"
 #include "solids.h"
 
 static char folder[64], path[128], other[128];

@@ -4,8 +4,8 @@
 
 #include "check_main.h"
 #include "exact_twin.h"
-#include "pair/pair_distance.h"
-#include "pair/triangle_pair.h"
+#include "extras/collide/pair_distance.h"
+#include "geometry/triangle_pair.h"
 #include "pair_twin.h"
 #include "solids.h"
 

@@ -4,10 +4,10 @@
 #include <stdlib.h>
 
 #include "check_main.h"
-#include "geom/plane_clip.h"
-#include "geom/plane_code.h"
-#include "planes/octants.h"
-#include "planes/planes.h"
+#include "geometry/plane_clip.h"
+#include "geometry/plane_code.h"
+#include "construct/octants.h"
+#include "construct/planes.h"
 #include "solids.h"
 
 static const double shapes[][6] = { { 0, 0, 0, 1, 1, 1 },

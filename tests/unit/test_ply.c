@@ -9,9 +9,9 @@
 
 #include <ebpo/mesh.h>
 
-#include "base/sha256.h"
+#include "core/sha256.h"
 #include "check_main.h"
-#include "ply/ply.h"
+#include "mesh/ply.h"
 #include "scratch.h"
 #include "solids.h"
 

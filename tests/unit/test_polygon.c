@@ -4,8 +4,8 @@
 #include <string.h>
 
 #include "check_main.h"
-#include "geom/polygon.h"
-#include "geom/predicates.h"
+#include "geometry/polygon.h"
+#include "geometry/predicates.h"
 
 enum { MOST = 4000 };
 

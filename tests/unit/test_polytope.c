@@ -4,9 +4,9 @@
 #include <stdlib.h>
 
 #include "check_main.h"
-#include "geom/plane_code.h"
-#include "geom/polytope.h"
-#include "planes/planes.h"
+#include "geometry/plane_code.h"
+#include "geometry/polytope.h"
+#include "construct/planes.h"
 #include "solids.h"
 
 static void random_direction(uint64_t *seed, double n[3])

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "check_main.h"
-#include "container/file_in.h"
+#include "format/file_in.h"
 #include "scratch.h"
 #include "solids.h"
 #include "two_layouts.h"

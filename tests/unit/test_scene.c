@@ -1,5 +1,5 @@
 /* Scenes: files good and bad, poses in time, boxes and pairs against plain twins. */
-#include "geom/strict_fp.h"
+#include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -8,8 +8,8 @@
 
 #include "check_main.h"
 #include "exact_twin.h"
-#include "pair/pose.h"
-#include "scene/scene_parts.h"
+#include "geometry/pose.h"
+#include "extras/scene/scene_parts.h"
 #include "scratch.h"
 
 static ebpo_error error;

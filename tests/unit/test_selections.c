@@ -11,11 +11,11 @@
 #include <ebpo/lod.h>
 #include <ebpo/verify.h>
 
-#include "base/arrays.h"
+#include "core/arrays.h"
 #include "check_main.h"
-#include "geom/plane_code.h"
-#include "planes/hull_directions.h"
-#include "planes/planes.h"
+#include "geometry/plane_code.h"
+#include "construct/hull_directions.h"
+#include "construct/planes.h"
 #include "scratch.h"
 #include "solids.h"
 

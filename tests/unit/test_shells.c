@@ -6,9 +6,9 @@
 #include <ebpo/ebpo.h>
 
 #include "check_main.h"
-#include "geom/predicates.h"
+#include "geometry/predicates.h"
 #include "mesh/mesh_parts.h"
-#include "pair/triangle_pair.h"
+#include "geometry/triangle_pair.h"
 #include "solids.h"
 
 enum { MOST = 60 };

@@ -4,7 +4,7 @@
 
 #include <ebpo/ebpo.h>
 
-#include "base/sized.h"
+#include "core/sized.h"
 #include "check_main.h"
 #include "query_kit.h"
 

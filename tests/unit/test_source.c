@@ -8,7 +8,7 @@
 
 #include "check_main.h"
 #include "read_by.h"
-#include "container/reader.h"
+#include "format/reader.h"
 #include "random_tree.h"
 #include "scratch.h"
 #include "solids.h"

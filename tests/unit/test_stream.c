@@ -13,11 +13,11 @@
 #include "check_main.h"
 #include "model_file.h"
 #include "read_by.h"
-#include "geom/plane_code.h"
-#include "octree/octcode.h"
+#include "geometry/plane_code.h"
+#include "geometry/octcode.h"
 #include "scratch.h"
 #include "solids.h"
-#include "stream/cell_to_model.h"
+#include "levels/cell_to_model.h"
 
 static const char *path;
 

@@ -14,9 +14,9 @@
 
 #include "check_main.h"
 #include "read_by.h"
-#include "container/reader.h"
+#include "format/reader.h"
 #include "query_kit.h"
-#include "subset/subset_parts.h"
+#include "derive/subset_parts.h"
 
 static const query_variant usual = { "usual", 4, 6, EBPO_RULE_NONZERO,
                                      EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS |

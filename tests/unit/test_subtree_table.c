@@ -8,12 +8,12 @@
 #include <ebpo/subset.h>
 
 #include "check_main.h"
-#include "container/places.h"
-#include "container/slice.h"
-#include "container/subtree_table.h"
+#include "format/places.h"
+#include "format/slice.h"
+#include "format/subtree_table.h"
 #include "counted_source.h"
 #include "expect.h"
-#include "octree/node_types.h"
+#include "geometry/node_types.h"
 #include "random_tree.h"
 #include "read_by.h"
 #include "scratch.h"

@@ -3,10 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/arrays.h"
+#include "core/arrays.h"
 #include "check_main.h"
-#include "geom/plane_code.h"
-#include "geom/predicates.h"
+#include "geometry/plane_code.h"
+#include "geometry/predicates.h"
 #include "solids.h"
 #include "verify/containment.h"
 #include "verify/exact.h"

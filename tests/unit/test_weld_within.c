@@ -5,7 +5,7 @@
 
 #include <ebpo/ebpo.h>
 
-#include "arrange/arrange.h"
+#include "construct/arrange.h"
 #include "check_main.h"
 #include "mesh/mesh_parts.h"
 #include "solids.h"

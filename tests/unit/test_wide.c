@@ -2,8 +2,8 @@
 #include <check.h>
 #include <gmp.h>
 
-#include "base/random.h"
-#include "base/wide.h"
+#include "core/random.h"
+#include "core/wide.h"
 #include "check_main.h"
 
 enum { ROUNDS = 20000 };

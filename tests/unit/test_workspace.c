@@ -8,9 +8,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/array_loops.h"
-#include "base/arrays.h"
-#include "base/parallel.h"
+#include "core/array_loops.h"
+#include "core/arrays.h"
+#include "core/parallel.h"
 #include "check_main.h"
 #include "scratch.h"
 

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "base/sha256.h"
+#include "core/sha256.h"
 
 void die(const char *what, const char *why)
 {

@@ -9,15 +9,15 @@
 #include <ebpo/build.h>
 
 #include "attributes_json.h"
-#include "attributes/textures.h"
-#include "base/sha256.h"
+#include "mesh/textures.h"
+#include "core/sha256.h"
 #include "change_file.h"
-#include "codec/chunk.h"
-#include "codec/face_gates.h"
+#include "hdf5_read/chunk.h"
+#include "hdf5_read/face_gates.h"
 #include "nodes_json.h"
-#include "ply/ply.h"
+#include "mesh/ply.h"
 #include "solids.h"
-#include "subset/subset_parts.h"
+#include "derive/subset_parts.h"
 #include "tree_json.h"
 #include "vector_read.h"
 

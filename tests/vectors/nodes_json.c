@@ -10,7 +10,7 @@
 #include <ebpo/query.h>
 
 #include "change_file.h"
-#include "octree/octcode.h"
+#include "geometry/octcode.h"
 
 enum { NODES_MOST = 600 };
 

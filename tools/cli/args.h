@@ -1,5 +1,5 @@
 /* Command-line arguments from a table: parsing, checking and --help. The tables are made of
- * tools/options/NAME.options, as the manuals are: see tools/options/option_tables.py. */
+ * tools/cli/options/NAME.options, as the manuals are: see tools/cli/options/option_tables.py. */
 #ifndef EBPO_TOOLS_ARGS_H
 #define EBPO_TOOLS_ARGS_H
 

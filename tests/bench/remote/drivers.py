@@ -15,7 +15,7 @@ ROOT = HERE.parent.parent.parent
 class Readers:
     def __init__(self, build, site, work):
         self.tool, self.site = build / "tools/ebpo", site
-        self.plugins = str(build / "lib/h5")
+        self.plugins = str(build / "lib/hdf5_write")
         self.point = work / "point"
         self.point.write_text("0 0 0\n")
 
@@ -38,7 +38,7 @@ class Readers:
                                          env=environment).stdout)
 
     def browser(self, reader, url, to):
-        done = subprocess.run(["node", HERE / "browser.mjs", ROOT / "tools/viewer", self.site,
+        done = subprocess.run(["node", HERE / "browser.mjs", ROOT / "tools/web", self.site,
                                reader, url, str(to)], check=True, capture_output=True, text=True)
         answer = json.loads(done.stdout)
         if "failed" in answer:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Everything that can be asked of a file, each kind as a text of its answers or the reader's own error. Other errors are thrown.
 import { createHash } from 'node:crypto';
-import { EbpoError, Tree, distanceInterval, envelope, inside, insideLeaf, nearestFace, openEbpo } from '../../../tools/viewer/reader/index.js';
+import { EbpoError, Tree, distanceInterval, envelope, inside, insideLeaf, nearestFace, openEbpo } from '../../../tools/web/reader/index.js';
 
 function plain(_, v) {
   if (v instanceof Set)

@@ -4,7 +4,7 @@
 //     node fuzz_reader.mjs [-n MUTATIONS] [-s SEED] FILE...     mutates; checksums are made good again half of the time
 //     node fuzz_reader.mjs -d [-e EVERY] [-o OTHER] FILE...     damages as tests/fuzz/damage.c does; wrong answers are counted
 //
-// Run where zstddec is found: in tools/viewer after npm ci, or with NODE_PATH's like.
+// Run where zstddec is found: in tools/web after npm ci, or with NODE_PATH's like.
 import { readFileSync, writeFileSync } from 'node:fs';
 import { basename } from 'node:path';
 import { parseArgs } from 'node:util';

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Changes of files: of any bytes; of the head, whose checksums are made good again; of numbers in chunks that are not compressed, likewise.
-import { fletcher32 } from '../../../tools/viewer/reader/chunk.js';
-import { lookup3 } from '../../../tools/viewer/reader/hdf5.js';
-import { EbpoError, openEbpo } from '../../../tools/viewer/reader/index.js';
+import { fletcher32 } from '../../../tools/web/reader/chunk.js';
+import { lookup3 } from '../../../tools/web/reader/hdf5.js';
+import { EbpoError, openEbpo } from '../../../tools/web/reader/index.js';
 
 const EXTREMES = [0, 1, 0x7f, 0x80, 0xff, 0x7fff, 0xffff, 0x7fffffff, 0x80000000, 0xfffffffe, 0xffffffff];
 

@@ -17,7 +17,7 @@ FIRST = 16  # queries before the first decision
 
 
 class Automatic:
-    """Decides as the command does without --memory (tools/cmd/query_holding.c): at most half of the free memory.
+    """Decides as the command does without --memory (tools/cli/commands/query_holding.c): at most half of the free memory.
 
     options: of the model; they are changed. waiting: it is held in parts, and all of it would fit.
     """

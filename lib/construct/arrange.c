@@ -1,0 +1,505 @@
+/* Vertices and faces along a Morton curve: then every cell's vertices are one run, and neighbours
+ * in space are neighbours in memory. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "construct/arrange.h"
+#include "core/sort.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "mesh/mesh_parts.h"
+#include "geometry/octcode.h"
+
+enum { GRAIN = 1 << 15 };
+
+#define UNREFERENCED (UINT64_C(1) << 63)
+
+typedef struct arranging {
+    ebpo_mesh *mesh;
+    unsigned threads;
+    bool together; /* referenced or not, vertices go where their positions say */
+    const ebpo_progress *progress;
+    uint8_t *referenced;    /* bit v: a face names vertex v */
+    double (*bounds)[2][3]; /* of each GRAIN of vertices */
+    struct ebpo_arrangement *to;
+    float *xyz32;
+    double *xyz64;
+    uint32_t *rank, *corners, *faces;
+    /* the window of `rank`: of vertices with these source numbers */
+    uint64_t rank_first, rank_count;
+} arranging;
+
+static bool is_referenced(const arranging *a, uint64_t v)
+{
+    return a->referenced[v / 8] >> v % 8 & 1;
+}
+
+/* --- what is there --- */
+
+static ebpo_status mark_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
+{
+    arranging *a = context;
+    (void)worker;
+    for (uint64_t i = 3 * begin; i < 3 * end; i++) {
+        uint32_t v = a->mesh->faces[i];
+        if (v >= a->mesh->vertex_count)
+            return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(a->mesh),
+                                  "face %llu names vertex %lu, but there are %llu vertices; repair "
+                                  "the file or drop the face",
+                                  (unsigned long long)ebpo_mesh_source_face(a->mesh, i / 3),
+                                  (unsigned long)v, (unsigned long long)a->mesh->vertex_count);
+        uint8_t bit = (uint8_t)(1u << v % 8);
+        if (!(__atomic_load_n(&a->referenced[v / 8], __ATOMIC_RELAXED) & bit))
+            __atomic_fetch_or(&a->referenced[v / 8], bit, __ATOMIC_RELAXED);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    arranging *a = context;
+    (void)worker;
+    double(*b)[3] = a->bounds[begin / GRAIN];
+    for (int k = 0; k < 3; k++)
+        b[0][k] = INFINITY, b[1][k] = -INFINITY;
+    for (uint64_t v = begin; v < end; v++) {
+        double p[3];
+        ebpo_mesh_position(a->mesh, v, p);
+        for (int k = 0; k < 3; k++)
+            if (!isfinite(p[k]))
+                return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(a->mesh),
+                                      "vertex %llu has %c = %s; repair the coordinate or drop the "
+                                      "vertex and its faces",
+                                      (unsigned long long)ebpo_mesh_source_vertex(a->mesh, v),
+                                      "xyz"[k],
+                                      isnan(p[k]) ? "nan"
+                                      : p[k] > 0  ? "inf"
+                                                  : "-inf");
+        for (int k = 0; k < 3 && is_referenced(a, v); k++) {
+            b[0][k] = p[k] < b[0][k] ? p[k] : b[0][k];
+            b[1][k] = p[k] > b[1][k] ? p[k] : b[1][k];
+        }
+    }
+    return EBPO_OK;
+}
+
+/* Exact walls at deep levels enlarge the box around a model that is small and far from the origin:
+ * the deepest level at which that hardly matters. */
+static bool choose_box(ebpo_box *out, const double min[3], const double max[3], int level)
+{
+    static const double larger = 1 + 0x1p-16;
+    ebpo_box least;
+    if (level >= 0)
+        return ebpo_box_make(out, min, max, level);
+    if (!ebpo_box_make(&least, min, max, 0))
+        return false;
+    for (int deep = EBPO_MAX_LEVEL; deep > 0; deep--)
+        if (ebpo_box_make(out, min, max, deep) && out->size[0] <= least.size[0] * larger &&
+            out->size[1] <= least.size[1] * larger && out->size[2] <= least.size[2] * larger)
+            return true;
+    *out = least;
+    return true;
+}
+
+static ebpo_status measure_all(arranging *a, int level, ebpo_error *error)
+{
+    ebpo_mesh *mesh = a->mesh;
+    uint64_t blocks = (mesh->vertex_count + GRAIN - 1) / GRAIN;
+    a->referenced = ebpo_array_zero(mesh->workspace, mesh->vertex_count / 8 + 1, 1);
+    a->bounds = ebpo_alloc(blocks, sizeof *a->bounds);
+    if (!a->referenced || !a->bounds)
+        return ebpo_workspace_fail(mesh->workspace,
+                                   mesh->vertex_count / 8 + blocks * sizeof *a->bounds, error);
+    ebpo_status status =
+        ebpo_parallel_for(a->threads, mesh->workspace, mesh->face_count, GRAIN, mark_vertices, a,
+                          a->progress, "looking at faces", error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(a->threads, mesh->workspace, mesh->vertex_count, GRAIN,
+                                   find_bounds, a, a->progress, "measuring the box", error);
+    if (status != EBPO_OK)
+        return status;
+    double min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
+    for (uint64_t i = 0; i < blocks; i++)
+        for (int k = 0; k < 3; k++) {
+            min[k] = fmin(min[k], a->bounds[i][0][k]);
+            max[k] = fmax(max[k], a->bounds[i][1][k]);
+        }
+    double most = 0;
+    for (int k = 0; k < 3; k++)
+        most = fmax(most, fmax(fabs(min[k]), fabs(max[k])));
+    if (!choose_box(&a->to->box, min, max, level))
+        return ebpo_fail_file(
+            error, EBPO_E_LIMIT, ebpo_mesh_label(mesh),
+            "coordinates up to %g are too large for an exact grid; scale the model", most);
+    return EBPO_OK;
+}
+
+/* --- vertices --- */
+
+typedef struct vertex_record {
+    uint64_t key;
+    uint32_t at, unused; /* in the mesh as it is */
+    double p[3];
+} vertex_record;
+
+/* The same with floats' bits, in 24 bytes. */
+typedef struct float_record {
+    uint64_t key;
+    uint32_t at;
+    float p[3];
+} float_record;
+
+/* The wall numbers around a coordinate; division may round to the wrong side of a wall, comparing
+ * with the exact wall does not. */
+static uint32_t slot(const ebpo_box *box, int axis, int level, double x)
+{
+    double cells = (double)(1u << level), at = (x - box->origin[axis]) / (box->size[axis] / cells);
+    uint32_t k = at <= 0 ? 0 : at >= cells ? (1u << level) - 1 : (uint32_t)at;
+    while (k > 0 && x < ebpo_wall(box, axis, level, k))
+        k--;
+    while (k + 1 < 1u << level && x >= ebpo_wall(box, axis, level, k + 1))
+        k++;
+    return k;
+}
+
+/* An octcode as if of level 20, so that sorting knows where its leading bits are. What no face
+ * names goes behind all that is. */
+static uint64_t key_of(const arranging *a, uint64_t v)
+{
+    const ebpo_box *box = &a->to->box;
+    double p[3];
+    ebpo_mesh_position(a->mesh, v, p);
+    ebpo_cell cell = { box->grid_level, { 0, 0, 0 } };
+    for (int k = 0; k < 3; k++)
+        cell.at[k] = slot(box, k, cell.level, p[k]);
+    return ebpo_octcode_of_cell(cell) << 3 * (EBPO_MAX_LEVEL - box->grid_level) |
+           (a->together || is_referenced(a, v) ? 0 : UNREFERENCED);
+}
+
+static ebpo_status make_vertices(void *context, uint64_t begin, uint64_t end, void *records,
+                                 ebpo_error *error)
+{
+    const arranging *a = context;
+    const ebpo_mesh *mesh = a->mesh;
+    (void)error;
+    for (uint64_t v = begin; v < end; v++) {
+        if (mesh->xyz32) {
+            float_record *r = (float_record *)records + (v - begin);
+            *r = (float_record){ .key = key_of(a, v), .at = (uint32_t)v };
+            memcpy(r->p, mesh->xyz32 + 3 * v, sizeof r->p);
+        } else {
+            vertex_record *r = (vertex_record *)records + (v - begin);
+            *r = (vertex_record){ .key = key_of(a, v), .at = (uint32_t)v };
+            memcpy(r->p, mesh->xyz64 + 3 * v, sizeof r->p);
+        }
+    }
+    return EBPO_OK;
+}
+
+/* Of one cell: by position, so that equal ones are neighbours; then as they were. */
+static int compare_points(const double p[3], const double q[3], uint32_t a, uint32_t b)
+{
+    for (int k = 0; k < 3; k++)
+        if (p[k] != q[k])
+            return p[k] < q[k] ? -1 : 1;
+    return a < b ? -1 : 1;
+}
+
+static int compare_floats(const void *x, const void *y)
+{
+    const float_record *a = x, *b = y;
+    double p[3] = { a->p[0], a->p[1], a->p[2] }, q[3] = { b->p[0], b->p[1], b->p[2] };
+    return compare_points(p, q, a->at, b->at);
+}
+
+static int compare_doubles(const void *x, const void *y)
+{
+    const vertex_record *a = x, *b = y;
+    return compare_points(a->p, b->p, a->at, b->at);
+}
+
+static void take_vertices(void *context, uint64_t place, const void *records, uint64_t count)
+{
+    arranging *a = context;
+    for (uint64_t i = 0; i < count; i++, place++) {
+        uint64_t key;
+        uint32_t at;
+        if (a->xyz32) {
+            const float_record *r = (const float_record *)records + i;
+            memcpy(a->xyz32 + 3 * place, r->p, sizeof r->p);
+            key = r->key, at = r->at;
+        } else {
+            const vertex_record *r = (const vertex_record *)records + i;
+            memcpy(a->xyz64 + 3 * place, r->p, sizeof r->p);
+            key = r->key, at = r->at;
+        }
+        if (a->to->key)
+            a->to->key[place] =
+                (key & ~UNREFERENCED) >> 3 * (EBPO_MAX_LEVEL - a->to->box.grid_level);
+        a->to->vertex_source[place] = at; /* told in the source's numbers at the end */
+    }
+}
+
+static ebpo_status sort_vertices(arranging *a, ebpo_error *error)
+{
+    ebpo_mesh *mesh = a->mesh;
+    uint64_t n = mesh->vertex_count;
+    for (uint64_t v = 0; v < n; v++)
+        a->to->referenced += is_referenced(a, v);
+    a->to->grouped = a->together || a->to->referenced == n;
+    bool ordered = !a->together || a->to->referenced == n;
+    a->to->key = ordered ? ebpo_array_alloc(mesh->workspace, n, sizeof *a->to->key) : NULL;
+    a->to->vertex_source = ebpo_array_alloc(mesh->workspace, n, sizeof *a->to->vertex_source);
+    a->xyz32 = mesh->xyz32 ? ebpo_array_alloc(mesh->workspace, n, 3 * sizeof *a->xyz32) : NULL;
+    a->xyz64 = mesh->xyz32 ? NULL : ebpo_array_alloc(mesh->workspace, n, 3 * sizeof *a->xyz64);
+    if ((ordered && !a->to->key) || !a->to->vertex_source || (!a->xyz32 && !a->xyz64))
+        return ebpo_workspace_fail(mesh->workspace, n * 36, error);
+    ebpo_sort sort = { .workspace = mesh->workspace,
+                       .threads = a->threads,
+                       .progress = a->progress,
+                       .stage = "ordering vertices",
+                       .count = n,
+                       .record = mesh->xyz32 ? sizeof(float_record) : sizeof(vertex_record),
+                       .shift = 46,
+                       .context = a,
+                       .make = make_vertices,
+                       .compare = mesh->xyz32 ? compare_floats : compare_doubles,
+                       .take = take_vertices };
+    return ebpo_sort_run(&sort, error);
+}
+
+/* --- faces: translated to the vertices' new numbers, then sorted by the least of these --- */
+
+static ebpo_status fill_ranks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
+{
+    arranging *a = context;
+    (void)worker, (void)error;
+    for (uint64_t i = begin; i < end; i++) {
+        uint64_t v = a->to->vertex_source[i] - a->rank_first;
+        if (v < a->rank_count)
+            a->rank[v] = (uint32_t)i;
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status translate(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    arranging *a = context;
+    (void)worker, (void)error;
+    for (uint64_t i = 3 * begin; i < 3 * end; i++) {
+        uint64_t v = a->mesh->faces[i] - a->rank_first;
+        if (v < a->rank_count)
+            a->corners[i] = a->rank[v];
+    }
+    return EBPO_OK;
+}
+
+/* By windows of vertices that fit into memory, all faces for each: memory is gone through in order,
+ * but for the window. */
+static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *error)
+{
+    ebpo_mesh *mesh = a->mesh;
+    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
+    figures.memory = UINT64_MAX;
+    if (mesh->workspace)
+        ebpo_workspace_get_stats(mesh->workspace, &figures);
+    uint64_t window = figures.memory / 8 / sizeof *a->rank;
+    a->rank_count = mesh->vertex_count < window ? mesh->vertex_count : window ? window : 1;
+    a->rank = ebpo_alloc(a->rank_count, sizeof *a->rank);
+    a->corners = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *a->corners);
+    if (!a->rank || !a->corners) {
+        free(a->rank);
+        a->rank = NULL;
+        return ebpo_workspace_fail(mesh->workspace, a->rank_count * 4 + mesh->face_count * 12,
+                                   error);
+    }
+    ebpo_status status = EBPO_OK;
+    *passes = 2 * ((mesh->vertex_count + a->rank_count - 1) / a->rank_count);
+    ebpo_pass pass = { a->progress, 0, 0, *passes + EBPO_SORT_PASSES };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
+    for (a->rank_first = 0; a->rank_first < mesh->vertex_count && status == EBPO_OK;
+         a->rank_first += a->rank_count) {
+        pass.begin = pass.end++;
+        status = ebpo_parallel_for(a->threads, mesh->workspace, mesh->vertex_count, GRAIN,
+                                   fill_ranks, a, &progress, "ordering faces", error);
+        pass.begin = pass.end++;
+        if (status == EBPO_OK)
+            status = ebpo_parallel_for(a->threads, mesh->workspace, mesh->face_count, GRAIN,
+                                       translate, a, &progress, "ordering faces", error);
+    }
+    free(a->rank);
+    a->rank = NULL;
+    return status;
+}
+
+typedef struct face_record {
+    /* least vertex << 32 | number in the source: the result does not depend on the old order */
+    uint64_t key;
+    uint32_t corner[3], unused;
+} face_record;
+
+static ebpo_status make_faces(void *context, uint64_t begin, uint64_t end, void *records,
+                              ebpo_error *error)
+{
+    const arranging *a = context;
+    (void)error;
+    for (uint64_t f = begin; f < end; f++) {
+        face_record *r = (face_record *)records + (f - begin);
+        const uint32_t *c = a->corners + 3 * f;
+        uint32_t least = c[0] < c[1] ? c[0] : c[1];
+        *r = (face_record){ .key = (uint64_t)(c[2] < least ? c[2] : least) << 32 |
+                                   ebpo_mesh_source_face(a->mesh, f),
+                            .corner = { c[0], c[1], c[2] } };
+    }
+    return EBPO_OK;
+}
+
+static int compare_faces(const void *x, const void *y)
+{
+    const face_record *a = x, *b = y;
+    return (a->key > b->key) - (a->key < b->key); /* keys differ */
+}
+
+static void take_faces(void *context, uint64_t place, const void *records, uint64_t count)
+{
+    arranging *a = context;
+    const face_record *r = records;
+    for (uint64_t i = 0; i < count; i++, place++) {
+        memcpy(a->faces + 3 * place, r[i].corner, sizeof r[i].corner);
+        a->to->face_source[place] = (uint32_t)r[i].key;
+    }
+}
+
+static ebpo_status sort_faces(arranging *a, ebpo_error *error)
+{
+    ebpo_mesh *mesh = a->mesh;
+    unsigned shift = 32;
+    uint64_t passes = 0;
+    ebpo_status status = translate_faces(a, &passes, error);
+    if (status != EBPO_OK)
+        return status;
+    a->faces = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *a->faces);
+    a->to->face_source =
+        ebpo_array_alloc(mesh->workspace, mesh->face_count, sizeof *a->to->face_source);
+    if (!a->faces || !a->to->face_source)
+        return ebpo_workspace_fail(mesh->workspace, mesh->face_count * 16, error);
+    while (mesh->vertex_count >> (shift - 32) >= EBPO_SORT_BINS)
+        shift++;
+    ebpo_sort sort = { .workspace = mesh->workspace,
+                       .threads = a->threads,
+                       .progress = a->progress,
+                       .stage = "ordering faces",
+                       .passes_before = passes,
+                       .count = mesh->face_count,
+                       .record = sizeof(face_record),
+                       .shift = shift,
+                       .context = a,
+                       .make = make_faces,
+                       .compare = compare_faces,
+                       .take = take_faces };
+    return ebpo_sort_run(&sort, error);
+}
+
+/* --- all --- */
+
+/* A mesh that was arranged already: the source's numbers of vertices come from its own map; those
+ * of faces were sorted by. */
+static void compose(const struct ebpo_arrangement *before, ebpo_workspace *workspace, uint32_t *map,
+                    uint64_t count)
+{
+    EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, before ? count : 0)
+        map[i] = before->vertex_source[map[i]];
+}
+
+static void put_in_place(arranging *a)
+{
+    ebpo_mesh *mesh = a->mesh;
+    struct ebpo_arrangement *before = mesh->arrangement;
+    compose(before, mesh->workspace, a->to->vertex_source, mesh->vertex_count);
+    ebpo_arrangement_free(before);
+    ebpo_array_free(mesh->workspace, mesh->xyz32);
+    ebpo_array_free(mesh->workspace, mesh->xyz64);
+    ebpo_array_free(mesh->workspace, mesh->faces);
+    mesh->xyz32 = a->xyz32;
+    mesh->xyz64 = a->xyz64;
+    mesh->faces = a->faces;
+    mesh->arrangement = a->to;
+    a->to = NULL;
+    a->xyz32 = NULL;
+    a->xyz64 = NULL;
+    a->faces = NULL;
+}
+
+static ebpo_status run(arranging a, int level, ebpo_error *error)
+{
+    ebpo_mesh *mesh = a.mesh;
+    ebpo_status status = ebpo_mesh_check_shape(mesh, error);
+    if (status == EBPO_OK && mesh->face_count == 0)
+        return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
+                              "%llu vertices but no faces; give a triangle mesh, not a point cloud",
+                              (unsigned long long)mesh->vertex_count);
+    if (status != EBPO_OK)
+        return status;
+    if (mesh->arrangement && mesh->arrangement->key && mesh->arrangement->level == level)
+        return EBPO_OK; /* it would come out the same */
+    a.to = ebpo_alloc_zero(1, sizeof *a.to);
+    if (a.to)
+        a.to->workspace = mesh->workspace;
+    if (a.to && mesh->arrangement) {
+        a.to->whole_vertices = mesh->arrangement->whole_vertices;
+        a.to->whole_faces = mesh->arrangement->whole_faces;
+        a.to->dropped_faces = mesh->arrangement->dropped_faces;
+    }
+    status = a.to ? measure_all(&a, level, error) : ebpo_fail_memory(error, sizeof *a.to);
+    if (status == EBPO_OK)
+        status = sort_vertices(&a, error);
+    if (status == EBPO_OK)
+        status = sort_faces(&a, error);
+    if (status == EBPO_OK) {
+        a.to->level = level;
+        put_in_place(&a);
+    }
+    ebpo_arrangement_free(a.to);
+    ebpo_array_free(mesh->workspace, a.referenced);
+    free(a.bounds);
+    ebpo_array_free(mesh->workspace, a.xyz32);
+    ebpo_array_free(mesh->workspace, a.xyz64);
+    ebpo_array_free(mesh->workspace, a.corners);
+    ebpo_array_free(mesh->workspace, a.faces);
+    return status;
+}
+
+ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
+                              ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    return ebpo_arrange(mesh, -1, threads, &progress, error);
+}
+
+ebpo_status ebpo_arrange_to_mend(ebpo_mesh *mesh, unsigned threads, const ebpo_progress *progress,
+                                 ebpo_error *error)
+{
+    return run((arranging){ .mesh = mesh,
+                            .threads = ebpo_thread_count(threads),
+                            .progress = progress,
+                            .together = true },
+               -1, error);
+}
+
+ebpo_status ebpo_arrange(ebpo_mesh *mesh, int level, unsigned threads,
+                         const ebpo_progress *progress, ebpo_error *error)
+{
+    return run((arranging){ .mesh = mesh,
+                            .threads = ebpo_thread_count(threads),
+                            .progress = progress },
+               level, error);
+}

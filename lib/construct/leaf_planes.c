@@ -1,0 +1,190 @@
+/* The envelope of a leaf, from its faces: the directions of the hull of what they leave in the
+ * cell. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/hash.h"
+#include "geometry/plane_code.h"
+#include "construct/hull_directions.h"
+#include "construct/planes.h"
+
+enum { LEAF_CANDIDATES = 64, LEAF_POINTS = 192, LEAF_TABLE = 512 };
+
+/* Extreme points of the solid in the cell, and what rounding may add to a coordinate. */
+typedef struct leaf_points {
+    double at[LEAF_POINTS][3], slack[LEAF_POINTS];
+    int count;
+    /* by hash: 1 + place of the point; most corners of faces come several times */
+    uint8_t number[LEAF_TABLE];
+} leaf_points;
+
+static bool add_candidate(uint32_t normal, ebpo_candidate *out, int *count)
+{
+    for (int i = 0; i < *count; i++)
+        if (out[i].normal == normal)
+            return true;
+    if (*count < LEAF_CANDIDATES)
+        out[(*count)++] = (ebpo_candidate){ .normal = normal, .support = -1e300 };
+    return *count < LEAF_CANDIDATES;
+}
+
+/* --- few points: their hull --- */
+
+static bool is_point(const double a[3], const double b[3])
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+static bool add_point(leaf_points *points, const double p[3], double slack)
+{
+    uint64_t bits[3], place;
+    memcpy(bits, p, sizeof bits);
+    EBPO_HASH_FIND(place, ebpo_hash_three(bits), LEAF_TABLE - 1,
+                   !points->number[place] || is_point(points->at[points->number[place] - 1], p));
+    if (points->number[place]) {
+        int i = points->number[place] - 1;
+        points->slack[i] = fmax(points->slack[i], slack);
+        return true;
+    }
+    if (points->count == LEAF_POINTS)
+        return false;
+    points->number[place] = (uint8_t)(points->count + 1);
+    for (int k = 0; k < 3; k++)
+        points->at[points->count][k] = p[k];
+    points->slack[points->count++] = slack;
+    return true;
+}
+
+/* False when there are more than fit. */
+static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
+                          uint64_t count, unsigned inside, leaf_points *points)
+{
+    points->count = 0;
+    memset(points->number, 0, sizeof points->number);
+    for (int i = 0; i < 8; i++)
+        if (inside >> i & 1)
+            (void)add_point(points, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0);
+    for (uint64_t i = 0; i < count; i++) {
+        double p[9][3], slack;
+        int corners = ebpo_clip_triangle(box, cell, &faces[i], p, &slack);
+        for (int c = 0; c < corners; c++)
+            if (!add_point(points, p[c], slack))
+                return false;
+    }
+    return true;
+}
+
+static int hull_normals(const leaf_points *points, ebpo_candidate *out)
+{
+    ebpo_hull_facet facets[2 * LEAF_POINTS];
+    int count = ebpo_hull_facets((const double(*)[3])points->at, points->count, 1e-9, facets,
+                                 2 * LEAF_POINTS),
+        kept = 0;
+    if (count > LEAF_CANDIDATES)
+        qsort(facets, (size_t)count, sizeof *facets, ebpo_hull_by_area);
+    for (int i = 0; i < count; i++) {
+        uint32_t normal;
+        if (ebpo_plane_code_normal(facets[i].n, &normal) && !add_candidate(normal, out, &kept))
+            break;
+    }
+    return kept;
+}
+
+/* --- many points, or all of them in a plane: the faces' directions --- */
+
+/* Distinct normals of the faces, of many an even sample; and the opposite ones, for solids and
+ * surfaces without thickness. */
+static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_t count,
+                        ebpo_candidate *out)
+{
+    int kept = 0;
+    uint64_t step = count / (LEAF_CANDIDATES / 2) + 1;
+    for (uint64_t i = 0; i < count; i += step) {
+        uint32_t normal;
+        if (!ebpo_face_normal_code(box, &faces[i], &normal))
+            continue;
+        int32_t n[3], d;
+        ebpo_plane_code_decode(normal, n, &d);
+        if (!add_candidate(normal, out, &kept))
+            break;
+        if (ebpo_plane_code_normal((const double[3]){ -n[0], -n[1], -n[2] }, &normal) &&
+            !add_candidate(normal, out, &kept))
+            break;
+    }
+    return kept;
+}
+
+/* --- offsets --- */
+
+static void raise_supports(ebpo_candidate *c, double (*n)[3], int count, const double p[3],
+                           double slack)
+{
+    double rounding = EBPO_NORMAL_NORM * slack;
+    for (int j = 0; j < count; j++) {
+        double s = n[j][0] * p[0] + n[j][1] * p[1] + n[j][2] * p[2] + rounding;
+        c[j].support = s > c[j].support ? s : c[j].support;
+    }
+}
+
+static void decode(const ebpo_candidate *c, int count, double (*n)[3])
+{
+    for (int j = 0; j < count; j++) {
+        int32_t v[3], d;
+        ebpo_plane_code_decode(c[j].normal, v, &d);
+        for (int k = 0; k < 3; k++)
+            n[j][k] = v[k];
+    }
+}
+
+static void supports_of_faces(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
+                              uint64_t count, unsigned inside, ebpo_candidate *c, double (*n)[3],
+                              int kept)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        double p[9][3], slack;
+        int corners = ebpo_clip_triangle(box, cell, &faces[i], p, &slack);
+        for (int k = 0; k < corners; k++)
+            raise_supports(c, n, kept, p[k], slack);
+    }
+    for (int i = 0; i < 8; i++)
+        if (inside >> i & 1)
+            raise_supports(c, n, kept, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0);
+}
+
+static int leaf_candidates(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
+                           uint64_t count, unsigned inside_corners,
+                           ebpo_candidate out[LEAF_CANDIDATES])
+{
+    leaf_points points;
+    double n[LEAF_CANDIDATES][3];
+    bool few = gather_points(box, cell, faces, count, inside_corners, &points);
+    int kept = few ? hull_normals(&points, out) : 0;
+    if (kept == 0)
+        kept = face_normals(box, faces, count, out);
+    decode(out, kept, n);
+    if (!few)
+        supports_of_faces(box, cell, faces, count, inside_corners, out, n, kept);
+    for (int i = 0; few && i < points.count; i++)
+        raise_supports(out, n, kept, points.at[i], points.slack[i]);
+    return kept;
+}
+
+int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
+                     uint64_t count, unsigned inside_corners, double epsilon,
+                     ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX])
+{
+    ebpo_candidate candidates[LEAF_CANDIDATES];
+    int kept = leaf_candidates(box, cell, faces, count, inside_corners, candidates);
+    if (epsilon > 0)
+        return ebpo_select_greedy(envelope,
+                                  &(ebpo_choice){ .candidates = candidates,
+                                                  .count = kept,
+                                                  .most = EBPO_PLANES_MAX,
+                                                  .epsilon = epsilon,
+                                                  .reach = ebpo_needle },
+                                  codes);
+    return ebpo_select_all(envelope, candidates, kept, EBPO_PLANES_MAX, codes);
+}

@@ -1,0 +1,291 @@
+/* Which closed components are apart. Where no faces of two components have a common point, each
+ * component is as a whole in or out of every other one, and winding numbers on its sides follow
+ * from the nesting. Faces are compared only where the boxes of their components do not settle it: a
+ * face of a component whose box is not within another one's, and that comes to that other box. Both
+ * passes stop after a number of steps that grows with the faces only; the components then count as
+ * not apart. */
+#include "core/strict_fp.h"
+
+#include "construct/solid_shells.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
+#include "mesh/mesh_frame.h"
+#include "mesh/shell_nesting.h"
+#include "geometry/rule.h"
+#include "geometry/triangle_pair.h"
+
+enum { RULES = 3, GRAIN = 1 << 13, STEPS_PER_FACE = 64, STEPS_AT_LEAST = 1 << 22 };
+
+typedef struct comparing {
+    ebpo_solid_shells *s;
+    uint8_t *exposed; /* [faces] the face comes to the box of a shell that its own is not within */
+    uint8_t *reached; /* [shells] some face of another shell does so here */
+    box_tree faces;   /* of shells that are reached; value: the shell */
+    uint64_t steps, most;
+    bool apart; /* until now */
+} comparing;
+
+/* What one face is compared with. */
+typedef struct visitor {
+    comparing *c;
+    point_box box;
+    uint64_t steps;
+    uint32_t face, shell;
+} visitor;
+
+static uint32_t shell_of_face(const comparing *c, uint64_t face)
+{
+    const ebpo_components *all = c->s->nesting.components;
+    return c->s->shell_of[all->of_face[face]];
+}
+
+static bool boxes_meet(const point_box *a, const double min[3], const double max[3])
+{
+    for (int k = 0; k < 3; k++)
+        if (a->min[k] > max[k] || a->max[k] < min[k])
+            return false;
+    return true;
+}
+
+static bool is_near(void *user, const box_node *node)
+{
+    return boxes_meet(&((const visitor *)user)->box, node->filled->min, node->filled->max);
+}
+
+static bool visit_shells(void *user, mesh_point *points, uint64_t count)
+{
+    visitor *v = user;
+    const shell *all = v->c->s->nesting.shells, *own = &all[v->shell];
+    v->steps += count;
+    for (uint64_t i = 0; i < count; i++) {
+        const shell *other = &all[points[i].number];
+        bool inner = ebpo_shell_box_within(own, other) && !ebpo_shell_box_within(other, own);
+        if (other == own || inner || !boxes_meet(&v->box, other->min, other->max))
+            continue;
+        v->c->exposed[v->face] = 1;
+        __atomic_store_n(&v->c->reached[points[i].number], 1, __ATOMIC_RELAXED);
+    }
+    return v->steps < v->c->most;
+}
+
+static bool visit_faces(void *user, mesh_point *points, uint64_t count)
+{
+    visitor *v = user;
+    const ebpo_mesh *mesh = v->c->s->mesh;
+    double a[3][3], b[3][3];
+    v->steps += count;
+    ebpo_face_corners(mesh, v->face, a);
+    for (uint64_t i = 0; i < count; i++) {
+        point_box box;
+        if (points[i].value == (int32_t)v->shell)
+            continue;
+        ebpo_face_box(mesh, &points[i], &box);
+        if (!boxes_meet(&v->box, box.min, box.max))
+            continue;
+        ebpo_face_corners(mesh, points[i].number, b);
+        if (ebpo_triangle_pair((const double(*)[3])a, (const double(*)[3])b) != EBPO_PAIR_APART) {
+            __atomic_store_n(&v->c->apart, false, __ATOMIC_RELAXED);
+            return false;
+        }
+    }
+    return v->steps < v->c->most;
+}
+
+/* Shows each face to the tree of shells, or each exposed face to the tree of faces. */
+static ebpo_status compare_faces(comparing *c, uint64_t begin, uint64_t end, const box_tree *tree,
+                                 points_fn visit)
+{
+    EBPO_FOR_ITEMS_SCATTERED(c->s->mesh->workspace, f, begin, end) {
+        visitor v = { .c = c, .face = (uint32_t)f, .shell = shell_of_face(c, f) };
+        mesh_point p = { .number = (uint32_t)f };
+        if (v.shell == EBPO_NO_INDEX || (visit == visit_faces && !c->exposed[f]))
+            continue;
+        if (!__atomic_load_n(&c->apart, __ATOMIC_RELAXED))
+            break;
+        ebpo_face_box(c->s->mesh, &p, &v.box);
+        (void)ebpo_box_tree_walk(tree, is_near, visit, &v);
+        if (__atomic_add_fetch(&c->steps, v.steps, __ATOMIC_RELAXED) >= c->most)
+            __atomic_store_n(&c->apart, false, __ATOMIC_RELAXED);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status find_exposed(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
+{
+    comparing *c = context;
+    (void)worker, (void)error;
+    return compare_faces(c, begin, end, &c->s->nesting.tree, visit_shells);
+}
+
+static ebpo_status find_meeting(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
+{
+    comparing *c = context;
+    (void)worker, (void)error;
+    return compare_faces(c, begin, end, &c->faces, visit_faces);
+}
+
+static ebpo_status plant_faces(comparing *c, ebpo_error *error)
+{
+    const ebpo_mesh *mesh = c->s->mesh;
+    bool planted = true;
+    c->faces.points.workspace = mesh->workspace;
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
+        uint32_t one = shell_of_face(c, f);
+        if (planted && one != EBPO_NO_INDEX && c->reached[one])
+            planted = ebpo_face_add(&c->faces, mesh, (uint32_t)f, (int32_t)one);
+    }
+    return planted && ebpo_box_tree_build(&c->faces, ebpo_face_box, mesh)
+               ? EBPO_OK
+               : ebpo_workspace_fail(mesh->workspace, c->faces.points.count * sizeof(mesh_point),
+                                     error);
+}
+
+static ebpo_status compare(comparing *c, ebpo_error *error)
+{
+    const nesting *n = &c->s->nesting;
+    ebpo_workspace *workspace = c->s->mesh->workspace;
+    uint64_t count = c->s->mesh->face_count;
+    c->exposed = ebpo_array_alloc(workspace, count, sizeof *c->exposed);
+    c->reached = ebpo_array_alloc(workspace, n->count, sizeof *c->reached);
+    if (!c->exposed || !c->reached)
+        return ebpo_workspace_fail(workspace, count * sizeof *c->exposed, error);
+    ebpo_array_fill(workspace, c->exposed, 0, count);
+    ebpo_array_fill(workspace, c->reached, 0, n->count);
+    ebpo_status status =
+        ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_exposed, c, NULL, "", error);
+    if (status == EBPO_OK && c->apart)
+        status = plant_faces(c, error);
+    if (status == EBPO_OK && c->apart && c->faces.points.count)
+        status = ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_meeting, c, NULL, "",
+                                   error);
+    return status;
+}
+
+static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
+{
+    comparing c = { .s = s, .apart = true };
+    c.most = STEPS_PER_FACE * s->mesh->face_count + STEPS_AT_LEAST;
+    ebpo_status status = s->nesting.count > 1 ? compare(&c, error) : EBPO_OK;
+    s->apart = c.apart;
+    ebpo_box_tree_free(&c.faces);
+    ebpo_array_free(s->mesh->workspace, c.exposed);
+    ebpo_array_free(s->mesh->workspace, c.reached);
+    return status;
+}
+
+/* Returns false for an open component, and for one that has no volume although it is not flat: it
+ * bounds parts whose volumes cancel. Two faces that are closed are one face and its back. */
+static bool is_simple(const ebpo_components *c, uint64_t i)
+{
+    const mesh_component *one = &c->list[i];
+    bool flat = c->faces.begin[i + 1] - c->faces.begin[i] <= 2;
+    for (int k = 0; k < 3; k++)
+        flat |= one->min[k] == one->max[k];
+    return !one->open && (one->volume != 0 || flat);
+}
+
+ebpo_status ebpo_solid_shells_find(ebpo_solid_shells *out, const ebpo_mesh *mesh, unsigned threads,
+                                   const ebpo_progress *progress, ebpo_error *error)
+{
+    bool simple = true;
+    *out = (ebpo_solid_shells){ .mesh = mesh };
+    nesting *n = &out->nesting;
+    ebpo_status status = ebpo_components_check(mesh, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_find_shells(mesh, threads, &out->closed, error);
+    if (status == EBPO_OK)
+        status = ebpo_nesting_find(n, mesh, out->closed, threads, progress, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t count = n->components->count;
+    out->shell_of = ebpo_array_alloc(mesh->workspace, count, sizeof *out->shell_of);
+    if (!out->shell_of)
+        return ebpo_workspace_fail(mesh->workspace, count * sizeof *out->shell_of, error);
+    for (uint64_t i = 0; i < count; i++) {
+        out->shell_of[i] = EBPO_NO_INDEX;
+        simple &= is_simple(n->components, i);
+    }
+    for (uint64_t i = 0; i < n->count; i++)
+        out->shell_of[n->shells[i].component] = (uint32_t)i;
+    return simple ? find_apart(out, error) : EBPO_OK;
+}
+
+void ebpo_solid_shells_free(ebpo_solid_shells *shells)
+{
+    ebpo_array_free(shells->mesh->workspace, shells->shell_of);
+    ebpo_nesting_free(&shells->nesting, shells->mesh);
+    ebpo_array_free(shells->mesh->workspace, shells->closed);
+}
+
+int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, ebpo_rule rule)
+{
+    if (shells->shell_of[component] == EBPO_NO_INDEX)
+        return 1;
+    const shell *one = &shells->nesting.shells[shells->shell_of[component]];
+    int sign = ebpo_shell_looks_inwards(&shells->nesting, one) ? -1 : 1;
+    return sign *
+           (ebpo_rule_inside(rule, one->around + sign) - ebpo_rule_inside(rule, one->around));
+}
+
+/* ---- counting ---- */
+
+static void count_one(const nesting *n, const shell *one, ebpo_shells *made)
+{
+    bool inwards = ebpo_shell_looks_inwards(n, one), cavity = ebpo_shell_is_cavity(one);
+    made->inside_out += inwards && !cavity;
+    made->cavities += inwards && cavity;
+    made->nested += !inwards && cavity;
+}
+
+/* Adds up what the solid of each rule has beyond the integral of the winding number. */
+static void add_beyond(const ebpo_solid_shells *s, ebpo_shells *made)
+{
+    ebpo_mesh_frame frame = ebpo_mesh_frame_of(s->mesh);
+    const nesting *n = &s->nesting;
+    int power = frame.scaled ? frame.exponent[0] + frame.exponent[1] + frame.exponent[2] : 0;
+    for (int rule = 0; rule < RULES; rule++) {
+        double sum = 0;
+        for (uint64_t i = 0; i < n->count; i++) {
+            uint32_t component = n->shells[i].component;
+            int more = ebpo_component_times(s, component, (ebpo_rule)rule) - 1;
+            sum += more * n->components->list[component].volume;
+        }
+        made->beyond[rule] = ldexp(sum, power);
+    }
+}
+
+void ebpo_solid_shells_count(const ebpo_solid_shells *s, ebpo_shells *out)
+{
+    *out = (ebpo_shells){ .struct_size = sizeof *out, .closed = s->nesting.count };
+    out->apart = s->apart;
+    for (uint64_t i = 0; i < s->nesting.count; i++)
+        count_one(&s->nesting, &s->nesting.shells[i], out);
+    if (s->apart)
+        add_beyond(s, out);
+}
+
+ebpo_status ebpo_mesh_count_shells(const ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
+                                   ebpo_shells *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    static const ebpo_shells nothing = EBPO_SHELLS_INIT;
+    ebpo_shells made = EBPO_SHELLS_INIT;
+    ebpo_solid_shells s = { .mesh = mesh };
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_shells, out, error);
+    if (status == EBPO_OK)
+        status = ebpo_solid_shells_find(&s, mesh, threads, &progress, error);
+    if (status == EBPO_OK)
+        ebpo_solid_shells_count(&s, &made);
+    ebpo_solid_shells_free(&s);
+    EBPO_GIVE(ebpo_shells, out, status == EBPO_OK ? &made : &nothing);
+    return status;
+}

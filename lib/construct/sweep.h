@@ -1,0 +1,46 @@
+/* The two inner loops of hulls and supports, four doubles at a time. They stand in sweep.inc and
+ * are compiled twice, for any processor and for those with AVX2; the same operations in the same
+ * order, so results are the same. */
+#ifndef EBPO_CONSTRUCT_SWEEP_H
+#define EBPO_CONSTRUCT_SWEEP_H
+
+#include <stdint.h>
+
+enum {
+    EBPO_STRETCH = 8,        /* fours of points that share a box */
+    EBPO_SWEEP_PLANES = 2048 /* at most */
+};
+
+/* Planes n . x = d by coordinate; what fills the last four is a plane that nothing sees. */
+typedef struct ebpo_sweep_planes {
+    const double *nx, *ny, *nz, *d;
+    int fours;
+} ebpo_sweep_planes;
+
+/* Points in fours, by coordinate: x, y, z, and what is added to n . x. What fills the last four is
+ * a copy. */
+typedef struct ebpo_sweep_points {
+    const double (*point)[4][4]; /* [fours] */
+    /* of each stretch: least and greatest coordinates, greatest addition */
+    const double (*box)[7];
+    uint64_t fours;
+} ebpo_sweep_points;
+
+typedef struct ebpo_sweep {
+    /* Planes that p lies above by more than `above`, if it is beyond any by more than `beyond`
+     * (else none): writes the first `capacity` numbers and returns how many there are. */
+    int (*seen)(const ebpo_sweep_planes *planes, const double p[3], double beyond, double above,
+                uint16_t *list, int capacity);
+    /* Raises *best to the greatest value among the points; ends when it has reached `enough`.
+     * Returns the first point's number of the stretch that the value is from; UINT64_MAX: none is
+     * greater. */
+    uint64_t (*highest)(const ebpo_sweep_points *points, const double n[3], double enough,
+                        double *best);
+} ebpo_sweep;
+
+extern const ebpo_sweep ebpo_sweep_base, ebpo_sweep_avx2;
+
+/* For this processor. */
+const ebpo_sweep *ebpo_sweep_best(void);
+
+#endif

@@ -1,0 +1,210 @@
+/* Which repairs make a solid of a mesh: they are tried. */
+#include "core/strict_fp.h"
+
+#include <ebpo/repair.h>
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
+#include "mesh/mesh_parts.h"
+
+enum {
+    WELD = EBPO_MEND_WELD,
+    ORIENT = EBPO_MEND_ORIENT,
+    FILL = EBPO_MEND_FILL,
+    DROP = EBPO_MEND_DROP
+};
+
+/* The root of the area is a length; sheets are thinner than this share of it. */
+static const double THIN = 0.01;
+
+typedef struct trying {
+    const ebpo_mesh *mesh;
+    const ebpo_mesh_report *given;
+    unsigned threads;
+    const ebpo_progress *progress;
+    ebpo_repairs *out;
+} trying;
+
+/* ---- doubts ---- */
+
+/* A loop of n edges was filled with n - 2 faces, which have n - 3 edges of their own. */
+static bool mostly_open(const ebpo_mesh_report *report, const ebpo_mend_record *record)
+{
+    uint64_t boundary = record->added_faces + 2 * record->filled_holes;
+    uint64_t before = report->edges - (record->added_faces - record->filled_holes);
+    return 2 * boundary > before;
+}
+
+static uint32_t doubts_of_filling(double area, const ebpo_mesh_report *report,
+                                  const ebpo_mend_record *record)
+{
+    uint32_t doubts = 0;
+    if (!record || !record->filled_holes)
+        return 0;
+    if (!record->weld && report->repeated_positions.count)
+        doubts |= EBPO_DOUBT_UNWELDED;
+    if (mostly_open(report, record))
+        doubts |= EBPO_DOUBT_MOSTLY_OPEN;
+    if (area > 0 && report->area - area >= area * 0.999999)
+        doubts |= EBPO_DOUBT_MOSTLY_FILLED;
+    return doubts;
+}
+
+/* A sheet, or turned inside out. Of what lies far from 1 volume and area overflow or vanish, though
+ * they keep their signs: only what has no thickness is surely a sheet then. */
+static uint32_t doubts_of_volume(const ebpo_mesh_report *report)
+{
+    enum { FAR = 1000 };
+    int exponent[3], sum = 0;
+    bool flat = false;
+    for (int k = 0; k < 3; k++) {
+        double extent = report->max[k] - report->min[k];
+        flat |= extent == 0;
+        frexp(isfinite(extent) ? extent : DBL_MAX, &exponent[k]);
+        sum += exponent[k];
+    }
+    bool far = sum > FAR || sum < -FAR;
+    if (flat || (!far && cbrt(fabs(report->volume)) <= THIN * sqrt(report->area)))
+        return EBPO_DOUBT_NO_VOLUME;
+    return signbit(report->volume) ? EBPO_DOUBT_INSIDE_OUT : 0;
+}
+
+uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
+                          const ebpo_mend_record *record)
+{
+    EBPO_DEFAULT_FP;
+    uint32_t doubts = doubts_of_filling(area, report, record);
+    if (!report->balanced)
+        return doubts | EBPO_DOUBT_OPEN;
+    return doubts | doubts_of_volume(report);
+}
+
+/* ---- sequences ---- */
+
+static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
+{
+    static const ebpo_progress silent;
+    ebpo_repair_try *one = &t->out->tries[t->out->count];
+    ebpo_mesh copy;
+    if (!ebpo_progress_stage(t->progress, "trying repairs", error))
+        return EBPO_E_CANCELLED;
+    ebpo_status status = ebpo_mesh_copy(t->mesh, &copy, error);
+    if (status != EBPO_OK)
+        return status;
+    one->steps = steps;
+    status = ebpo_mesh_mend(&copy, steps, 0, &one->record, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_check(&copy, t->threads, silent, &one->report, error);
+    ebpo_mesh_free(&copy);
+    if (status != EBPO_OK)
+        return status;
+    one->doubts = ebpo_mesh_doubts(t->given->area, &one->report, &one->record);
+    if (one->doubts == 0)
+        t->out->chosen = (int64_t)t->out->count;
+    t->out->count++;
+    return EBPO_OK;
+}
+
+/* Whether steps that begin where `base` was found may leave a solid. */
+static bool may_help(const ebpo_mesh_report *base, unsigned steps)
+{
+    bool open = base->boundary_edges.count > 0;
+    bool turned = base->misoriented_edges.count || base->nonmanifold_edges.count ||
+                  (ebpo_mesh_doubts(0, base, NULL) & ~(uint32_t)EBPO_DOUBT_OPEN);
+    if (open != !!(steps & FILL))
+        return false;
+    return !(steps & ORIENT) || turned || open;
+}
+
+/* What was done before, and what the mesh is then. */
+typedef struct start {
+    unsigned steps;
+    const ebpo_mesh_report *report; /* NULL: that was not done */
+} start;
+
+static ebpo_status try_more(trying *t, start from, unsigned more, ebpo_error *error)
+{
+    if (t->out->chosen >= 0 || !from.report || !may_help(from.report, more))
+        return EBPO_OK;
+    return try_steps(t, from.steps | more, error);
+}
+
+/* Tries what the step leaves by itself; *then is where others may begin. */
+static ebpo_status begin_with(trying *t, start from, unsigned step, start *then, ebpo_error *error)
+{
+    if (t->out->chosen >= 0)
+        return EBPO_OK;
+    *then = (start){ from.steps | step, &t->out->tries[t->out->count].report };
+    return try_steps(t, then->steps, error);
+}
+
+static ebpo_status drop(trying *t, start from, start *then, ebpo_error *error)
+{
+    return from.report->repeated_faces.count ? begin_with(t, from, DROP, then, error) : EBPO_OK;
+}
+
+/* Merging comes first where there is something to merge, unless nothing is open. */
+static ebpo_status weld_first(trying *t, start *from, ebpo_error *error)
+{
+    start bare = *from, dropped = { 0, NULL };
+    if (!bare.report->repeated_positions.count)
+        return EBPO_OK;
+    ebpo_status status = try_more(t, bare, ORIENT, error);
+    if (status == EBPO_OK)
+        status = drop(t, bare, &dropped, error);
+    if (status == EBPO_OK)
+        status = begin_with(t, bare, WELD, from, error);
+    return status == EBPO_OK ? try_more(t, dropped, ORIENT, error) : status;
+}
+
+/* Fewer steps first. */
+static ebpo_status try_all(trying *t, ebpo_error *error)
+{
+    start plain = { 0, t->given }, dropped = { 0, NULL };
+    ebpo_status status = weld_first(t, &plain, error);
+    if (status == EBPO_OK)
+        status = try_more(t, plain, ORIENT, error);
+    if (status == EBPO_OK)
+        status = try_more(t, plain, FILL, error);
+    if (status == EBPO_OK)
+        status = drop(t, plain, &dropped, error);
+    if (status == EBPO_OK)
+        status = try_more(t, dropped, ORIENT, error);
+    if (status == EBPO_OK)
+        status = try_more(t, dropped, FILL, error);
+    if (status == EBPO_OK)
+        status = try_more(t, plain, ORIENT | FILL, error);
+    return status == EBPO_OK ? try_more(t, dropped, ORIENT | FILL, error) : status;
+}
+
+/* A plausible solid stays what it is; but one may want to know. */
+static ebpo_status try_dropping(trying *t, ebpo_error *error)
+{
+    ebpo_status status = try_steps(t, DROP, error);
+    t->out->chosen = -1;
+    return status;
+}
+
+ebpo_status ebpo_mesh_try_repairs(const ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                                  unsigned threads, ebpo_progress progress, ebpo_repairs *out,
+                                  ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    static const ebpo_repairs nothing = { .struct_size = sizeof nothing, .chosen = -1 };
+    ebpo_repairs made = nothing;
+    trying t = { mesh, report, threads, &progress, &made };
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_repairs, out, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_check_shape(mesh, error);
+    if (status == EBPO_OK && ebpo_mesh_doubts(0, report, NULL))
+        status = try_all(&t, error);
+    else if (status == EBPO_OK && report->repeated_faces.count)
+        status = try_dropping(&t, error);
+    EBPO_GIVE(ebpo_repairs, out, status == EBPO_OK ? &made : &nothing);
+    return status;
+}

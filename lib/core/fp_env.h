@@ -1,0 +1,90 @@
+/* The floating-point environment of public functions: rounding to nearest, denormals kept, no
+ * traps, whatever the caller has set.
+ *
+ * EBPO_DEFAULT_FP; as the first line of a public function puts the caller's environment aside until
+ * the function returns, by any way. It costs a few nanoseconds where the environment is the default
+ * one, as nothing is written then. Threads that the function starts inherit the environment.
+ * Exception flags that the caller had raised stay; those of the library's own operations are added
+ * or not. */
+#ifndef EBPO_CORE_FP_ENV_H
+#define EBPO_CORE_FP_ENV_H
+
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+
+/* Only SSE decides results: strict_fp.h refuses x87 arithmetic. */
+typedef struct ebpo_fp_env {
+    unsigned control;
+} ebpo_fp_env;
+
+/* Of the control register, all but the six exception flags; and its default: all exceptions masked,
+ * to nearest, no flush to zero, no denormals-are-zero. */
+enum { EBPO_FP_CONTROL = 0xffc0, EBPO_FP_DEFAULT = 0x1f80 };
+
+/* The asm keeps the compiler from moving memory reads, and what is computed from them, across. */
+static inline ebpo_fp_env ebpo_fp_enter(void)
+{
+    ebpo_fp_env env = { _mm_getcsr() };
+    if (__builtin_expect((env.control & EBPO_FP_CONTROL) != EBPO_FP_DEFAULT, 0))
+        _mm_setcsr(EBPO_FP_DEFAULT);
+    __asm__ volatile("" ::: "memory");
+    return env;
+}
+
+static inline void ebpo_fp_leave(const ebpo_fp_env *env)
+{
+    __asm__ volatile("" ::: "memory");
+    if (__builtin_expect((env->control & EBPO_FP_CONTROL) != EBPO_FP_DEFAULT, 0))
+        _mm_setcsr(env->control);
+}
+
+#elif defined(__aarch64__)
+#include <stdint.h>
+
+typedef struct ebpo_fp_env {
+    uint64_t control;
+} ebpo_fp_env;
+
+static inline void ebpo_fp_set(uint64_t control)
+{
+    __asm__ volatile("msr fpcr, %0" ::"r"(control) : "memory");
+}
+
+static inline ebpo_fp_env ebpo_fp_enter(void)
+{
+    ebpo_fp_env env;
+    __asm__ volatile("mrs %0, fpcr" : "=r"(env.control)::"memory");
+    if (__builtin_expect(env.control != 0, 0))
+        ebpo_fp_set(0);
+    return env;
+}
+
+static inline void ebpo_fp_leave(const ebpo_fp_env *env)
+{
+    if (__builtin_expect(env->control != 0, 0))
+        ebpo_fp_set(env->control);
+}
+
+#else
+#include <fenv.h>
+
+typedef struct ebpo_fp_env {
+    fenv_t all;
+} ebpo_fp_env;
+
+static inline ebpo_fp_env ebpo_fp_enter(void)
+{
+    ebpo_fp_env env;
+    fegetenv(&env.all);
+    fesetenv(FE_DFL_ENV);
+    return env;
+}
+
+static inline void ebpo_fp_leave(const ebpo_fp_env *env) { fesetenv(&env->all); }
+#endif
+
+#define EBPO_DEFAULT_FP                                                                 \
+    __attribute__((cleanup(ebpo_fp_leave), unused)) const ebpo_fp_env ebpo_callers_fp = \
+        ebpo_fp_enter()
+
+#endif

@@ -1,0 +1,36 @@
+/* Hash tables, one way for all: open addressing in an array of a power of two of slots, nothing
+ * taken out. What a slot holds is its user's: a key, the number of what has the key, a count. */
+#ifndef EBPO_CORE_HASH_H
+#define EBPO_CORE_HASH_H
+
+#include <stdint.h>
+
+/* All bits of the key show in the low bits, those that choose the slot. */
+static inline uint64_t ebpo_hash_number(uint64_t key)
+{
+    key = (key ^ key >> 31) * UINT64_C(0x9e3779b97f4a7c15);
+    return key ^ key >> 32;
+}
+
+static inline uint64_t ebpo_hash_three(const uint64_t key[3])
+{
+    return ebpo_hash_number(ebpo_hash_number(ebpo_hash_number(key[0]) + key[1]) + key[2]);
+}
+
+/* The number of slots: the least power of two that is not below `least`, and 16 at least. A table
+ * that is fuller than three quarters gets slow. */
+static inline uint64_t ebpo_hash_slots(uint64_t least)
+{
+    uint64_t slots = 16;
+    while (slots < least)
+        slots *= 2;
+    return slots;
+}
+
+/* Sets `at` to the slot that a key of this hash has or would get, of mask + 1 slots. `found`, an
+ * expression in `at`: the slot is free, or holds the key. One slot has to be free. */
+#define EBPO_HASH_FIND(at, hash, mask, found)                          \
+    for ((at) = (hash) & (mask); !(found); (at) = ((at) + 1) & (mask)) \
+    continue
+
+#endif

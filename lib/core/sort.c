@@ -1,0 +1,292 @@
+#include "core/sort.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+
+/* Records of a group, more or less: few enough for a core's own cache. No more groups than places
+ * that may be written to at a time. */
+enum {
+    GROUP = 1 << 16,
+    LARGE_GROUP = 4 * GROUP,
+    GROUPS_MOST = 1024,
+    GRAIN = 1 << 14,
+    DIGIT = 256,
+    ALONE = 1 << 12,
+    JUMPS = 4
+};
+
+typedef struct sorting {
+    const ebpo_sort *s;
+    uint8_t *made, *dealt; /* records: as made, and by groups */
+    uint64_t *first;       /* [groups + 1] of each group, in `dealt` */
+    uint64_t *next;        /* [groups] where its next records go */
+    uint32_t *group_of;    /* [EBPO_SORT_BINS] */
+    uint64_t *in_bin;      /* [EBPO_SORT_BINS] */
+    uint64_t groups;
+} sorting;
+
+static uint64_t key_of(const uint8_t *record)
+{
+    uint64_t key;
+    memcpy(&key, record, sizeof key);
+    return key;
+}
+
+static ebpo_status make_records(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
+{
+    sorting *t = context;
+    const ebpo_sort *s = t->s;
+    (void)worker;
+    uint8_t *here = t->made + begin * s->record;
+    ebpo_status status = s->make(s->context, begin, end, here, error);
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++, here += s->record)
+        __atomic_fetch_add(&t->in_bin[key_of(here) >> s->shift], 1, __ATOMIC_RELAXED);
+    return status;
+}
+
+/* Neighbouring bins go together until they are enough. */
+static bool form_groups(sorting *t)
+{
+    uint64_t enough = t->s->count / GROUPS_MOST > GROUP ? t->s->count / GROUPS_MOST : GROUP,
+             capacity = 0, sum = 0;
+    t->groups = 0;
+    for (uint32_t bin = 0; bin < EBPO_SORT_BINS; bin++) {
+        t->group_of[bin] = (uint32_t)t->groups;
+        sum += t->in_bin[bin];
+        if (sum < enough && bin + 1 < EBPO_SORT_BINS)
+            continue;
+        if (!ebpo_grow(&t->first, &capacity, t->groups + 2, sizeof *t->first))
+            return false;
+        if (t->groups == 0)
+            t->first[0] = 0;
+        t->first[t->groups + 1] = t->first[t->groups] + sum;
+        t->groups++;
+        sum = 0;
+    }
+    t->next = ebpo_alloc(t->groups, sizeof *t->next);
+    if (t->next)
+        memcpy(t->next, t->first, (size_t)t->groups * sizeof *t->next);
+    return t->next != NULL;
+}
+
+/* Sorts a piece by groups, in the core's own cache, and moves each group's records together: in
+ * whatever order they arrive, there are no more jumps than groups. */
+static ebpo_status deal(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                        ebpo_error *error)
+{
+    sorting *t = context;
+    const ebpo_sort *s = t->s;
+    uint64_t past[GROUPS_MOST * 2], at = 0; /* where each group's records end, here */
+    (void)worker;
+    memset(past, 0, (size_t)t->groups * sizeof *past);
+    uint8_t *here = ebpo_alloc(end - begin, s->record);
+    if (!here)
+        return ebpo_fail_memory(error, (end - begin) * s->record);
+    const uint8_t *from = t->made + begin * s->record;
+    for (uint64_t i = begin; i < end; i++, from += s->record)
+        past[t->group_of[key_of(from) >> s->shift]]++;
+    for (uint64_t g = 0; g < t->groups; g++) {
+        uint64_t count = past[g];
+        past[g] = at;
+        at += count;
+    }
+    from = t->made + begin * s->record;
+    for (uint64_t i = begin; i < end; i++, from += s->record)
+        memcpy(here + past[t->group_of[key_of(from) >> s->shift]]++ * s->record, from, s->record);
+    for (uint64_t g = 0, first = 0, runs = 0; g < t->groups; first = past[g++]) {
+        uint64_t count = past[g] - first;
+        if (count == 0)
+            continue;
+        uint64_t place = __atomic_fetch_add(&t->next[g], count, __ATOMIC_RELAXED);
+        memcpy(t->dealt + place * s->record, here + first * s->record, (size_t)count * s->record);
+        if (++runs % JUMPS == 0)
+            ebpo_release_pages(s->workspace);
+    }
+    free(here);
+    return EBPO_OK;
+}
+
+/* --- groups --- */
+
+typedef struct keyed {
+    uint64_t key;
+    uint64_t at; /* in the group */
+} keyed;
+
+static keyed *radix(keyed *from, keyed *to, uint64_t count)
+{
+    uint64_t all = ~UINT64_C(0), any = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        all &= from[i].key;
+        any |= from[i].key;
+    }
+    for (int shift = 0; shift < 64; shift += 8) {
+        if (!((all ^ any) >> shift & (DIGIT - 1)))
+            continue;
+        uint64_t start[DIGIT] = { 0 }, sum = 0;
+        for (uint64_t i = 0; i < count; i++)
+            start[from[i].key >> shift & (DIGIT - 1)]++;
+        for (int d = 0; d < DIGIT; d++) {
+            uint64_t n = start[d];
+            start[d] = sum;
+            sum += n;
+        }
+        for (uint64_t i = 0; i < count; i++)
+            to[start[from[i].key >> shift & (DIGIT - 1)]++] = from[i];
+        keyed *swap = from;
+        from = to;
+        to = swap;
+    }
+    return from;
+}
+
+/* The records of one key, [begin, end), by insertion while they are few. */
+static void break_ties(const ebpo_sort *s, uint8_t *records, uint64_t begin, uint64_t end)
+{
+    enum { FEW = 16 };
+    uint8_t held[EBPO_SORT_RECORD_MOST];
+    if (end - begin > FEW) {
+        qsort(records + begin * s->record, (size_t)(end - begin), s->record, s->compare);
+        return;
+    }
+    for (uint64_t i = begin + 1; i < end; i++) {
+        memcpy(held, records + i * s->record, s->record);
+        uint64_t j = i;
+        for (; j > begin && s->compare(held, records + (j - 1) * s->record) < 0; j--)
+            memcpy(records + j * s->record, records + (j - 1) * s->record, s->record);
+        memcpy(records + j * s->record, held, s->record);
+    }
+}
+
+static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
+{
+    const ebpo_sort *s = t->s;
+    uint64_t count = t->first[g + 1] - t->first[g];
+    const uint8_t *group = t->dealt + t->first[g] * s->record;
+    /* records that differ in no leading bit */
+    ebpo_workspace *capacity = count > LARGE_GROUP ? s->workspace : NULL;
+    keyed *keys = ebpo_array_alloc(capacity, 2 * count, sizeof *keys);
+    uint8_t *sorted = ebpo_array_alloc(capacity, count, s->record);
+    ebpo_status status = EBPO_OK;
+    if (!keys || !sorted)
+        status = ebpo_workspace_fail(capacity, count * (2 * sizeof *keys + s->record), error);
+    else {
+        for (uint64_t i = 0; i < count; i++)
+            keys[i] = (keyed){ key_of(group + i * s->record), i };
+        keyed *order = radix(keys, keys + count, count);
+        for (uint64_t i = 0; i < count; i++)
+            memcpy(sorted + i * s->record, group + order[i].at * s->record, s->record);
+        for (uint64_t i = 0, end; i < count; i = end) {
+            for (end = i + 1; end < count && order[end].key == order[i].key; end++)
+                ;
+            break_ties(s, sorted, i, end);
+        }
+        s->take(s->context, t->first[g], sorted, count);
+    }
+    ebpo_array_free(capacity, keys);
+    ebpo_array_free(capacity, sorted);
+    return status;
+}
+
+static ebpo_status sort_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    sorting *t = context;
+    (void)worker;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t g = begin; g < end && status == EBPO_OK; g++) {
+        status = sort_group(t, g, error);
+    }
+    return status;
+}
+
+/* So few that they are one group: neither bins nor threads. */
+static ebpo_status run_alone(sorting *t, ebpo_error *error)
+{
+    const ebpo_sort *s = t->s;
+    uint64_t whole[2] = { 0, s->count };
+    if (!ebpo_progress_stage(s->progress, s->stage, error))
+        return EBPO_E_CANCELLED;
+    t->dealt = ebpo_alloc(s->count, s->record);
+    if (!t->dealt)
+        return ebpo_fail_memory(error, s->count * s->record);
+    ebpo_status status = s->make(s->context, 0, s->count, t->dealt, error);
+    t->first = whole;
+    if (status == EBPO_OK && s->count)
+        status = sort_group(t, 0, error);
+    t->first = NULL;
+    return status;
+}
+
+/* Each thread has a group in its hands: an eighth of the budget for all of them. */
+static unsigned threads_for_groups(const sorting *t)
+{
+    const ebpo_sort *s = t->s;
+    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
+    figures.memory = UINT64_MAX;
+    uint64_t largest = 1;
+    if (s->workspace)
+        ebpo_workspace_get_stats(s->workspace, &figures);
+    for (uint64_t g = 0; g < t->groups; g++)
+        largest = t->first[g + 1] - t->first[g] > largest ? t->first[g + 1] - t->first[g] : largest;
+    uint64_t fit =
+        figures.memory / 8 /
+        ((largest < LARGE_GROUP ? largest : LARGE_GROUP) * (2 * sizeof(keyed) + s->record));
+    return fit < 1 ? 1 : s->threads < fit ? s->threads : (unsigned)fit;
+}
+
+static ebpo_status run(sorting *t, ebpo_error *error)
+{
+    const ebpo_sort *s = t->s;
+    ebpo_pass pass = { s->progress, s->passes_before, s->passes_before + 1,
+                       s->passes_before + EBPO_SORT_PASSES };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
+    ebpo_status status = ebpo_parallel_for(s->threads, s->workspace, s->count, GRAIN, make_records,
+                                           t, &progress, s->stage, error);
+    pass.begin = pass.end++;
+    if (status == EBPO_OK && !form_groups(t))
+        status = ebpo_fail_memory(error, 0);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(s->threads, s->workspace, s->count, GRAIN, deal, t, &progress,
+                                   s->stage, error);
+    ebpo_array_free(s->workspace, t->made);
+    t->made = NULL;
+    pass.begin = pass.end++;
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(threads_for_groups(t), s->workspace, t->groups, 1, sort_groups,
+                                   t, &progress, s->stage, error);
+    return status;
+}
+
+ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error)
+{
+    if (sort->record > EBPO_SORT_RECORD_MOST)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "records of %zu bytes are not sorted",
+                         sort->record);
+    sorting t = { .s = sort };
+    uint64_t bytes = sort->count * sort->record;
+    if (sort->count <= ALONE) {
+        ebpo_status status = run_alone(&t, error);
+        free(t.dealt);
+        return status;
+    }
+    t.made = ebpo_array_alloc(sort->workspace, sort->count, sort->record);
+    t.dealt = ebpo_array_alloc(sort->workspace, sort->count, sort->record);
+    t.group_of = ebpo_alloc(EBPO_SORT_BINS, sizeof *t.group_of);
+    t.in_bin = ebpo_alloc_zero(EBPO_SORT_BINS, sizeof *t.in_bin);
+    ebpo_status status = t.made && t.dealt && t.group_of && t.in_bin
+                             ? run(&t, error)
+                             : ebpo_workspace_fail(sort->workspace, 2 * bytes, error);
+    ebpo_array_free(sort->workspace, t.made);
+    ebpo_array_free(sort->workspace, t.dealt);
+    free(t.first);
+    free(t.next);
+    free(t.group_of);
+    free(t.in_bin);
+    return status;
+}

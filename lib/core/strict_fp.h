@@ -1,0 +1,36 @@
+/* Included first by the files whose results rest on IEEE double arithmetic, one rounding for each
+ * operation, to nearest. Refuses compilers and flags that do not promise that; turns contraction
+ * into FMA off even where the flags forgot to or ask for it, and with gcc the SLP vectoriser, which
+ * drops the rounding of neighbouring (double)(float) casts (gcc 12).
+ * tests/lint/flags/test_strict_fp.py holds the sources and this file to it. */
+#ifndef EBPO_CORE_STRICT_FP_H
+#define EBPO_CORE_STRICT_FP_H
+
+#include <float.h>
+
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error \
+    "exact predicates need strict floating point: build without -ffast-math and -ffinite-math-only"
+#endif
+#if defined(__GNUC__) && !defined(__clang__) && (!defined(__GCC_IEC_559) || __GCC_IEC_559 == 0)
+#error \
+    "exact predicates need strict floating point: build without -funsafe-math-optimizations and its parts (-fassociative-math, -freciprocal-math, -fno-signed-zeros)"
+#endif
+/* 16 is 0 for double; it only widens what compilers do with _Float16. */
+#if FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
+#error \
+    "exact predicates need FLT_EVAL_METHOD 0, without excess precision: on x86 build with -msse2 -mfpmath=sse"
+#endif
+_Static_assert(FLT_RADIX == 2 && DBL_MANT_DIG == 53 && DBL_MAX_EXP == 1024,
+               "exact predicates need IEEE 754 binary64");
+
+#if defined(__clang__)
+/* Its unsafe-math flags define no macro, but give way to this. -ffp-contract=fast does not, and
+ * cannot be seen either: tests/lint/flags/fp_flags.py detects it. */
+#pragma float_control(precise, on)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off", "no-tree-slp-vectorize")
+#endif
+
+#endif

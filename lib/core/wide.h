@@ -1,0 +1,96 @@
+/* Integers of 128 bits, modulo 2^128, also where compilers have none (on machines of 32 bits). */
+#ifndef EBPO_CORE_WIDE_H
+#define EBPO_CORE_WIDE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Signed ones are in two's complement. */
+typedef struct ebpo_wide {
+    uint64_t high, low;
+} ebpo_wide;
+
+static inline ebpo_wide ebpo_wide_plus(ebpo_wide a, ebpo_wide b)
+{
+    uint64_t low = a.low + b.low;
+    return (ebpo_wide){ a.high + b.high + (low < a.low), low };
+}
+
+/* Exact; for compilers that have nothing better. */
+static inline ebpo_wide ebpo_wide_product_by_halves(uint64_t a, uint64_t b)
+{
+    uint64_t al = (uint32_t)a, ah = a >> 32, bl = (uint32_t)b, bh = b >> 32;
+    uint64_t one = al * bh, two = ah * bl;
+    ebpo_wide p =
+        ebpo_wide_plus((ebpo_wide){ ah * bh, al * bl }, (ebpo_wide){ one >> 32, one << 32 });
+    return ebpo_wide_plus(p, (ebpo_wide){ two >> 32, two << 32 });
+}
+
+/* Exact. */
+static inline ebpo_wide ebpo_wide_product(uint64_t a, uint64_t b)
+{
+#ifdef EBPO_HAVE_INT128
+    __extension__ unsigned __int128 p = (unsigned __int128)a * b;
+    return (ebpo_wide){ (uint64_t)(p >> 64), (uint64_t)p };
+#else
+    return ebpo_wide_product_by_halves(a, b);
+#endif
+}
+
+/* Exact, signed. */
+static inline ebpo_wide ebpo_wide_signed_product(int64_t a, int64_t b)
+{
+    ebpo_wide p = ebpo_wide_product((uint64_t)a, (uint64_t)b);
+    p.high -= (a < 0 ? (uint64_t)b : 0) + (b < 0 ? (uint64_t)a : 0);
+    return p;
+}
+
+static inline ebpo_wide ebpo_wide_times(ebpo_wide a, uint64_t b)
+{
+    ebpo_wide p = ebpo_wide_product(a.low, b);
+    p.high += a.high * b;
+    return p;
+}
+
+/* By n in 0 .. 127. */
+static inline ebpo_wide ebpo_wide_left(ebpo_wide a, int n)
+{
+    if (n >= 64)
+        return (ebpo_wide){ a.low << (n - 64), 0 };
+    return n ? (ebpo_wide){ a.high << n | a.low >> (64 - n), a.low << n } : a;
+}
+
+/* By n in 0 .. 127, of unsigned ones. */
+static inline ebpo_wide ebpo_wide_right(ebpo_wide a, int n)
+{
+    if (n >= 64)
+        return (ebpo_wide){ 0, a.high >> (n - 64) };
+    return n ? (ebpo_wide){ a.high >> n, a.low >> n | a.high << (64 - n) } : a;
+}
+
+/* Unsigned: a < b. */
+static inline bool ebpo_wide_less(ebpo_wide a, ebpo_wide b)
+{
+    return a.high != b.high ? a.high < b.high : a.low < b.low;
+}
+
+/* Signed: a <= b. */
+static inline bool ebpo_wide_signed_at_most(ebpo_wide a, ebpo_wide b)
+{
+    const uint64_t sign = UINT64_C(1) << 63;
+    return !ebpo_wide_less((ebpo_wide){ b.high ^ sign, b.low },
+                           (ebpo_wide){ a.high ^ sign, a.low });
+}
+
+/* a modulo m, unsigned; m in 1 .. 2^63. */
+static inline uint64_t ebpo_wide_modulo(ebpo_wide a, uint64_t m)
+{
+    uint64_t rest = a.high % m;
+    for (int bit = 63; bit >= 0; bit--) {
+        rest = rest * 2 + (a.low >> bit & 1);
+        rest -= rest >= m ? m : 0;
+    }
+    return rest;
+}
+
+#endif

@@ -1,0 +1,368 @@
+#include "core/strict_fp.h"
+
+#include "derive/fragments.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+/* so many faces are cut along; with more, halving makes them fewer */
+enum { CUT_FACES = 64 };
+/* a plane cuts a piece that reaches so far to both sides; in cells, above what ebpo_polytope_clip
+ * refuses */
+static const double side_least = 2e-7;
+
+/* --- the stack --- */
+
+ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind kind,
+                               const ebpo_fragment *parent, ebpo_fragment **out)
+{
+    double upper = parent ? parent->upper : INFINITY;
+    int levels = parent ? parent->levels : 0;
+    double beyond = parent ? parent->beyond : 0;
+    ebpo_node node = parent ? parent->node : (ebpo_node){ .rank = 0 };
+    if (!ebpo_grow(&b->fragments, &b->fragment_capacity, b->fragment_count + 1,
+                   sizeof *b->fragments))
+        return ebpo_fail_memory(b->error, (b->fragment_count + 1) * sizeof *b->fragments);
+    *out = &b->fragments[b->fragment_count++];
+    (*out)->kind = kind;
+    (*out)->upper = upper;
+    (*out)->levels = levels;
+    (*out)->beyond = beyond;
+    (*out)->node = node;
+    (*out)->face_first = b->face_count;
+    (*out)->face_count = 0;
+    return EBPO_OK;
+}
+
+static ebpo_status push_polytope(ebpo_bounder *b, ebpo_fragment_kind kind,
+                                 const ebpo_fragment *parent, const ebpo_polytope *p,
+                                 ebpo_fragment **out)
+{
+    ebpo_status status = ebpo_fragment_push(b, kind, parent, out);
+    if (status == EBPO_OK)
+        ebpo_polytope_copy(&(*out)->p, p);
+    return status;
+}
+
+/* Gives the piece those of `count` triangles that may meet it; they may be at the beginning of the
+ * stack of faces. */
+static ebpo_status give_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t first,
+                              uint64_t count)
+{
+    ebpo_extent e;
+    ebpo_extent_of(&fragment->p, &e);
+    fragment->face_first = b->face_count;
+    if (!ebpo_grow(&b->faces, &b->face_capacity, b->face_count + count, sizeof *b->faces))
+        return ebpo_fail_memory(b->error, (b->face_count + count) * sizeof *b->faces);
+    for (uint64_t i = first; i < first + count; i++) {
+        double t[3][3],
+            error = ebpo_cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[i], t) + 1e-9;
+        bool meets = true;
+        for (int k = 0; k < 3; k++)
+            meets = meets && fmin(fmin(t[0][k], t[1][k]), t[2][k]) <= e.max[k] + error &&
+                    fmax(fmax(t[0][k], t[1][k]), t[2][k]) >= e.min[k] - error;
+        if (meets)
+            memcpy(b->faces[b->face_count++], b->faces[i], sizeof *b->faces);
+    }
+    fragment->face_count = b->face_count - fragment->face_first;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
+                                     const ebpo_node *leaf)
+{
+    uint64_t count = 0, first = b->face_count;
+    ebpo_status status =
+        ebpo_lod_leaf_faces(b->whole, leaf->cell, leaf->rank, &b->scratch, &count, b->error);
+    if (status == EBPO_OK &&
+        !ebpo_grow(&b->faces, &b->face_capacity, first + count, sizeof *b->faces))
+        status = ebpo_fail_memory(b->error, (first + count) * sizeof *b->faces);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        memcpy(b->faces[b->face_count++], b->scratch.faces[i].corner, sizeof *b->faces);
+    fragment->face_first = first;
+    fragment->face_count = count;
+    return status;
+}
+
+/* --- cutting --- */
+
+/* Walls of a cell `levels` below the node's, in cell coordinates. */
+static void find_walls(const ebpo_bounder *b, ebpo_cell cell, int levels, double low[3],
+                       double high[3])
+{
+    double side = ebpo_half_power(levels);
+    for (int k = 0; k < 3; k++) {
+        uint32_t first = b->frame.cell.at[k] << levels;
+        low[k] = (double)(cell.at[k] - first) * side;
+        high[k] = (double)(cell.at[k] - first + 1) * side;
+    }
+}
+
+/* A piece reaches up to EBPO_CUT_THIN, or the slack of a cut, beyond its cell, where a neighbour's
+ * part was thin and went with it. That is measured in the node's cells: far below, it is not small
+ * beside the piece's own cell. What is known of the cell holds for the points beyond it, too, when
+ * their distance to it is added. */
+static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
+{
+    double low[3], high[3], origin[3] = { 0, 0, 0 }, apart[3];
+    ebpo_extent e;
+    ebpo_extent_of(p, &e);
+    find_walls(b, cell, levels, low, high);
+    for (int k = 0; k < 3; k++)
+        apart[k] = fmax(fmax(low[k] - e.min[k], e.max[k] - high[k]), 0);
+    return ebpo_cell_frame_apart(&b->frame, apart, origin);
+}
+
+/* Inside, but for what thin part of the neighbours went with it: more than the slack, by which
+ * neighbours overlap. */
+static void bound_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
+{
+    double low[3], high[3];
+    bool thin = false;
+    ebpo_extent e;
+    ebpo_extent_of(p, &e);
+    find_walls(b, cell, levels, low, high);
+    for (int k = 0; k < 3; k++)
+        thin = thin || e.min[k] < low[k] - EBPO_CUT_SLACK || e.max[k] > high[k] + EBPO_CUT_SLACK;
+    if (thin)
+        ebpo_bound_raise(b, find_beyond(b, p, cell, levels));
+}
+
+static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
+{
+    ebpo_polytope z, y, x;
+    ebpo_status status = EBPO_OK;
+    ebpo_level_nodes nodes = ebpo_lod_model_nodes(b->whole);
+    double low[3], half = .5 * ebpo_half_power(fragment->levels);
+    for (int k = 0; k < 3; k++)
+        low[k] = (double)(fragment->node.cell.at[k] - (b->frame.cell.at[k] << fragment->levels)) *
+                 2 * half;
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+        ebpo_node child = ebpo_level_child(&nodes, &fragment->node, octant);
+        ebpo_fragment *next = NULL;
+        if (!ebpo_cut_axis(&fragment->p, 2, octant >> 2 & 1, low[2] + half, &z) ||
+            !ebpo_cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
+            !ebpo_cut_axis(&y, 0, octant & 1, low[0] + half, &x))
+            continue;
+        if (child.type == EBPO_BLACK) {
+            bound_black(b, &x, child.cell, fragment->levels + 1);
+            continue;
+        }
+        status = push_polytope(b,
+                               child.type == EBPO_GRAY   ? EBPO_FRAGMENT_GRAY
+                               : child.type == EBPO_LEAF ? EBPO_FRAGMENT_LEAF
+                                                         : EBPO_FRAGMENT_OUTSIDE,
+                               fragment, &x, &next);
+        if (status != EBPO_OK)
+            break;
+        next->levels++;
+        next->node = child;
+        next->beyond = find_beyond(b, &next->p, child.cell, next->levels);
+        if (child.type == EBPO_LEAF)
+            status = ebpo_fragment_leaf_faces(b, next, &child);
+    }
+    return status;
+}
+
+static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_fragment *fragment,
+                               ebpo_fragment_kind kind)
+{
+    ebpo_extent e;
+    int axis = 0;
+    ebpo_status status = EBPO_OK;
+    ebpo_extent_of(&fragment->p, &e);
+    for (int k = 1; k < 3; k++)
+        if ((e.max[k] - e.min[k]) * b->frame.side[k] >
+            (e.max[axis] - e.min[axis]) * b->frame.side[axis])
+            axis = k;
+    for (int side = 0; side < 2 && status == EBPO_OK; side++) {
+        ebpo_polytope part;
+        ebpo_fragment *next = NULL;
+        if (!ebpo_cut_axis(&fragment->p, axis, side, .5 * e.min[axis] + .5 * e.max[axis], &part))
+            continue;
+        status = push_polytope(b, kind, fragment, &part, &next);
+        if (status == EBPO_OK && kind == EBPO_FRAGMENT_LEAF)
+            status = give_faces(b, next, fragment->face_first, fragment->face_count);
+    }
+    return status;
+}
+
+/* The plane of a face in cell coordinates, n of length 1; false when rounding leaves it too
+ * uncertain to rely on. */
+static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double *d)
+{
+    double t[3][3], u[3], v[3],
+        error = ebpo_cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[face], t);
+    for (int k = 0; k < 3; k++) {
+        u[k] = t[1][k] - t[0][k];
+        v[k] = t[2][k] - t[0][k];
+    }
+    for (int k = 0; k < 3; k++)
+        n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), edge = 0;
+    for (int k = 0; k < 3; k++)
+        edge += fabs(u[k]) + fabs(v[k]);
+    /* A corner off by the error tilts the plane by about error * edge / length, over distances of a
+     * cell or an edge. */
+    if (!(length > 0) || !(error * edge / length * (1 + edge) < 1e-9))
+        return false;
+    for (int k = 0; k < 3; k++)
+        n[k] /= length;
+    *d = n[0] * t[0][0] + n[1] * t[0][1] + n[2] * t[0][2];
+    return true;
+}
+
+/* Both halves along a plane, |n| = 1; not `done` when clipping gives up. */
+static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
+                             ebpo_fragment_kind kind, const double n[3], double d, bool *done)
+{
+    ebpo_polytope side[2];
+    double back[3] = { -n[0], -n[1], -n[2] };
+    ebpo_status status = EBPO_OK;
+    *done = ebpo_cut_plane(&fragment->p, n, d, &side[0]) &&
+            ebpo_cut_plane(&fragment->p, back, -d, &side[1]);
+    for (int i = 0; i < 2 && *done && status == EBPO_OK; i++) {
+        ebpo_fragment *next = NULL;
+        status = push_polytope(b, kind, fragment, &side[i], &next);
+        if (status == EBPO_OK && kind == EBPO_FRAGMENT_LEAF)
+            status = give_faces(b, next, fragment->face_first, fragment->face_count);
+    }
+    return status;
+}
+
+/* Over a face, its plane's distance is the face's: pieces of about its size are cut along the prism
+ * above it, so that flat places need no fine ones. */
+static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
+                             const ebpo_fragment_measure *l)
+{
+    double t[3][3], edge[3][3], normal[3], longest = 0;
+    bool done = false;
+    ebpo_status status = EBPO_OK;
+    (void)ebpo_cell_frame_triangle(&b->frame, l->face, t);
+    for (int i = 0; i < 3; i++) {
+        double sum = 0;
+        for (int k = 0; k < 3; k++) {
+            edge[i][k] = (t[(i + 1) % 3][k] - t[i][k]) * b->frame.side[k];
+            sum += edge[i][k] * edge[i][k];
+        }
+        longest = fmax(longest, sqrt(sum));
+    }
+    for (int k = 0; k < 3; k++)
+        normal[k] = edge[0][(k + 1) % 3] * edge[1][(k + 2) % 3] -
+                    edge[0][(k + 2) % 3] * edge[1][(k + 1) % 3];
+    for (int i = 0; i < 3 && l->reach <= 2 * longest && !done && status == EBPO_OK; i++) {
+        double n[3], d = 0, length = 0, most = -INFINITY, least = INFINITY;
+        for (int k = 0; k < 3; k++) {
+            n[k] = (edge[i][(k + 1) % 3] * normal[(k + 2) % 3] -
+                    edge[i][(k + 2) % 3] * normal[(k + 1) % 3]) *
+                   b->frame.side[k];
+            length += n[k] * n[k];
+        }
+        length = sqrt(length);
+        for (int k = 0; k < 3; k++) {
+            n[k] /= length;
+            d += n[k] * t[i][k];
+        }
+        for (int v = 0; v < fragment->p.vertex_count; v++) {
+            double e = n[0] * fragment->p.vertex[v][0] + n[1] * fragment->p.vertex[v][1] +
+                       n[2] * fragment->p.vertex[v][2] - d;
+            most = fmax(most, e);
+            least = fmin(least, e);
+        }
+        if (most > side_least && least < -side_least) /* never with NAN, of a face without area */
+            status = cut_along(b, fragment, EBPO_FRAGMENT_OUTSIDE, n, d, &done);
+    }
+    return status != EBPO_OK || done ? status : cut_longest(b, fragment, EBPO_FRAGMENT_OUTSIDE);
+}
+
+/* No face passes through the piece, but some may through its outermost bit: a segment from the
+ * centre to a point behind one ends so far behind it. So it is with the leaf's walls, where the
+ * piece reaches beyond them by more than cuts overlap: faces there are in the neighbour's list, not
+ * in this one. */
+static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
+                           const ebpo_fragment_measure *l)
+{
+    double share = 0, low[3], high[3];
+    ebpo_extent all;
+    ebpo_extent_of(&fragment->p, &all);
+    find_walls(b, fragment->node.cell, fragment->levels, low, high);
+    for (int k = 0; k < 3; k++)
+        for (int side = 0; side < 2; side++) {
+            double other = side ? all.max[k] - high[k] : low[k] - all.min[k],
+                   own = side ? high[k] - l->centre[k] : l->centre[k] - low[k];
+            if (other > EBPO_CUT_SLACK && !(own > 0))
+                return INFINITY; /* the centre is beyond the wall: only its own distance is known */
+            if (other > EBPO_CUT_SLACK)
+                share = fmax(share, (other + 2e-9) / (other + 2e-9 + own));
+        }
+    for (uint64_t i = 0; i < fragment->face_count; i++) {
+        double n[3], d, reach[2] = { 0, 0 };
+        if (!find_plane(b, fragment->face_first + i, n, &d))
+            return INFINITY;
+        double own = n[0] * l->centre[0] + n[1] * l->centre[1] + n[2] * l->centre[2] - d;
+        for (int v = 0; v < fragment->p.vertex_count; v++) {
+            double e = n[0] * fragment->p.vertex[v][0] + n[1] * fragment->p.vertex[v][1] +
+                       n[2] * fragment->p.vertex[v][2] - d;
+            reach[e > 0] = fmax(reach[e > 0], fabs(e));
+        }
+        double other = reach[own < 0] + 2e-9;
+        share = fmax(share, other / (other + fabs(own)));
+    }
+    return share * l->reach + b->frame.grain;
+}
+
+/* The cell is thinner on some axis than coordinates are sharp. */
+static bool is_flat(const ebpo_bounder *b)
+{
+    return fmin(fmin(b->frame.side[0], b->frame.side[1]), b->frame.side[2]) < 1e10 * b->frame.grain;
+}
+
+/* A piece within a leaf, with an inside and an outside. */
+static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_fragment *fragment,
+                            const ebpo_fragment_measure *l)
+{
+    bool done = false, known = fragment->face_count <= CUT_FACES;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < fragment->face_count && known && !done && status == EBPO_OK; i++) {
+        double n[3], d, most = -INFINITY, least = INFINITY;
+        known = find_plane(b, fragment->face_first + i, n, &d);
+        for (int v = 0; v < fragment->p.vertex_count && known; v++) {
+            double e = n[0] * fragment->p.vertex[v][0] + n[1] * fragment->p.vertex[v][1] +
+                       n[2] * fragment->p.vertex[v][2] - d;
+            most = fmax(most, e);
+            least = fmin(least, e);
+        }
+        if (known && most > side_least && least < -side_least) {
+            status = cut_along(b, fragment, EBPO_FRAGMENT_LEAF, n, d, &done);
+            known = done;
+        }
+    }
+    if (status != EBPO_OK || done)
+        return status;
+    if (!known && is_flat(b)) /* sides cannot be told apart: as a surface */
+        return cut_prism(b, fragment, l);
+    if (!known)
+        return cut_longest(b, fragment, EBPO_FRAGMENT_LEAF);
+    if (l->distance >= 0)
+        return cut_prism(b, fragment, l);
+    double behind = behind_faces(b, fragment, l);
+    if (behind > EBPO_FRAGMENT_LEAST && behind > b->target)
+        return cut_longest(b, fragment, EBPO_FRAGMENT_LEAF);
+    ebpo_bound_raise(b, fmin(behind, l->upper));
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_fragment_cut(ebpo_bounder *b, const ebpo_fragment *fragment,
+                              const ebpo_fragment_measure *l)
+{
+    switch (fragment->kind) {
+    case EBPO_FRAGMENT_GRAY: return cut_gray(b, fragment);
+    case EBPO_FRAGMENT_LEAF:
+        return b->whole->info->solid ? cut_leaf(b, fragment, l) : cut_prism(b, fragment, l);
+    case EBPO_FRAGMENT_OUTSIDE: break;
+    }
+    return cut_prism(b, fragment, l);
+}

@@ -1,0 +1,271 @@
+/* The convex hull of the solid in each cell. Its extreme points are mesh vertices in the cell,
+ * corners of what faces leave on the cell's walls, and the cell's corners that lie inside. */
+#include "core/strict_fp.h"
+
+#include <ebpo/limit.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
+#include "derive/qhull.h"
+#include "levels/lod_model.h"
+#include "geometry/cells.h"
+#include "geometry/node_types.h"
+#include "geometry/rule.h"
+
+/* One for each thread. */
+typedef struct scratch {
+    ebpo_hull *hull;
+    uint32_t *list;
+    ebpo_triangle *faces;
+    double *points;
+    uint64_t list_count, list_capacity, faces_capacity, point_count, points_capacity;
+    ebpo_limit sum;
+} scratch;
+
+typedef struct job {
+    ebpo_lod_model model;
+    ebpo_mesh mesh;
+    int level;
+    ebpo_level_nodes tree;
+    ebpo_node *nodes; /* whose hulls are wanted */
+    uint64_t node_count, node_capacity;
+    double *volume; /* [node_count] in cells */
+    double black;
+    bool in_root_cells; /* volumes */
+    scratch *scratch;   /* [threads] */
+} job;
+
+static double cell_volume(const job *j, int level)
+{
+    return j->in_root_cells ? ldexp(1, -3 * level) : ebpo_cell_volume(&j->model.box, level);
+}
+
+/* --- which nodes --- */
+
+static bool list_nodes(job *j, const ebpo_node *node)
+{
+    if (node->type == EBPO_BLACK)
+        j->black += cell_volume(j, node->cell.level);
+    if (ebpo_node_is_uniform(node))
+        return true;
+    if (node->type == EBPO_GRAY && node->cell.level < j->level) {
+        bool good = true;
+        for (unsigned octant = 0; octant < 8 && good; octant++) {
+            ebpo_node child = ebpo_level_child(&j->tree, node, octant);
+            good = list_nodes(j, &child);
+        }
+        return good;
+    }
+    if (!ebpo_grow(&j->nodes, &j->node_capacity, j->node_count + 1, sizeof *j->nodes))
+        return false;
+    j->nodes[j->node_count++] = *node;
+    return true;
+}
+
+/* --- a node's faces --- */
+
+static bool take_leaf(const job *j, scratch *s, int number, uint64_t leaf)
+{
+    const ebpo_level *level = &j->model.level[number];
+    uint64_t refs = level->leaf_ref_count[leaf], fresh = level->leaf_new[leaf];
+    if (!ebpo_grow(&s->list, &s->list_capacity, s->list_count + refs + fresh, sizeof *s->list))
+        return false;
+    if (refs)
+        memcpy(s->list + s->list_count, level->leaf_refs + j->model.ranks[number].ref_first[leaf],
+               refs * sizeof *s->list);
+    for (uint64_t i = 0; i < fresh; i++)
+        s->list[s->list_count + refs + i] = (uint32_t)(level->leaf_first[leaf] + i);
+    s->list_count += refs + fresh;
+    return true;
+}
+
+static bool take_node(const job *j, scratch *s, const ebpo_node *node)
+{
+    bool good = true;
+    if (node->type == EBPO_LEAF)
+        return take_leaf(j, s, node->cell.level, node->rank);
+    for (unsigned octant = 0; octant < 8 && good && node->type == EBPO_GRAY; octant++) {
+        ebpo_node child = ebpo_level_child(&j->tree, node, octant);
+        good = take_node(j, s, &child);
+    }
+    return good;
+}
+
+static int compare(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static bool take_faces(const job *j, scratch *s)
+{
+    const ebpo_mesh *m = &j->mesh;
+    uint64_t kept = 0;
+    qsort(s->list, s->list_count, sizeof *s->list, compare);
+    for (uint64_t i = 0; i < s->list_count; i++)
+        if (i == 0 || s->list[i] != s->list[i - 1])
+            s->list[kept++] = s->list[i];
+    s->list_count = kept;
+    if (!ebpo_grow(&s->faces, &s->faces_capacity, kept, sizeof *s->faces))
+        return false;
+    for (uint64_t i = 0; i < kept; i++)
+        for (uint64_t c = 0; c < 3; c++) {
+            uint64_t v = m->faces[3 * (uint64_t)s->list[i] + c];
+            for (uint64_t k = 0; k < 3; k++)
+                s->faces[i].corner[c][k] =
+                    m->xyz32 ? (double)m->xyz32[3 * v + k] : m->xyz64[3 * v + k];
+        }
+    return true;
+}
+
+/* --- its corners --- */
+
+/* Winding number at a node's lowest corner: of a gray one, that of the node in that corner. */
+static int32_t lowest_winding(const job *j, ebpo_node node)
+{
+    while (node.type == EBPO_GRAY)
+        node = ebpo_level_child(&j->tree, &node, 0);
+    return ebpo_level_winding(&j->tree, &node);
+}
+
+static bool add_corners(const job *j, scratch *s, const ebpo_node *w)
+{
+    const ebpo_lod_model *m = &j->model;
+    if (!m->info->solid)
+        return true;
+    int32_t delta[8], lowest = lowest_winding(j, *w);
+    ebpo_corner_windings(&m->box, w->cell, s->faces, s->list_count, delta);
+    if (!ebpo_grow(&s->points, &s->points_capacity, s->point_count + 8, 3 * sizeof *s->points))
+        return false;
+    for (int i = 0; i < 8; i++)
+        if (ebpo_rule_inside(m->info->rule, lowest + delta[i])) {
+            double *p = s->points + 3 * s->point_count++;
+            p[0] = i & 1, p[1] = i >> 1 & 1, p[2] = i >> 2 & 1;
+        }
+    return true;
+}
+
+static bool add_faces(const job *j, scratch *s, ebpo_cell cell)
+{
+    if (!ebpo_grow(&s->points, &s->points_capacity, s->point_count + 9 * s->list_count,
+                   3 * sizeof *s->points))
+        return false;
+    for (uint64_t i = 0; i < s->list_count; i++) {
+        double points[9][3], slack;
+        int count = ebpo_clip_triangle(&j->model.box, cell, &s->faces[i], points, &slack);
+        memcpy(s->points + 3 * s->point_count, points, (size_t)count * sizeof points[0]);
+        s->point_count += (uint64_t)count;
+    }
+    return true;
+}
+
+static ebpo_status hulls(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                         ebpo_error *error)
+{
+    job *j = context;
+    scratch *s = &j->scratch[worker];
+    for (uint64_t i = begin; i < end; i++) {
+        const ebpo_node *w = &j->nodes[i];
+        s->list_count = s->point_count = 0;
+        if (!take_node(j, s, w) || !take_faces(j, s) || !add_corners(j, s, w) ||
+            !add_faces(j, s, w->cell))
+            return ebpo_fail_memory(error, s->list_count * sizeof *s->faces);
+        j->volume[i] = ebpo_hull_volume(s->hull, s->points, s->point_count);
+    }
+    return EBPO_OK;
+}
+
+/* --- all of it --- */
+
+static ebpo_status check(const ebpo_file *file, int level, ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    if (level < 0 || level >= info->level_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "there is no level %d; this file has levels 0 to %d", level,
+                         info->level_count - 1);
+    if (!(info->parts & EBPO_PART_MESH) || info->pruned)
+        return ebpo_fail(error, EBPO_E_ABSENT, "hulls need the whole mesh, and this file has %s",
+                         info->pruned ? "a part of it" : "none");
+    return EBPO_OK;
+}
+
+static ebpo_status prepare(job *j, const ebpo_file *file, int level, unsigned threads,
+                           ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    j->level = level;
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    read.threads = threads;
+    ebpo_status status = ebpo_lod_model_read(&j->model, file, info->level_count - 1, &read, error);
+    if (status == EBPO_OK)
+        status = ebpo_file_read_mesh(file, &read, &j->mesh, error);
+    j->scratch = ebpo_alloc_zero(threads, sizeof *j->scratch);
+    if (status == EBPO_OK) {
+        j->tree = ebpo_lod_model_nodes(&j->model);
+        ebpo_node root = ebpo_level_root(&j->tree);
+        if (!j->scratch || !list_nodes(j, &root))
+            status = ebpo_fail_memory(error, j->node_count * sizeof *j->nodes);
+    }
+    for (unsigned i = 0; i < threads && status == EBPO_OK; i++)
+        status = ebpo_hull_new(&j->scratch[i].hull, error);
+    if (status == EBPO_OK && !(j->volume = ebpo_alloc(j->node_count, sizeof *j->volume)))
+        status = ebpo_fail_memory(error, j->node_count * sizeof *j->volume);
+    return status;
+}
+
+static void job_free(job *j, unsigned threads)
+{
+    for (unsigned i = 0; j->scratch && i < threads; i++) {
+        ebpo_hull_free(j->scratch[i].hull);
+        free(j->scratch[i].list);
+        free(j->scratch[i].faces);
+        free(j->scratch[i].points);
+    }
+    free(j->scratch);
+    free(j->nodes);
+    free(j->volume);
+    ebpo_mesh_free(&j->mesh);
+    ebpo_lod_model_free(&j->model);
+}
+
+ebpo_status ebpo_limit_level(const ebpo_file *file, int level, const ebpo_limit_options *options,
+                             ebpo_limit *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_limit_options asked = EBPO_LIMIT_OPTIONS_INIT;
+    job j = { 0 };
+    ebpo_limit found = EBPO_LIMIT_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_limit_options, &asked, options, error);
+    if (status == EBPO_OK)
+        status = EBPO_CHECK_SIZED(ebpo_limit, out, error);
+    if (status == EBPO_OK)
+        status = check(file, level, error);
+    if (status != EBPO_OK)
+        return status;
+    unsigned threads = ebpo_thread_count(asked.threads);
+    j.in_root_cells = asked.in_root_cells != 0;
+    status = prepare(&j, file, level, threads, error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(threads, NULL, j.node_count, 1, hulls, &j, &asked.progress,
+                                   "convex hulls", error);
+    for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
+        /* not 0 times infinity */
+        double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0;
+        found.volume += volume;
+        found.gray_volume += j.nodes[i].type == EBPO_GRAY ? volume : 0;
+        found.flat += j.volume[i] == 0;
+        found.hulls++;
+    }
+    found.volume += j.black;
+    EBPO_GIVE(ebpo_limit, out, &found);
+    job_free(&j, threads);
+    return status;
+}

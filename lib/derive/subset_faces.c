@@ -1,0 +1,235 @@
+/* Depth first through what remains, as the specification numbers faces. Maps from old numbers to
+ * new ones are as long as the source's mesh, but pages that nothing is written to take no memory,
+ * and what lies close together in space does so in numbers. */
+#include "core/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "mesh/attributes.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "format/attribute_read.h"
+#include "geometry/node_types.h"
+#include "derive/subset_parts.h"
+
+typedef struct numbering {
+    ebpo_cutting *c;
+    uint32_t *number; /* [faces of the source] new number + 1; 0: none yet */
+    uint32_t *old;    /* [count] of each new face */
+    uint64_t count, capacity;
+    /* references */
+    uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], read[EBPO_LEVELS_MAX],
+        written[EBPO_LEVELS_MAX];
+    bool no_memory;
+} numbering;
+
+static bool add_new(numbering *n, uint32_t face)
+{
+    n->no_memory = !ebpo_grow(&n->old, &n->capacity, n->count + 1, sizeof *n->old);
+    if (n->no_memory)
+        return false;
+    n->old[n->count++] = face;
+    n->number[face] = (uint32_t)n->count;
+    return true;
+}
+
+static int compare_numbers(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* References to faces whose first leaf is gone become new, in the order of their old numbers:
+ * before the leaf's own. The others stay, in place. */
+static ebpo_status number_leaf(numbering *n, int level)
+{
+    ebpo_level *l = &n->c->out->level[level];
+    uint64_t i = n->leaf[level]++, begin = n->count, kept = 0;
+    uint32_t *refs = l->leaf_refs + n->read[level], *to = l->leaf_refs + n->written[level];
+    bool sorted = true, good = true;
+    for (uint64_t k = 0; k < l->leaf_ref_count[i] && good; k++) {
+        uint32_t face = refs[k];
+        if (n->number[face] && n->number[face] <= begin) {
+            to[kept++] = n->number[face] - 1;
+            sorted = sorted && (kept == 1 || to[kept - 2] < to[kept - 1]);
+        } else {
+            good = n->number[face] == 0 && add_new(n, face);
+        }
+    }
+    for (uint64_t k = 0; k < l->leaf_new[i] && good; k++)
+        good = n->number[l->leaf_first[i] + k] == 0 && add_new(n, (uint32_t)(l->leaf_first[i] + k));
+    if (n->no_memory)
+        return ebpo_fail_memory(n->c->error, n->count * sizeof *n->old);
+    if (!good)
+        return ebpo_fail(n->c->error, EBPO_E_FORMAT,
+                         "level %d: a leaf lists a face twice or as new that an earlier leaf "
+                         "lists; run ebpo verify",
+                         level);
+    if (!sorted)
+        qsort(to, kept, sizeof *to, compare_numbers);
+    n->read[level] += l->leaf_ref_count[i];
+    n->written[level] += kept;
+    l->leaf_first[i] = begin;
+    l->leaf_new[i] = (uint32_t)(n->count - begin);
+    l->leaf_ref_count[i] = (uint32_t)kept;
+    return EBPO_OK;
+}
+
+static ebpo_status number_group(numbering *n, int level)
+{
+    const ebpo_tree *tree = n->c->out;
+    uint16_t types = tree->level[level].types[n->group[level]++];
+    ebpo_status status = EBPO_OK;
+    for (unsigned octant = 0; octant < ebpo_group_octants(level) && status == EBPO_OK; octant++) {
+        ebpo_node_type type = ebpo_group_type(types, octant);
+        if (type == EBPO_GRAY && level + 1 < tree->info.level_count)
+            status = number_group(n, level + 1);
+        else if (type == EBPO_LEAF)
+            status = number_leaf(n, level);
+    }
+    return status;
+}
+
+/* --- vertices --- */
+
+typedef struct vertices {
+    uint32_t *number, *old; /* as of faces */
+    uint64_t count, capacity;
+} vertices;
+
+static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
+{
+    ebpo_mesh *mesh = &c->out->mesh;
+    v->number = ebpo_alloc_zero(c->from->vertex_count, sizeof *v->number);
+    bool good = v->number;
+    for (uint64_t i = 0; i < 3 * mesh->face_count && good; i++) {
+        uint32_t vertex = mesh->faces[i];
+        if (v->number[vertex] == 0) {
+            good = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
+            if (good)
+                v->old[v->count++] = vertex;
+            v->number[vertex] = (uint32_t)v->count;
+        }
+        mesh->faces[i] = v->number[vertex] - 1;
+    }
+    for (uint64_t i = 0; i < c->from->vertex_count && good && !c->out->info.pruned;
+         i++) /* those that no face uses belong to the whole */
+        if (v->number[i] == 0) {
+            good = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
+            if (good)
+                v->old[v->count++] = (uint32_t)i;
+        }
+    return good ? EBPO_OK : ebpo_fail_memory(c->error, c->from->vertex_count * sizeof *v->number);
+}
+
+/* Of a subset, what other elements have is left out: its numbers are of things that may be gone.
+ * Textures stay. Where nothing was pruned, all is as it was. */
+static ebpo_status begin_attributes(ebpo_cutting *c)
+{
+    ebpo_read_options read = ebpo_read_threads(c->options->threads);
+    ebpo_attributes **to = &c->out->mesh.attributes;
+    if (!c->out->info.pruned)
+        return ebpo_attributes_read(c->file, &read, to, c->error);
+    ebpo_status status = ebpo_attributes_read_head(c->file, &read, to, c->error);
+    return status == EBPO_OK ? ebpo_attributes_read_textures(c->file, &read, *to, c->error)
+                             : status;
+}
+
+static ebpo_status take_attributes(ebpo_cutting *c, const char *element, const uint32_t *rows,
+                                   uint64_t count)
+{
+    ebpo_attributes *to = c->out->mesh.attributes;
+    return to && c->out->info.pruned ? ebpo_pick_attributes(c->chunks, to, element, rows, count,
+                                                            c->options->threads, c->error)
+                                     : EBPO_OK;
+}
+
+static ebpo_status take_vertices(ebpo_cutting *c)
+{
+    ebpo_tree *out = c->out;
+    vertices v = { NULL, NULL, 0, 0 };
+    ebpo_status status = number_vertices(c, &v);
+    free(v.number);
+    if (status == EBPO_OK) {
+        size_t size = c->from->double_coordinates ? 3 * sizeof(double) : 3 * sizeof(float);
+        void *xyz = ebpo_alloc(v.count, size);
+        ebpo_vertices_expect(c->chunks, v.old, v.count, c->parts);
+        out->info.vertex_count = out->mesh.vertex_count = v.count;
+        out->mesh.xyz32 = c->from->double_coordinates ? NULL : xyz;
+        out->mesh.xyz64 = c->from->double_coordinates ? xyz : NULL;
+        status = xyz ? ebpo_pick_rows(c->chunks, EBPO_A_VERTICES, v.old, v.count,
+                                      c->options->threads, xyz, c->error)
+                     : ebpo_fail_memory(c->error, v.count * size);
+    }
+    if (status == EBPO_OK && c->parts & EBPO_PART_MAPS) {
+        out->vertex_source = ebpo_alloc(v.count, sizeof *out->vertex_source);
+        status = out->vertex_source
+                     ? ebpo_pick_rows(c->chunks, EBPO_A_VERTEX_SOURCE, v.old, v.count,
+                                      c->options->threads, out->vertex_source, c->error)
+                     : ebpo_fail_memory(c->error, v.count * sizeof *out->vertex_source);
+    }
+    if (status == EBPO_OK)
+        status = take_attributes(c, "vertex", v.old, v.count);
+    free(v.old);
+    return status;
+}
+
+static ebpo_status take_faces(ebpo_cutting *c, const numbering *n)
+{
+    ebpo_tree *out = c->out;
+    out->info.face_count = out->mesh.face_count = n->count;
+    ebpo_faces_expect(c->chunks, n->old, n->count, c->parts);
+    out->mesh.faces = ebpo_alloc(n->count, 3 * sizeof *out->mesh.faces);
+    ebpo_status status = out->mesh.faces
+                             ? ebpo_pick_rows(c->chunks, EBPO_A_FACES, n->old, n->count,
+                                              c->options->threads, out->mesh.faces, c->error)
+                             : ebpo_fail_memory(c->error, n->count * 3 * sizeof *out->mesh.faces);
+    if (status == EBPO_OK && c->parts & EBPO_PART_MAPS) {
+        out->face_source = ebpo_alloc(n->count, sizeof *out->face_source);
+        status = out->face_source ? ebpo_pick_rows(c->chunks, EBPO_A_FACE_SOURCE, n->old, n->count,
+                                                   c->options->threads, out->face_source, c->error)
+                                  : ebpo_fail_memory(c->error, n->count * sizeof *out->face_source);
+    }
+    if (status == EBPO_OK && c->parts & EBPO_PART_ATTRIBUTES)
+        status = begin_attributes(c);
+    if (status == EBPO_OK)
+        status = take_attributes(c, "face", n->old, n->count);
+    return status == EBPO_OK ? take_vertices(c) : status;
+}
+
+/* Face lists of nothing are no part. */
+static void drop_lists(ebpo_cutting *c)
+{
+    c->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
+    for (int i = 0; i < c->out->info.level_count; i++) {
+        ebpo_level *l = &c->out->level[i];
+        ebpo_level_drop(l, EBPO_NEEDS_MESH);
+        l->new_count = l->ref_count = 0;
+    }
+}
+
+ebpo_status ebpo_cut_faces(ebpo_cutting *c)
+{
+    numbering n = { .c = c };
+    n.number = ebpo_alloc_zero(c->from->face_count, sizeof *n.number);
+    ebpo_status status = n.number
+                             ? number_group(&n, 0)
+                             : ebpo_fail_memory(c->error, c->from->face_count * sizeof *n.number);
+    free(n.number);
+    for (int i = 0; i < c->out->info.level_count && status == EBPO_OK; i++) {
+        ebpo_level *l = &c->out->level[i];
+        l->ref_count = n.written[i];
+        l->new_count = 0;
+        for (uint64_t k = 0; k < l->leaf_count; k++)
+            l->new_count += l->leaf_new[k];
+    }
+    if (status == EBPO_OK && n.count)
+        status = take_faces(c, &n);
+    else if (status == EBPO_OK)
+        drop_lists(c);
+    if (c->out->info.pruned)
+        ebpo_attributes_drop_others(c->out->mesh.attributes);
+    free(n.old);
+    return status;
+}

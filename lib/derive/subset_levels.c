@@ -1,0 +1,314 @@
+/* From level to level: which groups are wanted is known from the level above, so only these are
+ * read. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "format/subtree_expect.h"
+#include "format/subtree_table.h"
+#include "geometry/cells.h"
+#include "geometry/node_types.h"
+#include "derive/kept_nodes.h"
+#include "derive/subset_parts.h"
+
+static const uint64_t NOTHING = UINT64_MAX;
+
+/* A gray node of the result. */
+typedef struct gray {
+    uint64_t group; /* of its children, in the source; NOTHING: they are left out */
+    ebpo_cell cell;
+} gray;
+
+typedef struct descent {
+    ebpo_cutting *c;
+    int level;
+    ebpo_level from, *to;
+    ebpo_kept_nodes kept; /* of the one for the other */
+    gray *parent, *child;
+    ebpo_tolerance_node *judged; /* gray nodes and leaves as they come, with max_error; else NULL */
+    uint64_t next_judged;
+    uint64_t parent_count, child_count;
+    uint64_t group;  /* of the result, in hand: the number of its parent among gray nodes */
+    uint64_t filled; /* groups of the result that are not empty */
+    bool goes_on;    /* some child has children */
+} descent;
+
+static bool meets_box(const ebpo_cutting *c, ebpo_cell cell)
+{
+    return !c->options->boxed || ebpo_cell_meets(&c->box, cell, c->options->min, c->options->max);
+}
+
+/* Gray nodes of this level may have children in the result. */
+static bool may_go_on(const ebpo_cutting *c, int level)
+{
+    return level < c->last_level && level + 1 < c->from->level_count;
+}
+
+/* --- runs of groups that are wanted --- */
+
+/* Of a file with subtrees: where the parents are their roots, all nodes below can be announced, and
+ * lists of faces. Which faces: these tell. */
+static void expect_subtrees(const descent *d)
+{
+    const ebpo_cutting *c = d->c;
+    ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
+    uint64_t count = 0, *roots = ebpo_alloc(d->parent_count, sizeof *roots);
+    uint32_t needs = c->parts | EBPO_NEEDS_ALWAYS | EBPO_NEEDS_SOLID;
+    for (uint64_t i = 0; roots && i < d->parent_count; i++)
+        if (d->parent[i].group != NOTHING)
+            roots[count++] = d->parent[i].group;
+    if (count)
+        ebpo_subtree_table_expect(c->chunks, roots, count);
+    for (uint64_t i = 0; i < count; i++)
+        ebpo_subtrees_expect(c->chunks, &e, roots[i], 1, needs, c->last_level, false);
+    ebpo_expect_all(&e);
+    free(roots);
+}
+
+static ebpo_status pick(descent *d)
+{
+    uint64_t count = 0;
+    if (d->c->from->subtree_level && d->level == d->c->from->subtree_level + 1 &&
+        ebpo_input_expects(&d->c->file->in))
+        expect_subtrees(d);
+    ebpo_run *runs = ebpo_alloc(d->parent_count, sizeof *runs);
+    if (!runs)
+        return ebpo_fail_memory(d->c->error, d->parent_count * sizeof *runs);
+    for (uint64_t i = 0; i < d->parent_count; i++) {
+        uint64_t group = d->parent[i].group;
+        if (group == NOTHING)
+            continue;
+        if (count && runs[count - 1].group + runs[count - 1].groups == group)
+            runs[count - 1].groups++;
+        else
+            runs[count++] = (ebpo_run){ .group = group, .groups = 1 };
+    }
+    ebpo_status status =
+        ebpo_pick_level(d->c->chunks, d->level, runs, count, d->c->parts, &d->from, d->c->error);
+    /* Ranks of the picked gray nodes in the source are needed for their groups: one after the other
+     * through the runs. */
+    uint64_t next = 0;
+    if (status == EBPO_OK) {
+        d->child = ebpo_alloc(d->from.gray_count + d->from.leaf_count, sizeof *d->child);
+        if (!d->child)
+            status = ebpo_fail_memory(d->c->error,
+                                      (d->from.gray_count + d->from.leaf_count) * sizeof *d->child);
+    }
+    /* Kept at the end of the room, which leaves that become pruned fill from the front: never
+     * overtaken, as each gray node takes one place at most. */
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        for (uint64_t k = 0; k < runs[i].count[EBPO_GRAY]; k++)
+            d->child[d->from.leaf_count + next++].group = runs[i].rank[EBPO_GRAY] + k;
+    free(runs);
+    return status;
+}
+
+static ebpo_status make_room(descent *d)
+{
+    const ebpo_level *f = &d->from;
+    uint64_t whites = 8 * d->parent_count,
+             more[4] = { [EBPO_WHITE] = whites, [EBPO_GRAY] = f->leaf_count };
+    uint32_t needs = d->c->parts | (d->c->from->solid ? EBPO_NEEDS_SOLID : 0) | EBPO_NEEDS_ALWAYS;
+    d->to->types = ebpo_alloc_zero(d->parent_count, sizeof *d->to->types);
+    return d->to->types && ebpo_kept_begin(&d->kept, f, d->to, needs, more)
+               ? EBPO_OK
+               : ebpo_fail_memory(d->c->error,
+                                  f->leaf_count * 28 + (f->gray_count + f->ref_count + whites) * 4);
+}
+
+/* --- nodes --- */
+
+static void add_child(descent *d, ebpo_cell cell, uint64_t group)
+{
+    d->child[d->child_count++] = (gray){ group, cell };
+    d->goes_on = d->goes_on || group != NOTHING;
+}
+
+/* Whether the envelope is close enough to the model: asked once for each gray node and leaf, in
+ * their order. */
+static bool is_enough(descent *d) { return d->judged && d->judged[d->next_judged++].enough; }
+
+static void take_gray(descent *d, ebpo_cell cell)
+{
+    uint64_t rank = d->kept.next[EBPO_GRAY], group = d->child[d->from.leaf_count + rank].group;
+    bool enough = is_enough(d);
+    if (enough || !may_go_on(d->c, d->level) || !meets_box(d->c, cell))
+        group = NOTHING;
+    ebpo_kept_take(&d->kept, EBPO_GRAY);
+    add_child(d, cell, group);
+}
+
+/* The planes of the leaf in hand for the last gray node of the result. */
+static void add_leaf_planes(descent *d)
+{
+    const ebpo_level *f = &d->from;
+    ebpo_level *t = d->to;
+    uint64_t count =
+        f->leaf_plane_counts && t->plane_counts ? f->leaf_plane_counts[d->kept.next[EBPO_LEAF]] : 0;
+    if (count == 0)
+        return;
+    t->plane_counts[t->gray_count - 1] = (uint8_t)count;
+    memcpy(t->planes + t->plane_count, f->leaf_planes + d->kept.read[EBPO_PER_LEAF_PLANE],
+           count * sizeof *t->planes);
+    t->plane_count += count;
+}
+
+/* The last gray node of the result was a leaf, which is shown in its parent's colour. */
+static void add_colour(descent *d)
+{
+    ebpo_level *t = d->to;
+    if (t->gray_colours)
+        t->gray_colours[t->gray_count - 1] =
+            d->level ? t[-1].gray_colours[d->group] : EBPO_COLOUR_OF_NOTHING;
+}
+
+/* Outside the box a leaf becomes a pruned node; its own planes bound what is in its cell as well as
+ * a gray node's do. Where its parent's do well enough, it needs none. */
+static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
+{
+    bool enough = is_enough(d);
+    if (!enough && meets_box(d->c, cell)) {
+        ebpo_kept_take(&d->kept, EBPO_LEAF);
+        return EBPO_LEAF;
+    }
+    ebpo_kept_add(&d->kept, EBPO_GRAY);
+    if (!enough)
+        add_leaf_planes(d);
+    add_colour(d);
+    ebpo_kept_pass(&d->kept, EBPO_LEAF);
+    add_child(d, cell, NOTHING);
+    return EBPO_GRAY;
+}
+
+static ebpo_node_type take_node(descent *d, ebpo_node_type type, ebpo_cell cell)
+{
+    if (type == EBPO_LEAF)
+        return take_leaf(d, cell);
+    if (type == EBPO_GRAY)
+        take_gray(d, cell);
+    else
+        ebpo_kept_take(&d->kept, type);
+    return type;
+}
+
+/* Cell of an octant of a group of the result. */
+static ebpo_cell child_cell(const descent *d, uint64_t number, unsigned octant)
+{
+    return d->level ? ebpo_cell_child(d->parent[number].cell, octant)
+                    : (ebpo_cell){ 0, { 0, 0, 0 } };
+}
+
+static void take_group(descent *d, uint64_t number, uint16_t types)
+{
+    d->group = number;
+    for (unsigned octant = 0; octant < ebpo_group_octants(d->level); octant++) {
+        ebpo_node_type type =
+            take_node(d, ebpo_group_type(types, octant), child_cell(d, number, octant));
+        d->to->types[number] |= ebpo_group_of(type, octant);
+    }
+}
+
+/* --- how close envelopes are, all of a level at once --- */
+
+static ebpo_status judge(descent *d)
+{
+    uint64_t next = 0, count = 0;
+    d->next_judged = 0;
+    if (!d->c->need)
+        return EBPO_OK;
+    if (!(d->judged = ebpo_alloc_zero(d->from.gray_count + d->from.leaf_count, sizeof *d->judged)))
+        return ebpo_fail_memory(d->c->error,
+                                (d->from.gray_count + d->from.leaf_count) * sizeof *d->judged);
+    for (uint64_t i = 0; i < d->parent_count; i++) {
+        if (d->parent[i].group == NOTHING)
+            continue;
+        uint16_t types = d->from.types[next++];
+        for (unsigned octant = 0; octant < ebpo_group_octants(d->level); octant++) {
+            ebpo_node_type type = ebpo_group_type(types, octant);
+            if (type != EBPO_GRAY && type != EBPO_LEAF)
+                continue;
+            ebpo_tolerance_node *node = &d->judged[count++];
+            node->cell = child_cell(d, i, octant);
+            node->asked =
+                meets_box(d->c, node->cell) && (type == EBPO_LEAF || may_go_on(d->c, d->level));
+        }
+    }
+    return ebpo_tolerance_judge(d->c->need, d->judged, count, d->c->options->max_error,
+                                d->c->error);
+}
+
+/* The parents are done for good after this. */
+static ebpo_status cut_level(descent *d)
+{
+    ebpo_status status = pick(d);
+    if (status == EBPO_OK)
+        status = make_room(d);
+    if (status == EBPO_OK)
+        status = judge(d);
+    uint64_t next = 0;
+    d->to->group_count = d->parent_count;
+    for (uint64_t i = 0; i < d->parent_count && status == EBPO_OK; i++) {
+        if (d->parent[i].group == NOTHING)
+            for (int k = 0; k < 8; k++) /* the places of children that are not here */
+                ebpo_kept_add(&d->kept, EBPO_WHITE);
+        else
+            take_group(d, i, d->from.types[next++]);
+        d->filled += d->to->types[i] != 0;
+    }
+    ebpo_level_free(&d->from);
+    free(d->judged);
+    d->judged = NULL;
+    free(d->parent);
+    d->parent = d->child;
+    d->parent_count = d->child_count;
+    d->child = NULL;
+    d->child_count = 0;
+    return status;
+}
+
+ebpo_status ebpo_cut_levels(ebpo_cutting *c)
+{
+    ebpo_info *info = &c->out->info;
+    descent d = {
+        .c = c, .goes_on = true, .parent_count = 1, .parent = ebpo_alloc_zero(1, sizeof *d.parent)
+    };
+    ebpo_status status = d.parent ? EBPO_OK : ebpo_fail_memory(c->error, sizeof *d.parent);
+    info->level_count = 0;
+    for (; d.goes_on && status == EBPO_OK; d.level++) {
+        if (!ebpo_progress_step(&c->options->progress, "reading levels", (uint64_t)d.level,
+                                (uint64_t)c->last_level + 1, c->error)) {
+            status = EBPO_E_CANCELLED;
+            break;
+        }
+        d.to = &c->out->level[d.level];
+        d.filled = 0;
+        d.goes_on = false;
+        status = cut_level(&d);
+        if (status == EBPO_OK && d.level && d.filled == 0) {
+            ebpo_level_free(d.to); /* in a subset of a subset: nothing of this level lies in both */
+            break;
+        }
+        if (d.level)
+            d.to[-1].pruned_count = d.to->group_count - d.filled;
+        d.to->pruned_count = d.to->gray_count;
+        d.to->gray_volume = c->from->level[d.level].gray_volume;
+        d.to->leaf_volume = c->from->level[d.level].leaf_volume;
+        info->level_count = d.level + 1;
+    }
+    free(d.parent);
+    if (status != EBPO_OK)
+        return status;
+    bool cut = false, empty = false;
+    for (int i = 0; i < info->level_count; i++) {
+        empty = empty || c->out->level[i].pruned_count;
+        cut = cut || c->out->level[i].gray_count != c->from->level[i].gray_count ||
+              c->out->level[i].leaf_count != c->from->level[i].leaf_count;
+    }
+    cut = cut || info->level_count < c->from->level_count || c->from->pruned;
+    info->pruned = cut && empty;
+    for (int i = 0; i < info->level_count && !info->pruned; i++)
+        c->out->level[i].pruned_count = 0;
+    return EBPO_OK;
+}

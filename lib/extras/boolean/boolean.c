@@ -1,0 +1,206 @@
+#include "core/strict_fp.h"
+
+#include "extras/boolean/boolean.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
+#include "geometry/predicates.h"
+#include "geometry/rule.h"
+#include "query/options.h"
+
+/* --- making --- */
+
+ebpo_status ebpo_fail_operand(const ebpo_model *model, uint32_t number, const ebpo_error *cause,
+                              ebpo_error *error)
+{
+    const char *file = model->file->in.shown, *said = cause->message;
+    size_t named = strlen(file);
+    if (strncmp(said, file, named) == 0 && strncmp(said + named, ": ", 2) == 0)
+        said += named + 2;
+    return ebpo_fail_file(error, cause->status, file, "operand %" PRIu32 ": %s", number + 1, said);
+}
+
+static ebpo_status make_solids(ebpo_boolean *b, const ebpo_boolean_operand *operands,
+                               ebpo_error *error)
+{
+    for (uint32_t i = 0; i < b->count; i++) {
+        ebpo_error cause = EBPO_ERROR_INIT;
+        if (ebpo_check_solid(operands[i].model, &cause) != EBPO_OK ||
+            ebpo_posed_solid_make(&b->solid[i], operands[i].model, &operands[i].pose, &cause) !=
+                EBPO_OK)
+            return ebpo_fail_operand(operands[i].model, i, &cause, error);
+        b->pose[i] = operands[i].pose;
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status make_contexts(ebpo_boolean *b, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (size_t i = 0; i < (size_t)b->threads * b->count && status == EBPO_OK; i++)
+        status = ebpo_context_new(b->solid[i % b->count].model, &b->context[i], error);
+    return status;
+}
+
+static ebpo_status fill(ebpo_boolean *b, const ebpo_boolean_operand *operands, ebpo_error *error)
+{
+    b->solid = ebpo_alloc_zero(b->count, sizeof *b->solid);
+    b->pose = ebpo_alloc_zero(b->count, sizeof *b->pose);
+    b->context = ebpo_alloc_zero((uint64_t)b->threads * b->count, sizeof(ebpo_context *));
+    if (!b->solid || !b->pose || !b->context)
+        return ebpo_fail_memory(error, b->count * (sizeof *b->solid + b->threads * sizeof(void *)));
+    ebpo_status status = make_solids(b, operands, error);
+    return status == EBPO_OK ? make_contexts(b, error) : status;
+}
+
+ebpo_status ebpo_boolean_new(const ebpo_boolean_operand *operands, uint32_t operand_count,
+                             const ebpo_boolean_node *nodes, uint32_t node_count,
+                             const ebpo_boolean_options *options, ebpo_boolean **out,
+                             ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_boolean_options wanted = EBPO_BOOLEAN_OPTIONS_INIT;
+    *out = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_boolean_options, &wanted, options, error);
+    if (status != EBPO_OK)
+        return status;
+    if (operand_count == 0 || operand_count > EBPO_BOOLEAN_OPERANDS_MAX)
+        return ebpo_fail(error, EBPO_E_LIMIT, "an expression of %" PRIu32 " operands; give 1 to %d",
+                         operand_count, EBPO_BOOLEAN_OPERANDS_MAX);
+    ebpo_boolean *b = ebpo_alloc_zero(1, sizeof *b);
+    if (!b)
+        return ebpo_fail_memory(error, sizeof *b);
+    b->count = operand_count;
+    b->threads = ebpo_thread_count(wanted.threads);
+    status = ebpo_expression_make(&b->expression, nodes, node_count, operand_count, error);
+    if (status == EBPO_OK)
+        status = fill(b, operands, error);
+    if (status == EBPO_OK)
+        *out = b;
+    else
+        ebpo_boolean_free(b);
+    return status;
+}
+
+void ebpo_boolean_free(ebpo_boolean *b)
+{
+    if (!b)
+        return;
+    for (size_t i = 0; b->context && i < (size_t)b->threads * b->count; i++)
+        ebpo_context_free(b->context[i]);
+    free(b->context);
+    free(b->solid);
+    free(b->pose);
+    free(b);
+}
+
+/* --- points --- */
+
+/* What the operands say of a point: those that it is on have two sides. */
+typedef struct opinion {
+    uint64_t known;        /* of these operands, which side is inside is the same on both */
+    uint64_t above, below; /* inside there */
+    bool flat;             /* all faces through the point have one plane */
+    bool on;
+    double plane[3][3];
+} opinion;
+
+static bool same_plane(const double a[3][3], const double b[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        if (ebpo_orient3d(a[0], a[1], a[2], b[i]) != 0)
+            return false;
+    return true;
+}
+
+static void add_opinion(opinion *o, uint32_t i, ebpo_rule rule, const ebpo_posed_sides *sides)
+{
+    uint64_t above = ebpo_rule_inside(rule, sides->above),
+             below = ebpo_rule_inside(rule, sides->below);
+    if (sides->flat && above == below) { /* not its boundary, also if faces are there */
+        o->known |= UINT64_C(1) << i;
+        o->above |= above << i;
+        o->below |= above << i;
+        return;
+    }
+    o->above |= above << i;
+    o->below |= below << i;
+    if (!sides->flat ||
+        (o->on && !same_plane((const double(*)[3])o->plane, (const double(*)[3])sides->plane)))
+        o->flat = false;
+    for (int k = 0; k < 9; k++)
+        o->plane[k / 3][k % 3] = sides->plane[k / 3][k % 3];
+    o->on = true;
+}
+
+static void conclude(const ebpo_boolean *b, const opinion *o, unsigned may,
+                     ebpo_boolean_result *out)
+{
+    if (may == EBPO_MAY_BOTH && o->flat) {
+        uint64_t all = ~UINT64_C(0);
+        may = ebpo_expression_value(&b->expression, all, o->above) |
+              ebpo_expression_value(&b->expression, all, o->below);
+    }
+    out->where = may == EBPO_MAY_IN ? EBPO_IN : may == EBPO_MAY_OUT ? EBPO_OUT : EBPO_ON;
+    out->certain = out->where != EBPO_ON || o->flat;
+}
+
+ebpo_status ebpo_boolean_ask(const ebpo_boolean *b, unsigned worker, const double w[3],
+                             ebpo_boolean_result *out, ebpo_error *error)
+{
+    opinion o = { .flat = true };
+    unsigned may = EBPO_MAY_BOTH;
+    for (uint32_t i = 0; i < b->count && may == EBPO_MAY_BOTH; i++) {
+        ebpo_posed_sides sides;
+        ebpo_error cause = EBPO_ERROR_INIT;
+        if (ebpo_posed_solid_sides(&b->solid[i], ebpo_boolean_context(b, worker, i), w, &sides,
+                                   &cause) != EBPO_OK)
+            return ebpo_fail_operand(b->solid[i].model, i, &cause, error);
+        add_opinion(&o, i, b->solid[i].model->info->rule, &sides);
+        may = ebpo_expression_value(&b->expression, o.known, o.above);
+    }
+    conclude(b, &o, may, out);
+    return EBPO_OK;
+}
+
+typedef struct asking {
+    const ebpo_boolean *b;
+    const double *points;
+    ebpo_boolean_result *out;
+} asking;
+
+static ebpo_status ask_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                            ebpo_error *error)
+{
+    const asking *a = context;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
+        status = ebpo_boolean_ask(a->b, worker, a->points + 3 * i, &a->out[i], error);
+    return status;
+}
+
+ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolean, const double *points, uint64_t count,
+                                     ebpo_boolean_result *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    enum { GRAIN = 256 };
+    asking a = { boolean, points, out };
+    ebpo_status status = ebpo_check_points(points, count, error);
+    if (status != EBPO_OK)
+        return status;
+    return ebpo_parallel_for(count <= GRAIN ? 1 : boolean->threads, NULL, count, GRAIN, ask_some,
+                             &a, NULL, "booleans", error);
+}
+
+ebpo_status ebpo_boolean_inside(ebpo_boolean *boolean, const double point[3],
+                                ebpo_boolean_result *out, ebpo_error *error)
+{
+    return ebpo_boolean_inside_many(boolean, point, 1, out, error);
+}

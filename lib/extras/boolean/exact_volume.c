@@ -1,0 +1,406 @@
+/* Where no face of an operand meets one of another, each patch of faces is in or out of every other
+ * operand as a whole. So it bounds the result, from within or from without, or it does not; signed
+ * volumes below those that do add up. Proof: docs/develop/booleans.md, "Exact volumes". */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
+#include "extras/boolean/boolean.h"
+#include "extras/boolean/volume_sum.h"
+#include "extras/collide/collider.h"
+#include "extras/collide/edge_patches.h"
+#include "extras/collide/exact_winding.h"
+#include "extras/collide/face_slots.h"
+#include "extras/collide/posed_model.h"
+#include "geometry/predicates.h"
+#include "geometry/rule.h"
+
+static const char stage[] = "exact volume";
+
+enum { PATCHES_GRAIN = 16, FACES_GRAIN = 1 << 14 };
+
+typedef struct measuring {
+    const ebpo_boolean *b;
+    ebpo_volume_options options;
+    ebpo_exact_volume *out;
+    uint64_t first;                           /* operands that are asked, a bit for each, and */
+    uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* of each of these: those that are equal to it */
+    ebpo_volume_sum *sum;                     /* [threads] */
+} measuring;
+
+static bool is_asked(const measuring *m, uint32_t i) { return m->first >> i & 1; }
+
+/* --- what the expression is about --- */
+
+static bool equal_operands(const ebpo_boolean *b, uint32_t i, uint32_t k)
+{
+    return ebpo_same_model(b->solid[i].model, b->solid[k].model) &&
+           memcmp(&b->pose[i], &b->pose[k], sizeof b->pose[i]) == 0;
+}
+
+static void find_equal(measuring *m)
+{
+    uint64_t used = ebpo_expression_operands(&m->b->expression);
+    for (uint32_t i = 0; i < m->b->count; i++) {
+        uint32_t k = 0;
+        if (!(used >> i & 1))
+            continue;
+        while (k < i && !(is_asked(m, k) && equal_operands(m->b, k, i)))
+            k++;
+        m->first |= UINT64_C(1) << k;
+        m->same[k] |= UINT64_C(1) << i;
+    }
+}
+
+/* The result is in a box; so is its volume. Not even a box: it is empty. */
+static void bound_by_box(measuring *m)
+{
+    double boxes[EBPO_BOOLEAN_OPERANDS_MAX][6], box[6], most = 1;
+    for (uint32_t i = 0; i < m->b->count; i++)
+        memcpy(boxes[i], m->b->solid[i].box, sizeof boxes[i]);
+    ebpo_expression_box(&m->b->expression, (const double(*)[6])boxes, box);
+    for (int k = 0; k < 3; k++) {
+        double size = nextafter(box[3 + k] - box[k], INFINITY);
+        most = box[k] > box[3 + k] ? 0 : nextafter(most * size, INFINITY);
+        if (most == 0)
+            break;
+    }
+    m->out->volume = ebpo_certain_of(0, most);
+}
+
+static void doubt(measuring *m, ebpo_volume_doubt why, uint32_t i, uint32_t k)
+{
+    m->out->doubt = why;
+    m->out->operand[0] = i;
+    m->out->operand[1] = k;
+}
+
+static void check_models(measuring *m)
+{
+    for (uint32_t i = 0; i < m->b->count && !m->out->doubt; i++) {
+        const ebpo_model *model = m->b->solid[i].model;
+        if (is_asked(m, i) && model->info->pruned)
+            doubt(m, EBPO_VOLUME_SUBSET, i, i);
+        else if (is_asked(m, i) && !model->whole)
+            doubt(m, EBPO_VOLUME_IN_PARTS, i, i);
+    }
+}
+
+/* --- faces that meet --- */
+
+static ebpo_status make_collider(const measuring *m, uint32_t i, uint32_t k,
+                                 ebpo_collide_options *options, ebpo_collider **out,
+                                 ebpo_error *error)
+{
+    ebpo_collider_options how = EBPO_COLLIDER_OPTIONS_INIT;
+    *options = (ebpo_collide_options)EBPO_COLLIDE_OPTIONS_INIT;
+    how.threads = m->b->threads;
+    options->pose_a = m->b->pose[i];
+    options->pose_b = m->b->pose[k];
+    options->progress = m->options.progress;
+    return ebpo_collider_new(m->b->solid[i].model, m->b->solid[k].model, &how, out, error);
+}
+
+static bool boxes_apart(const double a[6], const double b[6])
+{
+    for (int k = 0; k < 3; k++)
+        if (a[k] > b[3 + k] || b[k] > a[3 + k])
+            return true;
+    return false;
+}
+
+static void name_faces(ebpo_exact_volume *out, const ebpo_face_pair *pair)
+{
+    out->file_face[0] = pair->file_face_a;
+    out->file_face[1] = pair->file_face_b;
+    out->face[0] = pair->face_a;
+    out->face[1] = pair->face_b;
+}
+
+static ebpo_status check_pair(measuring *m, uint32_t i, uint32_t k, ebpo_error *error)
+{
+    ebpo_collider *collider;
+    ebpo_collide_options options;
+    ebpo_face_pair pair;
+    int32_t found = 0;
+    if (boxes_apart(m->b->solid[i].box, m->b->solid[k].box))
+        return EBPO_OK;
+    ebpo_status status = make_collider(m, i, k, &options, &collider, error);
+    if (status != EBPO_OK)
+        return status;
+    status = ebpo_collide_first(collider, &options, &pair, &found, error);
+    if (status == EBPO_OK && found) {
+        doubt(m, EBPO_VOLUME_OPERANDS_MEET, i, k);
+        name_faces(m->out, &pair);
+    }
+    ebpo_collider_free(collider);
+    return status;
+}
+
+static ebpo_status check_pairs(measuring *m, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint32_t i = 0; i < m->b->count && status == EBPO_OK; i++)
+        for (uint32_t k = i + 1; k < m->b->count && status == EBPO_OK && !m->out->doubt; k++)
+            if (is_asked(m, i) && is_asked(m, k))
+                status = check_pair(m, i, k, error);
+    return status;
+}
+
+/* --- one operand --- */
+
+typedef struct operand {
+    measuring *m;
+    uint32_t number;
+    const ebpo_posed_solid *solid;
+    uint32_t *slots, *patch; /* of each face, by its number in the file */
+    uint32_t *head;          /* faces that patches begin with, */
+    uint64_t heads;
+    int8_t *times; /* how often faces of the patch that begins with this one count: -1, 0, 1 */
+} operand;
+
+static void pose_face(const operand *o, uint64_t face, double t[3][3])
+{
+    ebpo_posed_triangle(o->solid->model->whole, &o->solid->posing, o->slots[face], t);
+}
+
+static bool has_area(const operand *o, uint64_t face)
+{
+    double t[3][3];
+    pose_face(o, face, t);
+    return !ebpo_zero_area(t[0], t[1], t[2]);
+}
+
+static bool take_self(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    const operand *o = user;
+    for (uint64_t i = 0; i < count && !o->m->out->doubt; i++) {
+        if (!has_area(o, pairs[i].file_face_a) || !has_area(o, pairs[i].file_face_b))
+            continue; /* bounds nothing */
+        doubt(o->m, EBPO_VOLUME_FACES_MEET, o->number, o->number);
+        name_faces(o->m->out, &pairs[i]);
+    }
+    return !o->m->out->doubt;
+}
+
+static ebpo_status check_self(operand *o, ebpo_error *error)
+{
+    ebpo_collider *collider;
+    ebpo_collide_options options;
+    ebpo_status status = make_collider(o->m, o->number, o->number, &options, &collider, error);
+    if (status != EBPO_OK)
+        return status;
+    status = ebpo_collide_self_posed(collider, &options, take_self, o, error);
+    ebpo_collider_free(collider);
+    return status;
+}
+
+/* --- what patches bound --- */
+
+/* In the middle of the face, which no other face meets. */
+static ebpo_status own_winding(const operand *o, ebpo_context *context, const double t[3][3],
+                               int32_t *winding, ebpo_error *error)
+{
+    mpq_t x[3], more;
+    mpq_init(more);
+    for (int k = 0; k < 3; k++) {
+        mpq_init(x[k]);
+        for (int i = 0; i < 3; i++) {
+            mpq_set_d(more, t[i][k]);
+            mpq_add(x[k], x[k], more);
+        }
+        mpq_set_ui(more, 3, 1);
+        mpq_div(x[k], x[k], more);
+    }
+    ebpo_status status = ebpo_exact_winding(o->solid, context, (const mpq_t *)x, winding, error);
+    mpq_clears(x[0], x[1], x[2], more, NULL);
+    return status;
+}
+
+/* Where the normal points to. */
+static ebpo_status winding_in_front(const operand *o, unsigned worker, const double t[3][3],
+                                    int32_t *front, ebpo_error *error)
+{
+    int shifted = 0;
+    for (int k = 0; k < 3 && shifted == 0; k++)
+        shifted = ebpo_normal_sign(k, t[0], t[1], t[2]);
+    ebpo_status status =
+        own_winding(o, ebpo_boolean_context(o->m->b, worker, o->number), t, front, error);
+    *front -= shifted < 0;
+    return status;
+}
+
+/* Other operands that the face is in, as bits. */
+static ebpo_status find_around(const operand *o, unsigned worker, const double w[3], uint64_t *in,
+                               ebpo_error *error)
+{
+    const measuring *m = o->m;
+    ebpo_status status = EBPO_OK;
+    *in = 0;
+    for (uint32_t i = 0; i < m->b->count && status == EBPO_OK; i++) {
+        ebpo_posed_sides sides;
+        const ebpo_posed_solid *solid = &m->b->solid[i];
+        if (i == o->number || !is_asked(m, i))
+            continue;
+        status =
+            ebpo_posed_solid_sides(solid, ebpo_boolean_context(m->b, worker, i), w, &sides, error);
+        if (status == EBPO_OK && ebpo_rule_inside(solid->model->info->rule, sides.above))
+            *in |= m->same[i];
+    }
+    return status;
+}
+
+static int is_in(const operand *o, uint64_t around, int32_t winding)
+{
+    bool inside = ebpo_rule_inside(o->solid->model->info->rule, winding);
+    uint64_t in = around | (inside ? o->m->same[o->number] : 0);
+    return ebpo_expression_value(&o->m->b->expression, UINT64_MAX, in) == EBPO_MAY_IN;
+}
+
+static ebpo_status ask_patches(void *user, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    const operand *o = user;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
+        double t[3][3];
+        int32_t front = 0;
+        uint64_t around = 0;
+        pose_face(o, o->head[i], t);
+        status = winding_in_front(o, worker, (const double(*)[3])t, &front, error);
+        if (status == EBPO_OK)
+            status = find_around(o, worker, t[0], &around, error);
+        o->times[o->head[i]] = (int8_t)(is_in(o, around, front + 1) - is_in(o, around, front));
+    }
+    return status;
+}
+
+static ebpo_status add_faces(void *user, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    const operand *o = user;
+    (void)error;
+    for (uint64_t f = begin; f < end; f++) {
+        double t[3][3];
+        int times = o->times[o->patch[f]];
+        if (times == 0)
+            continue;
+        pose_face(o, f, t);
+        ebpo_volume_sum_add(&o->m->sum[worker], (const double(*)[3])t, times);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status find_heads(operand *o, uint64_t faces, ebpo_error *error)
+{
+    uint64_t capacity = 0;
+    for (uint32_t f = 0; f < faces; f++) {
+        if (o->patch[f] != f || !has_area(o, f))
+            continue;
+        if (!ebpo_grow(&o->head, &capacity, o->heads + 1, sizeof *o->head))
+            return ebpo_fail_memory(error, (o->heads + 1) * sizeof *o->head);
+        o->head[o->heads++] = f;
+    }
+    o->times = ebpo_alloc_zero(faces, sizeof *o->times);
+    return o->times ? EBPO_OK : ebpo_fail_memory(error, faces);
+}
+
+static ebpo_status add_patches(operand *o, ebpo_error *error)
+{
+    const ebpo_accel *whole = o->solid->model->whole;
+    const ebpo_progress *progress = &o->m->options.progress;
+    unsigned threads = o->m->b->threads;
+    ebpo_status status = ebpo_edge_patches(whole, o->slots, &o->solid->posing, &o->patch, error);
+    if (status == EBPO_OK)
+        status = find_heads(o, whole->face_count, error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(o->heads <= PATCHES_GRAIN ? 1 : threads, NULL, o->heads,
+                                   PATCHES_GRAIN, ask_patches, o, progress, stage, error);
+    if (status == EBPO_OK)
+        status =
+            ebpo_parallel_for(whole->face_count <= FACES_GRAIN ? 1 : threads, NULL,
+                              whole->face_count, FACES_GRAIN, add_faces, o, progress, stage, error);
+    o->m->out->patches += o->heads;
+    for (uint64_t i = 0; i < o->heads && status == EBPO_OK; i++)
+        o->m->out->bounding += o->times[o->head[i]] != 0;
+    return status;
+}
+
+static ebpo_status add_operand(measuring *m, uint32_t number, ebpo_error *error)
+{
+    operand o = { .m = m, .number = number, .solid = &m->b->solid[number] };
+    const ebpo_accel *whole = o.solid->model->whole;
+    o.slots = ebpo_face_slots(whole);
+    ebpo_status status = o.slots ? check_self(&o, error)
+                                 : ebpo_fail_memory(error, whole->face_count * sizeof *o.slots);
+    if (status == EBPO_OK && !m->out->doubt)
+        status = add_patches(&o, error);
+    free(o.slots);
+    free(o.patch);
+    free(o.head);
+    free(o.times);
+    return status;
+}
+
+/* --- all of them --- */
+
+static ebpo_status add_operands(measuring *m, ebpo_error *error)
+{
+    unsigned threads = m->b->threads;
+    ebpo_status status = EBPO_OK;
+    m->sum = ebpo_alloc(threads, sizeof *m->sum);
+    if (!m->sum)
+        return ebpo_fail_memory(error, threads * sizeof *m->sum);
+    for (unsigned i = 0; i < threads; i++)
+        ebpo_volume_sum_begin(&m->sum[i]);
+    for (uint32_t i = 0; i < m->b->count && status == EBPO_OK && !m->out->doubt; i++) {
+        ebpo_error cause = EBPO_ERROR_INIT;
+        if (is_asked(m, i) && add_operand(m, i, &cause) != EBPO_OK)
+            status = ebpo_fail_operand(m->b->solid[i].model, i, &cause, error);
+    }
+    for (unsigned i = 1; i < threads; i++)
+        ebpo_volume_sum_merge(&m->sum[0], &m->sum[i]);
+    double scaled, volume;
+    int64_t exponent;
+    volume = ebpo_volume_sum_value(&m->sum[0], &scaled, &exponent);
+    if (status == EBPO_OK && !m->out->doubt) {
+        m->out->volume = ebpo_certain_of(volume, volume);
+        m->out->scaled = scaled;
+        m->out->exponent = exponent;
+    }
+    for (unsigned i = 0; i < threads; i++)
+        ebpo_volume_sum_end(&m->sum[i]);
+    free(m->sum);
+    return status;
+}
+
+ebpo_status ebpo_boolean_exact_volume(ebpo_boolean *boolean, const ebpo_volume_options *options,
+                                      ebpo_exact_volume *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_exact_volume found = { .file_face = { EBPO_NO_FACE, EBPO_NO_FACE },
+                                .face = { EBPO_NO_FACE, EBPO_NO_FACE } };
+    measuring m = { .b = boolean, .options = EBPO_VOLUME_OPTIONS_INIT, .out = &found };
+    ebpo_status status = EBPO_TAKE(ebpo_volume_options, &m.options, options, error);
+    if (status == EBPO_OK)
+        status = EBPO_CHECK_SIZED(ebpo_exact_volume, out, error);
+    if (status != EBPO_OK)
+        return status;
+    find_equal(&m);
+    bound_by_box(&m);
+    if (found.volume.hi > 0) {
+        check_models(&m);
+        if (!found.doubt)
+            status = check_pairs(&m, error);
+        if (status == EBPO_OK && !found.doubt)
+            status = add_operands(&m, error);
+    }
+    return status == EBPO_OK ? EBPO_GIVE(ebpo_exact_volume, out, &found) : status;
+}

@@ -1,0 +1,45 @@
+/* Cells of an octree of the world, with what is known of them. */
+#ifndef EBPO_BOOLEAN_WORLD_CELL_H
+#define EBPO_BOOLEAN_WORLD_CELL_H
+
+#include "extras/boolean/boolean.h"
+#include "extras/boolean/solid_in_cube.h"
+#include "geometry/cells.h"
+
+/* The root: corners and centres of cells down to `level` are exact. */
+typedef struct ebpo_world {
+    double origin[3], edge; /* a power of two; 0: nothing is there */
+    int level;
+} ebpo_world;
+
+/* Around the result. EBPO_E_LIMIT: corners would be no doubles. */
+EBPO_MUST_USE ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level,
+                                          ebpo_error *error);
+
+typedef struct ebpo_world_cell {
+    ebpo_cell cell;
+    uint64_t known, in; /* operands, as ebpo_expression_value takes them */
+} ebpo_world_cell;
+
+static inline double ebpo_world_edge(const ebpo_world *w, int level)
+{
+    return w->edge * ebpo_half_power(level);
+}
+
+static inline double ebpo_world_wall(const ebpo_world *w, int axis, int level, uint32_t k)
+{
+    return w->origin[axis] + (double)k * ebpo_world_edge(w, level);
+}
+
+static inline ebpo_world_cell ebpo_world_child(const ebpo_world_cell *c, unsigned octant)
+{
+    return (ebpo_world_cell){ ebpo_cell_child(c->cell, octant), c->known, c->in };
+}
+
+/* Asks the operands that the cell does not know of yet, until the expression is decided: *may. Adds
+ * to ways[EBPO_CUBE_WAYS]. */
+EBPO_MUST_USE ebpo_status ebpo_world_cell_ask(const ebpo_boolean *b, unsigned worker,
+                                              const ebpo_world *w, ebpo_world_cell *c,
+                                              unsigned *may, uint8_t *ways, ebpo_error *error);
+
+#endif

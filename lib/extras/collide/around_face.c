@@ -1,0 +1,310 @@
+#include "core/strict_fp.h"
+
+#include "extras/collide/around_face.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "extras/collide/exact_winding.h"
+#include "geometry/min_max.h"
+#include "geometry/predicates.h"
+#include "geometry/rule.h"
+
+ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places, ebpo_error *error)
+{
+    const ebpo_collision *q = places->question;
+    ebpo_status status = EBPO_OK;
+    *two = (ebpo_two_models){ 0 };
+    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
+        int caller = (int)q->turned ^ i;
+        const ebpo_pose *pose = caller ? &q->options.pose_b : &q->options.pose_a;
+        two->faces[i] = &places->side[caller];
+        two->solid[i] = q->model[i]->info->solid;
+        two->rule[i] = q->model[i]->info->rule;
+        status = ebpo_posed_solid_make(&two->model[i], q->model[i], pose, error);
+        if (status == EBPO_OK)
+            status = ebpo_context_new(q->model[i], &two->context[i], error);
+    }
+    return status;
+}
+
+void ebpo_two_models_end(ebpo_two_models *two)
+{
+    for (int i = 0; i < 2; i++)
+        ebpo_context_free(two->context[i]);
+    ebpo_face_cuts_free(&two->pieces);
+    ebpo_face_cuts_free(&two->others);
+}
+
+void ebpo_two_models_let_go(ebpo_two_models *two)
+{
+    for (int i = 0; i < 2; i++)
+        ebpo_context_let_go(two->context[i]);
+}
+
+uint64_t ebpo_two_models_loads(const ebpo_two_models *two)
+{
+    uint64_t loads = 0;
+    for (int i = 0; i < 2; i++)
+        loads += two->context[i] ? two->context[i]->loaded : 0;
+    return loads;
+}
+
+ebpo_status ebpo_two_models_face(const ebpo_two_models *two, int m, uint64_t face, double out[3][3],
+                                 bool *has_area, ebpo_error *error)
+{
+    double own[3][3];
+    ebpo_status status = ebpo_faces_by_number_get(two->faces[m], face, own, error);
+    for (int k = 0; k < 3 && status == EBPO_OK; k++)
+        ebpo_posing_apply(&two->model[m].posing, own[k], out[k]);
+    *has_area = status == EBPO_OK && !ebpo_zero_area(out[0], out[1], out[2]);
+    return status;
+}
+
+/* --- faces that meet a face --- */
+
+typedef struct cutting {
+    const ebpo_two_models *two;
+    ebpo_face_cuts *pieces;
+    double low[3], high[3]; /* of the face */
+    int model;              /* whose faces are coming */
+    uint64_t own;           /* the face itself; EBPO_NO_FACE */
+} cutting;
+
+static bool near_box(const cutting *c, const double t[3][3])
+{
+    for (int k = 0; k < 3; k++)
+        if (ebpo_max3(t[0][k], t[1][k], t[2][k]) < c->low[k] ||
+            ebpo_min3(t[0][k], t[1][k], t[2][k]) > c->high[k])
+            return false;
+    return true;
+}
+
+static bool cut_by(void *user, const ebpo_triangles *triangles)
+{
+    const cutting *c = user;
+    for (uint64_t i = 0; i < triangles->count; i++) {
+        double t[3][3];
+        if (triangles->file_faces[i] == c->own)
+            continue;
+        for (int k = 0; k < 3; k++)
+            ebpo_posing_apply(&c->two->model[c->model].posing, triangles->corners[i][k], t[k]);
+        if (near_box(c, (const double(*)[3])t))
+            ebpo_face_cuts_add(c->pieces, (const double(*)[3])t, c->model);
+    }
+    return true;
+}
+
+/* The face t of model m, cut by all others. */
+static ebpo_status cut_face(ebpo_two_models *two, ebpo_face_cuts *pieces, int m, uint64_t face,
+                            const double t[3][3], ebpo_error *error)
+{
+    cutting c = { .two = two, .pieces = pieces };
+    ebpo_status status = EBPO_OK;
+    for (int k = 0; k < 3; k++) {
+        c.low[k] = ebpo_min3(t[0][k], t[1][k], t[2][k]);
+        c.high[k] = ebpo_max3(t[0][k], t[1][k], t[2][k]);
+    }
+    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
+        double low[3], high[3];
+        ebpo_unpose_box(&two->model[i], c.low, c.high, low, high);
+        c.model = i;
+        c.own = i == m ? face : EBPO_NO_FACE;
+        status = ebpo_triangles_in_box(two->context[i], low, high, cut_by, &c, error);
+    }
+    return status;
+}
+
+/* --- winding numbers --- */
+
+typedef struct looking {
+    ebpo_two_models *two;
+    const ebpo_face_cuts *pieces;
+    int m;
+    ebpo_around_fn visit;
+    void *user;
+    bool only_at_target;
+} looking;
+
+/* Whether x + (d0, d1, d2) is where the normal points to. */
+static bool shift_is_front(const ebpo_face_cuts *f)
+{
+    int sign = 0;
+    for (int k = 0; k < 3 && sign == 0; k++)
+        sign = mpq_sgn(f->normal[k]);
+    return sign > 0;
+}
+
+static ebpo_status sides_of_solid(const looking *l, const ebpo_piece *piece, int i, unsigned *in,
+                                  ebpo_error *error)
+{
+    ebpo_two_models *two = l->two;
+    int32_t winding, jump = piece->jump[i] + (i == l->m);
+    ebpo_status status =
+        ebpo_exact_winding(&two->model[i], two->context[i], piece->x, &winding, error);
+    int32_t front = shift_is_front(l->pieces) ? winding : winding - jump;
+    *in = (ebpo_rule_inside(two->rule[i], front) ? EBPO_SIDE_FRONT : 0u) |
+          (ebpo_rule_inside(two->rule[i], front + jump) ? EBPO_SIDE_BACK : 0u);
+    return status;
+}
+
+static ebpo_status look(void *user, const ebpo_piece *piece, ebpo_error *error)
+{
+    const looking *l = user;
+    ebpo_around around;
+    ebpo_status status = EBPO_OK;
+    if (l->only_at_target && !piece->at_target)
+        return EBPO_OK;
+    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
+        if (l->two->solid[i])
+            status = sides_of_solid(l, piece, i, &around.in[i], error);
+        else
+            around.in[i] = piece->covered[i] || i == l->m ? EBPO_SIDE_BOTH : 0;
+    }
+    if (status == EBPO_OK && !l->visit(l->user, &around))
+        return EBPO_E_CANCELLED;
+    return status;
+}
+
+/* EBPO_E_CANCELLED comes from `look` alone, and means enough. */
+static ebpo_status visit_pieces(looking *l, ebpo_face_cuts *pieces, ebpo_error *error)
+{
+    ebpo_status status = ebpo_face_pieces_visit(pieces, look, l, error);
+    return status == EBPO_E_CANCELLED ? EBPO_OK : status;
+}
+
+ebpo_status ebpo_look_around_face(ebpo_two_models *two, int m, uint64_t face, ebpo_around_fn visit,
+                                  void *user, ebpo_error *error)
+{
+    double t[3][3];
+    bool has_area;
+    ebpo_status status = ebpo_two_models_face(two, m, face, t, &has_area, error);
+    if (status != EBPO_OK || !has_area)
+        return status;
+    ebpo_face_cuts_begin(&two->pieces, (const double(*)[3])t, false);
+    status = cut_face(two, &two->pieces, m, face, (const double(*)[3])t, error);
+    looking l = { two, &two->pieces, m, visit, user, false };
+    return status == EBPO_OK ? visit_pieces(&l, &two->pieces, error) : status;
+}
+
+/* --- points of the closed models --- */
+
+/* Faces of a model near a point. */
+typedef struct faces_at {
+    uint64_t *face;
+    uint64_t count, capacity;
+    bool no_memory;
+} faces_at;
+
+static bool note_faces(void *user, const ebpo_triangles *triangles)
+{
+    faces_at *n = user;
+    n->no_memory = !ebpo_grow(&n->face, &n->capacity, n->count + triangles->count, sizeof *n->face);
+    for (uint64_t i = 0; i < triangles->count && !n->no_memory; i++)
+        n->face[n->count++] = triangles->file_faces[i];
+    return !n->no_memory;
+}
+
+static ebpo_status find_faces(ebpo_two_models *two, int m, const mpq_t x[3], faces_at *n,
+                              ebpo_error *error)
+{
+    double corner[2][3], low[3], high[3];
+    for (int k = 0; k < 3; k++) {
+        corner[0][k] = nextafter(mpq_get_d(x[k]), -INFINITY);
+        corner[1][k] = nextafter(mpq_get_d(x[k]), INFINITY);
+    }
+    ebpo_unpose_box(&two->model[m], corner[0], corner[1], low, high);
+    ebpo_status status = ebpo_triangles_in_box(two->context[m], low, high, note_faces, n, error);
+    if (status == EBPO_OK && n->no_memory)
+        status = ebpo_fail_memory(error, n->count * sizeof *n->face);
+    return status;
+}
+
+typedef struct asking {
+    ebpo_two_models *two;
+    int m;
+    bool in; /* the model has a side of a piece at the point */
+    bool on; /* a face with an area has the point */
+} asking;
+
+static bool note_side(void *user, const ebpo_around *around)
+{
+    asking *a = user;
+    a->in = around->in[a->m] != 0;
+    return !a->in;
+}
+
+/* One face that may have the point. */
+static ebpo_status ask_face(asking *a, uint64_t face, const mpq_t x[3], ebpo_error *error)
+{
+    double t[3][3];
+    bool has_area;
+    ebpo_two_models *two = a->two;
+    ebpo_status status = ebpo_two_models_face(two, a->m, face, t, &has_area, error);
+    if (status != EBPO_OK || !has_area)
+        return status;
+    ebpo_face_cuts_begin(&two->others, (const double(*)[3])t, true);
+    if (!ebpo_face_cuts_target(&two->others, x))
+        return EBPO_OK;
+    a->on = true;
+    a->in = !two->solid[a->m];
+    if (!a->in)
+        status = cut_face(two, &two->others, a->m, face, (const double(*)[3])t, error);
+    looking l = { two, &two->others, a->m, note_side, a, true };
+    return status == EBPO_OK && !a->in ? visit_pieces(&l, &two->others, error) : status;
+}
+
+/* Whether model m, a closed set, has the point. */
+static ebpo_status has_point(ebpo_two_models *two, int m, const mpq_t x[3], bool *has,
+                             ebpo_error *error)
+{
+    asking a = { .two = two, .m = m };
+    faces_at near = { 0 };
+    int32_t winding = 0;
+    ebpo_status status = find_faces(two, m, x, &near, error);
+    for (uint64_t i = 0; i < near.count && status == EBPO_OK && !a.in; i++)
+        status = ask_face(&a, near.face[i], x, error);
+    free(near.face);
+    if (status == EBPO_OK && !a.on && two->solid[m]) {
+        status = ebpo_exact_winding(&two->model[m], two->context[m], x, &winding, error);
+        a.in = ebpo_rule_inside(two->rule[m], winding);
+    }
+    *has = a.in;
+    return status;
+}
+
+typedef struct common {
+    ebpo_two_models *two;
+    bool *has;
+} common;
+
+static ebpo_status ask_both(void *user, const mpq_t x[3], ebpo_error *error)
+{
+    const common *c = user;
+    bool in[2] = { false, false };
+    ebpo_status status = has_point(c->two, 0, x, &in[0], error);
+    if (status == EBPO_OK && in[0])
+        status = has_point(c->two, 1, x, &in[1], error);
+    *c->has = in[0] && in[1];
+    return status == EBPO_OK && *c->has ? EBPO_E_CANCELLED : status;
+}
+
+ebpo_status ebpo_face_has_common_point(ebpo_two_models *two, int m, uint64_t face, bool *has,
+                                       ebpo_error *error)
+{
+    double t[3][3];
+    bool has_area;
+    *has = false;
+    ebpo_status status = ebpo_two_models_face(two, m, face, t, &has_area, error);
+    if (status != EBPO_OK || !has_area)
+        return status;
+    ebpo_face_cuts_begin(&two->pieces, (const double(*)[3])t, true);
+    status = cut_face(two, &two->pieces, m, face, (const double(*)[3])t, error);
+    common c = { two, has };
+    if (status == EBPO_OK)
+        status = ebpo_face_pieces_vertices(&two->pieces, ask_both, &c, error);
+    return *has ? EBPO_OK : status;
+}

@@ -1,0 +1,251 @@
+/* Pairs of two models in an HDF5 file for other programs; both models in a PLY file, the faces that
+ * meet red. */
+#include "core/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "extras/collide/contacts.h"
+#include "extras/collide/red_mesh.h"
+#include "hdf5_write/tables.h"
+#include "io/publish.h"
+
+/* --- HDF5 --- */
+
+enum { PAIR_FACES, PAIR_FILE_FACES, PAIR_KIND, POINTS, CONTACT_FACES, CONTACT_ON, TABLES };
+
+static const struct {
+    const char *path;
+    ebpo_h5_number number;
+    uint32_t cols;
+} layout[TABLES] = {
+    [PAIR_FACES] = { "/pairs/faces", EBPO_H5_I64, 2 },
+    [PAIR_FILE_FACES] = { "/pairs/file_faces", EBPO_H5_I64, 2 },
+    [PAIR_KIND] = { "/pairs/kind", EBPO_H5_U8, 0 },
+    [POINTS] = { "/contacts/points", EBPO_H5_F64, 6 },
+    [CONTACT_FACES] = { "/contacts/faces", EBPO_H5_I64, 2 },
+    [CONTACT_ON] = { "/contacts/on", EBPO_H5_U8, 4 },
+};
+
+enum { ROWS = 512 };
+
+typedef struct writing {
+    const ebpo_collision *question;
+    ebpo_pair_faces places;
+    ebpo_h5_out out;
+    ebpo_h5_table table[TABLES];
+    int64_t faces[ROWS][2], file_faces[ROWS][2], contact_faces[ROWS][2];
+    uint8_t kind[ROWS], on[ROWS][4];
+    double points[ROWS][6];
+    uint64_t pairs, contacts; /* that wait */
+    ebpo_error *error;
+    ebpo_status status;
+} writing;
+
+static ebpo_status make_tables(writing *w, ebpo_error *error)
+{
+    static const char *const groups[] = { "/pairs", "/contacts" };
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
+        ebpo_h5_id id;
+        status = ebpo_h5_make_plain_group(&w->out, groups[i], &id, error);
+        ebpo_h5_close_id(&w->out, id);
+    }
+    for (int i = 0; i < TABLES && status == EBPO_OK; i++)
+        status = ebpo_h5_make_table(&w->out, layout[i].path, layout[i].number, layout[i].cols,
+                                    &w->table[i], error);
+    return status;
+}
+
+static bool flush(writing *w)
+{
+    const void *const data[TABLES] = { w->faces,  w->file_faces,    w->kind,
+                                       w->points, w->contact_faces, w->on };
+    for (int i = 0; i < TABLES && w->status == EBPO_OK; i++)
+        w->status = ebpo_h5_append(&w->out, &w->table[i], data[i],
+                                   i < POINTS ? w->pairs : w->contacts, w->error);
+    w->pairs = w->contacts = 0;
+    return w->status == EBPO_OK;
+}
+
+static bool note_contact(writing *w, const ebpo_face_pair *pair)
+{
+    ebpo_posed_pair faces;
+    ebpo_contact_segment s;
+    uint64_t n = w->contacts++;
+    w->status = ebpo_pose_pair(&w->places, pair, &faces, w->error);
+    if (w->status != EBPO_OK)
+        return false;
+    ebpo_contact_of(&faces, pair, &s);
+    memcpy(w->points[n], s.point, sizeof s.point);
+    w->contact_faces[n][0] = (int64_t)s.face_a;
+    w->contact_faces[n][1] = (int64_t)s.face_b;
+    for (int i = 0; i < 2; i++) {
+        w->on[n][2 * i] = s.on_a[i];
+        w->on[n][2 * i + 1] = s.on_b[i];
+    }
+    return true;
+}
+
+static bool take_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    writing *w = user;
+    for (uint64_t i = 0; i < count; i++) {
+        uint64_t n = w->pairs++;
+        w->faces[n][0] = (int64_t)pairs[i].face_a;
+        w->faces[n][1] = (int64_t)pairs[i].face_b;
+        w->file_faces[n][0] = (int64_t)pairs[i].file_face_a;
+        w->file_faces[n][1] = (int64_t)pairs[i].file_face_b;
+        w->kind[n] = (uint8_t)pairs[i].kind;
+        if (pairs[i].kind == EBPO_PAIR_CROSSING && !note_contact(w, &pairs[i]))
+            return false;
+        if (w->pairs == ROWS && !flush(w))
+            return false;
+    }
+    return true;
+}
+
+static ebpo_status write_tables(writing *w, const char *path, ebpo_publish *target)
+{
+    const ebpo_collision *q = w->question;
+    ebpo_status status = ebpo_h5_create_plain(&w->out, ebpo_publish_path(target), path, w->error);
+    if (status == EBPO_OK)
+        status = make_tables(w, w->error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_all(q->collider, &q->options, take_rows, w, w->error);
+    if (status == EBPO_OK)
+        status = w->status;
+    if (status == EBPO_OK && !flush(w))
+        status = w->status;
+    for (int i = 0; i < TABLES; i++)
+        ebpo_h5_close_table(&w->out, &w->table[i]);
+    if (status == EBPO_OK)
+        status = ebpo_h5_finish(&w->out, w->error);
+    ebpo_h5_discard(&w->out);
+    return status;
+}
+
+static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_publish *target,
+                              ebpo_error *error)
+{
+    writing *w = ebpo_alloc_zero(1, sizeof *w);
+    if (!w)
+        return ebpo_fail_memory(error, sizeof *w);
+    w->question = q;
+    w->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
+    w->error = error;
+    for (int i = 0; i < TABLES; i++)
+        w->table[i] = (ebpo_h5_table)EBPO_H5_TABLE_INIT;
+    ebpo_status status = ebpo_pair_faces_begin(&w->places, q, error);
+    if (status == EBPO_OK)
+        status = write_tables(w, path, target);
+    ebpo_pair_faces_end(&w->places);
+    free(w);
+    return status;
+}
+
+/* --- PLY --- */
+
+/* Of a model in parts a chunk at a time; the mesh of a whole one is read once more. */
+typedef struct painted {
+    ebpo_mesh mesh;
+    ebpo_faces_by_number parts;
+    ebpo_red_source source;
+    uint64_t *met; /* a bit for each face */
+} painted;
+
+typedef struct painting {
+    painted side[2]; /* of the caller's A and B */
+} painting;
+
+static bool take_met(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    const painting *p = user;
+    uint64_t *a = p->side[0].met, *b = p->side[1].met;
+    for (uint64_t i = 0; i < count; i++) {
+        a[pairs[i].file_face_a / 64] |= UINT64_C(1) << pairs[i].file_face_a % 64;
+        b[pairs[i].file_face_b / 64] |= UINT64_C(1) << pairs[i].file_face_b % 64;
+    }
+    return true;
+}
+
+static ebpo_status part_vertex(void *user, uint64_t number, double out[3], ebpo_error *error)
+{
+    return ebpo_faces_by_number_vertex(user, number, out, error);
+}
+
+static ebpo_status part_face(void *user, uint64_t number, uint32_t out[3], ebpo_error *error)
+{
+    return ebpo_faces_by_number_corners(user, number, out, error);
+}
+
+static ebpo_status begin_painted(painted *p, const ebpo_model *model, ebpo_error *error)
+{
+    const ebpo_info *info = model->info;
+    p->met = ebpo_alloc_zero(info->face_count / 64 + 1, 8);
+    if (!p->met)
+        return ebpo_fail_memory(error, info->face_count / 8);
+    if (model->whole) {
+        ebpo_status status = ebpo_file_read_mesh(model->file, NULL, &p->mesh, error);
+        p->source = ebpo_red_source_of(&p->mesh);
+        return status;
+    }
+    ebpo_faces_by_number_begin(&p->parts, model, NULL);
+    p->source = (ebpo_red_source){ info->vertex_count, info->face_count, &p->parts, part_vertex,
+                                   part_face };
+    return EBPO_OK;
+}
+
+static void end_painted(painted *p)
+{
+    ebpo_faces_by_number_end(&p->parts);
+    ebpo_mesh_free(&p->mesh);
+    free(p->met);
+}
+
+static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo_error *error)
+{
+    static const char *const colour[2] = { "200 200 200", "150 150 160" };
+    painting p = { 0 };
+    ebpo_red_mesh red[2];
+    ebpo_status status = EBPO_OK;
+    for (int m = 0; m < 2 && status == EBPO_OK; m++)
+        status = begin_painted(&p.side[m], q->collider->model[m], error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_all(q->collider, &q->options, take_met, &p, error);
+    uint64_t before = ebpo_collision_bytes_read(q);
+    for (int m = 0; m < 2; m++)
+        red[m] = (ebpo_red_mesh){ p.side[m].source, &q->posing[(int)q->turned ^ m].posing,
+                                  p.side[m].met, colour[m] };
+    if (status == EBPO_OK)
+        status = ebpo_red_meshes_print(red, 2, target, error);
+    q->collider->bytes_read += ebpo_collision_bytes_read(q) - before;
+    for (int m = 0; m < 2; m++)
+        end_painted(&p.side[m]);
+    return status;
+}
+
+/* --- either --- */
+
+ebpo_status ebpo_collide_write(ebpo_collider *c, const ebpo_collide_options *options,
+                               ebpo_pairs_format format, const char *path, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_collision q;
+    ebpo_publish target = EBPO_PUBLISH_INIT;
+    if (format != EBPO_PAIRS_HDF5 && format != EBPO_PAIRS_PLY)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: no format of pairs", path);
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_publish_begin(&target, path, error);
+    if (status == EBPO_OK)
+        status = format == EBPO_PAIRS_PLY ? write_ply(&q, &target, error)
+                                          : write_hdf5(&q, path, &target, error);
+    if (status == EBPO_OK)
+        status = ebpo_publish_commit(&target, error);
+    ebpo_publish_abort(&target);
+    return status;
+}

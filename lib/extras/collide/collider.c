@@ -1,0 +1,177 @@
+#include "core/strict_fp.h"
+
+#include "extras/collide/collider.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
+#include "extras/collide/gap_search.h"
+#include "extras/collide/posed_model.h"
+#include "query/options.h"
+
+/* What was left out of a subset might meet as well. */
+static ebpo_status check_complete(const ebpo_model *model, ebpo_error *error)
+{
+    if (!model->info->pruned)
+        return EBPO_OK;
+    return ebpo_fail_file(error, EBPO_E_ABSENT, model->file->in.shown,
+                          "is a part of another file, and what was left out might meet too: ask "
+                          "the whole file, or put both into a scene, which knows what matters "
+                          "(`ebpo scene`)");
+}
+
+ebpo_status ebpo_collider_new(ebpo_model *a, ebpo_model *b, const ebpo_collider_options *options,
+                              ebpo_collider **out, ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_status status = check_complete(a, error);
+    if (status == EBPO_OK)
+        status = check_complete(b, error);
+    return status == EBPO_OK ? ebpo_collider_of_parts(a, b, options, out, error) : status;
+}
+
+ebpo_status ebpo_collider_of_parts(ebpo_model *a, ebpo_model *b,
+                                   const ebpo_collider_options *options, ebpo_collider **out,
+                                   ebpo_error *error)
+{
+    ebpo_collider_options wanted = EBPO_COLLIDER_OPTIONS_INIT;
+    *out = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_collider_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_mesh(a, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_mesh(b, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_collider *c = ebpo_alloc_lines(1, sizeof *c);
+    if (!c)
+        return ebpo_fail_memory(error, sizeof *c);
+    c->model[0] = a;
+    c->model[1] = b;
+    c->options = wanted;
+    if (!c->options.memory)
+        c->options.memory = 64 << 20;
+    *out = c;
+    return EBPO_OK;
+}
+
+void ebpo_collider_free(ebpo_collider *c)
+{
+    if (!c)
+        return;
+    ebpo_pair_walk_free(&c->walk);
+    for (unsigned i = 0; c->walks && i < c->walk_count; i++)
+        ebpo_pair_walk_free(&c->walks[i]);
+    free(c->walks);
+    ebpo_gap_free(c->gap);
+    free(c->nearest);
+    for (int i = 0; i < 2; i++) {
+        ebpo_context_free(c->context[i]);
+        free(c->slots[i]);
+    }
+    free(c);
+}
+
+void ebpo_collider_count(ebpo_collider *c, ebpo_pair_walk *w)
+{
+    c->node_pairs += w->node_pairs;
+    c->block_pairs += w->block_pairs;
+    c->exact += w->exact;
+    w->node_pairs = w->block_pairs = w->exact = 0;
+}
+
+ebpo_status ebpo_collider_get_stats(const ebpo_collider *c, ebpo_collider_stats *out)
+{
+    ebpo_collider_stats stats = EBPO_COLLIDER_STATS_INIT;
+    stats.node_pairs = c->node_pairs;
+    stats.block_pairs = c->block_pairs;
+    stats.exact = c->exact;
+    stats.subtree_pairs = c->subtree_pairs;
+    stats.subtrees = c->subtrees;
+    stats.loads = c->loads;
+    stats.bytes_read = c->bytes_read;
+    return EBPO_GIVE(ebpo_collider_stats, out, &stats);
+}
+
+/* --- questions --- */
+
+/* Files first, then poses: bits, so that the order needs no meaning. */
+static bool comes_second(const ebpo_collider *c, const ebpo_collide_options *o)
+{
+    int by_file = memcmp(c->model[0]->info->content_sha256, c->model[1]->info->content_sha256,
+                         sizeof c->model[0]->info->content_sha256);
+    return (by_file ? by_file : memcmp(&o->pose_a, &o->pose_b, sizeof o->pose_a)) > 0;
+}
+
+static ebpo_status make_posings(ebpo_collision *q, ebpo_error *error)
+{
+    ebpo_posing posing[2];
+    q->reach = 0;
+    for (int i = 0; i < 2; i++) {
+        double reach[3];
+        ebpo_model_reach(q->model[i], reach);
+        const ebpo_pose *pose = (i == 1) != q->turned ? &q->options.pose_b : &q->options.pose_a;
+        ebpo_status status = ebpo_posing_make(&posing[i], pose, reach, error);
+        if (status != EBPO_OK)
+            return status;
+        q->reach = fmax(q->reach, ebpo_posed_reach(&posing[i], reach));
+    }
+    for (int i = 0; i < 2; i++)
+        ebpo_block_posing_make(&q->posing[i], &posing[i], q->reach);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collider *c,
+                                 const ebpo_collide_options *options, ebpo_error *error)
+{
+    out->options = (ebpo_collide_options)EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_collide_options, &out->options, options, error);
+    if (status != EBPO_OK)
+        return status;
+    out->collider = c;
+    out->turned = comes_second(c, &out->options);
+    out->model[0] = c->model[out->turned];
+    out->model[1] = c->model[!out->turned];
+    out->late = out->options.deadline_ns ? ebpo_clock() + out->options.deadline_ns : UINT64_MAX;
+    return make_posings(out, error);
+}
+
+bool ebpo_collision_is_in_parts(const ebpo_collision *q)
+{
+    return !(q->model[0]->whole && q->model[1]->whole);
+}
+
+bool ebpo_collision_is_late(const ebpo_collision *q)
+{
+    return q->late != UINT64_MAX && ebpo_clock() >= q->late;
+}
+
+/* Of both files; of one, once. */
+uint64_t ebpo_collision_bytes_read(const ebpo_collision *q)
+{
+    uint64_t bytes = 0;
+    for (int i = 0; i < 2; i++) {
+        ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
+        if ((i == 0 || q->model[0]->file != q->model[1]->file) &&
+            ebpo_file_get_stats(q->model[i]->file, &stats) == EBPO_OK)
+            bytes += stats.bytes_read;
+    }
+    return bytes;
+}
+
+ebpo_face_pair ebpo_collision_pair(const ebpo_collision *q, const ebpo_accel *first,
+                                   const ebpo_accel *second, const ebpo_met_pair *met)
+{
+    uint64_t file[2] = { ebpo_accel_file_face(first, met->a),
+                         ebpo_accel_file_face(second, met->b) },
+             source[2] = { ebpo_accel_source_face(first, met->a),
+                           ebpo_accel_source_face(second, met->b) };
+    int a = q->turned, b = !q->turned;
+    return (ebpo_face_pair){ source[a], source[b], file[a], file[b], met->kind, 0 };
+}

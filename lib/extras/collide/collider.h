@@ -1,0 +1,83 @@
+/* A collider's parts, and what all questions begin with. */
+#ifndef EBPO_COLLIDE_COLLIDER_H
+#define EBPO_COLLIDE_COLLIDER_H
+
+#include <math.h>
+
+#include <ebpo/collide.h>
+
+#include "extras/collide/of_parts.h"
+#include "extras/collide/pair_walk.h"
+#include "query/query_model.h"
+
+struct ebpo_collider {
+    ebpo_model *model[2]; /* as the caller has them */
+    ebpo_collider_options options;
+    ebpo_pair_walk walk;   /* of the calling thread */
+    ebpo_pair_walk *walks; /* of the threads of all pairs, between questions; NULL: none are here */
+    unsigned walk_count;
+    uint64_t node_pairs, block_pairs, exact;
+    uint64_t subtree_pairs, subtrees, loads, bytes_read; /* of models in parts */
+    struct ebpo_gap_search *gap;                         /* of distances, once one has been asked */
+    struct ebpo_face_two *nearest; /* the last nearest pair, of the caller's A and B; or NULL */
+    ebpo_context *context[2];      /* of depths, once one has been asked of that model */
+    uint32_t *slots[2];            /* by numbers in the file, once they have been asked for */
+};
+
+/* A question: options checked, models in the order that swapping does not change. */
+typedef struct ebpo_collision {
+    ebpo_collider *collider;
+    ebpo_collide_options options;
+    bool turned; /* the caller's B comes first */
+    ebpo_model *model[2];
+    ebpo_block_posing posing[2];
+    double reach;  /* no posed coordinate is greater */
+    uint64_t late; /* by ebpo_clock; UINT64_MAX: never */
+} ebpo_collision;
+
+EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collider *collider,
+                                               const ebpo_collide_options *options,
+                                               ebpo_error *error);
+
+bool ebpo_collision_is_late(const ebpo_collision *collision);
+
+/* The first contact of two accels of the question's models: the collider's walk has it as met[0]
+ * and met_slot. found: as of ebpo_collide_first. */
+EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision,
+                                               const ebpo_accel *const accel[2], const char *stage,
+                                               int32_t *found, ebpo_error *error);
+
+/* That have been read of both files. */
+uint64_t ebpo_collision_bytes_read(const ebpo_collision *collision);
+
+/* A model is not all in memory. */
+bool ebpo_collision_is_in_parts(const ebpo_collision *collision);
+
+/* Adds a walk's counts to the collider's. */
+void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
+
+/* What the caller is told of local numbers of two accels. */
+ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
+                                   const ebpo_accel *second, const ebpo_met_pair *met);
+
+/* ebpo_collide_self at a pose: options have it twice. */
+EBPO_MUST_USE ebpo_status ebpo_collide_self_posed(ebpo_collider *collider,
+                                                  const ebpo_collide_options *options,
+                                                  ebpo_pairs_fn take, void *user,
+                                                  ebpo_error *error);
+
+/* What is certain of a figure. */
+static inline ebpo_certain ebpo_certain_of(double lo, double hi)
+{
+    bool bound = lo != hi && (lo == 0 || isinf(hi));
+    return (ebpo_certain){ lo, hi,
+                           lo == hi ? EBPO_FIGURE_EXACT
+                           : bound  ? EBPO_FIGURE_BOUND
+                                    : EBPO_FIGURE_INTERVAL,
+                           0 };
+}
+
+/* A walk takes so many pairs before it looks at the clock. */
+enum { EBPO_WALK_PAIRS = 1024 };
+
+#endif

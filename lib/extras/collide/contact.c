@@ -1,0 +1,224 @@
+/* Which edges pierce is decided by exact signs, where by double-double arithmetic: bounds in
+ * docs/develop/collision.md. */
+#include "core/strict_fp.h"
+
+#include "extras/collide/contact.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "geometry/double_double.h"
+#include "geometry/integer_vectors.h"
+#include "geometry/corner_order.h"
+#include "geometry/triangle_pair.h"
+
+/* An edge from below to above a plane, both in the order of coordinates. */
+typedef struct piercing {
+    const double *end[2], *plane[3];
+} piercing;
+
+static void sort_corners(const double **corner, int n)
+{
+    for (int i = 1; i < n; i++)
+        for (int j = i; j > 0 && ebpo_corner_order(corner[j - 1], corner[j]) > 0; j--) {
+            const double *last = corner[j - 1];
+            corner[j - 1] = corner[j];
+            corner[j] = last;
+        }
+}
+
+static piercing piercing_of(const double edge_of[3][3], int from, int to, const double plane[3][3])
+{
+    piercing p = { { edge_of[from], edge_of[to] }, { plane[0], plane[1], plane[2] } };
+    sort_corners(p.end, 2);
+    sort_corners(p.plane, 3);
+    return p;
+}
+
+/* --- the point, in double-double arithmetic --- */
+
+/* Of `point` over the plane, times the normal's length; returns the sum of its products' sizes. */
+static double height_over(const ebpo_pair normal[3], const double products[3], const double *from,
+                          const double *point, ebpo_pair *height)
+{
+    ebpo_pair d[3];
+    double sum = 0;
+    ebpo_pair_differences(from, point, d);
+    *height = ebpo_pair_dot(normal, d);
+    for (int k = 0; k < 3; k++)
+        sum += products[k] * fabs(d[k].head);
+    return sum;
+}
+
+/* How far along the edge: height[0] / (height[0] - height[1]). False: not certain enough. */
+static bool share_of_edge(const piercing *p, ebpo_pair *share)
+{
+    ebpo_pair e[3], f[3], normal[3], height[2];
+    double products[3], most = 0;
+    ebpo_pair_differences(p->plane[0], p->plane[1], e);
+    ebpo_pair_differences(p->plane[0], p->plane[2], f);
+    ebpo_pair_cross(e, f, normal);
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        products[k] = fabs(e[u].head * f[v].head) + fabs(e[v].head * f[u].head);
+    }
+    for (int i = 0; i < 2; i++)
+        most = fmax(most, height_over(normal, products, p->plane[0], p->end[i], &height[i]));
+    ebpo_pair both = ebpo_pair_subtract(height[0], height[1]);
+    *share = ebpo_pair_divide(height[0], both);
+    return most <= 0x1p30 * fabs(both.head) && fabs(both.head) >= 0x1p-600;
+}
+
+/* False: numbers so large or small that bounds do not hold. */
+static bool ordinary(const piercing *p)
+{
+    const double *const all[] = { p->end[0], p->end[1], p->plane[0], p->plane[1], p->plane[2] };
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < 5; i++)
+            if (fabs(all[i][k]) > 0x1p200)
+                return false;
+        double most = fmax(fabs(p->end[0][k]), fabs(p->end[1][k]));
+        if (most != 0 && most < 0x1p-900)
+            return false;
+    }
+    return true;
+}
+
+static bool point_by_pairs(const piercing *p, double out[3])
+{
+    ebpo_pair share, d[3];
+    if (!ordinary(p) || !share_of_edge(p, &share))
+        return false;
+    ebpo_pair_differences(p->end[0], p->end[1], d);
+    for (int k = 0; k < 3; k++)
+        out[k] = ebpo_pair_add(ebpo_pair_multiply(d[k], share), ebpo_pair_of(p->end[0][k])).head;
+    return true;
+}
+
+/* --- the point, exact and rounded once --- */
+
+typedef struct exact_piercing {
+    ebpo_vectorz end[2], plane[3], normal;
+    mpz_t height[2], numerator;
+} exact_piercing;
+
+static void set_exact(exact_piercing *e, const piercing *p, int unit)
+{
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < 2; i++)
+            ebpo_set_integer(e->end[i].x[k], p->end[i][k], unit);
+        for (int i = 0; i < 3; i++)
+            ebpo_set_integer(e->plane[i].x[k], p->plane[i][k], unit);
+    }
+    ebpo_vectorz_subtract(&e->plane[1], &e->plane[1], &e->plane[0]);
+    ebpo_vectorz_subtract(&e->plane[2], &e->plane[2], &e->plane[0]);
+    ebpo_vectorz_cross(&e->normal, &e->plane[1], &e->plane[2]);
+    for (int i = 0; i < 2; i++) {
+        ebpo_vectorz_subtract(&e->plane[1], &e->end[i], &e->plane[0]);
+        ebpo_vectorz_dot(e->height[i], &e->normal, &e->plane[1]);
+    }
+}
+
+/* Heights h0 and h1 have different signs: (end1 h0 - end0 h1) / (h0 - h1). */
+static void exact_point(exact_piercing *e, int unit, double out[3])
+{
+    if (mpz_sgn(e->height[0]) < 0 || mpz_sgn(e->height[1]) > 0)
+        for (int i = 0; i < 2; i++)
+            mpz_neg(e->height[i], e->height[i]);
+    for (int k = 0; k < 3; k++) {
+        mpz_mul(e->numerator, e->end[1].x[k], e->height[0]);
+        mpz_submul(e->numerator, e->end[0].x[k], e->height[1]);
+        mpz_sub(e->normal.x[0], e->height[0], e->height[1]);
+        out[k] = ebpo_round_quotient(e->numerator, e->normal.x[0], unit);
+    }
+}
+
+static void point_by_integers(const piercing *p, double out[3])
+{
+    exact_piercing e;
+    ebpo_vectorz *all[] = {
+        &e.end[0], &e.end[1], &e.plane[0], &e.plane[1], &e.plane[2], &e.normal
+    };
+    int unit = EBPO_UNIT_OF_ZEROS;
+    for (int i = 0; i < 2; i++)
+        unit = ebpo_common_unit(p->end[i], 3, unit);
+    for (int i = 0; i < 3; i++)
+        unit = ebpo_common_unit(p->plane[i], 3, unit);
+    for (int i = 0; i < 6; i++)
+        ebpo_vectorz_init(all[i]);
+    mpz_inits(e.height[0], e.height[1], e.numerator, NULL);
+    set_exact(&e, p, unit);
+    exact_point(&e, unit, out);
+    mpz_clears(e.height[0], e.height[1], e.numerator, NULL);
+    for (int i = 0; i < 6; i++)
+        ebpo_vectorz_clear(all[i]);
+}
+
+static void pierce(const piercing *p, double out[3])
+{
+    if (!point_by_pairs(p, out))
+        point_by_integers(p, out);
+}
+
+/* --- which edge pierces --- */
+
+/* An edge of a face, from the corner that is alone on its side of the other's plane. */
+typedef struct edge {
+    const double (*face)[3], (*plane)[3];
+    int from, to;
+    bool ends_there; /* corner `to` is in the plane */
+} edge;
+
+static ebpo_feature feature_of(const edge *e)
+{
+    if (e->ends_there)
+        return (ebpo_feature)(EBPO_NEAR_CORNER0 + e->to);
+    int next = e->from == 2 ? 0 : e->from + 1;
+    return (ebpo_feature)(EBPO_NEAR_EDGE0 + (e->to == next ? e->from : e->to));
+}
+
+static void end_of(const edge *e, double out[3])
+{
+    if (e->ends_there) {
+        memcpy(out, e->face[e->to], 3 * sizeof *out);
+        return;
+    }
+    piercing p = piercing_of(e->face, e->from, e->to, e->plane);
+    pierce(&p, out);
+}
+
+/* Of two edges that meet: one that ends there, else the lesser one. */
+static const edge *chosen(const edge *a, const edge *b)
+{
+    if (a->ends_there || b->ends_there)
+        return a->ends_there ? a : b;
+    piercing p = piercing_of(a->face, a->from, a->to, a->plane),
+             q = piercing_of(b->face, b->from, b->to, b->plane);
+    int order = ebpo_corner_order(p.end[0], q.end[0]);
+    return (order != 0 ? order : ebpo_corner_order(p.end[1], q.end[1])) <= 0 ? a : b;
+}
+
+/* `order`: negative: the end is that of A's edge, positive: of B's, 0: of both. */
+static void set_end(const edge *a, const edge *b, int order, ebpo_contact_end *out)
+{
+    end_of(order < 0 ? a : order > 0 ? b : chosen(a, b), out->point);
+    out->on_a = order <= 0 ? feature_of(a) : EBPO_NEAR_INTERIOR;
+    out->on_b = order >= 0 ? feature_of(b) : EBPO_NEAR_INTERIOR;
+}
+
+void ebpo_triangle_contact(const double a[3][3], const double b[3][3], ebpo_contact_end out[2])
+{
+    ebpo_turned_pair t;
+    ebpo_pair_kind kind;
+    if (!ebpo_turn_pair(a, b, &t, &kind))
+        return;
+    bool reversed = t.flipped_a != t.flipped_b;
+    edge of_a[2], of_b[2]; /* to corners 1 and 2 */
+    for (int i = 0; i < 2; i++) {
+        of_a[i] = (edge){ a, b, t.a[0], t.a[i + 1], t.side_a[t.a[i + 1]] == 0 };
+        of_b[i] = (edge){ b, a, t.b[0], t.b[i + 1], t.side_b[t.b[i + 1]] == 0 };
+    }
+    /* A's interval goes from its edge to corner 2 to that to corner 1, B's the other way. */
+    set_end(&of_a[1], &of_b[0], ebpo_compare_ends(a, b, &t, 2, 1), &out[reversed]);
+    set_end(&of_a[0], &of_b[1], -ebpo_compare_ends(a, b, &t, 1, 2), &out[!reversed]);
+}

@@ -1,0 +1,116 @@
+/* Contact segments of all crossing pairs, in the order of pairs. */
+#include "core/strict_fp.h"
+
+#include "extras/collide/contacts.h"
+
+#include <string.h>
+
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "extras/collide/face_slots.h"
+#include "extras/collide/contact.h"
+
+ebpo_status ebpo_collider_slots(ebpo_collider *c, ebpo_error *error)
+{
+    for (int i = 0; i < 2; i++) {
+        if (!c->model[i]->whole)
+            continue;
+        if (!c->slots[i])
+            c->slots[i] = ebpo_face_slots(c->model[i]->whole);
+        if (!c->slots[i])
+            return ebpo_fail_memory(error, c->model[i]->whole->face_count * sizeof(uint32_t));
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f, const ebpo_collision *q, ebpo_error *error)
+{
+    ebpo_collider *c = q->collider;
+    f->question = q;
+    ebpo_status status = ebpo_collider_slots(c, error);
+    for (int i = 0; i < 2 && status == EBPO_OK; i++)
+        ebpo_faces_by_number_begin(&f->side[i], c->model[i], c->slots[i]);
+    return status;
+}
+
+void ebpo_pair_faces_end(ebpo_pair_faces *f)
+{
+    for (int i = 0; i < 2; i++)
+        ebpo_faces_by_number_end(&f->side[i]);
+}
+
+ebpo_status ebpo_pose_pair(ebpo_pair_faces *f, const ebpo_face_pair *pair, ebpo_posed_pair *out,
+                           ebpo_error *error)
+{
+    const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
+    for (int i = 0; i < 2; i++) {
+        const ebpo_posing *posing = &f->question->posing[f->question->turned ^ i].posing;
+        ebpo_status status = ebpo_faces_by_number_get(&f->side[i], face[i], out->own[i], error);
+        if (status != EBPO_OK)
+            return status;
+        for (int k = 0; k < 3; k++)
+            ebpo_posing_apply(posing, out->own[i][k], out->corner[i][k]);
+    }
+    return EBPO_OK;
+}
+
+void ebpo_contact_of(const ebpo_posed_pair *faces, const ebpo_face_pair *pair,
+                     ebpo_contact_segment *out)
+{
+    ebpo_contact_end end[2];
+    ebpo_triangle_contact((const double(*)[3])faces->corner[0],
+                          (const double(*)[3])faces->corner[1], end);
+    *out = (ebpo_contact_segment){ .face_a = pair->face_a, .face_b = pair->face_b };
+    for (int i = 0; i < 2; i++) {
+        memcpy(out->point[i], end[i].point, sizeof out->point[i]);
+        out->on_a[i] = (uint8_t)end[i].on_a;
+        out->on_b[i] = (uint8_t)end[i].on_b;
+    }
+}
+
+enum { SEGMENTS_AT_ONCE = 512 };
+
+typedef struct telling {
+    ebpo_pair_faces faces;
+    ebpo_segments_fn take;
+    void *user;
+    ebpo_error *error; /* of `status` */
+    ebpo_status status;
+} telling;
+
+static bool tell(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    telling *t = user;
+    ebpo_contact_segment out[SEGMENTS_AT_ONCE];
+    uint64_t n = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_posed_pair faces;
+        if (pairs[i].kind == EBPO_PAIR_CROSSING) {
+            t->status = ebpo_pose_pair(&t->faces, &pairs[i], &faces, t->error);
+            if (t->status != EBPO_OK)
+                return false;
+            ebpo_contact_of(&faces, &pairs[i], &out[n++]);
+        }
+        if (n == SEGMENTS_AT_ONCE || (n > 0 && i + 1 == count)) {
+            if (!t->take(t->user, out, n))
+                return false;
+            n = 0;
+        }
+    }
+    return true;
+}
+
+ebpo_status ebpo_collide_contacts(ebpo_collider *c, const ebpo_collide_options *options,
+                                  ebpo_segments_fn take, void *user, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_collision q;
+    telling t = { .take = take, .user = user, .error = error };
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_pair_faces_begin(&t.faces, &q, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_all(c, options, tell, &t, error);
+    ebpo_pair_faces_end(&t.faces);
+    return status == EBPO_OK ? t.status : status;
+}

@@ -1,0 +1,227 @@
+/* Faces of one mesh that meet otherwise than as neighbours. The mesh becomes a temporary file,
+ * and that a model under a budget: so it may be larger than memory. Only the faces
+ * matter, so it is built as a surface without planes, which takes a fraction of the time. */
+#include "core/strict_fp.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/build.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
+#include "core/workspace_parts.h"
+#include "extras/collide/collider.h"
+#include "extras/collide/red_mesh.h"
+#include "format/container_write.h"
+#include "extras/collide/contact.h"
+#include "extras/collide/pair_distance.h"
+
+typedef struct crossings {
+    ebpo_crossings_options options;
+    ebpo_crossings_fn take;
+    void *user;
+    ebpo_tree tree;
+    ebpo_file *file;
+    ebpo_model *model;
+    ebpo_collider *collider;
+    ebpo_publish target; /* of the picture, if one is wanted */
+    ebpo_crossings_summary sum;
+    uint64_t *met; /* a bit for each face, by its number in the source */
+    bool enough;
+} crossings;
+
+/* --- the model --- */
+
+static ebpo_status build(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                         ebpo_error *error)
+{
+    ebpo_build_options how = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_mesh_report surface = *report;
+    surface.balanced = surface.manifold = false;
+    how.parts = EBPO_PART_MESH | EBPO_PART_MAPS;
+    how.threads = c->options.threads;
+    how.progress = c->options.progress;
+    return ebpo_build(mesh, &surface, NULL, &how, &c->tree, error);
+}
+
+/* What searching needs besides the file is the mesh, for places. */
+static void drop_levels(ebpo_tree *tree)
+{
+    for (int i = 0; i < tree->info.level_count; i++)
+        ebpo_level_free(&tree->level[i]);
+}
+
+/* libhdf5 wants a name, so the file has one until it has been opened. */
+static ebpo_status store(crossings *c, const char *folder, ebpo_error *error)
+{
+    ebpo_write_options how = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_publish named = EBPO_PUBLISH_INIT;
+    char path[EBPO_FOLDER_BYTES + 16];
+    how.codec_level = 1;
+    how.threads = c->options.threads;
+    how.progress = c->options.progress;
+    snprintf(path, sizeof path, "%s/ebpo-crossings", folder);
+    ebpo_status status = ebpo_publish_begin(&named, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_tree_write_into(&c->tree, ebpo_publish_path(&named), folder, &how, error);
+    if (status == EBPO_OK)
+        status = ebpo_open_own(ebpo_publish_path(&named), &c->file, error);
+    ebpo_publish_abort(&named);
+    return status;
+}
+
+/* The workspace holds half of what is allowed; of the rest half is the model's, and an eighth is
+ * for pairs that wait. */
+enum { LEAST_MODEL = 1 << 20 }; /* of workspaces for tests; others have more */
+
+static ebpo_status make_collider(crossings *c, uint64_t memory, ebpo_error *error)
+{
+    ebpo_model_options holding = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;
+    holding.memory = memory / 4 > LEAST_MODEL ? memory / 4 : LEAST_MODEL;
+    holding.threads = with.threads = c->options.threads;
+    holding.progress = c->options.progress;
+    with.memory = memory / 16;
+    ebpo_status status = ebpo_model_new(c->file, &holding, &c->model, error);
+    return status == EBPO_OK ? ebpo_collider_new(c->model, c->model, &with, &c->collider, error)
+                             : status;
+}
+
+/* --- pairs --- */
+
+static void corners_of(const crossings *c, uint64_t file_face, double out[3][3])
+{
+    const ebpo_mesh *mesh = &c->tree.mesh;
+    for (int i = 0; i < 3; i++) {
+        uint64_t v = 3 * (uint64_t)mesh->faces[3 * file_face + (unsigned)i];
+        for (unsigned k = 0; k < 3; k++)
+            out[i][k] = mesh->xyz64 ? mesh->xyz64[v + k] : (double)mesh->xyz32[v + k];
+    }
+}
+
+static void common_point(const double a[3][3], const double b[3][3], int32_t kind, double out[3])
+{
+    ebpo_contact_end end[2];
+    ebpo_pair_distance_bounds nearest;
+    if (kind == EBPO_PAIR_CROSSING) {
+        ebpo_triangle_contact(a, b, end);
+        for (int k = 0; k < 3; k++)
+            out[k] = end[0].point[k] / 2 + end[1].point[k] / 2;
+        return;
+    }
+    ebpo_triangles_distance_bounds(a, b, &nearest);
+    memcpy(out, nearest.point[0], sizeof nearest.point[0]);
+}
+
+static void note(crossings *c, uint64_t face)
+{
+    uint64_t bit = UINT64_C(1) << face % 64;
+    c->sum.faces += !(c->met[face / 64] & bit);
+    c->met[face / 64] |= bit;
+}
+
+static void tell(crossings *c, const ebpo_face_pair *pair, ebpo_crossing *out)
+{
+    double a[3][3], b[3][3];
+    bool swap = pair->face_a > pair->face_b;
+    *out = (ebpo_crossing){ .kind = pair->kind };
+    out->face[swap] = pair->face_a;
+    out->face[!swap] = pair->face_b;
+    corners_of(c, pair->file_face_a, a);
+    corners_of(c, pair->file_face_b, b);
+    common_point((const double(*)[3])a, (const double(*)[3])b, pair->kind, out->point);
+    c->sum.pairs[pair->kind]++;
+    for (int i = 0; i < 2; i++)
+        note(c, out->face[i]);
+}
+
+enum { TOLD_AT_ONCE = 256 };
+
+static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    crossings *c = user;
+    ebpo_crossing out[TOLD_AT_ONCE];
+    for (uint64_t at = 0; at < count && !c->enough; at += TOLD_AT_ONCE) {
+        uint64_t n = count - at < TOLD_AT_ONCE ? count - at : TOLD_AT_ONCE;
+        for (uint64_t i = 0; i < n; i++)
+            tell(c, &pairs[at + i], &out[i]);
+        c->enough = c->take && !c->take(c->user, out, n);
+    }
+    return !c->enough;
+}
+
+/* --- the call --- */
+
+static ebpo_status paint(crossings *c, ebpo_workspace *workspace, ebpo_error *error)
+{
+    ebpo_read_options how = EBPO_READ_OPTIONS_INIT;
+    ebpo_mesh mesh;
+    bool source_order;
+    how.threads = c->options.threads;
+    how.workspace = workspace;
+    ebpo_status status = ebpo_file_read_source_mesh(c->file, &how, &mesh, &source_order, error);
+    if (status != EBPO_OK)
+        return status;
+    const ebpo_red_mesh red = { ebpo_red_source_of(&mesh), NULL, c->met, "200 200 200" };
+    status = ebpo_red_meshes_print(&red, 1, &c->target, error);
+    ebpo_mesh_free(&mesh);
+    return status == EBPO_OK ? ebpo_publish_commit(&c->target, error) : status;
+}
+
+static ebpo_status search(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                          ebpo_workspace *workspace, ebpo_error *error)
+{
+    ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
+    how.progress = c->options.progress;
+    ebpo_status status = build(c, mesh, report, error);
+    if (status != EBPO_OK)
+        return status;
+    c->met = ebpo_alloc_zero(c->tree.mesh.face_count / 64 + 1, sizeof *c->met);
+    if (!c->met)
+        return ebpo_fail_memory(error, c->tree.mesh.face_count / 8);
+    status = store(c, workspace->folder, error);
+    drop_levels(&c->tree);
+    if (status == EBPO_OK)
+        status = make_collider(c, workspace->figures.memory, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_self(c->collider, &how, take_pairs, c, error);
+    return status == EBPO_OK && c->options.ply ? paint(c, workspace, error) : status;
+}
+
+static void close_all(crossings *c)
+{
+    ebpo_collider_free(c->collider);
+    ebpo_model_free(c->model);
+    ebpo_close(c->file);
+    ebpo_tree_free(&c->tree);
+    free(c->met);
+    ebpo_publish_abort(&c->target);
+}
+
+ebpo_status ebpo_mesh_crossings(ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                                const ebpo_crossings_options *options, ebpo_crossings_fn take,
+                                void *user, ebpo_crossings_summary *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    crossings c = { .options = EBPO_CROSSINGS_OPTIONS_INIT,
+                    .take = take,
+                    .user = user,
+                    .target = EBPO_PUBLISH_INIT,
+                    .sum = EBPO_CROSSINGS_SUMMARY_INIT };
+    ebpo_workspace *workspace = mesh->workspace, *own = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_crossings_options, &c.options, options, error);
+    if (status == EBPO_OK && !workspace)
+        status = ebpo_workspace_new(NULL, &own, error);
+    if (status == EBPO_OK && c.options.ply)
+        status = ebpo_publish_begin(&c.target, c.options.ply, error);
+    if (status == EBPO_OK)
+        status = search(&c, mesh, report, workspace ? workspace : own, error);
+    ebpo_mesh_free(mesh);
+    close_all(&c);
+    ebpo_workspace_free(own);
+    return status == EBPO_OK && out ? EBPO_GIVE(ebpo_crossings_summary, out, &c.sum) : status;
+}

@@ -1,0 +1,329 @@
+/* Seen along the direction both faces are convex polygons with heights; the difference of heights
+ * is concave where they overlap, so it is greatest over a corner of one, or where edges cross. */
+#include "core/strict_fp.h"
+
+#include "extras/collide/pair_sweep.h"
+
+#include <math.h>
+
+#include "geometry/integer_vectors.h"
+
+void ebpo_sweep_time_init(ebpo_sweep_time *t)
+{
+    mpz_inits(t->numerator, t->denominator, NULL);
+    t->unit = 0;
+    t->ever = false;
+}
+
+void ebpo_sweep_time_clear(ebpo_sweep_time *t) { mpz_clears(t->numerator, t->denominator, NULL); }
+
+int ebpo_sweep_time_compare(const ebpo_sweep_time *x, const ebpo_sweep_time *y)
+{
+    mpz_t left, right;
+    if (!x->ever || !y->ever)
+        return x->ever - y->ever;
+    mpz_inits(left, right, NULL);
+    mpz_mul(left, x->numerator, y->denominator);
+    mpz_mul(right, y->numerator, x->denominator);
+    if (x->unit > y->unit)
+        mpz_mul_2exp(left, left, (unsigned)(x->unit - y->unit));
+    else
+        mpz_mul_2exp(right, right, (unsigned)(y->unit - x->unit));
+    int order = mpz_cmp(left, right);
+    mpz_clears(left, right, NULL);
+    return order;
+}
+
+double ebpo_sweep_time_round(const ebpo_sweep_time *t)
+{
+    mpz_t size;
+    if (!t->ever)
+        return -INFINITY;
+    mpz_init(size);
+    mpz_abs(size, t->numerator);
+    double out = ebpo_round_quotient(size, t->denominator, t->unit);
+    mpz_clear(size);
+    return mpz_sgn(t->numerator) < 0 ? -out : out;
+}
+
+/* --- in integers --- */
+
+typedef struct sweep {
+    ebpo_vectorz d, corner[2][3]; /* of the face that moves, and of the other */
+    ebpo_vectorz u, v, w, n, m;
+    mpz_t top, bottom, share;
+    ebpo_sweep_time *best;
+} sweep;
+
+static void sweep_init(sweep *s)
+{
+    ebpo_vectorz *all[] = { &s->d, &s->u, &s->v, &s->w, &s->n, &s->m };
+    for (int i = 0; i < 6; i++) {
+        ebpo_vectorz_init(all[i]);
+        ebpo_vectorz_init(&s->corner[i / 3][i % 3]);
+    }
+    mpz_inits(s->top, s->bottom, s->share, NULL);
+}
+
+static void sweep_clear(sweep *s)
+{
+    ebpo_vectorz *all[] = { &s->d, &s->u, &s->v, &s->w, &s->n, &s->m };
+    for (int i = 0; i < 6; i++) {
+        ebpo_vectorz_clear(all[i]);
+        ebpo_vectorz_clear(&s->corner[i / 3][i % 3]);
+    }
+    mpz_clears(s->top, s->bottom, s->share, NULL);
+}
+
+/* x . (y cross z); `m` is lost. */
+static void triple(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebpo_vectorz *y,
+                   const ebpo_vectorz *z)
+{
+    ebpo_vectorz_cross(&s->m, y, z);
+    ebpo_vectorz_dot(out, x, &s->m);
+}
+
+/* top / bottom is a time of contact. `other`: of the face that does not move, seen from which time
+ * goes the other way. */
+static void take(sweep *s, bool other)
+{
+    if (mpz_sgn(s->bottom) < 0) {
+        mpz_neg(s->top, s->top);
+        mpz_neg(s->bottom, s->bottom);
+    }
+    if (other)
+        mpz_neg(s->top, s->top);
+    if (s->best->ever) {
+        mpz_mul(s->share, s->top, s->best->denominator);
+        mpz_submul(s->share, s->best->numerator, s->bottom);
+        if (mpz_sgn(s->share) <= 0)
+            return;
+    }
+    mpz_set(s->best->numerator, s->top);
+    mpz_set(s->best->denominator, s->bottom);
+    s->best->ever = true;
+}
+
+/* 0 <= share / bottom <= 1; bottom is not 0. */
+static bool is_share(const sweep *s)
+{
+    int sign = mpz_sgn(s->bottom);
+    return mpz_sgn(s->share) * sign >= 0 && mpz_cmp(s->share, s->bottom) * sign <= 0;
+}
+
+static const ebpo_vectorz *next_corner(const sweep *s, int of, int i)
+{
+    return &s->corner[of][i == 2 ? 0 : i + 1];
+}
+
+/* n: the normal of face `of`. False: it is parallel to the direction, or has no area. */
+static bool find_normal(sweep *s, int of)
+{
+    ebpo_vectorz_subtract(&s->u, &s->corner[of][1], &s->corner[of][0]);
+    ebpo_vectorz_subtract(&s->v, &s->corner[of][2], &s->corner[of][0]);
+    ebpo_vectorz_cross(&s->n, &s->u, &s->v);
+    ebpo_vectorz_dot(s->share, &s->n, &s->d);
+    return mpz_sgn(s->share) != 0;
+}
+
+/* The corner, seen along the direction, is in face `of`. */
+static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
+{
+    int signs[3] = { 0, 0, 0 };
+    for (int k = 0; k < 3; k++) {
+        ebpo_vectorz_subtract(&s->u, next_corner(s, of, k), &s->corner[of][k]);
+        ebpo_vectorz_subtract(&s->v, corner, &s->corner[of][k]);
+        triple(s, s->share, &s->d, &s->u, &s->v);
+        signs[mpz_sgn(s->share) + 1]++;
+    }
+    return signs[0] == 0 || signs[2] == 0;
+}
+
+/* Corners of face `of` against the other one, which is not parallel to the direction. */
+static void corners_and_face(sweep *s, int of)
+{
+    (void)find_normal(s, !of);
+    for (int i = 0; i < 3; i++) {
+        if (!is_over(s, &s->corner[of][i], !of))
+            continue;
+        ebpo_vectorz_subtract(&s->w, &s->corner[!of][0], &s->corner[of][i]);
+        ebpo_vectorz_dot(s->top, &s->n, &s->w);
+        ebpo_vectorz_dot(s->bottom, &s->n, &s->d);
+        take(s, of == 1);
+    }
+}
+
+/* Edges that cross, seen along the direction: w = t d + x u - y v, by Cramer's rule. */
+static void two_edges(sweep *s, int i, int j)
+{
+    const ebpo_vectorz *p = &s->corner[0][i], *q = &s->corner[1][j];
+    ebpo_vectorz_subtract(&s->u, next_corner(s, 0, i), p);
+    ebpo_vectorz_subtract(&s->v, next_corner(s, 1, j), q);
+    ebpo_vectorz_subtract(&s->w, q, p);
+    triple(s, s->bottom, &s->d, &s->u, &s->v);
+    if (mpz_sgn(s->bottom) == 0)
+        return;
+    triple(s, s->share, &s->d, &s->w, &s->v);
+    if (!is_share(s))
+        return;
+    triple(s, s->share, &s->d, &s->w, &s->u);
+    if (!is_share(s))
+        return;
+    triple(s, s->top, &s->w, &s->u, &s->v);
+    take(s, false);
+}
+
+/* Of a corner of face `of` that is over an edge of the other: w = t d - x v. */
+static void corner_and_edge(sweep *s, int of, int i, int j)
+{
+    const ebpo_vectorz *p = &s->corner[of][i], *q = &s->corner[!of][j];
+    ebpo_vectorz_subtract(&s->v, next_corner(s, !of, j), q);
+    ebpo_vectorz_subtract(&s->w, q, p);
+    ebpo_vectorz_cross(&s->n, &s->d, &s->v);
+    ebpo_vectorz_dot(s->bottom, &s->n, &s->n);
+    ebpo_vectorz_dot(s->share, &s->w, &s->n);
+    if (mpz_sgn(s->bottom) == 0 || mpz_sgn(s->share) != 0)
+        return;
+    triple(s, s->share, &s->n, &s->w, &s->d);
+    if (!is_share(s))
+        return;
+    triple(s, s->top, &s->n, &s->w, &s->v);
+    take(s, of == 1);
+}
+
+/* Of two corners one of which is over the other: w = t d. */
+static void two_corners(sweep *s, int i, int j)
+{
+    ebpo_vectorz_subtract(&s->w, &s->corner[1][j], &s->corner[0][i]);
+    ebpo_vectorz_cross(&s->n, &s->w, &s->d);
+    for (int k = 0; k < 3; k++)
+        if (mpz_sgn(s->n.x[k]) != 0)
+            return;
+    ebpo_vectorz_dot(s->top, &s->w, &s->d);
+    ebpo_vectorz_dot(s->bottom, &s->d, &s->d);
+    take(s, false);
+}
+
+static void look(sweep *s)
+{
+    bool upright[2] = { !find_normal(s, 0), !find_normal(s, 1) };
+    for (int of = 0; of < 2; of++)
+        if (!upright[!of])
+            corners_and_face(s, of);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            two_edges(s, i, j);
+            if (!upright[0] && !upright[1])
+                continue;
+            corner_and_edge(s, 0, i, j);
+            corner_and_edge(s, 1, i, j);
+            two_corners(s, i, j);
+        }
+}
+
+void ebpo_sweep_last(const double a[3][3], const double b[3][3], const double direction[3],
+                     ebpo_sweep_time *out)
+{
+    sweep s = { .best = out };
+    int unit = ebpo_common_unit(b[0], 9, ebpo_common_unit(a[0], 9, EBPO_UNIT_OF_ZEROS)),
+        along = ebpo_common_unit(direction, 3, EBPO_UNIT_OF_ZEROS);
+    if (unit == EBPO_UNIT_OF_ZEROS)
+        unit = 0;
+    sweep_init(&s);
+    for (int k = 0; k < 3; k++) {
+        ebpo_set_integer(s.d.x[k], direction[k], along);
+        for (int i = 0; i < 3; i++) {
+            ebpo_set_integer(s.corner[0][i].x[k], a[i][k], unit);
+            ebpo_set_integer(s.corner[1][i].x[k], b[i][k], unit);
+        }
+    }
+    out->ever = false;
+    out->unit = unit - along;
+    look(&s);
+    sweep_clear(&s);
+}
+
+/* --- bounds --- */
+
+/* The times left by one direction n after the other: n . d t lies between the extents' differences.
+ */
+typedef struct bounding {
+    double x[3][3], y[3][3], reach; /* seen from the first corner */
+    const double *d;
+    double most; /* less than 0: none */
+} bounding;
+
+static double dot(const double x[3], const double y[3])
+{
+    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+}
+
+static void cross(const double x[3], const double y[3], double out[3])
+{
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        out[k] = x[u] * y[v] - x[v] * y[u];
+    }
+}
+
+static void bound_by(bounding *b, const double n[3])
+{
+    double size = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
+    if (!(size > 0x1p-600 && size < 0x1p600) || b->most < 0)
+        return;
+    double c = dot(n, b->d), sign = c < 0 ? -1 : 1, slack = 0x1p-48 * size * b->reach;
+    double x_lo = INFINITY, x_hi = -INFINITY, y_lo = INFINITY, y_hi = -INFINITY;
+    for (int i = 0; i < 3; i++) {
+        double x = sign * dot(n, b->x[i]), y = sign * dot(n, b->y[i]);
+        x_lo = fmin(x_lo, x);
+        x_hi = fmax(x_hi, x);
+        y_lo = fmin(y_lo, y);
+        y_hi = fmax(y_hi, y);
+    }
+    double least = y_lo - x_hi - slack, greatest = y_hi - x_lo + slack;
+    double c_lo = fabs(c) - 0x1p-48 * size, c_hi = fabs(c) + 0x1p-48 * size;
+    if (least > b->most * c_hi * (1 + 0x1p-50) ||
+        greatest < (c_lo < 0 ? b->most * c_lo * (1 + 0x1p-50) : 0))
+        b->most = -1;
+    else if (c_lo > 0)
+        b->most = fmin(b->most, greatest / c_lo * (1 + 0x1p-50));
+}
+
+static void bound_by_cross(bounding *b, const double x[3], const double y[3])
+{
+    double n[3];
+    cross(x, y, n);
+    bound_by(b, n);
+}
+
+double ebpo_sweep_most(const double a[3][3], const double b[3][3], const double direction[3],
+                       double limit)
+{
+    bounding w = { .d = direction, .most = limit };
+    double edge[2][3][3];
+    for (int i = 0; i < 3; i++) {
+        double x = 0, y = 0;
+        for (int k = 0; k < 3; k++) {
+            w.x[i][k] = a[i][k] - a[0][k];
+            w.y[i][k] = b[i][k] - a[0][k];
+            x += fabs(w.x[i][k]);
+            y += fabs(w.y[i][k]);
+        }
+        w.reach = fmax(w.reach, fmax(x, y));
+    }
+    if (!(w.reach > 0x1p-250 && w.reach < 0x1p250))
+        return limit;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            edge[0][i][k] = w.x[i == 2 ? 0 : i + 1][k] - w.x[i][k];
+            edge[1][i][k] = w.y[i == 2 ? 0 : i + 1][k] - w.y[i][k];
+        }
+    bound_by(&w, direction);
+    for (int f = 0; f < 2; f++)
+        bound_by_cross(&w, edge[f][0], edge[f][1]);
+    for (int i = 0; i < 6; i++)
+        bound_by_cross(&w, direction, edge[i / 3][i % 3]);
+    for (int i = 0; i < 9; i++)
+        bound_by_cross(&w, edge[0][i / 3], edge[1][i % 3]);
+    return w.most;
+}

@@ -1,0 +1,86 @@
+/* Going down the hierarchies of two accels together to the pairs of faces that meet, with a stack
+ * of its own. One thread each. */
+#ifndef EBPO_COLLIDE_PAIR_WALK_H
+#define EBPO_COLLIDE_PAIR_WALK_H
+
+#include "extras/collide/accel_pair.h"
+#include "extras/collide/posed_faces.h"
+#include "extras/collide/pair_filter.h"
+#include <ebpo/pair.h>
+
+/* Children of nodes: the node's number << 3 | lane. */
+typedef struct ebpo_node_pair {
+    uint32_t a, b;
+    float key; /* the first contact looks at greater ones first */
+} ebpo_node_pair;
+
+/* Faces that meet, by their local numbers. */
+typedef struct ebpo_met_pair {
+    uint32_t a, b;
+    int32_t kind; /* ebpo_pair_kind, not EBPO_PAIR_APART */
+} ebpo_met_pair;
+
+/* A node's children in both frames: seen from the node's origin, not moved to the other's. */
+typedef struct ebpo_turned_node {
+    _Alignas(32) float c[3][8], e[3][8]; /* middles and half sides of boxes */
+    float c2[3][8], e2[3][8];            /* of the boxes around these along the other's axes */
+    float axis[3][8], axis2[3][8];       /* of slabs, of length 1 */
+    float mid[3][8], mid2[3][8];         /* of slabs */
+    float half[8], radius[8], extent[8]; /* extent: the sum of the half sides */
+    double origin[3];                    /* in the first's frame, both of them */
+    float size;                          /* no box is longer */
+    uint32_t node;                       /* EBPO_NO_CHILD: none is here */
+    uint8_t lanes;
+    bool slabs; /* a child has one */
+} ebpo_turned_node;
+
+enum { EBPO_TURNED_BITS = 4, EBPO_TURNED_NODES = 1 << EBPO_TURNED_BITS };
+
+typedef struct ebpo_pair_walk ebpo_pair_walk;
+
+/* Compiled for several processors, with the same results. */
+typedef struct ebpo_walk_kernels {
+    /* Takes so many pairs from the stack at most. False: no memory. */
+    bool (*run)(ebpo_pair_walk *walk, uint64_t pairs);
+    /* Pushes the children of both tops, or of one pair. False: no memory. */
+    bool (*start)(ebpo_pair_walk *walk);
+    bool (*expand)(ebpo_pair_walk *walk, ebpo_node_pair pair);
+} ebpo_walk_kernels;
+
+const ebpo_walk_kernels *ebpo_walk_kernels_best(void);
+extern const ebpo_walk_kernels ebpo_walk_kernels_base, ebpo_walk_kernels_avx2;
+
+struct ebpo_pair_walk {
+    const ebpo_accel_pair *pair;
+    const ebpo_walk_kernels *kernels;
+    const ebpo_pair_kernels *filter;
+    bool first;          /* ends with the first pair that meets; siblings by least overlap */
+    bool self;           /* both are one accel at one pose: each pair of faces once */
+    bool neighbours;     /* faces are of one mesh: what these have in common is no meeting */
+    uint32_t begin, end; /* faces of the first accel that matter */
+    ebpo_node_pair *stack;
+    uint64_t top, capacity;
+    uint64_t group; /* of the first contact: where the last group of the stack begins */
+    ebpo_met_pair *met;
+    uint64_t met_count, met_capacity;
+    uint32_t met_slot[2];                    /* of the pair that was found last */
+    uint64_t node_pairs, block_pairs, exact; /* looked at; of faces, left to the exact test */
+    ebpo_turned_node turned[2][EBPO_TURNED_NODES];
+    ebpo_posed_faces posed[2][EBPO_POSED_FACES];
+};
+
+/* `walk` is zero or has been used before: its memory stays. The pair must outlive what follows. */
+void ebpo_pair_walk_begin(ebpo_pair_walk *walk, const ebpo_accel_pair *pair);
+void ebpo_pair_walk_free(ebpo_pair_walk *walk);
+
+/* For kernels: decides what the filter has left of two blocks. False: no memory. */
+bool ebpo_pair_walk_decide(ebpo_pair_walk *walk, uint32_t block_a, uint32_t block_b,
+                           const ebpo_block_pairs *pairs);
+/* For kernels: room for more of the stack. */
+bool ebpo_pair_walk_room(ebpo_pair_walk *walk, uint64_t more);
+
+/* A face's posed coordinates. */
+void ebpo_posed_triangle(const ebpo_accel *accel, const ebpo_posing *posing, uint32_t slot,
+                         double out[3][3]);
+
+#endif

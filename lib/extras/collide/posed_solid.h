@@ -1,0 +1,40 @@
+/* A solid at a pose: where a point of the world lies in its model's coordinates, and whether it is
+ * inside, exact on posed coordinates. Proofs: docs/develop/booleans.md. Solids are not changed:
+ * any thread, each with a context of its own. */
+#ifndef EBPO_COLLIDE_POSED_SOLID_H
+#define EBPO_COLLIDE_POSED_SOLID_H
+
+#include "geometry/pose.h"
+#include "query/query_model.h"
+
+typedef struct ebpo_posed_solid {
+    ebpo_model *model;
+    ebpo_posing posing;
+    double rotation[3][3];
+    double box[6]; /* low and high: no posed vertex is beyond */
+    double moved;  /* posed vertices are at most so far from where the true motion has them */
+} ebpo_posed_solid;
+
+/* Of a surface too, which nobody may ask for winding numbers then. EBPO_E_ARGUMENT: a pose;
+ * EBPO_E_ABSENT: a model without its mesh. */
+EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model,
+                                                const ebpo_pose *pose, ebpo_error *error);
+
+/* False: w is certainly outside, beyond the box by more than `margin` (0 or more) on an axis. */
+bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double margin);
+
+/* The point in the model's coordinates that the true motion brings to w, and *doubt: that point is
+ * within it of p, and so is what rounding has moved. If no face of the model is within *doubt of p,
+ * the posed model has at w the winding number that the model has at p. */
+void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *doubt);
+
+/* The box, in the model, of all faces that may have a point of the box between a and b
+ * (corners of it, in any order) when posed. */
+void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
+                     double high[3]);
+
+/* No face of the model is within `doubt` of p, for certain. */
+EBPO_MUST_USE ebpo_status ebpo_posed_solid_clear(ebpo_context *context, const double p[3],
+                                                 double doubt, bool *clear, ebpo_error *error);
+
+#endif

@@ -1,0 +1,229 @@
+#include "core/strict_fp.h"
+
+#include "extras/collide/posed_subtrees.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "geometry/length.h"
+#include "geometry/plane_clip.h"
+#include "geometry/octcode.h"
+#include "query/query_node.h"
+
+typedef struct posed_hull {
+    ebpo_octcode code;
+    int count;
+    double point[][3];
+} posed_hull;
+
+/* Planes of so many levels cut an envelope: what rounding moves its corners by doubles from level
+ * to level. */
+enum { LEVELS_OF_PLANES = 8 };
+/* Of the side of a cell: 255 planes a level, each off by 1e-10 of its cell, and what the levels
+ * above have lost. */
+static const double cut_share = 0x1p-15;
+
+/* --- their order --- */
+
+typedef struct place {
+    uint64_t code; /* of the first cell of the deepest level that it has */
+    uint32_t number;
+} place;
+
+static int by_code(const void *x, const void *y)
+{
+    const place *p = x, *q = y;
+    return (p->code > q->code) - (p->code < q->code);
+}
+
+static ebpo_status order(ebpo_posed_subtrees *s, ebpo_error *error)
+{
+    const ebpo_top *top = s->model->top;
+    place *at = ebpo_alloc(s->count, sizeof *at);
+    if (!at)
+        return ebpo_fail_memory(error, s->count * sizeof *at);
+    for (uint64_t i = 0; i < s->count; i++) {
+        ebpo_octcode code = ebpo_octcode_of_cell(top->below[i].cell);
+        at[i] = (place){ ebpo_octcode_first_descendant(code, EBPO_MAX_LEVEL), (uint32_t)i };
+    }
+    if (s->count)
+        qsort(at, s->count, sizeof *at, by_code);
+    for (uint64_t i = 0; i < s->count; i++)
+        s->rank[at[i].number] = (uint32_t)i;
+    free(at);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_posed_subtrees_make(ebpo_posed_subtrees *out, const ebpo_model *model,
+                                     const ebpo_posing *posing, ebpo_error *error)
+{
+    *out = (ebpo_posed_subtrees){ .model = model, .posing = *posing };
+    out->count = model->whole ? 1 : model->top->below_count;
+    out->rank = ebpo_alloc_zero(out->count, sizeof *out->rank);
+    if (!out->rank)
+        return ebpo_fail_memory(error, out->count * sizeof *out->rank);
+    return model->whole ? EBPO_OK : order(out, error);
+}
+
+void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s)
+{
+    for (uint64_t i = 0; i < s->slots; i++)
+        free(s->hull[i]);
+    free(s->hull);
+    free(s->rank);
+    s->hull = NULL;
+    s->rank = NULL;
+}
+
+/* --- where they are --- */
+
+static const ebpo_node_table *nodes_of(const ebpo_posed_subtrees *s)
+{
+    return s->model->whole ? &s->model->whole->nodes : &s->model->top->nodes;
+}
+
+ebpo_posed_node ebpo_posed_root(const ebpo_posed_subtrees *s)
+{
+    return (ebpo_posed_node){ nodes_of(s)->root, { 0, { 0, 0, 0 } } };
+}
+
+ebpo_posed_node ebpo_posed_subtree_root(const ebpo_posed_subtrees *s)
+{
+    ebpo_posed_node root = ebpo_posed_root(s);
+    if (s->model->whole)
+        root.entry = ebpo_entry(EBPO_ENTRY_BELOW, 0);
+    return root;
+}
+
+ebpo_posed_node ebpo_posed_child(const ebpo_posed_subtrees *s, const ebpo_posed_node *gray,
+                                 unsigned octant)
+{
+    return (ebpo_posed_node){ ebpo_table_child(nodes_of(s), gray->entry, octant),
+                              ebpo_cell_child(gray->cell, octant) };
+}
+
+void ebpo_posed_cell(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[8][3])
+{
+    ebpo_box box = ebpo_model_box(s->model);
+    double wall[2][3];
+    ebpo_cell_bounds(&box, cell, wall[0], wall[1]);
+    for (unsigned corner = 0; corner < 8; corner++) {
+        double x[3];
+        for (unsigned k = 0; k < 3; k++)
+            x[k] = wall[corner >> k & 1][k];
+        ebpo_posing_apply(&s->posing, x, out[corner]);
+    }
+}
+
+double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double reach)
+{
+    double side = 0;
+    for (int k = 0; k < 3; k++)
+        side = fmax(side, s->model->info->box_size[k]);
+    side *= s->posing.scale / (double)(1u << cell.level);
+    return 1.75 * cut_share * side + 0x1p-45 * reach;
+}
+
+double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell)
+{
+    return ebpo_length(s->model->info->box_size) * s->posing.scale / (double)(1u << cell.level);
+}
+
+/* --- envelopes --- */
+
+static void cut(const ebpo_posed_subtrees *s, const ebpo_posed_node *node, ebpo_polytope *envelope)
+{
+    uint32_t count = 0;
+    ebpo_node as = ebpo_entry_node(node->entry, node->cell, s->model->info->rule);
+    as.subtree = s->model->whole;
+    const uint32_t *codes = ebpo_model_planes(s->model, &as, &count);
+    ebpo_planes_cut(envelope, codes, count);
+}
+
+/* In the cell's coordinates. */
+static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_polytope *out)
+{
+    ebpo_posed_node node = ebpo_posed_root(s);
+    ebpo_polytope above;
+    ebpo_polytope_cube(out);
+    for (int level = 0;; level++) {
+        bool matters = level + LEVELS_OF_PLANES > cell.level;
+        if (matters)
+            cut(s, &node, out);
+        if (level == cell.level)
+            return;
+        unsigned octant = ebpo_cell_octant(cell, level);
+        node = ebpo_posed_child(s, &node, octant);
+        if (matters) {
+            ebpo_polytope_copy(&above, out);
+            (void)ebpo_polytope_child(&above, octant, out); /* or a box around what is there */
+        }
+    }
+}
+
+static posed_hull *make_hull(const ebpo_posed_subtrees *s, ebpo_cell cell)
+{
+    ebpo_box box = ebpo_model_box(s->model);
+    ebpo_polytope p;
+    double low[3], high[3], x[3];
+    cut_envelope(s, cell, &p);
+    posed_hull *out = malloc(sizeof *out + (size_t)p.vertex_count * sizeof *out->point);
+    ebpo_cell_bounds(&box, cell, low, high);
+    for (int i = 0; out && i < p.vertex_count; i++) {
+        for (int k = 0; k < 3; k++)
+            x[k] = low[k] + p.vertex[i][k] * (high[k] - low[k]);
+        ebpo_posing_apply(&s->posing, x, out->point[i]);
+    }
+    if (out) {
+        out->count = p.vertex_count;
+        out->code = ebpo_octcode_of_cell(cell);
+    }
+    return out;
+}
+
+static posed_hull **find(posed_hull **hull, uint64_t slots, ebpo_octcode code)
+{
+    uint64_t at;
+    EBPO_HASH_FIND(at, ebpo_hash_number(code), slots - 1, !hull[at] || hull[at]->code == code);
+    return &hull[at];
+}
+
+/* Room for one more. */
+static bool widen(ebpo_posed_subtrees *s)
+{
+    if (4 * (s->hulls + 1) <= 3 * s->slots)
+        return true;
+    uint64_t slots = ebpo_hash_slots(2 * s->slots);
+    posed_hull **hull = ebpo_alloc_zero(slots, sizeof *hull);
+    if (!hull)
+        return false;
+    for (uint64_t i = 0; i < s->slots; i++)
+        if (s->hull[i])
+            *find(hull, slots, s->hull[i]->code) = s->hull[i];
+    free(s->hull);
+    s->hull = hull;
+    s->bytes += (slots - s->slots) * sizeof *hull;
+    s->slots = slots;
+    return true;
+}
+
+ebpo_status ebpo_posed_envelope(ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_convex *out,
+                                ebpo_error *error)
+{
+    if (!widen(s))
+        return ebpo_fail_memory(error, 2 * s->slots * sizeof *s->hull);
+    posed_hull **hull = find(s->hull, s->slots, ebpo_octcode_of_cell(cell));
+    if (!*hull) {
+        *hull = make_hull(s, cell);
+        if (!*hull)
+            return ebpo_fail_memory(error, sizeof(ebpo_polytope));
+        s->hulls++;
+        s->bytes += sizeof **hull + (uint64_t)(*hull)->count * sizeof *(*hull)->point;
+    }
+    *out = (ebpo_convex){ (*hull)->count, (const double(*)[3])(*hull)->point };
+    return EBPO_OK;
+}

@@ -1,0 +1,461 @@
+/* How two models lie to each other: which of the parts of space that are in both, in one and in the
+ * other there are, found around pieces of faces. */
+#include "core/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "extras/collide/around_face.h"
+#include "extras/collide/contacts.h"
+#include "extras/collide/posed_model.h"
+#include "extras/collide/unmet_patches.h"
+#include "geometry/predicates.h"
+
+static const char stage[] = "relation";
+
+/* Models in the question's order. */
+typedef struct relating {
+    const ebpo_collision *question;
+    ebpo_pair_faces places;
+    ebpo_two_models two;
+    ebpo_relation_result *out;
+    uint64_t *met[2], *seen[2]; /* a bit for each face: it meets one of the other; was looked at */
+    bool both, only[2];   /* there are points inner to both; of one that are not in the other */
+    bool told;            /* a face with an area has been looked at */
+    bool touch, doubtful; /* a common point; pairs that may have one */
+    unsigned last[2];     /* `in` of the piece looked at last */
+    uint64_t looked_at;
+    bool open;
+    ebpo_error *error; /* of `status`, within callbacks */
+    ebpo_status status;
+} relating;
+
+static bool mixed(const relating *r) { return r->two.solid[0] != r->two.solid[1]; }
+
+static bool surfaces(const relating *r) { return !r->two.solid[0] && !r->two.solid[1]; }
+
+/* Nothing that is still to be looked at can change the relation. */
+static bool is_decided(const relating *r)
+{
+    if (mixed(r))
+        return r->both && r->only[r->two.solid[0]];
+    return r->both && (surfaces(r) ? r->only[0] || r->only[1] : r->only[0] && r->only[1]);
+}
+
+static uint64_t face_count(const relating *r, int m)
+{
+    return r->question->model[m]->info->face_count;
+}
+
+static bool bit(const uint64_t *bits, uint64_t i) { return bits[i / 64] >> i % 64 & 1; }
+
+static void set_bit(uint64_t *bits, uint64_t i) { bits[i / 64] |= UINT64_C(1) << i % 64; }
+
+/* --- looking at faces --- */
+
+typedef struct facing {
+    relating *r;
+    int m;
+} facing;
+
+/* Two solids: each side of the piece is a part of space. */
+static void note_solids(relating *r, const ebpo_around *a)
+{
+    r->both |= (a->in[0] & a->in[1]) != 0;
+    r->only[0] |= (a->in[0] & ~a->in[1]) != 0;
+    r->only[1] |= (a->in[1] & ~a->in[0]) != 0;
+}
+
+static bool note(void *user, const ebpo_around *a)
+{
+    const facing *f = user;
+    relating *r = f->r;
+    unsigned other = a->in[!f->m];
+    r->told = true;
+    memcpy(r->last, a->in, sizeof r->last);
+    if (r->two.solid[0] && r->two.solid[1])
+        note_solids(r, a);
+    else {
+        r->both |= mixed(r) && other == EBPO_SIDE_BOTH;
+        r->only[f->m] |= other == 0;
+    }
+    return !is_decided(r);
+}
+
+/* Once; false: enough, or `status`. Of a solid and a surface the surface's faces tell all. */
+static bool look_at(relating *r, int m, uint64_t face)
+{
+    facing f = { r, m };
+    if ((mixed(r) && r->two.solid[m]) || bit(r->seen[m], face))
+        return true;
+    set_bit(r->seen[m], face);
+    r->status = ebpo_look_around_face(&r->two, m, face, note, &f, r->error);
+    if (r->status == EBPO_OK && ++r->looked_at % 64 == 0 &&
+        !ebpo_progress_step(&r->question->options.progress, stage, 0, 0, r->error))
+        r->status = EBPO_E_CANCELLED;
+    r->open |= ebpo_collision_is_late(r->question);
+    return r->status == EBPO_OK && !r->open && !is_decided(r);
+}
+
+static bool look_at_pair(relating *r, const ebpo_face_pair *pair)
+{
+    const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
+    bool turned = r->question->turned;
+    return look_at(r, 0, face[turned]) && look_at(r, 1, face[!turned]);
+}
+
+/* --- contacts --- */
+
+static bool all_have_area(relating *r, const ebpo_face_pair *pair)
+{
+    ebpo_posed_pair faces;
+    r->status = ebpo_pose_pair(&r->places, pair, &faces, r->error);
+    for (int i = 0; i < 2 && r->status == EBPO_OK; i++) {
+        const double(*t)[3] = (const double(*)[3])faces.corner[i];
+        if (ebpo_zero_area(t[0], t[1], t[2]))
+            return false;
+    }
+    return r->status == EBPO_OK;
+}
+
+/* What a pair tells of two surfaces. False: `status`. */
+static bool note_pair(relating *r, const ebpo_face_pair *pair)
+{
+    r->both |= pair->kind != EBPO_PAIR_TOUCHING;
+    r->touch = r->touch || r->both || all_have_area(r, pair);
+    return r->status == EBPO_OK;
+}
+
+static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    relating *r = user;
+    bool turned = r->question->turned, more = true;
+    for (uint64_t i = 0; i < count && more; i++) {
+        set_bit(r->met[turned], pairs[i].file_face_a);
+        set_bit(r->met[!turned], pairs[i].file_face_b);
+        if (surfaces(r))
+            more = note_pair(r, &pairs[i]);
+        else if (pairs[i].kind == EBPO_PAIR_CROSSING)
+            more = look_at_pair(r, &pairs[i]);
+    }
+    return more;
+}
+
+/* With what is left of the time. */
+static ebpo_collide_options options_left(const relating *r)
+{
+    ebpo_collide_options options = r->question->options;
+    uint64_t now = ebpo_clock();
+    if (r->question->late != UINT64_MAX)
+        options.deadline_ns = r->question->late > now ? r->question->late - now : 1;
+    return options;
+}
+
+static ebpo_status take_pairs(relating *r, ebpo_pairs_fn take, ebpo_error *error)
+{
+    const ebpo_collision *q = r->question;
+    ebpo_collide_options options = options_left(r);
+    ebpo_two_models_let_go(&r->two);
+    ebpo_status status = ebpo_collide_all(q->collider, &options, take, r, error);
+    if (status == EBPO_E_CANCELLED && ebpo_collision_is_late(q)) {
+        r->open = true;
+        status = EBPO_OK;
+    }
+    return status == EBPO_OK ? r->status : status;
+}
+
+static bool goes_on(const relating *r)
+{
+    return r->status == EBPO_OK && !r->open && !is_decided(r);
+}
+
+static void look_at_met(relating *r)
+{
+    for (int m = 0; m < 2; m++) {
+        uint64_t count = face_count(r, m);
+        for (uint64_t f = 0; f < count && goes_on(r); f++)
+            if (bit(r->met[m], f))
+                (void)look_at(r, m, f);
+    }
+}
+
+/* --- faces without contact --- */
+
+/* Patches of them are on one side of the other model. Does another face on that side (`in`: in it)
+ * tell nothing more? */
+static bool side_is_told(const relating *r, int m, bool in)
+{
+    if (mixed(r))
+        return in ? r->both : r->only[m];
+    return in ? r->both && r->only[!m] : r->only[m];
+}
+
+/* Own faces of a subtree that meet none of the other model, as long as their patch may tell more.
+ */
+static void look_through(relating *r, const ebpo_unmet_patches *u, uint64_t *done)
+{
+    for (uint64_t i = 0; i < u->count && goes_on(r); i++) {
+        if (bit(r->met[u->m], u->first + i) || bit(done, u->patch[i]))
+            continue;
+        r->told = false;
+        (void)look_at(r, u->m, u->first + i);
+        if (r->told && side_is_told(r, u->m, r->last[!u->m] != 0))
+            set_bit(done, u->patch[i]);
+    }
+}
+
+static uint64_t *make_bits(uint64_t count) { return ebpo_alloc_zero(count / 64 + 1, 8); }
+
+static ebpo_status fail_bits(uint64_t count, ebpo_error *error)
+{
+    return ebpo_fail_memory(error, count / 8);
+}
+
+static void look_at_subtree(relating *r, ebpo_unmet_patches *u, uint64_t number)
+{
+    r->status = ebpo_unmet_patches_find(u, number, r->met[u->m], r->error);
+    if (r->status != EBPO_OK)
+        return;
+    uint64_t *done = make_bits(u->count);
+    if (done)
+        look_through(r, u, done);
+    else
+        r->status = fail_bits(u->count, r->error);
+    free(done);
+}
+
+/* All faces of the subtree are on a side that has been told: it need not be loaded. */
+static bool is_settled(relating *r, const ebpo_unmet_patches *u, uint64_t number)
+{
+    int in = -1;
+    if (side_is_told(r, u->m, true) || side_is_told(r, u->m, false))
+        r->status = ebpo_unmet_patches_side(u, number, &in, r->error);
+    return in >= 0 && side_is_told(r, u->m, in);
+}
+
+static void look_at_patches(relating *r, int m)
+{
+    ebpo_unmet_patches u;
+    if (mixed(r) && r->two.solid[m])
+        return;
+    ebpo_unmet_patches_begin(&u, r->question, &r->two, m);
+    for (uint64_t i = 0; i < u.subtrees && goes_on(r); i++) {
+        if (!is_settled(r, &u, i) && r->status == EBPO_OK)
+            look_at_subtree(r, &u, i);
+        r->open |= ebpo_collision_is_late(r->question);
+    }
+    ebpo_unmet_patches_end(&u);
+}
+
+/* --- common points of models that have no inner ones in common --- */
+
+static bool note_sound(void *user, const ebpo_around *a)
+{
+    const facing *f = user;
+    f->r->told = true;
+    f->r->doubtful |= a->in[f->m] == 0;
+    return !f->r->doubtful;
+}
+
+/* Every piece of the face belongs to its model: so does every point of a contact. */
+static bool is_sound(relating *r, int m, uint64_t face)
+{
+    facing f = { r, m };
+    r->told = r->doubtful = false;
+    if (r->status == EBPO_OK)
+        r->status = ebpo_look_around_face(&r->two, m, face, note_sound, &f, r->error);
+    return r->status == EBPO_OK && r->told && !r->doubtful;
+}
+
+static bool take_sound(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    relating *r = user;
+    bool turned = r->question->turned;
+    for (uint64_t i = 0; i < count && !r->touch && r->status == EBPO_OK && !r->open; i++) {
+        const uint64_t face[2] = { pairs[i].file_face_a, pairs[i].file_face_b };
+        r->touch = is_sound(r, 0, face[turned]) && is_sound(r, 1, face[!turned]);
+        r->open |= ebpo_collision_is_late(r->question);
+    }
+    return !r->touch && r->status == EBPO_OK && !r->open;
+}
+
+static ebpo_status find_touch(relating *r, ebpo_error *error)
+{
+    ebpo_status status = take_pairs(r, take_sound, error);
+    uint64_t count = face_count(r, 0);
+    for (uint64_t f = 0; f < count && status == EBPO_OK && !r->touch && !r->open; f++) {
+        if (bit(r->met[0], f))
+            status = ebpo_face_has_common_point(&r->two, 0, f, &r->touch, error);
+        r->open |= ebpo_collision_is_late(r->question);
+    }
+    return status;
+}
+
+/* --- the relation --- */
+
+static bool has_unmet_area(relating *r, int m)
+{
+    bool has = false;
+    for (uint64_t f = 0; f < face_count(r, m) && r->status == EBPO_OK && !has; f++) {
+        double t[3][3];
+        if (!bit(r->met[m], f))
+            r->status = ebpo_two_models_face(&r->two, m, f, t, &has, r->error);
+    }
+    return has;
+}
+
+/* One file twice, at one pose. */
+static bool is_same(const ebpo_collision *q)
+{
+    return ebpo_same_model(q->model[0], q->model[1]) &&
+           memcmp(&q->options.pose_a, &q->options.pose_b, sizeof q->options.pose_a) == 0;
+}
+
+/* Whether there is anything. */
+static void look_for_any(relating *r)
+{
+    uint64_t count = face_count(r, 0);
+    r->out->contact = count > 0;
+    if (surfaces(r))
+        r->both = r->touch = has_unmet_area(r, 0);
+    for (uint64_t f = 0; f < count && goes_on(r) && !r->both; f++)
+        (void)look_at(r, 0, f);
+}
+
+/* A pair that meets, and what is around its faces: if they cross, that nearly always decides. */
+static ebpo_status look_at_first(relating *r, ebpo_error *error)
+{
+    const ebpo_collision *q = r->question;
+    ebpo_collide_options options = options_left(r);
+    ebpo_face_pair pair;
+    ebpo_status status = ebpo_collide_first(q->collider, &options, &pair, &r->out->contact, error);
+    r->open |= r->out->contact < 0;
+    if (status != EBPO_OK || r->out->contact != 1 || surfaces(r))
+        return status;
+    (void)look_at_pair(r, &pair);
+    return r->status;
+}
+
+static ebpo_status look_at_contacts(relating *r, ebpo_error *error)
+{
+    ebpo_status status = take_pairs(r, take_contacts, error);
+    for (int m = 0; m < 2 && r->both && surfaces(r) && goes_on(r); m++)
+        r->only[m] = has_unmet_area(r, m);
+    if (status == EBPO_OK && (r->both || !surfaces(r)))
+        look_at_met(r);
+    return status == EBPO_OK ? r->status : status;
+}
+
+static ebpo_status gather_facts(relating *r, ebpo_error *error)
+{
+    ebpo_status status = look_at_first(r, error);
+    if (status == EBPO_OK && r->out->contact == 1 && goes_on(r))
+        status = look_at_contacts(r, error);
+    for (int m = 0; m < 2 && status == EBPO_OK && !surfaces(r); m++) {
+        look_at_patches(r, m);
+        status = r->status;
+    }
+    if (status == EBPO_OK && !r->open && !r->both && !surfaces(r) && r->out->contact == 1)
+        status = find_touch(r, error);
+    return status;
+}
+
+/* Of the question's first model to its second. */
+static ebpo_relation relation_of(const relating *r)
+{
+    if (r->open)
+        return EBPO_RELATION_OPEN;
+    if (surfaces(r))
+        return !r->touch                    ? EBPO_DISJOINT
+               : !r->both                   ? EBPO_TOUCHING
+               : !r->only[0] && !r->only[1] ? EBPO_EQUAL
+                                            : EBPO_INTERSECTING;
+    for (int m = 0; m < 2; m++)
+        if (mixed(r) && !r->two.solid[m] && !r->only[m] && (r->both || r->touch))
+            return m ? EBPO_B_INSIDE_A : EBPO_A_INSIDE_B;
+    if (!r->both)
+        return r->touch ? EBPO_TOUCHING : EBPO_DISJOINT;
+    if (mixed(r) || (r->only[0] && r->only[1]))
+        return EBPO_INTERSECTING;
+    return r->only[0] ? EBPO_B_INSIDE_A : r->only[1] ? EBPO_A_INSIDE_B : EBPO_EQUAL;
+}
+
+static ebpo_relation turned(ebpo_relation r)
+{
+    return r == EBPO_A_INSIDE_B ? EBPO_B_INSIDE_A : r == EBPO_B_INSIDE_A ? EBPO_A_INSIDE_B : r;
+}
+
+static bool boxes_apart(const ebpo_two_models *two)
+{
+    const double *a = two->model[0].box, *b = two->model[1].box;
+    for (int k = 0; k < 3; k++)
+        if (a[k] > b[3 + k] || b[k] > a[3 + k])
+            return true;
+    return false;
+}
+
+static ebpo_status relate(relating *r, ebpo_error *error)
+{
+    const ebpo_collision *q = r->question;
+    ebpo_status status = ebpo_two_models_begin(&r->two, &r->places, error);
+    if (status != EBPO_OK)
+        return status;
+    r->out->contact = boxes_apart(&r->two) ? 0 : -1;
+    if (r->out->contact == 0)
+        return EBPO_OK;
+    for (int m = 0; m < 2; m++) {
+        uint64_t count = face_count(r, m);
+        r->met[m] = make_bits(count);
+        r->seen[m] = make_bits(count);
+        if (!r->met[m] || !r->seen[m])
+            return fail_bits(count, error);
+    }
+    if (!is_same(q))
+        return gather_facts(r, error);
+    look_for_any(r);
+    return r->status;
+}
+
+/* What subtrees cost, in both questions that are asked meanwhile and besides. */
+static void count_loads(const relating *r, uint64_t bytes_told, uint64_t read_before)
+{
+    ebpo_collider *c = r->question->collider;
+    c->loads += ebpo_two_models_loads(&r->two);
+    c->bytes_read = bytes_told + ebpo_collision_bytes_read(r->question) - read_before;
+}
+
+static void end(relating *r)
+{
+    ebpo_two_models_end(&r->two);
+    ebpo_pair_faces_end(&r->places);
+    for (int m = 0; m < 2; m++) {
+        free(r->met[m]);
+        free(r->seen[m]);
+    }
+}
+
+ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *options,
+                                  ebpo_relation_result *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_collision q;
+    *out = (ebpo_relation_result){ EBPO_RELATION_OPEN, -1 };
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    relating r = { .question = &q, .out = out, .error = error };
+    if (status == EBPO_OK)
+        status = ebpo_pair_faces_begin(&r.places, &q, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t told = c->bytes_read, before = ebpo_collision_bytes_read(&q);
+    status = relate(&r, error);
+    ebpo_relation relation = relation_of(&r);
+    out->relation = (int32_t)(q.turned ? turned(relation) : relation);
+    count_loads(&r, told, before);
+    end(&r);
+    return status;
+}

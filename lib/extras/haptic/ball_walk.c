@@ -1,0 +1,230 @@
+/* The tree's nodes are taken in the order in which the ball may come to touch them, and no more
+ * when the next one is touched after a face that is known. The distance from a box is convex along
+ * a line, as that from a face is: Newton's steps towards the ball's radius never go too far. Of
+ * those that it may touch already the closest are first: if it is held there, that is known soon.
+ *
+ * Where a tick's work ends before, the ball goes as far as the next node allows, if that is worth
+ * it; it is held by what is known if it is held where it is; else the next tick goes on. */
+#include "core/strict_fp.h"
+
+#include "extras/haptic/ball_walk.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "extras/haptic/face_near.h"
+#include "extras/haptic/vectors.h"
+
+enum {
+    STEPS = 6,
+    /* What looking leaves of a tick's work for checking. */
+    KEPT_FACES = 64,
+    KEPT_NODES = 256,
+    /* How many more are looked at where one holds the ball where it is. */
+    HELD_FACES = 48
+};
+
+static const double worth = 1.0 / 32; /* part of a way that is worth ending it */
+
+/* What waits is as many parts of the tree at most as it has leaves. */
+static uint64_t room_for(uint64_t faces) { return ebpo_face_box_leaves(faces) + 1; }
+
+uint64_t ebpo_ball_walk_bytes(uint64_t faces) { return room_for(faces) * sizeof(ebpo_near_node); }
+
+ebpo_status ebpo_ball_walk_new(ebpo_ball_walk *w, uint64_t faces, ebpo_error *error)
+{
+    *w = (ebpo_ball_walk){ .stage = EBPO_BALL_STANDS };
+    w->queue.item = ebpo_alloc(room_for(faces), sizeof *w->queue.item);
+    if (!w->queue.item)
+        return ebpo_fail_memory(error, ebpo_ball_walk_bytes(faces));
+    memset(w->queue.item, 0xff, ebpo_ball_walk_bytes(faces));
+    return EBPO_OK;
+}
+
+void ebpo_ball_walk_free(ebpo_ball_walk *w)
+{
+    free(w->queue.item);
+    w->queue.item = NULL;
+}
+
+/* Of nothing in `e` the ball comes nearer. What rounding does to that is within the slacks. */
+static bool goes_away(const ebpo_ball_walk *w, const ebpo_extent *e)
+{
+    double least = 0;
+    for (int i = 0; i < 3; i++)
+        least += w->way[i] * (w->from[i] - (w->way[i] > 0 ? e->max[i] : e->min[i]));
+    return least >= 0;
+}
+
+/* The part of the way, at least, at which the ball may come to touch what is in `e`; where it may
+ * touch it now, by how much that is too near, as a number below 0. INFINITY: not before the part
+ * that is known, or not at all. */
+static double soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
+{
+    double part = 0;
+    for (int step = 0; step < STEPS; step++) {
+        double off[3];
+        for (int i = 0; i < 3; i++) {
+            double x = w->from[i] + part * w->way[i];
+            off[i] = x > e->max[i] ? x - e->max[i] : x < e->min[i] ? x - e->min[i] : 0;
+        }
+        double distance = sqrt(dot(off, off)), gap = distance - (w->reach + 2 * w->band);
+        if (gap <= 0)
+            return part > 0 ? part : goes_away(w, e) ? INFINITY : gap;
+        double slope = dot(off, w->way) / distance;
+        if (!(slope < 0))
+            return INFINITY;
+        part -= gap / slope;
+        if (!(part <= w->part))
+            return INFINITY;
+    }
+    return part;
+}
+
+static void wait_for(ebpo_ball_walk *w, uint64_t node)
+{
+    double key = soonest(w, &w->box->node[node]);
+    if (key < w->part)
+        ebpo_near_push(&w->queue, key, node);
+}
+
+void ebpo_ball_set_out(ebpo_ball_walk *w)
+{
+    w->stage = EBPO_BALL_LOOKS;
+    w->part = 1;
+    w->met.count = 0;
+    w->cut = false;
+    w->queue.count = 0;
+    if (w->box && w->box->count > 0)
+        wait_for(w, 1);
+}
+
+static void look_at_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
+{
+    const ebpo_ball_way way = { w->from, w->way, w->reach, w->band, w->slack, w->least_slack };
+    uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
+    for (; f < end && f < w->box->count; f++) {
+        double away[3];
+        double met = ebpo_ball_meets(&way, (const double(*)[3])w->box->corner[f], away);
+        work->faces++;
+        if (met > w->part)
+            continue;
+        if (met < w->part)
+            w->met.count = 0;
+        w->part = met;
+        ebpo_held_planes_add(&w->met, away);
+    }
+}
+
+/* What is not looked at is farther than the first that waits. False: that is next to nothing. */
+static bool end_before_that(ebpo_ball_walk *w)
+{
+    if (w->part <= 0)
+        return true;
+    if (!(w->queue.item[0].key >= worth))
+        return false;
+    w->part = w->queue.item[0].key;
+    w->met.count = 0;
+    w->cut = true;
+    return true;
+}
+
+static bool look(ebpo_ball_walk *w, ebpo_ball_work *work)
+{
+    uint32_t held = work->faces; /* when it was not yet */
+    while (w->queue.count > 0 && w->queue.item[0].key < w->part) {
+        if (w->part <= 0 && (w->met.count == EBPO_PLANES_MOST || work->faces >= held + HELD_FACES))
+            break;
+        if (work->faces + EBPO_FACE_BOX_LEAF + KEPT_FACES > EBPO_BALL_FACES ||
+            work->nodes + 2 + KEPT_NODES > EBPO_BALL_NODES) {
+            if (!end_before_that(w))
+                return false;
+            break;
+        }
+        uint64_t node = ebpo_near_pop(&w->queue).node;
+        if (node >= w->box->leaves) {
+            held = w->part > 0 ? work->faces : held;
+            look_at_leaf(w, node - w->box->leaves, work);
+            continue;
+        }
+        work->nodes += 2;
+        wait_for(w, 2 * node);
+        wait_for(w, 2 * node + 1);
+    }
+    return true;
+}
+
+static void begin_check(ebpo_ball_walk *w)
+{
+    w->stage = EBPO_BALL_CHECKS;
+    for (int i = 0; i < 3; i++)
+        w->to[i] = w->from[i] + w->part * w->way[i];
+    w->depth = 0;
+    if (w->part > 0 && w->box && w->box->count > 0)
+        w->stack[w->depth++] = 1;
+}
+
+/* Whether the segment may meet `e`: it is widened by more than rounding does to where it enters and
+ * leaves, and by less than the ball stays away from faces. */
+static bool may_cross(const ebpo_ball_walk *w, const ebpo_extent *e)
+{
+    double enters = 0, leaves = 1, wider = 16 * w->band;
+    for (int i = 0; i < 3; i++) {
+        double d = w->to[i] - w->from[i];
+        double low = e->min[i] - wider - w->from[i], high = e->max[i] + wider - w->from[i];
+        if (d == 0) {
+            if (low > 0 || high < 0)
+                return false;
+            continue;
+        }
+        enters = fmax(enters, (d > 0 ? low : high) / d);
+        leaves = fmin(leaves, (d > 0 ? high : low) / d);
+    }
+    return enters <= leaves;
+}
+
+static bool crosses_leaf(const ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
+{
+    uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
+    for (; f < end && f < w->box->count; f++) {
+        work->faces++;
+        if (ebpo_segment_may_meet(w->from, w->to, (const double(*)[3])w->box->corner[f]))
+            return true;
+    }
+    return false;
+}
+
+static ebpo_ball_end check(ebpo_ball_walk *w, ebpo_ball_work *work)
+{
+    while (w->depth > 0) {
+        if (work->faces + EBPO_FACE_BOX_LEAF > EBPO_BALL_FACES || work->nodes >= EBPO_BALL_NODES)
+            return EBPO_BALL_LATER;
+        uint64_t node = w->stack[--w->depth];
+        work->nodes++;
+        if (!may_cross(w, &w->box->node[node]))
+            continue;
+        if (node < w->box->leaves) {
+            w->stack[w->depth++] = 2 * node + 1;
+            w->stack[w->depth++] = 2 * node;
+        } else if (crosses_leaf(w, node - w->box->leaves, work)) {
+            return EBPO_BALL_THROUGH;
+        }
+    }
+    return EBPO_BALL_THERE;
+}
+
+ebpo_ball_end ebpo_ball_go_on(ebpo_ball_walk *w, ebpo_ball_work *work)
+{
+    if (w->stage == EBPO_BALL_LOOKS) {
+        if (!look(w, work))
+            return EBPO_BALL_LATER;
+        begin_check(w);
+    }
+    ebpo_ball_end end = check(w, work);
+    if (end != EBPO_BALL_LATER)
+        w->stage = EBPO_BALL_STANDS;
+    return end;
+}

@@ -1,0 +1,146 @@
+#include "core/strict_fp.h"
+
+#include "extras/haptic/held_levels.h"
+
+#include <ebpo/subtree.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "geometry/cells.h"
+#include "geometry/octcode.h"
+
+enum { DEEPEST = 6, MOST = 1 << 17 };
+
+static ebpo_status keep(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
+                        ebpo_held_levels *out, ebpo_error *error)
+{
+    ebpo_box box = ebpo_root_box(ebpo_file_info(file));
+    out->node = ebpo_alloc_zero(nodes->node_count, sizeof *out->node);
+    if (!out->node)
+        return ebpo_fail_memory(error, nodes->node_count * sizeof *out->node);
+    out->count = nodes->node_count;
+    for (int i = 0; i < 3; i++)
+        out->slack += 0x1p-40 * (fabs(box.origin[i]) + box.size[i]);
+    for (uint64_t i = 0; i < out->count; i++) {
+        ebpo_held_node *n = &out->node[i];
+        ebpo_cell_bounds(&box, ebpo_cell_of_octcode(nodes->octcodes[i]), n->low, n->high);
+        n->children = nodes->children[i];
+        n->has_faces = nodes->types[i] == EBPO_GRAY || nodes->types[i] == EBPO_LEAF;
+        n->winding = nodes->windings ? nodes->windings[i] : 0;
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out, ebpo_error *error)
+{
+    *out = (ebpo_held_levels){ 0 };
+    for (int levels = DEEPEST; levels >= 0; levels--) {
+        ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
+        ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
+        ebpo_subtree *tree = NULL;
+        options.parts = 0;
+        options.levels = levels;
+        ebpo_status status = ebpo_subtree_open(file, 1, &options, &tree, error);
+        if (status == EBPO_OK)
+            status = ebpo_subtree_get_nodes(tree, &nodes);
+        bool few = status == EBPO_OK && (nodes.node_count <= MOST || levels == 0);
+        if (few)
+            status = keep(file, &nodes, out, error);
+        ebpo_subtree_close(tree);
+        if (few || status != EBPO_OK)
+            return status;
+    }
+    return EBPO_OK;
+}
+
+void ebpo_held_levels_free(ebpo_held_levels *levels)
+{
+    free(levels->node);
+    *levels = (ebpo_held_levels){ 0 };
+}
+
+static double to_cell(const ebpo_held_node *n, const double p[3])
+{
+    double square = 0;
+    for (int i = 0; i < 3; i++) {
+        double d = fmax(0, fmax(n->low[i] - p[i], p[i] - n->high[i]));
+        square += d * d;
+    }
+    return sqrt(square);
+}
+
+static double to_far_corner(const ebpo_held_node *n, const double p[3])
+{
+    double square = 0;
+    for (int i = 0; i < 3; i++) {
+        double d = fmax(fabs(n->low[i] - p[i]), fabs(n->high[i] - p[i]));
+        square += d * d;
+    }
+    return sqrt(square);
+}
+
+typedef struct waiting {
+    uint32_t node;
+    double lower;
+} waiting;
+
+/* The nearest on top. */
+static void add_children(const ebpo_held_levels *levels, const double p[3], uint32_t first,
+                         double enough, waiting *stack, int *depth)
+{
+    int begin = *depth;
+    for (uint32_t c = first; c < first + 8; c++) {
+        if (!levels->node[c].has_faces)
+            continue;
+        double lower = to_cell(&levels->node[c], p);
+        if (!(lower < enough))
+            continue;
+        int at = (*depth)++;
+        for (; at > begin && stack[at - 1].lower < lower; at--)
+            stack[at] = stack[at - 1];
+        stack[at] = (waiting){ c, lower };
+    }
+}
+
+void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], int visits,
+                            double *lo, double *hi)
+{
+    waiting stack[8 * (DEEPEST + 1)]; /* a level leaves seven behind at most */
+    int depth = 0;
+    double lower = INFINITY, upper = INFINITY;
+    if (levels->node[0].has_faces)
+        stack[depth++] = (waiting){ 0, to_cell(&levels->node[0], p) };
+    while (depth > 0) {
+        waiting w = stack[--depth];
+        const ebpo_held_node *n = &levels->node[w.node];
+        if (!(w.lower < lower))
+            continue;
+        upper = fmin(upper, to_far_corner(n, p));
+        if (n->children == EBPO_NO_CHILDREN || visits-- <= 0)
+            lower = w.lower;
+        else
+            add_children(levels, p, n->children, lower, stack, &depth);
+    }
+    /* Without faces both are infinite. */
+    *lo = isfinite(lower) ? fmax(0, lower - levels->slack - EBPO_LENGTH_SLACK * lower) : lower;
+    *hi = upper + levels->slack + EBPO_LENGTH_SLACK * upper;
+}
+
+bool ebpo_held_levels_winding(const ebpo_held_levels *levels, const double p[3], int32_t *winding)
+{
+    const ebpo_held_node *n = &levels->node[0];
+    *winding = 0;
+    if (to_cell(n, p) > 0)
+        return true;
+    while (n->children != EBPO_NO_CHILDREN) {
+        uint32_t octant = 0;
+        const ebpo_held_node *low = &levels->node[n->children]; /* its high corner is the middle */
+        for (int i = 0; i < 3; i++)
+            octant |= (uint32_t)(p[i] >= low->high[i]) << i;
+        n = low + octant;
+    }
+    *winding = n->winding;
+    return !n->has_faces;
+}

@@ -1,0 +1,152 @@
+/* The thread that loads boxes ahead of the hand. */
+#include "core/strict_fp.h"
+
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include <time.h>
+
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "extras/haptic/touch_parts.h"
+#include "extras/haptic/vectors.h"
+
+/* Seconds that a box should be ahead of the hand, and over which its speed is measured; of half a
+ * box's side, how far the proxy may be from the middle when it is made, and how far the middle
+ * moves before another is. */
+static const double ahead = 0.05, measured = 0.02, aside = 0.6, enough = 0.25;
+
+static void wait_a_little(void)
+{
+    const struct timespec half_a_millisecond = { 0, 500000 };
+    nanosleep(&half_a_millisecond, NULL);
+}
+
+/* Where the hand will be if it goes on like this. Its speed is that of some ticks: from one look to
+ * the next the hand has often made one step or none. */
+static void foresee(ebpo_touch *t, double out[3])
+{
+    uint64_t now = ebpo_clock();
+    double seconds = 1e-9 * (double)(now - t->when_before);
+    bool again = seconds >= measured;
+    for (int i = 0; i < 3; i++) {
+        double hand = atomic_load_explicit(&t->hand_told[i], memory_order_relaxed);
+        if (again) {
+            t->speed[i] = (hand - t->hand_before[i]) / seconds;
+            t->hand_before[i] = hand;
+        }
+        out[i] = hand + ahead * t->speed[i];
+    }
+    if (again)
+        t->when_before = now;
+}
+
+/* The centres of a box around the proxy, shifted to where the hand goes. */
+static void place_box(const ebpo_touch *t, const double goal[3], ebpo_extent *out)
+{
+    for (int i = 0; i < 3; i++) {
+        double proxy = atomic_load_explicit(&t->proxy_told[i], memory_order_relaxed);
+        double shift = fmin(fmax(goal[i] - proxy, -aside * t->half), aside * t->half);
+        out->min[i] = proxy + shift - t->half;
+        out->max[i] = proxy + shift + t->half;
+    }
+}
+
+static bool far_from_last(const ebpo_touch *t, const ebpo_extent *e)
+{
+    for (int i = 0; i < 3; i++)
+        if (!(fabs(e->min[i] + e->max[i] - t->last.min[i] - t->last.max[i]) <=
+              2 * enough * t->half))
+            return true;
+    return false;
+}
+
+static void hand_over(ebpo_touch *t, uint64_t began)
+{
+    uint64_t ns = ebpo_clock() - began;
+    unsigned got =
+        atomic_exchange_explicit(&t->between, t->own | EBPO_TOUCH_FRESH, memory_order_acq_rel);
+    t->own = got & ~(unsigned)EBPO_TOUCH_FRESH;
+    atomic_fetch_add(&t->loads, 1);
+    atomic_fetch_add(&t->load_ns, ns);
+    if (ns > atomic_load(&t->load_ns_most))
+        atomic_store(&t->load_ns_most, ns);
+}
+
+static ebpo_status load(ebpo_touch *t, const double goal[3], ebpo_error *error)
+{
+    uint64_t began = ebpo_clock();
+    ebpo_face_box *box = &t->box[t->own];
+    ebpo_extent centres;
+    for (bool fits = false; !fits;) {
+        place_box(t, goal, &centres);
+        ebpo_status status = ebpo_face_box_load(box, t->loading, &centres, t->margin, &fits, error);
+        if (status != EBPO_OK)
+            return status;
+        if (fits)
+            break;
+        atomic_fetch_add(&t->too_many, 1);
+        t->half /= 2;
+        if (!(t->half > t->reach * 0x1p-10 + t->band))
+            return ebpo_fail(error, EBPO_E_LIMIT,
+                             "more than %llu faces around one place; allow more "
+                             "(ebpo_touch_options.faces), or take a smaller radius or look",
+                             (unsigned long long)t->options.faces);
+    }
+    t->last = centres;
+    bool few = box->count < box->capacity / 4; /* and the box is the tick's from here on */
+    hand_over(t, began);
+    if (few)
+        t->half = fmin(1.5 * t->half, t->diagonal);
+    return EBPO_OK;
+}
+
+static void *run(void *user)
+{
+    ebpo_touch *t = user;
+    ebpo_status status = EBPO_OK;
+    ebpo_error error = EBPO_ERROR_INIT;
+    while (status == EBPO_OK && !atomic_load(&t->stop)) {
+        double goal[3];
+        ebpo_extent centres;
+        foresee(t, goal);
+        place_box(t, goal, &centres);
+        bool moved = false;
+        if (far_from_last(t, &centres))
+            status = load(t, goal, &error);
+        else if (t->options.kind == EBPO_TOUCH_PROBE)
+            status = ebpo_touch_learn(t, &moved, &error);
+        if (status == EBPO_OK && !moved)
+            wait_a_little();
+    }
+    if (status != EBPO_OK) {
+        pthread_mutex_lock(&t->mutex);
+        t->failure = error;
+        pthread_mutex_unlock(&t->mutex);
+        atomic_store(&t->stopped, true);
+    }
+    return NULL;
+}
+
+ebpo_status ebpo_touch_loader_start(ebpo_touch *t, ebpo_error *error)
+{
+    for (int i = 0; i < 3; i++) {
+        t->last.min[i] = t->last.max[i] = NAN; /* far from all */
+        t->asked[i] = NAN;
+        t->hand_before[i] = atomic_load(&t->hand_told[i]);
+    }
+    t->when_before = ebpo_clock();
+    int failed = ebpo_thread_start(&t->thread, run, t);
+    t->has_thread = failed == 0;
+    return failed ? ebpo_fail(error, EBPO_E_MEMORY, "no thread to load in: %s", strerror(failed))
+                  : EBPO_OK;
+}
+
+void ebpo_touch_loader_stop(ebpo_touch *t)
+{
+    atomic_store(&t->stop, true);
+    if (t->has_thread)
+        pthread_join(t->thread, NULL);
+    t->has_thread = false;
+}

@@ -1,0 +1,146 @@
+/* A tick of a probe: bounds from three sources, of which each is certain. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+
+#include "core/fp_env.h"
+#include "query/query_model.h"
+#include "extras/haptic/touch_parts.h"
+#include "extras/haptic/vectors.h"
+
+enum { VISITS = 512 };
+
+/* Unsigned. */
+typedef struct bounds {
+    double lo, hi;
+} bounds;
+
+static void narrow(bounds *b, double lo, double hi)
+{
+    b->lo = fmax(b->lo, lo);
+    b->hi = fmin(b->hi, hi);
+}
+
+/* What roundings may add up to: of the model's coordinates, and of lengths such as this. */
+static double rounding_of(const ebpo_touch *t, double length)
+{
+    return t->levels.slack + EBPO_LENGTH_SLACK * length;
+}
+
+/* The faces of the box at hand. True: the nearest is known. */
+static bool sense_faces(ebpo_touch *t, const double place[3], ebpo_touch_sensed *out, bounds *b)
+{
+    ebpo_touch_result near = { 0 };
+    ebpo_touch_look(t, &near);
+    out->work += near.work;
+    out->flags |= near.flags;
+    out->face = near.face;
+    copy(near.normal, out->normal);
+    copy(near.point, out->point);
+    copy(near.weight, out->weight);
+    bool all = !(near.flags & EBPO_TOUCH_PARTLY);
+    double distance = INFINITY, look = t->options.look;
+    if (near.face != EBPO_NO_FACE) {
+        double way[3];
+        difference(place, near.point, way);
+        distance = sqrt(dot(way, way));
+    }
+    double nearer = fmin(distance, look);
+    narrow(b, all ? nearer - rounding_of(t, nearer) : 0, distance + rounding_of(t, distance));
+    return all && near.face != EBPO_NO_FACE;
+}
+
+/* What was true a moment ago is so still, but for the way since. */
+static bool sense_known(ebpo_touch *t, const double place[3], ebpo_touch_sensed *out, bounds *b)
+{
+    const ebpo_known_place *known = ebpo_touch_known(t);
+    double way[3];
+    if (!known->there)
+        return false;
+    difference(place, known->place, way);
+    double far = sqrt(dot(way, way)), rounding = rounding_of(t, far + known->distance);
+    narrow(b, known->distance - far - rounding, known->distance + far + rounding);
+    if (out->normal[0] == 0 && out->normal[1] == 0 && out->normal[2] == 0)
+        copy(known->normal, out->normal);
+    return far == 0;
+}
+
+/* The side can begin anew where the answer of a moment ago was, if that is in the box. */
+static bool find_side(ebpo_touch *t, const double place[3], ebpo_touch_sensed *out)
+{
+    const ebpo_known_place *known = &t->known[t->answer];
+    const ebpo_face_box *box = &t->box[t->at];
+    for (int turn = 0; turn < 2; turn++) {
+        if (ebpo_side_go(&t->side, box, place, t->found, EBPO_TOUCH_FACES, EBPO_TOUCH_VISITS,
+                         &out->work))
+            return true;
+        if (t->side.known || !known->there || known->on)
+            return false;
+        copy(known->place, t->side.at);
+        t->side.winding = known->winding;
+        t->side.known = true;
+    }
+    return false;
+}
+
+static int32_t where(ebpo_touch *t, const double place[3], ebpo_touch_sensed *out)
+{
+    int32_t winding;
+    const ebpo_face_box *box = &t->box[t->at];
+    if (!t->solid)
+        return EBPO_OUT;
+    if (ebpo_held_levels_winding(&t->levels, place, &winding)) {
+        copy(place, t->side.at);
+        t->side.winding = winding;
+        t->side.known = true;
+    } else if (ebpo_extent_holds(&box->centres, place) &&
+               ebpo_side_on(box, place, t->found, EBPO_TOUCH_FACES, EBPO_TOUCH_VISITS)) {
+        return EBPO_ON;
+    } else if (!find_side(t, place, out)) {
+        return EBPO_MAYBE;
+    }
+    return ebpo_rule_inside(t->model->info->rule, t->side.winding) ? EBPO_IN : EBPO_OUT;
+}
+
+static void tell(ebpo_touch_sensed *out, const bounds *b, bool close)
+{
+    double lo = fmax(0, fmin(b->lo, b->hi)), hi = b->hi;
+    bool in = out->where == EBPO_IN, maybe = out->where == EBPO_MAYBE;
+    out->lo = in || maybe ? -hi : lo;
+    out->hi = in ? -lo : hi;
+    out->distance = !close || maybe ? NAN : in ? 0.5 * (out->lo + out->hi) : 0.5 * (lo + hi);
+    if (out->where == EBPO_ON)
+        out->distance = 0;
+    if (isfinite(out->distance))
+        out->flags |= EBPO_TOUCH_CLOSE;
+}
+
+void ebpo_touch_sense(ebpo_touch *t, const double place[3], ebpo_touch_sensed *out)
+{
+    EBPO_DEFAULT_FP;
+    double at[3];
+    bool astray = false;
+    bounds b = { 0, INFINITY };
+    *out = (ebpo_touch_sensed){ .face = EBPO_NO_FACE, .where = EBPO_MAYBE };
+    if (t->options.kind != EBPO_TOUCH_PROBE) {
+        out->flags = EBPO_TOUCH_OTHER;
+        return;
+    }
+    for (int i = 0; i < 3; i++)
+        astray |= !(fabs(place[i]) <= 0x1p200);
+    copy(astray ? t->hand : place, at);
+    out->flags = (astray ? EBPO_TOUCH_ASTRAY : 0) | ebpo_touch_stopped(t);
+    copy(at, t->proxy);
+    copy(at, t->hand);
+    (void)ebpo_touch_take_box(t);
+    bool close = sense_faces(t, at, out, &b);
+    close |= sense_known(t, at, out, &b);
+    double lo, hi;
+    ebpo_held_levels_bound(&t->levels, at, VISITS, &lo, &hi);
+    narrow(&b, lo, hi);
+    out->where = where(t, at, out);
+    tell(out, &b, close);
+    ebpo_touch_count(t, out->flags | (out->flags & EBPO_TOUCH_CLOSE ? 0 : EBPO_TOUCH_WAITS),
+                     out->work);
+    ebpo_touch_tell(t, at);
+}

@@ -1,0 +1,175 @@
+/* Distances at the points of a lattice, in slabs of layers. A slab is asked about in bricks, whose
+ * points are close to each other, so that subtrees are loaded few times and caches are warm. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "extras/map/map_ask.h"
+
+enum { BRICK = 16, SLAB_VALUES = 8 << 20 };
+#define POINTS_MOST (UINT64_C(1) << 40)
+
+typedef struct slab_job {
+    ebpo_map_askers askers;
+    const ebpo_lattice *lattice;
+    uint64_t first, layers; /* of the slab */
+    uint64_t bricks[3];
+    double *values; /* [layers][count[1]][count[0]] */
+} slab_job;
+
+static void point_of(const ebpo_lattice *l, uint64_t i, uint64_t j, uint64_t k, double out[3])
+{
+    for (int c = 0; c < 3; c++)
+        out[c] = l->origin[c] + (double)i * l->step[0][c] + (double)j * l->step[1][c] +
+                 (double)k * l->step[2][c];
+}
+
+typedef struct brick {
+    uint64_t low[3], high[3]; /* points of the slab, high ones excluded */
+} brick;
+
+static brick brick_of(const slab_job *j, uint64_t number)
+{
+    const uint64_t size[3] = { j->lattice->count[0], j->lattice->count[1], j->layers };
+    brick b;
+    for (int c = 0; c < 3; c++) {
+        b.low[c] = number % j->bricks[c] * BRICK;
+        b.high[c] = b.low[c] + BRICK < size[c] ? b.low[c] + BRICK : size[c];
+        number /= j->bricks[c];
+    }
+    return b;
+}
+
+static uint64_t fill(const slab_job *j, const brick *b, double (*points)[3])
+{
+    uint64_t count = 0;
+    for (uint64_t z = b->low[2]; z < b->high[2]; z++)
+        for (uint64_t y = b->low[1]; y < b->high[1]; y++)
+            for (uint64_t x = b->low[0]; x < b->high[0]; x++)
+                point_of(j->lattice, x, y, j->first + z, points[count++]);
+    return count;
+}
+
+static void keep(const slab_job *j, const brick *b, const ebpo_distance_result *results)
+{
+    const uint64_t *size = j->lattice->count;
+    for (uint64_t z = b->low[2]; z < b->high[2]; z++)
+        for (uint64_t y = b->low[1]; y < b->high[1]; y++)
+            for (uint64_t x = b->low[0]; x < b->high[0]; x++)
+                j->values[(z * size[1] + y) * size[0] + x] = (results++)->distance;
+}
+
+static ebpo_status ask_bricks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
+{
+    slab_job *j = context;
+    double(*points)[3] = ebpo_alloc(EBPO_MAP_PIECE, sizeof *points);
+    ebpo_distance_result *results = ebpo_alloc(EBPO_MAP_PIECE, sizeof *results);
+    ebpo_status status =
+        points && results ? EBPO_OK : ebpo_fail_memory(error, EBPO_MAP_PIECE * sizeof *results);
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
+        brick b = brick_of(j, i);
+        status = ebpo_map_ask(&j->askers, worker, points[0], fill(j, &b, points), results, error);
+        if (status == EBPO_OK)
+            keep(j, &b, results);
+    }
+    free(points);
+    free(results);
+    return status;
+}
+
+/* Corners that are finite, and sums on the way to them, make all points so: each coordinate is
+ * monotonous in i, j and k. */
+static ebpo_status check_lattice(const ebpo_lattice *l, ebpo_error *error)
+{
+    uint64_t points = 0;
+    if (l->count[0] == 0 || l->count[1] == 0 || l->count[2] == 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "a lattice needs at least one point on each axis");
+    if (!ebpo_mul_ok(l->count[0], l->count[1], &points) ||
+        !ebpo_mul_ok(points, l->count[2], &points) || points > POINTS_MOST)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "a lattice of more than 2^40 points; take fewer");
+    for (int corner = 0; corner < 8; corner++) {
+        double p[3];
+        point_of(l, corner & 1 ? l->count[0] - 1 : 0, corner & 2 ? l->count[1] - 1 : 0,
+                 corner & 4 ? l->count[2] - 1 : 0, p);
+        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]))
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "the lattice has points that are not finite numbers");
+    }
+    return EBPO_OK;
+}
+
+static uint64_t layers_of_slab(const ebpo_lattice *l)
+{
+    uint64_t layers = SLAB_VALUES / (l->count[0] * l->count[1]);
+    layers = layers < BRICK ? layers : layers / BRICK * BRICK;
+    layers = layers ? layers : 1;
+    return layers < l->count[2] ? layers : l->count[2];
+}
+
+static ebpo_status map_slab(slab_job *j, const ebpo_map_options *o, ebpo_error *error)
+{
+    const uint64_t size[3] = { j->lattice->count[0], j->lattice->count[1], j->layers };
+    uint64_t plane = size[0] * size[1], bricks = 1;
+    ebpo_pass pass = { &o->progress, j->first * plane, (j->first + j->layers) * plane,
+                       j->lattice->count[2] * plane };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
+    for (int c = 0; c < 3; c++) {
+        j->bricks[c] = (size[c] + BRICK - 1) / BRICK;
+        bricks *= j->bricks[c];
+    }
+    return ebpo_parallel_for(j->askers.threads, NULL, bricks, 1, ask_bricks, j, &progress,
+                             "asking for distances", error);
+}
+
+ebpo_status ebpo_map_lattice(ebpo_model *model, const ebpo_lattice *lattice,
+                             const ebpo_map_options *options, ebpo_map_fn take, void *user,
+                             ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_map_options o;
+    slab_job job = { .lattice = lattice };
+    ebpo_status status = ebpo_map_take_options(&o, options, error);
+    if (status == EBPO_OK)
+        status = check_lattice(lattice, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t plane = lattice->count[0] * lattice->count[1], most = layers_of_slab(lattice);
+    job.values = ebpo_alloc(most * plane, sizeof *job.values);
+    status = job.values ? ebpo_map_askers_make(&job.askers, model, &o, error)
+                        : ebpo_fail_memory(error, most * plane * sizeof *job.values);
+    while (status == EBPO_OK && job.first < lattice->count[2]) {
+        uint64_t left = lattice->count[2] - job.first;
+        job.layers = left < most ? left : most;
+        status = map_slab(&job, &o, error);
+        if (status == EBPO_OK)
+            status = take(user, job.values, job.first, job.layers, error);
+        job.first += job.layers;
+    }
+    ebpo_map_askers_free(&job.askers);
+    free(job.values);
+    return status;
+}
+
+ebpo_status ebpo_lattice_of_box(const double low[3], const double high[3], const uint64_t count[3],
+                                ebpo_lattice *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    *out = (ebpo_lattice){ .count = { count[0], count[1], count[2] } };
+    for (int c = 0; c < 3; c++) {
+        bool one = count[c] == 1;
+        if (!isfinite(low[c]) || !isfinite(high[c]) || !(low[c] < high[c]) ||
+            !isfinite(high[c] - low[c]))
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "a box needs a finite low corner below a finite high one");
+        out->origin[c] = one ? low[c] + (high[c] - low[c]) / 2 : low[c];
+        out->step[c][c] =
+            one ? high[c] - low[c] : (high[c] - low[c]) / (double)(count[c] ? count[c] - 1 : 1);
+    }
+    return check_lattice(out, error);
+}

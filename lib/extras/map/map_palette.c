@@ -1,0 +1,81 @@
+/* Colours of distances. The diverging palette is made in OKLab (B. Ottosson, 2020: the matrices
+ * below are its definition), whose lightness is what eyes take for it. */
+#include "core/strict_fp.h"
+
+#include <ebpo/map.h>
+#include <math.h>
+
+#include "core/fp_env.h"
+
+static const char *const names[EBPO_MAP_PALETTES] = { "diverging", "thesis" };
+
+const char *ebpo_map_palette_name(ebpo_map_palette palette)
+{
+    return (unsigned)palette < EBPO_MAP_PALETTES ? names[palette] : NULL;
+}
+
+static uint8_t byte_of(double share)
+{
+    return share <= 0 ? 0 : share >= 1 ? 255 : (uint8_t)(share * 255 + 0.5);
+}
+
+static double srgb_of(double linear)
+{
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
+}
+
+static void of_oklab(double light, double a, double b, uint8_t rgb[3])
+{
+    static const double to_cone[3][2] = { { 0.3963377774, 0.2158037573 },
+                                          { -0.1055613458, -0.0638541728 },
+                                          { -0.0894841775, -1.2914855480 } },
+                        to_rgb[3][3] = { { 4.0767416621, -3.3077115913, 0.2309699292 },
+                                         { -1.2684380046, 2.6097574011, -0.3413193965 },
+                                         { -0.0041960863, -0.7034186147, 1.7076147010 } };
+    double cone[3];
+    for (int i = 0; i < 3; i++) {
+        double root = light + to_cone[i][0] * a + to_cone[i][1] * b;
+        cone[i] = root * root * root;
+    }
+    for (int i = 0; i < 3; i++)
+        rgb[i] = byte_of(
+            srgb_of(to_rgb[i][0] * cone[0] + to_rgb[i][1] * cone[1] + to_rgb[i][2] * cone[2]));
+}
+
+/* Hues of 255 and 50 degrees, which the colour blind tell apart. */
+static void diverging(double share, uint8_t rgb[3])
+{
+    static const double cosine[2] = { -0.2588190451, 0.6427876097 },
+                        sine[2] = { -0.9659258263, 0.7660444431 };
+    double far = fabs(share), chroma = 0.12 * far * (2 - far), light = 0.93 - 0.48 * far;
+    int outside = share > 0;
+    of_oklab(light, chroma * cosine[outside], chroma * sine[outside], rgb);
+}
+
+/* Red over green to blue: a third of the circle of hues each. */
+static void thesis(double share, uint8_t rgb[3])
+{
+    double far = fabs(share), turn = 4 * far; /* red, yellow, green, cyan, blue */
+    double red = turn < 1 ? 1 : 2 - turn, blue = turn < 3 ? turn - 2 : 1,
+           green = turn < 1   ? turn
+                   : turn < 3 ? 1
+                              : 4 - turn;
+    rgb[0] = byte_of(far == 0 ? 0 : red);
+    rgb[1] = byte_of(far == 0 ? 0 : green);
+    rgb[2] = byte_of(far == 0 ? 0 : blue);
+}
+
+void ebpo_map_colour(ebpo_map_palette palette, double distance, double range, uint8_t rgb[3])
+{
+    EBPO_DEFAULT_FP;
+    rgb[0] = rgb[1] = rgb[2] = 128;
+    if (!isfinite(distance) || !(range > 0))
+        return;
+    double share = fmax(-1, fmin(1, distance / range));
+    if (share == 0 && distance != 0)
+        share = copysign(0x1p-1022, distance);
+    if (palette == EBPO_MAP_THESIS)
+        thesis(share, rgb);
+    else
+        diverging(share, rgb);
+}

@@ -1,0 +1,381 @@
+/* From where a hand was to strokes: steps along its way, and at each the more points the more it
+ * presses. */
+#include "core/strict_fp.h"
+
+#include <ebpo/paint.h>
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "core/sized.h"
+#include "extras/paint/paint_parts.h"
+#include "extras/paint/reach.h"
+#include "query/query_model.h"
+#include "extras/haptic/face_near.h"
+#include "extras/haptic/vectors.h"
+
+enum { DENSITY_MOST = 10000 };
+
+/* A stroke that is being laid. */
+typedef struct run {
+    uint64_t first, count;
+} run;
+
+typedef struct lay {
+    ebpo_context *context;
+    ebpo_paint_pen pen;
+    ebpo_reach reach;
+    ebpo_paint_point *point;
+    run *run;
+    uint64_t point_count, point_capacity, run_count, run_capacity, random, room;
+    bool down;    /* the pen painted at the step before */
+    double begun; /* when the stroke did */
+    ebpo_paint_laid laid;
+} lay;
+
+/* --- checking --- */
+
+static bool in_range(double v, double least, double most) { return v >= least && v <= most; }
+
+static const char *pen_wrong(const ebpo_paint_pen *pen)
+{
+    if (!in_range(pen->radius, 1 / EBPO_PAINT_MOST, EBPO_PAINT_MOST))
+        return "a pen's radius is 2^-200 to 2^200";
+    if (!in_range(pen->spread, 0, EBPO_PAINT_MOST))
+        return "a pen's spread is 0 to 2^200";
+    if (pen->density < 1 || pen->density > DENSITY_MOST || (pen->spread == 0 && pen->density != 1))
+        return "a pen's density is 1 to 10,000, and 1 without spread";
+    if (!in_range(pen->size_least, 0x1p-15, 1) || !in_range(pen->size_full, 0x1p-15, 1))
+        return "a pen's sizes are 2^-15 to 1";
+    if (pen->step != 0 && !in_range(pen->step, 1 / EBPO_PAINT_MOST, DBL_MAX))
+        return "a pen's step is 0, or 2^-200 and more";
+    return pen->within >= 0 ? NULL : "a pen's distance from the surface is at least 0";
+}
+
+static const char *hand_wrong(const ebpo_paint_hand *h)
+{
+    for (int k = 0; k < 3; k++)
+        if (!(fabs(h->place[k]) <= EBPO_PAINT_MOST))
+            return "a place of the hand is not finite, or beyond 2^200";
+    if (!in_range(h->pressure, 0, 1))
+        return "the hand's pressure is 0 to 1";
+    return in_range(h->time, 0, UINT32_MAX) ? NULL : "the hand's time is 0 to 2^32 - 1";
+}
+
+static ebpo_status check(const lay *l, const ebpo_paint *p, const ebpo_paint_hand *hand,
+                         uint64_t count, ebpo_error *error)
+{
+    const char *wrong = pen_wrong(&l->pen);
+    if (count == 0)
+        wrong = "a hand without a place lays nothing";
+    for (uint64_t i = 0; i < count && !wrong; i++)
+        wrong = hand_wrong(&hand[i]);
+    ebpo_stroke_held stroke = { .radius = l->pen.radius,
+                                .time = l->pen.time,
+                                .layer =
+                                    l->pen.layer < UINT32_MAX ? (uint32_t)l->pen.layer : UINT32_MAX,
+                                .kind = (uint32_t)l->pen.kind,
+                                .count = 1 };
+    for (int i = 0; i < 4; i++)
+        stroke.rgba[i] = (uint8_t)(l->pen.colour >> (24 - 8 * i));
+    if (!wrong)
+        wrong = ebpo_paint_stroke_wrong(&stroke, p->layer_count);
+    return wrong ? ebpo_fail(error, EBPO_E_ARGUMENT, "%s", wrong) : EBPO_OK;
+}
+
+/* --- a point --- */
+
+/* The weights of the second and third corner, in 2^-30. */
+static void round_weights(const double weight[3], uint32_t out[2])
+{
+    for (int i = 0; i < 2; i++) {
+        double w = floor(fmin(fmax(weight[i + 1], 0), 1) * EBPO_PAINT_WEIGHTS + 0.5);
+        out[i] = (uint32_t)w;
+    }
+    if (out[0] + out[1] > EBPO_PAINT_WEIGHTS)
+        out[1] = EBPO_PAINT_WEIGHTS - out[0];
+}
+
+static void set_point(ebpo_paint_point *q, const ebpo_distance_result *at,
+                      const double corner[3][3])
+{
+    ebpo_face_near near;
+    *q = (ebpo_paint_point){ .face = (uint32_t)at->face, .size = EBPO_PAINT_FULL };
+    memcpy(q->place, at->point, sizeof q->place);
+    ebpo_face_nearest(at->point, corner, &near);
+    round_weights(near.weight, q->weight);
+}
+
+static ebpo_status nearest(ebpo_context *context, const double place[3], double within,
+                           ebpo_distance_result *out, ebpo_error *error)
+{
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+    options.unsigned_distance = true;
+    options.max_distance = within;
+    return ebpo_distance(context, place, &options, out, error);
+}
+
+static bool found(const ebpo_distance_result *at)
+{
+    return at->face != EBPO_NO_FACE && isfinite(at->distance);
+}
+
+/* The reach of a ball around an answer. EBPO_E_ABSENT: a subset does not have all that is there. */
+static ebpo_status reach_around(ebpo_reach *reach, const ebpo_distance_result *at, double radius,
+                                ebpo_error *error)
+{
+    ebpo_reach_ball ball = { { at->point[0], at->point[1], at->point[2] }, radius, at->face };
+    bool here;
+    ebpo_status status = ebpo_reach_find(reach, &ball, &here, error);
+    return status != EBPO_OK || here
+               ? status
+               : ebpo_fail(error, EBPO_E_ABSENT,
+                           "the subset does not have all faces around the pen; paint on the whole "
+                           "model, or within the subset");
+}
+
+ebpo_status ebpo_paint_place(const ebpo_paint *p, ebpo_context *context, const double place[3],
+                             ebpo_paint_point *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_distance_result at;
+    ebpo_reach reach;
+    ebpo_status status = ebpo_paint_check_context(p, context, error);
+    if (status == EBPO_OK)
+        status = nearest(context, place, INFINITY, &at, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_reach_begin(&reach, context);
+    status = reach_around(&reach, &at, 0, error);
+    if (status == EBPO_OK)
+        set_point(out, &at, (const double(*)[3])reach.face[reach.own].corner);
+    ebpo_reach_end(&reach);
+    return status;
+}
+
+/* --- a step --- */
+
+static ebpo_status add_point(lay *l, const ebpo_distance_result *at, const double corner[3][3],
+                             const ebpo_paint_hand *hand, ebpo_error *error)
+{
+    double share = l->pen.size_least + hand->pressure * (l->pen.size_full - l->pen.size_least);
+    if (l->point_count == l->room)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "the way would become more than the %d points that a paint may have; take "
+                         "longer steps or fewer points",
+                         EBPO_PAINT_POINTS);
+    if (!ebpo_grow(&l->point, &l->point_capacity, l->point_count + 1, sizeof *l->point))
+        return ebpo_fail_memory(error, l->point_count * sizeof *l->point);
+    ebpo_paint_point *q = &l->point[l->point_count++];
+    set_point(q, at, corner);
+    q->size = (uint16_t)fmax(1, floor(share * EBPO_PAINT_FULL + 0.5));
+    q->pressure = (uint16_t)floor(hand->pressure * UINT16_MAX + 0.5);
+    q->time = (uint32_t)(hand->time - l->begun);
+    l->run[l->run_count - 1].count++;
+    return EBPO_OK;
+}
+
+/* Two unit vectors at right angles to the face's normal, or some where it has none. */
+static void make_frame(const double normal[3], double u[3], double v[3])
+{
+    double n[3] = { 0, 0, 1 }, axis[3] = { 0, 0, 0 };
+    int least = 0;
+    if (normal[0] != 0 || normal[1] != 0 || normal[2] != 0)
+        memcpy(n, normal, sizeof n);
+    for (int k = 1; k < 3; k++)
+        if (fabs(n[k]) < fabs(n[least]))
+            least = k;
+    axis[least] = 1;
+    cross(n, axis, u);
+    double length = sqrt(dot(u, u));
+    for (int k = 0; k < 3; k++)
+        u[k] /= length;
+    cross(n, u, v);
+}
+
+/* Evenly within the unit disc. */
+static void random_in_disc(uint64_t *state, double out[2])
+{
+    do {
+        for (int i = 0; i < 2; i++)
+            out[i] = 2 * ebpo_random_unit(ebpo_random_next(state)) - 1;
+    } while (out[0] * out[0] + out[1] * out[1] > 1);
+}
+
+/* Of the reach the face with this number; or NULL. */
+static const ebpo_reach_face *face_of(const ebpo_reach *reach, uint64_t face)
+{
+    for (uint64_t i = 0; i < reach->count; i++)
+        if (reach->face[i].face == face)
+            return &reach->face[i];
+    return NULL;
+}
+
+static ebpo_status scatter(lay *l, const ebpo_distance_result *middle, const ebpo_paint_hand *hand,
+                           ebpo_error *error)
+{
+    double u[3], v[3], place[3], disc[2], spread = l->pen.spread;
+    unsigned wanted = (unsigned)fmax(1, floor(hand->pressure * l->pen.density + 0.5));
+    ebpo_status status = EBPO_OK;
+    make_frame(middle->normal, u, v);
+    for (unsigned i = 0; i < wanted && status == EBPO_OK; i++) {
+        ebpo_distance_result at;
+        random_in_disc(&l->random, disc);
+        for (int k = 0; k < 3; k++)
+            place[k] = middle->point[k] + spread * (disc[0] * u[k] + disc[1] * v[k]);
+        status = nearest(l->context, place, spread, &at, error);
+        if (status != EBPO_OK)
+            return status;
+        const ebpo_reach_face *f = found(&at) ? face_of(&l->reach, at.face) : NULL;
+        if (f && ebpo_ball_holds(middle->point, spread * spread, at.point))
+            status = add_point(l, &at, f->corner, hand, error);
+        else
+            l->laid.strayed++;
+    }
+    return status;
+}
+
+static ebpo_status put_down(lay *l, const ebpo_paint_hand *hand, ebpo_error *error)
+{
+    if (l->down)
+        return EBPO_OK;
+    if (!ebpo_grow(&l->run, &l->run_capacity, l->run_count + 1, sizeof *l->run))
+        return ebpo_fail_memory(error, l->run_count * sizeof *l->run);
+    l->run[l->run_count++] = (run){ l->point_count, 0 };
+    l->begun = hand->time;
+    l->down = true;
+    return EBPO_OK;
+}
+
+static ebpo_status make_step(lay *l, const ebpo_paint_hand *hand, ebpo_error *error)
+{
+    ebpo_distance_result at = { .face = EBPO_NO_FACE };
+    ebpo_status status = EBPO_OK;
+    if (hand->pressure > 0)
+        status = nearest(l->context, hand->place, l->pen.within, &at, error);
+    if (status != EBPO_OK)
+        return status;
+    if (!found(&at)) {
+        l->down = false;
+        l->laid.lifted++;
+        return EBPO_OK;
+    }
+    l->laid.steps++;
+    status = put_down(l, hand, error);
+    if (status == EBPO_OK)
+        status = reach_around(&l->reach, &at, l->pen.spread, error);
+    if (status != EBPO_OK)
+        return status;
+    return l->pen.spread > 0
+               ? scatter(l, &at, hand, error)
+               : add_point(l, &at, (const double(*)[3])l->reach.face[l->reach.own].corner, hand,
+                           error);
+}
+
+/* --- the way --- */
+
+static void between(const ebpo_paint_hand *a, const ebpo_paint_hand *b, double t,
+                    ebpo_paint_hand *out)
+{
+    for (int k = 0; k < 3; k++)
+        out->place[k] = a->place[k] + t * (b->place[k] - a->place[k]);
+    out->pressure = fmin(fmax(a->pressure + t * (b->pressure - a->pressure), 0), 1);
+    out->time = fmax(a->time + t * (b->time - a->time), 0);
+}
+
+static double length_between(const ebpo_paint_hand *a, const ebpo_paint_hand *b)
+{
+    double d[3];
+    difference(b->place, a->place, d);
+    return sqrt(dot(d, d));
+}
+
+/* Steps are at whole multiples of their length, from the first place on. */
+static ebpo_status go(lay *l, const ebpo_paint_hand *hand, uint64_t count, ebpo_error *error)
+{
+    double step = l->pen.step != 0 ? l->pen.step : fmax(l->pen.radius, l->pen.spread) / 2,
+           ahead = step; /* from the place at hand to the next step */
+    ebpo_status status = make_step(l, &hand[0], error);
+    for (uint64_t i = 1; i < count && status == EBPO_OK; i++) {
+        double length = length_between(&hand[i - 1], &hand[i]), at = ahead;
+        if (i % 64 == 1 && !ebpo_progress_step(&l->pen.progress, "lay", i, count, error))
+            return EBPO_E_CANCELLED;
+        if (!(length / step <= EBPO_PAINT_POINTS))
+            return ebpo_fail(
+                error, EBPO_E_LIMIT,
+                "two places of the hand are more than %d steps apart; take longer ones",
+                EBPO_PAINT_POINTS);
+        for (uint64_t k = 1; at <= length && status == EBPO_OK; k++) {
+            ebpo_paint_hand pen;
+            between(&hand[i - 1], &hand[i], at / length, &pen);
+            pen.time = fmax(pen.time, l->begun);
+            status = make_step(l, &pen, error);
+            at = ahead + (double)k * step;
+        }
+        ahead = at - length;
+    }
+    return status;
+}
+
+/* All or none. */
+static ebpo_status keep(lay *l, ebpo_paint *p, ebpo_error *error)
+{
+    uint64_t before = p->stroke_count;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < l->run_count && status == EBPO_OK; i++) {
+        ebpo_paint_stroke s = EBPO_PAINT_STROKE_INIT;
+        s.layer = l->pen.layer;
+        s.kind = l->pen.kind;
+        s.colour = l->pen.colour;
+        s.radius = l->pen.radius;
+        s.time = l->pen.time;
+        s.points = l->point + l->run[i].first;
+        s.point_count = l->run[i].count;
+        if (s.point_count)
+            status = ebpo_paint_add_stroke(p, &s, error);
+    }
+    l->laid.strokes = p->stroke_count - before;
+    l->laid.points = l->point_count;
+    while (status != EBPO_OK && p->stroke_count > before) {
+        p->stroke_count--;
+        p->point_count -= p->stroke[p->stroke_count].count;
+    }
+    return status;
+}
+
+ebpo_status ebpo_paint_lay(ebpo_paint *p, ebpo_context *context, const ebpo_paint_hand *hand,
+                           uint64_t count, const ebpo_paint_pen *pen, ebpo_paint_laid *laid,
+                           ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    lay l = { .context = context, .pen = EBPO_PAINT_PEN_INIT };
+    l.laid.struct_size = sizeof l.laid;
+    ebpo_status status = EBPO_TAKE(ebpo_paint_pen, &l.pen, pen, error);
+    if (status == EBPO_OK && laid)
+        status = EBPO_CHECK_SIZED(ebpo_paint_laid, laid, error);
+    if (status == EBPO_OK)
+        status = check(&l, p, hand, count, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_check_context(p, context, error);
+    if (status != EBPO_OK)
+        return status;
+    l.random = l.pen.seed;
+    l.room = EBPO_PAINT_POINTS - p->point_count;
+    ebpo_reach_begin(&l.reach, context);
+    status = go(&l, hand, count, error);
+    if (status == EBPO_OK)
+        status = keep(&l, p, error);
+    if (status == EBPO_OK && laid)
+        EBPO_GIVE(ebpo_paint_laid, laid, &l.laid);
+    ebpo_reach_end(&l.reach);
+    free(l.point);
+    free(l.run);
+    return status;
+}

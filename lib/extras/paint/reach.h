@@ -1,0 +1,67 @@
+/* Inside lib/extras/paint: the reach of a point, the faces that hang together with it within its
+ * ball. format-spec/paint.md, section 4. */
+#ifndef EBPO_PAINT_REACH_H
+#define EBPO_PAINT_REACH_H
+
+#include <ebpo/query.h>
+
+typedef struct ebpo_reach_face {
+    double corner[3][3];
+    uint64_t face, file_face; /* as in ebpo_paint_face */
+    uint32_t at[3];           /* its corners among the positions */
+    bool within[3];           /* these corners are within the ball */
+} ebpo_reach_face;
+
+typedef struct ebpo_reach_position {
+    double p[3];
+    bool within;
+} ebpo_reach_position;
+
+/* An edge that goes through the ball between two positions outside of it. */
+typedef struct ebpo_reach_edge {
+    uint32_t a, b; /* positions, a < b */
+} ebpo_reach_edge;
+
+/* One for many points, one after the other; of one thread. */
+typedef struct ebpo_reach {
+    ebpo_context *context;
+    double tolerance;      /* a point may be so far from its face */
+    ebpo_reach_face *face; /* [count] after finding: the reach alone, in the order of the file */
+    uint64_t count, capacity;
+    uint64_t own; /* of them, the point's */
+    ebpo_reach_position *position;
+    ebpo_reach_edge *edge;
+    uint64_t position_count, position_capacity, edge_count, edge_capacity;
+    uint32_t *slot; /* hash table: of positions, then of edges; 0: free, else the number and 1 */
+    uint32_t *root; /* sets of faces, positions and edges: each names another one of its set */
+    uint64_t slots, slot_capacity, root_capacity;
+    bool short_of_memory, too_many;
+} ebpo_reach;
+
+/* Where the ball is, and on which face. */
+typedef struct ebpo_reach_ball {
+    double place[3], radius;
+    uint64_t face;
+} ebpo_reach_ball;
+
+void ebpo_reach_begin(ebpo_reach *reach, ebpo_context *context);
+void ebpo_reach_end(ebpo_reach *reach);
+
+/* Finds the reach of a ball. *here false: a subset does not have the face, or not all of what is
+ * around it. EBPO_E_FORMAT: the place is not on that face. EBPO_E_LIMIT, EBPO_E_MEMORY, and the
+ * errors of reading. */
+EBPO_MUST_USE ebpo_status ebpo_reach_find(ebpo_reach *reach, const ebpo_reach_ball *ball,
+                                          bool *here, ebpo_error *error);
+
+/* Sets *fits to whether a place is on that face, or may be where a subset is pruned. */
+EBPO_MUST_USE ebpo_status ebpo_reach_check(ebpo_reach *reach, const double place[3], uint64_t face,
+                                           bool *fits, ebpo_error *error);
+
+/* Whether a place is within: section 4. */
+static inline bool ebpo_ball_holds(const double centre[3], double square, const double q[3])
+{
+    double x = q[0] - centre[0], y = q[1] - centre[1], z = q[2] - centre[2];
+    return (x * x + y * y) + z * z <= square;
+}
+
+#endif

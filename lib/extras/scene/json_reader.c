@@ -1,0 +1,178 @@
+/* Members of a scene file, by jansson. */
+#include "core/strict_fp.h"
+
+#include "extras/scene/json_reader.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "core/error.h"
+
+void json_enter(json_reader *r, const char *key, uint64_t item)
+{
+    r->path[r->depth++] = (scene_at){ key, item };
+}
+
+void json_leave(json_reader *r) { r->depth--; }
+
+/* "instances[3].pose": what fits. */
+static void show_path(const json_reader *r, char *out, size_t room)
+{
+    size_t used = 0;
+    out[0] = 0;
+    for (int i = 0; i < r->depth && used < room; i++) {
+        const scene_at *at = &r->path[i];
+        int n = at->key ? snprintf(out + used, room - used, "%s%.60s", i ? "." : "", at->key)
+                        : snprintf(out + used, room - used, "[%llu]", (unsigned long long)at->item);
+        used += n > 0 ? (size_t)n : 0;
+    }
+    for (char *c = out; *c; c++)
+        if ((unsigned char)*c < 0x20)
+            *c = '?';
+}
+
+ebpo_status json_bad(json_reader *r, const char *format, ...)
+{
+    char what[256], path[200];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(what, sizeof what, format, args);
+    va_end(args);
+    show_path(r, path, sizeof path);
+    return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name, "line %llu: %s%s%s",
+                          (unsigned long long)scene_line_of(r->text, r->path, r->depth), path,
+                          *path ? ": " : "", what);
+}
+
+ebpo_status json_bad_at(json_reader *r, const char *key, const char *what)
+{
+    json_enter(r, key, 0);
+    ebpo_status status = json_bad(r, "%s", what);
+    json_leave(r);
+    return status;
+}
+
+ebpo_status json_judge(json_reader *r, ebpo_status status, const ebpo_error *why)
+{
+    if (status == EBPO_OK)
+        return status;
+    return status == EBPO_E_ARGUMENT ? json_bad(r, "%.250s", why->message)
+                                     : ebpo_fail_with(r->error, why);
+}
+
+ebpo_status json_members(json_reader *r, const json_t *value, const char *const *known)
+{
+    const char *key;
+    json_t *member;
+    if (!json_is_object(value))
+        return json_bad(r, "is not an object");
+    json_object_foreach((json_t *)value, key, member)
+    {
+        const char *const *k = known;
+        while (*k && strcmp(*k, key) != 0)
+            k++;
+        if (!*k && strncmp(key, "x-", 2) != 0)
+            return json_bad_at(r, key,
+                               "is not a member that this version knows; private ones begin "
+                               "with x-");
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status missing(json_reader *r, const char *key, bool needed)
+{
+    return needed ? json_bad(r, "has no member %s", key) : EBPO_OK;
+}
+
+ebpo_status json_get_text(json_reader *r, const json_t *object, const char *key, bool needed,
+                          const char **out)
+{
+    const json_t *value = json_object_get(object, key);
+    if (!value)
+        return missing(r, key, needed);
+    if (!json_is_string(value))
+        return json_bad_at(r, key, "is not a text");
+    *out = json_string_value(value);
+    return EBPO_OK;
+}
+
+ebpo_status json_get_flag(json_reader *r, const json_t *object, const char *key, bool *out)
+{
+    const json_t *value = json_object_get(object, key);
+    if (!value)
+        return EBPO_OK;
+    if (!json_is_boolean(value))
+        return json_bad_at(r, key, "is neither true nor false");
+    *out = json_is_true(value);
+    return EBPO_OK;
+}
+
+ebpo_status json_get_real(json_reader *r, const json_t *object, const char *key, bool needed,
+                          double *out)
+{
+    const json_t *value = json_object_get(object, key);
+    if (!value)
+        return missing(r, key, needed);
+    if (!json_is_number(value))
+        return json_bad_at(r, key, "is not a number");
+    *out = json_number_value(value);
+    return EBPO_OK;
+}
+
+ebpo_status json_get_reals(json_reader *r, const json_t *object, const char *key, bool needed,
+                           double *out, size_t count)
+{
+    char what[64];
+    const json_t *value = json_object_get(object, key);
+    if (!value)
+        return missing(r, key, needed);
+    bool fits = json_is_array(value) && json_array_size(value) == count;
+    for (size_t i = 0; i < count && fits; i++) {
+        fits = json_is_number(json_array_get(value, i));
+        out[i] = json_number_value(json_array_get(value, i));
+    }
+    snprintf(what, sizeof what, "is not an array of %zu numbers", count);
+    return fits ? EBPO_OK : json_bad_at(r, key, what);
+}
+
+ebpo_status json_each_member(json_reader *r, const json_t *object, const char *key,
+                             json_each_fn each)
+{
+    json_t *members = json_object_get(object, key), *value;
+    const char *name;
+    ebpo_status status = EBPO_OK;
+    if (!members)
+        return status;
+    if (!json_is_object(members))
+        return json_bad_at(r, key, "is not an object");
+    json_enter(r, key, 0);
+    json_object_foreach(members, name, value)
+    {
+        json_enter(r, name, 0);
+        status = each(r, name, value);
+        json_leave(r);
+        if (status != EBPO_OK)
+            break;
+    }
+    json_leave(r);
+    return status;
+}
+
+ebpo_status json_each_item(json_reader *r, const json_t *object, const char *key, json_each_fn each)
+{
+    const json_t *items = json_object_get(object, key);
+    ebpo_status status = EBPO_OK;
+    if (!items)
+        return status;
+    if (!json_is_array(items))
+        return json_bad_at(r, key, "is not an array");
+    json_enter(r, key, 0);
+    for (size_t i = 0; i < json_array_size(items) && status == EBPO_OK; i++) {
+        json_enter(r, NULL, i);
+        status = each(r, NULL, json_array_get(items, i));
+        json_leave(r);
+    }
+    json_leave(r);
+    return status;
+}

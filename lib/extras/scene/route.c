@@ -1,0 +1,241 @@
+/* Routes: where they are at a time, and how far what follows them can move. Sums, products,
+ * quotients and square roots only: the same bits on every machine. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "geometry/pose.h"
+#include "geometry/quaternion.h"
+#include "extras/scene/scene_parts.h"
+
+/* What rounding adds to lengths: of a few dozen operations, each 2^-53. */
+static const double slack = 0x1p-44;
+/* Times beyond would have differences that are no numbers. */
+static const double most_time = 0x1p1000;
+
+void scene_turn_of_matrix(const double m[3][3], double turn[4])
+{
+    double trace = m[0][0] + m[1][1] + m[2][2];
+    int i = m[1][1] > m[0][0] ? 1 : 0;
+    i = m[2][2] > m[i][i] ? 2 : i;
+    if (trace > m[i][i]) { /* the real part is the greatest */
+        turn[0] = m[2][1] - m[1][2];
+        turn[1] = m[0][2] - m[2][0];
+        turn[2] = m[1][0] - m[0][1];
+        turn[3] = 1 + trace;
+        return;
+    }
+    int j = (i + 1) % 3, k = (i + 2) % 3;
+    turn[i] = 1 + m[i][i] - m[j][j] - m[k][k];
+    turn[j] = m[j][i] + m[i][j];
+    turn[k] = m[k][i] + m[i][k];
+    turn[3] = m[k][j] - m[j][k];
+}
+
+static bool fits(const scene_key *key)
+{
+    static const double nowhere[3] = { 0, 0, 0 };
+    ebpo_pose pose = EBPO_POSE_INIT;
+    ebpo_posing posing;
+    memcpy(pose.translation, key->translation, sizeof pose.translation);
+    pose.scale = key->scale;
+    return fabs(key->time) <= most_time &&
+           ebpo_posing_make(&posing, &pose, nowhere, NULL) == EBPO_OK;
+}
+
+ebpo_status scene_add_key(scene_route *route, const scene_key *key, ebpo_error *error)
+{
+    scene_key k = *key;
+    if (!fits(&k))
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "a number is not finite, the time is beyond 2^1000, or the scale is not from "
+            "2^-300 to 2^300");
+    if (!ebpo_quaternion_normalise(k.turn))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the quaternion is 0 or too long");
+    if (route->count && !(k.time > route->keys[route->count - 1].time))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "time %g is not above the one before, %g", k.time,
+                         route->keys[route->count - 1].time);
+    if (!ebpo_grow(&route->keys, &route->capacity, route->count + 1, sizeof *route->keys))
+        return ebpo_fail_memory(error, (route->count + 1) * sizeof *route->keys);
+    route->keys[route->count++] = k;
+    return EBPO_OK;
+}
+
+/* The last key whose time is at most `time`; the first, if there is none. */
+static uint64_t key_at(const scene_route *route, double time)
+{
+    uint64_t low = 0, high = route->count;
+    while (high - low > 1) {
+        uint64_t middle = low + (high - low) / 2;
+        if (route->keys[middle].time <= time)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* At even speed along the shorter arc: halved until chord and arc are one. */
+static void turn_between(const double from[4], const double to[4], double u, double out[4])
+{
+    double a[4], b[4];
+    double dot = (from[0] * to[0] + from[1] * to[1]) + (from[2] * to[2] + from[3] * to[3]);
+    for (int k = 0; k < 4; k++) {
+        a[k] = from[k];
+        b[k] = dot < 0 ? -to[k] : to[k];
+    }
+    for (int i = 0; i < 28; i++) {
+        double middle[4];
+        for (int k = 0; k < 4; k++)
+            middle[k] = a[k] + b[k];
+        ebpo_quaternion_normalise(middle); /* at most a right angle apart: far from 0 */
+        bool later = u >= 0.5;
+        memcpy(later ? a : b, middle, sizeof middle);
+        u = later ? 2 * u - 1 : 2 * u;
+    }
+    for (int k = 0; k < 4; k++)
+        out[k] = a[k] + u * (b[k] - a[k]);
+    ebpo_quaternion_normalise(out);
+}
+
+void scene_route_at(const scene_route *route, double time, ebpo_pose *out)
+{
+    uint64_t n = key_at(route, time);
+    const scene_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
+    *out = (ebpo_pose)EBPO_POSE_INIT;
+    if (a == b || route->jumps || time <= a->time) {
+        ebpo_quaternion_matrix(a->turn, out->rotation);
+        memcpy(out->translation, a->translation, sizeof out->translation);
+        out->scale = a->scale;
+        return;
+    }
+    double u = (time - a->time) / (b->time - a->time), turn[4];
+    turn_between(a->turn, b->turn, u, turn);
+    ebpo_quaternion_matrix(turn, out->rotation);
+    for (int k = 0; k < 3; k++)
+        out->translation[k] = a->translation[k] + u * (b->translation[k] - a->translation[k]);
+    out->scale = a->scale + u * (b->scale - a->scale);
+}
+
+void scene_compose(const ebpo_pose *outer, const ebpo_pose *inner, ebpo_pose *out)
+{
+    ebpo_pose p;
+    for (int i = 0; i < 3; i++) {
+        const double *r = outer->rotation[i], *t = inner->translation;
+        for (int k = 0; k < 3; k++)
+            p.rotation[i][k] = (r[0] * inner->rotation[0][k] + r[1] * inner->rotation[1][k]) +
+                               r[2] * inner->rotation[2][k];
+        p.translation[i] =
+            outer->scale * ((r[0] * t[0] + r[1] * t[1]) + r[2] * t[2]) + outer->translation[i];
+    }
+    p.scale = outer->scale * inner->scale;
+    *out = p;
+}
+
+double scene_route_next(const scene_route *route, double from, double to)
+{
+    uint64_t n = key_at(route, from);
+    if (from < route->keys[0].time)
+        return fmin(to, route->keys[0].time);
+    return n + 1 < route->count ? fmin(to, route->keys[n + 1].time) : to;
+}
+
+/* An upper bound of the angle by which a rotation turns, in radians: twice that of quaternions, of
+ * which asin's series is summed. */
+static double angle_between(const double a[4], const double b[4])
+{
+    double less[4], more[4];
+    for (int k = 0; k < 4; k++) {
+        less[k] = a[k] - b[k];
+        more[k] = a[k] + b[k];
+    }
+    double y =
+        fmin(fmin(ebpo_quaternion_length(less), ebpo_quaternion_length(more)) / 2 * (1 + slack) +
+                 0x1p-50,
+             0.70711);
+    double square = y * y, term = y, sum = y;
+    for (int n = 1; n < 40; n++) {
+        term *= square * (2 * n - 1) / (2 * n);
+        sum += term / (2 * n + 1);
+    }
+    return 4 * (sum + term) * (1 + slack); /* what is left is below its first term / (1 - 1/2) */
+}
+
+double scene_length_above(const double way[3])
+{
+    double most = fmax(fmax(fabs(way[0]), fabs(way[1])), fabs(way[2])), sum = 0;
+    if (!(most > 0 && most < INFINITY))
+        return most;
+    for (int k = 0; k < 3; k++)
+        sum += (way[k] / most) * (way[k] / most);
+    return sqrt(sum) * (1 + slack) * most;
+}
+
+scene_step scene_route_step(const scene_route *route, double from, double to, scene_reach reach)
+{
+    uint64_t n = key_at(route, from);
+    const scene_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
+    double part = a == b ? 0 : (to - fmax(from, a->time)) / (b->time - a->time);
+    if (!(part > 0) || from < a->time || route->jumps)
+        return (scene_step){ 0, 0 };
+    part = part * (1 + slack) + slack;
+    double way[3], size = 0;
+    for (int k = 0; k < 3; k++) {
+        way[k] = b->translation[k] - a->translation[k];
+        size += fabs(a->translation[k]) + fabs(b->translation[k]);
+    }
+    double angle = angle_between(a->turn, b->turn), scale = fmax(a->scale, b->scale);
+    double grows = fabs(b->scale - a->scale);
+    double turned = angle * part, grown = grows * part;
+    double rounding = slack * (size + (reach.length + reach.size) * scale);
+    return (scene_step){
+        (scene_length_above(way) * part + reach.length * (scale * turned + grown)) * (1 + slack) +
+            rounding,
+        reach.length / 8 * (scale * turned * turned + 2 * grown * turned) * (1 + slack) + rounding,
+    };
+}
+
+/* A pose on the way from one time to another. */
+typedef struct growing {
+    double scale, grown, most, size;
+} growing;
+
+static void grow_to(growing *g, double scale, const double translation[3])
+{
+    double size = 0;
+    for (int k = 0; k < 3; k++)
+        size += fabs(translation[k]);
+    g->grown += fabs(scale - g->scale);
+    g->scale = scale;
+    g->most = fmax(g->most, scale);
+    g->size = fmax(g->size, size);
+}
+
+double scene_route_growth(const scene_route *route, double from, double to, scene_reach reach)
+{
+    ebpo_pose at;
+    scene_route_at(route, from, &at);
+    growing g = { .scale = at.scale };
+    grow_to(&g, at.scale, at.translation);
+    for (uint64_t n = key_at(route, from) + 1; n < route->count; n++) {
+        if (!(route->keys[n].time < to))
+            break;
+        grow_to(&g, route->keys[n].scale, route->keys[n].translation);
+    }
+    scene_route_at(route, to, &at);
+    grow_to(&g, at.scale, at.translation);
+    return reach.length * g.grown * (1 + slack) +
+           slack * (2 * g.size + (reach.length + reach.size) * g.most);
+}
+
+double scene_route_rounding(const scene_route *route, scene_reach reach)
+{
+    growing g = { .scale = 0 };
+    for (uint64_t n = 0; n < route->count; n++)
+        grow_to(&g, route->keys[n].scale, route->keys[n].translation);
+    return slack * (g.size + (reach.length + reach.size) * g.most);
+}

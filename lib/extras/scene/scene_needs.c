@@ -1,0 +1,295 @@
+/* Boxes, in each model's own coordinates, that hold all that another instance comes near: over
+ * steps of time so short that nothing moves far. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "extras/scene/asked_pairs.h"
+#include "extras/scene/pair_motion.h"
+#include "extras/scene/scene_needs.h"
+#include "derive/subset_reads.h"
+
+enum { HALVINGS = 12 };
+
+/* One instance as another one comes near it. */
+typedef struct nearing {
+    scene_needs *needs;
+    const ebpo_scene *scene;
+    uint64_t of, other;
+    double clearance, margin; /* in the world's unit */
+    scene_file_need *need;
+} nearing;
+
+static scene_file_need *need_of(const scene_needs *n, uint64_t instance)
+{
+    return &n->files[n->scene->models[n->scene->instances[instance].as.model].file];
+}
+
+static const scene_route *route_of(const ebpo_scene *scene, uint64_t instance)
+{
+    uint64_t route = scene->instances[instance].as.route;
+    return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
+}
+
+/* How far points where the other one is are from what moves along the route, at most, in its
+ * unit. */
+static ebpo_status reach_of_other(const nearing *n, const scene_route *route, double from,
+                                  double to, double *reach)
+{
+    double min[3], max[3], far[3];
+    ebpo_pose at[2];
+    scene_route_at(route, from, &at[0]);
+    scene_route_at(route, to, &at[1]);
+    ebpo_status status =
+        ebpo_scene_instance_box(n->scene, n->other, from, to, min, max, n->needs->error);
+    for (int k = 0; k < 3; k++) {
+        double low = fmin(at[0].translation[k], at[1].translation[k]),
+               high = fmax(at[0].translation[k], at[1].translation[k]);
+        far[k] = fmax(fabs(max[k] - low), fabs(high - min[k]));
+    }
+    *reach = scene_length_above(far) / fmin(at[0].scale, at[1].scale);
+    return status;
+}
+
+/* How far the other one goes at most, seen from this one, in the world's unit; no key is between
+ * the times. */
+static ebpo_status motion_seen(const nearing *n, double from, double to, double *out)
+{
+    const scene_route *route = route_of(n->scene, n->of);
+    double reach = 0, own = 0;
+    ebpo_status status = ebpo_scene_motion(n->scene, n->other, from, to, out, n->needs->error);
+    if (status == EBPO_OK && route && from < to) {
+        status = reach_of_other(n, route, from, to, &reach);
+        own = scene_route_step(route, from, to, (scene_reach){ reach, reach }).length;
+    }
+    *out = (*out + own) * (1 + 0x1p-40);
+    return status;
+}
+
+/* What the other one may come near between two times, within the model's box; false: nothing. */
+static ebpo_status near_box(const nearing *n, double from, double to, double motion,
+                            scene_space *out, bool *any)
+{
+    scene_seen at, later;
+    ebpo_status status = scene_seen_from(n->scene, n->of, n->other, from, &at, n->needs->error);
+    if (status == EBPO_OK)
+        status = scene_seen_from(n->scene, n->of, n->other, to, &later, n->needs->error);
+    if (status != EBPO_OK)
+        return status;
+    /* beyond what rounding may do between these times: also where nothing else is added */
+    double grow = (n->clearance + n->margin + motion) / fmin(at.unit, later.unit) * (1 + 0x1p-40) +
+                  2 * fmax(at.rounding, later.rounding);
+    *any = true;
+    for (int k = 0; k < 3; k++) {
+        double low = at.box.min[k] - grow, high = at.box.max[k] + grow;
+        /* what overflowed may be anywhere */
+        out->min[k] = low > n->need->whole.min[k] ? low : n->need->whole.min[k];
+        out->max[k] = high < n->need->whole.max[k] ? high : n->need->whole.max[k];
+        *any = *any && out->min[k] <= out->max[k];
+    }
+    return EBPO_OK;
+}
+
+static bool is_within(const scene_space *a, const scene_file_need *need)
+{
+    bool within = need->any;
+    for (int k = 0; k < 3; k++)
+        within = within && a->min[k] >= need->box.min[k] && a->max[k] <= need->box.max[k];
+    return within;
+}
+
+static void join(scene_file_need *need, const scene_space *box)
+{
+    if (!need->any)
+        need->box = *box;
+    need->any = true;
+    for (int k = 0; k < 3; k++) {
+        need->box.min[k] = fmin(need->box.min[k], box->min[k]);
+        need->box.max[k] = fmax(need->box.max[k], box->max[k]);
+    }
+}
+
+static ebpo_status come_near(const nearing *n, double from, double to, int halvings)
+{
+    double motion, middle = from + (to - from) / 2;
+    scene_space box;
+    bool any = false;
+    ebpo_status status = motion_seen(n, from, to, &motion);
+    if (status == EBPO_OK)
+        status = near_box(n, from, to, motion, &box, &any);
+    if (status != EBPO_OK || !any || is_within(&box, n->need))
+        return status;
+    if (motion <= n->margin || halvings == 0 || !(middle > from && middle < to)) {
+        join(n->need, &box);
+        return EBPO_OK;
+    }
+    status = come_near(n, from, middle, halvings - 1);
+    return status == EBPO_OK ? come_near(n, middle, to, halvings - 1) : status;
+}
+
+/* From key to key of either; a key itself begins the next part, as routes may jump there. */
+static ebpo_status come_near_along(const nearing *n)
+{
+    const ebpo_scene_pair pair = { n->of, n->other, 0 };
+    double to = n->needs->to;
+    ebpo_status status = EBPO_OK;
+    for (double at = n->needs->from; at < to && status == EBPO_OK;) {
+        double next = scene_pair_next(n->scene, &pair, at, to);
+        status = come_near(n, at, nextafter(next, -INFINITY), HALVINGS);
+        at = next;
+    }
+    return status == EBPO_OK ? come_near(n, to, to, HALVINGS) : status;
+}
+
+/* Longest side of an instance's box in the world. */
+static double size_of(const ebpo_scene *scene, uint64_t instance, double time)
+{
+    const scene_model *m = &scene->models[scene->instances[instance].as.model];
+    ebpo_pose pose = EBPO_POSE_INIT;
+    double size = 0;
+    if (ebpo_scene_pose(scene, instance, time, &pose, NULL) != EBPO_OK)
+        return 0; /* then it is told when the pose is asked for */
+    for (int k = 0; k < 3; k++)
+        size = fmax(size, m->max[k] - m->min[k]);
+    return size * pose.scale;
+}
+
+/* Usual for a pair; a point has no size of its own. */
+static double usual_margin(const scene_needs *needs, const ebpo_scene_pair *pair)
+{
+    double a = size_of(needs->scene, pair->a, needs->from);
+    double b = size_of(needs->scene, pair->b, needs->from);
+    return (fmin(a, b) > 0 ? fmin(a, b) : fmax(a, b)) / 32;
+}
+
+/* A face anywhere may be around the other one. */
+static void add_whole(scene_needs *needs, const ebpo_scene_pair *pair)
+{
+    for (int i = 0; i < 2; i++) {
+        scene_file_need *need = need_of(needs, i ? pair->b : pair->a);
+        need->askers++;
+        need->any = true;
+        need->box = need->whole;
+    }
+}
+
+static ebpo_status add_pair(scene_needs *needs, const ebpo_scene_pair *pair)
+{
+    if (needs->how.purpose == EBPO_SCENE_FOR_SOLIDS) {
+        add_whole(needs, pair);
+        return EBPO_OK;
+    }
+    bool inside = needs->how.purpose == EBPO_SCENE_FOR_INSIDE;
+    double margin = needs->how.margin > 0 ? needs->how.margin : usual_margin(needs, pair);
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
+        nearing n = { .needs = needs,
+                      .scene = needs->scene,
+                      .of = i ? pair->b : pair->a,
+                      .other = i ? pair->a : pair->b,
+                      .clearance = inside ? 0 : pair->clearance,
+                      .margin = margin };
+        n.need = need_of(needs, n.of);
+        n.need->askers++;
+        status = come_near_along(&n);
+    }
+    return status;
+}
+
+ebpo_status scene_add_near(scene_needs *needs)
+{
+    scene_pairs_list list = { 0 };
+    ebpo_status status =
+        scene_keep_pairs(needs->scene, needs->from, needs->to, &list, needs->error);
+    for (uint64_t i = 0; i < list.count && status == EBPO_OK; i++) {
+        status = add_pair(needs, &list.pairs[i]);
+        if (status == EBPO_OK && !ebpo_progress_step(&needs->how.progress, "finding what is needed",
+                                                     i + 1, list.count, needs->error))
+            status = EBPO_E_CANCELLED;
+    }
+    free(list.pairs);
+    return status;
+}
+
+/* Two models of one file have one box. */
+static void begin_files(scene_needs *needs)
+{
+    for (uint64_t i = 0; i < needs->scene->models_count; i++) {
+        const scene_model *m = &needs->scene->models[i];
+        scene_file_need *need = &needs->files[m->file];
+        memcpy(need->whole.min, m->min, sizeof m->min);
+        memcpy(need->whole.max, m->max, sizeof m->max);
+        need->box = need->whole;
+        need->last_level = -1;
+        need->parts = EBPO_PART_PLANES | EBPO_PART_MESH;
+        if (needs->how.purpose == EBPO_SCENE_FOR_COLLIDE ||
+            needs->how.purpose == EBPO_SCENE_FOR_SOLIDS)
+            need->parts |= EBPO_PART_MAPS;
+        if (needs->how.purpose == EBPO_SCENE_FOR_VIEW)
+            need->parts = ebpo_profile_parts(EBPO_PROFILE_LOD);
+    }
+}
+
+ebpo_status scene_begin_needs(scene_needs *needs)
+{
+    needs->files = ebpo_alloc_zero(needs->scene->files_count, sizeof *needs->files);
+    if (!needs->files)
+        return ebpo_fail_memory(needs->error, needs->scene->files_count * sizeof *needs->files);
+    begin_files(needs);
+    return EBPO_OK;
+}
+
+void scene_end_needs(scene_needs *needs)
+{
+    for (uint64_t i = 0; i < needs->scene->files_count; i++)
+        if (!needs->files[i].any) {
+            needs->files[i].last_level = 0;
+            needs->files[i].parts &= EBPO_PART_PLANES;
+        }
+}
+
+ebpo_subset_options scene_need_options(const scene_needs *needs, uint64_t file)
+{
+    const scene_file_need *need = &needs->files[file];
+    ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
+    o.parts = need->parts;
+    o.last_level = need->last_level;
+    for (int k = 0; k < 3; k++) {
+        o.boxed = o.boxed || need->box.min[k] > need->whole.min[k] ||
+                  need->box.max[k] < need->whole.max[k];
+        o.min[k] = need->box.min[k];
+        o.max[k] = need->box.max[k];
+    }
+    o.boxed = o.boxed && need->any;
+    return o;
+}
+
+ebpo_status scene_tell_need(const scene_needs *needs, uint64_t model, ebpo_scene_need *out)
+{
+    uint64_t number = needs->scene->models[model].file;
+    const scene_file_need *need = &needs->files[number];
+    const ebpo_file *file = needs->scene->files[number].file;
+    const ebpo_info *info = ebpo_file_info(file);
+    ebpo_subset_options o = scene_need_options(needs, number);
+    ebpo_subset_reads reads;
+    *out = (ebpo_scene_need)EBPO_SCENE_NEED_INIT;
+    out->model = model;
+    out->askers = need->askers;
+    out->boxed = o.boxed;
+    out->parts = info->parts & o.parts;
+    out->last_level = o.last_level < 0 ? info->level_count - 1 : o.last_level;
+    out->level_count = info->level_count;
+    memcpy(out->min, need->box.min, sizeof out->min);
+    memcpy(out->max, need->box.max, sizeof out->max);
+    out->file_bytes = info->file_bytes;
+    ebpo_status status = ebpo_subset_count_reads(file, &o, &reads, needs->error);
+    out->bytes = reads.bytes;
+    out->subtrees = reads.subtrees;
+    out->of_subtrees = reads.of_subtrees;
+    return status;
+}

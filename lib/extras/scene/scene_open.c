@@ -1,0 +1,254 @@
+/* Scene files and the models that they name. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/http.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
+#include "io/file_source.h"
+#include "geometry/pose.h"
+#include "extras/scene/scene_parts.h"
+
+static ebpo_status take_options(ebpo_scene_options *own, const ebpo_scene_options *options,
+                                ebpo_error *error)
+{
+    *own = (ebpo_scene_options)EBPO_SCENE_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_scene_options, own, options, error);
+    if (!own->most_bytes)
+        own->most_bytes = UINT64_C(64) << 20;
+    if (!own->most_pose_bytes)
+        own->most_pose_bytes = UINT64_C(256) << 20;
+    if (!own->most_values)
+        own->most_values = 4000000;
+    return status;
+}
+
+/* For packing. */
+static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, ebpo_error *error)
+{
+    scene->text = malloc(size + 1);
+    if (!scene->text)
+        return ebpo_fail_memory(error, size + 1);
+    memcpy(scene->text, text, size);
+    scene->text_size = size;
+    scene->text_models = scene->models_count;
+    scene->text_instances = scene->instances_count;
+    return EBPO_OK;
+}
+
+/* `folder` is taken over; NULL: there was no memory. */
+static ebpo_status parse(const char *text, size_t size, const char *name, char *folder,
+                         const ebpo_scene_options *options, ebpo_scene **out, ebpo_error *error)
+{
+    ebpo_scene *scene = NULL;
+    size_t mark = scene_text_mark(text, size);
+    text += mark;
+    size -= mark;
+    ebpo_status status = folder ? ebpo_scene_new(&scene, error) : ebpo_fail_memory(error, 1);
+    if (status == EBPO_OK) {
+        free(scene->folder);
+        scene->folder = folder;
+        status = scene_read_json(scene, text, size, name, options, error);
+    } else {
+        free(folder);
+    }
+    if (status == EBPO_OK) {
+        scene->outside = options->outside;
+        status = keep_text(scene, text, size, error);
+    }
+    if (status == EBPO_OK)
+        *out = scene;
+    else
+        ebpo_scene_free(scene);
+    return status;
+}
+
+static char *folder_with_slash(const char *folder)
+{
+    size_t size = folder ? strlen(folder) : 0;
+    char *out = malloc(size + 2);
+    if (!out)
+        return NULL;
+    if (size) /* memcpy wants no NULL */
+        memcpy(out, folder, size);
+    if (size && out[size - 1] != '/')
+        out[size++] = '/';
+    out[size] = 0;
+    return out;
+}
+
+ebpo_status ebpo_scene_parse(const char *text, size_t size, const char *name, const char *folder,
+                             const ebpo_scene_options *options, ebpo_scene **out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    *out = NULL;
+    ebpo_scene_options own;
+    ebpo_status status = take_options(&own, options, error);
+    if (status != EBPO_OK)
+        return status;
+    return parse(text, size, name, folder_with_slash(folder), &own, out, error);
+}
+
+ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options, ebpo_scene **out,
+                            ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    *out = NULL;
+    ebpo_scene_options own;
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
+    ebpo_status status = take_options(&own, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_open(&file, path, error);
+    if (status == EBPO_OK && file.size > own.most_bytes)
+        status = scene_too_long(path, &own, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
+    if (status == EBPO_OK)
+        status = parse((const char *)file.data, file.size, path, scene_folder_of(path), &own, out,
+                       error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_unchanged(&file, path, error);
+    if (status != EBPO_OK) {
+        ebpo_scene_free(*out);
+        *out = NULL;
+    }
+    ebpo_whole_file_close(&file);
+    return status;
+}
+
+/* ---- models ---- */
+
+static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t most_expansion,
+                             uint64_t *number, ebpo_error *error)
+{
+    uint64_t n = 0;
+    while (n < scene->files_count && strcmp(scene->files[n].path, path) != 0)
+        n++;
+    *number = n;
+    if (n < scene->files_count)
+        return EBPO_OK;
+    if (!ebpo_grow(&scene->files, &scene->files_capacity, n + 1, sizeof *scene->files))
+        return ebpo_fail_memory(error, (n + 1) * sizeof *scene->files);
+    scene_file f = { .path = strdup(path) };
+    ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
+    how.most_expansion = most_expansion;
+    ebpo_status status =
+        f.path ? ebpo_open_with(path, &how, &f.file, error) : ebpo_fail_memory(error, 1);
+    if (status != EBPO_OK) {
+        free(f.path);
+        return status;
+    }
+    scene->files[scene->files_count++] = f;
+    return EBPO_OK;
+}
+
+/* Of the faces, as the file says, where its root cell allows it; else the root cell. */
+static void box_of(scene_model *m, const ebpo_info *info)
+{
+    for (int k = 0; k < 3; k++) {
+        double low = info->box_origin[k], high = low + info->box_size[k];
+        bool tight = info->report.min[k] >= low && info->report.max[k] <= high &&
+                     info->report.min[k] <= info->report.max[k];
+        m->min[k] = tight ? info->report.min[k] : low;
+        m->max[k] = tight ? info->report.max[k] : high;
+    }
+}
+
+static ebpo_status check_digest(const scene_model *m, const ebpo_info *info, ebpo_error *error)
+{
+    static const uint8_t none[32];
+    if (memcmp(m->digest, none, 32) == 0 || memcmp(m->digest, info->content_sha256, 32) == 0)
+        return EBPO_OK;
+    char shown[256];
+    return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_url_redact(m->path, shown, sizeof shown),
+                          "is not the file that the scene means by model '%.80s': its "
+                          "content_sha256 is another",
+                          m->name);
+}
+
+static ebpo_status load_model(ebpo_scene *scene, scene_model *m, uint64_t most_expansion,
+                              ebpo_error *error)
+{
+    char *path = scene_join_path(scene->folder, m->path);
+    uint64_t number = 0;
+    bool of_text = (uint64_t)(m - scene->models) < scene->text_models;
+    ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(m->path));
+    if (status == EBPO_OK && of_text && !scene->outside)
+        status = scene_stays_within(scene->folder, path, error);
+    if (status == EBPO_OK)
+        status = open_file(scene, path, most_expansion, &number, error);
+    free(path);
+    if (status != EBPO_OK)
+        return status;
+    const ebpo_info *info = ebpo_file_info(scene->files[number].file);
+    status = check_digest(m, info, error);
+    if (status == EBPO_OK) {
+        box_of(m, info);
+        m->file = number;
+    }
+    return status;
+}
+
+static ebpo_status check_reach(const ebpo_scene *scene, const scene_instance *i, ebpo_error *error)
+{
+    const scene_model *m = &scene->models[i->as.model];
+    double reach[3];
+    ebpo_posing posing;
+    ebpo_error why = EBPO_ERROR_INIT;
+    for (int k = 0; k < 3; k++)
+        reach[k] = fmax(fabs(m->min[k]), fabs(m->max[k]));
+    ebpo_status status = ebpo_posing_make(&posing, &i->as.pose, reach, &why);
+    return status == EBPO_OK
+               ? EBPO_OK
+               : ebpo_fail(error, status, "instance '%.80s': %.300s", i->as.name, why.message);
+}
+
+ebpo_status ebpo_scene_load(ebpo_scene *scene, const ebpo_load_options *options, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_load_options own = EBPO_LOAD_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_load_options, &own, options, error);
+    if (status == EBPO_OK && own.memory && !scene->how.budget)
+        status = ebpo_budget_new(own.memory, &scene->how.budget, error);
+    if (status == EBPO_OK && !ebpo_progress_stage(&own.progress, "opening models", error))
+        status = EBPO_E_CANCELLED;
+    for (uint64_t i = 0; i < scene->models_count && status == EBPO_OK; i++) {
+        if (scene->models[i].file == EBPO_SCENE_NONE)
+            status = load_model(scene, &scene->models[i], own.most_expansion, error);
+        if (status == EBPO_OK &&
+            !ebpo_progress_step(&own.progress, "opening models", i + 1, scene->models_count, error))
+            status = EBPO_E_CANCELLED;
+    }
+    for (uint64_t i = 0; i < scene->instances_count && status == EBPO_OK; i++)
+        status = check_reach(scene, &scene->instances[i], error);
+    return status;
+}
+
+const ebpo_file *ebpo_scene_file(const ebpo_scene *scene, uint64_t model)
+{
+    bool loaded = model < scene->models_count && scene->models[model].file != EBPO_SCENE_NONE;
+    return loaded ? scene->files[scene->models[model].file].file : NULL;
+}
+
+ebpo_status ebpo_scene_model(ebpo_scene *scene, uint64_t model, ebpo_model **out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    *out = NULL;
+    if (!ebpo_scene_file(scene, model))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "model %llu has not been loaded",
+                         (unsigned long long)model);
+    scene_file *f = &scene->files[scene->models[model].file];
+    ebpo_status status = EBPO_OK;
+    if (!f->model)
+        status = ebpo_model_new(f->file, &scene->how, &f->model, error);
+    if (status == EBPO_OK)
+        *out = f->model;
+    return status;
+}

@@ -1,0 +1,320 @@
+/* What was asked of a scene at several times, in an HDF5 file for other programs. */
+#include "core/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "hdf5_write/tables.h"
+#include "io/publish.h"
+#include "extras/scene/scene_parts.h"
+
+/* Frames come first, then meetings. */
+enum {
+    TIME,
+    FIRST_MEETING,
+    MEETINGS,
+    ASKED,
+    NANOSECONDS,
+    BYTES_READ,
+    MODELS,
+    LOADS,
+    FRAME,
+    INSTANCES,
+    KIND,
+    RELATION,
+    FACES,
+    PAIRS,
+    CONTACTS,
+    CLEARANCE,
+    DISTANCE,
+    PLACE,
+    PLACE_BOX,
+    DEPTH,
+    TABLES
+};
+
+static const struct {
+    const char *path;
+    ebpo_h5_number number;
+    uint32_t cols;
+    const char *meaning;
+} layout[TABLES] = {
+    [TIME] = { "/frames/time", EBPO_H5_F64, 0, "the scene's seconds" },
+    [FIRST_MEETING] = { "/frames/first_meeting", EBPO_H5_I64, 0, "row of /meetings" },
+    [MEETINGS] = { "/frames/meetings", EBPO_H5_I64, 0, "rows of /meetings" },
+    [ASKED] = { "/frames/asked", EBPO_H5_I64, 0, "pairs of instances asked about" },
+    [NANOSECONDS] = { "/frames/nanoseconds", EBPO_H5_I64, 0, "that the answer took" },
+    [BYTES_READ] = { "/frames/bytes_read", EBPO_H5_I64, 0, "of models' files, meanwhile" },
+    [MODELS] = { "/frames/models", EBPO_H5_I64, 0, "read into memory, meanwhile" },
+    [LOADS] = { "/frames/loads", EBPO_H5_I64, 0, "of subtrees, meanwhile" },
+    [FRAME] = { "/meetings/frame", EBPO_H5_I64, 0, "row of /frames" },
+    [INSTANCES] = { "/meetings/instances", EBPO_H5_I64, 2, "a and b, numbers of /instances" },
+    [KIND] = { "/meetings/kind", EBPO_H5_U8, 0,
+               "1 near, 2 touching, 3 coplanar, 4 crossing, 5 protruding, 6 enclosed, "
+               "7 duplicate" },
+    [RELATION] = { "/meetings/relation", EBPO_H5_U8, 0,
+                   "0 disjoint, 1 touching, 2 intersecting, 3 a inside b, 4 b inside a, 5 equal, "
+                   "6 not asked" },
+    [FACES] = { "/meetings/faces", EBPO_H5_I64, 2, "a pair that meets or is nearest; -1: none" },
+    [PAIRS] = { "/meetings/pairs", EBPO_H5_I64, 3, "of faces: touching, coplanar, crossing" },
+    [CONTACTS] = { "/meetings/contacts", EBPO_H5_I64, 0, "lines of contact; -1: not told" },
+    [CLEARANCE] = { "/meetings/clearance", EBPO_H5_F64, 0, "wanted, the scene's unit" },
+    [DISTANCE] = { "/meetings/distance", EBPO_H5_F64, 0, "of faces, the scene's unit" },
+    [PLACE] = { "/meetings/place", EBPO_H5_F64, 3, "x, y, z in the world; nan: not asked" },
+    [PLACE_BOX] = { "/meetings/place_box", EBPO_H5_F64, 6,
+                    "of contacts in the world: least x, y, z, greatest x, y, z" },
+    [DEPTH] = { "/meetings/depth", EBPO_H5_F64, 4, "of a in b from, to; of b in a from, to" },
+};
+
+struct ebpo_scene_record {
+    const ebpo_scene *scene;
+    char *path;
+    ebpo_publish target;
+    ebpo_h5_out out;
+    ebpo_h5_table table[TABLES];
+    int64_t frames, meetings;
+};
+
+static ebpo_status put_meaning(ebpo_scene_record *r, ebpo_h5_id id, const char *meaning,
+                               ebpo_error *error)
+{
+    return ebpo_h5_put_ascii(&r->out, id, "meaning", meaning, error);
+}
+
+/* --- what the scene holds --- */
+
+static const char *instance_name(const ebpo_scene *scene, uint64_t i)
+{
+    return scene->instances[i].as.name;
+}
+
+static const char *model_name(const ebpo_scene *scene, uint64_t i) { return scene->models[i].name; }
+
+static ebpo_status put_names(ebpo_scene_record *r, const char *path,
+                             const char *(*name)(const ebpo_scene *, uint64_t), uint64_t count,
+                             ebpo_error *error)
+{
+    ebpo_h5_table table;
+    ebpo_status status = ebpo_h5_make_table(&r->out, path, EBPO_H5_U8, 0, &table, error);
+    if (status == EBPO_OK)
+        status = put_meaning(r, table.id, "UTF-8, each name ended by a 0", error);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        status = ebpo_h5_append(&r->out, &table, name(r->scene, i), strlen(name(r->scene, i)) + 1,
+                                error);
+    ebpo_h5_close_table(&r->out, &table);
+    return status;
+}
+
+static ebpo_status put_models(ebpo_scene_record *r, ebpo_error *error)
+{
+    uint64_t count = r->scene->instances_count;
+    int64_t *model = ebpo_alloc(count, sizeof *model);
+    if (!model)
+        return ebpo_fail_memory(error, count * sizeof *model);
+    for (uint64_t i = 0; i < count; i++)
+        model[i] = (int64_t)r->scene->instances[i].as.model;
+    ebpo_h5_table table;
+    ebpo_status status =
+        ebpo_h5_make_table(&r->out, "/instances/model", EBPO_H5_I64, 0, &table, error);
+    if (status == EBPO_OK)
+        status = put_meaning(r, table.id, "its model's number in /models", error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_append(&r->out, &table, model, count, error);
+    ebpo_h5_close_table(&r->out, &table);
+    free(model);
+    return status;
+}
+
+static ebpo_status put_scene(ebpo_scene_record *r, ebpo_error *error)
+{
+    ebpo_status status =
+        put_names(r, "/instances/names", instance_name, r->scene->instances_count, error);
+    if (status == EBPO_OK)
+        status = put_models(r, error);
+    return status == EBPO_OK
+               ? put_names(r, "/models/names", model_name, r->scene->models_count, error)
+               : status;
+}
+
+/* --- the file --- */
+
+static ebpo_status make_groups(ebpo_scene_record *r, ebpo_error *error)
+{
+    static const struct {
+        const char *path, *meaning;
+    } groups[] = {
+        { "/instances", "models at places, by number" },
+        { "/models", "by number" },
+        { "/frames", "times that were asked about, one after the other" },
+        { "/meetings", "pairs of instances that meet or come too near, frame after frame" },
+    };
+    ebpo_status status = EBPO_OK;
+    for (size_t i = 0; i < sizeof groups / sizeof *groups && status == EBPO_OK; i++) {
+        ebpo_h5_id id;
+        status = ebpo_h5_make_plain_group(&r->out, groups[i].path, &id, error);
+        if (status == EBPO_OK)
+            status = put_meaning(r, id, groups[i].meaning, error);
+        ebpo_h5_close_id(&r->out, id);
+    }
+    return status;
+}
+
+static ebpo_status make_tables(ebpo_scene_record *r, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < TABLES && status == EBPO_OK; i++) {
+        status = ebpo_h5_make_table(&r->out, layout[i].path, layout[i].number, layout[i].cols,
+                                    &r->table[i], error);
+        if (status == EBPO_OK)
+            status = put_meaning(r, r->table[i].id, layout[i].meaning, error);
+    }
+    return status;
+}
+
+static ebpo_status begin(ebpo_scene_record *r, const char *path, ebpo_error *error)
+{
+    ebpo_status status = ebpo_publish_begin(&r->target, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_create_plain(&r->out, ebpo_publish_path(&r->target), r->path, error);
+    if (status == EBPO_OK)
+        status = make_groups(r, error);
+    if (status == EBPO_OK)
+        status = put_scene(r, error);
+    return status == EBPO_OK ? make_tables(r, error) : status;
+}
+
+ebpo_status ebpo_scene_record_new(const ebpo_scene *scene, const char *path,
+                                  ebpo_scene_record **out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_scene_record *r = ebpo_alloc_zero(1, sizeof *r);
+    char *shown = strdup(path);
+    *out = NULL;
+    if (!r || !shown) {
+        free(r);
+        free(shown);
+        return ebpo_fail_memory(error, sizeof *r);
+    }
+    r->scene = scene;
+    r->path = shown;
+    r->target = (ebpo_publish)EBPO_PUBLISH_INIT;
+    r->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
+    for (int i = 0; i < TABLES; i++)
+        r->table[i] = (ebpo_h5_table)EBPO_H5_TABLE_INIT;
+    ebpo_status status = begin(r, path, error);
+    if (status == EBPO_OK)
+        *out = r;
+    else
+        ebpo_scene_record_free(r);
+    return status;
+}
+
+static void close_tables(ebpo_scene_record *r)
+{
+    for (int i = 0; i < TABLES; i++)
+        ebpo_h5_close_table(&r->out, &r->table[i]);
+}
+
+ebpo_status ebpo_scene_record_finish(ebpo_scene_record *r, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    close_tables(r);
+    ebpo_status status = ebpo_h5_finish(&r->out, error);
+    return status == EBPO_OK ? ebpo_publish_commit(&r->target, error) : status;
+}
+
+void ebpo_scene_record_free(ebpo_scene_record *r)
+{
+    if (!r)
+        return;
+    close_tables(r);
+    ebpo_h5_discard(&r->out);
+    ebpo_publish_abort(&r->target);
+    free(r->path);
+    free(r);
+}
+
+/* --- rows --- */
+
+enum { ROWS = 256 };
+
+typedef struct rows {
+    int64_t frame[ROWS], instances[ROWS][2], faces[ROWS][2], pairs[ROWS][3], contacts[ROWS];
+    uint8_t kind[ROWS], relation[ROWS];
+    double clearance[ROWS], distance[ROWS], place[ROWS][3], place_box[ROWS][6], depth[ROWS][4];
+} rows;
+
+/* Numbers of nothing become -1. */
+static int64_t number(uint64_t n) { return n > INT64_MAX ? -1 : (int64_t)n; }
+
+static void fill_row(rows *out, uint64_t i, const ebpo_scene_meeting *m, int64_t frame)
+{
+    out->frame[i] = frame;
+    out->instances[i][0] = number(m->a);
+    out->instances[i][1] = number(m->b);
+    out->kind[i] = (uint8_t)m->kind;
+    out->relation[i] = (uint8_t)m->relation;
+    out->faces[i][0] = number(m->face_a);
+    out->faces[i][1] = number(m->face_b);
+    out->pairs[i][0] = number(m->touching);
+    out->pairs[i][1] = number(m->coplanar);
+    out->pairs[i][2] = number(m->crossing);
+    out->contacts[i] = number(m->contacts);
+    out->clearance[i] = m->clearance;
+    out->distance[i] = m->distance;
+    memcpy(out->place[i], m->place, sizeof m->place);
+    memcpy(out->place_box[i], m->place_min, sizeof m->place_min);
+    memcpy(out->place_box[i] + 3, m->place_max, sizeof m->place_max);
+    for (int k = 0; k < 2; k++) {
+        out->depth[i][2 * k] = m->depth[k].lo;
+        out->depth[i][2 * k + 1] = m->depth[k].hi;
+    }
+}
+
+static ebpo_status put_rows(ebpo_scene_record *r, const rows *d, uint64_t count, ebpo_error *error)
+{
+    const void *const data[] = { d->frame,    d->instances, d->kind,      d->relation,
+                                 d->faces,    d->pairs,     d->contacts,  d->clearance,
+                                 d->distance, d->place,     d->place_box, d->depth };
+    ebpo_status status = EBPO_OK;
+    for (int i = FRAME; i < TABLES && status == EBPO_OK; i++)
+        status = ebpo_h5_append(&r->out, &r->table[i], data[i - FRAME], count, error);
+    r->meetings += (int64_t)count;
+    return status;
+}
+
+static ebpo_status put_frame(ebpo_scene_record *r, const ebpo_scene_frame *f, uint64_t meetings,
+                             ebpo_error *error)
+{
+    const int64_t n[] = { r->meetings,           number(meetings),
+                          number(f->asked),      number(f->nanoseconds),
+                          number(f->bytes_read), number(f->models),
+                          number(f->loads) };
+    ebpo_status status = ebpo_h5_append(&r->out, &r->table[TIME], &f->time, 1, error);
+    for (int i = FIRST_MEETING; i < FRAME && status == EBPO_OK; i++)
+        status = ebpo_h5_append(&r->out, &r->table[i], &n[i - FIRST_MEETING], 1, error);
+    return status;
+}
+
+ebpo_status ebpo_scene_record_add(ebpo_scene_record *r, const ebpo_scene_frame *frame,
+                                  const ebpo_scene_meeting *meetings, uint64_t count,
+                                  ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    rows *some = ebpo_alloc(1, sizeof *some);
+    if (!some)
+        return ebpo_fail_memory(error, sizeof *some);
+    ebpo_status status = put_frame(r, frame, count, error);
+    for (uint64_t at = 0; at < count && status == EBPO_OK; at += ROWS) {
+        uint64_t n = count - at < ROWS ? count - at : ROWS;
+        for (uint64_t i = 0; i < n; i++)
+            fill_row(some, i, &meetings[at + i], r->frames);
+        status = put_rows(r, some, n, error);
+    }
+    r->frames++;
+    free(some);
+    return status;
+}

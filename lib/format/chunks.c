@@ -1,0 +1,487 @@
+/* Decoded chunks through a cache. */
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/arrays.h"
+#include "core/hash.h"
+#include "hdf5_read/coding.h"
+#include "format/attribute_read.h"
+#include "format/chunks.h"
+
+enum { CHUNK_BITS = 48, AROUND = 4 };
+/* Announced for later: at most so much, and a share of what a limit leaves. */
+enum { AHEAD_MOST = 4 << 20, AHEAD_SHARE = 4, BATCH_SHARE = 16 };
+
+static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
+{
+    uint64_t number = array->id < EBPO_LEVEL_ARRAYS
+                          ? (uint64_t)array->level * EBPO_LEVEL_ARRAYS + array->id
+                          : (uint64_t)EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + array->id;
+    if (array->id == EBPO_A_ATTRIBUTE)
+        number += 1 + (uint64_t)array->level;
+    return number << CHUNK_BITS | chunk;
+}
+
+static const ebpo_array_in *array_of(const ebpo_chunks *c, uint64_t key)
+{
+    uint64_t number = key >> CHUNK_BITS, levels = (uint64_t)EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS;
+    return number < levels
+               ? &c->file->level_array[number / EBPO_LEVEL_ARRAYS][number % EBPO_LEVEL_ARRAYS]
+           : number - levels <= EBPO_A_ATTRIBUTE
+               ? &c->file->root_array[number - levels]
+               : &c->file->attributes.array[number - levels - EBPO_A_ATTRIBUTE - 1];
+}
+
+static uint64_t chunk_of(uint64_t key) { return key & ((UINT64_C(1) << CHUNK_BITS) - 1); }
+
+/* Without the filling of the last chunk. */
+static uint64_t chunk_rows(const ebpo_array_in *array, uint64_t chunk)
+{
+    uint64_t left = array->shape.rows - chunk * array->shape.chunk_rows;
+    return left < array->shape.chunk_rows ? left : array->shape.chunk_rows;
+}
+
+static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
+                            ebpo_error *error)
+{
+    const ebpo_array_in *array = array_of(user, key);
+    (void)error;
+    *peak = *keep = chunk_rows(array, chunk_of(key)) * ebpo_shape_row_bytes(&array->shape);
+    return EBPO_OK;
+}
+
+static ebpo_status decode_faces(const ebpo_chunks *c, uint64_t chunk, uint64_t rows,
+                                const uint8_t *raw, uint32_t *corners, ebpo_error *error)
+{
+    const ebpo_array_in *array = &c->file->root_array[EBPO_A_FACES];
+    uint64_t vertices = c->file->info.vertex_count, seen = c->seen ? c->seen[chunk] : 0;
+    if (seen > vertices || (chunk == 0 && seen))
+        return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX,
+                                "the index names more vertices than there are", error);
+    if (!ebpo_corners_decode(raw, rows, &seen, corners) || seen > vertices)
+        return ebpo_chunks_fail(c, -1, EBPO_A_FACES, "a face names a vertex that does not exist",
+                                error);
+    if (chunk + 1 < ebpo_shape_chunks(&array->shape) && seen != c->seen[chunk + 1])
+        return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX, "the index contradicts the faces",
+                                error);
+    return EBPO_OK;
+}
+
+static ebpo_status decode_vertices(const ebpo_chunks *c, uint64_t rows, const uint8_t *raw,
+                                   void *xyz, ebpo_error *error)
+{
+    bool finite = true;
+    if (c->file->info.double_coordinates) {
+        const double *numbers = xyz;
+        ebpo_points64_decode(raw, rows, xyz);
+        for (uint64_t i = 0; i < 3 * rows; i++)
+            finite &= isfinite(numbers[i]) != 0;
+    } else {
+        const float *numbers = xyz;
+        ebpo_points32_decode(raw, rows, xyz);
+        for (uint64_t i = 0; i < 3 * rows; i++)
+            finite &= isfinite(numbers[i]) != 0;
+    }
+    return finite ? EBPO_OK
+                  : ebpo_chunks_fail(c, -1, EBPO_A_VERTICES, "a coordinate is not a finite number",
+                                     error);
+}
+
+static ebpo_status decode_map(const ebpo_chunks *c, ebpo_array_id id, uint64_t rows,
+                              const uint8_t *raw, uint32_t *numbers, ebpo_error *error)
+{
+    const ebpo_info *info = &c->file->info;
+    uint64_t limit = id == EBPO_A_FACE_SOURCE ? info->source_face_count + info->mend.added_faces
+                                              : info->source_vertex_count;
+    uint32_t largest = 0;
+    ebpo_numbers_decode(raw, rows, numbers);
+    for (uint64_t i = 0; i < rows; i++)
+        largest = numbers[i] > largest ? numbers[i] : largest;
+    return largest < limit
+               ? EBPO_OK
+               : ebpo_chunks_fail(c, -1, id, "a source number is out of range or used twice",
+                                  error);
+}
+
+/* Once for each load, so that using a chunk again costs nothing but finding it. */
+static ebpo_status decode(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk,
+                          const uint8_t *raw, void *item, ebpo_error *error)
+{
+    uint64_t rows = chunk_rows(array, chunk);
+    switch (array->id) {
+    case EBPO_A_VERTICES: return decode_vertices(c, rows, raw, item, error);
+    case EBPO_A_FACES: return decode_faces(c, chunk, rows, raw, item, error);
+    case EBPO_A_VERTEX_SOURCE:
+    case EBPO_A_FACE_SOURCE: return decode_map(c, array->id, rows, raw, item, error);
+    case EBPO_A_ATTRIBUTE: ebpo_attribute_decode(c->file, array, rows, raw, item); return EBPO_OK;
+    default: memcpy(item, raw, rows * ebpo_shape_row_bytes(&array->shape)); return EBPO_OK;
+    }
+}
+
+static void expect_missing(ebpo_chunks *c, ebpo_expected *e, const ebpo_array_in *array,
+                           uint64_t begin, uint64_t end)
+{
+    for (uint64_t i = begin; i < end; i++)
+        if (!ebpo_cache_has(c->cache, key_of(array, i)))
+            ebpo_expect_chunks(e, array, i, i + 1);
+}
+
+void ebpo_chunks_expect(ebpo_chunks *c, ebpo_expected *e, ebpo_array_id id, int level, uint64_t row,
+                        uint64_t rows)
+{
+    const ebpo_array_in *array = ebpo_reader_array(c->file, id, level);
+    if (!ebpo_expected_wanted(e) || !array->present || rows == 0 || row >= array->shape.rows)
+        return;
+    if (c->collecting)
+        (void)ebpo_chunks_missing(c, id, level, row, rows, c->collecting);
+    if (c->counted)
+        return;
+    uint64_t left = array->shape.rows - row, last = row + (rows < left ? rows : left) - 1;
+    expect_missing(c, e, array, row / array->shape.chunk_rows, last / array->shape.chunk_rows + 1);
+}
+
+/* A request takes about as long for a few chunks as for one, and its neighbours are likely to be
+ * the next. */
+static void expect_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
+{
+    uint64_t begin = chunk / AROUND * AROUND, count = ebpo_shape_chunks(&array->shape);
+    ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
+    /* with subtrees its neighbours in the file are other arrays' */
+    if (!ebpo_input_expects(&c->file->in) || c->file->info.subtree_level)
+        return;
+    expect_missing(c, &e, array, begin, count - begin < AROUND ? count : begin + AROUND);
+    ebpo_expect_all(&e);
+}
+
+/* --- counting --- */
+
+/* What reading a chunk takes of the file; where the places of chunks have not been read yet, these
+ * as well. */
+static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
+{
+    if (ebpo_shape_chunks(&array->shape) == 1 || atomic_load(&c->file->located))
+        return array->chunks[chunk].bytes;
+    const ebpo_info *info = &c->file->info;
+    uint64_t prefetched = c->file->in.source.prefetched,
+             index_end = info->chunk_index_offset + info->chunk_index_bytes;
+    /* libhdf5 goes through the headers once more */
+    uint64_t again = prefetched < info->head_bytes ? info->chunk_index_offset : 0;
+    uint64_t index = index_end <= prefetched                 ? 0
+                     : info->chunk_index_offset < prefetched ? index_end - prefetched
+                                                             : info->chunk_index_bytes;
+    return again + index + ebpo_reader_chunk_bound(array);
+}
+
+static bool fits(const ebpo_chunks *c, uint64_t more)
+{
+    uint64_t taken = atomic_load(&c->file->in.bytes) + c->ahead_bytes;
+    return taken <= c->limit && more <= c->limit - taken;
+}
+
+static ebpo_status refuse(ebpo_chunks *c, const ebpo_array_in *array, ebpo_error *error)
+{
+    c->refused = true;
+    return ebpo_fail_at(error, EBPO_E_LIMIT, c->file->in.shown, array->path, -1,
+                        "reading on would take more than the %" PRIu64 " bytes allowed", c->limit);
+}
+
+/* Called before a chunk is read: what was announced has been counted then. */
+static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key,
+                         ebpo_error *error)
+{
+    uint64_t cost = cost_of(c, array, chunk_of(key));
+    for (uint64_t i = 0; i < c->ahead_count; i++)
+        if (c->ahead[i] == key) {
+            c->ahead[i] = c->ahead[--c->ahead_count];
+            c->ahead_bytes -= cost;
+            return EBPO_OK;
+        }
+    return fits(c, cost) ? EBPO_OK : refuse(c, array, error);
+}
+
+static bool is_ahead(const ebpo_chunks *c, uint64_t key)
+{
+    for (uint64_t i = 0; i < c->ahead_count; i++)
+        if (c->ahead[i] == key)
+            return true;
+    return false;
+}
+
+static uint64_t least(uint64_t a, uint64_t b) { return a < b ? a : b; }
+
+/* A share of what the limit leaves, less what waits to be read. What waits may wait for long, as a
+ * view turns to others first: a smaller share is left for each batch, or each would be one chunk.
+ */
+uint64_t ebpo_chunks_room(const ebpo_chunks *c)
+{
+    uint64_t taken = atomic_load(&c->file->in.bytes),
+             left = c->limit > taken ? c->limit - taken : 0,
+             share = least(left / AHEAD_SHARE, AHEAD_MOST);
+    uint64_t batch = least(left / BATCH_SHARE, AHEAD_MOST / BATCH_SHARE);
+    return share > c->ahead_bytes + batch ? share - c->ahead_bytes : batch;
+}
+
+void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
+{
+    ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
+    uint64_t room = ebpo_chunks_room(c);
+    for (unsigned i = 0; i < count; i++) {
+        const ebpo_array_in *array = array_of(c, keys[i]);
+        if (ebpo_shape_chunks(&array->shape) > 1 && !atomic_load(&c->file->located))
+            continue; /* where it lies is not known yet */
+        uint64_t cost = cost_of(c, array, chunk_of(keys[i]));
+        if (is_ahead(c, keys[i]) || !fits(c, cost) || (i >= now && cost > room) ||
+            !ebpo_grow(&c->ahead, &c->ahead_capacity, c->ahead_count + 1, sizeof *c->ahead))
+            continue;
+        room -= i >= now ? cost : 0;
+        c->ahead[c->ahead_count++] = keys[i];
+        c->ahead_bytes += cost;
+        ebpo_expect_chunks(&e, array, chunk_of(keys[i]), chunk_of(keys[i]) + 1);
+    }
+    ebpo_expect_all(&e);
+}
+
+bool ebpo_chunks_announced(const ebpo_chunks *c, const ebpo_chunk_keys *keys)
+{
+    for (unsigned i = 0; i < keys->count; i++)
+        if (!is_ahead(c, keys->key[i]))
+            return false;
+    return true;
+}
+
+static void clear_slots(ebpo_chunk_keys *keys, unsigned slots)
+{
+    keys->mask = slots - 1;
+    memset(keys->slot, 0, slots * sizeof *keys->slot);
+}
+
+void ebpo_chunk_keys_begin(ebpo_chunk_keys *keys)
+{
+    keys->count = 0;
+    keys->bytes = 0;
+    clear_slots(keys, 16);
+}
+
+static uint64_t slot_of(const ebpo_chunk_keys *keys, uint64_t key)
+{
+    uint64_t at;
+    EBPO_HASH_FIND(at, ebpo_hash_number(key), keys->mask,
+                   !keys->slot[at] || keys->key[keys->slot[at] - 1] == key);
+    return at;
+}
+
+static void add_key(ebpo_chunk_keys *keys, uint64_t key, uint64_t bytes)
+{
+    uint64_t at = slot_of(keys, key);
+    if (keys->slot[at] || keys->count == EBPO_CHUNK_KEYS)
+        return;
+    keys->key[keys->count++] = key;
+    keys->bytes += bytes;
+    keys->slot[at] = (uint16_t)keys->count;
+    if (2 * keys->count <= keys->mask || keys->count == EBPO_CHUNK_KEYS)
+        return;
+    clear_slots(keys, 2 * (keys->mask + 1));
+    for (unsigned i = 0; i < keys->count; i++)
+        keys->slot[slot_of(keys, keys->key[i])] = (uint16_t)(i + 1);
+}
+
+bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t row, uint64_t rows,
+                         ebpo_chunk_keys *keys)
+{
+    const ebpo_array_in *array = ebpo_reader_array(c->file, id, level);
+    bool missing = false;
+    if (!array->present || rows == 0 || row >= array->shape.rows)
+        return false;
+    uint64_t left = array->shape.rows - row,
+             last = (row + (rows < left ? rows : left) - 1) / array->shape.chunk_rows;
+    for (uint64_t i = row / array->shape.chunk_rows; i <= last; i++) {
+        uint64_t key = key_of(array, i);
+        if (!ebpo_cache_has(c->cache, key)) {
+            missing = true;
+            add_key(keys, key, cost_of(c, array, i));
+        }
+    }
+    return missing;
+}
+
+void ebpo_chunks_collect(ebpo_chunks *c, ebpo_chunk_keys *keys) { c->collecting = keys; }
+
+/* Rows of the table, and what leads to the subtrees: only they tell what comes after them. */
+static bool tells_more(const ebpo_chunks *c, uint64_t key)
+{
+    const ebpo_array_in *a = array_of(c, key);
+    return a->id >= EBPO_A_SUBTREE_INDEX ||
+           ((a->id == EBPO_A_TYPES || a->id == EBPO_A_TYPES_INDEX) &&
+            a->level <= c->file->info.subtree_level);
+}
+
+ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsigned now,
+                              ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    ebpo_chunks_announce(c, keys->key, now, keys->count);
+    for (unsigned i = 0; i < keys->count && status == EBPO_OK; i++) {
+        void *item;
+        if (i >= now && !(tells_more(c, keys->key[i]) && is_ahead(c, keys->key[i])))
+            continue;
+        status = ebpo_cache_get(c->cache, keys->key[i], &item, NULL, error);
+        if (status == EBPO_OK)
+            ebpo_cache_unpin(c->cache, keys->key[i]);
+    }
+    return status;
+}
+
+/* Vertices seen before each chunk of faces: of counted chunks only when the first is read. */
+static ebpo_status read_seen(ebpo_chunks *c, ebpo_error *error)
+{
+    const ebpo_array_in *index = ebpo_reader_array(c->file, EBPO_A_FACES_INDEX, 0);
+    uint64_t cost = 0;
+    ebpo_read_options read = ebpo_read_threads(1);
+    for (uint64_t i = 0; c->counted && index->present && i < ebpo_shape_chunks(&index->shape); i++)
+        cost += cost_of(c, index, i);
+    if (c->counted && !fits(c, cost))
+        return refuse(c, index, error);
+    return ebpo_reader_make(c->file, EBPO_A_FACES_INDEX, 0, &read, sizeof *c->seen, &c->seen,
+                            error);
+}
+
+void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes)
+{
+    chunks->limit = bytes;
+    chunks->refused = false;
+}
+
+bool ebpo_chunks_refused(const ebpo_chunks *chunks) { return chunks->refused; }
+
+static ebpo_status load(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
+                        ebpo_error *error)
+{
+    (void)most;
+    ebpo_chunks *c = user;
+    const ebpo_array_in *array = array_of(c, key);
+    ebpo_status allowed =
+        c->counted && array->id == EBPO_A_FACES && !c->seen ? read_seen(c, error) : EBPO_OK;
+    if (allowed == EBPO_OK && c->counted)
+        allowed = admit(c, array, key, error);
+    if (allowed != EBPO_OK)
+        return allowed;
+    uint64_t rows = chunk_rows(array, chunk_of(key));
+    size_t row_bytes = ebpo_shape_row_bytes(&array->shape);
+    ebpo_idle_readers *idle = &ebpo_reader_own(c->file)->idle;
+    ebpo_idle_reader *reader = ebpo_idle_readers_take(idle);
+    void *made = reader ? ebpo_alloc(rows, row_bytes) : NULL;
+    ebpo_status status =
+        made ? EBPO_OK : ebpo_fail_memory(error, rows * row_bytes + sizeof *reader);
+    if (!c->counted)
+        expect_around(c, array, chunk_of(key));
+    if (status == EBPO_OK)
+        status =
+            ebpo_reader_chunk(c->file, array, chunk_of(key), &reader->reader, reader->raw, error);
+    if (status == EBPO_OK)
+        status = decode(c, array, chunk_of(key), reader->raw, made, error);
+    ebpo_idle_readers_give(idle, reader);
+    if (status == EBPO_OK) {
+        *item = made;
+        *bytes = rows * row_bytes;
+    } else {
+        free(made);
+    }
+    return status;
+}
+
+static void release(void *user, void *item)
+{
+    (void)user;
+    free(item);
+}
+
+/* pool: NULL, or what the budget is of. */
+static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
+                        ebpo_cache_pool *pool, bool counted, ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_chunks *c = ebpo_alloc_zero(1, sizeof *c);
+    if (!c)
+        return ebpo_fail_memory(error, sizeof *c);
+    c->file = file;
+    c->counted = counted;
+    c->limit = UINT64_MAX;
+    pthread_mutex_init(&c->lock, NULL);
+    ebpo_cache_source source = { c, estimate, load, release };
+    ebpo_status status = counted ? EBPO_OK : read_seen(c, error);
+    if (status == EBPO_OK)
+        status = pool ? ebpo_cache_make_in(&c->cache, &source, "chunk", pool, error)
+                      : ebpo_cache_make(&c->cache, &source, "chunk", budget, error);
+    if (status == EBPO_OK)
+        *out = c;
+    else
+        ebpo_chunks_free(c);
+    return status;
+}
+
+ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
+                             ebpo_error *error)
+{
+    return make(out, file, budget, NULL, false, error);
+}
+
+ebpo_status ebpo_chunks_make_in(ebpo_chunks **out, const ebpo_file *file, ebpo_cache_pool *pool,
+                                ebpo_error *error)
+{
+    return make(out, file, 0, pool, false, error);
+}
+
+ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
+                                     ebpo_error *error)
+{
+    return make(out, file, budget, NULL, true, error);
+}
+
+void ebpo_chunks_free(ebpo_chunks *chunks)
+{
+    if (!chunks)
+        return;
+    ebpo_cache_free(chunks->cache);
+    ebpo_array_free(NULL, chunks->seen);
+    free(chunks->ahead);
+    free(chunks->rows);
+    pthread_mutex_destroy(&chunks->lock);
+    free(chunks);
+}
+
+void ebpo_chunks_get_stats(ebpo_chunks *chunks, ebpo_cache_stats *out)
+{
+    ebpo_cache_get_stats(chunks->cache, out);
+}
+
+void ebpo_held_chunk_release(ebpo_chunks *chunks, ebpo_held_chunk *view)
+{
+    if (view->rows)
+        ebpo_cache_unpin(chunks->cache, view->key);
+    *view = (ebpo_held_chunk){ .array = view->array };
+}
+
+ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uint64_t row,
+                                 ebpo_error *error)
+{
+    uint64_t chunk = row / view->array->shape.chunk_rows;
+    void *item;
+    ebpo_held_chunk_release(chunks, view); /* first: a tight budget may need the room */
+    uint64_t key = key_of(view->array, chunk);
+    if (chunks->collecting && !ebpo_cache_has(chunks->cache, key)) {
+        add_key(chunks->collecting, key, cost_of(chunks, view->array, chunk));
+        return EBPO_E_LIMIT;
+    }
+    ebpo_status status = ebpo_cache_get(chunks->cache, key, &item, NULL, error);
+    if (status != EBPO_OK)
+        return status;
+    view->key = key;
+    view->begin = chunk * view->array->shape.chunk_rows;
+    view->end = view->begin + chunk_rows(view->array, chunk);
+    view->rows = item;
+    return EBPO_OK;
+}

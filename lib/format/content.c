@@ -1,0 +1,126 @@
+#include "format/content.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/endian.h"
+#include "core/error.h"
+
+/* Of chunks of faces as they are without subtrees. */
+enum { PLAIN_FACE_ROWS = 4096, SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK };
+
+bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id)
+{
+    if (id == EBPO_A_FACES_INDEX && info->subtree_level)
+        return info->face_count > PLAIN_FACE_ROWS;
+    return !ebpo_schema_is_list(id) &&
+           !(ebpo_schema[id].needs & (EBPO_NEEDS_SUBTREES | EBPO_NEEDS_ATTRIBUTES));
+}
+
+void ebpo_array_digest_begin(ebpo_array_digest *digest) { ebpo_sha256_begin(&digest->state); }
+
+void ebpo_array_digest_end(ebpo_array_digest *digest, uint8_t out[32])
+{
+    ebpo_sha256_end(&digest->state, out);
+}
+
+static uint64_t load(const uint8_t *at, unsigned size)
+{
+    return size == 4 ? ebpo_load32(at) : ebpo_load64(at);
+}
+
+/* The value of a difference, and the other way round; modulo 2 to the bits of `size`. */
+static uint64_t unzigzag(uint64_t code) { return (code >> 1) ^ (0 - (code & 1)); }
+
+static uint64_t zigzag(uint64_t value, unsigned size)
+{
+    return size == 4 ? (uint32_t)((uint32_t)value << 1 ^ (0 - ((uint32_t)value >> 31)))
+                     : value << 1 ^ (0 - (value >> 63));
+}
+
+/* The first row as it is where it goes on from the chunk before; keeps the last one's values. */
+static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool goes_on,
+                        uint64_t rows, const uint8_t *bytes, uint8_t *joined)
+{
+    unsigned size = shape->element_size, cols = shape->cols ? shape->cols : 1;
+    for (unsigned k = 0; k < cols; k++) {
+        const uint8_t *column = bytes + k * size;
+        uint64_t sum = 0, from = goes_on ? digest->last[k] : 0,
+                 code = zigzag(unzigzag(load(column, size)) - from, size);
+        for (uint64_t i = 0; i < rows; i++)
+            sum += unzigzag(load(column + i * cols * size, size));
+        digest->last[k] = sum;
+        if (size == 4)
+            ebpo_store32(joined + k * size, (uint32_t)code);
+        else
+            ebpo_store64(joined + k * size, code);
+    }
+}
+
+static void add_faces_index(ebpo_array_digest *digest, uint64_t row, uint64_t rows,
+                            size_t row_bytes, const uint8_t *bytes)
+{
+    for (uint64_t i = 0; i < rows; i++)
+        if ((row + i) % SKIPPED == 0)
+            ebpo_sha256_add(&digest->state, bytes + i * row_bytes, row_bytes);
+}
+
+void ebpo_array_digest_add(ebpo_array_digest *digest, const ebpo_info *info, ebpo_array_id id,
+                           const ebpo_shape *shape, uint64_t row, uint64_t rows,
+                           const uint8_t *bytes)
+{
+    size_t row_bytes = ebpo_shape_row_bytes(shape);
+    uint32_t full = ebpo_full_chunk_rows(shape->rows, shape->cols, shape->element_size);
+    uint8_t joined[3 * sizeof(uint64_t)];
+    bool deltas = id == EBPO_A_VERTICES || id == EBPO_A_VERTEX_SOURCE || id == EBPO_A_FACE_SOURCE;
+    if (info->subtree_level && id == EBPO_A_FACES_INDEX) {
+        add_faces_index(digest, row, rows, row_bytes, bytes);
+    } else if (info->subtree_level && deltas) {
+        join_deltas(digest, shape, row % full != 0, rows, bytes, joined);
+        ebpo_sha256_add(&digest->state, joined, row_bytes);
+        ebpo_sha256_add(&digest->state, bytes + row_bytes, (rows - 1) * row_bytes);
+    } else {
+        ebpo_sha256_add(&digest->state, bytes, rows * row_bytes);
+    }
+}
+
+void ebpo_content_put(ebpo_content *content, const char *path, const uint8_t digest[32])
+{
+    if (!ebpo_grow(&content->entries, &content->capacity, content->count + 1,
+                   sizeof *content->entries)) {
+        content->short_of_memory = true;
+        return;
+    }
+    ebpo_content_entry *entry = &content->entries[content->count++];
+    snprintf(entry->path, sizeof entry->path, "%s", path);
+    memcpy(entry->digest, digest, 32);
+}
+
+static int by_path(const void *a, const void *b)
+{
+    return strcmp(((const ebpo_content_entry *)a)->path, ((const ebpo_content_entry *)b)->path);
+}
+
+ebpo_status ebpo_content_end(ebpo_content *content, uint8_t digest[32], ebpo_error *error)
+{
+    if (content->short_of_memory)
+        return ebpo_fail_memory(error, (content->count + 1) * sizeof *content->entries);
+    ebpo_sha256 state;
+    ebpo_sha256_begin(&state);
+    if (content->count)
+        qsort(content->entries, content->count, sizeof *content->entries, by_path);
+    for (uint64_t i = 0; i < content->count; i++) {
+        ebpo_sha256_add(&state, content->entries[i].path, strlen(content->entries[i].path) + 1);
+        ebpo_sha256_add(&state, content->entries[i].digest, 32);
+    }
+    ebpo_sha256_end(&state, digest);
+    return EBPO_OK;
+}
+
+void ebpo_content_free(ebpo_content *content)
+{
+    free(content->entries);
+    memset(content, 0, sizeof *content);
+}

@@ -1,0 +1,45 @@
+/* The attributes of the root and of the levels' groups: ebpo_info but for what the reader measures.
+ */
+#ifndef EBPO_FORMAT_HEAD_FACTS_H
+#define EBPO_FORMAT_HEAD_FACTS_H
+
+#include <ebpo/file.h>
+
+#include "hdf5_write/h5.h"
+#include "hdf5_read/head.h"
+
+/* Writes the root's attributes; checksums and chunk_index_* as they stand (put them again
+ * later). */
+EBPO_MUST_USE ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
+                                         ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root,
+                                                const uint8_t digest[32], ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_put_colours_digest(ebpo_h5_out *out, ebpo_h5_id root,
+                                                        const uint8_t digest[32],
+                                                        ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset,
+                                               uint64_t bytes, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_put_top(ebpo_h5_out *out, ebpo_h5_id root, uint64_t bytes,
+                                             ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group,
+                                               const ebpo_level_summary *level, ebpo_error *error);
+
+/* Reads the root's attributes: version and required parts first, so that a newer file is refused by
+ * name and not for its details. */
+EBPO_MUST_USE ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
+                                         ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_get_level(ebpo_head *in, ebpo_head_object group,
+                                               const char *path, ebpo_level_summary *level,
+                                               ebpo_error *error);
+
+/* One digest, of any object. */
+EBPO_MUST_USE ebpo_status ebpo_facts_get_digest(ebpo_head *in, ebpo_head_object id,
+                                                const char *object, const char *name,
+                                                uint8_t digest[32], ebpo_error *error);
+
+/* Checks that the facts agree with each other: ranges, and sums over the levels. For files
+ * (EBPO_E_FORMAT) and for callers' trees (EBPO_E_ARGUMENT). */
+EBPO_MUST_USE ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_status as,
+                                           ebpo_error *error);
+
+#endif

@@ -1,0 +1,42 @@
+/* Picking here and there: runs of sibling groups of one level, and rows of the mesh's arrays, each
+ * chunk fetched once and what is needed announced together. Everything that comes out has been
+ * checked, as in slice.h. */
+#ifndef EBPO_FORMAT_PICK_H
+#define EBPO_FORMAT_PICK_H
+
+#include "mesh/attributes.h"
+#include "format/level_runs.h"
+
+/* All nodes of ascending runs that do not overlap, as one level: group_count is the sum of the
+ * runs', whose ranks and counts are filled in. Every array that is there for one of `parts` (face
+ * lists with the file's numbers, leaf_first too) or for none. Volumes are left 0. The caller frees
+ * it with ebpo_level_free. */
+EBPO_MUST_USE ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs,
+                                          uint64_t run_count, uint32_t parts, ebpo_level *out,
+                                          ebpo_error *error);
+
+/* Rows of a decoded array without level (faces: three corners; vertices: three floats or doubles;
+ * maps: a number), in any order. EBPO_E_FORMAT for a row that is not there. */
+EBPO_MUST_USE ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id,
+                                         const uint32_t *rows, uint64_t count, unsigned threads,
+                                         void *out, ebpo_error *error);
+
+/* The same of an array of attributes (attribute_arrays.h): values, ends or items. */
+EBPO_MUST_USE ebpo_status ebpo_pick_attribute_rows(ebpo_chunks *chunks, int number,
+                                                   const uint32_t *rows, uint64_t count,
+                                                   unsigned threads, void *out, ebpo_error *error);
+
+/* Rows of all attributes of an element into `to`, which has the file's arrays without values and
+ * no workspace. */
+EBPO_MUST_USE ebpo_status ebpo_pick_attributes(ebpo_chunks *chunks, ebpo_attributes *to,
+                                               const char *element, const uint32_t *rows,
+                                               uint64_t count, unsigned threads, ebpo_error *error);
+
+/* Announces what picking these faces takes (parts: mesh, maps), and the vertices that come first
+ * with the chunks that hold them: most that the faces use. */
+void ebpo_faces_expect(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count, uint32_t parts);
+/* The same of vertices. */
+void ebpo_vertices_expect(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t count,
+                          uint32_t parts);
+
+#endif

@@ -1,0 +1,45 @@
+/* Where subtrees begin in every array, from the file's table: format-spec/README.md, section 9.
+ * What comes out fits the counts of the head. Any thread. */
+#ifndef EBPO_FORMAT_SUBTREE_TABLE_H
+#define EBPO_FORMAT_SUBTREE_TABLE_H
+
+#include "format/chunks.h"
+
+enum { EBPO_SUBTREE_COLS = EBPO_SUBTREE_LEVELS + EBPO_SUBTREE_LEVEL_COLS * EBPO_LEVELS_MAX };
+
+typedef struct ebpo_subtree_row {
+    uint64_t subtree;
+    uint64_t before[EBPO_SUBTREE_COLS]; /* sums of the columns before it, */
+    uint64_t after[EBPO_SUBTREE_COLS];  /* and with it */
+    uint64_t face, vertex;              /* its own first ones */
+} ebpo_subtree_row;
+
+/* Whether the table tells of a level's nodes: those below the subtrees' roots. */
+static inline bool ebpo_subtree_table_has(const ebpo_file *file, int level)
+{
+    return file->info.subtree_level && level > file->info.subtree_level;
+}
+
+/* A subtree's row; it must be less than the number of subtrees. */
+EBPO_MUST_USE ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree,
+                                                 ebpo_subtree_row *out, ebpo_error *error);
+/* The last subtree that begins at or before an item, of those that column `column` counts. */
+EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column,
+                                                  uint64_t item, ebpo_subtree_row *out,
+                                                  ebpo_error *error);
+
+/* Of a row, groups of a level before the subtree and after it. */
+uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row, int level,
+                             bool after);
+
+/* Adds the chunks of the table that are not in memory and that finding an item of a level takes (of
+ * its groups, gray nodes or leaves, by EBPO_PER_...); true if there are any, else *first is where
+ * its subtree begins. Errors are the reading's to tell: then true as well. */
+bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, uint64_t item,
+                                ebpo_chunk_keys *keys, uint64_t *first);
+
+/* Announces what reading rows of the table takes, of subtrees in any order. */
+void ebpo_subtree_table_expect(ebpo_chunks *chunks, const uint64_t *subtrees, uint64_t count);
+void ebpo_subtree_table_expect_run(ebpo_chunks *chunks, uint64_t first, uint64_t count);
+
+#endif

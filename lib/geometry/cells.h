@@ -1,0 +1,174 @@
+/* Cells as an octree has them: children and parents, what lies beside them, where points are. Walls
+ * are geometry/cell.h's. */
+#ifndef EBPO_GEOMETRY_CELLS_H
+#define EBPO_GEOMETRY_CELLS_H
+
+#include <ebpo/file.h>
+
+#include "geometry/cell.h"
+
+/* A file's root cell. */
+static inline ebpo_box ebpo_root_box(const ebpo_info *info)
+{
+    const double *origin = info->box_origin, *size = info->box_size;
+    return (ebpo_box){ { origin[0], origin[1], origin[2] },
+                       { size[0], size[1], size[2] },
+                       info->grid_level };
+}
+
+static inline ebpo_cell ebpo_cell_child(ebpo_cell cell, unsigned octant)
+{
+    return (ebpo_cell){ cell.level + 1,
+                        { 2 * cell.at[0] + (octant & 1), 2 * cell.at[1] + (octant >> 1 & 1),
+                          2 * cell.at[2] + (octant >> 2 & 1) } };
+}
+
+/* The cell of a coarser level that holds it. */
+static inline ebpo_cell ebpo_cell_ancestor(ebpo_cell cell, int level)
+{
+    int up = cell.level - level;
+    return (ebpo_cell){ level, { cell.at[0] >> up, cell.at[1] >> up, cell.at[2] >> up } };
+}
+
+static inline ebpo_cell ebpo_cell_parent(ebpo_cell cell)
+{
+    return ebpo_cell_ancestor(cell, cell.level - 1);
+}
+
+static inline bool ebpo_cell_equal(ebpo_cell a, ebpo_cell b)
+{
+    return a.level == b.level && a.at[0] == b.at[0] && a.at[1] == b.at[1] && a.at[2] == b.at[2];
+}
+
+/* Octant of the position's ancestor, `up` levels above it, in its own parent. */
+static inline unsigned ebpo_octant_at(const uint32_t at[3], int up)
+{
+    return (at[0] >> up & 1) | (at[1] >> up & 1) << 1 | (at[2] >> up & 1) << 2;
+}
+
+/* On the way from a coarser level down to the cell: which child of that level's node. */
+static inline unsigned ebpo_cell_octant(ebpo_cell cell, int level)
+{
+    return ebpo_octant_at(cell.at, cell.level - level - 1);
+}
+
+/* The cell of the same level one step of -1, 0 or 1 away on each axis: across a face, an edge or a
+ * corner. False outside the root. */
+static inline bool ebpo_cell_neighbour(ebpo_cell cell, const int step[3], ebpo_cell *out)
+{
+    *out = cell;
+    for (int k = 0; k < 3; k++) {
+        out->at[k] += (uint32_t)step[k];
+        if (out->at[k] >> cell.level) /* also of what wrapped around below 0 */
+            return false;
+    }
+    return true;
+}
+
+/* Two cells, of any levels and closed, have a point in common. */
+bool ebpo_cells_touch(ebpo_cell a, ebpo_cell b);
+
+/* The closed cell has a point in common with the box [min, max]. */
+static inline bool ebpo_cell_meets(const ebpo_box *box, ebpo_cell cell, const double min[3],
+                                   const double max[3])
+{
+    for (int k = 0; k < 3; k++)
+        if (ebpo_wall(box, k, cell.level, cell.at[k]) > max[k] ||
+            ebpo_wall(box, k, cell.level, cell.at[k] + 1) < min[k])
+            return false;
+    return true;
+}
+
+/* Volume of each cell of a level, in the model's unit cubed. */
+double ebpo_cell_volume(const ebpo_box *box, int level);
+
+/* The cell's walls: low and high coordinates. */
+static inline void ebpo_cell_bounds(const ebpo_box *box, ebpo_cell cell, double low[3],
+                                    double high[3])
+{
+    for (int k = 0; k < 3; k++) {
+        low[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
+        high[k] = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
+    }
+}
+
+static inline uint32_t ebpo_locate_on_axis(const ebpo_box *box, int level, int axis, double p)
+{
+    double cells = (double)(1u << level), guess = (p - box->origin[axis]) / box->size[axis] * cells;
+    /* The guess is right to 2^-30 of a cell: three roundings, of at most 2^20 cells. */
+    uint32_t i = guess >= cells ? (1u << level) - 1 : (uint32_t)guess;
+    double part = guess - (double)i;
+    if (part > 0x1p-30 && part < 1 - 0x1p-30)
+        return i;
+    while (ebpo_wall(box, axis, level, i) > p)
+        i--;
+    while (ebpo_wall(box, axis, level, i + 1) <= p)
+        i++;
+    return i;
+}
+
+/* The cell of the given level that holds p (walls belong to the upper cell); false outside the root
+ * cell. Exact: level <= grid_level. */
+static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3], uint32_t at[3])
+{
+    for (int k = 0; k < 3; k++) {
+        if (!(p[k] >= box->origin[k]) || !(p[k] < ebpo_wall(box, k, level, 1u << level)))
+            return false;
+        at[k] = ebpo_locate_on_axis(box, level, k, p[k]);
+    }
+    return true;
+}
+
+/* What finds the cells of one level, made once: most points need no division and no wall. */
+typedef struct ebpo_locator {
+    ebpo_box box;
+    int level;
+    double scale[3], half; /* cells in a unit; half of all cells of an axis */
+} ebpo_locator;
+
+/* A point's place in the grid of that level. */
+typedef struct ebpo_position {
+    uint32_t at[3];  /* its cell */
+    double cells[3]; /* its coordinates in cells, right to 2^-30 */
+} ebpo_position;
+
+static inline ebpo_locator ebpo_locator_make(const ebpo_box *box, int level)
+{
+    ebpo_locator l = { .box = *box, .level = level, .half = (double)(1u << level) / 2 };
+    for (int k = 0; k < 3; k++)
+        l.scale[k] = 2 * l.half / box->size[k]; /* infinite for boxes of almost no size */
+    return l;
+}
+
+/* Near a wall, or outside. */
+bool ebpo_locator_decide(const ebpo_locator *locator, const double p[3], ebpo_position *out);
+
+/* As ebpo_locate. */
+static inline bool ebpo_locator_find(const ebpo_locator *l, const double p[3], ebpo_position *out)
+{
+    bool sure = true;
+    for (int k = 0; k < 3; k++) {
+        double cells = (p[k] - l->box.origin[k]) * l->scale[k];
+        bool within = __builtin_fabs(cells - l->half) < l->half;
+        int32_t i = within ? (int32_t)cells : 0;
+        sure &= within & (__builtin_fabs(cells - (double)i - 0.5) < 0.5 - 0x1p-30);
+        out->cells[k] = cells;
+        out->at[k] = (uint32_t)i;
+    }
+    return __builtin_expect(sure, 1) || ebpo_locator_decide(l, p, out);
+}
+
+/* From the cell's coordinates to the model's. A point on a wall (`sides`: ebpo_polytope_sides) gets
+ * the wall's own coordinate, so that neighbouring cells agree to the last bit. */
+static inline double ebpo_wall_point(const ebpo_box *box, ebpo_cell cell, int axis, double xi,
+                                     unsigned sides)
+{
+    double low = ebpo_wall(box, axis, cell.level, cell.at[axis]);
+    if (xi <= 0 || sides >> 2 * axis & 1)
+        return low;
+    if (xi >= 1 || sides >> (2 * axis + 1) & 1)
+        return ebpo_wall(box, axis, cell.level, cell.at[axis] + 1);
+    return low + xi * (box->size[axis] / (double)(1u << cell.level));
+}
+
+#endif

@@ -1,0 +1,163 @@
+/* Exact arithmetic on doubles: a value is an unevaluated sum of doubles that do not overlap, the
+ * smallest first, without zeros. Exact as long as nothing overflows or underflows: callers keep
+ * exponents in range (see predicates_expansion.c). An array of n = 0 components is 0. Include
+ * strict_fp.h first. Source: Shewchuk 1997, section 2: TWO-SUM, SPLIT, TWO-PRODUCT,
+ * FAST-EXPANSION-SUM and SCALE-EXPANSION. */
+#ifndef EBPO_GEOMETRY_EXPANSION_H
+#define EBPO_GEOMETRY_EXPANSION_H
+
+#include <math.h>
+
+/* A double and what rounding left of it: head + tail is exact. */
+typedef struct ebpo_pair {
+    double head, tail;
+} ebpo_pair;
+
+static inline ebpo_pair ebpo_two_sum(double a, double b)
+{
+    double head = a + b;
+    double b_part = head - a, a_part = head - b_part;
+    return (ebpo_pair){ head, (a - a_part) + (b - b_part) };
+}
+
+static inline ebpo_pair ebpo_two_difference(double a, double b) { return ebpo_two_sum(a, -b); }
+
+/* Halves of at most 26 bits. */
+static inline ebpo_pair ebpo_split(double a)
+{
+    double c = 0x1.0000002p27 * a;
+    double high = c - (c - a);
+    return (ebpo_pair){ high, a - high };
+}
+
+static inline ebpo_pair ebpo_two_product(double a, double b)
+{
+    double head = a * b;
+#ifdef EBPO_PRODUCTS_BY_FMA /* the same while nothing overflows or underflows, and faster */
+    return (ebpo_pair){ head, __builtin_fma(a, b, -head) };
+#else
+    ebpo_pair p = ebpo_split(a), q = ebpo_split(b);
+    double rest = ((head - p.head * q.head) - p.tail * q.head) - p.head * q.tail;
+    return (ebpo_pair){ head, p.tail * q.tail - rest };
+#endif
+}
+
+static inline int ebpo_expansion_push(double *out, int n, double x)
+{
+    if (x != 0)
+        out[n++] = x;
+    return n;
+}
+
+static inline int ebpo_expansion_of_pair(double *out, ebpo_pair pair)
+{
+    return ebpo_expansion_push(out, ebpo_expansion_push(out, 0, pair.tail), pair.head);
+}
+
+/* out = e + f; `out` has room for n + m and is neither of them. Returns the number of components.
+ */
+static inline int ebpo_expansion_sum(double *out, const double *e, int n, const double *f, int m)
+{
+    int i = 0, j = 0, length = 0;
+    double carry = 0;
+    while (i < n || j < m) {
+        double next = j >= m || (i < n && fabs(e[i]) < fabs(f[j])) ? e[i++] : f[j++];
+        ebpo_pair sum = ebpo_two_sum(carry, next);
+        length = ebpo_expansion_push(out, length, sum.tail);
+        carry = sum.head;
+    }
+    return ebpo_expansion_push(out, length, carry);
+}
+
+/* out = e * factor; `out` has room for 2 n and is not e. */
+static inline int ebpo_expansion_scale(double *out, const double *e, int n, double factor)
+{
+    int length = 0;
+    double carry = 0;
+    for (int i = 0; i < n; i++) {
+        ebpo_pair product = ebpo_two_product(e[i], factor);
+        ebpo_pair low = ebpo_two_sum(carry, product.tail);
+        ebpo_pair high = ebpo_two_sum(product.head, low.head);
+        length = ebpo_expansion_push(out, length, low.tail);
+        length = ebpo_expansion_push(out, length, high.tail);
+        carry = high.head;
+    }
+    return ebpo_expansion_push(out, length, carry);
+}
+
+static inline void ebpo_expansion_negate(double *e, int n)
+{
+    for (int i = 0; i < n; i++)
+        e[i] = -e[i];
+}
+
+static inline int ebpo_expansion_sign(const double *e, int n)
+{
+    return n == 0 ? 0 : e[n - 1] > 0 ? 1 : -1;
+}
+
+/* Fewer components, each the rounded sum of itself and all below: e shrinks in place. Shewchuk's
+ * COMPRESS. */
+static inline int ebpo_expansion_compress(double *e, int n)
+{
+    if (n == 0)
+        return 0;
+    int bottom = n - 1, top = 0;
+    double sum = e[n - 1];
+    for (int i = n - 2; i >= 0; i--) {
+        ebpo_pair pair = ebpo_two_sum(sum, e[i]);
+        sum = pair.head;
+        if (pair.tail != 0) {
+            e[bottom--] = sum;
+            sum = pair.tail;
+        }
+    }
+    e[bottom] = sum;
+    for (int i = bottom + 1; i < n; i++) {
+        ebpo_pair pair = ebpo_two_sum(e[i], sum);
+        sum = pair.head;
+        if (pair.tail != 0)
+            e[top++] = pair.tail;
+    }
+    e[top++] = sum;
+    return top;
+}
+
+/* out = e * f for f of at most two components, e of at most 16; room for 4 n. */
+static inline int ebpo_expansion_times(double *out, const double *e, int n, const double *f, int m)
+{
+    double low[32], high[32];
+    if (m == 0)
+        return 0;
+    if (m == 1)
+        return ebpo_expansion_scale(out, e, n, f[0]);
+    int low_n = ebpo_expansion_scale(low, e, n, f[0]);
+    int high_n = ebpo_expansion_scale(high, e, n, f[1]);
+    return ebpo_expansion_sum(out, low, low_n, high, high_n);
+}
+
+/* A difference as an expansion of at most two components. */
+typedef struct ebpo_difference {
+    int n;
+    double x[2];
+} ebpo_difference;
+
+static inline ebpo_difference ebpo_difference_of(ebpo_pair pair)
+{
+    ebpo_difference d = { 0 };
+    d.n = ebpo_expansion_of_pair(d.x, pair);
+    return d;
+}
+
+/* out = p * q - r * s; room for 16. */
+static inline int ebpo_expansion_minor(double *out, ebpo_difference p, ebpo_difference q,
+                                       ebpo_difference r, ebpo_difference s)
+{
+    double left[8], right[8];
+    int left_n = ebpo_expansion_times(left, p.x, p.n, q.x, q.n);
+    int right_n = ebpo_expansion_times(right, r.x, r.n, s.x, s.n);
+    ebpo_expansion_negate(right, right_n);
+    return ebpo_expansion_sum(out, left, left_n, right, right_n);
+}
+
+#endif

@@ -1,0 +1,50 @@
+/* Cutting polygons in space into triangles over their own corners.
+ *
+ * The polygon is projected along the axis on which its normal (Newell's sum) is largest. There a
+ * convex polygon becomes a fan from its first corner; any other is cut ear by ear, every turn and
+ * every point-in-ear test by the exact ebpo_orient2d: first as if the outline did not touch itself,
+ * then, where that fails, with the rule for outlines that do (polygon_ears.h). All triangles then
+ * turn the polygon's way or have no area, so each point is covered as often as the outline winds
+ * around it: once in a polygon with slits, with bridges to holes, or pinched at corners.
+ *
+ * Outlines that cross themselves as projected (folded quads among them) have no such triangles.
+ * They get those of least area in space, up to EBPO_POLYGON_OPTIMAL corners, else the least ears
+ * first: a guess, which callers count. The result depends on nothing but the corners. Sources:
+ * Meisters, "Polygons have ears", 1975; Barequet and Sharir, "Filling gaps in the boundary of a
+ * polyhedron", 1995, for the least area.
+ */
+#ifndef EBPO_GEOMETRY_POLYGON_H
+#define EBPO_GEOMETRY_POLYGON_H
+
+#include <ebpo/base.h>
+
+typedef enum ebpo_polygon_kind {
+    EBPO_POLYGON_CONVEX, /* a fan; also every triangle */
+    /* no reflex corner but straight ones: cut by ears, so that no triangle lies on a straight side
+     */
+    EBPO_POLYGON_FLAT,
+    EBPO_POLYGON_CONCAVE, /* cut by ears; also where the outline touches itself */
+    EBPO_POLYGON_GUESSED, /* it crosses itself: triangles of least area */
+    /* a fan: its corners are on a line, or a coordinate is not finite */
+    EBPO_POLYGON_DEGENERATE,
+    /* more than EBPO_POLYGON_WORK steps were not enough; `triangle` is not usable */
+    EBPO_POLYGON_TOO_LARGE,
+    EBPO_POLYGON_NO_MEMORY
+} ebpo_polygon_kind;
+
+/* Limit of steps for one polygon, each a few tests of coordinates. Outlines of 100,000 corners stay
+ * well below it, unless tens of thousands of them are on one line or at one place. */
+#define EBPO_POLYGON_WORK (UINT64_C(1) << 31)
+
+enum { EBPO_POLYGON_OPTIMAL = 64 };
+
+/* Bytes of scratch for n corners, at any alignment that malloc gives; 0 when that does not fit 64
+ * bits. */
+uint64_t ebpo_polygon_scratch_bytes(uint64_t n);
+
+/* Writes n - 2 triangles of corner numbers (0 .. n - 1) with the polygon's orientation. n >= 3.
+ * Pure, any thread. */
+ebpo_polygon_kind ebpo_polygon_triangulate(uint32_t (*triangle)[3], const double (*corner)[3],
+                                           uint32_t n, void *scratch);
+
+#endif

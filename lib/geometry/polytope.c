@@ -1,0 +1,411 @@
+#include "core/strict_fp.h"
+
+#include "geometry/polytope.h"
+
+#include <math.h>
+#include <string.h>
+
+static const double tolerance = 1e-10;
+
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+void ebpo_polytope_cube(ebpo_polytope *p)
+{
+    /* Vertex i has bit 0 x, bit 1 y, bit 2 z. */
+    static const uint16_t loops[6][4] = { { 0, 4, 6, 2 }, { 1, 3, 7, 5 }, { 0, 1, 5, 4 },
+                                          { 2, 6, 7, 3 }, { 0, 2, 3, 1 }, { 4, 5, 7, 6 } };
+    p->vertex_count = 8;
+    p->face_count = 6;
+    p->corner_count = 24;
+    for (int i = 0; i < 8; i++)
+        for (int k = 0; k < 3; k++)
+            p->vertex[i][k] = i >> k & 1;
+    for (int f = 0; f < 6; f++) {
+        p->tag[f] = -1 - f;
+        p->first[f] = (uint16_t)(4 * f);
+        memcpy(p->corner + 4 * f, loops[f], sizeof loops[f]);
+    }
+    p->first[6] = 24;
+}
+
+double ebpo_polytope_volume(const ebpo_polytope *p)
+{
+    const double *o = p->vertex[0];
+    double sum = 0;
+    for (int f = 0; f < p->face_count; f++) {
+        const double *a = p->vertex[p->corner[p->first[f]]];
+        double oa[3] = { a[0] - o[0], a[1] - o[1], a[2] - o[2] };
+        for (int i = p->first[f] + 1; i + 1 < p->first[f + 1]; i++) {
+            const double *b = p->vertex[p->corner[i]], *c = p->vertex[p->corner[i + 1]];
+            double ob[3] = { b[0] - o[0], b[1] - o[1], b[2] - o[2] };
+            double oc[3] = { c[0] - o[0], c[1] - o[1], c[2] - o[2] };
+            double n[3];
+            cross(ob, oc, n);
+            sum += dot(oa, n);
+        }
+    }
+    return sum / 6;
+}
+
+static void between(const double a[3], double da, const double b[3], double db, double out[3])
+{
+    double t = da / (da - db);
+    for (int k = 0; k < 3; k++)
+        out[k] = a[k] + t * (b[k] - a[k]);
+}
+
+double ebpo_polytope_cap_bound(double volume, double width, double height)
+{
+    if (!(height > 1e-9) || !(width > 0))
+        return 0;
+    double left = height < width ? 1 - height / width : 0;
+    return volume * (1 - left * left * left);
+}
+
+static void minus(const double a[3], const double b[3], double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = a[k] - b[k];
+}
+
+/* What lies beyond a plane, seen from its farthest vertex: faces that have this vertex add nothing,
+ * the others a fan each, and the cut is a polygon whose area follows from its edges in any order.
+ */
+typedef struct beyond {
+    const ebpo_polytope *p;
+    /* area: twice the cut's, as a vector; origin: a point of the plane */
+    double dist[EBPO_POLYTOPE_VERTICES], fans, area[3], origin[3];
+    int farthest;
+    bool started;
+} beyond;
+
+static void point_between(const beyond *c, int out, int in, double x[3])
+{
+    /* always from the outer end, so that neighbours get the same point */
+    between(c->p->vertex[out], c->dist[out], c->p->vertex[in], c->dist[in], x);
+}
+
+/* An edge of the cut. */
+static void add_edge(beyond *c, const double from[3], const double to[3])
+{
+    if (!c->started) {
+        c->started = true;
+        memcpy(c->origin, from, sizeof c->origin);
+        return; /* seen from its own end it spans nothing */
+    }
+    double u[3], v[3], n[3];
+    minus(from, c->origin, u);
+    minus(to, c->origin, v);
+    cross(u, v, n);
+    for (int k = 0; k < 3; k++)
+        c->area[k] += n[k];
+}
+
+static void add_to_fan(beyond *c, const double x[3], int *kept, double first[3], double last[3])
+{
+    double v[3], n[3];
+    minus(x, c->p->vertex[c->farthest], v);
+    if (*kept == 0)
+        memcpy(first, v, sizeof v);
+    else if (*kept > 1) {
+        cross(last, v, n);
+        c->fans += dot(first, n);
+    }
+    memcpy(last, v, sizeof v);
+    ++*kept;
+}
+
+static void face_beyond(beyond *c, int f)
+{
+    const ebpo_polytope *p = c->p;
+    const uint16_t *loop = p->corner + p->first[f];
+    int count = p->first[f + 1] - p->first[f], outside = 0, kept = 0;
+    bool fan = true;
+    for (int i = 0; i < count; i++) {
+        outside += c->dist[loop[i]] > 0;
+        fan &= loop[i] != c->farthest;
+    }
+    if (!outside)
+        return;
+    double enter[3] = { 0, 0, 0 }, leave[3] = { 0, 0, 0 }, first[3] = { 0, 0, 0 },
+           last[3] = { 0, 0, 0 };
+    for (int i = 0, a = loop[count - 1]; i < count; a = loop[i++]) {
+        int b = loop[i];
+        bool a_out = c->dist[a] > 0, b_out = c->dist[b] > 0;
+        if (a_out != b_out) {
+            point_between(c, a_out ? a : b, a_out ? b : a, a_out ? leave : enter);
+            if (fan)
+                add_to_fan(c, a_out ? leave : enter, &kept, first, last);
+        }
+        if (fan && b_out)
+            add_to_fan(c, p->vertex[b], &kept, first, last);
+    }
+    if (outside < count)
+        add_edge(c, enter, leave);
+}
+
+double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d, double volume,
+                             double least)
+{
+    beyond c;
+    double low = 1e300, high = -1e300;
+    if (!p->vertex_count)
+        return 0;
+    for (int i = 0; i < p->vertex_count; i++) {
+        double e = dot(n, p->vertex[i]) - d;
+        c.dist[i] = e;
+        low = e < low ? e : low;
+        if (e > high)
+            high = e, c.farthest = i;
+    }
+    if (!(high > 0) || (least > 0 && ebpo_polytope_cap_bound(volume, high - low, high) < least))
+        return 0;
+    c.p = p;
+    c.fans = c.area[0] = c.area[1] = c.area[2] = 0;
+    c.started = false;
+    for (int f = 0; f < p->face_count; f++)
+        face_beyond(&c, f);
+    return (c.fans + high * fabs(dot(n, c.area)) / dot(n, n)) / 6;
+}
+
+/* --- clipping --- */
+
+typedef struct cut {
+    const ebpo_polytope *in;
+    ebpo_polytope *out;
+    double dist[EBPO_POLYTOPE_VERTICES];
+    uint16_t number[EBPO_POLYTOPE_VERTICES]; /* of kept vertices in `out` */
+    bool on[EBPO_POLYTOPE_VERTICES];         /* `out` vertex lies on the cutting plane */
+    /* cut edges and their new vertices */
+    struct {
+        uint16_t in, out, number;
+    } edge[EBPO_POLYTOPE_FACES];
+    int edges;
+    /* edges of kept loops that lie on the plane */
+    struct {
+        uint16_t from, to;
+    } rim[EBPO_POLYTOPE_CORNERS];
+    int rims;
+    bool full;
+    bool touched; /* old vertices lie on the plane: rim edges may have kept faces on both sides */
+} cut;
+
+static uint16_t add_vertex(cut *c, const double x[3], bool on)
+{
+    if (c->out->vertex_count == EBPO_POLYTOPE_VERTICES) {
+        c->full = true;
+        return 0;
+    }
+    int i = c->out->vertex_count++;
+    memcpy(c->out->vertex[i], x, sizeof c->out->vertex[i]);
+    c->on[i] = on;
+    return (uint16_t)i;
+}
+
+static uint16_t crossing(cut *c, uint16_t in, uint16_t out)
+{
+    if (c->dist[in] >= -tolerance)
+        return c->number[in]; /* the inner end itself lies on the plane */
+    for (int i = 0; i < c->edges; i++)
+        if (c->edge[i].in == in && c->edge[i].out == out)
+            return c->edge[i].number;
+    if (c->edges == EBPO_POLYTOPE_FACES) {
+        c->full = true;
+        return 0;
+    }
+    double x[3];
+    between(c->in->vertex[in], c->dist[in], c->in->vertex[out], c->dist[out], x);
+    uint16_t number = add_vertex(c, x, true);
+    c->edge[c->edges].in = in;
+    c->edge[c->edges].out = out;
+    c->edge[c->edges++].number = number;
+    return number;
+}
+
+static void add_corner(cut *c, int loop_start, uint16_t v)
+{
+    ebpo_polytope *o = c->out;
+    if (o->corner_count > loop_start && o->corner[o->corner_count - 1] == v)
+        return;
+    if (o->corner_count == EBPO_POLYTOPE_CORNERS) {
+        c->full = true;
+        return;
+    }
+    o->corner[o->corner_count++] = v;
+}
+
+static void close_face(cut *c, int start, int32_t tag)
+{
+    ebpo_polytope *o = c->out;
+    while (o->corner_count > start + 1 && o->corner[o->corner_count - 1] == o->corner[start])
+        o->corner_count--;
+    if (o->corner_count - start < 3 || o->corner_count - start > 255 ||
+        o->face_count == EBPO_POLYTOPE_FACES) {
+        /* users count corners in bytes */
+        c->full |= o->corner_count - start > 255 || o->face_count == EBPO_POLYTOPE_FACES;
+        o->corner_count = start;
+        return;
+    }
+    o->tag[o->face_count] = tag;
+    o->first[o->face_count++] = (uint16_t)start;
+    o->first[o->face_count] = (uint16_t)o->corner_count;
+}
+
+static void clip_face(cut *c, int f)
+{
+    const ebpo_polytope *p = c->in;
+    const uint16_t *loop = p->corner + p->first[f];
+    int count = p->first[f + 1] - p->first[f], start = c->out->corner_count;
+    bool inside = false;
+    for (int i = 0; i < count; i++)
+        inside |= c->dist[loop[i]] < -tolerance;
+    if (!inside)
+        return;
+    for (int i = 0; i < count; i++) {
+        uint16_t a = loop[i], b = loop[i + 1 < count ? i + 1 : 0];
+        bool a_out = c->dist[a] > tolerance, b_out = c->dist[b] > tolerance;
+        if (!a_out)
+            add_corner(c, start, c->number[a]);
+        if (a_out != b_out)
+            add_corner(c, start, a_out ? crossing(c, b, a) : crossing(c, a, b));
+    }
+    close_face(c, start, p->tag[f]);
+    for (int i = start; i < c->out->corner_count && !c->full; i++) {
+        uint16_t a = c->out->corner[i],
+                 b = c->out->corner[i + 1 < c->out->corner_count ? i + 1 : start];
+        if (c->on[a] && c->on[b]) {
+            c->rim[c->rims].from = a;
+            c->rim[c->rims++].to = b;
+        }
+    }
+}
+
+/* Rim edges used in both directions lie between two kept faces; the others, reversed, bound the
+ * cap. */
+static bool close_cap(cut *c, int32_t tag)
+{
+    int16_t next[EBPO_POLYTOPE_VERTICES];
+    memset(next, -1, (size_t)c->out->vertex_count * sizeof *next);
+    int open = 0, begin = -1;
+    for (int i = 0; i < c->rims; i++) {
+        bool paired = false;
+        for (int j = 0; c->touched && j < c->rims && !paired; j++)
+            paired = c->rim[i].from == c->rim[j].to && c->rim[i].to == c->rim[j].from;
+        if (paired)
+            continue;
+        if (next[c->rim[i].to] != -1)
+            return false;
+        next[c->rim[i].to] = c->rim[i].from;
+        begin = c->rim[i].to;
+        open++;
+    }
+    if (open < 3)
+        return false;
+    int start = c->out->corner_count, at = begin, steps = 0;
+    do {
+        add_corner(c, start, (uint16_t)at);
+        at = next[at];
+        steps++;
+    } while (at != -1 && at != begin && steps <= open);
+    if (at != begin || steps != open)
+        return false;
+    close_face(c, start, tag);
+    return true;
+}
+
+ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int32_t tag)
+{
+    cut c;
+    ebpo_polytope out;
+    c.in = p;
+    c.out = &out;
+    c.edges = c.rims = 0;
+    c.full = c.touched = false;
+    double most = -1e300, least = 1e300;
+    for (int i = 0; i < p->vertex_count; i++) {
+        double e = dot(n, p->vertex[i]) - d;
+        c.dist[i] = e;
+        most = e > most ? e : most;
+        least = e < least ? e : least;
+    }
+    if (most <= tolerance)
+        return EBPO_CLIP_NONE;
+    if (least >= -1e-7)
+        return EBPO_CLIP_REFUSED;
+    out.vertex_count = out.face_count = out.corner_count = 0;
+    out.first[0] = 0;
+    for (int i = 0; i < p->vertex_count; i++)
+        if (c.dist[i] <= tolerance) {
+            bool on = c.dist[i] >= -tolerance;
+            c.number[i] = add_vertex(&c, p->vertex[i], on);
+            c.touched |= on;
+        }
+    for (int f = 0; f < p->face_count && !c.full; f++)
+        clip_face(&c, f);
+    if (c.full || !close_cap(&c, tag) || c.full || out.face_count < 4)
+        return EBPO_CLIP_REFUSED;
+    memcpy(p->vertex, out.vertex, (size_t)out.vertex_count * sizeof out.vertex[0]);
+    memcpy(p->tag, out.tag, (size_t)out.face_count * sizeof out.tag[0]);
+    memcpy(p->first, out.first, (size_t)(out.face_count + 1) * sizeof out.first[0]);
+    memcpy(p->corner, out.corner, (size_t)out.corner_count * sizeof out.corner[0]);
+    p->vertex_count = out.vertex_count;
+    p->face_count = out.face_count;
+    p->corner_count = out.corner_count;
+    return EBPO_CLIP_CUT;
+}
+
+void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from)
+{
+    to->vertex_count = from->vertex_count;
+    to->face_count = from->face_count;
+    to->corner_count = from->corner_count;
+    memcpy(to->vertex, from->vertex, (size_t)from->vertex_count * sizeof from->vertex[0]);
+    memcpy(to->tag, from->tag, (size_t)from->face_count * sizeof from->tag[0]);
+    memcpy(to->first, from->first, (size_t)(from->face_count + 1) * sizeof from->first[0]);
+    memcpy(to->corner, from->corner, (size_t)from->corner_count * sizeof from->corner[0]);
+}
+
+/* Keeps one half, as ebpo_polytope_half does. */
+static bool halve(ebpo_polytope *p, int axis, int side)
+{
+    double n[3] = { 0, 0, 0 };
+    n[axis] = side ? -1 : 1;
+    for (int i = 0; i < p->vertex_count; i++)
+        p->vertex[i][axis] = 2 * p->vertex[i][axis] - side;
+    if (ebpo_polytope_clip(p, n, side ? 0 : 1, -1 - (2 * axis + !side)) != EBPO_CLIP_REFUSED)
+        return true;
+    ebpo_polytope_cube(p);
+    return false;
+}
+
+bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out)
+{
+    ebpo_polytope_copy(out, p);
+    return halve(out, axis, side);
+}
+
+bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out)
+{
+    ebpo_polytope_copy(out, p);
+    bool some = halve(out, 2, octant >> 2 & 1);
+    some = halve(out, 1, octant >> 1 & 1) && some;
+    return halve(out, 0, octant & 1) && some;
+}
+
+void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES])
+{
+    memset(sides, 0, EBPO_POLYTOPE_VERTICES);
+    for (int f = 0; f < p->face_count; f++)
+        for (int i = p->first[f]; p->tag[f] < 0 && i < p->first[f + 1]; i++)
+            sides[p->corner[i]] |= (uint8_t)(1u << (-1 - p->tag[f]));
+}

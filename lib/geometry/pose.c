@@ -1,0 +1,99 @@
+/* Checks poses; bounds: docs/develop/collision.md, "Posed coordinates". */
+#include "core/strict_fp.h"
+
+#include "geometry/pose.h"
+
+#include <math.h>
+
+#include "core/error.h"
+
+static const double most_deviation = 0x1p-20, least_scale = 0x1p-300, most_scale = 0x1p300,
+                    most_coordinate = 0x1p1000;
+
+static bool all_finite(const double *x, int n)
+{
+    bool finite = true;
+    for (int i = 0; i < n; i++)
+        finite &= isfinite(x[i]) != 0;
+    return finite;
+}
+
+/* The greatest |R^T R - 1|; infinite when that overflows. */
+static double deviation_of(const double r[3][3])
+{
+    double most = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            double product = (r[0][i] * r[0][k] + r[1][i] * r[1][k]) + r[2][i] * r[2][k];
+            double off = fabs(product - (i == k));
+            most = off <= most ? most : off < INFINITY ? off : INFINITY;
+        }
+    return most + 0x1p-50;
+}
+
+static double determinant(const double r[3][3])
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        sum += (r[0][u] * r[1][v] - r[0][v] * r[1][u]) * r[2][k];
+    }
+    return sum;
+}
+
+static ebpo_status check_rotation(const ebpo_pose *pose, double deviation, ebpo_error *error)
+{
+    if (!all_finite(&pose->rotation[0][0], 9) || !all_finite(pose->translation, 3))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "pose: a number is not finite");
+    if (!(deviation <= most_deviation))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "pose: the matrix is not a rotation: its transpose times itself is off by "
+                         "%.3g from the unit matrix, at most %.3g is allowed",
+                         deviation, most_deviation);
+    if (determinant(pose->rotation) < 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "pose: the matrix is a mirror, not a rotation: its determinant is -1");
+    if (!(pose->scale >= least_scale && pose->scale <= most_scale))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "pose: the scale is %g, not from %.3g to %.3g",
+                         pose->scale, least_scale, most_scale);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose, const double reach[3],
+                             ebpo_error *error)
+{
+    out->deviation = deviation_of(pose->rotation);
+    ebpo_status status = check_rotation(pose, out->deviation, error);
+    if (status != EBPO_OK)
+        return status;
+    out->scale = pose->scale;
+    for (int i = 0; i < 3; i++) {
+        out->translation[i] = pose->translation[i];
+        double size = fabs(pose->translation[i]);
+        for (int k = 0; k < 3; k++) {
+            out->matrix[i][k] = pose->scale * pose->rotation[i][k];
+            size += fabs(out->matrix[i][k]) * reach[k];
+        }
+        if (!(size <= most_coordinate))
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "pose: the model would reach to %.3g on axis %d, at most %.3g is "
+                             "allowed",
+                             size, i, most_coordinate);
+    }
+    return EBPO_OK;
+}
+
+void ebpo_posing_rotation(const ebpo_posing *p, double out[3][3])
+{
+    for (int i = 0; i < 9; i++)
+        out[i / 3][i % 3] = p->matrix[i / 3][i % 3] / p->scale;
+}
+
+double ebpo_posing_error(const ebpo_posing *p, double length)
+{
+    double most = 0;
+    for (int i = 0; i < 3; i++)
+        most = fmax(most, fabs(p->translation[i]));
+    double moved = p->scale * length * (2 * p->deviation + 6 * 0x1p-53);
+    return (moved + 1.01 * 0x1p-53 * most) * (1 + 0x1p-50) + 0x1p-1072;
+}

@@ -1,0 +1,40 @@
+/* Where a model is in the world, and the posed coordinates of its vertices: doubles, each operation
+ * rounded once, on which all decisions about two models are exact (docs/develop/collision.md).
+ * Functions are pure; any thread. */
+#ifndef EBPO_GEOMETRY_POSE_H
+#define EBPO_GEOMETRY_POSE_H
+
+#include <ebpo/pose.h>
+
+/* A pose that has been checked. */
+typedef struct ebpo_posing {
+    double matrix[3][3]; /* rotation times scale, each rounded once */
+    double translation[3];
+    double scale;
+    double deviation; /* of the rotation from one: the greatest |R^T R - 1|, and rounding */
+} ebpo_posing;
+
+/* For vertices whose coordinates are at most reach[axis] in size.
+ *
+ * EBPO_E_ARGUMENT: a number is not finite, the matrix is no rotation (by how much is said) or a
+ * mirror, the scale or a posed coordinate would leave its range. */
+EBPO_MUST_USE ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose,
+                                           const double reach[3], ebpo_error *error);
+
+/* Finite, within 2^1000. Compiled where core/strict_fp.h comes first: never contracted. */
+static inline void ebpo_posing_apply(const ebpo_posing *p, const double x[3], double out[3])
+{
+    for (int i = 0; i < 3; i++) {
+        const double *m = p->matrix[i];
+        out[i] = ((m[0] * x[0] + m[1] * x[1]) + m[2] * x[2]) + p->translation[i];
+    }
+}
+
+/* Rows of the rotation, as doubles have it. */
+void ebpo_posing_rotation(const ebpo_posing *p, double out[3][3]);
+
+/* No posed coordinate on any axis is farther than this from that of the true motion (nearest
+ * rotation, no rounding) for vertices at most `length` from the model's origin. */
+double ebpo_posing_error(const ebpo_posing *p, double length);
+
+#endif

@@ -1,0 +1,49 @@
+/* Exact predicates over doubles: the sign is right for every finite input, whatever the compiler
+ * and its flags. A floating-point filter answers nearly always; the rest goes to integers of any
+ * size (GMP). Overflow and underflow in the filter are detected and fall back too. All functions
+ * are pure and may be called from any thread. Source: Shewchuk, "Adaptive Precision Floating-Point
+ * Arithmetic and Fast Robust Geometric Predicates", 1997, for the idea of filters.
+ */
+#ifndef EBPO_GEOMETRY_PREDICATES_H
+#define EBPO_GEOMETRY_PREDICATES_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Sign (-1, 0, 1) of the determinant | b - a, c - a |: 1 when a, b, c turn counter-clockwise. */
+int ebpo_orient2d(const double a[2], const double b[2], const double c[2]);
+
+/* Sign of (b - a) x (c - a) . (d - a): 1 when d lies on the side that the normal of
+ * counter-clockwise a, b, c points to. */
+int ebpo_orient3d(const double a[3], const double b[3], const double c[3], const double d[3]);
+
+/* Sign of component `axis` of the normal (b - a) x (c - a). */
+int ebpo_normal_sign(int axis, const double a[3], const double b[3], const double c[3]);
+
+/* True when a, b, c are collinear or coincide: a face without area. */
+bool ebpo_zero_area(const double a[3], const double b[3], const double c[3]);
+
+/* Sign of the sum of n products factor[2i] * factor[2i+1], exactly; up to 8 are fastest. */
+int ebpo_sign_of_products(const double *factor, int n);
+
+/* Signed crossings of the face (a, b, c) with an axis-parallel segment, for winding numbers.
+ *
+ * The segment runs from `from` in direction +axis (0, 1, 2) to coordinate `to` >= from[axis] on
+ * that axis. Both ends are understood as shifted by (d0, d1, d2), infinitely small positive numbers
+ * with d0 >> d1 >> d2 (each negligible against every power of the one before): simulation of
+ * simplicity, with one and the same shift for every call. So no end lies on a face, no segment
+ * meets an edge or vertex, and crossing numbers are exact and consistent. A face without area
+ * counts as no crossing.
+ *
+ * Returns the change of the winding number from `from` to the end: +1 when the segment enters (goes
+ * against the normal of the counter-clockwise face), -1 when it leaves, 0 when there is no
+ * crossing. */
+int ebpo_axis_crossing(const double from[3], double to, int axis, const double a[3],
+                       const double b[3], const double c[3]);
+
+/* Where a point is in relation to a triangle: true when p lies on the closed triangle (a, b, c),
+ * also one without area. Exact. */
+bool ebpo_point_on_triangle(const double p[3], const double a[3], const double b[3],
+                            const double c[3]);
+
+#endif

@@ -1,0 +1,368 @@
+#include "hdf5_read/face_gates.h"
+
+#include <string.h>
+
+#include "core/endian.h"
+#include "hdf5_read/chunk.h"
+
+enum { OPEN_MOST = 64, NEAR = 32, ROOM = 4 * OPEN_MOST, FACE_MOST = 3 /* that a face opens */ };
+enum { IS_NEW, IS_LEFT, IS_RIGHT, BY_NUMBER, AT_OPEN }; /* corners beyond an edge */
+enum { LOW_END = 224, TWO_BYTES_END = 240 };            /* of what a byte of `low` is by itself */
+enum { AS_CODES = 1 };                                  /* first byte of a chunk without streams */
+
+/* Open edges, newest last: (a, b) where a face on the other side would run from a to b. Vertices
+ * are counted from the first one that is new in the chunk, modulo 2^32: codes say no more. */
+typedef struct open_edges {
+    uint64_t edge[ROOM];
+    uint32_t begin, end;
+    uint32_t seen;
+} open_edges;
+
+static uint64_t edge(uint32_t from, uint32_t to) { return from | (uint64_t)to << 32; }
+static uint32_t from(uint64_t e) { return (uint32_t)e; }
+static uint32_t to(uint64_t e) { return (uint32_t)(e >> 32); }
+
+static void start(open_edges *o) { o->begin = o->end = o->seen = 0; }
+
+/* Before each face: the list slides back to the front of its room now and then. */
+static void make_room(open_edges *o)
+{
+    if (o->end + FACE_MOST <= ROOM)
+        return;
+    o->end -= o->begin;
+    memmove(o->edge, o->edge + o->begin, o->end * sizeof *o->edge);
+    o->begin = 0;
+}
+
+static void push(open_edges *o, uint64_t e)
+{
+    o->edge[o->end++] = e;
+    o->begin += o->end - o->begin > OPEN_MOST;
+}
+
+static void drop(open_edges *o, uint32_t at)
+{
+    o->end--;
+    for (; at < o->end; at++)
+        o->edge[at] = o->edge[at + 1];
+}
+
+/* The newest that starts or ends at v; o->end: none. */
+static uint32_t starting(const open_edges *o, uint32_t v)
+{
+    for (uint32_t i = o->end; i > o->begin; i--)
+        if (from(o->edge[i - 1]) == v)
+            return i - 1;
+    return o->end;
+}
+
+static uint32_t ending(const open_edges *o, uint32_t v)
+{
+    for (uint32_t i = o->end; i > o->begin; i--)
+        if (to(o->edge[i - 1]) == v)
+            return i - 1;
+    return o->end;
+}
+
+/* Eight at a time, since as a rule none is. */
+static bool any_of_eight(const uint64_t *edges, uint64_t wanted)
+{
+    bool any = false;
+    for (int i = 0; i < 8; i++)
+        any |= edges[i] == wanted;
+    return any;
+}
+
+/* Side from a to b of a face: closes that edge if it is among the newest, else opens the other
+ * way's. */
+static void pass(open_edges *o, uint32_t a, uint32_t b)
+{
+    uint64_t wanted = edge(a, b);
+    uint32_t least = o->end - o->begin > NEAR ? o->end - NEAR : o->begin, i = o->end;
+    while (i >= least + 8 && !any_of_eight(o->edge + i - 8, wanted))
+        i -= 8;
+    while (i > least && o->edge[i - 1] != wanted)
+        i--;
+    if (i > least)
+        drop(o, i - 1);
+    else
+        push(o, edge(b, a));
+}
+
+static void open_all(open_edges *o, const uint32_t *face)
+{
+    for (int k = 0; k < 3; k++)
+        push(o, edge(face[(k + 1) % 3], face[k]));
+}
+
+/* What is open after face (a, b, c) across (a, b), which is open no longer. */
+static void go_through(open_edges *o, uint32_t kind, uint32_t at, uint32_t a, uint32_t b,
+                       uint32_t c)
+{
+    if (kind == IS_NEW) {
+        push(o, edge(c, b));
+        push(o, edge(a, c));
+        return;
+    }
+    if (kind == IS_LEFT || kind == IS_RIGHT)
+        drop(o, at);
+    if (kind != IS_LEFT)
+        pass(o, b, c);
+    if (kind != IS_RIGHT)
+        pass(o, c, a);
+}
+
+/* ---- writing ---- */
+
+typedef struct writing {
+    uint8_t *gate, *third, *low, *more; /* next bytes */
+    open_edges open;
+} writing;
+
+static void put_number(writing *w, uint32_t number)
+{
+    if (number < LOW_END) {
+        *w->low++ = (uint8_t)number;
+    } else if (number - LOW_END < 256 * (TWO_BYTES_END - LOW_END)) {
+        *w->low++ = (uint8_t)(LOW_END + ((number - LOW_END) >> 8));
+        *w->more++ = (uint8_t)(number - LOW_END);
+    } else {
+        *w->low++ = TWO_BYTES_END;
+        ebpo_store32(w->more, number);
+        w->more += 4;
+    }
+}
+
+/* Which open edge is a side of the face, and from which corner on; o->end: none. */
+static uint32_t gate_of(const open_edges *o, const uint32_t *face, int *first)
+{
+    uint64_t side[3];
+    for (int k = 0; k < 3; k++)
+        side[k] = edge(face[k], face[(k + 1) % 3]);
+    for (uint32_t i = o->end; i > o->begin; i--)
+        for (int k = 0; k < 3; k++)
+            if (o->edge[i - 1] == side[k]) {
+                *first = k;
+                return i - 1;
+            }
+    return o->end;
+}
+
+/* Which corner beyond the edge c is; where its edge is in *at. */
+static uint32_t kind_of(const open_edges *o, uint32_t a, uint32_t b, uint32_t c, uint32_t *at)
+{
+    if (c == o->seen)
+        return IS_NEW;
+    *at = starting(o, b);
+    if (*at < o->end && to(o->edge[*at]) == c)
+        return IS_LEFT;
+    *at = ending(o, a);
+    if (*at < o->end && from(o->edge[*at]) == c)
+        return IS_RIGHT;
+    *at = starting(o, c);
+    return *at < o->end ? AT_OPEN + o->end - 1 - *at : BY_NUMBER;
+}
+
+static void write_face(writing *w, const uint32_t *code, const uint32_t *face)
+{
+    open_edges *o = &w->open;
+    int k = 0;
+    make_room(o);
+    uint32_t at = gate_of(o, face, &k);
+    *w->gate++ = (uint8_t)(o->end - at);
+    if (at == o->end) {
+        for (k = 0; k < 3; k++)
+            put_number(w, code[k]);
+        open_all(o, face);
+        return;
+    }
+    uint32_t a = face[k], b = face[(k + 1) % 3], c = face[(k + 2) % 3];
+    drop(o, at);
+    uint32_t kind = kind_of(o, a, b, c, &at);
+    *w->third++ = (uint8_t)(3 * kind + (uint32_t)k);
+    if (kind == BY_NUMBER)
+        put_number(w, o->seen - c);
+    go_through(o, kind, at, a, b, c);
+}
+
+/* Byte 0 of all codes, then bytes 1, ... */
+static void write_codes(const uint8_t *codes, uint32_t rows, uint8_t *out,
+                        size_t ends[EBPO_GATES_ENDS])
+{
+    size_t plane = 3 * (size_t)rows;
+    *out = AS_CODES;
+    ebpo_shuffle(codes, 4 * plane, 4, out + 1);
+    for (size_t i = 0; i < EBPO_GATES_ENDS; i++)
+        ends[i] = 1 + (i + 1) * plane;
+}
+
+/* `third` and what follows are built where they cannot be in each other's way, then moved up. */
+static void join(const writing *w, uint32_t rows, uint8_t *out, size_t ends[EBPO_GATES_ENDS])
+{
+    size_t n = rows, low = (size_t)(w->low - out) - 2 * n, more = (size_t)(w->more - out) - 5 * n;
+    ends[0] = n;
+    ends[1] = (size_t)(w->third - out);
+    ends[2] = ends[1] + low;
+    ends[3] = ends[2] + more;
+    memmove(out + ends[1], out + 2 * n, low);
+    memmove(out + ends[2], out + 5 * n, more);
+}
+
+void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
+                       size_t ends[EBPO_GATES_ENDS])
+{
+    enum { MORE_OF_FACE = 12 };
+    size_t bytes = (size_t)rows * EBPO_GATES_COLS;
+    writing w = { out, out + rows, out + 2 * (size_t)rows, out + 5 * (size_t)rows, { .end = 0 } };
+    start(&w.open);
+    for (uint32_t i = 0; i < rows; i++) {
+        uint32_t code[3], face[3], seen = w.open.seen;
+        for (int k = 0; k < 3; k++) {
+            code[k] = ebpo_load32(codes + 4 * (3 * (size_t)i + (size_t)k));
+            face[k] = seen - code[k];
+            seen += code[k] == 0;
+        }
+        if ((size_t)(w.more - out) + MORE_OF_FACE > bytes)
+            break;
+        write_face(&w, code, face);
+        w.open.seen = seen;
+    }
+    if ((size_t)(w.gate - out) == rows)
+        join(&w, rows, out, ends);
+    else
+        write_codes(codes, rows, out, ends);
+    memset(out + ends[EBPO_GATES_ENDS - 1], 0, bytes - ends[EBPO_GATES_ENDS - 1]);
+}
+
+/* ---- reading ---- */
+
+typedef struct reading {
+    const uint8_t *gate, *third, *low, *more, *end;
+    open_edges open;
+} reading;
+
+/* A vertex by its number; `low` is as long as is asked of it. */
+static bool get_vertex(reading *r, uint32_t seen, uint32_t *vertex)
+{
+    uint32_t number = *r->low++;
+    if (number == TWO_BYTES_END) {
+        if (r->end - r->more < 4)
+            return false;
+        number = ebpo_load32(r->more);
+        r->more += 4;
+    } else if (number >= LOW_END) {
+        if (number > TWO_BYTES_END || r->more == r->end)
+            return false;
+        number = LOW_END + ((number - LOW_END) << 8) + *r->more++;
+    }
+    *vertex = seen - number;
+    return true;
+}
+
+static bool get_third(reading *r, uint32_t kind, uint32_t a, uint32_t b, uint32_t *at, uint32_t *c)
+{
+    const open_edges *o = &r->open;
+    if (kind == IS_NEW) {
+        *c = o->seen;
+        return true;
+    }
+    if (kind == BY_NUMBER)
+        return get_vertex(r, o->seen, c);
+    if (kind >= AT_OPEN && kind - AT_OPEN >= o->end - o->begin)
+        return false;
+    *at = kind == IS_LEFT    ? starting(o, b)
+          : kind == IS_RIGHT ? ending(o, a)
+                             : o->end - 1 - (kind - AT_OPEN);
+    if (*at == o->end)
+        return false;
+    *c = kind == IS_LEFT ? to(o->edge[*at]) : from(o->edge[*at]);
+    return true;
+}
+
+static bool read_across(reading *r, uint32_t gate, uint32_t *face)
+{
+    static const uint8_t next[5] = { 0, 1, 2, 0, 1 };
+    open_edges *o = &r->open;
+    if (gate > o->end - o->begin)
+        return false;
+    uint32_t third = *r->third++, at = o->end - gate, c;
+    uint32_t a = from(o->edge[at]), b = to(o->edge[at]), kind = third / 3, k = third % 3;
+    drop(o, at);
+    if (!get_third(r, kind, a, b, &at, &c))
+        return false;
+    face[k] = a;
+    face[next[k + 1]] = b;
+    face[next[k + 2]] = c;
+    go_through(o, kind, at, a, b, c);
+    return true;
+}
+
+static bool read_alone(reading *r, uint32_t *face)
+{
+    uint32_t seen = r->open.seen;
+    for (int k = 0; k < 3; k++) {
+        if (!get_vertex(r, seen, &face[k]))
+            return false;
+        seen += face[k] == seen;
+    }
+    open_all(&r->open, face);
+    return true;
+}
+
+static uint32_t put_codes(const uint32_t *face, uint32_t seen, uint8_t *codes)
+{
+    for (int k = 0; k < 3; k++) {
+        uint32_t code = seen - face[k];
+        ebpo_store32(codes + 4 * k, code);
+        seen += code == 0;
+    }
+    return seen;
+}
+
+/* Where streams begin follows from what those before them hold. */
+static void find_streams(reading *r, const uint8_t *in, uint32_t rows)
+{
+    size_t alone = 0, numbers = 0, bytes = (size_t)rows * EBPO_GATES_COLS;
+    for (uint32_t i = 0; i < rows; i++)
+        alone += in[i] == 0;
+    size_t thirds = rows - alone;
+    r->gate = in;
+    r->third = in + rows;
+    r->low = r->third + thirds;
+    for (size_t i = 0; i < thirds; i++)
+        numbers += r->third[i] / 3 == BY_NUMBER;
+    r->more = r->low + 3 * alone + numbers; /* at most 5 bytes a face so far */
+    r->end = in + bytes;
+    start(&r->open);
+}
+
+static bool is_zero(const uint8_t *begin, const uint8_t *end)
+{
+    unsigned any = 0;
+    for (; begin < end; begin++)
+        any |= *begin;
+    return !any;
+}
+
+static bool read_codes(const uint8_t *in, uint32_t rows, uint8_t *codes)
+{
+    size_t bytes = 12 * (size_t)rows;
+    ebpo_unshuffle(in + 1, bytes, 4, codes);
+    return is_zero(in + 1 + bytes, in + EBPO_GATES_COLS * (size_t)rows);
+}
+
+bool ebpo_gates_decode(const uint8_t *in, uint32_t rows, uint8_t *codes)
+{
+    reading r;
+    if (*in == AS_CODES)
+        return read_codes(in, rows, codes);
+    find_streams(&r, in, rows);
+    for (uint32_t i = 0; i < rows; i++, codes += 12) {
+        uint32_t face[3], gate = *r.gate++;
+        make_room(&r.open);
+        if (gate ? !read_across(&r, gate, face) : !read_alone(&r, face))
+            return false;
+        r.open.seen = put_codes(face, r.open.seen, codes);
+    }
+    return is_zero(r.more, r.end);
+}

@@ -1,0 +1,25 @@
+/* The coding `gates` of format-spec/README.md, section 7: a chunk of high-water codes of faces,
+ * written as how each face lies across an edge of faces before it. Pure functions, any thread. */
+#ifndef EBPO_HDF5_READ_FACE_GATES_H
+#define EBPO_HDF5_READ_FACE_GATES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum {
+    EBPO_GATES_COLS = 13, /* bytes of a face in a chunk */
+    EBPO_GATES_ENDS = 4   /* streams of a chunk, before its zeros */
+};
+
+/* `codes`: [rows][3] high-water codes (coding.h), little-endian, of faces that need not be the
+ * first ones of the mesh. Fills `out`, of EBPO_GATES_COLS bytes for each face, and tells where each
+ * stream ends in it. Any codes can be written. rows > 0. Time: in proportion to rows. */
+void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
+                       size_t ends[EBPO_GATES_ENDS]);
+
+/* The inverse, of any bytes. False when they are those of no faces. Numbers above `seen` come out
+ * as codes above it, which ebpo_corners_decode refuses. */
+bool ebpo_gates_decode(const uint8_t *in, uint32_t rows, uint8_t *codes);
+
+#endif

@@ -1,0 +1,169 @@
+#include "hdf5_write/apart.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "core/error.h"
+#include "hdf5_write/scope.h"
+
+/* What the other process says when it is done. */
+typedef struct report {
+    ebpo_status status;
+    ebpo_error error;
+} report;
+
+/* Addresses that this process has; 0: not known. */
+static uint64_t addresses(void)
+{
+    unsigned long long pages = 0;
+    FILE *f = fopen("/proc/self/statm", "re");
+    if (f && fscanf(f, "%llu", &pages) != 1)
+        pages = 0;
+    if (f)
+        fclose(f);
+    return pages * (uint64_t)sysconf(_SC_PAGESIZE);
+}
+
+static void limit(int what, uint64_t most)
+{
+    struct rlimit now;
+    if (getrlimit(what, &now) == 0 && (now.rlim_max == RLIM_INFINITY || most < now.rlim_max)) {
+        now.rlim_cur = now.rlim_max = most;
+        setrlimit(what, &now);
+    }
+}
+
+static void take_limits(const ebpo_apart_limits *limits, uint64_t has)
+{
+    limit(RLIMIT_CORE, 0);
+    limit(RLIMIT_FSIZE, limits->file_bytes);
+    limit(RLIMIT_CPU, limits->seconds);
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    (void)has; /* these set all addresses aside */
+#else
+    if (has)
+        limit(RLIMIT_AS, has + limits->memory_bytes);
+#endif
+}
+
+bool ebpo_apart_write(int fd, const void *data, size_t bytes)
+{
+    for (const char *at = data; bytes > 0;) {
+        ssize_t done = write(fd, at, bytes);
+        if (done < 0 && errno == EINTR)
+            continue;
+        if (done <= 0)
+            return false;
+        at += done;
+        bytes -= (size_t)done;
+    }
+    return true;
+}
+
+/* 1: all of it; 0: the other end was closed before; -1: reading failed. */
+static int read_all(int fd, void *data, size_t bytes)
+{
+    for (char *at = data; bytes > 0;) {
+        ssize_t done = read(fd, at, bytes);
+        if (done < 0 && errno == EINTR)
+            continue;
+        if (done <= 0)
+            return done < 0 ? -1 : 0;
+        at += done;
+        bytes -= (size_t)done;
+    }
+    return 1;
+}
+
+static void be_apart(ebpo_apart_fn work, void *user, const ebpo_apart_limits *limits, uint64_t has,
+                     int out)
+{
+    static const int usual[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGTERM };
+    report r = { EBPO_OK, EBPO_ERROR_INIT };
+    for (size_t i = 0; i < sizeof usual / sizeof usual[0]; i++)
+        signal(usual[i], SIG_DFL); /* handlers of the caller's are for its own process */
+    signal(SIGXFSZ, SIG_IGN);
+    signal(SIGPIPE, SIG_IGN);
+    take_limits(limits, has);
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+    H5PLset_loading_state(0);
+    r.status = work(user, &r.error);
+    ebpo_apart_write(out, &r, sizeof r);
+    _exit(0);
+}
+
+static ebpo_status judge_death(int state, const char *shown, ebpo_error *error)
+{
+    if (!WIFSIGNALED(state)) /* it could not say what it has to say */
+        return ebpo_fail_file(error, EBPO_E_IO, shown,
+                              "the process that read it through libhdf5 ended before it was done");
+    if (WTERMSIG(state) == SIGXCPU || WTERMSIG(state) == SIGKILL)
+        return ebpo_fail_file(
+            error, EBPO_E_FORMAT, shown,
+            "libhdf5 took longer or needed more than it may; the file is damaged, "
+            "or made to cost");
+    return ebpo_fail_file(
+        error, EBPO_E_FORMAT, shown,
+        "libhdf5 died of it, in a process of its own, by signal %d (%s); the file "
+        "is damaged, or made to harm: do not trust it",
+        WTERMSIG(state), strsignal(WTERMSIG(state)));
+}
+
+static bool make_pipe(int ends[2])
+{
+#ifdef EBPO_HAVE_PIPE2
+    return pipe2(ends, O_CLOEXEC) == 0;
+#else
+    return pipe(ends) == 0 && fcntl(ends[0], F_SETFD, FD_CLOEXEC) == 0 &&
+           fcntl(ends[1], F_SETFD, FD_CLOEXEC) == 0;
+#endif
+}
+
+ebpo_status ebpo_apart(ebpo_apart_fn work, void *user, const char *shown,
+                       const ebpo_apart_limits *limits, ebpo_error *error)
+{
+    int ends[2], state = 0;
+    ebpo_h5_scope scope;
+    report r;
+    if (!make_pipe(ends))
+        return ebpo_fail_errno(error, shown, "no process could be started for it");
+    uint64_t has = addresses();
+    ebpo_h5_enter(&scope); /* so that no thread is inside of libhdf5 when the process is copied */
+    pid_t child = fork();
+    if (child == 0) {
+        ebpo_h5_leave(&scope);
+        close(ends[0]);
+        be_apart(work, user, limits, has, ends[1]);
+    }
+    int fault = errno;
+    ebpo_h5_leave(&scope);
+    close(ends[1]);
+    int told = child > 0 ? read_all(ends[0], &r, sizeof r) : 0;
+    fault = told < 0 ? errno : fault;
+    close(ends[0]);
+    while (child > 0 && waitpid(child, &state, 0) < 0 && errno == EINTR)
+        ;
+    if (child < 0) {
+        errno = fault;
+        return ebpo_fail_errno(error, shown, "no process could be started for it");
+    }
+    errno = fault;
+    if (told < 0)
+        return ebpo_fail_errno(error, shown, "what the process that read it says is not known");
+    if (!told)
+        return judge_death(state, shown, error);
+    /* whatever has become of that process, its words end */
+    r.error.message[sizeof r.error.message - 1] = r.error.file[sizeof r.error.file - 1] =
+        r.error.object[sizeof r.error.object - 1] = 0;
+    if (r.status != EBPO_OK && r.status != r.error.status)
+        return judge_death(state, shown, error);
+    if (r.status != EBPO_OK || *r.error.message)
+        (void)!ebpo_fail_with(error, &r.error);
+    return r.status;
+}

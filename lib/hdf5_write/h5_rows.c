@@ -1,0 +1,341 @@
+/* Rows of numbers from files of others: rows.h. libhdf5 reads them in a process of its own, which
+ * hands them over in a file without a name. */
+#include <ebpo/rows.h>
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/text.h"
+#include "core/unnamed_file.h"
+#include "hdf5_write/apart.h"
+#include "hdf5_write/h5.h"
+#include "hdf5_write/scope.h"
+
+enum {
+    COLUMNS_MOST = 64,
+    ROWS_AT_ONCE = 16384,
+    /* Of a file's bytes, what its rows may take: as much as deflate can save, and so much anyhow. A
+     * file of a kilobyte can state any number of rows. */
+    EXPANSION_MOST = 1024,
+    EXPANSION_FREE = 64 << 20
+};
+
+typedef struct dataset {
+    const char *path, *name;
+    int to; /* the descriptor of where rows go */
+    unsigned least, most;
+    uint64_t bytes_most; /* of all rows */
+    double fill;
+    uint64_t first, end; /* the rows that are wanted */
+    hid_t file, set, space, type;
+    hsize_t size[2];
+} dataset;
+
+static ebpo_status fail(const dataset *d, const char *what, ebpo_error *error)
+{
+    return ebpo_h5_fail(error, EBPO_E_FORMAT, d->path, d->name, what);
+}
+
+static herr_t follow_none(const char *parent_file, const char *parent_group, const char *file,
+                          const char *object, unsigned *flags, hid_t access, void *user)
+{
+    (void)parent_file, (void)parent_group, (void)file, (void)object, (void)flags, (void)access;
+    *(bool *)user = true;
+    return -1;
+}
+
+static ebpo_status open_set(dataset *d, ebpo_error *error)
+{
+    bool elsewhere = false;
+    hid_t access = H5Pcreate(H5P_DATASET_ACCESS);
+    if (access < 0 || H5Pset_elink_cb(access, follow_none, &elsewhere) < 0)
+        return ebpo_fail_memory(error, sizeof *d);
+    d->set = H5Dopen2(d->file, d->name, access);
+    H5Pclose(access);
+    if (elsewhere || (d->set >= 0 && ebpo_h5_is_elsewhere(d->set)))
+        return fail(d, "its values lie in another file, which is not looked for; name that one",
+                    error);
+    if (d->set < 0)
+        return fail(d, "there is no such dataset", error);
+    d->space = H5Dget_space(d->set);
+    d->type = H5Dget_type(d->set);
+    return d->space < 0 || d->type < 0 ? fail(d, "the dataset is damaged", error) : EBPO_OK;
+}
+
+/* Returns whether the file's root names this format, or that of paint files. */
+static bool is_of_format(hid_t file)
+{
+    enum { MOST = 64 };
+    static const char begin[] = "EBP-Octree";
+    char text[MOST] = "";
+    hid_t attribute = H5Aexists(file, "format") > 0 ? H5Aopen(file, "format", H5P_DEFAULT) : -1,
+          type = attribute >= 0 ? H5Aget_type(attribute) : -1;
+    bool fits = type >= 0 && H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 &&
+                H5Tget_size(type) <= MOST && H5Aget_storage_size(attribute) <= MOST &&
+                H5Aread(attribute, type, text) >= 0 && strncmp(text, begin, sizeof begin - 1) == 0;
+    if (type >= 0)
+        H5Tclose(type);
+    if (attribute >= 0)
+        H5Aclose(attribute);
+    return fits;
+}
+
+/* Returns what the values are if they are no real numbers, else NULL. */
+static const char *other_values(const dataset *d, hid_t set, hid_t type)
+{
+    H5T_class_t class = H5Tget_class(type);
+    if (class == H5T_COMPOUND)
+        return "compound values, such as complex numbers or rows with named columns";
+    if (class == H5T_ENUM)
+        return "values of an enumeration, such as true and false";
+    if (class == H5T_ARRAY)
+        return "an array in each element";
+    if (class != H5T_INTEGER && class != H5T_FLOAT)
+        return "text, bits or references";
+    if (H5Aexists(set, "coding") <= 0 || !is_of_format(d->file))
+        return NULL;
+    return d->most == 3 ? "codes of the .ebpo.h5 format (`ebpo extract --mesh` writes the vertices "
+                          "as a PLY, which can be given instead)"
+                        : "codes of the .ebpo.h5 format";
+}
+
+static bool has_rows(hid_t space, unsigned least, unsigned most, hsize_t size[2])
+{
+    return H5Sget_simple_extent_ndims(space) == 2 &&
+           H5Sget_simple_extent_dims(space, size, NULL) == 2 && size[1] >= least && size[1] <= most;
+}
+
+/* Writes "rows of 3 numbers", or of "6 to 7". */
+static void describe_rows(const dataset *d, char what[64])
+{
+    snprintf(what, 64, "rows of %u%s%.0u numbers", d->least, d->most > d->least ? " to " : "",
+             d->most > d->least ? d->most : 0);
+}
+
+/* Writes a shape as "2 x 3"; nothing for a single value. */
+static void describe_shape(hid_t space, char *text, size_t room)
+{
+    hsize_t size[H5S_MAX_RANK];
+    int rank = H5Sget_simple_extent_dims(space, size, NULL), at = 0;
+    *text = 0;
+    for (int i = 0; i < rank && at >= 0 && (size_t)at < room; i++)
+        at +=
+            snprintf(text + at, room - (size_t)at, "%s%" PRIu64, i ? " x " : "", (uint64_t)size[i]);
+}
+
+static ebpo_status check_set(dataset *d, ebpo_error *error)
+{
+    char what[256], wanted[64], shape[96];
+    const char *others = other_values(d, d->set, d->type);
+    describe_rows(d, wanted);
+    if (others) {
+        snprintf(what, sizeof what, "holds no numbers but %s; %s are expected", others, wanted);
+        return fail(d, what, error);
+    }
+    if (has_rows(d->space, d->least, d->most, d->size))
+        return d->size[0] <= d->bytes_most / (d->most * sizeof(double))
+                   ? EBPO_OK
+                   : ebpo_h5_fail(error, EBPO_E_LIMIT, d->path, d->name,
+                                  "has so many more rows than its file has bytes that it may be "
+                                  "made to exhaust memory; give its rows as a NumPy array");
+    describe_shape(d->space, shape, sizeof shape);
+    snprintf(what, sizeof what, "%s are expected; this is %s%s", wanted,
+             *shape ? "an array of " : "a single value", shape);
+    return fail(d, what, error);
+}
+
+/* The datasets that could be meant. */
+typedef struct candidates {
+    const dataset *d;
+    unsigned objects, found;
+    char names[384];
+} candidates;
+
+static herr_t look_at(hid_t file, const char *name, const H5O_info_t *info, void *user)
+{
+    enum { OBJECTS_MOST = 65536, SHOWN = 4 };
+    candidates *c = user;
+    hsize_t size[2];
+    if (++c->objects > OBJECTS_MOST)
+        return 1;
+    if (info->type != H5O_TYPE_DATASET || !ebpo_text_ok(name)) /* it is shown */
+        return 0;
+    hid_t set = H5Dopen2(file, name, H5P_DEFAULT);
+    /* first: H5Dget_space opens a virtual dataset's files */
+    bool here = set >= 0 && !ebpo_h5_is_elsewhere(set);
+    hid_t space = here ? H5Dget_space(set) : -1, type = here ? H5Dget_type(set) : -1;
+    size_t at = strlen(c->names);
+    if (space >= 0 && type >= 0 && has_rows(space, c->d->least, c->d->most, size) &&
+        !other_values(c->d, set, type)) {
+        if (c->found < SHOWN && at + strlen(c->d->path) + strlen(name) + 8 < sizeof c->names)
+            snprintf(c->names + at, sizeof c->names - at, "%s%s:/%s", at ? ", " : "", c->d->path,
+                     name);
+        c->found++;
+    }
+    if (type >= 0)
+        H5Tclose(type);
+    if (space >= 0)
+        H5Sclose(space);
+    if (set >= 0)
+        H5Dclose(set);
+    return 0;
+}
+
+/* Fails in any case: with the datasets that could be meant, or as there is none. */
+static ebpo_status name_sets(dataset *d, ebpo_error *error)
+{
+    candidates c = { .d = d };
+    char wanted[64];
+    describe_rows(d, wanted);
+    (void)H5Ovisit2(d->file, H5_INDEX_NAME, H5_ITER_INC, look_at, &c, H5O_INFO_BASIC);
+    H5Eclear2(H5E_DEFAULT);
+    if (!c.found)
+        return ebpo_fail_file(error, EBPO_E_ABSENT, d->path, "has no dataset of %s", wanted);
+    return ebpo_fail_file(error, EBPO_E_FORMAT, d->path,
+                          "is an HDF5 file; name a dataset of %s in it: %s%s", wanted,
+                          *c.names ? c.names : "FILE.h5:/path", c.found > 4 ? ", ..." : "");
+}
+
+/* Rows from `first` on, into the first columns of rows that are `most` wide. *short_of_memory: why
+ * it is false. */
+static bool read_piece(const dataset *d, hsize_t first, hsize_t count, double *rows,
+                       bool *short_of_memory)
+{
+    hsize_t wide[2] = { count, d->most }, from[2] = { first, 0 }, to[2] = { 0, 0 },
+            size[2] = { count, d->size[1] };
+    hid_t memory = H5Screate_simple(2, wide, NULL);
+    bool good = memory >= 0 &&
+                H5Sselect_hyperslab(memory, H5S_SELECT_SET, to, NULL, size, NULL) >= 0 &&
+                H5Sselect_hyperslab(d->space, H5S_SELECT_SET, from, NULL, size, NULL) >= 0 &&
+                H5Dread(d->set, H5T_NATIVE_DOUBLE, memory, d->space, H5P_DEFAULT, rows) >= 0;
+    *short_of_memory = !good && ebpo_h5_short_of_memory(); /* closing wipes libhdf5's reason */
+    if (memory >= 0)
+        H5Sclose(memory);
+    return good;
+}
+
+static ebpo_status copy_rows(const dataset *d, ebpo_error *error)
+{
+    static double rows[ROWS_AT_ONCE * COLUMNS_MOST];
+    for (hsize_t i = 0; i < ROWS_AT_ONCE * (hsize_t)d->most; i++)
+        rows[i] = d->fill;
+    hsize_t end = d->end < d->size[0] ? d->end : d->size[0];
+    uint64_t total = d->size[0];
+    if (!ebpo_apart_write(d->to, &total, sizeof total))
+        return ebpo_fail_errno(error, d->path, "its rows could not be written to TMPDIR");
+    for (hsize_t first = d->first; first < end; first += ROWS_AT_ONCE) {
+        hsize_t count = end - first < ROWS_AT_ONCE ? end - first : ROWS_AT_ONCE;
+        bool short_of_memory;
+        if (!read_piece(d, first, count, rows, &short_of_memory))
+            return short_of_memory ? ebpo_fail_memory(error, d->size[0] * d->size[1] * sizeof *rows)
+                                   : fail(d, "the dataset cannot be read", error);
+        if (!ebpo_apart_write(d->to, rows, (size_t)count * d->most * sizeof *rows))
+            return ebpo_fail_errno(error, d->path, "its rows could not be written to TMPDIR");
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status read_apart(void *user, ebpo_error *error)
+{
+    dataset *d = user;
+    ebpo_status status = ebpo_h5_open_to_read(d->path, d->path, true, &d->file, error);
+    if (status == EBPO_OK && (!d->name || !*d->name))
+        return name_sets(d, error);
+    if (status == EBPO_OK)
+        status = open_set(d, error);
+    if (status == EBPO_OK)
+        status = check_set(d, error);
+    return status == EBPO_OK ? copy_rows(d, error) : status;
+}
+
+static bool take_bytes(const dataset *d, uint64_t from, void *to, uint64_t bytes)
+{
+    for (uint64_t at = 0; at < bytes;) {
+        ssize_t done = pread(d->to, (char *)to + at, (size_t)(bytes - at), (off_t)(from + at));
+        if (done < 0 && errno == EINTR)
+            continue;
+        if (done <= 0)
+            return false;
+        at += (uint64_t)done;
+    }
+    return true;
+}
+
+/* What the other process has left: how many rows there are in all, and those that are wanted. */
+static ebpo_status take_rows(const dataset *d, double **rows, uint64_t *count, uint64_t *total,
+                             ebpo_error *error)
+{
+    struct stat facts;
+    if (fstat(d->to, &facts) != 0 || !take_bytes(d, 0, total, sizeof *total))
+        return ebpo_fail_errno(error, d->path, "its rows in TMPDIR cannot be read");
+    uint64_t bytes = (uint64_t)facts.st_size - sizeof *total;
+    *rows = ebpo_alloc(bytes, 1);
+    if (!*rows)
+        return ebpo_fail_memory(error, bytes);
+    if (!take_bytes(d, sizeof *total, *rows, bytes))
+        return ebpo_fail_errno(error, d->path, "its rows in TMPDIR cannot be read");
+    *count = bytes / (d->most * sizeof **rows);
+    return EBPO_OK;
+}
+
+static ebpo_status make_ready(dataset *d, ebpo_error *error)
+{
+    const char *folder = getenv("TMPDIR");
+    struct stat facts;
+    if (access(d->path, R_OK) != 0 || stat(d->path, &facts) != 0)
+        return ebpo_fail_errno(error, d->path, "cannot be opened");
+    if (!S_ISREG(facts.st_mode))
+        return ebpo_fail_file(error, EBPO_E_IO, d->path, "is no regular file; name one");
+    uint64_t bytes = (uint64_t)facts.st_size;
+    d->bytes_most =
+        bytes > UINT64_MAX / 2 / EXPANSION_MOST ? UINT64_MAX / 2 : bytes * EXPANSION_MOST;
+    d->bytes_most = d->bytes_most < EXPANSION_FREE ? EXPANSION_FREE : d->bytes_most;
+    d->to = ebpo_open_unnamed(folder && *folder ? folder : "/tmp");
+    return d->to >= 0 ? EBPO_OK : ebpo_fail_errno(error, d->path, "no room for its rows in TMPDIR");
+}
+
+ebpo_status ebpo_rows_read(const char *path, const char *name, unsigned least, unsigned most,
+                           double fill, double **rows, uint64_t *count, ebpo_error *error)
+{
+    uint64_t total;
+    return ebpo_rows_read_part(path, name, least, most, fill, 0, UINT64_MAX, rows, count, &total,
+                               error);
+}
+
+ebpo_status ebpo_rows_read_part(const char *path, const char *name, unsigned least, unsigned most,
+                                double fill, uint64_t first, uint64_t most_rows, double **rows,
+                                uint64_t *count, uint64_t *total, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_apart_limits limits = { UINT64_C(1) << 30, 0, 600 };
+    uint64_t end = most_rows > UINT64_MAX - first ? UINT64_MAX : first + most_rows;
+    dataset d = { path, name, -1, least, most, 0, fill, first, end, -1, -1, -1, -1, { 0, 0 } };
+    *rows = NULL;
+    *count = *total = 0;
+    if (least < 1 || most < least || most > COLUMNS_MOST)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "rows: 1 to %d columns can be asked for",
+                         COLUMNS_MOST);
+    ebpo_status status = ebpo_h5_register(error); /* our own files have such datasets, too */
+    if (status == EBPO_OK)
+        status = make_ready(&d, error);
+    limits.file_bytes = d.bytes_most + sizeof *total;
+    if (status == EBPO_OK)
+        status = ebpo_apart(read_apart, &d, path, &limits, error);
+    if (status == EBPO_OK)
+        status = take_rows(&d, rows, count, total, error);
+    if (d.to >= 0)
+        close(d.to);
+    if (status != EBPO_OK) {
+        free(*rows);
+        *rows = NULL;
+        *count = *total = 0;
+    }
+    return status;
+}

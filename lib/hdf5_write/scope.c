@@ -1,0 +1,144 @@
+#include "hdf5_write/scope.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "hdf5_write/h5.h"
+#include "hdf5_write/zstd_filter.h"
+
+static pthread_mutex_t library = PTHREAD_MUTEX_INITIALIZER;
+
+void ebpo_h5_enter(ebpo_h5_scope *scope)
+{
+    pthread_mutex_lock(&library);
+    if (H5Eget_auto2(H5E_DEFAULT, &scope->printer, &scope->printer_data) < 0)
+        *scope = (ebpo_h5_scope){ NULL, NULL };
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+}
+
+void ebpo_h5_leave(ebpo_h5_scope *scope)
+{
+    H5Eset_auto2(H5E_DEFAULT, scope->printer, scope->printer_data);
+    pthread_mutex_unlock(&library);
+}
+
+/* libhdf5 tells the path first, the number of the error behind it */
+enum { CAUSE_BYTES = 8192, CAUSE_SHOWN = 160 };
+
+static herr_t take_first(unsigned depth, const H5E_error2_t *entry, void *data)
+{
+    (void)depth;
+    if (entry->desc)
+        snprintf(data, CAUSE_BYTES, "%s", entry->desc);
+    return 1; /* the innermost is enough */
+}
+
+static herr_t take_memory(unsigned depth, const H5E_error2_t *entry, void *data)
+{
+    (void)depth;
+    *(bool *)data |= entry->maj_num == H5E_RESOURCE && entry->min_num == H5E_NOSPACE;
+    return 0;
+}
+
+bool ebpo_h5_short_of_memory(void)
+{
+    bool found = false;
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_memory, &found);
+    return found;
+}
+
+/* Returns the number of the system's error in libhdf5's reason, 0 if there is none. */
+static int system_error(const char *cause)
+{
+    const char *number = strstr(cause, "errno = ");
+    return number ? atoi(number + 8) : 0;
+}
+
+ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown,
+                         const char *object, const char *what)
+{
+    char cause[CAUSE_BYTES] = "";
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_first, cause);
+    H5Eclear2(H5E_DEFAULT);
+    int number = system_error(cause);
+    if (number > 0)
+        return ebpo_fail_at(error, status, shown, object, -1, "%s: %s", what, strerror(number));
+    if (*cause && ebpo_text_ok(cause)) /* names from the file may be in it */
+        return ebpo_fail_at(error, status, shown, object, -1, "%s (libhdf5: %.*s)", what,
+                            CAUSE_SHOWN, cause);
+    return ebpo_fail_at(error, status, shown, object, -1, "%s", what);
+}
+
+static hid_t open_with(const char *path, bool lock)
+{
+    hid_t fapl = H5Pcreate(H5P_FILE_ACCESS);
+    if (!lock)
+        H5Pset_file_locking(fapl, false, true);
+    hid_t file = H5Fopen(path, H5F_ACC_RDONLY, fapl);
+    if (fapl >= 0 && file >= 0) /* else closing wipes libhdf5's reason, of which one list is left */
+        H5Pclose(fapl);
+    return file;
+}
+
+ebpo_status ebpo_h5_open_to_read(const char *path, const char *shown, bool lock, hid_t *file,
+                                 ebpo_error *error)
+{
+    char cause[CAUSE_BYTES] = "";
+    *file = open_with(path, lock);
+    if (*file >= 0)
+        return EBPO_OK;
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_first, cause);
+    int number = strstr(cause, "unable to lock file") ? system_error(cause) : 0;
+    if (number == EAGAIN || number == EACCES)
+        return ebpo_fail_file(error, EBPO_E_IO, shown,
+                              "is open for writing in another program; close it there first");
+    if (strstr(cause, "already open for write"))
+        return ebpo_fail_file(error, EBPO_E_IO, shown,
+                              "is marked as open for writing; close it in the program that writes "
+                              "it, or remove the mark of one that ended early with `h5clear -s`");
+    if (number) {
+        H5Eclear2(H5E_DEFAULT);
+        *file = open_with(path, false);
+    }
+    return *file >= 0
+               ? EBPO_OK
+               : ebpo_h5_fail(error, EBPO_E_FORMAT, shown, "", "not a whole HDF5 file, or damaged");
+}
+
+bool ebpo_h5_is_elsewhere(hid_t set)
+{
+    hid_t made = H5Dget_create_plist(set);
+    bool elsewhere =
+        made >= 0 && (H5Pget_layout(made) == H5D_VIRTUAL || H5Pget_external_count(made) > 0);
+    if (made >= 0)
+        H5Pclose(made);
+    return elsewhere;
+}
+
+hid_t ebpo_h5_integer_type(unsigned size, bool is_signed)
+{
+    switch (size) {
+    case 1: return is_signed ? H5T_STD_I8LE : H5T_STD_U8LE;
+    case 2: return is_signed ? H5T_STD_I16LE : H5T_STD_U16LE;
+    case 4: return is_signed ? H5T_STD_I32LE : H5T_STD_U32LE;
+    case 8: return is_signed ? H5T_STD_I64LE : H5T_STD_U64LE;
+    }
+    return -1;
+}
+
+ebpo_status ebpo_h5_register(ebpo_error *error)
+{
+    ebpo_h5_scope scope;
+    ebpo_h5_enter(&scope);
+    ebpo_status status = EBPO_OK;
+    if (H5Zregister(&ebpo_zstd_filter) < 0)
+        status = ebpo_h5_fail(error, EBPO_E_UNSUPPORTED, "HDF5", "",
+                              "the zstd filter could not be registered");
+    ebpo_h5_leave(&scope);
+    return status;
+}

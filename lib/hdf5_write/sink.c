@@ -1,0 +1,281 @@
+#include "hdf5_write/sink.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+/* No system writes more at once. */
+static const size_t PIECE_MAX = (size_t)1 << 30;
+
+/* What libhdf5 sees of an open file; it begins with libhdf5's own part. */
+typedef struct sink_file {
+    H5FD_t libhdf5;
+    ebpo_h5_sink *sink;
+    haddr_t end_of_addresses;
+} sink_file;
+
+/* What a file access list carries. */
+typedef struct sink_choice {
+    ebpo_h5_sink *sink;
+} sink_choice;
+
+void ebpo_h5_sink_fail(ebpo_h5_sink *sink, const ebpo_error *error)
+{
+    if (sink->status != EBPO_OK)
+        return;
+    sink->error = *error;
+    sink->status = error->status;
+}
+
+ebpo_status ebpo_h5_sink_status(const ebpo_h5_sink *sink, ebpo_error *error)
+{
+    return sink->status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &sink->error);
+}
+
+static void fail_errno(ebpo_h5_sink *sink, const char *what)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    (void)ebpo_fail_errno(&error, sink->shown, what);
+    ebpo_h5_sink_fail(sink, &error);
+}
+
+ebpo_status ebpo_h5_sink_open(ebpo_h5_sink **out, const char *path, const char *shown,
+                              ebpo_error *error)
+{
+    size_t size = sizeof **out + strlen(shown) + 1;
+    ebpo_h5_sink *sink = ebpo_alloc_zero(1, size);
+    *out = NULL;
+    if (!sink)
+        return ebpo_fail_memory(error, size);
+    sink->id = -1;
+    sink->fd = -1;
+    strcpy(sink->shown, shown);
+    if (path) {
+        sink->fd = open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+        if (sink->fd < 0) {
+            ebpo_status status = ebpo_fail_errno(error, shown, "cannot be opened for writing");
+            free(sink);
+            return status;
+        }
+    }
+    *out = sink;
+    return EBPO_OK;
+}
+
+static void let_go(ebpo_h5_sink *sink)
+{
+    if (sink->fd >= 0 && close(sink->fd) != 0)
+        fail_errno(sink, "could not be written");
+    sink->fd = -1;
+    free(sink->memory);
+    sink->memory = NULL;
+    sink->capacity = sink->size = 0;
+}
+
+ebpo_status ebpo_h5_sink_close(ebpo_h5_sink *sink, ebpo_error *error)
+{
+    let_go(sink);
+    ebpo_status status = ebpo_h5_sink_status(sink, error);
+    if (sink->id >= 0)
+        H5Idec_ref(sink->id);
+    free(sink);
+    return status;
+}
+
+void ebpo_h5_sink_abandon(ebpo_h5_sink *sink)
+{
+    let_go(sink);
+    if (sink->status == EBPO_OK)
+        sink->status = EBPO_E_MEMORY; /* nothing is written any more */
+}
+
+static H5FD_t *sink_open(const char *name, unsigned flags, hid_t fapl, haddr_t address_max)
+{
+    (void)name;
+    (void)address_max;
+    (void)flags; /* the sink was empty when it was made; libhdf5 opens and closes as it likes */
+    const sink_choice *choice = H5Pget_driver_info(fapl);
+    if (!choice)
+        return NULL;
+    sink_file *file = calloc(1, sizeof *file);
+    if (!file) {
+        errno = ENOMEM;
+        fail_errno(choice->sink, "could not be opened for writing");
+        return NULL;
+    }
+    file->sink = choice->sink;
+    return &file->libhdf5;
+}
+
+static herr_t sink_close(H5FD_t *file)
+{
+    free(file);
+    return 0;
+}
+
+/* The same as of libhdf5's own driver, on which the places of metadata depend. */
+static herr_t sink_query(const H5FD_t *file, unsigned long *flags)
+{
+    (void)file;
+    *flags = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_ACCUMULATE_METADATA | H5FD_FEAT_DATA_SIEVE |
+             H5FD_FEAT_AGGREGATE_SMALLDATA;
+    return 0;
+}
+
+static haddr_t sink_get_eoa(const H5FD_t *file, H5FD_mem_t type)
+{
+    (void)type;
+    return ((const sink_file *)file)->end_of_addresses;
+}
+
+static herr_t sink_set_eoa(H5FD_t *file, H5FD_mem_t type, haddr_t address)
+{
+    (void)type;
+    ((sink_file *)file)->end_of_addresses = address;
+    return 0;
+}
+
+static haddr_t sink_get_eof(const H5FD_t *file, H5FD_mem_t type)
+{
+    (void)type;
+    return ((const sink_file *)file)->sink->size;
+}
+
+/* How many bytes are there; what lies behind the end reads as zeros. */
+static size_t read_file(ebpo_h5_sink *sink, uint64_t at, size_t size, uint8_t *to)
+{
+    size_t done = 0;
+    while (done < size) {
+        size_t piece = size - done < PIECE_MAX ? size - done : PIECE_MAX;
+        ssize_t got = pread(sink->fd, to + done, piece, (off_t)(at + done));
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got < 0)
+            fail_errno(sink, "cannot be read back");
+        if (got <= 0)
+            break;
+        done += (size_t)got;
+    }
+    return done;
+}
+
+static herr_t sink_read(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t address, size_t size,
+                        void *buffer)
+{
+    (void)type;
+    (void)dxpl;
+    ebpo_h5_sink *sink = ((sink_file *)file)->sink;
+    size_t there = 0;
+    if (sink->fd >= 0)
+        there = read_file(sink, address, size, buffer);
+    else if (address < sink->size)
+        there = sink->size - address < size ? (size_t)(sink->size - address) : size;
+    if (sink->fd < 0 && there)
+        memcpy(buffer, sink->memory + address, there);
+    memset((uint8_t *)buffer + there, 0, size - there);
+    return 0;
+}
+
+static void write_file(ebpo_h5_sink *sink, uint64_t at, size_t size, const uint8_t *data)
+{
+    size_t done = 0;
+    while (done < size) {
+        size_t piece = size - done < PIECE_MAX ? size - done : PIECE_MAX;
+        ssize_t put = pwrite(sink->fd, data + done, piece, (off_t)(at + done));
+        if (put < 0 && errno == EINTR)
+            continue;
+        if (put == 0)
+            errno = EIO;
+        if (put <= 0) {
+            fail_errno(sink, "could not be written");
+            return;
+        }
+        done += (size_t)put;
+    }
+}
+
+static void write_memory(ebpo_h5_sink *sink, uint64_t at, size_t size, const uint8_t *data)
+{
+    uint64_t need = at + size, least = UINT64_C(1) << 20;
+    if (need > sink->capacity) {
+        uint64_t capacity = need < least / 2 ? least : 2 * need;
+        uint8_t *more = capacity <= SIZE_MAX ? realloc(sink->memory, (size_t)capacity) : NULL;
+        if (!more) {
+            errno = ENOMEM;
+            fail_errno(sink, "could not be laid out in memory");
+            return;
+        }
+        memset(more + sink->capacity, 0, (size_t)(capacity - sink->capacity));
+        sink->memory = more;
+        sink->capacity = capacity;
+    }
+    memcpy(sink->memory + at, data, size);
+}
+
+static herr_t sink_write(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t address, size_t size,
+                         const void *buffer)
+{
+    (void)type;
+    (void)dxpl;
+    ebpo_h5_sink *sink = ((sink_file *)file)->sink;
+    if (sink->status == EBPO_OK && sink->fd >= 0)
+        write_file(sink, address, size, buffer);
+    else if (sink->status == EBPO_OK)
+        write_memory(sink, address, size, buffer);
+    if (address + size > sink->size)
+        sink->size = address + size;
+    return 0;
+}
+
+/* Files end where their addresses do. */
+static herr_t sink_truncate(H5FD_t *file, hid_t dxpl, hbool_t closing)
+{
+    (void)dxpl;
+    (void)closing;
+    ebpo_h5_sink *sink = ((sink_file *)file)->sink;
+    haddr_t end = ((sink_file *)file)->end_of_addresses;
+    if (end == sink->size)
+        return 0;
+    if (sink->status == EBPO_OK && sink->fd >= 0 && ftruncate(sink->fd, (off_t)end) != 0)
+        fail_errno(sink, "could not be written");
+    sink->size = end;
+    return 0;
+}
+
+static const H5FD_class_t sink_class = {
+#ifdef H5FD_CLASS_VERSION
+    .version = H5FD_CLASS_VERSION,
+    .value = (H5FD_class_value_t)400, /* of those for private use */
+#endif
+    .name = "ebpo sink",
+    .maxaddr = (haddr_t)INT64_MAX,
+    .fc_degree = H5F_CLOSE_STRONG,
+    .fapl_size = sizeof(sink_choice), /* without functions for it, libhdf5 copies it as bytes */
+    .open = sink_open,
+    .close = sink_close,
+    .query = sink_query,
+    .get_eoa = sink_get_eoa,
+    .set_eoa = sink_set_eoa,
+    .get_eof = sink_get_eof,
+    .read = sink_read,
+    .write = sink_write,
+    .truncate = sink_truncate,
+    .fl_map = H5FD_FLMAP_DICHOTOMY,
+};
+
+/* Registered anew for each file: the caller may have closed and reopened libhdf5 since. Held until
+ * the file is closed, because libhdf5 calls the driver's `close` through the registration after
+ * giving up its own hold on it. */
+bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl)
+{
+    sink_choice choice = { sink };
+    if (sink->id < 0)
+        sink->id = H5FDregister(&sink_class);
+    return sink->id >= 0 && H5Pset_driver(fapl, sink->id, &choice) >= 0;
+}

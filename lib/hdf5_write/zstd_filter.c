@@ -1,0 +1,121 @@
+#include "hdf5_write/zstd_filter.h"
+
+#include <stdint.h>
+#include <stdlib.h>
+#include <zstd.h>
+
+enum { DEFAULT_LEVEL = 3 };
+
+/* HDF5 keeps chunk sizes in 32 bits. */
+static const uint64_t CHUNK_MAX = UINT32_MAX;
+
+/* HDF5 takes 0 as a sign of failure, and this as its cause. The plugin does without: programs that
+ * keep libhdf5 to themselves, as h5py does, could not load it for want of these symbols. */
+static size_t short_of_memory(void)
+{
+#ifndef EBPO_FILTER_IN_PLUGIN
+    H5Epush2(H5E_DEFAULT, __FILE__, __func__, __LINE__, H5E_ERR_CLS, H5E_RESOURCE, H5E_NOSPACE,
+             "not enough memory for a chunk");
+#endif
+    return 0;
+}
+
+static size_t replace(void **buffer, size_t *buffer_size, void *block, size_t capacity, size_t used)
+{
+    free(*buffer);
+    *buffer = block;
+    *buffer_size = capacity;
+    return used;
+}
+
+static size_t compress(size_t level_count, const unsigned level[], size_t bytes,
+                       size_t *buffer_size, void **buffer)
+{
+    size_t capacity = ZSTD_compressBound(bytes), used = 0;
+    ZSTD_CCtx *context = ZSTD_createCCtx();
+    void *block = malloc(capacity ? capacity : 1);
+    if (!context || !block)
+        goto failed;
+    int wanted = level_count ? (int)level[0] : DEFAULT_LEVEL;
+    if (ZSTD_isError(ZSTD_CCtx_setParameter(context, ZSTD_c_compressionLevel, wanted)) ||
+        ZSTD_isError(ZSTD_CCtx_setParameter(context, ZSTD_c_checksumFlag, 1)))
+        goto failed;
+    used = ZSTD_compress2(context, block, capacity, *buffer, bytes);
+    if (ZSTD_isError(used))
+        goto failed;
+    ZSTD_freeCCtx(context);
+    return replace(buffer, buffer_size, block, capacity, used);
+
+failed:
+    free(block);
+    ZSTD_freeCCtx(context);
+    return 0; /* HDF5's sign of failure */
+}
+
+/* A frame that states its size: one call. */
+static size_t expand_known(uint64_t size, size_t bytes, size_t *buffer_size, void **buffer)
+{
+    void *block = NULL;
+    if (!size || size > CHUNK_MAX)
+        return 0;
+    if (!(block = malloc((size_t)size)))
+        return short_of_memory();
+    size_t used = ZSTD_decompress(block, (size_t)size, *buffer, bytes);
+    if (ZSTD_isError(used) || used != size) {
+        free(block);
+        return 0;
+    }
+    return replace(buffer, buffer_size, block, (size_t)size, used);
+}
+
+/* A frame from another writer that does not: grow as it comes. */
+static size_t expand_unknown(size_t bytes, size_t *buffer_size, void **buffer)
+{
+    ZSTD_DCtx *context = ZSTD_createDCtx();
+    ZSTD_inBuffer in = { *buffer, bytes, 0 };
+    ZSTD_outBuffer out = { NULL, 0, 0 };
+    size_t left = 1;
+    while (context && left) {
+        if (out.pos == out.size) {
+            uint64_t size = out.size ? 2 * (uint64_t)out.size : 65536;
+            void *block = size <= CHUNK_MAX + 1 ? realloc(out.dst, (size_t)size) : NULL;
+            if (!block)
+                break;
+            out.dst = block;
+            out.size = (size_t)size;
+        }
+        size_t before = out.pos;
+        left = ZSTD_decompressStream(context, &out, &in);
+        if (ZSTD_isError(left) || (left && in.pos == in.size && out.pos == before))
+            break; /* damaged, or the frame ends early */
+    }
+    ZSTD_freeDCtx(context);
+    if (left == 0 && out.pos)
+        return replace(buffer, buffer_size, out.dst, out.size, out.pos);
+    free(out.dst);
+    return 0;
+}
+
+static size_t filter(unsigned flags, size_t cd_count, const unsigned cd_values[], size_t bytes,
+                     size_t *buffer_size, void **buffer)
+{
+    if (!(flags & H5Z_FLAG_REVERSE))
+        return compress(cd_count, cd_values, bytes, buffer_size, buffer);
+    unsigned long long size = ZSTD_getFrameContentSize(*buffer, bytes);
+    if (size == ZSTD_CONTENTSIZE_ERROR)
+        return 0;
+    if (size == ZSTD_CONTENTSIZE_UNKNOWN)
+        return expand_unknown(bytes, buffer_size, buffer);
+    return expand_known(size, bytes, buffer_size, buffer);
+}
+
+const H5Z_class2_t ebpo_zstd_filter = {
+    .version = H5Z_CLASS_T_VERS,
+    .id = EBPO_ZSTD_FILTER_ID,
+    .encoder_present = 1,
+    .decoder_present = 1,
+    .name = "zstd (EBP-Octree)",
+    .can_apply = NULL,
+    .set_local = NULL,
+    .filter = filter,
+};

@@ -1,0 +1,15 @@
+/* HDF5 filter 32015: a chunk as one zstd frame. One class for our own programs (registered) and for
+ * everybody else's (plugin). Links nothing of HDF5, so that one plugin serves the serial and the
+ * MPI builds. */
+#ifndef EBPO_HDF5_WRITE_ZSTD_FILTER_H
+#define EBPO_HDF5_WRITE_ZSTD_FILTER_H
+
+#include <hdf5.h>
+
+enum { EBPO_ZSTD_FILTER_ID = 32015 };
+
+/* cd_values[0], when given, is the compression level (default 3). Frames carry their content's size
+ * and checksum. Reads any single zstd frame, with or without them. */
+extern const H5Z_class2_t ebpo_zstd_filter;
+
+#endif

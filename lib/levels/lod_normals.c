@@ -1,0 +1,264 @@
+/* Which way a level's polygons are lit. A polygon on a plane lies nearly as the surface below it.
+ * One on a wall between cells, a step from one envelope to the next, says nothing of the surface:
+ * it takes the direction that the planes around it have.
+ *
+ * For each of the six sides: at every corner of a drawn cell the mean, by area, of the plane
+ * polygons of the nodes around it that look to that side; between corners, linearly. Planes of the
+ * other side of a thin part do not count. */
+#include "core/strict_fp.h"
+
+#include <ebpo/lod.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "geometry/cells.h"
+#include "geometry/octcode.h"
+
+enum { SIDES = 6, ON_PLANE = SIDES, DEEPEST = EBPO_LEVELS_MAX - 1 };
+
+static const uint32_t none = UINT32_MAX;
+static const double least_turned = -0.3; /* cosine of the widest angle between a plane and a side */
+
+typedef struct polygon {
+    double area[3]; /* its normal, as long as twice its area */
+    double middle[3];
+    int side; /* 2 * axis, + 1 the upper one; or ON_PLANE */
+} polygon;
+
+typedef struct lighting {
+    ebpo_box box;
+    const ebpo_lod_nodes *nodes;
+    polygon *polygons; /* [polygon_count] */
+    uint32_t (*at)[8]; /* of each node, its corners' numbers */
+    double (*sum)[4];  /* [corner_count] of normals, and of their lengths */
+    uint64_t *keys;    /* [corner_count] where they are */
+    uint64_t corner_count, key_capacity;
+} lighting;
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* --- polygons --- */
+
+/* Of a node's first triangle on. */
+static void add_triangle(const ebpo_mesh *mesh, const uint32_t *face, double area[3])
+{
+    const double *a = mesh->xyz64 + 3 * (uint64_t)face[0], *b = mesh->xyz64 + 3 * (uint64_t)face[1],
+                 *c = mesh->xyz64 + 3 * (uint64_t)face[2];
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        area[k] += (b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i]);
+    }
+}
+
+/* Corner i of a fan. */
+static const double *corner_of(const ebpo_mesh *mesh, const uint32_t *face, unsigned i)
+{
+    uint32_t v = i < 2 ? face[i] : face[3 * (i - 2) + 2];
+    return mesh->xyz64 + 3 * (uint64_t)v;
+}
+
+/* Corners on a wall have its very coordinate. Beyond walls of the root cell there is nothing to
+ * step to: what lies on them counts as a plane. */
+static int side_of(const ebpo_box *box, ebpo_cell cell, const ebpo_mesh *mesh, const uint32_t *face,
+                   unsigned corners)
+{
+    double wall[2][3];
+    ebpo_cell_bounds(box, cell, wall[0], wall[1]);
+    for (int side = 0; side < SIDES; side++) {
+        int axis = side / 2;
+        uint32_t outmost = side % 2 ? (1u << cell.level) - 1 : 0;
+        bool on = cell.at[axis] != outmost;
+        for (unsigned i = 0; i < corners && on; i++)
+            on = corner_of(mesh, face, i)[axis] == wall[side % 2][axis];
+        if (on)
+            return side;
+    }
+    return ON_PLANE;
+}
+
+static void describe(lighting *l, const ebpo_mesh *mesh)
+{
+    const uint32_t *face = mesh->faces;
+    polygon *p = l->polygons;
+    const uint8_t *corners = l->nodes->corners;
+    for (uint64_t i = 0; i < l->nodes->node_count; i++) {
+        const ebpo_lod_node *node = &l->nodes->nodes[i];
+        ebpo_cell cell = ebpo_cell_of_octcode(node->octcode);
+        for (uint32_t k = 0; k < node->polygon_count; k++, p++, corners++) {
+            unsigned n = *corners;
+            *p = (polygon){ .side = side_of(&l->box, cell, mesh, face, n) };
+            for (unsigned c = 0; c < n; c++)
+                for (int axis = 0; axis < 3; axis++)
+                    p->middle[axis] += corner_of(mesh, face, c)[axis] / n;
+            for (; n > 2; n--, face += 3)
+                add_triangle(mesh, face, p->area);
+        }
+    }
+}
+
+/* --- corners of cells --- */
+
+static uint64_t key_of(ebpo_cell cell, unsigned corner)
+{
+    uint64_t key = 0;
+    for (int k = 0; k < 3; k++)
+        key = key << 21 | (uint64_t)(cell.at[k] + (corner >> k & 1)) << (DEEPEST - cell.level);
+    return key;
+}
+
+static bool number_corners(lighting *l)
+{
+    uint64_t count = l->nodes->node_count, slots = ebpo_hash_slots(count * 8 / 3 * 4 + 1), at;
+    uint32_t *table = ebpo_alloc(slots, sizeof *table);
+    bool fine = table != NULL;
+    if (fine)
+        memset(table, 0xff, slots * sizeof *table);
+    for (uint64_t i = 0; i < count && fine; i++) {
+        ebpo_cell cell = ebpo_cell_of_octcode(l->nodes->nodes[i].octcode);
+        for (unsigned c = 0; c < 8 && fine; c++) {
+            uint64_t key = key_of(cell, c);
+            EBPO_HASH_FIND(at, ebpo_hash_number(key), slots - 1,
+                           table[at] == none || l->keys[table[at]] == key);
+            if (table[at] == none) {
+                fine = l->corner_count < none &&
+                       ebpo_grow(&l->keys, &l->key_capacity, l->corner_count + 1, sizeof *l->keys);
+                if (fine)
+                    l->keys[table[at] = (uint32_t)l->corner_count++] = key;
+            }
+            l->at[i][c] = table[at];
+        }
+    }
+    free(table);
+    return fine;
+}
+
+/* --- sides --- */
+
+/* What a node's planes that look to a side add up to. */
+static void node_sum(const polygon *p, uint32_t count, int side, double out[4])
+{
+    double sign = side % 2 ? 1 : -1;
+    memset(out, 0, 4 * sizeof *out);
+    for (uint32_t k = 0; k < count; k++, p++) {
+        double length = sqrt(dot(p->area, p->area));
+        if (p->side != ON_PLANE || !(sign * p->area[side / 2] > least_turned * length))
+            continue;
+        for (int axis = 0; axis < 3; axis++)
+            out[axis] += p->area[axis];
+        out[3] += length;
+    }
+}
+
+static void sum_side(lighting *l, int side)
+{
+    const polygon *p = l->polygons;
+    memset(l->sum, 0, l->corner_count * sizeof *l->sum);
+    for (uint64_t i = 0; i < l->nodes->node_count; i++) {
+        double sum[4];
+        node_sum(p, l->nodes->nodes[i].polygon_count, side, sum);
+        p += l->nodes->nodes[i].polygon_count;
+        for (int c = 0; c < 8 && sum[3] > 0; c++)
+            for (int k = 0; k < 4; k++)
+                l->sum[l->at[i][c]][k] += sum[k];
+    }
+}
+
+/* Between a cell's corners, at a place in it. */
+static void direction_at(const lighting *l, ebpo_cell cell, const uint32_t at[8],
+                         const double place[3], double out[3])
+{
+    double low[3], high[3];
+    ebpo_cell_bounds(&l->box, cell, low, high);
+    memset(out, 0, 3 * sizeof *out);
+    for (unsigned c = 0; c < 8; c++) {
+        const double *sum = l->sum[at[c]];
+        double share = 1;
+        for (int k = 0; k < 3; k++) {
+            double x = (place[k] - low[k]) / (high[k] - low[k]);
+            share *= c >> k & 1 ? x : 1 - x;
+        }
+        for (int k = 0; k < 3 && sum[3] > 0; k++)
+            out[k] += share * sum[k] / sum[3];
+    }
+}
+
+static void put(const double direction[3], float out[3])
+{
+    double length = sqrt(dot(direction, direction));
+    for (int k = 0; k < 3 && length > 0; k++)
+        out[k] = (float)(direction[k] / length);
+}
+
+static void light_side(const lighting *l, int side, float *out)
+{
+    const polygon *p = l->polygons;
+    for (uint64_t i = 0; i < l->nodes->node_count; i++) {
+        const ebpo_lod_node *node = &l->nodes->nodes[i];
+        for (uint32_t k = 0; k < node->polygon_count; k++, p++, out += 3) {
+            double direction[3];
+            if (p->side != side)
+                continue;
+            direction_at(l, ebpo_cell_of_octcode(node->octcode), l->at[i], p->middle, direction);
+            put(direction, out);
+        }
+    }
+}
+
+static ebpo_status prepare(lighting *l, ebpo_error *error)
+{
+    uint64_t nodes = l->nodes->node_count, polygons = l->nodes->polygon_count;
+    l->polygons = ebpo_alloc(polygons, sizeof *l->polygons);
+    l->at = ebpo_alloc(nodes, sizeof *l->at);
+    if (l->polygons && l->at && number_corners(l))
+        l->sum = ebpo_alloc(l->corner_count, sizeof *l->sum);
+    return l->sum ? EBPO_OK
+                  : ebpo_fail_memory(error, polygons * sizeof *l->polygons +
+                                                nodes * (sizeof *l->at + 8 * sizeof *l->sum));
+}
+
+static ebpo_status check(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes, ebpo_error *error)
+{
+    uint64_t triangles = 0;
+    if (!mesh->xyz64 && mesh->face_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the mesh is of single precision; give the one that came with the nodes");
+    for (uint64_t i = 0; i < nodes->polygon_count; i++)
+        triangles += nodes->corners[i] - 2u;
+    if (triangles == mesh->face_count)
+        return EBPO_OK;
+    return ebpo_fail(error, EBPO_E_ARGUMENT,
+                     "the nodes have %llu triangles, the mesh %llu; give both of one level",
+                     (unsigned long long)triangles, (unsigned long long)mesh->face_count);
+}
+
+ebpo_status ebpo_lod_normals(const ebpo_info *info, const ebpo_mesh *mesh,
+                             const ebpo_lod_nodes *nodes, float *out, ebpo_error *error)
+{
+    lighting l = { .box = ebpo_root_box(info), .nodes = nodes };
+    ebpo_status status = check(mesh, nodes, error);
+    if (status == EBPO_OK)
+        status = prepare(&l, error);
+    if (status == EBPO_OK) {
+        describe(&l, mesh);
+        memset(out, 0, nodes->polygon_count * 3 * sizeof *out);
+        for (uint64_t i = 0; i < nodes->polygon_count; i++)
+            put(l.polygons[i].area, out + 3 * i);
+    }
+    for (int side = 0; side < SIDES && status == EBPO_OK; side++) {
+        sum_side(&l, side);
+        light_side(&l, side, out);
+    }
+    free(l.polygons);
+    free(l.at);
+    free(l.keys);
+    free(l.sum);
+    return status;
+}

@@ -1,0 +1,340 @@
+#include "core/strict_fp.h"
+
+#include "mesh/import_build.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "mesh/attributes.h"
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "geometry/decimal.h"
+#include "geometry/polygon.h"
+#include "mesh/corner_weld.h"
+
+static ebpo_status fail_many(const import_build *b)
+{
+    return ebpo_fail_file(b->error, EBPO_E_LIMIT, b->name,
+                          "more than 2^32 - 2 vertices, triangles or values of one kind; split the "
+                          "model");
+}
+
+static ebpo_status fail_memory(const import_build *b, uint64_t bytes)
+{
+    return ebpo_workspace_fail(b->mesh->workspace, bytes, b->error);
+}
+
+unsigned ebpo_import_columns(import_sort sort) { return sort == IMPORT_TEXTURE ? 2 : 3; }
+
+ebpo_status ebpo_import_begin(import_build *b, ebpo_mesh *mesh, const char *name, bool attributes,
+                              bool doubles, ebpo_error *error)
+{
+    *b = (import_build){ .name = name,
+                         .error = error,
+                         .mesh = mesh,
+                         .attributes = attributes,
+                         .doubles = doubles,
+                         .position_size = 3 * (doubles ? sizeof(double) : sizeof(float)) };
+    b->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    return b->c_locale ? EBPO_OK : ebpo_fail_memory(error, 0);
+}
+
+/* --- numbers --- */
+
+bool ebpo_import_coordinate(import_build *b, double *value, const char *s, size_t n)
+{
+    float narrow;
+    bool kept;
+    if (b->doubles)
+        return ebpo_number_double(value, s, n, b->c_locale);
+    if (!ebpo_number_float_kept(&narrow, &kept, s, n, b->c_locale))
+        return false;
+    b->loses_digits |= !kept;
+    *value = (double)narrow;
+    return true;
+}
+
+void ebpo_import_quotient(import_build *b, double *value, const char *s, size_t n, double weight)
+{
+    double number = 0;
+    (void)ebpo_number_double(&number, s, n, b->c_locale);
+    *value = number / weight;
+    b->loses_digits |= (double)(float)*value != *value;
+}
+
+bool ebpo_import_value(import_build *b, float *value, const char *s, size_t n)
+{
+    bool kept;
+    bool good = ebpo_number_float_kept(value, &kept, s, n, b->c_locale);
+    b->rounded += !kept;
+    return good;
+}
+
+/* --- vertices and rows --- */
+
+ebpo_status ebpo_import_position(import_build *b, const double xyz[3])
+{
+    if (b->loses_digits && !b->doubles)
+        return EBPO_E_UNSUPPORTED;
+    if (b->vertices == IMPORT_MOST)
+        return fail_many(b);
+    if (!ebpo_array_grow(b->mesh->workspace, &b->xyz, &b->vertex_capacity, b->vertices + 1,
+                         b->position_size))
+        return fail_memory(b, (b->vertices + 1) * b->position_size);
+    char *to = (char *)b->xyz + b->vertices++ * b->position_size;
+    if (b->doubles) {
+        memcpy(to, xyz, 3 * sizeof *xyz);
+    } else {
+        const float narrow[3] = { (float)xyz[0], (float)xyz[1], (float)xyz[2] };
+        memcpy(to, narrow, sizeof narrow);
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_import_vertex(import_build *b, const float xyz[3])
+{
+    const double wide[3] = { (double)xyz[0], (double)xyz[1], (double)xyz[2] };
+    return ebpo_import_position(b, wide);
+}
+
+ebpo_status ebpo_import_row(import_build *b, import_sort sort, const float *values)
+{
+    import_table *t = &b->table[sort];
+    size_t bytes = ebpo_import_columns(sort) * sizeof *values;
+    if (t->rows == IMPORT_MOST)
+        return fail_many(b);
+    if (!ebpo_array_grow(b->mesh->workspace, &t->values, &t->capacity, t->rows + 1, bytes))
+        return fail_memory(b, (t->rows + 1) * bytes);
+    memcpy((char *)t->values + t->rows++ * bytes, values, bytes);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_import_faces(import_build *b)
+{
+    ebpo_mesh *mesh = b->mesh;
+    b->use = ebpo_array_alloc(mesh->workspace, b->vertices, sizeof *b->use);
+    void *xyz = ebpo_array_alloc(mesh->workspace, b->vertices, b->position_size);
+    if (b->doubles)
+        mesh->xyz64 = xyz;
+    else
+        mesh->xyz32 = xyz;
+    if (!b->use || !xyz)
+        return fail_memory(b, b->vertices * b->position_size);
+    ebpo_array_fill(mesh->workspace, b->use, 0xff, b->vertices * sizeof *b->use);
+    return EBPO_OK;
+}
+
+/* --- polygons --- */
+
+import_corner *ebpo_import_corner(import_build *b)
+{
+    if (!ebpo_grow(&b->corner, &b->corner_capacity, b->corners + 1, sizeof *b->corner))
+        return NULL;
+    return &b->corner[b->corners++];
+}
+
+static void *positions_of(const ebpo_mesh *mesh)
+{
+    return mesh->xyz32 ? (void *)mesh->xyz32 : (void *)mesh->xyz64;
+}
+
+/* The first polygon that names a vertex gives it its number. */
+static void number_vertices(import_build *b)
+{
+    ebpo_mesh *mesh = b->mesh;
+    for (uint64_t i = 0; i < b->corners; i++) {
+        uint32_t vertex = b->corner[i].vertex;
+        uint64_t from = 3 * (uint64_t)vertex, to = 3 * mesh->vertex_count;
+        if (b->use[vertex] != IMPORT_NONE)
+            continue;
+        if (b->doubles)
+            memcpy(mesh->xyz64 + to, (const double *)b->xyz + from, 3 * sizeof *mesh->xyz64);
+        else
+            memcpy(mesh->xyz32 + to, (const float *)b->xyz + from, 3 * sizeof *mesh->xyz32);
+        b->use[vertex] = (uint32_t)mesh->vertex_count++;
+    }
+}
+
+/* Faces before the first row have none. */
+static bool make_room_in(import_build *b, import_table *t, uint64_t faces)
+{
+    ebpo_workspace *workspace = b->mesh->workspace;
+    bool first = !t->index;
+    if (!ebpo_array_grow(workspace, &t->index, &t->index_capacity, faces, 3 * sizeof *t->index))
+        return false;
+    if (first)
+        ebpo_array_fill(workspace, t->index, 0xff, b->mesh->face_count * 3 * sizeof *t->index);
+    return true;
+}
+
+static ebpo_status make_room(import_build *b, uint64_t more)
+{
+    ebpo_mesh *mesh = b->mesh;
+    uint64_t need = mesh->face_count + more;
+    if (more > IMPORT_MOST - mesh->face_count)
+        return fail_many(b);
+    bool fine = ebpo_array_grow(mesh->workspace, &mesh->faces, &b->face_capacity, need,
+                                3 * sizeof *mesh->faces);
+    for (int i = 0; i < IMPORT_SORTS && fine; i++)
+        fine = !b->attributes || !b->table[i].rows || make_room_in(b, &b->table[i], need);
+    return fine ? EBPO_OK : fail_memory(b, need * 3 * sizeof *mesh->faces);
+}
+
+static void put_triangle(import_build *b, uint32_t a, uint32_t second, uint32_t third)
+{
+    const uint32_t corner[3] = { a, second, third };
+    uint64_t at = 3 * b->mesh->face_count++;
+    for (uint64_t k = 0; k < 3; k++) {
+        const import_corner *c = &b->corner[corner[k]];
+        b->mesh->faces[at + k] = b->use[c->vertex];
+        for (int i = 0; i < IMPORT_SORTS; i++) {
+            import_table *t = &b->table[i];
+            if (t->index)
+                t->index[at + k] = c->row[i];
+            t->named |= c->row[i] != IMPORT_NONE;
+        }
+    }
+}
+
+/* Scratch holds, one behind the other: positions of corners, triangles, and what cutting asks for.
+ */
+static ebpo_status reserve_scratch(import_build *b, uint64_t n)
+{
+    uint64_t bytes;
+    if (!ebpo_mul_ok(n, 3 * sizeof(double) + 4 * sizeof(uint32_t), &bytes) ||
+        __builtin_add_overflow(bytes, ebpo_polygon_scratch_bytes(n), &bytes) ||
+        !ebpo_grow(&b->scratch, &b->scratch_capacity, bytes, 1))
+        return ebpo_fail_memory(b->error, n * 40);
+    return EBPO_OK;
+}
+
+static void load_position(const import_build *b, uint64_t vertex, double xyz[3])
+{
+    const float *narrow = b->xyz;
+    const double *wide = b->xyz;
+    for (uint64_t k = 0; k < 3; k++)
+        xyz[k] = b->doubles ? wide[3 * vertex + k] : (double)narrow[3 * vertex + k];
+}
+
+static ebpo_status cut(import_build *b, uint32_t n)
+{
+    ebpo_status status = reserve_scratch(b, n);
+    if (status != EBPO_OK)
+        return status;
+    double(*corner)[3] = b->scratch;
+    uint32_t(*triangle)[3] = (uint32_t(*)[3])(corner + n);
+    void *scratch = triangle + n + (n & 1); /* stays aligned for doubles */
+    for (uint32_t i = 0; i < n; i++)
+        load_position(b, b->corner[i].vertex, corner[i]);
+    ebpo_polygon_kind kind =
+        ebpo_polygon_triangulate(triangle, (const double(*)[3])corner, n, scratch);
+    if (kind == EBPO_POLYGON_NO_MEMORY)
+        return ebpo_fail_memory(b->error, n * sizeof *corner);
+    if (kind == EBPO_POLYGON_TOO_LARGE)
+        return ebpo_fail_file(
+            b->error, EBPO_E_LIMIT, b->name,
+            "a concave polygon of %" PRIu32
+            " corners is too intricate to be cut into triangles here; triangulate it in the source",
+            n);
+    b->mesh->polygons_triangulated++;
+    b->mesh->polygons_concave += kind == EBPO_POLYGON_CONCAVE;
+    if (kind == EBPO_POLYGON_GUESSED && b->mesh->polygons_guessed++ == 0)
+        b->mesh->first_guessed_face = b->mesh->face_count;
+    for (uint32_t i = 0; i < n - 2; i++)
+        put_triangle(b, triangle[i][0], triangle[i][1], triangle[i][2]);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_import_polygon(import_build *b)
+{
+    uint64_t n = b->corners;
+    ebpo_status status = EBPO_OK;
+    if (n < 3) {
+        b->mesh->polygons_dropped++;
+    } else {
+        number_vertices(b);
+        status = make_room(b, n - 2);
+        if (status == EBPO_OK && n == 3)
+            put_triangle(b, 0, 1, 2);
+        else if (status == EBPO_OK)
+            status = cut(b, (uint32_t)n);
+    }
+    b->corners = 0;
+    return status;
+}
+
+/* --- the end --- */
+
+/* Arrays grew by halves, and vertices may be fewer. */
+static void trim(ebpo_mesh *mesh, size_t position_size)
+{
+    if (mesh->workspace)
+        return;
+    void *xyz = ebpo_realloc(positions_of(mesh), mesh->vertex_count, position_size);
+    uint32_t *faces = ebpo_realloc(mesh->faces, mesh->face_count, 3 * sizeof *faces);
+    if (xyz && mesh->xyz32)
+        mesh->xyz32 = xyz;
+    else if (xyz)
+        mesh->xyz64 = xyz;
+    mesh->faces = faces ? faces : mesh->faces;
+}
+
+ebpo_status ebpo_import_end(import_build *b)
+{
+    ebpo_mesh *mesh = b->mesh;
+    ebpo_workspace *workspace = mesh->workspace;
+    if (!mesh->face_count)
+        return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
+                              mesh->polygons_dropped
+                                  ? "none of its faces has three corners; there is no mesh in it"
+                                  : "has no faces; there is no mesh in this file");
+    ebpo_array_free(workspace, b->use);
+    ebpo_array_free(workspace, b->xyz);
+    b->use = NULL;
+    b->xyz = NULL;
+    uint32_t *map = ebpo_array_alloc(workspace, mesh->vertex_count, sizeof *map);
+    if (!map)
+        return fail_memory(b, mesh->vertex_count * sizeof *map);
+    ebpo_status status = ebpo_import_weld(positions_of(mesh), b->doubles, mesh->vertex_count, map,
+                                          &mesh->vertex_count, b->error);
+    if (status == EBPO_OK)
+        EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, 3 * mesh->face_count)
+            mesh->faces[i] = map[mesh->faces[i]];
+    ebpo_array_free(workspace, map);
+    if (status == EBPO_OK)
+        trim(mesh, b->position_size);
+    return status;
+}
+
+ebpo_status ebpo_import_notes(import_build *b)
+{
+    ebpo_mesh *mesh = b->mesh;
+    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
+        return ebpo_fail_memory(b->error, sizeof *mesh->attributes);
+    return EBPO_OK;
+}
+
+void ebpo_import_word_text(char text[IMPORT_WORD_TEXT], const char *s, size_t n)
+{
+    n = n < IMPORT_WORD_TEXT ? n : IMPORT_WORD_TEXT - 1;
+    for (size_t i = 0; i < n; i++)
+        text[i] = s[i] < ' ' || s[i] > '~' ? '?' : s[i];
+    text[n] = 0;
+}
+
+void ebpo_import_free(import_build *b)
+{
+    ebpo_workspace *workspace = b->mesh->workspace;
+    for (int i = 0; i < IMPORT_SORTS; i++) {
+        ebpo_array_free(workspace, b->table[i].values);
+        ebpo_array_free(workspace, b->table[i].index);
+    }
+    ebpo_array_free(workspace, b->xyz);
+    ebpo_array_free(workspace, b->use);
+    free(b->corner);
+    free(b->scratch);
+    if (b->c_locale)
+        freelocale(b->c_locale);
+}

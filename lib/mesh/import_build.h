@@ -1,0 +1,115 @@
+/* A mesh that is being made of a file that has vertices, faces over them, and values at corners.
+ *
+ * A mesh's vertices are those that faces name, in the order in which they do so, and one for each
+ * position: programs write OBJ and OFF files, and always STL, with vertices apart where faces meet.
+ */
+#ifndef EBPO_MESH_IMPORT_BUILD_H
+#define EBPO_MESH_IMPORT_BUILD_H
+
+#include <ebpo/mesh.h>
+#include <locale.h>
+
+#define IMPORT_MOST (UINT64_C(0xfffffffe))
+#define IMPORT_NONE UINT32_MAX /* no vertex has this number */
+
+typedef enum import_sort {
+    IMPORT_COLOURS,
+    IMPORT_NORMALS,
+    IMPORT_TEXTURE,
+    IMPORT_SORTS
+} import_sort;
+
+/* Values that corners name. */
+typedef struct import_table {
+    float *values; /* [rows][columns] */
+    uint64_t rows, capacity;
+    uint32_t *index; /* [faces of the mesh][3] rows; IMPORT_NONE: none; only with attributes */
+    uint64_t index_capacity;
+    bool named;   /* some corner names a row */
+    bool bytes;   /* values are whole numbers up to 255, and kept as such */
+    bool of_face; /* the file says it of faces */
+} import_table;
+
+/* A corner of a polygon: a vertex of the file, and rows of the tables. */
+typedef struct import_corner {
+    uint32_t vertex, row[IMPORT_SORTS];
+} import_corner;
+
+typedef struct import_build {
+    const char *name;
+    ebpo_error *error;
+    ebpo_mesh *mesh;
+    bool attributes; /* values are kept */
+    locale_t c_locale;
+
+    bool doubles;         /* positions are doubles; else floats */
+    bool loses_digits;    /* floats do not keep the text of some coordinate */
+    uint64_t rounded;     /* values of tables whose text floats do not keep */
+    size_t position_size; /* bytes */
+    void *xyz;            /* [vertices][3] of the file */
+    uint64_t vertices, vertex_capacity;
+    uint32_t *use; /* [vertices] the number by first use; IMPORT_NONE: not yet used */
+    uint64_t face_capacity;
+    import_table table[IMPORT_SORTS];
+
+    import_corner *corner; /* of the polygon being read */
+    uint64_t corners, corner_capacity;
+    void *scratch; /* for cutting it */
+    uint64_t scratch_capacity;
+} import_build;
+
+/* Positions are floats, or doubles. EBPO_E_MEMORY. On failure nothing is left to free. */
+EBPO_MUST_USE ebpo_status ebpo_import_begin(import_build *b, ebpo_mesh *mesh, const char *name,
+                                            bool attributes, bool doubles, ebpo_error *error);
+
+/* Reads s[0 .. n) as a coordinate: the nearest float or double. False: it is no number. */
+bool ebpo_import_coordinate(import_build *b, double *value, const char *s, size_t n);
+
+/* Reads a number again and divides it by a weight. A float stands for the quotient where it equals
+ * it. */
+void ebpo_import_quotient(import_build *b, double *value, const char *s, size_t n, double weight);
+
+/* Reads a value of a row: the nearest float. False: it is no number. */
+bool ebpo_import_value(import_build *b, float *value, const char *s, size_t n);
+
+/* Adds a vertex of the file. EBPO_E_LIMIT, EBPO_E_MEMORY, EBPO_E_IO. EBPO_E_UNSUPPORTED, without a
+ * message: floats do not keep its text (`loses_digits`); the file is to be read again with
+ * doubles. */
+EBPO_MUST_USE ebpo_status ebpo_import_position(import_build *b, const double xyz[3]);
+
+/* Likewise of a binary file, which holds floats. */
+EBPO_MUST_USE ebpo_status ebpo_import_vertex(import_build *b, const float xyz[3]);
+
+/* Adds a row to a table, of as many values as the sort has columns. Likewise. */
+EBPO_MUST_USE ebpo_status ebpo_import_row(import_build *b, import_sort sort, const float *values);
+unsigned ebpo_import_columns(import_sort sort);
+
+/* All vertices and rows are there: faces may come. */
+EBPO_MUST_USE ebpo_status ebpo_import_faces(import_build *b);
+
+/* Room for one corner more of the polygon being read; NULL: no memory. */
+import_corner *ebpo_import_corner(import_build *b);
+
+/* The corners make a polygon; it is cut into triangles, or counted as left out where it has fewer
+ * than three corners. Begins the next. EBPO_E_LIMIT, EBPO_E_MEMORY, EBPO_E_IO. */
+EBPO_MUST_USE ebpo_status ebpo_import_polygon(import_build *b);
+
+/* Positions become one vertex each. EBPO_E_FORMAT: there are no faces. */
+EBPO_MUST_USE ebpo_status ebpo_import_end(import_build *b);
+
+/* Adds what the tables hold to the mesh's attributes: to the vertices where all corners at a vertex
+ * say the same; else to the faces, one for the face or as lists of its three corners'. */
+EBPO_MUST_USE ebpo_status ebpo_import_attributes(import_build *b);
+
+/* Gives the mesh attributes where it has none, so that what was left out can be noted.
+ * EBPO_E_MEMORY. */
+EBPO_MUST_USE ebpo_status ebpo_import_notes(import_build *b);
+
+/* Copies a word for a message: at most 40 characters, what is not printable becomes '?'. */
+enum { IMPORT_WORD_TEXT = 41 };
+void ebpo_import_word_text(char text[IMPORT_WORD_TEXT], const char *s, size_t n);
+
+/* Frees all but the mesh. */
+void ebpo_import_free(import_build *b);
+
+#endif

@@ -1,0 +1,169 @@
+/* ebpo_mesh_read: one file of any known format; with its groups. */
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sha256.h"
+#include "core/arrays.h"
+#include "core/sized.h"
+#include "mesh/import.h"
+#include "mesh/stl.h"
+#include "mesh/texture_files.h"
+#include "io/file_source.h"
+#include "io/foreign_bytes.h"
+#include "mesh/mesh_parts.h"
+#include "mesh/named_groups.h"
+#include "mesh/ply.h"
+
+enum { HASH_STEP = 1 << 22 };
+
+typedef struct hashing {
+    const ebpo_whole_file *file;
+    ebpo_workspace *workspace;
+    uint8_t digest[32];
+    pthread_t thread;
+    bool threaded;
+} hashing;
+
+static void *hash_file(void *argument)
+{
+    hashing *h = argument;
+    ebpo_sha256 state;
+    ebpo_sha256_begin(&state);
+    EBPO_FOR_PIECES(h->workspace, at, h->file->size, HASH_STEP)
+        ebpo_sha256_add(&state, h->file->data + at,
+                        h->file->size - at < HASH_STEP ? (size_t)(h->file->size - at) : HASH_STEP);
+    ebpo_sha256_end(&state, h->digest);
+    return NULL;
+}
+
+/* Hashing runs beside parsing: it takes about as long, and both read the same pages. */
+static void hash_begin(hashing *h)
+{
+    h->threaded = ebpo_thread_start(&h->thread, hash_file, h) == 0;
+    if (!h->threaded)
+        hash_file(h);
+}
+
+static void hash_end(hashing *h)
+{
+    if (h->threaded)
+        pthread_join(h->thread, NULL);
+}
+
+static ebpo_status parse_ply(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
+                             const ebpo_mesh_read_options *wanted, ebpo_error *error)
+{
+    return ebpo_ply_parse_all(out, file->data, file->size, path, wanted->workspace,
+                              wanted->attributes != 0, wanted->threads, &wanted->progress, error);
+}
+
+/* With its groups, if it names any. */
+static ebpo_status import_groups(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
+                                 const ebpo_mesh_read_options *wanted, ebpo_mesh_groups **groups,
+                                 ebpo_error *error)
+{
+    ebpo_obj_runs runs;
+    ebpo_status status = ebpo_import_groups(out, file->data, file->size, path, wanted->workspace,
+                                            wanted->attributes != 0, &runs, error);
+    if (status != EBPO_OK)
+        return status;
+    if (runs.count > 1)
+        status = ebpo_mesh_groups_new(runs.of, runs.count, groups, error);
+    ebpo_obj_runs_free(&runs);
+    return status;
+}
+
+static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
+                         const ebpo_mesh_read_options *wanted, ebpo_mesh_groups **groups,
+                         ebpo_error *error)
+{
+    const char *dot = strrchr(ebpo_path_name(path), '.');
+    const char *foreign;
+    ebpo_import_format format;
+    if (ebpo_ply_recognise(file->data, file->size))
+        return parse_ply(out, file, path, wanted, error);
+    if (!ebpo_stl_recognise(file->data, file->size) &&
+        (foreign = ebpo_foreign_bytes(file->data, file->size)))
+        return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(path), "%s", foreign);
+    if (ebpo_import_recognise(&format, file->data, file->size, path))
+        return !ebpo_progress_stage(&wanted->progress, "reading", error) ? EBPO_E_CANCELLED
+               : groups && format == EBPO_IMPORT_OBJ
+                   ? import_groups(out, file, path, wanted, groups, error)
+                   : ebpo_import_memory(out, format, file->data, file->size, path,
+                                        wanted->workspace, wanted->attributes != 0, error);
+    if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
+        return parse_ply(out, file, path, wanted, error);
+    return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(path),
+                          "unrecognised format; expected PLY, OBJ, STL or OFF");
+}
+
+/* A file that is changed while it is read may be of no form at all: then that is what is told. */
+static ebpo_status tell_change(const ebpo_whole_file *file, const char *path, ebpo_status status,
+                               ebpo_error *error)
+{
+    ebpo_error changed = EBPO_ERROR_INIT;
+    ebpo_status unchanged = ebpo_whole_file_unchanged(file, path, &changed);
+    if (unchanged == EBPO_OK)
+        return status;
+    if (error)
+        *error = changed;
+    return unchanged;
+}
+
+static ebpo_status read_mesh(const char *path, const ebpo_mesh_read_options *options,
+                             ebpo_mesh *out, ebpo_mesh_groups **groups, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_mesh_read_options wanted = EBPO_MESH_READ_OPTIONS_INIT;
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_mesh_read_options, &wanted, options, error);
+    ebpo_workspace *workspace = wanted.workspace;
+    hashing hash = { .file = &file, .workspace = workspace };
+    memset(out, 0, sizeof *out);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_open(&file, path, error);
+    if (status != EBPO_OK)
+        return status;
+    status = ebpo_whole_file_load(&file, workspace, wanted.threads, &wanted.progress, path, error);
+    if (status != EBPO_OK) {
+        ebpo_whole_file_close(&file);
+        return status;
+    }
+    hash_begin(&hash);
+    status = parse(out, &file, path, &wanted, groups, error);
+    hash_end(&hash);
+    out->workspace = workspace;
+    if (status == EBPO_OK && wanted.attributes)
+        status =
+            ebpo_textures_find(out, path, file.data, file.size, wanted.embed_textures != 0, error);
+    if (status == EBPO_OK || status == EBPO_E_FORMAT)
+        status = tell_change(&file, path, status, error);
+    if (status == EBPO_OK)
+        memcpy(out->source_sha256, hash.digest, sizeof hash.digest);
+    else
+        ebpo_mesh_free(out);
+    ebpo_whole_file_close(&file);
+    return status;
+}
+
+ebpo_status ebpo_mesh_read(const char *path, const ebpo_mesh_read_options *options, ebpo_mesh *out,
+                           ebpo_error *error)
+{
+    return read_mesh(path, options, out, NULL, error);
+}
+
+ebpo_status ebpo_mesh_read_groups(const char *path, const ebpo_mesh_read_options *options,
+                                  ebpo_mesh *out, ebpo_mesh_groups **groups, ebpo_error *error)
+{
+    *groups = NULL;
+    ebpo_status status = read_mesh(path, options, out, groups, error);
+    if (status != EBPO_OK) {
+        ebpo_mesh_groups_free(*groups);
+        *groups = NULL;
+    }
+    return status;
+}

@@ -1,0 +1,437 @@
+#include "core/strict_fp.h"
+
+#include "mesh/off.h"
+
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "mesh/attributes.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "geometry/decimal.h"
+#include "mesh/off_text.h"
+
+enum { MOST_REST = 16, RELEASE = 1 << 22 };
+
+/* How rows lie in lines, told from how many of each there are. */
+typedef enum rows_in { ROW_A_LINE, ROWS_OVER_LINES, ROWS_ANYHOW } rows_in;
+
+typedef struct off_reading {
+    import_build *build;
+    const char *begin;
+    off_text text;
+    uint64_t next_release; /* byte */
+    uint64_t size, vertices, faces;
+    bool normals, colours, texture, weights; /* what vertices have */
+    rows_in rows;
+    off_word rest[MOST_REST]; /* of the row, beyond what it has to have */
+    int rest_count;
+    bool broken;                                       /* colours are no whole numbers */
+    float most;                                        /* of colours */
+    uint64_t surplus_vertices, surplus_faces, indexed; /* rows with values that are not kept */
+    uint64_t divided;
+    bool alpha, both, more;
+} off_reading;
+
+static ebpo_status fail(const off_reading *r, const char *format, ...) EBPO_PRINTF(2, 3);
+
+static ebpo_status fail(const off_reading *r, const char *format, ...)
+{
+    char text[320];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    return ebpo_fail_file(r->build->error, EBPO_E_FORMAT, r->build->name, "line %" PRIu64 ": %s",
+                          r->text.line, text);
+}
+
+/* --- head --- */
+
+/* Reads ST, C, N, 4 and n in this order, then OFF, and returns their length; 0: they are not there.
+ * ModelNet's files have the first count behind them, without a blank: OFF8. */
+static size_t read_kind(off_word word, off_reading *r, bool *dimension)
+{
+    const char *s = word.s, *end = s + word.n;
+    bool texture = end - s > 2 && s[0] == 'S' && s[1] == 'T';
+    s += texture ? 2 : 0;
+    bool colours = s < end && *s == 'C';
+    s += colours;
+    bool normals = s < end && *s == 'N';
+    s += normals;
+    bool weights = s < end && *s == '4';
+    s += weights;
+    *dimension = s < end && *s == 'n';
+    s += *dimension;
+    bool named = end - s >= 3 && strncasecmp(s, "OFF", 3) == 0;
+    for (const char *digit = s + 3; named && digit < end; digit++)
+        named = *digit >= '0' && *digit <= '9';
+    if (r && named) {
+        r->texture = texture;
+        r->colours = colours;
+        r->normals = normals;
+        r->weights = weights;
+    }
+    return named ? (size_t)(s + 3 - word.s) : 0;
+}
+
+bool ebpo_off_recognise(const uint8_t *data, uint64_t size)
+{
+    off_text t = { (const char *)data + ebpo_text_mark(data, size), (const char *)data + size, 1 };
+    off_word word;
+    bool dimension, found = ebpo_off_next(&t, &word) && t.at < t.end;
+    size_t length = found ? read_kind(word, NULL, &dimension) : 0;
+    return length && memcmp(word.s + length - 3, "OFF", 3) == 0;
+}
+
+static bool read_count(off_word word, uint64_t *value)
+{
+    *value = 0;
+    for (size_t i = 0; i < word.n; i++) {
+        if (word.s[i] < '0' || word.s[i] > '9')
+            return false;
+        *value = *value * 10 + (uint64_t)(word.s[i] - '0');
+    }
+    return word.n > 0 && word.n < 11;
+}
+
+static ebpo_status fail_counts(const off_reading *r)
+{
+    return fail(r, "no counts of vertices, faces and edges follow the word OFF; repair the file");
+}
+
+/* Edges: on the line of the faces, or alone on the next one; some programs leave their count out.
+ */
+static void read_edges(off_reading *r)
+{
+    off_text ahead = r->text;
+    off_word word, none;
+    uint64_t edges;
+    bool same_line = ebpo_off_next_here(&ahead, &word);
+    bool found =
+        same_line || (ebpo_off_next(&ahead, &word) && !(ebpo_off_next_here(&ahead, &none)));
+    if (found && read_count(word, &edges))
+        r->text = ahead;
+}
+
+/* Where there are as many lines as rows, a row has a line; where there are more, rows go over
+ * lines; where there are fewer, a line has several rows. */
+static ebpo_status find_rows(off_reading *r)
+{
+    off_text here = r->text;
+    off_word word;
+    uint64_t lines = ebpo_off_lines(&r->text), rows = r->vertices + r->faces;
+    r->rows = lines == rows ? ROW_A_LINE : lines > rows ? ROWS_OVER_LINES : ROWS_ANYHOW;
+    if (r->rows != ROWS_ANYHOW && ebpo_off_next_here(&here, &word))
+        return fail_counts(r);
+    return EBPO_OK;
+}
+
+static ebpo_status read_head(off_reading *r)
+{
+    off_word word;
+    bool dimension = false;
+    if (!ebpo_off_next(&r->text, &word))
+        return fail(r, "the file is empty; there is no mesh in it");
+    off_text behind = r->text;
+    size_t named = read_kind(word, r, &dimension);
+    if (named) {
+        off_word next;
+        r->text.at = word.s + named;
+        bool more = ebpo_off_next(&r->text, &next);
+        if (more && next.n == 6 && strncasecmp(next.s, "BINARY", 6) == 0)
+            return ebpo_fail_file(r->build->error, EBPO_E_UNSUPPORTED, r->build->name,
+                                  "is a binary OFF file; save it as text, or as PLY");
+        if (dimension)
+            return ebpo_fail_file(r->build->error, EBPO_E_UNSUPPORTED, r->build->name,
+                                  "line %" PRIu64 ": its points have a number of dimensions of "
+                                  "their own (nOFF); save it with three",
+                                  behind.line);
+        word = next;
+        if (!more)
+            return fail_counts(r);
+    }
+    if (!read_count(word, &r->vertices))
+        return named ? fail_counts(r)
+                     : fail(r, "neither the word OFF nor counts stand there; this is not an OFF "
+                               "file that can be read");
+    if (!ebpo_off_next(&r->text, &word) || !read_count(word, &r->faces))
+        return fail_counts(r);
+    read_edges(r);
+    if (r->vertices > r->size / 6 || r->faces > r->size / 2)
+        return ebpo_fail_file(r->build->error, EBPO_E_FORMAT, r->build->name,
+                              "%" PRIu64 " vertices and %" PRIu64
+                              " faces do not fit into a file of %" PRIu64 " bytes; it is damaged",
+                              r->vertices, r->faces, r->size);
+    return find_rows(r);
+}
+
+/* --- rows --- */
+
+static void let_go(off_reading *r)
+{
+    uint64_t at = (uint64_t)(r->text.at - r->begin);
+    if (at < r->next_release)
+        return;
+    ebpo_release_pages(r->build->mesh->workspace);
+    r->next_release = at + RELEASE;
+}
+
+/* A word that the row has to have. `first`: it may stand on a line of its own. */
+static bool next_needed(off_reading *r, bool first, off_word *word)
+{
+    return first || r->rows != ROW_A_LINE ? ebpo_off_next(&r->text, word)
+                                          : ebpo_off_next_here(&r->text, word);
+}
+
+/* What else the line has; where lines have several rows, that is the next ones. */
+static void take_rest(off_reading *r)
+{
+    off_word word;
+    r->rest_count = 0;
+    while (r->rows != ROWS_ANYHOW && ebpo_off_next_here(&r->text, &word))
+        if (r->rest_count < MOST_REST)
+            r->rest[r->rest_count++] = word;
+}
+
+/* Numbers of the rest from `first` on, into a row of a table. */
+static ebpo_status keep(off_reading *r, import_sort sort, int first, bool *good)
+{
+    float value[3] = { 0, 0, 0 };
+    int columns = (int)ebpo_import_columns(sort);
+    *good = first + columns <= r->rest_count;
+    for (int k = 0; k < columns && *good; k++) {
+        off_word word = r->rest[first + k];
+        *good = ebpo_import_value(r->build, &value[k], word.s, word.n);
+        if (sort != IMPORT_COLOURS)
+            continue;
+        /* the range first, in this way: what is not a number has no int */
+        bool byte = value[k] >= 0 && value[k] <= 255;
+        r->broken |= memchr(word.s, '.', word.n) || !byte || value[k] != (float)(int)value[k];
+        r->most = value[k] > r->most ? value[k] : r->most;
+    }
+    return r->build->attributes ? ebpo_import_row(r->build, sort, value) : EBPO_OK;
+}
+
+/* Normals, then colours of three or four values, then texture coordinates. */
+static ebpo_status keep_rest(off_reading *r)
+{
+    int at = r->normals ? 3 : 0, left = r->rest_count - at - (r->texture ? 2 : 0);
+    bool fine = left >= 0, good;
+    ebpo_status status = EBPO_OK;
+    if (r->normals) {
+        status = keep(r, IMPORT_NORMALS, 0, &good);
+        fine &= good;
+    }
+    if (r->colours && status == EBPO_OK) {
+        status = keep(r, IMPORT_COLOURS, at, &good);
+        fine &= good && (left == 3 || left == 4);
+        r->alpha |= left == 4;
+    } else {
+        fine &= left == 0;
+    }
+    if (r->texture && status == EBPO_OK) {
+        status = keep(r, IMPORT_TEXTURE, r->rest_count - 2 > 0 ? r->rest_count - 2 : 0, &good);
+        fine &= good;
+    }
+    r->surplus_vertices += !fine;
+    return status;
+}
+
+static ebpo_status fail_end(const off_reading *r, const char *what, uint64_t row)
+{
+    return ebpo_fail_file(r->build->error, EBPO_E_FORMAT, r->build->name,
+                          "the file ends before %s %" PRIu64 "; it is cut short, get it again",
+                          what, row);
+}
+
+/* Where rows are anyhow in lines, what vertices have must follow from the first word. */
+static ebpo_status take_rest_anyhow(off_reading *r, uint64_t row)
+{
+    int wanted = (r->normals ? 3 : 0) + (r->colours ? 4 : 0) + (r->texture ? 2 : 0);
+    if (r->rows != ROWS_ANYHOW) {
+        take_rest(r);
+        return EBPO_OK;
+    }
+    for (r->rest_count = 0; r->rest_count < wanted; r->rest_count++)
+        if (!ebpo_off_next(&r->text, &r->rest[r->rest_count]))
+            return fail_end(r, "vertex", row + 1);
+    return EBPO_OK;
+}
+
+static ebpo_status fail_number(const off_reading *r, off_word word, uint64_t row)
+{
+    char text[IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, word.s, word.n);
+    return fail(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text, row);
+}
+
+static ebpo_status read_vertex(off_reading *r, uint64_t row)
+{
+    double xyz[3], w = 1;
+    off_word word[4];
+    for (int k = 0; k < 3 + r->weights; k++) {
+        if (!next_needed(r, k == 0, &word[k])) {
+            if (k == 0 || r->text.at == r->text.end)
+                return fail_end(r, "vertex", row + (k > 0));
+            return fail(r, "vertex %" PRIu64 " has no three coordinates; repair the file", row);
+        }
+        const char *s = word[k].s;
+        size_t n = word[k].n;
+        bool good = k < 3 ? ebpo_import_coordinate(r->build, &xyz[k], s, n)
+                          : ebpo_number_double(&w, s, n, r->build->c_locale) && w != 0;
+        if (!good)
+            return fail_number(r, word[k], row);
+    }
+    for (int k = 0; k < 3 && w != 1; k++)
+        ebpo_import_quotient(r->build, &xyz[k], word[k].s, word[k].n, w);
+    r->divided += w != 1;
+    ebpo_status status = take_rest_anyhow(r, row);
+    if (status == EBPO_OK)
+        status = ebpo_import_position(r->build, xyz);
+    return status == EBPO_OK ? keep_rest(r) : status;
+}
+
+/* One value is a place in a table of colours that no file has. */
+static ebpo_status keep_face(off_reading *r, uint32_t *row)
+{
+    import_table *t = &r->build->table[IMPORT_COLOURS];
+    bool good = true;
+    *row = IMPORT_NONE;
+    r->indexed += r->rest_count == 1;
+    r->surplus_faces += r->rest_count == 2 || r->rest_count > 4;
+    if (r->rest_count != 3 && r->rest_count != 4)
+        return EBPO_OK;
+    if (r->colours) {
+        r->both = true;
+        return EBPO_OK;
+    }
+    r->alpha |= r->rest_count == 4;
+    t->of_face = true;
+    ebpo_status status = keep(r, IMPORT_COLOURS, 0, &good);
+    r->surplus_faces += !good;
+    if (t->rows)
+        *row = (uint32_t)(t->rows - 1);
+    return status;
+}
+
+static ebpo_status read_corner(off_reading *r, uint64_t row, uint64_t corners)
+{
+    import_corner *c = ebpo_import_corner(r->build);
+    off_word word;
+    uint64_t index;
+    if (!c)
+        return ebpo_fail_memory(r->build->error, r->build->corners * sizeof *c);
+    if (!next_needed(r, false, &word) || !read_count(word, &index))
+        return fail(r,
+                    "face %" PRIu64 " names fewer than its %" PRIu64 " vertices; repair the file",
+                    row, corners);
+    if (index >= r->vertices)
+        return fail(r,
+                    "face %" PRIu64 " names vertex %" PRIu64 ", but there are %" PRIu64
+                    " vertices; repair the file or drop the face",
+                    row, index, r->vertices);
+    c->vertex = (uint32_t)index;
+    c->row[IMPORT_COLOURS] = r->colours ? c->vertex : IMPORT_NONE;
+    c->row[IMPORT_NORMALS] = r->normals ? c->vertex : IMPORT_NONE;
+    c->row[IMPORT_TEXTURE] = r->texture ? c->vertex : IMPORT_NONE;
+    return EBPO_OK;
+}
+
+static ebpo_status read_face(off_reading *r, uint64_t row)
+{
+    import_build *b = r->build;
+    uint64_t corners;
+    uint32_t colour;
+    off_word word;
+    if (!next_needed(r, true, &word))
+        return fail_end(r, "face", row);
+    if (!read_count(word, &corners) || !corners)
+        return fail(r, "face %" PRIu64 " has no number of corners; repair the file", row);
+    if (corners > r->size / 2)
+        return fail(r,
+                    "face %" PRIu64 " has %" PRIu64 " corners, more than fit into the file; "
+                    "repair it",
+                    row, corners);
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < corners && status == EBPO_OK; i++)
+        status = read_corner(r, row, corners);
+    if (status != EBPO_OK)
+        return status;
+    take_rest(r);
+    status = keep_face(r, &colour);
+    for (uint64_t i = 0; i < corners && colour != IMPORT_NONE; i++)
+        b->corner[i].row[IMPORT_COLOURS] = colour;
+    return status == EBPO_OK ? ebpo_import_polygon(b) : status;
+}
+
+/* --- all of it --- */
+
+static ebpo_status note_unread(off_reading *r)
+{
+    ebpo_mesh *mesh = r->build->mesh;
+    bool any = r->divided || r->surplus_vertices || r->surplus_faces || r->more;
+    ebpo_status status = any ? ebpo_import_notes(r->build) : EBPO_OK;
+    if (!any || status != EBPO_OK)
+        return status;
+    ebpo_attributes_count_unread(mesh->attributes,
+                                 "weights of vertices, by which coordinates were divided",
+                                 r->divided);
+    ebpo_attributes_count_unread(mesh->attributes,
+                                 "vertices' values that the file's first word does not say",
+                                 r->surplus_vertices);
+    ebpo_attributes_count_unread(mesh->attributes, "faces' values that are no colours",
+                                 r->surplus_faces);
+    if (r->more)
+        ebpo_attributes_note_unread(mesh->attributes, "what follows the last face");
+    return EBPO_OK;
+}
+
+static void note_losses(const off_reading *r, ebpo_attributes *to)
+{
+    if (r->alpha)
+        ebpo_attributes_lose(to, "how opaque colours are");
+    if (r->both)
+        ebpo_attributes_lose(to, "colours of faces (vertices have some too)");
+    if (r->indexed)
+        ebpo_attributes_lose(to, "colours of faces that are numbers in a table");
+}
+
+static ebpo_status read_rows(off_reading *r)
+{
+    off_word word;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < r->vertices && status == EBPO_OK; i++, let_go(r))
+        status = read_vertex(r, i);
+    if (status == EBPO_OK)
+        status = ebpo_import_faces(r->build);
+    for (uint64_t i = 0; i < r->faces && status == EBPO_OK; i++, let_go(r))
+        status = read_face(r, i);
+    if (status == EBPO_OK)
+        r->more = ebpo_off_next(&r->text, &word);
+    if (status == EBPO_OK && r->more && r->rows == ROWS_ANYHOW)
+        status = fail(r, "there is more behind the last face, though lines have several rows; "
+                         "repair the counts");
+    return status;
+}
+
+ebpo_status ebpo_off_read(import_build *b, const uint8_t *data, uint64_t size)
+{
+    off_reading r = { .build = b, .begin = (const char *)data, .size = size };
+    r.text = (off_text){ r.begin + ebpo_text_mark(data, size), r.begin + size, 1 };
+    ebpo_status status = read_head(&r);
+    if (status == EBPO_OK)
+        status = read_rows(&r);
+    if (status == EBPO_OK)
+        status = ebpo_import_end(b);
+    b->table[IMPORT_COLOURS].bytes = !r.broken && r.most > 1;
+    if (status == EBPO_OK && b->attributes)
+        status = ebpo_import_attributes(b);
+    if (status == EBPO_OK && b->attributes)
+        note_losses(&r, b->mesh->attributes);
+    return status == EBPO_OK ? note_unread(&r) : status;
+}

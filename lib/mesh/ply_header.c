@@ -1,0 +1,367 @@
+#include "core/strict_fp.h"
+
+#include "mesh/ply_header.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "io/foreign_bytes.h"
+
+enum { MAX_WORDS = 6 }; /* no statement has more than five; a sixth shows that there are too many */
+
+typedef struct reader {
+    ply_header *header;
+    const char *at, *end;
+    uint64_t line;
+    const char *name;
+    bool format_seen;
+    ebpo_error *error;
+} reader;
+
+static const struct {
+    const char *word;
+    ply_type type;
+} type_names[] = {
+    { "char", PLY_INT8 },       { "uchar", PLY_UINT8 },    { "short", PLY_INT16 },
+    { "ushort", PLY_UINT16 },   { "int", PLY_INT32 },      { "uint", PLY_UINT32 },
+    { "float", PLY_FLOAT32 },   { "double", PLY_FLOAT64 }, { "int8", PLY_INT8 },
+    { "uint8", PLY_UINT8 },     { "int16", PLY_INT16 },    { "uint16", PLY_UINT16 },
+    { "int32", PLY_INT32 },     { "uint32", PLY_UINT32 },  { "float32", PLY_FLOAT32 },
+    { "float64", PLY_FLOAT64 },
+};
+
+unsigned ebpo_ply_type_bytes(ply_type type)
+{
+    static const unsigned char bytes[] = { 1, 1, 2, 2, 4, 4, 4, 8 };
+    return bytes[type];
+}
+
+static bool is(ply_word word, const char *text)
+{
+    return strlen(text) == word.n && memcmp(word.s, text, word.n) == 0;
+}
+
+void ebpo_ply_word_text(char text[PLY_WORD_TEXT], ply_word word)
+{
+    size_t n = word.n < PLY_WORD_TEXT - 1 ? word.n : PLY_WORD_TEXT - 1;
+    for (size_t i = 0; i < n; i++)
+        text[i] = word.s[i] >= ' ' && word.s[i] <= '~' ? word.s[i] : '?';
+    text[n] = 0;
+}
+
+static ebpo_status fail(const reader *r, const char *what, ply_word word)
+{
+    char text[PLY_WORD_TEXT];
+    ebpo_ply_word_text(text, word);
+    return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
+                          "line %" PRIu64
+                          ": %s '%s'; this is not a PLY header as the format describes it",
+                          r->line, what, text);
+}
+
+/* The next line without its end, and without the '\r' of a DOS file. False at the end of the data.
+ */
+static bool next_line(reader *r, ply_word *line)
+{
+    if (r->at == r->end)
+        return false;
+    const char *stop = memchr(r->at, r->header->line_end, (size_t)(r->end - r->at));
+    if (!stop)
+        return false;
+    *line = (ply_word){ r->at, (size_t)(stop - r->at) };
+    if (line->n && line->s[line->n - 1] == '\r')
+        line->n--;
+    r->at = stop + 1;
+    r->line++;
+    return true;
+}
+
+static int split(ply_word line, ply_word words[MAX_WORDS])
+{
+    int n = 0;
+    const char *s = line.s, *end = line.s + line.n;
+    while (n < MAX_WORDS) {
+        while (s < end && (*s == ' ' || *s == '\t'))
+            s++;
+        if (s == end)
+            break;
+        words[n].s = s;
+        while (s < end && *s != ' ' && *s != '\t')
+            s++;
+        words[n].n = (size_t)(s - words[n].s);
+        n++;
+    }
+    return n;
+}
+
+static bool parse_type(ply_word word, ply_type *type)
+{
+    for (size_t i = 0; i < sizeof type_names / sizeof *type_names; i++)
+        if (is(word, type_names[i].word)) {
+            *type = type_names[i].type;
+            return true;
+        }
+    return false;
+}
+
+static bool parse_count(ply_word word, uint64_t *count)
+{
+    *count = 0;
+    for (size_t i = 0; i < word.n; i++) {
+        unsigned digit = (unsigned char)word.s[i] - (unsigned)'0';
+        if (digit > 9 || __builtin_mul_overflow(*count, 10, count) ||
+            __builtin_add_overflow(*count, digit, count))
+            return false;
+    }
+    return word.n > 0;
+}
+
+/* "format ascii 1.0" */
+static ebpo_status format_statement(reader *r, const ply_word *words, int n)
+{
+    if (n != 3 || r->format_seen)
+        return fail(r, "unexpected statement", words[0]);
+    if (is(words[1], "ascii"))
+        r->header->encoding = PLY_ASCII;
+    else if (is(words[1], "binary_little_endian"))
+        r->header->encoding = PLY_LITTLE;
+    else if (is(words[1], "binary_big_endian"))
+        r->header->encoding = PLY_BIG;
+    else
+        return fail(r, "unknown format", words[1]);
+    if (!is(words[2], "1.0"))
+        return fail(r, "unknown format version", words[2]);
+    r->format_seen = true;
+    return EBPO_OK;
+}
+
+static ebpo_status note_kind(reader *r, ply_element *element)
+{
+    ply_header *h = r->header;
+    int64_t *place;
+    if (is(element->name, "vertex")) {
+        element->kind = PLY_KIND_VERTEX;
+        place = &h->vertex;
+    } else if (is(element->name, "face")) {
+        element->kind = PLY_KIND_FACE;
+        place = &h->face;
+    } else if (is(element->name, "tristrips")) {
+        element->kind = PLY_KIND_STRIPS;
+        place = &h->strips;
+    } else {
+        return EBPO_OK;
+    }
+    if (*place >= 0)
+        return fail(r, "a second element", element->name);
+    *place = (int64_t)h->elements;
+    return EBPO_OK;
+}
+
+/* "element vertex 8" */
+static ebpo_status element_statement(reader *r, const ply_word *words, int n)
+{
+    ply_header *h = r->header;
+    ply_element element = { .line = r->line, .first = h->properties };
+    if (n != 3)
+        return fail(r, "a name and a count should follow", words[0]);
+    if (!parse_count(words[2], &element.count))
+        return fail(r, "not a count:", words[2]);
+    element.name = words[1];
+    ebpo_status status = note_kind(r, &element);
+    if (status != EBPO_OK)
+        return status;
+    if (!ebpo_grow(&h->element, &h->element_capacity, h->elements + 1, sizeof *h->element))
+        return ebpo_fail_memory(r->error, sizeof element);
+    h->element[h->elements++] = element;
+    return EBPO_OK;
+}
+
+static ply_role role_of(const ply_element *element, const ply_property *property)
+{
+    if (element->kind == PLY_KIND_VERTEX && !property->list && property->name.n == 1) {
+        char c = property->name.s[0];
+        return c == 'x'   ? PLY_ROLE_X
+               : c == 'y' ? PLY_ROLE_Y
+               : c == 'z' ? PLY_ROLE_Z
+                          : PLY_ROLE_NONE;
+    }
+    bool corners = is(property->name, "vertex_indices") || is(property->name, "vertex_index");
+    if ((element->kind == PLY_KIND_FACE || element->kind == PLY_KIND_STRIPS) && property->list &&
+        corners)
+        return PLY_ROLE_CORNERS;
+    return PLY_ROLE_NONE;
+}
+
+static bool role_taken(const ply_header *h, const ply_element *element, ply_role role)
+{
+    for (uint64_t i = element->first; i < h->properties; i++)
+        if (role != PLY_ROLE_NONE && h->property[i].role == role)
+            return true;
+    return false;
+}
+
+/* "property float x" or "property list uchar int vertex_indices" */
+static ebpo_status property_statement(reader *r, const ply_word *words, int n)
+{
+    ply_header *h = r->header;
+    if (!h->elements)
+        return fail(r, "no element stands before", words[0]);
+    ply_property property = { .list = n > 1 && is(words[1], "list"), .attribute = -1 };
+    if (n != (property.list ? 5 : 3))
+        return fail(r, "too few or too many words in", words[0]);
+    if (!parse_type(words[n - 2], &property.type))
+        return fail(r, "unknown type", words[n - 2]);
+    if (property.list &&
+        (!parse_type(words[2], &property.count_type) || property.count_type >= PLY_FLOAT32))
+        return fail(r, "no type for a list's length:", words[2]);
+    property.name = words[n - 1];
+    ply_element *element = &h->element[h->elements - 1];
+    property.role = role_of(element, &property);
+    if (property.role == PLY_ROLE_CORNERS && property.type >= PLY_FLOAT32)
+        return fail(r, "no type for vertex numbers:", words[n - 2]);
+    if (role_taken(h, element, property.role))
+        return fail(r, "a second property", property.name);
+    if (!ebpo_grow(&h->property, &h->property_capacity, h->properties + 1, sizeof *h->property))
+        return ebpo_fail_memory(r->error, sizeof property);
+    h->property[h->properties++] = property;
+    element->properties++;
+    element->has_list = element->has_list || property.list;
+    element->row_bytes += ebpo_ply_type_bytes(property.list ? property.count_type : property.type);
+    return EBPO_OK;
+}
+
+static ebpo_status statement(reader *r, ply_word line, bool *ended)
+{
+    ply_word words[MAX_WORDS];
+    int n = split(line, words);
+    if (n == 0 || is(words[0], "comment") || is(words[0], "obj_info")) {
+        r->header->notes++;
+        return EBPO_OK;
+    }
+    if (is(words[0], "format"))
+        return format_statement(r, words, n);
+    if (is(words[0], "element"))
+        return element_statement(r, words, n);
+    if (is(words[0], "property"))
+        return property_statement(r, words, n);
+    if (is(words[0], "end_header")) {
+        *ended = true;
+        return EBPO_OK;
+    }
+    /* Blender 2.47 left the word "comment" out of its first line. Later on, a line that is not
+     * understood could change what the body means. */
+    r->header->notes++;
+    return r->header->elements ? fail(r, "unknown statement", words[0]) : EBPO_OK;
+}
+
+const char *ebpo_ply_first_line(const uint8_t *data, uint64_t size, char *line_end)
+{
+    const char *at = (const char *)data + ebpo_text_mark(data, size),
+               *end = (const char *)data + size;
+    if (end - at < 4 || memcmp(at, "ply", 3) != 0)
+        return NULL;
+    for (at += 3; at < end && (*at == ' ' || *at == '\t');)
+        at++;
+    *line_end = end - at > 1 && at[0] == '\r' && at[1] != '\n' ? '\r' : '\n';
+    return at < end && (*at == '\n' || *at == '\r') ? at : NULL;
+}
+
+static ebpo_status check_magic(reader *r, uint64_t size)
+{
+    ply_word line;
+    const char *end = ebpo_ply_first_line((const uint8_t *)r->at, size, &r->header->line_end);
+    const char *foreign = end ? NULL : ebpo_foreign_bytes((const uint8_t *)r->at, size);
+    if (foreign)
+        return ebpo_fail_at(r->error, EBPO_E_FORMAT, r->name, "", 0, "%s", foreign);
+    r->at = end ? end : r->at;
+    if (!end || !next_line(r, &line))
+        return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
+                              "line 1: no PLY file, it does not begin with a line 'ply'");
+    return EBPO_OK;
+}
+
+static ebpo_status statements(reader *r, bool whole)
+{
+    bool ended = false;
+    ply_word line = { "", 0 };
+    while (!ended) {
+        if (!next_line(r, &line))
+            return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
+                                  "line %" PRIu64
+                                  ": %s before 'end_header'; the file is cut short or no PLY file",
+                                  r->line + 1, whole ? "the file ends" : "a megabyte of header");
+        ebpo_status status = statement(r, line, &ended);
+        if (status != EBPO_OK)
+            return status;
+    }
+    if (!r->format_seen)
+        return fail(r, "no format was named before", line);
+    return EBPO_OK;
+}
+
+static bool has_role(const ply_header *h, const ply_element *element, ply_role role)
+{
+    for (uint64_t i = 0; i < element->properties; i++)
+        if (h->property[element->first + i].role == role)
+            return true;
+    return false;
+}
+
+static ebpo_status check_roles(const reader *r)
+{
+    const ply_header *h = r->header;
+    if (h->vertex < 0)
+        return ebpo_fail_file(
+            r->error, EBPO_E_FORMAT, r->name,
+            "line %" PRIu64 ": the header names no element 'vertex'; there is no mesh in this file",
+            r->line);
+    for (uint64_t i = 0; i < h->elements; i++) {
+        const ply_element *e = &h->element[i];
+        static const char *const missing[] = { "", "x", "y", "z", "vertex_indices" };
+        ply_role from = e->kind == PLY_KIND_VERTEX ? PLY_ROLE_X : PLY_ROLE_CORNERS;
+        ply_role to = e->kind == PLY_KIND_VERTEX ? PLY_ROLE_Z : PLY_ROLE_CORNERS;
+        for (int role = (int)from; role <= (int)to && e->kind != PLY_KIND_OTHER; role++)
+            if (!has_role(h, e, (ply_role)role))
+                return ebpo_fail_file(
+                    r->error, EBPO_E_FORMAT, r->name,
+                    "line %" PRIu64
+                    ": this element has no %s '%s'; the mesh cannot be read without",
+                    e->line, role == PLY_ROLE_CORNERS ? "list" : "property", missing[role]);
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_ply_header_parse(ply_header *out, const uint8_t *data, uint64_t size,
+                                  const char *name, ebpo_error *error)
+{
+    *out = (ply_header){ .line_end = '\n', .vertex = -1, .face = -1, .strips = -1 };
+    uint64_t visible = size < PLY_HEADER_LONGEST ? size : PLY_HEADER_LONGEST;
+    reader r = { .header = out,
+                 .at = (const char *)data,
+                 .end = (const char *)data + visible,
+                 .name = name,
+                 .error = error };
+    ebpo_status status = check_magic(&r, size);
+    if (status == EBPO_OK)
+        status = statements(&r, visible == size);
+    if (status == EBPO_OK)
+        status = check_roles(&r);
+    out->body = (uint64_t)((const uint8_t *)r.at - data);
+    out->body_line = r.line + 1;
+    if (status != EBPO_OK)
+        ebpo_ply_header_free(out);
+    return status;
+}
+
+void ebpo_ply_header_free(ply_header *header)
+{
+    free(header->element);
+    free(header->property);
+    header->element = NULL;
+    header->property = NULL;
+    header->elements = header->properties = 0;
+}

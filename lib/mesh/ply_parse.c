@@ -1,0 +1,294 @@
+#include "core/strict_fp.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/arrays.h"
+#include "io/file_source.h"
+#include "mesh/ply.h"
+#include "mesh/ply_ascii.h"
+#include "mesh/ply_attributes.h"
+#include "mesh/ply_binary.h"
+#include "mesh/ply_state.h"
+#include "mesh/ply_unused.h"
+
+#define MOST_VERTICES (UINT64_C(0xfffffffe))
+
+bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
+{
+    char line_end;
+    return ebpo_ply_first_line(data, size, &line_end) != NULL;
+}
+
+/* Least bytes of all rows; false when they exceed any file. */
+static bool least_bytes(const ply_parser *p, const ply_element *element, uint64_t *bytes)
+{
+    uint64_t row = element->row_bytes;
+    if (p->header.encoding == PLY_ASCII &&
+        !ebpo_mul_ok(element->properties, 2, &row)) /* a digit and a blank */
+        return false;
+    return ebpo_mul_ok(element->count, row, bytes);
+}
+
+/* Before anything is allocated: can the file hold what its header claims? */
+static ebpo_status check_counts(ply_parser *p)
+{
+    uint64_t left = p->size - p->header.body;
+    left += p->header.encoding == PLY_ASCII; /* the last blank may be missing */
+    for (uint64_t i = 0; i < p->header.elements; i++) {
+        const ply_element *e = &p->header.element[i];
+        uint64_t need;
+        if (least_bytes(p, e, &need) && need <= left) {
+            left -= need;
+            continue;
+        }
+        char name[PLY_WORD_TEXT];
+        ebpo_ply_word_text(name, e->name);
+        if (p->header.encoding == PLY_ASCII || e->has_list)
+            return ebpo_fail_file(
+                p->error, EBPO_E_FORMAT, p->name,
+                "line %" PRIu64 ": %" PRIu64
+                " rows of element '%s' do not fit into the rest of the file, %" PRIu64
+                " bytes; it is cut short or damaged, get it again",
+                e->line, e->count, name, left);
+        p->at = p->size;
+        return ebpo_ply_fail_end(p, e, left / e->row_bytes);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status check_parts(const ply_parser *p)
+{
+    const ply_header *h = &p->header;
+    uint64_t vertices = h->element[h->vertex].count,
+             faces = h->face >= 0 ? h->element[h->face].count : 0;
+    if (vertices > MOST_VERTICES || faces > MOST_VERTICES)
+        return ebpo_fail_file(
+            p->error, EBPO_E_LIMIT, p->name,
+            "%" PRIu64 " vertices and %" PRIu64
+            " faces, but no more than 2^32 - 2 of each can be read; split the model",
+            vertices, faces);
+    if (!faces && (h->strips < 0 || !h->element[h->strips].count))
+        return ebpo_fail_file(p->error, EBPO_E_FORMAT, p->name,
+                              "has %" PRIu64
+                              " vertices but no faces: a point cloud; make a surface of it first",
+                              vertices);
+    return EBPO_OK;
+}
+
+/* Floats stay floats when all three coordinates are; doubles hold every other type exactly. Points
+ * are doubles. */
+static bool all_float(const ply_parser *p)
+{
+    const ply_header *h = &p->header;
+    const ply_element *vertex = &h->element[h->vertex];
+    for (uint64_t i = 0; i < vertex->properties; i++) {
+        const ply_property *property = &h->property[vertex->first + i];
+        if (property->role != PLY_ROLE_NONE && property->type != PLY_FLOAT32)
+            return false;
+    }
+    return !p->strict;
+}
+
+static ebpo_status allocate_vertices(ply_parser *p)
+{
+    const ply_header *h = &p->header;
+    ebpo_mesh *mesh = p->mesh;
+    mesh->vertex_count = h->element[h->vertex].count;
+    size_t width = all_float(p) ? sizeof(float) : sizeof(double);
+    void *coordinates = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, 3 * width);
+    if (width == sizeof(float))
+        mesh->xyz32 = coordinates;
+    else
+        mesh->xyz64 = coordinates;
+    if (!coordinates)
+        return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * 3 * width, p->error);
+    if (h->encoding == PLY_ASCII && !(p->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0)))
+        return ebpo_fail_memory(p->error, 0);
+    return EBPO_OK;
+}
+
+static ebpo_status allocate(ply_parser *p)
+{
+    const ply_header *h = &p->header;
+    p->face_capacity = h->face >= 0 ? h->element[h->face].count : 0;
+    p->mesh->faces =
+        ebpo_array_alloc(p->mesh->workspace, p->face_capacity, 3 * sizeof *p->mesh->faces);
+    if (!p->mesh->faces)
+        return ebpo_workspace_fail(p->mesh->workspace,
+                                   p->face_capacity * 3 * sizeof *p->mesh->faces, p->error);
+    return allocate_vertices(p);
+}
+
+static ebpo_status read_element(ply_parser *p, const ply_element *element, bool store)
+{
+    return p->header.encoding == PLY_ASCII ? ebpo_ply_ascii_element(p, element, store)
+                                           : ebpo_ply_binary_element(p, element, store);
+}
+
+/* Faces that come before the vertices are skipped and read afterwards: cutting a polygon takes its
+ * positions. */
+static ebpo_status read_early_faces(ply_parser *p)
+{
+    uint64_t at = p->at, line = p->line;
+    p->at = p->header.body;
+    p->line = p->header.body_line;
+    ebpo_status status = EBPO_OK;
+    for (int64_t i = 0; i < p->header.vertex && status == EBPO_OK; i++)
+        status = read_element(p, &p->header.element[i], true);
+    p->at = at;
+    p->line = line;
+    p->next_report = 0;
+    return status;
+}
+
+static ebpo_status read_body(ply_parser *p)
+{
+    ebpo_status status = EBPO_OK;
+    p->at = p->header.body;
+    p->line = p->header.body_line;
+    for (int64_t i = 0; i < (int64_t)p->header.elements && status == EBPO_OK; i++) {
+        status = read_element(p, &p->header.element[i], i >= p->header.vertex);
+        if (status == EBPO_OK && i == p->header.vertex)
+            status = read_early_faces(p);
+    }
+    if (status == EBPO_OK && p->mesh->face_count == 0)
+        status =
+            ebpo_fail_file(p->error, EBPO_E_FORMAT, p->name,
+                           "none of its faces has three corners; there is no mesh in this file");
+    return status;
+}
+
+/* The face array grew by halves; give back what is left over. */
+static void trim(ply_parser *p)
+{
+    if (p->face_capacity == p->mesh->face_count || p->mesh->workspace)
+        return;
+    uint32_t *faces = ebpo_realloc(p->mesh->faces, p->mesh->face_count, 3 * sizeof *faces);
+    if (faces)
+        p->mesh->faces = faces;
+}
+
+static void describe(ply_parser *p)
+{
+    static const char *const formats[] = { "ply-ascii", "ply-le", "ply-be" };
+    snprintf(p->mesh->source_name, sizeof p->mesh->source_name, "%s", p->name);
+    snprintf(p->mesh->source_format, sizeof p->mesh->source_format, "%s",
+             formats[p->header.encoding]);
+    p->mesh->source_size = p->size;
+}
+
+static ebpo_status note_unread(ply_parser *p)
+{
+    bool more = p->header.encoding == PLY_ASCII && ebpo_ply_ascii_more(p);
+    ebpo_status status =
+        p->surplus_values || more || p->most_rounded > 0 ? ebpo_ply_notes(p) : EBPO_OK;
+    if (status != EBPO_OK)
+        return status;
+    if (more)
+        ebpo_attributes_note_unread(p->mesh->attributes,
+                                    "what follows the last element, from line %" PRIu64 " on",
+                                    p->line);
+    if (p->surplus_values)
+        ebpo_attributes_note_unread(p->mesh->attributes,
+                                    "values that the header does not describe: %" PRIu64
+                                    ", at the ends of %" PRIu64 " rows",
+                                    p->surplus_values, p->surplus_rows);
+    if (p->most_rounded > 0)
+        ebpo_attributes_note_unread(p->mesh->attributes,
+                                    "digits of coordinates that the header declares as float: "
+                                    "rounded by up to %.3g; declare them as double",
+                                    p->most_rounded);
+    return EBPO_OK;
+}
+
+/* All but the mesh. */
+static void release(ply_parser *p)
+{
+    if (p->c_locale)
+        freelocale(p->c_locale);
+    free(p->corners);
+    free(p->scratch);
+    free(p->lost);
+    ebpo_ply_header_free(&p->header);
+}
+
+ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t size, const char *name,
+                               ebpo_workspace *workspace, bool attributes, unsigned threads,
+                               const ebpo_progress *progress, ebpo_error *error)
+{
+    ebpo_mesh mesh = { .workspace = workspace };
+    ply_parser p = { .data = data,
+                     .size = size,
+                     .name = ebpo_path_name(name),
+                     .mesh = &mesh,
+                     .threads = threads,
+                     .progress = progress,
+                     .error = error };
+    ebpo_status status = ebpo_ply_header_parse(&p.header, data, size, p.name, error);
+    if (status == EBPO_OK)
+        status = check_counts(&p);
+    if (status == EBPO_OK)
+        status = check_parts(&p);
+    if (status == EBPO_OK)
+        status = allocate(&p);
+    if (status == EBPO_OK && attributes)
+        status = ebpo_ply_attributes_plan(&p);
+    if (status == EBPO_OK)
+        status = read_body(&p);
+    if (status == EBPO_OK)
+        status = ebpo_ply_attributes_end(&p);
+    if (status == EBPO_OK)
+        status = note_unread(&p);
+    if (status == EBPO_OK)
+        status = ebpo_ply_leave_unused(&p);
+    if (status == EBPO_OK) {
+        trim(&p);
+        describe(&p);
+    } else {
+        ebpo_array_free(workspace, mesh.xyz32);
+        ebpo_array_free(workspace, mesh.xyz64);
+        ebpo_array_free(workspace, mesh.faces);
+        ebpo_attributes_free(mesh.attributes);
+        mesh = (ebpo_mesh){ 0 };
+    }
+    release(&p);
+    *out = mesh;
+    return status;
+}
+
+ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *name, double **xyz,
+                                  uint64_t *count, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_mesh mesh = { 0 };
+    ply_parser p = {
+        .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .error = error
+    };
+    p.strict = true; /* nobody could be told of what is left out */
+    *xyz = NULL;
+    *count = 0;
+    ebpo_status status = ebpo_ply_header_parse(&p.header, p.data, size, p.name, error);
+    if (status == EBPO_OK)
+        status = check_counts(&p);
+    if (status == EBPO_OK)
+        status = allocate_vertices(&p);
+    p.at = p.header.body;
+    p.line = p.header.body_line;
+    for (int64_t i = 0; status == EBPO_OK && i <= p.header.vertex;
+         i++) /* what follows the vertices is not read */
+        status = read_element(&p, &p.header.element[i], i == p.header.vertex);
+    if (status == EBPO_OK) {
+        *xyz = mesh.xyz64;
+        *count = mesh.vertex_count;
+    } else {
+        free(mesh.xyz64);
+    }
+    release(&p);
+    return status;
+}

@@ -1,0 +1,338 @@
+/* Acceleration structures: a subtree (or a whole tree) decoded into the form that questions are
+ * asked of: child tables, leaves with blocks of faces, and a bounding hierarchy. Immutable once
+ * made, but for what makes leaves easy, which is found out when it is first asked for; any thread.
+ */
+#ifndef EBPO_QUERY_ACCEL_H
+#define EBPO_QUERY_ACCEL_H
+
+#include <ebpo/file.h>
+#include <pthread.h>
+#include <stdatomic.h>
+
+#include "format/slice.h"
+#include "geometry/cell.h"
+#include "geometry/node_source.h"
+#include "geometry/node_table.h"
+
+/* --- leaves --- */
+
+/* Kinds of leaves: extended octree (Brunet and Navazo 1990: face, edge nodes), SP-octree (Cano and
+ * Torres 2002: convex, concave). In all but general ones the planes' signs answer. */
+typedef enum ebpo_leaf_kind {
+    EBPO_LEAF_GENERAL = 0,
+    EBPO_LEAF_ONE_PLANE = 1,
+    EBPO_LEAF_TWO_PLANES = 2,
+    EBPO_LEAF_CONVEX = 3,
+    EBPO_LEAF_CONCAVE = 4,
+    EBPO_LEAF_UNKNOWN = 5, /* few have asked: as a general one without a wall */
+    EBPO_LEAF_IN_HAND = 6, /* a thread is finding its wall and the boxes of its list */
+    EBPO_LEAF_WALLED = 7,  /* these are known: to be asked as a general one */
+    EBPO_LEAF_SORTED = 8   /* as before, and a thread is finding the kind */
+} ebpo_leaf_kind;
+/* Finding a wall takes as long as an answer, finding the kind as dozens of them: they are done when
+ * so many questions have come. */
+enum { EBPO_LEAF_WALL_ASKED = 1, EBPO_LEAF_KIND_ASKED = 128 };
+enum { EBPO_NO_WALL = 6, EBPO_KIND_PLANES_MAX = 16 };
+
+/* A block in a leaf's list: bits 0 to 28 its number; 29 set in the last one of the leaf; 32 to 39
+ * the lanes that are the leaf's own, as other faces may share the block; 40 to 63 a box around what
+ * these may have in the cell, once the leaf has been walled: for each axis four bits of the lower
+ * side and four of 15 less the upper one, in sixteenths of the cell, rounded outward. */
+typedef _Atomic uint64_t ebpo_listed_block;
+enum { EBPO_LISTED_CELLS = 16, EBPO_LISTED_BOX = 40, EBPO_LISTED_LANES = 32 };
+#define EBPO_LISTED_LAST (UINT64_C(1) << 29)
+
+static inline uint64_t ebpo_listed(const ebpo_listed_block *b)
+{
+    return atomic_load_explicit(b, memory_order_relaxed);
+}
+static inline void ebpo_list(ebpo_listed_block *b, uint64_t listed)
+{
+    atomic_store_explicit(b, listed, memory_order_relaxed);
+}
+static inline uint32_t ebpo_listed_number(uint64_t b) { return b & (EBPO_LISTED_LAST - 1); }
+static inline unsigned ebpo_listed_lanes(uint64_t b) { return b >> EBPO_LISTED_LANES & 255; }
+
+/* What ebpo_leaf_ask finds is there once `kind` says so, and does not change then. */
+typedef struct ebpo_accel_leaf {
+    uint32_t list;         /* its blocks begin at list[list] of the subtree */
+    int32_t winding;       /* at the lowest corner, shifted (format-spec, section 5) */
+    uint32_t rows;         /* of kinds other than general: EBPO_KIND_ROW */
+    _Atomic uint8_t kind;  /* ebpo_leaf_kind; of surfaces always EBPO_LEAF_GENERAL */
+    _Atomic uint8_t asked; /* about how many questions came, until the kind is known */
+    /* 2 axis + side (1: upper) of a wall that no face meets, or EBPO_NO_WALL */
+    uint8_t wall;
+    int8_t wall_step; /* winding number on that wall less the one at the corner */
+} ebpo_accel_leaf;
+
+/* False: a general one, of which neither the wall nor the boxes of the list are to be read yet. */
+static inline bool ebpo_leaf_is_walled(ebpo_leaf_kind kind)
+{
+    return kind != EBPO_LEAF_UNKNOWN && kind != EBPO_LEAF_IN_HAND;
+}
+
+/* What planes say of a leaf: a row of winding numbers, then four rows for each four planes
+ * n . xi - d in the cell's coordinates (0 .. 1 on each axis): n0 of all four, n1, n2, d.
+ * |n0| + |n1| + |n2| = 1; beyond EBPO_PLANE_ERROR the sign is certain. */
+typedef union ebpo_kind_row {
+    float of_four[4];
+    struct {
+        int32_t inner, outer; /* where all planes say "below"; elsewhere in the cell */
+        uint32_t fours;       /* the last one filled up */
+    } says;
+} ebpo_kind_row;
+#define EBPO_PLANE_ERROR 0x1p-19f
+
+/* What has been found out about a subtree's leaves. Rows lie in pages: a row's number is that of
+ * the page, then that within it. */
+enum { EBPO_KIND_PAGES = 23, EBPO_KIND_PAGE_BITS = 27 };
+#define EBPO_NO_ROWS UINT32_MAX
+typedef struct ebpo_leaf_kinds {
+    pthread_mutex_t lock; /* of what follows, but for reading rows of a leaf that is known */
+    ebpo_kind_row *page[EBPO_KIND_PAGES];
+    uint32_t pages;
+    uint64_t used, room;                   /* rows of the last page */
+    _Atomic uint64_t rows;                 /* in all pages */
+    uint64_t rows_most;                    /* leaves beyond it stay general ones */
+    _Atomic uint64_t of_kind[5], one_wall; /* leaves known so far */
+} ebpo_leaf_kinds;
+#define EBPO_KIND_ROW(kinds, number)                  \
+    ((kinds)->page[(number) >> EBPO_KIND_PAGE_BITS] + \
+     ((number) & ((1u << EBPO_KIND_PAGE_BITS) - 1)))
+
+static inline ebpo_leaf_kind ebpo_leaf_kind_of(const ebpo_accel_leaf *leaf)
+{
+    return (ebpo_leaf_kind)atomic_load_explicit(&leaf->kind, memory_order_acquire);
+}
+
+static inline bool ebpo_leaf_has_planes(ebpo_leaf_kind kind)
+{
+    return kind >= EBPO_LEAF_ONE_PLANE && kind <= EBPO_LEAF_CONCAVE;
+}
+
+/* --- faces --- */
+
+/* A block of at most eight faces, the head of a record of its own size: after it x of all its
+ * vertices, then y, then z, in the model's unit: floats, or doubles (from EBPO_MESHLET_WIDE on).
+ * Corner i of lane l is vertex (corner[i] >> 4 * l) % 16. A block of more than 16 vertices has 24,
+ * and corner i of lane l is vertex 8 * i + l. Lanes without a face repeat the first one. Kernels
+ * read it with face_block.h; docs/develop/blocks.md. */
+typedef struct ebpo_meshlet {
+    uint32_t face; /* local number of the first face; the others follow */
+    uint32_t corner[3];
+    uint8_t faces, vertices;
+    uint8_t spare[2];
+} ebpo_meshlet;
+enum { EBPO_BLOCK = 8, EBPO_NO_SLOT = 0x7fffffff };
+enum { EBPO_MESHLET_SHARED = 16, EBPO_MESHLET_VERTICES = 24, EBPO_MESHLET_WIDE = 24 };
+/* A record begins at a multiple of so many bytes; the multiple is the block's number. */
+enum { EBPO_MESHLET_UNIT = 64 };
+/* Units at most: slots (block * EBPO_BLOCK + lane) have 32 bits. */
+enum { EBPO_BLOCKS_MOST = 1 << 29 };
+
+/* --- bounding hierarchy over the blocks --- */
+
+/* Eight children, their boxes in steps of 8 bits: axis k from origin + step * low to origin + step
+ * * high, in the subtree's own frame: (x - centre) * scale, about -1 .. 1 (farther where listed
+ * faces reach beyond the cell). The boxes are wider than the faces by what
+ * single precision can lose: docs/develop/bounds.md. */
+typedef struct ebpo_bound {
+    _Alignas(64) float origin[3];
+    float step[3];
+    uint8_t low[3][8], high[3][8];
+    uint32_t child[8]; /* number of a node, or of a block with EBPO_IS_BLOCK */
+    /* Slabs pay above this squared limit of a search: for nodes that are not large beside it. */
+    float slab_limit2;
+    uint32_t parent; /* number of a node; of the top: 0 */
+    uint8_t count;   /* of children; they have the first lanes */
+    uint8_t spare[15];
+} ebpo_bound;
+#define EBPO_IS_BLOCK UINT32_C(0x80000000)
+#define EBPO_NO_CHILD UINT32_MAX
+
+/* Two sides of a child's box, decoded: exact to 2^-52 of the greater of origin and side. */
+typedef struct ebpo_bound_sides {
+    double low, high;
+} ebpo_bound_sides;
+static inline ebpo_bound_sides ebpo_bound_side(const ebpo_bound *b, int lane, int axis)
+{
+    double origin = (double)b->origin[axis], step = (double)b->step[axis];
+    return (ebpo_bound_sides){ origin + step * b->low[axis][lane],
+                               origin + step * b->high[axis][lane] };
+}
+
+/* What a curved sheet needs for its distance to be told apart from its neighbours': with x the
+ * place of a point of the child seen from the middle of its box as decoded, and a = axis / 2^15,
+ *   along_step * from <= x . a <= along_step * to,   x . x - (x . a)^2 <= (aside_step * radius)^2.
+ * 16 bits: with 8 the axis is off by what curved sheets are thick, a fifth more blocks are met. */
+typedef struct ebpo_bound_slab {
+    _Alignas(64) int16_t axis[3][8];
+    int16_t from[8], to[8], radius[8];
+    float along_step, aside_step;
+    uint8_t spare[24];
+} ebpo_bound_slab;
+
+/* A child's slab, decoded. */
+typedef struct ebpo_child_slab {
+    double axis[3], from, to, radius;
+} ebpo_child_slab;
+static inline ebpo_child_slab ebpo_bound_slab_of(const ebpo_bound_slab *b, int lane)
+{
+    double along = (double)b->along_step, aside = (double)b->aside_step;
+    return (ebpo_child_slab){ { b->axis[0][lane] * 0x1p-15, b->axis[1][lane] * 0x1p-15,
+                                b->axis[2][lane] * 0x1p-15 },
+                              along * b->from[lane],
+                              along * b->to[lane],
+                              aside * b->radius[lane] };
+}
+
+typedef struct ebpo_accel {
+    ebpo_node root;
+    ebpo_box box; /* of the whole model */
+    int deepest;  /* level of its deepest nodes */
+    bool solid, has_planes;
+    uint8_t rule; /* ebpo_rule */
+    ebpo_node_table nodes;
+    ebpo_accel_leaf *leaf;
+    uint32_t leaf_count;
+    ebpo_listed_block *list; /* blocks of leaves */
+    uint64_t list_count;
+    uint32_t list_longest;  /* blocks of one leaf */
+    ebpo_leaf_kinds *kinds; /* of solids, or NULL */
+    bool wide;              /* blocks hold doubles */
+    char *meshlets;         /* [units][EBPO_MESHLET_UNIT]: ebpo_meshlet's records */
+    uint64_t units;
+    uint32_t face_count;
+    double centre[3], scale;
+    float turn_error; /* query/kernels.inc, of blocks of floats */
+    double reach;     /* no coordinate of a decoded box is greater, in the frame; 1 at least */
+    ebpo_bound *bound;
+    ebpo_bound_slab *slab; /* [bound_count] */
+    uint32_t bound_count;
+    uint32_t top; /* the root of the hierarchy */
+    uint32_t outer_count;
+    uint32_t *outer;       /* numbers in the file of faces that are new elsewhere */
+    uint64_t first_face;   /* the others: first_face + local - outer_count */
+    uint32_t *face_source; /* [local] or NULL */
+    /* codes of gray nodes' planes, group numbers' order; only for subtrees loaded on demand */
+    uint32_t *gray_planes;
+    /* [group_count + 1]: planes of the gray node whose children are group g */
+    uint32_t *gray_first;
+    uint64_t gray_count;
+    /* of memory, all in all; without planes of kinds for a whole model, with all that there may be
+     * for a subtree */
+    uint64_t bytes;
+} ebpo_accel;
+
+/* Sets the boxes of a leaf's list; returns the walls of the cell that its faces come to, a bit for
+ * each: 2 axis + side (1: upper). ebpo_kernels has it. */
+typedef unsigned ebpo_walls_fn(const ebpo_accel *subtree, ebpo_listed_block *list, ebpo_cell cell);
+
+/* A question has come to a leaf of a solid whose kind is not known. Number EBPO_LEAF_WALL_ASKED
+ * finds its wall and the boxes of its list, number EBPO_LEAF_KIND_ASKED its kind; true when that
+ * was this one. Without memory the leaf stays a general one. */
+bool ebpo_leaf_ask(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell cell,
+                   ebpo_walls_fn *walls);
+
+/* Makes it from a slice, which is consumed (freed, also on failure). `with_planes`: keep gray
+ * nodes' planes. `threads` 0: all cores. */
+EBPO_MUST_USE ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice,
+                                          const ebpo_info *info, bool with_planes, unsigned threads,
+                                          ebpo_error *error);
+/* The same; EBPO_E_LIMIT if that took more, the slice included, than the room's most bytes (NULL:
+ * no limit); ordinary subtrees and models are refused before they have taken more. */
+EBPO_MUST_USE ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice,
+                                                 const ebpo_info *info, ebpo_room *room,
+                                                 bool with_planes, unsigned threads,
+                                                 ebpo_error *error);
+void ebpo_accel_free(ebpo_accel *subtree);
+
+/* Of memory, now, of a whole model. */
+static inline uint64_t ebpo_accel_bytes(const ebpo_accel *whole)
+{
+    return whole->bytes + (whole->kinds ? whole->kinds->rows * sizeof(ebpo_kind_row) : 0);
+}
+
+/* Bytes that the subtree will take, and that making it will take at most (the slice included).
+ * Bounds from counts. */
+void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
+                         uint64_t *peak);
+/* The same, nearer, of ordinary models: of a whole one, of a subtree (its planes counted, or none
+ * kept). What has more is refused by ebpo_slice_read_within and ebpo_accel_make_within. */
+void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak);
+void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
+                                 uint64_t *peak);
+/* What ordinary subtrees take on average when there are so many, which have `all` together: nearer
+ * still, and little more. */
+uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info,
+                               uint64_t subtrees);
+
+/* --- its nodes (accel_nodes.c); `entry` is what finds them --- */
+
+ebpo_node ebpo_accel_root(const ebpo_accel *subtree);
+/* Child of a gray node that is not pruned. */
+ebpo_node ebpo_accel_child(const ebpo_accel *subtree, const ebpo_node *gray, unsigned octant);
+/* Codes of a gray node's planes, where the subtree has kept them. */
+const uint32_t *ebpo_accel_planes(const ebpo_accel *subtree, const ebpo_node *node,
+                                  unsigned *count);
+/* For cursors (geometry/cursor.h); the holder is an ebpo_accel. */
+extern const ebpo_node_source ebpo_accel_source;
+
+static inline const ebpo_meshlet *ebpo_accel_meshlet(const ebpo_accel *s, uint32_t block)
+{
+    return (const void *)(s->meshlets + (uint64_t)block * EBPO_MESHLET_UNIT);
+}
+
+/* Its vertices' coordinates, [3][vertices]. */
+static inline const float *ebpo_meshlet_floats(const ebpo_meshlet *m)
+{
+    return (const void *)(m + 1);
+}
+static inline const double *ebpo_meshlet_doubles(const ebpo_meshlet *m)
+{
+    return (const void *)((const char *)m + EBPO_MESHLET_WIDE);
+}
+
+static inline unsigned ebpo_meshlet_vertex(const ebpo_meshlet *m, unsigned lane, unsigned corner)
+{
+    return m->vertices > EBPO_MESHLET_SHARED ? EBPO_BLOCK * corner + lane
+                                             : m->corner[corner] >> 4 * lane & 15;
+}
+
+/* Local number of a slot's face; EBPO_NO_SLOT: the slot is empty. */
+static inline uint32_t ebpo_accel_slot_face(const ebpo_accel *s, uint32_t slot)
+{
+    const ebpo_meshlet *m = ebpo_accel_meshlet(s, slot / EBPO_BLOCK);
+    return slot % EBPO_BLOCK < m->faces ? m->face + slot % EBPO_BLOCK : EBPO_NO_SLOT;
+}
+
+/* A face's corners. */
+static inline void ebpo_accel_triangle(const ebpo_accel *s, uint32_t slot, double out[3][3])
+{
+    const ebpo_meshlet *m = ebpo_accel_meshlet(s, slot / EBPO_BLOCK);
+    for (unsigned i = 0; i < 3; i++) {
+        unsigned at = ebpo_meshlet_vertex(m, slot % EBPO_BLOCK, i);
+        for (unsigned k = 0; k < 3; k++, at += m->vertices)
+            out[i][k] = s->wide ? ebpo_meshlet_doubles(m)[at] : (double)ebpo_meshlet_floats(m)[at];
+    }
+}
+
+static inline uint64_t ebpo_accel_file_face(const ebpo_accel *s, uint32_t local)
+{
+    return local < s->outer_count ? s->outer[local] : s->first_face + (local - s->outer_count);
+}
+
+/* What the next function will read. */
+static inline void ebpo_accel_fetch_face(const ebpo_accel *s, uint32_t local)
+{
+    if (s->face_source)
+        __builtin_prefetch(&s->face_source[local]);
+}
+
+/* Number that callers are told. */
+static inline uint64_t ebpo_accel_source_face(const ebpo_accel *s, uint32_t local)
+{
+    return s->face_source ? s->face_source[local] : ebpo_accel_file_face(s, local);
+}
+
+#endif

@@ -1,0 +1,90 @@
+/* The stages of making a subtree. */
+#ifndef EBPO_QUERY_ACCEL_PARTS_H
+#define EBPO_QUERY_ACCEL_PARTS_H
+
+#include "query/accel.h"
+
+/* Faces to blocks and blocks to a hierarchy: only which goes where; nothing is computed from
+ * coordinates. One walk through the tree. */
+typedef struct ebpo_layout {
+    /* [block_count] first local face of each block, and one past the last; all faces, in order */
+    uint32_t *block_begin;
+    uint32_t *block_end;
+    uint64_t block_count, block_capacity;
+    /* [block_count] by what the accel knows each block: ebpo_meshlet; made with the blocks */
+    uint32_t *block_number;
+    uint32_t (*child)[8]; /* [bound_count] as in ebpo_bound */
+    /* [bound_count] blocks below a node are contiguous: first, and one past the last */
+    uint32_t *first_block;
+    uint32_t *last_block;
+    uint64_t bound_count, bound_capacity, bound_capacity2, bound_capacity3, block_capacity2;
+    uint32_t top;
+} ebpo_layout;
+
+/* EBPO_E_LIMIT for more than `most` blocks, which is EBPO_BLOCKS_MOST but in tests. */
+EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t most,
+                                           ebpo_error *error);
+void ebpo_layout_free(ebpo_layout *layout);
+
+/* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates
+ * beyond that, and doubles, take doubles. */
+bool ebpo_accel_needs_doubles(const ebpo_info *info);
+
+/* What is made, and of what. */
+typedef struct ebpo_accel_plan {
+    const ebpo_info *info;
+    const ebpo_slice *slice;
+    bool with_planes;
+    ebpo_layout *layout; /* NULL: not known yet */
+} ebpo_accel_plan;
+/* EBPO_E_LIMIT if making it with these blocks (the usual ones without a layout) takes more than the
+ * room (NULL: no limit) has, the slice included. */
+EBPO_MUST_USE ebpo_status ebpo_accel_fits(ebpo_room *room, const ebpo_accel_plan *plan,
+                                          uint64_t units, ebpo_error *error);
+
+/* Entries of leaves' lists at most: each reference is one, and more than eight new faces of a leaf
+ * are in 2 n / 9 blocks at most, fewer in one. */
+static inline uint64_t ebpo_list_most(uint64_t refs, uint64_t leaves, uint64_t faces)
+{
+    return refs + leaves + faces / 9 * 2 + 2;
+}
+
+/* Fills blocks, and gives them their numbers (parallel). */
+EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
+                                                 ebpo_room *room, unsigned threads,
+                                                 ebpo_error *error);
+/* Bounds of the hierarchy, from the blocks (parallel). */
+EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
+                                                 unsigned threads, ebpo_error *error);
+/* Child tables and leaf records with their lists of blocks (one walk). */
+EBPO_MUST_USE ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
+                                                const ebpo_layout *layout, ebpo_error *error);
+/* Room for at most so many rows; NULL: no memory. */
+ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_most);
+void ebpo_leaf_kinds_free(ebpo_leaf_kinds *kinds);
+
+/* --- a leaf of a solid --- */
+
+/* n . xi - d in the cell's coordinates (0 .. 1 on each axis), 1-norm of n 1. */
+typedef struct ebpo_leaf_plane {
+    double n[3], d;
+} ebpo_leaf_plane;
+
+/* Of a convex leaf (`flip` 1), or of a concave one (-1: with the planes turned): the winding number
+ * below all planes, and elsewhere in the cell. */
+typedef struct ebpo_deciding_planes {
+    int count, flip;
+    int32_t inner, outer;
+    ebpo_leaf_plane plane[EBPO_KIND_PLANES_MAX];
+} ebpo_deciding_planes;
+
+/* False when the planes of its faces do not decide. */
+bool ebpo_leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell,
+                           ebpo_deciding_planes *out);
+
+/* Crossings of the leaf's faces with a segment along an axis. Passed over are blocks of whose box
+ * any bit of `beside` is set: lower sides that are not the cell's, where the segment is. */
+int32_t ebpo_leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double from[3],
+                            double to, int axis, uint64_t beside);
+
+#endif

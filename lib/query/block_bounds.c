@@ -1,0 +1,487 @@
+/* Boxes and round slabs around the blocks below each child. All in doubles, in the subtree's frame,
+ * then rounded outward to 8 and 16 bits. docs/develop/bounds.md proves that what is read from them
+ * in single precision still bounds. */
+#include "core/strict_fp.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/huge_pages.h"
+#include "core/parallel.h"
+#include "query/accel_parts.h"
+#include "query/block_measure.h"
+
+/* Above so many blocks the slab is left away: such patches curve too much for one. */
+enum { SLAB_BLOCKS_MAX = 1024 };
+/* Boxes are wider than their faces by this, relative to the farthest of their coordinates. */
+static const double box_slack = 0x1p-19;
+/* Slabs by that, relative to the node's own size: patches are thinner than it is far away. */
+static const double slab_slack = 0x1p-19;
+/* Of a node's size, squared: slabs of nodes that are large beside a search drop hardly a child. */
+static const double slab_share = 0.01;
+/* Of a model without any extent. */
+static const double least_slack = 0x1p-60;
+enum { AXIS_UNIT = 1 << 15, SHORT_MOST = 32766 };
+
+typedef struct extent {
+    double low[3], high[3], normal[3];
+} extent;
+
+typedef struct job {
+    ebpo_accel *s;
+    const ebpo_layout *layout;
+    const ebpo_block_measures *measures;
+    extent *of_block, *of_node;
+} job;
+
+/* Two lanes at a time. */
+typedef double pair __attribute__((vector_size(16)));
+
+#if defined(__SSE2__)
+static inline pair lesser(pair a, pair b) { return (pair)_mm_min_pd((__m128d)a, (__m128d)b); }
+static inline pair greater(pair a, pair b) { return (pair)_mm_max_pd((__m128d)a, (__m128d)b); }
+#else
+typedef int64_t pair_mask __attribute__((vector_size(16)));
+static inline pair pick(pair_mask mask, pair yes, pair no)
+{
+    return (pair)(((pair_mask)yes & mask) | ((pair_mask)no & ~mask));
+}
+static inline pair lesser(pair a, pair b) { return pick(a < b, a, b); }
+static inline pair greater(pair a, pair b) { return pick(a > b, a, b); }
+#endif
+
+static double least_of(pair x) { return x[0] < x[1] ? x[0] : x[1]; }
+static double most_of(pair x) { return x[0] > x[1] ? x[0] : x[1]; }
+
+/* Vertices of a block of doubles, in the frame. */
+enum { PAIRS = EBPO_MESHLET_VERTICES / 2 };
+typedef struct vertices {
+    pair x[3][PAIRS];
+    unsigned pairs; /* the last vertex may be there twice */
+} vertices;
+
+static void load_vertices(const ebpo_accel *s, uint32_t block, vertices *out)
+{
+    const ebpo_meshlet *m = ebpo_accel_meshlet(s, block);
+    const double *x = ebpo_meshlet_doubles(m);
+    unsigned count = m->vertices;
+    out->pairs = (count + 1) / 2;
+    for (unsigned k = 0; k < 3; k++, x += count)
+        for (unsigned i = 0; i < count; i += 2)
+            out->x[k][i / 2] =
+                ((pair){ x[i], x[i + 1 < count ? i + 1 : i] } - s->centre[k]) * s->scale;
+}
+
+/* --- extents --- */
+
+static const extent nothing = { { INFINITY, INFINITY, INFINITY },
+                                { -INFINITY, -INFINITY, -INFINITY },
+                                { 0, 0, 0 } };
+
+static void add_vertices(const vertices *v, extent *e)
+{
+    for (int k = 0; k < 3; k++) {
+        pair low = { e->low[k], e->low[k] }, high = { e->high[k], e->high[k] };
+        for (unsigned i = 0; i < v->pairs; i++) {
+            low = lesser(v->x[k][i], low);
+            high = greater(v->x[k][i], high);
+        }
+        e->low[k] = least_of(low);
+        e->high[k] = most_of(high);
+    }
+}
+
+static void add_normals(const ebpo_accel *s, uint32_t block, double normal[3])
+{
+    const ebpo_meshlet *m = ebpo_accel_meshlet(s, block);
+    for (uint32_t lane = 0; lane < m->faces; lane++) {
+        double t[3][3];
+        ebpo_accel_triangle(s, block * EBPO_BLOCK + lane, t);
+        for (int k = 0; k < 3; k++) {
+            int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+            normal[k] += (t[1][u] - t[0][u]) * (t[2][v] - t[0][v]) -
+                         (t[1][v] - t[0][v]) * (t[2][u] - t[0][u]);
+        }
+    }
+}
+
+static void extend_wide(const ebpo_accel *s, uint32_t block, extent *e)
+{
+    vertices v;
+    load_vertices(s, block, &v);
+    *e = nothing;
+    add_vertices(&v, e);
+    add_normals(s, block, e->normal);
+}
+
+static void extend_narrow(const job *j, uint32_t block, extent *e)
+{
+    ebpo_block_extent b;
+    j->measures->extent(j->s, block, &b);
+    for (int k = 0; k < 3; k++) {
+        e->low[k] = ((double)b.low[k] - j->s->centre[k]) * j->s->scale;
+        e->high[k] = ((double)b.high[k] - j->s->centre[k]) * j->s->scale;
+        e->normal[k] = (double)b.normal[k];
+    }
+}
+
+static void add_extent(const extent *part, extent *e)
+{
+    for (int k = 0; k < 3; k++) {
+        e->low[k] = part->low[k] < e->low[k] ? part->low[k] : e->low[k];
+        e->high[k] = part->high[k] > e->high[k] ? part->high[k] : e->high[k];
+        e->normal[k] += part->normal[k];
+    }
+}
+
+static ebpo_status extend_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
+{
+    (void)worker;
+    (void)error;
+    job *j = context;
+    for (uint64_t b = begin; b < end; b++) {
+        uint32_t block = j->layout->block_number[b];
+        if (j->s->wide)
+            extend_wide(j->s, block, &j->of_block[b]);
+        else
+            extend_narrow(j, block, &j->of_block[b]);
+    }
+    return EBPO_OK;
+}
+
+static const extent *extent_of(const job *j, uint32_t child)
+{
+    return child & EBPO_IS_BLOCK ? &j->of_block[child & ~EBPO_IS_BLOCK] : &j->of_node[child];
+}
+
+/* Nodes come after their children. */
+static void extend_nodes(job *j)
+{
+    for (uint64_t n = 0; n < j->layout->bound_count; n++) {
+        j->of_node[n] = nothing;
+        for (int lane = 0; lane < 8 && j->layout->child[n][lane] != EBPO_NO_CHILD; lane++)
+            add_extent(extent_of(j, j->layout->child[n][lane]), &j->of_node[n]);
+    }
+}
+
+/* --- boxes --- */
+
+/* fmax of what are numbers: without calls. */
+static double larger(double a, double b) { return a > b ? a : b; }
+
+/* Origin and step of one axis: so that 255 steps hold what must be held. */
+static double choose_grid(double low, double high, float *origin, float *step)
+{
+    double slack = larger(fabs(low), fabs(high)) * box_slack + least_slack;
+    *origin = (float)(low - slack);
+    if ((double)*origin > low - slack)
+        *origin = nextafterf(*origin, -INFINITY);
+    *step = (float)((high + slack - (double)*origin) / 255 * (1 + 0x1p-20));
+    return slack;
+}
+
+/* floor and ceil of what an int holds; without calls. */
+static int round_down(double x)
+{
+    int whole = (int)x;
+    return whole - (whole > x);
+}
+static int round_up(double x)
+{
+    int whole = (int)x;
+    return whole + (whole < x);
+}
+
+static double to_byte(double x) { return x < 0 ? 0 : x > 255 ? 255 : x; }
+
+static void set_boxes(ebpo_bound *b, const extent *all, const extent child[8])
+{
+    for (int k = 0; k < 3; k++) {
+        double slack = choose_grid(all->low[k], all->high[k], &b->origin[k], &b->step[k]);
+        for (int lane = 0; lane < b->count; lane++) {
+            double from = child[lane].low[k] - slack - (double)b->origin[k],
+                   to = child[lane].high[k] + slack - (double)b->origin[k];
+            b->low[k][lane] = (uint8_t)round_down(to_byte(from / (double)b->step[k]));
+            b->high[k][lane] = (uint8_t)round_up(to_byte(to / (double)b->step[k]));
+        }
+    }
+    double size = 0;
+    for (int k = 0; k < 3; k++)
+        size = larger(size, all->high[k] - all->low[k]);
+    b->slab_limit2 = (float)(size * size * slab_share);
+}
+
+/* The greatest coordinate of any of its boxes. */
+static double reach_of(const ebpo_bound *b)
+{
+    double reach = 0;
+    for (int k = 0; k < 3; k++)
+        reach = larger(reach, larger(fabs((double)b->origin[k]),
+                                     fabs((double)b->origin[k] + 255 * (double)b->step[k])));
+    return reach;
+}
+
+/* --- slabs --- */
+
+typedef struct slab {
+    double middle[3], axis[3];
+    double from, to, radius2;
+} slab;
+
+/* Rounded towards zero: the decoded axis is never longer than 1, which the bound rests upon. */
+static void choose_axis(const extent *e, ebpo_bound_slab *b, int lane, slab *out)
+{
+    double length = sqrt(e->normal[0] * e->normal[0] + e->normal[1] * e->normal[1] +
+                         e->normal[2] * e->normal[2]);
+    for (int k = 0; k < 3; k++) {
+        double part = length > 0 && length < INFINITY ? e->normal[k] / length : 0;
+        b->axis[k][lane] = (int16_t)(part * (AXIS_UNIT - 0.5));
+        out->axis[k] = (double)b->axis[k][lane] / AXIS_UNIT;
+    }
+}
+
+typedef struct slab_pairs {
+    pair middle[3], axis[3], from, to, most;
+} slab_pairs;
+
+static inline void add_to_slab(const vertices *v, slab_pairs *p)
+{
+    for (unsigned i = 0; i < v->pairs; i++) {
+        pair along = { 0, 0 }, square = { 0, 0 };
+        for (int k = 0; k < 3; k++) {
+            pair d = v->x[k][i] - p->middle[k];
+            along += d * p->axis[k];
+            square += d * d;
+        }
+        p->from = lesser(along, p->from);
+        p->to = greater(along, p->to);
+        p->most = greater(square - along * along, p->most);
+    }
+}
+
+/* Of all vertices of a run of blocks. The middle of the box need not be between them: of a tilted
+ * patch it is off its plane. */
+static void add_run_wide(const job *j, uint32_t begin, uint32_t end, slab *out)
+{
+    slab_pairs p = { .from = { INFINITY, INFINITY }, .to = { -INFINITY, -INFINITY } };
+    for (int k = 0; k < 3; k++) {
+        p.middle[k] = (pair){ out->middle[k], out->middle[k] };
+        p.axis[k] = (pair){ out->axis[k], out->axis[k] };
+    }
+    for (uint32_t i = begin; i < end; i++) {
+        vertices v;
+        load_vertices(j->s, j->layout->block_number[i], &v);
+        add_to_slab(&v, &p);
+    }
+    out->from = least_of(p.from);
+    out->to = most_of(p.to);
+    out->radius2 = most_of(p.most);
+}
+
+/* The same in single precision, seen from two floats near the middle: what they are off it comes on
+ * top. */
+static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, slab *out)
+{
+    const ebpo_accel *s = j->s;
+    ebpo_slab_view view = { .scale = (float)s->scale };
+    ebpo_slab_extent e;
+    double square = 0, along = 0, off2 = 0;
+    for (int k = 0; k < 3; k++) {
+        double middle = s->centre[k] + out->middle[k] / s->scale;
+        view.high[k] = (float)middle;
+        view.low[k] = (float)(middle - (double)view.high[k]);
+        view.axis[k] = (float)out->axis[k];
+        square += out->axis[k] * out->axis[k];
+        double seen = ((double)view.high[k] - s->centre[k] + (double)view.low[k]) * s->scale,
+               off = seen - out->middle[k];
+        along += off * out->axis[k];
+        off2 += off * off;
+    }
+    view.rest = (float)(1 - square);
+    j->measures->slab(s, j->layout->block_number + begin, end - begin, &view, &e);
+    double aside = sqrt((double)e.aside2) + sqrt(off2);
+    out->from = (double)e.from + along;
+    out->to = (double)e.to + along;
+    out->radius2 = aside * aside;
+}
+
+/* Without an axis and as wide as the box is: says nothing that the box does not say. */
+static void no_slab(ebpo_bound_slab *b, int lane, const double half[3], slab *out)
+{
+    for (int k = 0; k < 3; k++) {
+        b->axis[k][lane] = 0;
+        out->radius2 += half[k] * half[k];
+    }
+}
+
+static slab measure_slab(const job *j, uint64_t n, int lane, const extent *e)
+{
+    const ebpo_bound *b = &j->s->bound[n];
+    slab out = { { 0, 0, 0 }, { 0, 0, 0 }, 0, 0, 0 };
+    double half[3];
+    for (int k = 0; k < 3; k++) {
+        ebpo_bound_sides side = ebpo_bound_side(b, lane, k);
+        out.middle[k] = (side.low + side.high) / 2;
+        half[k] = (side.high - side.low) / 2;
+    }
+    uint32_t child = j->layout->child[n][lane], first = child & ~EBPO_IS_BLOCK, last = first + 1;
+    if (!(child & EBPO_IS_BLOCK)) {
+        first = j->layout->first_block[child];
+        last = j->layout->last_block[child];
+    }
+    if (last - first > SLAB_BLOCKS_MAX) {
+        no_slab(&j->s->slab[n], lane, half, &out);
+        return out;
+    }
+    choose_axis(e, &j->s->slab[n], lane, &out);
+    if (j->s->wide)
+        add_run_wide(j, first, last, &out);
+    else
+        add_run_narrow(j, first, last, &out);
+    return out;
+}
+
+/* The longest side of the box that all children are in, at least 2^-18 of its reach. */
+static double size_of(const ebpo_bound *b)
+{
+    return 255 * (double)fmaxf(b->step[0], fmaxf(b->step[1], b->step[2]));
+}
+
+/* Not so of faces that are so far from their leaf that squares overflow (in files of others): such
+ * slabs say nothing, as a step that is infinite or NaN has no multiples. */
+static bool is_known(int count, const slab child[8], const double radius[8])
+{
+    for (int lane = 0; lane < count; lane++)
+        if (!(fabs(child[lane].from) < FLT_MAX / 4 && fabs(child[lane].to) < FLT_MAX / 4 &&
+              radius[lane] < FLT_MAX / 4))
+            return false;
+    return true;
+}
+
+static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab child[8])
+{
+    double slack = size * slab_slack, along = 0, aside = 0, radius[8];
+    for (int lane = 0; lane < count; lane++) {
+        along = larger(along, larger(child[lane].to, -child[lane].from) + slack);
+        /* the square is off by less than 2^-49 of size * size */
+        radius[lane] = sqrt(larger(child[lane].radius2, 0) + size * size * 0x1p-46) + slack;
+        aside = larger(aside, radius[lane]);
+    }
+    bool known = is_known(count, child, radius);
+    b->along_step = (float)((known ? along : FLT_MAX / 4) / SHORT_MOST);
+    b->aside_step = (float)((known ? aside : FLT_MAX / 4) / SHORT_MOST);
+    for (int lane = 0; lane < count; lane++) {
+        if (!known) {
+            b->from[lane] = -SHORT_MOST;
+            b->to[lane] = b->radius[lane] = SHORT_MOST;
+            continue;
+        }
+        b->from[lane] = (int16_t)round_down((child[lane].from - slack) / (double)b->along_step);
+        b->to[lane] = (int16_t)round_up((child[lane].to + slack) / (double)b->along_step);
+        b->radius[lane] = (int16_t)round_up(radius[lane] / (double)b->aside_step);
+    }
+}
+
+/* --- all of them --- */
+
+/* As the accel has it. */
+static uint32_t child_number(const job *j, uint32_t child)
+{
+    return child == EBPO_NO_CHILD || !(child & EBPO_IS_BLOCK)
+               ? child
+               : j->layout->block_number[child & ~EBPO_IS_BLOCK] | EBPO_IS_BLOCK;
+}
+
+static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    (void)worker;
+    (void)error;
+    job *j = context;
+    for (uint64_t n = begin; n < end; n++) {
+        ebpo_bound *b = &j->s->bound[n];
+        extent part[8];
+        slab slabs[8];
+        memset(b, 0, sizeof *b);
+        memset(&j->s->slab[n], 0, sizeof j->s->slab[n]);
+        for (int lane = 0; lane < 8; lane++) {
+            uint32_t child = j->layout->child[n][lane];
+            b->child[lane] = child_number(j, child);
+            if (child == EBPO_NO_CHILD)
+                continue;
+            b->count = (uint8_t)(lane + 1);
+            part[lane] = *extent_of(j, child);
+        }
+        set_boxes(b, &j->of_node[n], part);
+        for (int lane = 0; lane < b->count; lane++)
+            slabs[lane] = measure_slab(j, n, lane, &part[lane]);
+        set_slabs(&j->s->slab[n], b->count, size_of(b), slabs);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status make_room(job *j, ebpo_error *error)
+{
+    uint64_t count = j->layout->bound_count;
+    ebpo_accel *s = j->s;
+    if (count >= PTRDIFF_MAX / (sizeof *s->bound + sizeof *s->slab))
+        return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->slab));
+    size_t bounds = (size_t)(count + 1) * sizeof *s->bound,
+           slabs = (size_t)(count + 1) * sizeof *s->slab;
+    s->bound = aligned_alloc(64, bounds);
+    s->slab = aligned_alloc(64, slabs);
+    j->of_block = ebpo_alloc(j->layout->block_count, sizeof *j->of_block);
+    ebpo_prefer_huge_pages(s->bound, bounds);
+    ebpo_prefer_huge_pages(s->slab, slabs);
+    j->of_node = ebpo_alloc(count, sizeof *j->of_node);
+    if (s->bound && s->slab && j->of_block && j->of_node)
+        return EBPO_OK;
+    return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->slab));
+}
+
+static void link_parents(ebpo_accel *s)
+{
+    for (uint32_t n = 0; n < s->bound_count; n++)
+        for (int lane = 0; lane < s->bound[n].count; lane++)
+            if (!(s->bound[n].child[lane] & EBPO_IS_BLOCK))
+                s->bound[s->bound[n].child[lane]].parent = n;
+}
+
+static ebpo_status fill(job *j, unsigned threads, ebpo_error *error)
+{
+    ebpo_status status = ebpo_parallel_for(threads, NULL, j->layout->block_count, 512,
+                                           extend_blocks, j, NULL, "open", error);
+    if (status != EBPO_OK)
+        return status;
+    extend_nodes(j);
+    status = ebpo_parallel_for(threads, NULL, j->layout->bound_count, 64, bound_nodes, j, NULL,
+                               "open", error);
+    if (status == EBPO_OK)
+        link_parents(j->s);
+    return status;
+}
+
+ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, unsigned threads,
+                                   ebpo_error *error)
+{
+    job j = { .s = s, .layout = layout, .measures = ebpo_block_measures_best() };
+    s->bound_count = (uint32_t)layout->bound_count;
+    s->top = layout->top;
+    s->reach = 1;
+    ebpo_status status = make_room(&j, error);
+    if (status == EBPO_OK)
+        status = fill(&j, threads, error);
+    if (status == EBPO_OK && s->bound_count)
+        s->reach = larger(1, reach_of(&s->bound[s->top]));
+    free(j.of_block);
+    free(j.of_node);
+    return status;
+}

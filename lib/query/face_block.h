@@ -1,0 +1,53 @@
+/* How kernels read a block's faces: eight lanes at a time, one axis after the other. Lanes from
+ * `count` on repeat one of its faces: bounds need no mask, counting does. Included by what is
+ * compiled for several processors. */
+#ifndef EBPO_QUERY_FACE_BLOCK_H
+#define EBPO_QUERY_FACE_BLOCK_H
+
+#include "query/accel.h"
+#include "core/eight.h"
+
+typedef struct ebpo_face_block {
+    const ebpo_meshlet *m;
+    n8 corner[3]; /* which vertices, where they are shared */
+} ebpo_face_block;
+
+EBPO_EIGHT ebpo_face_block ebpo_face_block_open(const ebpo_accel *s, uint32_t block)
+{
+    ebpo_face_block b = { .m = ebpo_accel_meshlet(s, block) };
+    for (int i = 0; i < 3; i++)
+        b.corner[i] = n8_from_bits(b.m->corner[i]);
+    return b;
+}
+
+/* A bit for each lane that holds a face. */
+EBPO_EIGHT unsigned ebpo_face_block_lanes(const ebpo_face_block *b)
+{
+    return (1u << b->m->faces) - 1;
+}
+
+/* The three corners' coordinates on an axis, in the model's unit; of an accel of floats. */
+EBPO_EIGHT void ebpo_face_block_floats(const ebpo_face_block *b, int axis, f8 corner[3])
+{
+    const float *x = ebpo_meshlet_floats(b->m) + (unsigned)axis * b->m->vertices;
+    if (__builtin_expect(b->m->vertices > EBPO_MESHLET_SHARED, 0)) {
+        for (int i = 0; i < 3; i++)
+            corner[i] = f8_load(x + i * EBPO_BLOCK);
+        return;
+    }
+    f8_table table = f8_table_load(x); /* beyond its vertices: what lies behind, never picked */
+    for (int i = 0; i < 3; i++)
+        corner[i] = f8_look_up(table, b->corner[i]);
+}
+
+/* The same of an accel of doubles. */
+EBPO_EIGHT void ebpo_face_block_doubles(const ebpo_face_block *b, int axis,
+                                        double corner[3][EBPO_BLOCK])
+{
+    const double *x = ebpo_meshlet_doubles(b->m) + (unsigned)axis * b->m->vertices;
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned lane = 0; lane < EBPO_BLOCK; lane++)
+            corner[i][lane] = x[ebpo_meshlet_vertex(b->m, lane, i)];
+}
+
+#endif

@@ -1,0 +1,38 @@
+/* The kernels' filters for eight faces, for any processor or for those with AVX2. */
+#include "core/strict_fp.h"
+
+#include "query/kernels.inc"
+#include "query/near_kernel.inc"
+
+#include "filter_faces.h"
+
+static void near_faces_of(const ebpo_accel *s, uint32_t block, const ebpo_probe *probe,
+                          float low[EBPO_BLOCK], float high[EBPO_BLOCK])
+{
+    ebpo_face_block b = ebpo_face_block_open(s, block);
+    ebpo_near_search g;
+    g.probe = *probe;
+    near_faces f = near_load(&g, &b, s->wide);
+    f8 l, h;
+    near_bounds(&f, &l, &h);
+    f8_store(low, l);
+    f8_store(high, h);
+}
+
+static void turns_of(const ebpo_accel *s, uint32_t block, const ebpo_axis_segment *segment,
+                     unsigned *left, unsigned *right, unsigned *open)
+{
+    ebpo_face_block b = ebpo_face_block_open(s, block);
+    int u = segment->axis == 2 ? 0 : segment->axis + 1,
+        v = segment->axis == 0 ? 2 : segment->axis - 1;
+    turns t = turns_of_floats(&b, ebpo_face_block_lanes(&b), u, v, segment, s->turn_error);
+    *left = t.left;
+    *right = t.right;
+    *open = t.open;
+}
+
+const face_filters FILTERS = { near_faces_of, turns_of };
+
+/* What else the kernels' bodies have. */
+extern const ebpo_kernels UNUSED_KERNELS;
+const ebpo_kernels UNUSED_KERNELS = { crossings, NULL, near_walk, NULL };

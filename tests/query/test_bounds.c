@@ -1,0 +1,303 @@
+/* The hierarchy over blocks of faces: what its bytes say of the faces below each child holds in
+ * rational arithmetic, with the room that docs/develop/bounds.md counts on and hardly more; and the
+ * kernels for any processor answer as those for this one. */
+#include <gmp.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "query/block_measure.h"
+#include "check_main.h"
+#include "query/query_model.h"
+#include "query_kit.h"
+
+/* --- bounds --- */
+
+typedef struct exact {
+    mpq_t x[3], middle[3], along, square, bound, part;
+    double least, most, aside2; /* of a child's faces along its axis, and off it */
+    uint64_t wrong;
+} exact;
+
+static void exact_init(exact *e)
+{
+    for (int k = 0; k < 3; k++)
+        mpq_inits(e->x[k], e->middle[k], NULL);
+    mpq_inits(e->along, e->square, e->bound, e->part, NULL);
+    e->wrong = 0;
+}
+
+static void exact_free(exact *e)
+{
+    for (int k = 0; k < 3; k++)
+        mpq_clears(e->x[k], e->middle[k], NULL);
+    mpq_clears(e->along, e->square, e->bound, e->part, NULL);
+}
+
+/* out = a * b + c * d */
+static void set_sum(mpq_t out, double a, double b, double c, double d)
+{
+    mpq_t p, q;
+    mpq_inits(p, q, NULL);
+    mpq_set_d(out, a);
+    mpq_set_d(p, b);
+    mpq_mul(out, out, p);
+    mpq_set_d(p, c);
+    mpq_set_d(q, d);
+    mpq_mul(p, p, q);
+    mpq_add(out, out, p);
+    mpq_clears(p, q, NULL);
+}
+
+/* A corner in the subtree's frame, without rounding. */
+static void set_corner(exact *e, const ebpo_accel *s, const double corner[3])
+{
+    for (int k = 0; k < 3; k++)
+        set_sum(e->x[k], corner[k], s->scale, -s->centre[k], s->scale);
+}
+
+/* What single precision may lose of a side: docs/develop/bounds.md, "Boxes". */
+static double room(const ebpo_bound *b, int k)
+{
+    return 0x1p-22 * 1.25 * (fabs((double)b->origin[k]) + 255 * (double)b->step[k]);
+}
+
+static bool in_box(exact *e, const ebpo_bound *b, int lane)
+{
+    bool in = true;
+    for (int k = 0; k < 3; k++) {
+        set_sum(e->bound, b->origin[k], 1, b->step[k], b->low[k][lane]);
+        mpq_set_d(e->part, room(b, k));
+        mpq_add(e->bound, e->bound, e->part);
+        in = in && mpq_cmp(e->bound, e->x[k]) <= 0;
+        set_sum(e->bound, b->origin[k], 1, b->step[k], b->high[k][lane]);
+        mpq_sub(e->bound, e->bound, e->part);
+        in = in && mpq_cmp(e->x[k], e->bound) <= 0;
+    }
+    return in;
+}
+
+/* The longest side of a node. */
+static double size_of(const ebpo_bound *b)
+{
+    return 255 * fmax((double)b->step[0], fmax((double)b->step[1], (double)b->step[2]));
+}
+
+/* Where the corner is, seen from the middle of the child's box: along the axis, and the square of
+ * how far off it. */
+static void seen_from_middle(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
+{
+    mpq_set_ui(e->along, 0, 1);
+    mpq_set_ui(e->square, 0, 1);
+    for (int k = 0; k < 3; k++) {
+        set_sum(e->middle[k], b->origin[k], 1, b->step[k],
+                (b->low[k][lane] + b->high[k][lane]) / 2.0);
+        mpq_sub(e->middle[k], e->x[k], e->middle[k]);
+        mpq_mul(e->part, e->middle[k], e->middle[k]);
+        mpq_add(e->square, e->square, e->part);
+        mpq_set_d(e->part, slab->axis[k][lane] * 0x1p-15);
+        mpq_mul(e->part, e->part, e->middle[k]);
+        mpq_add(e->along, e->along, e->part);
+    }
+    mpq_mul(e->part, e->along, e->along);
+    mpq_sub(e->square, e->square, e->part);
+}
+
+/* With the room that single precision needs, 15 u of the node's size: docs/develop/bounds.md,
+ * "Points against slabs". */
+static bool in_slab(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
+{
+    double needed = size_of(b) * 0x1p-24 * 15;
+    seen_from_middle(e, b, slab, lane);
+    set_sum(e->bound, slab->along_step, slab->from[lane], needed, 1);
+    bool in = mpq_cmp(e->bound, e->along) <= 0;
+    set_sum(e->bound, slab->along_step, slab->to[lane], -needed, 1);
+    in = in && mpq_cmp(e->along, e->bound) <= 0;
+    set_sum(e->bound, slab->aside_step, slab->radius[lane], -needed, 1);
+    in = in && mpq_sgn(e->bound) >= 0;
+    mpq_mul(e->bound, e->bound, e->bound);
+    e->least = fmin(e->least, mpq_get_d(e->along));
+    e->most = fmax(e->most, mpq_get_d(e->along));
+    e->aside2 = fmax(e->aside2, mpq_get_d(e->square));
+    return in && mpq_cmp(e->square, e->bound) <= 0;
+}
+
+/* After all corners of the child: a slab wider than what rounding asks for drops too little. */
+static bool is_tight(const exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
+{
+    bool has_axis = slab->axis[0][lane] || slab->axis[1][lane] || slab->axis[2][lane];
+    double loose = size_of(b) * 0x1p-18, step = (double)slab->along_step,
+           aside_step = (double)slab->aside_step;
+    return !has_axis ||
+           (step * slab->from[lane] >= e->least - loose - 2 * step &&
+            step * slab->to[lane] <= e->most + loose + 2 * step &&
+            aside_step * slab->radius[lane] <= sqrt(fmax(e->aside2, 0)) + loose + 2 * aside_step);
+}
+
+/* Every face below `child` against what node `n` says of its child `lane`. */
+static void check_below(exact *e, const ebpo_accel *s, uint32_t n, int lane, uint32_t child)
+{
+    if (!(child & EBPO_IS_BLOCK)) {
+        for (int i = 0; i < s->bound[child].count; i++)
+            check_below(e, s, n, lane, s->bound[child].child[i]);
+        return;
+    }
+    for (uint32_t i = 0; i < EBPO_BLOCK; i++) {
+        uint32_t slot = (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + i;
+        double t[3][3];
+        if (ebpo_accel_slot_face(s, slot) == EBPO_NO_SLOT)
+            return;
+        ebpo_accel_triangle(s, slot, t);
+        for (int corner = 0; corner < 3; corner++) {
+            set_corner(e, s, t[corner]);
+            e->wrong +=
+                !in_box(e, &s->bound[n], lane) || !in_slab(e, &s->bound[n], &s->slab[n], lane);
+        }
+    }
+}
+
+/* The square of no axis is greater than 1: the proof for slabs rests on it. */
+static bool axis_is_short(const ebpo_bound_slab *slab, int lane)
+{
+    int64_t square = 0;
+    for (int k = 0; k < 3; k++)
+        square += (int64_t)slab->axis[k][lane] * slab->axis[k][lane];
+    return square <= INT64_C(1) << 30;
+}
+
+START_TEST(boxes_and_slabs_contain_their_faces)
+{
+    query_model m;
+    exact e;
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
+                     &query_variants[_i % query_variant_count]);
+    const ebpo_accel *s = m.model->whole;
+    ck_assert_ptr_nonnull(s);
+    exact_init(&e);
+    for (uint32_t n = 0; n < s->bound_count; n++)
+        for (int lane = 0; lane < s->bound[n].count; lane++) {
+            e.wrong += !axis_is_short(&s->slab[n], lane);
+            e.least = INFINITY;
+            e.most = -INFINITY;
+            e.aside2 = 0;
+            check_below(&e, s, n, lane, s->bound[n].child[lane]);
+            e.wrong += !is_tight(&e, &s->bound[n], &s->slab[n], lane);
+        }
+    ck_assert_uint_eq(e.wrong, 0);
+    exact_free(&e);
+    query_model_free(&m);
+}
+END_TEST
+
+/* --- what slabs are made of --- */
+
+static void same_measures(const ebpo_accel *s, uint32_t block, const ebpo_slab_view *view)
+{
+    const ebpo_block_measures *base = &ebpo_block_measures_base, *best = ebpo_block_measures_best();
+    ebpo_block_extent one, other;
+    ebpo_slab_extent one_slab, other_slab;
+    base->extent(s, block, &one);
+    best->extent(s, block, &other);
+    base->slab(s, &block, 1, view, &one_slab);
+    best->slab(s, &block, 1, view, &other_slab);
+    ck_assert_mem_eq(&one, &other, sizeof one);
+    ck_assert_mem_eq(&one_slab, &other_slab, sizeof one_slab);
+}
+
+START_TEST(blocks_are_measured_the_same_on_any_processor)
+{
+    query_model m;
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
+                     &query_variants[_i % query_variant_count]);
+    const ebpo_accel *s = m.model->whole;
+    ebpo_slab_view view = { .scale = (float)s->scale, .axis = { 0.5f, -0.75f, 0.25f } };
+    view.rest = 0.125f;
+    for (int k = 0; k < 3; k++)
+        view.high[k] = (float)s->centre[k];
+    for (uint32_t n = 0; n < s->bound_count && !s->wide; n++)
+        for (int lane = 0; lane < s->bound[n].count; lane++)
+            if (s->bound[n].child[lane] & EBPO_IS_BLOCK)
+                same_measures(s, s->bound[n].child[lane] & ~EBPO_IS_BLOCK, &view);
+    query_model_free(&m);
+}
+END_TEST
+
+/* --- kernels --- */
+
+enum { KEPT = 64 };
+
+typedef struct answers {
+    ebpo_ray_hit first, all[KEPT];
+    ebpo_distance_result nearest;
+    uint64_t count;
+    bool hit, any;
+} answers;
+
+static void ask_all(query_model *m, const query_ray *r, answers *out)
+{
+    const ebpo_ray_hit *hits;
+    memset(out, 0, sizeof *out);
+    ASSERT_OK(ebpo_ray_first(m->context, r->origin, r->direction, r->t_max, &out->first, &out->hit,
+                             error));
+    ASSERT_OK(ebpo_ray_any(m->context, r->origin, r->direction, r->t_max, &out->any, error));
+    ASSERT_OK(
+        ebpo_ray_all(m->context, r->origin, r->direction, r->t_max, &hits, &out->count, error));
+    for (uint64_t i = 0; i < out->count && i < KEPT; i++)
+        out->all[i] = hits[i];
+    ASSERT_OK(ebpo_distance(m->context, r->origin, NULL, &out->nearest, error));
+}
+
+static bool same_hit(const ebpo_ray_hit *a, const ebpo_ray_hit *b)
+{
+    return memcmp(&a->t, &b->t, sizeof a->t) == 0 && a->face == b->face && a->side == b->side;
+}
+
+/* Bit for bit. */
+static bool same_answers(const answers *a, const answers *b)
+{
+    bool same = a->hit == b->hit && a->any == b->any && a->count == b->count &&
+                memcmp(&a->nearest, &b->nearest, sizeof a->nearest) == 0 &&
+                (!a->hit || same_hit(&a->first, &b->first));
+    for (uint64_t i = 0; i < a->count && i < KEPT && same; i++)
+        same = same_hit(&a->all[i], &b->all[i]);
+    return same;
+}
+
+START_TEST(kernels_for_any_processor_answer_the_same)
+{
+    query_model m;
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
+                     &query_variants[_i % query_variant_count]);
+    const ebpo_kernels *usual = m.model->kernels;
+    uint64_t state = (uint64_t)_i, count = query_scaled(m.mesh.face_count > 500 ? 200 : 600);
+    if (strcmp(m.name, "all_scales") == 0)
+        count = query_scaled(100);
+    for (uint64_t i = 0; i < count; i++) {
+        query_ray r;
+        answers one, other;
+        query_make_ray(&m, &state, r.origin, r.direction, &r.t_max);
+        m.model->kernels = &ebpo_kernels_base;
+        ask_all(&m, &r, &one);
+        ck_assert(query_ask_ray(&m, m.context, &r)); /* against rational arithmetic */
+        m.model->kernels = usual;
+        ask_all(&m, &r, &other);
+        ck_assert_msg(same_answers(&one, &other), "%s: ray %" PRIu64, m.name, i);
+        ck_assert(one.any == one.hit);
+    }
+    query_model_free(&m);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("bounds");
+    TCase *bounds = tcase_create("bounds");
+    tcase_set_timeout(bounds, 600);
+    tcase_add_loop_test(bounds, boxes_and_slabs_contain_their_faces, 0, query_solid_count());
+    tcase_add_loop_test(bounds, blocks_are_measured_the_same_on_any_processor, 0,
+                        query_solid_count());
+    tcase_add_loop_test(bounds, kernels_for_any_processor_answer_the_same, 0, query_solid_count());
+    suite_add_tcase(suite, bounds);
+    return suite;
+}

@@ -1,0 +1,307 @@
+/* Two models at poses: contacts and distance against brute force in rational arithmetic
+ * (tests/support/models_twin.h). */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/collide.h>
+
+#include "check_main.h"
+#include "models_twin.h"
+#include "extras/collide/pair_distance.h"
+#include "solids.h"
+
+static const char *const names[] = { "cube",           "torus",      "touching_shells",
+                                     "sheet",          "cube_twice", "zero_area_face",
+                                     "far_away_float", "blob",       "nested_windings" };
+enum { NAMES = sizeof names / sizeof *names };
+/* Faces of both: a twin takes seconds for more. */
+enum { MOST_PAIRS = 100000 };
+
+typedef struct two_models {
+    query_model model[2];
+    ebpo_collider *collider, *swapped;
+} two_models;
+
+static ebpo_clearance ask(ebpo_collider *c, const ebpo_pose *a, const ebpo_pose *b,
+                          double tolerance, double at_least, bool warm)
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
+    ebpo_clearance out;
+    options.pose_a = *a;
+    options.pose_b = *b;
+    how.tolerance = tolerance;
+    how.at_least = at_least;
+    how.warm = warm;
+    ASSERT_OK(ebpo_collide_distance(c, &options, &how, &out, error));
+    return out;
+}
+
+/* --- what is told --- */
+
+static void check_pair(const twin_faces *f, const ebpo_clearance *got, const char *what)
+{
+    twin_met *met;
+    uint64_t count = twin_pairs(&f[0], &f[1], &met), i = 0;
+    ck_assert_msg((got->pair.kind != EBPO_PAIR_APART) == (count > 0), "%s: kind %d of %llu pairs",
+                  what, got->pair.kind, (unsigned long long)count);
+    while (i < count && !(met[i].a == got->pair.file_face_a && met[i].b == got->pair.file_face_b &&
+                          met[i].kind == got->pair.kind))
+        i++;
+    ck_assert_msg(count == 0 || i < count, "%s: a pair that does not meet so", what);
+    ck_assert_msg((got->distance.hi == 0) == (count > 0), "%s: %g", what, got->distance.hi);
+    free(met);
+    if (count)
+        return;
+    const char *wrong = twin_models_distance(&f[0], &f[1], got->distance.hi, got->pair.file_face_a,
+                                             got->pair.file_face_b);
+    ck_assert_msg(!wrong, "%s: %.17g: %s", what, got->distance.hi, wrong);
+}
+
+static void check_points(const ebpo_clearance *got, double size, const char *what)
+{
+    double square = 0, most = 0;
+    for (int k = 0; k < 3; k++) {
+        square += pow(got->point_a[k] - got->point_b[k], 2);
+        most = fmax(most, fmax(fabs(got->point_a[k]), fabs(got->point_b[k])));
+    }
+    ck_assert_msg(fabs(sqrt(square) - got->distance.hi) <= 1e-13 * (size + most),
+                  "%s: points are %.17g apart, not %.17g", what, sqrt(square), got->distance.hi);
+}
+
+static ebpo_clearance turned(ebpo_clearance c)
+{
+    ebpo_clearance out = c;
+    out.pair = (ebpo_face_pair){ c.pair.face_b,      c.pair.face_a, c.pair.file_face_b,
+                                 c.pair.file_face_a, c.pair.kind,   0 };
+    memcpy(out.point_a, c.point_b, sizeof out.point_a);
+    memcpy(out.point_b, c.point_a, sizeof out.point_b);
+    return out;
+}
+
+/* --- what else may be asked --- */
+
+static void check_intervals(const two_models *t, const ebpo_pose *a, const ebpo_pose *b,
+                            double distance, double size, const char *what)
+{
+    const double tolerance[] = { 1e-12, 1e-3, 0.5 };
+    for (int i = 0; i < 3; i++) {
+        ebpo_certain d = ask(t->collider, a, b, tolerance[i] * size, -1, i == 1).distance;
+        ck_assert_msg(d.lo <= distance && distance <= d.hi, "%s: %.17g is not in %.17g .. %.17g",
+                      what, distance, d.lo, d.hi);
+        ck_assert_msg(d.hi - d.lo <= (tolerance[i] + 1e-12) * size + 1e-9 * distance,
+                      "%s: %g is wider than %g", what, d.hi - d.lo, tolerance[i] * size);
+    }
+}
+
+static void check_at_least(const two_models *t, const ebpo_pose *a, const ebpo_pose *b,
+                           double distance, const char *what)
+{
+    const double asked[] = { 0, distance / 2, nextafter(distance, 0), nextafter(distance, INFINITY),
+                             2 * distance + 1 };
+    for (int i = 0; i < 5; i++) {
+        ebpo_clearance c = ask(t->collider, a, b, 0, asked[i], false);
+        int want = asked[i] <= distance;
+        ck_assert_msg(c.at_least == want, "%s: at least %.17g: %d", what, asked[i], c.at_least);
+        ck_assert(c.distance.lo <= distance && distance <= c.distance.hi);
+        if (!want)
+            ck_assert(c.pair.face_a != EBPO_NO_FACE && c.distance.lo <= asked[i]);
+    }
+}
+
+static void check_late(const two_models *t, const ebpo_pose *a, const ebpo_pose *b, double distance,
+                       const char *what)
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_clearance out;
+    options.pose_a = *a;
+    options.pose_b = *b;
+    options.deadline_ns = 1;
+    ASSERT_OK(ebpo_collide_distance(t->collider, &options, NULL, &out, error));
+    ck_assert_msg(out.distance.lo <= distance && distance <= out.distance.hi, "%s: late", what);
+}
+
+/* --- one case --- */
+
+static void check_case(two_models *t, int kind, uint64_t *state)
+{
+    ebpo_pose a, b;
+    twin_faces f[2];
+    char what[128];
+    double size = t->model[0].size > 0 ? t->model[0].size : 1;
+    snprintf(what, sizeof what, "%s, %s, %s", t->model[0].name, t->model[1].name,
+             twin_pose_name(kind));
+    twin_pose(kind, size, state, &a, &b);
+    twin_faces_make(&f[0], &t->model[0], &a);
+    twin_faces_make(&f[1], &t->model[1], &b);
+    ebpo_clearance got = ask(t->collider, &a, &b, 0, -1, false),
+                   other = turned(ask(t->swapped, &b, &a, 0, -1, false)),
+                   warm = ask(t->collider, &a, &b, 0, -1, true);
+    ck_assert_msg(memcmp(&got, &other, sizeof got) == 0, "%s: swapped", what);
+    ck_assert_msg(memcmp(&got.distance, &warm.distance, sizeof got.distance) == 0, "%s: warm",
+                  what);
+    ck_assert_int_eq(got.distance.figure, EBPO_FIGURE_EXACT);
+    check_pair(f, &got, what);
+    check_points(&got, size, what);
+    check_intervals(t, &a, &b, got.distance.hi, size, what);
+    check_at_least(t, &a, &b, got.distance.hi, what);
+    check_late(t, &a, &b, got.distance.hi, what);
+    twin_faces_free(&f[0]);
+    twin_faces_free(&f[1]);
+}
+
+static void make_two(two_models *t, const char *name_a, const char *name_b, int variant)
+{
+    query_model_make(&t->model[0], name_a, query_solid_by_name(name_a), &query_variants[variant]);
+    query_model_make(&t->model[1], name_b, query_solid_by_name(name_b),
+                     &query_variants[(variant + 1) % query_variant_count]);
+    ASSERT_OK(ebpo_collider_new(t->model[0].model, t->model[1].model, NULL, &t->collider, error));
+    ASSERT_OK(ebpo_collider_new(t->model[1].model, t->model[0].model, NULL, &t->swapped, error));
+}
+
+static void free_two(two_models *t)
+{
+    ebpo_collider_free(t->collider);
+    ebpo_collider_free(t->swapped);
+    query_model_free(&t->model[0]);
+    query_model_free(&t->model[1]);
+}
+
+START_TEST(distances_are_those_of_brute_force)
+{
+    two_models t;
+    uint64_t state = (uint64_t)_i + 1;
+    if (!ebpo_test_wanted(_i))
+        return;
+    make_two(&t, names[_i / NAMES], names[_i % NAMES], _i % query_variant_count);
+    bool few = t.model[0].mesh.face_count * t.model[1].mesh.face_count > MOST_PAIRS;
+    for (int kind = 0; kind < TWIN_POSES; kind++)
+        if (!few || kind % 5 == _i % 5)
+            check_case(&t, kind, &state);
+    free_two(&t);
+}
+END_TEST
+
+/* --- deep hierarchies --- */
+
+static double box_gap(const double a[3][3], const double b[3][3])
+{
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+        double low = fmin(fmin(a[0][k], a[1][k]), a[2][k]) - fmax(fmax(b[0][k], b[1][k]), b[2][k]),
+               high = fmin(fmin(b[0][k], b[1][k]), b[2][k]) - fmax(fmax(a[0][k], a[1][k]), a[2][k]),
+               gap = fmax(fmax(low, high), 0);
+        square += gap * gap;
+    }
+    return sqrt(square);
+}
+
+/* The least bounds of all pairs of faces: the distance is in *lo .. *hi. */
+static void distance_of_all(const twin_faces *a, const twin_faces *b, double *lo, double *hi)
+{
+    *lo = *hi = INFINITY;
+    for (uint64_t i = 0; i < a->count; i++)
+        for (uint64_t j = 0; j < b->count; j++) {
+            const double(*p)[3] = (const double(*)[3])a->corner[i],
+                  (*q)[3] = (const double(*)[3])b->corner[j];
+            ebpo_pair_distance_bounds d;
+            if (box_gap(p, q) > *hi * (1 + 1e-9))
+                continue;
+            ebpo_triangles_distance_bounds(p, q, &d);
+            *lo = fmin(*lo, d.lo);
+            *hi = fmin(*hi, d.hi);
+        }
+}
+
+/* Moves b until it is nearly at a. */
+static void approach(two_models *t, const ebpo_pose *a, ebpo_pose *b, double left)
+{
+    for (int i = 0; i < 3; i++) {
+        ebpo_clearance c = ask(t->collider, a, b, 0, -1, false);
+        for (int k = 0; k < 3; k++)
+            b->translation[k] += (1 - left) * (c.point_a[k] - c.point_b[k]);
+    }
+}
+
+/* Turned about: what decides there are bounds that small models at straight poses hardly ask for.
+ */
+START_TEST(bounds_of_deep_hierarchies_hold)
+{
+    two_models t;
+    uint64_t state = (uint64_t)_i + 77;
+    ebpo_pose a, b;
+    twin_faces f[2];
+    double lo, hi;
+    for (int i = 0; i < 2; i++)
+        query_model_make(&t.model[i], "fine torus", ebpo_test_torus(2, 0.7, 64, 32),
+                         &query_variants[0]);
+    ASSERT_OK(ebpo_collider_new(t.model[0].model, t.model[1].model, NULL, &t.collider, error));
+    ASSERT_OK(ebpo_collider_new(t.model[1].model, t.model[0].model, NULL, &t.swapped, error));
+    twin_pose(TWIN_TURNED_APART, t.model[0].size, &state, &a, &b);
+    approach(&t, &a, &b, 0.1 * (1 + _i));
+    twin_faces_make(&f[0], &t.model[0], &a);
+    twin_faces_make(&f[1], &t.model[1], &b);
+    distance_of_all(&f[0], &f[1], &lo, &hi);
+    double got = ask(t.collider, &a, &b, 0, -1, false).distance.hi;
+    ck_assert_msg(lo > 0 && lo <= got && got <= hi, "%d: %.17g is not in %.17g .. %.17g", _i, got,
+                  lo, hi);
+    for (int i = 0; i < 2; i++)
+        twin_faces_free(&f[i]);
+    free_two(&t);
+}
+END_TEST
+
+/* A translation that rounds nothing changes nothing. */
+START_TEST(moving_both_alike_changes_nothing)
+{
+    two_models t;
+    ebpo_pose a = EBPO_POSE_INIT, b = EBPO_POSE_INIT;
+    make_two(&t, "cube", "cube", 0);
+    double size = t.model[0].size;
+    b.translation[0] = 1.25 * size;
+    ebpo_clearance here = ask(t.collider, &a, &b, 0, -1, false);
+    for (int k = 0; k < 3; k++) {
+        a.translation[k] += 64 * size;
+        b.translation[k] += 64 * size;
+    }
+    ebpo_clearance there = ask(t.collider, &a, &b, 0, -1, false);
+    ck_assert_double_eq(here.distance.hi, 0.25 * size);
+    ck_assert_double_eq(there.distance.hi, here.distance.hi);
+    ck_assert(there.pair.file_face_a == here.pair.file_face_a &&
+              there.pair.file_face_b == here.pair.file_face_b);
+    free_two(&t);
+}
+END_TEST
+
+START_TEST(what_is_no_number_is_refused)
+{
+    two_models t;
+    ebpo_clearance out;
+    ebpo_error refusal = EBPO_ERROR_INIT;
+    make_two(&t, "cube", "torus", 0);
+    ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
+    how.tolerance = -1;
+    ck_assert_int_eq(ebpo_collide_distance(t.collider, NULL, &how, &out, &refusal),
+                     EBPO_E_ARGUMENT);
+    how.tolerance = 0;
+    how.at_least = NAN;
+    ck_assert_int_eq(ebpo_collide_distance(t.collider, NULL, &how, &out, &refusal),
+                     EBPO_E_ARGUMENT);
+    free_two(&t);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    TCase *tests = tcase_create("collide_distance");
+    tcase_set_timeout(tests, 900);
+    tcase_add_loop_test(tests, distances_are_those_of_brute_force, 0, NAMES * NAMES);
+    tcase_add_loop_test(tests, bounds_of_deep_hierarchies_hold, 0, 6);
+    tcase_add_test(tests, moving_both_alike_changes_nothing);
+    tcase_add_test(tests, what_is_no_number_is_refused);
+    Suite *suite = suite_create("collide_distance");
+    suite_add_tcase(suite, tests);
+    return suite;
+}

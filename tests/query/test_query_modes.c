@@ -1,0 +1,666 @@
+/* Questions in all modes: however a file is loaded, whatever the budget, the order, the threads:
+ * the answers are the same; with limits they are certain. */
+#include <inttypes.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "check_main.h"
+#include "query_kit.h"
+
+/* Deep trees with all kinds of leaves; (solid, variant). */
+static const struct {
+    const char *name;
+    int variant;
+} cases[] = {
+    { "sphere", 5 },         { "boxes_in_walls", 0 },     { "nested_windings", 1 },
+    { "blob", 2 },           { "touching_shells", 5 },    { "tetrahedra_at_random", 3 },
+    { "giant_and_dust", 0 }, { "cube_in_cell_walls", 1 }, { "far_away_float", 0 },
+    { "tetrahedron", 0 },
+};
+enum { CASES = sizeof cases / sizeof *cases };
+
+/* A model, points, and the truth about them. */
+typedef struct asked {
+    query_model m;
+    uint64_t count;
+    double *points;
+    query_truth *truth;
+    ebpo_inside_result *inside;
+    ebpo_distance_result *distance;
+} asked;
+
+static void make_room(asked *a, uint64_t count)
+{
+    a->count = count;
+    a->points = query_room(count, 3 * sizeof *a->points);
+    a->truth = query_room(count, sizeof *a->truth);
+    a->inside = query_room(count, sizeof *a->inside);
+    a->distance = query_room(count, sizeof *a->distance);
+}
+
+static void begin(asked *a, int i, uint64_t count)
+{
+    query_model_make(&a->m, cases[i].name, query_solid_by_name(cases[i].name),
+                     &query_variants[cases[i].variant]);
+    make_room(a, query_scaled(count / 3));
+    query_make_points(&a->m, a->count, (uint64_t)i + 1000, a->points);
+    query_find_truths(&a->m, a->points, a->count, a->truth);
+}
+
+static void end(asked *a)
+{
+    query_model_free(&a->m);
+    free(a->points);
+    free(a->truth);
+    free(a->inside);
+    free(a->distance);
+}
+
+static void ask_exactly(asked *a, ebpo_context *context, const ebpo_inside_options *inside,
+                        const ebpo_distance_options *options)
+{
+    ASSERT_OK(ebpo_inside_many(context, a->points, a->count, inside, a->inside, error));
+    ck_assert_uint_eq(query_wrong_inside(&a->m, a->points, a->truth, a->count, a->inside), 0);
+    ASSERT_OK(ebpo_distance_many(context, a->points, a->count, options, a->distance, error));
+    ck_assert_uint_eq(query_wrong_distance(&a->m, a->points, a->truth, a->count,
+                                           options && options->unsigned_distance, a->distance),
+                      0);
+}
+
+/* --- loading and memory --- */
+
+static void ask_loaded(asked *a, const ebpo_model_options *how)
+{
+    ebpo_model *model;
+    ebpo_context *context;
+    ASSERT_OK(ebpo_model_new(a->m.file, how, &model, error));
+    ASSERT_OK(ebpo_context_new(model, &context, error));
+    for (int envelopes = 0; envelopes < 3; envelopes++) {
+        ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
+        inside.envelopes = (ebpo_envelopes)envelopes;
+        ask_exactly(a, context, &inside, NULL);
+    }
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+}
+
+/* With EBPO_TEST_SCALE below 1 each test takes other cases than the one before it, so that all have
+ * their turn. */
+
+START_TEST(every_way_of_loading_gives_the_same_answers)
+{
+    if (!ebpo_test_wanted(_i + 1))
+        return;
+    asked a;
+    begin(&a, _i, 300);
+    for (int loading = 0; loading < 3; loading++)
+        for (int cut = -1; cut < 5; cut++) {
+            ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+            how.loading = (ebpo_loading)loading;
+            how.cut_level = cut;
+            how.prefetch = loading == EBPO_LOAD_CACHE && cut % 2 == 0;
+            if (cut < a.m.info.level_count)
+                ask_loaded(&a, &how);
+        }
+    end(&a);
+}
+END_TEST
+
+/* True when the budget allowed a model and a context. */
+static bool ask_within(asked *a, uint64_t budget, bool *resident)
+{
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *model = NULL;
+    ebpo_context *context = NULL;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    how.memory = budget;
+    ebpo_status status = ebpo_model_new(a->m.file, &how, &model, &error);
+    if (status == EBPO_OK)
+        status = ebpo_context_new(model, &context, &error);
+    ck_assert_msg(status == EBPO_OK || status == EBPO_E_LIMIT, "%s", error.message);
+    if (status == EBPO_E_LIMIT)
+        ck_assert_int_ne(error.message[0], 0);
+    else
+        ask_exactly(a, context, NULL, NULL);
+    if (model) {
+        ebpo_model_get_stats(model, &stats);
+        ck_assert_uint_eq(stats.budget, budget);
+        ck_assert_uint_le(stats.memory_peak, budget);
+        ck_assert_uint_le(stats.memory, stats.memory_peak);
+        *resident = stats.resident;
+    }
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return status == EBPO_OK;
+}
+
+START_TEST(budgets_are_kept_and_do_not_change_answers)
+{
+    if (!ebpo_test_wanted(_i + 2))
+        return;
+    asked a;
+    begin(&a, _i, 300);
+    bool resident = false, fits = false;
+    ck_assert(!ask_within(&a, 1, &resident));
+    for (uint64_t budget = 4096; !resident; budget += budget / 2) {
+        bool fitted = ask_within(&a, budget, &resident);
+        ck_assert(fitted || !fits); /* more memory is never worse */
+        fits = fitted;
+        ck_assert_uint_lt(budget, UINT64_C(1) << 32);
+    }
+    end(&a);
+}
+END_TEST
+
+/* --- how questions are put --- */
+
+START_TEST(batches_give_what_single_questions_give)
+{
+    if (!ebpo_test_wanted(_i + 3))
+        return;
+    asked a;
+    begin(&a, _i, 1000);
+    ask_exactly(&a, a.m.context, NULL, NULL);
+    for (uint64_t i = 0; i < a.count; i++) {
+        ebpo_inside_result inside;
+        ebpo_distance_result distance;
+        ASSERT_OK(ebpo_inside(a.m.context, a.points + 3 * i, NULL, &inside, error));
+        ASSERT_OK(ebpo_distance(a.m.context, a.points + 3 * i, NULL, &distance, error));
+        ck_assert_mem_eq(&inside, &a.inside[i], sizeof inside);
+        ck_assert_mem_eq(&distance, &a.distance[i], sizeof distance);
+    }
+    end(&a);
+}
+END_TEST
+
+START_TEST(warm_starts_and_signs_do_not_change_answers)
+{
+    if (!ebpo_test_wanted(_i + 4))
+        return;
+    asked a;
+    begin(&a, _i, 600);
+    for (int form = 0; form < 4; form++) {
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+        options.warm = form & 1;
+        options.unsigned_distance = form & 2;
+        ask_exactly(&a, a.m.context, NULL, &options);
+    }
+    /* along a path, where the last answer is close */
+    for (uint64_t i = 1; i < a.count; i++)
+        for (uint64_t k = 0; k < 3; k++)
+            a.points[3 * i + k] =
+                a.points[k] + (a.points[3 + k] - a.points[k]) * (double)i / (double)a.count;
+    query_find_truths(&a.m, a.points, a.count, a.truth);
+    for (int warm = 0; warm < 2; warm++) {
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+        options.warm = warm;
+        ask_exactly(&a, a.m.context, NULL, &options);
+    }
+    end(&a);
+}
+END_TEST
+
+START_TEST(what_is_beyond_max_distance_is_left_out)
+{
+    if (!ebpo_test_wanted(_i + 5))
+        return;
+    asked a;
+    begin(&a, _i, 500);
+    for (uint64_t i = 0; i < a.count; i++) {
+        double d = a.truth[i].distance;
+        const double limits[] = {
+            d, nextafter(d, INFINITY), d > 0 ? nextafter(d, 0) : 0, d / 2, 2 * d, 0, INFINITY
+        };
+        oracle_nearest near;
+        oracle_find_nearest(a.m.judge, a.points + 3 * i, &near);
+        for (size_t l = 0; l < sizeof limits / sizeof *limits; l++) {
+            ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+            ebpo_distance_result got;
+            options.max_distance = limits[l];
+            options.warm = i & 1;
+            ASSERT_OK(ebpo_distance(a.m.context, a.points + 3 * i, &options, &got, error));
+            if (oracle_distance_compare(a.m.judge, limits[l]) <= 0) {
+                ck_assert_uint_eq(query_wrong_distance(&a.m, a.points + 3 * i, a.truth + i, 1,
+                                                       false, &got),
+                                  0);
+            } else {
+                ck_assert_msg(isinf(got.distance), "point (%a, %a, %a), max_distance %a: %a",
+                              a.points[3 * i], a.points[3 * i + 1], a.points[3 * i + 2], limits[l],
+                              got.distance);
+                ck_assert(got.face == EBPO_NO_FACE);
+                ck_assert_double_le(got.lo, d);
+                ck_assert_double_ge(got.hi, d);
+            }
+        }
+    }
+    end(&a);
+}
+END_TEST
+
+/* --- limits --- */
+
+static void ask_limited(asked *a, ebpo_context *context, ebpo_envelopes envelopes,
+                        const ebpo_distance_options *options)
+{
+    ebpo_inside_options inside = query_inside_like(options);
+    inside.envelopes = envelopes;
+    ASSERT_OK(ebpo_inside_many(context, a->points, a->count, &inside, a->inside, error));
+    ck_assert_uint_eq(query_wrong_limited_inside(&a->m, a->points, a->truth, a->count, a->inside),
+                      0);
+    ASSERT_OK(ebpo_distance_many(context, a->points, a->count, options, a->distance, error));
+    ck_assert_uint_eq(query_wrong_limited_distance(&a->m, a->points, a->truth, a->count,
+                                                   a->distance),
+                      0);
+}
+
+START_TEST(answers_limited_to_a_level_are_certain)
+{
+    if (!ebpo_test_wanted(_i + 6))
+        return;
+    asked a;
+    begin(&a, _i, 600);
+    for (int level = 0; level < a.m.info.level_count; level++)
+        for (int envelopes = 0; envelopes < 3; envelopes++) {
+            ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+            options.level = level;
+            ask_limited(&a, a.m.context, (ebpo_envelopes)envelopes, &options);
+        }
+    end(&a);
+}
+END_TEST
+
+START_TEST(answers_limited_to_a_level_do_not_depend_on_what_is_in_memory)
+{
+    if (!ebpo_test_wanted(_i + 7))
+        return;
+    asked a;
+    begin(&a, _i, 300);
+    ebpo_distance_result *first = query_room(a.count, sizeof *first);
+    ebpo_inside_result *where = query_room(a.count, sizeof *where);
+    for (int level = 0; level < a.m.info.level_count; level += 2) {
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+        options.level = level;
+        ask_limited(&a, a.m.context, EBPO_ENVELOPES_AUTO, &options);
+        memcpy(first, a.distance, a.count * sizeof *first);
+        memcpy(where, a.inside, a.count * sizeof *where);
+        for (int cut = 0; cut < 4 && cut < a.m.info.level_count; cut++) {
+            ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+            ebpo_model *model;
+            ebpo_context *context;
+            how.cut_level = cut;
+            ASSERT_OK(ebpo_model_new(a.m.file, &how, &model, error));
+            ASSERT_OK(ebpo_context_new(model, &context, error));
+            ask_limited(&a, context, EBPO_ENVELOPES_AUTO, &options);
+            ebpo_context_free(context);
+            ebpo_model_free(model);
+        }
+    }
+    free(first);
+    free(where);
+    end(&a);
+}
+END_TEST
+
+START_TEST(answers_limited_by_a_deadline_are_certain)
+{
+    if (!ebpo_test_wanted(_i + 8))
+        return;
+    static const uint64_t deadlines[] = { 1, 100, 1000, 10000, 100000, 1000000 };
+    asked a;
+    begin(&a, _i, 300);
+    for (size_t d = 0; d < sizeof deadlines / sizeof *deadlines; d++)
+        for (int cut = -1; cut < 2 && cut < a.m.info.level_count; cut++) {
+            ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+            ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+            ebpo_model *model;
+            ebpo_context *context;
+            how.cut_level = cut;
+            options.deadline_ns = deadlines[d];
+            ASSERT_OK(ebpo_model_new(a.m.file, &how, &model, error));
+            ASSERT_OK(ebpo_context_new(model, &context, error));
+            ask_limited(&a, context, EBPO_ENVELOPES_AUTO, &options);
+            for (uint64_t i = 0; i < a.count;
+                 i++) /* however short it is, some face is in the root cell; beyond the largest
+                         double nobody can tell */
+                ck_assert(isfinite(a.distance[i].hi) || isinf(a.truth[i].distance) ||
+                          fabs(a.points[3 * i]) + fabs(a.points[3 * i + 1]) +
+                                  fabs(a.points[3 * i + 2]) >
+                              1e300);
+            ebpo_context_free(context);
+            ebpo_model_free(model);
+        }
+    end(&a);
+}
+END_TEST
+
+START_TEST(the_theses_modes_never_claim_too_much)
+{
+    if (!ebpo_test_wanted(_i + 9))
+        return;
+    asked a;
+    begin(&a, _i, 600);
+    for (int mode = EBPO_DISTANCE_RECURSIVE; mode <= EBPO_DISTANCE_ENVELOPE; mode++) {
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+        options.mode = (ebpo_distance_mode)mode;
+        ASSERT_OK(ebpo_distance_many(a.m.context, a.points, a.count, &options, a.distance, error));
+        for (uint64_t i = 0; i < a.count; i++) {
+            const ebpo_distance_result *got = a.distance + i;
+            double d = a.truth[i].distance;
+            ck_assert_msg(got->lo <= d && d <= got->hi,
+                          "mode %d, point (%a, %a, %a): [%a, %a], it is %a", mode, a.points[3 * i],
+                          a.points[3 * i + 1], a.points[3 * i + 2], got->lo, got->hi, d);
+            if (mode != EBPO_DISTANCE_ENVELOPE &&
+                isfinite(got->distance)) { /* the distance of some face */
+                ck_assert_double_ge(fabs(got->distance), d);
+                ck_assert(got->face != EBPO_NO_FACE);
+            }
+        }
+    }
+    end(&a);
+}
+END_TEST
+
+/* A context keeps envelopes for its next questions; one that has just been made has none. */
+START_TEST(kept_envelopes_are_those_that_would_be_cut)
+{
+    if (!ebpo_test_wanted(_i + 11))
+        return;
+    asked a;
+    begin(&a, _i, 300);
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+    options.mode = EBPO_DISTANCE_ENVELOPE;
+    for (uint64_t i = 0; i < a.count; i++) {
+        ebpo_context *fresh;
+        ebpo_distance_result kept, cut;
+        options.level = (int)(i % (uint64_t)a.m.info.level_count);
+        ASSERT_OK(ebpo_context_new(a.m.model, &fresh, error));
+        ASSERT_OK(ebpo_distance(a.m.context, a.points + 3 * i, &options, &kept, error));
+        ASSERT_OK(ebpo_distance(fresh, a.points + 3 * i, &options, &cut, error));
+        ck_assert_msg(memcmp(&kept.distance, &cut.distance, sizeof kept.distance) == 0 &&
+                          memcmp(kept.normal, cut.normal, sizeof kept.normal) == 0,
+                      "level %d, point (%a, %a, %a): %a, and newly cut %a", options.level,
+                      a.points[3 * i], a.points[3 * i + 1], a.points[3 * i + 2], kept.distance,
+                      cut.distance);
+        ebpo_context_free(fresh);
+    }
+    end(&a);
+}
+END_TEST
+
+/* What a leaf or a node has is told by the file, not by what lies beside it in memory. */
+START_TEST(the_theses_modes_do_not_depend_on_what_is_in_memory)
+{
+    if (!ebpo_test_wanted(_i + 10))
+        return;
+    asked a;
+    begin(&a, _i, 300);
+    ebpo_distance_result *resident = calloc(a.count, sizeof *resident);
+    for (int mode = EBPO_DISTANCE_RECURSIVE; mode <= EBPO_DISTANCE_ENVELOPE; mode++) {
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+        options.mode = (ebpo_distance_mode)mode;
+        ASSERT_OK(ebpo_distance_many(a.m.context, a.points, a.count, &options, resident, error));
+        for (int cut = 1; cut < a.m.info.level_count; cut++) {
+            ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+            ebpo_model *model;
+            ebpo_context *context;
+            how.cut_level = cut;
+            ASSERT_OK(ebpo_model_new(a.m.file, &how, &model, error));
+            ASSERT_OK(ebpo_context_new(model, &context, error));
+            ASSERT_OK(ebpo_distance_many(context, a.points, a.count, &options, a.distance, error));
+            for (uint64_t i = 0; i < a.count; i++) {
+                const ebpo_distance_result *got = a.distance + i, *want = resident + i;
+                ck_assert_msg(got->face == want->face && memcmp(&got->distance, &want->distance,
+                                                                sizeof got->distance) == 0,
+                              "mode %d, cut level %d, point (%a, %a, %a): %a of face %" PRIu64
+                              ", resident %a of face %" PRIu64,
+                              mode, cut, a.points[3 * i], a.points[3 * i + 1], a.points[3 * i + 2],
+                              got->distance, got->face, want->distance, want->face);
+            }
+            ebpo_context_free(context);
+            ebpo_model_free(model);
+        }
+    }
+    free(resident);
+    end(&a);
+}
+END_TEST
+
+/* --- a file without mesh --- */
+
+START_TEST(a_file_without_mesh_answers_by_levels_only)
+{
+    if (!ebpo_test_wanted(_i + 11))
+        return;
+    static const query_variant bare = { "planes only", 4, -1, EBPO_RULE_NONZERO, EBPO_PART_PLANES };
+    asked a;
+    begin(&a, _i, 500);
+    query_model m;
+    query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name), &bare);
+    ebpo_inside_result inside;
+    ebpo_distance_result distance;
+    const ebpo_ray_hit *hits;
+    const uint64_t *faces;
+    uint64_t count;
+    bool hit;
+    ebpo_ray_hit one;
+    const double *p = a.points;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_int_eq(ebpo_inside(m.context, p, NULL, &inside, &error), EBPO_E_ABSENT);
+    ck_assert_int_ne(error.message[0], 0);
+    ck_assert_int_eq(ebpo_distance(m.context, p, NULL, &distance, &error), EBPO_E_ABSENT);
+    ck_assert_int_eq(ebpo_ray_first(m.context, p, (double[3]){ 1, 0, 0 }, INFINITY, &one, &hit,
+                                    &error),
+                     EBPO_E_ABSENT);
+    ck_assert_int_eq(ebpo_ray_all(m.context, p, (double[3]){ 1, 0, 0 }, INFINITY, &hits, &count,
+                                  &error),
+                     EBPO_E_ABSENT);
+    ck_assert_int_eq(ebpo_faces_in_box(m.context, p, p, &faces, &count, &error), EBPO_E_ABSENT);
+    if (query_variants[cases[_i].variant].rule == EBPO_RULE_NONZERO)
+        for (int level = 0; level < m.info.level_count; level++) {
+            ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+            options.level = level;
+            ask_limited(&a, m.context, EBPO_ENVELOPES_AUTO, &options);
+        }
+    query_model_free(&m);
+    end(&a);
+}
+END_TEST
+
+/* --- threads --- */
+
+typedef struct thread_job {
+    asked *a;
+    ebpo_model *model;
+    unsigned number;
+    ebpo_status status;
+    uint64_t different;
+} thread_job;
+
+/* Starts at another point each; answers must be those of one thread, bit for bit. */
+static void *ask_in_thread(void *user)
+{
+    thread_job *job = user;
+    asked *a = job->a;
+    ebpo_context *context;
+    job->status = ebpo_context_new(job->model, &context, NULL);
+    for (uint64_t i = 0; i < a->count && job->status == EBPO_OK; i++) {
+        uint64_t at = (i + job->number * a->count / 4) % a->count;
+        ebpo_inside_result inside;
+        ebpo_distance_result distance;
+        job->status = ebpo_inside(context, a->points + 3 * at, NULL, &inside, NULL);
+        if (job->status == EBPO_OK)
+            job->status = ebpo_distance(context, a->points + 3 * at, NULL, &distance, NULL);
+        if (job->status == EBPO_OK)
+            job->different += memcmp(&inside, &a->inside[at], sizeof inside) != 0 ||
+                              memcmp(&distance, &a->distance[at], sizeof distance) != 0;
+    }
+    ebpo_context_free(context);
+    return NULL;
+}
+
+static void in_threads(asked *a, const ebpo_model_options *how, void *(*ask)(void *job),
+                       ebpo_model_stats *stats)
+{
+    enum { THREADS = 4 };
+    pthread_t thread[THREADS];
+    thread_job job[THREADS];
+    ebpo_model *model;
+    ASSERT_OK(ebpo_model_new(a->m.file, how, &model, error));
+    for (unsigned i = 0; i < THREADS; i++) {
+        job[i] = (thread_job){ .a = a, .model = model, .number = i };
+        ck_assert_int_eq(pthread_create(&thread[i], NULL, ask, &job[i]), 0);
+    }
+    for (int i = 0; i < THREADS; i++)
+        ck_assert_int_eq(pthread_join(thread[i], NULL), 0);
+    for (int i = 0; i < THREADS; i++) {
+        ck_assert_int_eq(job[i].status, EBPO_OK);
+        ck_assert_uint_eq(job[i].different, 0);
+    }
+    ebpo_model_get_stats(model, stats);
+    ebpo_model_free(model);
+}
+
+static void ask_in_threads(asked *a, const ebpo_model_options *how)
+{
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    in_threads(a, how, ask_in_thread, &stats);
+}
+
+/* With ThreadSanitizer (meson setup build-tsan -Db_sanitize=thread; CK_RUN_CASE=threads
+ * build-tsan/tests/query/test_query_modes) these look for races. */
+START_TEST(four_threads_get_the_answers_of_one)
+{
+    if (!ebpo_test_wanted(_i + 12))
+        return;
+    asked a;
+    begin(&a, _i, 400);
+    ask_exactly(&a, a.m.context, NULL, NULL);
+    for (int loading = 0; loading < 3; loading++)
+        for (int cut = -1; cut < 3 && cut < a.m.info.level_count; cut++)
+            for (int prefetch = 0; prefetch < 2; prefetch++) {
+                ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+                how.loading = (ebpo_loading)loading;
+                how.cut_level = cut;
+                how.prefetch = prefetch;
+                ask_in_threads(&a, &how);
+            }
+    end(&a);
+}
+END_TEST
+
+/* The smallest budgets that four contexts fit into, where subtrees come and go all the time. */
+START_TEST(four_threads_share_a_small_budget)
+{
+    if (!ebpo_test_wanted(_i + 13))
+        return;
+    asked a;
+    begin(&a, _i, 400);
+    ask_exactly(&a, a.m.context, NULL, NULL);
+    int runs = 0;
+    for (uint64_t budget = 16384; runs < 4; budget += budget / 3) {
+        ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+        ebpo_model *model;
+        ebpo_context *context[4] = { NULL };
+        how.memory = budget;
+        how.prefetch = true;
+        ebpo_status status = ebpo_model_new(a.m.file, &how, &model, NULL);
+        for (int i = 0; i < 4 && status == EBPO_OK; i++)
+            status = ebpo_context_new(model, &context[i], NULL);
+        for (int i = 0; i < 4; i++)
+            ebpo_context_free(context[i]);
+        ebpo_model_free(model);
+        if (status == EBPO_OK) {
+            ask_in_threads(&a, &how);
+            runs++;
+        }
+    }
+    end(&a);
+}
+END_TEST
+
+/* A leaf's wall is found by its first question, its planes by the 128th, while others ask. */
+enum { POINTS_ASKED_OFTEN = 12, OFTEN = 200 };
+
+static void *ask_often(void *user)
+{
+    thread_job *job = user;
+    asked *a = job->a;
+    ebpo_context *context;
+    job->status = ebpo_context_new(job->model, &context, NULL);
+    for (uint64_t i = 0; i < OFTEN * a->count && job->status == EBPO_OK; i++) {
+        uint64_t at = (i + job->number) % a->count;
+        ebpo_inside_result inside;
+        job->status = ebpo_inside(context, a->points + 3 * at, NULL, &inside, NULL);
+        job->different += memcmp(&inside, &a->inside[at], sizeof inside) != 0;
+    }
+    ebpo_context_free(context);
+    return NULL;
+}
+
+/* Of points close to faces, on either side: in leaves. */
+static void begin_in_leaves(asked *a, int number)
+{
+    query_model_make(&a->m, cases[number].name, query_solid_by_name(cases[number].name),
+                     &query_variants[cases[number].variant]);
+    make_room(a, POINTS_ASKED_OFTEN);
+    const ebpo_mesh *mesh = &a->m.mesh;
+    for (uint64_t i = 0; i < a->count; i++) {
+        const uint32_t *corner = mesh->faces + 3 * (i * mesh->face_count / a->count);
+        for (uint64_t k = 0; k < 3; k++) {
+            double sum = 0;
+            for (int c = 0; c < 3; c++)
+                sum += mesh->xyz64 ? mesh->xyz64[3 * (uint64_t)corner[c] + k]
+                                   : (double)mesh->xyz32[3 * (uint64_t)corner[c] + k];
+            a->points[3 * i + k] = sum / 3 + (i % 3 == k ? a->m.size / 300 : 0) * (i % 2 ? 1 : -1);
+        }
+    }
+    query_find_truths(&a->m, a->points, a->count, a->truth);
+}
+
+START_TEST(leaves_that_are_found_out_meanwhile_give_the_same_answers)
+{
+    asked a;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    uint64_t found = 0;
+    begin_in_leaves(&a, _i);
+    ask_exactly(&a, a.m.context, NULL, NULL);
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    how.cut_level = _i % 2 ? 1 : -1;
+    in_threads(&a, &how, ask_often, &stats);
+    for (int k = 0; k < 5; k++)
+        found += stats.leaves_of_kind[k];
+    ck_assert_uint_ge(found, 1);
+    end(&a);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("query_modes");
+    TCase *tests = tcase_create("modes"), *threads = tcase_create("threads");
+    tcase_set_timeout(tests, 1000);
+    tcase_set_timeout(threads, 1000);
+    tcase_add_loop_test(tests, every_way_of_loading_gives_the_same_answers, 0, CASES);
+    tcase_add_loop_test(tests, budgets_are_kept_and_do_not_change_answers, 0, CASES);
+    tcase_add_loop_test(tests, batches_give_what_single_questions_give, 0, CASES);
+    tcase_add_loop_test(tests, warm_starts_and_signs_do_not_change_answers, 0, CASES);
+    tcase_add_loop_test(tests, what_is_beyond_max_distance_is_left_out, 0, CASES);
+    tcase_add_loop_test(tests, answers_limited_to_a_level_are_certain, 0, CASES);
+    tcase_add_loop_test(tests, answers_limited_to_a_level_do_not_depend_on_what_is_in_memory, 0,
+                        CASES);
+    tcase_add_loop_test(tests, answers_limited_by_a_deadline_are_certain, 0, CASES);
+    tcase_add_loop_test(tests, the_theses_modes_never_claim_too_much, 0, CASES);
+    tcase_add_loop_test(tests, kept_envelopes_are_those_that_would_be_cut, 0, CASES);
+    tcase_add_loop_test(tests, the_theses_modes_do_not_depend_on_what_is_in_memory, 0, CASES);
+    tcase_add_loop_test(tests, a_file_without_mesh_answers_by_levels_only, 0, CASES);
+    tcase_add_loop_test(threads, four_threads_get_the_answers_of_one, 0, CASES);
+    tcase_add_loop_test(threads, four_threads_share_a_small_budget, 0, CASES);
+    tcase_add_loop_test(threads, leaves_that_are_found_out_meanwhile_give_the_same_answers, 0,
+                        CASES);
+    suite_add_tcase(suite, tests);
+    suite_add_tcase(suite, threads);
+    return suite;
+}

@@ -1,0 +1,267 @@
+#include "cli/bench/bench_walk.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { HOPS_MAX = 100, SWING_STEPS = 1000 };
+
+typedef struct walker {
+    const ebpo_mesh *mesh;
+    uint64_t *first;  /* [vertex_count + 1] place in `around` */
+    uint32_t *around; /* faces around each vertex */
+    uint64_t random;
+    uint64_t face;
+    double corner[3][3], n[3]; /* of the face; unit normal */
+    double p[3], d[3];         /* where, and a unit vector in the face's plane: where to */
+    double turn;               /* radians a step, to the left */
+    double side[3];            /* the normals that were passed, smoothed */
+} walker;
+
+uint64_t bench_random(uint64_t *state)
+{
+    uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
+    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
+    return z ^ z >> 31;
+}
+
+double bench_random_unit(uint64_t *state) { return (double)(bench_random(state) >> 11) * 0x1p-53; }
+
+/* --- vectors --- */
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static void subtract(const double a[3], const double b[3], double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = a[k] - b[k];
+}
+
+/* v += s w */
+static void add(double v[3], double s, const double w[3])
+{
+    for (int k = 0; k < 3; k++)
+        v[k] += s * w[k];
+}
+
+/* False when there is no direction. */
+static bool normalise(double v[3])
+{
+    double most = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    if (!(most > 0) || !isfinite(most))
+        return false;
+    for (int k = 0; k < 3; k++)
+        v[k] /= most; /* squares neither vanish nor overflow then */
+    double length = sqrt(dot(v, v));
+    for (int k = 0; k < 3; k++)
+        v[k] /= length;
+    return true;
+}
+
+/* --- the mesh --- */
+
+static bool index_vertices(walker *w)
+{
+    const ebpo_mesh *m = w->mesh;
+    uint64_t corners = 3 * m->face_count;
+    w->first = calloc(m->vertex_count + 2, sizeof *w->first);
+    w->around = malloc(corners * sizeof *w->around);
+    if (!w->first || !w->around)
+        return false;
+    for (uint64_t i = 0; i < corners; i++)
+        w->first[m->faces[i] + 2]++;
+    for (uint64_t v = 2; v < m->vertex_count + 2; v++)
+        w->first[v] += w->first[v - 1];
+    for (uint64_t i = 0; i < corners; i++)
+        w->around[w->first[m->faces[i] + 1]++] = (uint32_t)(i / 3);
+    return true;
+}
+
+static void vertex(const ebpo_mesh *m, uint32_t number, double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = m->xyz32 ? (double)m->xyz32[3 * (uint64_t)number + (unsigned)k]
+                          : m->xyz64[3 * (uint64_t)number + (unsigned)k];
+}
+
+/* The corner of `face` from which its edge from a to b (or, with `any`, from b to a) starts; -1: it
+ * has none. */
+static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b, bool any)
+{
+    const uint32_t *f = m->faces + 3 * face;
+    for (int i = 0; i < 3; i++)
+        if ((f[i] == a && f[(i + 1) % 3] == b) || (any && f[i] == b && f[(i + 1) % 3] == a))
+            return i;
+    return -1;
+}
+
+/* The face beyond the edge from a to b, the opposite one first; UINT64_MAX: there is none. `third`:
+ * its other corner. */
+static uint64_t neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t *third)
+{
+    for (int any = 0; any < 2; any++)
+        for (uint64_t i = w->first[a]; i < w->first[a + 1]; i++) {
+            uint64_t face = w->around[i];
+            int at = face == w->face ? -1 : edge_corner(w->mesh, face, b, a, any);
+            if (at >= 0) {
+                *third = w->mesh->faces[3 * face + (unsigned)(at + 2) % 3];
+                return face;
+            }
+        }
+    return UINT64_MAX;
+}
+
+/* --- the walk --- */
+
+/* False for a face without area. */
+static bool enter(walker *w, uint64_t face)
+{
+    double e0[3], e1[3];
+    w->face = face;
+    for (int i = 0; i < 3; i++)
+        vertex(w->mesh, w->mesh->faces[3 * face + (unsigned)i], w->corner[i]);
+    subtract(w->corner[1], w->corner[0], e0);
+    subtract(w->corner[2], w->corner[0], e1);
+    cross(e0, e1, w->n);
+    return normalise(w->n);
+}
+
+/* To the middle of the face, along its first edge. */
+static void stand(walker *w)
+{
+    for (int k = 0; k < 3; k++)
+        w->p[k] = w->corner[0][k] / 3 + w->corner[1][k] / 3 + w->corner[2][k] / 3;
+    subtract(w->corner[1], w->corner[0], w->d);
+    normalise(w->d);
+}
+
+/* To any face with an area; false when a thousand have none. */
+static bool land(walker *w)
+{
+    for (int i = 0; i < 1000; i++)
+        if (enter(w, bench_random(&w->random) % w->mesh->face_count)) {
+            stand(w);
+            return true;
+        }
+    return false;
+}
+
+/* How far the face's edge i is ahead; infinite when it is behind. `inward`: unit normal of the edge
+ * in the plane. */
+static double ahead(const walker *w, int i, double inward[3])
+{
+    double edge[3], from[3];
+    subtract(w->corner[(i + 1) % 3], w->corner[i], edge);
+    cross(w->n, edge, inward);
+    if (!normalise(inward))
+        return INFINITY;
+    subtract(w->p, w->corner[i], from);
+    double rate = dot(w->d, inward);
+    return rate < 0 ? fmax(0, dot(from, inward) / -rate) : INFINITY;
+}
+
+/* Over the edge i as if the two faces lay in one plane; at the end of the surface, back. */
+static bool pass(walker *w, int i)
+{
+    const uint32_t *f = w->mesh->faces + 3 * w->face;
+    uint32_t third = 0;
+    double edge[3], inward[3];
+    uint64_t next = neighbour(w, f[i], f[(i + 1) % 3], &third);
+    if (next == UINT64_MAX) {
+        ahead(w, i, inward);
+        add(w->d, -2 * dot(w->d, inward), inward);
+        return normalise(w->d);
+    }
+    double origin[3] = { w->corner[i][0], w->corner[i][1], w->corner[i][2] };
+    subtract(w->corner[(i + 1) % 3], origin, edge);
+    if (!normalise(edge) || !enter(w, next))
+        return land(w);
+    vertex(w->mesh, third, inward);
+    subtract(inward, origin, inward);
+    add(inward, -dot(inward, edge), edge);
+    if (!normalise(inward))
+        return land(w);
+    double along = dot(w->d, edge), across = sqrt(fmax(0, 1 - along * along));
+    for (int k = 0; k < 3; k++)
+        w->d[k] = along * edge[k] + across * inward[k];
+    return normalise(w->d) || land(w);
+}
+
+static bool advance(walker *w, double left)
+{
+    for (int hop = 0; hop < HOPS_MAX; hop++) {
+        int nearest = 0;
+        double distance = INFINITY, ignored[3];
+        for (int i = 0; i < 3; i++) {
+            double here = ahead(w, i, ignored);
+            if (here < distance) {
+                distance = here;
+                nearest = i;
+            }
+        }
+        double now = fmin(distance, left);
+        add(w->p, now, w->d);
+        left -= now;
+        if (!(left > 0) || isinf(distance))
+            return true;
+        if (!pass(w, nearest))
+            return false;
+    }
+    stand(w); /* round and round a vertex */
+    return true;
+}
+
+static void turn(walker *w)
+{
+    double left[3], off[3];
+    w->turn = 0.99 * w->turn + 0.0005 * (bench_random_unit(&w->random) - 0.5);
+    cross(w->n, w->d, left);
+    add(w->d, w->turn, left);
+    add(w->d, -dot(w->d, w->n), w->n);
+    if (!normalise(w->d))
+        stand(w);
+    subtract(w->p, w->corner[0], off);
+    add(w->p, -dot(off, w->n), w->n); /* back onto the face: rounding adds up */
+    for (int k = 0; k < 3; k++)
+        w->side[k] = 0.95 * w->side[k] + 0.05 * w->n[k];
+    if (!normalise(w->side))
+        memcpy(w->side, w->n, sizeof w->side);
+}
+
+/* Between -1 and 1, like a sine, with a period of 1. */
+static double wave(double phase)
+{
+    double x = 2 * phase - 1;
+    return 4 * x * (1 - fabs(x));
+}
+
+bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64_t seed,
+                uint64_t count, double *out)
+{
+    walker w = { .mesh = mesh, .random = seed };
+    double step = mean_edge > 0 ? mean_edge / 10 : diagonal / 1000;
+    bool good = index_vertices(&w);
+    if (good && (good = land(&w)))
+        memcpy(w.side, w.n, sizeof w.side);
+    for (uint64_t i = 0; i < count && good; i++) {
+        double swing = 0.01 * diagonal * wave((double)(i % SWING_STEPS) / SWING_STEPS);
+        for (int k = 0; k < 3; k++)
+            out[3 * i + (unsigned)k] = w.p[k] + swing * w.side[k];
+        good = advance(&w, step);
+        turn(&w);
+    }
+    free(w.first);
+    free(w.around);
+    return good;
+}

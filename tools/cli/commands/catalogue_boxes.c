@@ -1,0 +1,266 @@
+#include "cli/commands/catalogue_boxes.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { FAN = 8, BITS = 21 };
+
+/* --- order --- */
+
+typedef struct coded {
+    uint64_t code;
+    uint32_t number;
+} coded;
+
+static int by_code(const void *a, const void *b)
+{
+    const coded *x = a, *y = b;
+    return x->code != y->code ? (x->code < y->code ? -1 : 1)
+                              : (x->number > y->number) - (x->number < y->number);
+}
+
+static uint64_t code_of(const double p[3], const double min[3], const double max[3])
+{
+    uint64_t code = 0;
+    for (int k = 0; k < 3; k++) {
+        double size = max[k] / 2 - min[k] / 2,
+               share = size > 0 ? (p[k] / 2 - min[k] / 2) / size : 0;
+        uint32_t step = (uint32_t)(fmin(fmax(share, 0), 1) * ((1 << BITS) - 1));
+        for (int bit = 0; bit < BITS; bit++)
+            code |= (uint64_t)(step >> bit & 1) << (3 * bit + k);
+    }
+    return code;
+}
+
+/* numbers[count] of points, along the curve of a box around them. False: not enough memory. */
+static bool morton_order(const double (*points)[3], size_t count, uint32_t *numbers)
+{
+    double min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
+    coded *all = malloc(count * sizeof *all + 1);
+    for (size_t i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            min[k] = fmin(min[k], points[i][k]);
+            max[k] = fmax(max[k], points[i][k]);
+        }
+    for (size_t i = 0; all && i < count; i++)
+        all[i] = (coded){ code_of(points[i], min, max), (uint32_t)i };
+    if (all)
+        qsort(all, count, sizeof *all, by_code);
+    for (size_t i = 0; all && i < count; i++)
+        numbers[i] = all[i].number;
+    free(all);
+    return all != NULL;
+}
+
+/* --- the tree --- */
+
+static closed_box around(const closed_box *boxes, size_t count)
+{
+    closed_box all = boxes[0];
+    for (size_t i = 1; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            all.min[k] = fmin(all.min[k], boxes[i].min[k]);
+            all.max[k] = fmax(all.max[k], boxes[i].max[k]);
+        }
+    return all;
+}
+
+static bool make_lowest(catalogue_boxes *t, const closed_box *boxes, const uint32_t *numbers,
+                        size_t count)
+{
+    double(*centre)[3] = malloc(count * sizeof *centre);
+    uint32_t *order = malloc(count * sizeof *order);
+    t->number = malloc(count * sizeof *t->number);
+    t->box[0] = malloc(count * sizeof *t->box[0]);
+    bool fine = centre && order && t->number && t->box[0];
+    for (size_t i = 0; fine && i < count; i++)
+        for (int k = 0; k < 3; k++)
+            centre[i][k] = boxes[i].min[k] / 2 + boxes[i].max[k] / 2;
+    fine = fine && morton_order((const double(*)[3])centre, count, order);
+    for (size_t i = 0; fine && i < count; i++) {
+        t->number[i] = numbers[order[i]];
+        t->box[0][i] = boxes[order[i]];
+    }
+    free(centre);
+    free(order);
+    return fine;
+}
+
+bool catalogue_boxes_make(catalogue_boxes *t, const closed_box *boxes, const uint32_t *numbers,
+                          size_t count)
+{
+    *t = (catalogue_boxes){ .levels = 0 };
+    if (!count)
+        return true;
+    if (!make_lowest(t, boxes, numbers, count))
+        return false;
+    t->count[0] = count;
+    for (t->levels = 1; t->count[t->levels - 1] > 1; t->levels++) {
+        size_t below = t->count[t->levels - 1], here = (below + FAN - 1) / FAN;
+        closed_box *box = t->box[t->levels] = malloc(here * sizeof *box);
+        if (!box)
+            return false;
+        for (size_t i = 0; i < here; i++)
+            box[i] = around(t->box[t->levels - 1] + i * FAN,
+                            i + 1 < here ? (size_t)FAN : below - i * FAN);
+        t->count[t->levels] = here;
+    }
+    return true;
+}
+
+void catalogue_boxes_free(catalogue_boxes *t)
+{
+    free(t->number);
+    for (int level = 0; level < BOX_LEVELS; level++)
+        free(t->box[level]);
+    *t = (catalogue_boxes){ .levels = 0 };
+}
+
+/* --- going down --- */
+
+typedef struct walk {
+    const catalogue_boxes *t;
+    const double *p, *d; /* the point, or the ray's origin and direction */
+    double reach;        /* near: what is farther is not wanted */
+    double pad;          /* ray: more than what is rounded */
+    uint32_t item;
+    box_pairs *out; /* NULL: only `reach` is found */
+    bool (*keep)(struct walk *w, const closed_box *box, double *least);
+    bool failed;
+} walk;
+
+static void append(walk *w, uint32_t box, double least)
+{
+    box_pairs *o = w->out;
+    if (o->count == o->capacity) {
+        size_t more = o->capacity ? 2 * o->capacity : 1024;
+        box_pair *pair = realloc(o->pair, more * sizeof *pair);
+        if (!pair) {
+            w->failed = true;
+            return;
+        }
+        o->pair = pair;
+        o->capacity = more;
+    }
+    o->pair[o->count++] = (box_pair){ box, w->item, least };
+}
+
+/* At most BOX_LEVELS deep. */
+static void descend(walk *w, int level, size_t node) /* NOLINT(misc-no-recursion) */
+{
+    double least = 0;
+    if (w->failed || !w->keep(w, &w->t->box[level][node], &least))
+        return;
+    if (level == 0) {
+        if (w->out)
+            append(w, w->t->number[node], least);
+        return;
+    }
+    size_t end = (node + 1) * FAN;
+    end = end < w->t->count[level - 1] ? end : w->t->count[level - 1];
+    for (size_t child = node * FAN; child < end; child++)
+        descend(w, level - 1, child);
+}
+
+static bool go(walk *w)
+{
+    if (w->t->levels)
+        descend(w, w->t->levels - 1, 0);
+    return !w->failed;
+}
+
+/* --- points --- */
+
+static bool holds(walk *w, const closed_box *b, double *least)
+{
+    (void)least;
+    for (int k = 0; k < 3; k++)
+        if (!(b->min[k] <= w->p[k] && w->p[k] <= b->max[k]))
+            return false;
+    return true;
+}
+
+bool catalogue_boxes_holding(const catalogue_boxes *t, const double p[3], uint32_t item,
+                             box_pairs *out)
+{
+    walk w = { .t = t, .p = p, .item = item, .out = out, .keep = holds };
+    return go(&w);
+}
+
+/* Also where squares are beyond doubles. */
+static double length(const double v[3]) { return hypot(hypot(v[0], v[1]), v[2]); }
+
+static double least_length(const closed_box *b, const double p[3])
+{
+    double v[3];
+    for (int k = 0; k < 3; k++)
+        v[k] = fmax(fmax(b->min[k] - p[k], p[k] - b->max[k]), 0);
+    return length(v);
+}
+
+static double greatest_length(const closed_box *b, const double p[3])
+{
+    double v[3];
+    for (int k = 0; k < 3; k++)
+        v[k] = fmax(b->max[k] - p[k], p[k] - b->min[k]);
+    return length(v);
+}
+
+static bool may_be_near(walk *w, const closed_box *b, double *least)
+{
+    *least = least_length(b, w->p);
+    return *least * (1 - BOX_SLACK) <= w->reach;
+}
+
+/* Something of a box is nearer than its farthest corner. */
+static bool comes_nearer(walk *w, const closed_box *b, double *least)
+{
+    if (!may_be_near(w, b, least))
+        return false;
+    w->reach = fmin(w->reach, greatest_length(b, w->p));
+    return true;
+}
+
+bool catalogue_boxes_near(const catalogue_boxes *t, const double p[3], double most, uint32_t item,
+                          box_pairs *out)
+{
+    walk w = { .t = t, .p = p, .reach = most, .item = item, .keep = comes_nearer };
+    (void)go(&w);
+    w.out = out;
+    w.keep = may_be_near;
+    return go(&w);
+}
+
+/* --- rays --- */
+
+static bool may_be_met(walk *w, const closed_box *b, double *least)
+{
+    double near = -INFINITY, far = INFINITY;
+    (void)least;
+    for (int k = 0; k < 3; k++) {
+        double lower = b->min[k] - w->pad - w->p[k], upper = b->max[k] + w->pad - w->p[k];
+        if (w->d[k] == 0) {
+            if (lower > 0 || upper < 0)
+                return false;
+            continue;
+        }
+        double one = lower / w->d[k], other = upper / w->d[k];
+        near = fmax(near, fmin(one, other));
+        far = fmin(far, fmax(one, other));
+    }
+    return !(near > far + BOX_SLACK * fabs(far)) && !(far < 0);
+}
+
+bool catalogue_boxes_on_ray(const catalogue_boxes *t, const double o[3], const double d[3],
+                            uint32_t item, box_pairs *out)
+{
+    walk w = { .t = t, .p = o, .d = d, .item = item, .out = out, .keep = may_be_met };
+    for (int k = 0; t->levels && k < 3; k++) {
+        const closed_box *all = t->box[t->levels - 1];
+        w.pad = fmax(w.pad, fmax(fabs(all->min[k]), fabs(all->max[k])));
+        w.pad = fmax(w.pad, fabs(o[k]));
+    }
+    w.pad *= 2 * BOX_SLACK;
+    return go(&w);
+}

@@ -1,0 +1,311 @@
+#include "ebpo_config.h"
+
+#include "cli/commands/clash_pictures.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if EBPO_HAVE_PNG
+
+#include "cli/commands/painted_mesh.h"
+#include "cli/render/picture.h"
+#include "cli/render/raster.h"
+
+enum { WIDTH = 480, HEIGHT = 360, CAPTION = 28, UP = 2, THREADS_MOST = 64 };
+static const double azimuth = 35, elevation = 28;
+
+const char *clash_pictures_missing(void) { return NULL; }
+
+static ebpo_status no_memory(ebpo_error *error)
+{
+    snprintf(error->message, sizeof error->message, "no memory for pictures of the scene");
+    return error->status = EBPO_E_MEMORY;
+}
+
+/* From where a box just fits. */
+static void look_at(camera *view, const double min[3], const double max[3], int height)
+{
+    double corner[24];
+    uint32_t face[3] = { 0, 1, 2 };
+    ebpo_mesh box = { .vertex_count = 8, .face_count = 1, .xyz64 = corner, .faces = face };
+    for (int i = 0; i < 24; i++)
+        corner[i] = (i / 3 >> i % 3 & 1 ? max : min)[i % 3];
+    camera_fit(view, &box, azimuth, elevation, UP, WIDTH, height);
+}
+
+static ebpo_status draw(picture *out, int x, int y, int height, const camera *view,
+                        const painted_mesh *p, unsigned threads, ebpo_error *error)
+{
+    raster_style style = { .colour = { 0.66, 0.54, 0.40 }, .paint = p->paint };
+    unsigned count = threads && threads < THREADS_MOST ? threads : 4;
+    return p->mesh.face_count
+               ? raster_draw(out, x, y, WIDTH, height, view, &p->mesh, &style, count, error)
+               : EBPO_OK;
+}
+
+/* --- one clash --- */
+
+static void widen(double min[3], double max[3], const double p[3])
+{
+    for (int k = 0; k < 3; k++) {
+        min[k] = fmin(min[k], p[k]);
+        max[k] = fmax(max[k], p[k]);
+    }
+}
+
+static double longest(const double min[3], const double max[3])
+{
+    return fmax(max[0] - min[0], fmax(max[1] - min[1], max[2] - min[2]));
+}
+
+/* What to show: the smaller of the two and where they meet; of a contact that is small on it, the
+ * contact and what is around it. */
+static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double middle[3],
+                               double *reach, ebpo_error *error)
+{
+    const ebpo_scene_meeting *m = &c->worst;
+    double min[2][3], max[2][3];
+    bool placed = isfinite(m->place[0]);
+    for (int i = 0; i < 2; i++) {
+        ebpo_status status = ebpo_scene_instance_box(scene, i ? m->b : m->a, c->time, c->time,
+                                                     min[i], max[i], error);
+        if (status != EBPO_OK)
+            return status;
+    }
+    int small = longest(min[1], max[1]) < longest(min[0], max[0]);
+    double size = longest(min[small], max[small]), contact = longest(m->place_min, m->place_max);
+    bool zoom = placed && m->crossing && contact > 0 && 8 * contact < size;
+    const double *low = zoom ? m->place_min : min[small], *high = zoom ? m->place_max : max[small];
+    if (placed) {
+        widen(min[small], max[small], m->place_min);
+        widen(min[small], max[small], m->place_max);
+    }
+    for (int k = 0; k < 3; k++)
+        middle[k] = low[k] / 2 + high[k] / 2;
+    *reach = (zoom ? 4 : 0.6) * longest(low, high);
+    return EBPO_OK;
+}
+
+static ebpo_status paint_two(ebpo_scene *scene, const clash *c, unsigned threads, painted_mesh *out,
+                             ebpo_error *error)
+{
+    const ebpo_scene_meeting *m = &c->worst;
+    bool meet = m->touching + m->coplanar + m->crossing > 0;
+    uint8_t *red[2] = { NULL, NULL };
+    ebpo_status status =
+        meet ? painted_find_red(scene, m->a, m->b, c->time, threads, red, error) : EBPO_OK;
+    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
+        bool outer = m->kind == EBPO_MEETING_ENCLOSED &&
+                     m->relation == (i ? EBPO_A_INSIDE_B : EBPO_B_INSIDE_A);
+        status =
+            painted_add(out, scene, i ? m->b : m->a, c->time, red[i],
+                        (uint8_t)((i ? RASTER_OTHER : RASTER_PLAIN) | (outer ? RASTER_HOLLOW : 0)),
+                        error);
+    }
+    free(red[0]);
+    free(red[1]);
+    return status;
+}
+
+static ebpo_status draw_clash(const painted_mesh *p, const camera *view, clash *c, unsigned threads,
+                              ebpo_error *error)
+{
+    static const uint8_t ground[3] = { 246, 248, 250 };
+    picture on = { 0 };
+    void *png = NULL;
+    size_t size = 0;
+    ebpo_status status = picture_make(&on, WIDTH, HEIGHT, ground) ? EBPO_OK : no_memory(error);
+    if (status == EBPO_OK)
+        status = draw(&on, 0, 0, HEIGHT, view, p, threads, error);
+    if (status == EBPO_OK)
+        status = picture_encode_png(on.rgb, WIDTH, HEIGHT, 3, "picture", &png, &size, error);
+    if (status == EBPO_OK && !(c->picture = picture_data_uri(png, size)))
+        status = no_memory(error);
+    picture_free(&on);
+    free(png);
+    return status;
+}
+
+ebpo_status clash_draw(ebpo_scene *scene, clash *c, unsigned threads, ebpo_error *error)
+{
+    painted_mesh p = { 0 };
+    camera view;
+    double middle[3], min[3], max[3], reach;
+    ebpo_status status = find_region(scene, c, middle, &reach, error);
+    if (status == EBPO_OK)
+        status = paint_two(scene, c, threads, &p, error);
+    if (status == EBPO_OK) {
+        painted_crop(&p, middle, 1.5 * reach); /* nothing stands in the way, or behind the eye */
+        for (int k = 0; k < 3; k++) {
+            min[k] = middle[k] - reach;
+            max[k] = middle[k] + reach;
+        }
+        look_at(&view, min, max, HEIGHT);
+        status = draw_clash(&p, &view, c, threads, error);
+    }
+    painted_free(&p);
+    return status;
+}
+
+/* --- a strip --- */
+
+struct clash_strip {
+    ebpo_scene *scene;
+    unsigned threads;
+    int tiles, done, columns;
+    uint64_t instances;
+    bool boxes; /* the scene has so many faces that only instances that meet are drawn with them */
+    double min[3], max[3];
+    picture picture;
+};
+
+enum { FACES_MOST = 2000000 };
+
+static uint64_t faces_of(const ebpo_scene *scene, uint64_t models)
+{
+    uint64_t sum = 0;
+    for (uint64_t i = 0; i < models; i++) {
+        ebpo_scene_model_facts m = EBPO_SCENE_MODEL_FACTS_INIT;
+        (void)ebpo_scene_get_model(scene, i, &m);
+        sum += m.instances * ebpo_file_info(ebpo_scene_file(scene, i))->face_count;
+    }
+    return sum;
+}
+
+clash_strip *clash_strip_new(ebpo_scene *scene, double from, double to, int tiles, unsigned threads)
+{
+    static const uint8_t ground[3] = { 246, 248, 250 };
+    ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    clash_strip *s = calloc(1, sizeof *s);
+    if (!s)
+        return NULL;
+    (void)ebpo_scene_get_counts(scene, &counts);
+    s->scene = scene;
+    s->threads = threads;
+    s->tiles = tiles;
+    for (s->columns = 1; s->columns * s->columns < tiles;)
+        s->columns++;
+    s->instances = counts.instances;
+    s->boxes = faces_of(scene, counts.models) > FACES_MOST;
+    int rows = (tiles + s->columns - 1) / s->columns;
+    if (ebpo_scene_box(scene, from, to, s->min, s->max, &error) != EBPO_OK ||
+        !picture_make(&s->picture, WIDTH * s->columns, HEIGHT * rows, ground)) {
+        clash_strip_free(s);
+        return NULL;
+    }
+    return s;
+}
+
+void clash_strip_free(clash_strip *s)
+{
+    if (s)
+        picture_free(&s->picture);
+    free(s);
+}
+
+/* Bytes of red faces of each instance that meets, else NULL. */
+static ebpo_status find_red(clash_strip *s, double time, const ebpo_scene_meeting *meetings,
+                            uint64_t count, uint8_t **red, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        const ebpo_scene_meeting *m = &meetings[i];
+        uint8_t *two[2] = { red[m->a], red[m->b] };
+        if (m->touching + m->coplanar + m->crossing == 0)
+            continue;
+        status = painted_find_red(s->scene, m->a, m->b, time, s->threads, two, error);
+        red[m->a] = two[0];
+        red[m->b] = two[1];
+    }
+    return status;
+}
+
+static ebpo_status paint_all(const clash_strip *s, double time, uint8_t *const *red,
+                             painted_mesh *out, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < s->instances && status == EBPO_OK; i++) {
+        ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
+        (void)ebpo_scene_get_instance(s->scene, i, &at);
+        uint8_t paint = at.fixed ? RASTER_PLAIN : RASTER_OTHER;
+        status = s->boxes && !red[i] ? painted_add_box(out, s->scene, i, time, paint, error)
+                                     : painted_add(out, s->scene, i, time, red[i], paint, error);
+    }
+    return status;
+}
+
+static ebpo_status draw_tile(clash_strip *s, const painted_mesh *p, double time, uint64_t count,
+                             ebpo_error *error)
+{
+    static const uint8_t ink[3] = { 60, 66, 76 };
+    char text[80];
+    camera view;
+    int caption = picture_has_captions() ? CAPTION : 0;
+    int x = s->done % s->columns * WIDTH, y = s->done / s->columns * HEIGHT;
+    look_at(&view, s->min, s->max, HEIGHT - caption);
+    s->done++;
+    ebpo_status status = draw(&s->picture, x, y, HEIGHT - caption, &view, p, s->threads, error);
+    snprintf(text, sizeof text, "time %.4g: %llu meet", time, (unsigned long long)count);
+    if (status == EBPO_OK && caption)
+        status =
+            picture_caption(&s->picture, x, y + HEIGHT - caption, WIDTH, caption, ink, text, error);
+    return status;
+}
+
+ebpo_status clash_strip_add(clash_strip *s, double time, const ebpo_scene_meeting *meetings,
+                            uint64_t count, ebpo_error *error)
+{
+    painted_mesh p = { 0 };
+    uint8_t **red = calloc(s->instances + 1, sizeof *red);
+    ebpo_status status = red ? find_red(s, time, meetings, count, red, error) : no_memory(error);
+    if (status == EBPO_OK)
+        status = paint_all(s, time, red, &p, error);
+    if (status == EBPO_OK && s->done < s->tiles)
+        status = draw_tile(s, &p, time, count, error);
+    for (uint64_t i = 0; red && i < s->instances; i++)
+        free(red[i]);
+    free(red);
+    painted_free(&p);
+    return status;
+}
+
+ebpo_status clash_strip_write(const clash_strip *s, const char *path, ebpo_error *error)
+{
+    return picture_write_png(&s->picture, path, error);
+}
+
+#else
+
+const char *clash_pictures_missing(void) { return "this build has no libpng"; }
+
+ebpo_status clash_draw(ebpo_scene *scene, clash *c, unsigned threads, ebpo_error *error)
+{
+    (void)scene, (void)c, (void)threads, (void)error;
+    return EBPO_OK;
+}
+
+clash_strip *clash_strip_new(ebpo_scene *scene, double from, double to, int tiles, unsigned threads)
+{
+    (void)scene, (void)from, (void)to, (void)tiles, (void)threads;
+    return NULL;
+}
+
+ebpo_status clash_strip_add(clash_strip *s, double time, const ebpo_scene_meeting *meetings,
+                            uint64_t count, ebpo_error *error)
+{
+    (void)s, (void)time, (void)meetings, (void)count, (void)error;
+    return EBPO_OK;
+}
+
+ebpo_status clash_strip_write(const clash_strip *s, const char *path, ebpo_error *error)
+{
+    (void)s, (void)path, (void)error;
+    return EBPO_OK;
+}
+
+void clash_strip_free(clash_strip *s) { (void)s; }
+
+#endif

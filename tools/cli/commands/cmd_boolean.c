@@ -1,0 +1,418 @@
+/* ebpo boolean: questions about unions, intersections and differences of models at poses. */
+#include <inttypes.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/boolean_args.h"
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/points.h"
+#include "cli/pose_args.h"
+#include "cli/progress.h"
+#include "cli/query_args.h"
+#include "cli/remote_args.h"
+#include "cli/tables.h"
+#include "cli/words.h"
+#include "cli/commands/commands.h"
+
+enum { MODELS = ARGS_OPERANDS_MAX - 1 };
+
+typedef struct values {
+    query_values query; /* first */
+    const char *inside, *distance, *out;
+    arg_list poses;
+    int64_t level;
+    double tolerance;
+    bool volume, inner;
+} values;
+
+#include "cli/options/boolean.inc"
+
+/* --- answers --- */
+
+static const char *where_of(const ebpo_boolean_result *r)
+{
+    static const char *const words[] = { "OUT", "IN", "ON" };
+    return words[r->where];
+}
+
+static const char *doubt_of(const ebpo_boolean_result *r) { return r->certain ? "" : "?"; }
+
+static void print_inside(const values *v, const ebpo_boolean_result *r)
+{
+    if (v->query.json)
+        printf("{\"where\": \"%s\", \"certain\": %s}\n", where_of(r),
+               r->certain ? "true" : "false");
+    else
+        printf("%s%s\n", where_of(r), doubt_of(r));
+}
+
+static void print_distance(const values *v, const ebpo_boundary_distance *d)
+{
+    char lo[32], hi[32];
+    if (!v->query.json)
+        printf("%s %s %s%s\n", words_real(d->lo, lo), words_real(d->hi, hi), where_of(&d->inside),
+               doubt_of(&d->inside));
+    else
+        printf("{\"lo\": %s, \"hi\": %s, \"where\": \"%s\", \"certain\": %s, \"cells\": %" PRIu64
+               "}\n",
+               json_number(d->lo, lo), json_number(d->hi, hi), where_of(&d->inside),
+               d->inside.certain ? "true" : "false", d->cells);
+}
+
+/* --- volumes --- */
+
+/* What is asked about volumes and cells, and what comes out. */
+typedef struct cell_answer {
+    const values *v;
+    const char **models; /* as they were given */
+    ebpo_exact_volume exact;
+    ebpo_boolean_volume cells;
+    /* the volume is exact, but no cells can be made, and why */
+    bool no_cells;
+    char why_no_cells[1024];
+    bool volume; /* is asked for */
+    uint64_t faces_written;
+} cell_answer;
+
+static bool is_exact(const cell_answer *a) { return a->exact.volume.figure == EBPO_FIGURE_EXACT; }
+
+static int32_t figure_of(const cell_answer *a)
+{
+    return is_exact(a) ? (int32_t)EBPO_FIGURE_EXACT : a->cells.figure;
+}
+
+/* Why the volume is not exact. */
+static void say_why(const cell_answer *a, char *out, size_t capacity)
+{
+    const ebpo_exact_volume *e = &a->exact;
+    uint32_t i = e->operand[0], k = e->operand[1];
+    const char *first = remote_shown(a->models[i]), *second = remote_shown(a->models[k]);
+    switch ((ebpo_volume_doubt)e->doubt) {
+    case EBPO_VOLUME_OPERANDS_MEET:
+        snprintf(out, capacity, "face %" PRIu64 " of %c (%s) meets face %" PRIu64 " of %c (%s)",
+                 e->face[0], 'A' + (int)i, first, e->face[1], 'A' + (int)k, second);
+        break;
+    case EBPO_VOLUME_FACES_MEET:
+        snprintf(out, capacity,
+                 "faces %" PRIu64 " and %" PRIu64 " of %c (%s) meet otherwise than as neighbours",
+                 e->face[0], e->face[1], 'A' + (int)i, first);
+        break;
+    case EBPO_VOLUME_IN_PARTS:
+        snprintf(out, capacity, "%c (%s) is not all in memory", 'A' + (int)i, first);
+        break;
+    case EBPO_VOLUME_SUBSET:
+        snprintf(out, capacity, "%c (%s) is a part of another file", 'A' + (int)i, first);
+        break;
+    case EBPO_VOLUME_CERTAIN: snprintf(out, capacity, "%s", ""); break;
+    }
+}
+
+static const char *const figure_words[] = { "exact", "interval", "bound" };
+
+static void print_volume(const cell_answer *a)
+{
+    const ebpo_boolean_volume *b = &a->cells;
+    char why[1024], exact[32], lo[32], hi[32], cell[TABLE_CELL];
+    say_why(a, why, sizeof why);
+    if (is_exact(a))
+        printf("volume    %s, exact but for one rounding\n",
+               table_in_range(a->exact.scaled, a->exact.exponent)
+                   ? words_real(a->exact.volume.lo, exact)
+                   : table_scaled(cell, 9, a->exact.scaled, a->exact.exponent));
+    if (a->no_cells) {
+        printf("by cells  not known: %s\n", a->why_no_cells);
+        return;
+    }
+    if (is_exact(a))
+        printf("by cells  %s to %s\n", words_real(b->lo, lo), words_real(b->hi, hi));
+    else
+        printf("volume    %s to %s, %s: %s\n", words_real(b->lo, lo), words_real(b->hi, hi),
+               b->figure == EBPO_FIGURE_BOUND ? "a bound" : "an interval", why);
+    printf("cells     %" PRIu64 " in, %" PRIu64 " mixed of level %" PRId64
+           ", edge %g\ndecided   %" PRIu64 " by boxes, %" PRIu64 " by nodes, %" PRIu64
+           " by faces\n",
+           b->in_cells, b->mixed_cells, a->v->level, ldexp(b->edge, (int)-a->v->level), b->by_box,
+           b->by_nodes, b->by_faces);
+}
+
+static void volume_to_json(json *j, const cell_answer *a)
+{
+    const ebpo_boolean_volume *b = &a->cells;
+    char why[1024];
+    say_why(a, why, sizeof why);
+    for (int i = 0; i < 2; i++)
+        if (is_exact(a))
+            table_json(j, i ? "volume_hi" : "volume_lo", a->exact.scaled, a->exact.exponent);
+        else
+            json_real(j, i ? "volume_hi" : "volume_lo", i ? b->hi : b->lo);
+    json_text(j, "volume_figure", figure_words[figure_of(a)]);
+    if (is_exact(a))
+        json_null(j, "not_exact");
+    else
+        json_text(j, "not_exact", why);
+    if (a->no_cells) {
+        json_text(j, "no_cells", a->why_no_cells);
+        return;
+    }
+    json_real(j, "cells_lo", b->lo);
+    json_real(j, "cells_hi", b->hi);
+    json_int(j, "level", a->v->level);
+    json_reals(j, "root_origin", b->origin, 3);
+    json_real(j, "root_edge", b->edge);
+    json_uint(j, "in_cells", b->in_cells);
+    json_uint(j, "mixed_cells", b->mixed_cells);
+    json_uint(j, "by_box", b->by_box);
+    json_uint(j, "by_nodes", b->by_nodes);
+    json_uint(j, "by_faces", b->by_faces);
+}
+
+static void print_written(const cell_answer *a)
+{
+    char faces[40], in[40], mixed[40];
+    words_plural(faces, sizeof faces, a->faces_written, "face", "faces");
+    words_plural(in, sizeof in, a->cells.in_cells, "cell", "cells");
+    words_plural(mixed, sizeof mixed, a->cells.mixed_cells, "mixed cell", "mixed cells");
+    if (a->v->inner)
+        printf("%s: %s around %s that the result holds\n", a->v->out, faces, in);
+    else
+        printf("%s: %s around %s and %s that hold the result\n", a->v->out, faces, in, mixed);
+}
+
+static void print_cells(const cell_answer *a)
+{
+    json j;
+    if (!a->v->query.json) {
+        if (a->v->out)
+            print_written(a);
+        if (a->volume)
+            print_volume(a);
+        return;
+    }
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    if (a->v->out) {
+        json_text(&j, "output", a->v->out);
+        json_text(&j, "side", a->v->inner ? "inner" : "outer");
+        json_uint(&j, "faces", a->faces_written);
+    }
+    if (a->volume)
+        volume_to_json(&j, a);
+    json_finish(&j);
+}
+
+/* --- points --- */
+
+static ebpo_status answer_points(const values *v, ebpo_boolean *b, const double *rows,
+                                 uint64_t count, ebpo_boolean_result *results, ebpo_error *error)
+{
+    ebpo_boundary_options how = EBPO_BOUNDARY_OPTIONS_INIT;
+    how.tolerance = v->tolerance;
+    ebpo_status status =
+        v->inside ? ebpo_boolean_inside_many(b, rows, count, results, error) : EBPO_OK;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        ebpo_boundary_distance d;
+        if (v->distance)
+            status = ebpo_boolean_distance(b, rows + 3 * i, &how, &d, error);
+        if (status == EBPO_OK && v->distance)
+            print_distance(v, &d);
+        else if (status == EBPO_OK)
+            print_inside(v, &results[i]);
+    }
+    return status;
+}
+
+static int ask_points(const values *v, ebpo_boolean *b)
+{
+    points in;
+    ebpo_error error = EBPO_ERROR_INIT;
+    double *rows = malloc(sizeof *rows * POINTS_BATCH * POINTS_WIDEST);
+    ebpo_boolean_result *results = malloc(sizeof *results * POINTS_BATCH);
+    bool opened =
+        points_open(&in, "boolean", v->inside ? v->inside : v->distance, POINTS, false, INFINITY);
+    int code = !rows || !results ? command_no_memory("boolean") : opened ? EXIT_FINE : EXIT_FAILED;
+    uint64_t count = 0;
+    in.header = v->query.header;
+    while (code == EXIT_FINE && (count = points_next(&in, rows)) > 0) {
+        if (answer_points(v, b, rows, count, results, &error) != EBPO_OK)
+            code = command_failed("boolean", &error);
+        if (!command_flush("boolean"))
+            code = EXIT_FAILED;
+    }
+    if (code == EXIT_FINE && in.failed)
+        code = EXIT_FAILED;
+    points_close(&in);
+    free(results);
+    free(rows);
+    return code;
+}
+
+/* --- cells --- */
+
+static ebpo_status convert(ebpo_mesh *mesh, const values *v, ebpo_progress progress,
+                           ebpo_error *error)
+{
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    ebpo_prepare_options preparing = EBPO_PREPARE_OPTIONS_INIT;
+    ebpo_build_options building = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_write_options writing = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_tree tree;
+    preparing.threads = building.threads = writing.threads = (unsigned)v->query.threads;
+    preparing.progress = building.progress = writing.progress = progress;
+    building.require_solid = true;
+    ebpo_status status = ebpo_mesh_prepare(mesh, &preparing, &prepared, error);
+    if (status == EBPO_OK)
+        status = ebpo_build(mesh, &prepared.report, NULL, &building, &tree, error);
+    if (status != EBPO_OK)
+        return status;
+    status = ebpo_tree_write(&tree, v->out, &writing, error);
+    ebpo_tree_free(&tree);
+    return status;
+}
+
+static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_answer *a,
+                               ebpo_progress progress, ebpo_error *error)
+{
+    ebpo_mesh mesh;
+    const values *v = a->v;
+    ebpo_boolean_side side = v->inner ? EBPO_BOOLEAN_INNER : EBPO_BOOLEAN_OUTER;
+    ebpo_status status = ebpo_boolean_cells_mesh(cells, side, &mesh, error);
+    if (status != EBPO_OK)
+        return status;
+    a->faces_written = mesh.face_count;
+    if (mesh.face_count == 0) {
+        error->status = status = EBPO_E_ABSENT;
+        snprintf(error->message, sizeof error->message,
+                 "%s: there are no %s cells at level %" PRId64 "; give a higher level", v->out,
+                 v->inner ? "inner" : "such", v->level);
+    } else if (words_end_with(v->out, ".ply")) {
+        status = ebpo_mesh_write_ply(&mesh, v->out, error);
+    } else {
+        status = convert(&mesh, v, progress, error);
+    }
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status answer_cells(cell_answer *a, ebpo_boolean *b, ebpo_progress progress,
+                                ebpo_error *error)
+{
+    ebpo_boolean_cells *cells = NULL;
+    ebpo_volume_options measuring = EBPO_VOLUME_OPTIONS_INIT;
+    ebpo_cells_options how = EBPO_CELLS_OPTIONS_INIT;
+    how.level = (int)a->v->level;
+    how.progress = measuring.progress = progress;
+    ebpo_status status = EBPO_OK;
+    if (a->volume)
+        status = ebpo_boolean_exact_volume(b, &measuring, &a->exact, error);
+    bool exact = status == EBPO_OK && is_exact(a);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_cells_new(b, &how, &cells, error);
+    if (status == EBPO_E_LIMIT && exact && !a->v->out) {
+        a->no_cells = true;
+        snprintf(a->why_no_cells, sizeof a->why_no_cells, "%s", error->message);
+        return EBPO_OK;
+    }
+    if (status == EBPO_OK)
+        status = ebpo_boolean_cells_volume(cells, &a->cells);
+    if (status == EBPO_OK && a->v->out)
+        status = write_cells(cells, a, progress, error);
+    ebpo_boolean_cells_free(cells);
+    return status;
+}
+
+static int make_cells(const values *v, const char **models, ebpo_boolean *b)
+{
+    progress_line line;
+    ebpo_error error = EBPO_ERROR_INIT;
+    cell_answer a = { .v = v,
+                      .models = models,
+                      .exact = EBPO_EXACT_VOLUME_INIT,
+                      .cells = EBPO_BOOLEAN_VOLUME_INIT,
+                      .volume = v->volume || !v->out };
+    ebpo_progress progress = progress_start(&line, "boolean", v->query.json);
+    ebpo_status status = answer_cells(&a, b, progress, &error);
+    progress_wipe(&line);
+    if (status != EBPO_OK)
+        return command_failed("boolean", &error);
+    print_cells(&a);
+    return command_flush("boolean") ? EXIT_FINE : EXIT_FAILED;
+}
+
+/* --- all of it --- */
+
+static int check_values(const values *v, const char **models, uint32_t count)
+{
+    bool points_asked = v->inside || v->distance;
+    if (v->inside && v->distance)
+        return command_usage("boolean", "--inside and --distance cannot be used together");
+    if (points_asked && (v->volume || v->out || v->inner))
+        return command_usage("boolean",
+                             "%s asks about points; --volume, --output and --inner are "
+                             "about cells; give them in a call of their own",
+                             v->inside ? "--inside" : "--distance");
+    if (v->inner && !v->out)
+        return command_usage("boolean", "--inner belongs to --output");
+    if (v->out && !words_end_with(v->out, ".ply") && !words_end_with(v->out, ".ebpo.h5"))
+        return command_usage("boolean",
+                             "--output '%s': expected a name that ends with .ply or "
+                             ".ebpo.h5",
+                             v->out);
+    for (uint32_t i = 0; v->out && i < count; i++)
+        if (command_overwrites("boolean", models[i], v->out))
+            return EXIT_USAGE;
+    return EXIT_FINE;
+}
+
+static int answer(const values *v, const boolean_nodes *nodes, const query_session *sessions,
+                  const ebpo_pose *poses, const char **models, uint32_t count)
+{
+    ebpo_boolean_operand operands[MODELS];
+    ebpo_boolean *b;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_boolean_options how = EBPO_BOOLEAN_OPTIONS_INIT;
+    how.threads = (unsigned)v->query.threads;
+    for (uint32_t i = 0; i < count; i++)
+        operands[i] = (ebpo_boolean_operand){ sessions[i].model, poses[i] };
+    if (ebpo_boolean_new(operands, count, nodes->node, nodes->count, &how, &b, &error) != EBPO_OK)
+        return command_failed("boolean", &error);
+    int code = v->inside || v->distance ? ask_points(v, b) : make_cells(v, models, b);
+    ebpo_boolean_free(b);
+    return code;
+}
+
+static const values usual = { .query = QUERY_VALUES_INIT, .level = 6, .tolerance = 0.01 };
+
+static int run(void *given, const char **operand)
+{
+    const values *v = given;
+    boolean_nodes nodes;
+    ebpo_pose poses[MODELS];
+    query_session sessions[MODELS];
+    ebpo_model_options holding;
+    ebpo_inside_options inside;
+    ebpo_distance_options distance;
+    const char **models = operand + 1;
+    uint32_t count = 0;
+    for (; count < MODELS && models[count]; count++) {
+        poses[count] = (ebpo_pose)EBPO_POSE_INIT;
+        sessions[count] = (query_session)QUERY_SESSION_INIT;
+    }
+    if (!boolean_read("boolean", operand[0], count, &nodes) ||
+        !boolean_read_poses("boolean", &v->poses, count, poses) ||
+        !query_options_from("boolean", &v->query, &holding, &inside, &distance))
+        return EXIT_USAGE;
+    int code = check_values(v, models, count);
+    for (uint32_t i = 0; i < count && code == EXIT_FINE; i++)
+        code = query_open(&sessions[i], "boolean", models[i], &holding, -1, &v->query.remote);
+    if (code == EXIT_FINE)
+        code = answer(v, &nodes, sessions, poses, models, count);
+    for (uint32_t i = 0; i < count; i++)
+        query_close(&sessions[i]);
+    return code;
+}
+
+const command command_boolean = { &spec, sizeof usual, &usual, run };

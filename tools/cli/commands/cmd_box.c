@@ -1,0 +1,53 @@
+/* ebpo box: which faces meet boxes. */
+#include <stddef.h>
+
+#include "cli/command.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/query_run.h"
+
+#include "cli/options/box.inc"
+
+static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
+                          ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < count && status == EBPO_OK && !answer_text_is_over(w->text); i++) {
+        const uint64_t *faces;
+        uint64_t found;
+        status =
+            ebpo_faces_in_box(w->context, rows + 6 * i, rows + 6 * i + 3, &faces, &found, error);
+        if (status == EBPO_OK)
+            answers_box(w->text, job->form, faces, found);
+    }
+    return status;
+}
+
+static const char *columns(const query_job *job)
+{
+    (void)job;
+    return "count,faces";
+}
+
+static const char *dtype(const query_job *job, unsigned *bytes)
+{
+    (void)job;
+    *bytes = 0;
+    return NULL; /* lists of faces */
+}
+
+static const query_values usual = QUERY_VALUES_INIT;
+
+static int run(void *given, const char **operand)
+{
+    query_values *v = given;
+    query_job job = { .command = "box",
+                      .values = v,
+                      .kind = POINTS_BOXES,
+                      .parts_share = 0.25, /* docs/measured/asking.md */
+                      .answer = answer,
+                      .columns = columns,
+                      .dtype = dtype };
+    return query_run(&job, operand[0], operand[1]);
+}
+
+const command command_box = { &spec, sizeof usual, &usual, run };

@@ -1,0 +1,430 @@
+/* ebpo catalogue: which models are below a folder, and where they are. Reads heads only. */
+#include <errno.h>
+#include <float.h>
+#include <inttypes.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/progress.h"
+#include "cli/remote_args.h"
+#include "cli/words.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/folder_files.h"
+
+typedef struct values {
+    const char *out;
+    bool json, quiet;
+    int64_t threads, most_expansion;
+} values;
+
+#include "cli/options/catalogue.inc"
+
+static const values usual = { .out = NULL };
+
+/* What a head told, or why it told nothing. */
+typedef struct entry {
+    bool known;
+    char *why;
+    char *path;  /* as the catalogue has it */
+    char *shown; /* below the folder, as messages have it */
+    ebpo_rule rule;
+    bool solid, mesh, pruned;
+    uint64_t bytes, faces, vertices;
+    uint8_t content[32];
+    double min[3], max[3];
+} entry;
+
+typedef struct catalogue {
+    const values *v;
+    const char *folder;
+    char *from; /* how paths of the catalogue begin: "" or "north/" */
+    char *out;
+    folder_files files;
+    entry *entry; /* [files.count] */
+    progress_line *progress;
+    pthread_mutex_t lock; /* of the line and the two below */
+    size_t taken, done;
+    atomic_bool no_memory;
+    /* of all models */
+    uint64_t models, solids, faces, bytes;
+    double min[3], max[3];
+} catalogue;
+
+enum { THREADS_MOST = 64 };
+
+/* --- heads --- */
+
+static void take_facts(entry *e, const ebpo_info *info)
+{
+    e->known = true;
+    e->rule = info->rule;
+    e->solid = info->solid;
+    e->mesh = (info->parts & EBPO_PART_MESH) != 0;
+    e->pruned = info->pruned;
+    e->bytes = info->file_bytes;
+    e->faces = info->face_count;
+    e->vertices = info->vertex_count;
+    memcpy(e->content, info->content_sha256, sizeof e->content);
+    memcpy(e->min, info->report.min, sizeof e->min);
+    memcpy(e->max, info->report.max, sizeof e->max);
+}
+
+static bool is_box(const entry *e)
+{
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(e->min[k]) || !isfinite(e->max[k]) || e->min[k] > e->max[k])
+            return false;
+    return true;
+}
+
+static bool is_utf8(const char *text)
+{
+    for (int length; *text; text += length)
+        if ((length = json_utf8_length(text)) == 0)
+            return false;
+    return true;
+}
+
+static void leave_out(catalogue *c, entry *e, const char *why)
+{
+    e->known = false;
+    e->why = strdup(why);
+    if (!e->why)
+        c->no_memory = true;
+}
+
+static void look_at(catalogue *c, size_t number)
+{
+    entry *e = &c->entry[number];
+    const char *path = c->files.path[number];
+    remote_values how = REMOTE_VALUES_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    char *name = NULL;
+    how.most_expansion = c->v->most_expansion;
+    if (asprintf(&name, "%s/%s", c->folder, path) < 0)
+        name = NULL;
+    if (asprintf(&e->path, "%s%s", c->from, path) < 0)
+        e->path = NULL;
+    e->shown = folder_files_shown(path);
+    if (!name || !e->path || !e->shown) {
+        c->no_memory = true;
+    } else if (!is_utf8(e->path)) {
+        leave_out(c, e, "its name is not UTF-8; give it another one");
+    } else if (remote_open(&file, name, &how, &error) == EBPO_OK) {
+        take_facts(e, ebpo_file_info(file));
+        if (!is_box(e))
+            leave_out(c, e, "has no box, as it has no faces");
+    } else {
+        leave_out(c, e, error.message[0] ? error.message : ebpo_status_name(error.status));
+    }
+    ebpo_close(file);
+    free(name);
+}
+
+static void *work(void *user)
+{
+    catalogue *c = user;
+    pthread_mutex_lock(&c->lock);
+    while (c->taken < c->files.count) {
+        size_t number = c->taken++;
+        pthread_mutex_unlock(&c->lock);
+        look_at(c, number);
+        pthread_mutex_lock(&c->lock);
+        progress_tell(c->progress, "heads", ++c->done, c->files.count);
+    }
+    pthread_mutex_unlock(&c->lock);
+    return NULL;
+}
+
+static size_t threads_for(const catalogue *c)
+{
+    size_t wanted = c->v->threads ? (size_t)c->v->threads : command_cores();
+    wanted = wanted < THREADS_MOST ? wanted : THREADS_MOST;
+    return wanted < c->files.count ? wanted : c->files.count;
+}
+
+static bool look_at_all(catalogue *c)
+{
+    pthread_t thread[THREADS_MOST];
+    size_t wanted = threads_for(c), started = 0;
+    c->entry = calloc(c->files.count, sizeof *c->entry);
+    if (!c->entry)
+        return false;
+    pthread_mutex_init(&c->lock, NULL);
+    while (started + 1 < wanted && command_thread(&thread[started], work, c) == 0)
+        started++;
+    work(c);
+    while (started > 0)
+        pthread_join(thread[--started], NULL);
+    pthread_mutex_destroy(&c->lock);
+    progress_wipe(c->progress);
+    return !c->no_memory;
+}
+
+static void add_up(catalogue *c)
+{
+    for (int k = 0; k < 3; k++) {
+        c->min[k] = DBL_MAX;
+        c->max[k] = -DBL_MAX;
+    }
+    for (size_t i = 0; i < c->files.count; i++) {
+        const entry *e = &c->entry[i];
+        if (!e->known)
+            continue;
+        c->models++;
+        c->solids += e->solid;
+        c->faces += e->faces;
+        c->bytes += e->bytes;
+        for (int k = 0; k < 3; k++) {
+            c->min[k] = fmin(c->min[k], e->min[k]);
+            c->max[k] = fmax(c->max[k], e->max[k]);
+        }
+    }
+}
+
+/* --- paths --- */
+
+/* The folder of a file that need not be there, without links; or NULL. */
+static char *real_folder(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    char *folder = slash ? strndup(path, (size_t)(slash - path) + 1) : strdup(".");
+    char *real = folder ? realpath(folder, NULL) : NULL;
+    free(folder);
+    return real;
+}
+
+/* How one gets from folder `a` to what is in `b`: "", "x/" or "../x/"; or NULL. Both are real. */
+static char *way_between(const char *a, const char *b)
+{
+    size_t same = 0, at = 0;
+    for (;; at++) { /* folders that both have */
+        bool ends_a = !a[at] || a[at] == '/', ends_b = !b[at] || b[at] == '/';
+        if (ends_a && ends_b)
+            same = at;
+        if (a[at] != b[at] || !a[at])
+            break;
+    }
+    size_t ups = 0;
+    for (const char *s = a + same; *s; s++)
+        ups += *s == '/' && s[1];
+    const char *rest = b + same + (b[same] == '/');
+    char *way = malloc(3 * ups + strlen(rest) + 2), *end = way;
+    for (size_t i = 0; way && i < ups; i++)
+        end = stpcpy(end, "../");
+    if (way) {
+        end = stpcpy(end, rest);
+        strcpy(end, *rest ? "/" : "");
+    }
+    return way;
+}
+
+/* Returns the exit code. */
+static int find_way(catalogue *c)
+{
+    char *a = real_folder(c->out), *b = a ? realpath(c->folder, NULL) : NULL;
+    bool reached = b || errno == ENOMEM;
+    if (!reached)
+        fprintf(stderr, "ebpo catalogue: %s: %s\n", a ? c->folder : c->out, strerror(errno));
+    c->from = b ? way_between(a, b) : NULL;
+    int code = c->from ? EXIT_FINE : reached ? command_no_memory("catalogue") : EXIT_FAILED;
+    free(a);
+    free(b);
+    return code;
+}
+
+/* --- the file --- */
+
+static void write_entry(const catalogue *c, json *j, size_t number)
+{
+    const entry *e = &c->entry[number];
+    char hex[65];
+    words_hex(e->content, hex);
+    json_object(j, NULL);
+    json_text(j, "path", e->path);
+    json_uint(j, "bytes", e->bytes);
+    json_text(j, "content_sha256", hex);
+    json_uint(j, "faces", e->faces);
+    json_uint(j, "vertices", e->vertices);
+    json_bool(j, "solid", e->solid);
+    json_text(j, "rule", words_rule(e->rule));
+    json_bool(j, "mesh", e->mesh);
+    json_bool(j, "pruned", e->pruned);
+    json_reals(j, "box_min", e->min, 3);
+    json_reals(j, "box_max", e->max, 3);
+    json_end(j);
+}
+
+static int write_all(const catalogue *c)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    if (!out)
+        return command_no_memory("catalogue");
+    json j;
+    json_begin(&j, out);
+    json_object(&j, NULL);
+    json_text(&j, "format", "ebpo-catalogue");
+    json_uint(&j, "version", 1);
+    json_array(&j, "models");
+    for (size_t i = 0; i < c->files.count; i++)
+        if (c->entry[i].known)
+            write_entry(c, &j, i);
+    json_finish(&j);
+    int code = fclose(out) == 0 ? EXIT_FINE : command_no_memory("catalogue");
+    if (code == EXIT_FINE && ebpo_write_file(c->out, text, size, &error) != EBPO_OK)
+        code = command_failed("catalogue", &error);
+    free(text);
+    return code;
+}
+
+/* --- what is told --- */
+
+static uint64_t left_out(const catalogue *c)
+{
+    return (uint64_t)(c->files.count - c->models) + c->files.unread;
+}
+
+static void tell_left_out(const catalogue *c)
+{
+    for (size_t i = 0; i < c->files.count; i++) {
+        const entry *e = &c->entry[i];
+        if (e->known)
+            continue;
+        bool named = strstr(e->why, e->shown) != NULL;
+        fprintf(stderr, "ebpo catalogue: left out: %s%s%s\n", named ? "" : e->shown,
+                named ? "" : ": ", e->why);
+    }
+}
+
+static void print_json(const catalogue *c)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "catalogue", c->out);
+    json_uint(&j, "models", c->models);
+    json_uint(&j, "solids", c->solids);
+    json_uint(&j, "faces", c->faces);
+    json_uint(&j, "bytes", c->bytes);
+    json_reals(&j, "box_min", c->min, 3);
+    json_reals(&j, "box_max", c->max, 3);
+    json_uint(&j, "folders_unread", c->files.unread);
+    json_array(&j, "left_out");
+    for (size_t i = 0; i < c->files.count; i++)
+        if (!c->entry[i].known) {
+            json_object(&j, NULL);
+            json_text(&j, "path", c->files.path[i]);
+            json_text(&j, "why", c->entry[i].why);
+            json_end(&j);
+        }
+    json_end(&j);
+    json_finish(&j);
+}
+
+static void print_words(const catalogue *c)
+{
+    char models[40], faces[24], bytes[32], left[40];
+    words_plural(models, sizeof models, c->models, "model", "models");
+    words_count(faces, sizeof faces, (double)c->faces);
+    words_bytes(bytes, sizeof bytes, c->bytes);
+    words_plural(left, sizeof left, left_out(c), "was left out", "were left out");
+    printf("%s: %s, %" PRIu64 " of them solid, %s faces, %s", c->out, models, c->solids, faces,
+           bytes);
+    printf(left_out(c) ? "; %s\n" : "\n", left);
+}
+
+/* --- all of it --- */
+
+/* True, said on stderr: the catalogue would take the place of a file that it lists. `code` is then
+ * set. */
+static bool overwrites_model(const catalogue *c, int *code)
+{
+    for (size_t i = 0; i < c->files.count; i++) {
+        char *path = NULL;
+        if (asprintf(&path, "%s/%s", c->folder, c->files.path[i]) < 0) {
+            *code = command_no_memory("catalogue");
+            return true;
+        }
+        bool same = command_overwrites("catalogue", path, c->out);
+        free(path);
+        if (same) {
+            *code = EXIT_USAGE;
+            return true;
+        }
+    }
+    return false;
+}
+
+static int make(catalogue *c)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (!folder_files_find(&c->files, "catalogue", c->folder))
+        return c->files.no_memory ? command_no_memory("catalogue") : EXIT_FAILED;
+    if (ebpo_check_output(c->out, &error) != EBPO_OK)
+        return command_failed("catalogue", &error);
+    int code = find_way(c);
+    if (code != EXIT_FINE || overwrites_model(c, &code))
+        return code;
+    if (!look_at_all(c))
+        return command_no_memory("catalogue");
+    add_up(c);
+    tell_left_out(c);
+    if (!c->models) {
+        fprintf(stderr,
+                "ebpo catalogue: %s: holds no model; nothing was written (ebpo convert makes "
+                "them)\n",
+                c->folder);
+        return EXIT_FAILED;
+    }
+    code = write_all(c);
+    if (code != EXIT_FINE)
+        return code;
+    if (c->v->json)
+        print_json(c);
+    else if (!c->v->quiet)
+        print_words(c);
+    return left_out(c) ? EXIT_DIFFERS : EXIT_FINE;
+}
+
+static int run(void *given, const char **operand)
+{
+    const values *v = given;
+    progress_line line;
+    if (v->out && strcmp(v->out, "-") == 0)
+        return command_usage("catalogue", "--output: '-': a file's name is needed here, in whose "
+                                          "folder paths begin");
+    char *folder = strdup(operand[0]);
+    catalogue c = { .v = v, .folder = folder, .progress = &line };
+    for (size_t end = folder ? strlen(folder) : 0; end > 1 && folder[end - 1] == '/';)
+        folder[--end] = 0;
+    (void)progress_start(&line, "catalogue", v->quiet);
+    if (folder && v->out)
+        c.out = strdup(v->out);
+    else if (!folder || asprintf(&c.out, "%s/catalogue.json", folder) < 0)
+        c.out = NULL;
+    int code = c.out ? make(&c) : command_no_memory("catalogue");
+    for (size_t i = 0; c.entry && i < c.files.count; i++) {
+        free(c.entry[i].why);
+        free(c.entry[i].path);
+        free(c.entry[i].shown);
+    }
+    free(c.entry);
+    free(c.from);
+    free(c.out);
+    free(folder);
+    folder_files_free(&c.files);
+    return code;
+}
+
+const command command_catalogue = { &spec, sizeof usual, &usual, run };

@@ -1,0 +1,349 @@
+/* ebpo collide: which faces of two models meet, and how far apart they are. */
+#include <ebpo/http.h>
+#include <ebpo/memory.h>
+#include <float.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/model_memory.h"
+#include "cli/pose_args.h"
+#include "cli/progress.h"
+#include "cli/query_args.h"
+#include "cli/words.h"
+#include "cli/commands/collide_far.h"
+#include "cli/commands/commands.h"
+
+typedef struct collide_values {
+    query_values query;
+    const char *pose_a, *pose_b, *out;
+    bool first, self, relation, quiet;
+    uint64_t printed; /* pairs */
+    collide_far far;
+} collide_values;
+
+#include "cli/options/collide.inc"
+
+static bool read_pose(const char *name, const char *text, ebpo_pose *out)
+{
+    if (!text || pose_read(text, out))
+        return true;
+    (void)command_usage("collide",
+                        "--%s '%s': expected a pose, '" POSE_FORM "', the quaternion not 0", name,
+                        text);
+    return false;
+}
+
+/* --- answers --- */
+
+static const char *const kinds[] = { "APART", "TOUCHING", "CROSSING", "COPLANAR" };
+
+static void print_pair(bool as_json, const ebpo_face_pair *p)
+{
+    if (as_json)
+        printf("{\"face_a\": %llu, \"face_b\": %llu, \"kind\": \"%s\"}\n",
+               (unsigned long long)p->face_a, (unsigned long long)p->face_b, kinds[p->kind]);
+    else
+        printf("%llu %llu %s\n", (unsigned long long)p->face_a, (unsigned long long)p->face_b,
+               kinds[p->kind]);
+}
+
+static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    collide_values *v = user;
+    v->printed += count;
+    for (uint64_t i = 0; i < count; i++)
+        print_pair(v->query.json, &pairs[i]);
+    return command_flush("collide");
+}
+
+/* -1 .. 1 */
+static const char *const truths[] = { "null", "false", "true" };
+
+/* Prints the line of models whose faces do not meet. Of all pairs JSON has an object for each, and
+ * one where there is none but more to say. */
+static ebpo_status print_none(const collide_values *v, ebpo_collider *c,
+                              const ebpo_collide_options *how, ebpo_error *error)
+{
+    const char *relation;
+    bool as_json = v->query.json;
+    ebpo_status status = collide_unmet(c, how, &relation, error);
+    if (status != EBPO_OK || (as_json && v->query.all && !relation))
+        return status;
+    printf(as_json ? "{\"kind\": \"APART\"" : "none");
+    collide_print_unmet(as_json, relation);
+    puts(as_json ? "}" : "");
+    return EBPO_OK;
+}
+
+static ebpo_status ask_first(const collide_values *v, ebpo_collider *c,
+                             const ebpo_collide_options *how, ebpo_error *error)
+{
+    ebpo_face_pair pair;
+    int32_t found;
+    ebpo_status status = ebpo_collide_first(c, how, &pair, &found, error);
+    if (status != EBPO_OK)
+        return status;
+    if (found == 0)
+        return print_none(v, c, how, error);
+    if (found == 1)
+        print_pair(v->query.json, &pair);
+    else
+        puts(v->query.json ? "{\"kind\": null}" : "not known");
+    return EBPO_OK;
+}
+
+static ebpo_status ask_relation(const collide_values *v, ebpo_collider *c,
+                                const ebpo_collide_options *how, ebpo_error *error)
+{
+    ebpo_relation_result r;
+    ebpo_status status = ebpo_collide_relation(c, how, &r, error);
+    if (status != EBPO_OK)
+        return status;
+    if (!v->query.json)
+        puts(collide_relations[r.relation]);
+    else if (r.relation == EBPO_RELATION_OPEN)
+        printf("{\"relation\": null, \"contact\": %s}\n", truths[r.contact + 1]);
+    else
+        printf("{\"relation\": \"%s\", \"contact\": %s}\n", collide_relations[r.relation],
+               truths[r.contact + 1]);
+    return EBPO_OK;
+}
+
+/* -1 .. 1 */
+static const char *const words[] = { "possible", "apart", "meeting" };
+
+static void print_levels(bool as_json, const ebpo_level_result *r)
+{
+    char lo[32], hi[32];
+    if (as_json)
+        printf("{\"common\": %s, \"contact\": %s, \"open_pairs\": %llu, \"lo\": %s, \"hi\": "
+               "%s}\n",
+               truths[r->common + 1], truths[r->contact + 1], (unsigned long long)r->open_pairs,
+               json_number(r->distance.lo, lo), json_number(r->distance.hi, hi));
+    else
+        printf("%s %llu %s %s\n", words[r->common + 1], (unsigned long long)r->open_pairs,
+               words_real(r->distance.lo, lo), words_real(r->distance.hi, hi));
+}
+
+static ebpo_status ask_levels(const collide_values *v, ebpo_collider *c,
+                              const ebpo_collide_options *how, ebpo_error *error)
+{
+    ebpo_level_result r;
+    ebpo_status status = ebpo_collide_levels(c, how, &r, error);
+    if (status == EBPO_OK)
+        print_levels(v->query.json, &r);
+    return status;
+}
+
+/* Prints every pair, or that there is none. */
+static ebpo_status ask_pairs(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
+                             ebpo_error *error)
+{
+    ebpo_status status = v->self ? ebpo_collide_self(c, how, take_pairs, v, error)
+                                 : ebpo_collide_all(c, how, take_pairs, v, error);
+    if (status != EBPO_OK || v->printed)
+        return status;
+    if (!v->self)
+        return print_none(v, c, how, error);
+    if (!v->query.json)
+        puts("none");
+    return EBPO_OK;
+}
+
+/* Said on standard error, as answers are on the other. */
+static ebpo_status write_pairs(const collide_values *v, ebpo_collider *c,
+                               const ebpo_collide_options *how, ebpo_error *error)
+{
+    bool ply = words_end_with(v->out, ".ply");
+    const char *relation = NULL;
+    ebpo_status status =
+        ebpo_collide_write(c, how, ply ? EBPO_PAIRS_PLY : EBPO_PAIRS_HDF5, v->out, error);
+    if (v->quiet)
+        return status;
+    if (status == EBPO_OK)
+        status = collide_unmet(c, how, &relation, error);
+    if (status == EBPO_OK)
+        fprintf(stderr, "%s: %s%s%s\n", v->out,
+                ply ? "both models, in which the faces that meet are red"
+                    : "all pairs of faces that meet, and where they cross",
+                relation ? "; none meet: " : "", relation ? relation : "");
+    return status;
+}
+
+/* What is asked on the command line, one after the other. */
+static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
+                           ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    if (v->query.level >= 0)
+        return ask_levels(v, c, how, error);
+    if (v->relation)
+        status = ask_relation(v, c, how, error);
+    if (status == EBPO_OK && v->out)
+        status = write_pairs(v, c, how, error);
+    if (status == EBPO_OK && collide_far_asked(&v->far))
+        return collide_far_ask(&v->far, v->query.json, c, how, error);
+    if (status == EBPO_OK && (v->query.all || v->self))
+        return ask_pairs(v, c, how, error);
+    bool other = v->relation || v->out;
+    return status == EBPO_OK && (v->first || !other) ? ask_first(v, c, how, error) : status;
+}
+
+static void json_stats(const ebpo_collider_stats *s)
+{
+    json j;
+    json_begin(&j, stderr);
+    json_object(&j, NULL);
+    json_uint(&j, "node_pairs", s->node_pairs);
+    json_uint(&j, "block_pairs", s->block_pairs);
+    json_uint(&j, "exact", s->exact);
+    json_uint(&j, "subtree_pairs", s->subtree_pairs);
+    json_uint(&j, "subtrees", s->subtrees);
+    json_uint(&j, "loads", s->loads);
+    json_uint(&j, "bytes_read", s->bytes_read);
+    json_finish(&j);
+}
+
+static void tell_stats(const ebpo_collider *c, bool as_json)
+{
+    ebpo_collider_stats s = EBPO_COLLIDER_STATS_INIT;
+    if (ebpo_collider_get_stats(c, &s) != EBPO_OK)
+        return;
+    if (as_json) {
+        json_stats(&s);
+        return;
+    }
+    fprintf(stderr, "%llu pairs of nodes, %llu of blocks; %llu of faces by the exact test\n",
+            (unsigned long long)s.node_pairs, (unsigned long long)s.block_pairs,
+            (unsigned long long)s.exact);
+    if (s.subtree_pairs)
+        fprintf(stderr, "%llu pairs of subtrees, %llu of these, %llu loads, %llu bytes read\n",
+                (unsigned long long)s.subtree_pairs, (unsigned long long)s.subtrees,
+                (unsigned long long)s.loads, (unsigned long long)s.bytes_read);
+}
+
+static int ask(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_collide_options *how)
+{
+    ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_collider *c = NULL;
+    progress_line line;
+    with.threads = (unsigned)v->query.threads;
+    ebpo_status status = ebpo_collider_new(a, b, &with, &c, &error);
+    how->progress = progress_start(&line, "collide", v->quiet);
+    if (status == EBPO_OK)
+        status = ask_all(v, c, how, &error);
+    progress_wipe(&line);
+    if (c && v->query.remote.stats)
+        tell_stats(c, v->query.json);
+    ebpo_collider_free(c);
+    if (status != EBPO_OK)
+        return command_failed("collide", &error);
+    return command_flush("collide") ? EXIT_FINE : EXIT_FAILED;
+}
+
+/* --memory is of both models together: all of both if they fit, else both in parts that share it.
+ */
+static ebpo_status share_memory(const query_session *a, const query_session *b,
+                                ebpo_model_options *holding, ebpo_error *error)
+{
+    ebpo_model_options without = *holding;
+    ebpo_model_plan plan[2] = { EBPO_MODEL_PLAN_INIT, EBPO_MODEL_PLAN_INIT };
+    without.memory = 0;
+    ebpo_status status = ebpo_model_memory(a->file, &without, &plan[0], error);
+    if (status == EBPO_OK)
+        status = ebpo_model_memory(b->file, &without, &plan[1], error);
+    bool all = holding->cut_level < 0 && plan[0].whole + plan[1].whole <= holding->memory;
+    if (status != EBPO_OK || all)
+        return status;
+    return ebpo_budget_new(holding->memory, &holding->budget, error);
+}
+
+/* Where --memory is not given: half of what is free if all of both would take more, or the least
+ * that will do. Files on a server keep the library's usual budget. */
+static void usual_memory(const query_session *a, const query_session *b, const char *const path[2],
+                         ebpo_model_options *holding)
+{
+    if (ebpo_is_url(path[0]) || (b && ebpo_is_url(path[1])))
+        return;
+    ebpo_model_plan plan[2] = { EBPO_MODEL_PLAN_INIT, EBPO_MODEL_PLAN_INIT };
+    if (ebpo_model_memory(a->file, holding, &plan[0], NULL) != EBPO_OK ||
+        (b && ebpo_model_memory(b->file, holding, &plan[1], NULL) != EBPO_OK))
+        return; /* what is wrong is said when the models are made */
+    uint64_t half = ebpo_free_memory() / 2;
+    uint64_t least = plan[0].least + plan[1].least;
+    if (plan[0].whole + plan[1].whole <= half)
+        return;
+    holding->memory = half > least ? half : least;
+    if (least > half)
+        model_memory_tell_least("collide", "both models", least, half);
+}
+
+static int open_both(query_session *a, query_session *b, const collide_values *v,
+                     const char **operand, ebpo_model_options *holding)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    const char *path[2] = { operand[0], operand[1] };
+    bool one = v->self || strcmp(path[0], path[1]) == 0; /* then it is in memory once */
+    int level = (int)v->query.level;
+    int code = query_open_file(a, "collide", path[0], holding, level, &v->query.remote);
+    if (code == EXIT_FINE && !one)
+        code = query_open_file(b, "collide", path[1], holding, level, &v->query.remote);
+    if (code == EXIT_FINE && !v->query.memory && holding->cut_level < 0)
+        usual_memory(a, one ? NULL : b, path, holding);
+    if (code == EXIT_FINE && !one && holding->memory &&
+        share_memory(a, b, holding, &error) != EBPO_OK)
+        return command_failed("collide", &error);
+    if (code == EXIT_FINE)
+        code = query_open_model(a, "collide", holding);
+    if (code == EXIT_FINE && !one)
+        code = query_open_model(b, "collide", holding);
+    return code;
+}
+
+static int run(void *given, const char **operand)
+{
+    collide_values *v = given;
+    ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_model_options holding = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
+    ebpo_distance_options distance = EBPO_DISTANCE_OPTIONS_INIT;
+    query_session a = QUERY_SESSION_INIT, b = QUERY_SESSION_INIT;
+    if (v->self == (operand[1] != NULL))
+        return command_usage("collide", "two models, or one and --self");
+    if (!collide_far_fits(&v->far, v->query.all || v->self))
+        return EXIT_USAGE;
+    if (v->self && (v->query.all || v->pose_a || v->pose_b || v->relation || v->out))
+        return command_usage("collide",
+                             "--self takes neither --all nor poses, --relation or --output");
+    if (v->first && (v->self || v->query.all || collide_far_asked(&v->far)))
+        return command_usage("collide", "--first takes neither --all, --self, --distance, --depth "
+                                        "nor --way-out");
+    if (v->out && !words_end_with(v->out, ".h5") && !words_end_with(v->out, ".ply"))
+        return command_usage("collide", "--output %s: expected a name that ends in .h5 or .ply",
+                             v->out);
+    if (v->query.level >= 0 && (v->first || v->self || v->query.all || collide_far_asked(&v->far) ||
+                                v->relation || v->out))
+        return command_usage("collide", "--level takes no other question");
+    if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
+        !read_pose("pose-b", v->pose_b, &how.pose_b) ||
+        !query_options_from("collide", &v->query, &holding, &inside, &distance))
+        return EXIT_USAGE;
+    how.deadline_ns = distance.deadline_ns;
+    how.level = distance.level;
+    setvbuf(stdout, NULL, _IOFBF, 1 << 18);
+    int code = open_both(&a, &b, v, operand, &holding);
+    if (code == EXIT_FINE)
+        code = ask(v, a.model, b.model ? b.model : a.model, &how);
+    query_close(&b);
+    query_close(&a);
+    ebpo_budget_free(holding.budget);
+    return code;
+}
+
+static const collide_values usual = { .query = QUERY_VALUES_INIT, .far = COLLIDE_FAR_INIT };
+
+const command command_collide = { &spec, sizeof usual, &usual, run };

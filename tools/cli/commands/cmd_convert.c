@@ -1,0 +1,378 @@
+/* ebpo convert: from a mesh to an .ebpo.h5 file. */
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "cli/command.h"
+#include "cli/memory_args.h"
+#include "cli/mesh_input.h"
+#include "cli/progress.h"
+#include "cli/selection_args.h"
+#include "cli/stages.h"
+#include "cli/standard_files.h"
+#include "cli/subtree_args.h"
+#include "cli/words.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/convert_parts.h"
+#include "cli/commands/convert_tell.h"
+#include "cli/commands/subset_run.h"
+
+typedef struct values {
+    int64_t max_level, leaf_faces, zstd_level, threads;
+    double epsilon, percent, max_error;
+    int select, normals;
+    int64_t seed;
+    const char *k_root, *target_size, *subtree_faces;
+    memory_values memory;
+    uint32_t with, without;
+    int codec, face_coding, rule, profile;
+    mending mend;
+    bool require_solid, split_components, split_groups, embed_textures, timings, json, quiet;
+    const char *unit, *crs, *date;
+} values;
+
+static const char *const with_words[] = { "leaf-planes", NULL };
+static const char *const without_words[] = {
+    "planes", "mesh", "maps", "attributes", "colours", NULL
+};
+/* of each word */
+static const uint32_t without_parts[] = { EBPO_PART_PLANES, EBPO_PART_MESH, EBPO_PART_MAPS,
+                                          EBPO_PART_ATTRIBUTES, EBPO_PART_COLOURS };
+
+enum { WITHOUT_MESH = 1 << 1, WITHOUT_ATTRIBUTES = 1 << 3 };
+
+#include "cli/options/convert.inc"
+
+static int check_values(const values *v, const char *in, const char *out)
+{
+    selection_options chosen = { 1u << v->select, v->percent, v->epsilon,
+                                 v->k_root,       v->normals, v->seed };
+    int code = selection_check("convert", &chosen);
+    if (code != EXIT_FINE)
+        return code;
+    if (!memory_good("convert", &v->memory) || mending_check("convert", v->mend) != EXIT_FINE)
+        return EXIT_USAGE;
+    if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
+        return command_usage("convert", "--zstd-level does not apply to --codec deflate or none");
+    if (v->profile >= 0 && (v->with || v->without))
+        return command_usage(
+            "convert", "--profile says which parts are stored; leave out --with and --without");
+    if (v->embed_textures && v->without & (WITHOUT_ATTRIBUTES | WITHOUT_MESH))
+        return command_usage("convert",
+                             "--embed-textures does not go with --without attributes or mesh: "
+                             "textures are among the attributes");
+    if (v->split_components && v->split_groups)
+        return command_usage("convert", "--split-components and --split-groups: choose one");
+    if (v->split_groups && (v->mend.fill_holes || v->mend.repair))
+        return command_usage("convert", "--fill-holes and --repair do not go with --split-groups: "
+                                        "what they add is in no group");
+    if (v->date && !ebpo_is_date(v->date))
+        return command_usage("convert", "--date '%s': expected " WORDS_DATE_EXPECTED, v->date);
+    uint64_t subtree_faces;
+    if (!subtree_faces_read("convert", v->subtree_faces, &subtree_faces) ||
+        command_overwrites("convert", in, out))
+        return EXIT_USAGE;
+    return EXIT_FINE;
+}
+
+static bool judges(const values *v) { return v->max_error > 0 || v->target_size; }
+
+static int check_need(const values *v, ebpo_subset_options *need)
+{
+    int code = subset_need("convert", v->max_error, v->target_size, need);
+    if (code == EXIT_FINE && judges(v) && v->without & EBPO_PART_MESH)
+        return command_usage("convert",
+                             "--max-error and --target-size measure against the mesh; leave it out "
+                             "with --profile lod instead of --without mesh");
+    return code;
+}
+
+static bool chooses_parts(const values *v)
+{
+    return v->target_size && v->profile < 0 && !v->with && !v->without;
+}
+
+static uint32_t parts_of(const values *v)
+{
+    uint32_t without = 0;
+    for (int i = 0; without_words[i]; i++)
+        without |= v->without >> i & 1 ? without_parts[i] : 0;
+    if (v->profile >= 0 ||
+        chooses_parts(
+            v)) /* all are built, so that the file is the one that a subset of the full one is */
+        return ebpo_profile_parts(EBPO_PROFILE_FULL);
+    if (without & EBPO_PART_MESH)
+        without |= EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS;
+    uint32_t parts = (EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES |
+                      EBPO_PART_COLOURS) &
+                     ~without;
+    return v->with ? parts | EBPO_PART_LEAF_PLANES : parts;
+}
+
+static mesh_reading reading_of(const values *v)
+{
+    return !(parts_of(v) & EBPO_PART_ATTRIBUTES) ? READ_MESH
+           : v->embed_textures                   ? READ_TEXTURES
+                                                 : READ_ATTRIBUTES;
+}
+
+static convert_told told_of(const values *v, const char *in, const char *out)
+{
+    const char *shown = standard_files_shown(in);
+    return (convert_told){ .in = shown,
+                           .piped = shown != in,
+                           .out = out,
+                           .json = v->json,
+                           .quiet = v->quiet,
+                           .timings = v->timings,
+                           .repaired = v->mend.repair,
+                           .chosen = chooses_parts(v),
+                           .by_groups = v->split_groups };
+}
+
+/* --- work --- */
+
+/* Said before the hours of building that judging afterwards would be too much. */
+static ebpo_status room_to_judge(const values *v, uint64_t faces, const char *in,
+                                 const ebpo_workspace *workspace, ebpo_error *error)
+{
+    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
+    uint64_t needed = ebpo_subset_memory(faces, (uint32_t)v->leaf_faces);
+    char bytes[32], budget[32];
+    ebpo_workspace_get_stats(workspace, &figures);
+    if (needed <= figures.memory)
+        return EBPO_OK;
+    error->status = EBPO_E_LIMIT;
+    snprintf(error->message, sizeof error->message,
+             "%s: --max-error and --target-size measure with the whole model in memory, about %s, "
+             "but the budget is %s; allow more with --memory, or leave them out here and use 'ebpo "
+             "subset' on a machine that has it",
+             in, words_bytes(bytes, sizeof bytes, needed),
+             words_bytes(budget, sizeof budget, figures.memory));
+    return EBPO_E_LIMIT;
+}
+
+/* `need`: the error or size that was asked for. */
+static ebpo_status build_and_write(const values *v, mesh_input *p, const char *out,
+                                   const ebpo_subset_options *need, ebpo_progress progress,
+                                   ebpo_build_times *times, ebpo_error *error)
+{
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    build.max_level = (int)v->max_level;
+    build.leaf_faces = (uint32_t)v->leaf_faces;
+    build.epsilon = v->epsilon >= 0 ? v->epsilon : build.epsilon;
+    build.select = (ebpo_selection)v->select;
+    build.percent = v->percent >= 0 ? v->percent : build.percent;
+    build.normals = v->normals >= 0 ? (ebpo_normal_distance)v->normals : build.normals;
+    build.seed = v->seed >= 0 ? (uint64_t)v->seed : build.seed;
+    build.parts = parts_of(v);
+    build.rule = (ebpo_rule)v->rule;
+    build.require_solid = v->require_solid;
+    build.threads = (unsigned)v->threads;
+    build.unit = v->unit;
+    build.crs = v->crs;
+    build.date = v->date;
+    build.progress = progress;
+    build.times = times;
+    ebpo_tree tree;
+    ebpo_status status = selection_k_root(v->k_root, p->mesh.face_count, &build.k_root, error);
+    if (status != EBPO_OK) {
+        ebpo_mesh_free(&p->mesh);
+        return status;
+    }
+    status = ebpo_build(&p->mesh, &p->prepared.report, &p->prepared.record, &build, &tree, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    write.codec = (ebpo_codec)v->codec;
+    write.codec_level = (int)v->zstd_level;
+    write.threads = (unsigned)v->threads;
+    write.face_coding = (ebpo_face_coding)v->face_coding;
+    write.progress = progress;
+    (void)subtree_faces_read("convert", v->subtree_faces, &write.subtree_faces);
+    if (need->max_error > 0 || need->target_bytes) {
+        ebpo_subset_options subset = *need;
+        subset.codec = write.codec;
+        subset.codec_level = write.codec_level;
+        subset.threads = write.threads;
+        subset.progress = progress;
+        subset.subtree_faces = write.subtree_faces;
+        subset.face_coding = write.face_coding;
+        subset.choose_parts = chooses_parts(v);
+        if (v->profile >= 0)
+            subset.parts = ebpo_profile_parts((ebpo_profile)v->profile);
+        return ebpo_subset_of_tree(&tree, out, &subset, error);
+    }
+    if (v->profile >= 0)
+        write.parts = ebpo_profile_parts((ebpo_profile)v->profile);
+    status = ebpo_tree_write(&tree, out, &write, error);
+    ebpo_tree_free(&tree);
+    return status;
+}
+
+/* What the files of all components are made with. */
+typedef struct part_build {
+    const values *v;
+    const ebpo_subset_options *need;
+    const char *in;
+    const ebpo_workspace *workspace;
+} part_build;
+
+static ebpo_status part_fits(void *user, uint64_t faces, ebpo_error *error)
+{
+    const part_build *b = user;
+    return judges(b->v) ? room_to_judge(b->v, faces, b->in, b->workspace, error) : EBPO_OK;
+}
+
+static ebpo_status build_part(void *user, mesh_input *part, const char *path,
+                              ebpo_progress progress, ebpo_error *error)
+{
+    const part_build *b = user;
+    ebpo_build_times times = EBPO_BUILD_TIMES_INIT;
+    return build_and_write(b->v, part, path, b->need, progress, &times, error);
+}
+
+static bool splits(const values *v) { return v->split_components || v->split_groups; }
+
+static ebpo_status build_parts(part_build *build, mesh_input *p, const char *folder,
+                               const ebpo_mesh_groups *groups, progress_line *line,
+                               ebpo_progress progress, double begun, ebpo_error *error)
+{
+    const values *v = build->v;
+    parts_run run = { .build = build_part,
+                      .fits = part_fits,
+                      .user = build,
+                      .groups = groups,
+                      .folder = folder,
+                      .unit = v->unit,
+                      .json = v->json,
+                      .quiet = v->quiet,
+                      .threads = (unsigned)v->threads,
+                      .line = line,
+                      .progress = progress };
+    return parts_write(&run, p, begun, error);
+}
+
+/* What is known before the mesh is read; the rest afterwards. */
+static stage_facts plan_stages(const values *v, const char *in)
+{
+    const char *dot = strrchr(in, '.');
+    return (stage_facts){ .mended = v->mend.weld || v->mend.weld_distance > 0 ||
+                                    v->mend.drop_duplicates || v->mend.orient || v->mend.flip ||
+                                    v->mend.fill_holes || v->mend.repair ||
+                                    (dot && strcasecmp(dot, ".stl") == 0),
+                          .solid = true,
+                          .from_leaves =
+                              ebpo_selection_describe((ebpo_selection)v->select)->from_leaves,
+                          .judged = judges(v),
+                          .leaf_planes = parts_of(v) & EBPO_PART_LEAF_PLANES,
+                          .times = EBPO_BUILD_TIMES_INIT };
+}
+
+static const values usual = { .max_level = -1,
+                              .profile = -1,
+                              .leaf_faces = -1,
+                              .epsilon = -1,
+                              .percent = -1,
+                              .normals = -1,
+                              .seed = -1 };
+
+/* What was read is not what may be built. */
+static ebpo_status refuse(const values *v, const mesh_input *p, const char *in,
+                          const ebpo_workspace *workspace, ebpo_error *error)
+{
+    if (v->require_solid && !v->split_groups && p->doubts) {
+        snprintf(error->message, sizeof error->message,
+                 "%s: is %s, and --require-solid was given; nothing was written", in,
+                 p->doubts & EBPO_DOUBT_OPEN ? "not a solid"
+                                             : "probably not the solid that was meant");
+        return error->status = EBPO_E_NOT_SOLID;
+    }
+    return judges(v) && !splits(v) ? room_to_judge(v, p->mesh.face_count, in, workspace, error)
+                                   : EBPO_OK;
+}
+
+static ebpo_status no_groups(const char *in, ebpo_error *error)
+{
+    error->status = EBPO_E_FORMAT;
+    snprintf(error->message, sizeof error->message,
+             "%s: names no groups, which are lines g or o of an OBJ file; --split-components makes "
+             "parts of what shares no vertices",
+             in);
+    return error->status;
+}
+
+static ebpo_status convert(const values *v, const char *in, const char *out,
+                           const ebpo_subset_options *need, ebpo_workspace *workspace,
+                           ebpo_error *error)
+{
+    progress_line line;
+    ebpo_progress progress = progress_start(&line, "convert", v->quiet);
+    stage_facts stages = plan_stages(v, in);
+    int plan[STAGE_PLAN_MAX];
+    mesh_input p = { .mesh = { 0 } };
+    ebpo_mesh_groups *groups = NULL;
+    if (!splits(v))
+        progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
+    double begun = progress_now();
+    ebpo_status status =
+        mesh_input_read_groups(&p, in, v->mend, reading_of(v), v->split_groups ? &groups : NULL,
+                               workspace, (unsigned)v->threads, progress, error);
+    progress_wipe(&line);
+    if (status != EBPO_OK)
+        return status;
+    p.rule = (ebpo_rule)v->rule;
+    convert_told told = told_of(v, in, out);
+    convert_tell_mesh(&told, &p);
+    status = refuse(v, &p, in, workspace, error);
+    if (status == EBPO_OK && v->split_groups && !groups)
+        status = no_groups(in, error);
+    if (status == EBPO_OK && splits(v)) {
+        part_build build = { v, need, in, workspace };
+        status = build_parts(&build, &p, out, groups, &line, progress, begun, error);
+        ebpo_mesh_groups_free(groups);
+        progress_wipe(&line);
+        return status;
+    }
+    ebpo_mesh_groups_free(groups);
+    if (status == EBPO_OK)
+        status = build_and_write(v, &p, out, need, progress, &stages.times, error);
+    else
+        ebpo_mesh_free(&p.mesh);
+    progress_wipe(&line);
+    progress_end_stage(&line);
+    stages_split(&line, &stages.times);
+    stages.faces = p.as_read.face_count;
+    return status == EBPO_OK
+               ? convert_tell_file(&told, &p, &line, &stages, progress_now() - begun, error)
+               : status;
+}
+
+static int run(void *given, const char **operand)
+{
+    const ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_subset_options need = EBPO_SUBSET_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_workspace *workspace = NULL;
+    values *v = given;
+    if (v->leaf_faces < 0)
+        v->leaf_faces = defaults.leaf_faces;
+    int code = check_values(v, operand[0], operand[1]);
+    if (code == EXIT_FINE)
+        code = check_need(v, &need);
+    if (code != EXIT_FINE)
+        return code;
+    ebpo_status status = splits(v) ? parts_begin(operand[1], v->split_groups, &error)
+                                   : ebpo_check_output(operand[1], &error);
+    if (status == EBPO_OK)
+        status = memory_make(&workspace, &v->memory, &error);
+    if (status == EBPO_OK)
+        status = convert(v, operand[0], operand[1], &need, workspace, &error);
+    ebpo_workspace_free(workspace);
+    parts_end();
+    return status == EBPO_OK ? EXIT_FINE : command_failed("convert", &error);
+}
+
+const command command_convert = { &spec, sizeof usual, &usual, run };

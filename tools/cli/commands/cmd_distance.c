@@ -1,0 +1,122 @@
+/* ebpo distance: how far points are from the model, and from what. */
+#include <float.h>
+#include <stddef.h>
+
+#include "cli/command.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/query_run.h"
+
+#include "cli/options/distance.inc"
+
+/* Then all that is certain is an interval. */
+static bool limited(const ebpo_distance_options *o)
+{
+    return o->mode == EBPO_DISTANCE_EXACT && (o->level >= 0 || o->deadline_ns);
+}
+
+typedef struct listing {
+    const ebpo_sampler *sampler;
+    answer_text *text;
+    answer_form form;
+    bool begun;
+} listing;
+
+static bool list(void *user, const ebpo_near_face *face)
+{
+    listing *l = user;
+    answers_near(l->text, l->form, face, !l->begun, l->sampler);
+    l->begun = true;
+    return !answer_text_is_over(l->text);
+}
+
+static ebpo_status answer_lists(const query_job *job, query_worker *w, const double *rows,
+                                uint64_t count, ebpo_error *error)
+{
+    ebpo_within_options o = EBPO_WITHIN_OPTIONS_INIT;
+    ebpo_status status = EBPO_OK;
+    o.radius = job->values->within;
+    o.most = (uint64_t)job->values->nearest;
+    for (uint64_t i = 0; i < count && status == EBPO_OK && !answer_text_is_over(w->text); i++) {
+        listing l = { job->sampler, w->text, job->form, false };
+        status = ebpo_distance_within(w->context, rows + 3 * i, &o, list, &l, error);
+        if (status == EBPO_OK)
+            answers_near_end(w->text, job->form, !l.begun, job->sampler);
+    }
+    return status;
+}
+
+/* The numbers of a catalogue's models, behind the results. */
+static uint64_t *models_of(const query_worker *w, uint64_t count)
+{
+    return (uint64_t *)(void *)((ebpo_distance_result *)w->results + count);
+}
+
+static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
+                          ebpo_error *error)
+{
+    if (job->models)
+        return catalogue_distance(job->models, rows, count, job->distance.max_distance,
+                                  job->distance.unsigned_distance, w->results, models_of(w, count),
+                                  error);
+    if (count && query_lists(job->values))
+        return answer_lists(job, w, rows, count, error);
+    return ebpo_distance_many(w->context, rows, count, &job->distance, w->results, error);
+}
+
+static void print(const query_job *job, query_worker *w, const double *rows, uint64_t count)
+{
+    (void)rows;
+    if (!query_lists(job->values))
+        answers_distance(w->text, job->form, !job->models && limited(&job->distance), w->results,
+                         count, job->sampler, job->models ? models_of(w, count) : NULL);
+}
+
+static const char *columns(const query_job *job)
+{
+    return job->models ? "distance,x,y,z,nx,ny,nz,face,model"
+           : limited(&job->distance) && !query_lists(job->values) ? "lo,hi"
+                                                                  : "distance,x,y,z,nx,ny,nz,face";
+}
+
+static const char *dtype(const query_job *job, unsigned *bytes)
+{
+    if (query_lists(job->values))
+        return NULL;
+    if (job->models) {
+        *bytes = 72;
+        return "[('distance', '<f8'), ('point', '<f8', (3,)), ('normal', '<f8', (3,)), ('face', "
+               "'<u8'), ('model', '<u8')]";
+    }
+    *bytes = limited(&job->distance) ? 16 : 64;
+    return limited(&job->distance)
+               ? "[('lo', '<f8'), ('hi', '<f8')]"
+               : "[('distance', '<f8'), ('point', '<f8', (3,)), ('normal', '<f8', (3,)), ('face', "
+                 "'<u8')]";
+}
+
+static const query_values usual = QUERY_VALUES_INIT;
+
+static int run(void *given, const char **operand)
+{
+    query_values *v = given;
+    if (!query_distance_fits("distance", v) ||
+        (v->level >= 0 && !query_accepts("distance", v, QUERY_MAX_DISTANCE, "--level")))
+        return EXIT_USAGE;
+    if (v->attribute && v->distance_mode == EBPO_DISTANCE_ENVELOPE)
+        return command_usage("distance", "--attribute has no effect with --mode envelope; leave "
+                                         "out one of them");
+    if (v->attribute && !query_accepts("distance", v, QUERY_LEVEL | QUERY_DEADLINE, "--attribute"))
+        return EXIT_USAGE;
+    query_job job = { .command = "distance",
+                      .values = v,
+                      .kind = POINTS,
+                      .result_bytes = sizeof(ebpo_distance_result),
+                      .parts_share = 0.65, /* docs/measured/asking.md */
+                      .answer = answer,
+                      .print = print,
+                      .columns = columns,
+                      .dtype = dtype };
+    return query_run(&job, operand[0], operand[1]);
+}
+
+const command command_distance = { &spec, sizeof usual, &usual, run };

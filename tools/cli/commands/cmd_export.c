@@ -1,0 +1,213 @@
+/* ebpo export: levels and the model in other programs' formats. PLY is ebpo extract's. */
+#include <inttypes.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/process_memory.h"
+#include "cli/progress.h"
+#include "cli/remote_args.h"
+#include "cli/tables.h"
+#include "cli/words.h"
+#include "cli/commands/commands.h"
+
+typedef struct values {
+    int format;
+    int64_t level, threads;
+    const char *levels, *memory;
+    bool mesh, json, quiet, to_deepest;
+    remote_values remote;
+} values;
+
+static const char *const format_words[] = {
+    "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl", NULL
+}; /* as in ebpo_export_format */
+
+#include "cli/options/export.inc"
+
+static int choose_format(values *v, const char *out)
+{
+    const char *dot = strrchr(out, '.');
+    if (dot && strcasecmp(dot, ".ply") == 0 && v->format < 0)
+        return command_usage("export", "PLY is written by 'ebpo extract'");
+    for (int i = 0; dot && v->format < 0 && format_words[i]; i++)
+        if (strcasecmp(dot + 1, format_words[i]) == 0)
+            v->format = i;
+    return v->format >= 0
+               ? EXIT_FINE
+               : command_usage("export",
+                               "the output's extension does not say which format; give --format");
+}
+
+static int choose_levels(values *v, ebpo_export_options *o)
+{
+    word_levels levels;
+    *o = (ebpo_export_options)EBPO_EXPORT_OPTIONS_INIT;
+    o->mesh = v->mesh;
+    if (v->level < 0 && !v->levels && !v->mesh)
+        return command_usage("export", "nothing to export; give --level, --levels or --mesh");
+    if (v->level >= 0 && v->levels)
+        return command_usage("export", "--level and --levels cannot be used together");
+    if (v->level >= 0)
+        o->first_level = o->last_level = (int)v->level;
+    if (!v->levels)
+        return EXIT_FINE;
+    if (!words_read_levels(v->levels, &levels))
+        return command_usage("export", "--levels: '%s' is not " WORDS_LEVELS_EXPECTED, v->levels);
+    if (!levels.is_run)
+        return command_usage("export",
+                             "--levels: '%s' leaves out levels; give a first and a last one",
+                             v->levels);
+    o->first_level = levels.first;
+    o->last_level = levels.last;
+    v->to_deepest = levels.to_end;
+    return EXIT_FINE;
+}
+
+static int check_names(const char *in, const char *out, const char *second)
+{
+    const char *names[] = { out, second };
+    for (int i = 0; i < 2; i++)
+        if (*names[i] && command_overwrites("export", in, names[i]))
+            return EXIT_USAGE;
+    return EXIT_FINE;
+}
+
+/* --- what was written --- */
+
+static void print_colours(const ebpo_export_report *r)
+{
+    const uint64_t of[2] = { r->vertex_colours, r->face_colours };
+    for (int i = 0; i < 2; i++)
+        if (of[i] != EBPO_EXPORT_NO_COLOURS)
+            printf("colours of %s: %s\n", i ? "faces" : "vertices",
+                   of[i] == EBPO_EXPORT_WRITTEN ? "written"
+                   : i ? "left out, as this format has none; xdmf and vtkhdf do"
+                       : "left out, as this format has none; the other formats do");
+}
+
+static void print_report(const char *out, const char *second, const ebpo_export_report *r)
+{
+    char count[2][40], volume[TABLE_CELL];
+    printf("%s%s%s\n", out, *second ? ", " : "", second);
+    for (int i = 0; i < r->block_count; i++) {
+        const ebpo_export_block *b = &r->block[i];
+        words_plural(count[0], sizeof count[0], b->vertices, "vertex", "vertices");
+        words_plural(count[1], sizeof count[1], b->triangles, "triangle", "triangles");
+        if (b->level < 0)
+            printf("mesh: %s, %s\n", count[0], count[1]);
+        else
+            printf("level %d: %" PRIu64 " envelopes, %s, %s, volume %s\n", b->level, b->nodes,
+                   count[0], count[1], table_volume(volume, "%.9g", b->volume));
+    }
+    if (r->origin[0] != 0 || r->origin[1] != 0 || r->origin[2] != 0)
+        printf("vertices are relative to %.9g %.9g %.9g, the nodes' translation\n", r->origin[0],
+               r->origin[1], r->origin[2]);
+    if (r->largest_change > 0)
+        printf("float32: coordinates are rounded by up to %.3g\n", r->largest_change);
+    print_colours(r);
+}
+
+static void json_block(json *j, const ebpo_export_block *b)
+{
+    json_object(j, NULL);
+    if (b->level < 0) {
+        json_text(j, "block", "mesh");
+    } else {
+        json_text(j, "block", "level");
+        json_int(j, "level", b->level);
+        json_uint(j, "envelopes", b->nodes);
+        json_real(j, "volume", b->volume);
+    }
+    json_uint(j, "polygons", b->polygons);
+    json_uint(j, "triangles", b->triangles);
+    json_uint(j, "vertices", b->vertices);
+    json_end(j);
+}
+
+static const char *const colour_words[] = { "none", "written", "left out" };
+
+static void print_json(const values *v, const char *out, const char *second,
+                       const ebpo_export_report *r, const traffic *t)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "format", format_words[v->format]);
+    json_array(&j, "files");
+    json_text(&j, NULL, out);
+    if (*second)
+        json_text(&j, NULL, second);
+    json_end(&j);
+    json_array(&j, "blocks");
+    for (int i = 0; i < r->block_count; i++)
+        json_block(&j, &r->block[i]);
+    json_end(&j);
+    json_reals(&j, "origin", r->origin, 3);
+    json_real(&j, "largest_change", r->largest_change);
+    json_text(&j, "vertex_colours", colour_words[r->vertex_colours]);
+    json_text(&j, "face_colours", colour_words[r->face_colours]);
+    remote_json(&j, t, &v->remote);
+    json_finish(&j);
+}
+
+/* --- the command --- */
+
+static int write_out(const values *v, const char *in, const char *out, const char *second,
+                     ebpo_export_options *o)
+{
+    progress_line line;
+    o->progress = progress_start(&line, "export", v->quiet);
+    o->threads = (unsigned)v->threads;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_export_report report = EBPO_EXPORT_REPORT_INIT;
+    ebpo_file *file = NULL;
+    ebpo_status status = remote_open(&file, in, &v->remote, &error);
+    if (status == EBPO_OK && v->to_deepest && o->first_level < ebpo_file_info(file)->level_count)
+        o->last_level = ebpo_file_info(file)->level_count - 1;
+    if (status == EBPO_OK)
+        status = ebpo_export(file, out, (ebpo_export_format)v->format, o, &report, &error);
+    progress_wipe(&line);
+    if (status == EBPO_OK) {
+        traffic t = traffic_of(file);
+        if (v->json)
+            print_json(v, out, second, &report, &t);
+        else if (!v->quiet)
+            print_report(out, second, &report);
+        if (!v->json)
+            remote_tell(&t, &v->remote, false);
+    }
+    ebpo_close(file);
+    return status == EBPO_OK ? EXIT_FINE : command_failed("export", &error);
+}
+
+static const values usual = { .format = -1, .level = -1, .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
+{
+    values *v = given;
+    char second[4096];
+    ebpo_export_options o;
+    int code = choose_format(v, operand[1]);
+    if (code == EXIT_FINE)
+        code = choose_levels(v, &o);
+    if (code == EXIT_FINE && !process_memory_take("export", v->memory, v->threads))
+        code = EXIT_USAGE;
+    if (code != EXIT_FINE)
+        return code;
+    if (!ebpo_export_second_file((ebpo_export_format)v->format, operand[1], second, sizeof second))
+        return command_usage(
+            "export",
+            "the output's name is too long, or contains a ':', which XDMF does not allow");
+    code = check_names(operand[0], operand[1], second);
+    if (code != EXIT_FINE)
+        return code;
+    if (!command_wants_hdf5("export", operand[0]))
+        return EXIT_FAILED;
+    return write_out(v, operand[0], operand[1], second, &o);
+}
+
+const command command_export = { &spec, sizeof usual, &usual, run };

@@ -1,0 +1,235 @@
+/* ebpo extract: a level's envelopes, the model itself, or a part of it, as PLY. */
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/memory_args.h"
+#include "cli/progress.h"
+#include "cli/reading.h"
+#include "cli/remote_args.h"
+#include "cli/standard_files.h"
+#include "cli/tables.h"
+#include "cli/textures.h"
+#include "cli/words.h"
+#include "cli/commands/commands.h"
+
+/* What is written. */
+typedef struct extracted {
+    ebpo_mesh mesh;
+    ebpo_subtree *lender; /* of the mesh, unless NULL */
+    double volume;
+} extracted;
+
+typedef struct values {
+    int64_t level, subtree, threads;
+    memory_values memory;
+    bool mesh, no_walls, json, quiet;
+    const char *textures;
+    remote_values remote;
+} values;
+
+/* All octcodes are below; limits of options are doubles, which hold this one. */
+#define OCTCODE_MOST (INT64_C(1) << 61)
+
+#include "cli/options/extract.inc"
+
+static int check_values(const values *v, const char *in, const char *out)
+{
+    int asked = (v->level >= 0) + v->mesh + (v->subtree > 0);
+    if (v->textures && strcmp(v->textures, "-") == 0)
+        return command_usage("extract", "--textures: '-': a folder's name is needed here");
+    if (asked == 0 && v->textures && !out)
+        return v->json ? command_usage("extract", "--json does not go with --textures alone")
+                       : EXIT_FINE;
+    if (asked == 0)
+        return command_usage("extract", "specify --level N, --mesh or --subtree OCTCODE");
+    if (!out)
+        return command_usage("extract", "missing operand; expected: FILE OUT.ply");
+    if (asked > 1)
+        return command_usage("extract", "--level, --mesh and --subtree cannot be used together");
+    if (v->level < 0 && v->no_walls)
+        return command_usage("extract",
+                             "--no-walls belongs to --level; the model has no cell walls");
+    if (command_overwrites("extract", in, out))
+        return EXIT_USAGE;
+    return EXIT_FINE;
+}
+
+/* Gray nodes of a whole subtree that have no children are pruned. */
+static void warn_of_pruned(const ebpo_subtree *subtree, const char *path)
+{
+    ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
+    uint64_t pruned = 0;
+    if (ebpo_subtree_get_nodes(subtree, &nodes) != EBPO_OK)
+        return;
+    for (uint64_t i = 0; i < nodes.node_count; i++)
+        pruned += nodes.types[i] == EBPO_GRAY && nodes.children[i] == EBPO_NO_CHILDREN;
+    char lacking[40];
+    words_plural(lacking, sizeof lacking, pruned, "node", "nodes");
+    if (pruned)
+        fprintf(stderr,
+                "ebpo extract: %s: note: is a subset without what is below %s of this subtree, so "
+                "faces are missing\n",
+                remote_shown(path), lacking);
+}
+
+/* Its faces as a mesh, lent by the subtree. */
+static ebpo_status take_subtree(const ebpo_file *file, const values *v, const char *path,
+                                const ebpo_workspace *workspace, extracted *out, ebpo_error *error)
+{
+    ebpo_subtree_options how = EBPO_SUBTREE_OPTIONS_INIT;
+    ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;
+    ebpo_workspace_stats allowed = EBPO_WORKSPACE_STATS_INIT;
+    ebpo_workspace_get_stats(workspace, &allowed);
+    how.parts = EBPO_PART_MESH;
+    how.memory = allowed.memory;
+    ebpo_status status = ebpo_subtree_open(file, (uint64_t)v->subtree, &how, &out->lender, error);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_get_faces(out->lender, &faces, error);
+    if (status == EBPO_OK)
+        warn_of_pruned(out->lender, path);
+    out->mesh.vertex_count = faces.vertex_count;
+    out->mesh.face_count = faces.face_count;
+    out->mesh.xyz32 = (float *)faces.xyz32;
+    out->mesh.xyz64 = (double *)faces.xyz64;
+    out->mesh.faces = (uint32_t *)faces.faces;
+    return status;
+}
+
+/* What stands in other elements is written where numbers of vertices are those of the source. */
+static void warn_of_elements(const ebpo_file *file, bool source_order, const char *path)
+{
+    ebpo_attribute_facts a = EBPO_ATTRIBUTE_FACTS_INIT;
+    bool others = false;
+    for (unsigned n = 0; ebpo_file_attribute(file, n, &a); n++)
+        others = others || (strcmp(a.element, "vertex") != 0 && strcmp(a.element, "face") != 0 &&
+                            strcmp(a.element, "ebpo:texture") != 0);
+    if (others && (!source_order || ebpo_file_info(file)->mend.welded_vertices))
+        fprintf(stderr,
+                "ebpo extract: %s: note: other elements are left out, as their numbers of vertices "
+                "are the source's\n",
+                remote_shown(path));
+}
+
+static ebpo_status take(ebpo_file *file, const values *v, const char *path,
+                        ebpo_workspace *workspace, ebpo_progress progress, extracted *out,
+                        ebpo_error *error)
+{
+    if (v->subtree > 0)
+        return take_subtree(file, v, path, workspace, out, error);
+    if (!v->mesh) {
+        ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
+        lod.walls = !v->no_walls;
+        lod.threads = (unsigned)v->threads;
+        lod.progress = progress;
+        lod.workspace = workspace;
+        return ebpo_lod_level(file, (int)v->level, &lod, &out->mesh, &out->volume, error);
+    }
+    bool source_order = false;
+    ebpo_read_options read = reading(v->threads, workspace);
+    read.attributes = 1;
+    ebpo_status status = ebpo_file_read_source_mesh(file, &read, &out->mesh, &source_order, error);
+    if (status == EBPO_OK && !source_order)
+        fprintf(
+            stderr,
+            "ebpo extract: %s: note: has no maps, so vertices and faces are in the file's order\n",
+            remote_shown(path));
+    if (status == EBPO_OK)
+        warn_of_elements(file, source_order, path);
+    if (status == EBPO_OK && ebpo_file_info(file)->pruned)
+        fprintf(stderr,
+                "ebpo extract: %s: note: is a subset, so its mesh is only part of the model's\n",
+                remote_shown(path));
+    return status;
+}
+
+static ebpo_status take_textures(const ebpo_file *file, const values *v, ebpo_error *error)
+{
+    textures t;
+    uint64_t written;
+    ebpo_status status = textures_read(&t, file, true, error);
+    if (status != EBPO_OK)
+        return status;
+    status = textures_write(&t, v->textures, &written, error);
+    textures_free(&t);
+    char images[40];
+    words_plural(images, sizeof images, written, "image", "images");
+    if (status == EBPO_OK && !v->quiet && !v->json)
+        printf("%s: %s\n", v->textures, images);
+    return status;
+}
+
+static void summarise(const values *v, const char *path, const extracted *out)
+{
+    char vertices[40], faces[40], volume[TABLE_CELL];
+    words_plural(vertices, sizeof vertices, out->mesh.vertex_count, "vertex", "vertices");
+    words_plural(faces, sizeof faces, out->mesh.face_count, "face", "faces");
+    printf("%s: %s, %s", standard_files_shown(path), vertices, faces);
+    if (v->level >= 0)
+        printf(", envelope volume %s", table_volume(volume, "%.9g", out->volume));
+    putchar('\n');
+}
+
+static void summarise_json(const values *v, const char *path, const extracted *out,
+                           const traffic *t)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "file", standard_files_shown(path));
+    json_uint(&j, "vertices", out->mesh.vertex_count);
+    json_uint(&j, "faces", out->mesh.face_count);
+    if (v->level >= 0)
+        json_real(&j, "envelope_volume", out->volume);
+    remote_json(&j, t, &v->remote);
+    json_finish(&j);
+}
+
+static const values usual = { .level = -1, .subtree = -1, .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
+{
+    values *v = given;
+    int code = check_values(v, operand[0], operand[1]);
+    if (code != EXIT_FINE)
+        return code;
+    if (!memory_good("extract", &v->memory))
+        return EXIT_USAGE;
+    if (!command_wants_hdf5("extract", operand[0]))
+        return EXIT_FAILED;
+    progress_line line;
+    ebpo_progress progress = progress_start(&line, "extract", v->quiet);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    extracted out = { .volume = 0 };
+    ebpo_workspace *workspace = NULL;
+    ebpo_status status = memory_make(&workspace, &v->memory, &error);
+    if (status == EBPO_OK)
+        status = remote_open(&file, operand[0], &v->remote, &error);
+    if (status == EBPO_OK && v->textures)
+        status = take_textures(file, v, &error);
+    if (status == EBPO_OK && operand[1])
+        status = take(file, v, operand[0], workspace, progress, &out, &error);
+    if (status == EBPO_OK && operand[1])
+        status = ebpo_mesh_write_ply(&out.mesh, operand[1], &error);
+    progress_wipe(&line);
+    if (status == EBPO_OK) {
+        traffic t = traffic_of(file);
+        if (v->json)
+            summarise_json(v, operand[1], &out, &t);
+        else if (operand[1] && !v->quiet)
+            summarise(v, operand[1], &out);
+        if (!v->json)
+            remote_tell(&t, &v->remote, false);
+    }
+    if (!out.lender)
+        ebpo_mesh_free(&out.mesh);
+    ebpo_subtree_close(out.lender);
+    ebpo_close(file);
+    ebpo_workspace_free(workspace);
+    return status == EBPO_OK ? EXIT_FINE : command_failed("extract", &error);
+}
+
+const command command_extract = { &spec, sizeof usual, &usual, run };

@@ -1,0 +1,205 @@
+/* ebpo fetch: a file, or a part of it, from a web server; what has come stays when it is
+ * interrupted. */
+#include <dirent.h>
+#include <errno.h>
+#include <inttypes.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/progress.h"
+#include "cli/words.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/subset_run.h"
+
+#include "cli/options/fetch.inc"
+
+/* --- the folder OUT.part: blocks as the library keeps them (--http-cache) --- */
+
+static const char BLOCK[] = ".ebpo-block", TEMPORARY[] = ".ebpo-part-";
+
+static bool is_ours(const char *name)
+{
+    size_t length = strlen(name), end = sizeof BLOCK - 1;
+    return (length > end && strcmp(name + length - end, BLOCK) == 0) ||
+           strncmp(name, TEMPORARY, sizeof TEMPORARY - 1) == 0;
+}
+
+/* Takes the blocks away, and the folder when nothing else is in it. */
+static void remove_part(const char *folder)
+{
+    DIR *d = opendir(folder);
+    if (!d)
+        return;
+    for (struct dirent *f; (f = readdir(d)) != NULL;)
+        if (is_ours(f->d_name))
+            unlinkat(dirfd(d), f->d_name, 0);
+    closedir(d);
+    rmdir(folder);
+}
+
+/* --- progress: the transfers' own thread draws, as this one waits for them --- */
+
+typedef struct ticker {
+    _Atomic bool active;
+    _Atomic bool shown;        /* the transfers' thread ticks */
+    _Atomic(ebpo_file *) file; /* NULL while it is being opened */
+    double last;
+} ticker;
+
+static bool tick(void *user)
+{
+    ticker *t = user;
+    ebpo_http_stats s = EBPO_HTTP_STATS_INIT;
+    ebpo_file *file = atomic_load(&t->file);
+    double now = progress_now();
+    char bytes[32], before[32];
+    if (!t->active || now - t->last < 0.2 ||
+        (file && ebpo_file_get_http_stats(file, &s) != EBPO_OK))
+        return false;
+    t->last = now;
+    if (!file)
+        fputs("\r\033[Kfetch: opening", stderr);
+    else
+        fprintf(stderr, "\r\033[Kfetch: %s in %" PRIu64 " requests",
+                words_bytes(bytes, sizeof bytes, s.bytes), s.requests);
+    if (s.cache_bytes)
+        fprintf(stderr, ", %s fetched earlier", words_bytes(before, sizeof before, s.cache_bytes));
+    fflush(stderr);
+    t->shown = true;
+    return false;
+}
+
+static void wipe(ticker *t)
+{
+    t->active = false;
+    if (t->shown)
+        fputs("\r\033[K", stderr);
+    t->shown = false;
+}
+
+/* --- work --- */
+
+/* What the folder held when the file was opened; true when that is of use. */
+static bool tell_resuming(const subset_values *v, ebpo_file *file, const char *url,
+                          const char *part)
+{
+    ebpo_http_stats s = EBPO_HTTP_STATS_INIT;
+    char bytes[32];
+    if (ebpo_file_get_http_stats(file, &s) != EBPO_OK)
+        return false;
+    if (s.cache_others && !s.cache_held)
+        fprintf(stderr,
+                "ebpo fetch: %s: has changed on the server, or is not the file that is in %s; "
+                "fetching it from the beginning\n",
+                remote_shown(url), part);
+    else if (s.cache_held && !v->quiet)
+        fprintf(stderr, "ebpo fetch: %s: resuming with %s from %s\n", remote_shown(url),
+                words_bytes(bytes, sizeof bytes, s.cache_held), part);
+    return s.cache_held > 0;
+}
+
+enum { BOX_BLOCK = 8192 };
+
+static int fetch(subset_values *v, const char *url, const char *out, const char *part,
+                 ebpo_subset_options *subset)
+{
+    double begun = progress_now();
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ticker t = { .last = 0 };
+    atomic_init(&t.active, !v->quiet && isatty(STDERR_FILENO));
+    atomic_init(&t.file, NULL);
+    v->remote.stop = tick;
+    v->remote.stop_user = &t;
+    if (part) {
+        v->remote.cache = part;
+        v->remote.cache_size = "1048576T";
+        /* a box takes many short ranges */
+        v->remote.cache_block = v->box ? BOX_BLOCK : 0;
+    }
+    ebpo_status status = remote_open(&file, url, &v->remote, &error);
+    if (t.shown)
+        fputs("\r\033[K", stderr);
+    bool held = status == EBPO_OK && part && tell_resuming(v, file, url, part);
+    atomic_store(&t.file, file);
+    if (status == EBPO_OK)
+        status = subset_settle(v, ebpo_file_info(file), remote_shown(url), subset, &error);
+    if (status == EBPO_OK)
+        status = ebpo_subset(file, out, subset, &error);
+    bool usage = status == EBPO_E_ARGUMENT;
+    wipe(&t);
+    if (status == EBPO_OK) {
+        traffic seen = traffic_of(file);
+        status = subset_tell(v, out, ebpo_file_info(file), &seen, progress_now() - begun, &error);
+        if (status == EBPO_OK && !v->json)
+            remote_tell(&seen, &v->remote, false);
+    }
+    ebpo_close(file);
+    if (part && status == EBPO_E_FORMAT &&
+        access(part, F_OK) == 0) { /* kept blocks would be damaged the next time as well */
+        remove_part(part);
+        int code = command_failed("fetch", &error);
+        fprintf(stderr, "ebpo fetch: what had been fetched was removed, as it may have been "
+                        "damaged in transit; the same command starts again\n");
+        return code;
+    }
+    if (part && (status == EBPO_OK ||
+                 (usage && !held))) /* a slip in an option takes nothing away that came before */
+        remove_part(part);
+    if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 &&
+        rmdir(part) != 0) { /* an empty one is of no use */
+        int code = command_failed("fetch", &error);
+        fprintf(stderr,
+                "ebpo fetch: what has been fetched is kept in %s; the same command resumes from "
+                "there\n",
+                part);
+        return code;
+    }
+    return status == EBPO_OK ? EXIT_FINE : command_failed("fetch", &error);
+}
+
+/* Before anything is fetched: false when it could not be put in its place. */
+static bool out_fits(const char *out, const char *part)
+{
+    struct stat s;
+    if (stat(out, &s) == 0 && S_ISDIR(s.st_mode)) {
+        fprintf(stderr, "ebpo fetch: %s: is a folder; name a file in it\n", out);
+        return false;
+    }
+    if (part && lstat(part, &s) == 0 && !S_ISDIR(s.st_mode)) {
+        fprintf(
+            stderr,
+            "ebpo fetch: %s: is in the way of the folder for what has been fetched; move it away\n",
+            part);
+        return false;
+    }
+    return true;
+}
+
+static const subset_values usual = SUBSET_VALUES_INIT;
+
+static int run(void *given, const char **operand)
+{
+    subset_values *v = given;
+    ebpo_subset_options subset;
+    int code = subset_options("fetch", v, operand[0], operand[1], &subset);
+    if (code != EXIT_FINE)
+        return code;
+    if (!command_wants_hdf5("fetch", operand[0]))
+        return EXIT_FAILED;
+    char *part = NULL; /* with a folder of the user's, that one does */
+    if (ebpo_is_url(operand[0]) && !v->remote.cache && asprintf(&part, "%s.part", operand[1]) < 0)
+        return command_no_memory("fetch");
+    code =
+        out_fits(operand[1], part) ? fetch(v, operand[0], operand[1], part, &subset) : EXIT_FAILED;
+    free(part);
+    return code;
+}
+
+const command command_fetch = { &spec, sizeof usual, &usual, run };

@@ -1,0 +1,337 @@
+/* ebpo repair: a new file of what is left of a damaged one. Whatever the tree holds is made anew of
+ * the mesh; the mesh is the file's own, or that of its source. */
+#include <inttypes.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/memory_args.h"
+#include "cli/mesh_input.h"
+#include "cli/progress.h"
+#include "cli/remote_args.h"
+#include "cli/textures.h"
+#include "cli/words.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/repair_look.h"
+
+typedef struct values {
+    const char *out, *source;
+    int64_t threads, most_expansion;
+    memory_values memory;
+    bool json, quiet;
+} values;
+
+#include "cli/options/repair.inc"
+
+static const char *const fate_words[] = { "none", "kept", "rebuilt", "lost" };
+static const char *const piece_words[] = { "mesh", "maps", "attributes", "levels", "sums" };
+
+/* --- the mesh to build from --- */
+
+typedef struct remade {
+    ebpo_mesh mesh;
+    ebpo_mesh_report report;
+    ebpo_mend_record record;
+    /* of a vertex or face of the mesh, its number in the source; NULL: it is that */
+    uint32_t *vertex_source, *face_source;
+} remade;
+
+static int in_order(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* The numbers of a map, ascending. */
+static uint32_t *sorted(const uint32_t *map, uint64_t count)
+{
+    uint32_t *out = malloc(count * sizeof *out);
+    if (!out)
+        return NULL;
+    memcpy(out, map, count * sizeof *out);
+    qsort(out, count, sizeof *out, in_order);
+    return out;
+}
+
+/* Welding and dropping leave gaps in the source's numbers, which the mesh alone does not tell. */
+static ebpo_status numbers_of(const patient *p, remade *r, ebpo_error *error)
+{
+    const ebpo_mend_record *m = &p->info->mend;
+    ebpo_maps maps;
+    ebpo_read_options read = patient_reading(p);
+    if (p->fate[MAPS] != KEPT || (!m->welded_vertices && !m->dropped_faces))
+        return EBPO_OK;
+    ebpo_status status = ebpo_file_read_maps(p->file, &read, &maps, error);
+    if (status != EBPO_OK)
+        return status;
+    r->vertex_source = sorted(maps.vertex_source, p->info->vertex_count);
+    r->face_source = sorted(maps.face_source, p->info->face_count);
+    ebpo_maps_free(&maps);
+    if (r->vertex_source && r->face_source)
+        return EBPO_OK;
+    snprintf(error->message, sizeof error->message, "not enough memory");
+    return error->status = EBPO_E_MEMORY;
+}
+
+static ebpo_status from_file(patient *p, remade *r, ebpo_error *error)
+{
+    ebpo_read_options read = patient_reading(p);
+    ebpo_prepare_options prepare = EBPO_PREPARE_OPTIONS_INIT;
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    bool ordered;
+    read.attributes = p->fate[ATTRIBUTES] == KEPT;
+    ebpo_status status = p->fate[MAPS] == KEPT
+                             ? ebpo_file_read_source_mesh(p->file, &read, &r->mesh, &ordered, error)
+                             : ebpo_file_read_mesh(p->file, &read, &r->mesh, error);
+    if (status != EBPO_OK)
+        return status;
+    r->mesh.workspace = p->workspace;
+    prepare.threads = p->threads;
+    prepare.progress = p->progress;
+    status = ebpo_mesh_prepare(&r->mesh, &prepare, &prepared, error);
+    r->report = prepared.report;
+    r->record = p->info->mend;
+    memcpy(r->mesh.source_name, p->info->source_name, sizeof r->mesh.source_name);
+    memcpy(r->mesh.source_sha256, p->info->source_sha256, sizeof r->mesh.source_sha256);
+    memcpy(r->mesh.source_format, p->info->source_format, sizeof r->mesh.source_format);
+    r->mesh.source_size = p->info->source_size;
+    return status == EBPO_OK ? numbers_of(p, r, error) : status;
+}
+
+static ebpo_status from_source(patient *p, remade *r, ebpo_error *error)
+{
+    const ebpo_mend_record *m = &p->info->mend;
+    mending steps = { .weld = m->weld && !(m->weld_distance > 0),
+                      .weld_distance = m->weld_distance,
+                      .drop_duplicates = m->dropped_faces > 0,
+                      .orient = m->orient,
+                      .flip = !m->orient && m->flipped_faces,
+                      .fill_holes = m->fill_holes };
+    mesh_input in;
+    mesh_reading more = !(p->info->parts & EBPO_PART_ATTRIBUTES) ? READ_MESH
+                        : textures_embedded(p->file)             ? READ_TEXTURES
+                                                                 : READ_ATTRIBUTES;
+    ebpo_status status = mesh_input_read(&in, p->v->source, steps, more, p->workspace, p->threads,
+                                         p->progress, error);
+    if (status != EBPO_OK)
+        return status;
+    r->mesh = in.mesh;
+    r->report = in.prepared.report;
+    r->record = in.prepared.record;
+    if (memcmp(in.as_read.source_sha256, p->info->source_sha256, sizeof in.as_read.source_sha256) !=
+        0) {
+        snprintf(
+            error->message, sizeof error->message,
+            "%s: is not what the file was made from, %s: its SHA-256 is another one; find that "
+            "very file, or convert this one",
+            p->v->source, p->info->source_name);
+        return error->status = EBPO_E_ABSENT;
+    }
+    for (int i = 0; i < LEVELS; i++)
+        p->fate[i] = p->fate[i] == LOST ? REBUILT : p->fate[i];
+    return EBPO_OK;
+}
+
+/* --- making --- */
+
+static ebpo_build_options building(const patient *p)
+{
+    ebpo_build_options o = EBPO_BUILD_OPTIONS_INIT;
+    const ebpo_info *info = p->info;
+    o.max_level = info->max_level;
+    o.leaf_faces = info->leaf_faces;
+    o.epsilon = info->epsilon;
+    o.select = (ebpo_selection)info->selection;
+    o.percent = info->percent > 0 ? info->percent : o.percent;
+    o.k_root = info->k_root;
+    o.normals = (ebpo_normal_distance)info->normals;
+    o.seed = info->seed;
+    o.parts = info->parts;
+    if (p->fate[MAPS] == LOST)
+        o.parts &= ~(uint32_t)EBPO_PART_MAPS;
+    if (p->fate[ATTRIBUTES] == LOST)
+        o.parts &= ~(uint32_t)(EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS);
+    o.rule = info->rule;
+    o.require_solid = info->solid;
+    o.threads = p->threads;
+    o.unit = info->unit[0] ? info->unit : NULL;
+    o.crs = info->crs[0] ? info->crs : NULL;
+    o.date = info->date[0] ? info->date : NULL;
+    o.progress = p->progress;
+    return o;
+}
+
+/* The mesh is consumed. */
+static ebpo_status make(const patient *p, remade *r, ebpo_error *error)
+{
+    ebpo_build_options build = building(p);
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_tree tree;
+    ebpo_status status = ebpo_build(&r->mesh, &r->report, &r->record, &build, &tree, error);
+    if (status != EBPO_OK)
+        return status;
+    for (uint64_t i = 0; r->vertex_source && tree.vertex_source && i < tree.info.vertex_count; i++)
+        tree.vertex_source[i] = r->vertex_source[tree.vertex_source[i]];
+    for (uint64_t i = 0; r->face_source && tree.face_source && i < tree.info.face_count; i++)
+        tree.face_source[i] = r->face_source[tree.face_source[i]];
+    write.codec = p->info->codec;
+    write.threads = p->threads;
+    write.face_coding = p->info->gates ? EBPO_FACES_GATES : EBPO_FACES_USUAL;
+    write.progress = p->progress;
+    status = ebpo_tree_write(&tree, p->v->out, &write, error);
+    ebpo_tree_free(&tree);
+    return status;
+}
+
+static ebpo_status compare(patient *p, ebpo_error *error)
+{
+    ebpo_file *made;
+    ebpo_status status = remote_open_own(p->v->out, &made, error);
+    if (status != EBPO_OK)
+        return status;
+    p->same = memcmp(ebpo_file_info(made)->content_sha256, p->info->content_sha256,
+                     sizeof p->info->content_sha256) == 0;
+    /* what was read without fault is kept only if it has become what it was */
+    if (p->fate[LEVELS] == LOST || !p->same)
+        p->fate[LEVELS] = REBUILT;
+    if (p->v->source && !textures_same(p->file, made)) {
+        p->fate[ATTRIBUTES] = LOST;
+        snprintf(p->why[ATTRIBUTES], sizeof p->why[ATTRIBUTES],
+                 "images that %.200s names are no more what they were", p->v->source);
+    }
+    ebpo_close(made);
+    return EBPO_OK;
+}
+
+static ebpo_status refuse(const patient *p, const char *why, ebpo_error *error)
+{
+    snprintf(error->message, sizeof error->message, "%s", why);
+    (void)p;
+    return error->status = EBPO_E_ABSENT;
+}
+
+/* What is damaged may be the list of how chunks end: nothing can be told to be the file's then. */
+static ebpo_status refuse_mesh(const patient *p, ebpo_error *error)
+{
+    char why[sizeof error->message];
+    snprintf(why, sizeof why,
+             "the file's mesh cannot be read, and all else is made of it; give the mesh that the "
+             "file was made from with --source (%.300s)",
+             p->why[MESH]);
+    return refuse(p, why, error);
+}
+
+static ebpo_status repair(patient *p, ebpo_error *error)
+{
+    remade r = { .vertex_source = NULL };
+    if (p->info->pruned)
+        return refuse(p,
+                      "the file is a subset: of what was left out nothing can be made again; take "
+                      "another subset of the original",
+                      error);
+    ebpo_status status = patient_look(p, error);
+    if (status != EBPO_OK)
+        return status;
+    if (!p->v->source && p->fate[MESH] == LOST)
+        return refuse_mesh(p, error);
+    if (!p->v->source && p->fate[MESH] != KEPT)
+        return refuse(
+            p,
+            "the file has no mesh, of which all else is made; give the mesh that the file "
+            "was made from with --source",
+            error);
+    status = p->v->source ? from_source(p, &r, error) : from_file(p, &r, error);
+    if (status == EBPO_OK)
+        status = make(p, &r, error);
+    else
+        ebpo_mesh_free(&r.mesh);
+    free(r.vertex_source);
+    free(r.face_source);
+    return status == EBPO_OK ? compare(p, error) : status;
+}
+
+/* --- telling --- */
+
+static void print_words(const patient *p, const char *in)
+{
+    char hex[65];
+    for (int i = 0; i < PIECES; i++)
+        if (p->fate[i] != NONE)
+            printf("  %-11s %s%s%s\n", piece_words[i], fate_words[p->fate[i]],
+                   p->why[i][0] ? ": " : "", p->why[i]);
+    words_hex(p->info->content_sha256, hex);
+    printf("%s: %s of %s, SHA-256 %s\n", p->v->out, p->same ? "the content" : "not the content", in,
+           hex);
+}
+
+static void print_json(const patient *p, const char *in)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "file", in);
+    json_text(&j, "output", p->v->out);
+    json_bool(&j, "same_content", p->same);
+    json_object(&j, "parts");
+    for (int i = 0; i < PIECES; i++)
+        json_text(&j, piece_words[i], fate_words[p->fate[i]]);
+    json_end(&j);
+    json_object(&j, "damage");
+    for (int i = 0; i < PIECES; i++)
+        if (p->why[i][0])
+            json_text(&j, piece_words[i], p->why[i]);
+        else
+            json_null(&j, piece_words[i]);
+    json_end(&j);
+    json_finish(&j);
+}
+
+/* Where maps are lost the content has to be another one. */
+static int code_of(const patient *p)
+{
+    return p->same || p->fate[MAPS] == LOST ? EXIT_FINE : EXIT_DIFFERS;
+}
+
+static const values usual = { 0 };
+
+static int run(void *given, const char **operand)
+{
+    const values *v = given;
+    progress_line line;
+    patient p = { .v = v,
+                  .path = operand[0],
+                  .threads = (unsigned)v->threads,
+                  .most_expansion = (uint64_t)v->most_expansion };
+    ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
+    how.most_expansion = (uint64_t)v->most_expansion;
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (!v->out)
+        return command_usage("repair", "give the new file with --output");
+    if (!memory_good("repair", &v->memory) || command_overwrites("repair", operand[0], v->out))
+        return EXIT_USAGE;
+    if (!command_wants_hdf5("repair", operand[0]))
+        return EXIT_FAILED;
+    p.progress = progress_start(&line, "repair", v->quiet);
+    ebpo_status status = ebpo_check_output(v->out, &error);
+    if (status == EBPO_OK)
+        status = memory_make(&p.workspace, &v->memory, &error);
+    if (status == EBPO_OK)
+        status = ebpo_open_with(operand[0], &how, &p.file, &error);
+    if (status == EBPO_OK) {
+        p.info = ebpo_file_info(p.file);
+        status = repair(&p, &error);
+    }
+    progress_wipe(&line);
+    if (status == EBPO_OK && v->json)
+        print_json(&p, operand[0]);
+    else if (status == EBPO_OK && !v->quiet)
+        print_words(&p, operand[0]);
+    ebpo_close(p.file);
+    ebpo_workspace_free(p.workspace);
+    return status == EBPO_OK ? code_of(&p) : command_failed("repair", &error);
+}
+
+const command command_repair = { &spec, sizeof usual, &usual, run };

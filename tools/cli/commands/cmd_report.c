@@ -1,0 +1,264 @@
+/* ebpo report: methods compared level by level: bytes, error, run time. */
+#include <errno.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/command.h"
+#include "cli/process_memory.h"
+#include "cli/selection_args.h"
+#include "cli/words.h"
+#include "cli/commands/commands.h"
+#include "cli/report/report_data.h"
+#include "cli/report/report_output.h"
+
+static const char *const up_words[] = { "x", "y", "z", NULL };
+
+#include "cli/options/report.inc"
+
+static int wrong(const char *option, const char *value, const char *expected)
+{
+    return command_usage("report", "%s: '%s' is not %s", option, value, expected);
+}
+
+/* --- options --- */
+
+/* The next of a list with commas; false: there is none, or it is too long. */
+static bool next_word(const char **at, char *word, size_t capacity)
+{
+    size_t length = strcspn(*at, ",");
+    if (!length || length >= capacity)
+        return false;
+    memcpy(word, *at, length);
+    word[length] = 0;
+    *at += length + ((*at)[length] == ',' && (*at)[length + 1]);
+    return true;
+}
+
+static int add_setting(comparison *c, const report_values *v, const char *word)
+{
+    char *end;
+    plane_setting *s = &c->setting[c->settings++];
+    s->percent = v->percent ? strtod(word, &end) : 40;
+    if (v->percent && (*end || !(s->percent >= 0) || !(s->percent <= 100)))
+        return wrong("--percent", word, "a number from 0 to 100");
+    if (!v->percent)
+        snprintf(s->k_root, sizeof s->k_root, "%s", word);
+    snprintf(s->word, sizeof s->word, v->percent ? "-%s%%" : "-K%s", word);
+    for (const plane_setting *other = c->setting; other < s; other++)
+        if (strcmp(other->word, s->word) == 0)
+            return wrong(v->percent ? "--percent" : "--k-root", word,
+                         "another number than one before it");
+    selection_options chosen = { v->select,  v->percent ? s->percent : -1,
+                                 v->epsilon, v->percent ? NULL : s->k_root,
+                                 v->normals, -1 };
+    return selection_check("report", &chosen);
+}
+
+/* How many planes the theses' selections take. */
+static int read_settings(comparison *c, const report_values *v)
+{
+    const char *list = v->percent ? v->percent : v->k_root;
+    char word[sizeof c->setting->k_root];
+    int code = EXIT_FINE;
+    selection_options all = { v->select, v->percent ? 1 : -1, v->epsilon, NULL, v->normals, -1 };
+    if (!list) { /* the seed is of the points, too */
+        c->setting[c->settings++].percent = 40;
+        return selection_check("report", &all);
+    }
+    if (v->percent && v->k_root)
+        return command_usage("report", "--percent and --k-root cannot be used together; give one");
+    for (const char *at = list; *at && code == EXIT_FINE;) {
+        if (c->settings == SETTINGS_MAX || !next_word(&at, word, sizeof word))
+            return wrong(v->percent ? "--percent" : "--k-root", list,
+                         "at most 12 numbers with commas between them");
+        code = add_setting(c, v, word);
+    }
+    if (c->settings == 0)
+        return wrong(v->percent ? "--percent" : "--k-root", list, "a number");
+    if (c->settings == 1)
+        c->setting[0].word[0] = 0;
+    return code;
+}
+
+static int read_options(comparison *c, report_values *v, bool mesh)
+{
+    char rest;
+    word_levels levels = { .last = EBPO_LEVELS_MAX - 1, .is_run = true };
+    if (v->levels && (!words_read_levels(v->levels, &levels) || !levels.is_run))
+        return wrong("--levels", v->levels,
+                     "one level or a first and a last one, such as 0-6 or 3-");
+    c->first = levels.first;
+    c->last = levels.last;
+    if (sscanf(v->view, "%lf,%lf%c", &c->azimuth, &c->elevation, &rest) != 2 ||
+        !(fabs(c->azimuth) <= 360) || !(fabs(c->elevation) <= 90))
+        return wrong("--view", v->view,
+                     "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
+    bool building = v->select || v->percent || v->k_root || v->normals >= 0 || v->max_level >= 0 ||
+                    v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
+    if (!mesh && building)
+        return command_usage(
+            "report", "--select, --percent, --k-root, --normals, --max-level, --leaf-faces, "
+                      "--epsilon and --keep only apply to a mesh, from which files are made");
+    const ebpo_build_options usual = EBPO_BUILD_OPTIONS_INIT;
+    v->select = v->select ? v->select : 1u << EBPO_SELECT_INHERIT;
+    int code = read_settings(c, v);
+    if (code != EXIT_FINE)
+        return code;
+    v->normals = v->normals >= 0 ? v->normals : (int)usual.normals;
+    v->leaf_faces = v->leaf_faces >= 0 ? v->leaf_faces : usual.leaf_faces;
+    v->epsilon = v->epsilon >= 0 ? v->epsilon : usual.epsilon;
+    return EXIT_FINE;
+}
+
+/* --- output --- */
+
+static ebpo_status write_one(const comparison *c, const char *name,
+                             void (*write)(FILE *, const comparison *), ebpo_error *error)
+{
+    char path[sizeof c->folder + 32], *text = NULL;
+    size_t size = 0;
+    snprintf(path, sizeof path, "%s/%s", c->folder, name);
+    FILE *f = open_memstream(&text, &size);
+    if (f)
+        write(f, c);
+    bool good = f && !ferror(f);
+    if (f && fclose(f) != 0)
+        good = false;
+    ebpo_status status = EBPO_E_MEMORY;
+    if (good)
+        status = ebpo_write_file(path, text, size, error);
+    else
+        snprintf(error->message, sizeof error->message,
+                 "%s: not enough memory; use fewer --levels, or --no-pictures", name);
+    free(text);
+    return error->status = status;
+}
+
+static void write_json(FILE *out, const comparison *c) { report_to_json(out, c, false); }
+
+static ebpo_status write_all(const comparison *c, ebpo_error *error)
+{
+    ebpo_status status = write_one(c, "report.csv", report_csv, error);
+    if (status == EBPO_OK)
+        status = write_one(c, "report.json", write_json, error);
+    if (status == EBPO_OK && !report_page_missing())
+        status = write_one(c, "report.html", report_page, error);
+    return status;
+}
+
+static void drop_built(const comparison *c)
+{
+    for (int i = 0; i < c->count && !c->v->keep; i++)
+        if (strncmp(c->methods[i].path, c->folder, strlen(c->folder)) == 0)
+            remove(c->methods[i].path);
+}
+
+static void summary(const comparison *c, const char *place)
+{
+    printf("%s: ", place);
+    for (int i = 0; i < c->count; i++)
+        printf("%s%s", i ? ", " : "", c->methods[i].name);
+    printf("; levels %d to %d; %s/%sreport.csv, report.json in %.0f s\n", c->first,
+           comparison_last(c), place, report_page_missing() ? "" : "report.html, ", c->seconds);
+    for (int i = 0; i < c->count; i++)
+        for (int k = 0; k < c->methods[i].note_count; k++)
+            printf("  %s: %s\n", c->methods[i].name, c->methods[i].note[k]);
+}
+
+/* --- the work --- */
+
+static ebpo_status measure(comparison *c, ebpo_error *error)
+{
+    ebpo_status status = report_make_points(c, error);
+    for (int i = 0; i < c->count && status == EBPO_OK; i++)
+        status = report_gather(c, &c->methods[i], error);
+    for (int round = 0; round < ROUNDS; round++)
+        for (int i = 0; i < c->count && status == EBPO_OK; i++)
+            status = report_round(c, &c->methods[i], round, error);
+    for (int i = 0; i < c->count; i++)
+        report_settle(c, &c->methods[i]);
+    if (c->v->no_pictures)
+        c->without_pictures = "--no-pictures was given";
+    else if (status == EBPO_OK)
+        status = report_pictures(c, error);
+    return status;
+}
+
+static int work(comparison *c, const char *const *operand, const char *place, progress_line *line)
+{
+    double begun = progress_now();
+    ebpo_error error = EBPO_ERROR_INIT;
+    int code = report_find_methods(c, operand);
+    if (code != EXIT_FINE)
+        return code;
+    ebpo_status status = measure(c, &error);
+    c->seconds = progress_now() - begun;
+    if (status == EBPO_OK)
+        status = write_all(c, &error);
+    progress_wipe(line);
+    if (status != EBPO_OK)
+        return command_failed("report", &error);
+    drop_built(c);
+    if (!output_commit(place, c->folder))
+        return EXIT_FAILED;
+    c->folder[0] = 0;
+    if (report_page_missing())
+        fprintf(stderr, "ebpo report: warning: no page: %s\n", report_page_missing());
+    if (c->v->json)
+        report_to_json(stdout, c, false);
+    else if (!c->v->quiet)
+        summary(c, place);
+    return EXIT_FINE;
+}
+
+/* Of "dir/bunny.ply" report-bunny. */
+static void default_place(const char *operand, char *out, size_t capacity)
+{
+    char stem[201];
+    report_stem(operand, stem, sizeof stem);
+    snprintf(out, capacity, "report-%s", stem);
+}
+
+static const report_values usual = { .normals = -1,
+                                     .max_level = -1,
+                                     .leaf_faces = -1,
+                                     .epsilon = -1,
+                                     .points = 5000,
+                                     .seed = 1,
+                                     .up = 1,
+                                     .view = "30,20",
+                                     .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
+{
+    report_values *v = given;
+    char named_after_input[256];
+    comparison c = { .v = v };
+    if (!process_memory_take("report", v->memory, v->threads))
+        return EXIT_USAGE;
+    int is_hdf5 = command_is_hdf5("report", operand[0]);
+    int code = is_hdf5 < 0 ? EXIT_FAILED : read_options(&c, v, !is_hdf5);
+    if (code != EXIT_FINE)
+        return code;
+    default_place(operand[0], named_after_input, sizeof named_after_input);
+    const char *place = v->out ? v->out : named_after_input;
+    code = output_begin(place, operand, c.folder, sizeof c.folder);
+    if (code != EXIT_FINE)
+        return code;
+    progress_line line;
+    c.progress = progress_start(&line, "report", v->quiet);
+    c.methods = calloc(METHODS_MAX, sizeof *c.methods);
+    if (c.methods) {
+        code = work(&c, operand, place, &line);
+    } else {
+        code = command_no_memory("report");
+    }
+    progress_wipe(&line);
+    output_drop(c.folder);
+    comparison_free(&c);
+    return code;
+}
+
+const command command_report = { &spec, sizeof usual, &usual, run };

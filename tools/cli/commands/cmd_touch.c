@@ -1,0 +1,411 @@
+/* ebpo touch: a hand played at a steady rate, and whether any of its ticks was late. */
+#include <float.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/model_memory.h"
+#include "cli/numbers.h"
+#include "cli/points.h"
+#include "cli/remote_args.h"
+#include "cli/words.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/touch_play.h"
+
+typedef struct values {
+    const char *path, *device, *record, *tool, *memory;
+    double rate, seconds, radius, friction, stiffness, damping, skin, look;
+    int64_t faces;
+    bool sense, json;
+    remote_values remote;
+} values;
+
+#include "cli/options/touch.inc"
+
+typedef struct job {
+    const values *v;
+    const char *name; /* FILE */
+    ebpo_file *file;
+    ebpo_model *model;
+    ebpo_touch *touch;
+    double *points; /* of the tool */
+    uint64_t point_count;
+    ebpo_touch_kind kind;
+    touch_device device;
+    touch_pose *record;
+    const char *scheduling;
+    touch_times empty, times;
+    ebpo_touch_stats stats;
+    ebpo_error stopped; /* EBPO_OK, or what has ended loading */
+    ebpo_model_stats memory;
+} job;
+
+/* --- what is told --- */
+
+static const char *const kinds[] = { "a hand", "a probe", "a tool" };
+
+static void print_times(const char *name, const touch_times *t)
+{
+    printf("  %-8s %10llu %6llu %7llu %9.2f %9.2f %9.2f %9.2f %9.2f %11.2f %9.2f %10.2f %9.2f\n",
+           name, (unsigned long long)t->ticks, (unsigned long long)t->late,
+           (unsigned long long)t->over_ms, 1e6 * t->p50, 1e6 * t->p99, 1e6 * t->p99_9,
+           1e6 * t->p99_99, 1e6 * t->most, 1e6 * t->wake_p99_9, 1e6 * t->wake_most,
+           1e6 * t->cpu_p99_9, 1e6 * t->cpu_most);
+}
+
+static void print_bins(const touch_times *t)
+{
+    puts("  microseconds from begin to end: ticks");
+    for (int i = 0; i < TOUCH_BINS; i++)
+        if (t->bins[i])
+            printf("  %6d %s %llu\n", i ? 1 << (i - 1) : 0,
+                   i < TOUCH_BINS - 1 ? "up  " : "and more", (unsigned long long)t->bins[i]);
+}
+
+static void print_report(const job *j)
+{
+    const ebpo_touch_stats *s = &j->stats;
+    printf("%s: %s at %g Hz, %s\n", remote_shown(j->name), kinds[j->kind], j->v->rate,
+           j->scheduling);
+    printf("  %-8s %10s %6s %7s %9s %9s %9s %9s %9s %11s %9s %10s %9s\n", "us", "ticks", "late",
+           ">1 ms", "p50", "p99", "p99.9", "p99.99", "most", "wake p99.9", "most", "cpu p99.9",
+           "most");
+    print_times("touch", &j->times);
+    print_times("nothing", &j->empty);
+    printf("  contact %llu, waits %llu, short %llu, partly %llu; faces at most %llu; page faults "
+           "%llu\n",
+           (unsigned long long)s->contacts, (unsigned long long)s->waits,
+           (unsigned long long)s->shorts, (unsigned long long)s->partly,
+           (unsigned long long)s->work_most, (unsigned long long)j->times.page_faults);
+    if (j->kind == EBPO_TOUCH_PROBE)
+        printf("  distances known to %g on average, %g at most\n", j->times.between_mean,
+               j->times.between_most);
+    printf("  boxes loaded %llu, taken %llu, too full %llu; %.3f s, the longest %.3f s; %llu "
+           "bytes\n",
+           (unsigned long long)s->loads, (unsigned long long)s->taken,
+           (unsigned long long)s->too_many, s->load_seconds, s->load_seconds_most,
+           (unsigned long long)s->memory);
+    if (j->stopped.status != EBPO_OK)
+        printf("  loading has stopped: so it was in %llu ticks\n", (unsigned long long)s->stopped);
+    printf("  model: %llu bytes at most, %llu subtrees loaded\n",
+           (unsigned long long)j->memory.memory_peak, (unsigned long long)j->memory.loads);
+    print_bins(&j->times);
+}
+
+static void json_times(json *out, const char *key, const touch_times *t)
+{
+    json_object(out, key);
+    json_uint(out, "ticks", t->ticks);
+    json_uint(out, "late", t->late);
+    json_real(out, "p50", t->p50);
+    json_real(out, "p99", t->p99);
+    json_real(out, "p99_9", t->p99_9);
+    json_real(out, "p99_99", t->p99_99);
+    json_real(out, "most", t->most);
+    json_real(out, "wake_p99_9", t->wake_p99_9);
+    json_real(out, "wake_most", t->wake_most);
+    json_real(out, "cpu_p99_9", t->cpu_p99_9);
+    json_real(out, "cpu_most", t->cpu_most);
+    json_uint(out, "over_ms", t->over_ms);
+    json_uint(out, "page_faults", t->page_faults);
+    json_array(out, "histogram");
+    for (int i = 0; i < TOUCH_BINS; i++)
+        json_uint(out, NULL, t->bins[i]);
+    json_end(out);
+    json_end(out);
+}
+
+static void json_report(const job *j)
+{
+    const ebpo_touch_stats *s = &j->stats;
+    json out;
+    json_begin(&out, stdout);
+    json_object(&out, NULL);
+    json_text(&out, "file", remote_shown(j->name));
+    json_text(&out, "hand", kinds[j->kind] + 2);
+    json_real(&out, "rate", j->v->rate);
+    json_text(&out, "scheduling", j->scheduling);
+    json_times(&out, "touch", &j->times);
+    json_times(&out, "nothing", &j->empty);
+    if (j->kind == EBPO_TOUCH_PROBE) {
+        json_real(&out, "between_mean", j->times.between_mean);
+        json_real(&out, "between_most", j->times.between_most);
+    }
+    json_uint(&out, "contacts", s->contacts);
+    json_uint(&out, "waits", s->waits);
+    json_uint(&out, "shorts", s->shorts);
+    json_uint(&out, "partly", s->partly);
+    json_uint(&out, "faces_most", s->work_most);
+    json_uint(&out, "loads", s->loads);
+    json_uint(&out, "taken", s->taken);
+    json_uint(&out, "too_full", s->too_many);
+    json_real(&out, "load_seconds", s->load_seconds);
+    json_real(&out, "load_seconds_most", s->load_seconds_most);
+    json_uint(&out, "box_bytes", s->memory);
+    json_uint(&out, "model_bytes_most", j->memory.memory_peak);
+    json_uint(&out, "subtrees_loaded", j->memory.loads);
+    json_uint(&out, "stopped", s->stopped);
+    if (j->stopped.status != EBPO_OK)
+        json_text(&out, "failure", j->stopped.message);
+    json_finish(&out);
+}
+
+/* --- running --- */
+
+/* Tools are vertices of a mesh file, or points as `ebpo inside` reads them. */
+static bool read_mesh_tool(job *j)
+{
+    ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh mesh;
+    if (ebpo_mesh_read(j->v->tool, &read, &mesh, &error) != EBPO_OK) {
+        (void)command_failed("touch", &error);
+        return false;
+    }
+    j->point_count = mesh.vertex_count;
+    j->points = malloc(3 * mesh.vertex_count * sizeof *j->points);
+    for (uint64_t i = 0; j->points && i < 3 * mesh.vertex_count; i++)
+        j->points[i] = mesh.xyz32 ? (double)mesh.xyz32[i] : mesh.xyz64[i];
+    ebpo_mesh_free(&mesh);
+    return j->points != NULL;
+}
+
+static bool read_point_tool(job *j)
+{
+    points p;
+    double rows[3 * POINTS_BATCH];
+    uint64_t got;
+    bool fine = points_open(&p, "touch", j->v->tool, POINTS, false, INFINITY);
+    while (fine && (got = points_next(&p, rows)) > 0) {
+        double *more = realloc(j->points, (j->point_count + got) * 3 * sizeof *more);
+        fine = more != NULL;
+        if (!fine)
+            break;
+        memcpy(more + 3 * j->point_count, rows, got * 3 * sizeof *more);
+        j->points = more;
+        j->point_count += got;
+    }
+    fine = fine && !p.failed;
+    points_close(&p);
+    return fine;
+}
+
+static bool read_tool(job *j)
+{
+    const char *name = j->v->tool;
+    if (!name)
+        return true;
+    bool mesh = words_end_with(name, ".obj") || words_end_with(name, ".stl") ||
+                words_end_with(name, ".off");
+    if (!(mesh ? read_mesh_tool(j) : read_point_tool(j)))
+        return false;
+    if (j->point_count > 0 && j->point_count <= 10000)
+        return true;
+    fprintf(stderr, "ebpo touch: the tool %s has %llu points; 1 to 10,000 are expected\n", name,
+            (unsigned long long)j->point_count);
+    return false;
+}
+
+static double tool_radius(const job *j)
+{
+    double most = j->v->radius;
+    for (uint64_t i = 0; i < j->point_count; i++)
+        most =
+            fmax(most, hypot(hypot(j->points[3 * i], j->points[3 * i + 1]), j->points[3 * i + 2]));
+    return most;
+}
+
+static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
+{
+    ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
+    opening.memory = memory;
+    ebpo_status status = remote_open(&j->file, j->name, &j->v->remote, error);
+    if (status == EBPO_OK && !j->v->memory)
+        model_memory_usual("touch", j->file, j->name, &opening);
+    if (status == EBPO_OK)
+        status = ebpo_model_new(j->file, &opening, &j->model, error);
+    if (status == EBPO_OK && !j->v->path && !j->v->device)
+        status = touch_own_open(&j->device, j->model, ebpo_file_info(j->file), j->v->rate,
+                                tool_radius(j), error);
+    return status;
+}
+
+static ebpo_status open_hand(job *j, const double start[3], ebpo_error *error)
+{
+    const values *v = j->v;
+    ebpo_touch_options wanted = EBPO_TOUCH_OPTIONS_INIT;
+    wanted.radius = v->radius;
+    wanted.friction = v->friction;
+    wanted.stiffness = v->stiffness;
+    wanted.damping = v->damping;
+    wanted.skin = v->skin;
+    wanted.look = v->look;
+    wanted.tick = 1 / v->rate;
+    wanted.faces = (uint64_t)v->faces;
+    wanted.kind = j->kind;
+    wanted.points = (const double(*)[3])j->points;
+    wanted.point_count = j->point_count;
+    return ebpo_touch_new(j->model, &wanted, start, &j->touch, error);
+}
+
+static double diagonal(const ebpo_info *info)
+{
+    return hypot(hypot(info->box_size[0], info->box_size[1]), info->box_size[2]);
+}
+
+static ebpo_status no_memory(ebpo_error *error, const char *what)
+{
+    *error = (ebpo_error){ .status = EBPO_E_MEMORY };
+    snprintf(error->message, sizeof error->message, "not enough memory for %s", what);
+    return EBPO_E_MEMORY;
+}
+
+/* The empty loop, a tenth as long: what the machine itself adds. Before a device begins. */
+static ebpo_status play_nothing(job *j, ebpo_error *error)
+{
+    const values *v = j->v;
+    uint64_t ticks = v->path ? j->device.ticks(j->device.self) : 0;
+    const touch_play empty = { .rate = v->rate,
+                               .seconds = ticks ? (double)ticks / v->rate / 10 : v->seconds / 10 };
+    touch_play_first();
+    bool fine = touch_play_run(&empty, &j->empty);
+    touch_play_behind(); /* and so does what loads, which is made now */
+    return fine ? EBPO_OK : no_memory(error, "the times of ticks");
+}
+
+static ebpo_status play(job *j, ebpo_error *error)
+{
+    const values *v = j->v;
+    touch_play all = { v->rate,    v->seconds, j->touch,
+                       &j->device, j->kind,    diagonal(ebpo_file_info(j->file)) / 20,
+                       NULL };
+    if (v->record) {
+        j->record = calloc(touch_play_ticks(&all), sizeof *j->record);
+        if (!j->record)
+            return no_memory(error, "the record");
+        all.record = j->record;
+    }
+    j->scheduling = touch_play_first();
+    if (!touch_play_run(&all, &j->times))
+        return no_memory(error, "the times of ticks");
+    ebpo_touch_get_stats(j->touch, &j->stats);
+    ebpo_model_get_stats(j->model, &j->memory);
+    j->stopped.status = ebpo_touch_check(j->touch, &j->stopped);
+    return EBPO_OK;
+}
+
+/* As --path reads it: each number to the last bit. */
+static ebpo_status write_record(const job *j, ebpo_error *error)
+{
+    enum { LINE = 7 * (NUMBER_ROOM + 1) };
+    char *text = malloc(j->times.ticks * LINE + 1), *at = text;
+    if (!text)
+        return no_memory(error, "what is recorded");
+    for (uint64_t i = 0; i < j->times.ticks; i++) {
+        const touch_pose *p = &j->record[i];
+        for (int k = 0; k < 7; k++) {
+            at = number_write(at, k < 3 ? p->place[k] : p->turn[k - 3]);
+            *at++ = k < 6 ? ' ' : '\n';
+        }
+    }
+    ebpo_status status = ebpo_write_file(j->v->record, text, (size_t)(at - text), error);
+    free(text);
+    return status;
+}
+
+static int run_job(job *j, uint64_t memory)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    touch_pose start;
+    ebpo_status status = j->v->record ? ebpo_check_output(j->v->record, &error) : EBPO_OK;
+    if (status == EBPO_OK)
+        status = open_model(j, memory, &error);
+    if (status == EBPO_OK)
+        status = play_nothing(j, &error);
+    if (status == EBPO_OK && !j->device.begin(j->device.self, j->v->seconds, &start))
+        return EXIT_FAILED;
+    if (status == EBPO_OK)
+        status = open_hand(j, start.place, &error);
+    if (status == EBPO_OK)
+        status = play(j, &error);
+    if (status == EBPO_OK && j->v->record)
+        status = write_record(j, &error);
+    if (status != EBPO_OK)
+        return command_failed("touch", &error);
+    if (j->v->json)
+        json_report(j);
+    else
+        print_report(j);
+    return j->stopped.status == EBPO_OK ? EXIT_FINE : command_failed("touch", &j->stopped);
+}
+
+/* 0: nothing is wrong with them. */
+static int check(const values *v, uint64_t *memory)
+{
+    if (v->memory && !words_read_size(v->memory, memory))
+        return command_usage("touch", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
+    if (v->path && v->seconds != 10)
+        return command_usage("touch", "--seconds is for the hand without --path, which ends with "
+                                      "its last place");
+    if (v->path && v->device)
+        return command_usage("touch", "--path and --device: either moves the hand");
+    if (v->device && !touch_udp_named(v->device))
+        return command_usage("touch", "--device '%s': expected udp:PORT or udp:ADDRESS:PORT",
+                             v->device);
+    if (v->tool && v->sense)
+        return command_usage("touch", "--tool and --sense: a probe is a point");
+    if ((v->tool || v->sense) && v->radius > 0)
+        return command_usage("touch", "--radius is for a ball, without --tool and --sense");
+    return 0;
+}
+
+/* The record would replace what is read. */
+static bool overwrites(const values *v, const char *model)
+{
+    const char *in[] = { model, v->path, v->tool };
+    for (int i = 0; v->record && i < 3; i++)
+        if (in[i] && command_overwrites("touch", in[i], v->record))
+            return true;
+    return false;
+}
+
+static int run(void *given, const char **operand)
+{
+    const values *v = given;
+    job j = { .v = v,
+              .name = operand[0],
+              .kind = v->tool    ? EBPO_TOUCH_TOOL
+                      : v->sense ? EBPO_TOUCH_PROBE
+                                 : EBPO_TOUCH_BALL,
+              .stats = EBPO_TOUCH_STATS_INIT,
+              .memory = EBPO_MODEL_STATS_INIT };
+    uint64_t memory = 0;
+    int code = check(v, &memory);
+    if (code != 0 || overwrites(v, operand[0]))
+        return EXIT_USAGE;
+    bool fine = command_wants_hdf5("touch", operand[0]) && read_tool(&j) &&
+                (!v->path || touch_path_open(&j.device, v->path)) &&
+                (!v->device || touch_udp_open(&j.device, v->device));
+    code = fine ? run_job(&j, memory) : EXIT_FAILED;
+    ebpo_touch_free(j.touch);
+    ebpo_model_free(j.model);
+    ebpo_close(j.file);
+    if (j.device.end)
+        j.device.end(j.device.self);
+    free(j.points);
+    free(j.record);
+    return code;
+}
+
+static const values usual = { .rate = 1000,
+                              .seconds = 10,
+                              .stiffness = 400,
+                              .damping = 0.4,
+                              .faces = 1 << 14,
+                              .remote = REMOTE_VALUES_INIT };
+
+const command command_touch = { &spec, sizeof usual, &usual, run };

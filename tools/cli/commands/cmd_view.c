@@ -1,0 +1,304 @@
+/* ebpo view: nodes in the order in which they matter to an observer, under a budget. */
+#include <inttypes.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <ebpo/view.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/progress.h"
+#include "cli/remote_args.h"
+#include "cli/tables.h"
+#include "cli/words.h"
+#include "cli/commands/commands.h"
+#include "cli/render/cut_mesh.h"
+
+typedef struct values {
+    int order;
+    const char *eye, *look, *up, *size, *bytes, *memory, *out;
+    double fov, pixels, distance;
+    int64_t to, count;
+    bool seen_only, nodes, json;
+    remote_values remote;
+} values;
+
+static const char *const order_words[] = { "level", "distance", "pixels", "front-to-back", NULL };
+
+#include "cli/options/view.inc"
+
+static const char *const end_names[] = { "", "done", "bytes", "nodes" };
+
+typedef struct printer {
+    const values *v;
+    double begin;
+    json j;
+} printer;
+
+/* --- options --- */
+
+static int check_values(const values *v)
+{
+    if (!v->eye && (v->order > EBPO_PRIORITY_LEVEL || v->look || v->fov > 0 || v->size ||
+                    v->pixels > 0 || v->distance >= 0))
+        return command_usage("view", "--order distance, pixels and front-to-back, --look, --fov, "
+                                     "--size, --pixels and --distance need --eye X,Y,Z");
+    if (!v->look && (v->up || v->seen_only))
+        return command_usage(
+            "view",
+            "--up and --seen-only need --look X,Y,Z: without it the observer looks all around");
+    return EXIT_FINE;
+}
+
+static bool read_triple(const char *name, const char *text, double out[3])
+{
+    char rest;
+    if (sscanf(text, "%lf,%lf,%lf%c", &out[0], &out[1], &out[2], &rest) == 3 && isfinite(out[0]) &&
+        isfinite(out[1]) && isfinite(out[2]))
+        return true;
+    command_usage("view", "--%s: '%s' is not three numbers separated by commas", name, text);
+    return false;
+}
+
+static bool read_budget(const char *name, const char *text, uint64_t *out)
+{
+    if (!text || (words_read_size(text, out) && *out))
+        return true;
+    command_usage("view", "--%s: '%s' is not " WORDS_SIZE_EXPECTED, name, text);
+    return false;
+}
+
+static bool read_observer(const values *v, ebpo_observer *o)
+{
+    double look[3];
+    char rest;
+    if (!read_triple("eye", v->eye, o->eye) || (v->look && !read_triple("look", v->look, look)) ||
+        (v->up && !read_triple("up", v->up, o->up)))
+        return false;
+    for (int k = 0; k < 3 && v->look; k++)
+        o->direction[k] = look[k] - o->eye[k];
+    if (v->look && o->direction[0] == 0 && o->direction[1] == 0 && o->direction[2] == 0) {
+        fprintf(stderr, "ebpo view: --look and --eye are the same point; choose another --look\n");
+        return false;
+    }
+    if (v->fov > 0)
+        o->fov = v->fov;
+    if (v->size &&
+        (sscanf(v->size, "%9" SCNu32 "x%9" SCNu32 "%c", &o->width, &o->height, &rest) != 2 ||
+         !o->width || !o->height)) {
+        command_usage("view", "--size: '%s' is not a width, an x, and a height, each from 1",
+                      v->size);
+        return false;
+    }
+    return true;
+}
+
+static bool read_options(const values *v, ebpo_view_options *o, ebpo_observer *observer)
+{
+    o->priority = v->order >= 0 ? (ebpo_priority)v->order
+                  : v->eye      ? EBPO_PRIORITY_PIXELS
+                                : EBPO_PRIORITY_LEVEL;
+    o->observer = v->eye ? observer : NULL;
+    o->unseen = v->seen_only ? EBPO_UNSEEN_NEVER : EBPO_UNSEEN_LAST;
+    o->pixels = v->pixels > 0 ? v->pixels : 0;
+    o->distance = v->distance >= 0 ? v->distance : INFINITY;
+    o->level = (int)v->to;
+    o->nodes = v->count > 0 ? (uint64_t)v->count : 0;
+    o->polygons = v->out != NULL;
+    o->windings = v->nodes;
+    return read_budget("bytes", v->bytes, &o->bytes) &&
+           read_budget("memory", v->memory, &o->memory) && (!v->eye || read_observer(v, observer));
+}
+
+/* --- printing --- */
+
+static void print_row(printer *p, const ebpo_view_stream *stream, const char *key)
+{
+    ebpo_view_stats s = EBPO_VIEW_STATS_INIT;
+    ebpo_view_stream_get_stats(stream, &s);
+    double ms = (progress_now() - p->begin) * 1e3;
+    char pixels[TABLE_CELL];
+    if (!p->v->json) {
+        printf("%12" PRIu64 " %10" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64
+               " %9" PRIu64 " %10s %9.2f\n",
+               s.bytes_read, s.nodes, s.cut[EBPO_GRAY], s.cut[EBPO_LEAF], s.cut[EBPO_WHITE],
+               s.cut[EBPO_BLACK], s.waiting, table_cell(pixels, "%.5g", s.pixels), ms);
+        return;
+    }
+    json_object(&p->j, key);
+    json_uint(&p->j, "bytes_read", s.bytes_read);
+    json_uint(&p->j, "nodes", s.nodes);
+    json_uint(&p->j, "gray", s.cut[EBPO_GRAY]);
+    json_uint(&p->j, "leaf", s.cut[EBPO_LEAF]);
+    json_uint(&p->j, "white", s.cut[EBPO_WHITE]);
+    json_uint(&p->j, "black", s.cut[EBPO_BLACK]);
+    json_uint(&p->j, "waiting", s.waiting);
+    json_real(&p->j, "pixels", s.pixels);
+    json_real(&p->j, "ms", ms);
+    json_end(&p->j);
+}
+
+static void print_line(const ebpo_view_node *v)
+{
+    const ebpo_stream_node *n = &v->node;
+    printf("%" PRIu64 " %s ", n->octcode, words_node_type(n->type));
+    words_print_reals(n->min, 3, " ");
+    putchar(' ');
+    words_print_reals(n->max, 3, " ");
+    printf(" %d ", (int)n->winding);
+    words_print_reals((const double[]){ v->distance, v->pixels }, 2, " ");
+    printf(" %d %d %" PRIu32, v->seen, v->complete, n->plane_count);
+    for (uint32_t i = 0; i < n->plane_count; i++) {
+        putchar(' ');
+        words_print_reals(n->planes[i], 4, " ");
+    }
+    putchar('\n');
+}
+
+static void print_node(printer *p, const ebpo_view_node *v)
+{
+    const ebpo_stream_node *n = &v->node;
+    if (!p->v->json) {
+        print_line(v);
+        return;
+    }
+    json_object(&p->j, NULL);
+    json_uint(&p->j, "octcode", n->octcode);
+    json_text(&p->j, "type", words_node_type(n->type));
+    json_reals(&p->j, "min", n->min, 3);
+    json_reals(&p->j, "max", n->max, 3);
+    json_int(&p->j, "winding", n->winding);
+    json_real(&p->j, "distance", v->distance);
+    json_real(&p->j, "pixels", v->pixels);
+    json_bool(&p->j, "seen", v->seen);
+    json_bool(&p->j, "complete", v->complete);
+    json_array(&p->j, "planes");
+    for (uint32_t i = 0; i < n->plane_count; i++)
+        json_reals(&p->j, NULL, n->planes[i], 4);
+    json_end(&p->j);
+    json_end(&p->j);
+}
+
+static void print_legend(void)
+{
+    table_legend(stdout);
+    puts("waiting: gray, to be divided next; pixels: size of the largest of these, - without "
+         "--eye;\n"
+         "bytes: read of the file; ms: since opening");
+}
+
+/* --- streaming --- */
+
+static ebpo_status tell_nodes(printer *p, ebpo_view_stream *stream, ebpo_view_end *end,
+                              bool *arrived, ebpo_error *error)
+{
+    ebpo_view_node node;
+    ebpo_status status;
+    uint64_t count = 0, next = 1;
+    while (*arrived && (status = ebpo_view_stream_next(stream, &node, end, error)) == EBPO_OK &&
+           *end == EBPO_VIEW_NODE) {
+        count++;
+        if (p->v->nodes)
+            print_node(p, &node);
+        if (!node.complete || count < next)
+            continue;
+        if (!p->v->nodes)
+            print_row(p, stream, NULL);
+        next = 2 * count;
+        *arrived = command_flush("view");
+    }
+    return *arrived ? status : EBPO_OK;
+}
+
+static ebpo_status tell(printer *p, ebpo_file *file, const char *path,
+                        const ebpo_view_options *wanted, bool *arrived, ebpo_error *error)
+{
+    ebpo_view_stream *stream = NULL;
+    ebpo_view_end end = EBPO_VIEW_NODE;
+    const char *order = order_words[wanted->priority];
+    ebpo_status status = ebpo_view_stream_new(file, wanted, &stream, error);
+    if (status != EBPO_OK)
+        return status;
+    if (p->v->json) {
+        json_begin(&p->j, stdout);
+        json_object(&p->j, NULL);
+        json_text(&p->j, "file", remote_shown(path));
+        json_text(&p->j, "order", order);
+        json_array(&p->j, p->v->nodes ? "nodes" : "progress");
+    } else {
+        printf("%s: by %s\n%12s %10s %9s %9s %9s %9s %9s %10s %9s\n", remote_shown(path), order,
+               "bytes", "nodes", "gray", "leaf", "white", "black", "waiting", "pixels", "ms");
+    }
+    status = tell_nodes(p, stream, &end, arrived, error);
+    if (p->v->json)
+        json_end(&p->j);
+    print_row(p, stream, "last");
+    traffic t = traffic_of(file);
+    if (p->v->json) {
+        json_text(&p->j, "end", status == EBPO_OK ? end_names[end] : "failed");
+        remote_json(&p->j, &t, &p->v->remote);
+        json_finish(&p->j);
+    } else {
+        if (status == EBPO_OK && *arrived)
+            print_legend();
+        if (status == EBPO_OK && *arrived)
+            printf("%s\n", end == EBPO_VIEW_DONE    ? "everything that was asked for has arrived"
+                           : end == EBPO_VIEW_BYTES ? "stopped by --bytes"
+                                                    : "stopped by --count");
+        (void)command_flush("view");
+        remote_tell(&t, &p->v->remote, false);
+    }
+    ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
+    ebpo_view_stream_get_stats(stream, &stats);
+    if (status == EBPO_OK && *arrived && p->v->out && stats.nodes == 0) {
+        fprintf(stderr,
+                "ebpo view: %s: not written: the budget is too small even for the root; give more "
+                "--bytes\n",
+                p->v->out);
+        *arrived = false;
+    } else if (status == EBPO_OK && *arrived && p->v->out)
+        status = cut_mesh_write(stream, p->v->out, error);
+    ebpo_view_stream_free(stream);
+    return status;
+}
+
+static const values usual = { .order = -1,
+                              .fov = -1,
+                              .pixels = -1,
+                              .distance = -1,
+                              .to = -1,
+                              .count = -1,
+                              .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
+{
+    values *v = given;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    ebpo_view_options wanted = EBPO_VIEW_OPTIONS_INIT;
+    printer p = { .v = v, .begin = progress_now() };
+    int code = check_values(v);
+    if (code != EXIT_FINE)
+        return code;
+    if (!read_options(v, &wanted, &observer))
+        return EXIT_USAGE;
+    if (v->out && command_overwrites("view", operand[0], v->out))
+        return EXIT_USAGE;
+    if (!command_wants_hdf5("view", operand[0]))
+        return EXIT_FAILED;
+    if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
+        return command_failed("view", &error);
+    bool there = command_has_level("view", ebpo_file_info(file), v->to), arrived = true;
+    ebpo_status status = there ? tell(&p, file, operand[0], &wanted, &arrived, &error) : EBPO_OK;
+    ebpo_close(file);
+    if (!there)
+        return EXIT_USAGE;
+    if (!arrived)
+        return EXIT_FAILED;
+    return status == EBPO_OK ? EXIT_FINE : command_failed("view", &error);
+}
+
+const command command_view = { &spec, sizeof usual, &usual, run };

@@ -1,0 +1,432 @@
+#include "cli/commands/convert_parts.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <ebpo/ebpo.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/mesh_advice.h"
+#include "cli/mesh_findings.h"
+#include "cli/progress.h"
+#include "cli/remote_args.h"
+#include "cli/signals.h"
+#include "cli/words.h"
+#include "cli/commands/part_names.h"
+
+/* How it is called. */
+typedef struct part_kind {
+    const char *one, *many, *scene, *building, *too_many;
+} part_kind;
+
+static const part_kind components = { "component", "components", "components.scene.json",
+                                      "building components",
+                                      "; merge vertices at the same position with --weld" },
+                       groups = { "group", "groups", "groups.scene.json", "building groups", "" };
+
+enum { PARTS_MOST = 100000, ENDING_SIZE = 16 };
+
+/* Of a part, as it is on the disk. */
+typedef struct part {
+    char name[PART_NAME_SIZE], file[PART_NAME_SIZE + ENDING_SIZE];
+    char *shown; /* in the scene: the group's own name; NULL: `name` */
+    ebpo_component facts;
+    bool solid;
+    int levels;
+    uint64_t bytes;
+    char digest[65];
+} part;
+
+typedef struct writing {
+    const parts_run *run;
+    const part_kind *kind;
+    mesh_input *whole;
+    ebpo_components *components;
+    part *parts;
+    uint64_t count, faces_done;
+} writing;
+
+/* ---- the folder ---- */
+
+/* What a signal's handler removes too. */
+static char *making;
+static int making_fd = -1;
+static part *volatile made;
+static volatile uint64_t made_count;
+static const char *scene_name; /* of what is being made */
+
+/* Only what a signal handler may call. Once it has its name, the folder stays. */
+static void remove_all(void)
+{
+    if (!making || access(making, F_OK) != 0)
+        return;
+    for (uint64_t i = 0; i < made_count; i++)
+        unlinkat(making_fd, made[i].file, 0);
+    unlinkat(making_fd, scene_name, 0);
+    rmdir(making);
+}
+
+ebpo_status parts_begin(const char *folder, bool of_groups, ebpo_error *error)
+{
+    scene_name = (of_groups ? &groups : &components)->scene;
+    ebpo_status status = ebpo_folder_begin(folder, &making, error);
+    if (status != EBPO_OK)
+        return status;
+    making_fd = open(making, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    signals_also(remove_all);
+    return EBPO_OK;
+}
+
+void parts_end(void)
+{
+    remove_all();
+    signals_also(NULL);
+    if (making_fd >= 0)
+        close(making_fd);
+    free(making);
+    making = NULL;
+    making_fd = -1;
+    free(made);
+    made = NULL;
+    made_count = 0;
+}
+
+static void free_names(const writing *w)
+{
+    for (uint64_t i = 0; i < w->count; i++)
+        free(w->parts[i].shown);
+}
+
+static ebpo_status no_memory(ebpo_error *error)
+{
+    error->status = EBPO_E_MEMORY;
+    snprintf(error->message, sizeof error->message, "there is not enough memory");
+    return EBPO_E_MEMORY;
+}
+
+static char *path_of(const char *name)
+{
+    size_t size = strlen(making) + strlen(name) + 2;
+    char *path = malloc(size);
+    if (path)
+        snprintf(path, size, "%s/%s", making, name);
+    return path;
+}
+
+/* ---- parts ---- */
+
+static ebpo_status too_many(const writing *w, ebpo_error *error)
+{
+    error->status = EBPO_E_LIMIT;
+    snprintf(error->message, sizeof error->message, "%s: has %llu %s, and at most %d are written%s",
+             w->whole->as_read.source_name,
+             (unsigned long long)ebpo_components_count(w->components), w->kind->many, PARTS_MOST,
+             w->kind->too_many);
+    return EBPO_E_LIMIT;
+}
+
+/* Numbers have as many digits as the last one, so that names sort. */
+static ebpo_status name_part(const writing *w, uint64_t i, int digits, ebpo_error *error)
+{
+    part *p = &w->parts[i];
+    ebpo_mesh_group group = EBPO_MESH_GROUP_INIT;
+    ebpo_status status = EBPO_OK;
+    if (w->run->groups)
+        status = ebpo_mesh_groups_get(w->run->groups, i, &group, error);
+    part_file_name(p->name, w->kind->one, digits, i, group.name);
+    snprintf(p->file, sizeof p->file, "%s.ebpo.h5", p->name);
+    p->facts = (ebpo_component)EBPO_COMPONENT_INIT;
+    return status == EBPO_OK ? ebpo_components_get(w->components, i, &p->facts, error) : status;
+}
+
+/* What groups are called in the scene. */
+static ebpo_status show_names(const writing *w, ebpo_error *error)
+{
+    const char **own = calloc(w->count, sizeof *own), **taken = calloc(w->count, sizeof *taken);
+    uint64_t count = 0;
+    ebpo_status status = own && taken ? EBPO_OK : no_memory(error);
+    for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++) {
+        ebpo_mesh_group group = EBPO_MESH_GROUP_INIT;
+        status = ebpo_mesh_groups_get(w->run->groups, i, &group, error);
+        own[i] = group.name;
+        if (status == EBPO_OK && part_name_fits(own[i]))
+            taken[count++] = own[i];
+    }
+    if (status == EBPO_OK)
+        qsort(taken, count, sizeof *taken, part_compare_names);
+    for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++) {
+        char name[PART_SHOWN_SIZE];
+        part_shown_name(name, own[i], i, taken, count);
+        w->parts[i].shown = strdup(name);
+        status = w->parts[i].shown ? EBPO_OK : no_memory(error);
+    }
+    free(own);
+    free(taken);
+    return status;
+}
+
+static ebpo_status name_parts(writing *w, ebpo_error *error)
+{
+    uint64_t count = ebpo_components_count(w->components), most = 0;
+    if (count > PARTS_MOST)
+        return too_many(w, error);
+    w->parts = calloc(count, sizeof *w->parts);
+    if (!w->parts)
+        return no_memory(error);
+    int digits = snprintf(NULL, 0, "%llu", (unsigned long long)count - 1);
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        status = name_part(w, i, digits, error);
+        most = w->parts[i].facts.face_count > most ? w->parts[i].facts.face_count : most;
+    }
+    w->count = count;
+    made = w->parts;
+    made_count = count;
+    if (status == EBPO_OK && w->run->groups)
+        status = show_names(w, error);
+    return status == EBPO_OK ? w->run->fits(w->run->user, most, error) : status;
+}
+
+static const char *shown_name(const part *p) { return p->shown ? p->shown : p->name; }
+
+/* ---- files ---- */
+
+static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    const writing *w = user;
+    const ebpo_progress *outer = &w->run->progress;
+    (void)stage, (void)done, (void)total;
+    return !outer->report ||
+           outer->report(outer->user, w->kind->building, w->faces_done, w->whole->mesh.face_count);
+}
+
+static ebpo_status look_at(part *p, const char *path, ebpo_error *error)
+{
+    ebpo_file *file = NULL;
+    ebpo_status status = remote_open_own(path, &file, error);
+    if (status != EBPO_OK)
+        return status;
+    const ebpo_info *info = ebpo_file_info(file);
+    p->solid = info->solid;
+    p->levels = info->level_count;
+    p->bytes = info->file_bytes;
+    for (int i = 0; i < 32; i++)
+        snprintf(p->digest + 2 * i, 3, "%02x", info->content_sha256[i]);
+    ebpo_close(file);
+    return EBPO_OK;
+}
+
+/* The mesh of one, checked; mending was the whole mesh's. */
+static ebpo_status take_mesh(const writing *w, uint64_t number, mesh_input *out, ebpo_error *error)
+{
+    ebpo_progress progress = { report, (void *)(uintptr_t)w };
+    *out = *w->whole;
+    ebpo_status status = ebpo_components_mesh(w->components, number, &out->mesh, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_arrange(&out->mesh, w->run->threads, progress, error);
+    if (status == EBPO_OK)
+        status =
+            ebpo_mesh_check(&out->mesh, w->run->threads, progress, &out->prepared.report, error);
+    out->doubts = status == EBPO_OK ? ebpo_mesh_doubts(0, &out->prepared.report, NULL) : 0;
+    if (status != EBPO_OK)
+        ebpo_mesh_free(&out->mesh);
+    return status;
+}
+
+static ebpo_status write_part(writing *w, uint64_t number, ebpo_error *error)
+{
+    ebpo_progress progress = { report, w };
+    mesh_input one;
+    char *path = path_of(w->parts[number].file);
+    if (!path)
+        return no_memory(error);
+    ebpo_status status = take_mesh(w, number, &one, error);
+    if (status == EBPO_OK && w->run->groups) { /* the whole says little of them */
+        progress_wipe(w->run->line);
+        advice_warn(stderr, "convert", shown_name(&w->parts[number]), &one);
+    }
+    if (status == EBPO_OK)
+        status = w->run->build(w->run->user, &one, path, progress, error);
+    if (status == EBPO_OK)
+        status = look_at(&w->parts[number], path, error);
+    w->faces_done += w->parts[number].facts.face_count;
+    free(path);
+    return status;
+}
+
+/* ---- the scene ---- */
+
+static void print_scene(const writing *w, FILE *out)
+{
+    json j;
+    json_begin(&j, out);
+    json_object(&j, NULL);
+    json_text(&j, "ebpo_scene", "1.0");
+    if (w->run->unit)
+        json_text(&j, "unit", w->run->unit);
+    json_object(&j, "models");
+    for (uint64_t i = 0; i < w->count; i++) {
+        json_object(&j, w->parts[i].name);
+        json_text(&j, "file", w->parts[i].file);
+        json_text(&j, "content_sha256", w->parts[i].digest);
+        json_end(&j);
+    }
+    json_end(&j);
+    json_array(&j, "instances");
+    for (uint64_t i = 0; i < w->count; i++) {
+        json_object(&j, NULL);
+        json_text(&j, "name", shown_name(&w->parts[i]));
+        json_text(&j, "model", w->parts[i].name);
+        json_end(&j);
+    }
+    json_finish(&j);
+}
+
+static ebpo_status write_scene(const writing *w, ebpo_error *error)
+{
+    char *text = NULL, *path = path_of(scene_name);
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    ebpo_status status = out && path ? EBPO_OK : no_memory(error);
+    if (status == EBPO_OK)
+        print_scene(w, out);
+    bool whole = out && !ferror(out);
+    if (out && fclose(out) != 0)
+        whole = false;
+    if (status == EBPO_OK)
+        status = whole ? ebpo_write_file(path, text, size, error) : no_memory(error);
+    free(text);
+    free(path);
+    return status;
+}
+
+/* ---- what is told ---- */
+
+static void print_words(const writing *w, double seconds)
+{
+    char bytes[32];
+    uint64_t sum = 0;
+    for (uint64_t i = 0; i < w->count; i++) {
+        const part *p = &w->parts[i];
+        sum += p->bytes;
+        printf("%s: ", p->name);
+        if (p->shown)
+            printf("'%s', ", p->shown);
+        printf("%s, %llu faces", p->solid ? "a solid" : "a surface",
+               (unsigned long long)p->facts.face_count);
+        if (p->facts.cavities)
+            printf(" with %llu %s", (unsigned long long)p->facts.cavities,
+                   p->facts.cavities == 1 ? "cavity" : "cavities");
+        printf(", from face %llu on, levels 0 to %d, %s\n", (unsigned long long)p->facts.first_face,
+               p->levels - 1, words_bytes(bytes, sizeof bytes, p->bytes));
+    }
+    printf("%s: %llu %s, %s, in %.1f s\n", w->run->folder, (unsigned long long)w->count,
+           w->kind->many, words_bytes(bytes, sizeof bytes, sum), seconds);
+}
+
+static void print_json(const writing *w, double seconds)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "folder", w->run->folder);
+    json_text(&j, "scene", scene_name);
+    json_array(&j, w->kind->many);
+    for (uint64_t i = 0; i < w->count; i++) {
+        const part *p = &w->parts[i];
+        json_object(&j, NULL);
+        json_text(&j, "name", p->name);
+        if (p->shown)
+            json_text(&j, "group", p->shown);
+        json_text(&j, "file", p->file);
+        json_text(&j, "content_sha256", p->digest);
+        json_bool(&j, "solid", p->solid);
+        json_uint(&j, "faces", p->facts.face_count);
+        json_uint(&j, "vertices", p->facts.vertex_count);
+        json_uint(&j, "first_face", p->facts.first_face);
+        json_uint(&j, "cavities", p->facts.cavities);
+        json_int(&j, "levels", p->levels);
+        json_uint(&j, "bytes", p->bytes);
+        json_end(&j);
+    }
+    json_end(&j);
+    json_object(&j, "input");
+    findings_json_source(&j, "mesh", &w->whole->as_read, w->whole->unread);
+    ebpo_solid_volume before = mesh_input_solid(w->whole, false);
+    findings_json(&j, "report", &w->whole->prepared.before, &before);
+    json_end(&j);
+    json_real(&j, "seconds", seconds);
+    json_finish(&j);
+}
+
+/* ---- all of it ---- */
+
+/* Names without faces have no model, which is said. */
+static ebpo_status tell_empty(const writing *w, ebpo_error *error)
+{
+    uint64_t count = ebpo_mesh_groups_count(w->run->groups);
+    if (count <= w->count)
+        return EBPO_OK;
+    ebpo_mesh_group group = EBPO_MESH_GROUP_INIT;
+    char first[PART_SHOWN_SIZE];
+    ebpo_status status = ebpo_mesh_groups_get(w->run->groups, w->count, &group, error);
+    if (status != EBPO_OK)
+        return status;
+    part_shown_name(first, group.name, w->count, NULL, 0);
+    progress_wipe(w->run->line);
+    fprintf(stderr,
+            "ebpo convert: %s: note: %llu of %llu groups have no faces, and no model: '%s'%s\n",
+            w->whole->as_read.source_name, (unsigned long long)(count - w->count),
+            (unsigned long long)count, first, count - w->count > 1 ? " and others" : "");
+    return EBPO_OK;
+}
+
+static ebpo_status find_parts(writing *w, ebpo_error *error)
+{
+    const parts_run *run = w->run;
+    return run->groups
+               ? ebpo_components_of_groups(&w->whole->mesh, run->groups, &w->components, error)
+               : ebpo_components_new(&w->whole->mesh, run->threads, run->progress, &w->components,
+                                     error);
+}
+
+static ebpo_status write_all(writing *w, ebpo_error *error)
+{
+    const parts_run *run = w->run;
+    ebpo_status status = find_parts(w, error);
+    if (status == EBPO_OK)
+        status = name_parts(w, error);
+    if (status == EBPO_OK)
+        status = tell_empty(w, error);
+    for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++)
+        status = write_part(w, i, error);
+    if (status == EBPO_OK)
+        status = write_scene(w, error);
+    if (status == EBPO_OK)
+        status = ebpo_folder_publish(making, run->folder, error);
+    return status;
+}
+
+ebpo_status parts_write(const parts_run *run, mesh_input *whole, double begun, ebpo_error *error)
+{
+    writing w = { .run = run, .kind = run->groups ? &groups : &components, .whole = whole };
+    ebpo_status status = write_all(&w, error);
+    ebpo_components_free(w.components);
+    ebpo_mesh_free(&whole->mesh);
+    if (status == EBPO_OK) {
+        made_count = 0; /* it is there, and stays */
+        free(making);
+        making = NULL;
+        progress_wipe(run->line);
+        if (run->json)
+            print_json(&w, progress_now() - begun);
+        else if (!run->quiet)
+            print_words(&w, progress_now() - begun);
+    }
+    free_names(&w);
+    return status;
+}

@@ -1,0 +1,145 @@
+#include "cli/commands/folder_files.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "cli/words.h"
+
+static bool is_of_model(const char *name)
+{
+    return (words_end_with(name, ".h5") || words_end_with(name, ".hdf5")) &&
+           !words_end_with(name, ".paint.h5");
+}
+
+/* Takes `path`, also when it fails. */
+static bool add(folder_files *f, char *path)
+{
+    if (path && f->count == f->capacity) {
+        size_t capacity = f->capacity ? 2 * f->capacity : 256;
+        char **wider = realloc(f->path, capacity * sizeof *wider);
+        if (wider) {
+            f->path = wider;
+            f->capacity = capacity;
+        }
+    }
+    if (!path || f->count == f->capacity) {
+        free(path);
+        f->no_memory = true;
+        return false;
+    }
+    f->path[f->count++] = path;
+    return true;
+}
+
+static char *joined(const char *a, const char *b)
+{
+    char *text = NULL;
+    if (asprintf(&text, *a ? "%s/%s" : "%s%s", a, b) < 0)
+        return NULL;
+    return text;
+}
+
+char *folder_files_shown(const char *path)
+{
+    char *text = strdup(path);
+    for (char *c = text; c && *c; c++)
+        if ((unsigned char)*c < 0x20 || *c == 0x7f)
+            *c = ' ';
+    return text;
+}
+
+/* folder/below/name, or what of it is not ""; why is in errno. False: `no_memory`. */
+static bool tell_unread(folder_files *f, const char *folder, const char *below, const char *name)
+{
+    const char *why = strerror(errno);
+    char *within = *name ? joined(below, name) : strdup(below);
+    char *path = !within ? NULL : *within ? joined(folder, within) : strdup(folder);
+    char *shown = path ? folder_files_shown(path) : NULL;
+    if (shown)
+        fprintf(stderr, "ebpo %s: %s: cannot be read: %s\n", f->command, shown, why);
+    f->unread++;
+    f->no_memory |= !shown;
+    free(within);
+    free(path);
+    free(shown);
+    return !f->no_memory;
+}
+
+static bool look_into(folder_files *f, const char *folder, const char *below);
+
+/* Folders by links are not entered: links may go round in circles. */
+static bool look_at(folder_files *f, DIR *dir, const char *folder, const char *below,
+                    const char *name)
+{
+    struct stat st;
+    bool known = fstatat(dirfd(dir), name, &st, AT_SYMLINK_NOFOLLOW) == 0;
+    if (!known && errno == ENOENT)
+        return true; /* it went meanwhile */
+    bool enter = known && S_ISDIR(st.st_mode);
+    if (!known && !is_of_model(name)) /* it may be a folder */
+        return tell_unread(f, folder, below, name);
+    if (!enter && !is_of_model(name))
+        return true;
+    /* a link that leads nowhere is told when it is opened; one to a folder is none of ours */
+    if (!enter && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISDIR(st.st_mode))
+        return true;
+    char *path = joined(below, name);
+    if (!path || !enter)
+        return add(f, path);
+    bool fine = look_into(f, folder, path);
+    free(path);
+    return fine;
+}
+
+static DIR *open_folder(folder_files *f, const char *folder, const char *below)
+{
+    char *path = *below ? joined(folder, below) : strdup(folder);
+    DIR *dir = path ? opendir(path) : NULL;
+    f->no_memory |= !path;
+    if (path && !dir)
+        (void)tell_unread(f, folder, below, "");
+    free(path);
+    return dir;
+}
+
+static bool look_into(folder_files *f, const char *folder, const char *below)
+{
+    DIR *dir = open_folder(f, folder, below);
+    if (!dir)
+        return !f->no_memory && *below;
+    bool fine = true;
+    for (const struct dirent *entry; fine && (errno = 0, entry = readdir(dir));)
+        if (entry->d_name[0] != '.')
+            fine = look_at(f, dir, folder, below, entry->d_name);
+    if (fine && errno != 0)
+        fine = tell_unread(f, folder, below, "");
+    closedir(dir);
+    return fine;
+}
+
+static int by_bytes(const void *a, const void *b)
+{
+    return strcmp(*(char *const *)a, *(char *const *)b);
+}
+
+bool folder_files_find(folder_files *files, const char *command, const char *folder)
+{
+    *files = (folder_files){ .command = command };
+    bool fine = look_into(files, folder, "");
+    if (files->count)
+        qsort(files->path, files->count, sizeof *files->path, by_bytes);
+    return fine;
+}
+
+void folder_files_free(folder_files *files)
+{
+    for (size_t i = 0; i < files->count; i++)
+        free(files->path[i]);
+    free(files->path);
+    *files = (folder_files){ .count = 0 };
+}

@@ -1,0 +1,198 @@
+#include "cli/commands/query_run.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/model_sums.h"
+#include "cli/npy_answers.h"
+#include "cli/points_cut.h"
+#include "cli/commands/query_catalogue.h"
+#include "cli/commands/query_holding.h"
+#include "cli/commands/query_pipe.h"
+#include "cli/commands/query_shard.h"
+
+static void tell_stats(const query_job *job, const query_holding *holding)
+{
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    traffic t = traffic_of(holding->session.file);
+    ebpo_model_get_stats(holding->session.model, &stats);
+    if (!job->values->json) {
+        stats_print(stderr, &stats);
+        query_holding_tell(holding);
+        remote_tell(&t, &job->values->remote, false);
+        return;
+    }
+    json j;
+    json_begin(&j, stderr);
+    json_object(&j, NULL);
+    stats_json(&j, &stats);
+    query_holding_json(holding, &j);
+    remote_json(&j, &t, &job->values->remote);
+    json_finish(&j);
+}
+
+/* Cores that this process may use, unless a number was given. Ways of loading that keep nothing
+ * have one thread: each would drop what the other one has. */
+static unsigned threads_for(const query_values *v, const ebpo_model_options *holding)
+{
+    unsigned wanted = v->threads ? (unsigned)v->threads : command_cores();
+    wanted = wanted < QUERY_THREADS_MOST ? wanted : QUERY_THREADS_MOST;
+    return holding->loading == EBPO_LOAD_CACHE && wanted ? wanted : 1;
+}
+
+/* The attributes that are asked for. */
+static int open_sampler(query_job *job, const query_holding *holding, ebpo_sampler **out)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    const query_values *v = job->values;
+    *out = NULL;
+    if (v->attribute && ebpo_sampler_new(holding->session.file, v->attribute, (unsigned)v->threads,
+                                         out, &error) != EBPO_OK)
+        return command_failed(job->command, &error);
+    job->sampler = *out;
+    return EXIT_FINE;
+}
+
+static int ask(query_job *job, query_holding *holding, points *in,
+               const ebpo_model_options *options)
+{
+    progress_line line;
+    /* the line stands between answers where both go to one terminal */
+    (void)progress_start(&line, job->command, isatty(STDOUT_FILENO));
+    npy_answers npy = { .command = job->command };
+    bool as_npy = job->values->npy;
+    if (as_npy)
+        npy.dtype = job->dtype(job, &npy.bytes);
+    if (as_npy && !npy_begin(&npy, in))
+        return EXIT_FAILED;
+    int code = query_pipe_run(job, holding, in, threads_for(job->values, options), &line);
+    progress_wipe(&line);
+    return as_npy && !npy_end(&npy) ? EXIT_FAILED : code;
+}
+
+/* Forms of answers exclude each other; --raw, which tells of the questions too, gives way to them.
+ */
+static bool fits(const query_job *job)
+{
+    const query_values *v = job->values;
+    unsigned bytes;
+    const char *given = v->npy ? "--npy" : "--csv", *other = v->json ? "--json" : "--csv";
+    if ((v->npy && v->csv) || (v->json && (v->npy || v->csv)))
+        (void)command_usage(job->command, "%s has no effect with %s; leave out one of them", given,
+                            other);
+    else if (v->npy && !job->dtype(job, &bytes))
+        (void)command_usage(job->command, "--npy takes answers of one size each, not lists");
+    else if (v->npy && v->attribute)
+        (void)command_usage(job->command,
+                            "--attribute has no effect with --npy; leave out one of them");
+    else if (v->attribute && strlen(v->attribute) > ANSWER_NAMES)
+        (void)command_usage(job->command, "--attribute: names of at most %d bytes in all",
+                            ANSWER_NAMES);
+    else
+        return true;
+    return false;
+}
+
+static answer_form form_of(const query_values *v)
+{
+    return v->json  ? ANSWERS_JSON
+           : v->npy ? ANSWERS_RAW
+           : v->csv ? ANSWERS_CSV
+           : v->raw ? ANSWERS_RAW
+                    : ANSWERS_TEXT;
+}
+
+/* Nobody waits for answers that go to a file: where the model is held in parts, so many points are
+ * asked about together, in the order in which subtrees come, that few are loaded again. */
+enum { TOGETHER_IN_PARTS = 1 << 20 };
+/* What is kept of one of them in one array, at most. */
+enum { TOGETHER_BYTES = 1024 };
+
+static uint64_t together(const query_values *v, const query_holding *holding)
+{
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    const uint64_t most = SIZE_MAX / TOGETHER_BYTES; /* on machines of 32 bits */
+    if (v->together)
+        return (uint64_t)v->together < most ? (uint64_t)v->together : most;
+    bool parts =
+        v->out && !holding->waiting &&
+        (holding->elsewhere ||
+         (ebpo_model_get_stats(holding->session.model, &stats) == EBPO_OK && !stats.resident));
+    return parts ? TOGETHER_IN_PARTS : POINTS_BATCH;
+}
+
+static int open_asked(query_job *job, const char *model, const ebpo_model_options *options,
+                      query_holding *holding)
+{
+    if (!catalogue_is(model))
+        return query_holding_open(holding, job->command, model, job->values, options,
+                                  job->parts_share);
+    query_holding_elsewhere(holding, job->command);
+    job->result_bytes += sizeof(uint64_t); /* the model's number, behind all results */
+    return query_catalogue_open(job, model, options);
+}
+
+/* With the model, of what is in `in`. */
+static int run(query_job *job, const char *model, points *in, const ebpo_model_options *options,
+               query_shard *shard)
+{
+    query_holding holding;
+    ebpo_sampler *sampler = NULL;
+    int code = open_asked(job, model, options, &holding);
+    if (code == EXIT_FINE)
+        code = open_sampler(job, &holding, &sampler);
+    if (code == EXIT_FINE)
+        code = query_shard_begin(shard);
+    if (code == EXIT_FINE) {
+        in->together = together(job->values, &holding);
+        code = ask(job, &holding, in, options);
+        code = query_shard_end(shard, job, code);
+    }
+    ebpo_sampler_free(sampler);
+    if (holding.session.model && job->values->remote.stats)
+        tell_stats(job, &holding);
+    if (job->models && job->values->remote.stats)
+        query_catalogue_tell(job);
+    query_catalogue_close(job);
+    query_holding_close(&holding);
+    return code;
+}
+
+static int open_and_run(query_job *job, const char *model, const char *path,
+                        const ebpo_model_options *options, query_shard *shard)
+{
+    const query_values *v = job->values;
+    int code;
+    points in;
+    if (query_shard_done(shard, job, &code))
+        return code;
+    bool fine = points_open_shard(&in, job->command, path, job->kind, v->raw, v->tmax,
+                                  shard->number, shard->of ? shard->of : 1);
+    in.header = v->header;
+    if (fine && shard->of)
+        fine = points_cut(&in, shard->number, shard->of);
+    code = fine ? run(job, model, &in, options, shard) : EXIT_FAILED;
+    points_close(&in);
+    return code;
+}
+
+int query_run(query_job *job, const char *model, const char *path)
+{
+    ebpo_model_options options;
+    query_shard shard;
+    if (!query_options_from(job->command, job->values, &options, &job->inside, &job->distance))
+        return EXIT_USAGE;
+    if (!fits(job) || (catalogue_is(model) && !query_catalogue_fits(job)))
+        return EXIT_USAGE;
+    job->form = form_of(job->values);
+    int code = EXIT_USAGE;
+    if (query_shard_fits(&shard, job, model, path)) {
+        job->continues = shard.of && shard.number > 0;
+        code = open_and_run(job, model, path, &options, &shard);
+    }
+    query_shard_free(&shard);
+    return code;
+}

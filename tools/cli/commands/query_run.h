@@ -1,0 +1,10 @@
+/* The commands inside, distance, ray and box: blocks of questions in, their answers out. */
+#ifndef EBPO_TOOLS_QUERY_RUN_H
+#define EBPO_TOOLS_QUERY_RUN_H
+
+#include "cli/commands/query_job.h"
+
+/* Returns an exit code. `points` may be NULL. */
+int query_run(query_job *job, const char *model, const char *points);
+
+#endif

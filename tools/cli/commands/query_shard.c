@@ -1,0 +1,372 @@
+#include "cli/commands/query_shard.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/points_format.h"
+#include "cli/words.h"
+#include "cli/commands/query_catalogue.h"
+
+enum { SHARDS_MOST = 1000000000 };
+
+/* --- options --- */
+
+static bool read_number(const char **at, uint64_t *out)
+{
+    char *end;
+    if (**at < '0' || **at > '9')
+        return false;
+    errno = 0;
+    *out = strtoull(*at, &end, 10);
+    *at = end;
+    return errno == 0 && *out <= SHARDS_MOST;
+}
+
+static bool read_shard(query_shard *s, const char *text)
+{
+    const char *at = text;
+    if (read_number(&at, &s->number) && *at == '/' && (at++, read_number(&at, &s->of)) && !*at &&
+        s->of > 0 && s->number < s->of)
+        return true;
+    s->of = 0;
+    command_usage(s->command,
+                  "--shard: '%s' is not I/N, shard I of N; the first is 0, the last is N - 1",
+                  text);
+    return false;
+}
+
+/* True, said on stderr: `path` is the model, or the file of the points, which may be asked for as
+ * FILE.h5:/path. */
+static bool overwrites_input(const query_shard *s, const char *path)
+{
+    struct stat in, out;
+    const char *dataset;
+    if (command_overwrites(s->command, s->model, path))
+        return true;
+    if (!s->points || !points_file(s->points, &in, &dataset) || stat(path, &out) != 0 ||
+        in.st_dev != out.st_dev || in.st_ino != out.st_ino)
+        return false;
+    fprintf(stderr, "ebpo %s: %s: is both input and output; choose another output\n", s->command,
+            path);
+    return true;
+}
+
+bool query_shard_fits(query_shard *s, const query_job *job, const char *model, const char *asked)
+{
+    const query_values *v = job->values;
+    *s = (query_shard){
+        .command = job->command, .v = v, .model = model, .points = asked, .kept = -1
+    };
+    if (v->shard && !read_shard(s, v->shard))
+        return false;
+    if (v->shard && !v->out)
+        command_usage(s->command, "--shard has its answers in a file; name it with -o");
+    else if (v->force && !v->shard)
+        command_usage(s->command, "--force has no effect without --shard; leave it out");
+    else if (v->shard && (!asked || strcmp(asked, "-") == 0))
+        command_usage(s->command, "--shard takes its part of a file, not of standard input");
+    else if (v->shard && v->npy)
+        command_usage(s->command, "--npy has no effect with --shard; --raw gives answers that are "
+                                  "joined by cat");
+    else if (v->shard && v->deadline)
+        command_usage(s->command, "--deadline has no effect with --shard, whose answers do not "
+                                  "depend on time; leave out one of them");
+    else if (v->out && strcmp(v->out, "-") == 0)
+        command_usage(s->command, "answers go to standard output without -o; leave it out");
+    else
+        return !v->out || !overwrites_input(s, v->out);
+    return false;
+}
+
+/* --- what answers are made of --- */
+
+static void tell_question(json *j, const query_job *job)
+{
+    const query_values *v = job->values;
+    json_int(j, "form", (int)job->form);
+    json_bool(j, "raw", v->raw);
+    json_bool(j, "header", v->header);
+    json_text(j, "attribute", v->attribute ? v->attribute : "");
+    json_int(j, "level", v->level);
+    json_int(j, "distance_mode", v->distance_mode);
+    json_bool(j, "unsigned", v->unsigned_distance);
+    json_real(j, "max_distance", v->max_distance);
+    json_int(j, "nearest", v->nearest);
+    json_real(j, "within", v->within);
+    json_int(j, "ray_sides", v->ray_sides);
+    json_real(j, "tmax", v->tmax);
+    json_bool(j, "all", v->all);
+    json_bool(j, "any", v->any);
+}
+
+static void tell_file(json *j, const char *key, const struct stat *st)
+{
+    char time[48];
+    snprintf(time, sizeof time, "%" PRId64 ".%09ld", (int64_t)st->st_mtim.tv_sec,
+             (long)st->st_mtim.tv_nsec);
+    json_object(j, key);
+    json_uint(j, "bytes", (uint64_t)st->st_size);
+    json_text(j, "modified", time);
+}
+
+static int tell_model(json *j, const query_shard *s)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    char hex[65];
+    if (catalogue_is(s->model))
+        return query_catalogue_facts(j, s->command, s->model);
+    if (remote_open(&file, s->model, &s->v->remote, &error) != EBPO_OK)
+        return command_failed(s->command, &error);
+    words_hex(ebpo_file_info(file)->content_sha256, hex);
+    json_object(j, "model");
+    json_text(j, "content_sha256", hex);
+    json_uint(j, "bytes", ebpo_file_info(file)->file_bytes);
+    json_end(j);
+    ebpo_close(file);
+    return EXIT_FINE;
+}
+
+/* How the model is held and how many ask changes no answer, and is not in it. Returns an exit
+ * code. */
+static int tell_facts(const query_shard *s, const query_job *job, const struct stat *st,
+                      const char *dataset, char **facts)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *out = open_memstream(&text, &size);
+    if (!out)
+        return command_no_memory(s->command);
+    json j;
+    json_begin(&j, out);
+    json_object(&j, NULL);
+    json_text(&j, "format", "ebpo-shard");
+    json_uint(&j, "version", 1);
+    json_text(&j, "ebpo", ebpo_version());
+    json_text(&j, "command", s->command);
+    json_uint(&j, "shard", s->number);
+    json_uint(&j, "of", s->of);
+    int code = tell_model(&j, s);
+    tell_file(&j, "points", st);
+    json_text(&j, "dataset", dataset);
+    json_end(&j);
+    json_object(&j, "question");
+    tell_question(&j, job);
+    json_finish(&j);
+    if (fclose(out) != 0 && code == EXIT_FINE)
+        code = command_no_memory(s->command);
+    if (code == EXIT_FINE)
+        *facts = text;
+    else
+        free(text);
+    return code;
+}
+
+/* The head of the model and the file of points, as they are now. */
+static int look_at_inputs(const query_shard *s, const query_job *job, char **facts)
+{
+    struct stat st;
+    const char *dataset;
+    if (!catalogue_is(s->model) && !command_wants_hdf5(s->command, s->model))
+        return EXIT_FAILED;
+    if (!points_file(s->points, &st, &dataset)) {
+        fprintf(stderr, "ebpo %s: %s: cannot be opened: %s\n", s->command, s->points,
+                strerror(errno));
+        return EXIT_FAILED;
+    }
+    return tell_facts(s, job, &st, dataset, facts);
+}
+
+/* --- the note --- */
+
+/* The facts, and which answers: how long they are, and when they were written, so that the note of
+ * one of two commands is not taken for that of the other's answers. */
+static char *note_text(const char *facts, const struct stat *answers)
+{
+    char *text = NULL;
+    return asprintf(&text, "%sanswers: %" PRIu64 " bytes, of %" PRId64 ".%09ld\n", facts,
+                    (uint64_t)answers->st_size, (int64_t)answers->st_mtim.tv_sec,
+                    (long)answers->st_mtim.tv_nsec) < 0
+               ? NULL
+               : text;
+}
+
+static bool file_is(const char *path, const char *text)
+{
+    size_t size = strlen(text);
+    char *there = malloc(size + 1);
+    FILE *in = there ? fopen(path, "re") : NULL;
+    bool same = in && fread(there, 1, size + 1, in) == size && memcmp(there, text, size) == 0;
+    if (in)
+        fclose(in);
+    free(there);
+    return same;
+}
+
+/* What stands in the note's place and is none, such as an input, stays: it is said before all the
+ * work is done. */
+static bool note_is_free(const query_shard *s)
+{
+    static const char begins[] = "{\n  \"format\": \"ebpo-shard\",\n";
+    struct stat st;
+    char there[sizeof begins - 1];
+    if (lstat(s->note, &st) != 0)
+        return true; /* what else is wrong is told of the answers, which are in the same folder */
+    FILE *in = S_ISREG(st.st_mode) ? fopen(s->note, "re") : NULL;
+    bool is_note = in && fread(there, 1, sizeof there, in) == sizeof there &&
+                   memcmp(there, begins, sizeof there) == 0;
+    if (in)
+        fclose(in);
+    if (!is_note)
+        fprintf(stderr,
+                "ebpo %s: %s: is there and no note of a shard, and would be replaced by one; "
+                "choose another output\n",
+                s->command, s->note);
+    return is_note;
+}
+
+/* Whether the answers are there, of these inputs. */
+static bool is_there(const query_shard *s)
+{
+    struct stat st, note;
+    bool out = stat(s->v->out, &st) == 0 && S_ISREG(st.st_mode);
+    char *text = out ? note_text(s->facts, &st) : NULL;
+    bool same = text && file_is(s->note, text);
+    free(text);
+    if (same)
+        fprintf(stderr,
+                "ebpo %s: %s: is there, of the same model, points and options; nothing is done "
+                "(--force makes it anew)\n",
+                s->command, s->v->out);
+    else if (out && stat(s->note, &note) == 0)
+        fprintf(stderr,
+                "ebpo %s: %s: is of another model, other points or options, or was changed, as %s "
+                "tells; it is made anew\n",
+                s->command, s->v->out, s->note);
+    return same;
+}
+
+bool query_shard_done(query_shard *s, const query_job *job, int *code)
+{
+    *code = EXIT_FINE;
+    if (!s->of)
+        return false;
+    *code = look_at_inputs(s, job, &s->facts);
+    if (*code == EXIT_FINE && asprintf(&s->note, "%s.shard", s->v->out) < 0) {
+        s->note = NULL;
+        *code = command_no_memory(s->command);
+    }
+    if (*code == EXIT_FINE && overwrites_input(s, s->note))
+        *code = EXIT_USAGE;
+    if (*code == EXIT_FINE && !note_is_free(s))
+        *code = EXIT_FAILED;
+    return *code != EXIT_FINE || (!s->v->force && is_there(s));
+}
+
+/* --- the answers --- */
+
+int query_shard_begin(query_shard *s)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    int to;
+    if (!s->v->out)
+        return EXIT_FINE;
+    if (ebpo_output_begin(s->v->out, &s->out, &to, &error) != EBPO_OK)
+        return command_failed(s->command, &error);
+    fflush(stdout);
+    s->kept = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
+    if (s->kept >= 0 && dup2(to, STDOUT_FILENO) >= 0)
+        return EXIT_FINE;
+    fprintf(stderr, "ebpo %s: standard output: %s\n", s->command, strerror(errno));
+    return EXIT_FAILED;
+}
+
+/* What was asked about must still be what was looked at. */
+static int look_again(const query_shard *s, const query_job *job)
+{
+    char *now = NULL;
+    int code = look_at_inputs(s, job, &now);
+    if (code == EXIT_FINE && strcmp(now, s->facts) != 0) {
+        fprintf(stderr,
+                "ebpo %s: the model or the points were changed while they were read; nothing was "
+                "written, start again\n",
+                s->command);
+        code = EXIT_FAILED;
+    }
+    free(now);
+    return code;
+}
+
+static int fail_answers(const query_shard *s)
+{
+    fprintf(stderr, "ebpo %s: %s: %s\n", s->command, s->v->out, strerror(errno));
+    return EXIT_FAILED;
+}
+
+static int write_note(const query_shard *s, const struct stat *answers)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    char *text = note_text(s->facts, answers);
+    if (!text)
+        return command_no_memory(s->command);
+    ebpo_status status = ebpo_write_file(s->note, text, strlen(text), &error);
+    free(text);
+    return status == EBPO_OK ? EXIT_FINE : command_failed(s->command, &error);
+}
+
+/* The note of the answers that were there goes first, and comes last: whenever this is killed, it
+ * stands beside no others. `answers` is their descriptor: another command may have replaced them.
+ */
+static int put_in_place(query_shard *s, int answers)
+{
+    struct stat st;
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (s->of && unlink(s->note) != 0 && errno != ENOENT) {
+        fprintf(stderr, "ebpo %s: %s: %s\n", s->command, s->note, strerror(errno));
+        return EXIT_FAILED;
+    }
+    ebpo_status status = ebpo_output_end(s->out, &error);
+    s->out = NULL;
+    if (status != EBPO_OK)
+        return command_failed(s->command, &error);
+    if (!s->of)
+        return EXIT_FINE;
+    return fstat(answers, &st) == 0 ? write_note(s, &st) : fail_answers(s);
+}
+
+int query_shard_end(query_shard *s, const query_job *job, int code)
+{
+    if (s->kept < 0)
+        return code;
+    int answers = code == EXIT_FINE ? fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3) : -1;
+    if (code == EXIT_FINE && answers < 0)
+        code = fail_answers(s);
+    dup2(s->kept, STDOUT_FILENO);
+    close(s->kept);
+    s->kept = -1;
+    if (code == EXIT_FINE && s->of)
+        code = look_again(s, job);
+    if (code == EXIT_FINE)
+        code = put_in_place(s, answers);
+    if (answers >= 0)
+        close(answers);
+    return code;
+}
+
+void query_shard_free(query_shard *s)
+{
+    if (s->kept >= 0)
+        close(s->kept);
+    ebpo_output_abandon(s->out);
+    free(s->facts);
+    free(s->note);
+    *s = (query_shard){ .kept = -1 };
+}

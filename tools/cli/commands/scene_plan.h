@@ -1,0 +1,14 @@
+/* `ebpo scene plan`: what of its models a scene can ever call for; `ebpo scene pack`: that, as a
+ * folder. */
+#ifndef EBPO_TOOLS_SCENE_PLAN_H
+#define EBPO_TOOLS_SCENE_PLAN_H
+
+#include "cli/commands/scene_run.h"
+
+ebpo_status scene_plan(const scene_values *v, const char *path, ebpo_scene *scene,
+                       ebpo_error *error);
+
+ebpo_status scene_pack(const scene_values *v, const char *path, ebpo_scene *scene,
+                       ebpo_error *error);
+
+#endif

@@ -1,0 +1,245 @@
+/* Who meets in a scene, time after time. */
+#include "cli/commands/scene_report.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/commands/clash_page.h"
+#include "cli/commands/clash_pictures.h"
+#include "cli/json.h"
+#include "cli/progress.h"
+#include "cli/words.h"
+#include "cli/commands/scene_rows.h"
+
+typedef struct report {
+    const scene_values *v;
+    ebpo_scene *scene;
+    ebpo_scene_ask_options how;
+    uint64_t meetings, frames_met, asked;
+    scene_frame frame;
+    uint64_t capacity; /* of its meetings */
+    bool prints;       /* rows on standard output */
+    json j;
+    const char *path;
+    uint64_t frames, told;
+    /* What is written, as the name of v->out ends; else NULL and false. */
+    ebpo_scene_record *record;
+    clash_strip *strip;
+    bool page;
+    clash_list clashes;
+} report;
+
+/* --- a frame --- */
+
+static bool keep_meetings(void *user, const ebpo_scene_meeting *meetings, uint64_t count)
+{
+    report *r = user;
+    if (count > r->capacity) {
+        free(r->frame.meetings);
+        r->frame.meetings = malloc(count * sizeof *meetings);
+        r->capacity = r->frame.meetings ? count : 0;
+    }
+    if (r->frame.meetings)
+        memcpy(r->frame.meetings, meetings, count * sizeof *meetings);
+    r->frame.count = count;
+    return true;
+}
+
+static ebpo_status ask_frame(report *r, double time, ebpo_error *error)
+{
+    ebpo_scene_stats before = EBPO_SCENE_STATS_INIT, after = EBPO_SCENE_STATS_INIT;
+    scene_frame *f = &r->frame;
+    double begun = progress_now();
+    (void)ebpo_scene_get_stats(r->scene, &before);
+    f->count = 0;
+    f->cost = (ebpo_scene_frame){ .time = time };
+    ebpo_status status =
+        ebpo_scene_meet(r->scene, time, &r->how, keep_meetings, r, &f->cost.asked, error);
+    if (status == EBPO_OK && f->count && !f->meetings) {
+        snprintf(error->message, sizeof error->message, "no memory for %llu meetings",
+                 (unsigned long long)f->count);
+        status = error->status = EBPO_E_MEMORY;
+    }
+    (void)ebpo_scene_get_stats(r->scene, &after);
+    f->cost.nanoseconds = (uint64_t)((progress_now() - begun) * 1e9);
+    f->cost.bytes_read = after.bytes_read - before.bytes_read;
+    f->cost.models = after.models - before.models;
+    f->cost.loads = after.loads - before.loads;
+    r->asked += f->cost.asked;
+    r->meetings += f->count;
+    r->frames_met += f->count > 0;
+    return status;
+}
+
+/* --- what is told of it --- */
+
+static void frame_json(report *r)
+{
+    const ebpo_scene_frame *cost = &r->frame.cost;
+    json_object(&r->j, NULL);
+    json_real(&r->j, "time", cost->time);
+    json_array(&r->j, "meetings");
+    for (uint64_t i = 0; i < r->frame.count; i++)
+        scene_row_json(&r->j, r->v, r->scene, &r->frame.meetings[i]);
+    json_end(&r->j);
+    json_uint(&r->j, "pairs_asked", cost->asked);
+    json_real(&r->j, "seconds", (double)cost->nanoseconds * 1e-9);
+    json_uint(&r->j, "bytes_read", cost->bytes_read);
+    json_uint(&r->j, "models_read", cost->models);
+    json_uint(&r->j, "loads", cost->loads);
+    json_end(&r->j);
+}
+
+static void print_frame(report *r)
+{
+    const scene_frame *f = &r->frame;
+    if (r->v->json)
+        frame_json(r);
+    for (uint64_t i = 0; i < f->count && !r->v->json; i++)
+        (r->v->csv ? scene_row_csv : scene_row_words)(r->v, r->scene, f->cost.time,
+                                                      &f->meetings[i]);
+}
+
+/* Frames are as many as pictures, or spread evenly. */
+static bool is_pictured(const report *r)
+{
+    uint64_t n = r->told, most = r->frames < CLASH_TILES ? r->frames : CLASH_TILES;
+    return n == 0 || n * (most - 1) / (r->frames - 1) != (n - 1) * (most - 1) / (r->frames - 1);
+}
+
+static ebpo_status tell_frame(report *r, ebpo_error *error)
+{
+    const scene_frame *f = &r->frame;
+    ebpo_status status = EBPO_OK;
+    if (r->prints)
+        print_frame(r);
+    if (r->record)
+        status = ebpo_scene_record_add(r->record, &f->cost, f->meetings, f->count, error);
+    if (r->page)
+        status = clash_add(&r->clashes, f->cost.time, f->meetings, f->count, error);
+    if (r->strip && is_pictured(r))
+        status = clash_strip_add(r->strip, f->cost.time, f->meetings, f->count, error);
+    r->told++;
+    return status;
+}
+
+static ebpo_status begin_strip(report *r, ebpo_error *error)
+{
+    const char *missing = clash_pictures_missing();
+    int tiles = r->frames < CLASH_TILES ? (int)r->frames : CLASH_TILES;
+    if (!missing)
+        r->strip = clash_strip_new(r->scene, r->v->from, r->v->to, tiles, (unsigned)r->v->threads);
+    if (r->strip)
+        return EBPO_OK;
+    snprintf(error->message, sizeof error->message, "%s: %s", r->v->out,
+             missing ? missing : "no memory for the picture");
+    return error->status = missing ? EBPO_E_UNSUPPORTED : EBPO_E_MEMORY;
+}
+
+static ebpo_status begin(report *r, ebpo_error *error)
+{
+    const char *out = r->v->out;
+    if (r->prints && r->v->json) {
+        json_begin(&r->j, stdout);
+        json_object(&r->j, NULL);
+        json_array(&r->j, "frames");
+    } else if (r->prints && r->v->csv) {
+        scene_head_csv(r->v);
+    }
+    if (out && words_end_with(out, ".png"))
+        return begin_strip(r, error);
+    return out && !r->page ? ebpo_scene_record_new(r->scene, out, &r->record, error) : EBPO_OK;
+}
+
+/* Of the worst ones, as many as people look at. */
+enum { PICTURES_MOST = 60 };
+
+static ebpo_status write_page(report *r, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    clash_sort(&r->clashes);
+    for (uint64_t i = 0; i < r->clashes.count && i < PICTURES_MOST && status == EBPO_OK; i++)
+        status = clash_draw(r->scene, &r->clashes.clash[i], (unsigned)r->v->threads, error);
+    return status == EBPO_OK ? clash_page(&r->clashes, r->scene, r->path, r->v->from, r->v->to,
+                                          r->frames, r->v->out, error)
+                             : status;
+}
+
+static ebpo_status finish_files(report *r, ebpo_error *error)
+{
+    if (r->record)
+        return ebpo_scene_record_finish(r->record, error);
+    if (r->strip)
+        return clash_strip_write(r->strip, r->v->out, error);
+    return r->page ? write_page(r, error) : EBPO_OK;
+}
+
+static void finish(report *r, double seconds)
+{
+    if (r->prints && r->v->json) {
+        json_end(&r->j);
+        json_uint(&r->j, "pairs_asked", r->asked);
+        json_uint(&r->j, "pairs_that_meet", r->meetings);
+        json_real(&r->j, "seconds", seconds);
+        json_finish(&r->j);
+    } else if (!r->v->quiet) {
+        char times[40], asked[40];
+        words_plural(times, sizeof times, r->frames, "time", "times");
+        words_plural(asked, sizeof asked, r->asked, "pair", "pairs");
+        fprintf(stderr, "%s, %llu with meetings; %s asked, %llu meet%s; %.3g s\n", times,
+                (unsigned long long)r->frames_met, asked, (unsigned long long)r->meetings,
+                r->how.relate ? "" : " (one within another is not looked for without --solids)",
+                seconds);
+    }
+}
+
+/* --- all frames --- */
+
+/* Of the frame `n`: the last one is at the last time. */
+static double time_of(const scene_values *v, uint64_t n, uint64_t frames)
+{
+    return n + 1 == frames ? v->to : v->from + v->step * (double)n;
+}
+
+static uint64_t frames_of(const scene_values *v)
+{
+    return v->to > v->from /* the command has seen to it that these are not too many */
+               ? 1 + (uint64_t)ceil((v->to - v->from) / v->step * (1 - 0x1p-40))
+               : 1;
+}
+
+ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *scene,
+                         ebpo_error *error)
+{
+    report r = { .v = v, .scene = scene, .how = EBPO_SCENE_ASK_OPTIONS_INIT };
+    double begun = progress_now();
+    progress_line line;
+    r.path = path;
+    r.frames = frames_of(v);
+    r.page = v->out && words_end_with(v->out, ".html");
+    r.prints = !v->out || v->csv || v->json;
+    r.how.count = v->count || r.page;
+    r.how.places = v->places || r.page;
+    r.how.relate = v->solids || v->depth > 0 || r.page;
+    r.how.depth = v->depth;
+    r.how.threads = (unsigned)v->threads;
+    r.how.progress = progress_start(&line, "scene", v->quiet);
+    ebpo_status status = begin(&r, error);
+    for (uint64_t n = 0; n < r.frames && status == EBPO_OK; n++) {
+        status = ask_frame(&r, time_of(v, n, r.frames), error);
+        if (status == EBPO_OK)
+            status = tell_frame(&r, error);
+    }
+    if (status == EBPO_OK)
+        status = finish_files(&r, error);
+    progress_wipe(&line);
+    if (status == EBPO_OK)
+        finish(&r, progress_now() - begun);
+    ebpo_scene_record_free(r.record);
+    clash_strip_free(r.strip);
+    clash_free(&r.clashes);
+    free(r.frame.meetings);
+    return status;
+}

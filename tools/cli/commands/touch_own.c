@@ -1,0 +1,112 @@
+/* A hand of its own: around the longest axis of the model in 8 seconds, slowly up and down, and
+ * meanwhile into its surface and out of it. Where that is, rays tell beforehand. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "cli/commands/touch_device.h"
+
+enum { ROUND = 64, HIGH = 17 };
+
+static const double pi = 3.141592653589793;
+
+typedef struct own {
+    double rate, clear; /* the tool's radius, as a part of the model */
+    double origin[3], size[3];
+    int up;
+    double hit[HIGH][ROUND]; /* from the axis, in sizes of the box; where nothing is 0.1 */
+} own;
+
+/* In the box's own coordinates: an angle, a height from -0.5, how far from the axis. */
+static void place_at(const own *o, double angle, double height, double radius, double out[3])
+{
+    int u = (o->up + 1) % 3, v = (o->up + 2) % 3;
+    out[u] = o->origin[u] + o->size[u] * (0.5 + radius * cos(angle));
+    out[v] = o->origin[v] + o->size[v] * (0.5 + radius * sin(angle));
+    out[o->up] = o->origin[o->up] + o->size[o->up] * (0.5 + height);
+}
+
+static ebpo_status look(own *o, ebpo_context *context, ebpo_error *error)
+{
+    for (int h = 0; h < HIGH; h++)
+        for (int a = 0; a < ROUND; a++) {
+            double angle = 2 * pi * a / ROUND, height = 0.9 * ((double)h / (HIGH - 1) - 0.5);
+            double from[3], way[3];
+            ebpo_ray_hit hit;
+            bool is_hit;
+            place_at(o, angle, height, 0.8, from);
+            place_at(o, angle, height, 0, way);
+            for (int k = 0; k < 3; k++)
+                way[k] -= from[k];
+            ebpo_status status = ebpo_ray_first(context, from, way, 1, &hit, &is_hit, error);
+            if (status != EBPO_OK)
+                return status;
+            o->hit[h][a] = is_hit ? 0.8 * (1 - hit.t) : 0.1;
+        }
+    return EBPO_OK;
+}
+
+static double surface(const own *o, double angle, double height)
+{
+    double a = angle / (2 * pi) * ROUND, h = (height / 0.9 + 0.5) * (HIGH - 1);
+    int i = (int)floor(a), j = (int)fmin(fmax(floor(h), 0), HIGH - 2);
+    double s = a - i, t = h - j;
+    int i0 = ((i % ROUND) + ROUND) % ROUND, i1 = (i0 + 1) % ROUND;
+    return (1 - t) * ((1 - s) * o->hit[j][i0] + s * o->hit[j][i1]) +
+           t * ((1 - s) * o->hit[j + 1][i0] + s * o->hit[j + 1][i1]);
+}
+
+static bool pose_at(void *self, uint64_t tick, touch_pose *out)
+{
+    const own *o = self;
+    double seconds = (double)tick / o->rate, angle = 2 * pi * seconds / 8;
+    double height = 0.4 * sin(0.31 * angle), nod = 0.06 * cos(3.7 * angle);
+    double begun = fmax(0, 1 - seconds); /* from outside of all */
+    double radius = surface(o, angle, height) + o->clear + nod - 0.01;
+    place_at(o, angle, height, radius + begun * (0.9 + o->clear - radius), out->place);
+    for (int k = 0; k < 4; k++)
+        out->turn[k] = 0;
+    out->turn[o->up] = sin(0.3 * sin(angle)); /* to and fro */
+    out->turn[3] = cos(0.3 * sin(angle));
+    return true;
+}
+
+static bool begin(void *self, double seconds, touch_pose *first)
+{
+    (void)seconds;
+    return pose_at(self, 0, first);
+}
+
+static void write_answer(void *self, const touch_answer *answer)
+{
+    (void)self;
+    (void)answer;
+}
+
+static uint64_t ticks(void *self)
+{
+    (void)self;
+    return 0;
+}
+
+ebpo_status touch_own_open(touch_device *out, ebpo_model *model, const ebpo_info *info, double rate,
+                           double clear, ebpo_error *error)
+{
+    own *o = calloc(1, sizeof *o);
+    ebpo_context *context = NULL;
+    *out = (touch_device){ begin, pose_at, write_answer, ticks, free, o };
+    ebpo_status status = ebpo_context_new(model, &context, error);
+    if (status != EBPO_OK || !o)
+        return status != EBPO_OK ? status : EBPO_E_MEMORY;
+    double shortest = fmin(info->box_size[0], fmin(info->box_size[1], info->box_size[2]));
+    o->rate = rate;
+    o->clear = clear / shortest;
+    for (int k = 0; k < 3; k++) {
+        o->origin[k] = info->box_origin[k];
+        o->size[k] = info->box_size[k];
+        if (o->size[k] > o->size[o->up])
+            o->up = k;
+    }
+    status = look(o, context, error);
+    ebpo_context_free(context);
+    return status;
+}

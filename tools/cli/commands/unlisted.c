@@ -1,0 +1,74 @@
+#include "cli/commands/unlisted.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+typedef struct longer {
+    int fd;
+    uint64_t size; /* of the file; the source has one more */
+    const char *path;
+} longer;
+
+static ebpo_status fail(const char *path, ebpo_error *error)
+{
+    snprintf(error->message, sizeof error->message, "%s: %s", path, strerror(errno));
+    return error->status = EBPO_E_IO;
+}
+
+static ebpo_status read_longer(void *user, uint64_t offset, uint64_t size, void *data,
+                               ebpo_error *error)
+{
+    const longer *l = user;
+    uint64_t end = offset + size < l->size ? offset + size : l->size;
+    uint8_t *to = data;
+    memset(to, 0, size);
+    while (offset < end) {
+        ssize_t got = pread(l->fd, to, end - offset, (off_t)offset);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got == 0)
+            errno = EIO; /* it has been shortened */
+        if (got <= 0)
+            return fail(l->path, error);
+        to += got;
+        offset += (uint64_t)got;
+    }
+    return EBPO_OK;
+}
+
+static void close_longer(void *user)
+{
+    longer *l = user;
+    close(l->fd);
+    free(l);
+}
+
+ebpo_status unlisted_open(const char *path, uint64_t most_expansion, ebpo_file **out,
+                          ebpo_error *error)
+{
+    ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
+    ebpo_source source = EBPO_SOURCE_INIT;
+    struct stat st;
+    *out = NULL;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    longer *l = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode) ? malloc(sizeof *l) : NULL;
+    if (!l) {
+        ebpo_status status = fail(path, error);
+        if (fd >= 0)
+            close(fd);
+        return status;
+    }
+    *l = (longer){ fd, (uint64_t)st.st_size, path };
+    source.user = l;
+    source.size = l->size + 1;
+    source.read = read_longer;
+    source.close = close_longer;
+    how.most_expansion = most_expansion;
+    how.source = &source;
+    return ebpo_open_with(path, &how, out, error);
+}

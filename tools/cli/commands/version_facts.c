@@ -1,0 +1,92 @@
+#include "cli/commands/version_facts.h"
+
+#include <dlfcn.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/words.h"
+#include "ebpo_config.h"
+
+typedef struct installation {
+    char program[PATH_MAX];
+    char library[PATH_MAX]; /* the one that runs */
+    char own[PATH_MAX];     /* the one that was installed with the program; "": none is there */
+    char plugin[PATH_MAX];  /* the folder; "": not there */
+} installation;
+
+/* A path of what was installed, which is from the program's folder unless it is absolute; "": there
+ * is no such file. */
+static void locate(const char *program, const char *path, const char *name, char out[PATH_MAX])
+{
+    char joined[3 * PATH_MAX];
+    int folder = path[0] == '/' ? 0 : (int)(strrchr(program, '/') - program + 1);
+    snprintf(joined, sizeof joined, "%.*s%s%s", folder, program, path, name);
+    if (!realpath(joined, out))
+        out[0] = 0;
+}
+
+static void look(installation *i)
+{
+    Dl_info library;
+    if (!realpath("/proc/self/exe", i->program))
+        snprintf(i->program, sizeof i->program, "/");
+    void *function = dlsym(RTLD_DEFAULT, "ebpo_version");
+    bool known = function && dladdr(function, &library) && library.dli_fname;
+    if (!known || !realpath(library.dli_fname, i->library))
+        i->library[0] = 0;
+    locate(i->program, EBPO_LIBRARY_FROM_BIN, "", i->own);
+    i->plugin[0] = 0;
+    if (*EBPO_PLUGIN_FROM_BIN)
+        locate(i->program, EBPO_PLUGIN_FROM_BIN, "/libebpo_h5zstd.so", i->plugin);
+    if (i->plugin[0])
+        *strrchr(i->plugin, '/') = 0;
+}
+
+static void print(const installation *i)
+{
+    printf("program: %s\nlibrary: %s (%s)\nHDF5 plugin: %s\n", i->program,
+           i->library[0] ? i->library : "unknown", ebpo_version(),
+           i->plugin[0] ? i->plugin : "none was installed with this program");
+    printf("built with:%s%s%s%s%s%s\n", EBPO_HAVE_ASSIMP ? " assimp" : "",
+           EBPO_HAVE_HTTP ? " libcurl" : "", EBPO_HAVE_PNG ? " libpng" : "",
+           EBPO_HAVE_CAIRO ? " cairo" : "", EBPO_HAVE_CHART_JS ? " Chart.js" : "",
+           EBPO_HAVE_QHULL ? " qhull" : "");
+}
+
+/* Not printed with the rest: whoever asks for the version alone is told, too. */
+static int warn(const installation *i)
+{
+    bool other = i->own[0] && i->library[0] && !command_same_file(i->own, i->library);
+    if (other)
+        fprintf(
+            stderr,
+            "ebpo: the library that runs is not the one that was installed with this program, %s; "
+            "%s is in the loader's way: remove it, or take its folder out of LD_LIBRARY_PATH\n",
+            i->own, i->library);
+    bool differs = ebpo_version_number() != EBPO_VERSION_NUMBER;
+    if (differs)
+        fprintf(stderr, "ebpo: this program was made for version %d.%d.%d of the library, not %s\n",
+                EBPO_VERSION_MAJOR, EBPO_VERSION_MINOR, EBPO_VERSION_PATCH, ebpo_version());
+    return other || differs ? EXIT_FAILED : EXIT_FINE;
+}
+
+int version_tell(const char *argument)
+{
+    char format[32];
+    bool verbose = argument && strcmp(argument, "--verbose") == 0;
+    if (argument && !verbose) {
+        fprintf(stderr, "ebpo: --version takes nothing but --verbose, not '%s'\n", argument);
+        return EXIT_USAGE;
+    }
+    installation i;
+    look(&i);
+    printf("ebpo %s, format %s\n", ebpo_version(),
+           words_format(format, sizeof format, EBPO_FORMAT_MAJOR, EBPO_FORMAT_MINOR));
+    if (verbose)
+        print(&i);
+    return warn(&i);
+}

@@ -1,0 +1,438 @@
+/* Two steps: each sample gets the nearest triangle (z-buffer on 1/depth, which is linear on the
+ * screen); then pixels are shaded from their samples. */
+#include "cli/render/raster.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/command.h"
+
+enum { OCCLUSION_STEPS = 10, THREADS_MAX = 64 };
+#define EDGE UINT32_C(0x80000000)
+
+typedef struct sample {
+    float inverse; /* 1 / depth; 0: far away */
+    uint32_t what; /* triangle, top bit: on an outline */
+} sample;
+
+/* A vertex in the camera's axes (x right, y up, z depth) and on the screen. */
+typedef struct seen {
+    double x, y, inverse;
+} seen;
+
+typedef struct raster {
+    const camera *view;
+    const ebpo_mesh *mesh;
+    const raster_style *style;
+    int width, height, side; /* in samples; side: samples across a pixel */
+    double focal, per_focal; /* samples per unit of x / depth, and one by that */
+    sample *samples;
+    float (*normal)[3]; /* of each triangle, in the camera's axes, towards the eye */
+    double spiral[OCCLUSION_STEPS][2],
+        turn[256][2];   /* where occlusion looks: a spiral in the unit disk, and turns of it */
+    double linear[256]; /* sRGB values as light */
+} raster;
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* In the camera's axes: x right, y up, z towards the eye, from the target. */
+static void to_camera(const raster *r, uint64_t i, double out[3])
+{
+    double v[3];
+    for (uint64_t k = 0; k < 3; k++)
+        v[k] = (r->mesh->xyz32 ? (double)r->mesh->xyz32[3 * i + k] : r->mesh->xyz64[3 * i + k]) -
+               r->view->target[k];
+    out[0] = dot(v, r->view->right);
+    out[1] = dot(v, r->view->up);
+    out[2] = dot(v, r->view->back);
+}
+
+static seen project(const raster *r, const double v[3])
+{
+    double inverse = 1 / (r->view->distance - v[2]);
+    return (seen){ r->width / 2.0 + r->focal * v[0] * inverse,
+                   r->height / 2.0 - r->focal * v[1] * inverse, inverse };
+}
+
+static bool unit_normal(double (*c)[3], double out[3])
+{
+    double u[3], v[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = c[1][k] - c[0][k];
+        v[k] = c[2][k] - c[0][k];
+    }
+    cross(u, v, out);
+    double length = sqrt(dot(out, out));
+    for (int k = 0; k < 3; k++)
+        out[k] /= length;
+    return length > 0;
+}
+
+/* --- first step --- */
+
+/* Which sides (bit i: from corner i to the next) are outlines of the polygon: in the fans of
+ * ebpo_lod_level the sides between neighbouring triangles of one plane are none. */
+static unsigned outline(const raster *r, uint64_t face, const double normal[3])
+{
+    const uint32_t *f = r->mesh->faces + 3 * face;
+    unsigned sides = 7;
+    for (int step = -1; step <= 1; step += 2) {
+        if ((step < 0 && face == 0) || (step > 0 && face + 1 == r->mesh->face_count))
+            continue;
+        const uint32_t *g = f + 3 * step;
+        double c[3][3], other[3];
+        bool fan = g[0] == f[0] && (step > 0 ? g[1] == f[2] : g[2] == f[1]);
+        if (!fan)
+            continue;
+        for (int i = 0; i < 3; i++)
+            to_camera(r, g[i], c[i]);
+        if (!unit_normal(c, other) || dot(normal, other) > 1 - 1e-9)
+            sides &= step > 0 ? ~4u : ~1u;
+    }
+    return sides;
+}
+
+/* Side i from corner i to the next: value >= 0 inside, in samples from the side. */
+typedef struct sides {
+    double a[3], b[3], c[3];
+} sides;
+
+static bool make_sides(const seen p[3], sides *out)
+{
+    double area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
+    if (!(fabs(area) > 1e-12))
+        return false;
+    double sign = area > 0 ? 1 : -1;
+    for (int i = 0; i < 3; i++) {
+        const seen *s = &p[i], *t = &p[(i + 1) % 3];
+        double dx = t->x - s->x, dy = t->y - s->y, length = sqrt(dx * dx + dy * dy);
+        out->a[i] = -dy * sign / length;
+        out->b[i] = dx * sign / length;
+        out->c[i] = -(out->a[i] * s->x + out->b[i] * s->y);
+    }
+    return true;
+}
+
+static int clamp(double v, int most) { return v < 0 ? 0 : v > most ? most : (int)v; }
+
+static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned outlines)
+{
+    sides s;
+    if (!make_sides(p, &s))
+        return;
+    double line = 0.42 * r->side; /* half the outline's breadth */
+    double det = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
+    double gx = ((p[1].inverse - p[0].inverse) * (p[2].y - p[0].y) -
+                 (p[2].inverse - p[0].inverse) * (p[1].y - p[0].y)) /
+                det;
+    double gy = ((p[2].inverse - p[0].inverse) * (p[1].x - p[0].x) -
+                 (p[1].inverse - p[0].inverse) * (p[2].x - p[0].x)) /
+                det;
+    int x0 = clamp(fmin(p[0].x, fmin(p[1].x, p[2].x)), r->width),
+        x1 = clamp(fmax(p[0].x, fmax(p[1].x, p[2].x)) + 1, r->width);
+    int y0 = clamp(fmin(p[0].y, fmin(p[1].y, p[2].y)), r->height),
+        y1 = clamp(fmax(p[0].y, fmax(p[1].y, p[2].y)) + 1, r->height);
+    for (int y = y0; y < y1; y++)
+        for (int x = x0; x < x1; x++) {
+            double sx = x + 0.5, sy = y + 0.5, d[3];
+            for (int i = 0; i < 3; i++)
+                d[i] = s.a[i] * sx + s.b[i] * sy + s.c[i];
+            if (d[0] < 0 || d[1] < 0 || d[2] < 0)
+                continue;
+            float inverse = (float)(p[0].inverse + gx * (sx - p[0].x) + gy * (sy - p[0].y));
+            sample *at = &r->samples[(size_t)y * (size_t)r->width + (size_t)x];
+            if (inverse <= at->inverse)
+                continue;
+            bool on_line = (outlines & 1 && d[0] < line) || (outlines & 2 && d[1] < line) ||
+                           (outlines & 4 && d[2] < line);
+            *at = (sample){ inverse, what | (on_line ? EDGE : 0) };
+        }
+}
+
+/* The normal that the style has for a face, in the camera's axes. */
+static void light_from(const raster *r, uint64_t face, double n[3])
+{
+    const float *given = r->style->normals ? r->style->normals + 3 * face : NULL;
+    if (!given || (given[0] == 0 && given[1] == 0 && given[2] == 0))
+        return;
+    double v[3] = { (double)given[0], (double)given[1], (double)given[2] };
+    n[0] = dot(v, r->view->right);
+    n[1] = dot(v, r->view->up);
+    n[2] = dot(v, r->view->back);
+}
+
+static void draw_face(raster *r, uint64_t face)
+{
+    double c[3][3], n[3];
+    for (int i = 0; i < 3; i++)
+        to_camera(r, r->mesh->faces[3 * face + (uint64_t)i], c[i]);
+    if (!unit_normal(c, n))
+        return;
+    double to_eye[3] = { -c[0][0], -c[0][1], r->view->distance - c[0][2] };
+    bool front = dot(n, to_eye) > 0;
+    if (!front && r->style->closed)
+        return;
+    if (front && r->style->paint && r->style->paint[face] & RASTER_HOLLOW)
+        return;
+    unsigned outlines = r->style->edges ? outline(r, face, n) : 0;
+    light_from(r, face, n);
+    for (int k = 0; k < 3; k++)
+        r->normal[face][k] = (float)(front ? n[k] : -n[k]);
+    seen p[3] = { project(r, c[0]), project(r, c[1]), project(r, c[2]) };
+    fill_triangle(r, p, (uint32_t)face, outlines);
+}
+
+/* --- second step --- */
+
+static void position(const raster *r, int x, int y, double inverse, double out[3])
+{
+    double depth = 1 / inverse, scale = depth * r->per_focal;
+    out[0] = (x + 0.5 - r->width / 2.0) * scale;
+    out[1] = -(y + 0.5 - r->height / 2.0) * scale;
+    out[2] = r->view->distance - depth;
+}
+
+/* How much of the sky near a sample is hidden, 0 .. 1: points on a spiral around it that lie above
+ * its plane. */
+static double occlusion(const raster *r, int x, int y, const sample *at, const float n[3],
+                        double reach)
+{
+    double p[3], sum = 0;
+    position(r, x, y, at->inverse, p);
+    uint32_t hash = ((uint32_t)x * 73856093u ^ (uint32_t)y * 19349663u) * 2654435761u;
+    const double *turn = r->turn[hash >> 24];
+    double radius = reach * r->focal * at->inverse, tx = radius * turn[0], ty = radius * turn[1];
+    for (int i = 0; i < OCCLUSION_STEPS; i++) {
+        const double *s = r->spiral[i];
+        int qx = x + (int)(tx * s[0] - ty * s[1]), qy = y + (int)(tx * s[1] + ty * s[0]);
+        if (qx < 0 || qy < 0 || qx >= r->width || qy >= r->height)
+            continue;
+        const sample *other = &r->samples[(size_t)qy * (size_t)r->width + (size_t)qx];
+        if (other->inverse <= 0)
+            continue;
+        double q[3];
+        position(r, qx, qy, other->inverse, q);
+        double v[3] = { q[0] - p[0], q[1] - p[1], q[2] - p[2] };
+        double height = (double)n[0] * v[0] + (double)n[1] * v[1] + (double)n[2] * v[2];
+        if (height <= 0)
+            continue;
+        double square = dot(v, v), above = height / sqrt(square) - 0.08;
+        if (above > 0)
+            sum += above / (1 + square / (reach * reach));
+    }
+    double hidden = 2.4 * sum / OCCLUSION_STEPS;
+    return hidden > 1 ? 1 : hidden;
+}
+
+/* Shares of a face's corners at a point of its plane, in the camera's axes. */
+static void corner_shares(const raster *r, uint32_t face, const double p[3], double out[3])
+{
+    double c[3][3], from[3][3], n[3], part[3], sum = 0;
+    for (int i = 0; i < 3; i++) {
+        to_camera(r, r->mesh->faces[3 * (uint64_t)face + (uint64_t)i], c[i]);
+        for (int k = 0; k < 3; k++)
+            from[i][k] = c[i][k] - p[k];
+    }
+    for (int k = 0; k < 3; k++)
+        n[k] = (double)r->normal[face][k];
+    for (int i = 0; i < 3; i++) {
+        cross(from[(i + 1) % 3], from[(i + 2) % 3], part);
+        sum += out[i] = fabs(dot(part, n));
+    }
+    for (int i = 0; i < 3; i++)
+        out[i] = sum > 0 ? out[i] / sum : 1.0 / 3;
+}
+
+/* A face's colour at a sample, linear. */
+static void colour_at(const raster *r, int x, int y, const sample *at, double out[3])
+{
+    static const double other[3] = { 0.30, 0.48, 0.66 }, red[3] = { 0.85, 0.04, 0.03 };
+    const raster_style *style = r->style;
+    uint32_t face = at->what & ~EDGE;
+    int paint = style->paint ? style->paint[face] : RASTER_PLAIN;
+    memcpy(out,
+           paint & RASTER_RED     ? red
+           : paint & RASTER_OTHER ? other
+                                  : style->colour,
+           sizeof red);
+    for (int k = 0; k < 3 && style->face_colours; k++)
+        out[k] = r->linear[style->face_colours[4 * (uint64_t)face + (uint64_t)k]];
+    if (!style->vertex_colours)
+        return;
+    double p[3], shares[3];
+    const uint32_t *corner = r->mesh->faces + 3 * (uint64_t)face;
+    position(r, x, y, (double)at->inverse, p);
+    corner_shares(r, face, p, shares);
+    for (unsigned k = 0; k < 3; k++) {
+        out[k] = 0;
+        for (int i = 0; i < 3; i++)
+            out[k] += shares[i] * r->linear[style->vertex_colours[4 * (uint64_t)corner[i] + k]];
+    }
+}
+
+/* Key light from the upper left, a weak fill from the right, the sky above, a gloss. Linear light.
+ */
+static void light(const raster *r, int x, int y, const sample *at, double hidden, double out[3])
+{
+    double colour[3];
+    colour_at(r, x, y, at, colour);
+    const float *n = r->normal[at->what & ~EDGE];
+    static const double key[3] = { -0.46, 0.62, 0.635 }, fill[3] = { 0.86, 0.10, 0.50 },
+                        half[3] = { -0.254, 0.343, 0.904 };
+    double m[3] = { (double)n[0], (double)n[1], (double)n[2] };
+    double k = fmax(0, dot(m, key)), f = fmax(0, dot(m, fill)), sky = 0.5 + 0.5 * m[1];
+    double gloss = fmax(0, dot(m, half));
+    for (int i = 0; i < 5; i++) /* to the 32nd */
+        gloss *= gloss;
+    gloss *= 0.12;
+    double open = 1 - 0.85 * hidden, direct = 1 - 0.45 * hidden;
+    static const double warm[3] = { 1.0, 0.97, 0.92 }, cool[3] = { 0.90, 0.95, 1.0 };
+    for (int i = 0; i < 3; i++) {
+        double ambient = (0.07 + 0.22 * sky) * cool[i] * open;
+        out[i] = colour[i] * (ambient + direct * (0.95 * k * warm[i] + 0.16 * f * cool[i])) +
+                 gloss * direct;
+    }
+}
+
+static double to_linear(int v)
+{
+    double s = v / 255.0;
+    return s <= 0.04045 ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4);
+}
+
+static void make_tables(raster *r)
+{
+    for (int i = 0; i < OCCLUSION_STEPS; i++) {
+        double share = (i + 0.5) / OCCLUSION_STEPS, angle = i * 2.399963; /* the golden angle */
+        r->spiral[i][0] = share * cos(angle);
+        r->spiral[i][1] = share * sin(angle);
+    }
+    for (int i = 0; i < 256; i++) {
+        r->turn[i][0] = cos(i * M_PI / 128);
+        r->turn[i][1] = sin(i * M_PI / 128);
+        r->linear[i] = to_linear(i);
+    }
+}
+
+static uint8_t to_srgb(double v)
+{
+    double s = v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055;
+    return (uint8_t)(s <= 0 ? 0 : s >= 1 ? 255 : s * 255 + 0.5);
+}
+
+static void resolve_pixel(const raster *r, int x, int y, double reach, uint8_t *rgb)
+{
+    static const double ink[3] = { 0.03, 0.04, 0.06 };
+    double sum[3] = { 0, 0, 0 };
+    for (int j = y * r->side; j < (y + 1) * r->side; j++)
+        for (int i = x * r->side; i < (x + 1) * r->side; i++) {
+            const sample *at = &r->samples[(size_t)j * (size_t)r->width + (size_t)i];
+            double c[3] = { r->linear[rgb[0]], r->linear[rgb[1]], r->linear[rgb[2]] };
+            if (at->inverse > 0) {
+                uint32_t face = at->what & ~EDGE;
+                light(r, i, j, at, occlusion(r, i, j, at, r->normal[face], reach), c);
+                for (int k = 0; k < 3 && at->what & EDGE; k++)
+                    c[k] = 0.45 * c[k] + 0.55 * ink[k];
+            }
+            for (int k = 0; k < 3; k++)
+                sum[k] += c[k];
+        }
+    for (int k = 0; k < 3; k++)
+        rgb[k] = to_srgb(sum[k] / (r->side * r->side));
+}
+
+/* One thread's share of the second step: every threads-th row. */
+typedef struct share {
+    const raster *r;
+    picture *out;
+    int x, y, width, height;
+    unsigned number, threads;
+    pthread_t thread;
+} share;
+
+static void *resolve_rows(void *argument)
+{
+    const share *s = argument;
+    double reach = 0.10 * s->r->view->distance * s->r->view->tangent;
+    for (int j = (int)s->number; j < s->height; j += (int)s->threads)
+        for (int i = 0; i < s->width; i++)
+            resolve_pixel(s->r, i, j, reach,
+                          s->out->rgb + 3 * ((size_t)(s->y + j) * (size_t)s->out->width +
+                                             (size_t)(s->x + i)));
+    return NULL;
+}
+
+static void resolve(const raster *r, picture *out, int x, int y, int width, int height,
+                    unsigned threads)
+{
+    share shares[THREADS_MAX];
+    unsigned count = threads < 1 ? 1 : threads < THREADS_MAX ? threads : THREADS_MAX, started = 1;
+    for (unsigned i = 0; i < count; i++)
+        shares[i] = (share){ .r = r,
+                             .out = out,
+                             .x = x,
+                             .y = y,
+                             .width = width,
+                             .height = height,
+                             .number = i,
+                             .threads = count };
+    while (started < count &&
+           command_thread(&shares[started].thread, resolve_rows, &shares[started]) == 0)
+        started++;
+    resolve_rows(&shares[0]);
+    for (unsigned i = started; i < count; i++) /* threads that could not be had */
+        resolve_rows(&shares[i]);
+    for (unsigned i = 1; i < started; i++)
+        pthread_join(shares[i].thread, NULL);
+}
+
+ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const camera *view,
+                        const ebpo_mesh *mesh, const raster_style *style, unsigned threads,
+                        ebpo_error *error)
+{
+    if (mesh->face_count >= EDGE) {
+        snprintf(error->message, sizeof error->message,
+                 "more than 2147483647 faces cannot be drawn; choose a coarser level");
+        return error->status = EBPO_E_LIMIT;
+    }
+    int side = (int64_t)width * height > 4000000 ? 2 : 3;
+    raster r = { .view = view,
+                 .mesh = mesh,
+                 .style = style,
+                 .width = side * width,
+                 .height = side * height,
+                 .side = side };
+    r.focal = r.height / 2.0 / view->tangent;
+    r.per_focal = 1 / r.focal;
+    r.samples = calloc((size_t)r.width * (size_t)r.height, sizeof *r.samples);
+    r.normal = malloc((mesh->face_count ? mesh->face_count : 1) * sizeof *r.normal);
+    ebpo_status status = EBPO_OK;
+    if (!r.samples || !r.normal) {
+        status = error->status = EBPO_E_MEMORY;
+        snprintf(error->message, sizeof error->message,
+                 "not enough memory for a picture of %d x %d; choose a smaller --size", width,
+                 height);
+        goto done;
+    }
+    for (uint64_t face = 0; face < mesh->face_count; face++)
+        draw_face(&r, face);
+    make_tables(&r);
+    resolve(&r, out, x, y, width, height, threads);
+done:
+    free(r.samples);
+    free(r.normal);
+    return status;
+}

@@ -1,0 +1,73 @@
+/* The best distance within so many microseconds: how wide what is certain then is, and how long it
+ * really took. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "cli/bench/bench_run.h"
+#include "cli/report/report_data.h"
+
+typedef struct timing {
+    double *width, *took; /* [points] */
+    uint64_t exact, late;
+} timing;
+
+static ebpo_status ask(const comparison *c, ebpo_context *context, unsigned us, uint64_t clock_cost,
+                       timing *t, ebpo_error *error)
+{
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+    options.deadline_ns = UINT64_C(1000) * us;
+    options.unsigned_distance = true;
+    options.warm = false; /* each point by itself */
+    t->exact = t->late = 0;
+    for (uint64_t i = 0; i < c->points; i++) {
+        ebpo_distance_result answer;
+        uint64_t begin = tool_clock();
+        ebpo_status status = ebpo_distance(context, c->uniform + 3 * i, &options, &answer, error);
+        uint64_t took = tool_clock() - begin;
+        if (status != EBPO_OK)
+            return status;
+        t->took[i] = took > clock_cost ? (double)(took - clock_cost) : 0;
+        t->late += t->took[i] > 1e3 * us;
+        t->exact += !isnan(answer.distance);
+        t->width[i] = isnan(answer.distance) ? answer.hi - answer.lo : 0;
+    }
+    return EBPO_OK;
+}
+
+static void note(const comparison *c, timing *t, double *f)
+{
+    double count = (double)c->points;
+    f[OF_DUE_EXACT] = (double)t->exact / count;
+    f[OF_DUE_LATE] = (double)t->late / count;
+    f[OF_DUE_WIDTH_MEDIAN] = quantile_of(t->width, c->points, 0.5);
+    f[OF_DUE_WIDTH_P99] = quantile_of(t->width, c->points, 0.99);
+    f[OF_DUE_TOOK_MEDIAN] = quantile_of(t->took, c->points, 0.5);
+    f[OF_DUE_TOOK_P99] = quantile_of(t->took, c->points, 0.99);
+    f[OF_DUE_TOOK_MAX] = t->took[c->points - 1]; /* they are sorted now */
+}
+
+ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int round,
+                             ebpo_error *error)
+{
+    timing t = { .width = malloc(c->points * sizeof(double)),
+                 .took = malloc(c->points * sizeof(double)) };
+    uint64_t clock_cost = bench_clock_cost();
+    ebpo_context *context = NULL;
+    ebpo_status status = ebpo_context_new(model, &context, error);
+    if (status == EBPO_OK && (!t.width || !t.took)) {
+        snprintf(error->message, sizeof error->message,
+                 "not enough memory for the points; give fewer with --points");
+        status = error->status = EBPO_E_MEMORY;
+    }
+    for (int i = 0; i < DEADLINES && status == EBPO_OK; i++) {
+        if (c->progress.report)
+            c->progress.report(c->progress.user, "deadlines", (uint64_t)i, DEADLINES);
+        status = ask(c, context, deadlines_us[i], clock_cost, &t, error);
+        if (status == EBPO_OK)
+            note(c, &t, m->round[round].due[i]);
+    }
+    free(t.width);
+    free(t.took);
+    ebpo_context_free(context);
+    return method_without(m, "deadlines", status, error);
+}

@@ -1,0 +1,240 @@
+/* The figures of one method, but for times: what the head tells, volumes, the limit, how far the
+ * envelopes reach; then needs and the theses' costs. */
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/file_facts.h"
+#include "cli/mesh_findings.h"
+#include "cli/report/report_data.h"
+
+static void from_head(const comparison *c, method *m)
+{
+    const ebpo_info *info = &m->info;
+    double planes = 0;
+    for (int i = 0; i < info->level_count; i++)
+        planes += (double)(info->level[i].plane_count + info->level[i].leaf_plane_count);
+    m->whole[OF_FILE_BYTES] = (double)info->file_bytes;
+    m->whole[OF_HEAD_BYTES] = (double)info->head_bytes;
+    m->whole[OF_ALL_PLANES] = planes;
+    for (int i = c->first; i <= method_last(c, m); i++) {
+        const ebpo_level_summary *s = &info->level[i];
+        double *f = m->level[i];
+        f[OF_BYTES] = (double)m->stored.level_bytes[i];
+        f[OF_CUMULATIVE_BYTES] = (double)facts_cumulative(info, &m->stored, i);
+        f[OF_GRAY] = (double)s->gray_count;
+        f[OF_LEAVES] = (double)s->leaf_count;
+        f[OF_PLANES] = (double)s->plane_count;
+        f[OF_LEAF_PLANES] = (double)s->leaf_plane_count;
+    }
+}
+
+/* --- what the levels are --- */
+
+/* The volume of the root cell, or of a cell far below it, is no normal double. */
+static bool is_out_of_range(const ebpo_info *info)
+{
+    double volume = info->box_size[0] * info->box_size[1] * info->box_size[2];
+    return !isnormal(volume) || !isnormal(ldexp(volume, -60));
+}
+
+/* Volume within the mesh in root cells: free of the model's scale. */
+static double share_of_root(const ebpo_info *info, const ebpo_mesh *mesh)
+{
+    double sum = 0;
+    for (uint64_t i = 0; i < mesh->face_count; i++) {
+        double p[3][3];
+        for (uint64_t v = 0; v < 3; v++)
+            for (uint64_t k = 0; k < 3; k++) {
+                uint64_t at = 3 * (uint64_t)mesh->faces[3 * i + v] + k;
+                double x = mesh->xyz32 ? (double)mesh->xyz32[at] : mesh->xyz64[at];
+                p[v][k] = x / info->box_size[k] - info->box_origin[k] / info->box_size[k];
+            }
+        sum += p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
+               p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
+               p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
+    }
+    return fabs(sum) / 6;
+}
+
+/* Where volumes are beyond the range of a double. */
+static ebpo_status solid_in_root(const comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_mesh mesh = { 0 };
+    if (!m->info.solid || !is_out_of_range(&m->info) || m->info.report.components > 1 ||
+        !findings_knows(&m->solid))
+        return EBPO_OK;
+    read.threads = (unsigned)c->v->threads;
+    ebpo_status status = ebpo_file_read_mesh(file, &read, &mesh, error);
+    if (status != EBPO_OK)
+        return method_without(m, "excess, with volumes beyond a double's range", status, error);
+    m->solid_share = share_of_root(&m->info, &mesh);
+    ebpo_mesh_free(&mesh);
+    return EBPO_OK;
+}
+
+static ebpo_status excess_in_root(const comparison *c, method *m, ebpo_file *file, int level,
+                                  ebpo_error *error)
+{
+    ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
+    ebpo_mesh polygons = { 0 };
+    options.threads = (unsigned)c->v->threads;
+    options.progress = c->progress;
+    ebpo_status status = ebpo_lod_level(file, level, &options, &polygons, NULL, error);
+    if (status == EBPO_OK)
+        m->level[level][OF_EXCESS] =
+            100 * (share_of_root(&m->info, &polygons) - m->solid_share) / m->solid_share;
+    ebpo_mesh_free(&polygons);
+    return status;
+}
+
+/* Finds out the solid's volume: from the head, or else from the mesh. */
+static ebpo_status solid_volume(const comparison *c, method *m, const ebpo_file *file,
+                                ebpo_error *error)
+{
+    ebpo_mass mass = EBPO_MASS_INIT;
+    m->solid = facts_solid(&m->info, NULL);
+    if (findings_knows(&m->solid) || !(m->info.parts & EBPO_PART_MESH) || m->info.pruned)
+        return EBPO_OK;
+    ebpo_status status = ebpo_measure(file, (unsigned)c->v->threads, &mass, error);
+    if (status == EBPO_OK)
+        m->solid = facts_measured(&m->info, &mass);
+    return status;
+}
+
+/* With all that the file holds. */
+static ebpo_status volumes(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    ebpo_status status = solid_volume(c, m, file, error);
+    if (status == EBPO_OK)
+        status = solid_in_root(c, m, file, error);
+    for (int i = c->first; i <= method_last(c, m) && status == EBPO_OK; i++) {
+        double *f = m->level[i];
+        status = facts_derived(file, i, (unsigned)c->v->threads, c->progress, &f[OF_VOLUME], error);
+        f[OF_EXCESS] = facts_excess(&m->info, &m->solid, f[OF_VOLUME]);
+        if (status == EBPO_OK && m->solid_share > 0)
+            status = excess_in_root(c, m, file, i, error);
+    }
+    return status;
+}
+
+/* Volumes from the levels alone. */
+static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    ebpo_stream_options wanted = { sizeof(ebpo_stream_options), true, true,
+                                   (unsigned)c->v->threads };
+    ebpo_stream *stream = NULL;
+    bool more = true;
+    ebpo_status status = ebpo_stream_new(file, &wanted, &stream, error);
+    for (int i = 0; i <= method_last(c, m) && status == EBPO_OK; i++) {
+        ebpo_stream_level told;
+        status = ebpo_stream_next_level(stream, &told, &more, error);
+        if (status == EBPO_OK && i >= c->first) {
+            m->level[i][OF_LEVELS_VOLUME] = told.volume;
+            /* with leaf planes in the file, the levels alone are all that is known */
+            m->level[i][OF_LEVELS_EXCESS] =
+                !(m->solid_share > 0) ? facts_excess(&m->info, &m->solid, told.volume)
+                : m->info.parts & EBPO_PART_LEAF_PLANES ? m->level[i][OF_EXCESS]
+                                                        : NAN;
+        }
+    }
+    ebpo_stream_free(stream);
+    return status;
+}
+
+/* --- the limit, and how far envelopes reach --- */
+
+static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    for (int i = c->first; i <= method_last(c, m); i++) {
+        ebpo_limit limit = EBPO_LIMIT_INIT;
+        ebpo_limit_options options = EBPO_LIMIT_OPTIONS_INIT;
+        options.threads = (unsigned)c->v->threads;
+        options.progress = c->progress;
+        double *f = m->level[i];
+        ebpo_status status = ebpo_limit_level(file, i, &options, &limit, error);
+        if (status != EBPO_OK)
+            return method_without(m, "limit", status, error);
+        f[OF_LIMIT_VOLUME] = limit.volume;
+        f[OF_LIMIT_EXCESS] = facts_excess(&m->info, &m->solid, limit.volume);
+        f[OF_EXCESS_TO_LIMIT] = facts_excess_ratio(&m->info, &m->solid, f[OF_VOLUME], limit.volume);
+        if (!(m->solid_share > 0))
+            continue;
+        options.in_root_cells = 1;
+        status = ebpo_limit_level(file, i, &options, &limit, error);
+        if (status != EBPO_OK)
+            return status;
+        f[OF_LIMIT_EXCESS] = 100 * (limit.volume - m->solid_share) / m->solid_share;
+        f[OF_EXCESS_TO_LIMIT] = f[OF_LIMIT_EXCESS] > 1e-7 ? f[OF_EXCESS] / f[OF_LIMIT_EXCESS] : NAN;
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status deviations(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                              ebpo_error *error)
+{
+    ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+    const uint64_t samples = options.samples;
+    options.questions = REPORT_QUESTIONS;
+    options.seed = (uint64_t)c->v->seed;
+    options.threads = (unsigned)c->v->threads;
+    options.progress = c->progress;
+    /* from the root on: a level's bound is at most that of the one before, whichever are wanted */
+    for (int i = 0; i <= method_last(c, m); i++) {
+        ebpo_deviation far = EBPO_DEVIATION_INIT;
+        double *f = m->level[i];
+        options.samples = i < c->first ? 0 : samples;
+        ebpo_status status = ebpo_deviation_level(model, file, i, &options, &far, error);
+        if (status != EBPO_OK)
+            return method_without(m, "Hausdorff distance", status, error);
+        options.at_most = far.hi;
+        if (i < c->first)
+            continue;
+        f[OF_FAR_LO] = far.lo;
+        f[OF_FAR_HI] = far.hi;
+        f[OF_FAR_MEAN] = far.mean;
+        f[OF_FAR_RMS] = far.rms;
+    }
+    return EBPO_OK;
+}
+
+/* --- all of it --- */
+
+static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    ebpo_model *model = NULL;
+    options.threads = (unsigned)c->v->threads;
+    ebpo_status status = ebpo_model_new(file, &options, &model, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_model_get_stats(model, &stats);
+    m->whole[OF_MEMORY_BYTES] = (double)stats.memory;
+    status = deviations(c, m, file, model, error);
+    if (status == EBPO_OK && c->v->need)
+        status = report_needs(c, m, file, model, error);
+    ebpo_model_free(model);
+    return status == EBPO_OK ? report_budgets(c, m, file, error) : status;
+}
+
+ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
+{
+    ebpo_file *file = NULL;
+    ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
+    from_head(c, m);
+    if (status == EBPO_OK)
+        status = volumes(c, m, file, error);
+    if (status == EBPO_OK)
+        status = levels_alone(c, m, file, error);
+    if (status == EBPO_OK)
+        status = report_lines(c, m, error);
+    if (status == EBPO_OK)
+        status = report_thesis(c, m, file, error);
+    if (status == EBPO_OK)
+        status = limits(c, m, file, error);
+    if (status == EBPO_OK)
+        status = with_model(c, m, file, error);
+    ebpo_close(file);
+    return status;
+}

@@ -1,0 +1,122 @@
+/* Having a level over a line: bytes and round trips, counted at a source that only pretends to be
+ * far away. How long they take on a line follows from its rate and its delay; the page says so for
+ * some. */
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/report/report_data.h"
+
+/* as the library has it for URLs: what opening fetches, and the pieces that are fetched later */
+enum { HEAD_BYTES = 128 << 10, PIECE = 4096 };
+
+/* One thread reads, so there is no lock. */
+typedef struct line {
+    int file;
+    uint64_t size, bytes;
+    uint64_t trips;    /* gone by */
+    uint32_t *arrives; /* of each piece: with which trip; 0: not asked for */
+} line;
+
+/* Asks for the pieces of a range that have not been asked for; they come with the next trip. The
+ * last trip that any of the range comes with. */
+static uint64_t ask_for(line *l, uint64_t offset, uint64_t size)
+{
+    uint64_t last = 0;
+    for (uint64_t i = offset / PIECE; size && i <= (offset + size - 1) / PIECE; i++) {
+        if (!l->arrives[i]) {
+            l->arrives[i] = (uint32_t)l->trips + 1;
+            l->bytes += (i + 1) * PIECE < l->size ? PIECE : l->size - i * PIECE;
+        }
+        last = l->arrives[i] > last ? l->arrives[i] : last;
+    }
+    return last;
+}
+
+static ebpo_status read_range(void *user, uint64_t offset, uint64_t size, void *data,
+                              ebpo_error *error)
+{
+    line *l = user;
+    uint64_t arrival = ask_for(l, offset, size), done = 0;
+    l->trips = arrival > l->trips ? arrival : l->trips;
+    while (done < size) {
+        ssize_t got = pread(l->file, (char *)data + done, size - done, (off_t)(offset + done));
+        if (got <= 0) {
+            snprintf(error->message, sizeof error->message, "the file cannot be read");
+            return error->status = EBPO_E_IO;
+        }
+        done += (uint64_t)got;
+    }
+    return EBPO_OK;
+}
+
+static void announce(void *user, const ebpo_range *ranges, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        (void)ask_for(user, ranges[i].offset, ranges[i].size);
+}
+
+static ebpo_status have_level(line *l, const char *path, int level, ebpo_error *error)
+{
+    ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
+    ebpo_source source = EBPO_SOURCE_INIT;
+    ebpo_stream_level told;
+    ebpo_stream *stream = NULL;
+    ebpo_file *file = NULL;
+    bool more = true;
+    wanted.threads = 1;
+    source.user = l;
+    source.size = l->size;
+    source.read = read_range;
+    source.prefetch = announce;
+    source.prefetched = l->size < HEAD_BYTES ? l->size : HEAD_BYTES;
+    l->trips = l->bytes = 0;
+    memset(l->arrives, 0, (l->size / PIECE + 1) * sizeof *l->arrives);
+    l->trips = ask_for(l, 0, source.prefetched);
+    ebpo_status status = ebpo_open_source(&source, path, &file, error);
+    if (status == EBPO_OK) {
+        ebpo_file_prefetch_levels(file, 0, level);
+        status = ebpo_stream_new(file, &wanted, &stream, error);
+    }
+    for (int i = 0; i <= level && status == EBPO_OK; i++)
+        status = ebpo_stream_next_level(stream, &told, &more, error);
+    ebpo_stream_free(stream);
+    ebpo_close(file);
+    return status;
+}
+
+ebpo_status report_lines(comparison *c, method *m, ebpo_error *error)
+{
+    struct stat st;
+    line l = { .file = -1 };
+    ebpo_status status = EBPO_OK;
+    if (ebpo_is_url(m->path)) {
+        method_note(m, "lines", "the file came over one; compare files on disk");
+        return EBPO_OK;
+    }
+    l.file = open(m->path, O_RDONLY | O_CLOEXEC);
+    if (l.file < 0 || fstat(l.file, &st) != 0) {
+        snprintf(error->message, sizeof error->message, "%.200s: cannot be read", m->path);
+        status = error->status = EBPO_E_IO;
+    } else {
+        l.size = (uint64_t)st.st_size;
+        l.arrives = malloc((l.size / PIECE + 1) * sizeof *l.arrives);
+        if (!l.arrives) {
+            snprintf(error->message, sizeof error->message,
+                     "not enough memory for simulated lines");
+            status = error->status = EBPO_E_MEMORY;
+        }
+    }
+    for (int i = c->first; i <= method_last(c, m) && status == EBPO_OK; i++) {
+        status = have_level(&l, m->path, i, error);
+        m->level[i][OF_LINE_BYTES] = (double)l.bytes;
+        m->level[i][OF_LINE_TRIPS] = (double)l.trips;
+    }
+    free(l.arrives);
+    if (l.file >= 0)
+        close(l.file);
+    return status;
+}

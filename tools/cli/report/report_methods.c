@@ -1,0 +1,220 @@
+/* Which methods are compared: files as they are, or files made of one mesh with each selection. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/command.h"
+#include "cli/mesh_input.h"
+#include "cli/mesh_advice.h"
+#include "cli/report/report_data.h"
+#include "cli/selection_args.h"
+#include "cli/words.h"
+
+static int told(const char *message, const char *what)
+{
+    fprintf(stderr, "ebpo report: %s: %s; try 'ebpo report --help'\n", what, message);
+    return EXIT_USAGE;
+}
+
+/* --- files --- */
+
+static bool same_model(const ebpo_info *a, const ebpo_info *b)
+{
+    return memcmp(a->source_sha256, b->source_sha256, sizeof a->source_sha256) == 0 &&
+           a->solid == b->solid && a->rule == b->rule &&
+           a->source_face_count == b->source_face_count &&
+           memcmp(a->report.min, b->report.min, sizeof a->report.min) == 0 &&
+           memcmp(a->report.max, b->report.max, sizeof a->report.max) == 0 &&
+           memcmp(&a->report.volume, &b->report.volume, sizeof a->report.volume) == 0;
+}
+
+static int learn(comparison *c, method *m)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ebpo_status status = remote_open(&file, m->path, &c->v->remote, &error);
+    if (status == EBPO_OK) {
+        m->stored = (ebpo_stored_sizes)EBPO_STORED_SIZES_INIT;
+        status = ebpo_file_locate(file, &m->stored, &error);
+    }
+    if (status == EBPO_OK)
+        m->info = *ebpo_file_info(file);
+    ebpo_close(file);
+    m->levels = m->info.level_count;
+    if (status != EBPO_OK)
+        return command_failed("report", &error);
+    if (m == c->methods || same_model(&c->methods->info, &m->info))
+        return EXIT_FINE;
+    fprintf(stderr,
+            "ebpo report: %s and %s are made of different meshes; a report compares files of one "
+            "model\n",
+            remote_shown(c->methods->path), remote_shown(m->path));
+    return EXIT_FAILED;
+}
+
+/* A file's name makes a method's, whatever is in it. */
+static void usable_stem(const char *path, char *name, size_t capacity)
+{
+    report_stem(path, name, capacity);
+    for (char *c = name; *c; c++)
+        if (strchr("/,\"\n\r", *c))
+            *c = '_';
+}
+
+static int add_file(comparison *c, const char *path)
+{
+    char name[64];
+    if (c->count < c->v->names.count)
+        snprintf(name, sizeof name, "%s", c->v->names.item[c->count]);
+    else
+        usable_stem(path, name, sizeof name);
+    if (strlen(path) >= sizeof c->methods->path)
+        return told("the name is too long", path);
+    if (strpbrk(name, "/,\"\n"))
+        return told(
+            "a method's name has no '/', comma, quotation mark or new line; give another --name",
+            name);
+    for (int i = 0; i < c->count; i++)
+        if (strcmp(c->methods[i].name, name) == 0)
+            return told("two methods would have this name; give a --name for each file", name);
+    method *m = &c->methods[c->count++];
+    method_begin(m, name, path);
+    return learn(c, m);
+}
+
+/* --- from a mesh --- */
+
+static void build_options(const comparison *c, int selection, const plane_setting *setting,
+                          ebpo_build_options *o)
+{
+    const report_values *v = c->v;
+    *o = (ebpo_build_options)EBPO_BUILD_OPTIONS_INIT;
+    o->max_level = (int)v->max_level;
+    o->leaf_faces = (uint32_t)v->leaf_faces;
+    o->epsilon = v->epsilon;
+    o->parts |= EBPO_PART_LEAF_PLANES; /* so that each method's levels hold all of its own planes */
+    o->select = (ebpo_selection)selection;
+    o->percent = setting->percent;
+    o->normals = (ebpo_normal_distance)v->normals;
+    o->seed = (uint64_t)v->seed;
+    o->threads = (unsigned)v->threads;
+    o->progress = c->progress;
+}
+
+/* The builder consumes the mesh, so it is read for each. */
+static ebpo_status build_one(comparison *c, const char *mesh, int selection,
+                             const plane_setting *setting, const char *path, double *seconds,
+                             ebpo_error *error)
+{
+    ebpo_build_options build;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_tree tree;
+    mesh_input p;
+    ebpo_status status = mesh_input_read(&p, mesh, (mending){ 0 }, READ_MESH, NULL,
+                                         (unsigned)c->v->threads, c->progress, error);
+    if (status != EBPO_OK)
+        return status;
+    if (c->count == 0) {
+        if (c->progress.user)
+            progress_wipe(c->progress.user);
+        advice_warn(stderr, "report", mesh, &p);
+    }
+    build_options(c, selection, setting, &build);
+    status = selection_k_root(setting->k_root[0] ? setting->k_root : NULL, p.mesh.face_count,
+                              &build.k_root, error);
+    if (status != EBPO_OK) {
+        ebpo_mesh_free(&p.mesh);
+        return status;
+    }
+    double begin = progress_now();
+    status = ebpo_build(&p.mesh, &p.prepared.report, &p.prepared.record, &build, &tree, error);
+    *seconds = progress_now() - begin;
+    if (status != EBPO_OK)
+        return status;
+    write.threads = build.threads;
+    write.progress = c->progress;
+    status = ebpo_tree_write(&tree, path, &write, error);
+    ebpo_tree_free(&tree);
+    return status;
+}
+
+static int build_method(comparison *c, const char *mesh, int selection,
+                        const plane_setting *setting)
+{
+    char path[sizeof c->folder + 64];
+    ebpo_error error = EBPO_ERROR_INIT;
+    double seconds = 0;
+    snprintf(path, sizeof path, "%s/%s%s.ebpo.h5", c->folder, selection_words[selection],
+             setting->word);
+    if (build_one(c, mesh, selection, setting, path, &seconds, &error) != EBPO_OK)
+        return command_failed("report", &error);
+    int code = add_file(c, path);
+    if (code == EXIT_FINE)
+        c->methods[c->count - 1].whole[OF_BUILD_SECONDS] = seconds;
+    return code;
+}
+
+static int settings_of(const comparison *c, int selection)
+{
+    return ebpo_selection_describe((ebpo_selection)selection)->from_leaves ? c->settings : 1;
+}
+
+static int build_all(comparison *c, const char *mesh)
+{
+    static const plane_setting none = { .percent = 40 };
+    int code = EXIT_FINE, count = 0;
+    for (int i = 0; selection_words[i]; i++)
+        count += c->v->select >> i & 1 ? settings_of(c, i) : 0;
+    if (count > METHODS_MAX)
+        return told("more than 12 methods; give fewer selections, or fewer numbers of planes",
+                    mesh);
+    for (int i = 0; selection_words[i]; i++)
+        for (int k = 0; c->v->select >> i & 1 && k < settings_of(c, i) && code == EXIT_FINE; k++)
+            code = build_method(c, mesh, i,
+                                ebpo_selection_describe((ebpo_selection)i)->from_leaves
+                                    ? &c->setting[k]
+                                    : &none);
+    return code;
+}
+
+/* --- both --- */
+
+static int find(comparison *c, const char *const *operand)
+{
+    report_stem(operand[0], c->model, sizeof c->model);
+    for (int i = 0; operand[i]; i++) {
+        int is_hdf5 = command_is_hdf5("report", operand[i]);
+        if (is_hdf5 < 0)
+            return EXIT_FAILED;
+        if (!is_hdf5 && operand[1])
+            return told("a mesh stands alone; its methods are named by --select", operand[i]);
+        if (!is_hdf5 && c->v->names.count)
+            return told("the methods of a mesh have the selections' names; leave --name away",
+                        operand[i]);
+        if (!is_hdf5)
+            return build_all(c, operand[i]);
+        int code = add_file(c, operand[i]);
+        if (code != EXIT_FINE)
+            return code;
+    }
+    return EXIT_FINE;
+}
+
+int report_find_methods(comparison *c, const char *const *operand)
+{
+    int code = find(c, operand);
+    const ebpo_mesh_report *r = &c->methods->info.report;
+    if (code != EXIT_FINE)
+        return code;
+    if (c->count > 1 && c->methods->info.source_name[0])
+        report_stem(c->methods->info.source_name, c->model, sizeof c->model);
+    c->diagonal = hypot(hypot(r->max[0] - r->min[0], r->max[1] - r->min[1]), r->max[2] - r->min[2]);
+    if (c->first > comparison_last(c)) {
+        if (c->progress.user)
+            progress_wipe(c->progress.user);
+        fprintf(stderr, "ebpo report: --levels: there is no level %d; the deepest is %d\n",
+                c->first, comparison_last(c));
+        return EXIT_USAGE;
+    }
+    return EXIT_FINE;
+}

@@ -1,0 +1,115 @@
+/* Files cut to a need, an error or a size: how well they keep to it. */
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cli/bench/bench_run.h"
+#include "cli/report/report_data.h"
+
+static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */
+static const double sizes[] = { 3, 5, 10, 50 };   /* percent of the first file */
+
+/* What a viewer needs: envelopes without mesh. */
+static ebpo_status cut(const comparison *c, ebpo_file *file, const need_result *n, const char *path,
+                       ebpo_error *error)
+{
+    ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
+    options.parts = ebpo_profile_parts(EBPO_PROFILE_LOD);
+    options.threads = (unsigned)c->v->threads;
+    options.progress = c->progress;
+    if (n->kind == NEED_ERROR)
+        options.max_error = n->asked;
+    else
+        options.target_bytes = (uint64_t)n->asked;
+    return ebpo_subset(file, path, &options, error);
+}
+
+static ebpo_status reach(const comparison *c, ebpo_model *model, const char *path, need_result *n,
+                         ebpo_error *error)
+{
+    ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+    options.questions = REPORT_QUESTIONS;
+    ebpo_deviation far = EBPO_DEVIATION_INIT;
+    ebpo_file *file = NULL;
+    options.samples = 0;
+    options.tolerance = 0.01; /* or a word that is kept would seem broken */
+    options.threads = (unsigned)c->v->threads;
+    options.progress = c->progress;
+    ebpo_status status = ebpo_open(path, &file, error);
+    if (status == EBPO_OK) {
+        const ebpo_info *info = ebpo_file_info(file);
+        n->figure[OF_NEED_BYTES] = (double)info->file_bytes;
+        status = ebpo_deviation_level(model, file, info->level_count - 1, &options, &far, error);
+    }
+    if (status == EBPO_OK) {
+        n->figure[OF_NEED_FAR_LO] = far.lo;
+        n->figure[OF_NEED_FAR_HI] = far.hi;
+    }
+    ebpo_close(file);
+    return status;
+}
+
+/* Leaves cannot be refined: no subset is promised to be closer than the file's last level is, which
+ * --levels may have left out. 0: not known. */
+static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                             double *reach, ebpo_error *error)
+{
+    ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+    options.questions = REPORT_QUESTIONS;
+    ebpo_deviation far = EBPO_DEVIATION_INIT;
+    *reach = m->level[m->levels - 1][OF_FAR_HI];
+    if (!isnan(*reach))
+        return EBPO_OK;
+    options.samples = 0;
+    options.threads = (unsigned)c->v->threads;
+    options.progress = c->progress;
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < m->levels && status == EBPO_OK; i++) {
+        status = ebpo_deviation_level(model, file, i, &options, &far, error);
+        options.at_most = far.hi;
+    }
+    *reach = status == EBPO_OK ? far.hi : 0;
+    return method_without(m, "Hausdorff distance", status, error);
+}
+
+static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                            need_kind kind, double asked, double own, ebpo_error *error)
+{
+    char path[sizeof c->folder + 16];
+    need_result *n = &m->need[m->need_count];
+    *n = (need_result){ kind, asked, { NAN, NAN, NAN, NAN, NAN } };
+    snprintf(path, sizeof path, "%s/need.ebpo.h5", c->folder);
+    uint64_t begin = tool_clock();
+    ebpo_status status = cut(c, file, n, path, error);
+    n->figure[OF_NEED_SECONDS] = 1e-9 * (double)(tool_clock() - begin);
+    if (status == EBPO_OK)
+        status = reach(c, model, path, n, error);
+    unlink(path);
+    n->figure[OF_NEED_RATIO] = kind == NEED_ERROR ? n->figure[OF_NEED_FAR_HI] / fmax(asked, own)
+                                                  : n->figure[OF_NEED_BYTES] / asked;
+    if (status == EBPO_OK || status == EBPO_E_ABSENT)
+        m->need_count++;
+    return status;
+}
+
+/* What cannot be cut to a need is noted, and left out. */
+ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                         ebpo_error *error)
+{
+    double own;
+    ebpo_status status = own_reach(c, m, file, model, &own, error);
+    for (unsigned i = 0; i < NEEDS && status == EBPO_OK; i++) {
+        bool by_error = i < NEEDS / 2;
+        double asked =
+            by_error ? errors[i] / 100 * c->diagonal
+                     : floor(sizes[i - NEEDS / 2] / 100 * (double)c->methods[0].info.file_bytes);
+        status = one_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, asked, own, error);
+        if (status == EBPO_E_MEMORY || status == EBPO_E_IO || status == EBPO_E_CANCELLED)
+            return status;
+        if (status != EBPO_OK)
+            method_note(m, by_error ? "choosing by error" : "choosing by size", error->message);
+        *error = (ebpo_error)EBPO_ERROR_INIT;
+        status = EBPO_OK;
+    }
+    return status;
+}

@@ -1,0 +1,247 @@
+#include "cli/report/report_output.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/signals.h"
+#include "cli/words.h"
+
+static char being_made[4096]; /* for the signal handler */
+
+static int told(int code, const char *path, const char *what)
+{
+    fprintf(stderr, "ebpo report: %s: %s\n", path, what);
+    return code;
+}
+
+static bool is_named(const char *name, const char *const *names)
+{
+    for (; *names; names++)
+        if (strcmp(name, *names) == 0)
+            return true;
+    return false;
+}
+
+static bool is_dot(const char *name) { return strcmp(name, ".") == 0 || strcmp(name, "..") == 0; }
+
+/* What a report holds besides a file for each selection, SELECTION.ebpo.h5. */
+static const char *const fixed_names[] = { "report.csv", "report.json", "report.html", NULL };
+#define MODEL_ENDING ".ebpo.h5"
+
+/* "inherit.ebpo.h5", "kmedoids-10%.ebpo.h5", "kmedoids-K0.5%.ebpo.h5" */
+static bool is_selection_file(const char *name)
+{
+    size_t length = strlen(name), ending = strlen(MODEL_ENDING);
+    if (length < ending || strcmp(name + length - ending, MODEL_ENDING) != 0)
+        return false;
+    for (int i = 0; selection_words[i]; i++) {
+        size_t word = strlen(selection_words[i]), rest = length - ending;
+        if (strncmp(name, selection_words[i], word) == 0 &&
+            (word == rest ||
+             (name[word] == '-' && word + 1 + strspn(name + word + 1, "K0123456789.e+-%") >= rest)))
+            return true;
+    }
+    return false;
+}
+
+/* Only files of the names that a report has: whatever else is there is somebody's own. */
+static bool is_ours(const char *folder, const char *name)
+{
+    char path[8192];
+    struct stat st;
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return (is_named(name, fixed_names) || is_selection_file(name)) && lstat(path, &st) == 0 &&
+           S_ISREG(st.st_mode);
+}
+
+static bool is_operand(const char *folder, const char *name, const char *const *operand)
+{
+    char path[8192];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    for (; *operand; operand++)
+        if (command_same_file(path, *operand))
+            return true;
+    return false;
+}
+
+/* What is there would be deleted, so it has to be a report, and not the one that is compared. */
+static int look_into(const char *place, DIR *folder, const char *const *operand)
+{
+    char text[600];
+    bool empty = true, report = false;
+    for (struct dirent *entry; (entry = readdir(folder));) {
+        const char *name = entry->d_name;
+        if (is_dot(name))
+            continue;
+        empty = false;
+        report = report || strcmp(name, "report.json") == 0;
+        if (is_operand(place, name, operand)) {
+            snprintf(text, sizeof text,
+                     "is a folder with an input in it, '%.255s', and would be replaced; give "
+                     "another one with -o",
+                     name);
+            return told(EXIT_USAGE, place, text);
+        }
+        if (!is_ours(place, name)) {
+            snprintf(text, sizeof text,
+                     "is a folder with something else than a report in it, '%.255s'; give another "
+                     "one with -o",
+                     name);
+            return told(EXIT_FAILED, place, text);
+        }
+    }
+    if (!empty && !report)
+        return told(
+            EXIT_FAILED, place,
+            "is a folder without report.json, so it may be no report; give another one with -o");
+    return EXIT_FINE;
+}
+
+static int place_is_free(const char *place, const char *const *operand)
+{
+    struct stat st;
+    if (lstat(place, &st) != 0)
+        return errno == ENOENT ? EXIT_FINE : told(EXIT_FAILED, place, strerror(errno));
+    DIR *folder = S_ISDIR(st.st_mode) ? opendir(place) : NULL;
+    if (!folder)
+        return told(EXIT_FAILED, place, "is in the way and no folder; give another one with -o");
+    int code = look_into(place, folder, operand);
+    closedir(folder);
+    return code;
+}
+
+/* Removes the files, and the folder if nothing is left in it. */
+static bool remove_folder(const char *folder, bool ours_only)
+{
+    char path[8192];
+    DIR *d = opendir(folder);
+    if (!d)
+        return false;
+    for (struct dirent *entry; (entry = readdir(d));)
+        if (!is_dot(entry->d_name) && (!ours_only || is_ours(folder, entry->d_name))) {
+            snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
+            unlink(path);
+        }
+    closedir(d);
+    return rmdir(folder) == 0;
+}
+
+/* In a signal handler: only what may be called there. Names are known beforehand. */
+static void abandon_file(const char *stem, const char *ending)
+{
+    size_t length = strlen(being_made);
+    being_made[length] = '/';
+    strcpy(being_made + length + 1, stem);
+    strcat(being_made, ending);
+    unlink(being_made);
+    being_made[length] = 0;
+}
+
+static void abandon(void)
+{
+    if (!being_made[0])
+        return;
+    for (int i = 0; fixed_names[i]; i++)
+        abandon_file(fixed_names[i], "");
+    for (int i = 0; selection_words[i]; i++)
+        abandon_file(selection_words[i], MODEL_ENDING);
+    abandon_file("need", MODEL_ENDING); /* a trial of report_needs.c */
+    rmdir(being_made);
+}
+
+/* Without memory for looking into the folder, what a report has goes by its names. */
+void output_drop(const char *folder)
+{
+    if (folder[0] && !remove_folder(folder, false))
+        abandon();
+    being_made[0] = 0;
+}
+
+/* Under a hidden name, since a report may be in its place, which the library would refuse. */
+static bool make_folder(const char *place, size_t length, char *folder, size_t capacity)
+{
+    char *making, hidden[4200];
+    size_t name = length;
+    ebpo_error error = EBPO_ERROR_INIT;
+    while (name && place[name - 1] != '/')
+        name--;
+    snprintf(hidden, sizeof hidden, "%.*s.%.*s.new", (int)name, place, (int)(length - name),
+             place + name);
+    if (ebpo_folder_begin(hidden, &making, &error) != EBPO_OK) {
+        const char *cause = strncmp(error.message, hidden, strlen(hidden)) == 0
+                                ? error.message + strlen(hidden) + 2 /* and ": " */
+                                : error.message;
+        return told(EXIT_FAILED, access(hidden, F_OK) == 0 ? hidden : place, cause) == EXIT_FINE;
+    }
+    bool fits = strlen(making) < capacity && strlen(making) < sizeof being_made - 300;
+    if (fits)
+        memcpy(folder, making, strlen(making) + 1);
+    else
+        rmdir(making);
+    free(making);
+    return fits || told(EXIT_USAGE, place, "the name is too long") == EXIT_FINE;
+}
+
+int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity)
+{
+    size_t length = strlen(place);
+    while (length > 1 && place[length - 1] == '/')
+        length--;
+    folder[0] = 0;
+    if (length + 80 > capacity || length + 400 > sizeof being_made)
+        return told(EXIT_USAGE, place, "the name is too long");
+    int code = place_is_free(place, operand);
+    if (code != EXIT_FINE)
+        return code;
+    if (!make_folder(place, length, folder, capacity))
+        return EXIT_FAILED;
+    chmod(folder, 0755);
+    memcpy(being_made, folder, strlen(folder) + 1);
+    signals_also(abandon);
+    return EXIT_FINE;
+}
+
+/* Of the report that was there. Something may have come into it meanwhile. */
+static bool tell_rest(const char *older)
+{
+    if (!remove_folder(older, true))
+        fprintf(stderr,
+                "ebpo report: warning: what else is in the report that was there is now in %s\n",
+                older);
+    return true;
+}
+
+bool output_commit(const char *place, const char *folder)
+{
+    char older[8192], target[4200];
+    bool moved = false;
+    size_t length = strlen(place);
+    while (length > 1 && place[length - 1] == '/')
+        length--;
+    snprintf(target, sizeof target, "%.*s", (int)length, place);
+    /* At once, so that there is no moment without a report; not all file systems can. */
+    errno = 0;
+#ifdef EBPO_HAVE_RENAMEAT2
+    if (renameat2(AT_FDCWD, folder, AT_FDCWD, target, RENAME_EXCHANGE) == 0) {
+        being_made[0] = 0;
+        return tell_rest(folder);
+    }
+#endif
+    snprintf(older, sizeof older, "%s.old", folder);
+    moved = errno != ENOENT && rename(target, older) == 0;
+    if (rename(folder, target) != 0) {
+        told(EXIT_FAILED, place, strerror(errno));
+        if (moved && rename(older, target) != 0)
+            fprintf(stderr, "ebpo report: the report that was there is now %s\n", older);
+        return false;
+    }
+    being_made[0] = 0;
+    return !moved || tell_rest(older);
+}

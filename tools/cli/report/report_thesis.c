@@ -1,0 +1,124 @@
+/* What the theses' cost model takes to send each level of a tree (BP 2008, section 4.2):
+ * uncompressed, level after level from the root, a leaf with its faces and their vertices. A leaf:
+ * 1 byte for its corners. A plane: 16 bytes the first time its normal comes, else 4, and 4 for its
+ * offset. A face: 12 bytes the first time, else 4. A vertex of a leaf: 12 bytes the first time,
+ * else 4. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/reading.h"
+#include "cli/report/report_data.h"
+
+enum { NORMAL_SPAN = 1023 }; /* -511 .. 511 */
+
+typedef struct sent {
+    ebpo_mesh mesh;
+    uint8_t *normals, *faces, *vertices; /* bits: came before */
+    /* [vertex_count] number of the leaf that had the vertex last, from 1 */
+    uint64_t *leaf_of;
+    uint64_t leaves;
+} sent;
+
+/* Whether it is the first time. */
+static bool first_time(uint8_t *bits, uint64_t i)
+{
+    bool before = bits[i >> 3] >> (i & 7) & 1;
+    bits[i >> 3] |= (uint8_t)(1u << (i & 7));
+    return !before;
+}
+
+/* The half-spaces of one cell shape: equal integers are equal directions at every level. */
+static double plane_costs(sent *s, const uint32_t *codes, uint64_t count)
+{
+    double sum = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        int32_t n[3], d;
+        if (!ebpo_plane_decode(codes[i], n, &d))
+            continue;
+        uint64_t key =
+            ((uint64_t)(n[0] + 511) * NORMAL_SPAN + (uint64_t)(n[1] + 511)) * 2 + (n[2] < 0);
+        sum += 4 + (first_time(s->normals, key) ? 16 : 4);
+    }
+    return sum;
+}
+
+static double face_costs(sent *s, uint64_t face)
+{
+    double sum = first_time(s->faces, face) ? 12 : 4;
+    for (int k = 0; k < 3; k++) {
+        uint32_t v = s->mesh.faces[3 * face + (unsigned)k];
+        if (s->leaf_of[v] == s->leaves)
+            continue; /* of another face of this leaf */
+        s->leaf_of[v] = s->leaves;
+        sum += first_time(s->vertices, v) ? 12 : 4;
+    }
+    return sum;
+}
+
+static double leaf_costs(sent *s, const ebpo_level *l)
+{
+    double sum = (double)l->leaf_count;
+    uint64_t ref = 0;
+    for (uint64_t i = 0; i < l->leaf_count; i++) {
+        s->leaves++;
+        for (uint32_t k = 0; k < l->leaf_new[i]; k++)
+            sum += face_costs(s, l->leaf_first[i] + k);
+        for (uint32_t k = 0; k < l->leaf_ref_count[i]; k++)
+            sum += face_costs(s, l->leaf_refs[ref++]);
+    }
+    return sum;
+}
+
+static bool begin(sent *s)
+{
+    s->normals = calloc((size_t)NORMAL_SPAN * NORMAL_SPAN * 2 / 8 + 1, 1);
+    s->faces = calloc(s->mesh.face_count / 8 + 1, 1);
+    s->vertices = calloc(s->mesh.vertex_count / 8 + 1, 1);
+    s->leaf_of = calloc(s->mesh.vertex_count + 1, sizeof *s->leaf_of);
+    return s->normals && s->faces && s->vertices && s->leaf_of;
+}
+
+static ebpo_status add_up(comparison *c, method *m, ebpo_file *file, sent *s, ebpo_error *error)
+{
+    double sum = 0;
+    for (int i = 0; i <= method_last(c, m); i++) {
+        ebpo_level l;
+        ebpo_read_options read = reading(c->v->threads, NULL);
+        ebpo_status status = ebpo_file_read_level(file, i, &read, &l, error);
+        if (status != EBPO_OK)
+            return status;
+        double cost = plane_costs(s, l.planes, l.plane_count) +
+                      plane_costs(s, l.leaf_planes, l.leaf_plane_count) + leaf_costs(s, &l);
+        ebpo_level_free(&l);
+        sum += cost;
+        if (i < c->first)
+            continue;
+        m->level[i][OF_THESIS_BYTES] = cost;
+        m->level[i][OF_THESIS_CUMULATIVE] = sum;
+    }
+    return EBPO_OK;
+}
+
+ebpo_status report_thesis(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    sent s = { .leaves = 0 };
+    if (m->info.pruned) {
+        method_note(m, "theses' cost model", "is that of a whole tree; this file is a subset");
+        return EBPO_OK;
+    }
+    ebpo_read_options read = reading(c->v->threads, NULL);
+    ebpo_status status = ebpo_file_read_mesh(file, &read, &s.mesh, error);
+    if (status == EBPO_OK && !begin(&s)) {
+        snprintf(error->message, sizeof error->message,
+                 "not enough memory for a mark on each face and vertex");
+        status = error->status = EBPO_E_MEMORY;
+    }
+    if (status == EBPO_OK)
+        status = add_up(c, m, file, &s, error);
+    free(s.normals);
+    free(s.faces);
+    free(s.vertices);
+    free(s.leaf_of);
+    ebpo_mesh_free(&s.mesh);
+    return method_without(m, "theses' cost model", status, error);
+}

@@ -1,0 +1,141 @@
+/* report.json: the same figures as report.csv, with what the quantities are, the model and the
+ * machine. */
+#include "cli/json.h"
+#include "cli/mesh_findings.h"
+#include "cli/report/report_data.h"
+#include "cli/words.h"
+
+static void names(json *j, const char *scope, const figure_name *q, int count)
+{
+    for (int i = 0; i < count; i++) {
+        json_object(j, NULL);
+        json_text(j, "name", q[i].name);
+        json_text(j, "of", scope);
+        json_text(j, "unit", q[i].unit);
+        json_bool(j, "timed", q[i].timed);
+        json_text(j, "meaning", q[i].meaning);
+        if (q[i].absent)
+            json_text(j, "absent", q[i].absent);
+        json_end(j);
+    }
+}
+
+static void figures(json *j, const figure_name *q, const double *v, int count)
+{
+    for (int i = 0; i < count; i++)
+        json_real(j, q[i].name, v[i]);
+}
+
+static void one_method(json *j, const comparison *c, const method *m)
+{
+    json_object(j, NULL);
+    json_text(j, "name", m->name);
+    json_text(j, "file", remote_shown(m->path));
+    const ebpo_selection_traits *selection =
+        ebpo_selection_describe((ebpo_selection)m->info.selection);
+    json_text(j, "selection", selection ? selection->name : "other");
+    if (m->info.percent > 0)
+        json_real(j, "percent", m->info.percent);
+    if (m->info.k_root > 0)
+        json_real(j, "k_root", m->info.k_root);
+    json_int(j, "levels_in_file", m->levels);
+    json_bool(j, "leaf_planes_stored", m->info.parts & EBPO_PART_LEAF_PLANES);
+    figures(j, whole_figures, m->whole, WHOLE_FIGURES);
+    json_array(j, "levels");
+    for (int i = c->first; i <= method_last(c, m); i++) {
+        json_object(j, NULL);
+        json_int(j, "level", i);
+        figures(j, level_figures, m->level[i], LEVEL_FIGURES);
+        json_end(j);
+    }
+    json_end(j);
+    json_array(j, "deadlines");
+    for (int i = 0; i < DEADLINES; i++) {
+        json_object(j, NULL);
+        json_uint(j, "microseconds", deadlines_us[i]);
+        figures(j, deadline_figures, m->due[i], DEADLINE_FIGURES);
+        json_end(j);
+    }
+    json_end(j);
+    json_array(j, "budgets");
+    for (int i = 0; i < BUDGETS; i++) {
+        json_object(j, NULL);
+        json_uint(j, "part", budget_parts[i]);
+        figures(j, budget_figures, m->budget[i], BUDGET_FIGURES);
+        json_end(j);
+    }
+    json_end(j);
+    json_array(j, "needs");
+    for (int i = 0; i < m->need_count; i++) {
+        json_object(j, NULL);
+        json_real(j, m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes",
+                  m->need[i].asked);
+        figures(j, need_figures, m->need[i].figure, NEED_FIGURES);
+        json_end(j);
+    }
+    json_end(j);
+    json_array(j, "notes");
+    for (int i = 0; i < m->note_count; i++)
+        json_text(j, NULL, m->note[i]);
+    json_end(j);
+    json_end(j);
+}
+
+static void model(json *j, const comparison *c)
+{
+    const ebpo_info *info = &c->methods->info;
+    char hex[65];
+    words_hex(info->source_sha256, hex);
+    json_object(j, "model");
+    json_text(j, "name", c->model);
+    json_text(j, "source", info->source_name);
+    json_text(j, "source_sha256", hex);
+    json_uint(j, "source_bytes", info->source_size);
+    json_text(j, "kind", info->solid ? "solid" : "surface");
+    json_text(j, "rule", words_rule(info->rule));
+    json_text(j, "coordinates", info->double_coordinates ? "double" : "float");
+    json_uint(j, "faces", info->face_count);
+    json_uint(j, "vertices", info->vertex_count);
+    json_text(j, "unit", info->unit);
+    findings_volume_json(j, &c->methods->solid);
+    json_real(j, "area", info->report.area);
+    json_reals(j, "min", info->report.min, 3);
+    json_reals(j, "max", info->report.max, 3);
+    json_real(j, "diagonal", c->diagonal);
+    json_end(j);
+}
+
+void report_to_json(FILE *out, const comparison *c, bool in_page)
+{
+    json j;
+    json_begin(&j, out);
+    j.in_page = in_page;
+    json_object(&j, NULL);
+    json_text(&j, "version", ebpo_version());
+    json_int(&j, "seed", c->v->seed);
+    json_uint(&j, "points", c->points);
+    json_real(&j, "seconds", c->seconds);
+    json_object(&j, "machine");
+    json_text(&j, "processor", machine_processor());
+    json_uint(&j, "cores", machine_cores());
+    json_end(&j);
+    model(&j, c);
+    json_object(&j, "levels");
+    json_int(&j, "first", c->first);
+    json_int(&j, "last", comparison_last(c));
+    json_end(&j);
+    if (c->without_pictures)
+        json_text(&j, "without_pictures", c->without_pictures);
+    json_array(&j, "quantities");
+    names(&j, "method", whole_figures, WHOLE_FIGURES);
+    names(&j, "level", level_figures, LEVEL_FIGURES);
+    names(&j, "deadline", deadline_figures, DEADLINE_FIGURES);
+    names(&j, "budget", budget_figures, BUDGET_FIGURES);
+    names(&j, "need", need_figures, NEED_FIGURES);
+    json_end(&j);
+    json_array(&j, "methods");
+    for (int i = 0; i < c->count; i++)
+        one_method(&j, c, &c->methods[i]);
+    json_end(&j);
+    json_finish(&j);
+}

@@ -1,0 +1,511 @@
+// The page: what is asked for, what is shown, and the worker in between.
+import { cutOf } from './address.js';
+import { frameMs, frameTook, makeLevels, showLevel, showLevels, showStats } from './figures.js';
+import { busy, bytes, showError, showLine, showOpening } from './line.js';
+import { probeAt, probeShown, probeWith } from './probe.js';
+import { listSamples } from './samples.js';
+import { Scene } from './scene.js';
+import { LEVEL_COLOURS, MESH_COLOUR, TYPE_COLOURS } from './shade.js';
+import { address, atHome, changed, said, shareOf, went, whereTo } from './share.js';
+import { $, count, on, state, tell, toModel } from './state.js';
+
+const MORE_MS = 5000; // after the first picture the tools are loaded, or when nothing more comes before
+const TRIANGLES_MOST = 2_000_000; // about; a tile more does no harm
+
+let timer; // until the worker hears of the camera
+let coming; // more.js, once it has been asked for
+
+const boot = window.ebpoBoot, { worker } = boot; // boot.js has begun, perhaps with a file
+const scene = new Scene($('canvas'), boot, { changed: cameraMoved, drawn: frameDrawn });
+probeWith(scene, worker);
+shareOf(scene);
+
+// --- opening ---
+
+// `begun`: boot.js has told the worker already.
+function open(what, name, begun) {
+  state.opening++;
+  Object.assign(state, { info: undefined, depth: -1, idle: false, timeline: [], stats: undefined, probe: undefined, box: undefined, measured: undefined, error: undefined,
+    shownAfter: undefined, auto: AUTO.first, frames: [] });
+  scene.clear();
+  const { camera, level } = said(new URLSearchParams(location.search));
+  Object.assign(state, { levelAsked: level });
+  home(camera);
+  tell('closed');
+  showError();
+  busy(true);
+  showOpening(name);
+  $('start').hidden = true;
+  Object.assign(state, { shownName: name, what });
+  if (!begun)
+    worker.postMessage({ type: 'open', opening: state.opening, what, ahead: boot.ahead });
+  ask();
+}
+
+// `step`: a new one of the history; not when it has been taken already, or when the page comes with this file.
+function openUrl(text, { begun = false, step = true } = {}) {
+  let url;
+  try {
+    url = new URL(text, location.href);
+  } catch {
+    showError({ message: `${text}: this is no address; give one that begins with https://` });
+    return;
+  }
+  if (step)
+    went(text);
+  $('url').value = text;
+  open(url.href, boot.nameOf(url.href), begun);
+}
+
+function openFile(file, { step = true } = {}) {
+  if (step)
+    went(file);
+  open(file, file.name);
+}
+
+// Several models or a scene: a page of another kind, until it is left.
+async function openTogether(asked) {
+  if (state.info || coming || state.together) { // whose panel and tools are there already
+    showError({ message: 'other models are or were shown on this page; reload it, and open these files together then' });
+    return;
+  }
+  try {
+    const together = await import('./together.js');
+    await together.begin({ scene, layout }, await asked(together));
+  } catch (error) {
+    showOpening();
+    showError(error);
+  }
+}
+
+function openFiles(files) {
+  if (files.length > 1)
+    openTogether(({ ofFiles }) => ofFiles([...files]));
+  else if (files.length)
+    openFile(files[0]);
+}
+
+function close({ step = true } = {}) {
+  if (state.together) {
+    location.assign(location.pathname);
+    return;
+  }
+  if (step)
+    went();
+  state.opening++;
+  Object.assign(state, { info: undefined, depth: -1, idle: false });
+  tell('closed');
+  worker.postMessage({ type: 'close', opening: state.opening });
+  scene.clear();
+  busy(false);
+  showOpening();
+  showError();
+  for (const id of ['panel', 'bar', 'tools'])
+    $(id).hidden = true;
+  $('start').hidden = false;
+  layout();
+  document.title = 'EBP-Octree viewer';
+  $('url').focus();
+}
+
+// The view that an address asks for, or the usual one.
+function home(camera) {
+  scene.home();
+  atHome();
+  if (camera)
+    scene.place = camera;
+}
+
+// --- from the worker ---
+
+const handlers = {
+  located(m) {
+    Object.assign(state, { bytesTo: m.bytesTo, traffic: m.traffic });
+    makeLevels(chooseLevel);
+    levelChanged();
+  },
+  opened(m) {
+    $('ownRow').hidden = !m.coloured;
+    Object.assign(state, { info: m.info, scene: m.scene, bytesTo: m.bytesTo, size: m.size, traffic: m.traffic });
+    const i = m.info, name = state.shownName ?? m.name;
+    $('openingText').textContent = `${count(i.face_count)} faces`;
+    document.title = `${name} – EBP-Octree viewer`;
+    $('name').textContent = name;
+    $('name').title = m.name;
+    $('facts').textContent = `${count(i.face_count)} faces · ${i.solid ? 'solid' : 'surface'} · levels 0–${i.level_count - 1} · ${bytes(m.size)}`;
+    for (const id of ['panel', 'bar', 'tools'])
+      $(id).hidden = id === 'panel' && innerWidth <= 760;
+    const stops = i.level_count - 1 + (i.parts.has('mesh') ? 1 : 0);
+    $('level').max = stops;
+    makeLevels(chooseLevel);
+    layout();
+    shownAs(said(new URLSearchParams(location.search)));
+    tell('opened');
+  },
+  loaded(m) {
+    Object.assign(state, { depth: m.depth, timeline: m.timeline, traffic: m.traffic });
+    showLevels();
+    showStats(scene.walls);
+  },
+  tiles(m) {
+    scene.setTiles(m.set, m.removed);
+    if (m.set.length) {
+      if (state.shownAfter === undefined)
+        setTimeout(more, MORE_MS);
+      state.shownAfter ??= m.ms;
+      showOpening();
+    }
+    Object.assign(state, { stats: m.stats, traffic: m.traffic });
+    showLevels();
+    showStats(scene.walls);
+  },
+  probed(m) {
+    state.traffic = m.traffic;
+    state.probe = m;
+    probeShown();
+    showStats(scene.walls);
+    tell('probed');
+  },
+  idle(m) {
+    Object.assign(state, { traffic: m.traffic, settled: m.want, idle: m.want === state.want });
+    if (state.idle) {
+      busy(false);
+      refineMore();
+      more();
+    }
+    showStats(scene.walls);
+  },
+  line(m) {
+    state.line = m;
+    showLine(m);
+  },
+  failed(m) {
+    showError(m.error, m.error.code === 'NETWORK' ? retry : undefined);
+    busy(false);
+    showOpening();
+    state.error = m.error;
+    if (!state.info)
+      $('start').hidden = false;
+  },
+};
+worker.onmessage = ({ data }) => {
+  if (data.type === 'forget')
+    boot.forget();
+  else if (data.opening === state.opening)
+    (handlers[data.type] ?? ((news) => tell(data.type, news)))(data);
+};
+worker.onerror = (e) => showError({ message: `The page's worker failed (${e.message ?? 'it could not be loaded'}); run npm ci in tools/web, and reload` });
+
+// --- to the worker ---
+
+// What came before is kept, and not asked for again; a file that could not be opened is opened anew.
+function retry() {
+  state.error = undefined;
+  if (!state.info) {
+    open(state.what, state.shownName);
+    return;
+  }
+  worker.postMessage({ type: 'retry' });
+  ask();
+}
+
+function cameraMoved() {
+  if (state.together) {
+    state.together.moved();
+    return;
+  }
+  timer ??= setTimeout(ask, 90);
+  changed();
+}
+
+function frameDrawn(ms, info) {
+  frameTook(ms, info.calls);
+  tell('frame');
+}
+
+function ask() {
+  clearTimeout(timer);
+  timer = undefined;
+  const mesh = state.info?.parts.has('mesh') && Number($('level').value) === state.info.level_count;
+  const level = mesh ? 99 : state.info ? Number($('level').value) : state.levelAsked ?? 99; // already right while the file is being opened
+  state.idle = false;
+  if (state.info)
+    busy(true);
+  worker.postMessage({ type: 'view', view: scene.view(), want: {
+    number: ++state.want, level, mesh: Boolean(mesh), pixels: detail(), triangles: detail() === 0 ? Infinity : TRIANGLES_MOST,
+    black: scene.cut !== undefined, lines: $('wire').checked, cells: $('cells').checked } });
+}
+
+// Automatic detail: 16 pixels, and when all of that is there 8 if the frames are fast, 32 if they are slow.
+const AUTO = { first: 16, fast: 8, fastMs: 30, slow: 32, slowMs: 150 };
+const detail = () => ($('detail').value === 'auto' ? state.auto : Number($('detail').value));
+
+function refineMore() {
+  if ($('detail').value !== 'auto' || state.auto !== AUTO.first || !state.frames.length || (frameMs() > AUTO.fastMs && frameMs() < AUTO.slowMs))
+    return;
+  state.auto = frameMs() <= AUTO.fastMs ? AUTO.fast : AUTO.slow;
+  ask();
+}
+
+function levelChanged() {
+  showLevel();
+  changed();
+  ask();
+}
+
+function chooseLevel(level) {
+  $('level').value = level;
+  levelChanged();
+}
+
+// --- view ---
+
+function colouringChanged() {
+  const mode = document.querySelector('input[name=colouring]:checked').value;
+  scene.setColouring(mode);
+  changed();
+  const key = (c, text) => {
+    const span = document.createElement('span'), i = document.createElement('i');
+    i.style.background = c;
+    span.append(i, text);
+    return span;
+  };
+  $('legend').replaceChildren(...(mode === 'type' ? [key(TYPE_COLOURS[3], 'gray: goes on'), key(TYPE_COLOURS[2], 'leaf'), key(TYPE_COLOURS[1], 'black: full'), key(MESH_COLOUR, 'mesh')]
+    : mode === 'level' ? LEVEL_COLOURS.slice(0, state.info?.level_count ?? 9).map((c, l) => key(c, String(l))) : []));
+}
+
+// The plane and the box together: shares of the model's box, of each axis from and to.
+function cutChanged() {
+  const value = document.querySelector('input[name=clip]:checked').value, { clip } = state, was = scene.cut;
+  Object.assign(clip, { axis: value === '' ? undefined : Number(value), at: Number($('clipAt').value) / 1000 });
+  $('clipRow').hidden = clip.axis === undefined;
+  if (!state.info)
+    return;
+  const cut = cutOf(state.info.box_size, state.scene.scale, clip, state.box);
+  scene.setCut(cut?.low, cut?.high);
+  if ((was === undefined) !== (cut === undefined))
+    ask();
+  changed();
+  tell('cut');
+}
+
+// All that an address can say of a view.
+function shownAs({ camera, level, clip, box, point, measured, colouring, walls, detail: pixels }) {
+  home(camera);
+  $('level').value = level ?? $('level').max;
+  $('detail').value = pixels;
+  $('detail').value ||= 'auto';
+  const check = (name, value) => ([...document.querySelectorAll(`input[name=${name}]`)].find((i) => i.value === value) ?? document.querySelector(`input[name=${name}]`)).click();
+  Object.assign(state, { box, measured });
+  $('clipAt').value = 1000 * (clip?.at ?? 0.5);
+  state.clip.flip = clip?.flip ?? false;
+  check('clip', clip ? String(clip.axis) : '');
+  check('colouring', colouring);
+  cutChanged();
+  colouringChanged();
+  $('walls').checked = walls;
+  scene.setWalls(walls);
+  levelChanged();
+  if (point || state.probe)
+    probeAt(point);
+  else
+    probeShown();
+}
+
+function setTheme(theme) {
+  document.documentElement.dataset.theme = theme;
+  scene.setTheme(theme === 'dark');
+  tell('theme');
+}
+
+function layout() {
+  const narrow = innerWidth <= 760, shown = !$('panel').hidden;
+  scene.setInsets(shown && !narrow ? 310 : 0, shown && narrow ? $('panel').offsetHeight + 60 : 0);
+}
+
+// --- wiring ---
+
+$('openForm').onsubmit = (e) => {
+  e.preventDefault();
+  if ($('url').value.trim())
+    openUrl($('url').value.trim());
+};
+$('file').onchange = () => openFiles($('file').files);
+$('close').onclick = close;
+$('stallRetry').onclick = () => (state.together ? state.together.retry() : worker.postMessage({ type: 'retry' }));
+$('errorClose').onclick = () => showError();
+$('level').oninput = levelChanged;
+$('detail').onchange = () => {
+  ask();
+  changed();
+};
+$('walls').onchange = () => {
+  scene.setWalls($('walls').checked);
+  showStats(scene.walls);
+  changed();
+};
+$('own').onchange = () => scene.setOwnColours($('own').checked);
+$('wire').onchange = ask;
+$('cells').onchange = ask;
+$('colouring').onchange = colouringChanged;
+$('clipAxis').onchange = cutChanged;
+$('clipAt').oninput = cutChanged;
+$('clipFlip').onclick = () => {
+  state.clip.flip = !state.clip.flip;
+  cutChanged();
+};
+$('toolHome').onclick = () => {
+  home();
+  (state.together ?? { changed }).changed();
+};
+$('toolTheme').onclick = () => setTheme(document.documentElement.dataset.theme === 'light' ? 'dark' : 'light');
+$('toolPanel').onclick = () => {
+  $('panel').hidden = !$('panel').hidden;
+  layout();
+};
+$('toolHelp').onclick = () => $('help').showModal();
+let down;
+$('canvas').addEventListener('pointerdown', (e) => (down = e.button === 0 ? [e.clientX, e.clientY] : undefined));
+$('canvas').addEventListener('pointerup', (e) => {
+  if (!down || Math.hypot(e.clientX - down[0], e.clientY - down[1]) > 4 || !state.info)
+    return;
+  const point = scene.pick(e.clientX, e.clientY);
+  if (point)
+    (state.clicked ?? ((p) => (state.together ? state.together.clicked(p) : probeAt(p))))(toModel(point)); // a tool may want the point
+});
+
+addEventListener('dragover', (e) => {
+  e.preventDefault();
+  $('dropHint').hidden = false;
+});
+addEventListener('dragleave', (e) => {
+  if (!e.relatedTarget)
+    $('dropHint').hidden = true;
+});
+addEventListener('drop', (e) => {
+  e.preventDefault();
+  $('dropHint').hidden = true;
+  const { files } = e.dataTransfer, text = e.dataTransfer.getData('text/uri-list');
+  if (state.together)
+    showError({ message: 'several models are shown here; go back to the first page to open others' });
+  else if (files.length)
+    openFiles(files);
+  else if (text)
+    openUrl(text);
+});
+addEventListener('resize', layout);
+
+const click = (id) => () => $(id).click();
+const choose = (name, step) => {
+  const all = [...document.querySelectorAll(`input[name=${name}]`)], at = all.findIndex((i) => i.checked);
+  all[(at + step) % all.length].click();
+};
+const slide = (id, step, then) => () => {
+  $(id).value = Number($(id).value) + step;
+  then();
+};
+const KEYS = {
+  arrowleft: slide('level', -1, levelChanged), arrowright: slide('level', 1, levelChanged), g: click('walls'), w: click('wire'), c: click('cells'), m: click('own'),
+  k: () => choose('colouring', 1), x: () => choose('clip', 1), '[': slide('clipAt', -15, cutChanged), ']': slide('clipAt', 15, cutChanged), '/': click('clipFlip'),
+  f: click('toolHome'), t: click('toolTheme'), p: click('toolPanel'), '?': click('toolHelp'), o: close,
+  ',': slide('level', -1, levelChanged), '.': slide('level', 1, levelChanged),
+  escape: () => {
+    tell('escape');
+    probeAt();
+    showError();
+  },
+};
+// In the picture arrows turn (with Shift they move), and + and - go nearer and farther.
+const STEER = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, 1], arrowdown: [0, -1], '+': 0.8, '=': 0.8, '-': 1.25 };
+
+// With several models there is no level to choose, and no clipping plane.
+const TOGETHER_KEYS = ['g', 'm', 'k', 'f', 't', 'p', '?', 'o'];
+
+addEventListener('keydown', (e) => {
+  const writes = e.target.matches('input:not([type=range]):not([type=radio]):not([type=checkbox]), select, textarea');
+  if (e.ctrlKey || e.metaKey || e.altKey || document.querySelector('dialog[open]') || (writes && e.key !== 'Escape'))
+    return;
+  const key = e.key.toLowerCase();
+  if (!state.info && !['t', '?'].includes(key))
+    return;
+  const steer = e.target === $('canvas') ? STEER[key] : undefined;
+  if (state.together && key === 'escape') {
+    tell('escape');
+    showError();
+    return;
+  }
+  if (!steer && (!KEYS[key] || (state.together && !TOGETHER_KEYS.includes(key)))) {
+    tell('key', e);
+    return;
+  }
+  e.preventDefault();
+  if (steer)
+    scene.steer(steer, e.shiftKey);
+  else
+    KEYS[key]();
+});
+
+// --- the history ---
+
+addEventListener('popstate', (e) => {
+  if (state.together) {
+    location.reload();
+    return;
+  }
+  const query = new URLSearchParams(location.search), what = whereTo(query, e.state);
+  if (what === undefined)
+    close({ step: false });
+  else if (typeof what !== 'string')
+    openFile(what, { step: false });
+  else if (state.info && typeof state.what === 'string' && new URL(what, location.href).href === state.what)
+    shownAs(said(query));
+  else
+    openUrl(what, { step: false });
+});
+
+on('complaint', (message) => showError({ message }));
+
+// --- what comes later: measuring, notes, the pen, sharing ---
+
+function more() {
+  coming ??= import('./more.js').then((m) => m.begin({ scene, worker, ask, cutChanged, changed, address, shownAs: (query) => shownAs(said(query)), layout, query: boot.query }),
+    (error) => showError({ message: `The page's tools could not be loaded (${error.message}); reload the page` }));
+  return coming;
+}
+
+// --- begin: what an address may say is told in docs/guide/viewer.md ---
+
+const { query } = boot;
+setTheme(document.documentElement.dataset.theme);
+$('detail').value = query.get('detail') ?? 'auto';
+if (!$('detail').value)
+  $('detail').value = 'auto';
+if (query.has('samples'))
+  listSamples(query.get('samples'), openUrl).catch((e) => showError({ message: `${query.get('samples')}: the list of samples cannot be read (${e.message}); check the address` }));
+if (query.has('scene') || query.has('model'))
+  openTogether(({ wanted }) => wanted(query, location.href));
+else if (query.has('file'))
+  openUrl(query.get('file'), { begun: boot.opening === 1, step: false });
+boot.over();
+boot.said.splice(0).forEach((data) => worker.onmessage({ data }));
+
+/** For tests and for the curious: what is shown. */
+window.ebpoViewer = {
+  get state() {
+    return { idle: state.idle, depth: state.depth, stats: state.stats, traffic: state.traffic, timeline: state.timeline, shownAfter: state.shownAfter, probe: state.probe,
+      error: state.error, line: state.line,
+      levels: state.info?.levels.length, walls: scene.walls, calls: state.calls, box: state.box, measured: state.measured };
+  },
+  get place() {
+    return state.scene;
+  },
+  get together() {
+    return state.together;
+  },
+  scene, probeAt, address,
+};
+
+// more.js is bundled apart from this, and must not bring these along a second time.
+export { kit } from './scene.js';
+export * from './shade.js';
+export * from './state.js';
