@@ -4,6 +4,7 @@
 #ifndef EBPO_CONSTRUCT_SWEEP_H
 #define EBPO_CONSTRUCT_SWEEP_H
 
+#include "core/cpu.h"
 #include <stdint.h>
 
 enum {
@@ -38,9 +39,6 @@ typedef struct ebpo_sweep {
                         double *best);
 } ebpo_sweep;
 
-extern const ebpo_sweep ebpo_sweep_base, ebpo_sweep_avx2;
-
-/* For this processor. */
-const ebpo_sweep *ebpo_sweep_best(void);
+EBPO_KERNELS(ebpo_sweep, ebpo_sweep)
 
 #endif

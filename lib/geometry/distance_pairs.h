@@ -4,6 +4,7 @@
 #ifndef EBPO_GEOMETRY_DISTANCE_PAIRS_H
 #define EBPO_GEOMETRY_DISTANCE_PAIRS_H
 
+#include "core/cpu.h"
 #include "geometry/distance.h"
 #include "geometry/expansion.h"
 
@@ -26,8 +27,6 @@ typedef struct ebpo_distance_pairs {
     bool (*unit_normal)(const double triangle[3][3], double normal[3]);
 } ebpo_distance_pairs;
 
-/* Those that suit this processor best. */
-const ebpo_distance_pairs *ebpo_distance_pairs_best(void);
-extern const ebpo_distance_pairs ebpo_distance_pairs_base, ebpo_distance_pairs_fma;
+EBPO_KERNELS(ebpo_distance_pairs, ebpo_distance_pairs)
 
 #endif

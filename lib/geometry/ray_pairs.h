@@ -4,6 +4,7 @@
 #ifndef EBPO_GEOMETRY_RAY_PAIRS_H
 #define EBPO_GEOMETRY_RAY_PAIRS_H
 
+#include "core/cpu.h"
 #include "geometry/expansion.h"
 #include "geometry/ray.h"
 
@@ -29,9 +30,7 @@ typedef struct ebpo_ray_pairs {
                  ebpo_bounded *out);
 } ebpo_ray_pairs;
 
-/* Those that suit this processor best. */
-const ebpo_ray_pairs *ebpo_ray_pairs_best(void);
-extern const ebpo_ray_pairs ebpo_ray_pairs_base, ebpo_ray_pairs_fma;
+EBPO_KERNELS(ebpo_ray_pairs, ebpo_ray_pairs)
 
 /* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
 #define EBPO_RAY_SLACK 0x1p-960

@@ -4,6 +4,7 @@
 #ifndef EBPO_QUERY_BLOCK_MEASURE_H
 #define EBPO_QUERY_BLOCK_MEASURE_H
 
+#include "core/cpu.h"
 #include "query/accel.h"
 
 typedef struct ebpo_block_extent {
@@ -30,8 +31,6 @@ typedef struct ebpo_block_measures {
                  const ebpo_slab_view *view, ebpo_slab_extent *out);
 } ebpo_block_measures;
 
-extern const ebpo_block_measures ebpo_block_measures_base, ebpo_block_measures_avx2;
-/* For this processor. */
-const ebpo_block_measures *ebpo_block_measures_best(void);
+EBPO_KERNELS(ebpo_block_measures, ebpo_block_measures)
 
 #endif

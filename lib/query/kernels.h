@@ -4,6 +4,7 @@
 #ifndef EBPO_QUERY_KERNELS_H
 #define EBPO_QUERY_KERNELS_H
 
+#include "core/cpu.h"
 #include "query/accel.h"
 #include "query/near_kernel.h"
 #include "query/ray_kernel.h"
@@ -45,8 +46,6 @@ typedef struct ebpo_kernels {
     void (*ray)(ebpo_ray_search *search);
 } ebpo_kernels;
 
-/* Those that suit this processor best. */
-const ebpo_kernels *ebpo_kernels_best(void);
-extern const ebpo_kernels ebpo_kernels_base, ebpo_kernels_avx2;
+EBPO_KERNELS(ebpo_kernels, ebpo_kernels)
 
 #endif

@@ -328,14 +328,14 @@ START_TEST(processors_with_fma_give_the_same_bits)
         ebpo_distance_bounds b;
         ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
         bool base = ebpo_distance_pairs_base.unit_normal((const double(*)[3])t, n);
-        ck_assert_int_eq(base, ebpo_distance_pairs_fma.unit_normal((const double(*)[3])t, m));
+        ck_assert_int_eq(base, ebpo_distance_pairs_v3.unit_normal((const double(*)[3])t, m));
         ck_assert_msg(!base || memcmp(n, m, sizeof n) == 0, "case %d: normals differ", i);
         normals += base;
         if (b.feature == EBPO_NEAR_UNKNOWN || !in_range(p, 3) || !in_range(t[0], 9))
             continue;
         ebpo_measured x, y;
         ebpo_distance_pairs_base.measure(p, (const double(*)[3])t, b.feature, n, &x);
-        ebpo_distance_pairs_fma.measure(p, (const double(*)[3])t, b.feature, m, &y);
+        ebpo_distance_pairs_v3.measure(p, (const double(*)[3])t, b.feature, m, &y);
         ck_assert_msg(memcmp(&x, &y, sizeof x) == 0, "case %d: %a and %a", i, x.distance.head,
                       y.distance.head);
         measured++;

@@ -5,6 +5,7 @@
 #ifndef EBPO_COLLIDE_GAP_SEARCH_H
 #define EBPO_COLLIDE_GAP_SEARCH_H
 
+#include "core/cpu.h"
 #include "extras/collide/posed_faces.h"
 #include "extras/collide/two_frames.h"
 
@@ -86,8 +87,10 @@ bool ebpo_gap_wait_room(ebpo_gap_search *g);
 
 /* The walk through all pairs from the tops on; what then waits may be nearest. When it has been
  * ended early the stack has what was not seen. Compiled twice, with the same results. */
-typedef void ebpo_gap_walk_fn(ebpo_gap_search *g);
-ebpo_gap_walk_fn ebpo_gap_walk_base, ebpo_gap_walk_avx2;
-ebpo_gap_walk_fn *ebpo_gap_walk_best(void);
+typedef struct ebpo_gap_kernels {
+    void (*walk)(ebpo_gap_search *g);
+} ebpo_gap_kernels;
+
+EBPO_KERNELS(ebpo_gap_kernels, ebpo_gap_kernels)
 
 #endif

@@ -273,7 +273,7 @@ ebpo_status ebpo_nearest_pair_search(ebpo_nearest_pair *n, ebpo_gap_search *g, e
     n->error = error;
     begin_search(n, g);
     float before = g->best;
-    ebpo_gap_walk_best()(g);
+    ebpo_gap_kernels_best()->walk(g);
     if (g->no_memory)
         return ebpo_fail_memory(error, g->capacity * sizeof *g->stack);
     judge_rest(g, n, before);

@@ -4,6 +4,7 @@
 #ifndef EBPO_COLLIDE_PAIR_FILTER_H
 #define EBPO_COLLIDE_PAIR_FILTER_H
 
+#include "core/cpu.h"
 #include <stdint.h>
 
 /* A bit for each pair; those in neither are open. */
@@ -34,8 +35,6 @@ typedef struct ebpo_pair_kernels {
                    ebpo_block_pairs *out);
 } ebpo_pair_kernels;
 
-/* Those that suit this processor best. */
-const ebpo_pair_kernels *ebpo_pair_kernels_best(void);
-extern const ebpo_pair_kernels ebpo_pair_kernels_base, ebpo_pair_kernels_avx2;
+EBPO_KERNELS(ebpo_pair_kernels, ebpo_pair_kernels)
 
 #endif

@@ -3,6 +3,7 @@
 #ifndef EBPO_COLLIDE_PAIR_WALK_H
 #define EBPO_COLLIDE_PAIR_WALK_H
 
+#include "core/cpu.h"
 #include "extras/collide/accel_pair.h"
 #include "extras/collide/posed_faces.h"
 #include "extras/collide/pair_filter.h"
@@ -47,8 +48,7 @@ typedef struct ebpo_walk_kernels {
     bool (*expand)(ebpo_pair_walk *walk, ebpo_node_pair pair);
 } ebpo_walk_kernels;
 
-const ebpo_walk_kernels *ebpo_walk_kernels_best(void);
-extern const ebpo_walk_kernels ebpo_walk_kernels_base, ebpo_walk_kernels_avx2;
+EBPO_KERNELS(ebpo_walk_kernels, ebpo_walk_kernels)
 
 struct ebpo_pair_walk {
     const ebpo_accel_pair *pair;

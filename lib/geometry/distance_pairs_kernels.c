@@ -1,5 +1,10 @@
-/* What distance_exact.c does in double-double arithmetic; included by distance_pairs_base.c and
- * distance_pairs_fma.c, which name the table. Include core/strict_fp.h first. */
+/* What distance_exact.c does in double-double arithmetic. */
+#include "core/strict_fp.h"
+
+#ifdef __FMA__
+#define EBPO_PRODUCTS_BY_FMA
+#endif
+
 #include <math.h>
 #include <string.h>
 
@@ -125,3 +130,5 @@ static bool unit_normal(const double triangle[3][3], double normal[3])
     make_plane(triangle, &plane);
     return to_normal(&plane, normal);
 }
+
+const ebpo_distance_pairs EBPO_KERNEL(ebpo_distance_pairs) = { to_feature, unit_normal };

@@ -1,9 +1,14 @@
-/* What ray_close.c asks of double-double arithmetic; included by ray_pairs_base.c and
- * ray_pairs_fma.c, which name the table. Include core/strict_fp.h first.
+/* What ray_close.c asks of double-double arithmetic.
  *
  * Error bounds: as in predicates.c; each holds for the computed permanent (the sum of absolute
  * values), the slack covers underflow, and an overflow makes the bound infinite or not a number, so
  * that no comparison succeeds. */
+#include "core/strict_fp.h"
+
+#ifdef __FMA__
+#define EBPO_PRODUCTS_BY_FMA
+#endif
+
 #include "geometry/double_double.h"
 #include "geometry/ray_pairs.h"
 
@@ -67,3 +72,5 @@ static void edge(const double d[3], const ebpo_pair a[3], const double from[3], 
     plane_normal n = cross(a, e);
     *out = dot(&n, direction);
 }
+
+const ebpo_ray_pairs EBPO_KERNEL(ebpo_ray_pairs) = { plane, edge };

@@ -1,6 +1,7 @@
-/* Going down two hierarchies; included by walk_kernel_base.c and walk_kernel_avx2.c, which name the
- * table. Include core/strict_fp.h first. No operation here is an estimate, so both builds go the
+/* Going down two hierarchies. No operation here is an estimate, so both builds go the
  * same way. Why nothing is lost: docs/develop/collision.md, "Going down two hierarchies". */
+#include "core/strict_fp.h"
+
 #include "extras/collide/children_eight.inc"
 #include "extras/collide/pair_walk.h"
 #include "extras/collide/posed_faces.inc"
@@ -393,3 +394,5 @@ static bool walk_expand(ebpo_pair_walk *w, ebpo_node_pair r)
     push_pair(w, r.a, r.b, r.key);
     return true;
 }
+
+const ebpo_walk_kernels EBPO_KERNEL(ebpo_walk_kernels) = { walk_run, walk_start, walk_expand };

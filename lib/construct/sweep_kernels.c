@@ -1,4 +1,6 @@
 /* See sweep.h. Included by one source for each kind of processor. */
+#include "core/strict_fp.h"
+
 #include "construct/sweep.h"
 
 #include <string.h>
@@ -74,3 +76,5 @@ static uint64_t highest(const ebpo_sweep_points *points, const double n[3], doub
     }
     return stretch;
 }
+
+const ebpo_sweep EBPO_KERNEL(ebpo_sweep) = { seen, highest };

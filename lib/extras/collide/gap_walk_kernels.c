@@ -1,4 +1,6 @@
 /* The walk through pairs of nodes, compiled for several processors. */
+#include "core/strict_fp.h"
+
 #include "extras/collide/children_eight.inc"
 #include "extras/collide/gap_eight.inc"
 #include "extras/collide/gap_search.h"
@@ -455,3 +457,5 @@ static void walk(ebpo_gap_search *g)
         return;
     }
 }
+
+const ebpo_gap_kernels EBPO_KERNEL(ebpo_gap_kernels) = { walk };

@@ -1,5 +1,7 @@
-/* The filter of pairs; included by pair_filter_base.c and pair_filter_avx2.c, which name the table.
+/* The filter of pairs.
  * Include core/strict_fp.h first. Letters are those of docs/develop/collision.md. */
+#include "core/strict_fp.h"
+
 #include "core/eight.h"
 #include "extras/collide/pair_filter.h"
 
@@ -285,3 +287,6 @@ static void filter_blocks(const float *a, unsigned lanes_a, const float *b, unsi
         }
     }
 }
+
+const ebpo_pair_kernels EBPO_KERNEL(ebpo_pair_kernels) = { filter_one, filter_eight,
+                                                           filter_blocks };

@@ -1,4 +1,6 @@
 /* Compiled for several processors: block_measure.h. */
+#include "core/strict_fp.h"
+
 #include <math.h>
 
 #include "query/block_measure.h"
@@ -90,3 +92,5 @@ static void measure_slab(const ebpo_accel *s, const uint32_t *block, uint32_t co
     out->to = most_of(sum.to);
     out->aside2 = most_of(sum.aside2);
 }
+
+const ebpo_block_measures EBPO_KERNEL(ebpo_block_measures) = { measure_extent, measure_slab };

@@ -1,0 +1,32 @@
+/* Kernels: inner loops that are compiled once for each instruction set, with the same results.
+ *
+ * A kernel is a table of functions in NAME_kernels.c, which defines it as EBPO_KERNEL(table). Its
+ * header declares it by EBPO_KERNELS(type, table), and callers use table_best(). lib/meson.build
+ * has one row for each instruction set: its suffix and its flags. Tests compile the base set alone,
+ * with other flags (EBPO_BASE_KERNELS_ONLY). */
+#ifndef EBPO_CORE_CPU_H
+#define EBPO_CORE_CPU_H
+
+#include <stdbool.h>
+
+#define EBPO_KERNEL_JOIN(name, suffix)  name##_##suffix
+#define EBPO_KERNEL_NAMED(name, suffix) EBPO_KERNEL_JOIN(name, suffix)
+#define EBPO_KERNEL(name)               EBPO_KERNEL_NAMED(name, EBPO_KERNEL_SUFFIX)
+
+#if defined(__x86_64__) && !defined(EBPO_BASE_KERNELS_ONLY)
+#define EBPO_KERNELS(type, name)                              \
+    extern const type name##_base, name##_v3;                 \
+    static inline const type *name##_best(void)               \
+    {                                                         \
+        return ebpo_cpu_has_v3() ? &name##_v3 : &name##_base; \
+    }
+#else
+#define EBPO_KERNELS(type, name)   \
+    extern const type name##_base; \
+    static inline const type *name##_best(void) { return &name##_base; }
+#endif
+
+/* Says whether this processor has AVX2 and FMA (x86-64-v3). */
+bool ebpo_cpu_has_v3(void);
+
+#endif
