@@ -111,8 +111,10 @@ def main():
              if c != "help"]
     wrong = []
     there = {f[:-8] for f in os.listdir(tables) if f.endswith(".options")} - {"shared"}
-    if there != set(names):
-        wrong.append(f"commands without table, or tables without command: {there ^ set(names)}")
+    without = {name for name in there - set(names) if "built without" in subprocess.run(
+        [tool, name], capture_output=True, text=True).stderr}
+    if there - without != set(names):
+        wrong.append(f"commands without table, or tables without command: {(there - without) ^ set(names)}")
     _, commands = option_tables.read_all(tables, names)
     pages = ["ebpo.1", "ebpo-remote.7"]
     for command in commands:
@@ -126,7 +128,7 @@ def main():
     wrong += lint("zsh", ["-n"], [os.path.join(made, "_ebpo")])
     wrong += lint("fish", ["-n"], [os.path.join(made, "ebpo.fish")])
     print("\n".join(wrong + [f"{len(names)} commands, {len(wrong)} failed"]))
-    return 1 if wrong or len(names) < 20 else 0
+    return 1 if wrong or len(names) + len(without) < 20 else 0
 
 
 if __name__ == "__main__":

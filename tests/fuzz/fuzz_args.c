@@ -8,7 +8,6 @@
 
 #include <math.h>
 
-#include "cli/boolean_args.h"
 #include "cli/memory_args.h"
 #include "cli/numbers.h"
 #include "cli/pose_args.h"
@@ -17,15 +16,22 @@
 #include "cli/subtree_args.h"
 #include "cli/words.h"
 #include "cli/commands/commands.h"
+#include "ebpo_config.h"
+
+#if EBPO_HAVE_EXTRAS
+#include "cli/boolean_args.h"
 #include "cli/commands/map_job.h"
+#endif
 
 static const command *const commands[] = {
-    &command_convert, &command_check,   &command_info,   &command_levels, &command_view,
-    &command_extract, &command_export,  &command_subset, &command_repack, &command_fetch,
-    &command_measure, &command_render,  &command_verify, &command_inside, &command_distance,
-    &command_ray,     &command_box,     &command_bench,  &command_report, &command_scene,
-    &command_boolean, &command_collide, &command_repair, &command_map,    &command_touch,
-    &command_paint
+    &command_convert, &command_check,   &command_info,    &command_levels, &command_view,
+    &command_extract, &command_export,  &command_subset,  &command_repack, &command_fetch,
+    &command_measure, &command_render,  &command_verify,  &command_inside, &command_distance,
+    &command_ray,     &command_box,     &command_bench,   &command_report, &command_repair,
+#if EBPO_HAVE_EXTRAS
+    &command_scene,   &command_boolean, &command_collide, &command_map,    &command_touch,
+    &command_paint,
+#endif
 };
 enum { COMMANDS = sizeof commands / sizeof *commands, WORDS_MOST = 40, VALUES = 64 };
 
@@ -60,6 +66,7 @@ static void number(const char *text)
     fuzz_must(memcmp(&v, &again, sizeof v) == 0 || isnan(v));
 }
 
+#if EBPO_HAVE_EXTRAS
 static void expression(const char *text, uint32_t operands)
 {
     boolean_nodes nodes;
@@ -74,6 +81,7 @@ static void picture_size(const char *text)
     if (map_read_size(text, &width, &height))
         fuzz_must(width >= 2 && width <= 8192 && height >= 2 && height <= 8192);
 }
+#endif
 
 static void value(uint8_t what, const char *text)
 {
@@ -91,7 +99,10 @@ static void value(uint8_t what, const char *text)
         if (pose_read(text, &pose))
             fuzz_must(isfinite(pose.scale) && isfinite(pose.translation[0]));
         break;
+#if EBPO_HAVE_EXTRAS
     case 3: expression(text, 1 + what / 10 % 12); break;
+    case 8: picture_size(text); break;
+#endif
     case 4: (void)subtree_faces_read("fuzz", text, &n); break;
     case 5: (void)query_read_time("fuzz", text, &n); break;
     case 6: (void)memory_good("fuzz", &(memory_values){ text, NULL }); break;
@@ -102,7 +113,6 @@ static void value(uint8_t what, const char *text)
             fuzz_must(planes >= 0 && planes <= 1e9);
         break;
     }
-    case 8: picture_size(text); break;
     default: number(text);
     }
 }

@@ -43,7 +43,7 @@ case $plugin in "$own"/*) ;; *) fail "where the plugin is" ;; esac
 [ -f "$plugin/libebpo_h5zstd.so" ] || fail "the plugin is not where it is said to be"
 
 # A page of the manual for every command, and what each shell completes by, where shells look.
-commands=$("$ebpo" --help | sed -n '/^commands:/,/^$/s/^  \([a-z]*\) .*/\1/p' | grep -vx help)
+commands=$("$ebpo" --help | sed -n 's/^  \([a-z][a-z]*\)  *[a-z].*/\1/p' | grep -vx help)
 [ -n "$commands" ] || fail "no commands in --help"
 for command in $commands; do
     [ -s "$own/share/man/man1/ebpo-$command.1" ] || { echo "$command" >"$work/out" && fail "a command's page"; }

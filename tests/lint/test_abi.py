@@ -2,7 +2,8 @@
 """The public interface against its stored description: test_abi.py CC... -- SOURCE_ROOT [--update]
 
 What the headers declare is compiled into a library of empty functions, described by abidw and
-compared by abidiff with tests/lint/libebpo.abi: so it does not matter what the real library's
+compared by abidiff with tests/lint/libebpo.abi, and what those of the core declare with
+tests/lint/libebpo-core.abi: so it does not matter what the real library's
 private structs are, or how it was compiled. test_exports.py sees to it that the real library
 exports just these functions. Also: structs that begin with their size must not end in padding, or a
 member that is appended would come to lie where older callers have garbage.
@@ -17,21 +18,25 @@ import tempfile
 separator = sys.argv.index("--")
 compiler, (root, *rest) = sys.argv[1:separator], sys.argv[separator + 1:]
 root, update = pathlib.Path(root).resolve(), "--update" in rest
-baseline = root / "tests/lint/libebpo.abi"
 INCLUDE = root / "lib/include"
+EVERY = sorted((INCLUDE / "ebpo").glob("*.h"))
+CORE = [header for header in EVERY if header.name == "ebpo.h"
+        or f"<ebpo/{header.name}>" in (INCLUDE / "ebpo/ebpo.h").read_text()]
+BASELINES = {"libebpo.abi": EVERY, "libebpo-core.abi": CORE}
 SKIPPED = 77
 
 
-def header_text():
-    """All headers without comments and preprocessor lines."""
-    texts = [header.read_text() for header in sorted((INCLUDE / "ebpo").glob("*.h"))]
+def header_text(headers):
+    """Headers without comments and preprocessor lines."""
+    texts = [header.read_text() for header in headers]
     text = re.sub(r"/\*.*?\*/", " ", "\n".join(texts), flags=re.S)
     return re.sub(r"^#(.*\\\n)*.*$", "", text, flags=re.M)
 
 
-def stub(text):
+def stub(headers):
     """A C file that defines every function, and names every type, so that all are described."""
-    lines = ["#include <ebpo/ebpo.h>"]
+    text = header_text(headers)
+    lines = [f"#include <ebpo/{header.name}>" for header in headers]
     for declaration in re.findall(r"EBPO_API\b(.*?);", text, flags=re.S):
         declaration = re.sub(r"\bEBPO_MUST_USE\b|\bEBPO_PRINTF\([^)]*\)", "", declaration)
         lines.append(" ".join(declaration.split()) + " { __builtin_trap(); }")
@@ -50,9 +55,9 @@ def stub(text):
     return "\n".join(lines) + "\n"
 
 
-def describe(folder, output):
+def describe(folder, headers, output):
     source, library = folder / "stub.c", folder / "libebpo.so.0"
-    source.write_text(stub(header_text()))
+    source.write_text(stub(headers))
     subprocess.run([*compiler, "-std=c11", "-g", "-O0", "-shared", "-fPIC", "-fvisibility=hidden",
                     f"-I{INCLUDE}",
                     "-Wl,-soname,libebpo.so.0", "-nostdlib", "-o", library, source.name],
@@ -62,25 +67,31 @@ def describe(folder, output):
                     library], check=True)
 
 
+def compare(folder, name, headers):
+    """True when the headers are as the stored description says; --update stores them."""
+    now, baseline = folder / "now.abi", root / "tests/lint" / name
+    describe(folder, headers, now)
+    if update:
+        shutil.copy(now, baseline)
+        return True
+    compared = subprocess.run(["abidiff", baseline, now], capture_output=True, text=True)
+    if compared.returncode:
+        print(f"{name}:\n{compared.stdout}{compared.stderr}")
+    return compared.returncode == 0
+
+
 def main():
     if not shutil.which("abidw") or not shutil.which("abidiff"):
         print("abidw and abidiff are not installed (tools/install-deps.sh --tests)")
         return SKIPPED
     with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(name)
-        now = folder / "now.abi"
         try:
-            describe(folder, now)
+            same = [compare(pathlib.Path(name), *baseline) for baseline in BASELINES.items()]
         except subprocess.CalledProcessError:
             return 1
-        if update:
-            shutil.copy(now, baseline)
-            return 0
-        compared = subprocess.run(["abidiff", baseline, now], capture_output=True, text=True)
-    if compared.returncode == 0:
+    if all(same):
         return 0
-    print(compared.stdout + compared.stderr)
-    print("The public interface is not the one that is stored. Unless that is what you want, mend "
+    print("The public interface is not the one that is stored. Unless that is what you want, correct "
           "lib/include/ebpo. A member may be "
           "added at the end of a struct that begins with struct_size, a function or a constant "
           "may be added; all else breaks programs "

@@ -4,7 +4,13 @@
 #include <cstdlib>
 #include <cstring>
 
+#include <ebpo/boolean.h>
+#include <ebpo/collide.h>
 #include <ebpo/ebpo.h>
+#include <ebpo/map.h>
+#include <ebpo/paint.h>
+#include <ebpo/scene.h>
+#include <ebpo/touch.h>
 
 int main()
 {

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """The public headers, the shared library, and the documents tell the same: test_exports.py LIBEBPO
-SOURCE_ROOT VERSION
+SOURCE_ROOT VERSION core|extras
 
-The library exports exactly what the headers declare; ebpo.h includes every header, and each is
-installed; whatever name a header, a page or a sample mentions is declared; each function says which
+The library exports exactly what the headers declare, those of the core alone or all; ebpo.h includes
+every header of the core, and no other; each is installed; whatever name a header, a page or a sample mentions is declared; each function says which
 threads may call it; each struct that begins with its size has its macro; the version is the
 project's. What the library wants of every thread's stack (thread-local storage) is little.
 """
@@ -12,7 +12,9 @@ import re
 import subprocess
 import sys
 
-library, root, version = sys.argv[1], pathlib.Path(sys.argv[2]), sys.argv[3]
+library, root, version, parts = sys.argv[1], pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4]
+build = (root / "lib/meson.build").read_text()
+EXTRAS = set(re.findall(r"include/ebpo/(\w+\.h)", re.search(r"extra_headers = files\(.*?\)", build, re.S).group()))
 headers = {path.name: path.read_text() for path in sorted((root / "lib/include/ebpo").glob("*.h"))}
 problems = []
 
@@ -23,9 +25,9 @@ def code(text):
     return re.sub(r"^#(.*\\\n)*.*$", "", text, flags=re.M)
 
 
-def declared_functions():
+def declared_functions(there):
     names = set()
-    for text in headers.values():
+    for text in there:
         names |= set(re.findall(r"EBPO_API\b[^;]*?\b(ebpo_\w+)\s*\(", code(text)))
     return names
 
@@ -69,14 +71,17 @@ def thread_local_bytes():
     return sum(int(line.split()[5], 16) for line in output.splitlines() if line.split()[:1] == ["TLS"])
 
 
-functions, exported = declared_functions(), exported_functions()
+functions, exported = declared_functions(headers.values()), exported_functions()
+if parts == "core":
+    problems += [f"exported, but an extra: {name}" for name in sorted(
+        exported & declared_functions(headers[name] for name in EXTRAS))]
+    exported |= declared_functions(headers[name] for name in EXTRAS)
 problems += [f"declared, not exported: {name}" for name in sorted(functions - exported)]
 problems += [f"exported, not declared: {name}" for name in sorted(exported - functions)]
-problems += [f"ebpo.h does not include {name}" for name in headers if name != "ebpo.h"
-             and f"<ebpo/{name}>" not in headers["ebpo.h"]]
+problems += [f"{name}: ebpo.h includes what belongs to the core, and no more" for name in headers
+             if name != "ebpo.h" and (f"#include <ebpo/{name}>" in headers["ebpo.h"]) == (name in EXTRAS)]
 if thread_local_bytes() > 256:
     problems.append(f"{thread_local_bytes()} bytes of thread-local storage, which come off every thread's stack")
-build = (root / "lib/meson.build").read_text()
 problems += [f"not installed (lib/meson.build): {name}" for name in headers
              if f"'include/ebpo/{name}'" not in build]
 

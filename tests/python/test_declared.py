@@ -23,11 +23,12 @@ constants = [name for name, value in vars(declared).items() if name.startswith("
 
 def told_by_c():
     """Lines of a C program about all of it."""
-    lines = ["#include <ebpo/ebpo.h>", "#include <stdio.h>",
-             "static void told(const char *name, const void *data, size_t size) {",
-             '    printf("%s ", name);',
-             '    for (size_t i = 0; i < size; i++) printf("%02x", ((const unsigned char *)data)[i]);',
-             '    puts("");', "}", "int main(void) {"]
+    lines = [f"#include <ebpo/{header.name}>" for header in sorted((pathlib.Path(include) / "ebpo").glob("*.h"))]
+    lines += ["#include <stdio.h>",
+              "static void told(const char *name, const void *data, size_t size) {",
+              '    printf("%s ", name);',
+              '    for (size_t i = 0; i < size; i++) printf("%02x", ((const unsigned char *)data)[i]);',
+              '    puts("");', "}", "int main(void) {"]
     for kind in structs:
         name = kind.__name__
         lines.append(f'printf("size {name} %zu\\n", sizeof({name}));')

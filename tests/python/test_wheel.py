@@ -29,7 +29,7 @@ ALLOWED = {"libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "librt.so.
            "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
 
 ASK = """
-import os, sys
+import ctypes, os, sys
 import numpy as np, ebpo
 here = os.path.dirname(ebpo.__file__)
 assert here.startswith(sys.prefix) and os.path.dirname(ebpo.library()) == here, (here, ebpo.library())
@@ -39,7 +39,8 @@ inside = m.inside(P)
 assert 0 < inside.sum() < len(P)
 assert (inside == (m.winding(P) != 0)).all() and (m.distance(P[:999]).distance < 0).tolist() == inside[:999].tolist()
 mapped = open("/proc/self/maps").read()
-for name in ("zstd", "z", "gmp", "nettle", "jansson"):
+scenes = hasattr(ctypes.CDLL(ebpo.library()), "ebpo_scene_new")
+for name in ["zstd", "z", "gmp", "nettle"] + ["jansson"] * scenes:
     assert f"{here}/lib{name}-" in mapped, name
 print("asked")
 """

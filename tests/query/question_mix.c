@@ -1,3 +1,7 @@
+#include "ebpo_config.h"
+#if EBPO_HAVE_EXTRAS
+#include <ebpo/touch.h>
+#endif
 #include "question_mix.h"
 
 #include <math.h>
@@ -333,6 +337,7 @@ static ebpo_status ask_counts(const mix_asker *a, uint64_t number, uint64_t *has
     return status == EBPO_OK ? ebpo_file_locate(a->file, &sizes, error) : status;
 }
 
+#if EBPO_HAVE_EXTRAS
 /* A hand that goes through the model; what it meets depends on what has been loaded. */
 static ebpo_status ask_touch(const mix_asker *a, uint64_t number, uint64_t *hash, ebpo_error *error)
 {
@@ -361,20 +366,27 @@ static ebpo_status ask_touch(const mix_asker *a, uint64_t number, uint64_t *hash
     ebpo_touch_free(touch);
     return good ? status : EBPO_E_FORMAT; /* which no file here has */
 }
+#endif
 
 /* --- */
 
 typedef ebpo_status (*ask_fn)(const mix_asker *asker, uint64_t number, uint64_t *hash,
                               ebpo_error *error);
 static const ask_fn ask[MIX_KINDS] = {
-    ask_inside,  ask_inside_many, ask_distance, ask_distance_many, ask_within, ask_ray,
-    ask_ray_all, ask_rays,        ask_box,      ask_triangles,     ask_stream, ask_view,
-    ask_subtree, ask_level,       ask_counts,   ask_touch,
+    ask_inside, ask_inside_many, ask_distance, ask_distance_many, ask_within,
+    ask_ray,    ask_ray_all,     ask_rays,     ask_box,           ask_triangles,
+    ask_stream, ask_view,        ask_subtree,  ask_level,         ask_counts,
+#if EBPO_HAVE_EXTRAS
+    ask_touch,
+#endif
 };
 enum { RAYS = 7, TOUCH = 15 };
 const char *const mix_names[MIX_KINDS] = {
     "inside", "inside, many", "distance", "distance, many", "within",  "ray",   "ray all", "rays",
-    "box",    "triangles",    "stream",   "view",           "subtree", "level", "counts",  "touch",
+    "box",    "triangles",    "stream",   "view",           "subtree", "level", "counts",
+#if EBPO_HAVE_EXTRAS
+    "touch",
+#endif
 };
 
 bool mix_has_workers(int kind) { return kind == RAYS || kind == TOUCH; }

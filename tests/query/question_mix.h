@@ -3,6 +3,8 @@
 #ifndef EBPO_TESTS_QUESTION_MIX_H
 #define EBPO_TESTS_QUESTION_MIX_H
 
+#include "ebpo_config.h"
+
 #include <ebpo/query.h>
 
 /* What one thread asks of: its context, and the file behind it. */
@@ -12,7 +14,7 @@ typedef struct mix_asker {
     ebpo_context *context;
 } mix_asker;
 
-enum { MIX_KINDS = 16 };
+enum { MIX_KINDS = EBPO_HAVE_EXTRAS ? 16 : 15 };
 extern const char *const mix_names[MIX_KINDS];
 
 /* Whether the library reads for it in threads of its own, too. */

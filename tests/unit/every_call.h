@@ -18,7 +18,19 @@ typedef struct every_call {
 } every_call;
 
 /* Ends with a line without a name. */
-extern const every_call every_call_meshes[], every_call_files[], every_call_answers[];
+extern const every_call every_call_meshes[], every_call_files[], every_call_answers[],
+    every_call_extras[];
+
+/* Points in and around the model. */
+enum { EVERY_CALL_POINTS = 40 };
+void every_call_points(double (*points)[3]);
+
+/* A mesh of the scratch folder, and what makes a solid of it. */
+ebpo_status every_call_read(every_call_env *e, const char *name, ebpo_mesh *mesh);
+ebpo_status every_call_prepare(ebpo_mesh *mesh, ebpo_prepared *out, ebpo_error *error);
+
+/* Of every_call_extras.c, for a call of every_call_answers.c. */
+ebpo_status every_call_two_models(ebpo_model *model, bool whole, ebpo_error *error);
 
 /* What the calls read, below the scratch folder. */
 #define EVERY_CALL_MODEL     "model.ebpo.h5"

@@ -5,7 +5,7 @@
 #include "every_call.h"
 #include "scratch.h"
 
-static ebpo_status read_mesh(every_call_env *e, const char *name, ebpo_mesh *mesh)
+ebpo_status every_call_read(every_call_env *e, const char *name, ebpo_mesh *mesh)
 {
     ebpo_mesh_read_options options = EBPO_MESH_READ_OPTIONS_INIT;
     options.threads = 1;
@@ -17,7 +17,7 @@ static ebpo_status read_mesh(every_call_env *e, const char *name, ebpo_mesh *mes
 static ebpo_status call_read(every_call_env *e)
 {
     ebpo_mesh mesh;
-    ebpo_status status = read_mesh(e, EVERY_CALL_PLY, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_PLY, &mesh);
     (void)ebpo_mesh_attributes_lost(&mesh);
     (void)ebpo_mesh_unread(&mesh);
     (void)ebpo_mesh_has_attributes(&mesh);
@@ -28,7 +28,7 @@ static ebpo_status call_read(every_call_env *e)
 static ebpo_status call_import(every_call_env *e)
 {
     ebpo_mesh mesh;
-    ebpo_status status = read_mesh(e, EVERY_CALL_OBJ, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_OBJ, &mesh);
     ebpo_mesh_free(&mesh);
     return status;
 }
@@ -68,7 +68,7 @@ static ebpo_status call_rows_part(every_call_env *e)
 static ebpo_status call_write_ply(every_call_env *e)
 {
     ebpo_mesh mesh;
-    ebpo_status status = read_mesh(e, EVERY_CALL_PLY, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_PLY, &mesh);
     if (status == EBPO_OK)
         status = ebpo_mesh_write_ply(&mesh, scratch("written.ply"), e->error);
     ebpo_mesh_free(&mesh);
@@ -79,7 +79,7 @@ static ebpo_status call_colours(every_call_env *e)
 {
     ebpo_mesh mesh;
     ebpo_colours colours = { 0 };
-    ebpo_status status = read_mesh(e, EVERY_CALL_PLY, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_PLY, &mesh);
     if (status == EBPO_OK)
         status = ebpo_mesh_colours(&mesh, &colours, e->error);
     ebpo_colours_free(&colours);
@@ -91,7 +91,7 @@ static ebpo_status call_check(every_call_env *e)
 {
     ebpo_mesh mesh;
     ebpo_mesh_report report;
-    ebpo_status status = read_mesh(e, EVERY_CALL_HOLED, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_HOLED, &mesh);
     if (status == EBPO_OK)
         status = ebpo_mesh_check(&mesh, 1, (ebpo_progress){ NULL, NULL }, &report, e->error);
     ebpo_mesh_free(&mesh);
@@ -110,7 +110,7 @@ static ebpo_status call_places(every_call_env *e)
 {
     ebpo_mesh mesh;
     ebpo_places_options options = EBPO_PLACES_OPTIONS_INIT;
-    ebpo_status status = read_mesh(e, EVERY_CALL_HOLED, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_HOLED, &mesh);
     options.threads = 1;
     options.ply = scratch("places.ply");
     if (status == EBPO_OK)
@@ -122,7 +122,7 @@ static ebpo_status call_places(every_call_env *e)
 static ebpo_status call_arrange(every_call_env *e)
 {
     ebpo_mesh mesh;
-    ebpo_status status = read_mesh(e, EVERY_CALL_CROSSING, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_CROSSING, &mesh);
     if (status == EBPO_OK)
         status = ebpo_mesh_arrange(&mesh, 1, (ebpo_progress){ NULL, NULL }, e->error);
     ebpo_mesh_free(&mesh);
@@ -135,7 +135,7 @@ static ebpo_status mend(every_call_env *e, const char *name,
     ebpo_mesh mesh;
     ebpo_mend_record record;
     memset(&record, 0, sizeof record);
-    ebpo_status status = read_mesh(e, name, &mesh);
+    ebpo_status status = every_call_read(e, name, &mesh);
     if (status == EBPO_OK)
         status = how(&mesh, &record, e->error);
     ebpo_mesh_free(&mesh);
@@ -188,7 +188,7 @@ static ebpo_status call_shells(every_call_env *e)
 {
     ebpo_mesh mesh;
     ebpo_shells shells = EBPO_SHELLS_INIT;
-    ebpo_status status = read_mesh(e, EVERY_CALL_CROSSING, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_CROSSING, &mesh);
     if (status == EBPO_OK)
         status = ebpo_mesh_count_shells(&mesh, 1, (ebpo_progress){ NULL, NULL }, &shells, e->error);
     ebpo_mesh_free(&mesh);
@@ -200,7 +200,7 @@ static ebpo_status call_repeated(every_call_env *e)
     ebpo_mesh mesh;
     ebpo_finding repeated;
     uint64_t opposite;
-    ebpo_status status = read_mesh(e, EVERY_CALL_CROSSING, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_CROSSING, &mesh);
     if (status == EBPO_OK)
         status = ebpo_mesh_count_repeated(&mesh, 1, &repeated, &opposite, e->error);
     ebpo_mesh_free(&mesh);
@@ -236,7 +236,7 @@ static ebpo_status call_components(every_call_env *e)
     ebpo_mesh mesh, part = { 0 };
     ebpo_components *components = NULL;
     ebpo_component facts = EBPO_COMPONENT_INIT;
-    ebpo_status status = read_mesh(e, EVERY_CALL_CROSSING, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_CROSSING, &mesh);
     if (status == EBPO_OK)
         status =
             ebpo_components_new(&mesh, 1, (ebpo_progress){ NULL, NULL }, &components, e->error);
@@ -251,7 +251,7 @@ static ebpo_status call_components(every_call_env *e)
     return status;
 }
 
-static ebpo_status prepare(ebpo_mesh *mesh, ebpo_prepared *out, ebpo_error *error)
+ebpo_status every_call_prepare(ebpo_mesh *mesh, ebpo_prepared *out, ebpo_error *error)
 {
     ebpo_prepare_options options = EBPO_PREPARE_OPTIONS_INIT;
     options.weld = options.orient = options.fill_holes = true;
@@ -263,9 +263,9 @@ static ebpo_status call_prepare(every_call_env *e)
 {
     ebpo_mesh mesh;
     ebpo_prepared prepared = EBPO_PREPARED_INIT;
-    ebpo_status status = read_mesh(e, EVERY_CALL_HOLED, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_HOLED, &mesh);
     if (status == EBPO_OK)
-        status = prepare(&mesh, &prepared, e->error);
+        status = every_call_prepare(&mesh, &prepared, e->error);
     ebpo_mesh_free(&mesh);
     return status;
 }
@@ -276,7 +276,7 @@ static ebpo_status call_repairs(every_call_env *e)
     ebpo_mesh_report report;
     ebpo_repairs repairs = EBPO_REPAIRS_INIT;
     ebpo_progress silent = { NULL, NULL };
-    ebpo_status status = read_mesh(e, EVERY_CALL_HOLED, &mesh);
+    ebpo_status status = every_call_read(e, EVERY_CALL_HOLED, &mesh);
     if (status == EBPO_OK)
         status = ebpo_mesh_check(&mesh, 1, silent, &report, e->error);
     if (status == EBPO_OK)
@@ -299,9 +299,9 @@ static ebpo_status build(every_call_env *e, const char *name, ebpo_selection sel
     options.threads = threads;
     options.select = selection;
     options.parts |= ebpo_selection_describe(selection)->from_leaves ? EBPO_PART_LEAF_PLANES : 0;
-    ebpo_status status = read_mesh(e, name, &mesh);
+    ebpo_status status = every_call_read(e, name, &mesh);
     if (status == EBPO_OK)
-        status = prepare(&mesh, &prepared, e->error);
+        status = every_call_prepare(&mesh, &prepared, e->error);
     if (status == EBPO_OK)
         status = ebpo_build(&mesh, &prepared.report, &prepared.record, &options, &tree, e->error);
     ebpo_mesh_free(&mesh);
@@ -330,33 +330,6 @@ static ebpo_status call_build_threads(every_call_env *e)
     return build(e, EVERY_CALL_PLY, EBPO_SELECT_OFFSET, 2);
 }
 
-static bool count_crossings(void *user, const ebpo_crossing *crossings, uint64_t count)
-{
-    (void)crossings;
-    *(uint64_t *)user += count;
-    return true;
-}
-
-/* It takes the mesh, too. */
-static ebpo_status call_crossings(every_call_env *e)
-{
-    ebpo_mesh mesh;
-    ebpo_prepared prepared = EBPO_PREPARED_INIT;
-    ebpo_crossings_options options = EBPO_CROSSINGS_OPTIONS_INIT;
-    ebpo_crossings_summary sum = EBPO_CROSSINGS_SUMMARY_INIT;
-    uint64_t count = 0;
-    options.threads = 1;
-    options.ply = scratch("red.ply");
-    ebpo_status status = read_mesh(e, EVERY_CALL_CROSSING, &mesh);
-    if (status == EBPO_OK)
-        status = prepare(&mesh, &prepared, e->error);
-    if (status == EBPO_OK)
-        status = ebpo_mesh_crossings(&mesh, &prepared.report, &options, count_crossings, &count,
-                                     &sum, e->error);
-    ebpo_mesh_free(&mesh);
-    return status;
-}
-
 const every_call every_call_meshes[] = {
     { "read", call_read },
     { "import", call_import },
@@ -380,7 +353,6 @@ const every_call every_call_meshes[] = {
     { "groups", call_groups },
     { "prepare", call_prepare },
     { "repairs", call_repairs },
-    { "crossings", call_crossings },
     { "build", call_build },
     { "build_crossing", call_build_crossing },
     { "build_kmedoids", call_build_kmedoids },

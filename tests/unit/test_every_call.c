@@ -12,6 +12,7 @@
 #include "mesh/attributes.h"
 #include "core/workspace.h"
 #include "check_main.h"
+#include "ebpo_config.h"
 #include "every_call.h"
 #include "faults.h"
 #include "scratch.h"
@@ -193,8 +194,14 @@ static void finish(every_call_env *e)
 
 static const every_call *call_number(int i)
 {
-    static const every_call *const tables[] = { every_call_meshes, every_call_files,
-                                                every_call_answers };
+    static const every_call *const tables[] = {
+        every_call_meshes,
+        every_call_files,
+        every_call_answers,
+#if EBPO_HAVE_EXTRAS
+        every_call_extras
+#endif
+    };
     for (size_t table = 0; table < sizeof tables / sizeof *tables; table++)
         for (const every_call *c = tables[table]; c->name; c++)
             if (i-- == 0)

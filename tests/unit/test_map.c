@@ -6,6 +6,7 @@
 
 #include <ebpo/colours.h>
 #include <ebpo/ebpo.h>
+#include <ebpo/map.h>
 
 #include "check_main.h"
 #include "model_file.h"

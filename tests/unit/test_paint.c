@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <ebpo/ebpo.h>
+#include <ebpo/paint.h>
 
 #include "check_main.h"
 #include "expect.h"

@@ -205,7 +205,9 @@ def main():
         sys.exit(__doc__)
     include = pathlib.Path(sys.argv[1])
     try:
-        text = Headers(text_of(include / "ebpo" / "ebpo.h", set())).declared()
+        seen: set = set()
+        headers = [include / "ebpo" / "ebpo.h", *sorted((include / "ebpo").glob("*.h"))]
+        text = Headers("".join(text_of(header, seen) for header in headers)).declared()
     except Unknown as error:
         sys.exit(f"declare.py: not understood: {error}")
     if len(sys.argv) == 3:

@@ -71,6 +71,18 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collider_new(ebpo_model *a, ebpo_model *
  */
 EBPO_API void ebpo_collider_free(ebpo_collider *collider);
 
+/*
+ * Whether the model may be asked about at this pose.
+ *
+ * EBPO_E_ARGUMENT: the matrix is not a rotation; the message says by how much its columns are
+ * longer than 1 or not at right angles (2^-20 is allowed), or that it is a mirror; a number is not
+ * finite; the scale or the posed model is out of range.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_pose_check(const ebpo_model *model, const ebpo_pose *pose,
+                                                   ebpo_error *error);
+
 /* Of every question. NULL: both models as in their files, no deadline. */
 typedef struct ebpo_collide_options {
     size_t struct_size; /* EBPO_COLLIDE_OPTIONS_INIT sets it */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: the whole public interface.
+ * EBP-Octree in HDF5: the public interface of the core.
  *
  *   base.h        versions, errors, progress, outputs
  *   workspace.h   how much memory the work may use
@@ -16,21 +16,25 @@
  *   query.h       point in solid, distance, rays, boxes, mass
  *   pair.h        how two faces lie to each other
  *   pose.h        where a model is in the world
- *   boolean.h     unions and differences of solids at poses, by query
- *   collide.h     two models that meet
  *   stream.h      levels, coarse to fine
  *   view.h        nodes in the order of an observer
  *   subtree.h     a part of a model as plain arrays: nodes, envelopes, faces
  *   lod.h         a level as closed polygons
- *   map.h         maps of distance: planes, grids, two scans
- *   touch.h       a hand that touches a model, at a steady rate
- *   paint.h       paint and notes on a model, in a file of their own
  *   export.h      levels and the mesh in other programs' formats
  *   subset.h      a smaller file from a file
  *   verify.h      proving that a file keeps its promises
  *   deviation.h   how far a level reaches beyond the model
  *   limit.h       what no convex envelope can be better than
+ *
+ * What is built on queries has headers of its own, which are installed unless the library was
+ * configured with -Dextras=disabled:
+ *
+ *   boolean.h     unions and differences of solids at poses, by query
+ *   collide.h     two models that meet
  *   scene.h       models at many places, that move
+ *   map.h         maps of distance: planes, grids, two scans
+ *   touch.h       a hand that touches a model, at a steady rate
+ *   paint.h       paint and notes on a model, in a file of their own
  *
  * base.h says what holds for every function.
  */
@@ -51,21 +55,15 @@
 #include <ebpo/query.h>
 #include <ebpo/pair.h>
 #include <ebpo/pose.h>
-#include <ebpo/boolean.h>
-#include <ebpo/collide.h>
 #include <ebpo/stream.h>
 #include <ebpo/view.h>
 #include <ebpo/subtree.h>
 #include <ebpo/lod.h>
 #include <ebpo/export.h>
-#include <ebpo/map.h>
-#include <ebpo/touch.h>
-#include <ebpo/paint.h>
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 #include <ebpo/deviation.h>
 #include <ebpo/limit.h>
-#include <ebpo/scene.h>
 #include <ebpo/colours.h>
 
 #endif

@@ -42,18 +42,6 @@ typedef struct ebpo_pose {
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_pose_turn(ebpo_pose *pose, const double quaternion[4],
                                                   ebpo_error *error);
 
-/*
- * Whether the model may be asked about at this pose.
- *
- * EBPO_E_ARGUMENT: the matrix is not a rotation; the message says by how much its columns are
- * longer than 1 or not at right angles (2^-20 is allowed), or that it is a mirror; a number is not
- * finite; the scale or the posed model is out of range.
- *
- * Threads: any.
- */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_pose_check(const ebpo_model *model, const ebpo_pose *pose,
-                                                   ebpo_error *error);
-
 #ifdef __cplusplus
 }
 #endif

@@ -10,6 +10,7 @@
 // step, microseconds of the processor, the number of pairs, and subtrees and bytes that were
 // loaded.
 #include <ebpo/ebpo.h>
+#include <ebpo/collide.h>
 
 #include "peer.hpp"
 

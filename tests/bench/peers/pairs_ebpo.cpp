@@ -7,6 +7,7 @@
 //         random direction, from where the models touch), these turned about, none (out by 2 %),
 //         apart (at a distance of 1 %)
 #include <ebpo/ebpo.h>
+#include <ebpo/collide.h>
 
 #include <random>
 

@@ -2,7 +2,7 @@
 #ifndef EBPO_TOOLS_CHECK_CROSSINGS_H
 #define EBPO_TOOLS_CHECK_CROSSINGS_H
 
-#include <ebpo/ebpo.h>
+#include <ebpo/collide.h>
 
 #include "cli/json.h"
 #include "cli/progress.h"

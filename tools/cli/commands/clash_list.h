@@ -2,7 +2,7 @@
 #ifndef EBPO_TOOLS_CLASH_LIST_H
 #define EBPO_TOOLS_CLASH_LIST_H
 
-#include <ebpo/ebpo.h>
+#include <ebpo/scene.h>
 
 typedef struct clash {
     ebpo_scene_meeting worst; /* at `time` */

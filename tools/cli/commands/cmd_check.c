@@ -9,9 +9,13 @@
 #include "cli/mesh_input.h"
 #include "cli/progress.h"
 #include "cli/standard_files.h"
-#include "cli/commands/check_crossings.h"
 #include "cli/commands/check_places.h"
 #include "cli/commands/commands.h"
+#include "ebpo_config.h"
+
+#if EBPO_HAVE_EXTRAS
+#include "cli/commands/check_crossings.h"
+#endif
 
 typedef struct values {
     mending mend;
@@ -56,15 +60,26 @@ static void print_words(const values *v, const mesh_input *p, const char *path)
     advice_print_shells(stdout, p);
 }
 
-static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo_progress progress,
-                          progress_line *line, ebpo_error *error)
+#if EBPO_HAVE_EXTRAS
+static ebpo_status search_crossings(const values *v, mesh_input *p, ebpo_progress progress, json *j,
+                                    progress_line *line, ebpo_error *error)
 {
     ebpo_crossings_options how = EBPO_CROSSINGS_OPTIONS_INIT;
-    ebpo_status status = EBPO_OK;
-    json j;
     how.threads = (unsigned)v->threads;
     how.progress = progress;
     how.ply = v->out;
+    return check_crossings(&p->mesh, &p->prepared.report, &how, v->json ? j : NULL, v->quiet, line,
+                           error);
+}
+#else
+#define search_crossings(...) EBPO_OK /* --crossings is refused */
+#endif
+
+static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo_progress progress,
+                          progress_line *line, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    json j;
     if (v->json)
         print_json(&j, p, path);
     else if (!v->quiet)
@@ -78,8 +93,7 @@ static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo
     else if (v->json)
         json_null(&j, "places"); /* not asked for */
     if (status == EBPO_OK && v->crossings)
-        status = check_crossings(&p->mesh, &p->prepared.report, &how, v->json ? &j : NULL, v->quiet,
-                                 line, error);
+        status = search_crossings(v, p, progress, &j, line, error);
     else if (v->json)
         json_null(&j, "crossings"); /* not looked for */
     if (v->json)
@@ -112,6 +126,9 @@ static int run(void *given, const char **operand)
     values *v = given;
     if (!memory_good("check", &v->memory) || mending_check("check", v->mend) != EXIT_FINE)
         return EXIT_USAGE;
+    if (v->crossings && !EBPO_HAVE_EXTRAS)
+        return command_usage("check", "this program was built without --crossings "
+                                      "(-Dextras=disabled); build it with -Dextras=enabled");
     if (v->out && !v->crossings)
         return command_usage("check", "--output shows what --crossings finds; give both");
     if (v->places && !check_places_good(v->places))

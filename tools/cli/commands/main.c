@@ -1,4 +1,5 @@
-/* The command line: `ebpo COMMAND ...`. One table of commands, one cmd_*.c for each. */
+/* The command line: `ebpo COMMAND ...`. A table of the commands in groups; each has its cmd_NAME.c.
+ */
 #include <fenv.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,34 +13,71 @@
 #include "cli/words.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/version_facts.h"
+#include "ebpo_config.h"
 
-static const command *const commands[] = {
-    &command_convert,  &command_check,    &command_info,    &command_levels, &command_view,
-    &command_extract,  &command_export,   &command_subset,  &command_repack, &command_repair,
-    &command_fetch,    &command_measure,  &command_render,  &command_verify, &command_inside,
-    &command_distance, &command_ray,      &command_box,     &command_bench,  &command_report,
-    &command_scene,    &command_boolean,  &command_collide, &command_map,    &command_touch,
-    &command_paint,    &command_catalogue
+/* The commands of one part of `ebpo help`; `extras`: where the build has them. */
+typedef struct command_group {
+    const char *title;
+    const command *const *commands; /* NULL ends it */
+    const char *extras;             /* their names, for a build that lacks them; NULL: none */
+} command_group;
+
+#define COMMANDS(...) \
+    (const command *const[]) { __VA_ARGS__, NULL }
+#if EBPO_HAVE_EXTRAS
+#define EXTRAS(names, ...) COMMANDS(__VA_ARGS__), NULL
+#else
+#define EXTRAS(names, ...) NULL, names
+#endif
+
+static const command_group groups[] = {
+    { "create and inspect",
+      COMMANDS(&command_convert, &command_check, &command_repair, &command_info, &command_verify,
+               &command_render, &command_export),
+      NULL },
+    { "query",
+      COMMANDS(&command_inside, &command_distance, &command_ray, &command_box, &command_measure),
+      NULL },
+    { "remote files and subsets",
+      COMMANDS(&command_fetch, &command_view, &command_extract, &command_subset, &command_repack,
+               &command_catalogue),
+      NULL },
+    { "several models",
+      EXTRAS("collide boolean scene", &command_collide, &command_boolean, &command_scene) },
+    { "maps, haptics, paint",
+      EXTRAS("map touch paint", &command_map, &command_touch, &command_paint) },
+    { "study and measure", COMMANDS(&command_levels, &command_bench, &command_report), NULL },
 };
-enum { COMMANDS = sizeof commands / sizeof *commands };
+enum { GROUPS = sizeof groups / sizeof *groups };
 
-static const command *find(const char *name)
+static const command *find_command(const char *name)
 {
-    for (int i = 0; i < COMMANDS; i++)
-        if (strcmp(commands[i]->spec->command, name) == 0)
-            return commands[i];
+    for (int g = 0; g < GROUPS; g++)
+        for (const command *const *c = groups[g].commands; c && *c; c++)
+            if (strcmp((*c)->spec->command, name) == 0)
+                return *c;
     return NULL;
+}
+
+static void print_commands(FILE *out)
+{
+    for (int g = 0; g < GROUPS; g++) {
+        if (!groups[g].commands)
+            continue;
+        fprintf(out, "\n%s\n", groups[g].title);
+        for (const command *const *c = groups[g].commands; *c; c++)
+            fprintf(out, "  %-10s %s\n", (*c)->spec->command, (*c)->spec->summary);
+    }
 }
 
 static void usage(FILE *out)
 {
     fprintf(out, "usage: ebpo COMMAND [options] ...\n\nEBP-Octree in HDF5: closed triangle meshes "
-                 "as trees of convex envelopes.\n\ncommands:\n");
-    for (int i = 0; i < COMMANDS; i++)
-        fprintf(out, "  %-10s %s\n", commands[i]->spec->command, commands[i]->spec->summary);
-    fprintf(out, "  %-10s %s\n", "help", "describe a command and its options: ebpo help COMMAND");
+                 "as trees of convex envelopes.\n");
+    print_commands(out);
+    fprintf(out, "\n  %-10s %s\n", "help", "describe a command and its options: ebpo help COMMAND");
     fprintf(out,
-            "\n  --version  print the version and exit; with --verbose, where the program, its "
+            "  --version  print the version and exit; with --verbose, where the program, its "
             "library and the HDF5 plugin are\n\nexit codes: 0 success, 1 bad data "
             "or input/output, 2 wrong usage, 3 not a solid where one is required, 4 (repack) "
             "the content "
@@ -47,13 +85,31 @@ static void usage(FILE *out)
             "were left out\n");
 }
 
+/* Says whether `name` is one of the words of `names`. */
+static bool is_among(const char *names, const char *name)
+{
+    size_t length = strlen(name);
+    for (; *names; names += strcspn(names, " "), names += strspn(names, " "))
+        if (strcspn(names, " ") == length && strncmp(names, name, length) == 0)
+            return true;
+    return false;
+}
+
 static int unknown_command(const char *name)
 {
+    for (int g = 0; g < GROUPS; g++)
+        if (groups[g].extras && is_among(groups[g].extras, name)) {
+            fprintf(stderr,
+                    "ebpo: this program was built without '%s' (-Dextras=disabled); build it with "
+                    "-Dextras=enabled\n",
+                    name);
+            return EXIT_USAGE;
+        }
     fprintf(stderr, "ebpo: unknown command '%s'; try 'ebpo help'\n", name);
     return EXIT_USAGE;
 }
 
-static int help(int argc, char **argv)
+static int print_help(int argc, char **argv)
 {
     if (argc > 3) {
         fprintf(stderr,
@@ -65,7 +121,7 @@ static int help(int argc, char **argv)
         usage(stdout);
         return EXIT_FINE;
     }
-    const command *c = find(argv[2]);
+    const command *c = find_command(argv[2]);
     if (!c)
         return unknown_command(argv[2]);
     args_help(c->spec);
@@ -99,7 +155,7 @@ static int run_with_stack(command_call *call)
     return call->code;
 }
 
-static int run(const command *c, int argc, char **argv)
+static int run_parsed(const command *c, int argc, char **argv)
 {
     const char *operand[ARGS_OPERANDS_MAX];
     void *values = malloc(c->size);
@@ -125,9 +181,9 @@ static int dispatch(int argc, char **argv)
     if (strcmp(name, "--version") == 0 || strcmp(name, "-V") == 0)
         return version_tell(argv[2]);
     if (strcmp(name, "help") == 0 || strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0)
-        return help(argc, argv);
-    const command *c = find(name);
-    return c ? run(c, argc - 1, argv + 1) : unknown_command(name);
+        return print_help(argc, argv);
+    const command *c = find_command(name);
+    return c ? run_parsed(c, argc - 1, argv + 1) : unknown_command(name);
 }
 
 int main(int argc, char **argv)
@@ -140,7 +196,7 @@ int main(int argc, char **argv)
     words_init();
     process_memory_usual();
     int code = dispatch(argc, argv);
-    const command *c = argc > 1 ? find(argv[1]) : NULL;
+    const command *c = argc > 1 ? find_command(argv[1]) : NULL;
     if (!command_flush(c ? c->spec->command : NULL) && code == EXIT_FINE)
         code = EXIT_FAILED;
     return code;

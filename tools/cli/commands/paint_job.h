@@ -2,7 +2,7 @@
 #ifndef EBPO_TOOLS_PAINT_JOB_H
 #define EBPO_TOOLS_PAINT_JOB_H
 
-#include <ebpo/ebpo.h>
+#include <ebpo/paint.h>
 
 #include "cli/remote_args.h"
 

@@ -2,7 +2,7 @@
 #ifndef EBPO_TOOLS_PAINTED_MESH_H
 #define EBPO_TOOLS_PAINTED_MESH_H
 
-#include <ebpo/ebpo.h>
+#include <ebpo/scene.h>
 
 /* Zero at first. */
 typedef struct painted_mesh {

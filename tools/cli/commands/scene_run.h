@@ -2,7 +2,7 @@
 #ifndef EBPO_TOOLS_SCENE_RUN_H
 #define EBPO_TOOLS_SCENE_RUN_H
 
-#include <ebpo/ebpo.h>
+#include <ebpo/scene.h>
 
 typedef struct scene_values {
     double time, from, to;                 /* NAN: not given; then from and to are settled */

@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include <ebpo/ebpo.h>
+#include <ebpo/touch.h>
 
 /* Unit quaternions x, y, z, w; 0 0 0 1: not turned. */
 typedef struct touch_pose {

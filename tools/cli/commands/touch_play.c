@@ -8,6 +8,8 @@
 #include <sys/resource.h>
 #include <time.h>
 
+#include <ebpo/map.h>
+
 #include "cli/tool_clock.h"
 
 const char *touch_play_first(void)

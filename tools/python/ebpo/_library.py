@@ -15,7 +15,7 @@ import numpy as np
 
 from . import _declared as c
 from ._checked import checked, index_of, is_own, within
-from .errors import BY_STATUS, Error
+from .errors import BY_STATUS, Error, UnsupportedError
 
 HERE = pathlib.Path(__file__).resolve().parent
 
@@ -41,6 +41,14 @@ def candidates():
         yield system
 
 
+def absent(function, library):
+    """Stands for a function that the library lacks: it was built without its extras."""
+    def refuse(*_):
+        raise UnsupportedError(f"{library} has no {function}: it was built with -Dextras=disabled; build it with "
+                          "-Dextras=enabled", "EBPO_E_UNSUPPORTED", "", "", None)
+    return refuse
+
+
 def load():
     """The library, with arguments and results of its functions declared."""
     name = next(candidates(), None)
@@ -57,7 +65,9 @@ def load():
                           "install both together, or name another library in EBPO_LIBRARY")
     for function, (result, arguments, names, _) in c.FUNCTIONS.items():
         entry = getattr(library, function, None)
-        if entry is not None:
+        if entry is None:
+            setattr(library, function, absent(function, name))
+        else:
             entry.restype, entry.argtypes = result, arguments
             setattr(library, function, checked(entry, arguments, names))
     library.path = name

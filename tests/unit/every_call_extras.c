@@ -1,0 +1,651 @@
+/* Calls of what is built on queries: two models, Booleans, maps, haptics, paint, scenes. */
+#include <math.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <ebpo/boolean.h>
+#include <ebpo/collide.h>
+#include <ebpo/map.h>
+#include <ebpo/paint.h>
+#include <ebpo/scene.h>
+#include <ebpo/touch.h>
+
+#include "every_call.h"
+#include "scratch.h"
+
+static bool count_met(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    (void)pairs;
+    *(uint64_t *)user += count;
+    return true;
+}
+
+static bool count_segments(void *user, const ebpo_contact_segment *segments, uint64_t count)
+{
+    (void)segments;
+    *(uint64_t *)user += count;
+    return true;
+}
+
+static bool count_lines(void *user, const ebpo_polyline *line)
+{
+    *(uint64_t *)user += line->count;
+    return true;
+}
+
+static ebpo_status write_met(ebpo_collider *collider, const ebpo_collide_options *options,
+                             ebpo_error *error)
+{
+    ebpo_status status =
+        ebpo_collide_write(collider, options, EBPO_PAIRS_HDF5, scratch("pairs.h5"), error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_write(collider, options, EBPO_PAIRS_PLY, scratch("red.ply"), error);
+    unlink(scratch("pairs.h5"));
+    unlink(scratch("red.ply"));
+    return status;
+}
+
+static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *options,
+                           ebpo_error *error)
+{
+    ebpo_face_pair pair;
+    ebpo_collider_stats stats = EBPO_COLLIDER_STATS_INIT;
+    const double up[3] = { 0, 0, 1 };
+    ebpo_way_out way;
+    ebpo_clearance clearance;
+    ebpo_certain depth[2];
+    ebpo_relation_result relation;
+    ebpo_level_result levels;
+    int32_t found;
+    uint64_t count = 0;
+    ebpo_status status = ebpo_collide_first(collider, options, &pair, &found, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_all(collider, options, count_met, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_self(collider, options, count_met, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_contacts(collider, options, count_segments, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_polylines(collider, options, count_lines, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_distance(collider, options, NULL, &clearance, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_depth(collider, options, 0.5, &depth[0], &depth[1], error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_way_out(collider, options, up, &way, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_relation(collider, options, &relation, error);
+    if (status == EBPO_OK)
+        status = write_met(collider, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_levels(collider, options, &levels, error);
+    if (status == EBPO_OK)
+        status = ebpo_collider_get_stats(collider, &stats);
+    return status;
+}
+
+static bool take_segments(void *user, const ebpo_contact_segment *segments, uint64_t count)
+{
+    (void)segments;
+    *(uint64_t *)user += count;
+    return true;
+}
+
+/* What models in parts may be asked as well. */
+static ebpo_status ask_parts(ebpo_collider *c, const ebpo_collide_options *o, ebpo_error *error)
+{
+    ebpo_clearance clearance;
+    uint64_t segments = 0;
+    ebpo_status status = ebpo_collide_distance(c, o, NULL, &clearance, error);
+    return status == EBPO_OK ? ebpo_collide_contacts(c, o, take_segments, &segments, error)
+                             : status;
+}
+
+static ebpo_status collide(ebpo_model *model, bool whole, ebpo_error *error)
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_collider *collider = NULL;
+    options.pose_b.translation[0] = 0.3;
+    static const double half[4] = { 0, 0, 1, 1 };
+    ebpo_status status = ebpo_pose_turn(&options.pose_b, half, error);
+    if (status == EBPO_OK)
+        status = ebpo_pose_check(model, &options.pose_b, error);
+    if (status == EBPO_OK)
+        status = ebpo_collider_new(model, model, NULL, &collider, error);
+    if (status == EBPO_OK)
+        status = whole ? ask_two(collider, &options, error) : ask_parts(collider, &options, error);
+    ebpo_collider_free(collider);
+    return status;
+}
+
+static ebpo_status ask_boolean_cells(ebpo_boolean *boolean, ebpo_error *error)
+{
+    ebpo_cells_options options = EBPO_CELLS_OPTIONS_INIT;
+    ebpo_boolean_cells *cells = NULL;
+    ebpo_boolean_volume volume = EBPO_BOOLEAN_VOLUME_INIT;
+    ebpo_mesh mesh = { 0 };
+    options.level = 2;
+    ebpo_status status = ebpo_boolean_cells_new(boolean, &options, &cells, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_cells_volume(cells, &volume);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_cells_mesh(cells, EBPO_BOOLEAN_OUTER, &mesh, error);
+    ebpo_mesh_free(&mesh);
+    ebpo_boolean_cells_free(cells);
+    return status;
+}
+
+static ebpo_status ask_boolean(ebpo_model *model, ebpo_error *error)
+{
+    const ebpo_boolean_operand operands[2] = { { model, EBPO_POSE_INIT },
+                                               { model, EBPO_POSE_INIT } };
+    const ebpo_boolean_node nodes[3] = { { EBPO_BOOLEAN_OPERAND, 0, 0, 0 },
+                                         { EBPO_BOOLEAN_OPERAND, 1, 0, 0 },
+                                         { EBPO_BOOLEAN_UNION, 0, 1, 0 } };
+    double points[EVERY_CALL_POINTS][3];
+    ebpo_boolean_result results[EVERY_CALL_POINTS];
+    ebpo_boundary_distance distance;
+    ebpo_exact_volume exact = EBPO_EXACT_VOLUME_INIT;
+    ebpo_boolean_options options = EBPO_BOOLEAN_OPTIONS_INIT;
+    ebpo_boolean *boolean = NULL;
+    options.threads = 1;
+    every_call_points(points);
+    ebpo_status status = ebpo_boolean_new(operands, 2, nodes, 3, &options, &boolean, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_inside(boolean, points[0], results, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_inside_many(boolean, points[0], EVERY_CALL_POINTS, results, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_distance(boolean, points[0], NULL, &distance, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_exact_volume(boolean, NULL, &exact, error);
+    if (status == EBPO_OK)
+        status = ask_boolean_cells(boolean, error);
+    ebpo_boolean_free(boolean);
+    return status;
+}
+
+/* Two models, and Booleans of one. `whole`: all of the model is in memory. */
+ebpo_status every_call_two_models(ebpo_model *model, bool whole, ebpo_error *error)
+{
+    ebpo_status status = ask_boolean(model, error);
+    return status == EBPO_OK ? collide(model, whole, error) : status;
+}
+
+static ebpo_status take_layers(void *user, const double *values, uint64_t first, uint64_t layers,
+                               ebpo_error *error)
+{
+    (void)user;
+    (void)values;
+    (void)first;
+    (void)layers;
+    (void)error;
+    return EBPO_OK;
+}
+
+static ebpo_status map_lattice(ebpo_model *model, ebpo_error *error)
+{
+    static const double low[3] = { -1, -1, -1 }, high[3] = { 1, 1, 1 };
+    static const uint64_t count[3] = { 3, 2, 2 };
+    ebpo_map_options options = EBPO_MAP_OPTIONS_INIT;
+    ebpo_map_stats stats = EBPO_MAP_STATS_INIT;
+    ebpo_lattice lattice;
+    options.threads = 1;
+    ebpo_status status = ebpo_lattice_of_box(low, high, count, &lattice, error);
+    if (status == EBPO_OK)
+        status = ebpo_map_lattice(model, &lattice, &options, take_layers, NULL, error);
+    for (int format = 0; format < 2 && status == EBPO_OK; format++)
+        status = ebpo_map_write(model, &lattice, scratch("map"), (ebpo_map_format)format, &options,
+                                &stats, error);
+    every_call_pause();
+    unlink(scratch("map"));
+    every_call_resume();
+    return status;
+}
+
+static ebpo_status map_mesh(ebpo_model *model, ebpo_error *error)
+{
+    double xyz[9] = { 0, 0, 0, 1, 0, 0, 0, 1, 0 }, away[3];
+    uint32_t face[3] = { 0, 1, 2 };
+    ebpo_mesh mesh = { .vertex_count = 3, .face_count = 1 };
+    ebpo_map_options options = EBPO_MAP_OPTIONS_INIT;
+    ebpo_map_stats stats = EBPO_MAP_STATS_INIT;
+    ebpo_map_reach reach = EBPO_MAP_REACH_INIT;
+    ebpo_map_reach_options reaching = EBPO_MAP_REACH_OPTIONS_INIT;
+    options.threads = reaching.threads = 1;
+    ebpo_status status = ebpo_map_points(model, xyz, 3, &options, away, error);
+    if (status == EBPO_OK)
+        status = ebpo_map_describe(away, 3, &stats, error);
+    mesh.xyz64 = xyz;
+    mesh.faces = face;
+    if (status == EBPO_OK)
+        status = ebpo_map_find_reach(model, &mesh, away, &reaching, &reach, error);
+    mesh.xyz64 = NULL; /* what painting adds is the mesh's */
+    mesh.faces = NULL;
+    if (status == EBPO_OK)
+        status = ebpo_map_paint(&mesh, away, EBPO_MAP_THESIS, 1, error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status call_map(every_call_env *e)
+{
+    uint8_t rgb[3];
+    ebpo_model *model;
+    ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
+    opening.threads = 1;
+    ebpo_map_colour(EBPO_MAP_DIVERGING, ebpo_map_percent(0), 2, rgb);
+    if (!ebpo_map_palette_name(EBPO_MAP_DIVERGING))
+        return EBPO_E_ARGUMENT;
+    ebpo_status status = ebpo_model_new(e->file, &opening, &model, e->error);
+    if (status == EBPO_OK)
+        status = map_lattice(model, e->error);
+    if (status == EBPO_OK)
+        status = map_mesh(model, e->error);
+    ebpo_model_free(model);
+    return status;
+}
+
+static ebpo_status touch(ebpo_model *model, ebpo_error *error)
+{
+    static const double away[3] = { 9, 0, 0 }, closer[3] = { 6, 0, 0 };
+    ebpo_touch *touch;
+    ebpo_touch_result answer;
+    ebpo_touch_stats stats = EBPO_TOUCH_STATS_INIT;
+    double way[EBPO_TOUCH_WAY_MOST][3];
+    ebpo_touch_options options = EBPO_TOUCH_OPTIONS_INIT;
+    options.faces = 1 << 12;
+    ebpo_status status = ebpo_touch_new(model, &options, away, &touch, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_touch_sensed sensed;
+    ebpo_touch_turned turned;
+    double poses[EBPO_TOUCH_WAY_MOST][7];
+    static const double turn[4] = { 0, 0, 0, 1 };
+    ebpo_touch_move(touch, away, &answer);
+    (void)ebpo_touch_way(touch, way);
+    ebpo_touch_sense(touch, away, &sensed); /* not of its kind: answers so */
+    ebpo_touch_turn(touch, away, turn, &turned);
+    (void)ebpo_touch_poses(touch, poses);
+    status = ebpo_touch_place(touch, closer, error);
+    if (status == EBPO_OK)
+        status = ebpo_touch_check(touch, error);
+    if (status == EBPO_OK)
+        status = ebpo_touch_get_stats(touch, &stats);
+    ebpo_touch_free(touch);
+    return status;
+}
+
+static bool take_painted(void *user, const ebpo_paint_face *face)
+{
+    (void)user;
+    return face->file_face != 1;
+}
+
+/* A paint's strokes on the model, asked about. */
+static ebpo_status ask_paint(ebpo_paint *paint, ebpo_context *context, ebpo_error *error)
+{
+    const ebpo_paint_hand hand[2] = { { { 3, 0, 1 }, 1, 0 }, { { 3, 0.5, 1 }, 0.5, 10 } };
+    ebpo_paint_pen pen = EBPO_PAINT_PEN_INIT;
+    ebpo_paint_laid laid = EBPO_PAINT_LAID_INIT;
+    ebpo_paint_areas areas = EBPO_PAINT_AREAS_INIT;
+    ebpo_paint_options options = EBPO_PAINT_OPTIONS_INIT;
+    ebpo_paint_note note = EBPO_PAINT_NOTE_INIT;
+    uint64_t elsewhere;
+    pen.radius = 0.3;
+    pen.spread = 0.4;
+    pen.density = 3;
+    options.fineness = 8;
+    options.threads = 1;
+    ebpo_status status = ebpo_paint_lay(paint, context, hand, 2, &pen, &laid, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_cover(paint, context, 0, take_painted, NULL, &elsewhere, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_measure(paint, context, &options, &areas, error);
+    if (status == EBPO_OK)
+        ebpo_paint_areas_free(&areas);
+    if (status == EBPO_OK)
+        status = ebpo_paint_place(paint, context, hand[0].place, &note.at, error);
+    note.body = "here";
+    return status == EBPO_OK ? ebpo_paint_add_note(paint, &note, error) : status;
+}
+
+static ebpo_status bake_paint(const ebpo_paint *paint, const ebpo_file *file, ebpo_context *context,
+                              ebpo_error *error)
+{
+    ebpo_paint_baked baked = EBPO_PAINT_BAKED_INIT;
+    ebpo_mesh mesh;
+    ebpo_status status = ebpo_file_read_source_mesh(file, NULL, &mesh, NULL, error);
+    if (status != EBPO_OK)
+        return status;
+    uint8_t *rgba = calloc(mesh.vertex_count, 4);
+    if (rgba)
+        status = ebpo_paint_bake(paint, context, &mesh, NULL, rgba, &baked, error);
+    if (rgba && status == EBPO_OK)
+        status = ebpo_paint_dye_mesh(&mesh, rgba, error);
+    if (!rgba)
+        *error = (ebpo_error){ .status = status = EBPO_E_MEMORY, .message = "colours" };
+    free(rgba);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+/* Written, read, and taken apart. */
+static ebpo_status keep_paint(ebpo_paint *paint, ebpo_error *error)
+{
+    ebpo_paint *read = NULL;
+    ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
+    ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
+    ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
+    ebpo_paint_note note = EBPO_PAINT_NOTE_INIT;
+    ebpo_status status = ebpo_paint_save(paint, scratch("every.paint.h5"), error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_open_to_change(scratch("every.paint.h5"), NULL, 0, NULL, &read, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_save(read, scratch("every.paint.h5"), error);
+    ebpo_paint_free(read);
+    read = NULL;
+    if (status == EBPO_OK)
+        status = ebpo_paint_open(scratch("every.paint.h5"), &read, error);
+    if (status != EBPO_OK)
+        return status;
+    (void)ebpo_paint_get_info(read, &info);
+    (void)ebpo_paint_get_layer(read, 0, &layer);
+    (void)ebpo_paint_get_note(read, 0, &note);
+    (void)ebpo_paint_get_stroke(read, 0, &stroke);
+    status = ebpo_paint_set_layer(read, 0, &layer, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_add_stroke(paint, &stroke, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_remove_stroke(read, 0, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_remove_note(read, 0, error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_remove_layer(read, 0, error);
+    ebpo_paint_free(read);
+    return status;
+}
+
+static ebpo_status call_paint(every_call_env *e)
+{
+    static const uint8_t none[8] = { 0 };
+    ebpo_model *model = NULL;
+    ebpo_context *context = NULL;
+    ebpo_paint *paint = NULL;
+    ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
+    opening.threads = 1;
+    ebpo_status status = ebpo_model_new(e->file, &opening, &model, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_context_new(model, &context, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_new(e->file, &paint, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_check_model(paint, e->file, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_add_layer(paint, NULL, NULL, e->error);
+    if (status == EBPO_OK)
+        status = ask_paint(paint, context, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_paint_check_points(paint, context, NULL, e->error);
+    if (status == EBPO_OK)
+        status = bake_paint(paint, e->file, context, e->error);
+    if (status == EBPO_OK)
+        status = keep_paint(paint, e->error);
+    ebpo_paint_free(paint);
+    if (status == EBPO_OK &&
+        ebpo_paint_open_memory(none, sizeof none, NULL, &paint, NULL) == EBPO_OK)
+        abort();
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return status;
+}
+
+static ebpo_status call_touch(every_call_env *e)
+{
+    ebpo_model *model;
+    ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
+    opening.threads = 1;
+    ebpo_status status = ebpo_model_new(e->file, &opening, &model, e->error);
+    if (status == EBPO_OK)
+        status = touch(model, e->error);
+    ebpo_model_free(model);
+    return status;
+}
+
+static bool count_crossings(void *user, const ebpo_crossing *crossings, uint64_t count)
+{
+    (void)crossings;
+    *(uint64_t *)user += count;
+    return true;
+}
+
+/* It takes the mesh, too. */
+static ebpo_status call_crossings(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    ebpo_crossings_options options = EBPO_CROSSINGS_OPTIONS_INIT;
+    ebpo_crossings_summary sum = EBPO_CROSSINGS_SUMMARY_INIT;
+    uint64_t count = 0;
+    options.threads = 1;
+    options.ply = scratch("red.ply");
+    ebpo_status status = every_call_read(e, EVERY_CALL_CROSSING, &mesh);
+    if (status == EBPO_OK)
+        status = every_call_prepare(&mesh, &prepared, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_crossings(&mesh, &prepared.report, &options, count_crossings, &count,
+                                     &sum, e->error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static bool count_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count)
+{
+    *(uint64_t *)user += count + (pairs[0].a > pairs[0].b);
+    return true;
+}
+
+static ebpo_status look_at_scene(const ebpo_scene *scene)
+{
+    ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
+    ebpo_scene_model_facts model = EBPO_SCENE_MODEL_FACTS_INIT;
+    ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
+    ebpo_scene_camera camera = EBPO_SCENE_CAMERA_INIT;
+    double clearance;
+    bool fine = ebpo_scene_get_counts(scene, &counts) == EBPO_OK && counts.instances == 2 &&
+                ebpo_scene_get_model(scene, 0, &model) == EBPO_OK && model.loaded &&
+                ebpo_scene_get_instance(scene, 1, &instance) == EBPO_OK &&
+                ebpo_scene_get_camera(scene, 0, &camera) == EBPO_OK &&
+                !ebpo_scene_get_layer(scene, 0) && !ebpo_scene_get_group(scene, 0) &&
+                ebpo_scene_group_of(scene, 0, 0) == EBPO_SCENE_NONE &&
+                ebpo_scene_pair_rule(scene, 0, 1, &clearance) && ebpo_scene_file(scene, 0) &&
+                !ebpo_scene_file(scene, 1);
+    return fine ? EBPO_OK : EBPO_E_ARGUMENT;
+}
+
+static bool count_meetings(void *user, const ebpo_scene_meeting *meetings, uint64_t count)
+{
+    *(uint64_t *)user += count + (meetings[0].kind == EBPO_MEETING_NONE);
+    return true;
+}
+
+static bool count_ways(void *user, const ebpo_scene_way *ways, uint64_t count)
+{
+    *(uint64_t *)user += count + (ways[0].reached != 1);
+    return true;
+}
+
+static bool count_needs(void *user, const ebpo_scene_need *needs, uint64_t count)
+{
+    *(uint64_t *)user += count + (needs[0].bytes == 0);
+    return true;
+}
+
+static bool count_packed(void *user, const ebpo_scene_packed *models, uint64_t count)
+{
+    *(uint64_t *)user += count + !models[0].answers;
+    return true;
+}
+
+static ebpo_status pack_scene(ebpo_scene *scene, ebpo_error *error)
+{
+    uint64_t needs = 0, packed = 0;
+    ebpo_plan_options plan = EBPO_PLAN_OPTIONS_INIT;
+    ebpo_pack_options pack = EBPO_PACK_OPTIONS_INIT;
+    pack.threads = 1;
+    ebpo_status status = ebpo_scene_plan(scene, 0, 1, &plan, count_needs, &needs, error);
+    if (status == EBPO_OK)
+        status =
+            ebpo_scene_pack(scene, scratch("packed"), 0, 1, &pack, count_packed, &packed, error);
+    every_call_pause();
+    if (status == EBPO_OK)
+        scratch_remove(scratch("packed"));
+    every_call_resume();
+    return status == EBPO_OK && (needs != 1 || packed != 1) ? EBPO_E_ARGUMENT : status;
+}
+
+static bool count_leasts(void *user, const ebpo_scene_least *list, uint64_t count)
+{
+    *(uint64_t *)user += count + (list[0].hi != 0);
+    return true;
+}
+
+static ebpo_status record_scene(const ebpo_scene *scene, const ebpo_scene_meeting *meeting,
+                                ebpo_error *error)
+{
+    ebpo_scene_record *record;
+    ebpo_scene_frame frame = { .time = 1, .asked = 1 };
+    ebpo_status status = ebpo_scene_record_new(scene, scratch("report.h5"), &record, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_record_add(record, &frame, meeting, 1, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_record_finish(record, error);
+    ebpo_scene_record_free(record);
+    unlink(scratch("report.h5"));
+    return status;
+}
+
+static bool count_face_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    *(uint64_t *)user += count + (pairs[0].kind == EBPO_PAIR_APART);
+    return true;
+}
+
+/* Of the two that meet. */
+static ebpo_status look_at_meeting(ebpo_scene *scene, ebpo_error *error)
+{
+    uint64_t pairs = 0;
+    ebpo_scene_stats stats = EBPO_SCENE_STATS_INIT;
+    ebpo_scene_meeting meeting = { .b = 1, .face_a = EBPO_NO_FACE };
+    ebpo_status status = ebpo_scene_collide(scene, 0, 1, 1, 1, count_face_pairs, &pairs, error);
+    if (status == EBPO_OK)
+        status = record_scene(scene, &meeting, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_get_stats(scene, &stats);
+    return status == EBPO_OK && (pairs == 0 || stats.files != 1 || stats.models != 1)
+               ? EBPO_E_ARGUMENT
+               : status;
+}
+
+static ebpo_status meet_in_scene(ebpo_scene *scene, ebpo_error *error)
+{
+    uint64_t meetings = 0, asked = 0;
+    ebpo_scene_ask_options how = EBPO_SCENE_ASK_OPTIONS_INIT;
+    how.threads = 1;
+    how.count = how.places = how.relate = true;
+    how.depth = 0.1;
+    ebpo_status status = ebpo_scene_meet(scene, 1, &how, count_meetings, &meetings, &asked, error);
+    ebpo_scene_way_options along = EBPO_SCENE_WAY_OPTIONS_INIT;
+    uint64_t ways = 0;
+    if (status == EBPO_OK)
+        status = look_at_meeting(scene, error);
+    along.threads = 1;
+    along.tolerance = 0.01;
+    if (status == EBPO_OK)
+        status = ebpo_scene_approach(scene, 0, 1, &along, count_ways, &ways, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_least_distances(scene, 0, 1, &along, count_leasts, &ways, error);
+    return status == EBPO_OK && (meetings != 1 || asked != 1 || ways != 2) ? EBPO_E_ARGUMENT
+                                                                           : status;
+}
+
+static ebpo_status ask_scene(ebpo_scene *scene, ebpo_error *error)
+{
+    double min[3], max[3], length;
+    uint64_t pairs = 0;
+    ebpo_pose pose;
+    ebpo_model *model;
+    ebpo_status status = ebpo_scene_load(scene, NULL, error);
+    if (status == EBPO_OK)
+        status = look_at_scene(scene);
+    if (status == EBPO_OK)
+        status = ebpo_scene_pose(scene, 1, 0.5, &pose, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_motion(scene, 1, 0, 1, &length, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_instance_box(scene, 1, 0, 1, min, max, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_box(scene, 0, 1, min, max, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_pairs(scene, 0, 1, count_pairs, &pairs, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_model(scene, 0, &model, error);
+    if (status == EBPO_OK)
+        status = meet_in_scene(scene, error);
+    return status == EBPO_OK && pairs != 1 ? EBPO_E_ARGUMENT : status;
+}
+
+static const char scene_text[] =
+    "{\"ebpo_scene\": \"1.0\", \"models\": {\"m\": {\"file\": \"" EVERY_CALL_MODEL "\"}},"
+    "\"routes\": {\"r\": {\"poses\": [{}, {\"quaternion\": [1, 0, 0, 1]}], \"step\": 1}},"
+    "\"cameras\": [{\"name\": \"c\", \"eye\": [9, 9, 9], \"target\": [0, 0, 0]}],"
+    "\"instances\": [{\"name\": \"a\", \"model\": \"m\", \"route\": \"r\"}]}";
+
+static ebpo_status call_scene(every_call_env *e)
+{
+    ebpo_scene *scene;
+    ebpo_scene_instance second = EBPO_SCENE_INSTANCE_INIT;
+    second.name = "b";
+    ebpo_status status = ebpo_scene_parse(scene_text, sizeof scene_text - 1, "scene", scratch(NULL),
+                                          NULL, &scene, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_add_instance(scene, &second, NULL, e->error);
+    if (status == EBPO_OK)
+        status = ask_scene(scene, e->error);
+    ebpo_scene_free(scene);
+    return status;
+}
+
+static ebpo_status call_scene_file(every_call_env *e)
+{
+    ebpo_scene *scene = NULL;
+    ebpo_status status =
+        ebpo_write_file(scratch("s.json"), scene_text, sizeof scene_text - 1, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_open(scratch("s.json"), NULL, &scene, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_load(scene, NULL, e->error);
+    if (status == EBPO_OK)
+        status = pack_scene(scene, e->error);
+    ebpo_scene_free(scene);
+    every_call_pause();
+    unlink(scratch("s.json"));
+    every_call_resume();
+    return status;
+}
+
+static ebpo_status call_scene_new(every_call_env *e)
+{
+    ebpo_scene *scene;
+    ebpo_status status = ebpo_scene_new(&scene, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_add_model(scene, "m", "nowhere", NULL, NULL, e->error);
+    ebpo_scene_free(scene);
+    return status;
+}
+
+const every_call every_call_extras[] = {
+    { "crossings", call_crossings }, { "map", call_map },     { "touch", call_touch },
+    { "paint", call_paint },         { "scene", call_scene }, { "scene_file", call_scene_file },
+    { "scene_new", call_scene_new }, { NULL, NULL },
+};
