@@ -1,5 +1,7 @@
 #include "core/strict_fp.h"
 
+#include <ebpo/collide.h>
+
 #include "extras/collide/posed_model.h"
 
 #include <math.h>

@@ -1,12 +1,216 @@
-#include "cli/commands/clash_page.h"
-
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli/commands/clash_groups.h"
-#include "cli/commands/html_text.h"
+#include "cli/commands/clash_list.h"
+#include "cli/commands/clash_page.h"
+
+/* Names as text of a page. */
+
+/* Rows of a page of clashes by the groups of their parts: chosen without scripts. */
+
+/* Between tags. */
+static void html_put_text(FILE *f, const char *text)
+{
+    for (; *text; text++) {
+        if (*text == '<')
+            fputs("&lt;", f);
+        else if (*text == '&')
+            fputs("&amp;", f);
+        else
+            fputc(*text, f);
+    }
+}
+
+const char *clash_kind_word(int32_t kind)
+{
+    static const char *const words[] = { "none",     "near",       "touching", "coplanar",
+                                         "crossing", "protruding", "enclosed", "duplicate" };
+    return words[kind];
+}
+
+/* Of the worst the most. */
+static int rank_of(const ebpo_scene_meeting *m)
+{
+    static const int ranks[] = { 0, 1, 2, 3, 4, 6, 5, 7 }; /* by ebpo_meeting_kind */
+    return ranks[m->kind];
+}
+
+double clash_depth(const ebpo_scene_meeting *m)
+{
+    double a = m->depth[0].hi < INFINITY ? m->depth[0].lo : 0;
+    double b = m->depth[1].hi < INFINITY ? m->depth[1].lo : 0;
+    return fmax(a, b);
+}
+
+/* Below 0: the first is worse. */
+static int compare(const ebpo_scene_meeting *m, const ebpo_scene_meeting *n)
+{
+    if (rank_of(m) != rank_of(n))
+        return rank_of(n) - rank_of(m);
+    if (clash_depth(m) != clash_depth(n))
+        return clash_depth(m) > clash_depth(n) ? -1 : 1;
+    if (m->distance != n->distance)
+        return m->distance < n->distance ? -1 : 1;
+    return 0;
+}
+
+static int compare_pairs(const void *p, const void *q)
+{
+    const ebpo_scene_meeting *m = &((const clash *)p)->worst, *n = &((const clash *)q)->worst;
+    return m->a != n->a ? (m->a < n->a ? -1 : 1) : m->b != n->b ? (m->b < n->b ? -1 : 1) : 0;
+}
+
+static int compare_clashes(const void *p, const void *q)
+{
+    int order = compare(&((const clash *)p)->worst, &((const clash *)q)->worst);
+    return order ? order : compare_pairs(p, q);
+}
+
+static bool make_room(clash_list *list, uint64_t more)
+{
+    if (list->count + more <= list->capacity)
+        return true;
+    uint64_t capacity = 2 * (list->count + more);
+    clash *room = realloc(list->clash, capacity * sizeof *room);
+    if (!room)
+        return false;
+    list->clash = room;
+    list->capacity = capacity;
+    return true;
+}
+
+static void note_again(clash *c, double time, const ebpo_scene_meeting *m)
+{
+    c->frames++;
+    c->last = time;
+    if (compare(m, &c->worst) < 0) {
+        c->worst = *m;
+        c->time = time;
+    }
+}
+
+/* Both are in the order of pairs. */
+ebpo_status clash_add(clash_list *list, double time, const ebpo_scene_meeting *meetings,
+                      uint64_t count, ebpo_error *error)
+{
+    uint64_t known = list->count, at = 0;
+    if (!make_room(list, count)) {
+        snprintf(error->message, sizeof error->message, "no memory for %llu clashes",
+                 (unsigned long long)(known + count));
+        return error->status = EBPO_E_MEMORY;
+    }
+    for (uint64_t i = 0; i < count; i++) {
+        clash one = { meetings[i], time, time, time, 1, NULL };
+        while (at < known && compare_pairs(&list->clash[at], &one) < 0)
+            at++;
+        if (at < known && compare_pairs(&list->clash[at], &one) == 0)
+            note_again(&list->clash[at], time, &meetings[i]);
+        else
+            list->clash[list->count++] = one;
+    }
+    if (list->count)
+        qsort(list->clash, list->count, sizeof *list->clash, compare_pairs);
+    return EBPO_OK;
+}
+
+void clash_sort(clash_list *list)
+{
+    if (list->count)
+        qsort(list->clash, list->count, sizeof *list->clash, compare_clashes);
+}
+
+void clash_free(clash_list *list)
+{
+    for (uint64_t i = 0; i < list->count; i++)
+        free(list->clash[i].picture);
+    free(list->clash);
+    *list = (clash_list){ 0 };
+}
+
+/* Of both parts, the nth; EBPO_SCENE_NONE behind the last. */
+static uint64_t group_of(const clash *c, const ebpo_scene *scene, uint64_t nth)
+{
+    uint64_t of_a = 0;
+    while (of_a <= nth && ebpo_scene_group_of(scene, c->worst.a, of_a) != EBPO_SCENE_NONE)
+        of_a++;
+    return nth < of_a ? ebpo_scene_group_of(scene, c->worst.a, nth)
+                      : ebpo_scene_group_of(scene, c->worst.b, nth - of_a);
+}
+
+static bool is_first(const clash *c, const ebpo_scene *scene, uint64_t nth)
+{
+    uint64_t group = group_of(c, scene, nth);
+    for (uint64_t i = 0; i < nth; i++)
+        if (group_of(c, scene, i) == group)
+            return false;
+    return true;
+}
+
+static void count_clashes(const clash_list *list, const ebpo_scene *scene, uint64_t *sums)
+{
+    for (uint64_t i = 0; i < list->count; i++)
+        for (uint64_t n = 0; group_of(&list->clash[i], scene, n) != EBPO_SCENE_NONE; n++)
+            sums[group_of(&list->clash[i], scene, n)] += is_first(&list->clash[i], scene, n);
+}
+
+static void put_button(FILE *f, uint64_t number, uint64_t clashes, const char *name)
+{
+    fprintf(f, "<input type=radio name=g id=g%llu><label for=g%llu>", (unsigned long long)number,
+            (unsigned long long)number);
+    html_put_text(f, name);
+    fprintf(f, " (%llu)</label>\n", (unsigned long long)clashes);
+}
+
+static void put_choice(FILE *f, const uint64_t *sums, uint64_t groups, const clash_list *list,
+                       const ebpo_scene *scene)
+{
+    fputs("<style>", f);
+    for (uint64_t i = 0; i < groups; i++)
+        if (sums[i])
+            fprintf(f, "#g%llu:checked~.c tr:not(.g%llu):not(.h){display:none}",
+                    (unsigned long long)i, (unsigned long long)i);
+    fprintf(f,
+            "</style>\n<p>Of the group:</p>\n<input type=radio name=g id=all checked>"
+            "<label for=all>all (%llu)</label>\n",
+            (unsigned long long)list->count);
+    for (uint64_t i = 0; i < groups; i++)
+        if (sums[i])
+            put_button(f, i, sums[i], ebpo_scene_get_group(scene, i));
+}
+
+/* Buttons, one for each group that has clashes, before a table of class `c` that follows at once:
+ * nothing where there is none. False: no memory. */
+static bool clash_put_choice(FILE *f, const clash_list *list, const ebpo_scene *scene)
+{
+    ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
+    (void)ebpo_scene_get_counts(scene, &c);
+    uint64_t *sums = calloc(c.groups ? c.groups : 1, sizeof *sums), any = 0;
+    if (!sums)
+        return false;
+    count_clashes(list, scene, sums);
+    for (uint64_t i = 0; i < c.groups; i++)
+        any += sums[i] > 0;
+    if (any)
+        put_choice(f, sums, c.groups, list, scene);
+    free(sums);
+    return true;
+}
+
+/* The class that a row has for them: what stands in <tr> behind its name. */
+static void clash_put_classes(FILE *f, const clash *c, const ebpo_scene *scene)
+{
+    bool any = false;
+    for (uint64_t n = 0; group_of(c, scene, n) != EBPO_SCENE_NONE; n++) {
+        if (!is_first(c, scene, n))
+            continue;
+        fprintf(f, "%sg%llu", any ? " " : " class=\"", (unsigned long long)group_of(c, scene, n));
+        any = true;
+    }
+    if (any)
+        fputc('"', f);
+}
 
 static const char style[] =
     "body{font:15px/1.45 system-ui,sans-serif;color:#222;max-width:78em;margin:2em auto;"

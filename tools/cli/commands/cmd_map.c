@@ -1,16 +1,477 @@
-/* ebpo map: distances on a plane, on a grid, or of another model's vertices. */
+/* Where the points of a plane or grid are. */
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/colours.h>
 
 #include "cli/command.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/map_job.h"
 #include "cli/json.h"
 #include "cli/model_memory.h"
 #include "cli/progress.h"
+#include "cli/render/picture.h"
+#include "cli/render/raster.h"
 #include "cli/words.h"
-#include "cli/commands/commands.h"
-#include "cli/commands/map_job.h"
+#include "ebpo_config.h"
+
+enum { LONGER_EDGE = 1000, GRID_MOST = 1 << 20 };
+
+/* `count` finite numbers with commas between them, and nothing else. */
+static bool read_reals(const char *text, int count, double *out)
+{
+    for (int i = 0; i < count; i++) {
+        char *end;
+        out[i] = strtod(text, &end);
+        if (end == text || !isfinite(out[i]) || *end != (i + 1 < count ? ',' : 0))
+            return false;
+        text = end + 1;
+    }
+    return true;
+}
+
+static int wrong(const char *option, const char *value, const char *expected)
+{
+    return command_usage("map", "%s '%s': expected %s", option, value, expected);
+}
+
+bool map_read_size(const char *text, int *width, int *height)
+{
+    char rest;
+    if (sscanf(text, "%5dx%5d%c", width, height, &rest) == 2 && *width >= 2 && *width <= 8192 &&
+        *height >= 2 && *height <= 8192)
+        return true;
+    wrong("--size", text, "a width, an x and a height, each from 2 to 8192");
+    return false;
+}
+
+static int find_box(const map_job *j, double low[3], double high[3])
+{
+    const ebpo_info *info = ebpo_file_info(j->file);
+    double all[6], longest = 0;
+    if (j->v->box) {
+        if (!read_reals(j->v->box, 6, all) || !(all[0] < all[3]) || !(all[1] < all[4]) ||
+            !(all[2] < all[5]))
+            return wrong("--box", j->v->box, "six numbers, the low corner below the high one");
+        memcpy(low, all, 3 * sizeof *low);
+        memcpy(high, all + 3, 3 * sizeof *high);
+    }
+    for (int c = 0; c < 3; c++)
+        longest = fmax(longest, info->box_size[c]);
+    for (int c = 0; c < 3; c++) {
+        if (!j->v->box) {
+            low[c] = info->box_origin[c] - j->v->margin * longest;
+            high[c] = info->box_origin[c] + info->box_size[c] + j->v->margin * longest;
+        }
+        if (!isfinite(high[c] - low[c])) /* what is computed of it would be no number */
+            return command_usage("map", "a box whose edges are longer than a double tells");
+    }
+    return EXIT_FINE;
+}
+
+/* --- planes --- */
+
+static double length_of(const double v[3]) { return hypot(hypot(v[0], v[1]), v[2]); }
+
+typedef struct rectangle {
+    double corner[3], edge[2][3];
+} rectangle;
+
+/* "z=0.5" or "z=50%": the coordinate, by the model's box. */
+static bool read_place(const map_job *j, const char *text, int *axis, double *at)
+{
+    const ebpo_info *info = ebpo_file_info(j->file);
+    char *end;
+    if (text[0] < 'x' || text[0] > 'z' || text[1] != '=')
+        return false;
+    *axis = text[0] - 'x';
+    *at = strtod(text + 2, &end);
+    if (end == text + 2 || !isfinite(*at))
+        return false;
+    if (strcmp(end, "%") == 0)
+        *at = info->box_origin[*axis] + *at / 100 * info->box_size[*axis];
+    else if (*end)
+        return false;
+    return isfinite(*at);
+}
+
+/* Right and up as one looks at it: x and y, x and z, or y and z. */
+static int find_rectangle(const map_job *j, rectangle *r)
+{
+    double all[9], low[3], high[3], at;
+    int axis;
+    *r = (rectangle){ 0 };
+    if (read_place(j, j->v->plane, &axis, &at)) {
+        int code = find_box(j, low, high), right = axis == 0, up = axis == 2 ? 1 : 2;
+        if (code != EXIT_FINE)
+            return code;
+        memcpy(r->corner, low, sizeof r->corner);
+        r->corner[axis] = at;
+        r->edge[0][right] = high[right] - low[right];
+        r->edge[1][up] = high[up] - low[up];
+        return EXIT_FINE;
+    }
+    if (!read_reals(j->v->plane, 9, all))
+        return wrong("--plane", j->v->plane,
+                     "x=V, y=V or z=V with a number or a share such as 50%, or nine numbers: a "
+                     "corner and two edges");
+    if (j->v->box)
+        return command_usage("map", "--box belongs to --grid and to planes across an axis");
+    if (j->v->margin != MAP_MARGIN)
+        return command_usage("map", "--margin belongs to --grid and to planes across an axis");
+    memcpy(r, all, sizeof *r);
+    double a = length_of(r->edge[0]), b = length_of(r->edge[1]), dot = 0;
+    for (int c = 0; c < 3; c++)
+        dot += r->edge[0][c] / a * (r->edge[1][c] / b);
+    if (!(a > 0) || !(b > 0) || !isfinite(a) || !isfinite(b) || fabs(dot) > 1e-9)
+        return wrong("--plane", j->v->plane, "two edges with a length, at right angles");
+    return EXIT_FINE;
+}
+
+static void find_points(const map_job *j, double a, double b, uint64_t count[3])
+{
+    double longer = fmax(a, b);
+    double shares[2] = { a / longer, b / longer };
+    count[2] = 1;
+    for (int i = 0; i < 2; i++) {
+        double n = round(LONGER_EDGE * shares[i]);
+        count[i] = n < 2 ? 2 : (uint64_t)n;
+    }
+    if (j->width) {
+        count[0] = (uint64_t)j->width;
+        count[1] = (uint64_t)j->height;
+    }
+}
+
+static int lattice_of_plane(map_job *j)
+{
+    rectangle r;
+    int code = find_rectangle(j, &r);
+    if (code != EXIT_FINE)
+        return code;
+    ebpo_lattice *l = &j->lattice;
+    double a = length_of(r.edge[0]), b = length_of(r.edge[1]), step = 0;
+    find_points(j, a, b, l->count);
+    memcpy(l->origin, r.corner, sizeof l->origin);
+    for (int i = 0; i < 2; i++)
+        for (int c = 0; c < 3; c++)
+            l->step[i][c] = r.edge[i][c] / (double)(l->count[i] - 1);
+    step = length_of(l->step[0]);
+    for (int c = 0; c < 3; c++) { /* across, for formats that want one */
+        int d = (c + 1) % 3, e = (c + 2) % 3;
+        l->step[2][c] =
+            step * (r.edge[0][d] / a * (r.edge[1][e] / b) - r.edge[0][e] / a * (r.edge[1][d] / b));
+    }
+    return EXIT_FINE;
+}
+
+static int lattice_of_grid(map_job *j)
+{
+    double numbers[3], low[3], high[3];
+    uint64_t count[3];
+    ebpo_error error = EBPO_ERROR_INIT;
+    bool good = read_reals(j->v->grid, 3, numbers);
+    for (int c = 0; c < 3 && good; c++) {
+        good = numbers[c] >= 1 && numbers[c] <= GRID_MOST && numbers[c] == floor(numbers[c]);
+        count[c] = good ? (uint64_t)numbers[c] : 0;
+    }
+    if (!good)
+        return wrong("--grid", j->v->grid, "three whole numbers, each from 1 to 1048576");
+    int code = find_box(j, low, high);
+    if (code != EXIT_FINE)
+        return code;
+    if (ebpo_lattice_of_box(low, high, count, &j->lattice, &error) != EBPO_OK)
+        return command_failed("map", &error);
+    return EXIT_FINE;
+}
+
+int map_find_lattice(map_job *j)
+{
+    j->plane = j->v->plane != NULL;
+    return j->plane ? lattice_of_plane(j) : lattice_of_grid(j);
+}
+
+/* Pictures of distances: a plane's points as pixels, a painted mesh; a legend beside them. */
+
+#if EBPO_HAVE_PNG
+
+enum { LEGEND = 120, BAR = 24, EDGE = 16, LINE = 18 };
+static const uint8_t white[3] = { 255, 255, 255 }, ink[3] = { 40, 44, 52 };
+
+static ebpo_status no_picture_memory(ebpo_error *error)
+{
+    snprintf(error->message, sizeof error->message,
+             "no memory for the picture; choose a smaller "
+             "--size");
+    return error->status = EBPO_E_MEMORY;
+}
+
+static void put(picture *p, int x, int y, const uint8_t rgb[3])
+{
+    uint8_t *to = p->rgb + 3 * ((size_t)y * (size_t)p->width + (size_t)x);
+    for (int c = 0; c < 3; c++)
+        to[c] = rgb[c];
+}
+
+/* A bar of all colours, with numbers where it ends and in the middle. */
+static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_signs,
+                               ebpo_error *error)
+{
+    int top = EDGE, bottom = p->height - EDGE;
+    ebpo_status status = EBPO_OK;
+    for (int y = top; y < bottom; y++) {
+        double share = (double)(bottom - 1 - y) / fmax(1, bottom - 1 - top);
+        double distance = (has_signs ? 2 * share - 1 : share) * j->range;
+        uint8_t rgb[3];
+        ebpo_map_colour((ebpo_map_palette)j->v->palette, distance, j->range, rgb);
+        for (int i = 0; i < BAR; i++)
+            put(p, x + EDGE + i, y, rgb);
+    }
+    for (int i = 0; i < 3 && bottom - top >= 3 * LINE && status == EBPO_OK; i++) {
+        char text[32];
+        double share = i / 2.0;
+        snprintf(text, sizeof text, "%.4g", (has_signs ? 2 * share - 1 : share) * j->range);
+        int y = bottom - LINE - (int)(share * (bottom - top - LINE));
+        status = picture_caption(p, x + EDGE + BAR, y, LEGEND - EDGE - BAR, LINE, ink, text, error);
+    }
+    return status;
+}
+
+/* Where the sign changes between neighbours, or it is 0: the surface. */
+static bool on_surface(const double *values, int width, int height, int x, int y)
+{
+    double own = values[(size_t)y * (size_t)width + (size_t)x];
+    if (own == 0)
+        return true;
+    if (x + 1 < width && own * values[(size_t)y * (size_t)width + (size_t)x + 1] < 0)
+        return true;
+    return y + 1 < height && own * values[(size_t)(y + 1) * (size_t)width + (size_t)x] < 0;
+}
+
+static bool has_signs(const map_job *j)
+{
+    return j->v->palette == EBPO_MAP_DIVERGING && j->stats.min < 0;
+}
+
+ebpo_status map_draw_plane(const map_job *j, const double *values, const char *path,
+                           ebpo_error *error)
+{
+    int width = (int)j->lattice.count[0], height = (int)j->lattice.count[1];
+    picture p = { 0 };
+    if (!picture_make(&p, width + LEGEND, height, white))
+        return no_picture_memory(error);
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++) {
+            uint8_t rgb[3];
+            ebpo_map_colour((ebpo_map_palette)j->v->palette,
+                            values[(size_t)y * (size_t)width + (size_t)x], j->range, rgb);
+            put(&p, x, height - 1 - y, on_surface(values, width, height, x, y) ? ink : rgb);
+        }
+    ebpo_status status = draw_legend(j, &p, width, has_signs(j), error);
+    if (status == EBPO_OK)
+        status = picture_write_png(&p, path, error);
+    picture_free(&p);
+    return status;
+}
+
+ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *path,
+                          ebpo_error *error)
+{
+    picture p = { 0 };
+    camera view;
+    ebpo_colours colours = { 0 };
+    unsigned threads = j->options.threads ? j->options.threads : command_cores();
+    if (!picture_make(&p, j->width + LEGEND, j->height, white))
+        return no_picture_memory(error);
+    ebpo_status status = ebpo_mesh_colours(mesh, &colours, error);
+    raster_style style = { .colour = { 0.6, 0.6, 0.6 }, .vertex_colours = colours.vertex };
+    if (status == EBPO_OK && mesh->face_count) {
+        camera_fit(&view, mesh, 30, 20, 1, j->width, j->height);
+        status = raster_draw(&p, 0, 0, j->width, j->height, &view, mesh, &style,
+                             threads < 64 ? threads : 64, error);
+    }
+    if (status == EBPO_OK)
+        status = draw_legend(j, &p, j->width, has_signs(j), error);
+    if (status == EBPO_OK)
+        status = picture_write_png(&p, path, error);
+    ebpo_colours_free(&colours);
+    picture_free(&p);
+    return status;
+}
+
+#else
+
+static ebpo_status without(ebpo_error *error)
+{
+    snprintf(error->message, sizeof error->message,
+             "this build draws no pictures: it has no libpng; install libpng and rebuild ebpo");
+    return error->status = EBPO_E_UNSUPPORTED;
+}
+
+ebpo_status map_draw_plane(const map_job *j, const double *values, const char *path,
+                           ebpo_error *error)
+{
+    (void)j;
+    (void)values;
+    (void)path;
+    return without(error);
+}
+
+ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *path,
+                          ebpo_error *error)
+{
+    (void)j;
+    (void)mesh;
+    (void)path;
+    return without(error);
+}
+
+#endif
+
+/* Asking for the distances, and writing them. */
+
+static ebpo_status no_memory(ebpo_error *error)
+{
+    snprintf(error->message, sizeof error->message, "no memory for the map; make it coarser");
+    return error->status = EBPO_E_MEMORY;
+}
+
+/* --- planes and grids --- */
+
+static ebpo_status keep_layer(void *user, const double *values, uint64_t first, uint64_t layers,
+                              ebpo_error *error)
+{
+    map_job *const *with = ((void **)user)[0];
+    (void)first;
+    (void)layers;
+    (void)error;
+    const ebpo_lattice *l = &(*with)->lattice;
+    memcpy(((void **)user)[1], values, l->count[0] * l->count[1] * sizeof *values);
+    return EBPO_OK;
+}
+
+/* The values of a plane, which its picture needs anyway. */
+static ebpo_status map_plane(map_job *j, ebpo_error *error)
+{
+    uint64_t count = j->lattice.count[0] * j->lattice.count[1];
+    double *values = malloc(count * sizeof *values);
+    if (!values)
+        return no_memory(error);
+    void *user[2] = { &j, values };
+    ebpo_status status =
+        ebpo_map_lattice(j->model, &j->lattice, &j->options, keep_layer, user, error);
+    if (status == EBPO_OK)
+        status = ebpo_map_describe(values, count, &j->stats, error);
+    if (j->range == 0 && j->stats.farthest > 0)
+        j->range = j->stats.farthest;
+    if (status == EBPO_OK && j->v->out && words_end_with(j->v->out, ".png"))
+        status = map_draw_plane(j, values, j->v->out, error);
+    if (status == EBPO_OK && j->v->picture)
+        status = map_draw_plane(j, values, j->v->picture, error);
+    free(values);
+    return status;
+}
+
+ebpo_status map_plane_or_grid(map_job *j, ebpo_error *error)
+{
+    const char *out = j->v->out;
+    ebpo_status status = EBPO_OK;
+    if (j->plane)
+        status = map_plane(j, error);
+    if (status != EBPO_OK || (j->plane && (!out || words_end_with(out, ".png"))))
+        return status;
+    return ebpo_map_write(j->model, &j->lattice, out,
+                          words_end_with(out, ".nrrd") ? EBPO_MAP_NRRD : EBPO_MAP_VTKHDF,
+                          &j->options, j->plane ? NULL : &j->stats, error);
+}
+
+/* --- vertices --- */
+
+static ebpo_status read_other(const map_job *j, ebpo_progress progress, ebpo_mesh *out,
+                              ebpo_error *error)
+{
+    if (command_is_hdf5("map", j->v->from) == 0) {
+        ebpo_mesh_read_options o = EBPO_MESH_READ_OPTIONS_INIT;
+        o.threads = (unsigned)j->v->threads;
+        o.progress = progress;
+        o.attributes = 1;
+        return ebpo_mesh_read(j->v->from, &o, out, error);
+    }
+    ebpo_read_options o = EBPO_READ_OPTIONS_INIT;
+    ebpo_file *file = NULL;
+    bool ordered;
+    o.threads = (unsigned)j->v->threads;
+    o.attributes = 1;
+    ebpo_status status = remote_open(&file, j->v->from, &j->v->remote, error);
+    if (status == EBPO_OK)
+        status = ebpo_file_read_source_mesh(file, &o, out, &ordered, error);
+    ebpo_close(file);
+    return status;
+}
+
+/* A mesh's coordinates may be floats. */
+static double *points_of(const ebpo_mesh *m)
+{
+    double *points = malloc((m->vertex_count + 1) * 3 * sizeof *points);
+    for (uint64_t i = 0; points && i < 3 * m->vertex_count; i++)
+        points[i] = m->xyz32 ? (double)m->xyz32[i] : m->xyz64[i];
+    return points;
+}
+
+static ebpo_status paint(map_job *j, ebpo_mesh *m, const double *distances, ebpo_error *error)
+{
+    if (j->range == 0)
+        j->range = j->stats.percentile_unsigned[5];
+    if (!(j->range > 0)) /* nothing but zeros */
+        j->range = j->stats.farthest > 0 ? j->stats.farthest : 1;
+    ebpo_status status =
+        ebpo_map_paint(m, distances, (ebpo_map_palette)j->v->palette, j->range, error);
+    if (status == EBPO_OK && j->v->out)
+        status = ebpo_mesh_write_ply(m, j->v->out, error);
+    if (status == EBPO_OK && j->v->picture)
+        status = map_draw_mesh(j, m, j->v->picture, error);
+    return status;
+}
+
+static ebpo_status bound(map_job *j, const ebpo_mesh *m, const double *distances, ebpo_error *error)
+{
+    ebpo_map_reach_options o = EBPO_MAP_REACH_OPTIONS_INIT;
+    o.threads = j->options.threads;
+    o.progress = j->options.progress;
+    return ebpo_map_find_reach(j->model, m, distances, &o, &j->reach, error);
+}
+
+ebpo_status map_vertices(map_job *j, ebpo_progress progress, ebpo_error *error)
+{
+    ebpo_mesh m = { 0 };
+    ebpo_mesh_report report;
+    ebpo_status status = read_other(j, progress, &m, error);
+    if (status != EBPO_OK)
+        return status;
+    double *points = points_of(&m), *distances = malloc((m.vertex_count + 1) * sizeof *distances);
+    if (!points || !distances)
+        status = no_memory(error);
+    if (status == EBPO_OK) /* that every index can be drawn */
+        status = ebpo_mesh_check(&m, j->options.threads, progress, &report, error);
+    if (status == EBPO_OK)
+        status = ebpo_map_points(j->model, points, m.vertex_count, &j->options, distances, error);
+    if (status == EBPO_OK)
+        status = ebpo_map_describe(distances, m.vertex_count, &j->stats, error);
+    if (status == EBPO_OK && j->v->bounds)
+        status = bound(j, &m, distances, error);
+    if (status == EBPO_OK && (j->v->out || j->v->picture))
+        status = paint(j, &m, distances, error);
+    free(points);
+    free(distances);
+    ebpo_mesh_free(&m);
+    return status;
+}
+
+/* ebpo map: distances on a plane, on a grid, or of another model's vertices. */
 
 typedef map_values values;
 

@@ -1,5 +1,3 @@
-#include "cli/commands/convert_parts.h"
-
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,8 +5,10 @@
 #include <unistd.h>
 
 #include <ebpo/ebpo.h>
+#include <ebpo/groups.h>
 
 #include "cli/command.h"
+#include "cli/commands/convert_parts.h"
 #include "cli/json.h"
 #include "cli/mesh_advice.h"
 #include "cli/mesh_findings.h"
@@ -16,7 +16,105 @@
 #include "cli/remote_args.h"
 #include "cli/signals.h"
 #include "cli/words.h"
-#include "cli/commands/part_names.h"
+
+/* Names of parts: as files, and in a scene. */
+
+enum { PART_NAME_SIZE = 96, PART_SHOWN_SIZE = 256 };
+
+enum { OWN_IN_FILE = 40, SPELT_MOST = 220 };
+
+static bool is_safe(char c)
+{
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_';
+}
+
+/* "KIND-NUMBER-NAME", of letters, digits, '-' and '_' only; the number, of so many digits, tells
+ * them apart. `own`: NULL: without. */
+static void part_file_name(char out[PART_NAME_SIZE], const char *kind, int digits, uint64_t number,
+                           const char *own)
+{
+    size_t size = (size_t)snprintf(out, PART_NAME_SIZE, "%s-%0*llu", kind, digits,
+                                   (unsigned long long)number);
+    if (!own || !*own || size + OWN_IN_FILE + 2 > PART_NAME_SIZE)
+        return;
+    out[size++] = '-';
+    for (int i = 0; own[i] && i < OWN_IN_FILE; i++)
+        out[size++] = is_safe(own[i]) ? own[i] : '_';
+    out[size] = 0;
+}
+
+/* Words that stand for many instances. */
+static bool is_selector(const char *own)
+{
+    return strcmp(own, "*") == 0 || strncmp(own, "layer:", 6) == 0 ||
+           strncmp(own, "group:", 6) == 0;
+}
+
+/* Bytes of the character there; 0: a scene cannot have it. */
+static int plain_length(const char *s)
+{
+    unsigned char c = (unsigned char)*s;
+    return c < 0x20 || c == 0x7f ? 0 : json_utf8_length(s);
+}
+
+/* A scene can have this name: 1 to 255 bytes of UTF-8 without control characters and no selector.
+ */
+static bool part_name_fits(const char *own)
+{
+    size_t size = strnlen(own, PART_SHOWN_SIZE);
+    if (size == 0 || size >= PART_SHOWN_SIZE || is_selector(own))
+        return false;
+    for (const char *s = own; *s;) {
+        int length = plain_length(s);
+        if (length == 0)
+            return false;
+        s += length;
+    }
+    return true;
+}
+
+/* For qsort, of pointers to names. */
+static int part_compare_names(const void *a, const void *b)
+{
+    return strcmp(*(const char *const *)a, *(const char *const *)b);
+}
+
+/* Each byte that cannot be there as \xNN, as far as there is room. */
+static size_t spell(char *out, const char *own)
+{
+    size_t size = 0;
+    bool first = is_selector(own);
+    for (const char *s = own; *s && size + 4 <= SPELT_MOST; first = false) {
+        int length = first ? 0 : plain_length(s);
+        if (length)
+            memcpy(out + size, s, (size_t)length);
+        else
+            snprintf(out + size, 5, "\\x%02x", (unsigned char)*s);
+        size += length ? (size_t)length : 4;
+        s += length ? length : 1;
+    }
+    return size;
+}
+
+/* The group's own name, where a scene can have it; else what can be said of it, with a number.
+ * `taken`: sorted, the own names that are shown as they are. */
+static void part_shown_name(char out[PART_SHOWN_SIZE], const char *own, uint64_t number,
+                            const char *const *taken, uint64_t taken_count)
+{
+    if (part_name_fits(own)) {
+        snprintf(out, PART_SHOWN_SIZE, "%s", own);
+        return;
+    }
+    size_t size = spell(out, own);
+    size +=
+        (size_t)snprintf(out + size, PART_SHOWN_SIZE - size, " #%llu", (unsigned long long)number);
+    while (size + 1 < PART_SHOWN_SIZE &&
+           bsearch(&out, taken, taken_count, sizeof *taken, part_compare_names)) {
+        out[size++] = '#';
+        out[size] = 0;
+    }
+}
 
 /* How it is called. */
 typedef struct part_kind {
