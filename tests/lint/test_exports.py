@@ -3,9 +3,10 @@
 SOURCE_ROOT VERSION core|extras
 
 The library exports exactly what the headers declare, those of the core alone or all; ebpo.h includes
-every header of the core, and no other; each is installed; whatever name a header, a page or a sample mentions is declared; each function says which
-threads may call it; each struct that begins with its size has its macro; the version is the
-project's. What the library wants of every thread's stack (thread-local storage) is little.
+every header of the core, and no other; each is installed; whatever name a header, a page or a sample
+mentions is declared; each function says which threads may call it; each struct that begins with its
+size has its macro; the version is the project's. What the library wants of every thread's stack
+(thread-local storage) is little.
 """
 import pathlib
 import re

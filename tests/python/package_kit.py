@@ -3,6 +3,7 @@
 Run as  NAME.py EBPO EBPO_INPUTS EBPO_GENERATE  with PYTHONPATH at the package.
 """
 import atexit
+import ctypes
 import io
 import os
 import pathlib
@@ -43,6 +44,9 @@ def answers(command, name, questions, *options):
 
 def points(count, seed=1, reach=1.2):
     return np.random.default_rng(seed).uniform(-reach, reach, (count, 3))
+
+
+EXTRAS = hasattr(ctypes.CDLL(ebpo.library()), "ebpo_collider_new")  # else the library is the core alone
 
 
 class Case(unittest.TestCase):

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import types
 
-from package_kit import COMMAND, Case, model, np, points, run
+from package_kit import COMMAND, EXTRAS, Case, model, np, points, run
 
 import ebpo
 
@@ -307,11 +307,13 @@ class Text(Case):
              [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]])
         cube, ran = ebpo.convert(mesh, "cube.ebpo.h5"), 0
         for name in ["", *MODULES]:
+            if not EXTRAS and name in ("collide", "painting", "scenes", "touching"):
+                continue
             module = importlib.import_module(f"ebpo.{name}" if name else "ebpo")
             failed, tried = doctest.testmod(module, extraglobs={"cube": cube})
             self.assertEqual(failed, 0, name)
             ran += tried
-        self.assertGreater(ran, 40)
+        self.assertGreater(ran, 40 if EXTRAS else 20)
 
     def test_all_is_described(self):
         for name in ebpo.__all__:
