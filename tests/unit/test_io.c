@@ -14,7 +14,6 @@
 #include "io/file_lock.h"
 #include "io/file_source.h"
 #include "io/publish.h"
-#include "io/unfinished.h"
 #include "scratch.h"
 
 static const char *folder, *target;
