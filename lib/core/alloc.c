@@ -66,8 +66,7 @@ bool ebpo_grow(void *array, uint64_t *capacity, uint64_t need, size_t size)
 
 /* --- memory that making something may take --- */
 
-ebpo_status ebpo_room_check(ebpo_room *room, uint64_t bytes,
-                                                        ebpo_error *error)
+ebpo_status ebpo_room_check(ebpo_room *room, uint64_t bytes, ebpo_error *error)
 {
     if (!room || (room->taken <= room->most && bytes <= room->most - room->taken))
         return EBPO_OK;
@@ -80,8 +79,7 @@ ebpo_status ebpo_room_check(ebpo_room *room, uint64_t bytes,
                      room->most, all);
 }
 
-ebpo_status ebpo_room_take(ebpo_room *room, uint64_t bytes,
-                                                       ebpo_error *error)
+ebpo_status ebpo_room_take(ebpo_room *room, uint64_t bytes, ebpo_error *error)
 {
     ebpo_status status = ebpo_room_check(room, bytes, error);
     if (room && status == EBPO_OK)

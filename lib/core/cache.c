@@ -107,15 +107,14 @@ static bool make_slots(cache_slots *t)
 }
 
 static cache_slot **bucket_of(cache_slot **bucket, uint64_t bucket_count,
-                                   const struct ebpo_cache *owner, uint64_t key)
+                              const struct ebpo_cache *owner, uint64_t key)
 {
     uint64_t hash = ebpo_hash_number(ebpo_hash_number((uintptr_t)owner) + key);
     return &bucket[hash & (bucket_count - 1)];
 }
 
 /* NULL: it has none of this key. */
-static cache_slot *find_slot(const cache_slots *t, const struct ebpo_cache *owner,
-                                       uint64_t key)
+static cache_slot *find_slot(const cache_slots *t, const struct ebpo_cache *owner, uint64_t key)
 {
     cache_slot *s = *bucket_of(t->bucket, t->bucket_count, owner, key);
     while (s && (s->key != key || s->owner != owner))
@@ -247,7 +246,10 @@ static uint64_t kept_for(const ebpo_cache_pool *p, const cache_demand *d)
     return bytes;
 }
 
-static uint64_t saturated_sum(uint64_t a, uint64_t b) { return a > UINT64_MAX - b ? UINT64_MAX : a + b; }
+static uint64_t saturated_sum(uint64_t a, uint64_t b)
+{
+    return a > UINT64_MAX - b ? UINT64_MAX : a + b;
+}
 
 /* Of the budget, what nothing can be dropped for. */
 static uint64_t held_for(const ebpo_cache_pool *p, const cache_demand *d)
@@ -393,8 +395,7 @@ static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error
 
 /* Ends a load: `reserved` gives way to the item, which is pinned by whoever waits for it (and `own`
  * times more), or to nothing. */
-static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserved,
-                     unsigned own)
+static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserved, unsigned own)
 {
     give_back_reserved(c, reserved);
     if (loaded) {
@@ -447,8 +448,8 @@ static ebpo_status call_load(ebpo_cache *c, cache_slot *s, uint64_t reserved, ui
 
 /* With room for s's load, more of it each time that the source asks for that; *reserved: what ends
  * with the load. The lock is held at beginning and end. */
-static ebpo_status load_with_room(ebpo_cache *c, cache_slot *s, uint64_t peak,
-                                  uint64_t *reserved, ebpo_error *error)
+static ebpo_status load_with_room(ebpo_cache *c, cache_slot *s, uint64_t peak, uint64_t *reserved,
+                                  ebpo_error *error)
 {
     for (;;) {
         uint64_t needed = 0;
@@ -470,8 +471,7 @@ static ebpo_status load_with_room(ebpo_cache *c, cache_slot *s, uint64_t peak,
 /* The lock is held at beginning and end. */
 static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
-    cache_slot *s =
-        add_slot(&c->pool->slots, c, key); /* from here on others wait for this load */
+    cache_slot *s = add_slot(&c->pool->slots, c, key); /* from here on others wait for this load */
     uint64_t peak = 0, reserved = 0;
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
@@ -616,9 +616,8 @@ void ebpo_cache_give_back_aside(ebpo_cache *c, uint64_t bytes)
  * Nobody waits for our key meanwhile: whoever wants it loads it. */
 static bool load_ahead(ebpo_cache *c, cache_demand *d)
 {
-    cache_slot *s = find_slot(&c->pool->slots, c, d->key)
-                             ? NULL
-                             : add_slot(&c->pool->slots, c, d->key);
+    cache_slot *s =
+        find_slot(&c->pool->slots, c, d->key) ? NULL : add_slot(&c->pool->slots, c, d->key);
     if (!s)
         return true;
     if (!d->known) {
@@ -626,10 +625,9 @@ static bool load_ahead(ebpo_cache *c, cache_demand *d)
         d->known = estimate_bytes(c, d->key, &d->peak, NULL) == EBPO_OK;
         pthread_mutex_lock(&c->pool->lock);
     }
-    cache_capacity got = !d->known ? ROOM_NEVER
-                              : c->pool->serving != c->pool->tickets
-                                  ? ROOM_LATER
-                                  : make_room(c->pool, d);
+    cache_capacity got = !d->known                              ? ROOM_NEVER
+                         : c->pool->serving != c->pool->tickets ? ROOM_LATER
+                                                                : make_room(c->pool, d);
     if (got != ROOM_MADE) {
         end_load(c, s, false, 0, 0);
         return got == ROOM_NEVER;

@@ -43,8 +43,8 @@ static void keep_to_one_line(char *text)
             *text = ' ';
 }
 
-static ebpo_status fill_error(ebpo_error *error, ebpo_status status, const char *file, const char *object,
-                        int64_t offset, const char *format, va_list args)
+static ebpo_status fill_error(ebpo_error *error, ebpo_status status, const char *file,
+                              const char *object, int64_t offset, const char *format, va_list args)
 {
     int begin = 0;
     if (!error)

@@ -29,9 +29,6 @@ void ebpo_prefer_huge_pages(void *array, size_t bytes);
 /* Bytes: the machine's, or the least that a control group of this process allows. */
 uint64_t ebpo_machine_memory(void);
 
-/* The longest name of a folder for temporary files, with its closing zero byte. */
-enum { EBPO_FOLDER_BYTES = 4096 };
-
 /* A temporary file that no name leads to: a descriptor; -1 and errno when it cannot be made. */
 int ebpo_open_unnamed(const char *folder);
 

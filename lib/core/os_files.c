@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "core/os.h"
+#include "core/workspace.h"
 
 /* The name that a file has for a moment, where files cannot be made without one: a signal may come
  * in that moment. One at a time. */

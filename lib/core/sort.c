@@ -82,7 +82,7 @@ static bool form_groups(sorting *t)
 /* Sorts a piece by groups, in the core's own cache, and moves each group's records together: in
  * whatever order they arrive, there are no more jumps than groups. */
 static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                        ebpo_error *error)
+                                  ebpo_error *error)
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
@@ -257,8 +257,8 @@ static ebpo_status run_passes(sorting *t, ebpo_error *error)
     if (status == EBPO_OK && !form_groups(t))
         status = ebpo_fail_memory(error, 0);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(s->threads, s->workspace, s->count, GRAIN, deal_to_groups, t, &progress,
-                                   s->stage, error);
+        status = ebpo_parallel_for(s->threads, s->workspace, s->count, GRAIN, deal_to_groups, t,
+                                   &progress, s->stage, error);
     ebpo_array_free(s->workspace, t->made);
     t->made = NULL;
     pass.begin = pass.end++;

@@ -26,26 +26,17 @@
 
 /* Arrays smaller than a page are malloc's; those smaller than an extent are parts of a pool, which
  * is one: a build has thousands of them. */
-enum {
-    PAGE_BYTES = 4096,
-    LEAST_EXTENT = 1 << 16,
-    POOL_BYTES = 1 << 20,
-    BUCKET_BITS = 10
-};
+enum { PAGE_BYTES = 4096, LEAST_EXTENT = 1 << 16, POOL_BYTES = 1 << 20, BUCKET_BITS = 10 };
 
-typedef enum extent_kind {
-    EXTENT_OWN,
-    EXTENT_POOL,
-    EXTENT_PART
-} extent_kind;
+typedef enum extent_kind { EXTENT_OWN, EXTENT_POOL, EXTENT_PART } extent_kind;
 
 typedef struct extent {
     void *at;
     size_t bytes;
     extent_kind kind;
-    bool filed;               /* in a file */
+    bool filed;          /* in a file */
     struct extent *pool; /* of a part */
-    size_t used;              /* of a pool: bytes given out; and the parts that are not freed */
+    size_t used;         /* of a pool: bytes given out; and the parts that are not freed */
     uint64_t parts;
     struct extent *next;
 } extent;
@@ -55,7 +46,7 @@ struct ebpo_workspace {
     pthread_mutex_t pool_lock;
     ebpo_workspace_stats figures;
     uint64_t holders;   /* and the owner is one */
-    extent *pool;  /* that the next part comes from; NULL: none */
+    extent *pool;       /* that the next part comes from; NULL: none */
     _Atomic int failed; /* errno of the last allocation in a file that failed, 0: memory */
     int statm;          /* /proc/self/statm */
     /* bytes of files, libraries among them, that stayed resident when pages were released */
@@ -166,6 +157,13 @@ ebpo_status ebpo_workspace_get_stats(const ebpo_workspace *workspace, ebpo_works
     return EBPO_GIVE(ebpo_workspace_stats, out, &figures);
 }
 
+const char *ebpo_workspace_folder(const ebpo_workspace *workspace) { return workspace->folder; }
+
+uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace)
+{
+    return workspace->figures.memory;
+}
+
 ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes, ebpo_error *error)
 {
     int fault = workspace ? workspace->failed : 0;
@@ -198,10 +196,7 @@ static void enter_extent(ebpo_workspace *w, extent *b)
     pthread_mutex_unlock(&w->table_lock);
 }
 
-static bool is_at(const extent *b, const void *at)
-{
-    return b->at == at && b->kind != EXTENT_POOL;
-}
+static bool is_at(const extent *b, const void *at) { return b->at == at && b->kind != EXTENT_POOL; }
 
 /* Takes the extent that begins there out of the table; NULL: it is none of the workspace's. Not
  * pools: their first parts begin where they do. */
@@ -333,10 +328,10 @@ static extent *make_part(ebpo_workspace *w, size_t bytes)
     extent *pool = part ? w->pool : NULL;
     if (pool) {
         *part = (extent){ .at = (char *)pool->at + pool->used,
-                               .bytes = bytes,
-                               .kind = EXTENT_PART,
-                               .filed = pool->filed,
-                               .pool = pool };
+                          .bytes = bytes,
+                          .kind = EXTENT_PART,
+                          .filed = pool->filed,
+                          .pool = pool };
         pool->used += bytes;
         pool->parts++;
     }
@@ -395,8 +390,7 @@ static void free_extent(ebpo_workspace *w, extent *b)
 static void *alloc_array(ebpo_workspace *w, uint64_t count, size_t size, bool zero)
 {
     uint64_t bytes;
-    if (w && ebpo_mul_ok(count, size, &bytes) && bytes >= LEAST_EXTENT &&
-        bytes < PTRDIFF_MAX) {
+    if (w && ebpo_mul_ok(count, size, &bytes) && bytes >= LEAST_EXTENT && bytes < PTRDIFF_MAX) {
         extent *b = make_extent(w, (size_t)bytes, EXTENT_OWN);
         return b ? b->at : NULL;
     }
@@ -424,8 +418,8 @@ void ebpo_array_free(ebpo_workspace *workspace, void *array)
 {
     /* malloc never gives whole pages but by chance: the table knows */
     extent *b = workspace && array && (uintptr_t)array % PAGE_BYTES == 0
-                         ? take_extent(workspace, array)
-                         : NULL;
+                    ? take_extent(workspace, array)
+                    : NULL;
     if (b)
         free_extent(workspace, b);
     else

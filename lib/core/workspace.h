@@ -15,6 +15,13 @@ ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes,
 ebpo_status ebpo_workspace_fail_while(const ebpo_workspace *workspace, const char *what,
                                       ebpo_error *error);
 
+/* The folder of its temporary files: a name of less than EBPO_FOLDER_BYTES bytes, the workspace's.
+ */
+enum { EBPO_FOLDER_BYTES = 4096 };
+const char *ebpo_workspace_folder(const ebpo_workspace *workspace);
+/* Its budget in bytes. */
+uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace);
+
 /* Keeping to a budget: pages of files can be released, what was written stays in the file. */
 
 /* Between pieces of work, by each thread and for each few megabytes touched: releases pages of

@@ -1,10 +1,10 @@
 /* Chunks as HDF5 stores them. A pipeline is a row of the table below: the HDF5 filters that it is
  * made of, and the functions that encode and decode. All else (shuffle before compression, the
  * fletcher32 checksum behind it, which filters of a file are which pipeline, which ones a new array
- * gets) follows from its row: a new codec is a number in chunk.h, a row, and its functions in a file
- * of its own, as zstd_codec.c. Deflate is two calls of zlib, and here. What is written is bit for bit
- * what libhdf5's own filters write. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md,
- * section 2. */
+ * gets) follows from its row: a new codec is a number in chunk.h, a row, and its functions in a
+ * file of its own, as zstd_codec.c. Deflate is two calls of zlib, and here. What is written is bit
+ * for bit what libhdf5's own filters write. Source: docs of HDF5 ("HDF5 filters"),
+ * format-spec/README.md, section 2. */
 #include <string.h>
 #include <zlib.h>
 
@@ -149,7 +149,10 @@ static const codec codecs[] = {
                              ebpo_zstd_encode,
                              ebpo_zstd_decode },
     [EBPO_PIPELINE_DEFLATE] = { { { EBPO_FILTER_DEFLATE, EBPO_FILTER_FLETCHER },
-                                  2, EBPO_DEFLATE_LEVEL, true, true },
+                                  2,
+                                  EBPO_DEFLATE_LEVEL,
+                                  true,
+                                  true },
                                 deflate_encode,
                                 deflate_decode },
     [EBPO_PIPELINE_CHECKSUM] = { { { EBPO_FILTER_FLETCHER }, 1, 0, false, true },

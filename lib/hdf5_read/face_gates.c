@@ -202,7 +202,8 @@ static void write_codes(const uint8_t *codes, uint32_t rows, uint8_t *out,
 }
 
 /* `third` and what follows are built where they cannot be in each other's way, then moved up. */
-static void join_streams(const writing *w, uint32_t rows, uint8_t *out, size_t ends[EBPO_GATES_ENDS])
+static void join_streams(const writing *w, uint32_t rows, uint8_t *out,
+                         size_t ends[EBPO_GATES_ENDS])
 {
     size_t n = rows, low = (size_t)(w->low - out) - 2 * n, more = (size_t)(w->more - out) - 5 * n;
     ends[0] = n;

@@ -42,7 +42,8 @@ static void close_head_bytes(ebpo_head_bytes *b)
     *b = (ebpo_head_bytes){ .status = EBPO_OK };
 }
 
-static const uint8_t *held_within(const uint8_t *buffer, ebpo_range held, uint64_t at, uint64_t size)
+static const uint8_t *held_within(const uint8_t *buffer, ebpo_range held, uint64_t at,
+                                  uint64_t size)
 {
     if (!buffer || at < held.offset || at - held.offset > held.size ||
         size > held.size - (at - held.offset))
@@ -62,8 +63,9 @@ static bool read_into(ebpo_head_bytes *b, uint8_t **buffer, uint64_t capacity, e
 
 static const uint8_t *read_table(ebpo_head_bytes *b, uint64_t at, uint64_t size)
 {
-    return read_into(b, &b->table, b->index.size, b->index) ? held_within(b->table, b->index, at, size)
-                                                            : NULL;
+    return read_into(b, &b->table, b->index.size, b->index)
+               ? held_within(b->table, b->index, at, size)
+               : NULL;
 }
 
 /* Windows begin at multiples of half their size, so that reading to and fro around a place does not
@@ -265,7 +267,7 @@ static bool link_is(ebpo_head_cursor c, const char *name, size_t length, uint64_
 
 /* Of a group's links the one of this name: how many there are. */
 static unsigned follow_name(const ebpo_head_header *group, const char *name, size_t length,
-                       uint64_t *address)
+                            uint64_t *address)
 {
     unsigned found = 0;
     for (uint64_t i = 0; i < group->count; i++)

@@ -95,8 +95,8 @@ static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *fo
 }
 
 /* Takes the next chunk's place over. */
-static const char *take_place(ebpo_head_chunks *t, uint64_t i, uint64_t file_bytes, uint64_t address,
-                        uint64_t bytes, uint32_t mask)
+static const char *take_place(ebpo_head_chunks *t, uint64_t i, uint64_t file_bytes,
+                              uint64_t address, uint64_t bytes, uint32_t mask)
 {
     t->at = i;
     if (address == EBPO_NO_ADDRESS || bytes == 0)
@@ -125,7 +125,7 @@ static const char *read_single(ebpo_head_chunks *t, uint64_t file_bytes)
     if (t->filtered != l->single_filtered)
         return contradicts;
     return take_place(t, 0, file_bytes, l->address, t->filtered ? l->single_bytes : t->whole,
-                l->single_mask);
+                      l->single_mask);
 }
 
 static const char *read_implicit(ebpo_head_chunks *t, uint64_t file_bytes)
@@ -314,7 +314,10 @@ static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type
 static ebpo_head_refusal fail_sound(const char *what) { return (ebpo_head_refusal){ what, false }; }
 
 /* Not damaged, but rewritten by another program. */
-static ebpo_head_refusal fail_foreign(const char *what) { return (ebpo_head_refusal){ what, true }; }
+static ebpo_head_refusal fail_foreign(const char *what)
+{
+    return (ebpo_head_refusal){ what, true };
+}
 
 static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape)
 {
@@ -328,7 +331,7 @@ static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape
     bool grows = space.rank <= 2 && !space.fixed;
     if (type.class == EBPO_CLASS_OTHER_INTEGER || grows)
         return fail_foreign(grows ? "the array does not have fixed dimensions"
-                             : "the array is not of little-endian integers");
+                                  : "the array is not of little-endian integers");
     if (type.class != EBPO_CLASS_INTEGER ||
         (type.size != 1 && type.size != 2 && type.size != 4 && type.size != 8))
         return fail_sound("the array is not of little-endian integers");
@@ -351,12 +354,12 @@ static ebpo_head_refusal read_storage(const ebpo_head_header *h, ebpo_head_rows 
                             *layout_message = find_one(h, EBPO_M_LAYOUT, &wrong),
                             *filter_message = find_one(h, EBPO_M_PIPELINE, &wrong);
     if (external)
-        return fail_sound("the array's values lie in another file (external storage), which is never "
-                       "looked for");
+        return fail_sound(
+            "the array's values lie in another file (external storage), which is never "
+            "looked for");
     if (!layout_message)
         return wrong;
-    wrong.what =
-        read_layout(ebpo_head_message_cursor(h, layout_message), layout, &wrong.foreign);
+    wrong.what = read_layout(ebpo_head_message_cursor(h, layout_message), layout, &wrong.foreign);
     if (wrong.what)
         return wrong;
     bool whole = layout->rank == (shape->cols ? 2 : 1) &&

@@ -104,8 +104,8 @@ static bool begin_frame(ZSTD_CCtx *out, int level, size_t raw_bytes)
            (!effort || !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_minMatch, MATCH_LEAST)));
 }
 
-static size_t encode_blocks(ZSTD_CCtx *zstd, const uint8_t *raw, size_t raw_bytes, const ebpo_chunk_blocks *b,
-                          uint8_t *out)
+static size_t encode_blocks(ZSTD_CCtx *zstd, const uint8_t *raw, size_t raw_bytes,
+                            const ebpo_chunk_blocks *b, uint8_t *out)
 {
     ZSTD_outBuffer to = { out, ebpo_chunk_bound(raw_bytes), 0 };
     size_t left = ZSTD_CCtx_setPledgedSrcSize(zstd, raw_bytes), at = 0;
@@ -119,7 +119,8 @@ static size_t encode_blocks(ZSTD_CCtx *zstd, const uint8_t *raw, size_t raw_byte
 }
 
 ebpo_status ebpo_zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw,
-                               size_t raw_bytes, const ebpo_chunk_blocks *b, uint8_t *out, size_t *out_bytes)
+                             size_t raw_bytes, const ebpo_chunk_blocks *b, uint8_t *out,
+                             size_t *out_bytes)
 {
     if (!coder->zstd_out)
         coder->zstd_out = ZSTD_createCCtx();
@@ -153,7 +154,7 @@ static ZSTD_DCtx *make_reader(void)
 }
 
 ebpo_status ebpo_zstd_decode(ebpo_chunk_coder *coder, const uint8_t *stored, size_t stored_bytes,
-                               uint8_t *raw, size_t raw_bytes, const char **why)
+                             uint8_t *raw, size_t raw_bytes, const char **why)
 {
     if (!coder->zstd_in)
         coder->zstd_in = make_reader();

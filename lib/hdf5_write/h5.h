@@ -55,7 +55,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_count(ebpo_h5_out *out, ebpo_h5_id id, con
 EBPO_MUST_USE ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                                            const double *values, unsigned count, ebpo_error *error);
 
-/* Attributes as the VTKHDF format wants them: 64-bit integers [count], count > 0, ASCII of fixed length. */
+/* Attributes as the VTKHDF format wants them: 64-bit integers [count], count > 0, ASCII of fixed
+ * length. */
 EBPO_MUST_USE ebpo_status ebpo_h5_put_ints(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                                            const int64_t *values, unsigned count,
                                            ebpo_error *error);

@@ -59,8 +59,9 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
     d->set = H5Dopen2(d->file, d->name, access);
     H5Pclose(access);
     if (elsewhere || (d->set >= 0 && ebpo_h5_is_elsewhere(d->set)))
-        return rows_fail(d, "its values lie in another file, which is not looked for; name that one",
-                    error);
+        return rows_fail(d,
+                         "its values lie in another file, which is not looked for; name that one",
+                         error);
     if (d->set < 0)
         return rows_fail(d, "there is no such dataset", error);
     d->space = H5Dget_space(d->set);

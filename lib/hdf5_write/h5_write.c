@@ -355,8 +355,8 @@ void ebpo_h5_discard(ebpo_h5_out *out)
     ebpo_h5_leave(&scope);
 }
 
-static ebpo_status tell_outcome(const ebpo_h5_out *out, const char *object, bool good, const char *what,
-                        ebpo_error *error)
+static ebpo_status tell_outcome(const ebpo_h5_out *out, const char *object, bool good,
+                                const char *what, ebpo_error *error)
 {
     ebpo_error cause = EBPO_ERROR_INIT;
     if (out->sink && ebpo_h5_sink_status(out->sink, error) != EBPO_OK)

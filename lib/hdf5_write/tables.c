@@ -143,7 +143,8 @@ ebpo_status ebpo_h5_make_volume(ebpo_h5_out *out, const char *path, const uint64
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hsize_t size[3] = { dims[0], dims[1], dims[2] },
-            chunk[3] = { smaller_of(dims[0], LAYERS_OF_A_CHUNK), smaller_of(dims[1], SIDE_OF_A_CHUNK),
+            chunk[3] = { smaller_of(dims[0], LAYERS_OF_A_CHUNK),
+                         smaller_of(dims[1], SIDE_OF_A_CHUNK),
                          smaller_of(dims[2], SIDE_OF_A_CHUNK) };
     hid_t space = H5Screate_simple(3, size, NULL), dcpl = H5Pcreate(H5P_DATASET_CREATE);
     bool good = space >= 0 && dcpl >= 0 && H5Pset_chunk(dcpl, 3, chunk) >= 0 &&

@@ -27,7 +27,8 @@ static size_t short_of_memory(void)
     return 0;
 }
 
-static size_t replace_buffer(void **buffer, size_t *buffer_size, void *block, size_t capacity, size_t used)
+static size_t replace_buffer(void **buffer, size_t *buffer_size, void *block, size_t capacity,
+                             size_t used)
 {
     free(*buffer);
     *buffer = block;
@@ -36,7 +37,7 @@ static size_t replace_buffer(void **buffer, size_t *buffer_size, void *block, si
 }
 
 static size_t compress_chunk(size_t level_count, const unsigned level[], size_t bytes,
-                       size_t *buffer_size, void **buffer)
+                             size_t *buffer_size, void **buffer)
 {
     size_t capacity = ZSTD_compressBound(bytes), used = 0;
     ZSTD_CCtx *context = ZSTD_createCCtx();
@@ -103,8 +104,8 @@ static size_t expand_unknown(size_t bytes, size_t *buffer_size, void **buffer)
     return 0;
 }
 
-static size_t filter_chunk(unsigned flags, size_t cd_count, const unsigned cd_values[], size_t bytes,
-                     size_t *buffer_size, void **buffer)
+static size_t filter_chunk(unsigned flags, size_t cd_count, const unsigned cd_values[],
+                           size_t bytes, size_t *buffer_size, void **buffer)
 {
     if (!(flags & H5Z_FLAG_REVERSE))
         return compress_chunk(cd_count, cd_values, bytes, buffer_size, buffer);

@@ -128,7 +128,7 @@ ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspac
 
 /* Whether it still says what was loaded. */
 static ebpo_status compare_bytes(const ebpo_whole_file *file, const char *path, bool *same,
-                           ebpo_error *error)
+                                 ebpo_error *error)
 {
     enum { STEP = 1 << 16 };
     ebpo_status status = EBPO_OK;
@@ -327,8 +327,9 @@ static const char *find_markup(const char *text, uint64_t size)
         begins_with(text, size, "<head"))
         return "is an HTML page, as servers send it for errors and logins; download the file "
                "itself";
-    return begins_with(text, size, "<?xml") ? "is an XML file; save the mesh as PLY, OBJ, STL or OFF"
-                                       : NULL;
+    return begins_with(text, size, "<?xml")
+               ? "is an XML file; save the mesh as PLY, OBJ, STL or OFF"
+               : NULL;
 }
 
 const char *ebpo_foreign_bytes(const uint8_t *data, uint64_t size)

@@ -16,7 +16,7 @@
 
 /* Text of a header field without the blanks around it; false when the line is another field. */
 static bool take_field(const char *line, size_t size, const char *name, const char **text,
-                  size_t *length)
+                       size_t *length)
 {
     size_t at = strlen(name);
     if (size <= at || strncasecmp(line, name, at) != 0 || line[at] != ':')
@@ -61,7 +61,8 @@ static bool content_range(ebpo_answer *a, const char *at, const char *end)
         return false;
     at += 6;
     range = !take_token(&at, end, '*');
-    if (range && (!take_number(&at, end, &begin) || !take_token(&at, end, '-') || !take_number(&at, end, &last)))
+    if (range && (!take_number(&at, end, &begin) || !take_token(&at, end, '-') ||
+                  !take_number(&at, end, &last)))
         return false;
     if (!take_token(&at, end, '/'))
         return false;
@@ -191,13 +192,15 @@ static ebpo_verdict judge_part(const ebpo_answer *a, const ebpo_asked *asked,
                                char why[EBPO_WHY_BYTES])
 {
     if (a->bad_range || !a->has_range)
-        return give_verdict(EBPO_ANSWER_REFUSED, why,
-                   "the server sent a part without saying properly which one (Content-Range); this "
-                   "server or a proxy on the way is broken");
+        return give_verdict(
+            EBPO_ANSWER_REFUSED, why,
+            "the server sent a part without saying properly which one (Content-Range); this "
+            "server or a proxy on the way is broken");
     if (!a->has_total)
-        return give_verdict(EBPO_ANSWER_REFUSED, why,
-                   "the server does not tell the file's size (Content-Range ends with /*); such "
-                   "files cannot be read by ranges");
+        return give_verdict(
+            EBPO_ANSWER_REFUSED, why,
+            "the server does not tell the file's size (Content-Range ends with /*); such "
+            "files cannot be read by ranges");
     const char *change = asked->pinned ? what_changed(a, asked, a->total) : NULL;
     if (change)
         return give_verdict(EBPO_ANSWER_REFUSED, why, change);
@@ -226,9 +229,10 @@ static ebpo_verdict judge_whole(const ebpo_answer *a, const ebpo_asked *asked, e
     if (change)
         return give_verdict(EBPO_ANSWER_REFUSED, why, change);
     if (asked->pinned)
-        return give_verdict(EBPO_ANSWER_REFUSED, why,
-                   "the server sent the whole file when asked for a part, after it had sent parts; "
-                   "try again later");
+        return give_verdict(
+            EBPO_ANSWER_REFUSED, why,
+            "the server sent the whole file when asked for a part, after it had sent parts; "
+            "try again later");
     *status = EBPO_E_UNSUPPORTED;
     if (a->has_length && a->length > asked->whole_limit) {
         snprintf(why, EBPO_WHY_BYTES,
@@ -238,9 +242,10 @@ static ebpo_verdict judge_whole(const ebpo_answer *a, const ebpo_asked *asked, e
         return EBPO_ANSWER_REFUSED;
     }
     if (!a->has_length && !a->chunked && !a->http2)
-        return give_verdict(EBPO_ANSWER_REFUSED, why,
-                   "the server has no byte ranges and does not tell where the file ends; download "
-                   "the file, or use a server with ranges");
+        return give_verdict(
+            EBPO_ANSWER_REFUSED, why,
+            "the server has no byte ranges and does not tell where the file ends; download "
+            "the file, or use a server with ranges");
     return EBPO_ANSWER_WHOLE;
 }
 
@@ -270,8 +275,9 @@ ebpo_verdict ebpo_answer_judge(const ebpo_answer *a, const ebpo_asked *asked, eb
         return EBPO_ANSWER_REFUSED;
     }
     if (a->encoded)
-        return give_verdict(EBPO_ANSWER_REFUSED, why,
-                   "the server compressed what it was asked to send as it is (Content-Encoding); "
-                   "switch that off for this file");
+        return give_verdict(
+            EBPO_ANSWER_REFUSED, why,
+            "the server compressed what it was asked to send as it is (Content-Encoding); "
+            "switch that off for this file");
     return a->code == 206 ? judge_part(a, asked, why) : judge_whole(a, asked, status, why);
 }

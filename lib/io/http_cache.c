@@ -40,7 +40,8 @@ struct ebpo_disk {
     uint64_t held, others;
 };
 
-static void digest_block(const uint8_t head[DIGEST_AT], const void *data, size_t size, uint8_t out[32])
+static void digest_block(const uint8_t head[DIGEST_AT], const void *data, size_t size,
+                         uint8_t out[32])
 {
     ebpo_sha256 sha;
     ebpo_sha256_begin(&sha);
@@ -655,7 +656,7 @@ static void store_block(ebpo_range_cache *p, ebpo_cached_range *piece)
         uint64_t left = piece->fetch_end - at;
         if (has_block(p, at, piece->fetch_end))
             put_block(p->disk, at / p->block, piece->data + (at - piece->begin),
-                          (size_t)(left < p->block ? left : p->block));
+                      (size_t)(left < p->block ? left : p->block));
     }
     pthread_mutex_lock(&p->lock);
 }
@@ -772,8 +773,8 @@ ebpo_status ebpo_range_cache_read(ebpo_range_cache *p, uint64_t offset, uint64_t
         uint64_t before = at;
         status = read_piece(p, &at, end, data + (before - offset), error);
     }
-    for (uint64_t i = find_piece(p, at); status != EBPO_OK && i < p->count && p->piece[i]->begin < end;
-         i++)
+    for (uint64_t i = find_piece(p, at);
+         status != EBPO_OK && i < p->count && p->piece[i]->begin < end; i++)
         /* what comes of these requests is not this reader's any more */
         p->piece[i]->demanded = p->piece[i]->users > 0;
     p->wait_seconds += ebpo_seconds() - since;

@@ -20,7 +20,8 @@
 #include "io/http_answer.h"
 #include "io/http_transfer.h"
 
-/* --- redirects: where a request is led, and whether that is still the server it was meant for --- */
+/* --- redirects: where a request is led, and whether that is still the server it was meant for ---
+ */
 
 /* One for each attempt; zeroed, nothing has been led anywhere. */
 typedef struct ebpo_redirect {
@@ -85,7 +86,8 @@ static void keep_target(ebpo_redirect *r, const char *from, size_t size)
 
 /* One line of a head, as it came; `code` is the answer's. True when it is the one by which the
  * request begins to go elsewhere. */
-static bool take_redirect_line(ebpo_redirect *r, const char *url, int code, const char *line, size_t size)
+static bool take_redirect_line(ebpo_redirect *r, const char *url, int code, const char *line,
+                               size_t size)
 {
     static const char name[] = "location:";
     bool ends = size <= 2 && (size == 0 || line[0] == '\r' || line[0] == '\n'),
@@ -220,9 +222,10 @@ static size_t take_part(ebpo_slot *s, const char *bytes, size_t size)
 {
     uint64_t capacity = s->answer.last + 1 - s->begin - s->taken;
     if (size > capacity)
-        return refuse_body(s, EBPO_E_IO,
-                      "the server sent more bytes than it was asked for and than it said; this "
-                      "server or a proxy on the way is broken");
+        return refuse_body(
+            s, EBPO_E_IO,
+            "the server sent more bytes than it was asked for and than it said; this "
+            "server or a proxy on the way is broken");
     memcpy(s->request->data + (s->begin - s->request->offset) + s->taken, bytes, size);
     s->taken += size;
     return size;
@@ -232,9 +235,10 @@ static size_t take_whole(ebpo_slot *s, const char *bytes, size_t size)
 {
     ebpo_request *r = s->request;
     if (s->taken + size > s->owner->options->whole_limit)
-        return refuse_body(s, EBPO_E_UNSUPPORTED,
-                      "the server has no byte ranges, and the file is larger than what would be "
-                      "read as a whole; download the file, or use a server with ranges");
+        return refuse_body(
+            s, EBPO_E_UNSUPPORTED,
+            "the server has no byte ranges, and the file is larger than what would be "
+            "read as a whole; download the file, or use a server with ranges");
     if (!ebpo_grow(&r->whole, &r->whole_capacity, s->taken + size, 1))
         return refuse_body(s, EBPO_E_MEMORY, "out of memory");
     memcpy(r->whole + s->taken, bytes, size);
@@ -277,8 +281,9 @@ static bool set_up_slot(ebpo_slot *s)
 #else
     good = good &&
            curl_easy_setopt(e, CURLOPT_PROTOCOLS, CURLPROTO_HTTP | CURLPROTO_HTTPS) == CURLE_OK;
-    good = good && curl_easy_setopt(e, CURLOPT_REDIR_PROTOCOLS,
-                                    is_https(t->url) ? CURLPROTO_HTTPS
+    good =
+        good && curl_easy_setopt(e, CURLOPT_REDIR_PROTOCOLS,
+                                 is_https(t->url) ? CURLPROTO_HTTPS
                                                   : CURLPROTO_HTTP | CURLPROTO_HTTPS) == CURLE_OK;
 #endif
     curl_easy_setopt(e, CURLOPT_FOLLOWLOCATION, 1L);

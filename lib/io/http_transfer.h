@@ -8,7 +8,8 @@
 
 #include "io/http_answer.h"
 
-/* A byte range that is wanted, and what came of it. Zero-initialise, fill in the first part, keep in place until done. */
+/* A byte range that is wanted, and what came of it. Zero-initialise, fill in the first part, keep
+ * in place until done. */
 typedef struct ebpo_request {
     uint64_t offset, size; /* size > 0 */
     uint8_t *data;         /* [size] */

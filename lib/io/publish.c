@@ -362,7 +362,8 @@ ebpo_status ebpo_publish_commit_pair(ebpo_publish *first, ebpo_publish *second, 
         status = make_ready(second, error);
     if (status == EBPO_OK)
         status = ebpo_file_lock_take(&lock, first->target, EBPO_FILE_LOCK_SAVING, NULL, error);
-    bool exchanged = status == EBPO_OK && exchange_files(first), fresh = !exchanged && errno == ENOENT;
+    bool exchanged = status == EBPO_OK && exchange_files(first),
+         fresh = !exchanged && errno == ENOENT;
     if (status == EBPO_OK && !exchanged)
         status = put_in_place(first, error);
     if (status == EBPO_OK && put_in_place(second, &cause) != EBPO_OK)
