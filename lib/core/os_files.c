@@ -10,13 +10,14 @@
 #include <unistd.h>
 
 #include "core/os.h"
-#include "core/workspace.h"
+
+enum { PATH_BYTES = 4096 + 64 }; /* the longest name of a folder, and of a file in it */
 
 /* The name that a file has for a moment, where files cannot be made without one: a signal may come
  * in that moment. One at a time. */
 static pthread_mutex_t passing_lock = PTHREAD_MUTEX_INITIALIZER;
 static atomic_bool is_passing;
-static char passing[EBPO_FOLDER_BYTES + 64];
+static char passing[PATH_BYTES];
 
 void ebpo_workspace_abandon(void)
 {

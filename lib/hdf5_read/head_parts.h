@@ -26,6 +26,11 @@ typedef struct ebpo_head_bytes {
     ebpo_error error;
 } ebpo_head_bytes;
 
+/* Fetches the first bytes. Close also after an error. */
+EBPO_MUST_USE ebpo_status ebpo_head_bytes_open(ebpo_head_bytes *bytes, ebpo_input *input,
+                                               ebpo_error *error);
+void ebpo_head_bytes_close(ebpo_head_bytes *bytes);
+
 /* Bytes [at, at + size), until the next call; the caller bounds `size`. NULL: they lie beyond the
  * end of the file, or, as `status` says then, could not be read. */
 const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *bytes, uint64_t at, uint64_t size);

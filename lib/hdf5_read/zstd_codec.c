@@ -6,7 +6,7 @@
 #include <zstd.h>
 
 #include "core/endian.h"
-#include "hdf5_read/chunk.h"
+#include "hdf5_read/codec.h"
 
 /* --- what decoders do not look at: RFC 8878, 3.1.1 --- */
 

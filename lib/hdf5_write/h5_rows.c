@@ -1,5 +1,5 @@
-/* Rows of numbers from files of others (ebpo/rows.h). libhdf5 reads them in a process of its own, which
- * hands them over in a file without a name. */
+/* Rows of numbers from files of others (ebpo/rows.h). libhdf5 reads them in a process of its own,
+ * which hands them over in a file without a name. */
 #include <ebpo/rows.h>
 #include <errno.h>
 #include <inttypes.h>

@@ -19,7 +19,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "io/file_source.h"
-#include "io/publish.h"
+#include "io/unfinished.h"
 
 /* Opens the lock file, which is made if need be. To write, which locks over NFS need, or else to
  * read: another user's. errno EACCES: it cannot be made, or not be read. */

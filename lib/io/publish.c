@@ -23,6 +23,7 @@
 #include "io/file_lock.h"
 #include "io/file_source.h"
 #include "io/publish.h"
+#include "io/unfinished.h"
 
 /* --- what a new file takes over from the one that it replaces --- */
 

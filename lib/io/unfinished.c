@@ -23,7 +23,7 @@
 
 #include "core/error.h"
 #include "io/file_source.h"
-#include "io/publish.h"
+#include "io/unfinished.h"
 
 /* Fixed storage and lock-free states, because a signal handler reads them. */
 enum { SLOT_FREE, SLOT_TAKEN, SLOT_LIVE };

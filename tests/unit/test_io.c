@@ -14,6 +14,7 @@
 #include "io/file_lock.h"
 #include "io/file_source.h"
 #include "io/publish.h"
+#include "io/unfinished.h"
 #include "scratch.h"
 
 static const char *folder, *target;

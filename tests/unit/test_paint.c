@@ -10,7 +10,7 @@
 
 #include "check_main.h"
 #include "expect.h"
-#include "io/publish.h"
+#include "io/unfinished.h"
 #include "model_file.h"
 #include "scratch.h"
 #include "solids.h"
