@@ -2,7 +2,7 @@
  * the run, of which the calling one is the first; it alone reports progress. Which thread takes
  * which piece is not determined, so results may not depend on it; of several failures the one of
  * the lowest piece is returned. All threads of the library are started here, with a stack of a
- * fixed size and the caller's floating-point environment. */
+ * fixed size and the floating-point environment of the call. */
 #include "core/parallel.h"
 
 #include <stdatomic.h>
