@@ -15,7 +15,7 @@
 
 #include <ebpo/build.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "geometry/cell.h"
 #include "mesh/mesh_parts.h"
 #include "geometry/cells.h"

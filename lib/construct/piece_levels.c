@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 
 void ebpo_piece_levels_free(ebpo_piece_level *out)
 {

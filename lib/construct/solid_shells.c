@@ -11,11 +11,10 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "mesh/mesh_frame.h"
 #include "mesh/shell_nesting.h"
 #include "geometry/rule.h"

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/random.h"
+#include "core/hash.h"
 #include "geometry/plane_code.h"
 #include "construct/planes.h"
 

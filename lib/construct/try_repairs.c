@@ -9,7 +9,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "mesh/mesh_parts.h"
 
 enum {

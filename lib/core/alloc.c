@@ -1,7 +1,13 @@
+/* Memory from malloc, with checked sizes: the number of items comes from a file or a mesh, and the
+ * product of it and their size may not fit. Arrays that may be larger than memory come from a
+ * workspace instead (workspace.c). Also the count that keeps what is being made below a limit. */
 #include "core/alloc.h"
 
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "core/error.h"
 
 static bool size_ok(uint64_t count, size_t size, size_t *bytes)
 {
@@ -56,4 +62,33 @@ bool ebpo_grow(void *array, uint64_t *capacity, uint64_t need, size_t size)
     memcpy(array, &block, sizeof block);
     *capacity = wanted;
     return true;
+}
+
+/* --- memory that making something may take --- */
+
+ebpo_status ebpo_room_check(ebpo_room *room, uint64_t bytes, ebpo_error *error)
+{
+    if (!room || (room->taken <= room->most && bytes <= room->most - room->taken))
+        return EBPO_OK;
+    uint64_t all = bytes > UINT64_MAX - room->taken ? UINT64_MAX : room->taken + bytes,
+             grown = room->most + room->most / 4 + 1;
+    room->needed = all > grown ? all : grown;
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the memory budget leaves %" PRIu64
+                     " bytes for this, which takes up to %" PRIu64,
+                     room->most, all);
+}
+
+ebpo_status ebpo_room_take(ebpo_room *room, uint64_t bytes, ebpo_error *error)
+{
+    ebpo_status status = ebpo_room_check(room, bytes, error);
+    if (room && status == EBPO_OK)
+        room->taken += bytes;
+    return status;
+}
+
+void ebpo_room_give(ebpo_room *room, uint64_t bytes)
+{
+    if (room)
+        room->taken -= bytes;
 }

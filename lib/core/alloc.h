@@ -1,4 +1,5 @@
-/* Allocation with checked sizes: every array sized from a file or a mesh goes through here. */
+/* Allocation with checked sizes: every array whose size comes from a file or a mesh is allocated
+ * here, or by a workspace (core/workspace.h) if it may be larger than memory. */
 #ifndef EBPO_CORE_ALLOC_H
 #define EBPO_CORE_ALLOC_H
 
@@ -23,5 +24,18 @@ void *ebpo_realloc(void *block, uint64_t count, size_t size);
 /* Makes room for `need` items in a growing array (*capacity items of `size` bytes at *array),
  * growing it by half. False when memory is short; the array stays valid. */
 bool ebpo_grow(void *array, uint64_t *capacity, uint64_t need, size_t size);
+
+/* Memory that making something may take, counted while it is made. */
+
+/* One thread. `needed` is set by what is refused: so much might do, always more than `most`. */
+typedef struct ebpo_room {
+    uint64_t most, taken, needed;
+} ebpo_room;
+
+/* EBPO_E_LIMIT if there is no room for so much beside what is taken. NULL: no limit. */
+EBPO_MUST_USE ebpo_status ebpo_room_check(ebpo_room *room, uint64_t bytes, ebpo_error *error);
+/* The same, and takes it. */
+EBPO_MUST_USE ebpo_status ebpo_room_take(ebpo_room *room, uint64_t bytes, ebpo_error *error);
+void ebpo_room_give(ebpo_room *room, uint64_t bytes);
 
 #endif

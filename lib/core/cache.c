@@ -1,66 +1,420 @@
-#include "core/cache.h"
-
+/* Caches of items under a budget. A pool has one lock, one table of slots by cache and key, and
+ * one order of last use for all its caches; a cache with a budget of its own has a pool of its
+ * own. Room for an item is reserved before it is loaded, and the lock is not held while a source
+ * loads or releases: a slot is LOADING meanwhile, and those who want the same key wait for it.
+ * Requests for room that have to wait are served in the order in which they came, or a large one
+ * might wait for ever. A background thread loads what was announced; it evicts nothing that is in
+ * use or was announced with it. */
 #include <inttypes.h>
 #include <pthread.h>
 #include <signal.h>
+#include <stdbool.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/clock.h"
+#include "core/cache.h"
 #include "core/error.h"
+#include "core/hash.h"
+#include "core/os.h"
 #include "core/parallel.h"
-#include "core/cache_room.h"
 
-static void pin(ebpo_cache *c, ebpo_cache_slot *s)
+/* What caches hold that share a budget: a table by cache and key, and the order of last use of what
+ * is not in use. */
+
+typedef enum cache_slot_state { LOADING, READY, FAILED } cache_slot_state;
+
+struct ebpo_cache;
+
+/* One key of one cache. In the table while LOADING or READY; a FAILED one lives on until its last
+ * waiter has seen it. */
+typedef struct cache_slot {
+    struct ebpo_cache *owner;
+    uint64_t key, bytes;
+    cache_slot_state state;
+    unsigned pins, waiters;
+    void *item;
+    struct cache_slot *chain;         /* in its bucket, or in a list of items that leave */
+    struct cache_slot *older, *newer; /* READY and not pinned: by last use */
+} cache_slot;
+
+/* Chains by hash: unlike in core/hash.h, keys are taken out again. */
+typedef struct cache_slots {
+    cache_slot **bucket;
+    uint64_t bucket_count, count;
+    cache_slot *oldest, *newest;
+} cache_slots;
+
+/* A cache's parts, and how room is made in the budget that caches share. Inside lib/core. */
+
+/* One order of last use for all its caches, and one lock; a cache of its own budget has one too. */
+struct ebpo_cache_pool {
+    uint64_t budget;
+    pthread_mutex_t lock;   /* guards all below; never held while a source is called */
+    pthread_cond_t changed; /* loads ended, room came free */
+    cache_slots slots;
+    uint64_t bytes, peak_bytes; /* of all caches, and what has been taken for good */
+    uint64_t pinned;            /* bytes of items that are in use */
+    uint64_t taken;             /* for good: ebpo_cache_pool_take */
+    uint64_t aside_most;
+    /* bytes reserved for loads under way, and of items on their way out: these become free or
+     * pinned without anyone's help */
+    uint64_t passing;
+    /* gets that wait for room are served in the order they came, or a large one might wait for ever
+     */
+    uint64_t tickets, serving;
+};
+
+struct ebpo_cache {
+    ebpo_cache_source source;
+    char name[32];
+    ebpo_cache_pool *pool;
+    bool alone; /* the pool is its own */
+    /* the background has something to do: apart from `changed`, or each unpin would wake it */
+    pthread_cond_t asked;
+    uint64_t aside_most, aside;
+    uint64_t leaving; /* items that are out of the table and are being released */
+    ebpo_cache_stats stats;
+    bool ahead_runs, stop;
+    pthread_t ahead_thread;
+    uint64_t ahead[EBPO_CACHE_AHEAD];
+    unsigned ahead_count, ahead_next;
+    uint64_t asking; /* how often something was asked for */
+};
+
+/* What there must be room for. The background yields to everyone else, and drops nothing that was
+ * asked for together. */
+typedef struct cache_demand {
+    ebpo_cache *cache; /* NULL: for good */
+    uint64_t key, peak;
+    bool ahead;
+    bool aside; /* of what is set aside anyway */
+    bool known; /* the peak, from an attempt before */
+} cache_demand;
+
+/* What follows is called with the lock held, which may be let go meanwhile. */
+
+typedef enum cache_capacity { ROOM_MADE, ROOM_LATER, ROOM_NEVER } cache_capacity;
+
+/* False: out of memory. Its user frees the slots, then `bucket`. */
+static bool make_slots(cache_slots *t)
+{
+    enum { BUCKETS = 64 };
+    *t = (cache_slots){ .bucket = ebpo_alloc_zero(BUCKETS, sizeof *t->bucket) };
+    t->bucket_count = BUCKETS;
+    return t->bucket != NULL;
+}
+
+static cache_slot **bucket_of(cache_slot **bucket, uint64_t bucket_count,
+                              const struct ebpo_cache *owner, uint64_t key)
+{
+    uint64_t hash = ebpo_hash_number(ebpo_hash_number((uintptr_t)owner) + key);
+    return &bucket[hash & (bucket_count - 1)];
+}
+
+/* NULL: it has none of this key. */
+static cache_slot *find_slot(const cache_slots *t, const struct ebpo_cache *owner, uint64_t key)
+{
+    cache_slot *s = *bucket_of(t->bucket, t->bucket_count, owner, key);
+    while (s && (s->key != key || s->owner != owner))
+        s = s->chain;
+    return s;
+}
+
+/* Without memory the chains stay long, and that is all. */
+static void grow_table(cache_slots *t)
+{
+    uint64_t count = 2 * t->bucket_count;
+    cache_slot **bucket = ebpo_alloc_zero(count, sizeof *bucket);
+    if (!bucket)
+        return;
+    for (uint64_t i = 0; i < t->bucket_count; i++)
+        for (cache_slot *s = t->bucket[i], *next; s; s = next) {
+            next = s->chain;
+            cache_slot **to = bucket_of(bucket, count, s->owner, s->key);
+            s->chain = *to;
+            *to = s;
+        }
+    free(t->bucket);
+    t->bucket = bucket;
+    t->bucket_count = count;
+}
+
+/* A new one, LOADING, in the table but not in the order; NULL: out of memory. */
+static cache_slot *add_slot(cache_slots *t, struct ebpo_cache *owner, uint64_t key)
+{
+    cache_slot *s = ebpo_alloc_zero(1, sizeof *s);
+    if (!s)
+        return NULL;
+    if (t->count++ == t->bucket_count)
+        grow_table(t);
+    s->owner = owner;
+    s->key = key;
+    cache_slot **to = bucket_of(t->bucket, t->bucket_count, owner, key);
+    s->chain = *to;
+    *to = s;
+    return s;
+}
+
+static void take_slot_out(cache_slots *t, cache_slot *s)
+{
+    cache_slot **at = bucket_of(t->bucket, t->bucket_count, s->owner, s->key);
+    while (*at != s)
+        at = &(*at)->chain;
+    *at = s->chain;
+    t->count--;
+}
+
+/* Into the order of last use as the newest, and out of it. */
+static void link_slot(cache_slots *t, cache_slot *s)
+{
+    s->older = t->newest;
+    s->newer = NULL;
+    *(t->newest ? &t->newest->newer : &t->oldest) = s;
+    t->newest = s;
+}
+
+static void unlink_slot(cache_slots *t, cache_slot *s)
+{
+    *(s->older ? &s->older->newer : &t->oldest) = s->newer;
+    *(s->newer ? &s->newer->older : &t->newest) = s->older;
+}
+
+/* Room in a budget: what is used least recently goes, whoever's it is. */
+
+static void count_bytes(ebpo_cache_pool *p, ebpo_cache *c, uint64_t bytes)
+{
+    p->bytes += bytes;
+    if (p->bytes > p->peak_bytes)
+        p->peak_bytes = p->bytes;
+    if (!c)
+        return;
+    c->stats.bytes += bytes;
+    if (c->stats.bytes > c->stats.peak_bytes)
+        c->stats.peak_bytes = c->stats.bytes;
+}
+
+static bool is_asked_ahead(const ebpo_cache *c, uint64_t key)
+{
+    for (unsigned i = 0; i < c->ahead_count; i++)
+        if (c->ahead[i] == key)
+            return true;
+    return false;
+}
+
+/* Items that are out of the table: their bytes count until they are really gone, or another thread
+ * would use them twice. */
+static void release_leaving(ebpo_cache_pool *p, cache_slot *leaving)
+{
+    if (!leaving)
+        return;
+    pthread_mutex_unlock(&p->lock);
+    for (const cache_slot *s = leaving; s; s = s->chain)
+        s->owner->source.release(s->owner->source.user, s->item);
+    pthread_mutex_lock(&p->lock);
+    for (cache_slot *next; leaving; leaving = next) {
+        next = leaving->chain;
+        p->bytes -= leaving->bytes;
+        p->passing -= leaving->bytes;
+        leaving->owner->stats.bytes -= leaving->bytes;
+        leaving->owner->leaving--;
+        free(leaving);
+    }
+    pthread_cond_broadcast(&p->changed);
+}
+
+/* Takes an item out of the table, into the list of those that leave; and releases these. */
+static void drop_item(ebpo_cache_pool *p, cache_slot *s, cache_slot **leaving)
+{
+    unlink_slot(&p->slots, s);
+    take_slot_out(&p->slots, s);
+    p->passing += s->bytes;
+    s->owner->leaving++;
+    s->chain = *leaving;
+    *leaving = s;
+}
+
+/* Bytes that the background may not drop: what was asked for together. */
+static uint64_t kept_for(const ebpo_cache_pool *p, const cache_demand *d)
+{
+    uint64_t bytes = 0;
+    for (unsigned i = 0; d->ahead && i < d->cache->ahead_count; i++) {
+        const cache_slot *s = find_slot(&p->slots, d->cache, d->cache->ahead[i]);
+        bytes += s && s->state == READY && !s->pins ? s->bytes : 0;
+    }
+    return bytes;
+}
+
+static uint64_t saturated_sum(uint64_t a, uint64_t b)
+{
+    return a > UINT64_MAX - b ? UINT64_MAX : a + b;
+}
+
+/* Of the budget, what nothing can be dropped for. */
+static uint64_t held_for(const ebpo_cache_pool *p, const cache_demand *d)
+{
+    uint64_t held = saturated_sum(saturated_sum(p->pinned, p->taken), p->aside_most);
+    return saturated_sum(saturated_sum(held, kept_for(p, d)), d->aside ? 0 : d->peak);
+}
+
+/* Reserves d->peak, dropping the least recently used items. ROOM_LATER: when loads under way end.
+ */
+static cache_capacity make_room(ebpo_cache_pool *p, const cache_demand *d)
+{
+    while (p->budget && saturated_sum(p->bytes, d->peak) > p->budget) {
+        uint64_t held = held_for(p, d);
+        if (held > p->budget)
+            return ROOM_NEVER;
+        if (saturated_sum(held, p->passing) > p->budget)
+            return ROOM_LATER;
+        cache_slot *leaving = NULL;
+        uint64_t left = saturated_sum(p->bytes, d->peak);
+        for (cache_slot *s = p->slots.oldest, *newer; s && left > p->budget; s = newer) {
+            newer = s->newer;
+            if (d->ahead && s->owner == d->cache && is_asked_ahead(d->cache, s->key))
+                continue;
+            left -= s->bytes;
+            s->owner->stats.evicted++;
+            drop_item(p, s, &leaving);
+        }
+        release_leaving(p, leaving);
+    }
+    count_bytes(p, d->cache, d->peak);
+    p->passing += d->peak;
+    return ROOM_MADE;
+}
+
+/* The same, in turn, as soon as there is room. False: there will be none. */
+static bool wait_in_turn(ebpo_cache_pool *p, const cache_demand *d)
+{
+    uint64_t ticket = p->tickets++;
+    cache_capacity got = ROOM_LATER;
+    while (ticket != p->serving || (got = make_room(p, d)) == ROOM_LATER)
+        pthread_cond_wait(&p->changed, &p->lock);
+    p->serving++;
+    pthread_cond_broadcast(&p->changed);
+    return got == ROOM_MADE;
+}
+
+/* What was reserved for a load. */
+static void give_back_reserved(ebpo_cache *c, uint64_t reserved)
+{
+    c->stats.bytes -= reserved;
+    c->pool->bytes -= reserved;
+    c->pool->passing -= reserved;
+    pthread_cond_broadcast(&c->pool->changed);
+}
+
+/* --- pools --- */
+
+ebpo_status ebpo_cache_pool_make(ebpo_cache_pool **out, uint64_t budget, ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_cache_pool *p = ebpo_alloc_zero(1, sizeof *p);
+    if (!p || !make_slots(&p->slots)) {
+        free(p);
+        return ebpo_fail_memory(error, sizeof *p);
+    }
+    p->budget = budget;
+    pthread_mutex_init(&p->lock, NULL);
+    pthread_cond_init(&p->changed, NULL);
+    *out = p;
+    return EBPO_OK;
+}
+
+void ebpo_cache_pool_free(ebpo_cache_pool *p)
+{
+    if (!p)
+        return;
+    pthread_cond_destroy(&p->changed);
+    pthread_mutex_destroy(&p->lock);
+    free(p->slots.bucket);
+    free(p);
+}
+
+ebpo_status ebpo_cache_pool_take(ebpo_cache_pool *p, uint64_t bytes, ebpo_error *error)
+{
+    cache_demand d = { .peak = bytes };
+    pthread_mutex_lock(&p->lock);
+    bool made = wait_in_turn(p, &d);
+    uint64_t held = held_for(p, &d);
+    if (made) {
+        p->passing -= bytes;
+        p->taken += bytes;
+    }
+    pthread_mutex_unlock(&p->lock);
+    return made ? EBPO_OK
+                : ebpo_fail(error, EBPO_E_LIMIT,
+                            "%" PRIu64 " bytes of a shared budget are not free: there are %" PRIu64
+                            ", and with what is in use that would be %" PRIu64,
+                            bytes, p->budget, held);
+}
+
+void ebpo_cache_pool_give_back(ebpo_cache_pool *p, uint64_t bytes)
+{
+    pthread_mutex_lock(&p->lock);
+    p->taken -= bytes;
+    p->bytes -= bytes;
+    pthread_cond_broadcast(&p->changed);
+    pthread_mutex_unlock(&p->lock);
+}
+
+void ebpo_cache_pool_get_bytes(ebpo_cache_pool *p, uint64_t *now, uint64_t *peak, uint64_t *taken)
+{
+    pthread_mutex_lock(&p->lock);
+    *now = p->bytes;
+    *peak = p->peak_bytes;
+    *taken = p->taken;
+    pthread_mutex_unlock(&p->lock);
+}
+
+static void pin_slot(ebpo_cache *c, cache_slot *s)
 {
     if (s->pins++ == 0) {
-        ebpo_cache_slots_unlink(&c->pool->slots, s);
+        unlink_slot(&c->pool->slots, s);
         c->pool->pinned += s->bytes;
     }
 }
 
 /* --- loading --- */
 
-static uint64_t sum(uint64_t a, uint64_t b) { return a > UINT64_MAX - b ? UINT64_MAX : a + b; }
-
 static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error)
 {
     ebpo_cache_pool *p = c->pool;
-    ebpo_cache_demand d = { .cache = c, .peak = peak };
-    if (ebpo_cache_wait_for_room(p, &d))
+    cache_demand d = { .cache = c, .peak = peak };
+    if (wait_in_turn(p, &d))
         return EBPO_OK;
-    uint64_t used = sum(sum(p->pinned, p->taken), p->aside_most);
+    uint64_t used = saturated_sum(saturated_sum(p->pinned, p->taken), p->aside_most);
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the %s cache's budget is %" PRIu64 " bytes, of which %" PRIu64
                      " are in use, and one %s more takes up to %" PRIu64 "; a budget of %" PRIu64
                      " would do",
-                     c->name, p->budget, used, c->name, peak, sum(used, peak));
+                     c->name, p->budget, used, c->name, peak, saturated_sum(used, peak));
 }
 
 /* Ends a load: `reserved` gives way to the item, which is pinned by whoever waits for it (and `own`
  * times more), or to nothing. */
-static void end_load(ebpo_cache *c, ebpo_cache_slot *s, bool loaded, uint64_t reserved,
-                     unsigned own)
+static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserved, unsigned own)
 {
-    ebpo_cache_give_back(c, reserved);
+    give_back_reserved(c, reserved);
     if (loaded) {
         s->state = READY;
         s->pins = own + s->waiters;
-        ebpo_cache_count_bytes(c->pool, c, s->bytes);
+        count_bytes(c->pool, c, s->bytes);
         if (s->pins)
             c->pool->pinned += s->bytes;
         else
-            ebpo_cache_slots_link(&c->pool->slots, s);
+            link_slot(&c->pool->slots, s);
     } else {
-        ebpo_cache_slots_take(&c->pool->slots, s);
+        take_slot_out(&c->pool->slots, s);
         s->state = FAILED;
         if (s->waiters == 0)
             free(s);
     }
 }
 
-static ebpo_status estimate(ebpo_cache *c, uint64_t key, uint64_t *peak, ebpo_error *error)
+static ebpo_status estimate_bytes(ebpo_cache *c, uint64_t key, uint64_t *peak, ebpo_error *error)
 {
     uint64_t keep = 0;
     *peak = 0;
@@ -71,7 +425,7 @@ static ebpo_status estimate(ebpo_cache *c, uint64_t key, uint64_t *peak, ebpo_er
 
 /* Calls the source, without the lock; an item that is larger than was said cannot stay. *needed:
  * what the source asks for, or 0. */
-static ebpo_status call_load(ebpo_cache *c, ebpo_cache_slot *s, uint64_t reserved, uint64_t *needed,
+static ebpo_status call_load(ebpo_cache *c, cache_slot *s, uint64_t reserved, uint64_t *needed,
                              ebpo_error *error)
 {
     void *item = NULL;
@@ -94,8 +448,8 @@ static ebpo_status call_load(ebpo_cache *c, ebpo_cache_slot *s, uint64_t reserve
 
 /* With room for s's load, more of it each time that the source asks for that; *reserved: what ends
  * with the load. The lock is held at beginning and end. */
-static ebpo_status load_with_room(ebpo_cache *c, ebpo_cache_slot *s, uint64_t peak,
-                                  uint64_t *reserved, ebpo_error *error)
+static ebpo_status load_with_room(ebpo_cache *c, cache_slot *s, uint64_t peak, uint64_t *reserved,
+                                  ebpo_error *error)
 {
     for (;;) {
         uint64_t needed = 0;
@@ -108,7 +462,7 @@ static ebpo_status load_with_room(ebpo_cache *c, ebpo_cache_slot *s, uint64_t pe
         pthread_mutex_lock(&c->pool->lock);
         if (!needed)
             return status;
-        ebpo_cache_give_back(c, *reserved);
+        give_back_reserved(c, *reserved);
         *reserved = 0;
         peak = needed;
     }
@@ -117,13 +471,12 @@ static ebpo_status load_with_room(ebpo_cache *c, ebpo_cache_slot *s, uint64_t pe
 /* The lock is held at beginning and end. */
 static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
-    ebpo_cache_slot *s =
-        ebpo_cache_slots_add(&c->pool->slots, c, key); /* from here on others wait for this load */
+    cache_slot *s = add_slot(&c->pool->slots, c, key); /* from here on others wait for this load */
     uint64_t peak = 0, reserved = 0;
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
     pthread_mutex_unlock(&c->pool->lock);
-    ebpo_status status = estimate(c, key, &peak, error);
+    ebpo_status status = estimate_bytes(c, key, &peak, error);
     pthread_mutex_lock(&c->pool->lock);
     if (status == EBPO_OK)
         status = load_with_room(c, s, peak, &reserved, error);
@@ -136,7 +489,7 @@ static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_erro
 }
 
 /* Waits for another thread's load; false when it failed. The pin is already taken for us. */
-static bool wait_for(ebpo_cache *c, ebpo_cache_slot *s, void **item)
+static bool wait_for(ebpo_cache *c, cache_slot *s, void **item)
 {
     s->waiters++;
     while (s->state == LOADING)
@@ -153,9 +506,9 @@ static bool wait_for(ebpo_cache *c, ebpo_cache_slot *s, void **item)
 
 static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
-    for (ebpo_cache_slot *s; (s = ebpo_cache_slots_find(&c->pool->slots, c, key)) != NULL;) {
+    for (cache_slot *s; (s = find_slot(&c->pool->slots, c, key)) != NULL;) {
         if (s->state == READY) {
-            pin(c, s);
+            pin_slot(c, s);
             *item = s->item;
             return EBPO_OK;
         }
@@ -168,10 +521,10 @@ static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_e
 /* Pins an item that is there. */
 static bool take_ready(ebpo_cache *c, uint64_t key, void **item)
 {
-    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->pool->slots, c, key);
+    cache_slot *s = find_slot(&c->pool->slots, c, key);
     if (!s || s->state != READY)
         return false;
-    pin(c, s);
+    pin_slot(c, s);
     *item = s->item;
     c->stats.hits++;
     return true;
@@ -205,7 +558,7 @@ bool ebpo_cache_try(ebpo_cache *c, uint64_t key, void **item)
 bool ebpo_cache_has(ebpo_cache *c, uint64_t key)
 {
     pthread_mutex_lock(&c->pool->lock);
-    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->pool->slots, c, key);
+    cache_slot *s = find_slot(&c->pool->slots, c, key);
     bool there = s && s->state == READY;
     pthread_mutex_unlock(&c->pool->lock);
     return there;
@@ -214,10 +567,10 @@ bool ebpo_cache_has(ebpo_cache *c, uint64_t key)
 void ebpo_cache_unpin(ebpo_cache *c, uint64_t key)
 {
     pthread_mutex_lock(&c->pool->lock);
-    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->pool->slots, c, key);
+    cache_slot *s = find_slot(&c->pool->slots, c, key);
     if (s && s->pins && --s->pins == 0) {
         c->pool->pinned -= s->bytes;
-        ebpo_cache_slots_link(&c->pool->slots, s);
+        link_slot(&c->pool->slots, s);
         pthread_cond_broadcast(&c->pool->changed);
     }
     pthread_mutex_unlock(&c->pool->lock);
@@ -235,12 +588,12 @@ void ebpo_cache_set_aside(ebpo_cache *c, uint64_t most)
 
 bool ebpo_cache_take_aside(ebpo_cache *c, uint64_t bytes)
 {
-    ebpo_cache_demand d = { .cache = c, .peak = bytes, .aside = true };
+    cache_demand d = { .cache = c, .peak = bytes, .aside = true };
     pthread_mutex_lock(&c->pool->lock);
     bool taken = bytes <= c->aside_most - c->aside;
     if (taken) {
         c->aside += bytes;
-        taken = ebpo_cache_make_room(c->pool, &d) == ROOM_MADE;
+        taken = make_room(c->pool, &d) == ROOM_MADE;
         *(taken ? &c->pool->passing : &c->aside) -= bytes;
     }
     pthread_mutex_unlock(&c->pool->lock);
@@ -261,22 +614,20 @@ void ebpo_cache_give_back_aside(ebpo_cache *c, uint64_t bytes)
 
 /* Loads d->key in the background, or lets it be; false when it must wait for the loads of others.
  * Nobody waits for our key meanwhile: whoever wants it loads it. */
-static bool load_ahead(ebpo_cache *c, ebpo_cache_demand *d)
+static bool load_ahead(ebpo_cache *c, cache_demand *d)
 {
-    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->pool->slots, c, d->key)
-                             ? NULL
-                             : ebpo_cache_slots_add(&c->pool->slots, c, d->key);
+    cache_slot *s =
+        find_slot(&c->pool->slots, c, d->key) ? NULL : add_slot(&c->pool->slots, c, d->key);
     if (!s)
         return true;
     if (!d->known) {
         pthread_mutex_unlock(&c->pool->lock);
-        d->known = estimate(c, d->key, &d->peak, NULL) == EBPO_OK;
+        d->known = estimate_bytes(c, d->key, &d->peak, NULL) == EBPO_OK;
         pthread_mutex_lock(&c->pool->lock);
     }
-    ebpo_cache_capacity got = !d->known ? ROOM_NEVER
-                              : c->pool->serving != c->pool->tickets
-                                  ? ROOM_LATER
-                                  : ebpo_cache_make_room(c->pool, d);
+    cache_capacity got = !d->known                              ? ROOM_NEVER
+                         : c->pool->serving != c->pool->tickets ? ROOM_LATER
+                                                                : make_room(c->pool, d);
     if (got != ROOM_MADE) {
         end_load(c, s, false, 0, 0);
         return got == ROOM_NEVER;
@@ -293,7 +644,7 @@ static bool load_ahead(ebpo_cache *c, ebpo_cache_demand *d)
 static void *run_ahead(void *context)
 {
     ebpo_cache *c = context;
-    ebpo_cache_demand d = { .cache = c, .ahead = true };
+    cache_demand d = { .cache = c, .ahead = true };
     pthread_mutex_lock(&c->pool->lock);
     while (!c->stop) {
         if (c->ahead_next == c->ahead_count) {
@@ -302,7 +653,7 @@ static void *run_ahead(void *context)
         }
         uint64_t asking = c->asking;
         if (!d.known || d.key != c->ahead[c->ahead_next])
-            d = (ebpo_cache_demand){ .cache = c, .key = c->ahead[c->ahead_next], .ahead = true };
+            d = (cache_demand){ .cache = c, .key = c->ahead[c->ahead_next], .ahead = true };
         bool done = load_ahead(c, &d);
         if (done)
             d.known = false;
@@ -333,13 +684,13 @@ static void take_list(ebpo_cache *c, const uint64_t *keys, unsigned count)
     c->ahead_count = c->ahead_next = 0;
     c->asking++;
     for (unsigned i = 0; i < count && i < EBPO_CACHE_AHEAD; i++)
-        if (!ebpo_cache_asked_ahead(c, keys[i]))
+        if (!is_asked_ahead(c, keys[i]))
             c->ahead[c->ahead_count++] = keys[i];
     for (unsigned i = c->ahead_count; i-- > 0;) {
-        ebpo_cache_slot *s = ebpo_cache_slots_find(&c->pool->slots, c, c->ahead[i]);
+        cache_slot *s = find_slot(&c->pool->slots, c, c->ahead[i]);
         if (s && s->state == READY && !s->pins) {
-            ebpo_cache_slots_unlink(&c->pool->slots, s);
-            ebpo_cache_slots_link(&c->pool->slots, s);
+            unlink_slot(&c->pool->slots, s);
+            link_slot(&c->pool->slots, s);
         }
     }
 }
@@ -386,21 +737,21 @@ ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, c
 }
 
 /* The lock is held. */
-static void clear(ebpo_cache *c)
+static void drop_unpinned(ebpo_cache *c)
 {
-    ebpo_cache_slot *leaving = NULL;
-    for (ebpo_cache_slot *s = c->pool->slots.oldest, *newer; s; s = newer) {
+    cache_slot *leaving = NULL;
+    for (cache_slot *s = c->pool->slots.oldest, *newer; s; s = newer) {
         newer = s->newer;
         if (s->owner == c)
-            ebpo_cache_drop(c->pool, s, &leaving);
+            drop_item(c->pool, s, &leaving);
     }
-    ebpo_cache_release_all(c->pool, leaving);
+    release_leaving(c->pool, leaving);
 }
 
 void ebpo_cache_clear(ebpo_cache *c)
 {
     pthread_mutex_lock(&c->pool->lock);
-    clear(c);
+    drop_unpinned(c);
     pthread_mutex_unlock(&c->pool->lock);
 }
 
@@ -429,7 +780,7 @@ void ebpo_cache_free(ebpo_cache *c)
     ebpo_cache_pool *p = c->pool;
     stop_ahead(c);
     pthread_mutex_lock(&p->lock);
-    clear(c);
+    drop_unpinned(c);
     while (c->leaving) /* others drop them, to make room */
         pthread_cond_wait(&p->changed, &p->lock);
     p->bytes -= c->aside;

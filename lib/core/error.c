@@ -1,11 +1,16 @@
-#include "core/error.h"
-
+/* Where a public function meets its caller. Errors: the status, and a message that names file,
+ * object and offset; the first cause is handed on, not replaced. Structs that begin with their
+ * size (ebpo/base.h): options are taken, and results filled in, for a caller that was compiled
+ * with an older or a newer version of the header; fields that this version does not know must be
+ * zero. */
+#include <ctype.h>
 #include <errno.h>
 #include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "core/error.h"
 #include "ebpo_config.h"
 
 const char *ebpo_version(void) { return EBPO_VERSION; }
@@ -38,8 +43,8 @@ static void keep_to_one_line(char *text)
             *text = ' ';
 }
 
-static ebpo_status fail(ebpo_error *error, ebpo_status status, const char *file, const char *object,
-                        int64_t offset, const char *format, va_list args)
+static ebpo_status fill_error(ebpo_error *error, ebpo_status status, const char *file,
+                              const char *object, int64_t offset, const char *format, va_list args)
 {
     int begin = 0;
     if (!error)
@@ -62,7 +67,7 @@ ebpo_status ebpo_fail(ebpo_error *error, ebpo_status status, const char *format,
 {
     va_list args;
     va_start(args, format);
-    fail(error, status, "", "", -1, format, args);
+    fill_error(error, status, "", "", -1, format, args);
     va_end(args);
     return status;
 }
@@ -72,7 +77,7 @@ ebpo_status ebpo_fail_file(ebpo_error *error, ebpo_status status, const char *fi
 {
     va_list args;
     va_start(args, format);
-    fail(error, status, file, "", -1, format, args);
+    fill_error(error, status, file, "", -1, format, args);
     va_end(args);
     return status;
 }
@@ -82,7 +87,7 @@ ebpo_status ebpo_fail_at(ebpo_error *error, ebpo_status status, const char *file
 {
     va_list args;
     va_start(args, format);
-    fail(error, status, file, object, offset, format, args);
+    fill_error(error, status, file, object, offset, format, args);
     va_end(args);
     return status;
 }
@@ -103,4 +108,57 @@ ebpo_status ebpo_fail_memory(ebpo_error *error, uint64_t bytes)
 ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *what)
 {
     return ebpo_fail_file(error, EBPO_E_IO, path, "%s: %s", what, strerror(errno));
+}
+
+/* No struct has been smaller than its size and one member, and none will be larger than two
+ * pages. */
+enum { SMALLEST = 2 * sizeof(size_t), LARGEST = 8192 };
+
+static bool is_plausible_size(size_t size)
+{
+    return size >= SMALLEST && size <= LARGEST && size % sizeof(size_t) == 0;
+}
+
+ebpo_status ebpo_sized_check(size_t size, const char *type, ebpo_error *error)
+{
+    char macro[64];
+    size_t n = 0;
+    if (is_plausible_size(size))
+        return EBPO_OK;
+    for (; type[n] && n + 1 < sizeof macro; n++)
+        macro[n] = (char)toupper((unsigned char)type[n]);
+    macro[n] = 0;
+    return ebpo_fail(error, EBPO_E_ARGUMENT,
+                     "%s: its struct_size is %zu, which no version has; begin it with %s_INIT",
+                     type, size, macro);
+}
+
+ebpo_status ebpo_sized_take(void *own, size_t own_size, const void *given, size_t given_size,
+                            const char *type, ebpo_error *error)
+{
+    const unsigned char *bytes = given;
+    size_t common = given_size < own_size ? given_size : own_size;
+    ebpo_status status = ebpo_sized_check(given_size, type, error);
+    if (status != EBPO_OK)
+        return status;
+    for (size_t i = own_size; i < given_size; i++)
+        if (bytes[i])
+            return ebpo_fail(error, EBPO_E_UNSUPPORTED,
+                             "%s: something is set in it that libebpo %s does not know; leave it "
+                             "away, or use a newer library",
+                             type, ebpo_version());
+    memcpy((unsigned char *)own + sizeof(size_t), bytes + sizeof(size_t), common - sizeof(size_t));
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_sized_give(void *out, size_t out_size, const void *filled, size_t size)
+{
+    unsigned char *bytes = out;
+    size_t common = out_size < size ? out_size : size;
+    if (!is_plausible_size(out_size))
+        return EBPO_E_ARGUMENT;
+    memcpy(bytes + sizeof(size_t), (const unsigned char *)filled + sizeof(size_t),
+           common - sizeof(size_t));
+    memset(bytes + common, 0, out_size - common);
+    return EBPO_OK;
 }

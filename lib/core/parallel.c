@@ -1,12 +1,16 @@
+/* Threads: a run of independent pieces of work, handed out in ascending order to the threads of
+ * the run, of which the calling one is the first; it alone reports progress. Which thread takes
+ * which piece is not determined, so results may not depend on it; of several failures the one of
+ * the lowest piece is returned. All threads of the library are started here, with a stack of a
+ * fixed size and the floating-point environment of the call. */
 #include "core/parallel.h"
 
 #include <stdatomic.h>
 
-#include "core/clock.h"
-#include "core/cores.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/release_pages.h"
+#include "core/workspace.h"
 
 /* No work of the library takes a quarter of this stack; sanitizers take some times as much. */
 enum { MAX_THREADS = 256, STACK_BYTES = 4 << 20 };
@@ -65,7 +69,7 @@ static void record_failure(run *r, uint64_t at, ebpo_status status, const ebpo_e
     atomic_store(&r->stop, true);
 }
 
-static void work(run *r, unsigned number)
+static void work_on_pieces(run *r, unsigned number)
 {
     double last = ebpo_seconds();
     while (!atomic_load(&r->stop)) {
@@ -91,7 +95,7 @@ static void *run_worker(void *argument)
 {
     EBPO_DEFAULT_FP;
     worker *w = argument;
-    work(w->r, w->number);
+    work_on_pieces(w->r, w->number);
     return NULL;
 }
 
@@ -152,7 +156,7 @@ ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint6
         if (ebpo_thread_start(&workers[started].thread, run_worker, &workers[started]) != 0)
             break; /* fewer threads give the same result */
     }
-    work(&r, 0);
+    work_on_pieces(&r, 0);
     for (unsigned i = 1; i < started; i++)
         pthread_join(workers[i].thread, NULL);
     pthread_mutex_destroy(&r.lock);

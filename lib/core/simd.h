@@ -1,11 +1,263 @@
-/* Four doubles at a time, in the compiler's own vectors. */
+/* Vectors by name, for kernels (core/cpu.h): eight floats, four doubles, and three doubles, one
+ * for each axis. Eight floats are one register with AVX2, otherwise two of 16 bytes (gcc 12 makes
+ * poor code of its own 32-byte vectors for these). Masks are all ones or all zeros in a lane. */
 #ifndef EBPO_CORE_SIMD_H
 #define EBPO_CORE_SIMD_H
 
 #include <stdint.h>
+#include <string.h>
 
 #if defined(__SSE2__)
 #include <immintrin.h>
+#endif
+
+#define EBPO_EIGHT static inline __attribute__((always_inline))
+
+#if defined(__AVX2__)
+
+typedef __m256 f8;
+
+EBPO_EIGHT f8 f8_all(float x) { return _mm256_set1_ps(x); }
+EBPO_EIGHT f8 f8_load(const float *x) { return _mm256_loadu_ps(x); }
+EBPO_EIGHT f8 f8_load_twice(const float *x) { return _mm256_broadcast_ps((const __m128 *)x); }
+EBPO_EIGHT f8 f8_spread0(f8 a) { return _mm256_permute_ps(a, 0x00); }
+EBPO_EIGHT f8 f8_spread1(f8 a) { return _mm256_permute_ps(a, 0x55); }
+EBPO_EIGHT f8 f8_spread2(f8 a) { return _mm256_permute_ps(a, 0xaa); }
+EBPO_EIGHT f8 f8_spread3(f8 a) { return _mm256_permute_ps(a, 0xff); }
+EBPO_EIGHT void f8_store(float *x, f8 a) { _mm256_storeu_ps(x, a); }
+EBPO_EIGHT f8 f8_add(f8 a, f8 b) { return _mm256_add_ps(a, b); }
+EBPO_EIGHT f8 f8_sub(f8 a, f8 b) { return _mm256_sub_ps(a, b); }
+EBPO_EIGHT f8 f8_mul(f8 a, f8 b) { return _mm256_mul_ps(a, b); }
+EBPO_EIGHT f8 f8_div(f8 a, f8 b) { return _mm256_div_ps(a, b); }
+EBPO_EIGHT f8 f8_min(f8 a, f8 b) { return _mm256_min_ps(a, b); }
+EBPO_EIGHT f8 f8_max(f8 a, f8 b) { return _mm256_max_ps(a, b); }
+EBPO_EIGHT f8 f8_sqrt(f8 a) { return _mm256_sqrt_ps(a); }
+EBPO_EIGHT f8 f8_about_inverse(f8 a) { return _mm256_rcp_ps(a); }
+EBPO_EIGHT f8 f8_less(f8 a, f8 b) { return _mm256_cmp_ps(a, b, _CMP_LT_OQ); }
+EBPO_EIGHT f8 f8_at_most(f8 a, f8 b) { return _mm256_cmp_ps(a, b, _CMP_LE_OQ); }
+EBPO_EIGHT f8 f8_and(f8 a, f8 b) { return _mm256_and_ps(a, b); }
+EBPO_EIGHT f8 f8_or(f8 a, f8 b) { return _mm256_or_ps(a, b); }
+EBPO_EIGHT f8 f8_xor(f8 a, f8 b) { return _mm256_xor_ps(a, b); }
+EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no) { return _mm256_blendv_ps(no, yes, mask); }
+EBPO_EIGHT unsigned f8_bits(f8 mask) { return (unsigned)_mm256_movemask_ps(mask); }
+/* x[from[0]], x[from[1]], ...; all of x[0] to x[7] may be read. */
+EBPO_EIGHT f8 f8_load_lanes(const float *x, const int32_t *from)
+{
+    return _mm256_permutevar8x32_ps(_mm256_loadu_ps(x), _mm256_loadu_si256((const __m256i *)from));
+}
+/* All ones in the lanes whose bits are set, zeros in the others. */
+EBPO_EIGHT f8 f8_mask(unsigned lanes)
+{
+    __m256i bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128),
+            on = _mm256_and_si256(_mm256_set1_epi32((int)lanes), bit);
+    return _mm256_castsi256_ps(_mm256_cmpeq_epi32(on, bit));
+}
+EBPO_EIGHT f8 f8_abs(f8 a)
+{
+    return _mm256_and_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(0x7fffffff)));
+}
+/* Eight numbers below 16, and 16 floats from which they pick. */
+typedef struct n8 {
+    __m256i low, high; /* the lower three bits count; all ones from 8 on */
+} n8;
+typedef struct f8_table {
+    f8 first;
+    __m256i other; /* what turns a number of the first eight into that of the others */
+} f8_table;
+EBPO_EIGHT n8 n8_from_bits(uint32_t bits)
+{
+    __m256i x = _mm256_srlv_epi32(_mm256_set1_epi32((int)bits),
+                                  _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
+    return (n8){ x, _mm256_srai_epi32(_mm256_slli_epi32(x, 28), 31) };
+}
+EBPO_EIGHT f8_table f8_table_load(const float *x)
+{
+    f8 first = f8_load(x);
+    return (f8_table){ first, _mm256_castps_si256(_mm256_xor_ps(first, f8_load(x + 8))) };
+}
+EBPO_EIGHT f8 f8_look_up(f8_table t, n8 at)
+{
+    __m256i other = _mm256_and_si256(_mm256_permutevar8x32_epi32(t.other, at.low), at.high);
+    return _mm256_xor_ps(_mm256_permutevar8x32_ps(t.first, at.low), _mm256_castsi256_ps(other));
+}
+EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
+{
+    return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)x)));
+}
+EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
+{
+    return _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)x)));
+}
+
+#else
+
+typedef float f4 __attribute__((vector_size(16)));
+typedef int32_t i4 __attribute__((vector_size(16)));
+typedef struct f8 {
+    f4 half[2];
+} f8;
+#define EBPO_BOTH(expression_of_h)           \
+    f8 out;                                  \
+    for (int h = 0; h < 2; h++)              \
+        out.half[h] = (f4)(expression_of_h); \
+    return out
+
+EBPO_EIGHT f8 f8_all(float x) { EBPO_BOTH(((f4){ x, x, x, x })); }
+EBPO_EIGHT f8 f8_load(const float *x)
+{
+    f8 out;
+    memcpy(&out, x, sizeof out);
+    return out;
+}
+EBPO_EIGHT f8 f8_load_twice(const float *x)
+{
+    f4 a;
+    memcpy(&a, x, sizeof a);
+    return (f8){ { a, a } };
+}
+EBPO_EIGHT f8 f8_load_lanes(const float *x, const int32_t *from)
+{
+    return (f8){ { { x[from[0]], x[from[1]], x[from[2]], x[from[3]] },
+                   { x[from[4]], x[from[5]], x[from[6]], x[from[7]] } } };
+}
+EBPO_EIGHT void f8_store(float *x, f8 a) { memcpy(x, &a, sizeof a); }
+EBPO_EIGHT f8 f8_add(f8 a, f8 b) { EBPO_BOTH(a.half[h] + b.half[h]); }
+EBPO_EIGHT f8 f8_sub(f8 a, f8 b) { EBPO_BOTH(a.half[h] - b.half[h]); }
+EBPO_EIGHT f8 f8_mul(f8 a, f8 b) { EBPO_BOTH(a.half[h] * b.half[h]); }
+EBPO_EIGHT f8 f8_div(f8 a, f8 b) { EBPO_BOTH(a.half[h] / b.half[h]); }
+EBPO_EIGHT f8 f8_less(f8 a, f8 b) { EBPO_BOTH(a.half[h] < b.half[h]); }
+EBPO_EIGHT f8 f8_at_most(f8 a, f8 b) { EBPO_BOTH(a.half[h] <= b.half[h]); }
+EBPO_EIGHT f8 f8_and(f8 a, f8 b) { EBPO_BOTH((i4)a.half[h] & (i4)b.half[h]); }
+EBPO_EIGHT f8 f8_or(f8 a, f8 b) { EBPO_BOTH((i4)a.half[h] | (i4)b.half[h]); }
+EBPO_EIGHT f8 f8_xor(f8 a, f8 b) { EBPO_BOTH((i4)a.half[h] ^ (i4)b.half[h]); }
+EBPO_EIGHT f8 f8_mask(unsigned lanes)
+{
+    EBPO_BOTH((((int32_t)lanes >> 4 * h) & (i4){ 1, 2, 4, 8 }) != 0);
+}
+EBPO_EIGHT f8 f8_abs(f8 a) { EBPO_BOTH((i4)a.half[h] & 0x7fffffff); }
+EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no)
+{
+    EBPO_BOTH(((i4)yes.half[h] & (i4)mask.half[h]) | ((i4)no.half[h] & ~(i4)mask.half[h]));
+}
+
+/* Eight numbers below 16, and 16 floats from which they pick. */
+typedef struct n8 {
+    uint32_t bits;
+} n8;
+typedef struct f8_table {
+    const float *x;
+} f8_table;
+EBPO_EIGHT n8 n8_from_bits(uint32_t bits) { return (n8){ bits }; }
+EBPO_EIGHT f8_table f8_table_load(const float *x) { return (f8_table){ x }; }
+EBPO_EIGHT f8 f8_look_up(f8_table t, n8 at)
+{
+    EBPO_BOTH(((f4){ t.x[at.bits >> 16 * h & 15], t.x[at.bits >> (16 * h + 4) & 15],
+                     t.x[at.bits >> (16 * h + 8) & 15], t.x[at.bits >> (16 * h + 12) & 15] }));
+}
+
+#if defined(__SSE2__)
+EBPO_EIGHT f8 f8_min(f8 a, f8 b) { EBPO_BOTH(_mm_min_ps(a.half[h], b.half[h])); }
+EBPO_EIGHT f8 f8_max(f8 a, f8 b) { EBPO_BOTH(_mm_max_ps(a.half[h], b.half[h])); }
+EBPO_EIGHT f8 f8_sqrt(f8 a) { EBPO_BOTH(_mm_sqrt_ps(a.half[h])); }
+EBPO_EIGHT f8 f8_about_inverse(f8 a) { EBPO_BOTH(_mm_rcp_ps(a.half[h])); }
+EBPO_EIGHT unsigned f8_bits(f8 mask)
+{
+    return (unsigned)(_mm_movemask_ps(mask.half[0]) | _mm_movemask_ps(mask.half[1]) << 4);
+}
+EBPO_EIGHT f8 f8_spread0(f8 a) { EBPO_BOTH(_mm_shuffle_ps(a.half[h], a.half[h], 0x00)); }
+EBPO_EIGHT f8 f8_spread1(f8 a) { EBPO_BOTH(_mm_shuffle_ps(a.half[h], a.half[h], 0x55)); }
+EBPO_EIGHT f8 f8_spread2(f8 a) { EBPO_BOTH(_mm_shuffle_ps(a.half[h], a.half[h], 0xaa)); }
+EBPO_EIGHT f8 f8_spread3(f8 a) { EBPO_BOTH(_mm_shuffle_ps(a.half[h], a.half[h], 0xff)); }
+EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
+{
+    __m128i none = _mm_setzero_si128(),
+            words = _mm_unpacklo_epi8(_mm_loadl_epi64((const __m128i *)x), none);
+    return (f8){ { _mm_cvtepi32_ps(_mm_unpacklo_epi16(words, none)),
+                   _mm_cvtepi32_ps(_mm_unpackhi_epi16(words, none)) } };
+}
+EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
+{
+    __m128i words = _mm_loadu_si128((const __m128i *)x);
+    return (f8){ { _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(words, words), 16)),
+                   _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(words, words), 16)) } };
+}
+#else
+#include <math.h>
+EBPO_EIGHT f8 f8_min(f8 a, f8 b) { return f8_pick(f8_less(a, b), a, b); }
+EBPO_EIGHT f8 f8_max(f8 a, f8 b) { return f8_pick(f8_less(b, a), a, b); }
+EBPO_EIGHT f8 f8_about_inverse(f8 a) { return f8_div(f8_all(1), a); }
+EBPO_EIGHT f8 f8_spread0(f8 a) { return f8_all(a.half[0][0]); }
+EBPO_EIGHT f8 f8_spread1(f8 a) { return f8_all(a.half[0][1]); }
+EBPO_EIGHT f8 f8_spread2(f8 a) { return f8_all(a.half[0][2]); }
+EBPO_EIGHT f8 f8_spread3(f8 a) { return f8_all(a.half[0][3]); }
+EBPO_EIGHT f8 f8_sqrt(f8 a)
+{
+    for (int i = 0; i < 8; i++)
+        a.half[i / 4][i % 4] = sqrtf(a.half[i / 4][i % 4]);
+    return a;
+}
+EBPO_EIGHT unsigned f8_bits(f8 mask)
+{
+    unsigned out = 0;
+    for (int i = 0; i < 8; i++)
+        out |= (unsigned)(((i4)mask.half[i / 4])[i % 4] < 0) << i;
+    return out;
+}
+EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
+{
+    f8 out;
+    for (int i = 0; i < 8; i++)
+        out.half[i / 4][i % 4] = x[i];
+    return out;
+}
+EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
+{
+    f8 out;
+    for (int i = 0; i < 8; i++)
+        out.half[i / 4][i % 4] = x[i];
+    return out;
+}
+#endif
+#endif
+
+/* f8_load_twice: four floats, each half of the eight being these; f8_spread0 to 3: one of such four
+ * in all lanes. */
+EBPO_EIGHT f8 f8_min3(f8 a, f8 b, f8 c) { return f8_min(a, f8_min(b, c)); }
+EBPO_EIGHT f8 f8_max3(f8 a, f8 b, f8 c) { return f8_max(a, f8_max(b, c)); }
+
+/* 1 / a to about 2^-22, not always the same on all processors: for filters only. No number for 0.
+ */
+EBPO_EIGHT f8 f8_inverse(f8 a)
+{
+    f8 x = f8_about_inverse(a);
+    return f8_mul(x, f8_sub(f8_all(2), f8_mul(a, x)));
+}
+
+/* The least of the eight, none of which may be no number. */
+EBPO_EIGHT float f8_least(f8 a)
+{
+#if defined(__AVX2__)
+    __m128 x = _mm_min_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps(a, 1));
+    x = _mm_min_ps(x, _mm_movehl_ps(x, x));
+    return _mm_cvtss_f32(_mm_min_ss(x, _mm_movehdup_ps(x)));
+#elif defined(__SSE2__)
+    __m128 x = _mm_min_ps(a.half[0], a.half[1]);
+    x = _mm_min_ps(x, _mm_movehl_ps(x, x));
+    return _mm_cvtss_f32(_mm_min_ss(x, _mm_shuffle_ps(x, x, 1)));
+#else
+    float least = a.half[0][0];
+    for (int i = 1; i < 8; i++)
+        least = a.half[i / 4][i % 4] < least ? a.half[i / 4][i % 4] : least;
+    return least;
+#endif
+}
+
+/* Four doubles at a time, in the compiler's own vectors. Inlined everywhere: no call passes one on,
+ * whatever the ABI for them. */
+
+#if !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
 typedef double v4d __attribute__((vector_size(32)));
@@ -32,6 +284,87 @@ static inline unsigned v4l_mask(v4l m)
         out |= (unsigned)(m[i] < 0) << i;
     return out;
 }
+#endif
+
+#if !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif
+
+/* Three doubles at a time, one for each axis: a register with AVX2, otherwise plain arithmetic. The
+ * same bits either way. */
+
+#if defined(__AVX2__)
+
+typedef __m256d d3; /* the fourth is some number that nobody looks at */
+
+EBPO_EIGHT d3 d3_all(double x) { return _mm256_set1_pd(x); }
+/* One by one: what was just stored one by one is not there as a whole yet. */
+EBPO_EIGHT d3 d3_load(const double x[3]) { return _mm256_setr_pd(x[0], x[1], x[2], 0); }
+EBPO_EIGHT d3 d3_add(d3 a, d3 b) { return _mm256_add_pd(a, b); }
+EBPO_EIGHT d3 d3_sub(d3 a, d3 b) { return _mm256_sub_pd(a, b); }
+EBPO_EIGHT d3 d3_mul(d3 a, d3 b) { return _mm256_mul_pd(a, b); }
+EBPO_EIGHT d3 d3_div(d3 a, d3 b) { return _mm256_div_pd(a, b); }
+EBPO_EIGHT d3 d3_max(d3 a, d3 b) { return _mm256_max_pd(a, b); }
+EBPO_EIGHT d3 d3_abs(d3 a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
+/* a, not negative, with the signs of b */
+EBPO_EIGHT d3 d3_signed(d3 a, d3 b)
+{
+    return _mm256_or_pd(a, _mm256_and_pd(b, _mm256_set1_pd(-0.0)));
+}
+/* A bit for each that has a sign. */
+EBPO_EIGHT unsigned d3_signs(d3 a) { return (unsigned)_mm256_movemask_pd(a) & 7; }
+EBPO_EIGHT void d3_store(double x[4], d3 a) { _mm256_storeu_pd(x, a); }
+/* As floats, rounded to nearest; of which the fourth counts for nothing. */
+EBPO_EIGHT void d3_store_floats(float x[4], d3 a) { _mm_storeu_ps(x, _mm256_cvtpd_ps(a)); }
+/* The same, one place later. */
+EBPO_EIGHT void d3_store_floats_after(float x[4], d3 a)
+{
+    __m128 y = _mm256_cvtpd_ps(a);
+    _mm_storeu_ps(x, _mm_shuffle_ps(y, y, _MM_SHUFFLE(2, 1, 0, 3)));
+}
+/* What is lost by rounding to floats. */
+EBPO_EIGHT d3 d3_beyond_floats(d3 a) { return d3_sub(a, _mm256_cvtps_pd(_mm256_cvtpd_ps(a))); }
+
+#else
+
+typedef struct d3 {
+    double x[3];
+} d3;
+#define EBPO_THREE(expression_of_k)   \
+    d3 out;                           \
+    for (int k = 0; k < 3; k++)       \
+        out.x[k] = (expression_of_k); \
+    return out
+
+EBPO_EIGHT d3 d3_all(double x) { EBPO_THREE(x); }
+EBPO_EIGHT d3 d3_load(const double x[3]) { EBPO_THREE(x[k]); }
+EBPO_EIGHT d3 d3_add(d3 a, d3 b) { EBPO_THREE(a.x[k] + b.x[k]); }
+EBPO_EIGHT d3 d3_sub(d3 a, d3 b) { EBPO_THREE(a.x[k] - b.x[k]); }
+EBPO_EIGHT d3 d3_mul(d3 a, d3 b) { EBPO_THREE(a.x[k] * b.x[k]); }
+EBPO_EIGHT d3 d3_div(d3 a, d3 b) { EBPO_THREE(a.x[k] / b.x[k]); }
+EBPO_EIGHT d3 d3_max(d3 a, d3 b) { EBPO_THREE(a.x[k] > b.x[k] ? a.x[k] : b.x[k]); }
+EBPO_EIGHT d3 d3_abs(d3 a) { EBPO_THREE(__builtin_fabs(a.x[k])); }
+EBPO_EIGHT d3 d3_signed(d3 a, d3 b) { EBPO_THREE(__builtin_copysign(a.x[k], b.x[k])); }
+EBPO_EIGHT unsigned d3_signs(d3 a)
+{
+    unsigned bits = 0;
+    for (unsigned k = 0; k < 3; k++)
+        bits |= (unsigned)(__builtin_signbit(a.x[k]) != 0) << k;
+    return bits;
+}
+EBPO_EIGHT void d3_store(double x[4], d3 a) { memcpy(x, a.x, sizeof a.x); }
+EBPO_EIGHT void d3_store_floats(float x[4], d3 a)
+{
+    f4 y = { (float)a.x[0], (float)a.x[1], (float)a.x[2], 0 };
+    memcpy(x, &y, sizeof y);
+}
+EBPO_EIGHT void d3_store_floats_after(float x[4], d3 a)
+{
+    f4 y = { 0, (float)a.x[0], (float)a.x[1], (float)a.x[2] };
+    memcpy(x, &y, sizeof y);
+}
+EBPO_EIGHT d3 d3_beyond_floats(d3 a) { EBPO_THREE(a.x[k] - (double)(float)a.x[k]); }
+#undef EBPO_THREE
 #endif
 
 #endif

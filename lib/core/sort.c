@@ -1,3 +1,8 @@
+/* Sorting of records that do not fit into memory: they are made, dealt to groups by the leading
+ * bits of their keys, and each group is sorted in memory, by digits of its keys and then by the
+ * comparison where keys are equal. Three passes, each of which reads and writes in order or at as
+ * many places as there are groups, so that a workspace may keep the records in files. The result
+ * depends neither on the number of threads nor on memory. */
 #include "core/sort.h"
 
 #include <stdlib.h>
@@ -76,8 +81,8 @@ static bool form_groups(sorting *t)
 
 /* Sorts a piece by groups, in the core's own cache, and moves each group's records together: in
  * whatever order they arrive, there are no more jumps than groups. */
-static ebpo_status deal(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                        ebpo_error *error)
+static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
@@ -118,7 +123,7 @@ typedef struct keyed {
     uint64_t at; /* in the group */
 } keyed;
 
-static keyed *radix(keyed *from, keyed *to, uint64_t count)
+static keyed *sort_by_digits(keyed *from, keyed *to, uint64_t count)
 {
     uint64_t all = ~UINT64_C(0), any = 0;
     for (uint64_t i = 0; i < count; i++) {
@@ -178,7 +183,7 @@ static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
     else {
         for (uint64_t i = 0; i < count; i++)
             keys[i] = (keyed){ key_of(group + i * s->record), i };
-        keyed *order = radix(keys, keys + count, count);
+        keyed *order = sort_by_digits(keys, keys + count, count);
         for (uint64_t i = 0; i < count; i++)
             memcpy(sorted + i * s->record, group + order[i].at * s->record, s->record);
         for (uint64_t i = 0, end; i < count; i = end) {
@@ -240,7 +245,7 @@ static unsigned threads_for_groups(const sorting *t)
     return fit < 1 ? 1 : s->threads < fit ? s->threads : (unsigned)fit;
 }
 
-static ebpo_status run(sorting *t, ebpo_error *error)
+static ebpo_status run_passes(sorting *t, ebpo_error *error)
 {
     const ebpo_sort *s = t->s;
     ebpo_pass pass = { s->progress, s->passes_before, s->passes_before + 1,
@@ -252,8 +257,8 @@ static ebpo_status run(sorting *t, ebpo_error *error)
     if (status == EBPO_OK && !form_groups(t))
         status = ebpo_fail_memory(error, 0);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(s->threads, s->workspace, s->count, GRAIN, deal, t, &progress,
-                                   s->stage, error);
+        status = ebpo_parallel_for(s->threads, s->workspace, s->count, GRAIN, deal_to_groups, t,
+                                   &progress, s->stage, error);
     ebpo_array_free(s->workspace, t->made);
     t->made = NULL;
     pass.begin = pass.end++;
@@ -280,7 +285,7 @@ ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error)
     t.group_of = ebpo_alloc(EBPO_SORT_BINS, sizeof *t.group_of);
     t.in_bin = ebpo_alloc_zero(EBPO_SORT_BINS, sizeof *t.in_bin);
     ebpo_status status = t.made && t.dealt && t.group_of && t.in_bin
-                             ? run(&t, error)
+                             ? run_passes(&t, error)
                              : ebpo_workspace_fail(sort->workspace, 2 * bytes, error);
     ebpo_array_free(sort->workspace, t.made);
     ebpo_array_free(sort->workspace, t.dealt);

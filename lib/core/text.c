@@ -1,6 +1,13 @@
-#include "core/text.h"
-
+/* Text as files hold it: the check for UTF-8 without control characters (RFC 3629), dates and
+ * times of ISO 8601 by the calendar, and streams into memory that report a lack of memory, which
+ * open_memstream does not always do. */
+#include <stdlib.h>
 #include <string.h>
+
+#include <ebpo/base.h>
+
+#include "core/alloc.h"
+#include "core/text.h"
 
 bool ebpo_text_ok(const char *text)
 {
@@ -27,4 +34,119 @@ bool ebpo_text_ok(const char *text)
 uint64_t ebpo_text_mark(const void *text, uint64_t size)
 {
     return size >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
+}
+
+/* --- dates --- */
+
+/* Reads `count` digits as a number from `least` to `most`; *text goes on behind them. */
+static bool take_digits(const char **text, int count, int least, int most, int *out)
+{
+    *out = 0;
+    for (int i = 0; i < count; i++, (*text)++) {
+        if (**text < '0' || **text > '9')
+            return false;
+        *out = 10 * *out + (**text - '0');
+    }
+    return *out >= least && *out <= most;
+}
+
+static int days_of(int year, int month)
+{
+    static const int days[] = { 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31 };
+    bool leaps = (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
+    return days[month - 1] + (month == 2 && leaps);
+}
+
+/* Returns true for HH:MM, HH:MM:SS or with decimals of seconds, and then Z, +HH:MM, -HH:MM or
+ * nothing. */
+static bool is_time(const char *t)
+{
+    int n;
+    if (!take_digits(&t, 2, 0, 23, &n) || *t != ':' || (t++, !take_digits(&t, 2, 0, 59, &n)))
+        return false;
+    if (*t == ':') {
+        t++;
+        if (!take_digits(&t, 2, 0, 60, &n)) /* 60: a leap second */
+            return false;
+        if (*t == '.' || *t == ',') {
+            size_t digits = strspn(t + 1, "0123456789");
+            if (digits == 0)
+                return false;
+            t += 1 + digits;
+        }
+    }
+    if (*t == 'Z')
+        return t[1] == 0;
+    if (*t == '+' || *t == '-') {
+        t++;
+        if (!take_digits(&t, 2, 0, 23, &n) || *t != ':' || (t++, !take_digits(&t, 2, 0, 59, &n)))
+            return false;
+    }
+    return *t == 0;
+}
+
+bool ebpo_is_date(const char *text)
+{
+    int year, month, day;
+    if (!take_digits(&text, 4, 0, 9999, &year))
+        return false;
+    if (*text == 0)
+        return true;
+    if (*text++ != '-' || !take_digits(&text, 2, 1, 12, &month))
+        return false;
+    if (*text == 0)
+        return true;
+    if (*text++ != '-' || !take_digits(&text, 2, 1, days_of(year, month), &day))
+        return false;
+    return *text == 0 || (*text == 'T' && is_time(text + 1));
+}
+
+#ifdef EBPO_HAVE_FOPENCOOKIE
+static ssize_t keep_text(void *cookie, const char *data, size_t bytes)
+{
+    ebpo_text_stream *s = cookie;
+    if (s->failed || !ebpo_grow(&s->text, &s->capacity, s->bytes + bytes + 1, 1)) {
+        s->failed = true;
+        return 0; /* which stdio takes for an error */
+    }
+    memcpy(s->text + s->bytes, data, bytes);
+    s->bytes += bytes;
+    return (ssize_t)bytes;
+}
+
+bool ebpo_text_stream_begin(ebpo_text_stream *s)
+{
+    memset(s, 0, sizeof *s);
+    s->file = fopencookie(s, "w", (cookie_io_functions_t){ .write = keep_text });
+    if (s->file)
+        setvbuf(s->file, s->buffer, _IOFBF, sizeof s->buffer);
+    return s->file != NULL;
+}
+#else
+bool ebpo_text_stream_begin(ebpo_text_stream *s)
+{
+    memset(s, 0, sizeof *s);
+    s->file = open_memstream(&s->text, &s->size);
+    return s->file != NULL;
+}
+#endif
+
+bool ebpo_text_stream_end(ebpo_text_stream *s)
+{
+    s->failed = s->failed || ferror(s->file);
+    bool whole = fclose(s->file) == 0 && !s->failed;
+    s->file = NULL;
+#ifdef EBPO_HAVE_FOPENCOOKIE
+    whole = whole && ebpo_grow(&s->text, &s->capacity, 1, 1);
+#else
+    whole = whole && s->text;
+    s->bytes = s->size;
+#endif
+    if (whole) {
+        s->text[s->bytes] = 0;
+        return true;
+    }
+    free(s->text);
+    s->text = NULL;
+    return false;
 }

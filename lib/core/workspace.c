@@ -1,17 +1,71 @@
-#include "core/workspace.h"
-
+/* Workspaces: the owners of large arrays. An array is an extent of whole pages, in memory while
+ * half of the budget lasts and in an unnamed temporary file after that; arrays below LEAST_EXTENT
+ * are parts of a pool, and those below a page are malloc's. Each extent holds its workspace, so
+ * that either may be freed first. A file's pages count for the budget only while they are
+ * resident: loops release them between pieces of work (ebpo_release_pages), and what was written
+ * stays in the file. Any thread may allocate and free. How a build keeps to a budget is described
+ * in docs/develop/design.md. */
 #include <errno.h>
 #include <fcntl.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
+
+#include <ebpo/workspace.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sized.h"
-#include "core/machine_memory.h"
-#include "core/unnamed_file.h"
-#include "core/workspace_parts.h"
+#include "core/os.h"
+#include "core/workspace.h"
+
+/* What a workspace is made of. */
+
+/* Arrays smaller than a page are malloc's; those smaller than an extent are parts of a pool, which
+ * is one: a build has thousands of them. */
+enum { PAGE_BYTES = 4096, LEAST_EXTENT = 1 << 16, POOL_BYTES = 1 << 20, BUCKET_BITS = 10 };
+
+typedef enum extent_kind { EXTENT_OWN, EXTENT_POOL, EXTENT_PART } extent_kind;
+
+typedef struct extent {
+    void *at;
+    size_t bytes;
+    extent_kind kind;
+    bool filed;          /* in a file */
+    struct extent *pool; /* of a part */
+    size_t used;         /* of a pool: bytes given out; and the parts that are not freed */
+    uint64_t parts;
+    struct extent *next;
+} extent;
+
+struct ebpo_workspace {
+    pthread_mutex_t lock; /* guards the figures */
+    pthread_mutex_t pool_lock;
+    ebpo_workspace_stats figures;
+    uint64_t holders;   /* and the owner is one */
+    extent *pool;       /* that the next part comes from; NULL: none */
+    _Atomic int failed; /* errno of the last allocation in a file that failed, 0: memory */
+    int statm;          /* /proc/self/statm */
+    /* bytes of files, libraries among them, that stayed resident when pages were released */
+    uint64_t floor;
+    size_t page;
+    char folder[EBPO_FOLDER_BYTES];
+    /* its extents by address: pieces of a build have their arrays freed one by one, so there are
+     * thousands at most */
+    pthread_mutex_t table_lock;
+    extent *table[1 << BUCKET_BITS];
+};
+
+static inline extent **extent_bucket(ebpo_workspace *w, const void *at)
+{
+    uint64_t page = (uint64_t)((uintptr_t)at / PAGE_BYTES);
+    return &w->table[page * UINT64_C(0x9e3779b97f4a7c15) >> (64 - BUCKET_BITS)];
+}
+
+/* The extents of a workspace: whole pages of memory, or of files. */
 
 static ebpo_status choose_folder(ebpo_workspace *w, const char *wanted, ebpo_error *error)
 {
@@ -72,7 +126,8 @@ ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory, const
     return status;
 }
 
-void ebpo_workspace_leave(ebpo_workspace *w)
+/* One holder less, of which each extent is one; the last one frees it. */
+static void leave_workspace(ebpo_workspace *w)
 {
     pthread_mutex_lock(&w->lock);
     bool last = --w->holders == 0;
@@ -90,7 +145,7 @@ void ebpo_workspace_leave(ebpo_workspace *w)
 void ebpo_workspace_free(ebpo_workspace *workspace)
 {
     if (workspace)
-        ebpo_workspace_leave(workspace);
+        leave_workspace(workspace);
 }
 
 ebpo_status ebpo_workspace_get_stats(const ebpo_workspace *workspace, ebpo_workspace_stats *out)
@@ -100,6 +155,13 @@ ebpo_status ebpo_workspace_get_stats(const ebpo_workspace *workspace, ebpo_works
     ebpo_workspace_stats figures = w->figures;
     pthread_mutex_unlock(&w->lock);
     return EBPO_GIVE(ebpo_workspace_stats, out, &figures);
+}
+
+const char *ebpo_workspace_folder(const ebpo_workspace *workspace) { return workspace->folder; }
+
+uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace)
+{
+    return workspace->figures.memory;
 }
 
 ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes, ebpo_error *error)
@@ -123,4 +185,335 @@ ebpo_status ebpo_workspace_fail_while(const ebpo_workspace *workspace, const cha
         error, EBPO_E_IO, workspace->folder,
         "cannot hold the temporary files %s: %s; name another folder, or allow more memory", what,
         strerror(fault));
+}
+
+static void enter_extent(ebpo_workspace *w, extent *b)
+{
+    pthread_mutex_lock(&w->table_lock);
+    extent **bucket = extent_bucket(w, b->at);
+    b->next = *bucket;
+    *bucket = b;
+    pthread_mutex_unlock(&w->table_lock);
+}
+
+static bool is_at(const extent *b, const void *at) { return b->at == at && b->kind != EXTENT_POOL; }
+
+/* Takes the extent that begins there out of the table; NULL: it is none of the workspace's. Not
+ * pools: their first parts begin where they do. */
+static extent *take_extent(ebpo_workspace *w, const void *at)
+{
+    pthread_mutex_lock(&w->table_lock);
+    extent **link = extent_bucket(w, at), *found = NULL;
+    while (*link && !is_at(*link, at))
+        link = &(*link)->next;
+    if (*link) {
+        found = *link;
+        *link = found->next;
+    }
+    pthread_mutex_unlock(&w->table_lock);
+    return found;
+}
+
+/* Says where it goes, and counts it. */
+static bool choose_and_count(ebpo_workspace *w, size_t bytes)
+{
+    ebpo_workspace_stats *f = &w->figures;
+    pthread_mutex_lock(&w->lock);
+    bool filed = f->held + bytes > f->memory / 2;
+    if (filed) {
+        f->filed += bytes;
+        f->filed_total += bytes;
+        f->filed_peak = f->filed > f->filed_peak ? f->filed : f->filed_peak;
+    } else {
+        f->held += bytes;
+        f->held_peak = f->held > f->held_peak ? f->held : f->held_peak;
+    }
+    w->holders++;
+    pthread_mutex_unlock(&w->lock);
+    return filed;
+}
+
+static void count_off(ebpo_workspace *w, size_t bytes, bool filed)
+{
+    pthread_mutex_lock(&w->lock);
+    *(filed ? &w->figures.filed : &w->figures.held) -= bytes;
+    pthread_mutex_unlock(&w->lock);
+    leave_workspace(w);
+}
+
+/* 0, or why not. */
+static int take_blocks(int fd, size_t bytes)
+{
+#ifdef EBPO_HAVE_POSIX_FALLOCATE
+    int fault;
+    do /* some file systems give way to signals */
+        fault = posix_fallocate(fd, 0, (off_t)bytes);
+    while (fault == EINTR);
+    return fault;
+#else
+    static const char zeros[1 << 16];
+    for (size_t left = bytes; left > 0;) {
+        ssize_t done = write(fd, zeros, left < sizeof zeros ? left : sizeof zeros);
+        if (done < 0 && errno != EINTR)
+            return errno;
+        left -= done > 0 ? (size_t)done : 0;
+    }
+    return 0;
+#endif
+}
+
+/* The file's blocks are had before it is written to: a full disk would otherwise show as a signal.
+ */
+static void *map_file(ebpo_workspace *w, size_t bytes)
+{
+    int fd = ebpo_open_unnamed(w->folder), fault = fd < 0 ? errno : take_blocks(fd, bytes);
+    void *at = MAP_FAILED;
+    if (fault == 0) {
+        at = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+        fault = at == MAP_FAILED ? errno : 0;
+    }
+    if (fd >= 0)
+        close(fd);
+    if (at == MAP_FAILED)
+        w->failed = fault;
+    return at;
+}
+
+static void *map_memory(ebpo_workspace *w, size_t bytes)
+{
+    void *at = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (at == MAP_FAILED)
+        w->failed = 0;
+    return at;
+}
+
+/* NULL: the workspace's `failed` tells why. */
+static extent *make_extent(ebpo_workspace *w, size_t bytes, extent_kind kind)
+{
+    ebpo_release_pages(w); /* those who make many write to them without more ado */
+    extent *b = ebpo_alloc_zero(1, sizeof *b);
+    if (!b) {
+        w->failed = 0;
+        return NULL;
+    }
+    bytes = (bytes + w->page - 1) / w->page * w->page;
+    *b = (extent){ .bytes = bytes, .kind = kind, .filed = choose_and_count(w, bytes) };
+    b->at = b->filed ? map_file(w, bytes) : map_memory(w, bytes);
+    if (b->at == MAP_FAILED) {
+        count_off(w, bytes, b->filed);
+        free(b);
+        return NULL;
+    }
+    enter_extent(w, b);
+    return b;
+}
+
+static void unmap_extent(ebpo_workspace *w, extent *b)
+{
+    munmap(b->at, b->bytes);
+    count_off(w, b->bytes, b->filed);
+    free(b);
+}
+
+/* --- parts of pools --- */
+
+/* No place is given out twice, so parts are zero. */
+static extent *make_part(ebpo_workspace *w, size_t bytes)
+{
+    extent *part = ebpo_alloc_zero(1, sizeof *part);
+    bytes = (bytes + PAGE_BYTES - 1) / PAGE_BYTES * PAGE_BYTES;
+    pthread_mutex_lock(&w->pool_lock);
+    if (part && (!w->pool || w->pool->bytes - w->pool->used < bytes))
+        w->pool = make_extent(w, POOL_BYTES, EXTENT_POOL);
+    extent *pool = part ? w->pool : NULL;
+    if (pool) {
+        *part = (extent){ .at = (char *)pool->at + pool->used,
+                          .bytes = bytes,
+                          .kind = EXTENT_PART,
+                          .filed = pool->filed,
+                          .pool = pool };
+        pool->used += bytes;
+        pool->parts++;
+    }
+    pthread_mutex_unlock(&w->pool_lock);
+    if (!pool) {
+        w->failed = part ? w->failed : 0;
+        free(part);
+        return NULL;
+    }
+    enter_extent(w, part);
+    return part;
+}
+
+static void leave_pool(ebpo_workspace *w, extent *pool)
+{
+    pthread_mutex_lock(&w->pool_lock);
+    bool last = --pool->parts == 0;
+    if (last && w->pool == pool)
+        w->pool = NULL;
+    pthread_mutex_unlock(&w->pool_lock);
+    if (!last)
+        return;
+    pthread_mutex_lock(&w->table_lock);
+    extent **link = extent_bucket(w, pool->at);
+    while (*link != pool)
+        link = &(*link)->next;
+    *link = pool->next;
+    pthread_mutex_unlock(&w->table_lock);
+    unmap_extent(w, pool);
+}
+
+/* A part's memory or blocks; whether it can be done or not. */
+static void give_back(const extent *b)
+{
+#ifdef EBPO_HAVE_MADV_REMOVE
+    madvise(b->at, b->bytes, b->filed ? MADV_REMOVE : MADV_DONTNEED);
+#else
+    (void)b;
+#endif
+}
+
+static void free_extent(ebpo_workspace *w, extent *b)
+{
+    if (b->kind != EXTENT_PART) {
+        unmap_extent(w, b);
+        return;
+    }
+    if (w->page == PAGE_BYTES) /* whole pages, so none of a neighbour's */
+        give_back(b);
+    extent *pool = b->pool;
+    free(b);
+    leave_pool(w, pool);
+}
+
+/* Small ones and those without a workspace are not in the table: malloc never gives whole pages. */
+static void *alloc_array(ebpo_workspace *w, uint64_t count, size_t size, bool zero)
+{
+    uint64_t bytes;
+    if (w && ebpo_mul_ok(count, size, &bytes) && bytes >= LEAST_EXTENT && bytes < PTRDIFF_MAX) {
+        extent *b = make_extent(w, (size_t)bytes, EXTENT_OWN);
+        return b ? b->at : NULL;
+    }
+    if (w && ebpo_mul_ok(count, size, &bytes) && bytes >= PAGE_BYTES && bytes < LEAST_EXTENT) {
+        extent *part = make_part(w, (size_t)bytes);
+        return part ? part->at : NULL;
+    }
+    void *at = zero ? ebpo_alloc_zero(count, size) : ebpo_alloc(count, size);
+    if (!at && w)
+        w->failed = 0;
+    return at;
+}
+
+void *ebpo_array_alloc(ebpo_workspace *workspace, uint64_t count, size_t size)
+{
+    return alloc_array(workspace, count, size, false);
+}
+
+void *ebpo_array_zero(ebpo_workspace *workspace, uint64_t count, size_t size)
+{
+    return alloc_array(workspace, count, size, true);
+}
+
+void ebpo_array_free(ebpo_workspace *workspace, void *array)
+{
+    /* malloc never gives whole pages but by chance: the table knows */
+    extent *b = workspace && array && (uintptr_t)array % PAGE_BYTES == 0
+                    ? take_extent(workspace, array)
+                    : NULL;
+    if (b)
+        free_extent(workspace, b);
+    else
+        free(array);
+}
+
+enum { STEP = 4 << 20 };
+
+void ebpo_array_fill(ebpo_workspace *workspace, void *array, int byte, uint64_t bytes)
+{
+    EBPO_FOR_PIECES(workspace, at, bytes, STEP)
+        memset((char *)array + at, byte, bytes - at < STEP ? (size_t)(bytes - at) : STEP);
+}
+
+void ebpo_array_copy(ebpo_workspace *workspace, void *to, const void *from, uint64_t bytes)
+{
+    EBPO_FOR_PIECES(bytes > STEP ? workspace : NULL, at, bytes, STEP)
+        memcpy((char *)to + at, (const char *)from + at,
+               bytes - at < STEP ? (size_t)(bytes - at) : STEP);
+}
+
+bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
+                     size_t size)
+{
+    if (need <= *capacity)
+        return true;
+    uint64_t wanted = *capacity + *capacity / 2 + 16;
+    if (wanted < need)
+        wanted = need;
+    void *old, *bigger = ebpo_array_alloc(workspace, wanted, size);
+    if (!bigger)
+        return false;
+    memcpy(&old, array, sizeof old);
+    if (old)
+        ebpo_array_copy(workspace, bigger, old, *capacity * size);
+    ebpo_array_free(workspace, old);
+    memcpy(array, &bigger, sizeof bigger);
+    *capacity = wanted;
+    return true;
+}
+
+bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
+                          size_t size)
+{
+    enum { LATE = 1 << 20 };
+    if (need <= *capacity)
+        return true;
+    return workspace && need > LATE / size ? ebpo_array_grow(workspace, array, capacity, need, size)
+                                           : ebpo_grow(array, capacity, need, size);
+}
+
+typedef struct residency {
+    uint64_t all, files; /* bytes */
+} residency;
+
+static residency read_residency(const ebpo_workspace *w)
+{
+    char text[128];
+    unsigned long long size, pages, of_files;
+    ssize_t got = w->statm >= 0 ? pread(w->statm, text, sizeof text - 1, 0) : -1;
+    text[got > 0 ? got : 0] = 0;
+    if (sscanf(text, "%llu %llu %llu", &size, &pages, &of_files) != 3)
+        return (residency){ UINT64_MAX, UINT64_MAX }; /* not known: let go always */
+    return (residency){ pages * w->page, of_files * w->page };
+}
+
+static void let_go(const extent *b)
+{
+#ifdef EBPO_HAVE_MADVISE
+    madvise(b->at, b->bytes, MADV_DONTNEED);
+#else
+    msync(b->at, b->bytes, MS_ASYNC); /* the system then takes them when it is short */
+#endif
+}
+
+void ebpo_release_pages(ebpo_workspace *workspace)
+{
+    ebpo_workspace *w = workspace;
+    if (!w || read_residency(w).all <= w->figures.memory / 4 * 3)
+        return;
+    pthread_mutex_lock(&w->table_lock);
+    residency now = read_residency(w); /* another thread may have done it meanwhile */
+    if (now.all <= w->figures.memory / 4 * 3 ||
+        now.files < w->floor + w->figures.memory / 16) { /* there is hardly anything to let go of */
+        pthread_mutex_unlock(&w->table_lock);
+        return;
+    }
+    for (int i = 0; i < 1 << BUCKET_BITS; i++)
+        for (extent *b = w->table[i]; b; b = b->next)
+            if (b->kind != EXTENT_PART && b->filed)
+                /* of a file: what was written stays in it */
+                let_go(b);
+    /* Other threads bring pages in meanwhile, which are no floor: it rises slowly. */
+    uint64_t left = read_residency(w).files, most = w->floor + w->figures.memory / 64;
+    w->floor = left < most ? left : most;
+    pthread_mutex_unlock(&w->table_lock);
 }

@@ -12,7 +12,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "derive/bound.h"
 #include "derive/samples.h"
 #include "query/query_model.h"

@@ -12,7 +12,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "derive/qhull.h"
 #include "levels/lod_model.h"
 #include "geometry/cells.h"

@@ -14,7 +14,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/random.h"
+#include "core/hash.h"
 #include "derive/frame.h"
 #include "geometry/octcode.h"
 #include "query/query_model.h"

@@ -2,7 +2,7 @@
 #include "core/strict_fp.h"
 
 #include "core/fp_env.h"
-#include "core/sized.h"
+#include "core/error.h"
 #include "format/container_write.h"
 #include "io/publish.h"
 #include "derive/subset_parts.h"

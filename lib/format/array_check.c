@@ -7,7 +7,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "format/schema.h"
 #include "geometry/plane_code.h"
 #include "geometry/node_types.h"

@@ -1,7 +1,7 @@
 /* What the head tells of each array. */
 #include <stdio.h>
 
-#include "core/sized.h"
+#include "core/error.h"
 #include "format/file_in.h"
 
 static const ebpo_array_in *find(const ebpo_file *file, unsigned n)

@@ -1,7 +1,7 @@
 /* The checksum of the part `attributes`: of the values, however they are stored. */
 #include <stdlib.h>
 
-#include "core/array_loops.h"
+#include "core/workspace.h"
 #include "hdf5_read/coding.h"
 #include "format/attribute_digest.h"
 #include "format/attribute_paths.h"

@@ -6,7 +6,6 @@
 #include "mesh/textures.h"
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sized.h"
 #include "format/attribute_open.h"
 #include "format/attribute_paths.h"
 #include "format/head_facts.h"

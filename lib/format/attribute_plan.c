@@ -5,7 +5,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sha256.h"
+#include "core/checksum.h"
 #include "core/text.h"
 #include "hdf5_read/coding.h"
 #include "format/attribute_digest.h"

@@ -4,10 +4,9 @@
 
 #include "mesh/textures.h"
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
-#include "core/sized.h"
-#include "core/sums.h"
+#include "core/checksum.h"
 #include "hdf5_read/coding.h"
 #include "format/attribute_digest.h"
 #include "format/attribute_paths.h"

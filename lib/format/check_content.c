@@ -3,8 +3,7 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/sized.h"
-#include "core/sums.h"
+#include "core/checksum.h"
 #include "format/attribute_read.h"
 #include "format/content.h"
 #include "format/head_facts_table.h"

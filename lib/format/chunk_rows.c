@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "core/wide.h"
-#include "hdf5_read/shape.h"
+#include "hdf5_read/chunk.h"
 
 enum {
     FIRST_LEVELS = 5,    /* these lie together, whatever the subtrees */

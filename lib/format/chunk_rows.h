@@ -5,7 +5,7 @@
 
 #include <ebpo/file.h>
 
-#include "hdf5_read/shape.h"
+#include "hdf5_read/chunk.h"
 #include "format/schema.h"
 
 /* With subtrees: levels up to the first one lie as they are, from the second one on they are deep.

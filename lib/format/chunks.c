@@ -6,7 +6,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/hash.h"
 #include "hdf5_read/coding.h"
 #include "format/attribute_read.h"

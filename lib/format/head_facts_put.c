@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "core/error.h"
-#include "core/sha256.h"
+#include "core/checksum.h"
 #include "format/head_facts.h"
 #include "format/head_facts_table.h"
 

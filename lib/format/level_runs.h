@@ -3,7 +3,7 @@
 #ifndef EBPO_FORMAT_LEVEL_RUNS_H
 #define EBPO_FORMAT_LEVEL_RUNS_H
 
-#include "core/room.h"
+#include "core/alloc.h"
 #include "format/chunks.h"
 
 /* Groups [group, group + groups) of a level; level 0 has group 0. Its nodes by type: those of type

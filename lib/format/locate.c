@@ -3,7 +3,6 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sized.h"
 #include "format/all_arrays.h"
 #include "format/long_chunk.h"
 #include "format/places.h"

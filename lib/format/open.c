@@ -7,14 +7,13 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "format/attribute_open.h"
 #include "format/head_facts.h"
 #include "format/stored_sizes.h"
-#include "io/http_source.h"
+#include "io/byte_source.h"
 #include "mesh/import.h"
 #include "mesh/stl_binary.h"
-#include "io/foreign_bytes.h"
+#include "io/file_source.h"
 #include "mesh/ply.h"
 
 /* The word says how the numbers are to be read: with another one they would be read wrong. In files

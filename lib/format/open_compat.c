@@ -12,11 +12,9 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "format/chunk_rows.h"
-#include "hdf5_write/compat.h"
+#include "hdf5_write/h5.h"
 #include "hdf5_read/head.h"
-#include "io/http_source.h"
 #include "io/byte_source.h"
 
 enum { PIECE = 4 << 20, BYTES_A_SECOND = 4 << 20 };

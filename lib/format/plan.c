@@ -7,7 +7,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/text.h"
 #include "hdf5_read/coding.h"
 #include "format/array_check.h"

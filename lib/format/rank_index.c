@@ -1,7 +1,7 @@
 /* Prefix sums that let a reader start in the middle of a level. Arrays of an absent part count as
  * zeros. */
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "format/rank_index.h"
 #include "format/schema.h"
 #include "geometry/node_types.h"

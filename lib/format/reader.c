@@ -7,7 +7,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "hdf5_read/coding.h"
 #include "hdf5_read/face_gates.h"
 #include "format/chunk_sums.h"

@@ -5,7 +5,6 @@
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "format/container_write.h"
 #include "format/reader.h"
 #include "io/publish.h"

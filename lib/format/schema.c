@@ -3,7 +3,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "hdf5_read/face_gates.h"
 
 #define REQUIRED       .if_needed = false

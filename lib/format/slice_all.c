@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "core/error.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "format/reader.h"
 #include "format/slice.h"
 

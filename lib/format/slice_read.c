@@ -7,7 +7,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "format/chunks.h"
 #include "format/file_nodes.h"
 #include "format/level_runs.h"

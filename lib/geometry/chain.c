@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 
 static double triangle_area(const ebpo_chain *c, uint32_t i, uint32_t j, uint32_t k)
 {

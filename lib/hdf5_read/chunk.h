@@ -1,15 +1,16 @@
-/* A chunk's bytes as HDF5 stores them: shuffle, compression, checksum. Bit for bit what libhdf5's
- * own filters read and write. */
+/* Chunks of arrays: their bytes as HDF5 stores them (shuffle, compression, checksum), bit for bit
+ * what libhdf5's own filters read and write; the shape of an array, and where a chunk lies in its
+ * file. */
 #ifndef EBPO_HDF5_READ_CHUNK_H
 #define EBPO_HDF5_READ_CHUNK_H
 
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
 #include <ebpo/base.h>
 
-enum {
-    EBPO_CHUNK_BYTES_MAX = 65536, /* of one chunk before compression */
-    EBPO_ZSTD_LEVEL = 3,          /* of small chunks; what headers state */
-    EBPO_DEFLATE_LEVEL = 6
-};
+#include "hdf5_read/codec.h"
 
 /* Filter pipelines. Shuffle comes first where elements have more than one byte (but not in the last
  * two). */
@@ -17,20 +18,34 @@ typedef enum ebpo_pipeline {
     EBPO_PIPELINE_ZSTD,     /* shuffle, zstd frame with content size and checksum */
     EBPO_PIPELINE_DEFLATE,  /* shuffle, zlib stream, fletcher32 */
     EBPO_PIPELINE_CHECKSUM, /* fletcher32 */
-    EBPO_PIPELINE_BARE      /* nothing: what `h5repack -f NONE` leaves; read, never written */
+    EBPO_PIPELINE_BARE,     /* nothing: what `h5repack -f NONE` leaves; read, never written */
+    EBPO_PIPELINE_COUNT
 } ebpo_pipeline;
 
-/* Compression state and scratch of one thread; zero-initialise, clear when done. */
-typedef struct ebpo_chunk_coder {
-    void *zstd_out, *zstd_in;
-    uint8_t scratch[EBPO_CHUNK_BYTES_MAX];
-} ebpo_chunk_coder;
+/* HDF5's numbers of filters. */
+enum {
+    EBPO_FILTER_DEFLATE = 1,
+    EBPO_FILTER_SHUFFLE = 2,
+    EBPO_FILTER_FLETCHER = 3,
+    EBPO_FILTER_ZSTD = 32015
+};
+
+/* What a pipeline is made of: a row of the table in chunk.c. */
+typedef struct ebpo_pipeline_facts {
+    unsigned filter[2]; /* in the order in which they are applied, without shuffle */
+    int filter_count;
+    int level;       /* the usual one, which headers state; 0: it has none */
+    bool compresses; /* and elements of several bytes are shuffled before */
+    bool fletcher;   /* a fletcher32 checksum comes last */
+} ebpo_pipeline_facts;
+
+const ebpo_pipeline_facts *ebpo_pipeline_facts_of(ebpo_pipeline pipeline);
+/* Which pipeline these filters are, shuffle among them; false: none. Shuffled elements of one byte
+ * are what they were: h5repack shuffles all arrays alike. */
+bool ebpo_pipeline_of_filters(const unsigned *filters, int count, unsigned element_size,
+                              ebpo_pipeline *pipeline);
 
 void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder);
-
-/* Bytes that an encoded chunk of `raw_bytes` <= EBPO_CHUNK_BYTES_MAX can have at most, in any
- * pipeline. */
-size_t ebpo_chunk_bound(size_t raw_bytes);
 
 /* Encodes raw_bytes (a multiple of element_size) into `out` of ebpo_chunk_bound(raw_bytes) bytes.
  * `level` 0: the default, which in zstd goes by the chunk's size. */
@@ -60,5 +75,39 @@ void ebpo_unshuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_
 /* HDF5's fletcher32: over big-endian 16-bit words, both sums kept modulo 65535 (never reduced to 0
  * from a positive sum). */
 uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes);
+
+/* An integer array: [rows] when cols is 0, else [rows][cols]; chunks of chunk_rows rows. */
+typedef struct ebpo_shape {
+    uint64_t rows;
+    uint32_t cols;
+    uint32_t chunk_rows;
+    uint8_t element_size;
+    bool is_signed;
+    ebpo_pipeline pipeline;
+} ebpo_shape;
+
+/* Where a chunk lies in the file, as stored. */
+typedef struct ebpo_chunk_place {
+    uint64_t address;
+    uint32_t bytes;
+} ebpo_chunk_place;
+
+/* Rows of a chunk: the power of two that fills up to 64 KiB, or all rows when there are fewer. rows
+ * > 0. */
+static inline uint32_t ebpo_full_chunk_rows(uint64_t rows, uint32_t cols, uint32_t element_size)
+{
+    uint32_t row = element_size * (cols ? cols : 1), full = 1;
+    while (2 * full * row <= EBPO_CHUNK_BYTES_MAX)
+        full *= 2;
+    return rows < full ? (uint32_t)rows : full;
+}
+static inline uint64_t ebpo_shape_chunks(const ebpo_shape *shape)
+{
+    return shape->rows / shape->chunk_rows + (shape->rows % shape->chunk_rows != 0);
+}
+static inline size_t ebpo_shape_row_bytes(const ebpo_shape *shape)
+{
+    return (size_t)shape->element_size * (shape->cols ? shape->cols : 1);
+}
 
 #endif

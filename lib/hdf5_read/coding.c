@@ -1,3 +1,7 @@
+/* The codings of numbers of format-spec/README.md (section "Codings"): differences to the value
+ * before, wrapping, as zigzag; corners of faces by the number of vertices seen; integers of fewer
+ * bytes. Encoding and decoding are exact inverses for every bit pattern; floats are coded as
+ * integers of the same order. Files are little-endian. Pure functions. */
 #include "hdf5_read/coding.h"
 
 #include <string.h>
@@ -88,7 +92,7 @@ bool ebpo_corners_decode(const uint8_t *file, uint64_t rows, uint64_t *seen, uin
     return true;
 }
 
-static uint64_t native(const void *values, size_t size, uint64_t i)
+static uint64_t get_native(const void *values, size_t size, uint64_t i)
 {
     switch (size) {
     case 1: return ((const uint8_t *)values)[i];
@@ -102,7 +106,7 @@ void ebpo_integers_encode(const void *values, size_t size, uint64_t rows, size_t
                           uint8_t *file)
 {
     for (uint64_t i = 0; i < rows; i++) {
-        uint64_t value = native(values, size, i);
+        uint64_t value = get_native(values, size, i);
         switch (file_size) {
         case 1: file[i] = (uint8_t)value; break;
         case 2: ebpo_store16(file + 2 * i, (uint16_t)value); break;
@@ -112,7 +116,7 @@ void ebpo_integers_encode(const void *values, size_t size, uint64_t rows, size_t
     }
 }
 
-static uint64_t load(const uint8_t *p, size_t size, bool is_signed)
+static uint64_t load_integer(const uint8_t *p, size_t size, bool is_signed)
 {
     switch (size) {
     case 1: return is_signed ? (uint64_t)(int64_t)(int8_t)p[0] : p[0];
@@ -126,7 +130,7 @@ void ebpo_integers_decode(const uint8_t *file, size_t file_size, bool is_signed,
                           void *values, size_t size)
 {
     for (uint64_t i = 0; i < rows; i++) {
-        uint64_t value = load(file + file_size * i, file_size, is_signed);
+        uint64_t value = load_integer(file + file_size * i, file_size, is_signed);
         switch (size) {
         case 1: ((uint8_t *)values)[i] = (uint8_t)value; break;
         case 2: ((uint16_t *)values)[i] = (uint16_t)value; break;
@@ -146,7 +150,7 @@ static void put_native(void *values, size_t size, uint64_t i, uint64_t value)
     }
 }
 
-static void store(uint8_t *file, size_t size, uint64_t value)
+static void store_integer(uint8_t *file, size_t size, uint64_t value)
 {
     switch (size) {
     case 1: *file = (uint8_t)value; break;
@@ -156,7 +160,7 @@ static void store(uint8_t *file, size_t size, uint64_t value)
     }
 }
 
-static uint64_t sortable(uint64_t bits, size_t size)
+static uint64_t sortable_bits(uint64_t bits, size_t size)
 {
     return size == 4 ? ebpo_float_order32((uint32_t)bits) : ebpo_float_order64(bits);
 }
@@ -174,10 +178,10 @@ void ebpo_columns_encode(const void *values, size_t size, bool floats, uint64_t 
     for (uint32_t c = 0; c < cols; c++) {
         uint64_t before = 0;
         for (uint64_t i = 0; i < rows; i++, file += size) {
-            uint64_t value = native(values, size, i * cols + c);
+            uint64_t value = get_native(values, size, i * cols + c);
             if (floats)
-                value = sortable(value, size);
-            store(file, size, zigzag_of(value - before, size));
+                value = sortable_bits(value, size);
+            store_integer(file, size, zigzag_of(value - before, size));
             before = value;
         }
     }
@@ -189,8 +193,8 @@ void ebpo_columns_decode(const uint8_t *file, size_t size, bool floats, uint64_t
     for (uint32_t c = 0; c < cols; c++) {
         uint64_t value = 0;
         for (uint64_t i = 0; i < rows; i++, file += size) {
-            value += ebpo_unzigzag64(load(file, size, false));
-            put_native(values, size, i * cols + c, floats ? sortable(value, size) : value);
+            value += ebpo_unzigzag64(load_integer(file, size, false));
+            put_native(values, size, i * cols + c, floats ? sortable_bits(value, size) : value);
         }
     }
 }

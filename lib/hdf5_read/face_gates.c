@@ -1,3 +1,8 @@
+/* The coding "gates" of format-spec/README.md, section 7. Faces follow each other across edges: of
+ * each face is written across which open edge it lies (its gate), of the newest ones, and which
+ * vertex is its third. Edges that faces left open are kept in a short list, the newest last.
+ * Encoder and decoder keep the same list, so the coding is an inverse for all codes; a decoder
+ * takes any bytes and refuses those of no faces. Time is in proportion to the number of faces. */
 #include "hdf5_read/face_gates.h"
 
 #include <string.h>
@@ -18,11 +23,11 @@ typedef struct open_edges {
     uint32_t seen;
 } open_edges;
 
-static uint64_t edge(uint32_t from, uint32_t to) { return from | (uint64_t)to << 32; }
-static uint32_t from(uint64_t e) { return (uint32_t)e; }
-static uint32_t to(uint64_t e) { return (uint32_t)(e >> 32); }
+static uint64_t edge_of(uint32_t from, uint32_t to) { return from | (uint64_t)to << 32; }
+static uint32_t edge_from(uint64_t e) { return (uint32_t)e; }
+static uint32_t edge_to(uint64_t e) { return (uint32_t)(e >> 32); }
 
-static void start(open_edges *o) { o->begin = o->end = o->seen = 0; }
+static void start_edges(open_edges *o) { o->begin = o->end = o->seen = 0; }
 
 /* Before each face: the list slides back to the front of its room now and then. */
 static void make_room(open_edges *o)
@@ -34,13 +39,13 @@ static void make_room(open_edges *o)
     o->begin = 0;
 }
 
-static void push(open_edges *o, uint64_t e)
+static void push_edge(open_edges *o, uint64_t e)
 {
     o->edge[o->end++] = e;
     o->begin += o->end - o->begin > OPEN_MOST;
 }
 
-static void drop(open_edges *o, uint32_t at)
+static void drop_edge(open_edges *o, uint32_t at)
 {
     o->end--;
     for (; at < o->end; at++)
@@ -48,18 +53,18 @@ static void drop(open_edges *o, uint32_t at)
 }
 
 /* The newest that starts or ends at v; o->end: none. */
-static uint32_t starting(const open_edges *o, uint32_t v)
+static uint32_t find_starting(const open_edges *o, uint32_t v)
 {
     for (uint32_t i = o->end; i > o->begin; i--)
-        if (from(o->edge[i - 1]) == v)
+        if (edge_from(o->edge[i - 1]) == v)
             return i - 1;
     return o->end;
 }
 
-static uint32_t ending(const open_edges *o, uint32_t v)
+static uint32_t find_ending(const open_edges *o, uint32_t v)
 {
     for (uint32_t i = o->end; i > o->begin; i--)
-        if (to(o->edge[i - 1]) == v)
+        if (edge_to(o->edge[i - 1]) == v)
             return i - 1;
     return o->end;
 }
@@ -75,24 +80,24 @@ static bool any_of_eight(const uint64_t *edges, uint64_t wanted)
 
 /* Side from a to b of a face: closes that edge if it is among the newest, else opens the other
  * way's. */
-static void pass(open_edges *o, uint32_t a, uint32_t b)
+static void pass_edge(open_edges *o, uint32_t a, uint32_t b)
 {
-    uint64_t wanted = edge(a, b);
+    uint64_t wanted = edge_of(a, b);
     uint32_t least = o->end - o->begin > NEAR ? o->end - NEAR : o->begin, i = o->end;
     while (i >= least + 8 && !any_of_eight(o->edge + i - 8, wanted))
         i -= 8;
     while (i > least && o->edge[i - 1] != wanted)
         i--;
     if (i > least)
-        drop(o, i - 1);
+        drop_edge(o, i - 1);
     else
-        push(o, edge(b, a));
+        push_edge(o, edge_of(b, a));
 }
 
 static void open_all(open_edges *o, const uint32_t *face)
 {
     for (int k = 0; k < 3; k++)
-        push(o, edge(face[(k + 1) % 3], face[k]));
+        push_edge(o, edge_of(face[(k + 1) % 3], face[k]));
 }
 
 /* What is open after face (a, b, c) across (a, b), which is open no longer. */
@@ -100,16 +105,16 @@ static void go_through(open_edges *o, uint32_t kind, uint32_t at, uint32_t a, ui
                        uint32_t c)
 {
     if (kind == IS_NEW) {
-        push(o, edge(c, b));
-        push(o, edge(a, c));
+        push_edge(o, edge_of(c, b));
+        push_edge(o, edge_of(a, c));
         return;
     }
     if (kind == IS_LEFT || kind == IS_RIGHT)
-        drop(o, at);
+        drop_edge(o, at);
     if (kind != IS_LEFT)
-        pass(o, b, c);
+        pass_edge(o, b, c);
     if (kind != IS_RIGHT)
-        pass(o, c, a);
+        pass_edge(o, c, a);
 }
 
 /* ---- writing ---- */
@@ -138,7 +143,7 @@ static uint32_t gate_of(const open_edges *o, const uint32_t *face, int *first)
 {
     uint64_t side[3];
     for (int k = 0; k < 3; k++)
-        side[k] = edge(face[k], face[(k + 1) % 3]);
+        side[k] = edge_of(face[k], face[(k + 1) % 3]);
     for (uint32_t i = o->end; i > o->begin; i--)
         for (int k = 0; k < 3; k++)
             if (o->edge[i - 1] == side[k]) {
@@ -153,13 +158,13 @@ static uint32_t kind_of(const open_edges *o, uint32_t a, uint32_t b, uint32_t c,
 {
     if (c == o->seen)
         return IS_NEW;
-    *at = starting(o, b);
-    if (*at < o->end && to(o->edge[*at]) == c)
+    *at = find_starting(o, b);
+    if (*at < o->end && edge_to(o->edge[*at]) == c)
         return IS_LEFT;
-    *at = ending(o, a);
-    if (*at < o->end && from(o->edge[*at]) == c)
+    *at = find_ending(o, a);
+    if (*at < o->end && edge_from(o->edge[*at]) == c)
         return IS_RIGHT;
-    *at = starting(o, c);
+    *at = find_starting(o, c);
     return *at < o->end ? AT_OPEN + o->end - 1 - *at : BY_NUMBER;
 }
 
@@ -177,7 +182,7 @@ static void write_face(writing *w, const uint32_t *code, const uint32_t *face)
         return;
     }
     uint32_t a = face[k], b = face[(k + 1) % 3], c = face[(k + 2) % 3];
-    drop(o, at);
+    drop_edge(o, at);
     uint32_t kind = kind_of(o, a, b, c, &at);
     *w->third++ = (uint8_t)(3 * kind + (uint32_t)k);
     if (kind == BY_NUMBER)
@@ -197,7 +202,8 @@ static void write_codes(const uint8_t *codes, uint32_t rows, uint8_t *out,
 }
 
 /* `third` and what follows are built where they cannot be in each other's way, then moved up. */
-static void join(const writing *w, uint32_t rows, uint8_t *out, size_t ends[EBPO_GATES_ENDS])
+static void join_streams(const writing *w, uint32_t rows, uint8_t *out,
+                         size_t ends[EBPO_GATES_ENDS])
 {
     size_t n = rows, low = (size_t)(w->low - out) - 2 * n, more = (size_t)(w->more - out) - 5 * n;
     ends[0] = n;
@@ -214,7 +220,7 @@ void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
     enum { MORE_OF_FACE = 12 };
     size_t bytes = (size_t)rows * EBPO_GATES_COLS;
     writing w = { out, out + rows, out + 2 * (size_t)rows, out + 5 * (size_t)rows, { .end = 0 } };
-    start(&w.open);
+    start_edges(&w.open);
     for (uint32_t i = 0; i < rows; i++) {
         uint32_t code[3], face[3], seen = w.open.seen;
         for (int k = 0; k < 3; k++) {
@@ -228,7 +234,7 @@ void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
         w.open.seen = seen;
     }
     if ((size_t)(w.gate - out) == rows)
-        join(&w, rows, out, ends);
+        join_streams(&w, rows, out, ends);
     else
         write_codes(codes, rows, out, ends);
     memset(out + ends[EBPO_GATES_ENDS - 1], 0, bytes - ends[EBPO_GATES_ENDS - 1]);
@@ -270,12 +276,12 @@ static bool get_third(reading *r, uint32_t kind, uint32_t a, uint32_t b, uint32_
         return get_vertex(r, o->seen, c);
     if (kind >= AT_OPEN && kind - AT_OPEN >= o->end - o->begin)
         return false;
-    *at = kind == IS_LEFT    ? starting(o, b)
-          : kind == IS_RIGHT ? ending(o, a)
+    *at = kind == IS_LEFT    ? find_starting(o, b)
+          : kind == IS_RIGHT ? find_ending(o, a)
                              : o->end - 1 - (kind - AT_OPEN);
     if (*at == o->end)
         return false;
-    *c = kind == IS_LEFT ? to(o->edge[*at]) : from(o->edge[*at]);
+    *c = kind == IS_LEFT ? edge_to(o->edge[*at]) : edge_from(o->edge[*at]);
     return true;
 }
 
@@ -286,8 +292,8 @@ static bool read_across(reading *r, uint32_t gate, uint32_t *face)
     if (gate > o->end - o->begin)
         return false;
     uint32_t third = *r->third++, at = o->end - gate, c;
-    uint32_t a = from(o->edge[at]), b = to(o->edge[at]), kind = third / 3, k = third % 3;
-    drop(o, at);
+    uint32_t a = edge_from(o->edge[at]), b = edge_to(o->edge[at]), kind = third / 3, k = third % 3;
+    drop_edge(o, at);
     if (!get_third(r, kind, a, b, &at, &c))
         return false;
     face[k] = a;
@@ -333,7 +339,7 @@ static void find_streams(reading *r, const uint8_t *in, uint32_t rows)
         numbers += r->third[i] / 3 == BY_NUMBER;
     r->more = r->low + 3 * alone + numbers; /* at most 5 bytes a face so far */
     r->end = in + bytes;
-    start(&r->open);
+    start_edges(&r->open);
 }
 
 static bool is_zero(const uint8_t *begin, const uint8_t *end)

@@ -9,7 +9,7 @@
 
 #include <ebpo/base.h>
 
-#include "hdf5_read/shape.h"
+#include "hdf5_read/chunk.h"
 #include "io/byte_source.h"
 
 typedef struct ebpo_head {

@@ -1,4 +1,7 @@
-/* Arrays: their shape, held to what the format fixes, and where their chunks are. */
+/* Arrays: their shape, held to what the format fixes, and where their chunks are. Three of HDF5's
+ * indexes of chunks are read (a single chunk, an implicit index, a fixed array with pages); each
+ * chunk has to lie within the file and below the size that its filters can give. Source: HDF5 File
+ * Format Specification 3.0, sections IV.A.2.i and VII; format-spec/README.md, section 2. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -6,59 +9,278 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "hdf5_read/chunk_index.h"
-#include "hdf5_read/head_types.h"
+#include "hdf5_read/head_parts.h"
 
-enum {
-    COLS_MOST = 160,
-    FILTER_DEFLATE = 1,
-    FILTER_SHUFFLE = 2,
-    FILTER_FLETCHER = 3,
-    FILTER_ZSTD = 32015
-};
+/* --- how an array is stored, and the table of its chunks --- */
 
-/* Number of filters; shuffle must have been set for our elements. -1 when it is not. */
-static int list_filters(const ebpo_head_filters *f, unsigned element_size)
+typedef enum ebpo_head_index {
+    EBPO_INDEX_SINGLE = 1, /* one chunk */
+    EBPO_INDEX_IMPLICIT,   /* one behind the other, set aside at once, without filters */
+    EBPO_INDEX_FIXED       /* a table of as many as there are */
+} ebpo_head_index;
+
+typedef struct ebpo_head_layout {
+    unsigned rank;     /* of the chunks */
+    uint64_t chunk[3]; /* their size; the last is the element's */
+    ebpo_head_index index;
+    unsigned page_bits; /* FIXED: two to this many chunks are a page */
+    bool single_filtered;
+    uint64_t single_bytes; /* SINGLE with filters */
+    uint32_t single_mask;
+    uint64_t
+        address; /* of the chunk, the chunks, the table; EBPO_NO_ADDRESS: nothing was written */
+} ebpo_head_layout;
+
+/* What to look for. */
+typedef struct ebpo_head_chunks {
+    const ebpo_head_layout *layout;
+    bool filtered;
+    uint64_t count, whole, bound; /* chunks; bytes of one before its filters, and at most after */
+    ebpo_chunk_place *place;      /* out: count of them */
+    uint64_t stored;              /* out: bytes in all */
+    uint64_t at;                  /* out: the chunk that is wrong; UINT64_MAX: none in particular */
+} ebpo_head_chunks;
+
+static const char missing[] = "the chunk is missing", cut[] = "its description is cut short",
+                  contradicts[] = "the array's index contradicts its shape or its filters",
+                  no_index[] = "there is no chunk index where one is expected",
+                  damaged[] = "the array's chunk index is damaged: the checksum differs",
+                  beyond[] = "the array's chunk index lies beyond the end of the file";
+
+static const char *read_chunked(ebpo_head_cursor *c, ebpo_head_layout *l, bool *foreign)
 {
-    if (f->count > EBPO_HEAD_FILTERS)
-        return -1;
-    for (unsigned i = 0; i < f->count; i++)
-        if (f->filter[i].id == FILTER_SHUFFLE &&
-            (f->filter[i].values != 1 || f->filter[i].first != element_size))
-            return -1;
-    return (int)f->count;
+    enum { SINGLE_FILTERED = 2 };
+    unsigned flags = ebpo_cursor_u8(c), rank = ebpo_cursor_u8(c), bytes = ebpo_cursor_u8(c);
+    if (c->cut)
+        return cut;
+    if (rank < 2 || rank > 3 || bytes < 1 || bytes > 8 || flags & ~(unsigned)SINGLE_FILTERED)
+        return "the array's chunks do not have the size that the format fixes";
+    l->rank = rank - 1;
+    for (unsigned i = 0; i < rank; i++)
+        l->chunk[i] = ebpo_cursor_uint(c, bytes);
+    unsigned index = ebpo_cursor_u8(c);
+    l->single_filtered = index == EBPO_INDEX_SINGLE && flags & SINGLE_FILTERED;
+    if (l->single_filtered) {
+        l->single_bytes = ebpo_cursor_u64(c);
+        l->single_mask = ebpo_cursor_u32(c);
+    }
+    if (index == EBPO_INDEX_FIXED)
+        l->page_bits = ebpo_cursor_u8(c);
+    if (index < EBPO_INDEX_SINGLE || index > EBPO_INDEX_FIXED) {
+        *foreign = true;
+        return "the array's chunks have an index for arrays that grow";
+    }
+    l->index = (ebpo_head_index)index;
+    l->address = ebpo_cursor_u64(c);
+    return c->cut ? cut : NULL;
 }
 
-/* Shuffled elements of one byte are what they were: h5repack shuffles all arrays alike. */
+/* What is wrong, or NULL. `*foreign`: not wrong, but of a kind that only libhdf5 reads. */
+static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *foreign)
+{
+    enum { CHUNKED = 2, VIRTUAL = 3 };
+    unsigned version = ebpo_cursor_u8(&c), kind = ebpo_cursor_u8(&c);
+    *l = (ebpo_head_layout){ .address = EBPO_NO_ADDRESS };
+    *foreign = version < 3 || version > 4;
+    if (version < 3 || version > 4)
+        return "the array's layout is of a version that is not known";
+    if (kind == VIRTUAL)
+        return "the array is virtual: its values lie in other arrays, which are never looked for";
+    *foreign = kind != CHUNKED || version == 3;
+    if (kind != CHUNKED)
+        return "the array is not stored in chunks";
+    if (version == 4)
+        return read_chunked(&c, l, foreign);
+    return "the array's chunks are listed in a tree without checksums";
+}
+
+/* Takes the next chunk's place over. */
+static const char *take_place(ebpo_head_chunks *t, uint64_t i, uint64_t file_bytes,
+                              uint64_t address, uint64_t bytes, uint32_t mask)
+{
+    t->at = i;
+    if (address == EBPO_NO_ADDRESS || bytes == 0)
+        return missing;
+    if (mask != 0)
+        return "the chunk was stored without its filters";
+    if (bytes > t->bound)
+        return "the chunk is larger than it can be";
+    if (address > file_bytes || bytes > file_bytes - address)
+        return "the chunk lies beyond the end of the file";
+    t->place[i] = (ebpo_chunk_place){ address, (uint32_t)bytes };
+    t->stored += bytes;
+    t->at = UINT64_MAX;
+    return t->stored > file_bytes ? "the array's chunks do not fit the file" : NULL;
+}
+
+static const char *read_single(ebpo_head_chunks *t, uint64_t file_bytes)
+{
+    const ebpo_head_layout *l = t->layout;
+    if (t->count != 1)
+        return contradicts;
+    if (l->address == EBPO_NO_ADDRESS) {
+        t->at = 0;
+        return missing;
+    }
+    if (t->filtered != l->single_filtered)
+        return contradicts;
+    return take_place(t, 0, file_bytes, l->address, t->filtered ? l->single_bytes : t->whole,
+                      l->single_mask);
+}
+
+static const char *read_implicit(ebpo_head_chunks *t, uint64_t file_bytes)
+{
+    const ebpo_head_layout *l = t->layout;
+    const char *wrong = t->filtered ? contradicts : NULL;
+    for (uint64_t i = 0; i < t->count && !wrong; i++) {
+        uint64_t begin = EBPO_NO_ADDRESS; /* as this does not fit 64 bits, it is none */
+        if (l->address != EBPO_NO_ADDRESS && (__builtin_mul_overflow(i, t->whole, &begin) ||
+                                              __builtin_add_overflow(begin, l->address, &begin)))
+            begin = EBPO_NO_ADDRESS;
+        wrong = take_place(t, i, file_bytes, begin, t->whole, 0);
+    }
+    return wrong;
+}
+
+/* A fixed array: a header, then one block of pages. */
+typedef struct fixed_array {
+    uint64_t data; /* where the block is */
+    unsigned entry, size_bytes;
+} fixed_array;
+
+static const char *read_fixed_header(ebpo_head_state *s, const ebpo_head_chunks *t, fixed_array *f)
+{
+    enum { BYTES = 28, PAGE_BITS_MOST = 16, PLAIN_ENTRY = 8, FILTERED_MORE = 12 };
+    const ebpo_head_layout *l = t->layout;
+    const uint8_t *block = ebpo_head_bytes_at(&s->bytes, l->address, BYTES);
+    if (!block)
+        return beyond;
+    if (memcmp(block, "FAHD", 4) != 0 || block[4] != 0)
+        return no_index;
+    if (!ebpo_head_sound(block, BYTES))
+        return damaged;
+    ebpo_head_note_range(s, l->address, BYTES);
+    ebpo_head_cursor c = { block + 5, block + BYTES, false };
+    unsigned client = ebpo_cursor_u8(&c), page_bits;
+    f->entry = ebpo_cursor_u8(&c);
+    page_bits = ebpo_cursor_u8(&c);
+    uint64_t entries = ebpo_cursor_u64(&c);
+    f->data = ebpo_cursor_u64(&c);
+    f->size_bytes = t->filtered ? f->entry - FILTERED_MORE : 0;
+    bool fits =
+        t->filtered ? f->entry > FILTERED_MORE && f->size_bytes <= 8 : f->entry == PLAIN_ENTRY;
+    return client == (unsigned)t->filtered && fits && entries == t->count &&
+                   page_bits == l->page_bits && page_bits >= 1 && page_bits <= PAGE_BITS_MOST
+               ? NULL
+               : contradicts;
+}
+
+/* `count` entries from chunk `first` on, with their checksum behind them; `before`: bytes that the
+ * checksum counts, too. */
+static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
+                                uint64_t at, uint64_t before, uint64_t first, uint64_t count)
+{
+    uint64_t size = before + count * f->entry + 4, file_bytes = s->bytes.input->source.size;
+    const uint8_t *block = ebpo_head_bytes_at(&s->bytes, at, size);
+    if (!block)
+        return beyond;
+    if (!ebpo_head_sound(block, size))
+        return damaged;
+    ebpo_head_note_range(s, at, size);
+    ebpo_head_cursor c = { block + before, block + size, false };
+    const char *wrong = NULL;
+    for (uint64_t i = 0; i < count && !wrong; i++) {
+        uint64_t address = ebpo_cursor_u64(&c);
+        uint64_t bytes = t->filtered ? ebpo_cursor_uint(&c, f->size_bytes) : t->whole;
+        uint32_t mask = t->filtered ? ebpo_cursor_u32(&c) : 0;
+        wrong = take_place(t, first + i, file_bytes, address, bytes, mask);
+    }
+    return wrong;
+}
+
+/* The bits that say which pages have been written. */
+static const char *check_pages(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
+                               uint64_t prefix, uint64_t pages)
+{
+    const uint8_t *block = ebpo_head_bytes_at(&s->bytes, f->data, prefix + 4);
+    if (!block)
+        return beyond;
+    if (!ebpo_head_sound(block, prefix + 4))
+        return damaged;
+    ebpo_head_note_range(s, f->data, prefix + 4);
+    for (uint64_t page = 0; page < pages; page++)
+        if (!(block[14 + page / 8] >> (7 - page % 8) & 1)) {
+            t->at = page << t->layout->page_bits;
+            return missing;
+        }
+    return NULL;
+}
+
+static const char *read_fixed(ebpo_head_state *s, ebpo_head_chunks *t)
+{
+    enum { PREFIX = 14 };
+    fixed_array f = { EBPO_NO_ADDRESS, 0, 0 };
+    const char *wrong = NULL;
+    if (t->layout->address != EBPO_NO_ADDRESS)
+        wrong = read_fixed_header(s, t, &f);
+    if (wrong)
+        return wrong;
+    if (f.data == EBPO_NO_ADDRESS) {
+        t->at = 0;
+        return missing;
+    }
+    const uint8_t *block = ebpo_head_bytes_at(&s->bytes, f.data, PREFIX);
+    if (!block)
+        return beyond;
+    if (memcmp(block, "FADB", 4) != 0 || block[4] != 0 || block[5] != (unsigned)t->filtered ||
+        ebpo_load64(block + 6) != t->layout->address)
+        return no_index;
+    uint64_t page = UINT64_C(1) << t->layout->page_bits;
+    if (t->count <= page)
+        return read_entries(s, t, &f, f.data, PREFIX, 0, t->count);
+    uint64_t pages = (t->count - 1) / page + 1, prefix = PREFIX + (pages + 7) / 8;
+    wrong = check_pages(s, t, &f, prefix, pages);
+    uint64_t at = f.data + prefix + 4;
+    for (uint64_t first = 0; first < t->count && !wrong; first += page) {
+        uint64_t here = t->count - first < page ? t->count - first : page;
+        wrong = read_entries(s, t, &f, at, 0, first, here);
+        at += here * f.entry + 4;
+    }
+    return wrong;
+}
+
+/* In one pass. What is wrong, or NULL. */
+static const char *read_chunk_table(ebpo_head_state *s, ebpo_head_chunks *t)
+{
+    uint64_t file_bytes = s->bytes.input->source.size;
+    t->stored = 0;
+    t->at = UINT64_MAX;
+    switch (t->layout->index) {
+    case EBPO_INDEX_SINGLE: return read_single(t, file_bytes);
+    case EBPO_INDEX_IMPLICIT: return read_implicit(t, file_bytes);
+    case EBPO_INDEX_FIXED: return read_fixed(s, t);
+    }
+    return no_index;
+}
+
+/* --- the array --- */
+
+enum { COLS_MOST = 160 };
+
+/* Shuffle must have been set for elements of this size. */
 static bool find_pipeline(const ebpo_head_filters *f, unsigned element_size,
                           ebpo_pipeline *pipeline)
 {
-    static const struct {
-        ebpo_pipeline pipeline;
-        int count;
-        unsigned ids[2];
-        bool shuffled;
-    } known[] = {
-        { EBPO_PIPELINE_ZSTD, 1, { FILTER_ZSTD }, true },
-        { EBPO_PIPELINE_DEFLATE, 2, { FILTER_DEFLATE, FILTER_FLETCHER }, true },
-        { EBPO_PIPELINE_CHECKSUM, 1, { FILTER_FLETCHER }, false },
-        { EBPO_PIPELINE_BARE, 0, { 0 }, false },
-    };
-    int count = list_filters(f, element_size);
-    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
-        bool first = count > 0 && f->filter[0].id == FILTER_SHUFFLE;
-        int shuffles = known[i].shuffled && (element_size > 1 || first);
-        if (count != known[i].count + shuffles || (shuffles && !first))
-            continue;
-        bool same = true;
-        for (int k = 0; k < known[i].count; k++)
-            same = same && f->filter[shuffles + k].id == known[i].ids[k];
-        if (same) {
-            *pipeline = known[i].pipeline;
-            return true;
-        }
+    unsigned ids[EBPO_HEAD_FILTERS];
+    if (f->count > EBPO_HEAD_FILTERS)
+        return false;
+    for (unsigned i = 0; i < f->count; i++) {
+        ids[i] = f->filter[i].id;
+        if (ids[i] == EBPO_FILTER_SHUFFLE &&
+            (f->filter[i].values != 1 || f->filter[i].first != element_size))
+            return false;
     }
-    return false;
+    return ebpo_pipeline_of_filters(ids, (int)f->count, element_size, pipeline);
 }
 
 /* Chunks of 4 GiB and more are none of HDF5's. */
@@ -89,10 +311,13 @@ static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type
     return wrong->what ? NULL : found;
 }
 
-static ebpo_head_refusal refused(const char *what) { return (ebpo_head_refusal){ what, false }; }
+static ebpo_head_refusal fail_sound(const char *what) { return (ebpo_head_refusal){ what, false }; }
 
 /* Not damaged, but rewritten by another program. */
-static ebpo_head_refusal foreign(const char *what) { return (ebpo_head_refusal){ what, true }; }
+static ebpo_head_refusal fail_foreign(const char *what)
+{
+    return (ebpo_head_refusal){ what, true };
+}
 
 static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape)
 {
@@ -105,14 +330,14 @@ static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape
     ebpo_head_space space = ebpo_head_read_space(ebpo_head_message_cursor(h, space_message));
     bool grows = space.rank <= 2 && !space.fixed;
     if (type.class == EBPO_CLASS_OTHER_INTEGER || grows)
-        return foreign(grows ? "the array does not have fixed dimensions"
-                             : "the array is not of little-endian integers");
+        return fail_foreign(grows ? "the array does not have fixed dimensions"
+                                  : "the array is not of little-endian integers");
     if (type.class != EBPO_CLASS_INTEGER ||
         (type.size != 1 && type.size != 2 && type.size != 4 && type.size != 8))
-        return refused("the array is not of little-endian integers");
+        return fail_sound("the array is not of little-endian integers");
     if (space.rank < 1 || space.rank > 2 || !space.fixed || space.size[0] == 0 ||
         (space.rank == 2 && (space.size[1] == 0 || space.size[1] > COLS_MOST)))
-        return refused("the array does not have one or two fixed dimensions");
+        return fail_sound("the array does not have one or two fixed dimensions");
     shape->element_size = (uint8_t)type.size;
     shape->is_signed = type.is_signed;
     shape->rows = space.size[0];
@@ -129,24 +354,24 @@ static ebpo_head_refusal read_storage(const ebpo_head_header *h, ebpo_head_rows 
                             *layout_message = find_one(h, EBPO_M_LAYOUT, &wrong),
                             *filter_message = find_one(h, EBPO_M_PIPELINE, &wrong);
     if (external)
-        return refused("the array's values lie in another file (external storage), which is never "
-                       "looked for");
+        return fail_sound(
+            "the array's values lie in another file (external storage), which is never "
+            "looked for");
     if (!layout_message)
         return wrong;
-    wrong.what =
-        ebpo_head_read_layout(ebpo_head_message_cursor(h, layout_message), layout, &wrong.foreign);
+    wrong.what = read_layout(ebpo_head_message_cursor(h, layout_message), layout, &wrong.foreign);
     if (wrong.what)
         return wrong;
     bool whole = layout->rank == (shape->cols ? 2 : 1) &&
                  layout->chunk[layout->rank] == shape->element_size &&
                  (!shape->cols || layout->chunk[1] == shape->cols);
     if (!whole || !rows_fit(shape, rule, layout->chunk[0]))
-        return foreign("the array's chunks do not have the size that the format fixes");
+        return fail_foreign("the array's chunks do not have the size that the format fixes");
     shape->chunk_rows = (uint32_t)layout->chunk[0];
     if (filter_message)
         filters = ebpo_head_read_filters(ebpo_head_message_cursor(h, filter_message));
     if (!find_pipeline(&filters, shape->element_size, &shape->pipeline))
-        return foreign("the array's filters are none of the format's");
+        return fail_foreign("the array's filters are none of the format's");
     return wrong;
 }
 
@@ -168,7 +393,7 @@ static ebpo_status find_chunks(ebpo_head *head, const char *path, const ebpo_sha
     t.place = *places = ebpo_alloc(t.count, sizeof **places);
     if (!t.place)
         return ebpo_fail_memory(error, t.count * sizeof **places);
-    const char *wrong = ebpo_head_read_chunks(head->state, &t);
+    const char *wrong = read_chunk_table(head->state, &t);
     *stored = t.stored;
     if (!wrong)
         return EBPO_OK;

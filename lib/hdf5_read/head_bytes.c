@@ -1,9 +1,14 @@
-#include "hdf5_read/head_bytes.h"
-
+/* The bytes of an open head, in few reads, and what went wrong with them. The first bytes hold all
+ * headers and are fetched at once, the index of large arrays comes in one piece, and all else
+ * through a window. Nothing beyond the end of the file is read; the first failure of the input is
+ * kept, and nothing is read after it. An error says what was refused, unless the input itself
+ * failed. */
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "hdf5_read/head_parts.h"
 
 enum {
     FIRST_BYTES = 131072, /* holds all headers */
@@ -32,7 +37,8 @@ void ebpo_head_bytes_close(ebpo_head_bytes *b)
     *b = (ebpo_head_bytes){ .status = EBPO_OK };
 }
 
-static const uint8_t *within(const uint8_t *buffer, ebpo_range held, uint64_t at, uint64_t size)
+static const uint8_t *held_within(const uint8_t *buffer, ebpo_range held, uint64_t at,
+                                  uint64_t size)
 {
     if (!buffer || at < held.offset || at - held.offset > held.size ||
         size > held.size - (at - held.offset))
@@ -52,8 +58,9 @@ static bool read_into(ebpo_head_bytes *b, uint8_t **buffer, uint64_t capacity, e
 
 static const uint8_t *read_table(ebpo_head_bytes *b, uint64_t at, uint64_t size)
 {
-    return read_into(b, &b->table, b->index.size, b->index) ? within(b->table, b->index, at, size)
-                                                            : NULL;
+    return read_into(b, &b->table, b->index.size, b->index)
+               ? held_within(b->table, b->index, at, size)
+               : NULL;
 }
 
 /* Windows begin at multiples of half their size, so that reading to and fro around a place does not
@@ -81,11 +88,11 @@ const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *b, uint64_t at, uint64_t size
     uint64_t end = b->input->source.size;
     if (b->status != EBPO_OK || at > end || size > end - at)
         return NULL;
-    const uint8_t *found = within(b->first, (ebpo_range){ 0, b->first_bytes }, at, size);
+    const uint8_t *found = held_within(b->first, (ebpo_range){ 0, b->first_bytes }, at, size);
     if (!found)
-        found = within(b->window, (ebpo_range){ b->window_at, b->window_bytes }, at, size);
+        found = held_within(b->window, (ebpo_range){ b->window_at, b->window_bytes }, at, size);
     if (!found && b->table)
-        found = within(b->table, b->index, at, size);
+        found = held_within(b->table, b->index, at, size);
     if (found)
         return found;
     if (b->index.size && !b->table && at >= b->index.offset &&
@@ -100,4 +107,27 @@ const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *b, uint64_t at, uint64_t size
     b->window_at = window.offset;
     b->window_bytes = window.size;
     return b->window + (at - window.offset);
+}
+
+/* --- errors --- */
+
+static ebpo_status fail_refused(const ebpo_head *head, const char *path, const char *what,
+                                const ebpo_head_refusal *why, ebpo_error *error)
+{
+    if (why->foreign)
+        return ebpo_fail_at(error, EBPO_E_UNSUPPORTED, head->shown, path, -1,
+                            "%s, " EBPO_HEAD_FOREIGN, why->what);
+    return why->what && *what ? ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, path, -1, "%s: %s",
+                                             what, why->what)
+                              : ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, path, -1, "%s",
+                                             why->what ? why->what : what);
+}
+
+ebpo_status ebpo_head_fail(const ebpo_head *head, const char *path, const char *what,
+                           ebpo_error *error)
+{
+    const ebpo_head_state *s = head->state;
+    if (s->bytes.status != EBPO_OK)
+        return ebpo_fail_with(error, &s->bytes.error);
+    return fail_refused(head, path, what, &s->refusal, error);
 }

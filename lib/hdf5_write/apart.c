@@ -1,4 +1,7 @@
-#include "hdf5_write/apart.h"
+/* A process of its own for what libhdf5 does with files of others: forked, with limits of memory,
+ * time and bytes written, without plugins, and with a pipe for its status and error. What goes
+ * wrong in it, whatever it is, ends that process and not this one. */
+#include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -10,7 +13,6 @@
 #include <unistd.h>
 
 #include "core/error.h"
-#include "hdf5_write/scope.h"
 
 /* What the other process says when it is done. */
 typedef struct report {
@@ -19,7 +21,7 @@ typedef struct report {
 } report;
 
 /* Addresses that this process has; 0: not known. */
-static uint64_t addresses(void)
+static uint64_t address_bytes(void)
 {
     unsigned long long pages = 0;
     FILE *f = fopen("/proc/self/statm", "re");
@@ -30,7 +32,7 @@ static uint64_t addresses(void)
     return pages * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
-static void limit(int what, uint64_t most)
+static void limit_resource(int what, uint64_t most)
 {
     struct rlimit now;
     if (getrlimit(what, &now) == 0 && (now.rlim_max == RLIM_INFINITY || most < now.rlim_max)) {
@@ -41,14 +43,14 @@ static void limit(int what, uint64_t most)
 
 static void take_limits(const ebpo_apart_limits *limits, uint64_t has)
 {
-    limit(RLIMIT_CORE, 0);
-    limit(RLIMIT_FSIZE, limits->file_bytes);
-    limit(RLIMIT_CPU, limits->seconds);
+    limit_resource(RLIMIT_CORE, 0);
+    limit_resource(RLIMIT_FSIZE, limits->file_bytes);
+    limit_resource(RLIMIT_CPU, limits->seconds);
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
     (void)has; /* these set all addresses aside */
 #else
     if (has)
-        limit(RLIMIT_AS, has + limits->memory_bytes);
+        limit_resource(RLIMIT_AS, has + limits->memory_bytes);
 #endif
 }
 
@@ -133,7 +135,7 @@ ebpo_status ebpo_apart(ebpo_apart_fn work, void *user, const char *shown,
     report r;
     if (!make_pipe(ends))
         return ebpo_fail_errno(error, shown, "no process could be started for it");
-    uint64_t has = addresses();
+    uint64_t has = address_bytes();
     ebpo_h5_enter(&scope); /* so that no thread is inside of libhdf5 when the process is copied */
     pid_t child = fork();
     if (child == 0) {

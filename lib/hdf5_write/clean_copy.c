@@ -1,4 +1,8 @@
-/* Files of other programs' layout, written anew: compat.h. Runs apart, alone in its process. */
+/* Files of another program's layout, written anew in this format's, by libhdf5 in a process of its
+ * own (apart.c). Chunks whose filters and rows fit are copied as they are stored; of other
+ * layouts, filters and byte orders, libhdf5 decodes the values. What does not fit the format is
+ * left out, and the first such array is named. Depth and number of objects are bounded, as hard
+ * links may lead in circles. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,10 +12,9 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/text.h"
-#include "hdf5_read/zstd_frame.h"
-#include "hdf5_write/apart.h"
+#include "hdf5_read/chunk.h"
+#include "hdf5_write/h5_parts.h"
 #include "hdf5_write/h5.h"
-#include "hdf5_write/h5_objects.h"
 #include "hdf5_write/zstd_filter.h"
 
 enum {
@@ -113,33 +116,20 @@ static void leave_out(copying *c, const char *path, const char *what)
         (void)!ebpo_fail_at(&c->left_out, EBPO_E_FORMAT, c->shown, path, -1, "%s", what);
 }
 
-/* Shuffled elements of one byte are what they were. */
 static bool find_pipeline(hid_t plist, unsigned element_size, ebpo_pipeline *pipeline)
 {
-    int count = H5Pget_nfilters(plist), ids[3] = { 0 }, first = 0;
-    for (int i = 0; i < count && count <= 3; i++) {
+    enum { FILTERS_MOST = 3 };
+    int count = H5Pget_nfilters(plist);
+    unsigned ids[FILTERS_MOST] = { 0 };
+    for (int i = 0; i < count && count <= FILTERS_MOST; i++) {
         unsigned flags, values[4] = { 0 };
         size_t value_count = 4;
-        ids[i] = H5Pget_filter2(plist, (unsigned)i, &flags, &value_count, values, 0, NULL, NULL);
-        if (ids[i] < 0 ||
-            (ids[i] == H5Z_FILTER_SHUFFLE && (value_count != 1 || values[0] != element_size)))
+        int id = H5Pget_filter2(plist, (unsigned)i, &flags, &value_count, values, 0, NULL, NULL);
+        if (id < 0 || (id == H5Z_FILTER_SHUFFLE && (value_count != 1 || values[0] != element_size)))
             return false;
+        ids[i] = (unsigned)id;
     }
-    first = count > 0 && ids[0] == H5Z_FILTER_SHUFFLE;
-    bool shuffled = first || element_size == 1;
-    count -= first;
-    if (shuffled && count == 1 && ids[first] == EBPO_ZSTD_FILTER_ID)
-        *pipeline = EBPO_PIPELINE_ZSTD;
-    else if (shuffled && count == 2 && ids[first] == H5Z_FILTER_DEFLATE &&
-             ids[first + 1] == H5Z_FILTER_FLETCHER32)
-        *pipeline = EBPO_PIPELINE_DEFLATE;
-    else if (!first && count == 1 && ids[0] == H5Z_FILTER_FLETCHER32)
-        *pipeline = EBPO_PIPELINE_CHECKSUM;
-    else if (!first && count == 0)
-        *pipeline = EBPO_PIPELINE_BARE;
-    else
-        return false;
-    return true;
+    return ebpo_pipeline_of_filters(ids, count, element_size, pipeline);
 }
 
 static bool has_filter(hid_t plist, int id)

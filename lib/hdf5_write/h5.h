@@ -7,7 +7,7 @@
 
 #include <ebpo/base.h>
 
-#include "hdf5_read/shape.h"
+#include "hdf5_read/chunk.h"
 
 typedef int64_t ebpo_h5_id; /* an open object; negative: none */
 
@@ -55,6 +55,14 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_count(ebpo_h5_out *out, ebpo_h5_id id, con
 EBPO_MUST_USE ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                                            const double *values, unsigned count, ebpo_error *error);
 
+/* Attributes as the VTKHDF format wants them: 64-bit integers [count], count > 0, ASCII of fixed
+ * length. */
+EBPO_MUST_USE ebpo_status ebpo_h5_put_ints(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
+                                           const int64_t *values, unsigned count,
+                                           ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_h5_put_ascii(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
+                                            const char *text, ebpo_error *error);
+
 EBPO_MUST_USE ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *id,
                                              ebpo_error *error);
 /* Creates an array; the caller closes the id. Then its chunks, encoded, by number. */
@@ -76,5 +84,95 @@ EBPO_MUST_USE ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error);
 /* Closes without writing any more, also what a failing call above left. Harmless after
  * ebpo_h5_finish. */
 void ebpo_h5_discard(ebpo_h5_out *out);
+
+/* HDF5 files for other programs: plain arrays of numbers that grow by rows, compressed with what
+ * every HDF5 has (shuffle, deflate). Errors name file and object. */
+
+typedef enum ebpo_h5_number {
+    EBPO_H5_U8,
+    EBPO_H5_I32,
+    EBPO_H5_I64,
+    EBPO_H5_F32,
+    EBPO_H5_F64
+} ebpo_h5_number;
+
+static inline size_t ebpo_h5_number_bytes(ebpo_h5_number number)
+{
+    return number == EBPO_H5_U8 ? 1 : number == EBPO_H5_I32 || number == EBPO_H5_F32 ? 4 : 8;
+}
+
+/* [rows] when cols is 0, else [rows][cols]. */
+typedef struct ebpo_h5_table {
+    ebpo_h5_id id;
+    char path[96];
+    ebpo_h5_number number;
+    uint32_t cols;
+    uint64_t rows; /* so far */
+} ebpo_h5_table;
+#define EBPO_H5_TABLE_INIT       \
+    {                            \
+        -1, "", EBPO_H5_U8, 0, 0 \
+    }
+
+/* Creates a file by name that programs with any HDF5 from 1.8 on can read. Finish it with
+ * ebpo_h5_finish or ebpo_h5_discard. */
+EBPO_MUST_USE ebpo_status ebpo_h5_create_plain(ebpo_h5_out *out, const char *path,
+                                               const char *shown, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_h5_make_plain_group(ebpo_h5_out *out, const char *path,
+                                                   ebpo_h5_id *id, ebpo_error *error);
+
+/* Creates an array of no rows. The caller closes it with ebpo_h5_close_table. */
+EBPO_MUST_USE ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path,
+                                             ebpo_h5_number number, uint32_t cols,
+                                             ebpo_h5_table *table, ebpo_error *error);
+/* Appends rows, in the machine's byte order; stored little-endian. */
+EBPO_MUST_USE ebpo_status ebpo_h5_append(ebpo_h5_out *out, ebpo_h5_table *table, const void *data,
+                                         uint64_t rows, ebpo_error *error);
+/* A failure, as what is still to be compressed is written now, is told by the next call. */
+void ebpo_h5_close_table(const ebpo_h5_out *out, ebpo_h5_table *table);
+
+/* All three: an array that is written at once. */
+EBPO_MUST_USE ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path,
+                                            ebpo_h5_number number, uint32_t cols, const void *data,
+                                            uint64_t rows, ebpo_error *error);
+
+/* HDF5 arrays of three dimensions for other programs, of float64, written layer by layer. */
+
+/* [dims[0]][dims[1]][dims[2]], each at least 1. The caller closes the id. */
+EBPO_MUST_USE ebpo_status ebpo_h5_make_volume(ebpo_h5_out *out, const char *path,
+                                              const uint64_t dims[3], ebpo_h5_id *id,
+                                              ebpo_error *error);
+/* Layers from `first` on; data[layers][dims[1]][dims[2]]. */
+EBPO_MUST_USE ebpo_status ebpo_h5_put_layers(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
+                                             const uint64_t dims[3], uint64_t first,
+                                             uint64_t layers, const double *data,
+                                             ebpo_error *error);
+
+/* Files that other programs have laid out, through libhdf5, in a process of its own. */
+
+typedef struct ebpo_apart_limits {
+    uint64_t memory_bytes; /* of addresses, beyond those that this process has */
+    uint64_t file_bytes;   /* of what it writes */
+    unsigned seconds;      /* of processor time */
+} ebpo_apart_limits;
+
+/* Rows of a chunk of an array of this format. `stored`: its shape, with the chunk_rows that another
+ * program has given it, 0 for none; `subtrees`: the file has that part; `kept`: the arrays whose
+ * chunks the format fixes have these. */
+typedef uint32_t (*ebpo_h5_chunk_rows_fn)(const char *path, const ebpo_shape *stored, bool subtrees,
+                                          bool kept);
+
+/* Writes what a file has of this format anew, in the layout of this format: from the file `from` to
+ * the empty file `to`, which loses its name as soon as libhdf5, which wants one, has opened it; so
+ * does `from` with `from_goes`. Chunks that fit the format are copied as they are stored; of other
+ * layouts, filters and byte orders, libhdf5 reads the values. What does not fit the format is left
+ * out; *left_out then says what and why of the first such array (EBPO_E_FORMAT), and has no message
+ * else; on failure it is the failure. EBPO_E_FORMAT, EBPO_E_IO, EBPO_E_MEMORY; EBPO_E_UNSUPPORTED
+ * without libhdf5.
+ */
+EBPO_MUST_USE ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to,
+                                             const char *shown, ebpo_h5_chunk_rows_fn chunk_rows,
+                                             const ebpo_apart_limits *limits, ebpo_error *left_out,
+                                             ebpo_error *error);
 
 #endif

@@ -1,5 +1,5 @@
-/* Rows of numbers from files of others: rows.h. libhdf5 reads them in a process of its own, which
- * hands them over in a file without a name. */
+/* Rows of numbers from files of others (ebpo/rows.h). libhdf5 reads them in a process of its own,
+ * which hands them over in a file without a name. */
 #include <ebpo/rows.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -13,10 +13,9 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/text.h"
-#include "core/unnamed_file.h"
-#include "hdf5_write/apart.h"
+#include "core/os.h"
+#include "hdf5_write/h5_parts.h"
 #include "hdf5_write/h5.h"
-#include "hdf5_write/scope.h"
 
 enum {
     COLUMNS_MOST = 64,
@@ -38,7 +37,7 @@ typedef struct dataset {
     hsize_t size[2];
 } dataset;
 
-static ebpo_status fail(const dataset *d, const char *what, ebpo_error *error)
+static ebpo_status rows_fail(const dataset *d, const char *what, ebpo_error *error)
 {
     return ebpo_h5_fail(error, EBPO_E_FORMAT, d->path, d->name, what);
 }
@@ -60,13 +59,14 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
     d->set = H5Dopen2(d->file, d->name, access);
     H5Pclose(access);
     if (elsewhere || (d->set >= 0 && ebpo_h5_is_elsewhere(d->set)))
-        return fail(d, "its values lie in another file, which is not looked for; name that one",
-                    error);
+        return rows_fail(d,
+                         "its values lie in another file, which is not looked for; name that one",
+                         error);
     if (d->set < 0)
-        return fail(d, "there is no such dataset", error);
+        return rows_fail(d, "there is no such dataset", error);
     d->space = H5Dget_space(d->set);
     d->type = H5Dget_type(d->set);
-    return d->space < 0 || d->type < 0 ? fail(d, "the dataset is damaged", error) : EBPO_OK;
+    return d->space < 0 || d->type < 0 ? rows_fail(d, "the dataset is damaged", error) : EBPO_OK;
 }
 
 /* Returns whether the file's root names this format, or that of paint files. */
@@ -137,7 +137,7 @@ static ebpo_status check_set(dataset *d, ebpo_error *error)
     describe_rows(d, wanted);
     if (others) {
         snprintf(what, sizeof what, "holds no numbers but %s; %s are expected", others, wanted);
-        return fail(d, what, error);
+        return rows_fail(d, what, error);
     }
     if (has_rows(d->space, d->least, d->most, d->size))
         return d->size[0] <= d->bytes_most / (d->most * sizeof(double))
@@ -148,7 +148,7 @@ static ebpo_status check_set(dataset *d, ebpo_error *error)
     describe_shape(d->space, shape, sizeof shape);
     snprintf(what, sizeof what, "%s are expected; this is %s%s", wanted,
              *shape ? "an array of " : "a single value", shape);
-    return fail(d, what, error);
+    return rows_fail(d, what, error);
 }
 
 /* The datasets that could be meant. */
@@ -235,7 +235,7 @@ static ebpo_status copy_rows(const dataset *d, ebpo_error *error)
         bool short_of_memory;
         if (!read_piece(d, first, count, rows, &short_of_memory))
             return short_of_memory ? ebpo_fail_memory(error, d->size[0] * d->size[1] * sizeof *rows)
-                                   : fail(d, "the dataset cannot be read", error);
+                                   : rows_fail(d, "the dataset cannot be read", error);
         if (!ebpo_apart_write(d->to, rows, (size_t)count * d->most * sizeof *rows))
             return ebpo_fail_errno(error, d->path, "its rows could not be written to TMPDIR");
     }

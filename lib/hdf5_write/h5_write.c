@@ -1,10 +1,13 @@
-/* Creating files, see h5.h. */
+/* Creating files as this library lays them out: headers in one piece at the start, everything
+ * compact in object headers, chunks that come already encoded. What is taken over (spaces, lists
+ * of properties) is closed, also when something failed before. The first failure of a write is
+ * told by all calls after it (sink.c). Attributes of all kinds, also those of tables for other
+ * programs, are written here. */
 #include <string.h>
 
 #include "core/error.h"
 #include "hdf5_write/h5.h"
-#include "hdf5_write/h5_objects.h"
-#include "hdf5_write/sink.h"
+#include "hdf5_write/h5_parts.h"
 #include "hdf5_write/zstd_filter.h"
 
 /* Everything stays in object headers, wherever HDF5 would otherwise switch to B-trees and heaps. */
@@ -139,33 +142,30 @@ ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned link
     return status;
 }
 
-ebpo_status ebpo_h5_put_text(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text,
-                             ebpo_error *error)
+/* --- attributes: stored little-endian, from values in the machine's order --- */
+
+/* `count` 0: a scalar. */
+static ebpo_status put_numbers(ebpo_h5_out *out, ebpo_h5_id id, const char *name, hid_t stored,
+                               hid_t memory, const void *values, unsigned count, ebpo_error *error)
 {
-    ebpo_h5_scope scope;
-    ebpo_h5_enter(&scope);
-    hid_t type = H5Tcopy(H5T_C_S1);
-    size_t size = strlen(text);
-    if (H5Tset_size(type, size ? size : 1) < 0 || H5Tset_strpad(type, H5T_STR_NULLPAD) < 0 ||
-        H5Tset_cset(type, H5T_CSET_UTF8) < 0) {
-        H5Tclose(type);
-        type = -1;
-    }
-    ebpo_status status =
-        ebpo_h5_put_attribute(out, id, name, type, H5Screate(H5S_SCALAR), -1, text, error);
-    if (type >= 0)
-        H5Tclose(type);
-    ebpo_h5_leave(&scope);
-    return status;
+    hsize_t dims = count;
+    hid_t space = count ? H5Screate_simple(1, &dims, NULL) : H5Screate(H5S_SCALAR);
+    return ebpo_h5_put_attribute(out, id, name, stored, space, memory, values, error);
 }
 
 ebpo_status ebpo_h5_put_int(ebpo_h5_out *out, ebpo_h5_id id, const char *name, int64_t value,
                             ebpo_error *error)
 {
+    return ebpo_h5_put_ints(out, id, name, &value, 0, error); /* a scalar */
+}
+
+ebpo_status ebpo_h5_put_ints(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
+                             const int64_t *values, unsigned count, ebpo_error *error)
+{
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status = ebpo_h5_put_attribute(out, id, name, H5T_STD_I64LE, H5Screate(H5S_SCALAR),
-                                               H5T_NATIVE_INT64, &value, error);
+    ebpo_status status =
+        put_numbers(out, id, name, H5T_STD_I64LE, H5T_NATIVE_INT64, values, count, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -175,8 +175,8 @@ ebpo_status ebpo_h5_put_count(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status = ebpo_h5_put_attribute(out, id, name, H5T_STD_U64LE, H5Screate(H5S_SCALAR),
-                                               H5T_NATIVE_UINT64, &value, error);
+    ebpo_status status =
+        put_numbers(out, id, name, H5T_STD_U64LE, H5T_NATIVE_UINT64, &value, 0, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -186,28 +186,63 @@ ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    hsize_t dims = count;
-    hid_t space = count ? H5Screate_simple(1, &dims, NULL) : H5Screate(H5S_SCALAR);
-    ebpo_status status = ebpo_h5_put_attribute(out, id, name, H5T_IEEE_F64LE, space,
-                                               H5T_NATIVE_DOUBLE, values, error);
+    ebpo_status status =
+        put_numbers(out, id, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values, count, error);
     ebpo_h5_leave(&scope);
     return status;
 }
 
+/* A text of fixed length, without a closing zero byte. */
+static ebpo_status put_string(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text,
+                              size_t size, bool utf8, ebpo_error *error)
+{
+    ebpo_h5_scope scope;
+    ebpo_h5_enter(&scope);
+    hid_t type = H5Tcopy(H5T_C_S1);
+    bool good = type >= 0 && H5Tset_size(type, size) >= 0 &&
+                H5Tset_strpad(type, H5T_STR_NULLPAD) >= 0 &&
+                (!utf8 || H5Tset_cset(type, H5T_CSET_UTF8) >= 0);
+    ebpo_status status = ebpo_h5_put_attribute(out, id, name, good ? type : -1,
+                                               H5Screate(H5S_SCALAR), type, text, error);
+    if (type >= 0)
+        H5Tclose(type);
+    ebpo_h5_leave(&scope);
+    return status;
+}
+
+ebpo_status ebpo_h5_put_text(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text,
+                             ebpo_error *error)
+{
+    size_t size = strlen(text);
+    return put_string(out, id, name, text, size ? size : 1, true, error);
+}
+
+ebpo_status ebpo_h5_put_ascii(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text,
+                              ebpo_error *error)
+{
+    return put_string(out, id, name, text, strlen(text), false, error);
+}
+
+/* --- arrays --- */
+
+static bool set_filter(hid_t dcpl, unsigned filter, unsigned level)
+{
+    switch (filter) {
+    case EBPO_FILTER_DEFLATE: return H5Pset_deflate(dcpl, level) >= 0;
+    case EBPO_FILTER_FLETCHER: return H5Pset_fletcher32(dcpl) >= 0;
+    default: return H5Pset_filter(dcpl, (H5Z_filter_t)filter, H5Z_FLAG_MANDATORY, 1, &level) >= 0;
+    }
+}
+
 static bool set_filters(hid_t dcpl, const ebpo_shape *shape, int level)
 {
-    bool compressed =
-        shape->pipeline == EBPO_PIPELINE_ZSTD || shape->pipeline == EBPO_PIPELINE_DEFLATE;
-    if (compressed && shape->element_size > 1 && H5Pset_shuffle(dcpl) < 0)
+    const ebpo_pipeline_facts *row = ebpo_pipeline_facts_of(shape->pipeline);
+    if (row->compresses && shape->element_size > 1 && H5Pset_shuffle(dcpl) < 0)
         return false;
-    if (shape->pipeline == EBPO_PIPELINE_ZSTD) {
-        unsigned value = (unsigned)(level ? level : EBPO_ZSTD_LEVEL);
-        return H5Pset_filter(dcpl, EBPO_ZSTD_FILTER_ID, H5Z_FLAG_MANDATORY, 1, &value) >= 0;
-    }
-    if (shape->pipeline == EBPO_PIPELINE_DEFLATE &&
-        H5Pset_deflate(dcpl, (unsigned)(level ? level : EBPO_DEFLATE_LEVEL)) < 0)
-        return false;
-    return shape->pipeline == EBPO_PIPELINE_BARE || H5Pset_fletcher32(dcpl) >= 0;
+    for (int i = 0; i < row->filter_count; i++)
+        if (!set_filter(dcpl, row->filter[i], (unsigned)(level ? level : row->level)))
+            return false;
+    return true;
 }
 
 ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_shape *shape,
@@ -318,4 +353,79 @@ void ebpo_h5_discard(ebpo_h5_out *out)
     out->sink = NULL;
     out->file = -1;
     ebpo_h5_leave(&scope);
+}
+
+static ebpo_status tell_outcome(const ebpo_h5_out *out, const char *object, bool good,
+                                const char *what, ebpo_error *error)
+{
+    ebpo_error cause = EBPO_ERROR_INIT;
+    if (out->sink && ebpo_h5_sink_status(out->sink, error) != EBPO_OK)
+        return out->sink->status;
+    if (good)
+        return EBPO_OK;
+    (void)ebpo_h5_fail(&cause, ebpo_h5_short_of_memory() ? EBPO_E_MEMORY : EBPO_E_IO, out->shown,
+                       object, what);
+    if (out->sink)
+        ebpo_h5_sink_fail(out->sink, &cause);
+    return ebpo_fail_with(error, &cause);
+}
+
+ebpo_status ebpo_h5_created(const ebpo_h5_out *out, ebpo_error *error)
+{
+    return tell_outcome(out, "", out->file >= 0, "libhdf5 could not create the file", error);
+}
+
+ebpo_status ebpo_h5_written(const ebpo_h5_out *out, const char *what, bool good, ebpo_error *error)
+{
+    return tell_outcome(out, what, good, "libhdf5 could not write", error);
+}
+
+void ebpo_h5_close_list(hid_t list)
+{
+    if (list >= 0)
+        H5Pclose(list);
+}
+
+void ebpo_h5_close_space(hid_t space)
+{
+    if (space >= 0)
+        H5Sclose(space);
+}
+
+ebpo_status ebpo_h5_put_group(const ebpo_h5_out *out, const char *path, hid_t gcpl, bool good,
+                              ebpo_h5_id *id, ebpo_error *error)
+{
+    *id = good ? H5Gcreate2(out->file, path, H5P_DEFAULT, gcpl, H5P_DEFAULT) : -1;
+    ebpo_status status = ebpo_h5_written(out, path, *id >= 0, error);
+    ebpo_h5_close_list(gcpl);
+    return status;
+}
+
+ebpo_status ebpo_h5_put_dataset(const ebpo_h5_out *out, const char *path, hid_t type, hid_t space,
+                                hid_t dcpl, bool good, ebpo_h5_id *id, ebpo_error *error)
+{
+    *id = good ? H5Dcreate2(out->file, path, type, space, H5P_DEFAULT, dcpl, H5P_DEFAULT) : -1;
+    ebpo_status status = ebpo_h5_written(out, path, *id >= 0, error);
+    ebpo_h5_close_space(space);
+    ebpo_h5_close_list(dcpl);
+    return status;
+}
+
+ebpo_status ebpo_h5_put_attribute(const ebpo_h5_out *out, hid_t object, const char *name,
+                                  hid_t type, hid_t space, hid_t memory, const void *value,
+                                  ebpo_error *error)
+{
+    hid_t attribute = -1;
+    if (type >= 0 && space >= 0) {
+        if (H5Aexists(object, name) > 0)
+            attribute = H5Aopen(object, name, H5P_DEFAULT);
+        else
+            attribute = H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
+    }
+    bool good = attribute >= 0 && H5Awrite(attribute, memory < 0 ? type : memory, value) >= 0;
+    ebpo_status status = ebpo_h5_written(out, name, good, error);
+    if (attribute >= 0 && H5Aclose(attribute) < 0 && status == EBPO_OK)
+        status = ebpo_h5_written(out, name, false, error);
+    ebpo_h5_close_space(space);
+    return status;
 }

@@ -1,4 +1,8 @@
-#include "hdf5_write/scope.h"
+/* The scope of a use of libhdf5: a mutex, since Debian's serial build is not thread-safe, and
+ * HDF5's printing of errors, switched off and given back. Within it, messages that name file,
+ * object and libhdf5's innermost reason, opening files of others to read, and the filter of this
+ * library, which is registered once. */
+#include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
 #include <pthread.h>

@@ -1,4 +1,9 @@
-#include "hdf5_write/sink.h"
+/* The virtual file driver through which libhdf5 writes. libhdf5 1.10 does not survive a write that
+ * fails: what it cannot flush stays behind with an id that has lost its file, over which it trips
+ * at exit. So the first failure is kept, and told by everything that is called after it; to
+ * libhdf5 all writes succeed, and it always comes to an end. Bytes go to a file or, without one,
+ * to memory. */
+#include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
 #include <fcntl.h>

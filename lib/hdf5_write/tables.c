@@ -1,13 +1,13 @@
-#include "hdf5_write/tables.h"
-
+/* HDF5 files for other programs (VTKHDF, Python): arrays that grow by rows, and volumes that are
+ * written layer by layer. Compressed with what every HDF5 has, shuffle and deflate at its fastest
+ * level: these files are read once or twice, and numbers of nodes and corners shrink well even so.
+ */
 #include <stdio.h>
 #include <string.h>
 
-#include "hdf5_write/h5_objects.h"
-#include "hdf5_write/sink.h"
+#include "hdf5_write/h5.h"
+#include "hdf5_write/h5_parts.h"
 
-/* Deflate's fastest: these files are read once or twice, and numbers of nodes and corners shrink
- * well even so. */
 enum { ROWS_OF_A_CHUNK = 8192, DEFLATE = 1 };
 
 static hid_t stored_type(ebpo_h5_number number)
@@ -65,35 +65,6 @@ ebpo_status ebpo_h5_make_plain_group(ebpo_h5_out *out, const char *path, ebpo_h5
     return status;
 }
 
-ebpo_status ebpo_h5_put_ints(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
-                             const int64_t *values, unsigned count, ebpo_error *error)
-{
-    ebpo_h5_scope scope;
-    ebpo_h5_enter(&scope);
-    hsize_t dims = count;
-    ebpo_status status =
-        ebpo_h5_put_attribute(out, id, name, H5T_STD_I64LE, H5Screate_simple(1, &dims, NULL),
-                              H5T_NATIVE_INT64, values, error);
-    ebpo_h5_leave(&scope);
-    return status;
-}
-
-ebpo_status ebpo_h5_put_ascii(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text,
-                              ebpo_error *error)
-{
-    ebpo_h5_scope scope;
-    ebpo_h5_enter(&scope);
-    hid_t type = H5Tcopy(H5T_C_S1);
-    bool ok = type >= 0 && H5Tset_size(type, strlen(text)) >= 0 &&
-              H5Tset_strpad(type, H5T_STR_NULLPAD) >= 0;
-    ebpo_status status = ebpo_h5_put_attribute(out, id, name, ok ? type : -1, H5Screate(H5S_SCALAR),
-                                               type, text, error);
-    if (type >= 0)
-        H5Tclose(type);
-    ebpo_h5_leave(&scope);
-    return status;
-}
-
 ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path, ebpo_h5_number number,
                                uint32_t cols, ebpo_h5_table *table, ebpo_error *error)
 {
@@ -114,7 +85,7 @@ ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path, ebpo_h5_numbe
     return status;
 }
 
-static bool append(ebpo_h5_table *table, const void *data, uint64_t rows)
+static bool append_rows(ebpo_h5_table *table, const void *data, uint64_t rows)
 {
     int rank = table->cols ? 2 : 1;
     hsize_t start[2] = { table->rows, 0 }, count[2] = { rows, table->cols },
@@ -138,7 +109,7 @@ ebpo_status ebpo_h5_append(ebpo_h5_out *out, ebpo_h5_table *table, const void *d
         return EBPO_OK;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status = ebpo_h5_written(out, table->path, append(table, data, rows), error);
+    ebpo_status status = ebpo_h5_written(out, table->path, append_rows(table, data, rows), error);
     table->rows += status == EBPO_OK ? rows : 0;
     ebpo_h5_leave(&scope);
     return status;
@@ -158,5 +129,47 @@ ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path, ebpo_h5_number
     if (status == EBPO_OK)
         status = ebpo_h5_append(out, &table, data, rows, error);
     ebpo_h5_close_table(out, &table);
+    return status;
+}
+
+/* Neighbouring distances differ in their last bytes only, which deflate gains little from. */
+enum { LAYERS_OF_A_CHUNK = 16, SIDE_OF_A_CHUNK = 64 };
+
+static hsize_t smaller_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
+
+ebpo_status ebpo_h5_make_volume(ebpo_h5_out *out, const char *path, const uint64_t dims[3],
+                                ebpo_h5_id *id, ebpo_error *error)
+{
+    ebpo_h5_scope scope;
+    ebpo_h5_enter(&scope);
+    hsize_t size[3] = { dims[0], dims[1], dims[2] },
+            chunk[3] = { smaller_of(dims[0], LAYERS_OF_A_CHUNK),
+                         smaller_of(dims[1], SIDE_OF_A_CHUNK),
+                         smaller_of(dims[2], SIDE_OF_A_CHUNK) };
+    hid_t space = H5Screate_simple(3, size, NULL), dcpl = H5Pcreate(H5P_DATASET_CREATE);
+    bool good = space >= 0 && dcpl >= 0 && H5Pset_chunk(dcpl, 3, chunk) >= 0 &&
+                H5Pset_obj_track_times(dcpl, false) >= 0 && H5Pset_shuffle(dcpl) >= 0 &&
+                H5Pset_deflate(dcpl, DEFLATE) >= 0;
+    ebpo_status status =
+        ebpo_h5_put_dataset(out, path, H5T_IEEE_F64LE, space, dcpl, good, id, error);
+    ebpo_h5_leave(&scope);
+    return status;
+}
+
+ebpo_status ebpo_h5_put_layers(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
+                               const uint64_t dims[3], uint64_t first, uint64_t layers,
+                               const double *data, ebpo_error *error)
+{
+    ebpo_h5_scope scope;
+    ebpo_h5_enter(&scope);
+    hsize_t start[3] = { first, 0, 0 }, count[3] = { layers, dims[1], dims[2] };
+    hid_t space = H5Dget_space(id), memory = H5Screate_simple(3, count, NULL);
+    bool good = space >= 0 && memory >= 0 &&
+                H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, count, NULL) >= 0 &&
+                H5Dwrite(id, H5T_NATIVE_DOUBLE, memory, space, H5P_DEFAULT, data) >= 0;
+    ebpo_status status = ebpo_h5_written(out, path, good, error);
+    ebpo_h5_close_space(space);
+    ebpo_h5_close_space(memory);
+    ebpo_h5_leave(&scope);
     return status;
 }

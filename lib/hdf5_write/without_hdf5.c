@@ -3,19 +3,16 @@
 #include <ebpo/rows.h>
 
 #include "core/error.h"
-#include "hdf5_write/compat.h"
 #include "hdf5_write/h5.h"
-#include "hdf5_write/tables.h"
-#include "hdf5_write/volumes.h"
 
-static ebpo_status unsupported(const char *shown, ebpo_error *error)
+static ebpo_status is_unsupported(const char *shown, ebpo_error *error)
 {
     return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, shown,
                           "this library was built without libhdf5, and only reads files of this "
                           "format; use one that was built with -Dhdf5=enabled");
 }
 
-ebpo_status ebpo_h5_register(ebpo_error *error) { return unsupported("HDF5", error); }
+ebpo_status ebpo_h5_register(ebpo_error *error) { return is_unsupported("HDF5", error); }
 
 void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id) { (void)out, (void)id; }
 
@@ -23,20 +20,20 @@ ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown
                            uint64_t head_bytes, unsigned links, ebpo_error *error)
 {
     (void)out, (void)path, (void)head_bytes, (void)links;
-    return unsupported(shown, error);
+    return is_unsupported(shown, error);
 }
 
 ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, uint64_t metadata_bytes, ebpo_error *error)
 {
     (void)metadata_bytes;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_root(ebpo_h5_out *out, ebpo_h5_id *id, ebpo_error *error)
 {
     (void)id;
     *id = -1;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned links, ebpo_h5_id *id,
@@ -44,35 +41,35 @@ ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned link
 {
     (void)path, (void)links, (void)id;
     *id = -1;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_put_text(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text,
                              ebpo_error *error)
 {
     (void)id, (void)name, (void)text;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_put_int(ebpo_h5_out *out, ebpo_h5_id id, const char *name, int64_t value,
                             ebpo_error *error)
 {
     (void)id, (void)name, (void)value;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_put_count(ebpo_h5_out *out, ebpo_h5_id id, const char *name, uint64_t value,
                               ebpo_error *error)
 {
     (void)id, (void)name, (void)value;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                              const double *values, unsigned count, ebpo_error *error)
 {
     (void)id, (void)name, (void)values, (void)count;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *id,
@@ -80,7 +77,7 @@ ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *i
 {
     (void)path, (void)id;
     *id = -1;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_shape *shape,
@@ -88,7 +85,7 @@ ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_sh
 {
     (void)path, (void)shape, (void)id;
     *id = -1;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
@@ -96,20 +93,20 @@ ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
                               size_t bytes, ebpo_error *error)
 {
     (void)path, (void)id, (void)shape, (void)chunk, (void)data, (void)bytes;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes,
                               ebpo_error *error)
 {
     (void)first_raw, (void)bytes;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_size(ebpo_h5_out *out, uint64_t *bytes, ebpo_error *error)
 {
     (void)bytes;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error)
@@ -125,7 +122,7 @@ ebpo_status ebpo_h5_create_plain(ebpo_h5_out *out, const char *path, const char 
                                  ebpo_error *error)
 {
     (void)out, (void)path;
-    return unsupported(shown, error);
+    return is_unsupported(shown, error);
 }
 
 ebpo_status ebpo_h5_make_plain_group(ebpo_h5_out *out, const char *path, ebpo_h5_id *id,
@@ -133,35 +130,35 @@ ebpo_status ebpo_h5_make_plain_group(ebpo_h5_out *out, const char *path, ebpo_h5
 {
     (void)path, (void)id;
     *id = -1;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_put_ints(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                              const int64_t *values, unsigned count, ebpo_error *error)
 {
     (void)id, (void)name, (void)values, (void)count;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_put_ascii(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text,
                               ebpo_error *error)
 {
     (void)id, (void)name, (void)text;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path, ebpo_h5_number number,
                                uint32_t cols, ebpo_h5_table *table, ebpo_error *error)
 {
     (void)path, (void)number, (void)cols, (void)table;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_append(ebpo_h5_out *out, ebpo_h5_table *table, const void *data, uint64_t rows,
                            ebpo_error *error)
 {
     (void)table, (void)data, (void)rows;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 void ebpo_h5_close_table(const ebpo_h5_out *out, ebpo_h5_table *table) { (void)out, (void)table; }
@@ -170,7 +167,7 @@ ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path, ebpo_h5_number
                               uint32_t cols, const void *data, uint64_t rows, ebpo_error *error)
 {
     (void)path, (void)number, (void)cols, (void)data, (void)rows;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to, const char *shown,
@@ -178,7 +175,7 @@ ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to,
                                ebpo_error *left_out, ebpo_error *error)
 {
     (void)from, (void)from_goes, (void)to, (void)chunk_rows, (void)limits, (void)left_out;
-    return unsupported(shown, error);
+    return is_unsupported(shown, error);
 }
 
 ebpo_status ebpo_rows_read(const char *path, const char *name, unsigned least, unsigned most,
@@ -187,7 +184,7 @@ ebpo_status ebpo_rows_read(const char *path, const char *name, unsigned least, u
     (void)name, (void)least, (void)most, (void)fill;
     *rows = NULL;
     *count = 0;
-    return unsupported(path, error);
+    return is_unsupported(path, error);
 }
 
 ebpo_status ebpo_rows_read_part(const char *path, const char *name, unsigned least, unsigned most,
@@ -204,7 +201,7 @@ ebpo_status ebpo_h5_make_volume(ebpo_h5_out *out, const char *path, const uint64
 {
     (void)path, (void)dims, (void)id;
     *id = -1;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }
 
 ebpo_status ebpo_h5_put_layers(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
@@ -212,5 +209,5 @@ ebpo_status ebpo_h5_put_layers(ebpo_h5_out *out, const char *path, ebpo_h5_id id
                                const double *data, ebpo_error *error)
 {
     (void)path, (void)id, (void)dims, (void)first, (void)layers, (void)data;
-    return unsupported(out->shown, error);
+    return is_unsupported(out->shown, error);
 }

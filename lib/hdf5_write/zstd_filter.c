@@ -1,5 +1,12 @@
+/* HDF5 filter 32015, a chunk as one zstd frame: for libhdf5 in this process, which it is
+ * registered with, and, compiled once more with EBPO_FILTER_IN_PLUGIN, as a plugin for h5dump,
+ * h5py and every other program. It uses headers of HDF5 only and links nothing of it, so that one
+ * plugin serves all builds. */
 #include "hdf5_write/zstd_filter.h"
 
+#ifdef EBPO_FILTER_IN_PLUGIN
+#include <H5PLextern.h>
+#endif
 #include <stdint.h>
 #include <stdlib.h>
 #include <zstd.h>
@@ -20,7 +27,8 @@ static size_t short_of_memory(void)
     return 0;
 }
 
-static size_t replace(void **buffer, size_t *buffer_size, void *block, size_t capacity, size_t used)
+static size_t replace_buffer(void **buffer, size_t *buffer_size, void *block, size_t capacity,
+                             size_t used)
 {
     free(*buffer);
     *buffer = block;
@@ -28,8 +36,8 @@ static size_t replace(void **buffer, size_t *buffer_size, void *block, size_t ca
     return used;
 }
 
-static size_t compress(size_t level_count, const unsigned level[], size_t bytes,
-                       size_t *buffer_size, void **buffer)
+static size_t compress_chunk(size_t level_count, const unsigned level[], size_t bytes,
+                             size_t *buffer_size, void **buffer)
 {
     size_t capacity = ZSTD_compressBound(bytes), used = 0;
     ZSTD_CCtx *context = ZSTD_createCCtx();
@@ -44,7 +52,7 @@ static size_t compress(size_t level_count, const unsigned level[], size_t bytes,
     if (ZSTD_isError(used))
         goto failed;
     ZSTD_freeCCtx(context);
-    return replace(buffer, buffer_size, block, capacity, used);
+    return replace_buffer(buffer, buffer_size, block, capacity, used);
 
 failed:
     free(block);
@@ -65,7 +73,7 @@ static size_t expand_known(uint64_t size, size_t bytes, size_t *buffer_size, voi
         free(block);
         return 0;
     }
-    return replace(buffer, buffer_size, block, (size_t)size, used);
+    return replace_buffer(buffer, buffer_size, block, (size_t)size, used);
 }
 
 /* A frame from another writer that does not: grow as it comes. */
@@ -91,16 +99,16 @@ static size_t expand_unknown(size_t bytes, size_t *buffer_size, void **buffer)
     }
     ZSTD_freeDCtx(context);
     if (left == 0 && out.pos)
-        return replace(buffer, buffer_size, out.dst, out.size, out.pos);
+        return replace_buffer(buffer, buffer_size, out.dst, out.size, out.pos);
     free(out.dst);
     return 0;
 }
 
-static size_t filter(unsigned flags, size_t cd_count, const unsigned cd_values[], size_t bytes,
-                     size_t *buffer_size, void **buffer)
+static size_t filter_chunk(unsigned flags, size_t cd_count, const unsigned cd_values[],
+                           size_t bytes, size_t *buffer_size, void **buffer)
 {
     if (!(flags & H5Z_FLAG_REVERSE))
-        return compress(cd_count, cd_values, bytes, buffer_size, buffer);
+        return compress_chunk(cd_count, cd_values, bytes, buffer_size, buffer);
     unsigned long long size = ZSTD_getFrameContentSize(*buffer, bytes);
     if (size == ZSTD_CONTENTSIZE_ERROR)
         return 0;
@@ -117,5 +125,17 @@ const H5Z_class2_t ebpo_zstd_filter = {
     .name = "zstd (EBP-Octree)",
     .can_apply = NULL,
     .set_local = NULL,
-    .filter = filter,
+    .filter = filter_chunk,
 };
+
+#ifdef EBPO_FILTER_IN_PLUGIN
+__attribute__((visibility("default"))) H5PL_type_t H5PLget_plugin_type(void)
+{
+    return H5PL_TYPE_FILTER;
+}
+
+__attribute__((visibility("default"))) const void *H5PLget_plugin_info(void)
+{
+    return &ebpo_zstd_filter;
+}
+#endif

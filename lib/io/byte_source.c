@@ -1,15 +1,22 @@
-#include "io/byte_source.h"
-
+/* Where the bytes of a file come from: a regular file by pread, memory of the caller, or a URL
+ * (http_source.c), all as ebpo_source. An input is a source with a name for messages and a count
+ * of what is read; it bounds each read by the source's size. Files are not mapped, as one that is
+ * shortened by another program would end the process. Also what a URL is, and how it is shown
+ * without passwords. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <ebpo/http.h>
+
 #include "core/alloc.h"
 #include "core/error.h"
+#include "io/byte_source.h"
 
 /* No system reads more at once. */
 static const uint64_t PIECE_MAX = UINT64_C(1) << 30;
@@ -147,7 +154,7 @@ ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
 
 /* What the source had to fetch before it could be opened: counted once, however often it is looked
  * at. */
-static uint64_t prefetched(const ebpo_input *input)
+static uint64_t bytes_prefetched(const ebpo_input *input)
 {
     return input->source.prefetched < input->source.size ? input->source.prefetched
                                                          : input->source.size;
@@ -158,7 +165,7 @@ ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *source, const 
 {
     input->source = *source;
     input->shown = strdup(name);
-    atomic_init(&input->bytes, prefetched(input));
+    atomic_init(&input->bytes, bytes_prefetched(input));
     atomic_init(&input->reads, 0);
     if (input->shown)
         return EBPO_OK;
@@ -187,7 +194,7 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
                             " are named, but the file ends at %" PRIu64
                             "; get a fresh copy of the file",
                             offset, offset + size - 1, input->source.size);
-    uint64_t begin = offset > prefetched(input) ? offset : prefetched(input);
+    uint64_t begin = offset > bytes_prefetched(input) ? offset : bytes_prefetched(input);
     atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0,
                               memory_order_relaxed);
     atomic_fetch_add_explicit(&input->reads, 1, memory_order_relaxed);
@@ -212,4 +219,38 @@ void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count
         if (ranges[i].offset > size || ranges[i].size > size - ranges[i].offset)
             return; /* the reading will say so */
     input->source.prefetch(input->source.user, ranges, count);
+}
+
+bool ebpo_is_url(const char *name)
+{
+    return strncasecmp(name, "http://", 7) == 0 || strncasecmp(name, "https://", 8) == 0;
+}
+
+static size_t append_text(char *out, size_t used, size_t capacity, const char *text, size_t length)
+{
+    size_t left = capacity - 1 - used, taken = length < left ? length : left;
+    memcpy(out + used, text, taken);
+    return used + taken;
+}
+
+char *ebpo_url_redact(const char *name, char *out, size_t capacity)
+{
+    size_t used = 0;
+    if (capacity == 0)
+        return out;
+    if (ebpo_is_url(name)) {
+        const char *host = strstr(name, "//") + 2;
+        used = append_text(out, 0, capacity, name, (size_t)(host - name));
+        for (size_t i = strcspn(host, "/?#"); i > 0; i--)
+            if (host[i - 1] == '@') { /* the last one: a password with another breaks the rules, but
+                                         is a password */
+                host += i;
+                break;
+            }
+        used = append_text(out, used, capacity, host, strcspn(host, "?#"));
+    } else {
+        used = append_text(out, 0, capacity, name, strlen(name));
+    }
+    out[used] = 0;
+    return out;
 }

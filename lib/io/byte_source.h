@@ -3,8 +3,10 @@
 #ifndef EBPO_IO_BYTE_SOURCE_H
 #define EBPO_IO_BYTE_SOURCE_H
 
-#include <ebpo/file.h>
 #include <stdatomic.h>
+
+#include <ebpo/file.h>
+#include <ebpo/http.h>
 
 /* Opens a regular file, by pread: one that is shortened while it is open gives EBPO_E_IO, where a
  * mapping would raise SIGBUS. EBPO_E_IO when it is missing, may not be read, or is a folder, pipe
@@ -59,5 +61,12 @@ bool ebpo_input_hints(const ebpo_input *input);
 /* Tells it; it begins to read, and nobody waits. Ranges that are large, which it reads ahead by
  * itself, are let pass. */
 void ebpo_input_hint(ebpo_input *input, const ebpo_range *ranges, size_t count);
+
+/* What the layers above need of sources by URL: ebpo/http.h, and the figures of such a source. */
+
+enum { EBPO_SHOWN_BYTES = 300 }; /* room for a URL in a message */
+
+/* False when the source is not one of ebpo_source_of_url. */
+bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out);
 
 #endif

@@ -1,3 +1,7 @@
+/* Locks for the file at a path: a lock file beside it, locked by flock, which the system releases
+ * when the process ends. A lock file that has lost its name is given up and taken anew. Locks bind
+ * the users of this library alone, and some file systems have none, so replacing a file also
+ * compares versions (publish.c). */
 #include "io/file_lock.h"
 
 #include <errno.h>
@@ -11,11 +15,10 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "io/file_source.h"
-#include "io/stale_files.h"
 #include "io/unfinished.h"
 
 /* Opens the lock file, which is made if need be. To write, which locks over NFS need, or else to

@@ -1,21 +1,27 @@
-#include "io/file_source.h"
-
+/* Whole files that are read into memory or a workspace: meshes, images, scenes. A file that
+ * changes while it is read is refused, by its size, its times and, where these are in doubt, its
+ * bytes. Files that another file names are opened below a folder and never outside it, in one
+ * system call where there is one (openat2). What is given by mistake is recognised by its first
+ * bytes, and the message says what to do about it. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
 #include <limits.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/text.h"
 #include "core/workspace.h"
+#include "io/file_source.h"
 
 enum { PIECE = 1 << 22, FRESH_NS = 100000000 };
 
@@ -121,8 +127,8 @@ ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspac
 }
 
 /* Whether it still says what was loaded. */
-static ebpo_status compare(const ebpo_whole_file *file, const char *path, bool *same,
-                           ebpo_error *error)
+static ebpo_status compare_bytes(const ebpo_whole_file *file, const char *path, bool *same,
+                                 ebpo_error *error)
 {
     enum { STEP = 1 << 16 };
     ebpo_status status = EBPO_OK;
@@ -153,7 +159,7 @@ ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *p
     bool doubtful =
         file->fresh || st.st_ctim.tv_sec != file->ctime_s || st.st_ctim.tv_nsec != file->ctime_ns;
     ebpo_status status =
-        same && doubtful && file->data ? compare(file, path, &same, error) : EBPO_OK;
+        same && doubtful && file->data ? compare_bytes(file, path, &same, error) : EBPO_OK;
     if (status == EBPO_OK && !same)
         return ebpo_fail_file(error, EBPO_E_IO, path,
                               "was changed while it was read; read it again");
@@ -193,4 +199,154 @@ ebpo_status ebpo_target_path(const char *path, char **out, ebpo_error *error)
         return EBPO_OK;
     *out = NULL;
     return ebpo_fail_memory(error, strlen(path));
+}
+
+#ifdef EBPO_HAVE_OPENAT2
+#include <linux/openat2.h>
+#include <sys/syscall.h>
+#endif
+
+enum { FLAGS = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY };
+
+/* False: the system has no such call, or a filter forbids it. */
+static bool open_at_once(int top, const char *name, int *fd)
+{
+#ifdef EBPO_HAVE_OPENAT2
+    struct open_how how = { .flags = FLAGS, .resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS };
+    *fd = (int)syscall(SYS_openat2, top, name, &how, sizeof how);
+    return *fd >= 0 || (errno != ENOSYS && errno != EPERM && errno != EINVAL && errno != E2BIG);
+#else
+    (void)top, (void)name, (void)fd;
+    return false;
+#endif
+}
+
+/* Word by word, from folder to folder. */
+static int open_word_by_word(int top, char *name)
+{
+    char *left = NULL, *word = strtok_r(name, "/", &left), *next;
+    int folder = dup(top), fd = -1;
+    if (!word || folder < 0) {
+        errno = word ? errno : ENOENT;
+        return -1;
+    }
+    for (; folder >= 0 && (next = strtok_r(NULL, "/", &left)); word = next) {
+        int below = strcmp(word, "..") == 0
+                        ? (errno = EXDEV, -1)
+                        : openat(folder, word, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+        int why = errno;
+        close(folder);
+        errno = why;
+        folder = below;
+    }
+    if (folder >= 0) {
+        fd = strcmp(word, "..") == 0 ? (errno = EXDEV, -1)
+                                     : openat(folder, word, FLAGS | O_NOFOLLOW);
+        int why = errno;
+        close(folder);
+        errno = fd < 0 && why == ELOOP ? EXDEV : why;
+    }
+    return fd;
+}
+
+int ebpo_open_below(const char *folder, const char *name)
+{
+    int top = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC), fd = -1;
+    if (top < 0)
+        return -1;
+    if (!open_at_once(top, name, &fd)) {
+        char *copy = strdup(name);
+        fd = copy ? open_word_by_word(top, copy) : -1;
+        int why = copy ? errno : ENOMEM;
+        free(copy);
+        errno = why;
+    }
+    int why = errno;
+    close(top);
+    errno = why;
+    return fd;
+}
+
+enum { LOOK = 512 };
+
+static const struct {
+    const char *bytes;
+    size_t count;
+    const char *what;
+} kinds[] = {
+    { "version https://git-lfs.github.com/spec/", 40,
+      "is a Git LFS pointer, not the file itself; fetch that: git lfs pull" },
+    { "\xff\xfe\0\0", 4, "is text of four bytes a character (UTF-32); save it as UTF-8" },
+    { "\0\0\xfe\xff", 4, "is text of four bytes a character (UTF-32); save it as UTF-8" },
+    { "\xff\xfe", 2, "is text of two bytes a character (UTF-16); save it as UTF-8" },
+    { "\xfe\xff", 2, "is text of two bytes a character (UTF-16); save it as UTF-8" },
+    { "\x1f\x8b", 2, "is compressed by gzip; decompress it: gunzip <FILE >NEW" },
+    { "BZh", 3, "is compressed by bzip2; decompress it: bunzip2 <FILE >NEW" },
+    { "\xfd\x37zXZ\0", 6, "is compressed by xz; decompress it: unxz <FILE >NEW" },
+    { "\x28\xb5\x2f\xfd", 4, "is compressed by zstd; decompress it: unzstd <FILE >NEW" },
+    { "7z\xbc\xaf\x27\x1c", 6, "is a 7z archive; extract the file from it: 7z x" },
+    { "PK\3\4", 4,
+      "is a ZIP archive, as 3MF and NPZ files are; extract the file from it (unzip), or save the "
+      "mesh as PLY, OBJ, STL or OFF" },
+    { "\211HDF\r\n\032\n", 8,
+      "is an HDF5 file; of an .ebpo.h5 file, 'ebpo extract --mesh' writes the mesh as a PLY" },
+    { "glTF", 4, "is a glTF file; save the mesh as PLY, OBJ, STL or OFF" },
+};
+
+/* Text of two bytes a character without a mark: every other byte is zero. */
+static bool is_wide(const uint8_t *data, uint64_t size)
+{
+    enum { CHARACTERS = 8 };
+    if (size < 2 * CHARACTERS)
+        return false;
+    for (int first = 0; first < 2; first++) {
+        int good = 0;
+        for (int i = 0; i < CHARACTERS; i++) {
+            uint8_t c = data[2 * i + first];
+            good +=
+                data[2 * i + 1 - first] == 0 && c < 0x7f && (c >= ' ' || (c >= '\t' && c <= '\r'));
+        }
+        if (good == CHARACTERS)
+            return true;
+    }
+    return false;
+}
+
+static bool begins_with(const char *text, uint64_t size, const char *word)
+{
+    size_t n = strlen(word);
+    return size >= n && strncasecmp(text, word, n) == 0;
+}
+
+/* Markup may begin behind white space. */
+static const char *find_markup(const char *text, uint64_t size)
+{
+    for (; size && (*text == ' ' || (*text >= '\t' && *text <= '\r')); size--)
+        text++;
+    if (begins_with(text, size, "<!doctype html") || begins_with(text, size, "<html") ||
+        begins_with(text, size, "<head"))
+        return "is an HTML page, as servers send it for errors and logins; download the file "
+               "itself";
+    return begins_with(text, size, "<?xml")
+               ? "is an XML file; save the mesh as PLY, OBJ, STL or OFF"
+               : NULL;
+}
+
+const char *ebpo_foreign_bytes(const uint8_t *data, uint64_t size)
+{
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
+        if (size >= kinds[i].count && memcmp(data, kinds[i].bytes, kinds[i].count) == 0)
+            return kinds[i].what;
+    if (is_wide(data, size))
+        return "is text of two bytes a character (UTF-16); save it as UTF-8";
+    uint64_t mark = ebpo_text_mark(data, size);
+    return find_markup((const char *)data + mark, size - mark);
+}
+
+bool ebpo_bytes_are_text(const uint8_t *data, uint64_t size)
+{
+    for (uint64_t i = 0; i < size && i < LOOK; i++)
+        if (data[i] == 0x7f || (data[i] < ' ' && !(data[i] >= '\t' && data[i] <= '\r')))
+            return false;
+    return size > 0;
 }

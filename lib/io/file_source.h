@@ -1,7 +1,10 @@
-/* Whole files for reading. They are read and not mapped: a mapping of a file that another program
- * shortens ends the process. */
+/* Whole files for reading, files below a folder, and files of other kinds. They are read and not
+ * mapped: a mapping of a file that another program shortens ends the process. */
 #ifndef EBPO_IO_FILE_SOURCE_H
 #define EBPO_IO_FILE_SOURCE_H
+
+#include <stdbool.h>
+#include <stdint.h>
 
 #include <ebpo/base.h>
 #include <ebpo/workspace.h>
@@ -62,5 +65,23 @@ const char *ebpo_path_name(const char *path);
 /* Finds the absolute path, without symbolic links to folders, of a file that need not exist; free()
  * it. EBPO_E_IO: `path` ends with '/', or its folder cannot be used. EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_target_path(const char *path, char **out, ebpo_error *error);
+
+/* Opening a file that lies below a folder, whatever happens to names meanwhile. */
+
+/* A descriptor for reading, which does not wait for pipes; -1: as errno says, EXDEV where the name
+ * leads out of the folder. Links are followed while they stay below it; where the system cannot
+ * tell that at the moment of opening (Linux before 5.6), links are not followed at all. Any thread.
+ */
+int ebpo_open_below(const char *folder, const char *name);
+
+/* Files of other kinds that are given as meshes or models by mistake. */
+
+/* Names what the first bytes are and what to do about it, to follow a file's name in a message:
+ * "is compressed by gzip; ...". NULL: nothing known. A binary STL file begins with any bytes: look
+ * whether it is one first. */
+const char *ebpo_foreign_bytes(const uint8_t *data, uint64_t size);
+
+/* True for text: the first bytes hold no control characters but white space. */
+bool ebpo_bytes_are_text(const uint8_t *data, uint64_t size);
 
 #endif

@@ -1,15 +1,15 @@
-/* A source by URL: opening it, what is kept of the file, options. */
+/* A source by URL: its options are checked and copied, the first request learns the file's size
+ * and version and brings its head, and reads go to the cache of ranges (http_cache.c). A server
+ * without ranges sends the whole file, which is then kept in memory, up to a limit. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
-#include "core/sized.h"
-#include "io/disk.h"
-#include "io/http_source.h"
-#include "io/range_cache.h"
+#include "io/http_cache.h"
+#include "io/byte_source.h"
 
 enum { HEAD_BYTES = EBPO_HTTP_HEAD, CONNECTIONS_MAX = 32 };
 
@@ -171,7 +171,7 @@ bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)
 
 /* --- opening --- */
 
-static ebpo_status request(http_source *s, ebpo_request *r, ebpo_error *error)
+static ebpo_status request_range(http_source *s, ebpo_request *r, ebpo_error *error)
 {
     pthread_mutex_lock(&s->pieces.lock);
     double since = ebpo_seconds();
@@ -185,7 +185,7 @@ static ebpo_status request(http_source *s, ebpo_request *r, ebpo_error *error)
     return r->status;
 }
 
-static void pin(http_source *s)
+static void pin_version(http_source *s)
 {
     pthread_mutex_lock(&s->pieces.lock);
     ebpo_transfers_pin(s->pieces.transfers, &s->version);
@@ -216,7 +216,7 @@ static ebpo_status read_head(http_source *s, ebpo_error *error)
     if (!s->head)
         return ebpo_fail_memory(error, HEAD_BYTES);
     ebpo_request r = { .size = HEAD_BYTES, .data = s->head, .first = true };
-    ebpo_status status = request(s, &r, error);
+    ebpo_status status = request_range(s, &r, error);
     if (status != EBPO_OK) {
         free(r.whole);
         return status;
@@ -227,7 +227,7 @@ static ebpo_status read_head(http_source *s, ebpo_error *error)
         free(s->head);
         s->head = r.whole;
     }
-    pin(s);
+    pin_version(s);
     return check_type(s, &r, error);
 }
 
@@ -249,7 +249,7 @@ static ebpo_status read_whole(http_source *s, ebpo_error *error)
     s->head = all;
     s->head_bytes = s->version.size;
     ebpo_request r = { .size = s->version.size, .data = all };
-    return request(s, &r, error);
+    return request_range(s, &r, error);
 }
 
 static ebpo_status open_source(http_source *s, ebpo_error *error)

@@ -1,5 +1,8 @@
-#include "io/publish.h"
-
+/* Outputs that appear whole or not at all: a temporary file in the same folder, sync, rename, sync
+ * of the folder. What is replaced may be compared with the version that was read, under the
+ * target's lock; two files that belong together are exchanged, and the first is taken back when
+ * the second fails. A new file takes over owner, permissions and extended attributes of the one
+ * that it replaces. At the end the functions for the library's callers. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -8,16 +11,83 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#ifdef EBPO_HAVE_XATTR
+#include <sys/xattr.h>
+#endif
 #include <unistd.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/os.h"
 #include "io/byte_source.h"
 #include "io/file_lock.h"
 #include "io/file_source.h"
-#include "io/replaced_facts.h"
-#include "io/stale_files.h"
+#include "io/publish.h"
 #include "io/unfinished.h"
+
+/* --- what a new file takes over from the one that it replaces --- */
+
+#ifdef EBPO_HAVE_XATTR
+/* No system lets a file have more of these. */
+enum { NAMES_MOST = 65536, VALUE_MOST = 65536 };
+
+static void take_attribute(int from, int to, const char *name, void *value)
+{
+    ssize_t size = fgetxattr(from, name, value, VALUE_MOST);
+    if (size >= 0)
+        (void)!fsetxattr(to, name, value, (size_t)size, 0); /* where the system allows */
+}
+
+static void take_attributes(int from, int to)
+{
+    char *names = malloc(NAMES_MOST);
+    void *value = malloc(VALUE_MOST);
+    ssize_t size = names && value ? flistxattr(from, names, NAMES_MOST) : -1;
+    for (ssize_t at = 0; at < size; at += (ssize_t)strlen(names + at) + 1)
+        take_attribute(from, to, names + at, value);
+    free(names);
+    free(value);
+}
+
+#else
+static void take_attributes(int from, int to) { (void)from, (void)to; }
+#endif
+
+/* Who may not give a file away keeps it; it then does not act for another owner (set-user-ID). */
+static mode_t take_owner(int to, const struct stat *was)
+{
+    struct stat is;
+    mode_t mode = was->st_mode & 07777;
+    if (fstat(to, &is) != 0)
+        return mode & 0777;
+    bool user = is.st_uid == was->st_uid || fchown(to, was->st_uid, (gid_t)-1) == 0,
+         group = is.st_gid == was->st_gid || fchown(to, (uid_t)-1, was->st_gid) == 0;
+    if (user && group)
+        return mode;
+    /* what the group was allowed is not for another one */
+    return group ? mode & 0777 : mode & (0707 | (mode & 007) << 3);
+}
+
+/* Gives the open file mode, owner and extended attributes (access control lists are some) of the
+ * regular file at `path`; of the owner and the attributes, which not everybody may give, what the
+ * system allows. Without such a file: `mode`, if it is not -1. False, with errno, when the mode
+ * cannot be given. */
+static bool take_over_facts(int fd, const char *path, int mode)
+{
+    struct stat was;
+    int from = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY);
+    bool there = from >= 0 ? fstat(from, &was) == 0 : lstat(path, &was) == 0;
+    if (there && S_ISREG(was.st_mode)) {
+        mode = (int)take_owner(fd, &was);
+        if (from >= 0)
+            take_attributes(from, fd); /* before the mode, which a list may change */
+    }
+    if (from >= 0)
+        close(from);
+    return mode < 0 || fchmod(fd, (mode_t)mode) == 0;
+}
+
+/* --- beginning --- */
 
 static atomic_uint name_counter;
 
@@ -38,7 +108,7 @@ static ebpo_status check_target(ebpo_publish *publish, const char *path, ebpo_er
                           what);
 }
 
-static ebpo_status resolve(ebpo_publish *publish, const char *path, ebpo_error *error)
+static ebpo_status resolve_target(ebpo_publish *publish, const char *path, ebpo_error *error)
 {
     ebpo_status status = ebpo_target_path(path, &publish->target, error);
     if (status != EBPO_OK)
@@ -87,7 +157,7 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
 {
     *out = (ebpo_publish)EBPO_PUBLISH_INIT;
     ebpo_publish publish = EBPO_PUBLISH_INIT;
-    ebpo_status status = resolve(&publish, path, error);
+    ebpo_status status = resolve_target(&publish, path, error);
     if (status == EBPO_OK)
         status = check_target(&publish, path, error);
     if (status == EBPO_OK && (publish.slot = ebpo_unfinished_reserve()) < 0)
@@ -197,7 +267,7 @@ static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
         return ebpo_fail_errno(error, publish->shown,
                                errno ? "could not be written" : "could not be written whole");
     int fd = open(publish->temporary, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
-    if (fd >= 0 && !ebpo_take_over_facts(fd, publish->target, publish->mode)) {
+    if (fd >= 0 && !take_over_facts(fd, publish->target, publish->mode)) {
         int saved = errno;
         close(fd);
         errno = saved;
@@ -261,7 +331,7 @@ ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
 }
 
 /* Exchanges it for what was there, which is then the temporary file. */
-static bool exchange(const ebpo_publish *publish)
+static bool exchange_files(const ebpo_publish *publish)
 {
 #ifdef EBPO_HAVE_RENAMEAT2
     return renameat2(AT_FDCWD, publish->temporary, AT_FDCWD, publish->target, RENAME_EXCHANGE) == 0;
@@ -277,7 +347,7 @@ static bool exchange(const ebpo_publish *publish)
 static ebpo_status take_back(ebpo_publish *first, bool exchanged, bool fresh, ebpo_error *cause,
                              ebpo_error *error)
 {
-    if (exchanged ? exchange(first) : fresh && unlink(first->target) == 0)
+    if (exchanged ? exchange_files(first) : fresh && unlink(first->target) == 0)
         return ebpo_fail_with(error, cause);
     return ebpo_fail_file(error, cause->status, cause->file,
                           "%s; of the two files only %s is in place: write both anew",
@@ -293,7 +363,8 @@ ebpo_status ebpo_publish_commit_pair(ebpo_publish *first, ebpo_publish *second, 
         status = make_ready(second, error);
     if (status == EBPO_OK)
         status = ebpo_file_lock_take(&lock, first->target, EBPO_FILE_LOCK_SAVING, NULL, error);
-    bool exchanged = status == EBPO_OK && exchange(first), fresh = !exchanged && errno == ENOENT;
+    bool exchanged = status == EBPO_OK && exchange_files(first),
+         fresh = !exchanged && errno == ENOENT;
     if (status == EBPO_OK && !exchanged)
         status = put_in_place(first, error);
     if (status == EBPO_OK && put_in_place(second, &cause) != EBPO_OK)
@@ -319,4 +390,72 @@ void ebpo_publish_abort(ebpo_publish *publish)
     free(publish->target);
     free(publish->temporary);
     *publish = (ebpo_publish)EBPO_PUBLISH_INIT;
+}
+
+/* --- for the callers of the library: whole files, and giving up --- */
+
+ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebpo_error *error)
+{
+    ebpo_publish out = EBPO_PUBLISH_INIT;
+    ebpo_status status = ebpo_publish_begin(&out, path, error);
+    if (status != EBPO_OK)
+        return status;
+    FILE *stream = ebpo_publish_stream(&out);
+    if (!stream)
+        status = ebpo_fail_memory(error, BUFSIZ);
+    else if (fwrite(data, 1, size, stream) != size)
+        status = ebpo_fail_errno(error, path, "could not be written");
+    if (status == EBPO_OK)
+        status = ebpo_publish_commit(&out, error);
+    ebpo_publish_abort(&out);
+    return status;
+}
+
+struct ebpo_output {
+    ebpo_publish publish;
+};
+
+ebpo_status ebpo_output_begin(const char *path, ebpo_output **out, int *descriptor,
+                              ebpo_error *error)
+{
+    *descriptor = -1;
+    *out = ebpo_alloc(1, sizeof **out);
+    if (!*out)
+        return ebpo_fail_memory(error, sizeof **out);
+    ebpo_status status = ebpo_publish_begin(&(*out)->publish, path, error);
+    if (status != EBPO_OK) {
+        free(*out);
+        *out = NULL;
+        return status;
+    }
+    *descriptor = (*out)->publish.fd;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_output_end(ebpo_output *out, ebpo_error *error)
+{
+    ebpo_status status = ebpo_publish_commit(&out->publish, error);
+    free(out);
+    return status;
+}
+
+void ebpo_output_abandon(ebpo_output *out)
+{
+    if (out)
+        ebpo_publish_abort(&out->publish);
+    free(out);
+}
+
+ebpo_status ebpo_check_output(const char *path, ebpo_error *error)
+{
+    ebpo_publish out;
+    ebpo_status status = ebpo_publish_begin(&out, path, error);
+    ebpo_publish_abort(&out);
+    return status;
+}
+
+void ebpo_abandon_outputs(void)
+{
+    ebpo_unfinished_remove();
+    ebpo_workspace_abandon();
 }

@@ -10,10 +10,12 @@
 #ifndef EBPO_IO_PUBLISH_H
 #define EBPO_IO_PUBLISH_H
 
-#include <ebpo/base.h>
+#include <stdbool.h>
 #include <stdio.h>
-#include <time.h>
 #include <sys/types.h>
+#include <time.h>
+
+#include <ebpo/base.h>
 
 #include "io/byte_source.h"
 

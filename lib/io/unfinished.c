@@ -1,10 +1,29 @@
-#include "io/unfinished.h"
-
+/* What is not finished yet, or never will be. Names of outputs and locks that go when a signal
+ * ends this process: in fixed storage with lock-free states, as a signal handler reads them.
+ * Temporary files and folders of processes that were killed: recognised by their names, which hold
+ * the process, and removed when it is gone and nobody holds their lock. Folders that appear whole
+ * or not at all: made beside their place and renamed. What cannot be looked at or removed stays. */
+#include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
 #include <limits.h>
+#include <signal.h>
 #include <stdatomic.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
+
+#include <ebpo/base.h>
+
+#include "core/error.h"
+#include "io/file_source.h"
+#include "io/unfinished.h"
 
 /* Fixed storage and lock-free states, because a signal handler reads them. */
 enum { SLOT_FREE, SLOT_TAKEN, SLOT_LIVE };
@@ -44,4 +63,198 @@ void ebpo_unfinished_remove(void)
         if (atomic_load(&slots[i].state) == SLOT_LIVE)
             unlink(slots[i].path);
     errno = saved;
+}
+
+/* ".NAME.PROCESS-NUMBER.tmp": the process, or 0. */
+static long process_of(const char *file, const char *name)
+{
+    char *end;
+    size_t kept = strnlen(name, EBPO_TARGET_NAME_KEPT);
+    if (file[0] != '.' || strncmp(file + 1, name, kept) != 0 || file[kept + 1] != '.')
+        return 0;
+    long process = strtol(file + kept + 2, &end, 10);
+    if (process <= 0 || *end != '-')
+        return 0;
+    (void)strtoul(end + 1, &end, 10);
+    return strcmp(end, ".tmp") == 0 ? process : 0;
+}
+
+static void remove_if_stale(int folder, const char *file)
+{
+    struct stat facts;
+    int fd = openat(folder, file, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY);
+    if (fd < 0)
+        return;
+    if (fstat(fd, &facts) == 0 && S_ISREG(facts.st_mode) && flock(fd, LOCK_EX | LOCK_NB) == 0)
+        (void)unlinkat(folder, file, 0); /* it may stay */
+    close(fd);
+}
+
+void ebpo_remove_stale_files(const char *folder, const char *name)
+{
+    int saved = errno;
+    DIR *d = opendir(folder);
+    for (struct dirent *e; d && (e = readdir(d));) {
+        long process = process_of(e->d_name, name);
+        if (process && kill((pid_t)process, 0) != 0 && errno == ESRCH)
+            remove_if_stale(dirfd(d), e->d_name);
+    }
+    if (d)
+        closedir(d);
+    errno = saved;
+}
+
+static const char MARK[] = ".part-", MADE[] = "XXXXXX";
+
+/* One number for all who see the same processes: since this start of the machine, in this
+ * namespace. 0: not known. */
+static uint32_t system_number(void)
+{
+    struct stat space;
+    char start[64];
+    int fd = open("/proc/sys/kernel/random/boot_id", O_RDONLY | O_CLOEXEC);
+    ssize_t size = fd >= 0 ? read(fd, start, sizeof start) : -1;
+    if (fd >= 0)
+        close(fd);
+    if (size < 32 || stat("/proc/self/ns/pid", &space) != 0)
+        return 0;
+    uint64_t sum = 0xcbf29ce484222325u ^ space.st_ino; /* FNV-1a */
+    for (ssize_t i = 0; i < size; i++)
+        sum = (sum ^ (uint8_t)start[i]) * 0x100000001b3u;
+    return (uint32_t)(sum ^ sum >> 32);
+}
+
+/* Bytes of the path without slashes at its end, and where its name begins. */
+static size_t without_slashes(const char *folder, size_t *name)
+{
+    size_t size = strlen(folder);
+    while (size > 1 && folder[size - 1] == '/')
+        size--;
+    for (*name = size; *name && folder[*name - 1] != '/';)
+        --*name;
+    return size - *name > EBPO_TARGET_NAME_KEPT ? *name + EBPO_TARGET_NAME_KEPT : size;
+}
+
+/* "FOLDER.part-SYSTEM-PROCESS-XXXXXX" for mkdtemp, where SYSTEM says to whom the process's number
+ * means anything; of a long name the beginning. Freed by free(); NULL: no memory. */
+static char *making_name(const char *folder)
+{
+    char *path;
+    size_t name, size = without_slashes(folder, &name);
+    if (asprintf(&path, "%.*s%s%08" PRIx32 "-%ld-%s", (int)size, folder, MARK, system_number(),
+                 (long)getpid(), MADE) < 0)
+        return NULL;
+    return path;
+}
+
+/* Gives the folder that was made under that name the one with its inode in place of XXXXXX: where
+ * another folder is put there in exchange, it is not taken for the one that was made. */
+static void settle_making(char **made)
+{
+    char *path;
+    struct stat facts;
+    int kept = (int)(strlen(*made) - strlen(MADE));
+    if (stat(*made, &facts) != 0 ||
+        asprintf(&path, "%.*s%ju", kept, *made, (uintmax_t)facts.st_ino) < 0)
+        return;
+    if (rename(*made, path) == 0) {
+        free(*made);
+        *made = path;
+    } else {
+        free(path);
+    }
+}
+
+/* What follows the process's number, or NULL: it is there, or the name is no such. */
+static const char *rest_of_dead(const char *file, const char *name, size_t kept, uint32_t system)
+{
+    char *end;
+    size_t mark = sizeof MARK - 1;
+    if (strncmp(file, name, kept) != 0 || strncmp(file + kept, MARK, mark) != 0 ||
+        strtoull(file + kept + mark, &end, 16) != system || *end != '-')
+        return NULL;
+    long process = strtol(end + 1, &end, 10);
+    bool dead = process > 0 && *end == '-' && kill((pid_t)process, 0) != 0 && errno == ESRCH;
+    return dead ? end + 1 : NULL;
+}
+
+static void empty_folder(int fd)
+{
+    DIR *d = fdopendir(fd);
+    for (struct dirent *e; d && (e = readdir(d));)
+        (void)unlinkat(dirfd(d), e->d_name, 0); /* folders are none of ours, and stay */
+    if (d)
+        closedir(d);
+    else
+        close(fd);
+}
+
+/* One that had not got its inode's number yet has nothing in it. */
+static void remove_one(int parent, const char *file, const char *rest)
+{
+    struct stat facts;
+    char inode[32];
+    int fd = openat(parent, file, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_DIRECTORY);
+    if (fd < 0)
+        return;
+    bool ours = fstat(fd, &facts) == 0 && facts.st_uid == geteuid();
+    snprintf(inode, sizeof inode, "%ju", ours ? (uintmax_t)facts.st_ino : 0);
+    if (ours && strcmp(rest, inode) == 0)
+        empty_folder(fd);
+    else
+        close(fd);
+    if (ours)
+        (void)unlinkat(parent, file, AT_REMOVEDIR);
+}
+
+/* Removes folders in the making for `folder`, with what is in them, that nobody fills any more:
+ * they are of this user and of a process of this system that is not there. What cannot be looked at
+ * or removed stays. */
+static void remove_stale_folders(const char *folder)
+{
+    int saved = errno;
+    uint32_t system = system_number();
+    size_t name, end = without_slashes(folder, &name);
+    char *parent = system ? name ? strndup(folder, name) : strdup(".") : NULL;
+    DIR *d = parent ? opendir(parent) : NULL;
+    for (struct dirent *e; d && (e = readdir(d));) {
+        const char *rest = rest_of_dead(e->d_name, folder + name, end - name, system);
+        if (rest)
+            remove_one(dirfd(d), e->d_name, rest);
+    }
+    if (d)
+        closedir(d);
+    free(parent);
+    errno = saved;
+}
+
+/* --- new folders --- */
+
+ebpo_status ebpo_folder_begin(const char *folder, char **making, ebpo_error *error)
+{
+    struct stat st;
+    *making = NULL;
+    if (stat(folder, &st) == 0)
+        return ebpo_fail_file(error, EBPO_E_IO, folder,
+                              "is there already; what is written has to be a new folder");
+    remove_stale_folders(folder);
+    char *path = making_name(folder);
+    if (!path)
+        return ebpo_fail_memory(error, strlen(folder));
+    if (mkdtemp(path)) {
+        settle_making(&path);
+        *making = path;
+        return EBPO_OK;
+    }
+    free(path);
+    return ebpo_fail_errno(error, folder, "the folder cannot be made");
+}
+
+ebpo_status ebpo_folder_publish(const char *making, const char *folder, ebpo_error *error)
+{
+    mode_t mask = umask(0);
+    umask(mask);
+    if (chmod(making, 0777 & ~mask) != 0 || rename(making, folder) != 0)
+        return ebpo_fail_errno(error, folder, "the folder cannot be put in its place");
+    return EBPO_OK;
 }

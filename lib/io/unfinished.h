@@ -1,7 +1,10 @@
-/* Names of files that go when this process is ended by a signal: outputs in the making, and locks.
- */
+/* What is not finished yet, or never will be: outputs and locks that go with the process, and what
+ * processes that were killed have left. */
 #ifndef EBPO_IO_UNFINISHED_H
 #define EBPO_IO_UNFINISHED_H
+
+/* Names of files that go when this process is ended by a signal: outputs in the making, and locks.
+ */
 
 enum { EBPO_UNFINISHED_MOST = 32 }; /* at a time */
 
@@ -19,5 +22,16 @@ void ebpo_unfinished_forget(int slot);
 
 /* Removes all of them. Only calls unlink: allowed in a signal handler. */
 void ebpo_unfinished_remove(void);
+
+/* Temporary files of writers that were killed. */
+
+/* Bytes of a target's name that its temporary files begin with: enough to recognise it, and few
+ * enough to keep the sum below the usual limit of 255. */
+enum { EBPO_TARGET_NAME_KEPT = 200 };
+
+/* Removes temporary files for `name` in `folder` that nobody writes any more: their process is not
+ * there, and nobody, of another machine either, holds their lock (flock). What cannot be looked at
+ * or removed stays. */
+void ebpo_remove_stale_files(const char *folder, const char *name);
 
 #endif

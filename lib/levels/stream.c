@@ -13,7 +13,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "format/reader.h"
 #include "geometry/cells.h"
 #include "geometry/node_types.h"

@@ -2,7 +2,7 @@
 #include <math.h>
 
 #include "core/fp_env.h"
-#include "core/sized.h"
+#include "core/error.h"
 #include "levels/view_stream.h"
 
 typedef struct visitor {

@@ -8,7 +8,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "levels/view_fetch.h"
 
 enum { MEMORY_LEAST = 1 << 20 };

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "mesh/attributes.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 
 typedef struct picking {

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 
 static const char *const type_names[] = { "int8",  "uint8",  "int16",   "uint16",

@@ -2,7 +2,7 @@
 
 #include "mesh/box_tree.h"
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 
 typedef struct filling {
     box_tree *tree;

@@ -3,9 +3,9 @@
 
 #include <stdlib.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
-#include "core/sort_with.h"
+#include "core/sort.h"
 #include "geometry/predicates.h"
 #include "mesh/component_parts.h"
 

@@ -6,7 +6,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "mesh/mesh_check_parts.h"
 #include "mesh/same_faces.h"
 

@@ -7,7 +7,7 @@
 #include "mesh/attributes.h"
 #include "mesh/textures_named.h"
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "mesh/component_parts.h"
 

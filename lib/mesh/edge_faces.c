@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 #include "core/alloc.h"
-#include "core/sort_with.h"
+#include "core/sort.h"
 #include "geometry/predicates.h"
 
 typedef struct edge {

@@ -1,5 +1,5 @@
 /* Places while checking, a list for each worker. */
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "mesh/mesh_check_parts.h"
 
 void ebpo_found_add(const ebpo_check *check, unsigned worker, ebpo_found found)

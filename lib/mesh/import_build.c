@@ -8,7 +8,7 @@
 
 #include "mesh/attributes.h"
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "geometry/decimal.h"
 #include "geometry/polygon.h"

@@ -1,7 +1,7 @@
 /* Mending in the one order that there is. */
 #include "core/strict_fp.h"
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "mesh/mesh_parts.h"

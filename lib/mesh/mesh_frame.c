@@ -2,7 +2,7 @@
 
 #include "mesh/mesh_frame.h"
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 
 static void include(double most[3], const ebpo_mesh *mesh, uint64_t vertex)
 {

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "mesh/attributes.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "mesh/mesh_parts.h"
 
 void ebpo_arrangement_free(struct ebpo_arrangement *arrangement)

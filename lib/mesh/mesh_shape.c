@@ -3,7 +3,7 @@
 #include <stdlib.h>
 
 #include "core/error.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 
 const char *ebpo_mesh_label(const ebpo_mesh *mesh)
 {

@@ -5,8 +5,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sized.h"
-#include "core/sort_with.h"
+#include "core/sort.h"
 #include "mesh/mesh_parts.h"
 
 /* Of faces under no name, as the OBJ format has it. */

@@ -4,7 +4,7 @@
 
 #include <ebpo/groups.h>
 
-#include "core/named_run.h"
+#include "core/text.h"
 
 struct ebpo_mesh_groups {
     ebpo_mesh_group *list; /* [count] those with faces first, in the order of these */

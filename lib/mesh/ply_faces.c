@@ -6,7 +6,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "geometry/polygon.h"
 #include "mesh/ply_attributes.h"
 #include "mesh/ply_faces.h"

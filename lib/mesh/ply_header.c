@@ -9,7 +9,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/text.h"
-#include "io/foreign_bytes.h"
+#include "io/file_source.h"
 
 enum { MAX_WORDS = 6 }; /* no statement has more than five; a sixth shows that there are too many */
 

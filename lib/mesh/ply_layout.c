@@ -6,9 +6,9 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
-#include "core/text_stream.h"
+#include "core/text.h"
 #include "mesh/ply_layout.h"
 
 typedef struct making {

@@ -8,7 +8,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "io/file_source.h"
 #include "mesh/ply.h"
 #include "mesh/ply_ascii.h"

@@ -3,7 +3,7 @@
 #include "core/strict_fp.h"
 
 #include "core/parallel.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "mesh/ply_attributes.h"
 #include "mesh/ply_number.h"
 #include "mesh/ply_plain.h"

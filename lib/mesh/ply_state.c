@@ -5,7 +5,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 
 enum { REPORT_BYTES = 1 << 22 };

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/parallel.h"
 
 enum { GRAIN = 1 << 15, WORD = 64 };

@@ -8,7 +8,7 @@
 #include "core/alloc.h"
 #include "core/endian.h"
 #include "core/error.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "io/publish.h"
 #include <ebpo/mesh.h>
 #include "mesh/ply_layout.h"

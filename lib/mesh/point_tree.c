@@ -2,7 +2,7 @@
 
 #include "mesh/point_tree.h"
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 
 mesh_point *ebpo_point_tree_add(point_tree *tree)
 {

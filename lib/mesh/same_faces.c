@@ -2,7 +2,7 @@
 
 #include <stdlib.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 
 enum { INSERTION_LIMIT = 48 };
 

@@ -5,7 +5,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 
 enum { FACE_GRAIN = 1 << 15, INSERTION_LIMIT = 48 };
 

@@ -9,10 +9,9 @@
 #include "mesh/textures.h"
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sha256.h"
+#include "core/checksum.h"
 #include "mesh/texture_names.h"
 #include "io/file_source.h"
-#include "io/open_below.h"
 
 /* Of material libraries: bytes of all, and names that are tried. */
 enum { LIBRARY_BYTES = 1 << 25, LIBRARIES = 100, DIGEST = 32, STEP = 1 << 20 };

@@ -3,10 +3,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
-#include "core/sha256.h"
-#include "core/sums.h"
+#include "core/checksum.h"
 
 enum { DIGEST = 32, STEP = 1 << 20 };
 

@@ -7,7 +7,7 @@
 
 #include "mesh/textures.h"
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 
 /* Text that does not end with a zero. */

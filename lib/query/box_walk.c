@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 #include "core/alloc.h"
-#include "core/eight.h"
+#include "core/simd.h"
 #include "core/error.h"
 #include "geometry/ray_triangle.h"
 #include "query/options.h"

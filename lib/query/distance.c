@@ -4,10 +4,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "query/batch.h"
 #include "query/prefetch.h"
 #include "query/inside.h"

@@ -2,7 +2,7 @@
 #include "core/strict_fp.h"
 
 #include "core/error.h"
-#include "core/clock.h"
+#include "core/os.h"
 #include "geometry/cursor.h"
 #include "geometry/node_types.h"
 #include "query/inside.h"

@@ -8,7 +8,6 @@
 #include "query/accel.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "format/reader.h"
 #include "query/query_top.h"
 #include "query/shared_budget.h"

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 #include "core/alloc.h"
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "geometry/cell.h"
 #include "geometry/octcode.h"

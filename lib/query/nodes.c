@@ -4,7 +4,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/huge_pages.h"
+#include "core/os.h"
 #include "geometry/node_types.h"
 #include "query/accel_parts.h"
 

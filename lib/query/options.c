@@ -7,7 +7,6 @@
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "format/reader.h"
 #include "query/batch.h"
 #include "query/prefetch.h"

@@ -9,10 +9,9 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "query/model_budget.h"
 #include "query/shared_budget.h"
 

@@ -7,7 +7,6 @@
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "query/near_band.h"
 #include "query/node_queue.h"
 #include "query/options.h"

@@ -10,7 +10,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "query/batch.h"
 #include "query/options.h"
 #include "query/ray_walk.h"

@@ -7,7 +7,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sort_with.h"
+#include "core/sort.h"
 #include "geometry/ray_triangle.h"
 
 bool ebpo_casting_meets(const ebpo_casting *c, int facing, ebpo_met *m)

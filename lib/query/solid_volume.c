@@ -7,7 +7,6 @@
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "geometry/rule.h"
 
 /* What rounding may do to sums of envelopes: of the sum, and of the root cell's volume. */

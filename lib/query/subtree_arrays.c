@@ -6,7 +6,6 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sized.h"
 #include "geometry/node_types.h"
 #include "geometry/octcode.h"
 #include "query/subtree_parts.h"

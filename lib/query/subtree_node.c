@@ -8,7 +8,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "geometry/plane_code.h"
 #include "levels/lod_model.h"
 #include "geometry/envelope_stack.h"

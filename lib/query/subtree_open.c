@@ -8,7 +8,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "format/file_nodes.h"
 #include "geometry/cursor.h"
 #include "query/subtree_parts.h"

@@ -2,7 +2,7 @@
 
 #include "verify/nesting.h"
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/wide.h"
 
 #include "geometry/plane_code.h"

@@ -5,7 +5,7 @@
 #include <inttypes.h>
 #include <math.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "format/schema.h"
 #include "mesh/mesh_parts.h"
 

@@ -6,8 +6,8 @@
 #include <inttypes.h>
 #include <math.h>
 
-#include "core/arrays.h"
-#include "core/random.h"
+#include "core/workspace.h"
+#include "core/hash.h"
 #include "mesh/mesh_parts.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)

@@ -1,7 +1,7 @@
 #include "verify/twin_tree.h"
 
 #include "core/error.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 
 /* Adds what a group holds to the running counts. */
 static void add_group(ebpo_twin_group *sum, const ebpo_twin_tree *view, const ebpo_level *level,

@@ -4,7 +4,6 @@
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "mesh/mesh_parts.h"
 #include "verify/nesting.h"
 #include "verify/verify_colours.h"

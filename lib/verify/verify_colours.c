@@ -10,7 +10,7 @@
 
 #include <ebpo/colours.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/wide.h"
 #include "mesh/mesh_parts.h"
 

@@ -4,7 +4,7 @@
 
 #include <inttypes.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/wide.h"
 #include "verify/winding.h"
 

@@ -8,7 +8,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "verify/winding.h"
 
 enum { SIDE_MAX = 2048, FACE_GRAIN = 1 << 14 };

@@ -8,8 +8,8 @@
 #include "mesh/textures.h"
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/arrays.h"
-#include "core/sort_with.h"
+#include "core/workspace.h"
+#include "core/sort.h"
 #include "format/reader.h"
 #include "mesh/mesh_parts.h"
 

@@ -11,7 +11,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "verify/containment.h"
 #include "verify/verify_labels.h"
 #include "verify/lists.h"

@@ -22,7 +22,7 @@
 #include <unistd.h>
 
 #include "ask_all.h"
-#include "core/sums.h"
+#include "core/checksum.h"
 #include "format/file_in.h"
 #include "known_leaks.h"
 

@@ -7,7 +7,7 @@
 
 #include <ebpo/http.h>
 
-#include "io/answer.h"
+#include "io/http_answer.h"
 
 static const ebpo_http_version version = { 100000, "\"tag\"", "Mon, 23 Nov 2026 09:00:00 GMT" };
 

@@ -1,6 +1,6 @@
 /* Any bytes as the head of a file: every object, attribute and array that the format has is asked
  * for. Refused or read, and what is read keeps its promises. Tests build it twice: as it is, and
- * with a reader that does not compare checksums (core/sums.h). */
+ * with a reader that does not compare checksums (core/checksum.h). */
 #include "fuzz_kit.h"
 
 #include "format/schema.h"

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "core/endian.h"
-#include "core/sums.h"
+#include "core/checksum.h"
 #include "hdf5_read/chunk.h"
 #include "format/file_in.h"
 #include "read_by.h"

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/sums.h"
+#include "core/checksum.h"
 #include "hdf5_read/chunk.h"
 #include "format/file_in.h"
 #include "read_by.h"

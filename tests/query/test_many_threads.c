@@ -14,7 +14,7 @@
 
 #include <ebpo/ebpo.h>
 
-#include "core/clock.h"
+#include "core/os.h"
 #include "check_main.h"
 #include "model_file.h"
 #include "question_mix.h"

@@ -8,7 +8,7 @@
 
 #include <ebpo/file.h>
 
-#include "core/sha256.h"
+#include "core/checksum.h"
 
 /* Long arrays by their SHA-256, as little-endian integers and floats of the widths in ebpo_tree. */
 static void tj_digest(FILE *out, const void *values, uint64_t count, size_t size)

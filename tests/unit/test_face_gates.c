@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "core/endian.h"
-#include "core/random.h"
+#include "core/hash.h"
 #include "hdf5_read/chunk.h"
 #include "hdf5_read/coding.h"
 #include "check_main.h"

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "read_by.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "check_main.h"
 #include "hdf5_read/coding.h"
 #include "format/long_chunk.h"
@@ -18,7 +18,7 @@
 #include "format/rank_index.h"
 #include "format/reader.h"
 #include "core/endian.h"
-#include "hdf5_read/lookup3.h"
+#include "core/checksum.h"
 #include "mesh/import.h"
 #include "io/file_source.h"
 #include "mesh/ply.h"

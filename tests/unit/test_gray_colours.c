@@ -10,7 +10,7 @@
 #include <ebpo/verify.h>
 
 #include "mesh/attributes.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "check_main.h"
 #include "scratch.h"
 #include "solids.h"

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "core/hash.h"
-#include "core/random.h"
 
 enum { KEYS = 12288, SLOTS = 16384 }; /* three quarters full */
 

@@ -6,7 +6,7 @@
 
 #include "check_main.h"
 #include "hdf5_read/head.h"
-#include "hdf5_read/lookup3.h"
+#include "core/checksum.h"
 #include "scratch.h"
 
 enum { NAME = 64 };

@@ -15,8 +15,8 @@
 #include <ebpo/ebpo.h>
 
 #include "check_main.h"
-#include "io/answer.h"
-#include "io/http_source.h"
+#include "io/http_answer.h"
+#include "io/byte_source.h"
 #include "scratch.h"
 #include "solids.h"
 #include "web.h"

@@ -9,7 +9,7 @@
 
 #include "core/endian.h"
 #include "check_main.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "mesh/import.h"
 #include "mesh/corner_weld.h"
 

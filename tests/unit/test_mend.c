@@ -8,7 +8,7 @@
 
 #include "construct/arrange.h"
 #include "check_main.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "mesh/mesh_parts.h"
 #include "solids.h"
 

@@ -9,7 +9,7 @@
 
 #include <ebpo/mesh.h>
 
-#include "core/sha256.h"
+#include "core/checksum.h"
 #include "check_main.h"
 #include "mesh/ply.h"
 #include "scratch.h"

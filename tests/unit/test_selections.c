@@ -11,7 +11,7 @@
 #include <ebpo/lod.h>
 #include <ebpo/verify.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "check_main.h"
 #include "geometry/plane_code.h"
 #include "construct/hull_directions.h"

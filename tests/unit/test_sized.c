@@ -4,7 +4,7 @@
 
 #include <ebpo/ebpo.h>
 
-#include "core/sized.h"
+#include "core/error.h"
 #include "check_main.h"
 #include "query_kit.h"
 

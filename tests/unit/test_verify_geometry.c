@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "check_main.h"
 #include "geometry/plane_code.h"
 #include "geometry/predicates.h"

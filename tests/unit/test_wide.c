@@ -2,7 +2,7 @@
 #include <check.h>
 #include <gmp.h>
 
-#include "core/random.h"
+#include "core/hash.h"
 #include "core/wide.h"
 #include "check_main.h"
 

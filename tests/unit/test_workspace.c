@@ -8,8 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "core/array_loops.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/parallel.h"
 #include "check_main.h"
 #include "scratch.h"

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "core/sha256.h"
+#include "core/checksum.h"
 
 void die(const char *what, const char *why)
 {

@@ -10,7 +10,7 @@
 
 #include "attributes_json.h"
 #include "mesh/textures.h"
-#include "core/sha256.h"
+#include "core/checksum.h"
 #include "change_file.h"
 #include "hdf5_read/chunk.h"
 #include "hdf5_read/face_gates.h"

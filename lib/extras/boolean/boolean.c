@@ -10,7 +10,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "geometry/predicates.h"
 #include "geometry/rule.h"
 #include "query/options.h"

@@ -12,7 +12,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "extras/collide/collider.h"
 
 enum { PARENTS = 1 << 14, GRAIN = 64 };

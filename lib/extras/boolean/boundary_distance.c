@@ -6,7 +6,6 @@
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "extras/boolean/boundary_search.h"
 
 typedef struct measuring {

@@ -7,7 +7,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/heap.h"
+#include "core/sort.h"
 
 typedef struct waiting {
     double near; /* no point of the cell is nearer */

@@ -11,7 +11,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "extras/boolean/boolean.h"
 #include "extras/boolean/volume_sum.h"
 #include "extras/collide/collider.h"

@@ -7,7 +7,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "extras/collide/collider.h"
 #include "extras/collide/nearest_pair.h"
 #include "extras/collide/subtree_distance.h"

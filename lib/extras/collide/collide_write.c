@@ -10,7 +10,7 @@
 #include "core/fp_env.h"
 #include "extras/collide/contacts.h"
 #include "extras/collide/red_mesh.h"
-#include "hdf5_write/tables.h"
+#include "hdf5_write/h5.h"
 #include "io/publish.h"
 
 /* --- HDF5 --- */

@@ -7,10 +7,9 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "extras/collide/gap_search.h"
 #include "extras/collide/posed_model.h"
 #include "query/options.h"

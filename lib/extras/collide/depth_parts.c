@@ -7,9 +7,9 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
-#include "core/heap.h"
+#include "core/sort.h"
 #include "geometry/distance.h"
 #include "geometry/length.h"
 

@@ -12,8 +12,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
-#include "core/workspace_parts.h"
+#include "core/workspace.h"
 #include "extras/collide/collider.h"
 #include "extras/collide/red_mesh.h"
 #include "format/container_write.h"
@@ -183,10 +182,10 @@ static ebpo_status search(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report 
     c->met = ebpo_alloc_zero(c->tree.mesh.face_count / 64 + 1, sizeof *c->met);
     if (!c->met)
         return ebpo_fail_memory(error, c->tree.mesh.face_count / 8);
-    status = store(c, workspace->folder, error);
+    status = store(c, ebpo_workspace_folder(workspace), error);
     drop_levels(&c->tree);
     if (status == EBPO_OK)
-        status = make_collider(c, workspace->figures.memory, error);
+        status = make_collider(c, ebpo_workspace_memory(workspace), error);
     if (status == EBPO_OK)
         status = ebpo_collide_self(c->collider, &how, take_pairs, c, error);
     return status == EBPO_OK && c->options.ply ? paint(c, workspace, error) : status;

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "geometry/triangle_pair.h"

@@ -2,7 +2,7 @@
  * Include core/strict_fp.h first. Letters are those of docs/develop/collision.md. */
 #include "core/strict_fp.h"
 
-#include "core/eight.h"
+#include "core/simd.h"
 #include "extras/collide/pair_filter.h"
 
 typedef struct vector8 {

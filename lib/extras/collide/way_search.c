@@ -7,7 +7,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/heap.h"
+#include "core/sort.h"
 #include "core/parallel.h"
 
 /* --- the heap --- */

@@ -6,7 +6,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "extras/haptic/touch_parts.h"

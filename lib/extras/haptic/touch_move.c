@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "core/fp_env.h"
-#include "core/sized.h"
+#include "core/error.h"
 #include "extras/haptic/tool.h"
 #include "extras/haptic/touch_parts.h"
 #include "extras/haptic/vectors.h"

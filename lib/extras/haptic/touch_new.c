@@ -8,7 +8,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "geometry/length.h"
 #include "query/query_model.h"
 #include "extras/haptic/tool.h"

@@ -6,7 +6,6 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 
 ebpo_status ebpo_map_take_options(ebpo_map_options *out, const ebpo_map_options *given,
                                   ebpo_error *error)

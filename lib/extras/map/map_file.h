@@ -5,7 +5,7 @@
 #include <ebpo/map.h>
 #include <stdio.h>
 
-#include "hdf5_write/tables.h"
+#include "hdf5_write/h5.h"
 
 typedef struct ebpo_map_file {
     const ebpo_lattice *lattice;

@@ -13,7 +13,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "extras/map/map_ask.h"
 
 /* Faces that are looked at together; and triangles of a round, beyond which their bounds are taken

@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "core/error.h"
-#include "hdf5_write/volumes.h"
+#include "hdf5_write/h5.h"
 #include "extras/map/map_file.h"
 
 static const char values_path[] = "/VTKHDF/PointData/distance";

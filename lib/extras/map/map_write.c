@@ -5,7 +5,6 @@
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "io/publish.h"
 #include "extras/map/map_file.h"
 #include "extras/map/map_sums.h"

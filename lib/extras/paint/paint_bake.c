@@ -11,7 +11,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "extras/paint/paint_parts.h"
 #include "extras/paint/reached.h"
 #include "query/query_model.h"

@@ -3,7 +3,7 @@
 #ifndef EBPO_PAINT_PAINT_COLUMNS_H
 #define EBPO_PAINT_PAINT_COLUMNS_H
 
-#include "hdf5_read/shape.h"
+#include "hdf5_read/chunk.h"
 #include "extras/paint/paint_parts.h"
 
 typedef struct ebpo_paint_column {

@@ -8,7 +8,6 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sized.h"
 #include "core/text.h"
 #include "extras/paint/paint_parts.h"
 

@@ -11,7 +11,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "extras/paint/area_cut.h"
 #include "extras/paint/met_faces.h"
 #include "extras/paint/paint_reach.h"

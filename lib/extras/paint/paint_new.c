@@ -11,7 +11,6 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sized.h"
 #include "format/file_in.h"
 #include "extras/paint/paint_parts.h"
 #include "query/query_model.h"

@@ -15,7 +15,7 @@
 #include "core/endian.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sums.h"
+#include "core/checksum.h"
 #include "hdf5_read/head.h"
 #include "io/byte_source.h"
 #include "io/file_source.h"

@@ -8,7 +8,6 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sized.h"
 #include "extras/paint/paint_parts.h"
 
 const char *ebpo_paint_point_wrong(const ebpo_paint_point *q)

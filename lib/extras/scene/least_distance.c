@@ -7,7 +7,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/heap.h"
+#include "core/sort.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "extras/scene/pair_looks.h"

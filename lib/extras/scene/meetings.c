@@ -8,7 +8,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "extras/scene/asked_pairs.h"
 #include "extras/scene/left_out.h"
 #include "extras/scene/meeting_facts.h"

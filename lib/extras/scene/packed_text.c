@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "core/error.h"
-#include "core/sha256.h"
+#include "core/checksum.h"
 #include "io/file_source.h"
 
 void scene_packed_name(uint64_t file, char name[40])

@@ -5,7 +5,6 @@
 #include <math.h>
 
 #include "core/error.h"
-#include "core/sized.h"
 #include "extras/scene/left_out.h"
 
 /* Of a collider that is not there: nothing is left to be near. */

@@ -7,7 +7,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "extras/scene/planning.h"
 #include "extras/scene/scene_views.h"
 

@@ -7,7 +7,6 @@
 
 #include "core/error.h"
 #include "io/file_source.h"
-#include "io/foreign_bytes.h"
 #include "geometry/decimal.h"
 #include "extras/scene/scene_parts.h"
 

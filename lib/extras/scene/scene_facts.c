@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/sized.h"
+#include "core/error.h"
 #include "extras/scene/scene_parts.h"
 
 static void add_times(const ebpo_scene *scene, ebpo_scene_counts *c)

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "core/error.h"
-#include "io/foreign_bytes.h"
+#include "io/file_source.h"
 #include "extras/scene/json_reader.h"
 #include "extras/scene/json_routes.h"
 

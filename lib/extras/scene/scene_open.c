@@ -11,7 +11,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "io/file_source.h"
 #include "geometry/pose.h"
 #include "extras/scene/scene_parts.h"

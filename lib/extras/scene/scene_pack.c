@@ -13,7 +13,6 @@
 #include "core/error.h"
 #include "format/file_in.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "extras/scene/packed_text.h"
 #include "extras/scene/planning.h"
 

@@ -7,7 +7,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "hdf5_write/tables.h"
+#include "hdf5_write/h5.h"
 #include "io/publish.h"
 #include "extras/scene/scene_parts.h"
 

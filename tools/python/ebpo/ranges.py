@@ -35,7 +35,7 @@ class Piece:
 class Ranges:
     """Reads an object with `size` and `read_range(offset, size)`, which several threads call at once.
 
-    As the library reads URLs (lib/io/range_cache.c): announced ranges are joined over small gaps, cut into
+    As the library reads URLs (lib/io/http_cache.c): announced ranges are joined over small gaps, cut into
     requests of at most MOST bytes, and fetched ahead of the reader as long as they fit into `memory`.
 
     connections: so many requests at a time.

@@ -1,0 +1,230 @@
+/* Inside lib/hdf5_read only: the parts of an open head, which are its bytes, in few reads; a
+ * cursor in them; headers of objects; types, dimensions and filters. Our writer puts headers at
+ * the start of the file, and the index of large arrays in one piece behind the first levels. */
+#ifndef EBPO_HDF5_READ_HEAD_PARTS_H
+#define EBPO_HDF5_READ_HEAD_PARTS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include <ebpo/base.h>
+
+#include "core/alloc.h"
+#include "core/endian.h"
+#include "hdf5_read/head.h"
+#include "io/byte_source.h"
+
+typedef struct ebpo_head_bytes {
+    ebpo_input *input;
+    uint8_t *first, *window; /* the first bytes, and a piece elsewhere, NULL until needed */
+    uint8_t *table;          /* all of `index`, NULL until needed */
+    uint8_t *large;          /* what fits none of them */
+    uint64_t first_bytes, window_at, window_bytes, large_capacity;
+    ebpo_range index; /* where more metadata is expected, or nothing */
+    /* of the input's first failure, after which nothing is read any more */
+    ebpo_status status;
+    ebpo_error error;
+} ebpo_head_bytes;
+
+/* Fetches the first bytes. Close also after an error. */
+EBPO_MUST_USE ebpo_status ebpo_head_bytes_open(ebpo_head_bytes *bytes, ebpo_input *input,
+                                               ebpo_error *error);
+void ebpo_head_bytes_close(ebpo_head_bytes *bytes);
+
+/* Bytes [at, at + size), until the next call; the caller bounds `size`. NULL: they lie beyond the
+ * end of the file, or, as `status` says then, could not be read. */
+const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *bytes, uint64_t at, uint64_t size);
+
+/* Inside lib/hdf5_read only: a reading place in bytes that nobody vouches for. Beyond the end it
+ * gives zeros and notes that it did. */
+
+#define EBPO_NO_ADDRESS UINT64_MAX
+
+typedef struct ebpo_head_cursor {
+    const uint8_t *at, *end;
+    bool cut; /* more was asked for than there is */
+} ebpo_head_cursor;
+
+static inline size_t ebpo_cursor_left(const ebpo_head_cursor *c)
+{
+    return (size_t)(c->end - c->at);
+}
+
+/* Moves on; NULL when there are not so many bytes. */
+static inline const uint8_t *ebpo_cursor_take(ebpo_head_cursor *c, size_t bytes)
+{
+    const uint8_t *from = c->at;
+    if (bytes > ebpo_cursor_left(c)) {
+        c->cut = true;
+        c->at = c->end;
+        return NULL;
+    }
+    c->at += bytes;
+    return from;
+}
+
+/* An unsigned integer of at most 8 bytes. */
+static inline uint64_t ebpo_cursor_uint(ebpo_head_cursor *c, unsigned bytes)
+{
+    const uint8_t *from = ebpo_cursor_take(c, bytes);
+    uint64_t value = 0;
+    for (unsigned i = bytes; from && i-- > 0;)
+        value = value << 8 | from[i];
+    return value;
+}
+static inline uint8_t ebpo_cursor_u8(ebpo_head_cursor *c)
+{
+    return (uint8_t)ebpo_cursor_uint(c, 1);
+}
+static inline uint16_t ebpo_cursor_u16(ebpo_head_cursor *c)
+{
+    return (uint16_t)ebpo_cursor_uint(c, 2);
+}
+static inline uint32_t ebpo_cursor_u32(ebpo_head_cursor *c)
+{
+    return (uint32_t)ebpo_cursor_uint(c, 4);
+}
+static inline uint64_t ebpo_cursor_u64(ebpo_head_cursor *c) { return ebpo_cursor_uint(c, 8); }
+
+/* The next `bytes` bytes as a cursor of their own. */
+static inline ebpo_head_cursor ebpo_cursor_part(ebpo_head_cursor *c, size_t bytes)
+{
+    const uint8_t *from = ebpo_cursor_take(c, bytes);
+    return (ebpo_head_cursor){ from ? from : c->end, from ? from + bytes : c->end, !from };
+}
+
+/* Inside lib/hdf5_read only: an open head, and the headers of its objects. */
+
+/* Types of messages. */
+enum {
+    EBPO_M_DATASPACE = 0x01,
+    EBPO_M_LINK_INFO = 0x02,
+    EBPO_M_DATATYPE = 0x03,
+    EBPO_M_LINK = 0x06,
+    EBPO_M_EXTERNAL = 0x07,
+    EBPO_M_LAYOUT = 0x08,
+    EBPO_M_GROUP_INFO = 0x0a,
+    EBPO_M_PIPELINE = 0x0b,
+    EBPO_M_ATTRIBUTE = 0x0c,
+    EBPO_M_CONTINUATION = 0x10,
+    EBPO_M_SYMBOL_TABLE = 0x11,
+    EBPO_M_ATTRIBUTE_INFO = 0x15
+};
+
+typedef struct ebpo_head_message {
+    uint32_t offset, size; /* in the header's bytes */
+    uint8_t type, flags;
+} ebpo_head_message;
+
+/* An object's header: its blocks, one behind the other, and the messages in them. */
+typedef struct ebpo_head_header {
+    uint64_t address, used; /* used: by the state's clock, 0: the slot is free */
+    uint8_t *bytes;
+    ebpo_head_message *message;
+    uint64_t byte_count, byte_capacity, count, capacity;
+    ebpo_head_kind kind;
+} ebpo_head_header;
+
+/* Why something was refused. */
+typedef struct ebpo_head_refusal {
+    const char *what; /* NULL: nothing was */
+    bool foreign;     /* it is not damaged, but of a kind that only libhdf5 reads */
+} ebpo_head_refusal;
+
+enum { EBPO_HEAD_SLOTS = 32 };
+
+typedef struct ebpo_head_state {
+    ebpo_head_bytes bytes;
+    uint64_t root, clock;
+    ebpo_head_header slot[EBPO_HEAD_SLOTS]; /* those used last */
+    ebpo_head_refusal refusal;              /* the last one */
+    ebpo_range *kept;                       /* see ebpo_head_keep_ranges */
+    uint64_t kept_count, kept_capacity;
+    bool keeps, kept_short; /* short of memory */
+} ebpo_head_state;
+
+/* These bytes of the file are ours. */
+static inline void ebpo_head_note_range(ebpo_head_state *s, uint64_t at, uint64_t size)
+{
+    if (!s->keeps)
+        return;
+    if (ebpo_grow(&s->kept, &s->kept_capacity, s->kept_count + 1, sizeof *s->kept))
+        s->kept[s->kept_count++] = (ebpo_range){ at, size };
+    else
+        s->kept_short = true;
+}
+
+/* Notes why; false, so that `return` reads well. */
+static inline bool ebpo_refuse(ebpo_head_state *s, const char *what)
+{
+    s->refusal = (ebpo_head_refusal){ what, false };
+    return false;
+}
+static inline bool ebpo_refuse_foreign(ebpo_head_state *s, const char *what)
+{
+    s->refusal = (ebpo_head_refusal){ what, true };
+    return false;
+}
+
+/* Whether `size` bytes, the last four of which are the checksum of the others, are whole. */
+bool ebpo_head_sound(const uint8_t *block, uint64_t size);
+
+/* The header at an address, until the next call. NULL: the refusal says why. */
+const ebpo_head_header *ebpo_head_header_at(ebpo_head_state *s, uint64_t address);
+void ebpo_head_headers_free(ebpo_head_state *s);
+
+static inline ebpo_head_cursor ebpo_head_message_cursor(const ebpo_head_header *h,
+                                                        const ebpo_head_message *m)
+{
+    const uint8_t *from = h->bytes + m->offset;
+    return (ebpo_head_cursor){ from, from + m->size, false };
+}
+
+/* What a path names, and where its header is. Without a refusal ABSENT and OTHER are what they say.
+ */
+ebpo_head_kind ebpo_head_find(ebpo_head_state *s, const char *path, ebpo_head_object *object);
+
+/* The error that says what was refused: "`path`: `what`: the refusal". A failed input's own error
+ * goes before. */
+EBPO_MUST_USE ebpo_status ebpo_head_fail(const ebpo_head *head, const char *path, const char *what,
+                                         ebpo_error *error);
+
+/* Inside lib/hdf5_read only: types, dimensions and filters as messages describe them. */
+
+typedef enum ebpo_head_class {
+    EBPO_CLASS_INTEGER,       /* little-endian, all bits of it */
+    EBPO_CLASS_DOUBLE,        /* IEEE 754, little-endian, 64 bits */
+    EBPO_CLASS_TEXT,          /* of fixed length, however it is padded */
+    EBPO_CLASS_OTHER_INTEGER, /* big-endian, say */
+    EBPO_CLASS_OTHER
+} ebpo_head_class;
+
+typedef struct ebpo_head_type {
+    ebpo_head_class class;
+    uint32_t size;
+    bool is_signed;
+} ebpo_head_type;
+
+ebpo_head_type ebpo_head_read_type(ebpo_head_cursor c);
+
+/* Dimensions. `values`: the product; 0 where there are none, or more than 64 bits count. */
+typedef struct ebpo_head_space {
+    unsigned rank; /* UINT32_MAX: nothing that can be read */
+    bool fixed;    /* they cannot grow */
+    uint64_t size[2], values;
+} ebpo_head_space;
+
+ebpo_head_space ebpo_head_read_space(ebpo_head_cursor c);
+
+/* Filters in the order in which they are applied. */
+enum { EBPO_HEAD_FILTERS = 3 };
+typedef struct ebpo_head_filters {
+    unsigned count; /* more than EBPO_HEAD_FILTERS: nothing of this format */
+    struct {
+        unsigned id, values, first; /* how many values, and the first one */
+    } filter[EBPO_HEAD_FILTERS];
+} ebpo_head_filters;
+
+ebpo_head_filters ebpo_head_read_filters(ebpo_head_cursor c);
+
+#endif

@@ -1,0 +1,185 @@
+/* Chunks as zstd frames (RFC 8878), each with its content's size and a checksum. What a decoder of
+ * zstd does not look at in a frame, and no checksum covers, is looked at here: a changed bit must
+ * not go unnoticed. The blocks of a frame are the planes of shuffled elements, or the streams of a
+ * coding, as each has statistics of its own. */
+#include <string.h>
+#include <zstd.h>
+
+#include "core/endian.h"
+#include "hdf5_read/codec.h"
+
+/* --- what decoders do not look at: RFC 8878, 3.1.1 --- */
+
+enum { RAW, RLE, COMPRESSED, RESERVED };
+enum { DESCRIPTOR = 4 };
+static const char unused_set[] = "an unused bit of the zstd frame is set";
+
+/* How many bytes the literals of a compressed block take, with their header; 0: it is cut short. */
+static size_t literals_bytes(const uint8_t *block, size_t size)
+{
+    unsigned kind = block[0] & 3, format = block[0] >> 2 & 3;
+    if (kind < COMPRESSED) {
+        size_t header = format == 1 ? 2 : format == 3 ? 3 : 1;
+        if (size < header)
+            return 0;
+        size_t count = header == 1   ? block[0] >> 3
+                       : header == 2 ? (block[0] | block[1] << 8) >> 4
+                                     : (block[0] | block[1] << 8 | block[2] << 16) >> 4;
+        return header + (kind == RLE ? 1 : count);
+    }
+    size_t header = format < 2 ? 3 : format + 2;
+    unsigned width = format < 2 ? 10 : format == 2 ? 14 : 18;
+    uint64_t bits = 0;
+    if (size < header)
+        return 0;
+    for (size_t i = 0; i < header; i++)
+        bits |= (uint64_t)block[i] << 8 * i;
+    return header + (size_t)(bits >> (4 + width) & ((1u << width) - 1));
+}
+
+static bool block_has_unused(const uint8_t *block, size_t size)
+{
+    size_t at = size ? literals_bytes(block, size) : 0;
+    if (at == 0 || at >= size || block[at] == 0) /* 0: no sequences, and no modes */
+        return false;
+    at += block[at] < 128 ? 1 : block[at] < 255 ? 2 : 3;
+    return at < size && block[at] & 3;
+}
+
+static const char *block_fault(unsigned kind, const uint8_t *block, size_t stated)
+{
+    if (kind == RLE && stated == 1)
+        return "a block of the zstd frame repeats its byte once";
+    return kind == COMPRESSED && block_has_unused(block, stated) ? unused_set : NULL;
+}
+
+const char *ebpo_zstd_fault(const uint8_t *frame, size_t bytes)
+{
+    static const uint8_t id_bytes[4] = { 0, 1, 2, 4 };
+    enum { UNUSED = 1 << 4, BLOCK_HEADER = 3 };
+    const char *fault = NULL;
+    if (bytes <= DESCRIPTOR)
+        return NULL;
+    unsigned d = frame[DESCRIPTOR], single = d >> 5 & 1, size_code = d >> 6;
+    size_t at =
+        DESCRIPTOR + 1 + !single + id_bytes[d & 3] + (size_code ? (size_t)1 << size_code : single);
+    if (d & UNUSED)
+        return unused_set;
+    for (bool last = false; !last && !fault && at + BLOCK_HEADER <= bytes;) {
+        uint32_t header = (uint32_t)(frame[at] | frame[at + 1] << 8 | frame[at + 2] << 16);
+        unsigned kind = header >> 1 & 3;
+        size_t size = kind == RLE ? 1 : header >> 3;
+        at += BLOCK_HEADER;
+        last = header & 1;
+        if (kind == RESERVED || size > bytes - at)
+            return NULL;
+        fault = block_fault(kind, frame + at, header >> 3);
+        at += size;
+    }
+    return fault;
+}
+
+bool ebpo_zstd_has_checksum(const uint8_t *frame, size_t bytes)
+{
+    enum { CONTENT_CHECKSUM = 1 << 2 };
+    return bytes > DESCRIPTOR && ebpo_load32(frame) == ZSTD_MAGICNUMBER &&
+           frame[DESCRIPTOR] & CONTENT_CHECKSUM;
+}
+
+/* --- encoding --- */
+
+/* A shuffled chunk is planes of bytes that have little in common: the low ones are noise, the high
+ * ones nearly all alike. Each in a block of its own has a table of codes of its own. Short matches
+ * are left alone: in such planes they cost more than single bytes. Chunks too small to gain by any
+ * of that are as HDF5's filter makes them. */
+static bool begin_frame(ZSTD_CCtx *out, int level, size_t raw_bytes)
+{
+    enum { LARGE = 4096, LEVEL_OF_LARGE = 7, MATCH_LEAST = 6 };
+    bool effort = !level && raw_bytes >= LARGE;
+    if (!level)
+        level = effort ? LEVEL_OF_LARGE : EBPO_ZSTD_LEVEL;
+    return !ZSTD_isError(ZSTD_CCtx_reset(out, ZSTD_reset_session_and_parameters)) &&
+           !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_compressionLevel, level)) &&
+           !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_checksumFlag, 1)) &&
+           (!effort || !ZSTD_isError(ZSTD_CCtx_setParameter(out, ZSTD_c_minMatch, MATCH_LEAST)));
+}
+
+static size_t encode_blocks(ZSTD_CCtx *zstd, const uint8_t *raw, size_t raw_bytes,
+                            const ebpo_chunk_blocks *b, uint8_t *out)
+{
+    ZSTD_outBuffer to = { out, ebpo_chunk_bound(raw_bytes), 0 };
+    size_t left = ZSTD_CCtx_setPledgedSrcSize(zstd, raw_bytes), at = 0;
+    for (int i = 0; i <= b->count && left == 0; i++) {
+        size_t end = i < b->count ? b->end[i] : raw_bytes;
+        ZSTD_inBuffer from = { raw + at, end - at, 0 };
+        left = ZSTD_compressStream2(zstd, &to, &from, i == b->count ? ZSTD_e_end : ZSTD_e_flush);
+        at = end;
+    }
+    return left ? (size_t)-1 : to.pos; /* an error, as ZSTD_isError has it */
+}
+
+ebpo_status ebpo_zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw,
+                             size_t raw_bytes, const ebpo_chunk_blocks *b, uint8_t *out,
+                             size_t *out_bytes)
+{
+    if (!coder->zstd_out)
+        coder->zstd_out = ZSTD_createCCtx();
+    if (!coder->zstd_out)
+        return EBPO_E_MEMORY;
+    if (!begin_frame(coder->zstd_out, level, raw_bytes))
+        return EBPO_E_ARGUMENT;
+    size_t size = b->count ? encode_blocks(coder->zstd_out, raw, raw_bytes, b, out)
+                           : ZSTD_compress2(coder->zstd_out, out, ebpo_chunk_bound(raw_bytes), raw,
+                                            raw_bytes);
+    *out_bytes = size;
+    return ZSTD_isError(size) ? EBPO_E_MEMORY : EBPO_OK; /* the bound leaves no other cause */
+}
+
+/* --- decoding --- */
+
+static ebpo_status frame_is_broken(const char **why, const char *what)
+{
+    *why = what;
+    return EBPO_E_FORMAT;
+}
+
+static ZSTD_DCtx *make_reader(void)
+{
+    ZSTD_DCtx *in = ZSTD_createDCtx();
+#ifdef EBPO_FUZZING
+    if (in) /* ZSTD_d_forceIgnoreChecksum, see core/checksum.h */
+        (void)ZSTD_DCtx_setParameter(in, ZSTD_d_experimentalParam3, 1);
+#endif
+    return in;
+}
+
+ebpo_status ebpo_zstd_decode(ebpo_chunk_coder *coder, const uint8_t *stored, size_t stored_bytes,
+                             uint8_t *raw, size_t raw_bytes, const char **why)
+{
+    if (!coder->zstd_in)
+        coder->zstd_in = make_reader();
+    if (!coder->zstd_in)
+        return EBPO_E_MEMORY;
+    if (ZSTD_getFrameContentSize(stored, stored_bytes) != raw_bytes)
+        return frame_is_broken(why, "the zstd frame does not state the chunk's size");
+    if (!ebpo_zstd_has_checksum(stored, stored_bytes))
+        return frame_is_broken(why, "the zstd frame has no checksum");
+    const char *fault = ebpo_zstd_fault(stored, stored_bytes);
+    if (fault)
+        return frame_is_broken(why, fault);
+    if (ZSTD_findFrameCompressedSize(stored, stored_bytes) != stored_bytes)
+        return frame_is_broken(why, "the zstd frame does not fill the chunk");
+    size_t size = ZSTD_decompressDCtx(coder->zstd_in, raw, raw_bytes, stored, stored_bytes);
+    if (ZSTD_isError(size))
+        return frame_is_broken(why, ZSTD_getErrorName(size));
+    return size == raw_bytes
+               ? EBPO_OK
+               : frame_is_broken(why, "the zstd frame decodes to another size than the chunk's");
+}
+
+void ebpo_zstd_coder_clear(ebpo_chunk_coder *coder)
+{
+    ZSTD_freeCCtx(coder->zstd_out);
+    ZSTD_freeDCtx(coder->zstd_in);
+    coder->zstd_out = coder->zstd_in = NULL;
+}

@@ -1,0 +1,797 @@
+/* Requests for byte ranges through libcurl, which one thread drives. Requests wait in a queue,
+ * urgent ones first; up to EBPO_SLOTS_MAX are under way, each in a slot with a handle that is used
+ * again. An answer is judged from its head (http_answer.c), before its body is taken; what arrived
+ * of a body that breaks off is kept, and the next attempt requests the rest, after growing pauses.
+ * At most five redirects are followed, never from https to http, and what identifies the caller is
+ * not sent to another server. The lock is the owner's. */
+#include <curl/curl.h>
+#include <inttypes.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/os.h"
+#include "core/parallel.h"
+#include "ebpo_config.h"
+#include "io/http_answer.h"
+#include "io/http_transfer.h"
+
+/* --- redirects: where a request is led, and whether that is still the server it was meant for ---
+ */
+
+/* One for each attempt; zeroed, nothing has been led anywhere. */
+typedef struct ebpo_redirect {
+    CURLU *at;      /* the latest address, or NULL: the first one */
+    char *target;   /* of the head that is being read, or NULL */
+    bool elsewhere; /* another scheme, host or port has been come to, or it is not known */
+} ebpo_redirect;
+
+/* For another attempt, or for good. */
+static void clear_redirect(ebpo_redirect *r)
+{
+    curl_url_cleanup(r->at);
+    free(r->target);
+    *r = (ebpo_redirect){ .at = NULL };
+}
+
+static bool same_part(CURLU *a, CURLU *b, CURLUPart part)
+{
+    char *x = NULL, *y = NULL;
+    bool same = curl_url_get(a, part, &x, CURLU_DEFAULT_PORT) == CURLUE_OK &&
+                curl_url_get(b, part, &y, CURLU_DEFAULT_PORT) == CURLUE_OK && strcasecmp(x, y) == 0;
+    curl_free(x);
+    curl_free(y);
+    return same;
+}
+
+static bool same_server(CURLU *a, CURLU *b)
+{
+    return same_part(a, b, CURLUPART_SCHEME) && same_part(a, b, CURLUPART_HOST) &&
+           same_part(a, b, CURLUPART_PORT);
+}
+
+/* False: it is another server, or nobody can tell. */
+static bool stays_on_server(ebpo_redirect *r, const char *url)
+{
+    CURLU *first = curl_url();
+    if (!r->at) {
+        r->at = curl_url();
+        if (r->at && curl_url_set(r->at, CURLUPART_URL, url, 0) != CURLUE_OK)
+            r->elsewhere = true;
+    }
+    /* the second is relative to the first, if it is no whole address */
+    bool stays = first && r->at && curl_url_set(first, CURLUPART_URL, url, 0) == CURLUE_OK &&
+                 curl_url_set(r->at, CURLUPART_URL, r->target, CURLU_URLENCODE) == CURLUE_OK &&
+                 same_server(first, r->at);
+    curl_url_cleanup(first);
+    return stays;
+}
+
+static void keep_target(ebpo_redirect *r, const char *from, size_t size)
+{
+    while (size && (*from == ' ' || *from == '\t')) {
+        from++;
+        size--;
+    }
+    while (size && strchr(" \t\r\n", from[size - 1]))
+        size--;
+    free(r->target);
+    r->target = strndup(from, size);
+    r->elsewhere = r->elsewhere || !r->target;
+}
+
+/* One line of a head, as it came; `code` is the answer's. True when it is the one by which the
+ * request begins to go elsewhere. */
+static bool take_redirect_line(ebpo_redirect *r, const char *url, int code, const char *line,
+                               size_t size)
+{
+    static const char name[] = "location:";
+    bool ends = size <= 2 && (size == 0 || line[0] == '\r' || line[0] == '\n'),
+         before = r->elsewhere;
+    if (size >= sizeof name && strncasecmp(line, name, sizeof name - 1) == 0)
+        keep_target(r, line + sizeof name - 1, size - (sizeof name - 1));
+    if (!ends || !r->target)
+        return r->elsewhere && !before;
+    if (code / 100 == 3 && !stays_on_server(r, url))
+        r->elsewhere = true;
+    free(r->target);
+    r->target = NULL;
+    return r->elsewhere && !before;
+}
+
+/* --- places for requests under way --- */
+
+enum { EBPO_SLOTS_MAX = 32 };
+
+typedef struct ebpo_transfers ebpo_transfers;
+
+/* One of the places for requests under way, with a handle that is used again and again. */
+typedef struct ebpo_slot {
+    ebpo_transfers *owner;
+    CURL *easy;
+    ebpo_request *request;    /* NULL: free */
+    ebpo_http_version pinned; /* a copy for this attempt */
+    bool is_pinned;
+    ebpo_answer answer;
+    ebpo_redirect redirect;
+    bool judged, stopped, stalled; /* stopped, stalled: we ended the transfer ourselves */
+    bool sent;                     /* connected, and the request is out */
+    double moved;                  /* time of the last bytes */
+    ebpo_verdict verdict;
+    ebpo_status status;
+    char why[EBPO_WHY_BYTES];
+    uint64_t begin, end;                /* requested in this attempt */
+    uint64_t received, taken, unwanted; /* bytes of its body */
+    char trouble[CURL_ERROR_SIZE];
+} ebpo_slot;
+
+struct ebpo_transfers {
+    const char *url, *shown;
+    const ebpo_http_options *options;
+    pthread_mutex_t *lock;
+    pthread_cond_t *done;
+    CURLM *multi;
+    struct curl_slist *headers, *bare_headers; /* with the caller's, and without */
+    pthread_t thread;
+    bool running;
+    ebpo_slot slots[EBPO_SLOTS_MAX];
+    unsigned slot_count, active;
+    /* Guarded by the lock. */
+    bool quit, cancelled;
+    ebpo_request *queue; /* urgent ones first */
+    ebpo_http_version pinned;
+    bool is_pinned;
+    ebpo_http_stats stats;
+    /* The thread's own. */
+    uint64_t random;
+};
+
+enum {
+    REDIRECTS_MAX = 5,
+    STALL_BYTES = 100, /* a second */
+    /* of a body that is not wanted: reading it to its end keeps the connection */
+    DRAIN_BYTES = 65536
+};
+
+/* --- what libcurl calls --- */
+
+/* Some ten times a second while a request is under way. libcurl's own measure of speed is an
+ * average over several seconds. */
+static int check_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t upload_total,
+                       curl_off_t uploaded)
+{
+    ebpo_slot *s = user;
+    curl_off_t connected = 0;
+    double now = ebpo_seconds();
+    (void)total;
+    (void)done;
+    (void)upload_total;
+    (void)uploaded;
+    if (!s->sent &&
+        curl_easy_getinfo(s->easy, CURLINFO_PRETRANSFER_TIME_T, &connected) == CURLE_OK &&
+        connected > 0) {
+        s->sent = true;
+        s->moved = now;
+    }
+    s->stalled = s->sent && now - s->moved > s->owner->options->stall_timeout;
+    return s->stalled;
+}
+
+static size_t take_header(char *line, size_t size, size_t count, void *user)
+{
+    ebpo_slot *s = user;
+    s->moved = ebpo_seconds();
+    ebpo_answer_line(&s->answer, line, size * count);
+    /* what was given for one server is not for others: libcurl would send it along */
+    if (take_redirect_line(&s->redirect, s->owner->url, s->answer.code, line, size * count))
+        curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, s->owner->bare_headers);
+    if (s->answer.header_bytes <= EBPO_HTTP_HEADERS_MAX)
+        return size * count;
+    s->judged = true;
+    s->stopped = true;
+    s->verdict = EBPO_ANSWER_REFUSED;
+    s->status = EBPO_E_IO;
+    strcpy(s->why, "the head of the server's answer is too long; this server is broken");
+    return 0;
+}
+
+/* Decides what the answer is, from its head; once for each attempt. */
+static void judge_slot(ebpo_slot *s)
+{
+    ebpo_asked asked = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL,
+                         s->owner->options->whole_limit, s->owner->options->unversioned };
+    if (!s->judged)
+        s->verdict = ebpo_answer_judge(&s->answer, &asked, &s->status, s->why);
+    s->judged = true;
+}
+
+static size_t refuse_body(ebpo_slot *s, ebpo_status status, const char *why)
+{
+    s->verdict = EBPO_ANSWER_REFUSED;
+    s->status = status;
+    s->stopped = true;
+    snprintf(s->why, sizeof s->why, "%s", why);
+    return 0;
+}
+
+static size_t take_part(ebpo_slot *s, const char *bytes, size_t size)
+{
+    uint64_t capacity = s->answer.last + 1 - s->begin - s->taken;
+    if (size > capacity)
+        return refuse_body(
+            s, EBPO_E_IO,
+            "the server sent more bytes than it was asked for and than it said; this "
+            "server or a proxy on the way is broken");
+    memcpy(s->request->data + (s->begin - s->request->offset) + s->taken, bytes, size);
+    s->taken += size;
+    return size;
+}
+
+static size_t take_whole(ebpo_slot *s, const char *bytes, size_t size)
+{
+    ebpo_request *r = s->request;
+    if (s->taken + size > s->owner->options->whole_limit)
+        return refuse_body(
+            s, EBPO_E_UNSUPPORTED,
+            "the server has no byte ranges, and the file is larger than what would be "
+            "read as a whole; download the file, or use a server with ranges");
+    if (!ebpo_grow(&r->whole, &r->whole_capacity, s->taken + size, 1))
+        return refuse_body(s, EBPO_E_MEMORY, "out of memory");
+    memcpy(r->whole + s->taken, bytes, size);
+    s->taken += size;
+    return size;
+}
+
+static size_t take_body(char *bytes, size_t size, size_t count, void *user)
+{
+    ebpo_slot *s = user;
+    size *= count;
+    s->moved = ebpo_seconds();
+    judge_slot(s);
+    s->received += size;
+    if (s->verdict == EBPO_ANSWER_PART)
+        return take_part(s, bytes, size);
+    if (s->verdict == EBPO_ANSWER_WHOLE)
+        return take_whole(s, bytes, size);
+    s->unwanted += size;
+    s->stopped = s->unwanted > DRAIN_BYTES || s->verdict == EBPO_ANSWER_REFUSED;
+    return s->stopped ? 0 : size;
+}
+
+/* --- setting up --- */
+
+static bool is_https(const char *url) { return url[4] == 's' || url[4] == 'S'; }
+
+/* Options that stay the same for all requests. The owner's url, options and headers are set. */
+static bool set_up_slot(ebpo_slot *s)
+{
+    const ebpo_transfers *t = s->owner;
+    const ebpo_http_options *o = t->options;
+    CURL *e = s->easy;
+    bool good = curl_easy_setopt(e, CURLOPT_URL, t->url) == CURLE_OK &&
+                curl_easy_setopt(e, CURLOPT_HTTPHEADER, t->headers) == CURLE_OK;
+#if LIBCURL_VERSION_NUM >= 0x075500
+    good = good && curl_easy_setopt(e, CURLOPT_PROTOCOLS_STR, "http,https") == CURLE_OK;
+    good = good && curl_easy_setopt(e, CURLOPT_REDIR_PROTOCOLS_STR,
+                                    is_https(t->url) ? "https" : "http,https") == CURLE_OK;
+#else
+    good = good &&
+           curl_easy_setopt(e, CURLOPT_PROTOCOLS, CURLPROTO_HTTP | CURLPROTO_HTTPS) == CURLE_OK;
+    good =
+        good && curl_easy_setopt(e, CURLOPT_REDIR_PROTOCOLS,
+                                 is_https(t->url) ? CURLPROTO_HTTPS
+                                                  : CURLPROTO_HTTP | CURLPROTO_HTTPS) == CURLE_OK;
+#endif
+    curl_easy_setopt(e, CURLOPT_FOLLOWLOCATION, 1L);
+    curl_easy_setopt(e, CURLOPT_MAXREDIRS, (long)REDIRECTS_MAX);
+    curl_easy_setopt(e, CURLOPT_HTTP_VERSION, (long)CURL_HTTP_VERSION_2TLS);
+    curl_easy_setopt(e, CURLOPT_NOSIGNAL, 1L);
+    curl_easy_setopt(e, CURLOPT_SUPPRESS_CONNECT_HEADERS, 1L);
+    curl_easy_setopt(e, CURLOPT_TCP_KEEPALIVE, 1L);
+    curl_easy_setopt(e, CURLOPT_BUFFERSIZE, 262144L);
+    curl_easy_setopt(e, CURLOPT_CONNECTTIMEOUT_MS, (long)(o->connect_timeout * 1000) + 1);
+    curl_easy_setopt(e, CURLOPT_LOW_SPEED_LIMIT, (long)STALL_BYTES);
+    curl_easy_setopt(e, CURLOPT_LOW_SPEED_TIME, (long)(o->stall_timeout + 0.999));
+    curl_easy_setopt(e, CURLOPT_NETRC, (long)(o->netrc ? CURL_NETRC_OPTIONAL : CURL_NETRC_IGNORED));
+    good = good &&
+           curl_easy_setopt(e, CURLOPT_USERAGENT,
+                            o->user_agent ? o->user_agent : "libebpo/" EBPO_VERSION) == CURLE_OK;
+    good = good && (!o->user || curl_easy_setopt(e, CURLOPT_USERPWD, o->user) == CURLE_OK);
+    good = good && (!o->ca_file || curl_easy_setopt(e, CURLOPT_CAINFO, o->ca_file) == CURLE_OK);
+    good = good && (!o->proxy || curl_easy_setopt(e, CURLOPT_PROXY, o->proxy) == CURLE_OK);
+    curl_easy_setopt(e, CURLOPT_NOPROGRESS, 0L);
+    curl_easy_setopt(e, CURLOPT_XFERINFOFUNCTION, check_stall);
+    curl_easy_setopt(e, CURLOPT_XFERINFODATA, s);
+    curl_easy_setopt(e, CURLOPT_ERRORBUFFER, s->trouble);
+    curl_easy_setopt(e, CURLOPT_HEADERFUNCTION, take_header);
+    curl_easy_setopt(e, CURLOPT_HEADERDATA, s);
+    curl_easy_setopt(e, CURLOPT_WRITEFUNCTION, take_body);
+    curl_easy_setopt(e, CURLOPT_WRITEDATA, s);
+    curl_easy_setopt(e, CURLOPT_PRIVATE, s);
+    return good;
+}
+
+enum {
+    LOOK_MS = 100, /* between checks of `stop` and for stalls */
+    IDLE_MS = 60000
+};
+static const double PAUSE_FIRST = 0.2, PAUSE_MOST = 8, PAUSE_ASKED_MOST = 60; /* seconds */
+
+static pthread_once_t curl_once = PTHREAD_ONCE_INIT;
+static CURLcode curl_state;
+
+static void start_curl(void) { curl_state = curl_global_init(CURL_GLOBAL_DEFAULT); }
+
+/* --- setting up --- */
+
+static bool add_header(struct curl_slist **list, const char *text)
+{
+    struct curl_slist *more = curl_slist_append(*list, text);
+    if (more)
+        *list = more;
+    return more != NULL;
+}
+
+static void *drive_transfers(void *transfers);
+
+static bool set_up_transfers(ebpo_transfers *t)
+{
+    bool good = add_header(&t->headers, "Accept-Encoding: identity") &&
+                add_header(&t->bare_headers, "Accept-Encoding: identity");
+    for (const char *const *h = t->options->headers; h && *h; h++)
+        good = good && add_header(&t->headers, *h);
+    t->multi = curl_multi_init();
+    if (!t->multi || !good)
+        return false;
+    curl_multi_setopt(t->multi, CURLMOPT_MAX_HOST_CONNECTIONS, (long)t->slot_count);
+    curl_multi_setopt(t->multi, CURLMOPT_MAXCONNECTS, (long)t->slot_count);
+    for (unsigned i = 0; i < t->slot_count; i++) {
+        t->slots[i].owner = t;
+        t->slots[i].easy = curl_easy_init();
+        if (!t->slots[i].easy || !set_up_slot(&t->slots[i]))
+            return false;
+    }
+    t->running = ebpo_thread_start(&t->thread, drive_transfers, t) == 0;
+    return t->running;
+}
+
+ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url, const char *shown,
+                                const ebpo_http_options *options, pthread_mutex_t *lock,
+                                pthread_cond_t *done, ebpo_error *error)
+{
+    *out = NULL;
+    pthread_once(&curl_once, start_curl);
+    if (curl_state != CURLE_OK)
+        return ebpo_fail_file(error, EBPO_E_IO, shown, "libcurl cannot be started: %s",
+                              curl_easy_strerror(curl_state));
+    ebpo_transfers *t = ebpo_alloc_zero(1, sizeof *t);
+    if (!t)
+        return ebpo_fail_memory(error, sizeof *t);
+    t->url = url;
+    t->shown = shown;
+    t->options = options;
+    t->lock = lock;
+    t->done = done;
+    t->slot_count = options->connections < EBPO_SLOTS_MAX ? options->connections : EBPO_SLOTS_MAX;
+    t->random = (uint64_t)(ebpo_seconds() * 1e9) ^ (uint64_t)(uintptr_t)t;
+    if (set_up_transfers(t)) {
+        *out = t;
+        return EBPO_OK;
+    }
+    ebpo_transfers_free(t);
+    return ebpo_fail_file(
+        error, EBPO_E_IO, shown,
+        "libcurl cannot be set up: no memory, no threads, or options that it does not take");
+}
+
+void ebpo_transfers_free(ebpo_transfers *t)
+{
+    if (!t)
+        return;
+    if (t->running) {
+        pthread_mutex_lock(t->lock);
+        t->quit = true;
+        pthread_mutex_unlock(t->lock);
+        curl_multi_wakeup(t->multi);
+        pthread_join(t->thread, NULL);
+    }
+    for (unsigned i = 0; i < t->slot_count; i++) {
+        if (t->slots[i].request)
+            curl_multi_remove_handle(t->multi, t->slots[i].easy);
+        curl_easy_cleanup(t->slots[i].easy);
+        clear_redirect(&t->slots[i].redirect);
+    }
+    if (t->multi)
+        curl_multi_cleanup(t->multi);
+    curl_slist_free_all(t->headers);
+    curl_slist_free_all(t->bare_headers);
+    free(t);
+}
+
+/* --- the queue; lock held --- */
+
+static void enqueue_request(ebpo_transfers *t, ebpo_request *r)
+{
+    ebpo_request **at = &t->queue;
+    if (r->deadline > 0)
+        while (*at && (*at)->deadline > 0)
+            at = &(*at)->next;
+    else
+        while (*at)
+            at = &(*at)->next;
+    r->next = *at;
+    *at = r;
+}
+
+static bool dequeue_request(ebpo_transfers *t, ebpo_request *r)
+{
+    for (ebpo_request **at = &t->queue; *at; at = &(*at)->next)
+        if (*at == r) {
+            *at = r->next;
+            return true;
+        }
+    return false;
+}
+
+void ebpo_transfers_add(ebpo_transfers *t, ebpo_request *r, bool urgent)
+{
+    if (urgent)
+        r->deadline = ebpo_seconds() + t->options->time_limit;
+    enqueue_request(t, r);
+    curl_multi_wakeup(t->multi);
+}
+
+void ebpo_transfers_urge(ebpo_transfers *t, ebpo_request *r)
+{
+    if (r->deadline > 0)
+        return;
+    r->deadline = ebpo_seconds() + t->options->time_limit;
+    if (dequeue_request(t, r))
+        enqueue_request(t, r);
+    curl_multi_wakeup(t->multi);
+}
+
+void ebpo_transfers_pin(ebpo_transfers *t, const ebpo_http_version *version)
+{
+    t->pinned = *version;
+    t->is_pinned = true;
+}
+
+void ebpo_transfers_add_stats(const ebpo_transfers *t, ebpo_http_stats *stats)
+{
+    stats->requests += t->stats.requests;
+    stats->retries += t->stats.retries;
+    stats->connections += t->stats.connections;
+    stats->bytes += t->stats.bytes;
+}
+
+static void finish_request(ebpo_transfers *t, ebpo_request *r, ebpo_status status, const char *why)
+{
+    r->status = status;
+    if (status != EBPO_OK)
+        ebpo_fail_file(&r->error, status, t->shown, "%s", why);
+    r->done = true;
+    pthread_cond_broadcast(t->done);
+}
+
+/* --- attempts, by the thread --- */
+
+/* Seconds until the next attempt: doubling, and jitter so that many readers do not come back at
+ * once. What the server asks for counts when it is more. */
+static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *asked_for)
+{
+    curl_off_t asked = 0;
+    double pause = PAUSE_FIRST;
+    for (unsigned i = 1; i < s->request->failures && pause < PAUSE_MOST; i++)
+        pause *= 2;
+    pause = (pause < PAUSE_MOST ? pause : PAUSE_MOST) *
+            (0.5 + 0.5 * ebpo_random_unit(ebpo_random_next(&t->random)));
+    if (s->judged && s->verdict == EBPO_ANSWER_LATER)
+        curl_easy_getinfo(s->easy, CURLINFO_RETRY_AFTER, &asked);
+    *asked_for = (double)asked > pause;
+    return *asked_for ? (double)asked : pause;
+}
+
+static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
+{
+    char range[64];
+    bool begun = r->first && r->got > 0;
+    s->request = r;
+    s->is_pinned = t->is_pinned || begun;
+    s->pinned = begun ? r->version : t->pinned;
+    s->answer = (ebpo_answer){ .code = 0 };
+    s->judged = s->stopped = s->stalled = s->sent = false;
+    s->status = EBPO_E_IO;
+    s->why[0] = s->trouble[0] = 0;
+    s->begin = r->offset + (r->whole ? 0 : r->got);
+    s->end = r->offset + r->size;
+    s->received = s->taken = s->unwanted = 0;
+    if (r->deadline <= 0)
+        r->deadline = now + t->options->time_limit;
+    double left = (r->deadline - now) * 1000;
+    snprintf(range, sizeof range, "%" PRIu64 "-%" PRIu64, s->begin, s->end - 1);
+    curl_easy_setopt(s->easy, CURLOPT_RANGE, range);
+    if (s->redirect.at || s->redirect.elsewhere) /* the one before was led somewhere */
+        curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, t->headers);
+    clear_redirect(&s->redirect);
+    curl_easy_setopt(s->easy, CURLOPT_TIMEOUT_MS, (long)(left > 1 ? left : 1));
+    t->stats.requests++;
+    t->stats.retries += r->failures > 0;
+    t->active++;
+}
+
+/* Errors after which the same request may well succeed. */
+static bool may_pass_by(CURLcode code)
+{
+    switch (code) {
+    case CURLE_COULDNT_RESOLVE_HOST:
+    case CURLE_COULDNT_RESOLVE_PROXY:
+    case CURLE_COULDNT_CONNECT:
+    case CURLE_OPERATION_TIMEDOUT:
+    case CURLE_SEND_ERROR:
+    case CURLE_RECV_ERROR:
+    case CURLE_GOT_NOTHING:
+    case CURLE_PARTIAL_FILE:
+    case CURLE_HTTP2:
+    case CURLE_HTTP2_STREAM:
+    case CURLE_SSL_CONNECT_ERROR:
+    case CURLE_AGAIN: return true;
+    default: return false;
+    }
+}
+
+/* Keeps what arrived, so that the next attempt requests only the rest. */
+static bool keep_arrived(ebpo_slot *s, CURLcode code)
+{
+    ebpo_request *r = s->request;
+    memcpy(r->type, s->answer.type, sizeof r->type);
+    if (s->verdict == EBPO_ANSWER_WHOLE) {
+        if (code == CURLE_OK) {
+            r->version = (ebpo_http_version){ .size = s->taken };
+            r->got = s->taken;
+        }
+        return code == CURLE_OK;
+    }
+    if (r->first) {
+        r->version.size = s->answer.total;
+        if (s->answer.total < r->offset + r->size)
+            r->size = s->answer.total - r->offset;
+        memcpy(r->version.etag, s->answer.etag, sizeof r->version.etag);
+        memcpy(r->version.modified, s->answer.modified, sizeof r->version.modified);
+    }
+    free(r->whole); /* an earlier answer began to send everything */
+    r->whole = NULL;
+    r->whole_capacity = 0;
+    r->got = s->begin - r->offset + s->taken;
+    return r->got == r->size;
+}
+
+/* Returns what went wrong in libcurl, which says that memory is short of lines that are too long
+ * for it. */
+static const char *trouble_of(const ebpo_slot *s, CURLcode code)
+{
+    if (code == CURLE_OUT_OF_MEMORY && !s->received)
+        return "the head of the server's answer, such as the address of a redirect, is too long "
+               "for libcurl, or memory is short; check the address";
+    return *s->trouble ? s->trouble : curl_easy_strerror(code);
+}
+
+static void describe_trouble(const ebpo_slot *s, CURLcode code, char *out, size_t capacity)
+{
+    const char *trouble = trouble_of(s, code);
+    if (s->judged && s->verdict == EBPO_ANSWER_LATER)
+        snprintf(out, capacity, "%s", s->why);
+    else if (s->stalled)
+        snprintf(out, capacity, "the server sent nothing for %g s",
+                 s->owner->options->stall_timeout);
+    else if (code == CURLE_OK)
+        snprintf(out, capacity, "the server sent %" PRIu64 " bytes of %" PRIu64, s->taken,
+                 s->end - s->begin);
+    else
+        snprintf(out, capacity, "%s", trouble);
+}
+
+/* Whether the rest may come in another answer: not if a change of version would go unnoticed. */
+static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
+{
+    const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
+    return *v->etag || *v->modified || t->options->unversioned;
+}
+
+/* Again later, or the end of it. */
+static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now)
+{
+    ebpo_request *r = s->request;
+    char what[CURL_ERROR_SIZE], why[CURL_ERROR_SIZE + 160];
+    if (code == CURLE_OK && s->judged && s->verdict == EBPO_ANSWER_PART && s->taken &&
+        s->taken == s->answer.last - s->answer.begin + 1 && may_join(t, r) && now < r->deadline) {
+        r->due = now; /* a server that answers in smaller parts: no failure */
+        enqueue_request(t, r);
+        return;
+    }
+    describe_trouble(s, code, what, sizeof what);
+    r->failures++;
+    bool asked_for;
+    double pause = pause_after(t, s, &asked_for);
+    if (now >= r->deadline - 0.01 || (!asked_for && now + pause >= r->deadline))
+        snprintf(why, sizeof why,
+                 "bytes %" PRIu64 " to %" PRIu64
+                 ": not read within %g s (%s); try again later, or with a longer time limit",
+                 r->offset, r->offset + r->size - 1, t->options->time_limit, what);
+    else if (r->failures > t->options->retries)
+        snprintf(why, sizeof why,
+                 "bytes %" PRIu64 " to %" PRIu64
+                 ": %s; given up after %u attempt%s, try again later",
+                 r->offset, r->offset + r->size - 1, what, r->failures,
+                 r->failures == 1 ? "" : "s");
+    else if (pause > PAUSE_ASKED_MOST || now + pause >= r->deadline)
+        snprintf(why, sizeof why,
+                 "bytes %" PRIu64 " to %" PRIu64
+                 ": %s and is to be asked again in %.0f s; try again then",
+                 r->offset, r->offset + r->size - 1, what, pause);
+    else {
+        if (!may_join(t, r))
+            r->got = 0;
+        r->due = now + pause;
+        enqueue_request(t, r);
+        return;
+    }
+    finish_request(t, r, EBPO_E_IO, why);
+}
+
+static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
+{
+    long connections = 0, redirects = 0;
+    ebpo_request *r = s->request;
+    double now = ebpo_seconds();
+    curl_easy_getinfo(s->easy, CURLINFO_NUM_CONNECTS, &connections);
+    curl_easy_getinfo(s->easy, CURLINFO_REDIRECT_COUNT, &redirects);
+    curl_multi_remove_handle(t->multi, s->easy);
+    if (code == CURLE_OK)
+        judge_slot(s);
+    pthread_mutex_lock(t->lock);
+    t->active--;
+    t->stats.bytes += s->received;
+    t->stats.connections += (uint64_t)(connections > 0 ? connections : 0);
+    t->stats.requests += (uint64_t)(redirects > 0 ? redirects : 0);
+    bool usable = s->judged && !s->stopped &&
+                  (s->verdict == EBPO_ANSWER_PART || s->verdict == EBPO_ANSWER_WHOLE);
+    if (s->judged && s->verdict == EBPO_ANSWER_REFUSED)
+        finish_request(t, r, s->status, s->why);
+    else if (usable && keep_arrived(s, code))
+        finish_request(t, r, EBPO_OK, NULL);
+    else if (code == CURLE_OK || s->stalled || may_pass_by(code) ||
+             (s->judged && s->verdict == EBPO_ANSWER_LATER))
+        try_again(t, s, code, now);
+    else
+        finish_request(t, r, EBPO_E_IO, trouble_of(s, code));
+    s->request = NULL;
+    pthread_mutex_unlock(t->lock);
+}
+
+static void cancel_queue(ebpo_transfers *t)
+{
+    while (t->queue) {
+        ebpo_request *r = t->queue;
+        t->queue = r->next;
+        finish_request(t, r, EBPO_E_CANCELLED, "stopped on request");
+    }
+}
+
+/* Of large requests fewer: together they would only share the line, and the first one come last. */
+static unsigned slots_for(const ebpo_transfers *t, const ebpo_request *r)
+{
+    enum { LARGE_BYTES = 1 << 20, LARGE_AT_A_TIME = 6 };
+    return r->size > LARGE_BYTES && t->slot_count > LARGE_AT_A_TIME ? LARGE_AT_A_TIME
+                                                                    : t->slot_count;
+}
+
+/* Lock held. Requests that have waited too long for a slot end; *wait: seconds until something is
+ * due. */
+static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
+{
+    for (ebpo_request **at = &t->queue; *at;) {
+        ebpo_request *r = *at;
+        if (r->deadline > 0 && now >= r->deadline) {
+            *at = r->next;
+            char why[160];
+            snprintf(why, sizeof why,
+                     "bytes %" PRIu64 " to %" PRIu64
+                     ": not read within %g s; try again later, or with a longer time limit",
+                     r->offset, r->offset + r->size - 1, t->options->time_limit);
+            finish_request(t, r, EBPO_E_IO, why);
+            continue;
+        }
+        if (r->due <= now && t->active < slots_for(t, r)) {
+            *at = r->next;
+            return r;
+        }
+        if (r->due > now && r->due - now < *wait)
+            *wait = r->due - now;
+        if (r->deadline > 0 && r->deadline - now < *wait)
+            *wait = r->deadline - now;
+        at = &r->next;
+    }
+    return NULL;
+}
+
+static ebpo_slot *free_slot(ebpo_transfers *t)
+{
+    for (unsigned i = 0; i < t->slot_count; i++)
+        if (!t->slots[i].request)
+            return &t->slots[i];
+    return NULL;
+}
+
+/* Starts what is due. False: the end. */
+static bool start_due(ebpo_transfers *t, double *wait)
+{
+    ebpo_request *r;
+    pthread_mutex_lock(t->lock);
+    bool quit = t->quit;
+    if (t->cancelled)
+        cancel_queue(t);
+    while (!quit && (r = next_due(t, ebpo_seconds(), wait)) != NULL) {
+        ebpo_slot *s = free_slot(t);
+        begin_attempt(t, s, r, ebpo_seconds());
+        if (curl_multi_add_handle(t->multi, s->easy) != CURLM_OK) {
+            t->active--;
+            s->request = NULL;
+            finish_request(t, r, EBPO_E_IO, "libcurl cannot take another request");
+        }
+    }
+    pthread_mutex_unlock(t->lock);
+    return !quit;
+}
+
+static void check_stop(ebpo_transfers *t)
+{
+    const ebpo_http_options *o = t->options;
+    if (!o->stop || t->cancelled || !o->stop(o->stop_user))
+        return;
+    for (unsigned i = 0; i < t->slot_count; i++)
+        if (t->slots[i].request)
+            curl_multi_remove_handle(t->multi, t->slots[i].easy);
+    pthread_mutex_lock(t->lock);
+    t->cancelled = true;
+    cancel_queue(t);
+    for (unsigned i = 0; i < t->slot_count; i++)
+        if (t->slots[i].request) {
+            finish_request(t, t->slots[i].request, EBPO_E_CANCELLED, "stopped on request");
+            t->slots[i].request = NULL;
+            t->active--;
+        }
+    pthread_mutex_unlock(t->lock);
+}
+
+static void *drive_transfers(void *transfers)
+{
+    ebpo_transfers *t = transfers;
+    for (;;) {
+        int running = 0, left = 0;
+        double wait = IDLE_MS * 0.001;
+        if (!start_due(t, &wait))
+            return NULL;
+        curl_multi_perform(t->multi, &running);
+        bool ended = false;
+        for (CURLMsg *m; (m = curl_multi_info_read(t->multi, &left)) != NULL;) {
+            char *private = NULL;
+            if (m->msg != CURLMSG_DONE)
+                continue;
+            CURLcode code = m->data.result; /* the message goes with the handle */
+            curl_easy_getinfo(m->easy_handle, CURLINFO_PRIVATE, &private);
+            end_attempt(t, (ebpo_slot *)(void *)private, code);
+            ended = true;
+        }
+        if (ended)
+            continue;
+        bool busy = running || wait * 1000 < IDLE_MS;
+        int ms = (int)(wait * 1000) + 1;
+        curl_multi_poll(t->multi, NULL, 0, busy && ms > LOOK_MS ? LOOK_MS : ms, NULL);
+        check_stop(t);
+    }
+}
