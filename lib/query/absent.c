@@ -1,6 +1,6 @@
 #include "core/strict_fp.h"
 
-#include "query/absent.h"
+#include "query/query_node.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -2,6 +2,7 @@
 #ifndef EBPO_QUERY_ACCEL_PARTS_H
 #define EBPO_QUERY_ACCEL_PARTS_H
 
+#include "core/cpu.h"
 #include "query/accel.h"
 
 /* Faces to blocks and blocks to a hierarchy: only which goes where; nothing is computed from
@@ -86,5 +87,35 @@ bool ebpo_leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebp
  * any bit of `beside` is set: lower sides that are not the cell's, where the segment is. */
 int32_t ebpo_leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double from[3],
                             double to, int axis, uint64_t beside);
+
+/* What is measured of blocks of floats, eight vertices at a time: compiled for any processor and
+ * for those with AVX2, the same operations in the same order. How far off it may be:
+ * docs/develop/bounds.md, "How slabs are measured". */
+
+typedef struct ebpo_block_extent {
+    float low[3], high[3]; /* of its vertices, in the model's unit */
+    /* The sum of its faces' normals, as long as twice their areas. Where the axis of a slab points
+     * is only a matter of how tight it is. */
+    float normal[3];
+} ebpo_block_extent;
+
+/* Where slabs are seen from: a place, in two parts, in the model's unit; the frame's scale; the
+ * axis, and 1 less its square. */
+typedef struct ebpo_slab_view {
+    float high[3], low[3], scale, axis[3], rest;
+} ebpo_slab_view;
+
+typedef struct ebpo_slab_extent {
+    float from, to, aside2; /* in the frame; the square of the greatest distance from the axis */
+} ebpo_slab_extent;
+
+typedef struct ebpo_block_measures {
+    void (*extent)(const ebpo_accel *s, uint32_t block, ebpo_block_extent *out);
+    /* Of all vertices of `count` blocks, of these numbers. */
+    void (*slab)(const ebpo_accel *s, const uint32_t *block, uint32_t count,
+                 const ebpo_slab_view *view, ebpo_slab_extent *out);
+} ebpo_block_measures;
+
+EBPO_KERNELS(ebpo_block_measures, ebpo_block_measures)
 
 #endif

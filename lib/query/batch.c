@@ -1,7 +1,7 @@
 /* Many questions at once: sorted along the curve, answered in the order in which they came. */
 #include "core/strict_fp.h"
 
-#include "query/batch.h"
+#include "query/load_ahead.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -11,7 +11,6 @@
 #include "format/reader.h"
 #include "geometry/octcode.h"
 #include "query/nearest.h"
-#include "query/prefetch.h"
 #include "query/query_node.h"
 
 /* Subtrees announced at a time, and points that they are gathered from: some megabytes, of which

@@ -16,7 +16,6 @@
 #include "core/huge_pages.h"
 #include "core/parallel.h"
 #include "query/accel_parts.h"
-#include "query/block_measure.h"
 
 /* Above so many blocks the slab is left away: such patches curve too much for one. */
 enum { SLAB_BLOCKS_MAX = 1024 };

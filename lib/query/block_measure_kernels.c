@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "query/block_measure.h"
+#include "query/accel_parts.h"
 #include "query/face_block.h"
 
 static const float lane_number[8] = { 0, 1, 2, 3, 4, 5, 6, 7 };

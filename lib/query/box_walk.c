@@ -9,9 +9,9 @@
 #include "core/eight.h"
 #include "core/error.h"
 #include "geometry/ray_triangle.h"
-#include "query/options.h"
-#include "query/prefetch.h"
-#include "query/pruned.h"
+#include "query/query_model.h"
+#include "query/load_ahead.h"
+#include "query/query_node.h"
 
 ebpo_status ebpo_check_box(const double min[3], const double max[3], ebpo_error *error)
 {

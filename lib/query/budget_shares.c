@@ -1,4 +1,4 @@
-#include "query/budget_shares.h"
+#include "query/model_parts.h"
 
 /* Decoded chunks: an eighth of the budget, within these. */
 enum { CHUNKS_MOST = 128 << 20 };

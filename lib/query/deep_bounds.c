@@ -1,6 +1,6 @@
 #include "core/strict_fp.h"
 
-#include "query/deep_bounds.h"
+#include "query/nearest.h"
 
 #include <math.h>
 

@@ -8,17 +8,13 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/sized.h"
-#include "query/batch.h"
-#include "query/prefetch.h"
+#include "query/load_ahead.h"
 #include "query/inside.h"
 #include "query/limited.h"
 #include "query/modes.h"
 #include "query/nearest.h"
-#include "query/nearest_first.h"
-#include "query/options.h"
-#include "query/pruned.h"
+#include "query/query_model.h"
 #include "query/query_node.h"
-#include "query/sign.h"
 
 /* --- subsets: when a face that was left out may be nearer than what was found --- */
 

@@ -1,6 +1,6 @@
 #include "core/strict_fp.h"
 
-#include "query/far_point.h"
+#include "query/point_bounds.h"
 
 #include <math.h>
 #include <string.h>

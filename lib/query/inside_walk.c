@@ -7,7 +7,6 @@
 #include "geometry/node_types.h"
 #include "query/inside.h"
 #include "query/limited.h"
-#include "query/pruned.h"
 #include "query/query_node.h"
 
 static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)

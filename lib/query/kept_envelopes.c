@@ -1,6 +1,6 @@
 #include "core/strict_fp.h"
 
-#include "query/kept_envelopes.h"
+#include "query/query_model.h"
 
 #include <stdlib.h>
 #include <string.h>

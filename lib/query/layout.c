@@ -175,7 +175,7 @@ static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
 
 /* Blocks are found in the order in which they are filled; numbers them by their faces instead, so
  * that what lies below a node is one range of blocks. */
-static bool number_blocks(ebpo_layout *o, uint64_t faces)
+static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
 {
     uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face),
              *end = ebpo_alloc(o->block_count, sizeof *end);
@@ -227,7 +227,7 @@ ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t
         bundle all = join(&w, part, parts);
         if (!w.failed)
             out->top = add_bound(&w, &all);
-        w.failed = w.failed || !number_blocks(out, part[parts - 1].end);
+        w.failed = w.failed || !renumber_blocks(out, part[parts - 1].end);
     }
     if (!w.failed)
         return EBPO_OK;

@@ -1,7 +1,7 @@
 /* Which levels stay. */
 #include "core/strict_fp.h"
 
-#include "query/model_budget.h"
+#include "query/model_parts.h"
 
 #include <inttypes.h>
 
@@ -10,9 +10,6 @@
 #include "core/fp_env.h"
 #include "core/sized.h"
 #include "format/reader.h"
-#include "query/query_top.h"
-#include "query/shared_budget.h"
-#include "query/skeleton.h"
 
 /* Of a cache: a path needs the subtree where it is, those around, and room to load the next. More
  * of them, smaller ones, are faster to load. */

@@ -12,9 +12,8 @@
 #include "query/inside.h"
 #include "query/limited.h"
 #include "query/nearest.h"
-#include "query/pruned.h"
 #include "query/query_node.h"
-#include "query/sign.h"
+#include "query/query_model.h"
 
 static const ebpo_distance_result nothing = { INFINITY,          0,           INFINITY,
                                               { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };

@@ -4,7 +4,7 @@
 #define EBPO_QUERY_NEAR_BAND_H
 
 #include "query/accel.h"
-#include "query/near_order.h"
+#include "query/nearest.h"
 
 typedef struct ebpo_near {
     const double *p;

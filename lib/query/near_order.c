@@ -1,6 +1,6 @@
 #include "core/strict_fp.h"
 
-#include "query/near_order.h"
+#include "query/nearest.h"
 
 static bool same_corner(const double a[3], const double b[3])
 {

@@ -13,8 +13,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
-#include "query/kernels.h"
-#include "query/near_order.h"
+#include "query/query_kernels.h"
 
 /* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
 #define FAR 32.0

@@ -1,7 +1,7 @@
 /* Distances under a budget: subtrees are loaded in the order in which they may matter. */
 #include "core/strict_fp.h"
 
-#include "query/nearest_first.h"
+#include "query/nearest.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -11,8 +11,6 @@
 #include "core/error.h"
 #include "geometry/cell.h"
 #include "geometry/octcode.h"
-#include "query/deep_bounds.h"
-#include "query/node_queue.h"
 
 /* --- the search --- */
 
@@ -279,7 +277,7 @@ static ebpo_status look_at_outer(searching *g, const ebpo_ranked *r, ebpo_error 
     return search_below(g, r->node, error);
 }
 
-static bool is_late(ebpo_nearest *n)
+static bool is_past_deadline(ebpo_nearest *n)
 {
     return n->late = n->late || (n->deadline && ebpo_clock() > n->deadline);
 }
@@ -296,7 +294,7 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
         ebpo_ranked next = ebpo_queue_pop(g->c);
         if (next.lower > ebpo_nearest_limit(n))
             break;
-        if (is_late(n)) {
+        if (is_past_deadline(n)) {
             ebpo_nearest_pass_over(n, next.lower);
             break;
         }

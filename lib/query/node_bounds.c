@@ -1,6 +1,6 @@
 #include "core/strict_fp.h"
 
-#include "query/node_bounds.h"
+#include "query/point_bounds.h"
 
 #include <math.h>
 

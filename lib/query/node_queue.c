@@ -1,5 +1,5 @@
 /* Nodes that wait to be searched, the nearest first. */
-#include "query/node_queue.h"
+#include "query/nearest.h"
 
 #include "core/alloc.h"
 #include "core/error.h"

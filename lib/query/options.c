@@ -1,6 +1,6 @@
 #include "core/strict_fp.h"
 
-#include "query/options.h"
+#include "query/query_model.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -9,8 +9,7 @@
 #include "core/fp_env.h"
 #include "core/sized.h"
 #include "format/reader.h"
-#include "query/batch.h"
-#include "query/prefetch.h"
+#include "query/load_ahead.h"
 #include "query/inside.h"
 #include "query/limited.h"
 

@@ -2,7 +2,7 @@
  * EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that holds the position instead. */
 #include "core/strict_fp.h"
 
-#include "query/prefetch.h"
+#include "query/load_ahead.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 #include "core/strict_fp.h"
 
-#include "query/pruned.h"
+#include "query/query_node.h"
 
 #include <string.h>
 

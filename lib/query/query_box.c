@@ -7,7 +7,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "query/box_walk.h"
-#include "query/options.h"
+#include "query/query_model.h"
 
 /* Number in the file, and the one that is told. */
 typedef struct pair {
@@ -20,7 +20,7 @@ typedef struct gathering {
     uint64_t count, capacity;
 } gathering;
 
-static ebpo_status take(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+static ebpo_status take_face_number(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     gathering *g = (gathering *)walk;
     if (!ebpo_grow(&g->list, &g->capacity, g->count + walk->count, sizeof *g->list))
@@ -59,7 +59,7 @@ ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const 
     EBPO_DEFAULT_FP;
     *faces = NULL;
     *count = 0;
-    gathering g = { .walk = { .context = context, .min = min, .max = max, .take = take } };
+    gathering g = { .walk = { .context = context, .min = min, .max = max, .take = take_face_number } };
     ebpo_status status = ebpo_check_box(min, max, error);
     if (status == EBPO_OK)
         status = ebpo_check_mesh(context->model, error);

@@ -13,8 +13,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/sized.h"
-#include "query/model_budget.h"
-#include "query/shared_budget.h"
+#include "query/model_parts.h"
 
 /* --- subtrees for the cache --- */
 

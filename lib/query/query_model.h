@@ -2,20 +2,21 @@
 #ifndef EBPO_QUERY_QUERY_MODEL_H
 #define EBPO_QUERY_QUERY_MODEL_H
 
-#include <ebpo/query.h>
 #include <pthread.h>
 #include <stdatomic.h>
+
+#include <ebpo/query.h>
 
 #include "core/cache.h"
 #include "format/reader.h"
 #include "format/slice.h"
+#include "geometry/cell.h"
 #include "geometry/cells.h"
+#include "geometry/polytope.h"
 #include "geometry/rule.h"
-#include "query/kept_envelopes.h"
-#include "query/kernels.h"
-#include "query/query_top.h"
-#include "query/skeleton.h"
 #include "query/accel.h"
+#include "query/model_parts.h"
+#include "query/query_kernels.h"
 
 struct ebpo_model {
     const ebpo_file *file;
@@ -122,5 +123,34 @@ EBPO_MUST_USE ebpo_status ebpo_context_subtree(ebpo_context *context, uint32_t b
                                                ebpo_accel **out, ebpo_error *error);
 /* Others may have its room; NULL is fine. */
 void ebpo_context_let_go(ebpo_context *context);
+
+/* Envelopes that a context has cut, kept for its next questions: cutting one takes ten times what
+ * looking for its nearest point does. One thread. */
+
+typedef struct ebpo_kept_envelopes ebpo_kept_envelopes;
+
+/* The envelope of the node with this cell, if it is there. */
+bool ebpo_kept_envelopes_get(const ebpo_kept_envelopes *kept, ebpo_cell cell, ebpo_polytope *out);
+/* Keeps it, in the place of another. *kept begins as NULL; without memory nothing is kept. */
+void ebpo_kept_envelopes_put(ebpo_kept_envelopes **kept, ebpo_cell cell,
+                             const ebpo_polytope *envelope);
+void ebpo_kept_envelopes_free(ebpo_kept_envelopes *kept);
+
+/* Checks that all questions begin with. */
+
+EBPO_MUST_USE ebpo_status ebpo_check_query_level(int level, ebpo_error *error);
+/* EBPO_E_ARGUMENT: an option is none of its kind. */
+ebpo_status ebpo_fail_value(ebpo_error *error);
+/* EBPO_E_ABSENT when the file has no mesh. */
+EBPO_MUST_USE ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error);
+/* EBPO_E_NOT_SOLID for a surface. */
+EBPO_MUST_USE ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error);
+
+/* On which side of the surface a point lies. */
+
+/* Makes an answer's distance negative inside: solids, unless unsigned. */
+EBPO_MUST_USE ebpo_status ebpo_give_sign(ebpo_context *context, const double p[3],
+                                         const ebpo_distance_options *options,
+                                         ebpo_distance_result *out, ebpo_error *error);
 
 #endif

@@ -5,7 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "query/absent.h"
 
 /* A node of the top. */
 static ebpo_node node_of(const ebpo_model *model, uint32_t entry, ebpo_cell cell)

@@ -3,7 +3,7 @@
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "query/options.h"
+#include "query/query_model.h"
 #include "query/ray_walk.h"
 
 static ebpo_status cast(ebpo_casting *c, ebpo_context *context, const double origin[3],

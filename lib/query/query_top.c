@@ -1,4 +1,4 @@
-#include "query/query_top.h"
+#include "query/model_parts.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -96,7 +96,7 @@ static ebpo_status add_gray(reading *r, const ebpo_level *level, uint64_t rank, 
                       &t->gray[group]);
 }
 
-static bool is_pruned(const reading *r, int number, uint64_t rank)
+static bool is_pruned_group(const reading *r, int number, uint64_t rank)
 {
     return r->info->pruned &&
            (number + 1 == r->info->level_count || (r->next_types && r->next_types[rank] == 0));
@@ -125,7 +125,7 @@ static ebpo_status add_node(reading *r, const ebpo_level *level, ebpo_node_type 
         return uniform(r, level->black_winding, rank, 1, entry);
     ebpo_node node = { .cell = cell,
                        .type = type,
-                       .pruned = type == EBPO_GRAY && is_pruned(r, cell.level, rank),
+                       .pruned = type == EBPO_GRAY && is_pruned_group(r, cell.level, rank),
                        .rank = rank };
     if (node.pruned)
         return add_pruned(r, level, &node, &seen->planes, entry);

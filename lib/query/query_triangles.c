@@ -7,7 +7,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "query/box_walk.h"
-#include "query/options.h"
+#include "query/query_model.h"
 
 typedef struct block {
     double corners[EBPO_TRIANGLES_MOST][3][3];
@@ -33,7 +33,7 @@ static void hand_over(delivery *d)
     d->count = 0;
 }
 
-static ebpo_status take(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+static ebpo_status take_triangle(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     delivery *d = (delivery *)walk;
     (void)error;
@@ -55,7 +55,7 @@ ebpo_status ebpo_triangles_in_box(ebpo_context *context, const double min[3], co
                                   ebpo_triangles_fn function, void *user, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    delivery d = { .walk = { .context = context, .min = min, .max = max, .take = take },
+    delivery d = { .walk = { .context = context, .min = min, .max = max, .take = take_triangle },
                    .take = function,
                    .user = user };
     ebpo_status status = ebpo_check_box(min, max, error);

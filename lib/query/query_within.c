@@ -9,10 +9,10 @@
 #include "core/fp_env.h"
 #include "core/sized.h"
 #include "query/near_band.h"
-#include "query/node_queue.h"
-#include "query/options.h"
-#include "query/prefetch.h"
-#include "query/pruned.h"
+#include "query/nearest.h"
+#include "query/query_model.h"
+#include "query/load_ahead.h"
+#include "query/query_node.h"
 
 /* The first band is small, for those who soon have enough; each one is some times larger, so that
  * beginning anew costs little. */

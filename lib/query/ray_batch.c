@@ -11,8 +11,8 @@
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "core/sized.h"
-#include "query/batch.h"
-#include "query/options.h"
+#include "query/load_ahead.h"
+#include "query/query_model.h"
 #include "query/ray_walk.h"
 
 /* Rays that a thread takes at a time; of a model that is not all in memory more, which are

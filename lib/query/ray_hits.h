@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "query/query_model.h"
-#include "query/ray_kernel.h"
+#include "query/query_kernels.h"
 
 /* A face that the ray meets, with what exact comparison needs. */
 struct ebpo_met {

@@ -3,7 +3,7 @@
 #ifndef EBPO_QUERY_RAY_SEARCH_H
 #define EBPO_QUERY_RAY_SEARCH_H
 
-#include "query/kernels.h"
+#include "query/query_kernels.h"
 
 /* Shows `decide` every face that may matter, the most promising first. */
 void ebpo_ray_search_accel(ebpo_ray_search *search, const ebpo_kernels *kernels,

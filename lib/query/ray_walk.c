@@ -5,7 +5,6 @@
 #include <math.h>
 
 #include "core/error.h"
-#include "query/pruned.h"
 #include "query/query_node.h"
 #include "query/ray_search.h"
 

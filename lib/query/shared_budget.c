@@ -1,4 +1,4 @@
-#include "query/shared_budget.h"
+#include "query/model_parts.h"
 
 #include <inttypes.h>
 #include <pthread.h>
@@ -7,7 +7,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/sized.h"
-#include "query/budget_shares.h"
 
 struct ebpo_budget {
     uint64_t bytes;

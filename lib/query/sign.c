@@ -1,6 +1,6 @@
 #include "core/strict_fp.h"
 
-#include "query/sign.h"
+#include "query/query_model.h"
 
 #include "query/inside.h"
 #include "query/limited.h"

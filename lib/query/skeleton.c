@@ -1,7 +1,7 @@
 /* Bounds of the distance to subtrees that are not in memory: the upper nodes of each. */
 #include "core/strict_fp.h"
 
-#include "query/skeleton.h"
+#include "query/model_parts.h"
 
 #include <float.h>
 #include <math.h>

@@ -14,7 +14,7 @@
 /* --- room --- */
 
 /* The group of a pruned node, which stands in subsets for eight nodes that are not there. */
-static bool is_pruned(const ebpo_slice *slice, int level, uint64_t group)
+static bool is_pruned_group(const ebpo_slice *slice, int level, uint64_t group)
 {
     return level && slice->pruned && slice->level[level].types[group] == 0;
 }
@@ -35,7 +35,7 @@ static ebpo_status count_nodes(ebpo_subtree *s, const ebpo_slice *slice, uint64_
         const ebpo_level *level = &slice->level[i];
         uint64_t groups = level->group_count;
         for (uint64_t g = 0; slice->pruned && g < level->group_count; g++)
-            groups -= is_pruned(slice, i, g);
+            groups -= is_pruned_group(slice, i, g);
         if (groups > UINT32_MAX / 8)
             return too_many("nodes", error);
         s->level_first[i] = s->node_count;
@@ -129,7 +129,7 @@ static void take_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
     for (uint64_t parent = s->level_first[i - 1]; parent < s->level_first[i]; parent++) {
         if (s->types[parent] != EBPO_GRAY)
             continue;
-        if (is_pruned(slice, i, group++)) {
+        if (is_pruned_group(slice, i, group++)) {
             at.rank[EBPO_WHITE] += 8;
             continue;
         }

@@ -3,7 +3,7 @@
 #ifndef EBPO_TESTS_FILTER_FACES_H
 #define EBPO_TESTS_FILTER_FACES_H
 
-#include "query/kernels.h"
+#include "query/query_kernels.h"
 
 typedef struct face_filters {
     /* Bounds of the distances to a point, in the frame. */

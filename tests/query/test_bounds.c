@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "query/block_measure.h"
+#include "query/accel_parts.h"
 #include "check_main.h"
 #include "query/query_model.h"
 #include "query_kit.h"

@@ -13,7 +13,7 @@
 #include "core/sized.h"
 #include "geometry/predicates.h"
 #include "geometry/rule.h"
-#include "query/options.h"
+#include "query/query_model.h"
 
 /* --- making --- */
 

@@ -1,3 +1,24 @@
+/* What a cell and the half-spaces of its envelope tell of a point: bounds that are certain. */
+#ifndef EBPO_QUERY_POINT_BOUNDS_H
+#define EBPO_QUERY_POINT_BOUNDS_H
+
+#include "geometry/cells.h"
+#include "query/accel.h"
+
+/* Length of the cell's diagonal, rounded up so that it bounds the distance of any point of the cell
+ * to a face that the node lists. */
+double ebpo_cell_diagonal(const ebpo_box *box, ebpo_cell cell);
+
+/* True when p is certainly outside one of the half-spaces of a cell. */
+bool ebpo_outside_planes(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes, uint32_t count,
+                         const double p[3]);
+
+/* Certain lower bound of the distance of p to the cell cut by the half-spaces: some bound is enough
+ * that is beyond `enough`. And upper bound of the distance to the farthest point of the cell. */
+double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,
+                              uint32_t count, const double p[3], double enough);
+double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3]);
+
 /* A point so far from a model that doubles hardly tell its distances to the model's parts apart, or
  * not at all. They are told apart by keys instead: with c the middle of the model's box,
  *   key(x) = (|p - x|^2 - |p - c|^2) / (2 |p - c|)
@@ -5,11 +26,6 @@
  * but for a small square: h |y|^2 - u . y, with y the place of x seen from c, in a unit of about
  * the model's size, u the direction of p, h 1 / (2 |p - c|) in that unit. Bounds of keys are
  * certain; they lose some 2^-46 of the model's size: docs/develop/bounds.md, "Points far away". */
-#ifndef EBPO_QUERY_FAR_POINT_H
-#define EBPO_QUERY_FAR_POINT_H
-
-#include "query/accel.h"
-#include "geometry/cells.h"
 
 typedef struct ebpo_far {
     bool far; /* else nothing of what follows is to be used */

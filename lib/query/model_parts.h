@@ -1,3 +1,46 @@
+/* The top of a tree: levels 0 .. cut level without faces, and which nodes lie below.
+ * Immutable; any thread. */
+#ifndef EBPO_QUERY_MODEL_PARTS_H
+#define EBPO_QUERY_MODEL_PARTS_H
+
+#include <ebpo/query.h>
+
+#include "core/cache.h"
+#include "format/slice.h"
+#include "query/accel.h"
+#include "query/point_bounds.h"
+
+typedef struct ebpo_top_planes {
+    uint32_t first;
+    uint32_t count;
+} ebpo_top_planes;
+
+typedef struct ebpo_top {
+    int cut_level;
+    /* entries UNIFORM, GRAY (levels above the cut), BELOW (gray nodes of the cut level, leaves down
+     * to it, pruned nodes) */
+    ebpo_node_table nodes;
+    uint32_t *planes;      /* codes */
+    ebpo_top_planes *gray; /* which of them are the gray node's whose children are group g */
+
+    uint64_t below_count;
+    ebpo_node *below;              /* NULL of envelopes alone */
+    ebpo_top_planes *below_planes; /* [below_count]; leaves have none */
+    uint64_t bytes;
+} ebpo_top;
+
+EBPO_MUST_USE ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level,
+                                        unsigned threads, ebpo_error *error);
+/* Only envelopes, with room for nothing else: without `below`. */
+EBPO_MUST_USE ebpo_status ebpo_top_read_envelopes(ebpo_top **out, const ebpo_file *file,
+                                                  int cut_level, unsigned threads,
+                                                  ebpo_error *error);
+void ebpo_top_free(ebpo_top *top);
+
+/* Bytes that the top will take: from the head alone. */
+uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level);
+uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
+
 /* What is kept in memory of each subtree that has ever been loaded: the upper nodes of its
  * hierarchy over faces (query/accel.h), eight at first, 2 KB where the subtree takes hundreds. They
  * bound the distance to its faces much better than its cell and its envelope do, so that searches
@@ -8,12 +51,6 @@
  * Lower bounds only. Subtrees are searched in the order of certain lower bounds until the next is
  * beyond what has been found (nearest_first.c): those searched are the ones whose bound is at most
  * the answer. No upper bound could save one of them. */
-#ifndef EBPO_QUERY_SKELETON_H
-#define EBPO_QUERY_SKELETON_H
-
-#include "query/accel.h"
-#include "core/cache.h"
-#include "query/far_point.h"
 
 /* Any thread; one at a time where it is not const. */
 typedef struct ebpo_skeleton ebpo_skeleton;
@@ -78,5 +115,52 @@ void ebpo_skeletons_grow(ebpo_skeletons *all, uint64_t number, const ebpo_accel 
                          const double p[3], double limit);
 /* NULL where nothing is known. */
 const ebpo_skeleton *ebpo_skeletons_find(const ebpo_skeletons *all, uint64_t number);
+
+/* Who gets which share of a budget. */
+
+/* For loading one at least. */
+enum { EBPO_SUBTREES_LEAST = 1 << 20 };
+
+/* For decoded chunks. */
+enum { EBPO_CHUNKS_LEAST = 2 << 20 };
+
+/* Bytes for decoded chunks, for skeletons, and for both: what is not for the top and subtrees. */
+uint64_t ebpo_chunk_budget(uint64_t budget);
+uint64_t ebpo_skeleton_budget(const ebpo_model_options *options, uint64_t budget);
+uint64_t ebpo_beside_subtrees(const ebpo_model_options *options, uint64_t budget);
+
+/* What is chosen by a model's budget: from the counts in the file's head. */
+
+/* Sets the budget: what is left of one that is shared, or that of a file far away where nobody
+ * asked for one; true then. */
+bool ebpo_usual_memory(const ebpo_file *file, ebpo_model_options *options);
+
+/* Everything at once, or the cut level. Errors are those of ebpo_model_memory. */
+EBPO_MUST_USE ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *options,
+                                          bool default_memory, ebpo_model_plan *out,
+                                          ebpo_error *error);
+/* The cut level for a budget that everything was found to exceed. Only that and `least` are set. */
+EBPO_MUST_USE ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_model_options *options,
+                                          ebpo_model_plan *out, ebpo_error *error);
+
+/* A budget that models share: what of it each of them takes for good, and what is for the caches of
+ * all. Any thread. */
+
+/* Of the caches of subtrees, and of those of chunks: what one loads needs room in the other. */
+ebpo_cache_pool *ebpo_budget_subtrees(const ebpo_budget *budget);
+ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *budget);
+
+uint64_t ebpo_budget_bytes(const ebpo_budget *budget);
+/* What is not taken for good. */
+uint64_t ebpo_budget_left(const ebpo_budget *budget);
+
+/* Takes bytes for a model that is all in memory, for as long as it lives. False: these take too
+ * much, or there is no room. And what turned out not to be needed, or all of it, back. */
+bool ebpo_budget_take_whole(ebpo_budget *budget, uint64_t bytes);
+void ebpo_budget_give_back_whole(ebpo_budget *budget, uint64_t bytes);
+
+/* Of the room for skeletons, at most `wanted`; and back. */
+uint64_t ebpo_budget_take_skeletons(ebpo_budget *budget, uint64_t wanted);
+void ebpo_budget_give_back_skeletons(ebpo_budget *budget, uint64_t bytes);
 
 #endif
