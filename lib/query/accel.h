@@ -225,7 +225,7 @@ typedef struct ebpo_accel {
 } ebpo_accel;
 
 /* Sets the boxes of a leaf's list; returns the walls of the cell that its faces come to, a bit for
- * each: 2 axis + side (1: upper). ebpo_kernels has it. */
+ * each: 2 axis + side (1: upper). ebpo_inside_kernels has it. */
 typedef unsigned ebpo_walls_fn(const ebpo_accel *subtree, ebpo_listed_block *list, ebpo_cell cell);
 
 /* A question has come to a leaf of a solid whose kind is not known. Number EBPO_LEAF_WALL_ASKED

@@ -1,9 +1,4 @@
-/* Depth first, nearest child first, with everything pruned that is certainly farther than something
- * already seen. Bounds and triangles in single precision, with errors bounded; what passes is
- * judged with certain bounds in double precision, and what these cannot tell apart exactly. */
 #include "core/strict_fp.h"
-
-#include "query/nearest.h"
 
 #include <float.h>
 #include <math.h>
@@ -13,7 +8,48 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "query/nearest.h"
 #include "query/query_kernels.h"
+
+static bool same_corner(const double a[3], const double b[3])
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+static bool is_edge(ebpo_feature feature)
+{
+    return feature >= EBPO_NEAR_EDGE0 && feature <= EBPO_NEAR_EDGE2;
+}
+
+/* Faces around one vertex or edge are the usual tie. */
+static bool same_feature(const double a[3][3], ebpo_feature of_a, const double b[3][3],
+                         ebpo_feature of_b)
+{
+    if (of_a <= EBPO_NEAR_CORNER2 && of_b <= EBPO_NEAR_CORNER2)
+        return same_corner(a[of_a], b[of_b]);
+    if (!is_edge(of_a) || !is_edge(of_b))
+        return false;
+    const double *a0 = a[of_a - EBPO_NEAR_EDGE0], *a1 = a[(of_a - EBPO_NEAR_EDGE0 + 1) % 3],
+                 *b0 = b[of_b - EBPO_NEAR_EDGE0], *b1 = b[(of_b - EBPO_NEAR_EDGE0 + 1) % 3];
+    return (same_corner(a0, b1) && same_corner(a1, b0)) ||
+           (same_corner(a0, b0) && same_corner(a1, b1));
+}
+
+int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distance_bounds *a_bounds,
+                      const double b[3][3], const ebpo_distance_bounds *b_bounds)
+{
+    if (a_bounds->hi < b_bounds->lo)
+        return -1;
+    if (a_bounds->lo > b_bounds->hi)
+        return 1;
+    return same_feature(a, a_bounds->feature, b, b_bounds->feature)
+               ? 0
+               : ebpo_triangle_distance_compare(p, a, b);
+}
+
+/* Depth first, nearest child first, with everything pruned that is certainly farther than something
+ * already seen. Bounds and triangles in single precision, with errors bounded; what passes is
+ * judged with certain bounds in double precision, and what these cannot tell apart exactly. */
 
 /* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
 #define FAR 32.0
@@ -186,7 +222,7 @@ static bool late(ebpo_near_search *g)
     return ebpo_clock() > n->deadline;
 }
 
-static void search_near(ebpo_nearest *n, const ebpo_kernels *kernels, ebpo_near_search *g)
+static void search_near(ebpo_nearest *n, const ebpo_nearest_kernels *kernels, ebpo_near_search *g)
 {
     g->user = n;
     g->judge = judge;
@@ -195,7 +231,7 @@ static void search_near(ebpo_nearest *n, const ebpo_kernels *kernels, ebpo_near_
     g->first_block = n->first_block;
     g->first_node = n->first_node;
     ebpo_near_set_best(g, frame_limit(g));
-    kernels->near(g);
+    kernels->walk(g);
     if (g->top)
         give_up(g);
     judge(g);
@@ -311,7 +347,7 @@ void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebp
         far_search far = { n, s, ebpo_far_frame_of(&n->far, s->centre, s->scale, s->reach) };
         search_by_keys(&far, s->top);
     } else if (make_probe(s, n->p, &g.probe))
-        search_near(n, context->model->kernels, &g);
+        search_near(n, context->model->kernels.nearest, &g);
     else
         search_far(n, s, s->top);
 }

@@ -205,7 +205,7 @@ static inline bool ebpo_axis_segment_meets(const ebpo_axis_segment *g, uint64_t 
     return (even & odd & carry) == carry;
 }
 
-typedef struct ebpo_kernels {
+typedef struct ebpo_inside_kernels {
     /* Sum of the certain crossings of a leaf's listed faces, in the part of them that is in the
      * leaf's cell (as ebpo_axis_crossing gives them) with the segment; lanes that are not certain
      * are appended to `open` as slots (room for 8 a block), their number to *open_count. Every face
@@ -213,12 +213,38 @@ typedef struct ebpo_kernels {
     int32_t (*crossings)(const ebpo_accel *s, const ebpo_listed_block *list,
                          const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count);
     ebpo_walls_fn *walls;
-    /* Not pure: they ask search->judge when many faces wait. They walk through search->s: what
-     * then waits may be nearest, or met, and best, or the limit, has fallen. */
-    void (*near)(ebpo_near_search *search);
-    void (*ray)(ebpo_ray_search *search);
-} ebpo_kernels;
+} ebpo_inside_kernels;
 
-EBPO_KERNELS(ebpo_kernels, ebpo_kernels)
+/* Not pure: they call search->judge when many faces wait. They walk through search->s: what then
+ * waits may be nearest, or met, and best, or the limit, has fallen. */
+typedef struct ebpo_nearest_kernels {
+    void (*walk)(ebpo_near_search *search);
+} ebpo_nearest_kernels;
+typedef struct ebpo_ray_kernels {
+    void (*walk)(ebpo_ray_search *search);
+} ebpo_ray_kernels;
+
+EBPO_KERNELS(ebpo_inside_kernels, ebpo_inside_kernels)
+EBPO_KERNELS(ebpo_nearest_kernels, ebpo_nearest_kernels)
+EBPO_KERNELS(ebpo_ray_kernels, ebpo_ray_kernels)
+
+/* Those that a model uses. */
+typedef struct ebpo_query_kernels {
+    const ebpo_inside_kernels *inside;
+    const ebpo_nearest_kernels *nearest;
+    const ebpo_ray_kernels *ray;
+} ebpo_query_kernels;
+
+static inline ebpo_query_kernels ebpo_query_kernels_base(void)
+{
+    return (ebpo_query_kernels){ &ebpo_inside_kernels_base, &ebpo_nearest_kernels_base,
+                                 &ebpo_ray_kernels_base };
+}
+
+static inline ebpo_query_kernels ebpo_query_kernels_best(void)
+{
+    return (ebpo_query_kernels){ ebpo_inside_kernels_best(), ebpo_nearest_kernels_best(),
+                                 ebpo_ray_kernels_best() };
+}
 
 #endif

@@ -25,7 +25,7 @@ struct ebpo_model {
     ebpo_model_options options;
     uint64_t shared_taken, shared_skeletons; /* of a budget that is shared: for good */
     bool default_memory; /* nobody asked for a budget, but the file is far away */
-    const ebpo_kernels *kernels;
+    ebpo_query_kernels kernels;
     ebpo_accel *whole;   /* everything, or NULL: */
     bool answers_inside; /* of a solid and with the mesh, whole */
     ebpo_top *top;       /* levels 0 .. cut level */
@@ -47,7 +47,8 @@ void ebpo_model_count_leaves(ebpo_model *model, const ebpo_accel *subtree, int s
 void ebpo_model_count_kind(ebpo_model *model, const ebpo_accel_leaf *leaf);
 
 typedef struct ebpo_ranked ebpo_ranked; /* query/query_node.h */
-typedef struct ebpo_met ebpo_met;       /* query/ray_hits.h */
+typedef struct ebpo_met ebpo_met;       /* rays.c */
+typedef struct ebpo_kept_envelopes ebpo_kept_envelopes;
 
 struct ebpo_context {
     ebpo_model *model;
@@ -126,8 +127,6 @@ void ebpo_context_let_go(ebpo_context *context);
 
 /* Envelopes that a context has cut, kept for its next questions: cutting one takes ten times what
  * looking for its nearest point does. One thread. */
-
-typedef struct ebpo_kept_envelopes ebpo_kept_envelopes;
 
 /* The envelope of the node with this cell, if it is there. */
 bool ebpo_kept_envelopes_get(const ebpo_kept_envelopes *kept, ebpo_cell cell, ebpo_polytope *out);

@@ -1,5 +1,4 @@
-/* What filters in single precision say of the eight faces of a block; FILTERS names the functions.
- */
+/* What filters in single precision say of the eight faces of a block, for each instruction set. */
 #ifndef EBPO_TESTS_FILTER_FACES_H
 #define EBPO_TESTS_FILTER_FACES_H
 

@@ -1,19 +1,39 @@
 #include "core/strict_fp.h"
 
-#include "query/box_walk.h"
-
 #include <math.h>
 #include <stdlib.h>
 
 #include "core/alloc.h"
 #include "core/eight.h"
 #include "core/error.h"
+#include "core/fp_env.h"
 #include "geometry/ray_triangle.h"
-#include "query/query_model.h"
 #include "query/load_ahead.h"
+#include "query/query_model.h"
 #include "query/query_node.h"
 
-ebpo_status ebpo_check_box(const double min[3], const double max[3], ebpo_error *error)
+/* The faces in a box, accel by accel. */
+
+typedef struct ebpo_box_walk ebpo_box_walk;
+
+struct ebpo_box_walk {
+    ebpo_context *context;
+    const double *min, *max;
+    /* In the accel at hand, the faces that meet the box: their slots, ascending, which is the order
+     * of the file. */
+    uint32_t *slot;
+    uint64_t count, capacity;
+    ebpo_node below; /* in whose place it stands, when it is not the whole tree */
+    bool no_memory, enough;
+    /* Of a file far away: what the walk will enter, in its order, and how many it has. */
+    uint32_t *ahead;
+    uint64_t ahead_count, ahead_capacity, entered;
+    /* Called for each accel that the box meets, depth first; *enough ends the walk. */
+    ebpo_status (*take)(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *error);
+};
+
+/* EBPO_E_ARGUMENT: no box. */
+static ebpo_status check_box(const double min[3], const double max[3], ebpo_error *error)
 {
     for (int k = 0; k < 3; k++)
         if (!isfinite(min[k]) || !isfinite(max[k]) || !(min[k] <= max[k]))
@@ -136,12 +156,14 @@ static ebpo_status gather_node(ebpo_box_walk *w, const ebpo_box *box, ebpo_node 
     return status;
 }
 
-ebpo_status ebpo_box_walk_check(ebpo_box_walk *w, ebpo_error *error)
+/* EBPO_E_ABSENT: what a subset has left out meets the box. */
+static ebpo_status box_walk_check(ebpo_box_walk *w, ebpo_error *error)
 {
     return ebpo_check_pruned(w->context, box_matters, w, error);
 }
 
-ebpo_status ebpo_box_walk_run(ebpo_box_walk *w, ebpo_error *error)
+/* The whole walk. The list of slots is freed. */
+static ebpo_status box_walk_run(ebpo_box_walk *w, ebpo_error *error)
 {
     const ebpo_model *m = w->context->model;
     ebpo_box box = ebpo_model_box(m);
@@ -182,7 +204,9 @@ static bool find_first(const ebpo_box_walk *w, const ebpo_box *box, ebpo_node no
     return found;
 }
 
-bool ebpo_box_walk_is_first(const ebpo_box_walk *w, bool own, const double triangle[3][3])
+/* The triangle, which meets the box, is to be taken in the accel at hand and in no other, so that a
+ * walk that takes it where this is true takes each once. `own`: the accel has it as its own. */
+static bool box_walk_is_first(const ebpo_box_walk *w, bool own, const double triangle[3][3])
 {
     const ebpo_model *m = w->context->model;
     ebpo_box box = ebpo_model_box(m);
@@ -192,4 +216,136 @@ bool ebpo_box_walk_is_first(const ebpo_box_walk *w, bool own, const double trian
     if (own) /* no accel before this one has it */
         return touches_cell(&box, &w->below, triangle);
     return find_first(w, &box, ebpo_model_root(m), triangle, &entry) && entry == w->below.entry;
+}
+
+/* The faces in a box. */
+
+/* Number in the file, and the one that is told. */
+typedef struct pair {
+    uint64_t file_face, source_face;
+} pair;
+
+typedef struct gathering {
+    ebpo_box_walk walk; /* first */
+    pair *list;
+    uint64_t count, capacity;
+} gathering;
+
+static ebpo_status take_face_number(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+{
+    gathering *g = (gathering *)walk;
+    if (!ebpo_grow(&g->list, &g->capacity, g->count + walk->count, sizeof *g->list))
+        return ebpo_fail_memory(error, (g->count + walk->count) * sizeof *g->list);
+    for (uint64_t i = 0; i < walk->count; i++) {
+        uint32_t local = ebpo_accel_slot_face(s, walk->slot[i]);
+        g->list[g->count++] =
+            (pair){ ebpo_accel_file_face(s, local), ebpo_accel_source_face(s, local) };
+    }
+    return EBPO_OK;
+}
+
+static int compare_pairs(const void *a, const void *b)
+{
+    const pair *x = a, *y = b;
+    return (x->file_face > y->file_face) - (x->file_face < y->file_face);
+}
+
+static ebpo_status finish(gathering *g, const uint64_t **faces, uint64_t *count, ebpo_error *error)
+{
+    ebpo_context *c = g->walk.context;
+    if (!ebpo_grow(&c->faces, &c->face_capacity, g->count, sizeof *c->faces))
+        return ebpo_fail_memory(error, g->count * sizeof *g->list);
+    if (g->count)
+        qsort(g->list, g->count, sizeof *g->list, compare_pairs);
+    for (uint64_t i = 0; i < g->count; i++)
+        if (i == 0 || g->list[i].file_face != g->list[i - 1].file_face) /* subtrees share faces */
+            c->faces[(*count)++] = g->list[i].source_face;
+    *faces = c->faces;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const double max[3],
+                              const uint64_t **faces, uint64_t *count, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    *faces = NULL;
+    *count = 0;
+    gathering g = { .walk = { .context = context, .min = min, .max = max, .take = take_face_number } };
+    ebpo_status status = check_box(min, max, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_mesh(context->model, error);
+    if (status == EBPO_OK)
+        status = box_walk_run(&g.walk, error);
+    if (status == EBPO_OK)
+        status = box_walk_check(&g.walk, error);
+    if (status == EBPO_OK)
+        status = finish(&g, faces, count, error);
+    free(g.list);
+    return status;
+}
+
+/* The triangles in a box, block by block. */
+
+typedef struct block {
+    double corners[EBPO_TRIANGLES_MOST][3][3];
+    uint64_t faces[EBPO_TRIANGLES_MOST], file_faces[EBPO_TRIANGLES_MOST];
+} block;
+
+typedef struct delivery {
+    ebpo_box_walk walk; /* first */
+    block *block;
+    uint64_t count; /* in the block */
+    ebpo_triangles_fn take;
+    void *user;
+} delivery;
+
+static void hand_over(delivery *d)
+{
+    ebpo_triangles all = { .count = d->count,
+                           .corners = (const double(*)[3][3])d->block->corners,
+                           .faces = d->block->faces,
+                           .file_faces = d->block->file_faces };
+    if (d->count && !d->walk.enough)
+        d->walk.enough = !d->take(d->user, &all);
+    d->count = 0;
+}
+
+static ebpo_status take_triangle(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+{
+    delivery *d = (delivery *)walk;
+    (void)error;
+    for (uint64_t i = 0; i < walk->count && !walk->enough; i++) {
+        uint32_t local = ebpo_accel_slot_face(s, walk->slot[i]);
+        double(*corners)[3] = d->block->corners[d->count];
+        ebpo_accel_triangle(s, walk->slot[i], corners);
+        if (!box_walk_is_first(walk, local >= s->outer_count, (const double(*)[3])corners))
+            continue;
+        d->block->faces[d->count] = ebpo_accel_source_face(s, local);
+        d->block->file_faces[d->count++] = ebpo_accel_file_face(s, local);
+        if (d->count == EBPO_TRIANGLES_MOST)
+            hand_over(d);
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_triangles_in_box(ebpo_context *context, const double min[3], const double max[3],
+                                  ebpo_triangles_fn function, void *user, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    delivery d = { .walk = { .context = context, .min = min, .max = max, .take = take_triangle },
+                   .take = function,
+                   .user = user };
+    ebpo_status status = check_box(min, max, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_mesh(context->model, error);
+    if (status == EBPO_OK)
+        status = box_walk_check(&d.walk, error); /* before the first triangle is given */
+    if (status == EBPO_OK && !(d.block = ebpo_alloc(1, sizeof *d.block)))
+        status = ebpo_fail_memory(error, sizeof *d.block);
+    if (status == EBPO_OK)
+        status = box_walk_run(&d.walk, error);
+    if (status == EBPO_OK)
+        hand_over(&d);
+    free(d.block);
+    return status;
 }

@@ -1,15 +1,151 @@
-/* Which levels stay. */
 #include "core/strict_fp.h"
 
-#include "query/model_parts.h"
-
 #include <inttypes.h>
+#include <pthread.h>
+#include <stdlib.h>
 
-#include "query/accel.h"
+#include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/sized.h"
 #include "format/reader.h"
+#include "query/accel.h"
+#include "query/model_parts.h"
+
+/* Decoded chunks: an eighth of the budget, within these. */
+enum { CHUNKS_MOST = 128 << 20 };
+
+uint64_t ebpo_chunk_budget(uint64_t budget)
+{
+    return budget / 8 < EBPO_CHUNKS_LEAST ? EBPO_CHUNKS_LEAST
+           : budget / 8 > CHUNKS_MOST     ? CHUNKS_MOST
+                                          : budget / 8;
+}
+
+/* Skeletons of subtrees, at most: searches that go everywhere gain more by them than by a few more
+ * subtrees. Of what is beyond the least, so that small budgets do for what they would do for
+ * without them. */
+uint64_t ebpo_skeleton_budget(const ebpo_model_options *o, uint64_t budget)
+{
+    const uint64_t least = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
+    return o->loading == EBPO_LOAD_CACHE && budget > least ? (budget - least) / 4 : 0;
+}
+
+uint64_t ebpo_beside_subtrees(const ebpo_model_options *o, uint64_t budget)
+{
+    return ebpo_chunk_budget(budget) + ebpo_skeleton_budget(o, budget);
+}
+
+struct ebpo_budget {
+    uint64_t bytes;
+    ebpo_cache_pool *subtrees, *chunks;
+    pthread_mutex_t lock;      /* of what follows */
+    uint64_t whole, skeletons; /* that may still be taken */
+};
+
+ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget **out, ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_model_options usual = EBPO_MODEL_OPTIONS_INIT;
+    uint64_t chunks = ebpo_chunk_budget(bytes), least = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
+    if (bytes == 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "a budget of 0 bytes");
+    if (bytes < least)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "a budget of %" PRIu64 " bytes is too small for any model; give %" PRIu64
+                         " at least",
+                         bytes, least);
+    ebpo_budget *b = ebpo_alloc_zero(1, sizeof *b);
+    if (!b)
+        return ebpo_fail_memory(error, sizeof *b);
+    (void)pthread_mutex_init(&b->lock, NULL);
+    b->bytes = bytes;
+    b->whole = bytes / 2;
+    b->skeletons = ebpo_skeleton_budget(&usual, bytes);
+    ebpo_status status = ebpo_cache_pool_make(&b->subtrees, bytes - chunks, error);
+    if (status == EBPO_OK)
+        status = ebpo_cache_pool_make(&b->chunks, chunks, error);
+    if (status == EBPO_OK)
+        *out = b;
+    else
+        ebpo_budget_free(b);
+    return status;
+}
+
+void ebpo_budget_free(ebpo_budget *b)
+{
+    if (!b)
+        return;
+    ebpo_cache_pool_free(b->subtrees);
+    ebpo_cache_pool_free(b->chunks);
+    (void)pthread_mutex_destroy(&b->lock);
+    free(b);
+}
+
+ebpo_status ebpo_budget_get_stats(const ebpo_budget *b, ebpo_budget_stats *out)
+{
+    ebpo_budget_stats stats = EBPO_BUDGET_STATS_INIT;
+    uint64_t now, peak, taken;
+    ebpo_cache_pool_get_bytes(b->subtrees, &stats.memory, &stats.memory_peak, &taken);
+    ebpo_cache_pool_get_bytes(b->chunks, &now, &peak, &taken);
+    stats.budget = b->bytes;
+    stats.memory += now;
+    stats.memory_peak += peak;
+    return EBPO_GIVE(ebpo_budget_stats, out, &stats);
+}
+
+ebpo_cache_pool *ebpo_budget_subtrees(const ebpo_budget *b) { return b->subtrees; }
+
+ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *b) { return b->chunks; }
+
+uint64_t ebpo_budget_bytes(const ebpo_budget *b) { return b->bytes; }
+
+uint64_t ebpo_budget_left(const ebpo_budget *b)
+{
+    uint64_t now, peak, taken;
+    ebpo_cache_pool_get_bytes(b->subtrees, &now, &peak, &taken);
+    return b->bytes - taken;
+}
+
+bool ebpo_budget_take_whole(ebpo_budget *b, uint64_t bytes)
+{
+    (void)pthread_mutex_lock(&b->lock);
+    bool fits = bytes <= b->whole;
+    b->whole -= fits ? bytes : 0;
+    (void)pthread_mutex_unlock(&b->lock);
+    if (!fits || ebpo_cache_pool_take(b->subtrees, bytes, NULL) == EBPO_OK)
+        return fits;
+    (void)pthread_mutex_lock(&b->lock);
+    b->whole += bytes;
+    (void)pthread_mutex_unlock(&b->lock);
+    return false;
+}
+
+void ebpo_budget_give_back_whole(ebpo_budget *b, uint64_t bytes)
+{
+    ebpo_cache_pool_give_back(b->subtrees, bytes);
+    (void)pthread_mutex_lock(&b->lock);
+    b->whole += bytes;
+    (void)pthread_mutex_unlock(&b->lock);
+}
+
+uint64_t ebpo_budget_take_skeletons(ebpo_budget *b, uint64_t wanted)
+{
+    (void)pthread_mutex_lock(&b->lock);
+    uint64_t got = wanted < b->skeletons ? wanted : b->skeletons;
+    b->skeletons -= got;
+    (void)pthread_mutex_unlock(&b->lock);
+    return got;
+}
+
+void ebpo_budget_give_back_skeletons(ebpo_budget *b, uint64_t bytes)
+{
+    (void)pthread_mutex_lock(&b->lock);
+    b->skeletons += bytes;
+    (void)pthread_mutex_unlock(&b->lock);
+}
+
+/* Which levels stay. */
 
 /* Of a cache: a path needs the subtree where it is, those around, and room to load the next. More
  * of them, smaller ones, are faster to load. */

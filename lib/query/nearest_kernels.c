@@ -1,5 +1,13 @@
-/* The walk to the nearest face, compiled as kernels.inc is. Its bounds are certain
- * (docs/develop/bounds.md); what they leave is decided elsewhere. */
+/* Kernel of the nearest face: the walk from node to node of one accel's hierarchy over faces, eight
+ * children or eight faces at a time, in single precision.
+ *
+ * The walk drops only what is certainly farther than the best upper bound. The faces that may be
+ * nearest are collected as candidates and decided by nearest.c.
+ *
+ * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
+ * docs/develop/bounds.md. */
+#include "core/strict_fp.h"
+
 #include <math.h>
 
 #include "query/face_block.h"
@@ -331,3 +339,5 @@ static void near_walk(ebpo_near_search *g)
     else
         near_walk_in(g, false);
 }
+
+const ebpo_nearest_kernels EBPO_KERNEL(ebpo_nearest_kernels) = { near_walk };

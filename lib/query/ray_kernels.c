@@ -1,11 +1,18 @@
-/* The walk of a ray through the hierarchy and its filter for eight faces, compiled as kernels.inc
- * is. Nothing here decides an answer: what it drops is certainly not met or too far, what it calls
- * certain is certain. */
+/* Kernel of rays: the walk of a ray through one accel's hierarchy over faces, and the filter for
+ * eight faces, in single precision.
+ *
+ * The kernel decides no result: it drops what the ray certainly does not meet, or meets beyond the
+ * limit; what it calls certain is certain. The faces that remain are decided exactly by rays.c.
+ *
+ * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
+ * docs/develop/bounds.md. */
+#include "core/strict_fp.h"
+
 #include <math.h>
 #include <stddef.h>
 
-#include "query/face_block.h"
 #include "core/three.h"
+#include "query/face_block.h"
 #include "query/query_kernels.h"
 
 /* --- the ray --- */
@@ -325,3 +332,5 @@ static void ray_walk(ebpo_ray_search *r)
     else
         ray_walk_in(r, false, false);
 }
+
+const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk };
