@@ -272,9 +272,6 @@ uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info
 ebpo_node ebpo_accel_root(const ebpo_accel *subtree);
 /* Child of a gray node that is not pruned. */
 ebpo_node ebpo_accel_child(const ebpo_accel *subtree, const ebpo_node *gray, unsigned octant);
-/* Codes of a gray node's planes, where the subtree has kept them. */
-const uint32_t *ebpo_accel_planes(const ebpo_accel *subtree, const ebpo_node *node,
-                                  unsigned *count);
 /* For cursors (geometry/cursor.h); the holder is an ebpo_accel. */
 extern const ebpo_node_source ebpo_accel_source;
 

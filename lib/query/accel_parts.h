@@ -27,10 +27,6 @@ EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *s
                                            ebpo_error *error);
 void ebpo_layout_free(ebpo_layout *layout);
 
-/* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates
- * beyond that, and doubles, take doubles. */
-bool ebpo_accel_needs_doubles(const ebpo_info *info);
-
 /* What is made, and of what. */
 typedef struct ebpo_accel_plan {
     const ebpo_info *info;
@@ -57,36 +53,9 @@ EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel
 /* Bounds of the hierarchy, from the blocks (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
                                                  unsigned threads, ebpo_error *error);
-/* Child tables and leaf records with their lists of blocks (one walk). */
-EBPO_MUST_USE ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
-                                                const ebpo_layout *layout, ebpo_error *error);
 /* Room for at most so many rows; NULL: no memory. */
 ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_most);
 void ebpo_leaf_kinds_free(ebpo_leaf_kinds *kinds);
-
-/* --- a leaf of a solid --- */
-
-/* n . xi - d in the cell's coordinates (0 .. 1 on each axis), 1-norm of n 1. */
-typedef struct ebpo_leaf_plane {
-    double n[3], d;
-} ebpo_leaf_plane;
-
-/* Of a convex leaf (`flip` 1), or of a concave one (-1: with the planes turned): the winding number
- * below all planes, and elsewhere in the cell. */
-typedef struct ebpo_deciding_planes {
-    int count, flip;
-    int32_t inner, outer;
-    ebpo_leaf_plane plane[EBPO_KIND_PLANES_MAX];
-} ebpo_deciding_planes;
-
-/* False when the planes of its faces do not decide. */
-bool ebpo_leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell,
-                           ebpo_deciding_planes *out);
-
-/* Crossings of the leaf's faces with a segment along an axis. Passed over are blocks of whose box
- * any bit of `beside` is set: lower sides that are not the cell's, where the segment is. */
-int32_t ebpo_leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double from[3],
-                            double to, int axis, uint64_t beside);
 
 /* What is measured of blocks of floats, eight vertices at a time: compiled for any processor and
  * for those with AVX2, the same operations in the same order. How far off it may be:

@@ -91,7 +91,7 @@ static run choose_run(const bundle *part, int parts, const bool wrapped[8])
     return best;
 }
 
-static bundle gather(const bundle *part, int parts)
+static bundle gather_parts(const bundle *part, int parts)
 {
     bundle out = { part[0].begin, part[parts - 1].end, 0, { 0 } };
     for (int i = 0; i < parts; i++)
@@ -102,7 +102,7 @@ static bundle gather(const bundle *part, int parts)
 
 /* Wraps neighbours in nodes, as full ones as there are, until all members together are at most
  * eight. */
-static bundle join(walk *w, bundle *part, int parts)
+static bundle join_parts(walk *w, bundle *part, int parts)
 {
     bool wrapped[8] = { false };
     int total = 0;
@@ -112,7 +112,7 @@ static bundle join(walk *w, bundle *part, int parts)
     }
     while (total > EBPO_BLOCK && !w->failed) {
         run r = choose_run(part, parts, wrapped);
-        bundle all = gather(part + r.begin, r.end - r.begin);
+        bundle all = gather_parts(part + r.begin, r.end - r.begin);
         total -= all.members - 1;
         all.member[0] = add_bound(w, &all);
         all.members = 1;
@@ -123,7 +123,7 @@ static bundle join(walk *w, bundle *part, int parts)
         parts -= r.end - r.begin - 1;
     }
     return w->failed ? (bundle){ part[0].begin, part[parts - 1].end, 0, { 0 } }
-                     : gather(part, parts);
+                     : gather_parts(part, parts);
 }
 
 /* A range in its own order: blocks of equal size, eight by eight under nodes. */
@@ -140,7 +140,7 @@ static bundle split_range(walk *w, uint32_t begin, uint32_t end)
     for (uint64_t i = 0; i < pieces; i++)
         part[i] = split_range(w, begin + (uint32_t)(count * i / pieces),
                               begin + (uint32_t)(count * (i + 1) / pieces));
-    return join(w, part, (int)pieces);
+    return join_parts(w, part, (int)pieces);
 }
 
 static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin);
@@ -165,7 +165,7 @@ static bundle walk_gray(walk *w, int depth, uint32_t begin)
     }
     if (parts == 0)
         return (bundle){ begin, at, 0, { 0 } };
-    return parts == 1 ? part[0] : join(w, part, parts);
+    return parts == 1 ? part[0] : join_parts(w, part, parts);
 }
 
 static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
@@ -228,7 +228,7 @@ ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t
     if (part[parts].end > part[parts].begin)
         parts++;
     if (parts) {
-        bundle all = join(&w, part, parts);
+        bundle all = join_parts(&w, part, parts);
         if (!w.failed)
             out->top = add_bound(&w, &all);
         w.failed = w.failed || !renumber_blocks(out, part[parts - 1].end);
@@ -327,7 +327,7 @@ static uint32_t size_of(const ebpo_accel *s, unsigned vertices)
     return (uint32_t)((bytes + EBPO_MESHLET_UNIT - 1) / EBPO_MESHLET_UNIT);
 }
 
-static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned worker,
+static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                            ebpo_error *error)
 {
     (void)worker;
@@ -354,7 +354,7 @@ static bool number_blocks(ebpo_accel *s, ebpo_layout *layout)
 /* --- filling --- */
 
 /* What is not shared enough: each corner of each lane is a vertex of its own. */
-static void spread(shared *v)
+static void spread_corners(shared *v)
 {
     uint32_t corner[EBPO_MESHLET_VERTICES];
     for (unsigned lane = 0; lane < EBPO_BLOCK; lane++)
@@ -387,7 +387,7 @@ static void set_coordinates(const job *j, const shared *v, ebpo_meshlet *m)
         }
 }
 
-static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned worker,
+static ebpo_status fill_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                         ebpo_error *error)
 {
     (void)worker;
@@ -400,7 +400,7 @@ static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned wo
         memset(at, 0, (size_t)size_of(j->s, v.count) * EBPO_MESHLET_UNIT);
         ebpo_meshlet *m = (void *)at;
         if (v.count > EBPO_MESHLET_SHARED)
-            spread(&v);
+            spread_corners(&v);
         else
             set_corners(&v, m);
         m->face = j->layout->block_begin[b];
@@ -436,7 +436,7 @@ ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, e
                              ? EBPO_OK
                              : ebpo_fail_memory(error, layout->block_count * sizeof *j.found);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, measure, &j, NULL,
+        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, measure_blocks, &j, NULL,
                                    "open", error);
     if (status == EBPO_OK && !number_blocks(s, layout))
         status = ebpo_fail(error, EBPO_E_LIMIT,
@@ -446,7 +446,7 @@ ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, e
     if (status == EBPO_OK)
         status = make_room(s, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill, &j, NULL, "open",
+        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill_blocks, &j, NULL, "open",
                                    error);
     free(j.found);
     return status;

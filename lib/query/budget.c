@@ -100,7 +100,8 @@ ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *b) { return b->chunks; }
 
 uint64_t ebpo_budget_bytes(const ebpo_budget *b) { return b->bytes; }
 
-uint64_t ebpo_budget_left(const ebpo_budget *b)
+/* What is not taken for good. */
+static uint64_t budget_left(const ebpo_budget *b)
 {
     uint64_t now, peak, taken;
     ebpo_cache_pool_get_bytes(b->subtrees, &now, &peak, &taken);
@@ -211,7 +212,7 @@ static bool reads_parts(const ebpo_file *file, bool default_memory)
 bool ebpo_usual_memory(const ebpo_file *file, ebpo_model_options *o)
 {
     if (o->budget)
-        o->memory = ebpo_budget_left(o->budget);
+        o->memory = budget_left(o->budget);
     bool usual = !o->memory && ebpo_input_is_far(&file->in);
     if (usual && o->cut_level < 0)
         o->memory = FAR_MEMORY;
@@ -244,7 +245,7 @@ static ebpo_status choose_parts(const ebpo_info *info, const ebpo_model_options 
     return EBPO_OK;
 }
 
-static ebpo_status choose(const ebpo_file *file, const ebpo_model_options *o, bool default_memory,
+static ebpo_status choose_plan(const ebpo_file *file, const ebpo_model_options *o, bool default_memory,
                           ebpo_model_plan *out, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
@@ -261,7 +262,7 @@ static ebpo_status choose(const ebpo_file *file, const ebpo_model_options *o, bo
 }
 
 /* By counts. */
-static void share(const ebpo_info *info, const ebpo_model_options *o, ebpo_model_plan *out)
+static void share_budget(const ebpo_info *info, const ebpo_model_options *o, ebpo_model_plan *out)
 {
     ebpo_slice_size size = whole_size(info);
     uint64_t taken;
@@ -299,9 +300,9 @@ ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *o, 
     least = least_budget(info, o);
     out->least = least < out->whole ? least : out->whole;
     out->budget = o->memory;
-    ebpo_status status = choose(file, o, default_memory, out, error);
+    ebpo_status status = choose_plan(file, o, default_memory, out, error);
     if (status == EBPO_OK && !out->resident)
-        share(info, o, out);
+        share_budget(info, o, out);
     return status;
 }
 

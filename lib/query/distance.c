@@ -117,7 +117,7 @@ typedef struct node_chain {
     ebpo_node child;
 } node_chain;
 
-static ebpo_status follow(ebpo_context *c, const uint32_t at[3], int level, node_chain *out,
+static ebpo_status follow_cells(ebpo_context *c, const uint32_t at[3], int level, node_chain *out,
                           ebpo_error *error)
 {
     int fine = c->model->info->level_count - 1;
@@ -190,7 +190,7 @@ static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
     if (!ebpo_locate(&box, c->model->info->level_count - 1, p, at))
         return EBPO_OK;
     node_chain chain;
-    ebpo_status status = follow(c, at, o->level, &chain, error);
+    ebpo_status status = follow_cells(c, at, o->level, &chain, error);
     if (status != EBPO_OK)
         return status;
     if (!c->cutting && !(c->cutting = ebpo_alloc(2, sizeof *c->cutting)))
@@ -253,7 +253,7 @@ static void look_ahead(ebpo_context *c, const double p[3], double reach)
         ebpo_context_prefetch(c, p, reach);
 }
 
-static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
+static ebpo_status exact_distance(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
                          ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_nearest n;
@@ -303,7 +303,7 @@ typedef struct interval {
     double lo, hi; /* distances, or a far point's keys */
 } interval;
 
-static ebpo_status narrow(interval *v, ebpo_node node, double lower, ebpo_error *error)
+static ebpo_status narrow_interval(interval *v, ebpo_node node, double lower, ebpo_error *error)
 {
     if (lower > v->hi || ebpo_node_is_uniform(&node))
         return EBPO_OK;
@@ -322,7 +322,7 @@ static ebpo_status narrow(interval *v, ebpo_node node, double lower, ebpo_error 
     int count = ebpo_rank_children(&v->ranking, &node, lower, v->hi, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
-        status = narrow(v, child[i].node, child[i].lower, error);
+        status = narrow_interval(v, child[i].node, child[i].lower, error);
     return status;
 }
 
@@ -337,7 +337,7 @@ static ebpo_status distance_interval(ebpo_context *context, const double p[3],
     ebpo_far_make(&v.far, &box, p);
     v.ranking = ebpo_ranking_of(context->model, p, &v.far);
     ebpo_status status =
-        narrow(&v, ebpo_model_root(context->model), ebpo_rank_root(&v.ranking), error);
+        narrow_interval(&v, ebpo_model_root(context->model), ebpo_rank_root(&v.ranking), error);
     *lo = fmin(v.lo, v.hi);
     *hi = v.hi;
     if (v.far.far) {
@@ -347,7 +347,7 @@ static ebpo_status distance_interval(ebpo_context *context, const double p[3],
     return status;
 }
 
-static ebpo_status limited(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
+static ebpo_status limited_distance(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
                            ebpo_distance_result *out, ebpo_error *error)
 {
     *out = (ebpo_distance_result){ NAN, 0, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
@@ -357,14 +357,14 @@ static ebpo_status limited(ebpo_context *c, const double p[3], const ebpo_distan
     return status;
 }
 
-static ebpo_status one(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
+static ebpo_status distance_of_point(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
                        ebpo_distance_result *out, ebpo_error *error)
 {
     if (o->mode == EBPO_DISTANCE_ENVELOPE)
         return distance_to_envelope(c, p, o, out, error);
     if (o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES)
         return distance_around(c, p, o, out, error);
-    return o->level >= 0 ? limited(c, p, o, out, error) : exact(c, p, o, out, error);
+    return o->level >= 0 ? limited_distance(c, p, o, out, error) : exact_distance(c, p, o, out, error);
 }
 
 /* Modes that cannot keep to a level or a deadline say so. */
@@ -426,7 +426,7 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
                          true);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         uint64_t k = batch.count ? ebpo_batch_next(&batch, i) : i;
-        status = one(context, points + 3 * k, o, &out[k], error);
+        status = distance_of_point(context, points + 3 * k, o, &out[k], error);
     }
     ebpo_batch_end(&batch);
     count_work(context, status == EBPO_OK ? count : 0, searched, loaded);

@@ -88,7 +88,7 @@ static int compare_slots(const void *a, const void *b)
 }
 
 /* Blocks are numbered in the order of their faces. */
-static ebpo_status gather(ebpo_box_walk *w, const ebpo_accel *s, ebpo_error *error)
+static ebpo_status gather_blocks(ebpo_box_walk *w, const ebpo_accel *s, ebpo_error *error)
 {
     float low[3], high[3];
     w->count = 0;
@@ -131,7 +131,7 @@ static void list_ahead(ebpo_box_walk *w, const ebpo_box *box, ebpo_node node)
 }
 
 /* Before a subtree is entered: with the first of each window those behind it. */
-static void announce(ebpo_box_walk *w)
+static void announce_window(ebpo_box_walk *w)
 {
     uint64_t at = w->entered++, left = at < w->ahead_count ? w->ahead_count - at : 0;
     if (at % EBPO_ANNOUNCED_MOST == 0 && left)
@@ -147,9 +147,9 @@ static ebpo_status gather_node(ebpo_box_walk *w, const ebpo_box *box, ebpo_node 
     ebpo_status status = EBPO_OK;
     if (ebpo_node_is_below(&node)) {
         w->below = node;
-        announce(w);
+        announce_window(w);
         status = ebpo_model_enter(w->context, &node, error);
-        return status == EBPO_OK ? gather(w, node.subtree, error) : status;
+        return status == EBPO_OK ? gather_blocks(w, node.subtree, error) : status;
     }
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK && !w->enough; octant++)
         status = gather_node(w, box, ebpo_model_child(w->context->model, &node, octant), error);
@@ -171,7 +171,7 @@ static ebpo_status box_walk_run(ebpo_box_walk *w, ebpo_error *error)
         list_ahead(w, &box, ebpo_model_root(m));
     w->no_memory = false;
     ebpo_status status =
-        m->whole ? gather(w, m->whole, error) : gather_node(w, &box, ebpo_model_root(m), error);
+        m->whole ? gather_blocks(w, m->whole, error) : gather_node(w, &box, ebpo_model_root(m), error);
     free(w->slot);
     free(w->ahead);
     w->slot = w->ahead = NULL;
@@ -250,7 +250,7 @@ static int compare_pairs(const void *a, const void *b)
     return (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-static ebpo_status finish(gathering *g, const uint64_t **faces, uint64_t *count, ebpo_error *error)
+static ebpo_status finish_faces(gathering *g, const uint64_t **faces, uint64_t *count, ebpo_error *error)
 {
     ebpo_context *c = g->walk.context;
     if (!ebpo_grow(&c->faces, &c->face_capacity, g->count, sizeof *c->faces))
@@ -279,7 +279,7 @@ ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const 
     if (status == EBPO_OK)
         status = box_walk_check(&g.walk, error);
     if (status == EBPO_OK)
-        status = finish(&g, faces, count, error);
+        status = finish_faces(&g, faces, count, error);
     free(g.list);
     return status;
 }

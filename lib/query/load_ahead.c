@@ -28,7 +28,7 @@ typedef struct looking {
     wanted list[EBPO_CACHE_AHEAD]; /* the nearest first */
 } looking;
 
-static void add(looking *l, uint64_t key, double lower)
+static void add_subtree(looking *l, uint64_t key, double lower)
 {
     unsigned at = l->count < EBPO_CACHE_AHEAD ? l->count++ : EBPO_CACHE_AHEAD - 1;
     for (; at > 0 && l->list[at - 1].lower > lower; at--)
@@ -38,25 +38,25 @@ static void add(looking *l, uint64_t key, double lower)
         l->limit = fmin(l->limit, l->list[EBPO_CACHE_AHEAD - 1].lower);
 }
 
-static void look(looking *l, ebpo_node node, double lower)
+static void look_around(looking *l, ebpo_node node, double lower)
 {
     if (lower > l->limit || ebpo_node_is_uniform(&node) || node.pruned)
         return;
     if (ebpo_node_is_below(&node)) {
-        add(l, ebpo_entry_value(node.entry), lower);
+        add_subtree(l, ebpo_entry_value(node.entry), lower);
         return;
     }
     ebpo_ranked child[8];
     int count = ebpo_rank_children(&l->ranking, &node, lower, l->limit, child);
     for (int i = 0; i < count; i++)
-        look(l, child[i].node, child[i].lower);
+        look_around(l, child[i].node, child[i].lower);
 }
 
 unsigned ebpo_subtrees_near(const ebpo_model *m, const double p[3], double limit,
                             uint64_t keys[EBPO_CACHE_AHEAD])
 {
     looking l = { .ranking = ebpo_ranking_of(m, p, NULL), .limit = limit };
-    look(&l, ebpo_model_root(m), ebpo_rank_root(&l.ranking));
+    look_around(&l, ebpo_model_root(m), ebpo_rank_root(&l.ranking));
     for (unsigned i = 0; i < l.count; i++)
         keys[i] = l.list[i].key;
     return l.count;
@@ -67,7 +67,7 @@ static double longest_side(const ebpo_box *box, int level)
     return ldexp(fmax(box->size[0], fmax(box->size[1], box->size[2])), -level);
 }
 
-static double apart(const double a[3], const double b[3])
+static double distance_apart(const double a[3], const double b[3])
 {
     return fmax(fabs(a[0] - b[0]), fmax(fabs(a[1] - b[1]), fabs(a[2] - b[2])));
 }
@@ -77,7 +77,7 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double reach)
     const ebpo_model *m = c->model;
     ebpo_box box = ebpo_model_box(m);
     double side = longest_side(&box, m->top->cut_level);
-    if (c->has_prefetched && apart(p, c->prefetched_from) < side / 4 &&
+    if (c->has_prefetched && distance_apart(p, c->prefetched_from) < side / 4 &&
         fabs(reach) <= c->prefetched_reach + side / 4)
         return;
     c->has_prefetched = true;
@@ -201,7 +201,7 @@ uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t c
 
 /* Points in no order are asked about along the curve also where everything is in memory: what one
  * reads the next one finds in the caches, and its answer is close. A path is in order already. */
-static bool scattered(const ebpo_box *box, const double *points, uint64_t count)
+static bool are_scattered(const ebpo_box *box, const double *points, uint64_t count)
 {
     const double far = 0x1p-5;
     double sum = 0;
@@ -221,7 +221,7 @@ void ebpo_batch_begin(ebpo_batch *b, ebpo_context *context, const double *points
     const ebpo_model *m = context->model;
     ebpo_box box = ebpo_model_box(m);
     *b = (ebpo_batch){ .context = context, .points = points, .count = count, .reach = reach };
-    if (m->whole && reach && scattered(&box, points, count))
+    if (m->whole && reach && are_scattered(&box, points, count))
         b->order = ebpo_curve_order(&box, points, count);
     if (m->whole || count < 2 || m->options.loading != EBPO_LOAD_CACHE)
         return;
@@ -256,7 +256,7 @@ static uint64_t home_of(const ebpo_batch *b, const double p[3])
                                                          : EBPO_NO_SUBTREE;
 }
 
-static void collect(ebpo_batch *b, uint64_t below)
+static void collect_subtree(ebpo_batch *b, uint64_t below)
 {
     if (below != EBPO_NO_SUBTREE &&
         !ebpo_cache_has(b->context->model->cache, ebpo_context_key(b->context, below)) &&
@@ -264,13 +264,13 @@ static void collect(ebpo_batch *b, uint64_t below)
         b->below[b->below_count++] = (uint32_t)below;
 }
 
-static void announce(ebpo_batch *b)
+static void announce_collected(ebpo_batch *b)
 {
     ebpo_context_announce(b->context, b->below, b->below_count);
     b->below_count = 0;
 }
 
-static const double *point(const ebpo_batch *b, uint64_t i)
+static const double *ordered_point(const ebpo_batch *b, uint64_t i)
 {
     return b->points + 3 * (b->order ? b->order[i] : i);
 }
@@ -281,11 +281,11 @@ static void tell_next(ebpo_batch *b)
     uint64_t begin = b->told;
     while (b->told < b->count && b->told - begin < POINTS_A_TIME &&
            b->below_count < SUBTREES_A_TIME) {
-        uint64_t before = b->below_count, home = home_of(b, point(b, b->told++));
+        uint64_t before = b->below_count, home = home_of(b, ordered_point(b, b->told++));
         if (before == 0 || b->below[before - 1] != home)
-            collect(b, home);
+            collect_subtree(b, home);
     }
-    announce(b);
+    announce_collected(b);
 }
 
 /* What else is near, as far as where a point begins tells: with these, nothing is left that would
@@ -295,7 +295,7 @@ static void search_around(ebpo_batch *b, uint64_t end)
 {
     ebpo_context *c = b->context;
     for (bool fails = false; b->searched < end && !fails; b->searched++) {
-        const double *p = point(b, b->searched);
+        const double *p = ordered_point(b, b->searched);
         uint64_t home = home_of(b, p), keys[EBPO_CACHE_AHEAD];
         ebpo_accel *accel;
         ebpo_nearest n;
@@ -308,9 +308,9 @@ static void search_around(ebpo_batch *b, uint64_t end)
         ebpo_nearest_search(&n, c, accel);
         unsigned count = ebpo_subtrees_near(c->model, p, fmin(n.upper, n.limit), keys);
         for (unsigned k = 0; k < count; k++)
-            collect(b, keys[k]);
+            collect_subtree(b, keys[k]);
     }
-    announce(b);
+    announce_collected(b);
 }
 
 uint64_t ebpo_batch_next(ebpo_batch *b, uint64_t i)

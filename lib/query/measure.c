@@ -92,21 +92,21 @@ static void scaled_corners(const pass *p, uint64_t face, double out[3][3])
 
 /* --- moments --- */
 
-static void accumulate(ebpo_pair *sum, ebpo_pair x) { *sum = ebpo_pair_add(*sum, x); }
+static void add_pair(ebpo_pair *sum, ebpo_pair x) { *sum = ebpo_pair_add(*sum, x); }
 
-static void merge(moments *sum, const moments *m)
+static void merge_moments(moments *sum, const moments *m)
 {
-    accumulate(&sum->area2, m->area2);
-    accumulate(&sum->volume6, m->volume6);
-    accumulate(&sum->integral6, m->integral6);
+    add_pair(&sum->area2, m->area2);
+    add_pair(&sum->volume6, m->volume6);
+    add_pair(&sum->integral6, m->integral6);
     for (int k = 0; k < 3; k++)
-        accumulate(&sum->first24[k], m->first24[k]);
+        add_pair(&sum->first24[k], m->first24[k]);
     for (int k = 0; k < 6; k++)
-        accumulate(&sum->second120[k], m->second120[k]);
+        add_pair(&sum->second120[k], m->second120[k]);
     sum->absolute6 += m->absolute6;
 }
 
-static double length(const ebpo_pair n[3])
+static double pair_length(const ebpo_pair n[3])
 {
     double largest = fmax(fabs(n[0].head), fmax(fabs(n[1].head), fabs(n[2].head)));
     if (largest == 0)
@@ -134,7 +134,7 @@ static ebpo_pair mixed_product(ebpo_pair r[3][3], const ebpo_pair s[3], int u, i
 {
     ebpo_pair sum = ebpo_pair_multiply(s[u], s[v]);
     for (int i = 0; i < 3; i++)
-        accumulate(&sum, ebpo_pair_multiply(r[i][u], r[i][v]));
+        add_pair(&sum, ebpo_pair_multiply(r[i][u], r[i][v]));
     return sum;
 }
 
@@ -142,22 +142,22 @@ static void add_face(moments *m, const double corner[3][3], const double middle[
 {
     ebpo_pair n[3], r[3][3], s[3], det = { 0, 0 };
     normal_of(corner, n);
-    accumulate(&m->area2, ebpo_pair_of(length(n)));
+    add_pair(&m->area2, ebpo_pair_of(pair_length(n)));
     for (int k = 0; k < 3; k++) {
         for (int i = 0; i < 3; i++)
             r[i][k] = ebpo_two_difference(corner[i][k], middle[k]);
         s[k] = ebpo_pair_add(ebpo_pair_add(r[0][k], r[1][k]), r[2][k]);
         ebpo_pair product = ebpo_pair_multiply(r[0][k], n[k]);
-        accumulate(&det, product);
+        add_pair(&det, product);
         m->absolute6 += fabs(product.head);
     }
-    accumulate(&m->integral6, det);
+    add_pair(&m->integral6, det);
     det = (ebpo_pair){ times * det.head, times * det.tail };
-    accumulate(&m->volume6, det);
+    add_pair(&m->volume6, det);
     for (int k = 0; k < 3; k++) {
-        accumulate(&m->first24[k], ebpo_pair_multiply(det, s[k]));
-        accumulate(&m->second120[k], ebpo_pair_multiply(det, mixed_product(r, s, k, k)));
-        accumulate(&m->second120[3 + k],
+        add_pair(&m->first24[k], ebpo_pair_multiply(det, s[k]));
+        add_pair(&m->second120[k], ebpo_pair_multiply(det, mixed_product(r, s, k, k)));
+        add_pair(&m->second120[3 + k],
                    ebpo_pair_multiply(det, mixed_product(r, s, (k + 1) % 3, (k + 2) % 3)));
     }
 }
@@ -246,7 +246,7 @@ static ebpo_status count_components(pass *p, const ebpo_solid_shells *s, ebpo_ru
 }
 
 /* Finds out whether the volume is known; then sets how often faces count. */
-static ebpo_status decide(pass *p, const ebpo_info *info, unsigned threads, ebpo_solid_shells *s,
+static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned threads, ebpo_solid_shells *s,
                           ebpo_solid_volume *volume, ebpo_error *error)
 {
     ebpo_shells shells;
@@ -308,7 +308,7 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
     read.threads = threads;
     status = ebpo_file_read_mesh(file, &read, &mesh, error);
     if (status == EBPO_OK)
-        status = decide(&p, info, threads, &shells, &volume, error);
+        status = decide_volume(&p, info, threads, &shells, &volume, error);
     if (status != EBPO_OK)
         goto done;
     block_count = mesh.face_count / BLOCK_FACES + (mesh.face_count % BLOCK_FACES != 0);
@@ -323,7 +323,7 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
     if (status != EBPO_OK)
         goto done;
     for (uint64_t b = 0; b < block_count; b++)
-        merge(&sum, &p.blocks[b]);
+        merge_moments(&sum, &p.blocks[b]);
     if (!p.component && volume.lo == volume.hi && sum.volume6.head < 0)
         count_inwards(&sum, info->rule);
     mass_of(&mass, &sum, &p.frame, info->solid);

@@ -151,8 +151,6 @@ ebpo_cache_pool *ebpo_budget_subtrees(const ebpo_budget *budget);
 ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *budget);
 
 uint64_t ebpo_budget_bytes(const ebpo_budget *budget);
-/* What is not taken for good. */
-uint64_t ebpo_budget_left(const ebpo_budget *budget);
 
 /* Takes bytes for a model that is all in memory, for as long as it lives. False: these take too
  * much, or there is no room. And what turned out not to be needed, or all of it, back. */

@@ -68,7 +68,7 @@ void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p
     n->block = n->first_block = EBPO_NO_BLOCK;
 }
 
-static void take(ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *bounds,
+static void take_face(ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *bounds,
                  const ebpo_far_keys *keys, uint64_t file_face, uint64_t source_face)
 {
     n->found = true;
@@ -88,7 +88,7 @@ static ebpo_far_keys keys_of(const ebpo_nearest *n, const double triangle[3][3])
 }
 
 /* Sign of what the face is farther than the nearest one so far; exact. */
-static int compare(const ebpo_nearest *n, const double triangle[3][3],
+static int compare_with_nearest(const ebpo_nearest *n, const double triangle[3][3],
                    const ebpo_distance_bounds *b, const ebpo_far_keys *keys)
 {
     if (keys->hi < n->keys.lo)
@@ -105,7 +105,7 @@ void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint6
     ebpo_far_keys keys = keys_of(n, triangle);
     ebpo_triangle_distance_bounds(n->p, (const double(*)[3])triangle, &b);
     if (b.lo <= n->limit && keys.lo <= n->key_limit)
-        take(n, triangle, &b, &keys, file_face, source_face);
+        take_face(n, triangle, &b, &keys, file_face, source_face);
 }
 
 /* True: it is the nearest so far. */
@@ -127,11 +127,11 @@ static bool try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
     if (b.lo > n->limit)
         return false;
     if (n->found) {
-        int sign = compare(n, (const double(*)[3])triangle, &b, &keys);
+        int sign = compare_with_nearest(n, (const double(*)[3])triangle, &b, &keys);
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return false;
     }
-    take(n, (const double(*)[3])triangle, &b, &keys, file_face, ebpo_accel_source_face(s, local));
+    take_face(n, (const double(*)[3])triangle, &b, &keys, file_face, ebpo_accel_source_face(s, local));
     return true;
 }
 
@@ -178,7 +178,7 @@ static float frame_limit(const ebpo_near_search *g)
 }
 
 /* Judges the candidates, the most promising first. */
-static void judge(ebpo_near_search *g)
+static void judge_waiting(ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;
     ebpo_near_drop_far(g);
@@ -216,7 +216,7 @@ static void give_up(const ebpo_near_search *g)
     }
 }
 
-static bool late(ebpo_near_search *g)
+static bool is_search_late(ebpo_near_search *g)
 {
     const ebpo_nearest *n = g->user;
     return ebpo_clock() > n->deadline;
@@ -225,8 +225,8 @@ static bool late(ebpo_near_search *g)
 static void search_near(ebpo_nearest *n, const ebpo_nearest_kernels *kernels, ebpo_near_search *g)
 {
     g->user = n;
-    g->judge = judge;
-    g->late = n->deadline ? late : NULL;
+    g->judge = judge_waiting;
+    g->late = n->deadline ? is_search_late : NULL;
     g->count = 0;
     g->first_block = n->first_block;
     g->first_node = n->first_node;
@@ -234,7 +234,26 @@ static void search_near(ebpo_nearest *n, const ebpo_nearest_kernels *kernels, eb
     kernels->walk(g);
     if (g->top)
         give_up(g);
-    judge(g);
+    judge_waiting(g);
+}
+
+/* --- in double precision --- */
+
+static void try_block(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
+{
+    for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
+        try_face(n, s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
+}
+
+/* Takes the lane with the least lower bound from `left`, which is not empty. */
+static int take_nearest_lane(unsigned *left, const double lower[8])
+{
+    int best = __builtin_ctz(*left);
+    for (int lane = best + 1; lane < 8; lane++)
+        if (*left >> lane & 1 && lower[lane] < lower[best])
+            best = lane;
+    *left &= ~(1u << best);
+    return best;
 }
 
 /* --- far from the model: by keys --- */
@@ -265,20 +284,14 @@ static void search_by_keys(const far_search *g, uint32_t child)
 {
     ebpo_nearest *n = g->n;
     if (child & EBPO_IS_BLOCK) {
-        for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
-            try_face(n, g->s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
+        try_block(n, g->s, child);
         return;
     }
     double lower[8];
     unsigned left = far_children(g, child, lower);
     while (left) {
-        int best = __builtin_ctz(left);
-        for (int lane = best + 1; lane < 8; lane++)
-            if (left >> lane & 1 && lower[lane] < lower[best])
-                best = lane;
-        left &= ~(1u << best);
-        if (n->late || (n->deadline && ebpo_clock() > n->deadline)) {
-            n->late = true;
+        int best = take_nearest_lane(&left, lower);
+        if (ebpo_nearest_is_late(n)) {
             ebpo_nearest_pass_over(n, lower[best]);
         } else if (lower[best] <= n->key_limit) {
             search_by_keys(g, g->s->bound[child].child[best]);
@@ -311,8 +324,7 @@ static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, c
 static void search_far(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
 {
     if (child & EBPO_IS_BLOCK) {
-        for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
-            try_face(n, s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
+        try_block(n, s, child);
         return;
     }
     const ebpo_bound *b = &s->bound[child];
@@ -323,14 +335,9 @@ static void search_far(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
         left |= 1u << lane;
     }
     while (left) {
-        int best = __builtin_ctz(left);
-        for (int lane = best + 1; lane < 8; lane++)
-            if (left >> lane & 1 && lower[lane] < lower[best])
-                best = lane;
-        left &= ~(1u << best);
-        if (n->late || (n->deadline && ebpo_clock() > n->deadline)) {
-            n->late = true;
-            n->passed_over = fmin(n->passed_over, lower[best]);
+        int best = take_nearest_lane(&left, lower);
+        if (ebpo_nearest_is_late(n)) {
+            ebpo_nearest_pass_over(n, lower[best]);
         } else if (lower[best] <= n->limit) {
             search_far(n, s, b->child[best]);
         }

@@ -2,6 +2,7 @@
 #ifndef EBPO_QUERY_NEAREST_H
 #define EBPO_QUERY_NEAREST_H
 
+#include "core/clock.h"
 #include "geometry/distance.h"
 #include "query/query_node.h"
 
@@ -46,6 +47,12 @@ static inline void ebpo_nearest_pass_over(ebpo_nearest *n, double lower)
     n->passed_over = distance < n->passed_over ? distance : n->passed_over;
 }
 
+/* True from the first time on that the deadline is found to have passed. */
+static inline bool ebpo_nearest_is_late(ebpo_nearest *n)
+{
+    return n->late = n->late || (n->deadline && ebpo_clock() > n->deadline);
+}
+
 /* Begins with a face of the model that is known from before. */
 void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face,
                              uint64_t source_face);
@@ -88,11 +95,6 @@ void ebpo_deep_bounds_make(ebpo_model *model);
 /* A question has loaded so many subtrees of which nothing was known. Makes them when it is time.
  * Any thread. */
 void ebpo_deep_bounds_tell(ebpo_model *model, unsigned loaded);
-
-/* A certain lower bound, not less than `lower`, for what is of the solid's surface in the cell of a
- * node of the cut level; what is beyond `limit` is not told apart. Any thread. */
-double ebpo_deep_bound(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
-                       double limit);
 
 /* The nearest face of a model: all of it, or subtree by subtree, the nearest first. */
 

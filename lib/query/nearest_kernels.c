@@ -82,11 +82,11 @@ EBPO_EIGHT f8 three_dot(three a, three b)
 {
     return f8_add(f8_add(f8_mul(a.x, b.x), f8_mul(a.y, b.y)), f8_mul(a.z, b.z));
 }
-EBPO_EIGHT f8 minor(f8 a, f8 b, f8 c, f8 d) { return f8_sub(f8_mul(a, d), f8_mul(b, c)); }
+EBPO_EIGHT f8 minor_of_four(f8 a, f8 b, f8 c, f8 d) { return f8_sub(f8_mul(a, d), f8_mul(b, c)); }
 EBPO_EIGHT three three_cross(three a, three b)
 {
-    return (three){ minor(a.y, a.z, b.y, b.z), minor(a.z, a.x, b.z, b.x),
-                    minor(a.x, a.y, b.x, b.y) };
+    return (three){ minor_of_four(a.y, a.z, b.y, b.z), minor_of_four(a.z, a.x, b.z, b.x),
+                    minor_of_four(a.x, a.y, b.x, b.y) };
 }
 /* At least the length. */
 EBPO_EIGHT f8 three_size(three a) { return f8_add(f8_add(f8_abs(a.x), f8_abs(a.y)), f8_abs(a.z)); }

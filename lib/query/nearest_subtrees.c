@@ -13,7 +13,7 @@
 #include "query/nearest.h"
 
 /* A heap. */
-static bool before(const ebpo_ranked *a, const ebpo_ranked *b)
+static bool comes_out_before(const ebpo_ranked *a, const ebpo_ranked *b)
 {
     return a->lower != b->lower ? a->lower < b->lower : a->node.entry < b->node.entry;
 }
@@ -23,7 +23,7 @@ ebpo_status ebpo_queue_push(ebpo_context *c, const ebpo_ranked *r, ebpo_error *e
     if (!ebpo_grow(&c->queue, &c->queue_capacity, c->queue_count + 1, sizeof *c->queue))
         return ebpo_fail_memory(error, (c->queue_count + 1) * sizeof *c->queue);
     uint64_t at = c->queue_count++;
-    for (; at > 0 && before(r, &c->queue[(at - 1) / 2]); at = (at - 1) / 2)
+    for (; at > 0 && comes_out_before(r, &c->queue[(at - 1) / 2]); at = (at - 1) / 2)
         c->queue[at] = c->queue[(at - 1) / 2];
     c->queue[at] = *r;
     return EBPO_OK;
@@ -34,9 +34,9 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *c)
     ebpo_ranked first = c->queue[0], last = c->queue[--c->queue_count];
     uint64_t at = 0, count = c->queue_count;
     for (uint64_t child = 1; child < count; child = 2 * at + 1) {
-        if (child + 1 < count && before(&c->queue[child + 1], &c->queue[child]))
+        if (child + 1 < count && comes_out_before(&c->queue[child + 1], &c->queue[child]))
             child++;
-        if (!before(&c->queue[child], &last))
+        if (!comes_out_before(&c->queue[child], &last))
             break;
         c->queue[at] = c->queue[child];
         at = child;
@@ -108,7 +108,7 @@ static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
 }
 
 /* Those that may be nearer than the best, the nearest first. */
-static int rank(const deep_search *g, uint32_t gray, ebpo_cell cell, double parent,
+static int rank_deep_children(const deep_search *g, uint32_t gray, ebpo_cell cell, double parent,
                 deep_child out[8])
 {
     int count = 0;
@@ -130,18 +130,20 @@ static int rank(const deep_search *g, uint32_t gray, ebpo_cell cell, double pare
     return count;
 }
 
-static void search(deep_search *g, uint32_t gray, ebpo_cell cell, double parent)
+static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double parent)
 {
     deep_child child[8];
-    int count = rank(g, gray, cell, parent, child);
+    int count = rank_deep_children(g, gray, cell, parent, child);
     for (int i = 0; i < count && child[i].lower < g->best; i++)
         if (ebpo_entry_kind_of(child[i].entry) == EBPO_ENTRY_GRAY)
-            search(g, child[i].entry, child[i].cell, child[i].lower);
+            search_deep(g, child[i].entry, child[i].cell, child[i].lower);
         else
             g->best = child[i].lower;
 }
 
-double ebpo_deep_bound(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
+/* A certain lower bound, not less than `lower`, for what is of the solid's surface in the cell of a
+ * node of the cut level; what is beyond `limit` is not told apart. Any thread. */
+static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
                        double limit)
 {
     const ebpo_model *m = ranking->model;
@@ -155,7 +157,7 @@ double ebpo_deep_bound(const ebpo_ranking *ranking, const ebpo_node *node, doubl
     if (d.level < level || ebpo_entry_kind_of(d.entry) != EBPO_ENTRY_GRAY)
         return lower;
     deep_search g = { top, ranking, nextafter(limit, INFINITY) };
-    search(&g, d.entry, node->cell, lower);
+    search_deep(&g, d.entry, node->cell, lower);
     return fmax(lower, g.best);
 }
 
@@ -174,7 +176,7 @@ typedef struct searching {
     unsigned new_loads; /* of subtrees of which nothing was known */
 } searching;
 
-static ebpo_status add(searching *g, const ebpo_ranked *r, ebpo_error *error)
+static ebpo_status add_node(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_nearest *n = g->n;
     if (r->lower > ebpo_nearest_limit(n) || ebpo_node_is_uniform(&r->node) ||
@@ -197,7 +199,7 @@ static ebpo_status add_children(searching *g, const ebpo_ranked *r, ebpo_error *
         ebpo_rank_children(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n), child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
-        status = add(g, &child[i], error);
+        status = add_node(g, &child[i], error);
     return status;
 }
 
@@ -325,7 +327,7 @@ static bool is_known(owners *o, uint32_t below, ebpo_error *error)
     return ebpo_skeletons_find(o->g->c->model->skeletons, below) != NULL;
 }
 
-static bool consider(owners *o, uint32_t below, ebpo_error *error)
+static bool consider_owner(owners *o, uint32_t below, ebpo_error *error)
 {
     o->status = consider_own(o->g, below, o->lower, error);
     return o->status == EBPO_OK;
@@ -371,7 +373,7 @@ static bool consider_owners(searching *g, const ebpo_skeleton *k, const ebpo_ran
                  .status = EBPO_OK };
     if (!visit_all(&o, box, count, error))
         return false;
-    o.visit = consider;
+    o.visit = consider_owner;
     visit_all(&o, box, count, error);
     *status = o.status;
     return true;
@@ -379,7 +381,7 @@ static bool consider_owners(searching *g, const ebpo_skeleton *k, const ebpo_ran
 
 static double deep_bound(const searching *g, const ebpo_ranked *r)
 {
-    return ebpo_deep_bound(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n));
+    return bound_below_cut(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n));
 }
 
 /* Nothing has been kept of it: it is searched, but after what is nearer than it can be. */
@@ -392,7 +394,7 @@ static ebpo_status look_at_new(searching *g, const ebpo_ranked *r, ebpo_error *e
                                 : search_below(g, r->node, error);
 }
 
-static ebpo_status look(searching *g, const ebpo_ranked *r, ebpo_error *error)
+static ebpo_status look_at_subtree(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     uint32_t below = ebpo_entry_value(r->node.entry);
     const ebpo_skeleton *k = ebpo_skeletons_find(g->c->model->skeletons, below);
@@ -426,11 +428,6 @@ static ebpo_status look_at_outer(searching *g, const ebpo_ranked *r, ebpo_error 
     return search_below(g, r->node, error);
 }
 
-static bool is_past_deadline(ebpo_nearest *n)
-{
-    return n->late = n->late || (n->deadline && ebpo_clock() > n->deadline);
-}
-
 static ebpo_status search_parts(searching *g, ebpo_error *error)
 {
     ebpo_nearest *n = g->n;
@@ -438,19 +435,19 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
     ebpo_ranked root = { ebpo_model_root(m), n->far.far ? -INFINITY : 0, NODE };
     ebpo_status status = begin_question(g->c, error);
     if (status == EBPO_OK)
-        status = add(g, &root, error);
+        status = add_node(g, &root, error);
     while (status == EBPO_OK && g->c->queue_count) {
         ebpo_ranked next = ebpo_queue_pop(g->c);
         if (next.lower > ebpo_nearest_limit(n))
             break;
-        if (is_past_deadline(n)) {
+        if (ebpo_nearest_is_late(n)) {
             ebpo_nearest_pass_over(n, next.lower);
             break;
         }
         status = !ebpo_node_is_below(&next.node) ? add_children(g, &next, error)
                  : next.what == OWN              ? search_below(g, next.node, error)
                  : next.what == OUTER            ? look_at_outer(g, &next, error)
-                                                 : look(g, &next, error);
+                                                 : look_at_subtree(g, &next, error);
     }
     ebpo_deep_bounds_tell(g->c->model, g->new_loads);
     return status;

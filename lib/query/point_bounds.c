@@ -19,7 +19,7 @@ static void cell_size(const ebpo_box *box, ebpo_cell cell, double low[3], double
 }
 
 /* sqrt(x0^2 + x1^2 + x2^2) without overflow, right to a few ulp. */
-static double length3(const double x[3])
+static double scaled_length(const double x[3])
 {
     double most = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
     if (!(most > 0) || isinf(most))
@@ -32,7 +32,7 @@ double ebpo_cell_diagonal(const ebpo_box *box, ebpo_cell cell)
 {
     double low[3], size[3];
     cell_size(box, cell, low, size);
-    return length3(size) * (1 + near_share);
+    return scaled_length(size) * (1 + near_share);
 }
 
 /* Value of a half-space at p, 4096 n . xi - d, and a bound on its error. */
@@ -75,7 +75,7 @@ double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_
         xi[k] = (p[k] - low[k]) / size[k];
         d[k] = fmax(fmax(low[k] - p[k], p[k] - (low[k] + size[k])), 0);
     }
-    double best = length3(d) * (1 - 0x1p-48);
+    double best = scaled_length(d) * (1 - 0x1p-48);
     for (uint32_t i = 0; i < count && !(best > enough); i++) {
         int32_t n[3];
         double error, value = plane_value(xi, codes[i], n, &error);
@@ -83,7 +83,7 @@ double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_
             continue;
         double gradient[3] = { 4096.0 * n[0] / size[0], 4096.0 * n[1] / size[1],
                                4096.0 * n[2] / size[2] };
-        double length = length3(gradient), distance = (value - error) / length * (1 - 0x1p-48);
+        double length = scaled_length(gradient), distance = (value - error) / length * (1 - 0x1p-48);
         if (length > 0 && isfinite(length) && distance > best)
             best = distance;
     }
@@ -96,7 +96,7 @@ double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3])
     cell_size(box, cell, low, size);
     for (int k = 0; k < 3; k++)
         d[k] = fmax(fabs(p[k] - low[k]), fabs(p[k] - (low[k] + size[k])));
-    return length3(d) * (1 + 0x1p-40) + length3(size) * near_share;
+    return scaled_length(d) * (1 + 0x1p-40) + scaled_length(size) * near_share;
 }
 
 /* In sizes of the model's box. */
@@ -167,25 +167,25 @@ double ebpo_far_upper(const ebpo_far *f, double key) { return distance_of(f, key
 
 /* --- places --- */
 
-static double place(const ebpo_far *f, double x, int axis)
+static double place_on_axis(const ebpo_far *f, double x, int axis)
 {
     return (x - f->centre[axis]) * f->unit[0] * f->unit[1];
 }
 
 /* Where h y^2 - u y is least. */
-static double apex(double half, double toward)
+static double apex_of_square(double half, double toward)
 {
     return half > 0 ? toward / (2 * half) : toward > 0 ? INFINITY : -INFINITY;
 }
 
 /* Its least from `low` to `high`. */
-static inline double least(double half, double toward, double at, double low, double high)
+static inline double least_between(double half, double toward, double at, double low, double high)
 {
     double y = at < low ? low : at > high ? high : at;
     return (half * y - toward) * y;
 }
 
-static double height(const ebpo_far *f, const double y[3])
+static double height_of(const ebpo_far *f, const double y[3])
 {
     double sum = 0;
     for (int k = 0; k < 3; k++)
@@ -208,7 +208,7 @@ static placed_cell cell_place(const ebpo_far *f, const ebpo_box *box, ebpo_cell 
 {
     placed_cell out = { .most = 0 };
     for (int k = 0; k < 3; k++) {
-        out.low[k] = place(f, ebpo_wall(box, k, cell.level, cell.at[k]), k);
+        out.low[k] = place_on_axis(f, ebpo_wall(box, k, cell.level, cell.at[k]), k);
         out.size[k] = box->size[k] * f->unit[0] * f->unit[1] / (double)(1u << cell.level);
         out.most = fmax(out.most, fabs(out.low[k]) + out.size[k]);
     }
@@ -236,7 +236,7 @@ static double cut_bound(const ebpo_far *f, const placed_cell *c, const double gr
     for (int k = 0; k < 3; k++) {
         double low = c->low[k], high = c->low[k] + c->size[k], tilt = share * gradient[k];
         double toward = f->toward[k] - tilt;
-        sum += least(f->half, toward, apex(f->half, toward), low, high);
+        sum += least_between(f->half, toward, apex_of_square(f->half, toward), low, high);
         size += (fabs(f->toward[k]) + fabs(tilt)) * (fabs(low) + fabs(high)) +
                 share * fabs(gradient[k] * low);
     }
@@ -278,7 +278,7 @@ ebpo_far_frame ebpo_far_frame_of(const ebpo_far *f, const double centre[3], doub
     ebpo_far_frame g = { .ratio = f->unit[0] / scale * f->unit[1] };
     double most = g.ratio * reach;
     for (int k = 0; k < 3; k++) {
-        g.offset[k] = place(f, centre[k], k);
+        g.offset[k] = place_on_axis(f, centre[k], k);
         most = fmax(most, fabs(g.offset[k]) + g.ratio * reach);
     }
     g.margin = margin_of(f, 2 * most);
@@ -292,9 +292,9 @@ void ebpo_far_boxes(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound
         lower[lane] = -g->margin;
     for (int k = 0; k < 3; k++) {
         double origin = g->offset[k] + g->ratio * (double)b->origin[k],
-               step = g->ratio * (double)b->step[k], at = apex(f->half, f->toward[k]);
+               step = g->ratio * (double)b->step[k], at = apex_of_square(f->half, f->toward[k]);
         for (int lane = 0; lane < b->count; lane++)
-            lower[lane] += least(f->half, f->toward[k], at, origin + step * b->low[k][lane],
+            lower[lane] += least_between(f->half, f->toward[k], at, origin + step * b->low[k][lane],
                                  origin + step * b->high[k][lane]);
     }
 }
@@ -316,7 +316,7 @@ double ebpo_far_slab(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_boun
     }
     double aside = sqrt(fmax(square - along * along, 0) + 0x1p-46 * (1 + square));
     double ahead = fmax(along * s.from, along * s.to);
-    return height(f, y) - (ahead + aside * s.radius) * g->ratio - g->margin;
+    return height_of(f, y) - (ahead + aside * s.radius) * g->ratio - g->margin;
 }
 
 /* --- faces --- */
@@ -329,10 +329,10 @@ ebpo_far_keys ebpo_far_face(const ebpo_far *f, const double triangle[3][3])
     int best = 0;
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) {
-            y[i][k] = place(f, triangle[i][k], k);
+            y[i][k] = place_on_axis(f, triangle[i][k], k);
             most = fmax(most, fabs(y[i][k]));
         }
-        key[i] = height(f, (const double *)y[i]);
+        key[i] = height_of(f, (const double *)y[i]);
         best = key[i] < key[best] ? i : best;
     }
     double margin = margin_of(f, most), low = key[best];

@@ -133,7 +133,6 @@ bool ebpo_kept_envelopes_get(const ebpo_kept_envelopes *kept, ebpo_cell cell, eb
 /* Keeps it, in the place of another. *kept begins as NULL; without memory nothing is kept. */
 void ebpo_kept_envelopes_put(ebpo_kept_envelopes **kept, ebpo_cell cell,
                              const ebpo_polytope *envelope);
-void ebpo_kept_envelopes_free(ebpo_kept_envelopes *kept);
 
 /* Checks that all questions begin with. */
 

@@ -24,7 +24,8 @@ ebpo_node ebpo_accel_child(const ebpo_accel *s, const ebpo_node *gray, unsigned 
                    ebpo_cell_child(gray->cell, octant));
 }
 
-const uint32_t *ebpo_accel_planes(const ebpo_accel *s, const ebpo_node *node, unsigned *count)
+/* Codes of a gray node's planes, where the subtree has kept them. */
+static const uint32_t *accel_planes(const ebpo_accel *s, const ebpo_node *node, unsigned *count)
 {
     uint32_t number = ebpo_entry_value(node->entry);
     *count = 0;
@@ -48,7 +49,7 @@ static ebpo_status copy_accel_planes(void *holder, const ebpo_node *node, uint32
                           unsigned *count, ebpo_error *error)
 {
     (void)error;
-    const uint32_t *from = ebpo_accel_planes(holder, node, count);
+    const uint32_t *from = accel_planes(holder, node, count);
     if (*count)
         memcpy(codes, from, *count * sizeof *codes);
     return EBPO_OK;
@@ -111,7 +112,7 @@ const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node
     bool below = ebpo_node_is_below(node);
     *count = 0;
     if (node->subtree)
-        return ebpo_accel_planes(node->subtree, node, count);
+        return accel_planes(node->subtree, node, count);
     if (!below && node->type != EBPO_GRAY)
         return NULL;
     ebpo_top_planes planes = below ? model->top->below_planes[value] : model->top->gray[value];
@@ -202,7 +203,7 @@ static ebpo_status copy_model_planes(void *holder, const ebpo_node *node, uint32
 const ebpo_node_source ebpo_context_source = { model_children, copy_model_planes, uniform_winding };
 
 /* What the file was cut to, in words. */
-static void describe(const ebpo_info *info, char *out, size_t capacity)
+static void describe_cut(const ebpo_info *info, char *out, size_t capacity)
 {
     const double *b = info->kept_box;
     size_t used = 0;
@@ -226,7 +227,7 @@ ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error
 {
     char cut[200];
     ebpo_box box = ebpo_model_box(model);
-    describe(model->info, cut, sizeof cut);
+    describe_cut(model->info, cut, sizeof cut);
     return ebpo_fail(error, EBPO_E_ABSENT,
                      "%.120s: this needs nodes left out below level %d at %.6g %.6g %.6g (%s); ask "
                      "with a level, or make a larger part of the original with "
@@ -243,7 +244,7 @@ typedef struct checking {
     ebpo_box box;
 } checking;
 
-static ebpo_status check(const checking *k, ebpo_node node, ebpo_error *error)
+static ebpo_status check_below(const checking *k, ebpo_node node, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     if (ebpo_node_is_uniform(&node) || node.type != EBPO_GRAY ||
@@ -252,7 +253,7 @@ static ebpo_status check(const checking *k, ebpo_node node, ebpo_error *error)
     if (ebpo_node_is_below(&node)) /* fails for pruned ones */
         status = ebpo_model_enter(k->context, &node, error);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
-        status = check(k, ebpo_model_child(k->context->model, &node, octant), error);
+        status = check_below(k, ebpo_model_child(k->context->model, &node, octant), error);
     return status;
 }
 
@@ -262,5 +263,5 @@ ebpo_status ebpo_check_pruned(ebpo_context *context, ebpo_matters_fn matters, vo
     if (!context->model->info->pruned)
         return EBPO_OK;
     checking k = { context, matters, user, ebpo_model_box(context->model) };
-    return check(&k, ebpo_model_root(context->model), error);
+    return check_below(&k, ebpo_model_root(context->model), error);
 }

@@ -56,7 +56,7 @@ static void near_band_begin(ebpo_near_band *band, uint64_t most)
 
 /* --- order --- */
 
-static int compare(const void *x, const void *y)
+static int compare_faces(const void *x, const void *y)
 {
     const ebpo_near *a = x, *b = y;
     if (a->file_face == b->file_face)
@@ -72,7 +72,7 @@ static void near_band_settle(ebpo_near_band *band)
 {
     uint64_t kept = 0;
     if (band->count)
-        qsort(band->near, band->count, sizeof *band->near, compare);
+        qsort(band->near, band->count, sizeof *band->near, compare_faces);
     for (uint64_t i = 0; i < band->count; i++)
         if (kept == 0 || band->near[i].file_face != band->near[kept - 1].file_face)
             band->near[kept++] = band->near[i];
@@ -86,7 +86,7 @@ static void near_band_settle(ebpo_near_band *band)
 /* --- faces --- */
 
 /* Sorting is put off until there are about twice as many as wanted. */
-static void add(ebpo_near_band *band, const ebpo_near *face)
+static void add_face(ebpo_near_band *band, const ebpo_near *face)
 {
     enum { SPARE_LEAST = 64 };
     uint64_t spare = band->most < SPARE_LEAST ? SPARE_LEAST : band->most;
@@ -111,13 +111,13 @@ static void try_face(ebpo_near_band *band, const ebpo_accel *s, uint32_t slot)
     face.p = band->p;
     face.file_face = ebpo_accel_file_face(s, local);
     face.source_face = ebpo_accel_source_face(s, local);
-    if (band->has_after && compare(&face, &band->after) <= 0)
+    if (band->has_after && compare_faces(&face, &band->after) <= 0)
         return;
     if (face.bounds.hi > band->radius &&
         ebpo_triangle_distance_compare_to(band->p, (const double(*)[3])face.triangle,
                                           band->radius) > 0)
         return;
-    add(band, &face);
+    add_face(band, &face);
 }
 
 /* --- the hierarchy --- */
@@ -129,7 +129,7 @@ typedef struct searching {
 } searching;
 
 /* Where exact arithmetic might be finite, this is. */
-static double length3(const double x[3])
+static double length_of_positive(const double x[3])
 {
     double most = fmax(x[0], fmax(x[1], x[2]));
     if (!(most > 0))
@@ -152,11 +152,11 @@ static void box_bounds(const searching *g, const ebpo_bound *b, int lane, double
         far[k] = fmax(fabs(low - p[k]), fabs(p[k] - high));
     }
     /* a difference that overflows may have been finite before rounding */
-    *lower = fmin(fmax(length3(near) - g->error, 0), 0x1p1022);
-    *upper = length3(far) + g->error;
+    *lower = fmin(fmax(length_of_positive(near) - g->error, 0), 0x1p1022);
+    *upper = length_of_positive(far) + g->error;
 }
 
-static void search(const searching *g, uint32_t child)
+static void search_child(const searching *g, uint32_t child)
 {
     ebpo_near_band *band = g->band;
     if (child & EBPO_IS_BLOCK) {
@@ -177,7 +177,7 @@ static void search(const searching *g, uint32_t child)
         order[at] = lane;
     }
     for (int i = 0; i < count && lower[order[i]] <= band->limit; i++)
-        search(g, b->child[order[i]]);
+        search_child(g, b->child[order[i]]);
 }
 
 /* Adds what the subtree has of it. Faces may come again in another subtree. */
@@ -189,7 +189,7 @@ static void near_band_search(ebpo_near_band *band, const ebpo_accel *s)
         size += fabs(band->p[k]) * 0x1p-46 + fabs(s->centre[k]) * 0x1p-46;
     g.error = size;
     if (s->bound_count)
-        search(&g, s->top);
+        search_child(&g, s->top);
 }
 
 /* The nearest faces of a point, one after the other. */
@@ -234,7 +234,7 @@ static double known_bound(const within *w, uint32_t below)
 }
 
 /* What a subset has left out is looked at when the band is known. */
-static ebpo_status put(within *w, const ebpo_box *box, const ebpo_ranked *r, ebpo_error *error)
+static ebpo_status put_node(within *w, const ebpo_box *box, const ebpo_ranked *r, ebpo_error *error)
 {
     if (ebpo_node_is_uniform(&r->node) || r->node.pruned || r->lower > w->band.limit ||
         ebpo_near_band_is_past(&w->band, ebpo_cell_far(box, r->node.cell, w->band.p)))
@@ -247,7 +247,7 @@ static ebpo_status put(within *w, const ebpo_box *box, const ebpo_ranked *r, ebp
 }
 
 /* Before a subtree is entered: with the first of each window some of those behind it. */
-static void announce(within *w, const ebpo_ranked *next)
+static void announce_window(within *w, const ebpo_ranked *next)
 {
     const ebpo_context *c = w->context;
     uint32_t below[EBPO_ANNOUNCED_MOST];
@@ -270,7 +270,7 @@ static ebpo_status search_below(within *w, ebpo_ranked *r, ebpo_error *error)
         near_band_settle(&w->band);
     if (r->lower > w->band.limit)
         return EBPO_OK;
-    announce(w, r);
+    announce_window(w, r);
     ebpo_status status = ebpo_model_enter(w->context, &r->node, error);
     if (status == EBPO_OK)
         near_band_search(&w->band, r->node.subtree);
@@ -285,7 +285,7 @@ static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranke
     int count = ebpo_rank_children(&ranking, &r->node, r->lower, w->band.limit, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
-        status = put(w, box, &child[i], error);
+        status = put_node(w, box, &child[i], error);
     return status;
 }
 
@@ -295,7 +295,7 @@ static ebpo_status search_parts(within *w, ebpo_error *error)
     ebpo_box box = ebpo_model_box(c->model);
     ebpo_ranked root = { ebpo_model_root(c->model), 0, 0 };
     c->queue_count = 0;
-    ebpo_status status = put(w, &box, &root, error);
+    ebpo_status status = put_node(w, &box, &root, error);
     while (status == EBPO_OK && c->queue_count) {
         ebpo_ranked r = ebpo_queue_pop(c);
         if (r.lower > w->band.limit)
@@ -334,7 +334,7 @@ static ebpo_status search_band(within *w, uint64_t most, ebpo_error *error)
 }
 
 /* False: enough. */
-static bool give(within *w, const ebpo_near *n)
+static bool give_face(within *w, const ebpo_near *n)
 {
     ebpo_triangle_nearest exact;
     ebpo_near_face out = { .normal = { NAN, NAN, NAN },
@@ -351,7 +351,7 @@ static bool give(within *w, const ebpo_near *n)
 static bool give_band(within *w)
 {
     for (uint64_t i = 0; i < w->band.count; i++)
-        if (!give(w, &w->band.near[i]))
+        if (!give_face(w, &w->band.near[i]))
             return false;
     if (!w->band.cut)
         return false;
@@ -360,7 +360,7 @@ static bool give_band(within *w)
     return true;
 }
 
-static ebpo_status stream(within *w, ebpo_error *error)
+static ebpo_status stream_faces(within *w, ebpo_error *error)
 {
     uint64_t wanted = w->options->most ? w->options->most : UINT64_MAX,
              most = w->options->most ? BAND_MOST : FIRST_BAND;
@@ -395,7 +395,7 @@ ebpo_status ebpo_distance_within(ebpo_context *context, const double point[3],
     memcpy(w.band.p, point, sizeof w.band.p);
     w.band.radius = wanted.radius;
     w.ahead = lists_ahead(&w);
-    status = stream(&w, error);
+    status = stream_faces(&w, error);
     free(w.band.near);
     return status;
 }

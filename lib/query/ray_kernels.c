@@ -140,7 +140,7 @@ typedef struct edges {
     f8 u, v, w, least, most, error;
 } edges;
 
-EBPO_EIGHT f8 area(f8 ax, f8 ay, f8 bx, f8 by) { return f8_sub(f8_mul(ax, by), f8_mul(ay, bx)); }
+EBPO_EIGHT f8 signed_area(f8 ax, f8 ay, f8 bx, f8 by) { return f8_sub(f8_mul(ax, by), f8_mul(ay, bx)); }
 
 EBPO_EIGHT edges ray_edges(const seen *a, f8 size_z)
 {
@@ -149,9 +149,9 @@ EBPO_EIGHT edges ray_edges(const seen *a, f8 size_z)
     for (int i = 0; i < 3; i++)
         size = f8_add(size, f8_add(f8_abs(a->x[i]), f8_abs(a->y[i])));
     f8 wide = f8_add(f8_add(size_z, size_z), size);
-    e.u = area(a->x[2], a->y[2], a->x[1], a->y[1]);
-    e.v = area(a->x[0], a->y[0], a->x[2], a->y[2]);
-    e.w = area(a->x[1], a->y[1], a->x[0], a->y[0]);
+    e.u = signed_area(a->x[2], a->y[2], a->x[1], a->y[1]);
+    e.v = signed_area(a->x[0], a->y[0], a->x[2], a->y[2]);
+    e.w = signed_area(a->x[1], a->y[1], a->x[0], a->y[0]);
     e.least = f8_min3(e.u, e.v, e.w);
     e.most = f8_max3(e.u, e.v, e.w);
     e.error = f8_mul(f8_add(size, f8_mul(wide, f8_all(0x1p-21f))), f8_mul(wide, f8_all(0x1p-22f)));

@@ -90,7 +90,7 @@ static void lower_bound(ebpo_ray_search *r)
 /* --- the ray in the frame --- */
 
 /* Not fmax, which is a call. */
-static inline double greater(double a, double b) { return a > b ? a : b; }
+static inline double greater_of(double a, double b) { return a > b ? a : b; }
 
 /* A direction whose longest coordinate is out of the ordinary is scaled by a power of two. That
  * takes the processor a while before anything else can begin: most directions are left as they are.
@@ -111,10 +111,10 @@ static double to_frame(ebpo_ray_search *r)
     double longest = 0, most = 0;
     for (int k = 0; k < 3; k++) {
         r->direction[k] = r->ray->direction[k];
-        longest = greater(longest, fabs(r->direction[k]));
+        longest = greater_of(longest, fabs(r->direction[k]));
         r->from[k] = r->ray->origin[k];
         r->origin[k] = (r->ray->origin[k] - s->centre[k]) * s->scale;
-        most = greater(most, fabs(r->origin[k]));
+        most = greater_of(most, fabs(r->origin[k]));
     }
     r->limit_scale = s->scale;
     if (!(longest >= 0x1p-12 && longest <= 0x1p12))
@@ -126,7 +126,7 @@ static double to_frame(ebpo_ray_search *r)
 /* Where the ray comes to the cube of `reach` around all faces, somewhat before; false: nowhere.
  * Rounding is far below what the cube is widened by as long as the origin is not so far away that
  * the ray is blurred to the cube's size; then it stays where it is. */
-static bool entry(const ebpo_ray_search *r, double reach, double *t)
+static bool enters_cube(const ebpo_ray_search *r, double reach, double *t)
 {
     double from = 0, to = INFINITY;
     for (int k = 0; k < 3; k++) {
@@ -148,7 +148,7 @@ static bool move_origin(ebpo_ray_search *r, double *most)
 {
     const ebpo_accel *s = r->s;
     double t;
-    if (!entry(r, s->reach, &t))
+    if (!enters_cube(r, s->reach, &t))
         return false;
     r->moved = t;
     *most = 0;
@@ -157,7 +157,7 @@ static bool move_origin(ebpo_ray_search *r, double *most)
                   step = ebpo_two_product(t, r->direction[k]);
         from = (ebpo_pair){ from.head * s->scale, from.tail * s->scale };
         r->origin[k] = ebpo_pair_add(from, step).head;
-        *most = greater(*most, fabs(r->origin[k]));
+        *most = greater_of(*most, fabs(r->origin[k]));
         r->from[k] = s->centre[k] + r->origin[k] / s->scale;
     }
     return true;
@@ -181,7 +181,7 @@ static void set_error(ebpo_ray_search *r, double most)
 /* --- candidates --- */
 
 /* The nearest first, where that may spare others. */
-static void judge(ebpo_ray_search *r)
+static void judge_waiting(ebpo_ray_search *r)
 {
     while (r->count && !r->done) {
         int first = 0;
@@ -203,7 +203,7 @@ static void judge(ebpo_ray_search *r)
 static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels, const ebpo_accel *s)
 {
     r->s = s;
-    r->judge = judge;
+    r->judge = judge_waiting;
     r->count = 0;
     r->done = r->met = false;
     if (s->bound_count == 0)
@@ -217,7 +217,7 @@ static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels
     lower_bound(r);
     kernels->walk(r);
     if (r->count)
-        judge(r);
+        judge_waiting(r);
 }
 
 /* Whether the ray meets m->triangle, and from a side that counts; then m->meeting says where.
@@ -343,7 +343,7 @@ static bool meets_slabs(const double origin[3], const double direction[3], doubl
     return from <= to;
 }
 
-static void decide(ebpo_ray_search *r, uint32_t slot, int facing)
+static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
 {
     ebpo_casting *c = r->user;
     ebpo_met m;
@@ -366,7 +366,7 @@ static void cast_subtree(ebpo_casting *c, const ebpo_accel *s)
     r.wants = c->wants;
     r.facing = c->sides == EBPO_RAY_BOTH ? 0 : c->sides == EBPO_RAY_FRONT ? 1 : -1;
     r.limit = c->limit;
-    r.decide = decide;
+    r.decide = decide_face;
     r.user = c;
     ray_search_accel(&r, c->context->model->kernels.ray, s);
     if (r.met) { /* only where any hit was wanted */
@@ -432,7 +432,7 @@ static ebpo_status ray_walk(ebpo_casting *c, ebpo_error *error)
 
 /* One ray: what it meets first, whether it meets anything, all that it meets. */
 
-static ebpo_status cast(ebpo_casting *c, ebpo_context *context, const double origin[3],
+static ebpo_status cast_ray(ebpo_casting *c, ebpo_context *context, const double origin[3],
                         const double direction[3], double t_max, ebpo_ray_wants wants,
                         ebpo_error *error)
 {
@@ -449,7 +449,7 @@ ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3], const 
 {
     EBPO_DEFAULT_FP;
     ebpo_casting c;
-    ebpo_status status = cast(&c, context, origin, direction, t_max, EBPO_WANTS_FIRST, error);
+    ebpo_status status = cast_ray(&c, context, origin, direction, t_max, EBPO_WANTS_FIRST, error);
     *hit = status == EBPO_OK && c.count;
     if (*hit)
         *out = hit_of(&c.first);
@@ -461,7 +461,7 @@ ebpo_status ebpo_ray_any(ebpo_context *context, const double origin[3], const do
 {
     EBPO_DEFAULT_FP;
     ebpo_casting c;
-    ebpo_status status = cast(&c, context, origin, direction, t_max, EBPO_WANTS_ANY, error);
+    ebpo_status status = cast_ray(&c, context, origin, direction, t_max, EBPO_WANTS_ANY, error);
     *any = status == EBPO_OK && c.count;
     return status;
 }
@@ -475,7 +475,7 @@ ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const do
     uint64_t end;
     *hits = NULL;
     *count = 0;
-    ebpo_status status = cast(&c, context, origin, direction, t_max, EBPO_WANTS_ALL, error);
+    ebpo_status status = cast_ray(&c, context, origin, direction, t_max, EBPO_WANTS_ALL, error);
     if (status == EBPO_OK)
         status = casting_sort(&c, 0, &end, error);
     if (status == EBPO_OK && end) {
@@ -515,7 +515,7 @@ typedef struct batch {
 
 /* --- one ray --- */
 
-static ebpo_status answer(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
+static ebpo_status answer_ray(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
 {
     ebpo_casting c;
     const ebpo_ray *r = &b->rays[i];
@@ -547,7 +547,7 @@ static ebpo_status answer_piece(void *user, uint64_t begin, uint64_t end, unsign
         ebpo_batch_begin(&along, b->context[worker], b->entry + 3 * begin, end - begin, false);
     for (uint64_t i = 0; i < end - begin && status == EBPO_OK; i++) {
         uint64_t k = begin + (b->order ? ebpo_batch_next(&along, i) : i);
-        status = answer(b, b->order ? b->order[k] : k, worker, error);
+        status = answer_ray(b, b->order ? b->order[k] : k, worker, error);
     }
     ebpo_batch_end(&along);
     return status;
@@ -619,7 +619,7 @@ static ebpo_status make_contexts(batch *b, ebpo_context *own, ebpo_error *error)
     return status;
 }
 
-static void clear(batch *b)
+static void clear_batch(batch *b)
 {
     for (unsigned i = 1; b->context && i < b->threads; i++)
         ebpo_context_free(b->context[i]);
@@ -663,7 +663,7 @@ ebpo_status ebpo_ray_first_many(ebpo_context *context, const ebpo_ray *rays, uin
     EBPO_DEFAULT_FP;
     batch b = { .rays = rays, .count = count, .wants = EBPO_WANTS_FIRST, .first = out };
     ebpo_status status = answer_all(&b, context, options, error);
-    clear(&b);
+    clear_batch(&b);
     return status;
 }
 
@@ -673,12 +673,12 @@ ebpo_status ebpo_ray_any_many(ebpo_context *context, const ebpo_ray *rays, uint6
     EBPO_DEFAULT_FP;
     batch b = { .rays = rays, .count = count, .wants = EBPO_WANTS_ANY, .any = any };
     ebpo_status status = answer_all(&b, context, options, error);
-    clear(&b);
+    clear_batch(&b);
     return status;
 }
 
 /* Puts the hits together in the order of the rays, in the caller's context. */
-static ebpo_status gather(const batch *b, ebpo_context *context, ebpo_error *error)
+static ebpo_status gather_hits(const batch *b, ebpo_context *context, ebpo_error *error)
 {
     uint64_t total = 0;
     if (!ebpo_grow(&context->hit_begin, &context->hit_begin_capacity, b->count + 1,
@@ -716,11 +716,11 @@ ebpo_status ebpo_ray_all_many(ebpo_context *context, const ebpo_ray *rays, uint6
     ebpo_status status = b.all ? answer_all(&b, context, options, error)
                                : ebpo_fail_memory(error, count * sizeof *b.all);
     if (status == EBPO_OK)
-        status = gather(&b, context, error);
+        status = gather_hits(&b, context, error);
     if (status == EBPO_OK) {
         *hits = context->hits;
         *begin = context->hit_begin;
     }
-    clear(&b);
+    clear_batch(&b);
     return status;
 }

@@ -60,7 +60,7 @@ static void keep_child(ebpo_skeleton *k, const ebpo_accel *s, uint32_t *place)
     __atomic_store_n(place, IS_KEPT | number, __ATOMIC_RELEASE);
 }
 
-static double diagonal2(const ebpo_bound *b, int lane)
+static double squared_diagonal(const ebpo_bound *b, int lane)
 {
     double sum = 0;
     for (int k = 0; k < 3; k++) {
@@ -109,7 +109,7 @@ static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t outer_e
         for (int lane = 0; lane < b->count; lane++) {
             bool leads_on =
                 !(b->child[lane] & (IS_KEPT | EBPO_IS_BLOCK)) && (number || k->own >> lane & 1);
-            double size = leads_on ? diagonal2(b, lane) : -1;
+            double size = leads_on ? squared_diagonal(b, lane) : -1;
             if (size > most) {
                 most = size;
                 place = &b->child[lane];

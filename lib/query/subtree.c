@@ -450,7 +450,7 @@ static ebpo_status derive_planes(ebpo_subtree *s, uint64_t leaf, uint32_t codes[
 
 /* --- all of a node --- */
 
-static ebpo_status describe(ebpo_subtree *s, uint64_t number, bool polygons, ebpo_subtree_node *out,
+static ebpo_status describe_node(ebpo_subtree *s, uint64_t number, bool polygons, ebpo_subtree_node *out,
                             ebpo_error *error)
 {
     uint64_t octcode = s->octcodes[number];
@@ -494,7 +494,7 @@ ebpo_status ebpo_subtree_get_node(ebpo_subtree *s, uint64_t number, bool polygon
                          number, s->node_count);
     if (!s->scratch && !(s->scratch = ebpo_alloc_zero(1, sizeof *s->scratch)))
         return ebpo_fail_memory(error, sizeof *s->scratch);
-    status = describe(s, number, polygons, &node, error);
+    status = describe_node(s, number, polygons, &node, error);
     return status == EBPO_OK ? EBPO_GIVE(ebpo_subtree_node, out, &node) : status;
 }
 
@@ -602,7 +602,7 @@ static uint64_t least_memory(uint64_t bytes)
 }
 
 /* Of a slice, what is made of it, and what is needed on the way: a bound, from counts. */
-static uint64_t bound(const ebpo_slice_size *size, const ebpo_info *info, bool whole, bool corners)
+static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, bool whole, bool corners)
 {
     enum {
         NODE = 32,      /* octcode, type, winding, children, planes, list; winding in the slice */
@@ -658,11 +658,11 @@ static ebpo_status check_memory(const ebpo_subtree *s, ebpo_chunks *chunks, uint
         return status;
     ebpo_slice_size lists = size;
     lists.outer = lists.new_faces = 0;
-    uint64_t least = least_memory(bound(&size, info, whole, corners));
+    uint64_t least = least_memory(bound_bytes(&size, info, whole, corners));
     if (least > o->memory && size.outer &&
-        least_memory(bound(&lists, info, whole, corners)) <= o->memory) {
+        least_memory(bound_bytes(&lists, info, whole, corners)) <= o->memory) {
         status = count_outer(s, chunks, &size.outer, error);
-        least = least_memory(bound(&size, info, whole, corners));
+        least = least_memory(bound_bytes(&size, info, whole, corners));
     }
     if (status != EBPO_OK || least <= o->memory)
         return status;
@@ -691,7 +691,7 @@ static uint32_t choose_needs(ebpo_subtree *s, const ebpo_subtree_options *o, uin
     return has | EBPO_NEEDS_ALWAYS | EBPO_NEEDS_SOLID;
 }
 
-static ebpo_status fill(ebpo_subtree *s, ebpo_chunks *chunks, ebpo_cursor *c,
+static ebpo_status fill_arrays(ebpo_subtree *s, ebpo_chunks *chunks, ebpo_cursor *c,
                         const ebpo_subtree_options *o, ebpo_error *error)
 {
     ebpo_slice slice;
@@ -721,7 +721,7 @@ static ebpo_status open_below(ebpo_subtree *s, ebpo_chunks *chunks, uint64_t oct
     ebpo_status status = find_node(chunks, octcode, o->or_leaf_above, c, error);
     if (status == EBPO_OK) {
         s->root = *ebpo_cursor_node(c);
-        status = fill(s, chunks, c, o, error);
+        status = fill_arrays(s, chunks, c, o, error);
     }
     free(c);
     return status;
