@@ -204,7 +204,7 @@ typedef struct ebpo_accel {
     uint64_t units;
     uint32_t face_count;
     double centre[3], scale;
-    float turn_error; /* query/kernels.inc, of blocks of floats */
+    float turn_error; /* query/inside_kernels.c, of blocks of floats */
     double reach;     /* no coordinate of a decoded box is greater, in the frame; 1 at least */
     ebpo_bound *bound;
     ebpo_bound_slab *slab; /* [bound_count] */
@@ -267,7 +267,7 @@ void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *i
 uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info,
                                uint64_t subtrees);
 
-/* --- its nodes (accel_nodes.c); `entry` is what finds them --- */
+/* --- its nodes (query_node.c); `entry` is what finds them --- */
 
 ebpo_node ebpo_accel_root(const ebpo_accel *subtree);
 /* Child of a gray node that is not pruned. */

@@ -1,4 +1,13 @@
-/* A subtree from its slice, stage by stage, and how much memory that takes. */
+/* Makes an accel, the acceleration structure of a subtree (accel.h), from the subtree's slice of
+ * the file, and says how much memory that takes.
+ *
+ * The stages, each in a file: which faces share a block and how blocks hang together (blocks.c),
+ * the blocks' bounds (block_bounds.c), child tables and leaf records (here); what leaves are like
+ * is found out later (leaf_kinds.c).
+ *
+ * Memory is estimated from counts, before anything is read. Only blocks, the hierarchy over them
+ * and what lies across a subtree's border are bounded by what ordinary models have;
+ * ebpo_accel_make_within and ebpo_slice_read_within refuse what has more. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -170,7 +179,8 @@ static uint64_t peak_bytes(const told *t, const found *f)
              late = t->nodes + t->list, after = t->nodes + t->list + t->planes + t->rows,
              kept = kept_bytes(t, f) - after,
              read = t->levels + t->mesh + t->outer + t->maps + t->only_read;
-    uint64_t made = t->levels + kept + greater_of(greater_of(early, extents), late + t->slots) + layout;
+    uint64_t made =
+        t->levels + kept + greater_of(greater_of(early, extents), late + t->slots) + layout;
     return greater_of(greater_of(read, made), t->levels + kept + after) + t->beside;
 }
 
@@ -224,8 +234,8 @@ ebpo_status ebpo_accel_fits(ebpo_room *room, const ebpo_accel_plan *plan, uint64
     counts c = counts_of_slice(plan->slice, plan->with_planes);
     told t = told_by(&c, plan->info);
     t.only_read = 0; /* it has been read */
-    found f =
-        layout ? (found){ layout->block_count, layout->bound_count, units } : usual_model(&c, plan->info);
+    found f = layout ? (found){ layout->block_count, layout->bound_count, units }
+                     : usual_model(&c, plan->info);
     uint64_t peak = peak_bytes(&t, &f);
     ebpo_room all = { .most = room->most };
     ebpo_status status = ebpo_room_check(&all, peak, error);
@@ -392,8 +402,8 @@ static void trim_list(ebpo_accel *s)
 }
 
 /* Child tables and leaf records with their lists of blocks (one walk). */
-static ebpo_status accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice, const ebpo_layout *layout,
-                                  ebpo_error *error)
+static ebpo_status accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
+                                    const ebpo_layout *layout, ebpo_error *error)
 {
     walk w = { .s = s, .slice = slice, .status = EBPO_OK, .error = error };
     uint32_t *slot_of = NULL;
@@ -488,8 +498,8 @@ static uint64_t count_bytes(const ebpo_accel *s)
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
-static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info *info, ebpo_room *room,
-                        unsigned threads, ebpo_error *error)
+static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info *info,
+                               ebpo_room *room, unsigned threads, ebpo_error *error)
 {
     ebpo_layout layout;
     ebpo_accel_plan plan = { info, slice, s->has_planes, NULL };

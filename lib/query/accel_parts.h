@@ -57,7 +57,9 @@ EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layou
 ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_most);
 void ebpo_leaf_kinds_free(ebpo_leaf_kinds *kinds);
 
-/* What is measured of blocks of floats, eight vertices at a time: compiled for any processor and
+/* --- kernels (block_measure_kernels.c) ---
+ *
+ * What is measured of blocks of floats, eight vertices at a time: compiled for any processor and
  * for those with AVX2, the same operations in the same order. How far off it may be:
  * docs/develop/bounds.md, "How slabs are measured". */
 

@@ -1,6 +1,9 @@
-/* Boxes and round slabs around the blocks below each child. All in doubles, in the subtree's frame,
- * then rounded outward to 8 and 16 bits. docs/develop/bounds.md proves that what is read from them
- * in single precision still bounds. */
+/* Bounds of the hierarchy over faces: boxes and bounding cylinders around the blocks below each
+ * child.
+ *
+ * All bounds are computed in doubles, in the subtree's frame, then rounded outward to 8 and 16
+ * bits. Blocks of floats are measured by kernels (block_measure_kernels.c). docs/develop/bounds.md
+ * proves that what kernels read from these bounds in single precision still bounds. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -224,7 +227,7 @@ static double reach_of(const ebpo_bound *b)
     double reach = 0;
     for (int k = 0; k < 3; k++)
         reach = larger_of(reach, larger_of(fabs((double)b->origin[k]),
-                                     fabs((double)b->origin[k] + 255 * (double)b->step[k])));
+                                           fabs((double)b->origin[k] + 255 * (double)b->step[k])));
     return reach;
 }
 

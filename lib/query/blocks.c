@@ -1,6 +1,11 @@
-/* Which faces share a block, and how the blocks hang together. The octree is the hierarchy's
- * skeleton: a node's new faces are one range of numbers, so neighbouring children with few faces
- * share a block, and nodes with few blocks are passed up until eight come together. */
+/* Blocks: at most eight faces, with the vertices that they share.
+ *
+ * The layout decides which faces share a block and how the blocks hang together; it computes
+ * nothing from coordinates. The octree is the skeleton of the hierarchy: a node's new faces are one
+ * range of numbers, so neighbouring children with few faces share a block, and nodes with few
+ * blocks are passed up until eight come together. The blocks are then measured, numbered and filled
+ * in parallel; their bounds are made in block_bounds.c. The encoding is that of ebpo_meshlet
+ * (accel.h). */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -253,7 +258,7 @@ void ebpo_layout_free(ebpo_layout *layout)
     memset(layout, 0, sizeof *layout);
 }
 
-/* Faces, up to eight together, with the vertices that they share. */
+/* --- blocks --- */
 
 /* Which of a block's vertices, in the order in which its faces have them: [face][corner]. */
 typedef struct found {
@@ -328,7 +333,7 @@ static uint32_t size_of(const ebpo_accel *s, unsigned vertices)
 }
 
 static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                           ebpo_error *error)
+                                  ebpo_error *error)
 {
     (void)worker;
     (void)error;
@@ -388,7 +393,7 @@ static void set_coordinates(const job *j, const shared *v, ebpo_meshlet *m)
 }
 
 static ebpo_status fill_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                        ebpo_error *error)
+                               ebpo_error *error)
 {
     (void)worker;
     (void)error;
@@ -436,8 +441,8 @@ ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, e
                              ? EBPO_OK
                              : ebpo_fail_memory(error, layout->block_count * sizeof *j.found);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, measure_blocks, &j, NULL,
-                                   "open", error);
+        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, measure_blocks, &j,
+                                   NULL, "open", error);
     if (status == EBPO_OK && !number_blocks(s, layout))
         status = ebpo_fail(error, EBPO_E_LIMIT,
                            "the model has too many faces to be held at once; give a memory budget");
@@ -446,8 +451,8 @@ ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, e
     if (status == EBPO_OK)
         status = make_room(s, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill_blocks, &j, NULL, "open",
-                                   error);
+        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill_blocks, &j, NULL,
+                                   "open", error);
     free(j.found);
     return status;
 }

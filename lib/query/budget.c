@@ -1,3 +1,12 @@
+/* Budgets: how much memory a model may take, and for what.
+ *
+ * A model is held in memory as a whole if the budget allows it. Otherwise the budget is shared by
+ * the top of the tree (query_top.c), a cache of decoded chunks, skeletons (skeleton.c) and a cache
+ * of subtrees, and the cut level is chosen so that subtrees are small enough. All of this is
+ * planned from the counts in the file's head, before anything is read.
+ *
+ * Several models may share a budget: what each takes for good is taken from it, and their caches
+ * share the rest. A shared budget may be used by any thread. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -146,7 +155,7 @@ void ebpo_budget_give_back_skeletons(ebpo_budget *b, uint64_t bytes)
     (void)pthread_mutex_unlock(&b->lock);
 }
 
-/* Which levels stay. */
+/* --- the plan of a model --- */
 
 /* Of a cache: a path needs the subtree where it is, those around, and room to load the next. More
  * of them, smaller ones, are faster to load. */
@@ -245,8 +254,8 @@ static ebpo_status choose_parts(const ebpo_info *info, const ebpo_model_options 
     return EBPO_OK;
 }
 
-static ebpo_status choose_plan(const ebpo_file *file, const ebpo_model_options *o, bool default_memory,
-                          ebpo_model_plan *out, ebpo_error *error)
+static ebpo_status choose_plan(const ebpo_file *file, const ebpo_model_options *o,
+                               bool default_memory, ebpo_model_plan *out, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     int deepest = info->level_count - 1;

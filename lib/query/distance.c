@@ -1,3 +1,11 @@
+/* Distance to the surface, nearest point and normal: EBP 2017, 4.4.
+ *
+ * The exact minimum comes from nearest_subtrees.c. The modes of the thesis, which are not always
+ * the minimum, look at the leaf around the point, at all leaves below the deepest gray node around
+ * it, or at the envelope of a node. With a level a query returns an interval that the envelopes of
+ * that level's nodes prove; when a deadline passes, one that follows from what was searched by
+ * then. In a subset a query fails with EBPO_E_ABSENT when an omitted face might be nearer than what
+ * was found. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,7 +24,7 @@
 #include "query/query_model.h"
 #include "query/query_node.h"
 
-/* The distances of EBP 2017, section 4.4, which are not always the minimum. */
+/* --- distances that are not always the minimum --- */
 
 static const ebpo_distance_result nothing = { INFINITY,          0,           INFINITY,
                                               { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
@@ -43,8 +51,9 @@ static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_node node, 
 
 /* Of the leaf around p; where there is none: nothing (LEAVES), or of all leaves below the deepest
  * gray node around p (RECURSIVE). */
-static ebpo_status distance_around(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
-                                 ebpo_distance_result *out, ebpo_error *error)
+static ebpo_status distance_around(ebpo_context *c, const double p[3],
+                                   const ebpo_distance_options *o, ebpo_distance_result *out,
+                                   ebpo_error *error)
 {
     ebpo_box box = ebpo_model_box(c->model);
     uint32_t at[3];
@@ -118,7 +127,7 @@ typedef struct node_chain {
 } node_chain;
 
 static ebpo_status follow_cells(ebpo_context *c, const uint32_t at[3], int level, node_chain *out,
-                          ebpo_error *error)
+                                ebpo_error *error)
 {
     int fine = c->model->info->level_count - 1;
     ebpo_node node = ebpo_model_root(c->model);
@@ -181,8 +190,8 @@ static int cut_envelope(ebpo_context *c, const node_chain *chain)
 
 /* To the polygons of the envelope of the deepest gray node around p, at most at options->level. */
 static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
-                                      const ebpo_distance_options *o, ebpo_distance_result *out,
-                                      ebpo_error *error)
+                                        const ebpo_distance_options *o, ebpo_distance_result *out,
+                                        ebpo_error *error)
 {
     ebpo_box box = ebpo_model_box(c->model);
     uint32_t at[3];
@@ -203,8 +212,6 @@ static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
     out->hi = INFINITY;
     return EBPO_OK;
 }
-
-/* Distance, nearest point and normal: EBP 2017, 4.4. */
 
 /* --- subsets: when a face that was left out may be nearer than what was found --- */
 
@@ -253,8 +260,9 @@ static void look_ahead(ebpo_context *c, const double p[3], double reach)
         ebpo_context_prefetch(c, p, reach);
 }
 
-static ebpo_status exact_distance(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
-                         ebpo_distance_result *out, ebpo_error *error)
+static ebpo_status exact_distance(ebpo_context *c, const double p[3],
+                                  const ebpo_distance_options *o, ebpo_distance_result *out,
+                                  ebpo_error *error)
 {
     ebpo_nearest n;
     ebpo_nearest_begin(&n, c->model, p, o->max_distance);
@@ -327,8 +335,8 @@ static ebpo_status narrow_interval(interval *v, ebpo_node node, double lower, eb
 }
 
 static ebpo_status distance_interval(ebpo_context *context, const double p[3],
-                                   const ebpo_distance_options *options, double *lo, double *hi,
-                                   ebpo_error *error)
+                                     const ebpo_distance_options *options, double *lo, double *hi,
+                                     ebpo_error *error)
 {
     interval v = { .c = context, .o = options, .lo = INFINITY, .hi = INFINITY };
     if (options->deadline_ns)
@@ -347,8 +355,9 @@ static ebpo_status distance_interval(ebpo_context *context, const double p[3],
     return status;
 }
 
-static ebpo_status limited_distance(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
-                           ebpo_distance_result *out, ebpo_error *error)
+static ebpo_status limited_distance(ebpo_context *c, const double p[3],
+                                    const ebpo_distance_options *o, ebpo_distance_result *out,
+                                    ebpo_error *error)
 {
     *out = (ebpo_distance_result){ NAN, 0, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
     ebpo_status status = distance_interval(c, p, o, &out->lo, &out->hi, error);
@@ -357,14 +366,16 @@ static ebpo_status limited_distance(ebpo_context *c, const double p[3], const eb
     return status;
 }
 
-static ebpo_status distance_of_point(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
-                       ebpo_distance_result *out, ebpo_error *error)
+static ebpo_status distance_of_point(ebpo_context *c, const double p[3],
+                                     const ebpo_distance_options *o, ebpo_distance_result *out,
+                                     ebpo_error *error)
 {
     if (o->mode == EBPO_DISTANCE_ENVELOPE)
         return distance_to_envelope(c, p, o, out, error);
     if (o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES)
         return distance_around(c, p, o, out, error);
-    return o->level >= 0 ? limited_distance(c, p, o, out, error) : exact_distance(c, p, o, out, error);
+    return o->level >= 0 ? limited_distance(c, p, o, out, error)
+                         : exact_distance(c, p, o, out, error);
 }
 
 /* Modes that cannot keep to a level or a deadline say so. */

@@ -1,3 +1,10 @@
+/* The faces that meet a box: their numbers, or their triangles block by block.
+ *
+ * The walk goes through the tree depth first, from accel to accel; in each it tests the
+ * boxes of children, in a way that drops only what is certainly outside, then triangles exactly. Of
+ * files far away the walk announces the subtrees that it will enter. A face that several subtrees
+ * list is reported once, for the first of them. In a subset the query fails when an omitted node
+ * meets the box. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -12,11 +19,8 @@
 #include "query/query_model.h"
 #include "query/query_node.h"
 
-/* The faces in a box, accel by accel. */
-
-typedef struct ebpo_box_walk ebpo_box_walk;
-
-struct ebpo_box_walk {
+typedef struct box_walk box_walk;
+struct box_walk {
     ebpo_context *context;
     const double *min, *max;
     /* In the accel at hand, the faces that meet the box: their slots, ascending, which is the order
@@ -29,7 +33,7 @@ struct ebpo_box_walk {
     uint32_t *ahead;
     uint64_t ahead_count, ahead_capacity, entered;
     /* Called for each accel that the box meets, depth first; *enough ends the walk. */
-    ebpo_status (*take)(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *error);
+    ebpo_status (*take)(box_walk *walk, const ebpo_accel *s, ebpo_error *error);
 };
 
 /* EBPO_E_ARGUMENT: no box. */
@@ -44,7 +48,7 @@ static ebpo_status check_box(const double min[3], const double max[3], ebpo_erro
 
 /* --- in one accel --- */
 
-static void try_block(ebpo_box_walk *w, const ebpo_accel *s, uint32_t block)
+static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
 {
     for (uint32_t lane = 0; lane < EBPO_BLOCK && !w->no_memory; lane++) {
         uint32_t slot = block * EBPO_BLOCK + lane;
@@ -62,8 +66,8 @@ static void try_block(ebpo_box_walk *w, const ebpo_accel *s, uint32_t block)
 
 /* low, high: the box in the frame. Boxes of the hierarchy are wider than their faces by more than
  * what floats lose here. */
-static void gather_bound(ebpo_box_walk *w, const ebpo_accel *s, const float low[3],
-                         const float high[3], uint32_t child)
+static void gather_bound(box_walk *w, const ebpo_accel *s, const float low[3], const float high[3],
+                         uint32_t child)
 {
     if (child & EBPO_IS_BLOCK) {
         try_block(w, s, child & ~EBPO_IS_BLOCK);
@@ -88,7 +92,7 @@ static int compare_slots(const void *a, const void *b)
 }
 
 /* Blocks are numbered in the order of their faces. */
-static ebpo_status gather_blocks(ebpo_box_walk *w, const ebpo_accel *s, ebpo_error *error)
+static ebpo_status gather_blocks(box_walk *w, const ebpo_accel *s, ebpo_error *error)
 {
     float low[3], high[3];
     w->count = 0;
@@ -110,12 +114,12 @@ static ebpo_status gather_blocks(ebpo_box_walk *w, const ebpo_accel *s, ebpo_err
 
 static bool box_matters(void *user, const ebpo_box *box, const ebpo_node *node)
 {
-    const ebpo_box_walk *w = user;
+    const box_walk *w = user;
     return ebpo_cell_meets(box, node->cell, w->min, w->max);
 }
 
 /* Without memory for it, subtrees are announced as they are entered. */
-static void list_ahead(ebpo_box_walk *w, const ebpo_box *box, ebpo_node node)
+static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
 {
     if (ebpo_node_is_uniform(&node) || !box_matters(w, box, &node) || w->no_memory)
         return;
@@ -131,7 +135,7 @@ static void list_ahead(ebpo_box_walk *w, const ebpo_box *box, ebpo_node node)
 }
 
 /* Before a subtree is entered: with the first of each window those behind it. */
-static void announce_window(ebpo_box_walk *w)
+static void announce_window(box_walk *w)
 {
     uint64_t at = w->entered++, left = at < w->ahead_count ? w->ahead_count - at : 0;
     if (at % EBPO_ANNOUNCED_MOST == 0 && left)
@@ -139,8 +143,7 @@ static void announce_window(ebpo_box_walk *w)
                               left < EBPO_ANNOUNCED_MOST ? left : EBPO_ANNOUNCED_MOST);
 }
 
-static ebpo_status gather_node(ebpo_box_walk *w, const ebpo_box *box, ebpo_node node,
-                               ebpo_error *error)
+static ebpo_status gather_node(box_walk *w, const ebpo_box *box, ebpo_node node, ebpo_error *error)
 {
     if (ebpo_node_is_uniform(&node) || !box_matters(w, box, &node))
         return EBPO_OK;
@@ -157,21 +160,21 @@ static ebpo_status gather_node(ebpo_box_walk *w, const ebpo_box *box, ebpo_node 
 }
 
 /* EBPO_E_ABSENT: what a subset has left out meets the box. */
-static ebpo_status box_walk_check(ebpo_box_walk *w, ebpo_error *error)
+static ebpo_status box_walk_check(box_walk *w, ebpo_error *error)
 {
     return ebpo_check_pruned(w->context, box_matters, w, error);
 }
 
 /* The whole walk. The list of slots is freed. */
-static ebpo_status box_walk_run(ebpo_box_walk *w, ebpo_error *error)
+static ebpo_status box_walk_run(box_walk *w, ebpo_error *error)
 {
     const ebpo_model *m = w->context->model;
     ebpo_box box = ebpo_model_box(m);
     if (!m->whole && m->options.loading == EBPO_LOAD_CACHE && ebpo_input_expects(&m->file->in))
         list_ahead(w, &box, ebpo_model_root(m));
     w->no_memory = false;
-    ebpo_status status =
-        m->whole ? gather_blocks(w, m->whole, error) : gather_node(w, &box, ebpo_model_root(m), error);
+    ebpo_status status = m->whole ? gather_blocks(w, m->whole, error)
+                                  : gather_node(w, &box, ebpo_model_root(m), error);
     free(w->slot);
     free(w->ahead);
     w->slot = w->ahead = NULL;
@@ -190,7 +193,7 @@ static bool touches_cell(const ebpo_box *box, const ebpo_node *node, const doubl
 /* Accels list the faces that touch the cells in whose place they stand, and some that only pass by
  * (format-spec, section 5). So of those whose cell the face touches, one is the first, depth first:
  * no list of what has been seen is needed, however much that is. */
-static bool find_first(const ebpo_box_walk *w, const ebpo_box *box, ebpo_node node,
+static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)
 {
     if (ebpo_node_is_uniform(&node) || !ebpo_cell_meets(box, node.cell, w->min, w->max) ||
@@ -206,7 +209,7 @@ static bool find_first(const ebpo_box_walk *w, const ebpo_box *box, ebpo_node no
 
 /* The triangle, which meets the box, is to be taken in the accel at hand and in no other, so that a
  * walk that takes it where this is true takes each once. `own`: the accel has it as its own. */
-static bool box_walk_is_first(const ebpo_box_walk *w, bool own, const double triangle[3][3])
+static bool box_walk_is_first(const box_walk *w, bool own, const double triangle[3][3])
 {
     const ebpo_model *m = w->context->model;
     ebpo_box box = ebpo_model_box(m);
@@ -218,7 +221,7 @@ static bool box_walk_is_first(const ebpo_box_walk *w, bool own, const double tri
     return find_first(w, &box, ebpo_model_root(m), triangle, &entry) && entry == w->below.entry;
 }
 
-/* The faces in a box. */
+/* --- numbers of faces --- */
 
 /* Number in the file, and the one that is told. */
 typedef struct pair {
@@ -226,12 +229,12 @@ typedef struct pair {
 } pair;
 
 typedef struct gathering {
-    ebpo_box_walk walk; /* first */
+    box_walk walk; /* first */
     pair *list;
     uint64_t count, capacity;
 } gathering;
 
-static ebpo_status take_face_number(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+static ebpo_status take_face_number(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     gathering *g = (gathering *)walk;
     if (!ebpo_grow(&g->list, &g->capacity, g->count + walk->count, sizeof *g->list))
@@ -250,7 +253,8 @@ static int compare_pairs(const void *a, const void *b)
     return (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-static ebpo_status finish_faces(gathering *g, const uint64_t **faces, uint64_t *count, ebpo_error *error)
+static ebpo_status finish_faces(gathering *g, const uint64_t **faces, uint64_t *count,
+                                ebpo_error *error)
 {
     ebpo_context *c = g->walk.context;
     if (!ebpo_grow(&c->faces, &c->face_capacity, g->count, sizeof *c->faces))
@@ -270,7 +274,8 @@ ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const 
     EBPO_DEFAULT_FP;
     *faces = NULL;
     *count = 0;
-    gathering g = { .walk = { .context = context, .min = min, .max = max, .take = take_face_number } };
+    gathering g = { .walk = {
+                        .context = context, .min = min, .max = max, .take = take_face_number } };
     ebpo_status status = check_box(min, max, error);
     if (status == EBPO_OK)
         status = ebpo_check_mesh(context->model, error);
@@ -284,7 +289,7 @@ ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const 
     return status;
 }
 
-/* The triangles in a box, block by block. */
+/* --- triangles, block by block --- */
 
 typedef struct block {
     double corners[EBPO_TRIANGLES_MOST][3][3];
@@ -292,7 +297,7 @@ typedef struct block {
 } block;
 
 typedef struct delivery {
-    ebpo_box_walk walk; /* first */
+    box_walk walk; /* first */
     block *block;
     uint64_t count; /* in the block */
     ebpo_triangles_fn take;
@@ -310,7 +315,7 @@ static void hand_over(delivery *d)
     d->count = 0;
 }
 
-static ebpo_status take_triangle(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+static ebpo_status take_triangle(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     delivery *d = (delivery *)walk;
     (void)error;

@@ -5,9 +5,9 @@
  * or from its lowest corner: a filter in single precision (inside_kernels.c), then exact
  * predicates. Many points in a model that is all in memory go down the tree several at a time.
  *
- * A query that may use envelopes, stops at a level or has a deadline goes from node to node, through
- * subtrees that it loads on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. Pruned
- * nodes are decided by envelopes, or the query fails with EBPO_E_ABSENT.
+ * A query that may use envelopes, stops at a level or has a deadline goes from node to node,
+ * through subtrees that it loads on the way; with EBPO_LOAD_NODES it reads only the nodes on the
+ * way. Pruned nodes are decided by envelopes, or the query fails with EBPO_E_ABSENT.
  *
  * Sources: EBP 2017, 4.2; format-spec, section 5. */
 #include "core/strict_fp.h"
@@ -50,8 +50,9 @@ static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t coun
 
 /* Crossings along a segment; `point` (its end) is looked for on the faces, NULL: is not. False when
  * it lies on one. */
-static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s, const ebpo_accel_leaf *leaf,
-                  const ebpo_axis_segment *g, const double *point, uint32_t *open, int32_t *sum)
+static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
+                       const ebpo_accel_leaf *leaf, const ebpo_axis_segment *g, const double *point,
+                       uint32_t *open, int32_t *sum)
 {
     uint32_t count = 0;
     *sum = kernels->crossings(s, s->list + leaf->list, g, open, &count);
@@ -104,8 +105,9 @@ static ebpo_axis_segment wall_segment(const ebpo_box *box, uint8_t wall, const i
 }
 
 /* One segment from a wall that no face meets. */
-static bool from_wall(const ebpo_inside_kernels *kernels, const ebpo_accel *s, const ebpo_accel_leaf *leaf,
-                      const in_leaf *i, const double p[3], uint32_t *open, int32_t *winding)
+static bool from_wall(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
+                      const ebpo_accel_leaf *leaf, const in_leaf *i, const double p[3],
+                      uint32_t *open, int32_t *winding)
 {
     ebpo_axis_segment g = wall_segment(&s->box, leaf->wall, i, p);
     int32_t sum;
@@ -193,7 +195,8 @@ static inline ebpo_leaf_kind kind_of(const ebpo_context *context, const ebpo_acc
     return kind <= EBPO_LEAF_CONCAVE ? kind : ask_kind(context, s, leaf, i);
 }
 
-static inline void give_winding(const ebpo_context *context, int32_t winding, ebpo_inside_result *out)
+static inline void give_winding(const ebpo_context *context, int32_t winding,
+                                ebpo_inside_result *out)
 {
     *out = (ebpo_inside_result){ ebpo_rule_inside(context->model->info->rule, winding) ? EBPO_IN
                                                                                        : EBPO_OUT,
@@ -239,9 +242,9 @@ static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_accel *s, eb
 }
 
 /* In a leaf of a subtree and of this level, whose cell holds p, which is at `place`. */
-static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t number, int level,
-                             const ebpo_position *place, const double p[3], ebpo_inside_result *out,
-                             ebpo_error *error)
+static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t number,
+                               int level, const ebpo_position *place, const double p[3],
+                               ebpo_inside_result *out, ebpo_error *error)
 {
     in_leaf i;
     find_in_leaf(context->model->locator.level, level, place, &i);
@@ -256,8 +259,8 @@ static void inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_ins
 
 /* In a subtree whose root holds p, which is at `place`. */
 static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
-                                const ebpo_position *place, const double p[3],
-                                ebpo_inside_result *out, ebpo_error *error)
+                                  const ebpo_position *place, const double p[3],
+                                  ebpo_inside_result *out, ebpo_error *error)
 {
     ebpo_descent d = ebpo_descend(&s->nodes, context->model->locator.level, place->at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM) {
@@ -385,7 +388,7 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
 
 /* With the whole tree in memory. */
 static ebpo_status inside_whole(ebpo_context *context, const double *points, uint64_t count,
-                              ebpo_inside_result *out, ebpo_error *error)
+                                ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_accel *s = context->model->whole;
     ebpo_status status = EBPO_OK;
@@ -481,7 +484,7 @@ static ebpo_status walk_down(asking *a, ebpo_inside_result *out, ebpo_error *err
         }
         if (ebpo_entry_kind_of(node.entry) == EBPO_ENTRY_LEAF)
             return inside_leaf(a->context, node.subtree, ebpo_entry_value(node.entry),
-                                    node.cell.level, &a->place, a->p, out, error);
+                               node.cell.level, &a->place, a->p, out, error);
         node = ebpo_model_child(m, &node, ebpo_octant_at(a->place.at, fine - node.cell.level - 1));
     }
 }
@@ -503,7 +506,7 @@ static ebpo_status leaf_from_file(asking *a, const ebpo_node *leaf, ebpo_inside_
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
         status = inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root),
-                                  leaf->cell.level, &a->place, a->p, out, error);
+                             leaf->cell.level, &a->place, a->p, out, error);
         ebpo_model_count_leaves(m, subtree, -1);
         ebpo_accel_free(subtree);
     }
@@ -637,14 +640,14 @@ static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *stat
     else if (is_late(a))
         give_maybe(a, cell, out);
     else
-        *status = inside_leaf(a->context, held, ebpo_entry_value(d.entry), d.level, &a->place,
-                                   a->p, out, error);
+        *status = inside_leaf(a->context, held, ebpo_entry_value(d.entry), d.level, &a->place, a->p,
+                              out, error);
     return true;
 }
 
 /* Below a pruned node of the whole tree or of a subtree: an envelope decides, or EBPO_E_ABSENT. */
 static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out,
-                               ebpo_error *error)
+                                 ebpo_error *error)
 {
     const ebpo_model *m = context->model;
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
@@ -663,8 +666,8 @@ static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_
 /* Point in solid from node to node: with envelopes, to a level, against the clock, or because not
  * everything is in memory. */
 static ebpo_status inside_walk(ebpo_context *context, const double p[3],
-                             const ebpo_inside_options *options, ebpo_inside_result *out,
-                             ebpo_error *error)
+                               const ebpo_inside_options *options, ebpo_inside_result *out,
+                               ebpo_error *error)
 {
     const ebpo_model *m = context->model;
     asking a = { .context = context,

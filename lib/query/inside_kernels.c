@@ -1,8 +1,8 @@
 /* Kernels of point in solid: the faces that a leaf lists, eight at a time.
  *
  * `crossings` counts the faces that a segment along an axis crosses, as far as single precision (in
- * accels of doubles: double precision) is certain. The faces that remain open are decided exactly by
- * inside.c. `walls` finds the walls of a leaf's cell that no face comes to, and the boxes of the
+ * accels of doubles: double precision) is certain. The faces that remain open are decided exactly
+ * by inside.c. `walls` finds the walls of a leaf's cell that no face comes to, and the boxes of the
  * leaf's list, when the first queries come to the leaf; its comparisons are exact.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
@@ -94,8 +94,9 @@ static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, i
         unsigned left = 0, right = 0;
         for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
             int j = i == 2 ? 0 : i + 1;
-            double size, turn = cross_product(x[i][lane] - g->from[u], y[i][lane] - g->from[v],
-                                      x[j][lane] - g->from[u], y[j][lane] - g->from[v], &size);
+            double size,
+                turn = cross_product(x[i][lane] - g->from[u], y[i][lane] - g->from[v],
+                                     x[j][lane] - g->from[u], y[j][lane] - g->from[v], &size);
             double error = CROSS_ERROR * size + UNDERFLOW_ERROR;
             left |= (unsigned)(turn > error) << lane;
             right |= (unsigned)(turn < -error) << lane;
@@ -175,7 +176,7 @@ EBPO_EIGHT int32_t cross_block(const ebpo_accel *s, uint64_t listed, int u, int 
 }
 
 static int32_t sum_crossings(const ebpo_accel *s, const ebpo_listed_block *list,
-                         const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count)
+                             const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count)
 {
     int axis = segment->axis, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
     int32_t sum = 0;

@@ -1,4 +1,18 @@
-/* What is found out about leaves once questions come to them, and where it is kept. */
+/* Kinds of leaves: what is found out about a leaf once queries come to it, and where it is kept.
+ *
+ * The first query finds a wall that no face meets and the boxes of the leaf's list; after many
+ * queries the leaf is classified: one plane, two planes, convex or concave (then the signs of
+ * planes decide), or general (accel.h). Any thread may do that; one does, and the others meanwhile
+ * treat the leaf as a general one. Kinds never change results.
+ *
+ * Leaves whose faces' planes alone decide:
+ * Let P be the set of points of the cell below all planes of the leaf's faces. If every face
+ * lies in P (all its corners below all planes), then each face lies on the boundary of P, so the
+ * winding number is constant within P's interior; and it is constant in each component of the rest
+ * of the cell. Every such component contains a corner of the cell: a point above plane i can move
+ * to the corner that is farthest along that plane's normal and stays above. So when all corners of
+ * the cell that do not lie in P's closure have the same winding number, and one point of P's
+ * interior is known, the planes decide. The same holds with "above" for "below" (concave). */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -10,15 +24,7 @@
 #include "geometry/predicates.h"
 #include "query/accel_parts.h"
 
-/* Leaves whose faces' planes alone decide.
- *
- * Let P be the set of points of the cell below all planes of the leaf's faces. If every face
- * lies in P (all its corners below all planes), then each face lies on the boundary of P, so the
- * winding number is constant within P's interior; and it is constant in each component of the rest
- * of the cell. Every such component contains a corner of the cell: a point above plane i can move
- * to the corner that is farthest along that plane's normal and stays above. So when all corners of
- * the cell that do not lie in P's closure have the same winding number, and one point of P's
- * interior is known, the planes decide. The same holds with "above" for "below" (concave). */
+/* --- planes that decide --- */
 
 /* n . xi - d in the cell's coordinates (0 .. 1 on each axis), 1-norm of n 1. */
 typedef struct leaf_plane {
@@ -62,7 +68,8 @@ static void add_face(uint32_t slot, const double t[3][3], leaf_faces *f)
 
 /* Gathers the faces whose boxes meet the cell. False when they are not to be had: too many, or a
  * cell too small for what follows. */
-static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell, leaf_faces *f)
+static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell,
+                         leaf_faces *f)
 {
     double low[3], high[3];
     ebpo_cell_bounds(&s->box, cell, low, high);
@@ -94,8 +101,8 @@ static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_
 
 /* Crossings of the leaf's faces with a segment along an axis. Passed over are blocks of whose box
  * any bit of `beside` is set: lower sides that are not the cell's, where the segment is. */
-static int32_t leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double from[3],
-                            double to, int axis, uint64_t beside)
+static int32_t leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf,
+                              const double from[3], double to, int axis, uint64_t beside)
 {
     int32_t sum = 0;
     for (const ebpo_listed_block *at = s->list + leaf->list;; at++) {
@@ -291,7 +298,7 @@ static bool find_windings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, cons
 
 /* False when the planes of its faces do not decide. */
 static bool leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell,
-                           deciding_planes *out)
+                             deciding_planes *out)
 {
     leaf_faces f;
     return gather_faces(s, leaf, cell, &f) && f.count && collect_planes(s, &f, out) &&
@@ -395,11 +402,12 @@ static ebpo_leaf_kind classify_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, 
 {
     deciding_planes planes;
     return leaf_find_planes(s, leaf, cell, &planes) ? keep_planes(s->kinds, leaf, &planes)
-                                                         : EBPO_LEAF_GENERAL;
+                                                    : EBPO_LEAF_GENERAL;
 }
 
 /* Its wall, the winding number there, and the boxes of its list. */
-static void bound_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell, ebpo_walls_fn *walls)
+static void bound_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
+                       ebpo_walls_fn *walls)
 {
     uint8_t wall = choose_wall(walls(s, s->list + leaf->list, cell));
     int32_t step = 0;
@@ -407,8 +415,7 @@ static void bound_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cel
         double low[3], high[3];
         uint64_t at_corner = UINT64_C(0x0f0f0f) & ~(UINT64_C(255) << 8 * (wall / 2));
         ebpo_cell_bounds(&s->box, cell, low, high);
-        step = leaf_crossings(s, leaf, low, high[wall / 2], wall / 2,
-                                   at_corner << EBPO_LISTED_BOX);
+        step = leaf_crossings(s, leaf, low, high[wall / 2], wall / 2, at_corner << EBPO_LISTED_BOX);
     }
     bool small = step >= INT8_MIN && step <= INT8_MAX;
     leaf->wall = small ? wall : EBPO_NO_WALL;

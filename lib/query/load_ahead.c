@@ -1,5 +1,12 @@
-/* What will be asked for next: the subtrees that queries about places around the last one may need.
- * EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that holds the position instead. */
+/* Loading ahead: subtrees are loaded, or announced to a source far away, before queries need them.
+ *
+ * Prefetching asks for the subtrees that queries near the last one may need, in the order of their
+ * distance. EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that holds the position
+ * instead.
+ *
+ * A batch evaluates many points sorted along the Morton curve, so that subtrees are loaded few
+ * times, and returns results in the order of the points; what the next points need is announced in
+ * windows. A batch belongs to one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -152,7 +159,7 @@ void ebpo_context_announce(const ebpo_context *c, const uint32_t *below, uint64_
     free(numbers);
 }
 
-/* Many questions at once: sorted along the curve, answered in the order in which they came. */
+/* --- batches --- */
 
 /* Subtrees announced at a time, and points that they are gathered from: some megabytes, of which
  * two are under way. */

@@ -1,4 +1,4 @@
-/* Loading ahead. */
+/* Loading ahead: prefetching, announcing, and batches of points. */
 #ifndef EBPO_QUERY_LOAD_AHEAD_H
 #define EBPO_QUERY_LOAD_AHEAD_H
 

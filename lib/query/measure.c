@@ -158,7 +158,7 @@ static void add_face(moments *m, const double corner[3][3], const double middle[
         add_pair(&m->first24[k], ebpo_pair_multiply(det, s[k]));
         add_pair(&m->second120[k], ebpo_pair_multiply(det, mixed_product(r, s, k, k)));
         add_pair(&m->second120[3 + k],
-                   ebpo_pair_multiply(det, mixed_product(r, s, (k + 1) % 3, (k + 2) % 3)));
+                 ebpo_pair_multiply(det, mixed_product(r, s, (k + 1) % 3, (k + 2) % 3)));
     }
 }
 
@@ -246,8 +246,8 @@ static ebpo_status count_components(pass *p, const ebpo_solid_shells *s, ebpo_ru
 }
 
 /* Finds out whether the volume is known; then sets how often faces count. */
-static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned threads, ebpo_solid_shells *s,
-                          ebpo_solid_volume *volume, ebpo_error *error)
+static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned threads,
+                                 ebpo_solid_shells *s, ebpo_solid_volume *volume, ebpo_error *error)
 {
     ebpo_shells shells;
     bool several = info->solid && info->report.manifold && info->report.components > 1;
@@ -337,7 +337,7 @@ done:
     return status;
 }
 
-/* Decides whether the volume of a solid is known. */
+/* --- the volume of a solid, from the file's head --- */
 
 /* What rounding may do to sums of envelopes: of the sum, and of the root cell's volume. */
 static const double OF_SUM = 1e-9, OF_ROOT = 1e-12;

@@ -1,5 +1,4 @@
-/* The top of a tree: levels 0 .. cut level without faces, and which nodes lie below.
- * Immutable; any thread. */
+/* What a model has beside subtrees: the top of its tree, skeletons, and its share of budgets. */
 #ifndef EBPO_QUERY_MODEL_PARTS_H
 #define EBPO_QUERY_MODEL_PARTS_H
 
@@ -9,6 +8,10 @@
 #include "format/slice.h"
 #include "query/accel.h"
 #include "query/point_bounds.h"
+
+/* --- the top: levels 0 .. cut level without faces, and which nodes lie below. Immutable; any
+ * thread
+ * --- */
 
 typedef struct ebpo_top_planes {
     uint32_t first;
@@ -41,7 +44,9 @@ void ebpo_top_free(ebpo_top *top);
 uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level);
 uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
 
-/* What is kept in memory of each subtree that has ever been loaded: the upper nodes of its
+/* --- skeletons ---
+ *
+ * What is kept in memory of each subtree that has ever been loaded: the upper nodes of its
  * hierarchy over faces (query/accel.h), eight at first, 2 KB where the subtree takes hundreds. They
  * bound the distance to its faces much better than its cell and its envelope do, so that searches
  * load it again only if it may matter. Made when it is loaded, kept when the cache drops it: works
@@ -49,8 +54,8 @@ uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
  * added where it was looked for: memory goes where bounds are too loose.
  *
  * Lower bounds only. Subtrees are searched in the order of certain lower bounds until the next is
- * beyond what has been found (nearest_first.c): those searched are the ones whose bound is at most
- * the answer. No upper bound could save one of them. */
+ * beyond what has been found (nearest_subtrees.c): those searched are the ones whose bound is at
+ * most the answer. No upper bound could save one of them. */
 
 /* Any thread; one at a time where it is not const. */
 typedef struct ebpo_skeleton ebpo_skeleton;
@@ -116,7 +121,7 @@ void ebpo_skeletons_grow(ebpo_skeletons *all, uint64_t number, const ebpo_accel 
 /* NULL where nothing is known. */
 const ebpo_skeleton *ebpo_skeletons_find(const ebpo_skeletons *all, uint64_t number);
 
-/* Who gets which share of a budget. */
+/* --- shares of a budget --- */
 
 /* For loading one at least. */
 enum { EBPO_SUBTREES_LEAST = 1 << 20 };
@@ -129,7 +134,7 @@ uint64_t ebpo_chunk_budget(uint64_t budget);
 uint64_t ebpo_skeleton_budget(const ebpo_model_options *options, uint64_t budget);
 uint64_t ebpo_beside_subtrees(const ebpo_model_options *options, uint64_t budget);
 
-/* What is chosen by a model's budget: from the counts in the file's head. */
+/* --- the plan for a model's budget, from the counts in the file's head --- */
 
 /* Sets the budget: what is left of one that is shared, or that of a file far away where nobody
  * asked for one; true then. */
@@ -143,7 +148,9 @@ EBPO_MUST_USE ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_mode
 EBPO_MUST_USE ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_model_options *options,
                                           ebpo_model_plan *out, ebpo_error *error);
 
-/* A budget that models share: what of it each of them takes for good, and what is for the caches of
+/* --- shared budgets ---
+ *
+ * A budget that models share: what of it each of them takes for good, and what is for the caches of
  * all. Any thread. */
 
 /* Of the caches of subtrees, and of those of chunks: what one loads needs room in the other. */

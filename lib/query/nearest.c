@@ -1,3 +1,12 @@
+/* The nearest face: the search in one accel, and the decision which of two faces is nearer.
+ *
+ * Depth first, nearest child first; what is certainly farther than something already seen is
+ * pruned. Bounds and triangles are in single precision with bounded errors (nearest_kernels.c).
+ * Faces that pass are judged with certain bounds in double precision, and exactly where these
+ * cannot tell two faces apart; of equally near faces the one with the least number in the file is
+ * returned. Points too far for single precision search by boxes in doubles, points too far for
+ * doubles by keys (point_bounds.h). An ebpo_nearest may search several accels one after the other.
+ */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -47,9 +56,7 @@ int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distan
                : ebpo_triangle_distance_compare(p, a, b);
 }
 
-/* Depth first, nearest child first, with everything pruned that is certainly farther than something
- * already seen. Bounds and triangles in single precision, with errors bounded; what passes is
- * judged with certain bounds in double precision, and what these cannot tell apart exactly. */
+/* --- the search --- */
 
 /* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
 #define FAR 32.0
@@ -68,8 +75,9 @@ void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p
     n->block = n->first_block = EBPO_NO_BLOCK;
 }
 
-static void take_face(ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *bounds,
-                 const ebpo_far_keys *keys, uint64_t file_face, uint64_t source_face)
+static void take_face(ebpo_nearest *n, const double triangle[3][3],
+                      const ebpo_distance_bounds *bounds, const ebpo_far_keys *keys,
+                      uint64_t file_face, uint64_t source_face)
 {
     n->found = true;
     n->bounds = *bounds;
@@ -89,7 +97,7 @@ static ebpo_far_keys keys_of(const ebpo_nearest *n, const double triangle[3][3])
 
 /* Sign of what the face is farther than the nearest one so far; exact. */
 static int compare_with_nearest(const ebpo_nearest *n, const double triangle[3][3],
-                   const ebpo_distance_bounds *b, const ebpo_far_keys *keys)
+                                const ebpo_distance_bounds *b, const ebpo_far_keys *keys)
 {
     if (keys->hi < n->keys.lo)
         return -1;
@@ -131,7 +139,8 @@ static bool try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return false;
     }
-    take_face(n, (const double(*)[3])triangle, &b, &keys, file_face, ebpo_accel_source_face(s, local));
+    take_face(n, (const double(*)[3])triangle, &b, &keys, file_face,
+              ebpo_accel_source_face(s, local));
     return true;
 }
 

@@ -1,4 +1,5 @@
-/* Which of two faces is nearer. */
+/* The nearest face: in one accel (nearest.c), and in a model under a budget (nearest_subtrees.c).
+ */
 #ifndef EBPO_QUERY_NEAREST_H
 #define EBPO_QUERY_NEAREST_H
 
@@ -11,7 +12,7 @@
 int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distance_bounds *a_bounds,
                       const double b[3][3], const ebpo_distance_bounds *b_bounds);
 
-/* The nearest face: a search that may go through several subtrees. */
+/* --- a search, which may go through several accels --- */
 
 typedef struct ebpo_nearest {
     double p[3];
@@ -73,7 +74,9 @@ void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_accel *s, const ebpo_accel_le
 /* The answer but for its sign; nothing within the limit: INFINITY. */
 void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out);
 
-/* A context's queue of nodes to be come to: the nearest first, of equal ones that with the least
+/* --- a context's queue ---
+ *
+ * Nodes to be come to: the nearest first, of equal ones that with the least
  * entry. */
 
 EBPO_MUST_USE ebpo_status ebpo_queue_push(ebpo_context *context, const ebpo_ranked *item,
@@ -81,12 +84,14 @@ EBPO_MUST_USE ebpo_status ebpo_queue_push(ebpo_context *context, const ebpo_rank
 /* Of a queue that is not empty. */
 ebpo_ranked ebpo_queue_pop(ebpo_context *context);
 
-/* Nodes of the levels right below the cut, with their envelopes and nothing of their faces: a few
+/* --- deep bounds ---
+ *
+ * Nodes of the levels right below the cut, with their envelopes and nothing of their faces: a few
  * bytes for each. They tell of subtrees that have never been loaded what their own envelopes do
- * not, as skeletons (query/skeleton.h) tell of those that have. Read at once, when questions have
- * loaded about as much for nothing as reading them takes, so that neither opening nor paths wait
- * for them; of local files only: of others a request more would cost what it saves. Counted with
- * skeletons, and of their room. */
+ * not, as skeletons (query/model_parts.h) tell of those that have. Read at once, when questions
+ * have loaded about as much for nothing as reading them takes, so that neither opening nor paths
+ * wait for them; of local files only: of others a request more would cost what it saves. Counted
+ * with skeletons, and of their room. */
 
 /* Reads them, unless there is no room, or nothing below the cut. Once; what cannot be read will
  * be told by the questions that come to it. */
@@ -96,7 +101,7 @@ void ebpo_deep_bounds_make(ebpo_model *model);
  * Any thread. */
 void ebpo_deep_bounds_tell(ebpo_model *model, unsigned loaded);
 
-/* The nearest face of a model: all of it, or subtree by subtree, the nearest first. */
+/* --- a model: all of it, or subtree by subtree, the nearest first --- */
 
 /* Nodes of the top and subtrees are come to in the order of certain lower bounds of their distance,
  * until the next is beyond what has been found: a subtree is searched, and loaded if need be, only

@@ -1,4 +1,11 @@
-/* Nodes that wait to be searched, the nearest first. */
+/* The nearest face of a model: under a budget, subtrees are searched, and loaded, in the order in
+ * which they may matter.
+ *
+ * Nodes of the top and subtrees wait in a queue, ordered by certain lower bounds of their distance;
+ * the search ends when the next is beyond the best face. A subtree is loaded only if its bound is
+ * at most the answer, whatever else is in memory. Bounds come from a subtree's skeleton, if it has
+ * ever been loaded (skeleton.c), else from the envelopes of the levels right below the cut (deep
+ * bounds), which are read once queries have loaded enough for nothing. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -52,7 +59,7 @@ enum { DEEP_LEVELS = 2 };
  * two levels takes about as long as so many loads. */
 enum { NEW_AS_USUAL = 4, LOADS_TO_READ = 64 };
 
-/* --- making --- */
+/* --- deep bounds --- */
 
 static bool take_levels(ebpo_model *m, int level)
 {
@@ -87,8 +94,6 @@ void ebpo_deep_bounds_tell(ebpo_model *m, unsigned loaded)
         ebpo_deep_bounds_make(m);
 }
 
-/* --- asking --- */
-
 typedef struct deep_search {
     const ebpo_top *top;
     const ebpo_ranking *ranking;
@@ -109,7 +114,7 @@ static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
 
 /* Those that may be nearer than the best, the nearest first. */
 static int rank_deep_children(const deep_search *g, uint32_t gray, ebpo_cell cell, double parent,
-                deep_child out[8])
+                              deep_child out[8])
 {
     int count = 0;
     for (unsigned octant = 0; octant < 8; octant++) {
@@ -144,7 +149,7 @@ static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double pa
 /* A certain lower bound, not less than `lower`, for what is of the solid's surface in the cell of a
  * node of the cut level; what is beyond `limit` is not told apart. Any thread. */
 static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
-                       double limit)
+                              double limit)
 {
     const ebpo_model *m = ranking->model;
     const ebpo_top *top = atomic_load_explicit(&m->deep, memory_order_acquire);
@@ -160,8 +165,6 @@ static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node
     search_deep(&g, d.entry, node->cell, lower);
     return fmax(lower, g.best);
 }
-
-/* Distances under a budget: subtrees are loaded in the order in which they may matter. */
 
 /* --- the search --- */
 
@@ -301,7 +304,7 @@ typedef struct owners {
     ebpo_status status;
 } owners;
 
-/* A cell lists what comes near it, too: node_bounds.c. */
+/* A cell lists what comes near it, too: point_bounds.c. */
 static bool cell_meets(const owners *o, ebpo_cell cell)
 {
     double low[3], high[3];

@@ -1,3 +1,10 @@
+/* Certain bounds of the distance of a point to a cell, to the half-spaces of an envelope, and to
+ * the hierarchy over faces.
+ *
+ * From 16 sizes of the model's box on doubles hardly tell distances apart; there the bounds are
+ * those of keys, which grow with the distance (point_bounds.h). Upper bounds allow for what a node
+ * may list without containing it: faces within 1/256 of the cell's size (format-spec, section 5).
+ * Rounding: docs/develop/bounds.md, "Points far away". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -83,7 +90,8 @@ double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_
             continue;
         double gradient[3] = { 4096.0 * n[0] / size[0], 4096.0 * n[1] / size[1],
                                4096.0 * n[2] / size[2] };
-        double length = scaled_length(gradient), distance = (value - error) / length * (1 - 0x1p-48);
+        double length = scaled_length(gradient),
+               distance = (value - error) / length * (1 - 0x1p-48);
         if (length > 0 && isfinite(length) && distance > best)
             best = distance;
     }
@@ -295,7 +303,7 @@ void ebpo_far_boxes(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound
                step = g->ratio * (double)b->step[k], at = apex_of_square(f->half, f->toward[k]);
         for (int lane = 0; lane < b->count; lane++)
             lower[lane] += least_between(f->half, f->toward[k], at, origin + step * b->low[k][lane],
-                                 origin + step * b->high[k][lane]);
+                                         origin + step * b->high[k][lane]);
     }
 }
 

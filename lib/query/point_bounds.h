@@ -1,4 +1,4 @@
-/* What a cell and the half-spaces of its envelope tell of a point: bounds that are certain. */
+/* Certain bounds of distances from a point to cells, to envelopes and, for a far point, to all. */
 #ifndef EBPO_QUERY_POINT_BOUNDS_H
 #define EBPO_QUERY_POINT_BOUNDS_H
 
@@ -19,7 +19,9 @@ double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_
                               uint32_t count, const double p[3], double enough);
 double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3]);
 
-/* A point so far from a model that doubles hardly tell its distances to the model's parts apart, or
+/* --- far points ---
+ *
+ * A point so far from a model that doubles hardly tell its distances to the model's parts apart, or
  * not at all. They are told apart by keys instead: with c the middle of the model's box,
  *   key(x) = (|p - x|^2 - |p - c|^2) / (2 |p - c|)
  * grows with the distance, is about as large as the model wherever p is, and is a plane's height

@@ -1,4 +1,6 @@
-/* Children that a search has still to visit, on a stack: the nearest one on top. */
+/* The kernels of queries, and what they work on: inner loops over blocks of faces and bounds of
+ * eight. They are filters, whose "certain" holds in exact arithmetic. Compiled for several
+ * instruction sets with the same results (core/cpu.h). */
 #ifndef EBPO_QUERY_QUERY_KERNELS_H
 #define EBPO_QUERY_QUERY_KERNELS_H
 
@@ -8,6 +10,8 @@
 #include "core/cpu.h"
 #include "geometry/ray.h"
 #include "query/accel.h"
+
+/* --- children that a search has still to visit, on a stack: the nearest one on top --- */
 
 /* The bits of a key that is not negative (so of the same order as integers), then the child's
  * number. */
@@ -67,7 +71,7 @@ static inline uint32_t ebpo_visit_push(ebpo_visit *stack, uint32_t top, const eb
     return top;
 }
 
-/* A search for the nearest face of one accel, as the kernels see it. */
+/* --- a search for the nearest face of one accel --- */
 
 /* A point as the kernels want it. */
 typedef struct ebpo_probe {
@@ -125,7 +129,7 @@ static inline void ebpo_near_drop_far(ebpo_near_search *g)
     g->count = kept;
 }
 
-/* A ray on its way through one accel, as the kernels see it. */
+/* --- a ray on its way through one accel --- */
 
 typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL } ebpo_ray_wants;
 
@@ -178,9 +182,7 @@ struct ebpo_ray_search {
     ebpo_ray_candidate waiting[EBPO_RAY_CANDIDATES];
 };
 
-/* The inner loops of questions, over blocks of faces and bounds of eight: filters, whose "certain"
- * holds in exact arithmetic. Compiled twice on x86-64, for any processor and for those with AVX2,
- * with the same results. Pure functions. */
+/* --- point in solid --- */
 
 /* A segment along an axis from `from` (on all three axes) up to coordinate `to`: predicates.h,
  * ebpo_axis_crossing. */
@@ -205,6 +207,9 @@ static inline bool ebpo_axis_segment_meets(const ebpo_axis_segment *g, uint64_t 
     return (even & odd & carry) == carry;
 }
 
+/* --- tables --- */
+
+/* Pure functions. */
 typedef struct ebpo_inside_kernels {
     /* Sum of the certain crossings of a leaf's listed faces, in the part of them that is in the
      * leaf's cell (as ebpo_axis_crossing gives them) with the segment; lanes that are not certain

@@ -1,4 +1,9 @@
-/* Opening a model: everything at once when that fits, else the top of the tree and a cache. */
+/* Models and contexts: opening a file for queries, loading subtrees, and the checks that all
+ * queries begin with.
+ *
+ * A model holds everything if that fits into its budget, else the top of the tree and a cache of
+ * subtrees (budget.c plans this). Models may be used by any thread; a context, with the buffers of
+ * queries and the subtree that it has pinned, by one. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

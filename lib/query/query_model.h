@@ -1,4 +1,4 @@
-/* A model's parts, and a context's. */
+/* Models and contexts: their members, and what all queries share. */
 #ifndef EBPO_QUERY_QUERY_MODEL_H
 #define EBPO_QUERY_QUERY_MODEL_H
 
@@ -32,7 +32,7 @@ struct ebpo_model {
     ebpo_chunks *chunks;
     ebpo_cache *cache;         /* subtrees by their number in the top */
     ebpo_skeletons *skeletons; /* of those that have been loaded; or NULL */
-    _Atomic(ebpo_top *) deep;  /* levels below the cut: deep_bounds.h; or NULL */
+    _Atomic(ebpo_top *) deep;  /* levels below the cut: nearest_subtrees.c; or NULL */
     atomic_bool deep_begun;
     _Atomic uint64_t new_loads; /* that may have been for nothing, until then */
     double open_seconds;
@@ -65,9 +65,9 @@ struct ebpo_context {
     uint64_t met_capacity;
     uint64_t *faces;
     uint64_t face_capacity;
-    ebpo_ranked *queue; /* of nodes to be searched: nearest_first.c */
+    ebpo_ranked *queue; /* of nodes to be searched: nearest_subtrees.c */
     uint64_t queue_count, queue_capacity;
-    uint32_t *seen; /* of subtrees, and the number of the question: nearest_first.c */
+    uint32_t *seen; /* of subtrees, and the number of the question: nearest_subtrees.c */
     uint32_t question;
     uint64_t searched, loaded; /* subtrees, by distances; that were not there, by all questions */
     ebpo_kept_envelopes *envelopes; /* of distances to them; or NULL */
@@ -134,7 +134,7 @@ bool ebpo_kept_envelopes_get(const ebpo_kept_envelopes *kept, ebpo_cell cell, eb
 void ebpo_kept_envelopes_put(ebpo_kept_envelopes **kept, ebpo_cell cell,
                              const ebpo_polytope *envelope);
 
-/* Checks that all questions begin with. */
+/* --- checks that all queries begin with --- */
 
 EBPO_MUST_USE ebpo_status ebpo_check_query_level(int level, ebpo_error *error);
 /* EBPO_E_ARGUMENT: an option is none of its kind. */
@@ -143,8 +143,6 @@ ebpo_status ebpo_fail_value(ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error);
 /* EBPO_E_NOT_SOLID for a surface. */
 EBPO_MUST_USE ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error);
-
-/* On which side of the surface a point lies. */
 
 /* Makes an answer's distance negative inside: solids, unless unsigned. */
 EBPO_MUST_USE ebpo_status ebpo_give_sign(ebpo_context *context, const double p[3],

@@ -1,3 +1,11 @@
+/* Nodes of a model: going from a node to its children, in the top of the tree and in subtrees
+ * alike, with the bounds that envelopes give on the way.
+ *
+ * Accels (nodes of one subtree) and contexts (nodes of the model; they load subtrees on demand) are
+ * also sources for cursors. Nodes of a subtree are valid until the context enters another one.
+ *
+ * In a subset nodes may be pruned: a query that needs what was omitted below one fails with
+ * EBPO_E_ABSENT, and the message says where and what the file was cut to. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,12 +24,15 @@ static ebpo_node accel_node_of(const ebpo_accel *s, uint32_t entry, ebpo_cell ce
     return node;
 }
 
-ebpo_node ebpo_accel_root(const ebpo_accel *s) { return accel_node_of(s, s->nodes.root, s->root.cell); }
+ebpo_node ebpo_accel_root(const ebpo_accel *s)
+{
+    return accel_node_of(s, s->nodes.root, s->root.cell);
+}
 
 ebpo_node ebpo_accel_child(const ebpo_accel *s, const ebpo_node *gray, unsigned octant)
 {
     return accel_node_of(s, ebpo_table_child(&s->nodes, gray->entry, octant),
-                   ebpo_cell_child(gray->cell, octant));
+                         ebpo_cell_child(gray->cell, octant));
 }
 
 /* Codes of a gray node's planes, where the subtree has kept them. */
@@ -37,7 +48,8 @@ static const uint32_t *accel_planes(const ebpo_accel *s, const ebpo_node *node, 
 
 /* --- for cursors --- */
 
-static ebpo_status accel_children(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error)
+static ebpo_status accel_children(void *holder, ebpo_node *gray, ebpo_node child[8],
+                                  ebpo_error *error)
 {
     (void)error;
     for (unsigned octant = 0; octant < 8 && !gray->pruned; octant++)
@@ -45,8 +57,9 @@ static ebpo_status accel_children(void *holder, ebpo_node *gray, ebpo_node child
     return EBPO_OK;
 }
 
-static ebpo_status copy_accel_planes(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
-                          unsigned *count, ebpo_error *error)
+static ebpo_status copy_accel_planes(void *holder, const ebpo_node *node,
+                                     uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
+                                     ebpo_error *error)
 {
     (void)error;
     const uint32_t *from = accel_planes(holder, node, count);
@@ -55,7 +68,8 @@ static ebpo_status copy_accel_planes(void *holder, const ebpo_node *node, uint32
     return EBPO_OK;
 }
 
-static ebpo_status uniform_winding(void *holder, const ebpo_node *uniform, int32_t *out, ebpo_error *error)
+static ebpo_status uniform_winding(void *holder, const ebpo_node *uniform, int32_t *out,
+                                   ebpo_error *error)
 {
     (void)holder;
     (void)error;
@@ -85,9 +99,10 @@ ebpo_node ebpo_model_root(const ebpo_model *model)
 
 ebpo_node ebpo_model_child(const ebpo_model *model, const ebpo_node *gray, unsigned octant)
 {
-    return gray->subtree ? ebpo_accel_child(gray->subtree, gray, octant)
-                         : top_node_of(model, ebpo_table_child(&model->top->nodes, gray->entry, octant),
-                                   ebpo_cell_child(gray->cell, octant));
+    return gray->subtree
+               ? ebpo_accel_child(gray->subtree, gray, octant)
+               : top_node_of(model, ebpo_table_child(&model->top->nodes, gray->entry, octant),
+                             ebpo_cell_child(gray->cell, octant));
 }
 
 ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error *error)
@@ -175,7 +190,8 @@ int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, doubl
 
 /* --- for cursors --- */
 
-static ebpo_status model_children(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error)
+static ebpo_status model_children(void *holder, ebpo_node *gray, ebpo_node child[8],
+                                  ebpo_error *error)
 {
     ebpo_context *context = holder;
     ebpo_status status = EBPO_OK;
@@ -189,8 +205,9 @@ static ebpo_status model_children(void *holder, ebpo_node *gray, ebpo_node child
     return status;
 }
 
-static ebpo_status copy_model_planes(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
-                          unsigned *count, ebpo_error *error)
+static ebpo_status copy_model_planes(void *holder, const ebpo_node *node,
+                                     uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
+                                     ebpo_error *error)
 {
     const ebpo_context *context = holder;
     (void)error;

@@ -58,19 +58,17 @@ double ebpo_rank_cell_end(const ebpo_ranking *ranking, ebpo_cell cell);
 struct ebpo_ranked {
     ebpo_node node;
     double lower;
-    uint8_t what; /* of a subtree: nearest_first.c */
+    uint8_t what; /* of a subtree: nearest_subtrees.c */
 };
 
 int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, double parent,
                        double limit, ebpo_ranked out[8]);
 
-/* Questions that need what a subset has left out. */
+/* --- subsets: what was left out must not change a result --- */
 
 /* EBPO_E_ABSENT: the question needs what was left out below this node. Says which file, where, and
  * what it was cut to. */
 ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error *error);
-
-/* Files that are subsets: what was left out must not change an answer. */
 
 /* Whether something in the node's cell matters to the question. */
 typedef bool (*ebpo_matters_fn)(void *user, const ebpo_box *box, const ebpo_node *node);

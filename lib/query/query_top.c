@@ -1,3 +1,8 @@
+/* The top of a tree: levels 0 to the cut level without faces, and which nodes lie below.
+ *
+ * It is all that a model under a budget always has in memory; queries go down through it to the
+ * subtrees. The same table, with envelopes alone, holds the levels right below the cut for deep
+ * bounds (nearest_subtrees.c). Immutable once it is read; any thread may use it. */
 #include "query/model_parts.h"
 
 #include <stdlib.h>
@@ -51,8 +56,8 @@ typedef struct ranks {
     uint64_t of[4], planes;
 } ranks;
 
-static ebpo_status uniform_entry(const reading *r, const int32_t *windings, uint64_t rank, int32_t usual,
-                           uint32_t *entry)
+static ebpo_status uniform_entry(const reading *r, const int32_t *windings, uint64_t rank,
+                                 int32_t usual, uint32_t *entry)
 {
     return ebpo_entry_uniform(windings ? windings[rank] : usual, entry)
                ? EBPO_OK

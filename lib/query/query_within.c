@@ -1,5 +1,11 @@
-/* Depth first, nearest child first; what is certainly beyond the limit, or certainly was in a band
- * before, is passed over. */
+/* The faces within a distance of a point, one after the other, the nearest first.
+ *
+ * Faces come in bands: those after a given one, up to a number of them. Bands follow each other, so
+ * that a stream of any length needs little memory; the first is small, for callers who soon have
+ * enough. A band is searched depth first, nearest child first; what is certainly beyond its limit,
+ * or certainly was in an earlier band, is passed over. The order is exact: by distance, then by
+ * number in the file. Subtrees that are not in memory are loaded in the order of certain lower
+ * bounds, until the next is beyond the band. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,37 +22,36 @@
 #include "query/query_model.h"
 #include "query/query_node.h"
 
-/* The next faces by their distance from a point: those that come after a given one and before there
- * are too many. Bands follow each other, so that a stream of any length needs little memory. */
+/* --- bands --- */
 
-typedef struct ebpo_near {
+typedef struct near_face {
     const double *p;
     ebpo_distance_bounds bounds;
     uint64_t file_face, source_face;
     double triangle[3][3];
-} ebpo_near;
+} near_face;
 
-typedef struct ebpo_near_band {
+typedef struct near_band {
     double p[3];
     double radius;  /* what is farther is in no band: exact */
     double limit;   /* what is farther is not in this one: certain */
     uint64_t most;  /* faces in it, at least 1 */
     bool has_after; /* faces up to `after` were in bands before */
-    ebpo_near after;
-    ebpo_near *near;
+    near_face after;
+    near_face *near;
     uint64_t count, capacity;
     bool cut; /* there may be faces after the last one */
     bool no_memory;
-} ebpo_near_band;
+} near_band;
 
 /* Everything that has a distance of at most `far` was in bands before. */
-static inline bool ebpo_near_band_is_past(const ebpo_near_band *band, double far)
+static inline bool near_band_is_past(const near_band *band, double far)
 {
     return band->has_after && far < band->after.bounds.lo;
 }
 
 /* Before the search for a band; `after` and what memory there is are kept. */
-static void near_band_begin(ebpo_near_band *band, uint64_t most)
+static void near_band_begin(near_band *band, uint64_t most)
 {
     band->limit = band->radius;
     band->most = most;
@@ -58,7 +63,7 @@ static void near_band_begin(ebpo_near_band *band, uint64_t most)
 
 static int compare_faces(const void *x, const void *y)
 {
-    const ebpo_near *a = x, *b = y;
+    const near_face *a = x, *b = y;
     if (a->file_face == b->file_face)
         return 0;
     int sign = ebpo_near_compare(a->p, (const double(*)[3])a->triangle, &a->bounds,
@@ -68,7 +73,7 @@ static int compare_faces(const void *x, const void *y)
 
 /* In order: by exact distance, then by number in the file, each once, at most `most`. The limit
  * falls to what may still come in between. */
-static void near_band_settle(ebpo_near_band *band)
+static void near_band_settle(near_band *band)
 {
     uint64_t kept = 0;
     if (band->count)
@@ -86,7 +91,7 @@ static void near_band_settle(ebpo_near_band *band)
 /* --- faces --- */
 
 /* Sorting is put off until there are about twice as many as wanted. */
-static void add_face(ebpo_near_band *band, const ebpo_near *face)
+static void add_face(near_band *band, const near_face *face)
 {
     enum { SPARE_LEAST = 64 };
     uint64_t spare = band->most < SPARE_LEAST ? SPARE_LEAST : band->most;
@@ -98,15 +103,15 @@ static void add_face(ebpo_near_band *band, const ebpo_near *face)
         band->near[band->count++] = *face;
 }
 
-static void try_face(ebpo_near_band *band, const ebpo_accel *s, uint32_t slot)
+static void try_face(near_band *band, const ebpo_accel *s, uint32_t slot)
 {
-    ebpo_near face;
+    near_face face;
     uint32_t local = ebpo_accel_slot_face(s, slot);
     if (local == EBPO_NO_SLOT || band->no_memory)
         return;
     ebpo_accel_triangle(s, slot, face.triangle);
     ebpo_triangle_distance_bounds(band->p, (const double(*)[3])face.triangle, &face.bounds);
-    if (face.bounds.lo > band->limit || ebpo_near_band_is_past(band, face.bounds.hi))
+    if (face.bounds.lo > band->limit || near_band_is_past(band, face.bounds.hi))
         return;
     face.p = band->p;
     face.file_face = ebpo_accel_file_face(s, local);
@@ -123,7 +128,7 @@ static void try_face(ebpo_near_band *band, const ebpo_accel *s, uint32_t slot)
 /* --- the hierarchy --- */
 
 typedef struct searching {
-    ebpo_near_band *band;
+    near_band *band;
     const ebpo_accel *s;
     double error; /* bound on what rounding does to distances of the hierarchy's boxes */
 } searching;
@@ -158,7 +163,7 @@ static void box_bounds(const searching *g, const ebpo_bound *b, int lane, double
 
 static void search_child(const searching *g, uint32_t child)
 {
-    ebpo_near_band *band = g->band;
+    near_band *band = g->band;
     if (child & EBPO_IS_BLOCK) {
         for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
             try_face(band, g->s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
@@ -169,7 +174,7 @@ static void search_child(const searching *g, uint32_t child)
     int order[8], count = 0;
     for (int lane = 0; lane < b->count; lane++) {
         box_bounds(g, b, lane, &lower[lane], &upper);
-        if (lower[lane] > band->limit || ebpo_near_band_is_past(band, upper))
+        if (lower[lane] > band->limit || near_band_is_past(band, upper))
             continue;
         int at = count++;
         for (; at > 0 && lower[order[at - 1]] > lower[lane]; at--)
@@ -181,7 +186,7 @@ static void search_child(const searching *g, uint32_t child)
 }
 
 /* Adds what the subtree has of it. Faces may come again in another subtree. */
-static void near_band_search(ebpo_near_band *band, const ebpo_accel *s)
+static void near_band_search(near_band *band, const ebpo_accel *s)
 {
     searching g = { band, s, 0 };
     double size = s->reach / s->scale * 0x1p-46;
@@ -192,7 +197,7 @@ static void near_band_search(ebpo_near_band *band, const ebpo_accel *s)
         search_child(&g, s->top);
 }
 
-/* The nearest faces of a point, one after the other. */
+/* --- the stream --- */
 
 /* The first band is small, for those who soon have enough; each one is some times larger, so that
  * beginning anew costs little. */
@@ -201,7 +206,7 @@ enum { FIRST_BAND = 256, BAND_GROWTH = 8, BAND_MOST = 1 << 16 };
 typedef struct within {
     ebpo_context *context;
     const ebpo_within_options *options;
-    ebpo_near_band band;
+    near_band band;
     uint64_t given;
     bool ahead;         /* lists_ahead */
     uint64_t announced; /* subtrees that were, and were not entered since */
@@ -237,7 +242,7 @@ static double known_bound(const within *w, uint32_t below)
 static ebpo_status put_node(within *w, const ebpo_box *box, const ebpo_ranked *r, ebpo_error *error)
 {
     if (ebpo_node_is_uniform(&r->node) || r->node.pruned || r->lower > w->band.limit ||
-        ebpo_near_band_is_past(&w->band, ebpo_cell_far(box, r->node.cell, w->band.p)))
+        near_band_is_past(&w->band, ebpo_cell_far(box, r->node.cell, w->band.p)))
         return EBPO_OK;
     if (!ebpo_node_is_below(&r->node))
         return w->ahead ? put_children(w, box, r, error) : ebpo_queue_push(w->context, r, error);
@@ -334,7 +339,7 @@ static ebpo_status search_band(within *w, uint64_t most, ebpo_error *error)
 }
 
 /* False: enough. */
-static bool give_face(within *w, const ebpo_near *n)
+static bool give_face(within *w, const near_face *n)
 {
     ebpo_triangle_nearest exact;
     ebpo_near_face out = { .normal = { NAN, NAN, NAN },

@@ -140,7 +140,10 @@ typedef struct edges {
     f8 u, v, w, least, most, error;
 } edges;
 
-EBPO_EIGHT f8 signed_area(f8 ax, f8 ay, f8 bx, f8 by) { return f8_sub(f8_mul(ax, by), f8_mul(ay, bx)); }
+EBPO_EIGHT f8 signed_area(f8 ax, f8 ay, f8 bx, f8 by)
+{
+    return f8_sub(f8_mul(ax, by), f8_mul(ay, bx));
+}
 
 EBPO_EIGHT edges ray_edges(const seen *a, f8 size_z)
 {

@@ -1,3 +1,12 @@
+/* Rays: the first face that a ray meets, whether it meets any, all that it meets; and many rays on
+ * all cores.
+ *
+ * On the way down the tree tests are conservative: a node is passed over only if the ray certainly
+ * misses its cell or what it holds is beyond the limit. In an accel a filter in single precision
+ * (ray_kernels.c) leaves a few faces, about which exact predicates decide, the most promising
+ * first. Hits are ordered by t, then by the number in the file. Results do not depend on threads:
+ * of many rays each thread takes some at a time, with a context of its own. Error bounds:
+ * docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -18,12 +27,6 @@
 #include "query/query_model.h"
 #include "query/query_node.h"
 
-/* One ray through one accel: a filter in single precision, certain in what it says, and exact
- * decisions about the few faces that it leaves. Bounds: docs/develop/bounds.md. */
-
-/* What a ray has met so far: exact decisions about one triangle after the other, of which the
- * question's answer is kept. One thread. */
-
 /* A face that the ray meets, with what exact comparison needs. */
 struct ebpo_met {
     double triangle[3][3];
@@ -31,7 +34,7 @@ struct ebpo_met {
     ebpo_ray_meeting meeting;
 };
 
-typedef struct ebpo_casting {
+typedef struct casting {
     ebpo_context *context; /* its list of faces takes all hits */
     ebpo_segment ray;
     ebpo_ray_wants wants;
@@ -41,11 +44,11 @@ typedef struct ebpo_casting {
     bool no_memory;
     uint64_t count;
     ebpo_met first; /* if count > 0, unless all are wanted */
-} ebpo_casting;
+} casting;
 
-static inline void casting_begin(ebpo_casting *c, ebpo_context *context,
-                                      const double origin[3], const double direction[3],
-                                      double t_max, ebpo_ray_wants wants, ebpo_ray_sides sides)
+static inline void casting_begin(casting *c, ebpo_context *context, const double origin[3],
+                                 const double direction[3], double t_max, ebpo_ray_wants wants,
+                                 ebpo_ray_sides sides)
 {
     c->context = context;
     memcpy(c->ray.origin, origin, sizeof c->ray.origin);
@@ -62,7 +65,7 @@ static inline ebpo_ray_hit hit_of(const ebpo_met *m)
     return (ebpo_ray_hit){ m->meeting.t, m->source_face, m->meeting.side };
 }
 
-/* Rays through a model: conservative on the way down, exact at the faces. */
+/* --- one ray through one accel --- */
 
 /* Origins farther from the box than this many times its reach are moved towards it. */
 static const double near_enough = 4;
@@ -200,7 +203,8 @@ static void judge_waiting(ebpo_ray_search *r)
 }
 
 /* Shows `decide` every face that may matter, the most promising first. */
-static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels, const ebpo_accel *s)
+static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels,
+                             const ebpo_accel *s)
 {
     r->s = s;
     r->judge = judge_waiting;
@@ -222,7 +226,7 @@ static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels
 
 /* Whether the ray meets m->triangle, and from a side that counts; then m->meeting says where.
  * `facing`: where that is certain already, because the line goes through its interior; else 0. */
-static bool casting_meets(const ebpo_casting *c, int facing, ebpo_met *m)
+static bool casting_meets(const casting *c, int facing, ebpo_met *m)
 {
     const double(*triangle)[3] = (const double(*)[3])m->triangle;
     if (facing)
@@ -242,7 +246,7 @@ static int compare_met(const void *a, const void *b, void *ray)
     return sign ? sign : (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-static void keep_first(ebpo_casting *c, const ebpo_met *m)
+static void keep_first(casting *c, const ebpo_met *m)
 {
     if (c->count && compare_met(m, &c->first, &c->ray) >= 0)
         return;
@@ -253,7 +257,7 @@ static void keep_first(ebpo_casting *c, const ebpo_met *m)
 }
 
 /* A face that is met, with its numbers. */
-static void casting_keep(ebpo_casting *c, const ebpo_met *m)
+static void casting_keep(casting *c, const ebpo_met *m)
 {
     ebpo_context *k = c->context;
     if (c->wants == EBPO_WANTS_FIRST) {
@@ -285,7 +289,7 @@ static void sort_met(ebpo_met *met, uint64_t count, ebpo_segment *ray)
 }
 
 /* All hits in order, each once, into context->hits from `begin` on, up to *end. */
-static ebpo_status casting_sort(ebpo_casting *c, uint64_t begin, uint64_t *end, ebpo_error *error)
+static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_error *error)
 {
     ebpo_context *k = c->context;
     *end = begin;
@@ -345,7 +349,7 @@ static bool meets_slabs(const double origin[3], const double direction[3], doubl
 
 static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
 {
-    ebpo_casting *c = r->user;
+    casting *c = r->user;
     ebpo_met m;
     uint32_t local = ebpo_accel_slot_face(r->s, slot);
     ebpo_accel_fetch_face(r->s, local);
@@ -359,7 +363,7 @@ static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
     r->limit = c->limit;
 }
 
-static void cast_subtree(ebpo_casting *c, const ebpo_accel *s)
+static void cast_subtree(casting *c, const ebpo_accel *s)
 {
     ebpo_ray_search r;
     r.ray = &c->ray;
@@ -376,7 +380,7 @@ static void cast_subtree(ebpo_casting *c, const ebpo_accel *s)
 }
 
 /* Whether the ray comes to the node's cell before its limit; rather yes than no. */
-static bool meets_cell(const ebpo_casting *c, const ebpo_box *box, const ebpo_node *node)
+static bool meets_cell(const casting *c, const ebpo_box *box, const ebpo_node *node)
 {
     double low[3], high[3], slack = 0, enter;
     ebpo_cell_bounds(box, node->cell, low, high);
@@ -390,8 +394,7 @@ static bool ray_matters(void *user, const ebpo_box *box, const ebpo_node *node)
     return meets_cell(user, box, node);
 }
 
-static ebpo_status cast_node(ebpo_casting *c, const ebpo_box *box, ebpo_node node,
-                             ebpo_error *error)
+static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, ebpo_error *error)
 {
     const ebpo_model *m = c->context->model;
     if (c->done || ebpo_node_is_uniform(&node) || !meets_cell(c, box, &node) ||
@@ -414,7 +417,7 @@ static ebpo_status cast_node(ebpo_casting *c, const ebpo_box *box, ebpo_node nod
 }
 
 /* Shows the casting every face that may matter to it. The ray is one that makes sense. */
-static ebpo_status ray_walk(ebpo_casting *c, ebpo_error *error)
+static ebpo_status ray_walk(casting *c, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     if (c->context->model->whole) {
@@ -430,11 +433,11 @@ static ebpo_status ray_walk(ebpo_casting *c, ebpo_error *error)
     return status;
 }
 
-/* One ray: what it meets first, whether it meets anything, all that it meets. */
+/* --- one ray --- */
 
-static ebpo_status cast_ray(ebpo_casting *c, ebpo_context *context, const double origin[3],
-                        const double direction[3], double t_max, ebpo_ray_wants wants,
-                        ebpo_error *error)
+static ebpo_status cast_ray(casting *c, ebpo_context *context, const double origin[3],
+                            const double direction[3], double t_max, ebpo_ray_wants wants,
+                            ebpo_error *error)
 {
     casting_begin(c, context, origin, direction, t_max, wants, EBPO_RAY_BOTH);
     ebpo_status status = ebpo_check_mesh(context->model, error);
@@ -448,7 +451,7 @@ ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3], const 
                            double t_max, ebpo_ray_hit *out, bool *hit, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_casting c;
+    casting c;
     ebpo_status status = cast_ray(&c, context, origin, direction, t_max, EBPO_WANTS_FIRST, error);
     *hit = status == EBPO_OK && c.count;
     if (*hit)
@@ -460,7 +463,7 @@ ebpo_status ebpo_ray_any(ebpo_context *context, const double origin[3], const do
                          double t_max, bool *any, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_casting c;
+    casting c;
     ebpo_status status = cast_ray(&c, context, origin, direction, t_max, EBPO_WANTS_ANY, error);
     *any = status == EBPO_OK && c.count;
     return status;
@@ -471,7 +474,7 @@ ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const do
                          ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_casting c;
+    casting c;
     uint64_t end;
     *hits = NULL;
     *count = 0;
@@ -485,7 +488,7 @@ ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const do
     return status;
 }
 
-/* Many rays: pieces of them on all cores, each thread with a context of its own. */
+/* --- many rays --- */
 
 /* Rays that a thread takes at a time; of a model that is not all in memory more, which are
  * neighbours on the curve. */
@@ -513,14 +516,14 @@ typedef struct batch {
     found *all;
 } batch;
 
-/* --- one ray --- */
+/* --- a ray of many --- */
 
 static ebpo_status answer_ray(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
 {
-    ebpo_casting c;
+    casting c;
     const ebpo_ray *r = &b->rays[i];
     casting_begin(&c, b->context[worker], r->origin, r->direction, r->t_max, b->wants,
-                       b->options.sides);
+                  b->options.sides);
     ebpo_status status = ray_walk(&c, error);
     if (status != EBPO_OK)
         return status;
@@ -585,7 +588,7 @@ static void put_in_order(batch *b, const ebpo_model *m)
     free(entry);
 }
 
-/* --- all of them --- */
+/* --- on all cores --- */
 
 static ebpo_segment segment_of(const ebpo_ray *r)
 {

@@ -1,5 +1,8 @@
-/* Attributes where points lie on faces: of vertices weighed by where the point is on its face, of
- * faces the face's own. How exactly is said in query.h. */
+/* Attributes at points on faces: those of vertices weighed by where the point is on its face, those
+ * of faces as they are.
+ *
+ * A sampler reads the columns that were asked for once, and then serves any number of points. How
+ * exact results are is documented in ebpo/query.h. */
 #include "core/strict_fp.h"
 
 #include <ebpo/query.h>
@@ -261,7 +264,8 @@ static void weigh_corners(const double corner[3][3], const double p[3], double w
 {
     double e[3][3];
     edges_of(corner, p, e);
-    double bb = ebpo_vec3_dot(e[0], e[0]), bc = ebpo_vec3_dot(e[0], e[1]), cc = ebpo_vec3_dot(e[1], e[1]), pb = ebpo_vec3_dot(e[2], e[0]),
+    double bb = ebpo_vec3_dot(e[0], e[0]), bc = ebpo_vec3_dot(e[0], e[1]),
+           cc = ebpo_vec3_dot(e[1], e[1]), pb = ebpo_vec3_dot(e[2], e[0]),
            pc = ebpo_vec3_dot(e[2], e[1]), det = bb * cc - bc * bc;
     if (!(det > 0x1p-900)) {
         weigh_edge((const double(*)[3])e, weight);

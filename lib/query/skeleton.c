@@ -1,4 +1,10 @@
-/* Bounds of the distance to subtrees that are not in memory: the upper nodes of each. */
+/* Skeletons: bounds of the distance to the faces of subtrees that are not in memory.
+ *
+ * Of each subtree that has ever been loaded the upper nodes of its hierarchy over faces are kept,
+ * eight at first; searches load it again only if it may matter. Whenever a search has loaded it for
+ * nothing, nodes are added where it looked. All skeletons together stay within their share of the
+ * budget. They give lower bounds only (model_parts.h says why); any thread may use them, also while
+ * one grows. */
 #include "core/strict_fp.h"
 
 #include "query/model_parts.h"
@@ -70,8 +76,8 @@ static double squared_diagonal(const ebpo_bound *b, int lane)
     return sum;
 }
 
-/* Blocks, and so children of the topmost node, hold outer faces or own ones: see
- * layout.c. */
+/* Blocks, and so children of the topmost node, hold outer faces or own ones: see blocks.c.
+ */
 static bool is_outer(const ebpo_accel *s, uint32_t child)
 {
     while (!(child & EBPO_IS_BLOCK))

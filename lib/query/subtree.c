@@ -1,4 +1,10 @@
-/* From a slice, which has an array for each type of node, to arrays with a row for each node. */
+/* A subtree as plain arrays: what ebpo/subtree.h returns.
+ *
+ * A node is found by its octcode; what is below it is read as a slice, if a bound of its memory,
+ * from counts, is within the caller's limit. The slice has an array for each type of node; this
+ * file makes arrays with a row for each node, faces with corners and numbers, and lists of leaves.
+ * A single node can then be described in the model's coordinates: half-spaces inherited on the way
+ * from the root, and the polygons of its envelope. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -24,9 +30,7 @@
 #include "levels/lod_model.h"
 #include "levels/stream_node.h"
 
-/* Inside an ebpo_subtree, and the stages of making one. */
-
-typedef struct ebpo_subtree_scratch ebpo_subtree_scratch; /* what describing a node takes */
+typedef struct subtree_scratch subtree_scratch; /* what describing a node takes */
 
 struct ebpo_subtree {
     ebpo_box box;
@@ -54,7 +58,7 @@ struct ebpo_subtree {
     double *corners64;
     uint32_t *numbers, *source, *list_first, *list;
     uint64_t memory;
-    ebpo_subtree_scratch *scratch; /* with the first node that is asked for */
+    subtree_scratch *scratch; /* with the first node that is asked for */
 };
 
 /* --- room --- */
@@ -272,7 +276,7 @@ static ebpo_status take_corners(ebpo_subtree *s, ebpo_error *error)
 
 /* Then faces and lists. */
 static ebpo_status subtree_take_faces(ebpo_subtree *s, ebpo_slice *slice,
-                                    const ebpo_subtree_options *options, ebpo_error *error)
+                                      const ebpo_subtree_options *options, ebpo_error *error)
 {
     s->mesh = slice->mesh;
     memset(&slice->mesh, 0, sizeof slice->mesh);
@@ -332,9 +336,9 @@ ebpo_status ebpo_subtree_get_faces(const ebpo_subtree *s, ebpo_subtree_faces *ou
     return EBPO_GIVE(ebpo_subtree_faces, out, &faces);
 }
 
-/* A node in the model's coordinates: its half-spaces and its envelope. */
+/* --- a node in the model's coordinates --- */
 
-struct ebpo_subtree_scratch {
+struct subtree_scratch {
     ebpo_envelope_stack envelopes;
     ebpo_polytope leaf;
     ebpo_node_buffers lent;
@@ -343,7 +347,7 @@ struct ebpo_subtree_scratch {
     uint64_t face_capacity;
 };
 
-static void subtree_free_scratch(ebpo_subtree_scratch *scratch)
+static void subtree_free_scratch(subtree_scratch *scratch)
 {
     if (scratch)
         free(scratch->faces);
@@ -415,7 +419,7 @@ static const ebpo_polytope *stored_envelope(ebpo_subtree *s, uint64_t octcode, e
 
 static ebpo_status gather_faces(ebpo_subtree *s, uint64_t leaf, uint64_t *count, ebpo_error *error)
 {
-    ebpo_subtree_scratch *scratch = s->scratch;
+    subtree_scratch *scratch = s->scratch;
     uint32_t first = s->list_first[leaf];
     *count = s->list_first[leaf + 1] - first;
     if (!ebpo_grow(&scratch->faces, &scratch->face_capacity, *count, sizeof *scratch->faces))
@@ -450,8 +454,8 @@ static ebpo_status derive_planes(ebpo_subtree *s, uint64_t leaf, uint32_t codes[
 
 /* --- all of a node --- */
 
-static ebpo_status describe_node(ebpo_subtree *s, uint64_t number, bool polygons, ebpo_subtree_node *out,
-                            ebpo_error *error)
+static ebpo_status describe_node(ebpo_subtree *s, uint64_t number, bool polygons,
+                                 ebpo_subtree_node *out, ebpo_error *error)
 {
     uint64_t octcode = s->octcodes[number];
     ebpo_node_type type = (ebpo_node_type)s->types[number];
@@ -498,9 +502,9 @@ ebpo_status ebpo_subtree_get_node(ebpo_subtree *s, uint64_t number, bool polygon
     return status == EBPO_OK ? EBPO_GIVE(ebpo_subtree_node, out, &node) : status;
 }
 
-/* Finding a node by its octcode, and reading what is below it. */
+/* --- opening --- */
 
-/* --- the node --- */
+/* --- the node of an octcode --- */
 
 static ebpo_status fail_uniform(const ebpo_chunks *chunks, uint64_t octcode, ebpo_cursor *c,
                                 ebpo_error *error)
@@ -602,7 +606,8 @@ static uint64_t least_memory(uint64_t bytes)
 }
 
 /* Of a slice, what is made of it, and what is needed on the way: a bound, from counts. */
-static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, bool whole, bool corners)
+static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, bool whole,
+                            bool corners)
 {
     enum {
         NODE = 32,      /* octcode, type, winding, children, planes, list; winding in the slice */
@@ -692,7 +697,7 @@ static uint32_t choose_needs(ebpo_subtree *s, const ebpo_subtree_options *o, uin
 }
 
 static ebpo_status fill_arrays(ebpo_subtree *s, ebpo_chunks *chunks, ebpo_cursor *c,
-                        const ebpo_subtree_options *o, ebpo_error *error)
+                               const ebpo_subtree_options *o, ebpo_error *error)
 {
     ebpo_slice slice;
     uint32_t needs = choose_needs(s, o, chunks->file->info.parts);
