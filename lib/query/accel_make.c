@@ -225,8 +225,10 @@ uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info
 
 /* --- and refused --- */
 
-ebpo_status ebpo_accel_fits(ebpo_room *room, const ebpo_accel_plan *plan, uint64_t units,
-                            ebpo_error *error)
+/* EBPO_E_LIMIT if making it with these blocks (the usual ones without a layout) takes more than the
+ * room (NULL: no limit) has, the slice included. */
+static ebpo_status accel_fits(ebpo_room *room, const ebpo_accel_plan *plan, uint64_t units,
+                              ebpo_error *error)
 {
     if (!room)
         return EBPO_OK;
@@ -503,15 +505,19 @@ static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info
 {
     ebpo_layout layout;
     ebpo_accel_plan plan = { info, slice, s->has_planes, NULL };
-    ebpo_status status = ebpo_accel_fits(room, &plan, 0, error);
+    ebpo_status status = accel_fits(room, &plan, 0, error);
     if (status == EBPO_OK)
         status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MOST, error);
     if (status != EBPO_OK)
         return status;
     plan.layout = &layout;
-    status = ebpo_accel_fits(room, &plan, layout.block_count, error);
+    status = accel_fits(room, &plan, layout.block_count, error);
     if (status == EBPO_OK)
-        status = ebpo_accel_fill_blocks(s, &plan, room, threads, error);
+        status = ebpo_accel_number_blocks(s, &plan, threads, error);
+    if (status == EBPO_OK)
+        status = accel_fits(room, &plan, s->units, error);
+    if (status == EBPO_OK)
+        status = ebpo_accel_fill_blocks(s, &plan, threads, error);
     ebpo_mesh_free(&slice->mesh);
     if (status == EBPO_OK)
         status = ebpo_accel_fill_bounds(s, &layout, threads, error);

@@ -14,7 +14,8 @@ typedef struct ebpo_layout {
     uint64_t block_count, block_capacity;
     /* [block_count] by what the accel knows each block: ebpo_meshlet; made with the blocks */
     uint32_t *block_number;
-    uint32_t (*child)[8]; /* [bound_count] as in ebpo_bound */
+    struct ebpo_block_corners *corners; /* [block_count] until they are filled */
+    uint32_t (*child)[8];               /* [bound_count] as in ebpo_bound */
     /* [bound_count] blocks below a node are contiguous: first, and one past the last */
     uint32_t *first_block;
     uint32_t *last_block;
@@ -34,10 +35,6 @@ typedef struct ebpo_accel_plan {
     bool with_planes;
     ebpo_layout *layout; /* NULL: not known yet */
 } ebpo_accel_plan;
-/* EBPO_E_LIMIT if making it with these blocks (the usual ones without a layout) takes more than the
- * room (NULL: no limit) has, the slice included. */
-EBPO_MUST_USE ebpo_status ebpo_accel_fits(ebpo_room *room, const ebpo_accel_plan *plan,
-                                          uint64_t units, ebpo_error *error);
 
 /* Entries of leaves' lists at most: each reference is one, and more than eight new faces of a leaf
  * are in 2 n / 9 blocks at most, fewer in one. */
@@ -46,10 +43,12 @@ static inline uint64_t ebpo_list_most(uint64_t refs, uint64_t leaves, uint64_t f
     return refs + leaves + faces / 9 * 2 + 2;
 }
 
-/* Fills blocks, and gives them their numbers (parallel). */
+/* Finds out what blocks take, gives them their numbers, and sets s->units (parallel); then fills
+ * them (parallel). */
+EBPO_MUST_USE ebpo_status ebpo_accel_number_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
+                                                   unsigned threads, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
-                                                 ebpo_room *room, unsigned threads,
-                                                 ebpo_error *error);
+                                                 unsigned threads, ebpo_error *error);
 /* Bounds of the hierarchy, from the blocks (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
                                                  unsigned threads, ebpo_error *error);

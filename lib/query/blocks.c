@@ -252,6 +252,7 @@ void ebpo_layout_free(ebpo_layout *layout)
     free(layout->block_begin);
     free(layout->block_end);
     free(layout->block_number);
+    free(layout->corners);
     free(layout->child);
     free(layout->first_block);
     free(layout->last_block);
@@ -261,15 +262,14 @@ void ebpo_layout_free(ebpo_layout *layout)
 /* --- blocks --- */
 
 /* Which of a block's vertices, in the order in which its faces have them: [face][corner]. */
-typedef struct found {
+struct ebpo_block_corners {
     uint8_t at[EBPO_MESHLET_VERTICES], count;
-} found;
+};
 
 typedef struct job {
     ebpo_accel *s;
     const ebpo_mesh *mesh;
     ebpo_layout *layout;
-    found *found; /* of each block */
 } job;
 
 /* A block's vertices. */
@@ -305,19 +305,19 @@ static void find_shared(const job *j, uint64_t block)
                 break;
         }
         table[slot] = (uint8_t)(at + 1);
-        j->found[block].at[i] = (uint8_t)at;
+        j->layout->corners[block].at[i] = (uint8_t)at;
         count += at == count;
     }
-    j->found[block].count = (uint8_t)count;
+    j->layout->corners[block].count = (uint8_t)count;
 }
 
 static void take_shared(const job *j, uint64_t block, shared *out)
 {
     unsigned corners;
     const uint32_t *corner = corners_of(j, block, &corners);
-    out->at = j->found[block].at;
+    out->at = j->layout->corners[block].at;
     out->faces = corners / 3;
-    out->count = j->found[block].count;
+    out->count = j->layout->corners[block].count;
     for (unsigned i = 0; i < corners; i++)
         out->vertex[out->at[i]] = corner[i];
 }
@@ -340,7 +340,7 @@ static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, u
     job *j = context;
     for (uint64_t b = begin; b < end; b++) {
         find_shared(j, b);
-        j->layout->block_number[b] = size_of(j->s, j->found[b].count);
+        j->layout->block_number[b] = size_of(j->s, j->layout->corners[b].count);
     }
     return EBPO_OK;
 }
@@ -430,29 +430,33 @@ static ebpo_status make_room(ebpo_accel *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, ebpo_room *room,
-                                   unsigned threads, ebpo_error *error)
+ebpo_status ebpo_accel_number_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, unsigned threads,
+                                     ebpo_error *error)
 {
     ebpo_layout *layout = plan->layout;
-    job j = { s, &plan->slice->mesh, layout, NULL };
+    job j = { s, &plan->slice->mesh, layout };
     layout->block_number = ebpo_alloc(layout->block_count, sizeof *layout->block_number);
-    j.found = ebpo_alloc(layout->block_count, sizeof *j.found);
-    ebpo_status status = layout->block_number && j.found
-                             ? EBPO_OK
-                             : ebpo_fail_memory(error, layout->block_count * sizeof *j.found);
-    if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, measure_blocks, &j,
-                                   NULL, "open", error);
+    layout->corners = ebpo_alloc(layout->block_count, sizeof *layout->corners);
+    if (!layout->block_number || !layout->corners)
+        return ebpo_fail_memory(error, layout->block_count * sizeof *layout->corners);
+    ebpo_status status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, measure_blocks,
+                                           &j, NULL, "open", error);
     if (status == EBPO_OK && !number_blocks(s, layout))
         status = ebpo_fail(error, EBPO_E_LIMIT,
                            "the model has too many faces to be held at once; give a memory budget");
-    if (status == EBPO_OK)
-        status = ebpo_accel_fits(room, plan, s->units, error);
-    if (status == EBPO_OK)
-        status = make_room(s, error);
+    return status;
+}
+
+ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, unsigned threads,
+                                   ebpo_error *error)
+{
+    ebpo_layout *layout = plan->layout;
+    job j = { s, &plan->slice->mesh, layout };
+    ebpo_status status = make_room(s, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill_blocks, &j, NULL,
                                    "open", error);
-    free(j.found);
+    free(layout->corners);
+    layout->corners = NULL;
     return status;
 }
