@@ -26,6 +26,13 @@
 
 /* --- memory --- */
 
+/* Entries of leaves' lists at most: each reference is one, and more than eight new faces of a leaf
+ * are in 2 n / 9 blocks at most, fewer in one. */
+static inline uint64_t list_most(uint64_t refs, uint64_t leaves, uint64_t faces)
+{
+    return refs + leaves + faces / 9 * 2 + 2;
+}
+
 /* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates
  * beyond that, and doubles, take doubles. */
 static bool accel_needs_doubles(const ebpo_info *info)
@@ -80,7 +87,7 @@ static told told_by(const counts *c, const ebpo_info *info)
             c->below ? border_bytes(c) : maps * c->vertices + c->leaves + 4 * c->leaf_planes,
         .nodes = c->groups * 32 + (c->below ? 0 : grid_bytes(c->groups)) +
                  c->leaves * sizeof(ebpo_accel_leaf),
-        .list = ebpo_list_most(c->refs, c->leaves, c->faces) * sizeof(ebpo_listed_block),
+        .list = list_most(c->refs, c->leaves, c->faces) * sizeof(ebpo_listed_block),
         .planes = c->keeps_planes ? 4 * (c->groups + 1 + c->planes) : 0,
         .rows = c->below && info->solid ? c->leaves * sizeof(ebpo_kind_row) : 0,
         .slots = 4 * c->faces,
@@ -384,7 +391,7 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
     uint64_t faces = layout->block_count ? layout->block_end[layout->block_count - 1] : 0;
     uint32_t *map = *slot_of = ebpo_alloc(faces, sizeof *map);
     bool list = ebpo_grow(&s->list, &w->list_capacity,
-                          ebpo_list_most(refs, leaves, slice->face_count), sizeof *s->list);
+                          list_most(refs, leaves, slice->face_count), sizeof *s->list);
     if (!s->nodes.group || !s->leaf || !map || !list)
         return ebpo_fail_memory(w->error, groups * 32 + leaves * sizeof *s->leaf + faces * 4);
     ebpo_prefer_huge_pages(s->nodes.group, groups * sizeof *s->nodes.group);

@@ -36,13 +36,6 @@ typedef struct ebpo_accel_plan {
     ebpo_layout *layout; /* NULL: not known yet */
 } ebpo_accel_plan;
 
-/* Entries of leaves' lists at most: each reference is one, and more than eight new faces of a leaf
- * are in 2 n / 9 blocks at most, fewer in one. */
-static inline uint64_t ebpo_list_most(uint64_t refs, uint64_t leaves, uint64_t faces)
-{
-    return refs + leaves + faces / 9 * 2 + 2;
-}
-
 /* Finds out what blocks take, gives them their numbers, and sets s->units (parallel); then fills
  * them (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_number_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
