@@ -230,6 +230,24 @@ uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info
     return kept_bytes(&t, &f);
 }
 
+/* Blocks are half full but for the one that a leaf of few faces has alone, where its neighbours'
+ * fill theirs: what that takes beyond its faces' share is in the 64 bytes of each leaf, as what its
+ * planes may take in a subtree. Lists name at most one block for each listed face. Of a face a
+ * record has three vertices at most, or four where it has room for more than 16. */
+void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
+                         uint64_t *peak)
+{
+    uint64_t wide = accel_needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->outer;
+    uint64_t blocks = faces / 4 + 2, bounds = blocks / 3 + 2;
+    *keep = sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + size->groups * 64 +
+            size->leaves * (sizeof(ebpo_accel_leaf) + 64) +
+            (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
+            blocks * (EBPO_MESHLET_WIDE + EBPO_MESHLET_UNIT) + faces * 48 * wide +
+            bounds * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab)) + faces * 8;
+    *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 24) +
+            (blocks + bounds) * 72 + 65536;
+}
+
 /* --- and refused --- */
 
 /* EBPO_E_LIMIT if making it with these blocks (the usual ones without a layout) takes more than the
@@ -390,8 +408,8 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
     s->leaf_count = (uint32_t)leaves;
     uint64_t faces = layout->block_count ? layout->block_end[layout->block_count - 1] : 0;
     uint32_t *map = *slot_of = ebpo_alloc(faces, sizeof *map);
-    bool list = ebpo_grow(&s->list, &w->list_capacity,
-                          list_most(refs, leaves, slice->face_count), sizeof *s->list);
+    bool list = ebpo_grow(&s->list, &w->list_capacity, list_most(refs, leaves, slice->face_count),
+                          sizeof *s->list);
     if (!s->nodes.group || !s->leaf || !map || !list)
         return ebpo_fail_memory(w->error, groups * 32 + leaves * sizeof *s->leaf + faces * 4);
     ebpo_prefer_huge_pages(s->nodes.group, groups * sizeof *s->nodes.group);
@@ -603,22 +621,4 @@ void ebpo_accel_free(ebpo_accel *s)
     free(s->gray_planes);
     free(s->gray_first);
     free(s);
-}
-
-/* Blocks are half full but for the one that a leaf of few faces has alone, where its neighbours'
- * fill theirs: what that takes beyond its faces' share is in the 64 bytes of each leaf, as what its
- * planes may take in a subtree. Lists name at most one block for each listed face. Of a face a
- * record has three vertices at most, or four where it has room for more than 16. */
-void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
-                         uint64_t *peak)
-{
-    uint64_t wide = accel_needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->outer;
-    uint64_t blocks = faces / 4 + 2, bounds = blocks / 3 + 2;
-    *keep = sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + size->groups * 64 +
-            size->leaves * (sizeof(ebpo_accel_leaf) + 64) +
-            (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
-            blocks * (EBPO_MESHLET_WIDE + EBPO_MESHLET_UNIT) + faces * 48 * wide +
-            bounds * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab)) + faces * 8;
-    *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 24) +
-            (blocks + bounds) * 72 + 65536;
 }
