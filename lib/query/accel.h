@@ -204,7 +204,7 @@ typedef struct ebpo_accel {
     uint64_t units;
     uint32_t face_count;
     double centre[3], scale;
-    float turn_error; /* query/kernels.inc, of blocks of floats */
+    float turn_error; /* query/inside_kernels.c, of blocks of floats */
     double reach;     /* no coordinate of a decoded box is greater, in the frame; 1 at least */
     ebpo_bound *bound;
     ebpo_bound_slab *slab; /* [bound_count] */
@@ -225,7 +225,7 @@ typedef struct ebpo_accel {
 } ebpo_accel;
 
 /* Sets the boxes of a leaf's list; returns the walls of the cell that its faces come to, a bit for
- * each: 2 axis + side (1: upper). ebpo_kernels has it. */
+ * each: 2 axis + side (1: upper). ebpo_inside_kernels has it. */
 typedef unsigned ebpo_walls_fn(const ebpo_accel *subtree, ebpo_listed_block *list, ebpo_cell cell);
 
 /* A question has come to a leaf of a solid whose kind is not known. Number EBPO_LEAF_WALL_ASKED
@@ -267,14 +267,11 @@ void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *i
 uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info,
                                uint64_t subtrees);
 
-/* --- its nodes (accel_nodes.c); `entry` is what finds them --- */
+/* --- its nodes (query_node.c); `entry` is what finds them --- */
 
 ebpo_node ebpo_accel_root(const ebpo_accel *subtree);
 /* Child of a gray node that is not pruned. */
 ebpo_node ebpo_accel_child(const ebpo_accel *subtree, const ebpo_node *gray, unsigned octant);
-/* Codes of a gray node's planes, where the subtree has kept them. */
-const uint32_t *ebpo_accel_planes(const ebpo_accel *subtree, const ebpo_node *node,
-                                  unsigned *count);
 /* For cursors (geometry/cursor.h); the holder is an ebpo_accel. */
 extern const ebpo_node_source ebpo_accel_source;
 

@@ -2,6 +2,7 @@
 #ifndef EBPO_QUERY_ACCEL_PARTS_H
 #define EBPO_QUERY_ACCEL_PARTS_H
 
+#include "core/cpu.h"
 #include "query/accel.h"
 
 /* Faces to blocks and blocks to a hierarchy: only which goes where; nothing is computed from
@@ -13,7 +14,8 @@ typedef struct ebpo_layout {
     uint64_t block_count, block_capacity;
     /* [block_count] by what the accel knows each block: ebpo_meshlet; made with the blocks */
     uint32_t *block_number;
-    uint32_t (*child)[8]; /* [bound_count] as in ebpo_bound */
+    struct ebpo_block_corners *corners; /* [block_count] until they are filled */
+    uint32_t (*child)[8];               /* [bound_count] as in ebpo_bound */
     /* [bound_count] blocks below a node are contiguous: first, and one past the last */
     uint32_t *first_block;
     uint32_t *last_block;
@@ -26,10 +28,6 @@ EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *s
                                            ebpo_error *error);
 void ebpo_layout_free(ebpo_layout *layout);
 
-/* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates
- * beyond that, and doubles, take doubles. */
-bool ebpo_accel_needs_doubles(const ebpo_info *info);
-
 /* What is made, and of what. */
 typedef struct ebpo_accel_plan {
     const ebpo_info *info;
@@ -37,54 +35,50 @@ typedef struct ebpo_accel_plan {
     bool with_planes;
     ebpo_layout *layout; /* NULL: not known yet */
 } ebpo_accel_plan;
-/* EBPO_E_LIMIT if making it with these blocks (the usual ones without a layout) takes more than the
- * room (NULL: no limit) has, the slice included. */
-EBPO_MUST_USE ebpo_status ebpo_accel_fits(ebpo_room *room, const ebpo_accel_plan *plan,
-                                          uint64_t units, ebpo_error *error);
 
-/* Entries of leaves' lists at most: each reference is one, and more than eight new faces of a leaf
- * are in 2 n / 9 blocks at most, fewer in one. */
-static inline uint64_t ebpo_list_most(uint64_t refs, uint64_t leaves, uint64_t faces)
-{
-    return refs + leaves + faces / 9 * 2 + 2;
-}
-
-/* Fills blocks, and gives them their numbers (parallel). */
+/* Finds out what blocks take, gives them their numbers, and sets s->units (parallel); then fills
+ * them (parallel). */
+EBPO_MUST_USE ebpo_status ebpo_accel_number_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
+                                                   unsigned threads, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
-                                                 ebpo_room *room, unsigned threads,
-                                                 ebpo_error *error);
+                                                 unsigned threads, ebpo_error *error);
 /* Bounds of the hierarchy, from the blocks (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
                                                  unsigned threads, ebpo_error *error);
-/* Child tables and leaf records with their lists of blocks (one walk). */
-EBPO_MUST_USE ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
-                                                const ebpo_layout *layout, ebpo_error *error);
 /* Room for at most so many rows; NULL: no memory. */
 ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_most);
 void ebpo_leaf_kinds_free(ebpo_leaf_kinds *kinds);
 
-/* --- a leaf of a solid --- */
+/* --- kernels (block_measure_kernels.c) ---
+ *
+ * What is measured of blocks of floats, eight vertices at a time: compiled for any processor and
+ * for those with AVX2, the same operations in the same order. How far off it may be:
+ * docs/develop/bounds.md, "How slabs are measured". */
 
-/* n . xi - d in the cell's coordinates (0 .. 1 on each axis), 1-norm of n 1. */
-typedef struct ebpo_leaf_plane {
-    double n[3], d;
-} ebpo_leaf_plane;
+typedef struct ebpo_block_extent {
+    float low[3], high[3]; /* of its vertices, in the model's unit */
+    /* The sum of its faces' normals, as long as twice their areas. Where the axis of a slab points
+     * is only a matter of how tight it is. */
+    float normal[3];
+} ebpo_block_extent;
 
-/* Of a convex leaf (`flip` 1), or of a concave one (-1: with the planes turned): the winding number
- * below all planes, and elsewhere in the cell. */
-typedef struct ebpo_deciding_planes {
-    int count, flip;
-    int32_t inner, outer;
-    ebpo_leaf_plane plane[EBPO_KIND_PLANES_MAX];
-} ebpo_deciding_planes;
+/* Where slabs are seen from: a place, in two parts, in the model's unit; the frame's scale; the
+ * axis, and 1 less its square. */
+typedef struct ebpo_slab_view {
+    float high[3], low[3], scale, axis[3], rest;
+} ebpo_slab_view;
 
-/* False when the planes of its faces do not decide. */
-bool ebpo_leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell,
-                           ebpo_deciding_planes *out);
+typedef struct ebpo_slab_extent {
+    float from, to, aside2; /* in the frame; the square of the greatest distance from the axis */
+} ebpo_slab_extent;
 
-/* Crossings of the leaf's faces with a segment along an axis. Passed over are blocks of whose box
- * any bit of `beside` is set: lower sides that are not the cell's, where the segment is. */
-int32_t ebpo_leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double from[3],
-                            double to, int axis, uint64_t beside);
+typedef struct ebpo_block_measures {
+    void (*extent)(const ebpo_accel *s, uint32_t block, ebpo_block_extent *out);
+    /* Of all vertices of `count` blocks, of these numbers. */
+    void (*slab)(const ebpo_accel *s, const uint32_t *block, uint32_t count,
+                 const ebpo_slab_view *view, ebpo_slab_extent *out);
+} ebpo_block_measures;
+
+EBPO_KERNELS(ebpo_block_measures, ebpo_block_measures)
 
 #endif

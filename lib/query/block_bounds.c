@@ -1,6 +1,9 @@
-/* Boxes and round slabs around the blocks below each child. All in doubles, in the subtree's frame,
- * then rounded outward to 8 and 16 bits. docs/develop/bounds.md proves that what is read from them
- * in single precision still bounds. */
+/* Bounds of the hierarchy over faces: boxes and bounding cylinders around the blocks below each
+ * child.
+ *
+ * All bounds are computed in doubles, in the subtree's frame, then rounded outward to 8 and 16
+ * bits. Blocks of floats are measured by kernels (block_measure_kernels.c). docs/develop/bounds.md
+ * proves that what kernels read from these bounds in single precision still bounds. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -13,10 +16,9 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/os.h"
+#include "core/huge_pages.h"
 #include "core/parallel.h"
 #include "query/accel_parts.h"
-#include "query/block_measure.h"
 
 /* Above so many blocks the slab is left away: such patches curve too much for one. */
 enum { SLAB_BLOCKS_MAX = 1024 };
@@ -45,16 +47,16 @@ typedef struct job {
 typedef double pair __attribute__((vector_size(16)));
 
 #if defined(__SSE2__)
-static inline pair lesser(pair a, pair b) { return (pair)_mm_min_pd((__m128d)a, (__m128d)b); }
-static inline pair greater(pair a, pair b) { return (pair)_mm_max_pd((__m128d)a, (__m128d)b); }
+static inline pair lesser_pair(pair a, pair b) { return (pair)_mm_min_pd((__m128d)a, (__m128d)b); }
+static inline pair greater_pair(pair a, pair b) { return (pair)_mm_max_pd((__m128d)a, (__m128d)b); }
 #else
 typedef int64_t pair_mask __attribute__((vector_size(16)));
-static inline pair pick(pair_mask mask, pair yes, pair no)
+static inline pair pick_pair(pair_mask mask, pair yes, pair no)
 {
     return (pair)(((pair_mask)yes & mask) | ((pair_mask)no & ~mask));
 }
-static inline pair lesser(pair a, pair b) { return pick(a < b, a, b); }
-static inline pair greater(pair a, pair b) { return pick(a > b, a, b); }
+static inline pair lesser_pair(pair a, pair b) { return pick_pair(a < b, a, b); }
+static inline pair greater_pair(pair a, pair b) { return pick_pair(a > b, a, b); }
 #endif
 
 static double least_of(pair x) { return x[0] < x[1] ? x[0] : x[1]; }
@@ -90,8 +92,8 @@ static void add_vertices(const vertices *v, extent *e)
     for (int k = 0; k < 3; k++) {
         pair low = { e->low[k], e->low[k] }, high = { e->high[k], e->high[k] };
         for (unsigned i = 0; i < v->pairs; i++) {
-            low = lesser(v->x[k][i], low);
-            high = greater(v->x[k][i], high);
+            low = lesser_pair(v->x[k][i], low);
+            high = greater_pair(v->x[k][i], high);
         }
         e->low[k] = least_of(low);
         e->high[k] = most_of(high);
@@ -175,12 +177,12 @@ static void extend_nodes(job *j)
 /* --- boxes --- */
 
 /* fmax of what are numbers: without calls. */
-static double larger(double a, double b) { return a > b ? a : b; }
+static double larger_of(double a, double b) { return a > b ? a : b; }
 
 /* Origin and step of one axis: so that 255 steps hold what must be held. */
 static double choose_grid(double low, double high, float *origin, float *step)
 {
-    double slack = larger(fabs(low), fabs(high)) * box_slack + least_slack;
+    double slack = larger_of(fabs(low), fabs(high)) * box_slack + least_slack;
     *origin = (float)(low - slack);
     if ((double)*origin > low - slack)
         *origin = nextafterf(*origin, -INFINITY);
@@ -215,7 +217,7 @@ static void set_boxes(ebpo_bound *b, const extent *all, const extent child[8])
     }
     double size = 0;
     for (int k = 0; k < 3; k++)
-        size = larger(size, all->high[k] - all->low[k]);
+        size = larger_of(size, all->high[k] - all->low[k]);
     b->slab_limit2 = (float)(size * size * slab_share);
 }
 
@@ -224,8 +226,8 @@ static double reach_of(const ebpo_bound *b)
 {
     double reach = 0;
     for (int k = 0; k < 3; k++)
-        reach = larger(reach, larger(fabs((double)b->origin[k]),
-                                     fabs((double)b->origin[k] + 255 * (double)b->step[k])));
+        reach = larger_of(reach, larger_of(fabs((double)b->origin[k]),
+                                           fabs((double)b->origin[k] + 255 * (double)b->step[k])));
     return reach;
 }
 
@@ -261,9 +263,9 @@ static inline void add_to_slab(const vertices *v, slab_pairs *p)
             along += d * p->axis[k];
             square += d * d;
         }
-        p->from = lesser(along, p->from);
-        p->to = greater(along, p->to);
-        p->most = greater(square - along * along, p->most);
+        p->from = lesser_pair(along, p->from);
+        p->to = greater_pair(along, p->to);
+        p->most = greater_pair(square - along * along, p->most);
     }
 }
 
@@ -370,10 +372,10 @@ static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab chi
 {
     double slack = size * slab_slack, along = 0, aside = 0, radius[8];
     for (int lane = 0; lane < count; lane++) {
-        along = larger(along, larger(child[lane].to, -child[lane].from) + slack);
+        along = larger_of(along, larger_of(child[lane].to, -child[lane].from) + slack);
         /* the square is off by less than 2^-49 of size * size */
-        radius[lane] = sqrt(larger(child[lane].radius2, 0) + size * size * 0x1p-46) + slack;
-        aside = larger(aside, radius[lane]);
+        radius[lane] = sqrt(larger_of(child[lane].radius2, 0) + size * size * 0x1p-46) + slack;
+        aside = larger_of(aside, radius[lane]);
     }
     bool known = is_known(count, child, radius);
     b->along_step = (float)((known ? along : FLT_MAX / 4) / SHORT_MOST);
@@ -455,7 +457,7 @@ static void link_parents(ebpo_accel *s)
                 s->bound[s->bound[n].child[lane]].parent = n;
 }
 
-static ebpo_status fill(job *j, unsigned threads, ebpo_error *error)
+static ebpo_status fill_levels(job *j, unsigned threads, ebpo_error *error)
 {
     ebpo_status status = ebpo_parallel_for(threads, NULL, j->layout->block_count, 512,
                                            extend_blocks, j, NULL, "open", error);
@@ -478,9 +480,9 @@ ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, uns
     s->reach = 1;
     ebpo_status status = make_room(&j, error);
     if (status == EBPO_OK)
-        status = fill(&j, threads, error);
+        status = fill_levels(&j, threads, error);
     if (status == EBPO_OK && s->bound_count)
-        s->reach = larger(1, reach_of(&s->bound[s->top]));
+        s->reach = larger_of(1, reach_of(&s->bound[s->top]));
     free(j.of_block);
     free(j.of_node);
     return status;

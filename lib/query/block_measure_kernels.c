@@ -1,9 +1,13 @@
-/* Compiled for several processors: block_measure.h. */
+/* Kernels that measure blocks of floats for block_bounds.c, eight vertices at a time: the extent of
+ * a block, and its extent along an axis and around it.
+ *
+ * Compiled for several instruction sets (core/cpu.h), with the same operations in the same order.
+ * Error bounds: docs/develop/bounds.md, "How slabs are measured". */
 #include "core/strict_fp.h"
 
 #include <math.h>
 
-#include "query/block_measure.h"
+#include "query/accel_parts.h"
 #include "query/face_block.h"
 
 static const float lane_number[8] = { 0, 1, 2, 3, 4, 5, 6, 7 };

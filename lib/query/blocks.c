@@ -1,4 +1,11 @@
-/* Faces, up to eight together, with the vertices that they share. */
+/* Blocks: at most eight faces, with the vertices that they share.
+ *
+ * The layout decides which faces share a block and how the blocks hang together; it computes
+ * nothing from coordinates. The octree is the skeleton of the hierarchy: a node's new faces are one
+ * range of numbers, so neighbouring children with few faces share a block, and nodes with few
+ * blocks are passed up until eight come together. The blocks are then measured, numbered and filled
+ * in parallel; their bounds are made in block_bounds.c. The encoding is that of ebpo_meshlet
+ * (accel.h). */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -6,20 +13,263 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/os.h"
+#include "core/huge_pages.h"
 #include "core/parallel.h"
+#include "geometry/node_types.h"
 #include "query/accel_parts.h"
 
+/* What a walk brings up from a node: either up to eight faces that are no block yet, or up to eight
+ * members of the hierarchy. */
+typedef struct bundle {
+    uint32_t begin, end; /* faces */
+    int members;         /* 0: no block yet */
+    uint32_t member[8];
+} bundle;
+
+typedef struct walk {
+    ebpo_layout *out;
+    const ebpo_slice *slice;
+    uint64_t gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX]; /* of each level, seen so far */
+    uint64_t most;                                         /* blocks */
+    bool failed;
+} walk;
+
+static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
+{
+    ebpo_layout *o = w->out;
+    if (o->block_count >= w->most ||
+        !ebpo_grow(&o->block_begin, &o->block_capacity, o->block_count + 1,
+                   sizeof *o->block_begin) ||
+        !ebpo_grow(&o->block_end, &o->block_capacity2, o->block_count + 1, sizeof *o->block_end)) {
+        w->failed = true;
+        return EBPO_NO_CHILD;
+    }
+    o->block_begin[o->block_count] = begin;
+    o->block_end[o->block_count] = end;
+    return (uint32_t)o->block_count++ | EBPO_IS_BLOCK;
+}
+
+/* first_block and last_block hold faces until all blocks are known. */
+static uint32_t add_bound(walk *w, const bundle *b)
+{
+    ebpo_layout *o = w->out;
+    uint64_t n = o->bound_count;
+    if (w->failed || !ebpo_grow(&o->child, &o->bound_capacity, n + 1, sizeof *o->child) ||
+        !ebpo_grow(&o->first_block, &o->bound_capacity2, n + 1, sizeof *o->first_block) ||
+        !ebpo_grow(&o->last_block, &o->bound_capacity3, n + 1, sizeof *o->last_block)) {
+        w->failed = true;
+        return EBPO_NO_CHILD;
+    }
+    for (int i = 0; i < 8; i++)
+        o->child[n][i] = i < b->members ? b->member[i] : EBPO_NO_CHILD;
+    o->first_block[n] = b->begin;
+    o->last_block[n] = b->end;
+    return (uint32_t)o->bound_count++;
+}
+
+static void close_bundle(walk *w, bundle *b)
+{
+    if (b->members == 0 && b->end > b->begin) {
+        b->member[0] = add_block(w, b->begin, b->end);
+        b->members = 1;
+    }
+}
+
+/* Neighbours that together fill a node best; of those not wrapped yet, or the hierarchy would get
+ * deep. */
+typedef struct run {
+    int begin, end, members;
+} run;
+
+static run choose_run(const bundle *part, int parts, const bool wrapped[8])
+{
+    run best = { 0, 0, 0 };
+    for (int begin = 0; begin < parts; begin++) {
+        int members = 0;
+        for (int end = begin;
+             end < parts && !wrapped[end] && members + part[end].members <= EBPO_BLOCK; end++) {
+            members += part[end].members;
+            if (members > best.members)
+                best = (run){ begin, end + 1, members };
+        }
+    }
+    return best;
+}
+
+static bundle gather_parts(const bundle *part, int parts)
+{
+    bundle out = { part[0].begin, part[parts - 1].end, 0, { 0 } };
+    for (int i = 0; i < parts; i++)
+        for (int k = 0; k < part[i].members; k++)
+            out.member[out.members++] = part[i].member[k];
+    return out;
+}
+
+/* Wraps neighbours in nodes, as full ones as there are, until all members together are at most
+ * eight. */
+static bundle join_parts(walk *w, bundle *part, int parts)
+{
+    bool wrapped[8] = { false };
+    int total = 0;
+    for (int i = 0; i < parts; i++) {
+        close_bundle(w, &part[i]);
+        total += part[i].members;
+    }
+    while (total > EBPO_BLOCK && !w->failed) {
+        run r = choose_run(part, parts, wrapped);
+        bundle all = gather_parts(part + r.begin, r.end - r.begin);
+        total -= all.members - 1;
+        all.member[0] = add_bound(w, &all);
+        all.members = 1;
+        part[r.begin] = all;
+        wrapped[r.begin] = true;
+        memmove(part + r.begin + 1, part + r.end, (size_t)(parts - r.end) * sizeof *part);
+        memmove(wrapped + r.begin + 1, wrapped + r.end, (size_t)(parts - r.end));
+        parts -= r.end - r.begin - 1;
+    }
+    return w->failed ? (bundle){ part[0].begin, part[parts - 1].end, 0, { 0 } }
+                     : gather_parts(part, parts);
+}
+
+/* A range in its own order: blocks of equal size, eight by eight under nodes. */
+static bundle split_range(walk *w, uint32_t begin, uint32_t end)
+{
+    uint64_t count = end - begin;
+    if (count <= EBPO_BLOCK)
+        return (bundle){ begin, end, 0, { 0 } };
+    uint64_t span = EBPO_BLOCK;
+    while (count > span * 8)
+        span *= 8;
+    uint64_t pieces = (count + span - 1) / span;
+    bundle part[8];
+    for (uint64_t i = 0; i < pieces; i++)
+        part[i] = split_range(w, begin + (uint32_t)(count * i / pieces),
+                              begin + (uint32_t)(count * (i + 1) / pieces));
+    return join_parts(w, part, (int)pieces);
+}
+
+static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin);
+
+static bundle walk_gray(walk *w, int depth, uint32_t begin)
+{
+    const ebpo_level *level = &w->slice->level[depth + 1];
+    uint16_t types = level->types[w->gray[depth]++];
+    bundle part[8];
+    int parts = 0;
+    uint32_t at = begin;
+    for (unsigned octant = 0; octant < 8 && !w->failed; octant++) {
+        bundle b = walk_node(w, depth + 1, ebpo_group_type(types, octant), at);
+        at = b.end;
+        if (b.end == b.begin)
+            continue;
+        bundle *last = parts ? &part[parts - 1] : NULL;
+        if (last && last->members == 0 && b.members == 0 && b.end - last->begin <= EBPO_BLOCK)
+            last->end = b.end;
+        else
+            part[parts++] = b;
+    }
+    if (parts == 0)
+        return (bundle){ begin, at, 0, { 0 } };
+    return parts == 1 ? part[0] : join_parts(w, part, parts);
+}
+
+static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
+{
+    if (type == EBPO_GRAY && depth + 1 < w->slice->level_count) /* pruned otherwise */
+        return walk_gray(w, depth, begin);
+    if (type == EBPO_LEAF)
+        return split_range(w, begin, begin + w->slice->level[depth].leaf_new[w->leaf[depth]++]);
+    return (bundle){ begin, begin, 0, { 0 } };
+}
+
+/* Blocks are found in the order in which they are filled; numbers them by their faces instead, so
+ * that what lies below a node is one range of blocks. */
+static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
+{
+    uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face),
+             *end = ebpo_alloc(o->block_count, sizeof *end);
+    if (!at_face || !end) {
+        free(at_face);
+        free(end);
+        return false;
+    }
+    for (uint64_t b = 0; b < o->block_count; b++)
+        at_face[o->block_begin[b]] = (uint32_t)b;
+    uint32_t number = 0;
+    for (uint64_t face = 0; face < faces; number++) {
+        uint32_t old = at_face[face];
+        end[number] = o->block_end[old];
+        o->block_end[old] = number; /* from now on: the new number of an old one */
+        at_face[face] = number;
+        face = end[number];
+    }
+    at_face[faces] = number;
+    for (uint64_t n = 0; n < o->bound_count; n++) {
+        for (int i = 0; i < 8; i++)
+            if (o->child[n][i] != EBPO_NO_CHILD && o->child[n][i] & EBPO_IS_BLOCK)
+                o->child[n][i] = o->block_end[o->child[n][i] & ~EBPO_IS_BLOCK] | EBPO_IS_BLOCK;
+        o->first_block[n] = at_face[o->first_block[n]];
+        o->last_block[n] = at_face[o->last_block[n]];
+    }
+    for (uint32_t b = 0; b < number; b++)
+        o->block_begin[b] = b ? end[b - 1] : 0;
+    free(o->block_end);
+    free(at_face);
+    o->block_end = end;
+    return true;
+}
+
+ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t most,
+                             ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    walk w = { .out = out, .slice = slice, .most = most };
+    bundle part[2];
+    int parts = 0;
+    if (slice->outer_count)
+        part[parts++] = split_range(&w, 0, slice->outer_count);
+    part[parts] =
+        walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0), slice->outer_count);
+    if (part[parts].end > part[parts].begin)
+        parts++;
+    if (parts) {
+        bundle all = join_parts(&w, part, parts);
+        if (!w.failed)
+            out->top = add_bound(&w, &all);
+        w.failed = w.failed || !renumber_blocks(out, part[parts - 1].end);
+    }
+    if (!w.failed)
+        return EBPO_OK;
+    bool full = out->block_count >= most;
+    ebpo_layout_free(out);
+    return full ? ebpo_fail(error, EBPO_E_LIMIT,
+                            "the model has too many faces to be held at once; give a memory budget")
+                : ebpo_fail_memory(error, slice->mesh.face_count * 8);
+}
+
+void ebpo_layout_free(ebpo_layout *layout)
+{
+    free(layout->block_begin);
+    free(layout->block_end);
+    free(layout->block_number);
+    free(layout->corners);
+    free(layout->child);
+    free(layout->first_block);
+    free(layout->last_block);
+    memset(layout, 0, sizeof *layout);
+}
+
+/* --- blocks --- */
+
 /* Which of a block's vertices, in the order in which its faces have them: [face][corner]. */
-typedef struct found {
+struct ebpo_block_corners {
     uint8_t at[EBPO_MESHLET_VERTICES], count;
-} found;
+};
 
 typedef struct job {
     ebpo_accel *s;
     const ebpo_mesh *mesh;
     ebpo_layout *layout;
-    found *found; /* of each block */
 } job;
 
 /* A block's vertices. */
@@ -55,19 +305,19 @@ static void find_shared(const job *j, uint64_t block)
                 break;
         }
         table[slot] = (uint8_t)(at + 1);
-        j->found[block].at[i] = (uint8_t)at;
+        j->layout->corners[block].at[i] = (uint8_t)at;
         count += at == count;
     }
-    j->found[block].count = (uint8_t)count;
+    j->layout->corners[block].count = (uint8_t)count;
 }
 
 static void take_shared(const job *j, uint64_t block, shared *out)
 {
     unsigned corners;
     const uint32_t *corner = corners_of(j, block, &corners);
-    out->at = j->found[block].at;
+    out->at = j->layout->corners[block].at;
     out->faces = corners / 3;
-    out->count = j->found[block].count;
+    out->count = j->layout->corners[block].count;
     for (unsigned i = 0; i < corners; i++)
         out->vertex[out->at[i]] = corner[i];
 }
@@ -82,15 +332,15 @@ static uint32_t size_of(const ebpo_accel *s, unsigned vertices)
     return (uint32_t)((bytes + EBPO_MESHLET_UNIT - 1) / EBPO_MESHLET_UNIT);
 }
 
-static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                           ebpo_error *error)
+static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
 {
     (void)worker;
     (void)error;
     job *j = context;
     for (uint64_t b = begin; b < end; b++) {
         find_shared(j, b);
-        j->layout->block_number[b] = size_of(j->s, j->found[b].count);
+        j->layout->block_number[b] = size_of(j->s, j->layout->corners[b].count);
     }
     return EBPO_OK;
 }
@@ -109,7 +359,7 @@ static bool number_blocks(ebpo_accel *s, ebpo_layout *layout)
 /* --- filling --- */
 
 /* What is not shared enough: each corner of each lane is a vertex of its own. */
-static void spread(shared *v)
+static void spread_corners(shared *v)
 {
     uint32_t corner[EBPO_MESHLET_VERTICES];
     for (unsigned lane = 0; lane < EBPO_BLOCK; lane++)
@@ -142,8 +392,8 @@ static void set_coordinates(const job *j, const shared *v, ebpo_meshlet *m)
         }
 }
 
-static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                        ebpo_error *error)
+static ebpo_status fill_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     (void)worker;
     (void)error;
@@ -155,7 +405,7 @@ static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned wo
         memset(at, 0, (size_t)size_of(j->s, v.count) * EBPO_MESHLET_UNIT);
         ebpo_meshlet *m = (void *)at;
         if (v.count > EBPO_MESHLET_SHARED)
-            spread(&v);
+            spread_corners(&v);
         else
             set_corners(&v, m);
         m->face = j->layout->block_begin[b];
@@ -180,29 +430,33 @@ static ebpo_status make_room(ebpo_accel *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, ebpo_room *room,
-                                   unsigned threads, ebpo_error *error)
+ebpo_status ebpo_accel_number_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, unsigned threads,
+                                     ebpo_error *error)
 {
     ebpo_layout *layout = plan->layout;
-    job j = { s, &plan->slice->mesh, layout, NULL };
+    job j = { s, &plan->slice->mesh, layout };
     layout->block_number = ebpo_alloc(layout->block_count, sizeof *layout->block_number);
-    j.found = ebpo_alloc(layout->block_count, sizeof *j.found);
-    ebpo_status status = layout->block_number && j.found
-                             ? EBPO_OK
-                             : ebpo_fail_memory(error, layout->block_count * sizeof *j.found);
-    if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, measure, &j, NULL,
-                                   "open", error);
+    layout->corners = ebpo_alloc(layout->block_count, sizeof *layout->corners);
+    if (!layout->block_number || !layout->corners)
+        return ebpo_fail_memory(error, layout->block_count * sizeof *layout->corners);
+    ebpo_status status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, measure_blocks,
+                                           &j, NULL, "open", error);
     if (status == EBPO_OK && !number_blocks(s, layout))
         status = ebpo_fail(error, EBPO_E_LIMIT,
                            "the model has too many faces to be held at once; give a memory budget");
+    return status;
+}
+
+ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, unsigned threads,
+                                   ebpo_error *error)
+{
+    ebpo_layout *layout = plan->layout;
+    job j = { s, &plan->slice->mesh, layout };
+    ebpo_status status = make_room(s, error);
     if (status == EBPO_OK)
-        status = ebpo_accel_fits(room, plan, s->units, error);
-    if (status == EBPO_OK)
-        status = make_room(s, error);
-    if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill, &j, NULL, "open",
-                                   error);
-    free(j.found);
+        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill_blocks, &j, NULL,
+                                   "open", error);
+    free(layout->corners);
+    layout->corners = NULL;
     return status;
 }

@@ -1,13 +1,38 @@
-/* Point in solid, exact. */
+/* Point in solid, exact.
+ *
+ * A leaf answers by the signs of its faces' planes, where these decide (leaf_kinds.c), else by
+ * counting the faces that axis-parallel segments cross, from a wall of its cell that no face meets
+ * or from its lowest corner: a filter in single precision (inside_kernels.c), then exact
+ * predicates. Many points in a model that is all in memory go down the tree several at a time.
+ *
+ * A query that may use envelopes, stops at a level or has a deadline goes from node to node,
+ * through subtrees that it loads on the way; with EBPO_LOAD_NODES it reads only the nodes on the
+ * way. Pruned nodes are decided by envelopes, or the query fails with EBPO_E_ABSENT.
+ *
+ * Sources: EBP 2017, 4.2; format-spec, section 5. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
+#include "core/clock.h"
 #include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
+#include "format/reader.h"
+#include "geometry/cursor.h"
+#include "geometry/node_types.h"
 #include "geometry/predicates.h"
-#include "query/inside.h"
+#include "query/load_ahead.h"
+#include "query/query_model.h"
+#include "query/query_node.h"
+
+/* Recursion: a subtree may end in a pruned node, above which envelopes decide. */
+static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out,
+                                 ebpo_error *error);
+
+/* --- one leaf --- */
 
 /* Adds the crossings that the filter left open; true when the point lies on one of these faces. */
 static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t count,
@@ -25,8 +50,9 @@ static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t coun
 
 /* Crossings along a segment; `point` (its end) is looked for on the faces, NULL: is not. False when
  * it lies on one. */
-static bool cross(const ebpo_kernels *kernels, const ebpo_accel *s, const ebpo_accel_leaf *leaf,
-                  const ebpo_axis_segment *g, const double *point, uint32_t *open, int32_t *sum)
+static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
+                       const ebpo_accel_leaf *leaf, const ebpo_axis_segment *g, const double *point,
+                       uint32_t *open, int32_t *sum)
 {
     uint32_t count = 0;
     *sum = kernels->crossings(s, s->list + leaf->list, g, open, &count);
@@ -79,12 +105,13 @@ static ebpo_axis_segment wall_segment(const ebpo_box *box, uint8_t wall, const i
 }
 
 /* One segment from a wall that no face meets. */
-static bool from_wall(const ebpo_kernels *kernels, const ebpo_accel *s, const ebpo_accel_leaf *leaf,
-                      const in_leaf *i, const double p[3], uint32_t *open, int32_t *winding)
+static bool from_wall(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
+                      const ebpo_accel_leaf *leaf, const in_leaf *i, const double p[3],
+                      uint32_t *open, int32_t *winding)
 {
     ebpo_axis_segment g = wall_segment(&s->box, leaf->wall, i, p);
     int32_t sum;
-    if (!cross(kernels, s, leaf, &g, p, open, &sum))
+    if (!cross_leaf(kernels, s, leaf, &g, p, open, &sum))
         return false;
     *winding = leaf->winding + leaf->wall_step + (leaf->wall % 2 ? -sum : sum);
     return true;
@@ -92,7 +119,7 @@ static bool from_wall(const ebpo_kernels *kernels, const ebpo_accel *s, const eb
 
 /* Three segments from the lowest corner: format-spec, section 5. Faces that the point lies on come
  * up in the last one. `boxed`: the boxes of the leaf's list are known. */
-static bool from_corner(const ebpo_kernels *kernels, const ebpo_accel *s,
+static bool from_corner(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
                         const ebpo_accel_leaf *leaf, bool boxed, const in_leaf *i,
                         const double p[3], uint32_t *open, int32_t *winding)
 {
@@ -109,7 +136,7 @@ static bool from_corner(const ebpo_kernels *kernels, const ebpo_accel *s,
         reach |= i->sixteenth & byte;
         if (boxed)
             g.reach = reach;
-        if (!cross(kernels, s, leaf, &g, axis == 2 ? p : NULL, open, &sum))
+        if (!cross_leaf(kernels, s, leaf, &g, axis == 2 ? p : NULL, open, &sum))
             return false;
         *winding += sum;
         g.from[axis] = p[axis];
@@ -121,7 +148,7 @@ static bool from_corner(const ebpo_kernels *kernels, const ebpo_accel *s,
 typedef float four_floats __attribute__((vector_size(16)));
 typedef int32_t four_signs __attribute__((vector_size(16)));
 
-static inline bool any(four_signs mask)
+static inline bool any_sign(four_signs mask)
 {
     uint64_t half[2];
     memcpy(half, &mask, sizeof half);
@@ -143,12 +170,12 @@ static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const 
         above |= value > EBPO_PLANE_ERROR;
         near |= value >= -EBPO_PLANE_ERROR;
     }
-    if (any(above)) {
+    if (any_sign(above)) {
         *winding = says->says.outer;
         return true;
     }
     *winding = says->says.inner;
-    return !any(near);
+    return !any_sign(near);
 }
 
 /* What a leaf is like is found out when questions come to it. */
@@ -156,7 +183,7 @@ static __attribute__((noinline)) ebpo_leaf_kind ask_kind(const ebpo_context *con
                                                          const ebpo_accel *s, ebpo_accel_leaf *leaf,
                                                          const in_leaf *i)
 {
-    if (ebpo_leaf_ask(s, leaf, i->leaf, context->model->kernels->walls))
+    if (ebpo_leaf_ask(s, leaf, i->leaf, context->model->kernels.inside->walls))
         ebpo_model_count_kind(context->model, leaf);
     return ebpo_leaf_kind_of(leaf);
 }
@@ -168,11 +195,17 @@ static inline ebpo_leaf_kind kind_of(const ebpo_context *context, const ebpo_acc
     return kind <= EBPO_LEAF_CONCAVE ? kind : ask_kind(context, s, leaf, i);
 }
 
-static inline void give(const ebpo_context *context, int32_t winding, ebpo_inside_result *out)
+static inline void give_winding(const ebpo_context *context, int32_t winding,
+                                ebpo_inside_result *out)
 {
     *out = (ebpo_inside_result){ ebpo_rule_inside(context->model->info->rule, winding) ? EBPO_IN
                                                                                        : EBPO_OUT,
                                  winding, 0 };
+}
+
+static inline void give_out(ebpo_inside_result *out)
+{
+    *out = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
 }
 
 /* By crossing faces. */
@@ -180,7 +213,7 @@ static ebpo_status answer_by_faces(ebpo_context *context, const ebpo_accel *s,
                                    const ebpo_accel_leaf *leaf, bool walled, const in_leaf *i,
                                    const double p[3], ebpo_inside_result *out, ebpo_error *error)
 {
-    const ebpo_kernels *kernels = context->model->kernels;
+    const ebpo_inside_kernels *kernels = context->model->kernels.inside;
     uint64_t most = (uint64_t)s->list_longest * EBPO_BLOCK;
     int32_t winding;
     if (most > context->open_capacity &&
@@ -190,7 +223,7 @@ static ebpo_status answer_by_faces(ebpo_context *context, const ebpo_accel *s,
                    ? from_wall(kernels, s, leaf, i, p, context->open, &winding)
                    : from_corner(kernels, s, leaf, walled, i, p, context->open, &winding);
     if (off)
-        give(context, winding, out);
+        give_winding(context, winding, out);
     else
         *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
     return EBPO_OK;
@@ -204,36 +237,39 @@ static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_accel *s, eb
     ebpo_leaf_kind kind = kind_of(context, s, leaf, i);
     if (!ebpo_leaf_has_planes(kind) || !from_planes(s, leaf, i, &winding))
         return answer_by_faces(context, s, leaf, ebpo_leaf_is_walled(kind), i, p, out, error);
-    give(context, winding, out);
+    give_winding(context, winding, out);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t number, int level,
-                             const ebpo_position *place, const double p[3], ebpo_inside_result *out,
-                             ebpo_error *error)
+/* In a leaf of a subtree and of this level, whose cell holds p, which is at `place`. */
+static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t number,
+                               int level, const ebpo_position *place, const double p[3],
+                               ebpo_inside_result *out, ebpo_error *error)
 {
     in_leaf i;
     find_in_leaf(context->model->locator.level, level, place, &i);
     return answer_in_leaf(context, s, &s->leaf[number], &i, p, out, error);
 }
 
-void ebpo_inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out)
+/* In a white or black node. */
+static void inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out)
 {
-    give(context, ebpo_entry_winding(entry), out);
+    give_winding(context, ebpo_entry_winding(entry), out);
 }
 
-ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_accel *s,
-                                const ebpo_position *place, const double p[3],
-                                ebpo_inside_result *out, ebpo_error *error)
+/* In a subtree whose root holds p, which is at `place`. */
+static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
+                                  const ebpo_position *place, const double p[3],
+                                  ebpo_inside_result *out, ebpo_error *error)
 {
     ebpo_descent d = ebpo_descend(&s->nodes, context->model->locator.level, place->at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM) {
-        ebpo_inside_uniform(context, d.entry, out);
+        inside_uniform(context, d.entry, out);
         return EBPO_OK;
     }
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_BELOW)
-        return ebpo_inside_pruned(context, p, out, error);
-    return ebpo_inside_leaf(context, s, ebpo_entry_value(d.entry), d.level, place, p, out, error);
+        return inside_pruned(context, p, out, error);
+    return inside_leaf(context, s, ebpo_entry_value(d.entry), d.level, place, p, out, error);
 }
 
 /* Several points at a time, stage by stage, so that the memory that one stage needs is on its way
@@ -332,11 +368,11 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
     descend_together(s, fine, count, l);
     for (unsigned i = 0; i < count; i++) {
         if (!l[i].within) {
-            out[i] = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
+            give_out(&out[i]);
         } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_UNIFORM) {
-            ebpo_inside_uniform(context, l[i].d.entry, &out[i]);
+            inside_uniform(context, l[i].d.entry, &out[i]);
         } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_BELOW) {
-            ebpo_status status = ebpo_inside_pruned(context, points + 3 * i, &out[i], error);
+            ebpo_status status = inside_pruned(context, points + 3 * i, &out[i], error);
             if (status != EBPO_OK)
                 return status;
         } else {
@@ -350,21 +386,386 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
     return answer_waiting(context, s, w, leaves, points, out, error);
 }
 
-ebpo_status ebpo_inside_whole(ebpo_context *context, const double *points, uint64_t count,
-                              ebpo_inside_result *out, ebpo_error *error)
+/* With the whole tree in memory. */
+static ebpo_status inside_whole(ebpo_context *context, const double *points, uint64_t count,
+                                ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_accel *s = context->model->whole;
     ebpo_status status = EBPO_OK;
     if (count == 1) {
         ebpo_position place;
         if (ebpo_locator_find(&context->model->locator, points, &place))
-            return ebpo_inside_subtree(context, s, &place, points, out, error);
-        *out = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
+            return inside_subtree(context, s, &place, points, out, error);
+        give_out(out);
         return EBPO_OK;
     }
     for (uint64_t i = 0; i < count && status == EBPO_OK; i += TOGETHER)
         status = inside_together(context, s, points + 3 * i,
                                  count - i < TOGETHER ? (unsigned)(count - i) : TOGETHER, out + i,
                                  error);
+    return status;
+}
+
+/* --- node by node: EBP 2017, 4.2 --- */
+
+static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
+{
+    /* An envelope tells that a point is outside, not its winding number: with rules other than
+     * nonzero that is no whole answer. */
+    bool whole_answer =
+        c->model->info->rule == EBPO_RULE_NONZERO || o->level >= 0 || o->deadline_ns;
+    if (o->envelopes == EBPO_ENVELOPES_SKIP || !whole_answer)
+        return false;
+    return o->envelopes == EBPO_ENVELOPES_USE || !c->model->whole || o->level >= 0 ||
+           o->deadline_ns;
+}
+
+typedef struct asking {
+    ebpo_context *context;
+    const ebpo_inside_options *options;
+    ebpo_box box;
+    bool envelopes;
+    uint64_t deadline; /* 0: none */
+    const double *p;
+    ebpo_position place;
+} asking;
+
+static void give_maybe(const asking *a, ebpo_cell cell, ebpo_inside_result *out)
+{
+    *out = (ebpo_inside_result){ EBPO_MAYBE, 0, ebpo_cell_diagonal(&a->box, cell) };
+}
+
+static bool outside_envelope(const asking *a, const ebpo_node *node)
+{
+    uint32_t count;
+    const uint32_t *codes =
+        a->envelopes ? ebpo_model_planes(a->context->model, node, &count) : NULL;
+    return codes && ebpo_outside_planes(&a->box, node->cell, codes, count, a->p);
+}
+
+static bool is_late(const asking *a) { return a->deadline && ebpo_clock() > a->deadline; }
+
+static bool stops_here(const asking *a, const ebpo_node *node)
+{
+    if (a->options->level >= 0 &&
+        (node->cell.level >= a->options->level || node->type != EBPO_GRAY || node->pruned))
+        return true;
+    return is_late(a);
+}
+
+/* Decides at a node of the top or of a subtree, without looking below it; false: it does not. */
+static inline bool decide_at(const asking *a, const ebpo_node *node, ebpo_inside_result *out)
+{
+    if (ebpo_node_is_uniform(node))
+        inside_uniform(a->context, node->entry, out);
+    else if (outside_envelope(a, node))
+        give_out(out);
+    else if (stops_here(a, node))
+        give_maybe(a, node->cell, out);
+    else
+        return false;
+    return true;
+}
+
+static ebpo_status walk_down(asking *a, ebpo_inside_result *out, ebpo_error *error)
+{
+    const ebpo_model *m = a->context->model;
+    int fine = m->info->level_count - 1;
+    ebpo_node node = ebpo_model_root(m);
+    for (;;) {
+        if (decide_at(a, &node, out))
+            return EBPO_OK;
+        if (ebpo_node_is_below(&node)) {
+            ebpo_status status = ebpo_model_enter(a->context, &node, error);
+            if (status != EBPO_OK)
+                return status;
+            if (!a->envelopes && a->options->level < 0 && !a->deadline)
+                return inside_subtree(a->context, node.subtree, &a->place, a->p, out, error);
+        }
+        if (ebpo_entry_kind_of(node.entry) == EBPO_ENTRY_LEAF)
+            return inside_leaf(a->context, node.subtree, ebpo_entry_value(node.entry),
+                               node.cell.level, &a->place, a->p, out, error);
+        node = ebpo_model_child(m, &node, ebpo_octant_at(a->place.at, fine - node.cell.level - 1));
+    }
+}
+
+/* --- node by node from the file: only what lies on the way is read, nothing is kept but decoded
+ * chunks --- */
+
+static ebpo_status leaf_from_file(asking *a, const ebpo_node *leaf, ebpo_inside_result *out,
+                                  ebpo_error *error)
+{
+    ebpo_model *m = a->context->model;
+    ebpo_slice slice;
+    ebpo_accel *subtree;
+    ebpo_status status = ebpo_model_has_room(m, leaf, error);
+    if (status == EBPO_OK)
+        status = ebpo_slice_read(&slice, m->chunks, leaf, error);
+    if (status == EBPO_OK)
+        status = ebpo_accel_make(&subtree, &slice, m->info, false, 1, error);
+    if (status == EBPO_OK) {
+        ebpo_model_count_leaves(m, subtree, 1);
+        status = inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root),
+                             leaf->cell.level, &a->place, a->p, out, error);
+        ebpo_model_count_leaves(m, subtree, -1);
+        ebpo_accel_free(subtree);
+    }
+    return status;
+}
+
+static ebpo_status uniform_from_file(asking *a, const ebpo_node *node, ebpo_inside_result *out,
+                                     ebpo_error *error)
+{
+    int32_t winding;
+    ebpo_status status = ebpo_chunks_winding(a->context->model->chunks, node, &winding, error);
+    if (status == EBPO_OK)
+        give_winding(a->context, winding, out);
+    return status;
+}
+
+/* A gray node on the way; *done when it answers. Whether it is pruned is known once its
+ * children have been asked for. */
+static ebpo_status pass_gray(asking *a, ebpo_cursor *c, bool *done, ebpo_inside_result *out,
+                             ebpo_error *error)
+{
+    const ebpo_model *m = a->context->model;
+    const ebpo_node *node = ebpo_cursor_node(c), *child;
+    uint32_t codes[EBPO_NODE_PLANES];
+    unsigned count = 0;
+    ebpo_status status = EBPO_OK;
+    *done = true;
+    if (a->envelopes)
+        status = ebpo_cursor_planes(c, codes, &count, error);
+    if (status != EBPO_OK)
+        return status;
+    if (ebpo_outside_planes(&a->box, node->cell, codes, count, a->p)) {
+        give_out(out);
+        return EBPO_OK;
+    }
+    bool limited = a->options->level >= 0;
+    if ((limited && (node->cell.level >= a->options->level || node->pruned)) || is_late(a)) {
+        give_maybe(a, node->cell, out);
+        return EBPO_OK;
+    }
+    status = ebpo_cursor_children(c, &child, error);
+    if (status != EBPO_OK)
+        return status;
+    *done = !child;
+    if (child)
+        ebpo_cursor_down(c,
+                         ebpo_octant_at(a->place.at, m->info->level_count - 2 - node->cell.level));
+    else if (limited || is_late(a))
+        give_maybe(a, node->cell, out);
+    else
+        status = ebpo_fail_pruned(m, node->cell, error);
+    return status;
+}
+
+/* From a node BELOW on. */
+static ebpo_status walk_file(asking *a, const ebpo_node *below, ebpo_inside_result *out,
+                             ebpo_error *error)
+{
+    const ebpo_model *m = a->context->model;
+    ebpo_cursor c;
+    ebpo_cursor_begin(&c, &ebpo_chunks_source, m->chunks,
+                      m->top->below[ebpo_entry_value(below->entry)]);
+    while (ebpo_cursor_node(&c)->type == EBPO_GRAY) {
+        bool done;
+        ebpo_status status = pass_gray(a, &c, &done, out, error);
+        if (status != EBPO_OK || done)
+            return status;
+    }
+    const ebpo_node *node = ebpo_cursor_node(&c);
+    if (node->type == EBPO_LEAF && (a->options->level >= 0 || is_late(a))) {
+        give_maybe(a, node->cell, out);
+        return EBPO_OK;
+    }
+    return node->type == EBPO_LEAF ? leaf_from_file(a, node, out, error)
+                                   : uniform_from_file(a, node, out, error);
+}
+
+static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *error)
+{
+    const ebpo_model *m = a->context->model;
+    int fine = m->info->level_count - 1;
+    ebpo_node node = ebpo_model_root(m);
+    while (!ebpo_node_is_below(&node)) {
+        if (decide_at(a, &node, out))
+            return EBPO_OK;
+        node = ebpo_model_child(m, &node, ebpo_octant_at(a->place.at, fine - node.cell.level - 1));
+    }
+    return walk_file(a, &node, out, error);
+}
+
+/* The subtree that is in the context's hands and holds p, or NULL; *entry: what the levels above
+ * say, when they decide it. */
+static const ebpo_accel *held_around(const asking *a, uint32_t *entry)
+{
+    const ebpo_context *c = a->context;
+    *entry = ebpo_entry(EBPO_ENTRY_BELOW, 0);
+    if (c->model->whole)
+        return c->model->whole;
+    *entry =
+        ebpo_descend(&c->model->top->nodes, c->model->info->level_count - 1, a->place.at).entry;
+    bool below = ebpo_entry_kind_of(*entry) == EBPO_ENTRY_BELOW;
+    return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
+}
+
+/* True when everything that p needs is in the context's hands: then envelopes save nothing, and
+ * only the faces of a leaf take time. */
+static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *status,
+                           ebpo_error *error)
+{
+    const ebpo_model *m = a->context->model;
+    uint32_t entry;
+    const ebpo_accel *held = held_around(a, &entry);
+    *status = EBPO_OK;
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM) {
+        inside_uniform(a->context, entry, out);
+        return true;
+    }
+    if (!held)
+        return false;
+    if (!a->deadline) {
+        *status = inside_subtree(a->context, held, &a->place, a->p, out, error);
+        return true;
+    }
+    int fine = m->info->level_count - 1;
+    ebpo_descent d = ebpo_descend(&held->nodes, fine, a->place.at);
+    if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_BELOW)
+        return false; /* pruned: envelopes may tell */
+    ebpo_cell cell = ebpo_descent_cell(&d, fine, a->place.at);
+    if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM)
+        inside_uniform(a->context, d.entry, out);
+    else if (is_late(a))
+        give_maybe(a, cell, out);
+    else
+        *status = inside_leaf(a->context, held, ebpo_entry_value(d.entry), d.level, &a->place, a->p,
+                              out, error);
+    return true;
+}
+
+/* Below a pruned node of the whole tree or of a subtree: an envelope decides, or EBPO_E_ABSENT. */
+static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out,
+                                 ebpo_error *error)
+{
+    const ebpo_model *m = context->model;
+    ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
+    asking a = {
+        .context = context, .options = &options, .box = ebpo_model_box(m), .envelopes = true, .p = p
+    };
+    if (!ebpo_locator_find(&m->locator, p, &a.place))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "a point outside the root cell has no node");
+    ebpo_status status = walk_down(&a, out, error);
+    if (status == EBPO_OK && out->where == EBPO_OUT &&
+        m->info->rule != EBPO_RULE_NONZERO) /* outside, but the winding number is not known */
+        return ebpo_fail_pruned(m, (ebpo_cell){ 0, { 0, 0, 0 } }, error);
+    return status;
+}
+
+/* Point in solid from node to node: with envelopes, to a level, against the clock, or because not
+ * everything is in memory. */
+static ebpo_status inside_walk(ebpo_context *context, const double p[3],
+                               const ebpo_inside_options *options, ebpo_inside_result *out,
+                               ebpo_error *error)
+{
+    const ebpo_model *m = context->model;
+    asking a = { .context = context,
+                 .options = options,
+                 .box = ebpo_model_box(m),
+                 .envelopes = uses_envelopes(context, options),
+                 .p = p };
+    if (options->deadline_ns)
+        a.deadline = ebpo_clock() + options->deadline_ns;
+    if (!ebpo_locator_find(&m->locator, p, &a.place)) {
+        give_out(out);
+        return EBPO_OK;
+    }
+    ebpo_status status;
+    bool plain = options->envelopes != EBPO_ENVELOPES_USE && options->level < 0;
+    if (plain && (m->whole || m->options.loading != EBPO_LOAD_NODES) &&
+        answer_at_hand(&a, out, &status, error))
+        return status;
+    return !m->whole && m->options.loading == EBPO_LOAD_NODES ? walk_nodes(&a, out, error)
+                                                              : walk_down(&a, out, error);
+}
+
+ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64_t count,
+                             const ebpo_inside_options *options, ebpo_inside_result *out,
+                             ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_inside_options wanted = EBPO_INSIDE_OPTIONS_INIT;
+    const ebpo_inside_options *o = &wanted;
+    const ebpo_model *m = context->model;
+    ebpo_status status = EBPO_TAKE(ebpo_inside_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_query_level(o->level, error);
+    if (status == EBPO_OK && o->envelopes > EBPO_ENVELOPES_SKIP)
+        status = ebpo_fail_value(error);
+    if (status == EBPO_OK)
+        status = ebpo_check_solid(m, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_points(points, count, error);
+    if (status == EBPO_OK && o->level < 0)
+        status = ebpo_check_mesh(m, error);
+    if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns &&
+        o->envelopes != EBPO_ENVELOPES_USE)
+        return inside_whole(context, points, count, out, error);
+    context->planes =
+        o->level >= 0 || o->deadline_ns || o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned;
+    ebpo_batch batch = { .count = 0 };
+    if (status == EBPO_OK)
+        ebpo_batch_begin(&batch, context, points, o->deadline_ns || o->level >= 0 ? 0 : count,
+                         false);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        uint64_t k = batch.count ? ebpo_batch_next(&batch, i) : i;
+        status = inside_walk(context, points + 3 * k, o, &out[k], error);
+        if (status == EBPO_OK && ebpo_model_prefetches(m) &&
+            (o->level < 0 || o->level > m->top->cut_level))
+            ebpo_context_prefetch(context, points + 3 * k, 0);
+    }
+    ebpo_batch_end(&batch);
+    return status;
+}
+
+/* Nothing to be checked but the point, and all in memory. */
+static inline bool is_plain(const ebpo_context *context, const ebpo_inside_options *o)
+{
+    return context->model->answers_inside &&
+           (!o || (o->struct_size == sizeof *o && o->level == EBPO_LEVEL_ALL &&
+                   o->envelopes == EBPO_ENVELOPES_AUTO && !o->deadline_ns));
+}
+
+static ebpo_status inside_plain(ebpo_context *context, const double point[3],
+                                ebpo_inside_result *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_position place;
+    if (ebpo_locator_find(&context->model->locator, point, &place))
+        return inside_subtree(context, context->model->whole, &place, point, out, error);
+    give_out(out);
+    return ebpo_check_points(point, 1, error);
+}
+
+ebpo_status ebpo_inside(ebpo_context *context, const double point[3],
+                        const ebpo_inside_options *options, ebpo_inside_result *out,
+                        ebpo_error *error)
+{
+    return is_plain(context, options) ? inside_plain(context, point, out, error)
+                                      : ebpo_inside_many(context, point, 1, options, out, error);
+}
+
+ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
+                           ebpo_distance_result *out, ebpo_error *error)
+{
+    ebpo_inside_result where;
+    ebpo_inside_options plain = EBPO_INSIDE_OPTIONS_INIT;
+    if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE)
+        return EBPO_OK;
+    ebpo_status status = c->model->whole ? inside_whole(c, p, 1, &where, error)
+                                         : inside_walk(c, p, &plain, &where, error);
+    if (status == EBPO_OK && where.where == EBPO_IN)
+        out->distance = -out->distance;
     return status;
 }

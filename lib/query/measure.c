@@ -8,20 +8,22 @@
  * exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex coordinates". */
 #include "core/strict_fp.h"
 
-#include <ebpo/query.h>
-
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include <ebpo/query.h>
 
 #include "construct/solid_shells.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
+#include "core/sized.h"
 #include "format/reader.h"
 #include "geometry/double_double.h"
-#include "mesh/mesh_parts.h"
 #include "geometry/rule.h"
+#include "mesh/mesh_parts.h"
 
 enum { BLOCK_FACES = 16384 };
 
@@ -90,21 +92,21 @@ static void scaled_corners(const pass *p, uint64_t face, double out[3][3])
 
 /* --- moments --- */
 
-static void accumulate(ebpo_pair *sum, ebpo_pair x) { *sum = ebpo_pair_add(*sum, x); }
+static void add_pair(ebpo_pair *sum, ebpo_pair x) { *sum = ebpo_pair_add(*sum, x); }
 
-static void merge(moments *sum, const moments *m)
+static void merge_moments(moments *sum, const moments *m)
 {
-    accumulate(&sum->area2, m->area2);
-    accumulate(&sum->volume6, m->volume6);
-    accumulate(&sum->integral6, m->integral6);
+    add_pair(&sum->area2, m->area2);
+    add_pair(&sum->volume6, m->volume6);
+    add_pair(&sum->integral6, m->integral6);
     for (int k = 0; k < 3; k++)
-        accumulate(&sum->first24[k], m->first24[k]);
+        add_pair(&sum->first24[k], m->first24[k]);
     for (int k = 0; k < 6; k++)
-        accumulate(&sum->second120[k], m->second120[k]);
+        add_pair(&sum->second120[k], m->second120[k]);
     sum->absolute6 += m->absolute6;
 }
 
-static double length(const ebpo_pair n[3])
+static double pair_length(const ebpo_pair n[3])
 {
     double largest = fmax(fabs(n[0].head), fmax(fabs(n[1].head), fabs(n[2].head)));
     if (largest == 0)
@@ -132,7 +134,7 @@ static ebpo_pair mixed_product(ebpo_pair r[3][3], const ebpo_pair s[3], int u, i
 {
     ebpo_pair sum = ebpo_pair_multiply(s[u], s[v]);
     for (int i = 0; i < 3; i++)
-        accumulate(&sum, ebpo_pair_multiply(r[i][u], r[i][v]));
+        add_pair(&sum, ebpo_pair_multiply(r[i][u], r[i][v]));
     return sum;
 }
 
@@ -140,23 +142,23 @@ static void add_face(moments *m, const double corner[3][3], const double middle[
 {
     ebpo_pair n[3], r[3][3], s[3], det = { 0, 0 };
     normal_of(corner, n);
-    accumulate(&m->area2, ebpo_pair_of(length(n)));
+    add_pair(&m->area2, ebpo_pair_of(pair_length(n)));
     for (int k = 0; k < 3; k++) {
         for (int i = 0; i < 3; i++)
             r[i][k] = ebpo_two_difference(corner[i][k], middle[k]);
         s[k] = ebpo_pair_add(ebpo_pair_add(r[0][k], r[1][k]), r[2][k]);
         ebpo_pair product = ebpo_pair_multiply(r[0][k], n[k]);
-        accumulate(&det, product);
+        add_pair(&det, product);
         m->absolute6 += fabs(product.head);
     }
-    accumulate(&m->integral6, det);
+    add_pair(&m->integral6, det);
     det = (ebpo_pair){ times * det.head, times * det.tail };
-    accumulate(&m->volume6, det);
+    add_pair(&m->volume6, det);
     for (int k = 0; k < 3; k++) {
-        accumulate(&m->first24[k], ebpo_pair_multiply(det, s[k]));
-        accumulate(&m->second120[k], ebpo_pair_multiply(det, mixed_product(r, s, k, k)));
-        accumulate(&m->second120[3 + k],
-                   ebpo_pair_multiply(det, mixed_product(r, s, (k + 1) % 3, (k + 2) % 3)));
+        add_pair(&m->first24[k], ebpo_pair_multiply(det, s[k]));
+        add_pair(&m->second120[k], ebpo_pair_multiply(det, mixed_product(r, s, k, k)));
+        add_pair(&m->second120[3 + k],
+                 ebpo_pair_multiply(det, mixed_product(r, s, (k + 1) % 3, (k + 2) % 3)));
     }
 }
 
@@ -244,8 +246,8 @@ static ebpo_status count_components(pass *p, const ebpo_solid_shells *s, ebpo_ru
 }
 
 /* Finds out whether the volume is known; then sets how often faces count. */
-static ebpo_status decide(pass *p, const ebpo_info *info, unsigned threads, ebpo_solid_shells *s,
-                          ebpo_solid_volume *volume, ebpo_error *error)
+static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned threads,
+                                 ebpo_solid_shells *s, ebpo_solid_volume *volume, ebpo_error *error)
 {
     ebpo_shells shells;
     bool several = info->solid && info->report.manifold && info->report.components > 1;
@@ -306,7 +308,7 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
     read.threads = threads;
     status = ebpo_file_read_mesh(file, &read, &mesh, error);
     if (status == EBPO_OK)
-        status = decide(&p, info, threads, &shells, &volume, error);
+        status = decide_volume(&p, info, threads, &shells, &volume, error);
     if (status != EBPO_OK)
         goto done;
     block_count = mesh.face_count / BLOCK_FACES + (mesh.face_count % BLOCK_FACES != 0);
@@ -321,7 +323,7 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
     if (status != EBPO_OK)
         goto done;
     for (uint64_t b = 0; b < block_count; b++)
-        merge(&sum, &p.blocks[b]);
+        merge_moments(&sum, &p.blocks[b]);
     if (!p.component && volume.lo == volume.hi && sum.volume6.head < 0)
         count_inwards(&sum, info->rule);
     mass_of(&mass, &sum, &p.frame, info->solid);
@@ -333,4 +335,61 @@ done:
     ebpo_solid_shells_free(&shells);
     ebpo_mesh_free(&mesh);
     return status;
+}
+
+/* --- the volume of a solid, from the file's head --- */
+
+/* What rounding may do to sums of envelopes: of the sum, and of the root cell's volume. */
+static const double OF_SUM = 1e-9, OF_ROOT = 1e-12;
+
+/* Sets out->lo and hi to what black cells fill and envelopes hold. */
+static void bound_by_cells(const ebpo_info *info, ebpo_solid_volume *out)
+{
+    double root = info->box_size[0] * info->box_size[1] * info->box_size[2], lo = 0, hi = 0;
+    if (info->pruned || !isnormal(ldexp(root, -3 * EBPO_LEVELS_MAX)))
+        return;
+    for (int i = 0; i < info->level_count; i++) {
+        lo += (double)info->level[i].black_count * ldexp(root, -3 * i);
+        hi += info->level[i].leaf_volume;
+    }
+    hi += lo;
+    out->lo = fmax(0, lo * (1 - OF_SUM));
+    out->hi = hi * (1 + OF_SUM) + root * OF_ROOT;
+}
+
+/* Returns the volume of components that do not meet; NAN: it is not known. Shells that were not
+ * counted are not apart. */
+static double known_volume(const ebpo_mesh_report *report, ebpo_rule rule,
+                           const ebpo_shells *shells)
+{
+    double integral = report->volume;
+    if (!report->manifold)
+        return NAN;
+    if (report->components == 1)
+        return ebpo_rule_inside(rule, signbit(integral) ? -1 : 1) ? fabs(integral) : 0;
+    return shells->apart ? integral + shells->beyond[rule] : NAN;
+}
+
+ebpo_status ebpo_solid_volume_of(const ebpo_mesh_report *report, ebpo_rule rule,
+                                 const ebpo_shells *shells, const ebpo_info *info,
+                                 ebpo_solid_volume *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_solid_volume v = { .hi = INFINITY, .integral = report->volume };
+    ebpo_shells own = EBPO_SHELLS_INIT;
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_solid_volume, out, error);
+    if (status == EBPO_OK)
+        status = EBPO_TAKE(ebpo_shells, &own, shells, error);
+    if (status != EBPO_OK)
+        return status;
+    if ((unsigned)rule > EBPO_RULE_POSITIVE)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown winding rule %d", (int)rule);
+    if (info)
+        bound_by_cells(info, &v);
+    double volume = known_volume(report, rule, &own);
+    if (!report->balanced)
+        v = (ebpo_solid_volume){ .integral = 0 };
+    else if (volume >= v.lo && volume <= v.hi)
+        v.lo = v.hi = volume;
+    return EBPO_GIVE(ebpo_solid_volume, out, &v);
 }

@@ -1,9 +1,13 @@
-/* Depth first, nearest child first, with everything pruned that is certainly farther than something
- * already seen. Bounds and triangles in single precision, with errors bounded; what passes is
- * judged with certain bounds in double precision, and what these cannot tell apart exactly. */
+/* The nearest face: the search in one accel, and the decision which of two faces is nearer.
+ *
+ * Depth first, nearest child first; what is certainly farther than something already seen is
+ * pruned. Bounds and triangles are in single precision with bounded errors (nearest_kernels.c).
+ * Faces that pass are judged with certain bounds in double precision, and exactly where these
+ * cannot tell two faces apart; of equally near faces the one with the least number in the file is
+ * returned. Points too far for single precision search by boxes in doubles, points too far for
+ * doubles by keys (point_bounds.h). An ebpo_nearest may search several accels one after the other.
+ */
 #include "core/strict_fp.h"
-
-#include "query/nearest.h"
 
 #include <float.h>
 #include <math.h>
@@ -11,10 +15,48 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/os.h"
+#include "core/clock.h"
 #include "core/error.h"
-#include "query/kernels.h"
-#include "query/near_order.h"
+#include "query/nearest.h"
+#include "query/query_kernels.h"
+
+static bool same_corner(const double a[3], const double b[3])
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+static bool is_edge(ebpo_feature feature)
+{
+    return feature >= EBPO_NEAR_EDGE0 && feature <= EBPO_NEAR_EDGE2;
+}
+
+/* Faces around one vertex or edge are the usual tie. */
+static bool same_feature(const double a[3][3], ebpo_feature of_a, const double b[3][3],
+                         ebpo_feature of_b)
+{
+    if (of_a <= EBPO_NEAR_CORNER2 && of_b <= EBPO_NEAR_CORNER2)
+        return same_corner(a[of_a], b[of_b]);
+    if (!is_edge(of_a) || !is_edge(of_b))
+        return false;
+    const double *a0 = a[of_a - EBPO_NEAR_EDGE0], *a1 = a[(of_a - EBPO_NEAR_EDGE0 + 1) % 3],
+                 *b0 = b[of_b - EBPO_NEAR_EDGE0], *b1 = b[(of_b - EBPO_NEAR_EDGE0 + 1) % 3];
+    return (same_corner(a0, b1) && same_corner(a1, b0)) ||
+           (same_corner(a0, b0) && same_corner(a1, b1));
+}
+
+int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distance_bounds *a_bounds,
+                      const double b[3][3], const ebpo_distance_bounds *b_bounds)
+{
+    if (a_bounds->hi < b_bounds->lo)
+        return -1;
+    if (a_bounds->lo > b_bounds->hi)
+        return 1;
+    return same_feature(a, a_bounds->feature, b, b_bounds->feature)
+               ? 0
+               : ebpo_triangle_distance_compare(p, a, b);
+}
+
+/* --- the search --- */
 
 /* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
 #define FAR 32.0
@@ -33,8 +75,9 @@ void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p
     n->block = n->first_block = EBPO_NO_BLOCK;
 }
 
-static void take(ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *bounds,
-                 const ebpo_far_keys *keys, uint64_t file_face, uint64_t source_face)
+static void take_face(ebpo_nearest *n, const double triangle[3][3],
+                      const ebpo_distance_bounds *bounds, const ebpo_far_keys *keys,
+                      uint64_t file_face, uint64_t source_face)
 {
     n->found = true;
     n->bounds = *bounds;
@@ -53,8 +96,8 @@ static ebpo_far_keys keys_of(const ebpo_nearest *n, const double triangle[3][3])
 }
 
 /* Sign of what the face is farther than the nearest one so far; exact. */
-static int compare(const ebpo_nearest *n, const double triangle[3][3],
-                   const ebpo_distance_bounds *b, const ebpo_far_keys *keys)
+static int compare_with_nearest(const ebpo_nearest *n, const double triangle[3][3],
+                                const ebpo_distance_bounds *b, const ebpo_far_keys *keys)
 {
     if (keys->hi < n->keys.lo)
         return -1;
@@ -70,7 +113,7 @@ void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint6
     ebpo_far_keys keys = keys_of(n, triangle);
     ebpo_triangle_distance_bounds(n->p, (const double(*)[3])triangle, &b);
     if (b.lo <= n->limit && keys.lo <= n->key_limit)
-        take(n, triangle, &b, &keys, file_face, source_face);
+        take_face(n, triangle, &b, &keys, file_face, source_face);
 }
 
 /* True: it is the nearest so far. */
@@ -92,11 +135,12 @@ static bool try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
     if (b.lo > n->limit)
         return false;
     if (n->found) {
-        int sign = compare(n, (const double(*)[3])triangle, &b, &keys);
+        int sign = compare_with_nearest(n, (const double(*)[3])triangle, &b, &keys);
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return false;
     }
-    take(n, (const double(*)[3])triangle, &b, &keys, file_face, ebpo_accel_source_face(s, local));
+    take_face(n, (const double(*)[3])triangle, &b, &keys, file_face,
+              ebpo_accel_source_face(s, local));
     return true;
 }
 
@@ -143,7 +187,7 @@ static float frame_limit(const ebpo_near_search *g)
 }
 
 /* Judges the candidates, the most promising first. */
-static void judge(ebpo_near_search *g)
+static void judge_waiting(ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;
     ebpo_near_drop_far(g);
@@ -181,25 +225,44 @@ static void give_up(const ebpo_near_search *g)
     }
 }
 
-static bool late(ebpo_near_search *g)
+static bool is_search_late(ebpo_near_search *g)
 {
     const ebpo_nearest *n = g->user;
     return ebpo_clock() > n->deadline;
 }
 
-static void search_near(ebpo_nearest *n, const ebpo_kernels *kernels, ebpo_near_search *g)
+static void search_near(ebpo_nearest *n, const ebpo_nearest_kernels *kernels, ebpo_near_search *g)
 {
     g->user = n;
-    g->judge = judge;
-    g->late = n->deadline ? late : NULL;
+    g->judge = judge_waiting;
+    g->late = n->deadline ? is_search_late : NULL;
     g->count = 0;
     g->first_block = n->first_block;
     g->first_node = n->first_node;
     ebpo_near_set_best(g, frame_limit(g));
-    kernels->near(g);
+    kernels->walk(g);
     if (g->top)
         give_up(g);
-    judge(g);
+    judge_waiting(g);
+}
+
+/* --- in double precision --- */
+
+static void try_block(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
+{
+    for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
+        try_face(n, s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
+}
+
+/* Takes the lane with the least lower bound from `left`, which is not empty. */
+static int take_nearest_lane(unsigned *left, const double lower[8])
+{
+    int best = __builtin_ctz(*left);
+    for (int lane = best + 1; lane < 8; lane++)
+        if (*left >> lane & 1 && lower[lane] < lower[best])
+            best = lane;
+    *left &= ~(1u << best);
+    return best;
 }
 
 /* --- far from the model: by keys --- */
@@ -230,20 +293,14 @@ static void search_by_keys(const far_search *g, uint32_t child)
 {
     ebpo_nearest *n = g->n;
     if (child & EBPO_IS_BLOCK) {
-        for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
-            try_face(n, g->s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
+        try_block(n, g->s, child);
         return;
     }
     double lower[8];
     unsigned left = far_children(g, child, lower);
     while (left) {
-        int best = __builtin_ctz(left);
-        for (int lane = best + 1; lane < 8; lane++)
-            if (left >> lane & 1 && lower[lane] < lower[best])
-                best = lane;
-        left &= ~(1u << best);
-        if (n->late || (n->deadline && ebpo_clock() > n->deadline)) {
-            n->late = true;
+        int best = take_nearest_lane(&left, lower);
+        if (ebpo_nearest_is_late(n)) {
             ebpo_nearest_pass_over(n, lower[best]);
         } else if (lower[best] <= n->key_limit) {
             search_by_keys(g, g->s->bound[child].child[best]);
@@ -276,8 +333,7 @@ static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, c
 static void search_far(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
 {
     if (child & EBPO_IS_BLOCK) {
-        for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
-            try_face(n, s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
+        try_block(n, s, child);
         return;
     }
     const ebpo_bound *b = &s->bound[child];
@@ -288,14 +344,9 @@ static void search_far(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
         left |= 1u << lane;
     }
     while (left) {
-        int best = __builtin_ctz(left);
-        for (int lane = best + 1; lane < 8; lane++)
-            if (left >> lane & 1 && lower[lane] < lower[best])
-                best = lane;
-        left &= ~(1u << best);
-        if (n->late || (n->deadline && ebpo_clock() > n->deadline)) {
-            n->late = true;
-            n->passed_over = fmin(n->passed_over, lower[best]);
+        int best = take_nearest_lane(&left, lower);
+        if (ebpo_nearest_is_late(n)) {
+            ebpo_nearest_pass_over(n, lower[best]);
         } else if (lower[best] <= n->limit) {
             search_far(n, s, b->child[best]);
         }
@@ -312,7 +363,7 @@ void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebp
         far_search far = { n, s, ebpo_far_frame_of(&n->far, s->centre, s->scale, s->reach) };
         search_by_keys(&far, s->top);
     } else if (make_probe(s, n->p, &g.probe))
-        search_near(n, context->model->kernels, &g);
+        search_near(n, context->model->kernels.nearest, &g);
     else
         search_far(n, s, s->top);
 }

@@ -1,7 +1,10 @@
-/* Opening a model: everything at once when that fits, else the top of the tree and a cache. */
+/* Models and contexts: opening a file for queries, loading subtrees, and the checks that all
+ * queries begin with.
+ *
+ * A model holds everything if that fits into its budget, else the top of the tree and a cache of
+ * subtrees (budget.c plans this). Models may be used by any thread; a context, with the buffers of
+ * queries and the subtree that it has pinned, by one. */
 #include "core/strict_fp.h"
-
-#include "query/query_model.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -9,11 +12,146 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/os.h"
+#include "core/clock.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "query/model_budget.h"
-#include "query/shared_budget.h"
+#include "core/hash.h"
+#include "core/sized.h"
+#include "query/model_parts.h"
+#include "query/query_model.h"
+
+/* --- checks that all queries begin with --- */
+
+ebpo_status ebpo_check_query_level(int level, ebpo_error *error)
+{
+    if (level < -1 || level >= EBPO_LEVELS_MAX)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "level %d: give 0 to %d, or -1 for all", level,
+                         EBPO_LEVELS_MAX - 1);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_fail_value(ebpo_error *error)
+{
+    return ebpo_fail(error, EBPO_E_ARGUMENT,
+                     "the query options contain a value that is not one of its kind");
+}
+
+ebpo_status ebpo_check_points(const double *points, uint64_t count, ebpo_error *error)
+{
+    for (uint64_t i = 0; i < 3 * count; i++)
+        if (!isfinite(points[i]))
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "point %" PRIu64 " has a coordinate that is not a finite number",
+                             i / 3);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error)
+{
+    if (model->info->parts & EBPO_PART_MESH)
+        return EBPO_OK;
+    return ebpo_fail_file(
+        error, EBPO_E_ABSENT, model->file->in.shown,
+        "the file was written without its mesh: exact answers need it; ask with a "
+        "level, or use a file that has it (`ebpo subset`, `ebpo fetch` or "
+        "`ebpo convert` with --profile collision or full)");
+}
+
+ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
+{
+    if (model->info->solid)
+        return EBPO_OK;
+    return ebpo_fail(error, EBPO_E_NOT_SOLID,
+                     "the model is a surface: it has no inside; 'ebpo check' on its source tells "
+                     "which repairs leave a solid, and 'ebpo convert --repair' does them");
+}
+
+/* --- envelopes that a context keeps --- */
+
+/* Most have 1 to 3 KB. */
+enum { SLOTS = 256 };
+
+/* Behind it what is in use of the arrays, in the order of ebpo_polytope. */
+typedef struct kept {
+    ebpo_cell cell;
+    int vertices, faces, corners;
+    double vertex[][3];
+} kept;
+
+struct ebpo_kept_envelopes {
+    kept *slot[SLOTS];
+};
+
+static unsigned slot_of(ebpo_cell cell)
+{
+    uint64_t key[3] = { (uint64_t)cell.level << 32 | cell.at[0], cell.at[1], cell.at[2] };
+    return (unsigned)(ebpo_hash_three(key) % SLOTS);
+}
+
+static bool same_cell(ebpo_cell a, ebpo_cell b)
+{
+    return a.level == b.level && a.at[0] == b.at[0] && a.at[1] == b.at[1] && a.at[2] == b.at[2];
+}
+
+bool ebpo_kept_envelopes_get(const ebpo_kept_envelopes *k, ebpo_cell cell, ebpo_polytope *out)
+{
+    const kept *from = k ? k->slot[slot_of(cell)] : NULL;
+    if (!from || !same_cell(from->cell, cell))
+        return false;
+    const int32_t *tag = (const void *)(from->vertex + from->vertices);
+    const uint16_t *first = (const void *)(tag + from->faces);
+    out->vertex_count = from->vertices;
+    out->face_count = from->faces;
+    out->corner_count = from->corners;
+    memcpy(out->vertex, from->vertex, (size_t)from->vertices * sizeof out->vertex[0]);
+    memcpy(out->tag, tag, (size_t)from->faces * sizeof *tag);
+    memcpy(out->first, first, (size_t)(from->faces + 1) * sizeof *first);
+    memcpy(out->corner, first + from->faces + 1, (size_t)from->corners * sizeof *first);
+    return true;
+}
+
+static kept *copy_of(ebpo_cell cell, const ebpo_polytope *p)
+{
+    size_t vertices = (size_t)p->vertex_count, faces = (size_t)p->face_count,
+           corners = (size_t)p->corner_count;
+    kept *to =
+        ebpo_alloc(1, sizeof *to + vertices * sizeof to->vertex[0] + faces * sizeof p->tag[0] +
+                          (faces + 1 + corners) * sizeof p->first[0]);
+    if (!to)
+        return NULL;
+    to->cell = cell;
+    to->vertices = p->vertex_count;
+    to->faces = p->face_count;
+    to->corners = p->corner_count;
+    int32_t *tag = (void *)(to->vertex + vertices);
+    uint16_t *first = (void *)(tag + faces);
+    memcpy(to->vertex, p->vertex, vertices * sizeof to->vertex[0]);
+    memcpy(tag, p->tag, faces * sizeof *tag);
+    memcpy(first, p->first, (faces + 1) * sizeof *first);
+    memcpy(first + faces + 1, p->corner, corners * sizeof *first);
+    return to;
+}
+
+void ebpo_kept_envelopes_put(ebpo_kept_envelopes **k, ebpo_cell cell, const ebpo_polytope *envelope)
+{
+    if (!*k)
+        *k = ebpo_alloc_zero(1, sizeof **k);
+    kept *made = *k ? copy_of(cell, envelope) : NULL;
+    if (!made)
+        return;
+    kept **slot = &(*k)->slot[slot_of(cell)];
+    free(*slot);
+    *slot = made;
+}
+
+static void kept_envelopes_free(ebpo_kept_envelopes *k)
+{
+    for (int i = 0; k && i < SLOTS; i++)
+        free(k->slot[i]);
+    free(k);
+}
+
+/* --- models and contexts --- */
 
 /* --- subtrees for the cache --- */
 
@@ -217,7 +355,7 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     ebpo_box box = ebpo_root_box(m->info);
     m->locator = ebpo_locator_make(&box, m->info->level_count - 1);
     m->options = wanted;
-    m->kernels = ebpo_kernels_best();
+    m->kernels = ebpo_query_kernels_best();
     m->default_memory = ebpo_usual_memory(file, &m->options);
     status = open_parts(m, error);
     if (status != EBPO_OK) {
@@ -329,7 +467,7 @@ void ebpo_context_free(ebpo_context *c)
     free(c->queue);
     free(c->seen);
     free(c->faces);
-    ebpo_kept_envelopes_free(c->envelopes);
+    kept_envelopes_free(c->envelopes);
     free(c->cutting);
     free(c);
 }

@@ -1,21 +1,22 @@
-/* A model's parts, and a context's. */
+/* Models and contexts: their members, and what all queries share. */
 #ifndef EBPO_QUERY_QUERY_MODEL_H
 #define EBPO_QUERY_QUERY_MODEL_H
 
-#include <ebpo/query.h>
 #include <pthread.h>
 #include <stdatomic.h>
+
+#include <ebpo/query.h>
 
 #include "core/cache.h"
 #include "format/reader.h"
 #include "format/slice.h"
+#include "geometry/cell.h"
 #include "geometry/cells.h"
+#include "geometry/polytope.h"
 #include "geometry/rule.h"
-#include "query/kept_envelopes.h"
-#include "query/kernels.h"
-#include "query/query_top.h"
-#include "query/skeleton.h"
 #include "query/accel.h"
+#include "query/model_parts.h"
+#include "query/query_kernels.h"
 
 struct ebpo_model {
     const ebpo_file *file;
@@ -24,14 +25,14 @@ struct ebpo_model {
     ebpo_model_options options;
     uint64_t shared_taken, shared_skeletons; /* of a budget that is shared: for good */
     bool default_memory; /* nobody asked for a budget, but the file is far away */
-    const ebpo_kernels *kernels;
+    ebpo_query_kernels kernels;
     ebpo_accel *whole;   /* everything, or NULL: */
     bool answers_inside; /* of a solid and with the mesh, whole */
     ebpo_top *top;       /* levels 0 .. cut level */
     ebpo_chunks *chunks;
     ebpo_cache *cache;         /* subtrees by their number in the top */
     ebpo_skeletons *skeletons; /* of those that have been loaded; or NULL */
-    _Atomic(ebpo_top *) deep;  /* levels below the cut: deep_bounds.h; or NULL */
+    _Atomic(ebpo_top *) deep;  /* levels below the cut: nearest_subtrees.c; or NULL */
     atomic_bool deep_begun;
     _Atomic uint64_t new_loads; /* that may have been for nothing, until then */
     double open_seconds;
@@ -46,7 +47,8 @@ void ebpo_model_count_leaves(ebpo_model *model, const ebpo_accel *subtree, int s
 void ebpo_model_count_kind(ebpo_model *model, const ebpo_accel_leaf *leaf);
 
 typedef struct ebpo_ranked ebpo_ranked; /* query/query_node.h */
-typedef struct ebpo_met ebpo_met;       /* query/ray_hits.h */
+typedef struct ebpo_met ebpo_met;       /* rays.c */
+typedef struct ebpo_kept_envelopes ebpo_kept_envelopes;
 
 struct ebpo_context {
     ebpo_model *model;
@@ -63,9 +65,9 @@ struct ebpo_context {
     uint64_t met_capacity;
     uint64_t *faces;
     uint64_t face_capacity;
-    ebpo_ranked *queue; /* of nodes to be searched: nearest_first.c */
+    ebpo_ranked *queue; /* of nodes to be searched: nearest_subtrees.c */
     uint64_t queue_count, queue_capacity;
-    uint32_t *seen; /* of subtrees, and the number of the question: nearest_first.c */
+    uint32_t *seen; /* of subtrees, and the number of the question: nearest_subtrees.c */
     uint32_t question;
     uint64_t searched, loaded; /* subtrees, by distances; that were not there, by all questions */
     ebpo_kept_envelopes *envelopes; /* of distances to them; or NULL */
@@ -122,5 +124,29 @@ EBPO_MUST_USE ebpo_status ebpo_context_subtree(ebpo_context *context, uint32_t b
                                                ebpo_accel **out, ebpo_error *error);
 /* Others may have its room; NULL is fine. */
 void ebpo_context_let_go(ebpo_context *context);
+
+/* Envelopes that a context has cut, kept for its next questions: cutting one takes ten times what
+ * looking for its nearest point does. One thread. */
+
+/* The envelope of the node with this cell, if it is there. */
+bool ebpo_kept_envelopes_get(const ebpo_kept_envelopes *kept, ebpo_cell cell, ebpo_polytope *out);
+/* Keeps it, in the place of another. *kept begins as NULL; without memory nothing is kept. */
+void ebpo_kept_envelopes_put(ebpo_kept_envelopes **kept, ebpo_cell cell,
+                             const ebpo_polytope *envelope);
+
+/* --- checks that all queries begin with --- */
+
+EBPO_MUST_USE ebpo_status ebpo_check_query_level(int level, ebpo_error *error);
+/* EBPO_E_ARGUMENT: an option is none of its kind. */
+ebpo_status ebpo_fail_value(ebpo_error *error);
+/* EBPO_E_ABSENT when the file has no mesh. */
+EBPO_MUST_USE ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error);
+/* EBPO_E_NOT_SOLID for a surface. */
+EBPO_MUST_USE ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error);
+
+/* Makes an answer's distance negative inside: solids, unless unsigned. */
+EBPO_MUST_USE ebpo_status ebpo_give_sign(ebpo_context *context, const double p[3],
+                                         const ebpo_distance_options *options,
+                                         ebpo_distance_result *out, ebpo_error *error);
 
 #endif

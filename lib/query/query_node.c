@@ -1,14 +1,86 @@
+/* Nodes of a model: going from a node to its children, in the top of the tree and in subtrees
+ * alike, with the bounds that envelopes give on the way.
+ *
+ * Accels (nodes of one subtree) and contexts (nodes of the model; they load subtrees on demand) are
+ * also sources for cursors. Nodes of a subtree are valid until the context enters another one.
+ *
+ * In a subset nodes may be pruned: a query that needs what was omitted below one fails with
+ * EBPO_E_ABSENT, and the message says where and what the file was cut to. */
 #include "core/strict_fp.h"
 
-#include "query/query_node.h"
-
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
-#include "query/absent.h"
+#include "core/error.h"
+#include "format/reader.h"
+#include "query/accel.h"
+#include "query/query_node.h"
+
+static ebpo_node accel_node_of(const ebpo_accel *s, uint32_t entry, ebpo_cell cell)
+{
+    ebpo_node node = ebpo_entry_node(entry, cell, (ebpo_rule)s->rule);
+    node.subtree = s;
+    return node;
+}
+
+ebpo_node ebpo_accel_root(const ebpo_accel *s)
+{
+    return accel_node_of(s, s->nodes.root, s->root.cell);
+}
+
+ebpo_node ebpo_accel_child(const ebpo_accel *s, const ebpo_node *gray, unsigned octant)
+{
+    return accel_node_of(s, ebpo_table_child(&s->nodes, gray->entry, octant),
+                         ebpo_cell_child(gray->cell, octant));
+}
+
+/* Codes of a gray node's planes, where the subtree has kept them. */
+static const uint32_t *accel_planes(const ebpo_accel *s, const ebpo_node *node, unsigned *count)
+{
+    uint32_t number = ebpo_entry_value(node->entry);
+    *count = 0;
+    if (node->type != EBPO_GRAY || !s->gray_first)
+        return NULL;
+    *count = s->gray_first[number + 1] - s->gray_first[number];
+    return s->gray_planes + s->gray_first[number];
+}
+
+/* --- for cursors --- */
+
+static ebpo_status accel_children(void *holder, ebpo_node *gray, ebpo_node child[8],
+                                  ebpo_error *error)
+{
+    (void)error;
+    for (unsigned octant = 0; octant < 8 && !gray->pruned; octant++)
+        child[octant] = ebpo_accel_child(holder, gray, octant);
+    return EBPO_OK;
+}
+
+static ebpo_status copy_accel_planes(void *holder, const ebpo_node *node,
+                                     uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
+                                     ebpo_error *error)
+{
+    (void)error;
+    const uint32_t *from = accel_planes(holder, node, count);
+    if (*count)
+        memcpy(codes, from, *count * sizeof *codes);
+    return EBPO_OK;
+}
+
+static ebpo_status uniform_winding(void *holder, const ebpo_node *uniform, int32_t *out,
+                                   ebpo_error *error)
+{
+    (void)holder;
+    (void)error;
+    *out = ebpo_entry_winding(uniform->entry);
+    return EBPO_OK;
+}
+
+const ebpo_node_source ebpo_accel_source = { accel_children, copy_accel_planes, uniform_winding };
 
 /* A node of the top. */
-static ebpo_node node_of(const ebpo_model *model, uint32_t entry, ebpo_cell cell)
+static ebpo_node top_node_of(const ebpo_model *model, uint32_t entry, ebpo_cell cell)
 {
     ebpo_node node = ebpo_entry_node(entry, cell, model->info->rule);
     if (ebpo_node_is_below(&node)) {
@@ -22,14 +94,15 @@ static ebpo_node node_of(const ebpo_model *model, uint32_t entry, ebpo_cell cell
 ebpo_node ebpo_model_root(const ebpo_model *model)
 {
     return model->whole ? ebpo_accel_root(model->whole)
-                        : node_of(model, model->top->nodes.root, (ebpo_cell){ 0, { 0, 0, 0 } });
+                        : top_node_of(model, model->top->nodes.root, (ebpo_cell){ 0, { 0, 0, 0 } });
 }
 
 ebpo_node ebpo_model_child(const ebpo_model *model, const ebpo_node *gray, unsigned octant)
 {
-    return gray->subtree ? ebpo_accel_child(gray->subtree, gray, octant)
-                         : node_of(model, ebpo_table_child(&model->top->nodes, gray->entry, octant),
-                                   ebpo_cell_child(gray->cell, octant));
+    return gray->subtree
+               ? ebpo_accel_child(gray->subtree, gray, octant)
+               : top_node_of(model, ebpo_table_child(&model->top->nodes, gray->entry, octant),
+                             ebpo_cell_child(gray->cell, octant));
 }
 
 ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error *error)
@@ -54,7 +127,7 @@ const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node
     bool below = ebpo_node_is_below(node);
     *count = 0;
     if (node->subtree)
-        return ebpo_accel_planes(node->subtree, node, count);
+        return accel_planes(node->subtree, node, count);
     if (!below && node->type != EBPO_GRAY)
         return NULL;
     ebpo_top_planes planes = below ? model->top->below_planes[value] : model->top->gray[value];
@@ -117,7 +190,8 @@ int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, doubl
 
 /* --- for cursors --- */
 
-static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error)
+static ebpo_status model_children(void *holder, ebpo_node *gray, ebpo_node child[8],
+                                  ebpo_error *error)
 {
     ebpo_context *context = holder;
     ebpo_status status = EBPO_OK;
@@ -131,8 +205,9 @@ static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], e
     return status;
 }
 
-static ebpo_status planes(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
-                          unsigned *count, ebpo_error *error)
+static ebpo_status copy_model_planes(void *holder, const ebpo_node *node,
+                                     uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
+                                     ebpo_error *error)
 {
     const ebpo_context *context = holder;
     (void)error;
@@ -142,12 +217,68 @@ static ebpo_status planes(void *holder, const ebpo_node *node, uint32_t codes[EB
     return EBPO_OK;
 }
 
-static ebpo_status winding(void *holder, const ebpo_node *uniform, int32_t *out, ebpo_error *error)
+const ebpo_node_source ebpo_context_source = { model_children, copy_model_planes, uniform_winding };
+
+/* What the file was cut to, in words. */
+static void describe_cut(const ebpo_info *info, char *out, size_t capacity)
 {
-    (void)holder;
-    (void)error;
-    *out = ebpo_entry_winding(uniform->entry);
-    return EBPO_OK;
+    const double *b = info->kept_box;
+    size_t used = 0;
+    out[0] = 0;
+    if (info->cut_levels)
+        used =
+            (size_t)snprintf(out, capacity, "it was cut to levels 0 to %d", info->cut_levels - 1);
+    if (info->boxed && used < capacity)
+        snprintf(out + used, capacity - used, "%s %.9g,%.9g,%.9g to %.9g,%.9g,%.9g",
+                 used ? " and to the box" : "it was cut to the box", b[0], b[1], b[2], b[3], b[4],
+                 b[5]);
+    used = strlen(out);
+    if (info->kept_error > 0 && used < capacity)
+        snprintf(out + used, capacity - used, "%s %.9g",
+                 used ? " and to an error of" : "it was cut to an error of", info->kept_error);
+    if (!out[0])
+        snprintf(out, capacity, "it is a part of another file");
 }
 
-const ebpo_node_source ebpo_context_source = { children, planes, winding };
+ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error *error)
+{
+    char cut[200];
+    ebpo_box box = ebpo_model_box(model);
+    describe_cut(model->info, cut, sizeof cut);
+    return ebpo_fail(error, EBPO_E_ABSENT,
+                     "%.120s: this needs nodes left out below level %d at %.6g %.6g %.6g (%s); ask "
+                     "with a level, or make a larger part of the original with "
+                     "`ebpo subset` or `ebpo fetch`",
+                     model->file->in.shown, cell.level, ebpo_wall(&box, 0, cell.level, cell.at[0]),
+                     ebpo_wall(&box, 1, cell.level, cell.at[1]),
+                     ebpo_wall(&box, 2, cell.level, cell.at[2]), cut);
+}
+
+typedef struct checking {
+    ebpo_context *context;
+    ebpo_matters_fn matters;
+    void *user;
+    ebpo_box box;
+} checking;
+
+static ebpo_status check_below(const checking *k, ebpo_node node, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    if (ebpo_node_is_uniform(&node) || node.type != EBPO_GRAY ||
+        !k->matters(k->user, &k->box, &node))
+        return EBPO_OK;
+    if (ebpo_node_is_below(&node)) /* fails for pruned ones */
+        status = ebpo_model_enter(k->context, &node, error);
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
+        status = check_below(k, ebpo_model_child(k->context->model, &node, octant), error);
+    return status;
+}
+
+ebpo_status ebpo_check_pruned(ebpo_context *context, ebpo_matters_fn matters, void *user,
+                              ebpo_error *error)
+{
+    if (!context->model->info->pruned)
+        return EBPO_OK;
+    checking k = { context, matters, user, ebpo_model_box(context->model) };
+    return check_below(&k, ebpo_model_root(context->model), error);
+}

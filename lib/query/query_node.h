@@ -3,8 +3,7 @@
 #ifndef EBPO_QUERY_QUERY_NODE_H
 #define EBPO_QUERY_QUERY_NODE_H
 
-#include "query/far_point.h"
-#include "query/node_bounds.h"
+#include "query/point_bounds.h"
 #include "query/query_model.h"
 
 ebpo_node ebpo_model_root(const ebpo_model *model);
@@ -59,10 +58,23 @@ double ebpo_rank_cell_end(const ebpo_ranking *ranking, ebpo_cell cell);
 struct ebpo_ranked {
     ebpo_node node;
     double lower;
-    uint8_t what; /* of a subtree: nearest_first.c */
+    uint8_t what; /* of a subtree: nearest_subtrees.c */
 };
 
 int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, double parent,
                        double limit, ebpo_ranked out[8]);
+
+/* --- subsets: what was left out must not change a result --- */
+
+/* EBPO_E_ABSENT: the question needs what was left out below this node. Says which file, where, and
+ * what it was cut to. */
+ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error *error);
+
+/* Whether something in the node's cell matters to the question. */
+typedef bool (*ebpo_matters_fn)(void *user, const ebpo_box *box, const ebpo_node *node);
+
+/* EBPO_OK when no pruned node matters. `matters` holds for a node when it does for one below it. */
+EBPO_MUST_USE ebpo_status ebpo_check_pruned(ebpo_context *context, ebpo_matters_fn matters,
+                                            void *user, ebpo_error *error);
 
 #endif

@@ -1,11 +1,16 @@
-#include "query/query_top.h"
+/* The top of a tree: levels 0 to the cut level without faces, and which nodes lie below.
+ *
+ * It is all that a model under a budget always has in memory; queries go down through it to the
+ * subtrees. The same table, with envelopes alone, holds the levels right below the cut for deep
+ * bounds (nearest_subtrees.c). Immutable once it is read; any thread may use it. */
+#include "query/model_parts.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/workspace.h"
+#include "core/arrays.h"
 #include "format/reader.h"
 #include "geometry/node_types.h"
 
@@ -51,8 +56,8 @@ typedef struct ranks {
     uint64_t of[4], planes;
 } ranks;
 
-static ebpo_status uniform(const reading *r, const int32_t *windings, uint64_t rank, int32_t usual,
-                           uint32_t *entry)
+static ebpo_status uniform_entry(const reading *r, const int32_t *windings, uint64_t rank,
+                                 int32_t usual, uint32_t *entry)
 {
     return ebpo_entry_uniform(windings ? windings[rank] : usual, entry)
                ? EBPO_OK
@@ -96,7 +101,7 @@ static ebpo_status add_gray(reading *r, const ebpo_level *level, uint64_t rank, 
                       &t->gray[group]);
 }
 
-static bool is_pruned(const reading *r, int number, uint64_t rank)
+static bool is_pruned_group(const reading *r, int number, uint64_t rank)
 {
     return r->info->pruned &&
            (number + 1 == r->info->level_count || (r->next_types && r->next_types[rank] == 0));
@@ -120,12 +125,12 @@ static ebpo_status add_node(reading *r, const ebpo_level *level, ebpo_node_type 
 {
     uint64_t rank = seen->of[type]++;
     if (type == EBPO_WHITE)
-        return uniform(r, level->white_winding, rank, 0, entry);
+        return uniform_entry(r, level->white_winding, rank, 0, entry);
     if (type == EBPO_BLACK)
-        return uniform(r, level->black_winding, rank, 1, entry);
+        return uniform_entry(r, level->black_winding, rank, 1, entry);
     ebpo_node node = { .cell = cell,
                        .type = type,
-                       .pruned = type == EBPO_GRAY && is_pruned(r, cell.level, rank),
+                       .pruned = type == EBPO_GRAY && is_pruned_group(r, cell.level, rank),
                        .rank = rank };
     if (node.pruned)
         return add_pruned(r, level, &node, &seen->planes, entry);
@@ -163,7 +168,7 @@ static ebpo_status add_level(reading *r, int number, const ebpo_level *level, ui
 }
 
 /* An array with room for what it has; of less memory than before, or the same. */
-static void shrink(void *array, uint64_t *capacity, uint64_t count, size_t size)
+static void shrink_array(void *array, uint64_t *capacity, uint64_t count, size_t size)
 {
     void **at = array, *less = *at ? realloc(*at, (count ? count : 1) * size) : NULL;
     if (less) {
@@ -175,10 +180,10 @@ static void shrink(void *array, uint64_t *capacity, uint64_t count, size_t size)
 static void shrink_all(reading *r)
 {
     ebpo_top *t = r->top;
-    shrink(&t->nodes.group, &r->group_capacity, r->group, sizeof *t->nodes.group);
-    shrink(&t->gray, &r->gray_capacity, r->group, sizeof *t->gray);
-    shrink(&t->planes, &r->plane_capacity, r->plane, sizeof *t->planes);
-    shrink(&t->below_planes, &r->below_planes_capacity, r->below, sizeof *t->below_planes);
+    shrink_array(&t->nodes.group, &r->group_capacity, r->group, sizeof *t->nodes.group);
+    shrink_array(&t->gray, &r->gray_capacity, r->group, sizeof *t->gray);
+    shrink_array(&t->planes, &r->plane_capacity, r->plane, sizeof *t->planes);
+    shrink_array(&t->below_planes, &r->below_planes_capacity, r->below, sizeof *t->below_planes);
 }
 
 static ebpo_status read_top(ebpo_top **out, const ebpo_file *file, int cut_level, unsigned threads,
@@ -254,7 +259,7 @@ void ebpo_top_free(ebpo_top *top)
 /* Arrays that grow have room for some items from the first one on: bytes of five. */
 enum { GROWN_LEAST = 4096 };
 
-static uint64_t estimate(const ebpo_info *info, int cut_level, size_t node)
+static uint64_t estimate_levels(const ebpo_info *info, int cut_level, size_t node)
 {
     uint64_t bytes = sizeof(ebpo_top) + GROWN_LEAST, largest = 0;
     for (int i = 0; i <= cut_level && i < info->level_count; i++) {
@@ -273,10 +278,10 @@ static uint64_t estimate(const ebpo_info *info, int cut_level, size_t node)
 
 uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level)
 {
-    return estimate(info, cut_level, sizeof(ebpo_node));
+    return estimate_levels(info, cut_level, sizeof(ebpo_node));
 }
 
 uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level)
 {
-    return estimate(info, cut_level, 0);
+    return estimate_levels(info, cut_level, 0);
 }

@@ -1,17 +1,203 @@
-/* The nearest faces of a point, one after the other. */
+/* The faces within a distance of a point, one after the other, the nearest first.
+ *
+ * Faces come in bands: those after a given one, up to a number of them. Bands follow each other, so
+ * that a stream of any length needs little memory; the first is small, for callers who soon have
+ * enough. A band is searched depth first, nearest child first; what is certainly beyond its limit,
+ * or certainly was in an earlier band, is passed over. The order is exact: by distance, then by
+ * number in the file. Subtrees that are not in memory are loaded in the order of certain lower
+ * bounds, until the next is beyond the band. */
 #include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "query/near_band.h"
-#include "query/node_queue.h"
-#include "query/options.h"
-#include "query/prefetch.h"
-#include "query/pruned.h"
+#include "core/sized.h"
+#include "query/accel.h"
+#include "query/load_ahead.h"
+#include "query/nearest.h"
+#include "query/query_model.h"
+#include "query/query_node.h"
+
+/* --- bands --- */
+
+typedef struct near_face {
+    const double *p;
+    ebpo_distance_bounds bounds;
+    uint64_t file_face, source_face;
+    double triangle[3][3];
+} near_face;
+
+typedef struct near_band {
+    double p[3];
+    double radius;  /* what is farther is in no band: exact */
+    double limit;   /* what is farther is not in this one: certain */
+    uint64_t most;  /* faces in it, at least 1 */
+    bool has_after; /* faces up to `after` were in bands before */
+    near_face after;
+    near_face *near;
+    uint64_t count, capacity;
+    bool cut; /* there may be faces after the last one */
+    bool no_memory;
+} near_band;
+
+/* Everything that has a distance of at most `far` was in bands before. */
+static inline bool near_band_is_past(const near_band *band, double far)
+{
+    return band->has_after && far < band->after.bounds.lo;
+}
+
+/* Before the search for a band; `after` and what memory there is are kept. */
+static void near_band_begin(near_band *band, uint64_t most)
+{
+    band->limit = band->radius;
+    band->most = most;
+    band->count = 0;
+    band->cut = false;
+}
+
+/* --- order --- */
+
+static int compare_faces(const void *x, const void *y)
+{
+    const near_face *a = x, *b = y;
+    if (a->file_face == b->file_face)
+        return 0;
+    int sign = ebpo_near_compare(a->p, (const double(*)[3])a->triangle, &a->bounds,
+                                 (const double(*)[3])b->triangle, &b->bounds);
+    return sign ? sign : a->file_face < b->file_face ? -1 : 1;
+}
+
+/* In order: by exact distance, then by number in the file, each once, at most `most`. The limit
+ * falls to what may still come in between. */
+static void near_band_settle(near_band *band)
+{
+    uint64_t kept = 0;
+    if (band->count)
+        qsort(band->near, band->count, sizeof *band->near, compare_faces);
+    for (uint64_t i = 0; i < band->count; i++)
+        if (kept == 0 || band->near[i].file_face != band->near[kept - 1].file_face)
+            band->near[kept++] = band->near[i];
+    band->count = kept < band->most ? kept : band->most;
+    if (band->count < band->most)
+        return;
+    band->limit = fmin(band->limit, band->near[band->count - 1].bounds.hi);
+    band->cut = true;
+}
+
+/* --- faces --- */
+
+/* Sorting is put off until there are about twice as many as wanted. */
+static void add_face(near_band *band, const near_face *face)
+{
+    enum { SPARE_LEAST = 64 };
+    uint64_t spare = band->most < SPARE_LEAST ? SPARE_LEAST : band->most;
+    if (band->count == band->most + spare)
+        near_band_settle(band);
+    if (!ebpo_grow(&band->near, &band->capacity, band->count + 1, sizeof *band->near))
+        band->no_memory = true;
+    else
+        band->near[band->count++] = *face;
+}
+
+static void try_face(near_band *band, const ebpo_accel *s, uint32_t slot)
+{
+    near_face face;
+    uint32_t local = ebpo_accel_slot_face(s, slot);
+    if (local == EBPO_NO_SLOT || band->no_memory)
+        return;
+    ebpo_accel_triangle(s, slot, face.triangle);
+    ebpo_triangle_distance_bounds(band->p, (const double(*)[3])face.triangle, &face.bounds);
+    if (face.bounds.lo > band->limit || near_band_is_past(band, face.bounds.hi))
+        return;
+    face.p = band->p;
+    face.file_face = ebpo_accel_file_face(s, local);
+    face.source_face = ebpo_accel_source_face(s, local);
+    if (band->has_after && compare_faces(&face, &band->after) <= 0)
+        return;
+    if (face.bounds.hi > band->radius &&
+        ebpo_triangle_distance_compare_to(band->p, (const double(*)[3])face.triangle,
+                                          band->radius) > 0)
+        return;
+    add_face(band, &face);
+}
+
+/* --- the hierarchy --- */
+
+typedef struct searching {
+    near_band *band;
+    const ebpo_accel *s;
+    double error; /* bound on what rounding does to distances of the hierarchy's boxes */
+} searching;
+
+/* Where exact arithmetic might be finite, this is. */
+static double length_of_positive(const double x[3])
+{
+    double most = fmax(x[0], fmax(x[1], x[2]));
+    if (!(most > 0))
+        return 0;
+    double a = x[0] / most, b = x[1] / most, c = x[2] / most;
+    return most * sqrt(a * a + b * b + c * c);
+}
+
+/* Certain bounds of the distances of all points of a child's box. */
+static void box_bounds(const searching *g, const ebpo_bound *b, int lane, double *lower,
+                       double *upper)
+{
+    const double *p = g->band->p;
+    double near[3], far[3];
+    for (int k = 0; k < 3; k++) {
+        ebpo_bound_sides sides = ebpo_bound_side(b, lane, k);
+        double low = g->s->centre[k] + sides.low / g->s->scale,
+               high = g->s->centre[k] + sides.high / g->s->scale;
+        near[k] = fmax(fmax(low - p[k], p[k] - high), 0);
+        far[k] = fmax(fabs(low - p[k]), fabs(p[k] - high));
+    }
+    /* a difference that overflows may have been finite before rounding */
+    *lower = fmin(fmax(length_of_positive(near) - g->error, 0), 0x1p1022);
+    *upper = length_of_positive(far) + g->error;
+}
+
+static void search_child(const searching *g, uint32_t child)
+{
+    near_band *band = g->band;
+    if (child & EBPO_IS_BLOCK) {
+        for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
+            try_face(band, g->s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
+        return;
+    }
+    const ebpo_bound *b = &g->s->bound[child];
+    double lower[8], upper;
+    int order[8], count = 0;
+    for (int lane = 0; lane < b->count; lane++) {
+        box_bounds(g, b, lane, &lower[lane], &upper);
+        if (lower[lane] > band->limit || near_band_is_past(band, upper))
+            continue;
+        int at = count++;
+        for (; at > 0 && lower[order[at - 1]] > lower[lane]; at--)
+            order[at] = order[at - 1];
+        order[at] = lane;
+    }
+    for (int i = 0; i < count && lower[order[i]] <= band->limit; i++)
+        search_child(g, b->child[order[i]]);
+}
+
+/* Adds what the subtree has of it. Faces may come again in another subtree. */
+static void near_band_search(near_band *band, const ebpo_accel *s)
+{
+    searching g = { band, s, 0 };
+    double size = s->reach / s->scale * 0x1p-46;
+    for (int k = 0; k < 3; k++) /* each side takes part with a few roundings of such numbers */
+        size += fabs(band->p[k]) * 0x1p-46 + fabs(s->centre[k]) * 0x1p-46;
+    g.error = size;
+    if (s->bound_count)
+        search_child(&g, s->top);
+}
+
+/* --- the stream --- */
 
 /* The first band is small, for those who soon have enough; each one is some times larger, so that
  * beginning anew costs little. */
@@ -20,7 +206,7 @@ enum { FIRST_BAND = 256, BAND_GROWTH = 8, BAND_MOST = 1 << 16 };
 typedef struct within {
     ebpo_context *context;
     const ebpo_within_options *options;
-    ebpo_near_band band;
+    near_band band;
     uint64_t given;
     bool ahead;         /* lists_ahead */
     uint64_t announced; /* subtrees that were, and were not entered since */
@@ -53,10 +239,10 @@ static double known_bound(const within *w, uint32_t below)
 }
 
 /* What a subset has left out is looked at when the band is known. */
-static ebpo_status put(within *w, const ebpo_box *box, const ebpo_ranked *r, ebpo_error *error)
+static ebpo_status put_node(within *w, const ebpo_box *box, const ebpo_ranked *r, ebpo_error *error)
 {
     if (ebpo_node_is_uniform(&r->node) || r->node.pruned || r->lower > w->band.limit ||
-        ebpo_near_band_is_past(&w->band, ebpo_cell_far(box, r->node.cell, w->band.p)))
+        near_band_is_past(&w->band, ebpo_cell_far(box, r->node.cell, w->band.p)))
         return EBPO_OK;
     if (!ebpo_node_is_below(&r->node))
         return w->ahead ? put_children(w, box, r, error) : ebpo_queue_push(w->context, r, error);
@@ -66,7 +252,7 @@ static ebpo_status put(within *w, const ebpo_box *box, const ebpo_ranked *r, ebp
 }
 
 /* Before a subtree is entered: with the first of each window some of those behind it. */
-static void announce(within *w, const ebpo_ranked *next)
+static void announce_window(within *w, const ebpo_ranked *next)
 {
     const ebpo_context *c = w->context;
     uint32_t below[EBPO_ANNOUNCED_MOST];
@@ -86,13 +272,13 @@ static void announce(within *w, const ebpo_ranked *next)
 static ebpo_status search_below(within *w, ebpo_ranked *r, ebpo_error *error)
 {
     if (w->band.count > w->band.most) /* it may not be needed */
-        ebpo_near_band_settle(&w->band);
+        near_band_settle(&w->band);
     if (r->lower > w->band.limit)
         return EBPO_OK;
-    announce(w, r);
+    announce_window(w, r);
     ebpo_status status = ebpo_model_enter(w->context, &r->node, error);
     if (status == EBPO_OK)
-        ebpo_near_band_search(&w->band, r->node.subtree);
+        near_band_search(&w->band, r->node.subtree);
     return status;
 }
 
@@ -104,7 +290,7 @@ static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranke
     int count = ebpo_rank_children(&ranking, &r->node, r->lower, w->band.limit, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
-        status = put(w, box, &child[i], error);
+        status = put_node(w, box, &child[i], error);
     return status;
 }
 
@@ -114,7 +300,7 @@ static ebpo_status search_parts(within *w, ebpo_error *error)
     ebpo_box box = ebpo_model_box(c->model);
     ebpo_ranked root = { ebpo_model_root(c->model), 0, 0 };
     c->queue_count = 0;
-    ebpo_status status = put(w, &box, &root, error);
+    ebpo_status status = put_node(w, &box, &root, error);
     while (status == EBPO_OK && c->queue_count) {
         ebpo_ranked r = ebpo_queue_pop(c);
         if (r.lower > w->band.limit)
@@ -139,21 +325,21 @@ static ebpo_status search_band(within *w, uint64_t most, ebpo_error *error)
 {
     const ebpo_model *m = w->context->model;
     ebpo_status status = EBPO_OK;
-    ebpo_near_band_begin(&w->band, most);
+    near_band_begin(&w->band, most);
     if (m->whole)
-        ebpo_near_band_search(&w->band, m->whole);
+        near_band_search(&w->band, m->whole);
     else
         status = search_parts(w, error);
     if (status == EBPO_OK && w->band.no_memory)
         status = ebpo_fail_memory(error, (w->band.count + 1) * sizeof *w->band.near);
     if (status != EBPO_OK)
         return status;
-    ebpo_near_band_settle(&w->band);
+    near_band_settle(&w->band);
     return ebpo_check_pruned(w->context, node_matters, w, error);
 }
 
 /* False: enough. */
-static bool give(within *w, const ebpo_near *n)
+static bool give_face(within *w, const near_face *n)
 {
     ebpo_triangle_nearest exact;
     ebpo_near_face out = { .normal = { NAN, NAN, NAN },
@@ -170,7 +356,7 @@ static bool give(within *w, const ebpo_near *n)
 static bool give_band(within *w)
 {
     for (uint64_t i = 0; i < w->band.count; i++)
-        if (!give(w, &w->band.near[i]))
+        if (!give_face(w, &w->band.near[i]))
             return false;
     if (!w->band.cut)
         return false;
@@ -179,7 +365,7 @@ static bool give_band(within *w)
     return true;
 }
 
-static ebpo_status stream(within *w, ebpo_error *error)
+static ebpo_status stream_faces(within *w, ebpo_error *error)
 {
     uint64_t wanted = w->options->most ? w->options->most : UINT64_MAX,
              most = w->options->most ? BAND_MOST : FIRST_BAND;
@@ -214,7 +400,7 @@ ebpo_status ebpo_distance_within(ebpo_context *context, const double point[3],
     memcpy(w.band.p, point, sizeof w.band.p);
     w.band.radius = wanted.radius;
     w.ahead = lists_ahead(&w);
-    status = stream(&w, error);
+    status = stream_faces(&w, error);
     free(w.band.near);
     return status;
 }

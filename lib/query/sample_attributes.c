@@ -1,5 +1,8 @@
-/* Attributes where points lie on faces: of vertices weighed by where the point is on its face, of
- * faces the face's own. How exactly is said in query.h. */
+/* Attributes at points on faces: those of vertices weighed by where the point is on its face, those
+ * of faces as they are.
+ *
+ * A sampler reads the columns that were asked for once, and then serves any number of points. How
+ * exact results are is documented in ebpo/query.h. */
 #include "core/strict_fp.h"
 
 #include <ebpo/query.h>
@@ -8,11 +11,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "mesh/attributes.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "format/file_in.h"
+#include "geometry/vec3.h"
+#include "mesh/attributes.h"
 
 /* A column of an array. */
 typedef struct sampled {
@@ -69,7 +73,7 @@ static bool of_element(const ebpo_attribute *head, const wanted *w, const char *
                                   memcmp(element, w->element, w->element_bytes) == 0));
 }
 
-static bool find(const ebpo_file *file, const wanted *w, const char *element, sampled *out)
+static bool find_column(const ebpo_file *file, const wanted *w, const char *element, sampled *out)
 {
     for (unsigned n = 0; n < file->attributes.count; n++) {
         const ebpo_attribute *head = &file->attributes.head[n].head;
@@ -83,13 +87,13 @@ static bool find(const ebpo_file *file, const wanted *w, const char *element, sa
     return false;
 }
 
-static ebpo_status choose(ebpo_sampler *s, const char *names, ebpo_error *error)
+static ebpo_status choose_columns(ebpo_sampler *s, const char *names, ebpo_error *error)
 {
     const char *shown = s->file->in.shown, *at = names;
     for (bool more = true; more;) {
         wanted w = next_wanted(at);
         sampled item;
-        if (!find(s->file, &w, "vertex", &item) && !find(s->file, &w, "face", &item))
+        if (!find_column(s->file, &w, "vertex", &item) && !find_column(s->file, &w, "face", &item))
             return ebpo_fail_file(error, EBPO_E_ABSENT, shown,
                                   "vertices and faces have no attribute '%.*s', or it is a list; "
                                   "'ebpo info' tells what the file has",
@@ -170,7 +174,7 @@ ebpo_status ebpo_sampler_new(const ebpo_file *file, const char *names, unsigned 
         return ebpo_fail_memory(error, sizeof *s);
     read.threads = threads;
     s->file = file;
-    ebpo_status status = choose(s, names, error);
+    ebpo_status status = choose_columns(s, names, error);
     if (status == EBPO_OK)
         status = read_values(s, &read, error);
     if (status == EBPO_OK)
@@ -200,18 +204,13 @@ unsigned ebpo_sampler_columns(const ebpo_sampler *s) { return s->count; }
 
 /* --- weights --- */
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static double clamp(double v, double least, double most)
+static double clamp_to(double v, double least, double most)
 {
     return v < least ? least : v > most ? most : v;
 }
 
 /* Exponent of the greatest of `count` numbers, by their absolute values; 0 if all are 0. */
-static int exponent(const double *v, int count)
+static int greatest_exponent(const double *v, int count)
 {
     double most = 0;
     for (int i = 0; i < count; i++)
@@ -219,7 +218,7 @@ static int exponent(const double *v, int count)
     return most > 0 ? ilogb(most) : 0;
 }
 
-static void scale(double *v, int count, int by)
+static void scale_by_power(double *v, int count, int by)
 {
     for (int i = 0; i < count; i++)
         v[i] = scalbn(v[i], by);
@@ -232,11 +231,11 @@ static void edges_of(const double corner[3][3], const double p[3], double e[3][3
     double at[4][3];
     memcpy(at, corner, 3 * sizeof *at);
     memcpy(at[3], p, sizeof *at);
-    scale(at[0], 12, -exponent(at[0], 9));
+    scale_by_power(at[0], 12, -greatest_exponent(at[0], 9));
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
             e[i][k] = at[i + 1][k] - at[0][k];
-    scale(e[0], 9, -exponent(e[0], 6));
+    scale_by_power(e[0], 9, -greatest_exponent(e[0], 6));
 }
 
 /* Where a face has no area: along its longest edge. */
@@ -251,28 +250,29 @@ static void weigh_edge(const double e[3][3], double weight[3])
     const double *edges[3] = { e[0], e[1], third };
     int longest = 0;
     for (int i = 1; i < 3; i++)
-        if (dot(edges[i], edges[i]) > dot(edges[longest], edges[longest]))
+        if (ebpo_vec3_dot(edges[i], edges[i]) > ebpo_vec3_dot(edges[longest], edges[longest]))
             longest = i;
-    double length2 = dot(edges[longest], edges[longest]);
-    double along = dot(longest == 2 ? beyond : e[2], edges[longest]);
-    double t = length2 > 0 ? clamp(along / length2, 0, 1) : 0;
+    double length2 = ebpo_vec3_dot(edges[longest], edges[longest]);
+    double along = ebpo_vec3_dot(longest == 2 ? beyond : e[2], edges[longest]);
+    double t = length2 > 0 ? clamp_to(along / length2, 0, 1) : 0;
     weight[0] = weight[1] = weight[2] = 0;
     weight[from[longest]] = 1 - t;
     weight[to[longest]] = t;
 }
 
-static void weigh(const double corner[3][3], const double p[3], double weight[3])
+static void weigh_corners(const double corner[3][3], const double p[3], double weight[3])
 {
     double e[3][3];
     edges_of(corner, p, e);
-    double bb = dot(e[0], e[0]), bc = dot(e[0], e[1]), cc = dot(e[1], e[1]), pb = dot(e[2], e[0]),
-           pc = dot(e[2], e[1]), det = bb * cc - bc * bc;
+    double bb = ebpo_vec3_dot(e[0], e[0]), bc = ebpo_vec3_dot(e[0], e[1]),
+           cc = ebpo_vec3_dot(e[1], e[1]), pb = ebpo_vec3_dot(e[2], e[0]),
+           pc = ebpo_vec3_dot(e[2], e[1]), det = bb * cc - bc * bc;
     if (!(det > 0x1p-900)) {
         weigh_edge((const double(*)[3])e, weight);
         return;
     }
-    double b = clamp((cc * pb - bc * pc) / det, 0, INFINITY),
-           c = clamp((bb * pc - bc * pb) / det, 0, INFINITY), a = clamp(1 - b - c, 0, 1),
+    double b = clamp_to((cc * pb - bc * pc) / det, 0, INFINITY),
+           c = clamp_to((bb * pc - bc * pb) / det, 0, INFINITY), a = clamp_to(1 - b - c, 0, 1),
            sum = a + b + c;
     weight[0] = a / sum;
     weight[1] = b / sum;
@@ -280,7 +280,7 @@ static void weigh(const double corner[3][3], const double p[3], double weight[3]
 }
 
 /* Between the values that take part, also when it is rounded. */
-static double blend(const double weight[3], const double value[3])
+static double blend_values(const double weight[3], const double value[3])
 {
     double sum = 0, least = INFINITY, most = -INFINITY;
     for (int k = 0; k < 3; k++) {
@@ -290,7 +290,7 @@ static double blend(const double weight[3], const double value[3])
         least = value[k] < least ? value[k] : least;
         most = value[k] > most ? value[k] : most;
     }
-    return clamp(sum, least, most);
+    return clamp_to(sum, least, most);
 }
 
 /* --- answers --- */
@@ -312,20 +312,20 @@ static double value_of(const sampled *item, uint64_t row)
                                  item->head->type);
 }
 
-static void sample(const ebpo_sampler *s, uint64_t f, const double point[3], double *out)
+static void sample_face(const ebpo_sampler *s, uint64_t f, const double point[3], double *out)
 {
     const uint32_t *face = s->mesh.faces ? s->mesh.faces + 3 * f : NULL;
     double corner[3][3], weight[3] = { 1, 0, 0 };
     if (face) {
         corners_of(&s->mesh, face, corner);
-        weigh((const double(*)[3])corner, point, weight);
+        weigh_corners((const double(*)[3])corner, point, weight);
     }
     for (unsigned i = 0; i < s->count; i++) {
         const sampled *item = &s->item[i];
         double value[3] = { 0, 0, 0 };
         for (int k = 0; k < 3 && item->of_vertices; k++)
             value[k] = value_of(item, face[k]);
-        out[i] = item->of_vertices ? blend(weight, value) : value_of(item, f);
+        out[i] = item->of_vertices ? blend_values(weight, value) : value_of(item, f);
     }
 }
 
@@ -357,7 +357,7 @@ ebpo_status ebpo_sample(const ebpo_sampler *s, const double *points, const uint6
         if (!isfinite(points[0]) || !isfinite(points[1]) || !isfinite(points[2]))
             return ebpo_fail(error, EBPO_E_ARGUMENT, "point %llu is not finite",
                              (unsigned long long)i);
-        sample(s, f, points, values);
+        sample_face(s, f, points, values);
     }
     return EBPO_OK;
 }

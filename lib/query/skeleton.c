@@ -1,7 +1,13 @@
-/* Bounds of the distance to subtrees that are not in memory: the upper nodes of each. */
+/* Skeletons: bounds of the distance to the faces of subtrees that are not in memory.
+ *
+ * Of each subtree that has ever been loaded the upper nodes of its hierarchy over faces are kept,
+ * eight at first; searches load it again only if it may matter. Whenever a search has loaded it for
+ * nothing, nodes are added where it looked. All skeletons together stay within their share of the
+ * budget. They give lower bounds only (model_parts.h says why); any thread may use them, also while
+ * one grows. */
 #include "core/strict_fp.h"
 
-#include "query/skeleton.h"
+#include "query/model_parts.h"
 
 #include <float.h>
 #include <math.h>
@@ -60,7 +66,7 @@ static void keep_child(ebpo_skeleton *k, const ebpo_accel *s, uint32_t *place)
     __atomic_store_n(place, IS_KEPT | number, __ATOMIC_RELEASE);
 }
 
-static double diagonal2(const ebpo_bound *b, int lane)
+static double squared_diagonal(const ebpo_bound *b, int lane)
 {
     double sum = 0;
     for (int k = 0; k < 3; k++) {
@@ -70,8 +76,8 @@ static double diagonal2(const ebpo_bound *b, int lane)
     return sum;
 }
 
-/* Blocks, and so children of the topmost node, hold outer faces or own ones: see
- * layout.c. */
+/* Blocks, and so children of the topmost node, hold outer faces or own ones: see blocks.c.
+ */
 static bool is_outer(const ebpo_accel *s, uint32_t child)
 {
     while (!(child & EBPO_IS_BLOCK))
@@ -109,7 +115,7 @@ static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t outer_e
         for (int lane = 0; lane < b->count; lane++) {
             bool leads_on =
                 !(b->child[lane] & (IS_KEPT | EBPO_IS_BLOCK)) && (number || k->own >> lane & 1);
-            double size = leads_on ? diagonal2(b, lane) : -1;
+            double size = leads_on ? squared_diagonal(b, lane) : -1;
             if (size > most) {
                 most = size;
                 place = &b->child[lane];

@@ -46,7 +46,7 @@ static void know_below(const ebpo_accel *s, const ebpo_node *node)
     for (int i = 0; i < EBPO_LEAF_KIND_ASKED && ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_LEAF;
          i++)
         (void)ebpo_leaf_ask(s, &s->leaf[ebpo_entry_value(node->entry)], node->cell,
-                            ebpo_kernels_best()->walls);
+                            ebpo_inside_kernels_best()->walls);
     for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY && !node->pruned; octant++) {
         ebpo_node child = ebpo_accel_child(s, node, octant);
         know_below(s, &child);

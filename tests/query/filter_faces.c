@@ -1,10 +1,14 @@
 /* The kernels' filters for eight faces, for any processor or for those with AVX2. */
 #include "core/strict_fp.h"
 
-#include "query/kernels.inc"
-#include "query/near_kernel.inc"
-
 #include "filter_faces.h"
+
+/* The kernels' tables, under this set's name (EBPO_KERNEL_SUFFIX). */
+extern const ebpo_inside_kernels EBPO_KERNEL(ebpo_inside_kernels);
+extern const ebpo_nearest_kernels EBPO_KERNEL(ebpo_nearest_kernels);
+
+#include "query/inside_kernels.c"
+#include "query/nearest_kernels.c"
 
 static void near_faces_of(const ebpo_accel *s, uint32_t block, const ebpo_probe *probe,
                           float low[EBPO_BLOCK], float high[EBPO_BLOCK])
@@ -31,8 +35,5 @@ static void turns_of(const ebpo_accel *s, uint32_t block, const ebpo_axis_segmen
     *open = t.open;
 }
 
-const face_filters FILTERS = { near_faces_of, turns_of };
-
-/* What else the kernels' bodies have. */
-extern const ebpo_kernels UNUSED_KERNELS;
-const ebpo_kernels UNUSED_KERNELS = { crossings, NULL, near_walk, NULL };
+/* face_filters_base or face_filters_avx2. */
+const face_filters EBPO_KERNEL(face) = { near_faces_of, turns_of };

@@ -1,9 +1,8 @@
-/* What filters in single precision say of the eight faces of a block; FILTERS names the functions.
- */
+/* What filters in single precision say of the eight faces of a block, for each instruction set. */
 #ifndef EBPO_TESTS_FILTER_FACES_H
 #define EBPO_TESTS_FILTER_FACES_H
 
-#include "query/kernels.h"
+#include "query/query_kernels.h"
 
 typedef struct face_filters {
     /* Bounds of the distances to a point, in the frame. */

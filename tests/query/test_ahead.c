@@ -3,7 +3,7 @@
 #include <stdlib.h>
 
 #include "check_main.h"
-#include "query/prefetch.h"
+#include "query/load_ahead.h"
 #include "query_kit.h"
 
 static const struct {

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "query/block_measure.h"
+#include "query/accel_parts.h"
 #include "check_main.h"
 #include "query/query_model.h"
 #include "query_kit.h"
@@ -269,7 +269,7 @@ START_TEST(kernels_for_any_processor_answer_the_same)
     query_model m;
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
                      &query_variants[_i % query_variant_count]);
-    const ebpo_kernels *usual = m.model->kernels;
+    const ebpo_query_kernels usual = m.model->kernels;
     uint64_t state = (uint64_t)_i, count = query_scaled(m.mesh.face_count > 500 ? 200 : 600);
     if (strcmp(m.name, "all_scales") == 0)
         count = query_scaled(100);
@@ -277,7 +277,7 @@ START_TEST(kernels_for_any_processor_answer_the_same)
         query_ray r;
         answers one, other;
         query_make_ray(&m, &state, r.origin, r.direction, &r.t_max);
-        m.model->kernels = &ebpo_kernels_base;
+        m.model->kernels = ebpo_query_kernels_base();
         ask_all(&m, &r, &one);
         ck_assert(query_ask_ray(&m, m.context, &r)); /* against rational arithmetic */
         m.model->kernels = usual;

@@ -6,7 +6,7 @@
 
 #include "check_main.h"
 #include "geometry/distance.h"
-#include "query/deep_bounds.h"
+#include "query/nearest.h"
 #include "query/query_model.h"
 #include "query_kit.h"
 

@@ -12,7 +12,7 @@
 #include "core/parallel.h"
 #include "geometry/predicates.h"
 #include "geometry/rule.h"
-#include "query/options.h"
+#include "query/query_model.h"
 
 /* --- making --- */
 

@@ -8,7 +8,7 @@
 #include "extras/collide/collider.h"
 #include "extras/collide/depth_search.h"
 #include "extras/collide/posed_model.h"
-#include "query/options.h"
+#include "query/query_model.h"
 
 /* Of the caller's model `solid` (0: A), which holds the other one's surface. */
 static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance, ebpo_certain *out,

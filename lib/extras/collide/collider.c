@@ -12,7 +12,7 @@
 #include "core/fp_env.h"
 #include "extras/collide/gap_search.h"
 #include "extras/collide/posed_model.h"
-#include "query/options.h"
+#include "query/query_model.h"
 
 /* What was left out of a subset might meet as well. */
 static ebpo_status check_complete(const ebpo_model *model, ebpo_error *error)

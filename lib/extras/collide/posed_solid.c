@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "extras/collide/posed_model.h"
-#include "query/options.h"
+#include "query/query_model.h"
 
 /* More than the roundings of a bound's own computation. */
 static const double more = 1 + 0x1p-40;

@@ -9,8 +9,7 @@
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "extras/map/map_ask.h"
-#include "query/batch.h"
-#include "query/options.h"
+#include "query/load_ahead.h"
 #include "query/query_model.h"
 
 typedef struct points_job {

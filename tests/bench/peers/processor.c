@@ -4,5 +4,5 @@
 
 void processor_is_base(ebpo_model *model, bool base)
 {
-    model->kernels = base ? &ebpo_kernels_base : ebpo_kernels_best();
+    model->kernels = base ? ebpo_query_kernels_base() : ebpo_query_kernels_best();
 }

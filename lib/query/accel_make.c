@@ -1,0 +1,624 @@
+/* Makes an accel, the acceleration structure of a subtree (accel.h), from the subtree's slice of
+ * the file, and says how much memory that takes.
+ *
+ * The stages, each in a file: which faces share a block and how blocks hang together (blocks.c),
+ * the blocks' bounds (block_bounds.c), child tables and leaf records (here); what leaves are like
+ * is found out later (leaf_kinds.c).
+ *
+ * Memory is estimated from counts, before anything is read. Only blocks, the hierarchy over them
+ * and what lies across a subtree's border are bounded by what ordinary models have;
+ * ebpo_accel_make_within and ebpo_slice_read_within refuse what has more. */
+#include "core/strict_fp.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/huge_pages.h"
+#include "format/compact.h"
+#include "geometry/node_types.h"
+#include "query/accel.h"
+#include "query/accel_parts.h"
+
+/* --- memory --- */
+
+/* Entries of leaves' lists at most: each reference is one, and more than eight new faces of a leaf
+ * are in 2 n / 9 blocks at most, fewer in one. */
+static inline uint64_t list_most(uint64_t refs, uint64_t leaves, uint64_t faces)
+{
+    return refs + leaves + faces / 9 * 2 + 2;
+}
+
+/* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates
+ * beyond that, and doubles, take doubles. */
+static bool accel_needs_doubles(const ebpo_info *info)
+{
+    double most = 0;
+    for (int k = 0; k < 3; k++)
+        most = fmax(most,
+                    fmax(fabs(info->box_origin[k]), fabs(info->box_origin[k] + info->box_size[k])));
+    double least = fmin(info->box_size[0], fmin(info->box_size[1], info->box_size[2]));
+    return info->double_coordinates || !(most < 0x1p40) || !(least > 0x1p-40);
+}
+
+static uint64_t greater_of(uint64_t a, uint64_t b) { return a > b ? a : b; }
+static uint64_t lesser_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
+
+/* --- what counts tell --- */
+
+typedef struct counts {
+    uint64_t groups, leaves, refs, uniform, planes, leaf_planes;
+    uint64_t faces, outer, vertices; /* the outer ones are among the faces */
+    bool below;                      /* a subtree, not the whole model */
+    bool keeps_planes;
+} counts;
+
+/* In bytes. */
+typedef struct told {
+    uint64_t levels, mesh, maps, outer; /* of the slice */
+    uint64_t only_read;                 /* what a slice does not have */
+    uint64_t nodes, list, planes, rows, slots;
+    uint64_t beside;
+} told;
+
+static uint64_t grid_bytes(uint64_t groups)
+{
+    int bits = ebpo_node_grid_bits(groups);
+    return bits ? (UINT64_C(1) << 3 * bits) * 5 : 0;
+}
+
+/* Corners that lead to vertices before the subtree: of the outer faces, and of their neighbours. */
+static uint64_t border_bytes(const counts *c) { return ebpo_compact_bytes(6 * c->outer); }
+
+static told told_by(const counts *c, const ebpo_info *info)
+{
+    uint64_t coordinate = info->double_coordinates ? sizeof(double) : sizeof(float),
+             maps = info->parts & EBPO_PART_MAPS ? 4 : 0;
+    return (told){
+        .levels = 3 * c->groups + 20 * c->leaves + 4 * (c->uniform + c->refs + c->planes),
+        .mesh = 12 * c->faces + 3 * coordinate * c->vertices,
+        .maps = maps * c->faces,
+        .outer = 4 * c->outer,
+        .only_read =
+            c->below ? border_bytes(c) : maps * c->vertices + c->leaves + 4 * c->leaf_planes,
+        .nodes = c->groups * 32 + (c->below ? 0 : grid_bytes(c->groups)) +
+                 c->leaves * sizeof(ebpo_accel_leaf),
+        .list = list_most(c->refs, c->leaves, c->faces) * sizeof(ebpo_listed_block),
+        .planes = c->keeps_planes ? 4 * (c->groups + 1 + c->planes) : 0,
+        .rows = c->below && info->solid ? c->leaves * sizeof(ebpo_kind_row) : 0,
+        .slots = 4 * c->faces,
+        .beside = c->below ? 1 << 14 : 3 << 16,
+    };
+}
+
+static counts counts_of_all(const ebpo_info *info)
+{
+    counts c = {
+        .groups = 1, .faces = info->face_count, .vertices = info->vertex_count, .keeps_planes = true
+    };
+    for (int i = 0; i < info->level_count; i++) {
+        const ebpo_level_summary *level = &info->level[i];
+        c.groups += level->gray_count;
+        c.leaves += level->leaf_count;
+        c.refs += level->ref_count;
+        c.uniform += level->white_count + level->black_count;
+        c.planes += level->plane_count;
+        c.leaf_planes += level->leaf_plane_count;
+    }
+    return c;
+}
+
+static counts counts_of_slice(const ebpo_slice *slice, bool with_planes)
+{
+    counts c = { .faces = slice->mesh.face_count,
+                 .outer = slice->outer_count,
+                 .vertices = slice->mesh.vertex_count,
+                 .below = slice->root.cell.level > 0,
+                 .keeps_planes = with_planes };
+    for (int i = 0; i < slice->level_count; i++) {
+        const ebpo_level *level = &slice->level[i];
+        c.groups += level->group_count;
+        c.leaves += level->leaf_count;
+        c.refs += level->ref_count;
+        c.uniform += level->white_count + level->black_count;
+        c.planes += level->plane_count;
+    }
+    return c;
+}
+
+/* Faces across a subtree's border are as many as its patch of surface is round: about three times
+ * the root of their number; `most` times here, and no more than are listed. */
+static counts counts_of_size(const ebpo_slice_size *size, const ebpo_info *info, double roots,
+                             uint64_t more)
+{
+    uint64_t own = size->new_faces, nodes = 8 * size->groups,
+             outer = lesser_of(size->refs, (uint64_t)(roots * sqrt((double)own)) + more),
+             faces = own + outer, usual = faces / 4 * 3 + 64;
+    double of_face = info->face_count ? (double)info->vertex_count / (double)info->face_count : 0;
+    return (counts){ .groups = size->groups,
+                     .leaves = size->leaves,
+                     .refs = size->refs,
+                     .uniform = nodes > size->leaves ? nodes - size->leaves : 0,
+                     .planes = size->planes,
+                     .faces = faces,
+                     .outer = outer,
+                     .vertices = greater_of(usual, (uint64_t)(1.25 * of_face * (double)faces)),
+                     .below = true,
+                     .keeps_planes = size->planes > 0 };
+}
+
+/* --- what making finds out, in numbers --- */
+
+typedef struct found {
+    uint64_t blocks, bounds, units;
+} found;
+
+static found usual_model(const counts *c, const ebpo_info *info)
+{
+    uint64_t bytes = c->faces * (accel_needs_doubles(info) ? 56 : 32);
+    return (found){ .blocks = c->faces / 4 + 16,
+                    .bounds = c->faces / 16 + 16,
+                    .units = bytes / EBPO_MESHLET_UNIT + 64 };
+}
+
+static uint64_t kept_bytes(const told *t, const found *f)
+{
+    return sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + t->maps + t->outer + t->nodes + t->list +
+           t->planes + t->rows + (f->units + 1) * EBPO_MESHLET_UNIT +
+           (f->bounds + 1) * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab));
+}
+
+/* Arrays of a layout have grown by half. Side by side with all that is kept later are first the
+ * mesh and what is found of blocks, then extents, then the nodes. A layout that is refused fits
+ * too: 12 bytes a block, 60 a bound, no more blocks than faces, 7 bounds for 13 blocks (the first
+ * run that is wrapped in a join has five members at least, the others four, three, two, two ..),
+ * and 8 bytes a face to number them are below the 56 bytes a face of usual records, bounds and
+ * layout. Beside it all is what one thread decodes a whole model with. */
+static uint64_t peak_bytes(const told *t, const found *f)
+{
+    enum { LAYOUT_BLOCK = 16, LAYOUT_BOUND = 60, FOUND = 25, EXTENT = 72 };
+    uint64_t layout = f->blocks * LAYOUT_BLOCK + f->bounds * LAYOUT_BOUND,
+             early = t->mesh + f->blocks * FOUND, extents = (f->blocks + f->bounds) * EXTENT,
+             late = t->nodes + t->list, after = t->nodes + t->list + t->planes + t->rows,
+             kept = kept_bytes(t, f) - after,
+             read = t->levels + t->mesh + t->outer + t->maps + t->only_read;
+    uint64_t made =
+        t->levels + kept + greater_of(greater_of(early, extents), late + t->slots) + layout;
+    return greater_of(greater_of(read, made), t->levels + kept + after) + t->beside;
+}
+
+/* --- foretold --- */
+
+void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak)
+{
+    counts c = counts_of_all(info);
+    told t = told_by(&c, info);
+    found f = usual_model(&c, info);
+    *keep = kept_bytes(&t, &f);
+    *peak = peak_bytes(&t, &f);
+}
+
+void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
+                                 uint64_t *peak)
+{
+    counts c = counts_of_size(size, info, 8, 64);
+    told t = told_by(&c, info);
+    found f = usual_model(&c, info);
+    *keep = kept_bytes(&t, &f);
+    *peak = peak_bytes(&t, &f);
+}
+
+/* Blocks and the hierarchy are fuller than is certain, and a leaf's list names a block once for
+ * several faces. */
+uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info, uint64_t subtrees)
+{
+    uint64_t n = subtrees ? subtrees : 1;
+    ebpo_slice_size mean = { .groups = all->groups / n + 1,
+                             .leaves = all->leaves / n + 1,
+                             .refs = all->refs / n + 1,
+                             .new_faces = all->new_faces / n + 1,
+                             .planes = all->planes / n + 1 };
+    counts c = counts_of_size(&mean, info, 3.5, 2);
+    told t = told_by(&c, info);
+    uint64_t bytes = c.faces * (accel_needs_doubles(info) ? 48 : 27);
+    found f = { .units = bytes / EBPO_MESHLET_UNIT + 4, .bounds = c.faces / 24 + 1 };
+    t.list = ((c.refs + c.leaves) / 2 + c.faces / 16 + 4) * sizeof(ebpo_listed_block);
+    return kept_bytes(&t, &f);
+}
+
+/* Blocks are half full but for the one that a leaf of few faces has alone, where its neighbours'
+ * fill theirs: what that takes beyond its faces' share is in the 64 bytes of each leaf, as what its
+ * planes may take in a subtree. Lists name at most one block for each listed face. Of a face a
+ * record has three vertices at most, or four where it has room for more than 16. */
+void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
+                         uint64_t *peak)
+{
+    uint64_t wide = accel_needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->outer;
+    uint64_t blocks = faces / 4 + 2, bounds = blocks / 3 + 2;
+    *keep = sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + size->groups * 64 +
+            size->leaves * (sizeof(ebpo_accel_leaf) + 64) +
+            (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
+            blocks * (EBPO_MESHLET_WIDE + EBPO_MESHLET_UNIT) + faces * 48 * wide +
+            bounds * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab)) + faces * 8;
+    *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 24) +
+            (blocks + bounds) * 72 + 65536;
+}
+
+/* --- and refused --- */
+
+/* EBPO_E_LIMIT if making it with these blocks (the usual ones without a layout) takes more than the
+ * room (NULL: no limit) has, the slice included. */
+static ebpo_status accel_fits(ebpo_room *room, const ebpo_accel_plan *plan, uint64_t units,
+                              ebpo_error *error)
+{
+    if (!room)
+        return EBPO_OK;
+    const ebpo_layout *layout = plan->layout;
+    counts c = counts_of_slice(plan->slice, plan->with_planes);
+    told t = told_by(&c, plan->info);
+    t.only_read = 0; /* it has been read */
+    found f = layout ? (found){ layout->block_count, layout->bound_count, units }
+                     : usual_model(&c, plan->info);
+    uint64_t peak = peak_bytes(&t, &f);
+    ebpo_room all = { .most = room->most };
+    ebpo_status status = ebpo_room_check(&all, peak, error);
+    room->needed = all.needed;
+    return status;
+}
+
+/* --- child tables and leaf records --- */
+
+typedef struct walk {
+    ebpo_accel *s;
+    const ebpo_slice *slice;
+    const uint32_t *slot_of;           /* [local face] */
+    uint64_t rank[EBPO_LEVELS_MAX][4]; /* nodes of each type of each level, seen so far */
+    uint64_t refs[EBPO_LEVELS_MAX];
+    uint64_t group_begin[EBPO_LEVELS_MAX]; /* number of the first group of each level */
+    uint64_t leaf_begin[EBPO_LEVELS_MAX];
+    uint64_t list_capacity;
+    ebpo_status status;
+    ebpo_error *error;
+} walk;
+
+/* For a leaf's entries, at most. What all leaves need was made at once, and is given back at the
+ * end. */
+static bool make_list_room(walk *w, uint64_t more)
+{
+    ebpo_accel *s = w->s;
+    if (!ebpo_grow(&s->list, &w->list_capacity, s->list_count + more, sizeof *s->list))
+        w->status = ebpo_fail_memory(w->error, (s->list_count + more) * sizeof *s->list);
+    else if (s->list_count + more > UINT32_MAX)
+        w->status =
+            ebpo_fail(w->error, EBPO_E_LIMIT,
+                      "the leaves list too many faces to be held at once; give a memory budget");
+    return w->status == EBPO_OK;
+}
+
+/* A leaf's entries so far. */
+typedef struct listing {
+    ebpo_listed_block *list;
+    uint32_t count, block; /* that the last entry is of; none: no block's number */
+    uint64_t last;
+} listing;
+
+/* Faces come in ascending order, and so do blocks: those of one block become one entry. Whether a
+ * face begins one is a toss: without a branch. */
+static inline void list_face(const walk *w, uint64_t face, listing *l)
+{
+    uint32_t slot = w->slot_of[face], block = slot / EBPO_BLOCK;
+    uint64_t lane = UINT64_C(1) << (slot % EBPO_BLOCK + EBPO_LISTED_LANES);
+    bool begins = block != l->block;
+    l->last = (begins ? block : l->last) | lane;
+    l->count += begins;
+    l->block = block;
+    ebpo_list(&l->list[l->count - 1], l->last);
+}
+
+/* References, which lie before the leaf's own faces, then these. */
+static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t number)
+{
+    ebpo_accel_leaf *leaf = &w->s->leaf[number];
+    uint64_t refs = level->leaf_ref_count[rank], fresh = level->leaf_new[rank];
+    if (!make_list_room(w, refs + (fresh > EBPO_BLOCK ? 2 * fresh / 9 : 1)))
+        return;
+    listing l = { .list = w->s->list + w->s->list_count, .block = UINT32_MAX };
+    const uint32_t *ref = refs ? level->leaf_refs + w->refs[depth] : NULL;
+    for (uint64_t i = 0; i < refs; i++)
+        list_face(w, ref[i], &l);
+    for (uint64_t i = level->leaf_first[rank], end = i + fresh; i < end; i++)
+        list_face(w, i, &l);
+    if (!l.count) /* a leaf without faces: block 0 without lanes */
+        l.count = 1;
+    ebpo_list(&l.list[l.count - 1], l.last | EBPO_LISTED_LAST);
+    if (w->s->list_longest < l.count)
+        w->s->list_longest = l.count;
+    leaf->list = (uint32_t)w->s->list_count;
+    w->s->list_count += l.count;
+    w->refs[depth] += refs;
+    leaf->kind = w->s->solid ? EBPO_LEAF_UNKNOWN : EBPO_LEAF_GENERAL;
+    leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;
+}
+
+static uint32_t uniform_entry(walk *w, const int32_t *windings, uint64_t rank, int32_t usual)
+{
+    uint32_t entry = 0;
+    if (!ebpo_entry_uniform(windings ? windings[rank] : usual, &entry))
+        w->status =
+            ebpo_fail(w->error, EBPO_E_LIMIT,
+                      "a node's winding number is beyond 2^29: the solid has too many shells");
+    return entry;
+}
+
+static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
+{
+    const ebpo_level *level = &w->slice->level[depth];
+    uint64_t rank = w->rank[depth][type]++;
+    if (w->status != EBPO_OK)
+        return 0;
+    if (type == EBPO_WHITE)
+        return uniform_entry(w, level->white_winding, rank, 0);
+    if (type == EBPO_BLACK)
+        return uniform_entry(w, level->black_winding, rank, 1);
+    if (type == EBPO_LEAF) {
+        uint32_t number = (uint32_t)(w->leaf_begin[depth] + rank);
+        fill_leaf(w, level, depth, rank, number);
+        return ebpo_entry(EBPO_ENTRY_LEAF, number);
+    }
+    uint64_t group = w->group_begin[depth + 1] + rank;
+    if (w->slice->pruned &&
+        (depth + 1 == w->slice->level_count || w->slice->level[depth + 1].types[rank] == 0)) {
+        if (depth + 1 < w->slice->level_count) {
+            w->rank[depth + 1][EBPO_WHITE] += 8; /* where its children would be */
+            memset(w->s->nodes.group[group], 0xff, sizeof w->s->nodes.group[group]);
+        }
+        return ebpo_entry(EBPO_ENTRY_BELOW, (uint32_t)group);
+    }
+    uint16_t types = w->slice->level[depth + 1].types[rank];
+    for (unsigned octant = 0; octant < 8; octant++)
+        w->s->nodes.group[group][octant] = walk_node(w, depth + 1, ebpo_group_type(types, octant));
+    return ebpo_entry(EBPO_ENTRY_GRAY, (uint32_t)group);
+}
+
+static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot_of)
+{
+    const ebpo_slice *slice = w->slice;
+    ebpo_accel *s = w->s;
+    uint64_t groups = 0, leaves = 0, refs = 0;
+    for (int depth = 0; depth < slice->level_count; depth++) {
+        w->group_begin[depth] = depth ? groups : 0;
+        w->leaf_begin[depth] = leaves;
+        groups += depth ? slice->level[depth].group_count : 0;
+        leaves += slice->level[depth].leaf_count;
+        refs += slice->level[depth].ref_count;
+    }
+    if (slice->level_count < EBPO_LEVELS_MAX)
+        /* gray nodes are numbered on where they have no groups */
+        w->group_begin[slice->level_count] = groups;
+    if (groups >= EBPO_ENTRY_ZERO || leaves >= EBPO_ENTRY_ZERO)
+        return ebpo_fail(w->error, EBPO_E_LIMIT,
+                         "the tree has too many nodes to be held at once; give a memory budget");
+    s->nodes.group = ebpo_alloc(groups, sizeof *s->nodes.group);
+    s->nodes.group_count = (uint32_t)groups;
+    s->leaf = ebpo_alloc_zero(leaves, sizeof *s->leaf);
+    s->leaf_count = (uint32_t)leaves;
+    uint64_t faces = layout->block_count ? layout->block_end[layout->block_count - 1] : 0;
+    uint32_t *map = *slot_of = ebpo_alloc(faces, sizeof *map);
+    bool list = ebpo_grow(&s->list, &w->list_capacity, list_most(refs, leaves, slice->face_count),
+                          sizeof *s->list);
+    if (!s->nodes.group || !s->leaf || !map || !list)
+        return ebpo_fail_memory(w->error, groups * 32 + leaves * sizeof *s->leaf + faces * 4);
+    ebpo_prefer_huge_pages(s->nodes.group, groups * sizeof *s->nodes.group);
+    ebpo_prefer_huge_pages(s->leaf, leaves * sizeof *s->leaf);
+    ebpo_prefer_huge_pages(map, faces * sizeof *map);
+    for (uint64_t b = 0; b < layout->block_count; b++)
+        for (uint32_t face = layout->block_begin[b]; face < layout->block_end[b]; face++)
+            map[face] = layout->block_number[b] * EBPO_BLOCK + face - layout->block_begin[b];
+    return EBPO_OK;
+}
+
+/* What has been counted is what is held. */
+static void trim_list(ebpo_accel *s)
+{
+    ebpo_listed_block *less = ebpo_realloc(s->list, s->list_count, sizeof *s->list);
+    s->list = less ? less : s->list;
+}
+
+/* Child tables and leaf records with their lists of blocks (one walk). */
+static ebpo_status accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
+                                    const ebpo_layout *layout, ebpo_error *error)
+{
+    walk w = { .s = s, .slice = slice, .status = EBPO_OK, .error = error };
+    uint32_t *slot_of = NULL;
+    ebpo_status status = make_room(&w, layout, &slot_of);
+    if (status == EBPO_OK) {
+        w.slot_of = slot_of;
+        s->nodes.root_level = slice->root.cell.level;
+        s->nodes.root = walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0));
+        status = w.status;
+    }
+    free(slot_of);
+    if (status == EBPO_OK)
+        trim_list(s);
+    return status;
+}
+
+/* --- the stages --- */
+
+/* What floats lose of a cross product of differences of coordinates, with room to spare. */
+static double turn_error(const ebpo_box *box)
+{
+    double reach = 0, size = 0;
+    for (int k = 0; k < 3; k++) {
+        reach = fmax(reach, fmax(fabs(box->origin[k]), fabs(box->origin[k] + box->size[k])));
+        size = fmax(size, box->size[k]);
+    }
+    return 0x1p-43 * reach * size;
+}
+
+static void make_frame(ebpo_accel *s)
+{
+    double most = 0, low[3], high[3];
+    ebpo_cell_bounds(&s->box, s->root.cell, low, high);
+    for (int k = 0; k < 3; k++) {
+        s->centre[k] = low[k] / 2 + high[k] / 2;
+        most = fmax(most, high[k] - low[k]);
+    }
+    int exponent;
+    frexp(most, &exponent);
+    s->turn_error = (float)turn_error(&s->box);
+    s->scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : 1 - exponent);
+}
+
+static ebpo_status copy_planes(ebpo_accel *s, const ebpo_slice *slice, ebpo_error *error)
+{
+    uint64_t grays = 0, planes = 0, at = 0;
+    for (int i = 0; i < slice->level_count; i++) {
+        grays += slice->level[i].gray_count;
+        planes += slice->level[i].plane_count;
+    }
+    if (planes > UINT32_MAX) /* what gray_first holds */
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "the tree has too many planes to be held at once; give a memory budget");
+    s->gray_planes = ebpo_alloc(planes, sizeof *s->gray_planes);
+    s->gray_first = ebpo_alloc(grays + 1, sizeof *s->gray_first);
+    if (!s->gray_planes || !s->gray_first)
+        return ebpo_fail_memory(error, (grays + planes) * 4);
+    uint64_t gray = 0;
+    for (int i = 0; i < slice->level_count; i++) {
+        const ebpo_level *level = &slice->level[i];
+        uint64_t first = at;
+        for (uint64_t k = 0; k < level->gray_count; k++) {
+            s->gray_first[gray++] = (uint32_t)at;
+            at += level->plane_counts ? level->plane_counts[k] : 0;
+        }
+        if (level->plane_count)
+            memcpy(s->gray_planes + first, level->planes,
+                   level->plane_count * sizeof *s->gray_planes);
+    }
+    s->gray_first[gray] = (uint32_t)at;
+    s->gray_count = gray;
+    return EBPO_OK;
+}
+
+/* Of planes that make leaves easy. Few leaves of one subtree are asked about; what they may take
+ * counts from the beginning. */
+static uint64_t rows_most(const ebpo_accel *s)
+{
+    return s->root.cell.level ? s->leaf_count : 5 * (uint64_t)s->leaf_count;
+}
+
+static uint64_t count_bytes(const ebpo_accel *s)
+{
+    uint64_t cells = s->nodes.grid_bits ? UINT64_C(1) << 3 * s->nodes.grid_bits : 0;
+    return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 +
+           s->leaf_count * sizeof *s->leaf + s->list_count * sizeof *s->list +
+           (s->kinds ? sizeof *s->kinds : 0) +
+           (s->kinds && s->root.cell.level ? rows_most(s) * sizeof(ebpo_kind_row) : 0) +
+           (s->units + 1) * EBPO_MESHLET_UNIT +
+           s->bound_count * (sizeof *s->bound + sizeof *s->slab) + (uint64_t)s->outer_count * 4 +
+           (s->face_source ? (uint64_t)s->face_count * 4 : 0) +
+           (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
+}
+
+static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info *info,
+                               ebpo_room *room, unsigned threads, ebpo_error *error)
+{
+    ebpo_layout layout;
+    ebpo_accel_plan plan = { info, slice, s->has_planes, NULL };
+    ebpo_status status = accel_fits(room, &plan, 0, error);
+    if (status == EBPO_OK)
+        status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MOST, error);
+    if (status != EBPO_OK)
+        return status;
+    plan.layout = &layout;
+    status = accel_fits(room, &plan, layout.block_count, error);
+    if (status == EBPO_OK)
+        status = ebpo_accel_number_blocks(s, &plan, threads, error);
+    if (status == EBPO_OK)
+        status = accel_fits(room, &plan, s->units, error);
+    if (status == EBPO_OK)
+        status = ebpo_accel_fill_blocks(s, &plan, threads, error);
+    ebpo_mesh_free(&slice->mesh);
+    if (status == EBPO_OK)
+        status = ebpo_accel_fill_bounds(s, &layout, threads, error);
+    if (status == EBPO_OK)
+        status = accel_fill_nodes(s, slice, &layout, error);
+    ebpo_layout_free(&layout);
+    if (status == EBPO_OK && s->solid) {
+        s->kinds = ebpo_leaf_kinds_make(rows_most(s));
+        status = s->kinds ? EBPO_OK : ebpo_fail_memory(error, sizeof *s->kinds);
+    }
+    if (status == EBPO_OK && s->has_planes)
+        status = copy_planes(s, slice, error);
+    return status;
+}
+
+ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice, const ebpo_info *info,
+                            bool with_planes, unsigned threads, ebpo_error *error)
+{
+    return ebpo_accel_make_within(out, slice, info, NULL, with_planes, threads, error);
+}
+
+ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice, const ebpo_info *info,
+                                   ebpo_room *room, bool with_planes, unsigned threads,
+                                   ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_accel *s = ebpo_alloc_zero(1, sizeof *s);
+    if (!s) {
+        ebpo_slice_free(slice);
+        return ebpo_fail_memory(error, sizeof *s);
+    }
+    s->box = ebpo_root_box(info);
+    s->root = slice->root;
+    s->deepest = slice->root.cell.level + slice->level_count - 1;
+    s->solid = info->solid;
+    s->rule = (uint8_t)info->rule;
+    s->has_planes = with_planes;
+    s->wide = accel_needs_doubles(info);
+    s->face_count = (uint32_t)slice->mesh.face_count;
+    s->outer_count = slice->outer_count;
+    s->first_face = slice->first_face;
+    make_frame(s);
+    ebpo_status status =
+        slice->mesh.face_count >= EBPO_IS_BLOCK
+            ? ebpo_fail(error, EBPO_E_LIMIT,
+                        "the model has too many faces to be held at once; give a memory budget")
+            : make_stages(s, slice, info, room, threads, error);
+    s->outer = slice->outer;
+    s->face_source = slice->face_source;
+    slice->outer = slice->face_source = NULL;
+    ebpo_slice_free(slice);
+    if (status != EBPO_OK) {
+        ebpo_accel_free(s);
+        return status;
+    }
+    if (s->root.cell.level == 0)
+        ebpo_node_table_make_grid(&s->nodes);
+    s->bytes = count_bytes(s);
+    *out = s;
+    return EBPO_OK;
+}
+
+void ebpo_accel_free(ebpo_accel *s)
+{
+    if (!s)
+        return;
+    ebpo_node_table_free(&s->nodes);
+    free(s->leaf);
+    free(s->list);
+    ebpo_leaf_kinds_free(s->kinds);
+    free(s->meshlets);
+    free(s->bound);
+    free(s->slab);
+    free(s->outer);
+    free(s->face_source);
+    free(s->gray_planes);
+    free(s->gray_first);
+    free(s);
+}

@@ -1,0 +1,341 @@
+/* Budgets: how much memory a model may take, and for what.
+ *
+ * A model is held in memory as a whole if the budget allows it. Otherwise the budget is shared by
+ * the top of the tree (query_top.c), a cache of decoded chunks, skeletons (skeleton.c) and a cache
+ * of subtrees, and the cut level is chosen so that subtrees are small enough. All of this is
+ * planned from the counts in the file's head, before anything is read.
+ *
+ * Several models may share a budget: what each takes for good is taken from it, and their caches
+ * share the rest. A shared budget may be used by any thread. */
+#include "core/strict_fp.h"
+
+#include <inttypes.h>
+#include <pthread.h>
+#include <stdlib.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
+#include "format/reader.h"
+#include "query/accel.h"
+#include "query/model_parts.h"
+
+/* Decoded chunks: an eighth of the budget, within these. */
+enum { CHUNKS_MOST = 128 << 20 };
+
+uint64_t ebpo_chunk_budget(uint64_t budget)
+{
+    return budget / 8 < EBPO_CHUNKS_LEAST ? EBPO_CHUNKS_LEAST
+           : budget / 8 > CHUNKS_MOST     ? CHUNKS_MOST
+                                          : budget / 8;
+}
+
+/* Skeletons of subtrees, at most: searches that go everywhere gain more by them than by a few more
+ * subtrees. Of what is beyond the least, so that small budgets do for what they would do for
+ * without them. */
+uint64_t ebpo_skeleton_budget(const ebpo_model_options *o, uint64_t budget)
+{
+    const uint64_t least = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
+    return o->loading == EBPO_LOAD_CACHE && budget > least ? (budget - least) / 4 : 0;
+}
+
+uint64_t ebpo_beside_subtrees(const ebpo_model_options *o, uint64_t budget)
+{
+    return ebpo_chunk_budget(budget) + ebpo_skeleton_budget(o, budget);
+}
+
+struct ebpo_budget {
+    uint64_t bytes;
+    ebpo_cache_pool *subtrees, *chunks;
+    pthread_mutex_t lock;      /* of what follows */
+    uint64_t whole, skeletons; /* that may still be taken */
+};
+
+ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget **out, ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_model_options usual = EBPO_MODEL_OPTIONS_INIT;
+    uint64_t chunks = ebpo_chunk_budget(bytes), least = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
+    if (bytes == 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "a budget of 0 bytes");
+    if (bytes < least)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "a budget of %" PRIu64 " bytes is too small for any model; give %" PRIu64
+                         " at least",
+                         bytes, least);
+    ebpo_budget *b = ebpo_alloc_zero(1, sizeof *b);
+    if (!b)
+        return ebpo_fail_memory(error, sizeof *b);
+    (void)pthread_mutex_init(&b->lock, NULL);
+    b->bytes = bytes;
+    b->whole = bytes / 2;
+    b->skeletons = ebpo_skeleton_budget(&usual, bytes);
+    ebpo_status status = ebpo_cache_pool_make(&b->subtrees, bytes - chunks, error);
+    if (status == EBPO_OK)
+        status = ebpo_cache_pool_make(&b->chunks, chunks, error);
+    if (status == EBPO_OK)
+        *out = b;
+    else
+        ebpo_budget_free(b);
+    return status;
+}
+
+void ebpo_budget_free(ebpo_budget *b)
+{
+    if (!b)
+        return;
+    ebpo_cache_pool_free(b->subtrees);
+    ebpo_cache_pool_free(b->chunks);
+    (void)pthread_mutex_destroy(&b->lock);
+    free(b);
+}
+
+ebpo_status ebpo_budget_get_stats(const ebpo_budget *b, ebpo_budget_stats *out)
+{
+    ebpo_budget_stats stats = EBPO_BUDGET_STATS_INIT;
+    uint64_t now, peak, taken;
+    ebpo_cache_pool_get_bytes(b->subtrees, &stats.memory, &stats.memory_peak, &taken);
+    ebpo_cache_pool_get_bytes(b->chunks, &now, &peak, &taken);
+    stats.budget = b->bytes;
+    stats.memory += now;
+    stats.memory_peak += peak;
+    return EBPO_GIVE(ebpo_budget_stats, out, &stats);
+}
+
+ebpo_cache_pool *ebpo_budget_subtrees(const ebpo_budget *b) { return b->subtrees; }
+
+ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *b) { return b->chunks; }
+
+uint64_t ebpo_budget_bytes(const ebpo_budget *b) { return b->bytes; }
+
+/* What is not taken for good. */
+static uint64_t budget_left(const ebpo_budget *b)
+{
+    uint64_t now, peak, taken;
+    ebpo_cache_pool_get_bytes(b->subtrees, &now, &peak, &taken);
+    return b->bytes - taken;
+}
+
+bool ebpo_budget_take_whole(ebpo_budget *b, uint64_t bytes)
+{
+    (void)pthread_mutex_lock(&b->lock);
+    bool fits = bytes <= b->whole;
+    b->whole -= fits ? bytes : 0;
+    (void)pthread_mutex_unlock(&b->lock);
+    if (!fits || ebpo_cache_pool_take(b->subtrees, bytes, NULL) == EBPO_OK)
+        return fits;
+    (void)pthread_mutex_lock(&b->lock);
+    b->whole += bytes;
+    (void)pthread_mutex_unlock(&b->lock);
+    return false;
+}
+
+void ebpo_budget_give_back_whole(ebpo_budget *b, uint64_t bytes)
+{
+    ebpo_cache_pool_give_back(b->subtrees, bytes);
+    (void)pthread_mutex_lock(&b->lock);
+    b->whole += bytes;
+    (void)pthread_mutex_unlock(&b->lock);
+}
+
+uint64_t ebpo_budget_take_skeletons(ebpo_budget *b, uint64_t wanted)
+{
+    (void)pthread_mutex_lock(&b->lock);
+    uint64_t got = wanted < b->skeletons ? wanted : b->skeletons;
+    b->skeletons -= got;
+    (void)pthread_mutex_unlock(&b->lock);
+    return got;
+}
+
+void ebpo_budget_give_back_skeletons(ebpo_budget *b, uint64_t bytes)
+{
+    (void)pthread_mutex_lock(&b->lock);
+    b->skeletons += bytes;
+    (void)pthread_mutex_unlock(&b->lock);
+}
+
+/* --- the plan of a model --- */
+
+/* Of a cache: a path needs the subtree where it is, those around, and room to load the next. More
+ * of them, smaller ones, are faster to load. */
+enum { SUBTREES_NEEDED = 64, SUBTREES_WANTED = 320 };
+
+static ebpo_slice_size whole_size(const ebpo_info *info)
+{
+    ebpo_slice_size size = { .new_faces = info->face_count };
+    for (int i = 0; i < info->level_count; i++) {
+        size.groups += info->level[i].gray_count;
+        size.leaves += info->level[i].leaf_count;
+        size.refs += info->level[i].ref_count;
+        size.planes += info->level[i].plane_count;
+    }
+    return size;
+}
+
+/* Half the budget for subtrees must hold so many of the average size; the top may take a quarter.
+ */
+static int cut_for(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget,
+                   uint64_t subtrees)
+{
+    ebpo_slice_size size = whole_size(info);
+    for (int level = 1; level < info->level_count; level++) {
+        uint64_t grays = info->level[level].gray_count;
+        uint64_t top = ebpo_top_estimate(info, level);
+        if (top > budget / 4 ||
+            top + ebpo_beside_subtrees(o, budget) + EBPO_SUBTREES_LEAST > budget)
+            return -1;
+        if (grays == 0 || ebpo_accel_mean_bytes(&size, info, grays) * subtrees <= budget / 2)
+            return level;
+    }
+    return budget < ebpo_beside_subtrees(o, budget) + 2 * EBPO_SUBTREES_LEAST
+               ? -1
+               : info->level_count - 1;
+}
+
+static int choose_cut(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget)
+{
+    int cut = cut_for(info, o, budget, SUBTREES_WANTED);
+    return cut < 0 ? cut_for(info, o, budget, SUBTREES_NEEDED) : cut;
+}
+
+/* A budget that choose_cut accepts, not much more than the least. */
+static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
+{
+    uint64_t budget = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
+    while (choose_cut(info, o, budget) < 0 && budget < UINT64_C(1) << 60)
+        budget += budget / 8;
+    return budget;
+}
+
+/* Files far away are read in parts, unless they are small: nobody asked for all of them. */
+enum { FAR_MEMORY = 256 << 20, FAR_WHOLE_BYTES = 2 << 20 };
+
+static bool reads_parts(const ebpo_file *file, bool default_memory)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    bool small = info->file_bytes <= FAR_WHOLE_BYTES;
+    return ebpo_input_is_far(&file->in) && !small && (info->subtree_level || default_memory);
+}
+
+bool ebpo_usual_memory(const ebpo_file *file, ebpo_model_options *o)
+{
+    if (o->budget)
+        o->memory = budget_left(o->budget);
+    bool usual = !o->memory && ebpo_input_is_far(&file->in);
+    if (usual && o->cut_level < 0)
+        o->memory = FAR_MEMORY;
+    return usual;
+}
+
+/* The roots of the file's subtrees, which are read as one, if the budget allows them. */
+static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, int cut)
+{
+    int level = info->subtree_level;
+    uint64_t top = ebpo_top_estimate(info, level), budget = o->memory;
+    return level > cut && top <= budget / 4 &&
+                   top + ebpo_beside_subtrees(o, budget) + EBPO_SUBTREES_LEAST <= budget
+               ? level
+               : cut;
+}
+
+/* --- what comes of it --- */
+
+static ebpo_status choose_parts(const ebpo_info *info, const ebpo_model_options *o,
+                                ebpo_model_plan *out, ebpo_error *error)
+{
+    out->cut_level = choose_cut(info, o, o->memory);
+    if (out->cut_level < 0)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "a budget of %" PRIu64
+                         " bytes is too small for this model; give at least %" PRIu64,
+                         o->memory, out->least);
+    out->cut_level = prefer_subtrees(info, o, out->cut_level);
+    return EBPO_OK;
+}
+
+static ebpo_status choose_plan(const ebpo_file *file, const ebpo_model_options *o,
+                               bool default_memory, ebpo_model_plan *out, ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    int deepest = info->level_count - 1;
+    if (!(info->parts & EBPO_PART_MESH)) /* nothing could be loaded from below a cut level */
+        out->cut_level = deepest;
+    else if (o->cut_level >= 0)
+        out->cut_level = o->cut_level < deepest ? o->cut_level : deepest;
+    else if ((o->memory == 0 || out->whole <= o->memory) && !reads_parts(file, default_memory))
+        out->resident = true;
+    else
+        return choose_parts(info, o, out, error);
+    return EBPO_OK;
+}
+
+/* By counts. */
+static void share_budget(const ebpo_info *info, const ebpo_model_options *o, ebpo_model_plan *out)
+{
+    ebpo_slice_size size = whole_size(info);
+    uint64_t taken;
+    for (int level = 0; level <= out->cut_level; level++)
+        out->subtrees += info->level[level].leaf_count;
+    out->subtrees += info->level[out->cut_level].gray_count;
+    out->subtree_bytes = out->subtrees ? ebpo_accel_mean_bytes(&size, info, out->subtrees) : 0;
+    out->top = ebpo_top_estimate(info, out->cut_level);
+    out->chunks = o->memory ? ebpo_chunk_budget(o->memory) : 0;
+    out->skeletons =
+        ebpo_skeletons_room(out->subtrees,
+                            ebpo_skeleton_budget(o, o->memory ? o->memory : UINT64_MAX));
+    taken = out->top + out->chunks + out->skeletons;
+    out->subtrees_held = out->subtrees;
+    if (o->memory && out->subtree_bytes) {
+        uint64_t room = o->memory > taken ? (o->memory - taken) / out->subtree_bytes : 0;
+        out->subtrees_held = room < out->subtrees ? room : out->subtrees;
+    }
+}
+
+ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *o, bool default_memory,
+                            ebpo_model_plan *out, ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    uint64_t keep, least;
+    *out = (ebpo_model_plan)EBPO_MODEL_PLAN_INIT;
+    if (o->loading > EBPO_LOAD_NODES)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "model options: there is no way of loading number %d", (int)o->loading);
+    if (o->budget && o->loading != EBPO_LOAD_CACHE)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "model options: models that share a budget keep what they load "
+                         "(EBPO_LOAD_CACHE)");
+    ebpo_accel_estimate_whole(info, &keep, &out->whole);
+    least = least_budget(info, o);
+    out->least = least < out->whole ? least : out->whole;
+    out->budget = o->memory;
+    ebpo_status status = choose_plan(file, o, default_memory, out, error);
+    if (status == EBPO_OK && !out->resident)
+        share_budget(info, o, out);
+    return status;
+}
+
+ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_model_options *o,
+                            ebpo_model_plan *out, ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    *out = (ebpo_model_plan)EBPO_MODEL_PLAN_INIT;
+    out->least = least_budget(info, o);
+    return choose_parts(info, o, out, error);
+}
+
+ebpo_status ebpo_model_memory(const ebpo_file *file, const ebpo_model_options *options,
+                              ebpo_model_plan *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_model_options wanted = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_plan plan;
+    ebpo_status status = EBPO_TAKE(ebpo_model_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = EBPO_CHECK_SIZED(ebpo_model_plan, out, error);
+    if (status != EBPO_OK)
+        return status;
+    bool default_memory = ebpo_usual_memory(file, &wanted);
+    status = ebpo_plan_model(file, &wanted, default_memory, &plan, error);
+    return status == EBPO_OK ? EBPO_GIVE(ebpo_model_plan, out, &plan) : status;
+}

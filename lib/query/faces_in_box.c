@@ -1,0 +1,356 @@
+/* The faces that meet a box: their numbers, or their triangles block by block.
+ *
+ * The walk goes through the tree depth first, from accel to accel; in each it tests the
+ * boxes of children, in a way that drops only what is certainly outside, then triangles exactly. Of
+ * files far away the walk announces the subtrees that it will enter. A face that several subtrees
+ * list is reported once, for the first of them. In a subset the query fails when an omitted node
+ * meets the box. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/alloc.h"
+#include "core/eight.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "geometry/ray_triangle.h"
+#include "query/load_ahead.h"
+#include "query/query_model.h"
+#include "query/query_node.h"
+
+typedef struct box_walk box_walk;
+struct box_walk {
+    ebpo_context *context;
+    const double *min, *max;
+    /* In the accel at hand, the faces that meet the box: their slots, ascending, which is the order
+     * of the file. */
+    uint32_t *slot;
+    uint64_t count, capacity;
+    ebpo_node below; /* in whose place it stands, when it is not the whole tree */
+    bool no_memory, enough;
+    /* Of a file far away: what the walk will enter, in its order, and how many it has. */
+    uint32_t *ahead;
+    uint64_t ahead_count, ahead_capacity, entered;
+    /* Called for each accel that the box meets, depth first; *enough ends the walk. */
+    ebpo_status (*take)(box_walk *walk, const ebpo_accel *s, ebpo_error *error);
+};
+
+/* EBPO_E_ARGUMENT: no box. */
+static ebpo_status check_box(const double min[3], const double max[3], ebpo_error *error)
+{
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(min[k]) || !isfinite(max[k]) || !(min[k] <= max[k]))
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "a box needs finite corners, the lower one first on each axis");
+    return EBPO_OK;
+}
+
+/* --- in one accel --- */
+
+static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
+{
+    for (uint32_t lane = 0; lane < EBPO_BLOCK && !w->no_memory; lane++) {
+        uint32_t slot = block * EBPO_BLOCK + lane;
+        double t[3][3];
+        if (ebpo_accel_slot_face(s, slot) == EBPO_NO_SLOT)
+            return;
+        ebpo_accel_triangle(s, slot, t);
+        if (!ebpo_triangle_meets_box((const double(*)[3])t, w->min, w->max))
+            continue;
+        w->no_memory = !ebpo_grow(&w->slot, &w->capacity, w->count + 1, sizeof *w->slot);
+        if (!w->no_memory)
+            w->slot[w->count++] = slot;
+    }
+}
+
+/* low, high: the box in the frame. Boxes of the hierarchy are wider than their faces by more than
+ * what floats lose here. */
+static void gather_bound(box_walk *w, const ebpo_accel *s, const float low[3], const float high[3],
+                         uint32_t child)
+{
+    if (child & EBPO_IS_BLOCK) {
+        try_block(w, s, child & ~EBPO_IS_BLOCK);
+        return;
+    }
+    const ebpo_bound *b = &s->bound[child];
+    f8 apart = f8_all(0);
+    for (int k = 0; k < 3; k++) {
+        f8 step = f8_all(b->step[k]), origin = f8_all(b->origin[k]);
+        f8 from = f8_add(origin, f8_mul(f8_from_bytes(b->low[k]), step)),
+           to = f8_add(origin, f8_mul(f8_from_bytes(b->high[k]), step));
+        apart = f8_or(apart, f8_or(f8_less(f8_all(high[k]), from), f8_less(to, f8_all(low[k]))));
+    }
+    for (unsigned lanes = ~f8_bits(apart) & ((1u << b->count) - 1); lanes; lanes &= lanes - 1)
+        gather_bound(w, s, low, high, b->child[__builtin_ctz(lanes)]);
+}
+
+static int compare_slots(const void *a, const void *b)
+{
+    const uint32_t *x = a, *y = b;
+    return (*x > *y) - (*x < *y);
+}
+
+/* Blocks are numbered in the order of their faces. */
+static ebpo_status gather_blocks(box_walk *w, const ebpo_accel *s, ebpo_error *error)
+{
+    float low[3], high[3];
+    w->count = 0;
+    if (s->bound_count == 0)
+        return EBPO_OK;
+    for (int k = 0; k < 3; k++) {
+        low[k] = (float)((w->min[k] - s->centre[k]) * s->scale);
+        high[k] = (float)((w->max[k] - s->centre[k]) * s->scale);
+    }
+    gather_bound(w, s, low, high, s->top);
+    if (w->no_memory)
+        return ebpo_fail_memory(error, (w->count + 1) * sizeof *w->slot);
+    if (w->count)
+        qsort(w->slot, w->count, sizeof *w->slot, compare_slots);
+    return w->take(w, s, error);
+}
+
+/* --- in all of them --- */
+
+static bool box_matters(void *user, const ebpo_box *box, const ebpo_node *node)
+{
+    const box_walk *w = user;
+    return ebpo_cell_meets(box, node->cell, w->min, w->max);
+}
+
+/* Without memory for it, subtrees are announced as they are entered. */
+static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
+{
+    if (ebpo_node_is_uniform(&node) || !box_matters(w, box, &node) || w->no_memory)
+        return;
+    if (ebpo_node_is_below(&node)) {
+        w->no_memory =
+            !ebpo_grow(&w->ahead, &w->ahead_capacity, w->ahead_count + 1, sizeof *w->ahead);
+        if (!w->no_memory)
+            w->ahead[w->ahead_count++] = ebpo_entry_value(node.entry);
+        return;
+    }
+    for (unsigned octant = 0; octant < 8; octant++)
+        list_ahead(w, box, ebpo_model_child(w->context->model, &node, octant));
+}
+
+/* Before a subtree is entered: with the first of each window those behind it. */
+static void announce_window(box_walk *w)
+{
+    uint64_t at = w->entered++, left = at < w->ahead_count ? w->ahead_count - at : 0;
+    if (at % EBPO_ANNOUNCED_MOST == 0 && left)
+        ebpo_context_announce(w->context, w->ahead + at,
+                              left < EBPO_ANNOUNCED_MOST ? left : EBPO_ANNOUNCED_MOST);
+}
+
+static ebpo_status gather_node(box_walk *w, const ebpo_box *box, ebpo_node node, ebpo_error *error)
+{
+    if (ebpo_node_is_uniform(&node) || !box_matters(w, box, &node))
+        return EBPO_OK;
+    ebpo_status status = EBPO_OK;
+    if (ebpo_node_is_below(&node)) {
+        w->below = node;
+        announce_window(w);
+        status = ebpo_model_enter(w->context, &node, error);
+        return status == EBPO_OK ? gather_blocks(w, node.subtree, error) : status;
+    }
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK && !w->enough; octant++)
+        status = gather_node(w, box, ebpo_model_child(w->context->model, &node, octant), error);
+    return status;
+}
+
+/* EBPO_E_ABSENT: what a subset has left out meets the box. */
+static ebpo_status box_walk_check(box_walk *w, ebpo_error *error)
+{
+    return ebpo_check_pruned(w->context, box_matters, w, error);
+}
+
+/* The whole walk. The list of slots is freed. */
+static ebpo_status box_walk_run(box_walk *w, ebpo_error *error)
+{
+    const ebpo_model *m = w->context->model;
+    ebpo_box box = ebpo_model_box(m);
+    if (!m->whole && m->options.loading == EBPO_LOAD_CACHE && ebpo_input_expects(&m->file->in))
+        list_ahead(w, &box, ebpo_model_root(m));
+    w->no_memory = false;
+    ebpo_status status = m->whole ? gather_blocks(w, m->whole, error)
+                                  : gather_node(w, &box, ebpo_model_root(m), error);
+    free(w->slot);
+    free(w->ahead);
+    w->slot = w->ahead = NULL;
+    return status;
+}
+
+/* --- each face once --- */
+
+static bool touches_cell(const ebpo_box *box, const ebpo_node *node, const double triangle[3][3])
+{
+    double low[3], high[3];
+    ebpo_cell_bounds(box, node->cell, low, high);
+    return ebpo_triangle_meets_box(triangle, low, high);
+}
+
+/* Accels list the faces that touch the cells in whose place they stand, and some that only pass by
+ * (format-spec, section 5). So of those whose cell the face touches, one is the first, depth first:
+ * no list of what has been seen is needed, however much that is. */
+static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
+                       const double triangle[3][3], uint32_t *entry)
+{
+    if (ebpo_node_is_uniform(&node) || !ebpo_cell_meets(box, node.cell, w->min, w->max) ||
+        !touches_cell(box, &node, triangle))
+        return false;
+    *entry = node.entry;
+    bool found = ebpo_node_is_below(&node);
+    for (unsigned octant = 0; octant < 8 && !ebpo_node_is_below(&node) && !found; octant++)
+        found =
+            find_first(w, box, ebpo_model_child(w->context->model, &node, octant), triangle, entry);
+    return found;
+}
+
+/* The triangle, which meets the box, is to be taken in the accel at hand and in no other, so that a
+ * walk that takes it where this is true takes each once. `own`: the accel has it as its own. */
+static bool box_walk_is_first(const box_walk *w, bool own, const double triangle[3][3])
+{
+    const ebpo_model *m = w->context->model;
+    ebpo_box box = ebpo_model_box(m);
+    uint32_t entry = 0;
+    if (m->whole)
+        return true;
+    if (own) /* no accel before this one has it */
+        return touches_cell(&box, &w->below, triangle);
+    return find_first(w, &box, ebpo_model_root(m), triangle, &entry) && entry == w->below.entry;
+}
+
+/* --- numbers of faces --- */
+
+/* Number in the file, and the one that is told. */
+typedef struct pair {
+    uint64_t file_face, source_face;
+} pair;
+
+typedef struct gathering {
+    box_walk walk; /* first */
+    pair *list;
+    uint64_t count, capacity;
+} gathering;
+
+static ebpo_status take_face_number(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+{
+    gathering *g = (gathering *)walk;
+    if (!ebpo_grow(&g->list, &g->capacity, g->count + walk->count, sizeof *g->list))
+        return ebpo_fail_memory(error, (g->count + walk->count) * sizeof *g->list);
+    for (uint64_t i = 0; i < walk->count; i++) {
+        uint32_t local = ebpo_accel_slot_face(s, walk->slot[i]);
+        g->list[g->count++] =
+            (pair){ ebpo_accel_file_face(s, local), ebpo_accel_source_face(s, local) };
+    }
+    return EBPO_OK;
+}
+
+static int compare_pairs(const void *a, const void *b)
+{
+    const pair *x = a, *y = b;
+    return (x->file_face > y->file_face) - (x->file_face < y->file_face);
+}
+
+static ebpo_status finish_faces(gathering *g, const uint64_t **faces, uint64_t *count,
+                                ebpo_error *error)
+{
+    ebpo_context *c = g->walk.context;
+    if (!ebpo_grow(&c->faces, &c->face_capacity, g->count, sizeof *c->faces))
+        return ebpo_fail_memory(error, g->count * sizeof *g->list);
+    if (g->count)
+        qsort(g->list, g->count, sizeof *g->list, compare_pairs);
+    for (uint64_t i = 0; i < g->count; i++)
+        if (i == 0 || g->list[i].file_face != g->list[i - 1].file_face) /* subtrees share faces */
+            c->faces[(*count)++] = g->list[i].source_face;
+    *faces = c->faces;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const double max[3],
+                              const uint64_t **faces, uint64_t *count, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    *faces = NULL;
+    *count = 0;
+    gathering g = { .walk = {
+                        .context = context, .min = min, .max = max, .take = take_face_number } };
+    ebpo_status status = check_box(min, max, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_mesh(context->model, error);
+    if (status == EBPO_OK)
+        status = box_walk_run(&g.walk, error);
+    if (status == EBPO_OK)
+        status = box_walk_check(&g.walk, error);
+    if (status == EBPO_OK)
+        status = finish_faces(&g, faces, count, error);
+    free(g.list);
+    return status;
+}
+
+/* --- triangles, block by block --- */
+
+typedef struct block {
+    double corners[EBPO_TRIANGLES_MOST][3][3];
+    uint64_t faces[EBPO_TRIANGLES_MOST], file_faces[EBPO_TRIANGLES_MOST];
+} block;
+
+typedef struct delivery {
+    box_walk walk; /* first */
+    block *block;
+    uint64_t count; /* in the block */
+    ebpo_triangles_fn take;
+    void *user;
+} delivery;
+
+static void hand_over(delivery *d)
+{
+    ebpo_triangles all = { .count = d->count,
+                           .corners = (const double(*)[3][3])d->block->corners,
+                           .faces = d->block->faces,
+                           .file_faces = d->block->file_faces };
+    if (d->count && !d->walk.enough)
+        d->walk.enough = !d->take(d->user, &all);
+    d->count = 0;
+}
+
+static ebpo_status take_triangle(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
+{
+    delivery *d = (delivery *)walk;
+    (void)error;
+    for (uint64_t i = 0; i < walk->count && !walk->enough; i++) {
+        uint32_t local = ebpo_accel_slot_face(s, walk->slot[i]);
+        double(*corners)[3] = d->block->corners[d->count];
+        ebpo_accel_triangle(s, walk->slot[i], corners);
+        if (!box_walk_is_first(walk, local >= s->outer_count, (const double(*)[3])corners))
+            continue;
+        d->block->faces[d->count] = ebpo_accel_source_face(s, local);
+        d->block->file_faces[d->count++] = ebpo_accel_file_face(s, local);
+        if (d->count == EBPO_TRIANGLES_MOST)
+            hand_over(d);
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_triangles_in_box(ebpo_context *context, const double min[3], const double max[3],
+                                  ebpo_triangles_fn function, void *user, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    delivery d = { .walk = { .context = context, .min = min, .max = max, .take = take_triangle },
+                   .take = function,
+                   .user = user };
+    ebpo_status status = check_box(min, max, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_mesh(context->model, error);
+    if (status == EBPO_OK)
+        status = box_walk_check(&d.walk, error); /* before the first triangle is given */
+    if (status == EBPO_OK && !(d.block = ebpo_alloc(1, sizeof *d.block)))
+        status = ebpo_fail_memory(error, sizeof *d.block);
+    if (status == EBPO_OK)
+        status = box_walk_run(&d.walk, error);
+    if (status == EBPO_OK)
+        hand_over(&d);
+    free(d.block);
+    return status;
+}

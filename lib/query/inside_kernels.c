@@ -1,0 +1,352 @@
+/* Kernels of point in solid: the faces that a leaf lists, eight at a time.
+ *
+ * `crossings` counts the faces that a segment along an axis crosses, as far as single precision (in
+ * accels of doubles: double precision) is certain. The faces that remain open are decided exactly
+ * by inside.c. `walls` finds the walls of a leaf's cell that no face comes to, and the boxes of the
+ * leaf's list, when the first queries come to the leaf; its comparisons are exact.
+ *
+ * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
+ * docs/develop/bounds.md; crossings: EBP 2017, 4.2. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/eight.h"
+#include "geometry/cells.h"
+#include "geometry/min_max.h"
+#include "query/face_block.h"
+#include "query/query_kernels.h"
+
+/* --- crossings --- */
+
+/* How eight faces lie around the segment's line: a bit for each that turns left around it, right,
+ * or perhaps either. The others pass it by. */
+typedef struct turns {
+    unsigned left, right, open;
+} turns;
+
+/* What the turns at the three corners say. */
+EBPO_EIGHT turns judge_turns(unsigned some_left, unsigned some_right, unsigned all_left,
+                             unsigned all_right, unsigned lanes)
+{
+    return (turns){ lanes & all_left, lanes & all_right,
+                    lanes & ~(all_left | all_right | (some_left & some_right)) };
+}
+
+/* Rounding: with R the greatest coordinate of the model's box and M its greatest size, a difference
+ * q is right to 2^-23 of itself and 2^-47 R (two floats are `from` to 2^-48 R); so a cross product
+ * is to 2^-21 of the sum of its products' sizes and 2^-45 R M, as no |q| is above M. Underflow
+ * loses far less than that, R being above 2^-41 and M above 2^-40. */
+#define TURN_ERROR 0x1p-20f
+
+EBPO_EIGHT void see_axis(const ebpo_face_block *b, int axis, double from, f8 out[3])
+{
+    float high = (float)from, low = (float)(from - (double)high);
+    ebpo_face_block_floats(b, axis, out);
+    for (int i = 0; i < 3; i++)
+        out[i] = f8_sub(f8_sub(out[i], f8_all(high)), f8_all(low));
+}
+
+EBPO_EIGHT turns turns_of_floats(const ebpo_face_block *b, unsigned lanes, int u, int v,
+                                 const ebpo_axis_segment *g, float turn_error)
+{
+    f8 x[3], y[3], zero = f8_all(0), left[3], right[3], lost = f8_all(turn_error);
+    see_axis(b, u, g->from[u], x);
+    see_axis(b, v, g->from[v], y);
+    for (int i = 0; i < 3; i++) {
+        int j = i == 2 ? 0 : i + 1;
+        f8 p = f8_mul(x[i], y[j]), q = f8_mul(y[i], x[j]), turn = f8_sub(p, q);
+        f8 size = f8_add(f8_abs(p), f8_abs(q));
+        f8 error = f8_add(f8_mul(size, f8_all(TURN_ERROR)), lost);
+        left[i] = f8_less(error, turn);
+        right[i] = f8_less(turn, f8_sub(zero, error));
+    }
+    return judge_turns(f8_bits(f8_or(left[0], f8_or(left[1], left[2]))),
+                       f8_bits(f8_or(right[0], f8_or(right[1], right[2]))),
+                       f8_bits(f8_and(left[0], f8_and(left[1], left[2]))),
+                       f8_bits(f8_and(right[0], f8_and(right[1], right[2]))), lanes);
+}
+
+/* Rounding: a difference of two doubles is right to 2^-53 of itself; a cross product of two
+ * differences to 2^-50 of the sum of its products' sizes; underflow is covered by the last term,
+ * overflow makes bounds infinite or no numbers, and nothing is certain then. */
+#define CROSS_ERROR     0x1p-50
+#define HEIGHT_ERROR    0x1p-47
+#define UNDERFLOW_ERROR 0x1p-960
+
+/* The cross product of corners seen from the line; *size: the sum of its products' sizes. */
+EBPO_EIGHT double cross_product(double au, double av, double bu, double bv, double *size)
+{
+    double p = au * bv, q = av * bu;
+    *size = fabs(p) + fabs(q);
+    return p - q;
+}
+
+static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, int v,
+                              const ebpo_axis_segment *g)
+{
+    double x[3][EBPO_BLOCK], y[3][EBPO_BLOCK];
+    unsigned some[2] = { 0, 0 }, all[2] = { ~0u, ~0u };
+    ebpo_face_block_doubles(b, u, x);
+    ebpo_face_block_doubles(b, v, y);
+    for (int i = 0; i < 3; i++) {
+        unsigned left = 0, right = 0;
+        for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
+            int j = i == 2 ? 0 : i + 1;
+            double size,
+                turn = cross_product(x[i][lane] - g->from[u], y[i][lane] - g->from[v],
+                                     x[j][lane] - g->from[u], y[j][lane] - g->from[v], &size);
+            double error = CROSS_ERROR * size + UNDERFLOW_ERROR;
+            left |= (unsigned)(turn > error) << lane;
+            right |= (unsigned)(turn < -error) << lane;
+        }
+        some[0] |= left;
+        some[1] |= right;
+        all[0] &= left;
+        all[1] &= right;
+    }
+    return judge_turns(some[0], some[1], all[0], all[1], lanes);
+}
+
+/* Where a plane is, seen along the segment from coordinate `at`: 1 above, -1 below, 0 not certain.
+ * `turn` 1 of a face that turns left around the line. */
+static int side_of_plane(const double weight[3], const double size[3], const double k[3], double at,
+                         int turn)
+{
+    double a = k[0] - at, b = k[1] - at, c = k[2] - at;
+    double error = HEIGHT_ERROR * (size[1] * fabs(a) + size[2] * fabs(b) + size[0] * fabs(c)) +
+                   UNDERFLOW_ERROR * (1 + fabs(a) + fabs(b) + fabs(c));
+    double height = turn * (weight[1] * a + weight[2] * b + weight[0] * c);
+    return height > error ? 1 : height < -error ? -1 : 0;
+}
+
+/* Whether a face that turns around the line meets it between the segment's ends: 1 yes, 0 no, -1
+ * not certain. */
+static int met_between(const double t[3][3], int u, int v, const ebpo_axis_segment *g, int turn)
+{
+    double from = g->from[g->axis], weight[3], size[3], x[3], y[3],
+           k[3] = { t[0][g->axis], t[1][g->axis], t[2][g->axis] };
+    double least = k[0] < k[1] ? k[0] : k[1], most = k[0] < k[1] ? k[1] : k[0];
+    least = k[2] < least ? k[2] : least;
+    most = k[2] < most ? most : k[2];
+    if (least > g->to || most < from)
+        return 0;
+    if (least > from && most < g->to)
+        return 1;
+    for (int i = 0; i < 3; i++) {
+        x[i] = t[i][u] - g->from[u];
+        y[i] = t[i][v] - g->from[v];
+    }
+    for (int i = 0; i < 3; i++) {
+        int j = i == 2 ? 0 : i + 1;
+        weight[i] = cross_product(x[i], y[i], x[j], y[j], &size[i]);
+    }
+    int at_from = least > from ? 1 : side_of_plane(weight, size, k, from, turn),
+        at_to = most < g->to ? -1 : side_of_plane(weight, size, k, g->to, turn);
+    return at_from < 0 || at_to > 0 ? 0 : at_from > 0 && at_to < 0 ? 1 : -1;
+}
+
+/* The certain crossings of a block's faces; others are appended to `open`. */
+EBPO_EIGHT int32_t cross_block(const ebpo_accel *s, uint64_t listed, int u, int v,
+                               const ebpo_axis_segment *segment, uint32_t *open,
+                               uint32_t *open_count)
+{
+    uint32_t block = ebpo_listed_number(listed);
+    ebpo_face_block b = ebpo_face_block_open(s, block);
+    turns t = s->wide
+                  ? turns_of_doubles(&b, ebpo_listed_lanes(listed), u, v, segment)
+                  : turns_of_floats(&b, ebpo_listed_lanes(listed), u, v, segment, s->turn_error);
+    int32_t sum = 0;
+    for (unsigned lanes = t.left | t.right | t.open; lanes; lanes &= lanes - 1) {
+        unsigned lane = (unsigned)__builtin_ctz(lanes);
+        uint32_t slot = block * EBPO_BLOCK + lane;
+        int met = -1, turn = t.left >> lane & 1 ? 1 : -1;
+        if (!(t.open >> lane & 1)) {
+            double corners[3][3];
+            ebpo_accel_triangle(s, slot, corners);
+            met = met_between((const double(*)[3])corners, u, v, segment, turn);
+        }
+        if (met < 0)
+            open[(*open_count)++] = slot;
+        else
+            sum -= met * turn;
+    }
+    return sum;
+}
+
+static int32_t sum_crossings(const ebpo_accel *s, const ebpo_listed_block *list,
+                             const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count)
+{
+    int axis = segment->axis, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
+    int32_t sum = 0;
+    for (;; list++) {
+        uint64_t listed = ebpo_listed(list);
+        if (ebpo_axis_segment_meets(segment, listed))
+            sum += cross_block(s, listed, u, v, segment, open, open_count);
+        if (listed & EBPO_LISTED_LAST)
+            return sum;
+    }
+}
+
+/* --- walls --- */
+
+/* A cell's walls, and the floats next to them: nothing that is a float lies between. */
+typedef struct cell_walls {
+    double low[3], high[3];
+    double inverse[3]; /* of its size */
+    float low_down[3], low_up[3], high_down[3], high_up[3];
+    bool fine; /* in cells too small for the boxes these stay as they are: all of the cell */
+} cell_walls;
+
+/* The float that is `steps` (-1, 0, 1) from this one, in their order; the zeros count as two, of
+ * which rounding gives the one on the number's own side. */
+static inline float step_float(float f, int32_t steps)
+{
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    uint32_t turn = bits >> 31 ? UINT32_C(0x7fffffff) : 0;
+    bits = ((bits ^ turn) + (uint32_t)steps) ^ turn;
+    memcpy(&f, &bits, sizeof bits);
+    return f;
+}
+
+/* Which way a number is rounded is anyone's guess: without branches. */
+static inline float float_below(double x)
+{
+    float f = (float)x;
+    return step_float(f, -(int32_t)((double)f > x));
+}
+
+static inline float float_above(double x)
+{
+    float f = (float)x;
+    return step_float(f, (double)f < x);
+}
+
+static void find_walls(const ebpo_accel *s, ebpo_cell cell, cell_walls *out)
+{
+    ebpo_cell_bounds(&s->box, cell, out->low, out->high);
+    out->fine = true;
+    for (int k = 0; k < 3; k++) {
+        double size = out->high[k] - out->low[k];
+        out->inverse[k] = 1 / size;
+        out->fine = out->fine && size > 0x1p-900;
+        out->low_down[k] = float_below(out->low[k]);
+        out->low_up[k] = float_above(out->low[k]);
+        out->high_down[k] = float_below(out->high[k]);
+        out->high_up[k] = float_above(out->high[k]);
+    }
+}
+
+/* What a block's faces have on an axis; a bit for each lane. */
+typedef struct spans {
+    f8 least, most;      /* rounded outward */
+    unsigned away;       /* from the cell */
+    unsigned touches[2]; /* its lower wall, its upper one */
+} spans;
+
+static inline spans span_floats(const ebpo_face_block *b, const cell_walls *w, int k)
+{
+    f8 x[3];
+    spans out;
+    ebpo_face_block_floats(b, k, x);
+    out.least = f8_min3(x[0], x[1], x[2]);
+    out.most = f8_max3(x[0], x[1], x[2]);
+    out.away = f8_bits(f8_or(f8_less(f8_all(w->high_down[k]), out.least),
+                             f8_less(out.most, f8_all(w->low_up[k]))));
+    out.touches[0] = f8_bits(f8_at_most(out.least, f8_all(w->low_down[k])));
+    out.touches[1] = f8_bits(f8_at_most(f8_all(w->high_up[k]), out.most));
+    return out;
+}
+
+static spans span_doubles(const ebpo_face_block *b, const cell_walls *w, int k)
+{
+    double x[3][EBPO_BLOCK];
+    float lows[EBPO_BLOCK], highs[EBPO_BLOCK];
+    spans out = { .away = 0 };
+    ebpo_face_block_doubles(b, k, x);
+    for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
+        double least = ebpo_min3(x[0][lane], x[1][lane], x[2][lane]),
+               most = ebpo_max3(x[0][lane], x[1][lane], x[2][lane]);
+        lows[lane] = float_below(least);
+        highs[lane] = float_above(most);
+        out.away |= (unsigned)((least > w->high[k]) | (most < w->low[k])) << lane;
+        out.touches[0] |= (unsigned)(least <= w->low[k]) << lane;
+        out.touches[1] |= (unsigned)(most >= w->high[k]) << lane;
+    }
+    out.least = f8_load(lows);
+    out.most = f8_load(highs);
+    return out;
+}
+
+/* On each axis a lower side in sixteenths of the cell, and 15 less the upper one; 0 to 15. Widened
+ * by far more than the rounding here and in those that ask (2^-20 of a sixteenth). */
+static inline uint64_t find_sixteenth(float x, double low, double inverse, double direction)
+{
+    double cells = ((double)x - low) * inverse * EBPO_LISTED_CELLS + direction * 0x1p-8;
+    cells = direction < 0 ? cells : 16 - cells;
+    cells = cells > 0 ? cells : 0; /* one after the other: without branches */
+    return (uint64_t)(int32_t)(cells < 15 ? cells : 15);
+}
+
+/* A box around those of the listed faces whose boxes meet the cell. */
+static uint64_t box_of(const spans span[3], unsigned near, const cell_walls *w)
+{
+    f8 none = f8_all(INFINITY), mask = f8_mask(near), zero = f8_all(0);
+    uint64_t box = 0;
+    for (int k = 0; k < 3; k++) {
+        float least = f8_least(f8_pick(mask, span[k].least, none)),
+              most = -f8_least(f8_pick(mask, f8_sub(zero, span[k].most), none));
+        box |= find_sixteenth(least, w->low[k], w->inverse[k], -1) << 8 * k |
+               find_sixteenth(most, w->low[k], w->inverse[k], 1) << (8 * k + 4);
+    }
+    return box << EBPO_LISTED_BOX;
+}
+
+/* Sets the block's box; returns the walls that its listed faces come to, if their boxes meet the
+ * cell (bit 2 axis + side). Exact comparisons. */
+static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const cell_walls *w)
+{
+    uint64_t listed = ebpo_listed(at);
+    ebpo_face_block b = ebpo_face_block_open(s, ebpo_listed_number(listed));
+    spans span[3];
+    unsigned near = ebpo_listed_lanes(listed), come_to = 0;
+    for (int k = 0; k < 3; k++) {
+        span[k] = s->wide ? span_doubles(&b, w, k) : span_floats(&b, w, k);
+        near &= ~span[k].away;
+    }
+    for (int i = 0; i < 6; i++)
+        come_to |= (unsigned)((near & span[i / 2].touches[i % 2]) != 0) << i;
+    uint64_t box = !near ? UINT64_MAX << EBPO_LISTED_BOX : w->fine ? box_of(span, near, w) : 0;
+    ebpo_list(at, listed | box);
+    return come_to;
+}
+
+/* They are on their way while the cell is looked at; of long lists the first ones. */
+static void fetch_blocks(const ebpo_accel *s, const ebpo_listed_block *list)
+{
+    for (int i = 0; i < 8; i++) {
+        uint64_t listed = ebpo_listed(list + i);
+        const ebpo_meshlet *m = ebpo_accel_meshlet(s, ebpo_listed_number(listed));
+        for (int line = 0; line < (s->wide ? 4 : 2); line++)
+            __builtin_prefetch((const char *)m + EBPO_MESHLET_UNIT * line);
+        if (listed & EBPO_LISTED_LAST)
+            return;
+    }
+}
+
+static unsigned find_free_walls(const ebpo_accel *s, ebpo_listed_block *list, ebpo_cell cell)
+{
+    cell_walls w;
+    unsigned out = 0;
+    fetch_blocks(s, list);
+    find_walls(s, cell, &w);
+    for (;; list++) {
+        out |= bound_block(s, list, &w);
+        if (ebpo_listed(list) & EBPO_LISTED_LAST)
+            return out;
+    }
+}
+
+const ebpo_inside_kernels EBPO_KERNEL(ebpo_inside_kernels) = { sum_crossings, find_free_walls };

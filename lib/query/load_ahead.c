@@ -1,0 +1,335 @@
+/* Loading ahead: subtrees are loaded, or announced to a source far away, before queries need them.
+ *
+ * Prefetching asks for the subtrees that queries near the last one may need, in the order of their
+ * distance. EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that holds the position
+ * instead.
+ *
+ * A batch evaluates many points sorted along the Morton curve, so that subtrees are loaded few
+ * times, and returns results in the order of the points; what the next points need is announced in
+ * windows. A batch belongs to one thread. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "format/reader.h"
+#include "format/subtree_expect.h"
+#include "format/subtree_table.h"
+#include "geometry/octcode.h"
+#include "query/load_ahead.h"
+#include "query/nearest.h"
+#include "query/query_node.h"
+
+typedef struct wanted {
+    uint64_t key;
+    double lower; /* bound of the distance */
+} wanted;
+
+/* The nearest subtrees within `limit` of p. */
+typedef struct looking {
+    ebpo_ranking ranking;
+    double limit;
+    unsigned count;
+    wanted list[EBPO_CACHE_AHEAD]; /* the nearest first */
+} looking;
+
+static void add_subtree(looking *l, uint64_t key, double lower)
+{
+    unsigned at = l->count < EBPO_CACHE_AHEAD ? l->count++ : EBPO_CACHE_AHEAD - 1;
+    for (; at > 0 && l->list[at - 1].lower > lower; at--)
+        l->list[at] = l->list[at - 1];
+    l->list[at] = (wanted){ key, lower };
+    if (l->count == EBPO_CACHE_AHEAD)
+        l->limit = fmin(l->limit, l->list[EBPO_CACHE_AHEAD - 1].lower);
+}
+
+static void look_around(looking *l, ebpo_node node, double lower)
+{
+    if (lower > l->limit || ebpo_node_is_uniform(&node) || node.pruned)
+        return;
+    if (ebpo_node_is_below(&node)) {
+        add_subtree(l, ebpo_entry_value(node.entry), lower);
+        return;
+    }
+    ebpo_ranked child[8];
+    int count = ebpo_rank_children(&l->ranking, &node, lower, l->limit, child);
+    for (int i = 0; i < count; i++)
+        look_around(l, child[i].node, child[i].lower);
+}
+
+unsigned ebpo_subtrees_near(const ebpo_model *m, const double p[3], double limit,
+                            uint64_t keys[EBPO_CACHE_AHEAD])
+{
+    looking l = { .ranking = ebpo_ranking_of(m, p, NULL), .limit = limit };
+    look_around(&l, ebpo_model_root(m), ebpo_rank_root(&l.ranking));
+    for (unsigned i = 0; i < l.count; i++)
+        keys[i] = l.list[i].key;
+    return l.count;
+}
+
+static double longest_side(const ebpo_box *box, int level)
+{
+    return ldexp(fmax(box->size[0], fmax(box->size[1], box->size[2])), -level);
+}
+
+static double distance_apart(const double a[3], const double b[3])
+{
+    return fmax(fabs(a[0] - b[0]), fmax(fabs(a[1] - b[1]), fabs(a[2] - b[2])));
+}
+
+void ebpo_context_prefetch(ebpo_context *c, const double p[3], double reach)
+{
+    const ebpo_model *m = c->model;
+    ebpo_box box = ebpo_model_box(m);
+    double side = longest_side(&box, m->top->cut_level);
+    if (c->has_prefetched && distance_apart(p, c->prefetched_from) < side / 4 &&
+        fabs(reach) <= c->prefetched_reach + side / 4)
+        return;
+    c->has_prefetched = true;
+    c->prefetched_reach = fabs(reach);
+    memcpy(c->prefetched_from, p, sizeof c->prefetched_from);
+    /* Over a way w distances and their bounds change by at most w each: what is needed until then
+     * is within the reach and 2 w. A cell's diagonal is 1.73 sides: where envelopes do not decide
+     * (other rules than nonzero), the cell that holds the place is needed. */
+    uint64_t keys[EBPO_CACHE_AHEAD];
+    unsigned count = ebpo_subtrees_near(m, p, fabs(reach) + 2.25 * side, keys);
+    for (unsigned i = 0; i < count; i++)
+        keys[i] = ebpo_context_key(c, keys[i]);
+    ebpo_cache_prefetch(m->cache, keys, count);
+}
+
+/* The number in the file's table of the subtree that this one is or lies in, when it is to be
+ * loaded; UINT64_MAX: none. */
+static uint64_t table_number(const ebpo_context *c, uint32_t below)
+{
+    const ebpo_model *m = c->model;
+    const ebpo_node *root = &m->top->below[below];
+    int level = root->cell.level;
+    if (level < m->info->subtree_level || root->pruned ||
+        ebpo_cache_has(m->cache, ebpo_context_key(c, below)))
+        return UINT64_MAX;
+    if (level == m->info->subtree_level)
+        return root->type == EBPO_GRAY ? root->rank : UINT64_MAX;
+    ebpo_subtree_row row;
+    unsigned column =
+        ebpo_subtree_column(m->info, level, root->type == EBPO_GRAY ? EBPO_S_GRAY : EBPO_S_LEAF);
+    return ebpo_subtree_table_find(m->chunks, column, root->rank, &row, NULL) == EBPO_OK
+               ? row.subtree
+               : UINT64_MAX;
+}
+
+static int compare_numbers(const void *x, const void *y)
+{
+    uint64_t a = *(const uint64_t *)x, b = *(const uint64_t *)y;
+    return (a > b) - (a < b);
+}
+
+/* Ascending, each once; returns how many. */
+static uint64_t sort_numbers(uint64_t *numbers, uint64_t count)
+{
+    uint64_t kept = 0;
+    if (count)
+        qsort(numbers, count, sizeof *numbers, compare_numbers);
+    for (uint64_t i = 0; i < count; i++)
+        if (i == 0 || numbers[i] != numbers[kept - 1])
+            numbers[kept++] = numbers[i];
+    return kept;
+}
+
+void ebpo_context_announce(const ebpo_context *c, const uint32_t *below, uint64_t count)
+{
+    const ebpo_model *m = c->model;
+    ebpo_expected expected = EBPO_EXPECTED_INIT(m->file);
+    if (m->info->subtree_level == 0 || !ebpo_input_expects(&m->file->in) || count == 0)
+        return;
+    uint64_t found = 0, *numbers = ebpo_alloc(count, sizeof *numbers);
+    for (uint64_t i = 0; numbers && i < count; i++) {
+        uint64_t number = table_number(c, below[i]);
+        if (number != UINT64_MAX)
+            numbers[found++] = number;
+    }
+    found = sort_numbers(numbers, found);
+    ebpo_subtree_table_expect(m->chunks, numbers, found);
+    for (uint64_t i = 0; i < found; i++)
+        ebpo_subtrees_expect(m->chunks, &expected, numbers[i], 1, ebpo_subtree_needs(c->planes),
+                             EBPO_LEVELS_MAX, true);
+    ebpo_expect_all(&expected);
+    free(numbers);
+}
+
+/* --- batches --- */
+
+/* Subtrees announced at a time, and points that they are gathered from: some megabytes, of which
+ * two are under way. */
+enum { SUBTREES_A_TIME = 128, POINTS_A_TIME = 4096 };
+
+typedef struct placed {
+    uint64_t key, point;
+} placed;
+
+static int compare_placed(const void *x, const void *y)
+{
+    const placed *a = x, *b = y;
+    if (a->key != b->key)
+        return a->key < b->key ? -1 : 1;
+    return (a->point > b->point) - (a->point < b->point);
+}
+
+/* Of the nearest cell, for points outside the box. */
+static uint64_t curve_key(const ebpo_box *box, const double p[3])
+{
+    ebpo_cell cell = { .level = EBPO_MAX_LEVEL };
+    for (int k = 0; k < 3; k++) {
+        double part = (p[k] - box->origin[k]) / box->size[k] * 0x1p20;
+        cell.at[k] = !(part > 0) ? 0 : part < 0x1p20 ? (uint32_t)part : (1u << 20) - 1;
+    }
+    return ebpo_octcode_of_cell(cell);
+}
+
+uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t count)
+{
+    placed *list = ebpo_alloc(count, sizeof *list);
+    uint64_t *order = ebpo_alloc(count, sizeof *order);
+    for (uint64_t i = 0; list && i < count; i++)
+        list[i] = (placed){ curve_key(box, points + 3 * i), i };
+    if (list && order)
+        qsort(list, count, sizeof *list, compare_placed);
+    for (uint64_t i = 0; list && order && i < count; i++)
+        order[i] = list[i].point;
+    if (!list) {
+        free(order);
+        order = NULL;
+    }
+    free(list);
+    return order;
+}
+
+/* Points in no order are asked about along the curve also where everything is in memory: what one
+ * reads the next one finds in the caches, and its answer is close. A path is in order already. */
+static bool are_scattered(const ebpo_box *box, const double *points, uint64_t count)
+{
+    const double far = 0x1p-5;
+    double sum = 0;
+    for (uint64_t i = 1; i < count; i++) {
+        double most = 0;
+        for (int k = 0; k < 3; k++)
+            most = fmax(most, fabs(points[3 * i + (unsigned)k] - points[3 * i + (unsigned)k - 3]) /
+                                  box->size[k]);
+        sum += most;
+    }
+    return count >= 32 && sum > far * (double)count;
+}
+
+void ebpo_batch_begin(ebpo_batch *b, ebpo_context *context, const double *points, uint64_t count,
+                      bool reach)
+{
+    const ebpo_model *m = context->model;
+    ebpo_box box = ebpo_model_box(m);
+    *b = (ebpo_batch){ .context = context, .points = points, .count = count, .reach = reach };
+    if (m->whole && reach && are_scattered(&box, points, count))
+        b->order = ebpo_curve_order(&box, points, count);
+    if (m->whole || count < 2 || m->options.loading != EBPO_LOAD_CACHE)
+        return;
+    b->order = ebpo_curve_order(&box, points, count);
+    b->far = ebpo_input_expects(&m->file->in) && m->info->subtree_level &&
+             m->info->parts & EBPO_PART_MESH;
+}
+
+void ebpo_batch_end(ebpo_batch *b)
+{
+    free(b->order);
+    free(b->below);
+}
+
+/* --- announcing --- */
+
+/* The subtree where the search for a point begins; EBPO_NO_SUBTREE: the top decides. */
+#define EBPO_NO_SUBTREE UINT64_MAX
+static uint64_t home_of(const ebpo_batch *b, const double p[3])
+{
+    const ebpo_model *m = b->context->model;
+    uint64_t keys[EBPO_CACHE_AHEAD];
+    uint32_t at[3];
+    ebpo_box box = ebpo_model_box(m);
+    int fine = m->info->level_count - 1;
+    if (b->reach)
+        return ebpo_subtrees_near(m, p, INFINITY, keys) ? keys[0] : EBPO_NO_SUBTREE;
+    if (!ebpo_locate(&box, fine, p, at))
+        return EBPO_NO_SUBTREE;
+    uint32_t entry = ebpo_descend(&m->top->nodes, fine, at).entry;
+    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW ? ebpo_entry_value(entry)
+                                                         : EBPO_NO_SUBTREE;
+}
+
+static void collect_subtree(ebpo_batch *b, uint64_t below)
+{
+    if (below != EBPO_NO_SUBTREE &&
+        !ebpo_cache_has(b->context->model->cache, ebpo_context_key(b->context, below)) &&
+        ebpo_grow(&b->below, &b->capacity, b->below_count + 1, sizeof *b->below))
+        b->below[b->below_count++] = (uint32_t)below;
+}
+
+static void announce_collected(ebpo_batch *b)
+{
+    ebpo_context_announce(b->context, b->below, b->below_count);
+    b->below_count = 0;
+}
+
+static const double *ordered_point(const ebpo_batch *b, uint64_t i)
+{
+    return b->points + 3 * (b->order ? b->order[i] : i);
+}
+
+/* Subtrees that the next points begin with. */
+static void tell_next(ebpo_batch *b)
+{
+    uint64_t begin = b->told;
+    while (b->told < b->count && b->told - begin < POINTS_A_TIME &&
+           b->below_count < SUBTREES_A_TIME) {
+        uint64_t before = b->below_count, home = home_of(b, ordered_point(b, b->told++));
+        if (before == 0 || b->below[before - 1] != home)
+            collect_subtree(b, home);
+    }
+    announce_collected(b);
+}
+
+/* What else is near, as far as where a point begins tells: with these, nothing is left that would
+ * be asked for alone. A subtree that cannot be loaded ends it: the question will tell, and each
+ * further try may wait as long as the first. */
+static void search_around(ebpo_batch *b, uint64_t end)
+{
+    ebpo_context *c = b->context;
+    for (bool fails = false; b->searched < end && !fails; b->searched++) {
+        const double *p = ordered_point(b, b->searched);
+        uint64_t home = home_of(b, p), keys[EBPO_CACHE_AHEAD];
+        ebpo_accel *accel;
+        ebpo_nearest n;
+        if (home == EBPO_NO_SUBTREE || c->model->top->below[home].pruned)
+            continue;
+        fails = ebpo_context_subtree(c, (uint32_t)home, &accel, NULL) != EBPO_OK;
+        if (fails)
+            continue;
+        ebpo_nearest_begin(&n, c->model, p, INFINITY);
+        ebpo_nearest_search(&n, c, accel);
+        unsigned count = ebpo_subtrees_near(c->model, p, fmin(n.upper, n.limit), keys);
+        for (unsigned k = 0; k < count; k++)
+            collect_subtree(b, keys[k]);
+    }
+    announce_collected(b);
+}
+
+uint64_t ebpo_batch_next(ebpo_batch *b, uint64_t i)
+{
+    if (b->far && i == 0)
+        tell_next(b);
+    if (b->far && i >= (b->reach ? b->searched : b->told - (b->told != 0)) && i < b->count) {
+        uint64_t end = b->told;
+        if (b->told < b->count)
+            tell_next(b);
+        if (b->reach)
+            search_around(b, end);
+    }
+    return b->order ? b->order[i] : i;
+}

@@ -1,0 +1,466 @@
+/* The nearest face of a model: under a budget, subtrees are searched, and loaded, in the order in
+ * which they may matter.
+ *
+ * Nodes of the top and subtrees wait in a queue, ordered by certain lower bounds of their distance;
+ * the search ends when the next is beyond the best face. A subtree is loaded only if its bound is
+ * at most the answer, whatever else is in memory. Bounds come from a subtree's skeleton, if it has
+ * ever been loaded (skeleton.c), else from the envelopes of the levels right below the cut (deep
+ * bounds), which are read once queries have loaded enough for nothing. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "format/reader.h"
+#include "geometry/cell.h"
+#include "geometry/octcode.h"
+#include "query/nearest.h"
+
+/* A heap. */
+static bool comes_out_before(const ebpo_ranked *a, const ebpo_ranked *b)
+{
+    return a->lower != b->lower ? a->lower < b->lower : a->node.entry < b->node.entry;
+}
+
+ebpo_status ebpo_queue_push(ebpo_context *c, const ebpo_ranked *r, ebpo_error *error)
+{
+    if (!ebpo_grow(&c->queue, &c->queue_capacity, c->queue_count + 1, sizeof *c->queue))
+        return ebpo_fail_memory(error, (c->queue_count + 1) * sizeof *c->queue);
+    uint64_t at = c->queue_count++;
+    for (; at > 0 && comes_out_before(r, &c->queue[(at - 1) / 2]); at = (at - 1) / 2)
+        c->queue[at] = c->queue[(at - 1) / 2];
+    c->queue[at] = *r;
+    return EBPO_OK;
+}
+
+ebpo_ranked ebpo_queue_pop(ebpo_context *c)
+{
+    ebpo_ranked first = c->queue[0], last = c->queue[--c->queue_count];
+    uint64_t at = 0, count = c->queue_count;
+    for (uint64_t child = 1; child < count; child = 2 * at + 1) {
+        if (child + 1 < count && comes_out_before(&c->queue[child + 1], &c->queue[child]))
+            child++;
+        if (!comes_out_before(&c->queue[child], &last))
+            break;
+        c->queue[at] = c->queue[child];
+        at = child;
+    }
+    c->queue[at] = last;
+    return first;
+}
+
+/* Each level takes four times the one above it; the third would save a tenth of the loads that two
+ * leave: docs/develop/design.md. */
+enum { DEEP_LEVELS = 2 };
+/* On a path a question comes to a few subtrees that are new. What is more is for nothing; reading
+ * two levels takes about as long as so many loads. */
+enum { NEW_AS_USUAL = 4, LOADS_TO_READ = 64 };
+
+/* --- deep bounds --- */
+
+static bool take_levels(ebpo_model *m, int level)
+{
+    uint64_t most = ebpo_top_envelopes_estimate(m->info, level);
+    ebpo_top *deep = NULL;
+    if (!ebpo_skeletons_take(m->skeletons, most))
+        return false;
+    if (ebpo_top_read_envelopes(&deep, m->file, level, m->options.threads, NULL) != EBPO_OK)
+        deep = NULL;
+    ebpo_skeletons_give_back(m->skeletons, most - (deep ? deep->bytes : 0));
+    atomic_store_explicit(&m->deep, deep, memory_order_release);
+    return true;
+}
+
+void ebpo_deep_bounds_make(ebpo_model *m)
+{
+    int cut = m->top->cut_level, level = cut + DEEP_LEVELS;
+    if (level > m->info->level_count - 1)
+        level = m->info->level_count - 1;
+    if (!m->skeletons || atomic_exchange(&m->deep_begun, true))
+        return;
+    while (level > cut && !take_levels(m, level))
+        level--;
+}
+
+void ebpo_deep_bounds_tell(ebpo_model *m, unsigned loaded)
+{
+    if (loaded <= NEW_AS_USUAL || m->deep_begun || ebpo_input_expects(&m->file->in))
+        return;
+    uint64_t more = loaded - NEW_AS_USUAL;
+    if (atomic_fetch_add(&m->new_loads, more) + more >= LOADS_TO_READ)
+        ebpo_deep_bounds_make(m);
+}
+
+typedef struct deep_search {
+    const ebpo_top *top;
+    const ebpo_ranking *ranking;
+    double best; /* so far */
+} deep_search;
+
+typedef struct deep_child {
+    uint32_t entry;
+    ebpo_cell cell;
+    double lower;
+} deep_child;
+
+static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
+{
+    uint32_t value = ebpo_entry_value(entry);
+    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW ? t->below_planes[value] : t->gray[value];
+}
+
+/* Those that may be nearer than the best, the nearest first. */
+static int rank_deep_children(const deep_search *g, uint32_t gray, ebpo_cell cell, double parent,
+                              deep_child out[8])
+{
+    int count = 0;
+    for (unsigned octant = 0; octant < 8; octant++) {
+        deep_child c = { ebpo_table_child(&g->top->nodes, gray, octant),
+                         ebpo_cell_child(cell, octant), 0 };
+        if (ebpo_entry_kind_of(c.entry) == EBPO_ENTRY_UNIFORM)
+            continue;
+        ebpo_top_planes planes = planes_of(g->top, c.entry);
+        c.lower = fmax(parent, ebpo_rank_cell(g->ranking, c.cell, g->top->planes + planes.first,
+                                              planes.count, g->best));
+        if (c.lower >= g->best)
+            continue;
+        int at = count++;
+        for (; at > 0 && out[at - 1].lower > c.lower; at--)
+            out[at] = out[at - 1];
+        out[at] = c;
+    }
+    return count;
+}
+
+static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double parent)
+{
+    deep_child child[8];
+    int count = rank_deep_children(g, gray, cell, parent, child);
+    for (int i = 0; i < count && child[i].lower < g->best; i++)
+        if (ebpo_entry_kind_of(child[i].entry) == EBPO_ENTRY_GRAY)
+            search_deep(g, child[i].entry, child[i].cell, child[i].lower);
+        else
+            g->best = child[i].lower;
+}
+
+/* A certain lower bound, not less than `lower`, for what is of the solid's surface in the cell of a
+ * node of the cut level; what is beyond `limit` is not told apart. Any thread. */
+static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
+                              double limit)
+{
+    const ebpo_model *m = ranking->model;
+    const ebpo_top *top = atomic_load_explicit(&m->deep, memory_order_acquire);
+    int level = node->cell.level;
+    if (!top || !m->skeletons || node->type != EBPO_GRAY)
+        return lower;
+    ebpo_descent d = ebpo_descent_begin(&top->nodes, level, node->cell.at);
+    while (d.level < level && ebpo_descent_step(&d, &top->nodes, level, node->cell.at))
+        ;
+    if (d.level < level || ebpo_entry_kind_of(d.entry) != EBPO_ENTRY_GRAY)
+        return lower;
+    deep_search g = { top, ranking, nextafter(limit, INFINITY) };
+    search_deep(&g, d.entry, node->cell, lower);
+    return fmax(lower, g.best);
+}
+
+/* --- the search --- */
+
+/* What of a subtree waits: the node, of which nothing else is known; its own faces; its outer ones.
+ */
+enum { NODE = 0, OWN, OUTER };
+
+typedef struct searching {
+    ebpo_context *c;
+    ebpo_nearest *n;
+    ebpo_ranking ranking;
+    unsigned new_loads; /* of subtrees of which nothing was known */
+} searching;
+
+static ebpo_status add_node(searching *g, const ebpo_ranked *r, ebpo_error *error)
+{
+    ebpo_nearest *n = g->n;
+    if (r->lower > ebpo_nearest_limit(n) || ebpo_node_is_uniform(&r->node) ||
+        r->node.pruned) /* pruned: see look_at_pruned */
+        return EBPO_OK;
+    if (ebpo_node_is_below(&r->node)) {
+        /* it holds some face */
+        double end = ebpo_rank_cell_end(&g->ranking, r->node.cell);
+        n->upper = fmin(n->upper, n->far.far ? ebpo_far_upper(&n->far, end) : end);
+        n->limit = fmin(n->limit, n->upper);
+        n->key_limit = n->far.far ? fmin(n->key_limit, end) : n->key_limit;
+    }
+    return r->lower <= ebpo_nearest_limit(n) ? ebpo_queue_push(g->c, r, error) : EBPO_OK;
+}
+
+static ebpo_status add_children(searching *g, const ebpo_ranked *r, ebpo_error *error)
+{
+    ebpo_ranked child[8];
+    int count =
+        ebpo_rank_children(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n), child);
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < count && status == EBPO_OK; i++)
+        status = add_node(g, &child[i], error);
+    return status;
+}
+
+/* --- subtrees, once each: by numbers that are twice the question's, or one more --- */
+
+static bool is_searched(const ebpo_context *c, uint32_t below)
+{
+    return c->seen[below] == 2 * c->question + 1;
+}
+
+static ebpo_status begin_question(ebpo_context *c, ebpo_error *error)
+{
+    uint64_t count = c->model->top->below_count;
+    c->queue_count = 0;
+    if (c->seen && ++c->question < UINT32_MAX / 2)
+        return EBPO_OK;
+    free(c->seen);
+    c->question = 1;
+    c->seen = ebpo_alloc_zero(count, sizeof *c->seen);
+    return c->seen ? EBPO_OK : ebpo_fail_memory(error, count * sizeof *c->seen);
+}
+
+static bool is_there(const ebpo_context *c, uint32_t below)
+{
+    return ebpo_context_has_pinned(c, below) ||
+           ebpo_cache_has(c->model->cache, ebpo_context_key(c, below));
+}
+
+static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
+{
+    uint32_t below = ebpo_entry_value(node.entry);
+    if (is_searched(g->c, below))
+        return EBPO_OK;
+    g->c->seen[below] = 2 * g->c->question + 1;
+    g->c->searched++;
+    const ebpo_skeletons *skeletons = g->c->model->skeletons;
+    bool is_new = !ebpo_skeletons_find(skeletons, below);
+    uint64_t loaded = g->c->loaded;
+    double limit = g->n->limit;
+    ebpo_status status = ebpo_model_enter(g->c, &node, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_nearest_search(g->n, g->c, node.subtree);
+    g->new_loads += g->c->loaded > loaded && is_new;
+    /* for nothing, or as one of many that are about as far away */
+    bool again =
+        g->n->limit == limit || g->n->limit > ebpo_cell_diagonal(&g->ranking.box, node.cell);
+    if (g->c->loaded > loaded && again)
+        ebpo_skeletons_grow(g->c->model->skeletons, below, node.subtree, g->n->p, g->n->limit);
+    return EBPO_OK;
+}
+
+/* --- what skeletons tell ---
+ *
+ * A face is listed by every subtree whose cell it meets, and is the own of one of them: else one
+ * across a wall would be looked for on both sides. A subtree is come to by its cell, for what its
+ * faces have within it. For its own faces it is searched. For outer ones that may matter, the
+ * subtrees whose own they may be are, by bounds that hold wherever their faces are; unless one of
+ * those is not known: then it is searched itself. So the nearest face is found: its nearest point
+ * is in a cell that is come to, and that subtree is searched, or the one whose own the face is. No
+ * bound on the way there is greater than the face's distance. Which of these two the order of the
+ * queue brings first does not matter. */
+
+static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skeleton *k)
+{
+    return g->ranking.far ? ebpo_skeleton_far_bounds(k, g->ranking.far, g->n->key_limit)
+                          : ebpo_skeleton_lower_bounds(k, g->n->p, g->n->limit);
+}
+
+static ebpo_node node_below(const ebpo_model *m, uint32_t below)
+{
+    ebpo_node node = m->top->below[below];
+    node.entry = ebpo_entry(EBPO_ENTRY_BELOW, below);
+    return node;
+}
+
+/* `lower`: of what it is considered for. These only rise, so that once is enough. */
+static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo_error *error)
+{
+    ebpo_context *c = g->c;
+    if (c->seen[below] >= 2 * c->question)
+        return EBPO_OK;
+    c->seen[below] = 2 * c->question;
+    const ebpo_skeleton *k = ebpo_skeletons_find(c->model->skeletons, below);
+    double own = skeleton_bounds(g, k).own;
+    ebpo_ranked r = { node_below(c->model, below), fmax(lower, own), OWN };
+    return r.lower <= ebpo_nearest_limit(g->n) ? ebpo_queue_push(c, &r, error) : EBPO_OK;
+}
+
+/* A walk to the subtrees that may have outer faces of another one as their own: whose cells meet
+ * the faces' box, and come before it, depth first. */
+typedef struct owners {
+    searching *g;
+    uint64_t code; /* of the other one */
+    int level;
+    double lower;
+    const ebpo_outer_box *outer;
+    bool (*visit)(struct owners *o, uint32_t below, ebpo_error *error);
+    ebpo_status status;
+} owners;
+
+/* A cell lists what comes near it, too: point_bounds.c. */
+static bool cell_meets(const owners *o, ebpo_cell cell)
+{
+    double low[3], high[3];
+    ebpo_cell_bounds(&o->g->ranking.box, cell, low, high);
+    for (int k = 0; k < 3; k++) {
+        double near = (high[k] - low[k]) / 128 + (fabs(low[k]) + fabs(high[k])) * 0x1p-50;
+        if (o->outer->low[k] > high[k] + near || o->outer->high[k] < low[k] - near)
+            return false;
+    }
+    return true;
+}
+
+static bool comes_before(const owners *o, ebpo_cell cell)
+{
+    uint64_t code = ebpo_octcode_of_cell(cell);
+    int deeper = cell.level - o->level;
+    return deeper > 0 ? code >> 3 * deeper < o->code : code <= o->code >> 3 * -deeper;
+}
+
+static bool is_known(owners *o, uint32_t below, ebpo_error *error)
+{
+    (void)error;
+    return ebpo_skeletons_find(o->g->c->model->skeletons, below) != NULL;
+}
+
+static bool consider_owner(owners *o, uint32_t below, ebpo_error *error)
+{
+    o->status = consider_own(o->g, below, o->lower, error);
+    return o->status == EBPO_OK;
+}
+
+/* False as soon as a visit is. */
+static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *error)
+{
+    const ebpo_node_table *nodes = &o->g->c->model->top->nodes;
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM || !comes_before(o, cell) ||
+        !cell_meets(o, cell))
+        return true;
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
+        return ebpo_octcode_of_cell(cell) == o->code || o->visit(o, ebpo_entry_value(entry), error);
+    for (unsigned octant = 0; octant < 8; octant++)
+        if (!visit_owners(o, ebpo_table_child(nodes, entry, octant), ebpo_cell_child(cell, octant),
+                          error))
+            return false;
+    return true;
+}
+
+static bool visit_all(owners *o, const ebpo_outer_box *boxes, unsigned count, ebpo_error *error)
+{
+    for (unsigned i = 0; i < count; i++) {
+        o->outer = &boxes[i];
+        if (!visit_owners(o, o->g->c->model->top->nodes.root, (ebpo_cell){ 0, { 0, 0, 0 } }, error))
+            return false;
+    }
+    return true;
+}
+
+/* False: some owner is not known, and nothing has been done. */
+static bool consider_owners(searching *g, const ebpo_skeleton *k, const ebpo_ranked *r,
+                            ebpo_status *status, ebpo_error *error)
+{
+    ebpo_outer_box box[EBPO_OUTER_BOXES];
+    unsigned count = ebpo_skeleton_outer_boxes(k, g->n->p, g->n->limit, box);
+    owners o = { .g = g,
+                 .code = ebpo_octcode_of_cell(r->node.cell),
+                 .level = r->node.cell.level,
+                 .lower = r->lower,
+                 .visit = is_known,
+                 .status = EBPO_OK };
+    if (!visit_all(&o, box, count, error))
+        return false;
+    o.visit = consider_owner;
+    visit_all(&o, box, count, error);
+    *status = o.status;
+    return true;
+}
+
+static double deep_bound(const searching *g, const ebpo_ranked *r)
+{
+    return bound_below_cut(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n));
+}
+
+/* Nothing has been kept of it: it is searched, but after what is nearer than it can be. */
+static ebpo_status look_at_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
+{
+    ebpo_ranked all = { r->node, deep_bound(g, r), OWN };
+    if (all.lower > ebpo_nearest_limit(g->n))
+        return EBPO_OK;
+    return all.lower > r->lower ? ebpo_queue_push(g->c, &all, error)
+                                : search_below(g, r->node, error);
+}
+
+static ebpo_status look_at_subtree(searching *g, const ebpo_ranked *r, ebpo_error *error)
+{
+    uint32_t below = ebpo_entry_value(r->node.entry);
+    const ebpo_skeleton *k = ebpo_skeletons_find(g->c->model->skeletons, below);
+    if (ebpo_context_has_pinned(g->c, below))
+        return search_below(g, r->node, error);
+    if (!k)
+        return look_at_new(g, r, error);
+    ebpo_skeleton_bounds bounds = skeleton_bounds(g, k);
+    double least = fmax(r->lower, fmin(bounds.own, bounds.outer));
+    if (least > ebpo_nearest_limit(g->n))
+        return EBPO_OK;
+    bool there = is_there(g->c, below); /* then both at once */
+    double lower = there ? r->lower : deep_bound(g, r);
+    ebpo_ranked own = { r->node, there ? least : fmax(lower, bounds.own), OWN },
+                outer = { r->node, there ? INFINITY : fmax(lower, bounds.outer), OUTER };
+    double limit = ebpo_nearest_limit(g->n);
+    ebpo_status status = own.lower <= limit ? ebpo_queue_push(g->c, &own, error) : EBPO_OK;
+    if (status == EBPO_OK && outer.lower <= limit)
+        status = ebpo_queue_push(g->c, &outer, error);
+    return status;
+}
+
+static ebpo_status look_at_outer(searching *g, const ebpo_ranked *r, ebpo_error *error)
+{
+    uint32_t below = ebpo_entry_value(r->node.entry);
+    const ebpo_skeleton *k = ebpo_skeletons_find(g->c->model->skeletons, below);
+    ebpo_status status = EBPO_OK;
+    if (is_searched(g->c, below) ||
+        (!is_there(g->c, below) && consider_owners(g, k, r, &status, error)))
+        return status;
+    return search_below(g, r->node, error);
+}
+
+static ebpo_status search_parts(searching *g, ebpo_error *error)
+{
+    ebpo_nearest *n = g->n;
+    const ebpo_model *m = g->c->model;
+    ebpo_ranked root = { ebpo_model_root(m), n->far.far ? -INFINITY : 0, NODE };
+    ebpo_status status = begin_question(g->c, error);
+    if (status == EBPO_OK)
+        status = add_node(g, &root, error);
+    while (status == EBPO_OK && g->c->queue_count) {
+        ebpo_ranked next = ebpo_queue_pop(g->c);
+        if (next.lower > ebpo_nearest_limit(n))
+            break;
+        if (ebpo_nearest_is_late(n)) {
+            ebpo_nearest_pass_over(n, next.lower);
+            break;
+        }
+        status = !ebpo_node_is_below(&next.node) ? add_children(g, &next, error)
+                 : next.what == OWN              ? search_below(g, next.node, error)
+                 : next.what == OUTER            ? look_at_outer(g, &next, error)
+                                                 : look_at_subtree(g, &next, error);
+    }
+    ebpo_deep_bounds_tell(g->c->model, g->new_loads);
+    return status;
+}
+
+ebpo_status ebpo_nearest_first(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
+{
+    searching g = { c, n, ebpo_ranking_of(c->model, n->p, &n->far), 0 };
+    if (!c->model->whole)
+        return search_parts(&g, error);
+    ebpo_nearest_search(n, c, c->model->whole);
+    return EBPO_OK;
+}

@@ -1,0 +1,354 @@
+/* Certain bounds of the distance of a point to a cell, to the half-spaces of an envelope, and to
+ * the hierarchy over faces.
+ *
+ * From 16 sizes of the model's box on doubles hardly tell distances apart; there the bounds are
+ * those of keys, which grow with the distance (point_bounds.h). Upper bounds allow for what a node
+ * may list without containing it: faces within 1/256 of the cell's size (format-spec, section 5).
+ * Rounding: docs/develop/bounds.md, "Points far away". */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "geometry/plane_code.h"
+#include "query/point_bounds.h"
+
+/* A node may list a face that only comes near, within 1/256 of the cell's size on each axis
+ * (format-spec, section 5); and some room for rounding. */
+static const double near_share = 0x1.1p-8;
+
+static void cell_size(const ebpo_box *box, ebpo_cell cell, double low[3], double size[3])
+{
+    for (int k = 0; k < 3; k++) {
+        low[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
+        size[k] = box->size[k] / (double)(1u << cell.level);
+    }
+}
+
+/* sqrt(x0^2 + x1^2 + x2^2) without overflow, right to a few ulp. */
+static double scaled_length(const double x[3])
+{
+    double most = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
+    if (!(most > 0) || isinf(most))
+        return most;
+    double a = x[0] / most, b = x[1] / most, c = x[2] / most;
+    return most * sqrt(a * a + b * b + c * c);
+}
+
+double ebpo_cell_diagonal(const ebpo_box *box, ebpo_cell cell)
+{
+    double low[3], size[3];
+    cell_size(box, cell, low, size);
+    return scaled_length(size) * (1 + near_share);
+}
+
+/* Value of a half-space at p, 4096 n . xi - d, and a bound on its error. */
+static double plane_value(const double xi[3], uint32_t code, int32_t n[3], double *error)
+{
+    int32_t d;
+    if (!ebpo_plane_code_decode(code, n, &d)) {
+        *error = INFINITY;
+        return 0;
+    }
+    double sum = 0, size = fabs((double)d);
+    for (int k = 0; k < 3; k++) {
+        sum += 4096.0 * n[k] * xi[k];
+        size += 4096.0 * fabs((double)n[k]) * (fabs(xi[k]) + 1);
+    }
+    *error = size * 0x1p-48;
+    return sum - d;
+}
+
+bool ebpo_outside_planes(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes, uint32_t count,
+                         const double p[3])
+{
+    double low[3], size[3], xi[3], error;
+    int32_t n[3];
+    cell_size(box, cell, low, size);
+    for (int k = 0; k < 3; k++)
+        xi[k] = (p[k] - low[k]) / size[k];
+    for (uint32_t i = 0; i < count; i++)
+        if (plane_value(xi, codes[i], n, &error) > error)
+            return true;
+    return false;
+}
+
+double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,
+                              uint32_t count, const double p[3], double enough)
+{
+    double low[3], size[3], xi[3], d[3];
+    cell_size(box, cell, low, size);
+    for (int k = 0; k < 3; k++) {
+        xi[k] = (p[k] - low[k]) / size[k];
+        d[k] = fmax(fmax(low[k] - p[k], p[k] - (low[k] + size[k])), 0);
+    }
+    double best = scaled_length(d) * (1 - 0x1p-48);
+    for (uint32_t i = 0; i < count && !(best > enough); i++) {
+        int32_t n[3];
+        double error, value = plane_value(xi, codes[i], n, &error);
+        if (!(value > error))
+            continue;
+        double gradient[3] = { 4096.0 * n[0] / size[0], 4096.0 * n[1] / size[1],
+                               4096.0 * n[2] / size[2] };
+        double length = scaled_length(gradient),
+               distance = (value - error) / length * (1 - 0x1p-48);
+        if (length > 0 && isfinite(length) && distance > best)
+            best = distance;
+    }
+    return isnan(best) ? 0 : best;
+}
+
+double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3])
+{
+    double low[3], size[3], d[3];
+    cell_size(box, cell, low, size);
+    for (int k = 0; k < 3; k++)
+        d[k] = fmax(fabs(p[k] - low[k]), fabs(p[k] - (low[k] + size[k])));
+    return scaled_length(d) * (1 + 0x1p-40) + scaled_length(size) * near_share;
+}
+
+/* In sizes of the model's box. */
+static const double far_away = 16;
+/* What keys lose, of the greatest coordinate: docs/develop/bounds.md. */
+static const double loss = 0x1p-46;
+
+void ebpo_far_make(ebpo_far *f, const ebpo_box *box, const double p[3])
+{
+    double size = 0, most = 0, sum = 0, to[3];
+    int unit, exponent;
+    memset(f, 0, sizeof *f);
+    for (int k = 0; k < 3; k++) {
+        f->centre[k] = box->origin[k] + box->size[k] / 2;
+        size = fmax(size, box->size[k]);
+        most = fmax(most, fmax(fabs(p[k]), fabs(f->centre[k])));
+    }
+    if (!(size > 0) || !isfinite(size) || !isfinite(most))
+        return;
+    frexp(size, &unit);
+    frexp(most, &exponent);
+    for (int k = 0; k < 3; k++) {
+        to[k] = ldexp(p[k], -exponent) - ldexp(f->centre[k], -exponent);
+        sum += to[k] * to[k];
+    }
+    double length = sqrt(sum);
+    f->reach = ldexp(length, exponent - unit);
+    if (!(f->reach >= far_away))
+        return;
+    f->far = true;
+    f->distance = ldexp(length, exponent);
+    f->half = ldexp(1 / (2 * length), unit - exponent);
+    f->unit[0] = ldexp(1, -unit / 2);
+    f->unit[1] = ldexp(1, -unit - -unit / 2);
+    for (int k = 0; k < 3; k++)
+        f->toward[k] = to[k] / length;
+}
+
+/* --- keys and distances: d^2 = D^2 + 2 D key --- */
+
+double ebpo_far_limit(const ebpo_far *f, double distance)
+{
+    if (!(distance < INFINITY) || !isfinite(f->reach) || !(f->distance < INFINITY) ||
+        f->distance < 0x1p-1000)
+        return INFINITY;
+    double ratio = distance / f->distance; /* (d / D)^2 = 1 + 2 key / reach */
+    return ((ratio - 1) * (ratio + 1) / 2 + (ratio * ratio + 1) * 0x1p-47) * f->reach;
+}
+
+static double distance_of(const ebpo_far *f, double key, double share)
+{
+    if (key == INFINITY)
+        return INFINITY;
+    double square = 1 + (isfinite(f->reach) ? 2 * key / f->reach : 0) + share;
+    return square > 0 ? f->distance * sqrt(square) * (1 + share) : 0;
+}
+
+/* What is too small for a normal double has lost more. */
+static const double tiny = 0x1p-1070;
+
+double ebpo_far_lower(const ebpo_far *f, double key)
+{
+    /* the distance itself may be finite where what doubles make of it is not */
+    double distance = distance_of(f, key, -0x1p-40) - tiny;
+    return key == INFINITY ? INFINITY : fmin(fmax(distance, 0), 0x1p1023);
+}
+double ebpo_far_upper(const ebpo_far *f, double key) { return distance_of(f, key, 0x1p-40) + tiny; }
+
+/* --- places --- */
+
+static double place_on_axis(const ebpo_far *f, double x, int axis)
+{
+    return (x - f->centre[axis]) * f->unit[0] * f->unit[1];
+}
+
+/* Where h y^2 - u y is least. */
+static double apex_of_square(double half, double toward)
+{
+    return half > 0 ? toward / (2 * half) : toward > 0 ? INFINITY : -INFINITY;
+}
+
+/* Its least from `low` to `high`. */
+static inline double least_between(double half, double toward, double at, double low, double high)
+{
+    double y = at < low ? low : at > high ? high : at;
+    return (half * y - toward) * y;
+}
+
+static double height_of(const ebpo_far *f, const double y[3])
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++)
+        sum += (f->half * y[k] - f->toward[k]) * y[k];
+    return sum;
+}
+
+static double margin_of(const ebpo_far *f, double most)
+{
+    return loss * most * (1 + f->half * most) + 0x1p-1000;
+}
+
+/* --- cells and envelopes --- */
+
+typedef struct placed_cell {
+    double low[3], size[3], most;
+} placed_cell;
+
+static placed_cell cell_place(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell)
+{
+    placed_cell out = { .most = 0 };
+    for (int k = 0; k < 3; k++) {
+        out.low[k] = place_on_axis(f, ebpo_wall(box, k, cell.level, cell.at[k]), k);
+        out.size[k] = box->size[k] * f->unit[0] * f->unit[1] / (double)(1u << cell.level);
+        out.most = fmax(out.most, fabs(out.low[k]) + out.size[k]);
+    }
+    return out;
+}
+
+double ebpo_far_cell_end(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell)
+{
+    placed_cell c = cell_place(f, box, cell);
+    double sum = 0;
+    for (int k = 0; k < 3; k++) {
+        double low = c.low[k] - near_share * c.size[k],
+               high = c.low[k] + (1 + near_share) * c.size[k];
+        sum += fmax((f->half * low - f->toward[k]) * low, (f->half * high - f->toward[k]) * high);
+    }
+    return sum + margin_of(f, 2 * c.most);
+}
+
+/* By Lagrange: where n . xi <= d, adding share (n . xi - d) makes nothing greater, so the least
+ * over the whole cell is a lower bound, for every share of 0 or more. */
+static double cut_bound(const ebpo_far *f, const placed_cell *c, const double gradient[3],
+                        double beyond, double share)
+{
+    double sum = -share * beyond, size = share * fabs(beyond);
+    for (int k = 0; k < 3; k++) {
+        double low = c->low[k], high = c->low[k] + c->size[k], tilt = share * gradient[k];
+        double toward = f->toward[k] - tilt;
+        sum += least_between(f->half, toward, apex_of_square(f->half, toward), low, high);
+        size += (fabs(f->toward[k]) + fabs(tilt)) * (fabs(low) + fabs(high)) +
+                share * fabs(gradient[k] * low);
+    }
+    double bound = sum - size * loss - margin_of(f, c->most);
+    return isnan(bound) ? -INFINITY : bound;
+}
+
+double ebpo_far_envelope(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell,
+                         const uint32_t *codes, uint32_t count, double enough)
+{
+    static const double none[3];
+    placed_cell c = cell_place(f, box, cell);
+    double best = cut_bound(f, &c, none, 0, 0);
+    for (uint32_t i = 0; i < count && !(best > enough); i++) {
+        int32_t n[3], d;
+        double gradient[3], beyond;
+        if (!ebpo_plane_code_decode(codes[i], n, &d))
+            continue;
+        beyond = d / 4096.0;
+        for (int k = 0; k < 3; k++) {
+            gradient[k] = c.size[k] > 0 ? n[k] / c.size[k] : 0;
+            beyond += gradient[k] * c.low[k];
+        }
+        /* as a function of the share the bound is concave, and bends only here */
+        for (int k = 0; k < 3; k++) {
+            double share = f->toward[k] / gradient[k];
+            if (c.size[k] > 0 && share > 0 && isfinite(share))
+                best = fmax(best, cut_bound(f, &c, gradient, beyond, share));
+        }
+    }
+    return best;
+}
+
+/* --- the hierarchy over faces --- */
+
+ebpo_far_frame ebpo_far_frame_of(const ebpo_far *f, const double centre[3], double scale,
+                                 double reach)
+{
+    ebpo_far_frame g = { .ratio = f->unit[0] / scale * f->unit[1] };
+    double most = g.ratio * reach;
+    for (int k = 0; k < 3; k++) {
+        g.offset[k] = place_on_axis(f, centre[k], k);
+        most = fmax(most, fabs(g.offset[k]) + g.ratio * reach);
+    }
+    g.margin = margin_of(f, 2 * most);
+    return g;
+}
+
+void ebpo_far_boxes(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound *b,
+                    double lower[8])
+{
+    for (int lane = 0; lane < b->count; lane++)
+        lower[lane] = -g->margin;
+    for (int k = 0; k < 3; k++) {
+        double origin = g->offset[k] + g->ratio * (double)b->origin[k],
+               step = g->ratio * (double)b->step[k], at = apex_of_square(f->half, f->toward[k]);
+        for (int lane = 0; lane < b->count; lane++)
+            lower[lane] += least_between(f->half, f->toward[k], at, origin + step * b->low[k][lane],
+                                         origin + step * b->high[k][lane]);
+    }
+}
+
+/* |p - x|^2 >= |p - m|^2 - 2 (p - m) . (x - m) for the middle m of the box, and by Cauchy and
+ * Schwarz (p - m) . (x - m) <= ((p - m) . a) ((x - m) . a) + N(p - m) N(x - m), N as in bounds.md.
+ */
+double ebpo_far_slab(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound *b,
+                     const ebpo_bound_slab *slab, int lane)
+{
+    ebpo_child_slab s = ebpo_bound_slab_of(slab, lane);
+    double y[3], along = 0, square = 0;
+    for (int k = 0; k < 3; k++) {
+        ebpo_bound_sides side = ebpo_bound_side(b, lane, k);
+        y[k] = g->offset[k] + g->ratio * ((side.low + side.high) / 2);
+        double to = f->toward[k] - 2 * f->half * y[k];
+        along += to * s.axis[k];
+        square += to * to;
+    }
+    double aside = sqrt(fmax(square - along * along, 0) + 0x1p-46 * (1 + square));
+    double ahead = fmax(along * s.from, along * s.to);
+    return height_of(f, y) - (ahead + aside * s.radius) * g->ratio - g->margin;
+}
+
+/* --- faces --- */
+
+/* |y|^2 >= 2 z . y - |z|^2 for every z: with the best corner for z that is linear in y, and its
+ * least is at a corner. */
+ebpo_far_keys ebpo_far_face(const ebpo_far *f, const double triangle[3][3])
+{
+    double y[3][3], key[3], most = 0;
+    int best = 0;
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 3; k++) {
+            y[i][k] = place_on_axis(f, triangle[i][k], k);
+            most = fmax(most, fabs(y[i][k]));
+        }
+        key[i] = height_of(f, (const double *)y[i]);
+        best = key[i] < key[best] ? i : best;
+    }
+    double margin = margin_of(f, most), low = key[best];
+    for (int i = 0; i < 3; i++) {
+        double square = 0;
+        for (int k = 0; k < 3; k++)
+            square += (y[i][k] - y[best][k]) * (y[i][k] - y[best][k]);
+        low = fmin(low, key[i] - f->half * square);
+    }
+    return (ebpo_far_keys){ low - margin, key[best] + margin };
+}

@@ -1,0 +1,255 @@
+/* The kernels of queries, and what they work on: inner loops over blocks of faces and bounds of
+ * eight. They are filters, whose "certain" holds in exact arithmetic. Compiled for several
+ * instruction sets with the same results (core/cpu.h). */
+#ifndef EBPO_QUERY_QUERY_KERNELS_H
+#define EBPO_QUERY_QUERY_KERNELS_H
+
+#include <stdint.h>
+#include <string.h>
+
+#include "core/cpu.h"
+#include "geometry/ray.h"
+#include "query/accel.h"
+
+/* --- children that a search has still to visit, on a stack: the nearest one on top --- */
+
+/* The bits of a key that is not negative (so of the same order as integers), then the child's
+ * number. */
+typedef uint64_t ebpo_visit;
+
+/* An octree level adds at most one level to the hierarchy, a long list of one leaf eleven. */
+enum { EBPO_VISITS_MOST = 64 * 8 };
+
+static inline ebpo_visit ebpo_visit_make(float key, uint32_t child)
+{
+    uint32_t bits;
+    memcpy(&bits, &key, sizeof bits);
+    return (uint64_t)bits << 32 | child;
+}
+
+static inline float ebpo_visit_key(ebpo_visit v)
+{
+    uint32_t bits = (uint32_t)(v >> 32);
+    float key;
+    memcpy(&key, &bits, sizeof key);
+    return key;
+}
+
+/* The first cache lines of what will be read. */
+static inline void ebpo_visit_fetch(const ebpo_accel *s, uint32_t child)
+{
+    const char *at = (const char *)&s->bound[child & ~EBPO_IS_BLOCK];
+    unsigned lines = 2;
+    if (child & EBPO_IS_BLOCK) {
+        at = (const char *)ebpo_accel_meshlet(s, child & ~EBPO_IS_BLOCK);
+        lines = s->wide ? 4 : 2;
+    }
+    for (unsigned i = 0; i < lines; i++)
+        __builtin_prefetch(at + 64 * i);
+}
+
+static inline void ebpo_visit_fetch_slab(const ebpo_accel *s, uint32_t node)
+{
+    const char *at = (const char *)&s->slab[node];
+    __builtin_prefetch(at);
+    __builtin_prefetch(at + 64);
+}
+
+/* Pushes the children of `lanes`, farthest first; returns the new top. */
+static inline uint32_t ebpo_visit_push(ebpo_visit *stack, uint32_t top, const ebpo_bound *bound,
+                                       unsigned lanes, const float key[8])
+{
+    uint32_t base = top;
+    for (; lanes; lanes &= lanes - 1) {
+        unsigned lane = (unsigned)__builtin_ctz(lanes);
+        ebpo_visit v = ebpo_visit_make(key[lane], bound->child[lane]);
+        uint32_t at = top++;
+        for (; at > base && stack[at - 1] < v; at--)
+            stack[at] = stack[at - 1];
+        stack[at] = v;
+    }
+    return top;
+}
+
+/* --- a search for the nearest face of one accel --- */
+
+/* A point as the kernels want it. */
+typedef struct ebpo_probe {
+    double p[3];
+    float high[3], low[3]; /* p = high + low up to 2^-48 of |p| (blocks of floats) */
+    float local[3];        /* in the subtree's frame */
+    float scale;           /* of the frame */
+    double scale64;
+    /* bound on what it does to a distance that `local` is rounded, in the frame */
+    float error;
+} ebpo_probe;
+
+/* Faces that may be nearest wait until the end: by then nearly all are known to be farther. */
+typedef struct ebpo_near_candidate {
+    float low;
+    uint32_t slot, node; /* that has its block as a child */
+} ebpo_near_candidate;
+enum { EBPO_NEAR_CANDIDATES = 64 };
+#define EBPO_NO_BLOCK UINT32_MAX
+
+typedef struct ebpo_near_search ebpo_near_search;
+struct ebpo_near_search {
+    const ebpo_accel *s;
+    ebpo_probe probe;
+    void *user;
+    void (*judge)(ebpo_near_search *search); /* decides about all that waits */
+    bool (*late)(ebpo_near_search *search);  /* NULL: there is time */
+    /* looked at before all others, and the node above it; EBPO_NO_BLOCK: none */
+    uint32_t first_block, first_node;
+    float best;   /* some face is certainly not farther, or what is does not matter: in the frame */
+    float limit2; /* what squared lower bounds are compared with */
+    int count;
+    ebpo_near_candidate waiting[EBPO_NEAR_CANDIDATES];
+    uint32_t top; /* visits that were left when it was late */
+    ebpo_visit stack[EBPO_VISITS_MOST];
+    uint32_t from[EBPO_VISITS_MOST]; /* the nodes that have the stack's visits as children */
+};
+
+/* What underflow of squares does to a distance is far less: sqrt(2^-149) and some. */
+#define EBPO_NEAR_UNDERFLOW 0x1p-56f
+
+static inline void ebpo_near_set_best(ebpo_near_search *g, float best)
+{
+    float limit = best * (1 + 0x1p-18f) + g->probe.error + EBPO_NEAR_UNDERFLOW;
+    g->best = best;
+    g->limit2 = limit * limit;
+}
+
+static inline void ebpo_near_drop_far(ebpo_near_search *g)
+{
+    int kept = 0;
+    for (int i = 0; i < g->count; i++)
+        if (g->waiting[i].low <= g->best)
+            g->waiting[kept++] = g->waiting[i];
+    g->count = kept;
+}
+
+/* --- a ray on its way through one accel --- */
+
+typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL } ebpo_ray_wants;
+
+typedef struct ebpo_ray_search ebpo_ray_search;
+
+/* A face that may be met: not before `low`, a t of the frame. `facing`: of ebpo_ray_meeting, where
+ * the line certainly goes through its interior; else 0. */
+typedef struct ebpo_ray_candidate {
+    float low;
+    uint32_t slot;
+    int facing;
+} ebpo_ray_candidate;
+enum { EBPO_RAY_CANDIDATES = 64 };
+
+struct ebpo_ray_search {
+    /* Set by the caller. */
+    const ebpo_segment *ray;
+    ebpo_ray_wants wants;
+    int facing;   /* 1, -1: only faces seen from the front, the back; 0: all */
+    double limit; /* t beyond which nothing matters, certain; falls */
+    /* Decides exactly about a face (`facing`: as of a candidate), keeps it if it counts, and lowers
+     * search->limit and sets search->done accordingly. */
+    void (*decide)(ebpo_ray_search *search, uint32_t slot, int facing);
+    void *user;
+
+    /* All that follows is made by ebpo_ray_search_accel. */
+    bool done; /* nothing more is to be looked at */
+    bool met;  /* any wanted: some face is certainly met (`decide` was not told) */
+    void (*judge)(ebpo_ray_search *search); /* decides about all that waits */
+    const ebpo_accel *s;
+    /* In the frame: the direction with a longest coordinate of 2^-12 to 2^12, and the origin, moved
+     * along the ray to `moved`; how far off it may be, for boxes. */
+    double direction[3], origin[3], error;
+    /* Made of these by the kernels. What distances to the sides of boxes start from, the nearer
+     * ones and the farther ones; four floats, of which three count. */
+    float near_from[4], far_from[4], inverse[4];
+    float step_inverse[4];    /* any number, then `inverse` */
+    double inverse_double[4]; /* of the direction, small coordinates replaced */
+    /* bytes in ebpo_bound where those sides are: nearer ones, farther ones */
+    const uint8_t (*side_at)[3];
+    int axis[3];    /* z: where the direction is longest */
+    float shear[3]; /* x and y for a step of 1 along z; t for such a step */
+    /* The origin in the model's unit, in two parts for blocks of floats. */
+    double from[3];
+    float from_high[4], from_low[4];
+    float blur; /* distance at which rounding would be as bad as the origin's own */
+    double moved, limit_scale;
+    float bound, surely; /* limit, rounded up; t_max, rounded down */
+    int count;
+    ebpo_ray_candidate waiting[EBPO_RAY_CANDIDATES];
+};
+
+/* --- point in solid --- */
+
+/* A segment along an axis from `from` (on all three axes) up to coordinate `to`: predicates.h,
+ * ebpo_axis_crossing. */
+typedef struct ebpo_axis_segment {
+    double from[3];
+    double to;
+    int axis;
+    /* As an ebpo_listed_block has boxes, but for each axis the upper side and 15 less the lower
+     * one, rounded down; all ones: meets everything. */
+    uint32_t reach;
+} ebpo_axis_segment;
+#define EBPO_REACH_ALL UINT32_C(0xffffff)
+
+/* False when nothing that the block has in the cell can meet the segment: a side of the box, four
+ * bits each, is above the segment's. */
+static inline bool ebpo_axis_segment_meets(const ebpo_axis_segment *g, uint64_t listed)
+{
+    const uint32_t digits = 0x0f0f0f, carry = 0x101010;
+    uint32_t box = (uint32_t)(listed >> EBPO_LISTED_BOX);
+    uint32_t even = ((g->reach & digits) | carry) - (box & digits),
+             odd = ((g->reach >> 4 & digits) | carry) - (box >> 4 & digits);
+    return (even & odd & carry) == carry;
+}
+
+/* --- tables --- */
+
+/* Pure functions. */
+typedef struct ebpo_inside_kernels {
+    /* Sum of the certain crossings of a leaf's listed faces, in the part of them that is in the
+     * leaf's cell (as ebpo_axis_crossing gives them) with the segment; lanes that are not certain
+     * are appended to `open` as slots (room for 8 a block), their number to *open_count. Every face
+     * on which the segment's end at `to` or `from` lies is among them. */
+    int32_t (*crossings)(const ebpo_accel *s, const ebpo_listed_block *list,
+                         const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count);
+    ebpo_walls_fn *walls;
+} ebpo_inside_kernels;
+
+/* Not pure: they call search->judge when many faces wait. They walk through search->s: what then
+ * waits may be nearest, or met, and best, or the limit, has fallen. */
+typedef struct ebpo_nearest_kernels {
+    void (*walk)(ebpo_near_search *search);
+} ebpo_nearest_kernels;
+typedef struct ebpo_ray_kernels {
+    void (*walk)(ebpo_ray_search *search);
+} ebpo_ray_kernels;
+
+EBPO_KERNELS(ebpo_inside_kernels, ebpo_inside_kernels)
+EBPO_KERNELS(ebpo_nearest_kernels, ebpo_nearest_kernels)
+EBPO_KERNELS(ebpo_ray_kernels, ebpo_ray_kernels)
+
+/* Those that a model uses. */
+typedef struct ebpo_query_kernels {
+    const ebpo_inside_kernels *inside;
+    const ebpo_nearest_kernels *nearest;
+    const ebpo_ray_kernels *ray;
+} ebpo_query_kernels;
+
+static inline ebpo_query_kernels ebpo_query_kernels_base(void)
+{
+    return (ebpo_query_kernels){ &ebpo_inside_kernels_base, &ebpo_nearest_kernels_base,
+                                 &ebpo_ray_kernels_base };
+}
+
+static inline ebpo_query_kernels ebpo_query_kernels_best(void)
+{
+    return (ebpo_query_kernels){ ebpo_inside_kernels_best(), ebpo_nearest_kernels_best(),
+                                 ebpo_ray_kernels_best() };
+}
+
+#endif

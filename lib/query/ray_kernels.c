@@ -1,0 +1,339 @@
+/* Kernel of rays: the walk of a ray through one accel's hierarchy over faces, and the filter for
+ * eight faces, in single precision.
+ *
+ * The kernel decides no result: it drops what the ray certainly does not meet, or meets beyond the
+ * limit; what it calls certain is certain. The faces that remain are decided exactly by rays.c.
+ *
+ * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
+ * docs/develop/bounds.md. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stddef.h>
+
+#include "core/three.h"
+#include "query/face_block.h"
+#include "query/query_kernels.h"
+
+/* --- the ray --- */
+
+/* By the signs of the direction: a bit for each axis. No branch: half of them would be
+ * mispredicted.
+ */
+#define LOW(k)  (offsetof(ebpo_bound, low) + 8 * (k))
+#define HIGH(k) (offsetof(ebpo_bound, high) + 8 * (k))
+static const uint8_t ray_side_at[8][2][3] = {
+    { { LOW(0), LOW(1), LOW(2) }, { HIGH(0), HIGH(1), HIGH(2) } },
+    { { HIGH(0), LOW(1), LOW(2) }, { LOW(0), HIGH(1), HIGH(2) } },
+    { { LOW(0), HIGH(1), LOW(2) }, { HIGH(0), LOW(1), HIGH(2) } },
+    { { HIGH(0), HIGH(1), LOW(2) }, { LOW(0), LOW(1), HIGH(2) } },
+    { { LOW(0), LOW(1), HIGH(2) }, { HIGH(0), HIGH(1), LOW(2) } },
+    { { HIGH(0), LOW(1), HIGH(2) }, { LOW(0), HIGH(1), LOW(2) } },
+    { { LOW(0), HIGH(1), HIGH(2) }, { HIGH(0), LOW(1), LOW(2) } },
+    { { HIGH(0), HIGH(1), HIGH(2) }, { LOW(0), LOW(1), LOW(2) } },
+};
+#undef LOW
+#undef HIGH
+
+EBPO_EIGHT void ray_set_boxes(ebpo_ray_search *r)
+{
+    d3 d = d3_load(r->direction), origin = d3_load(r->origin),
+       slack = d3_add(d3_mul(d3_abs(origin), d3_all(0x1p-21)), d3_all(r->error)),
+       ahead = d3_signed(slack, d),
+       inverse = d3_div(d3_all(1), d3_signed(d3_max(d3_abs(d), d3_all(0x1p-72)), d));
+    d3_store(r->inverse_double, inverse);
+    d3_store_floats(r->inverse, inverse);
+    d3_store_floats_after(r->step_inverse, inverse);
+    d3_store_floats(r->near_from, d3_add(origin, ahead));
+    d3_store_floats(r->far_from, d3_sub(origin, ahead));
+    r->side_at = ray_side_at[d3_signs(d)];
+}
+
+EBPO_EIGHT void ray_set_faces(ebpo_ray_search *r)
+{
+    const double *d = r->direction;
+    double x = fabs(d[0]), y = fabs(d[1]), most = y > x ? y : x;
+    int z = fabs(d[2]) > most ? 2 : y > x;
+    r->axis[2] = z;
+    r->axis[0] = z == 2 ? 0 : z + 1;
+    r->axis[1] = z == 0 ? 2 : z - 1;
+    for (int i = 0; i < 2; i++)
+        r->shear[i] = (float)(d[r->axis[i]] * r->inverse_double[z]);
+    r->shear[2] = (float)r->inverse_double[z];
+    d3 from = d3_load(r->from);
+    d3_store_floats(r->from_high, from);
+    d3_store_floats(r->from_low, d3_beyond_floats(from));
+}
+
+/* --- boxes --- */
+
+EBPO_EIGHT f8 side_at(const ebpo_bound *b, unsigned at, f8 step, f8 from)
+{
+    return f8_add(f8_mul(f8_from_bytes((const uint8_t *)b + at), step), from);
+}
+
+/* Children whose boxes the ray may meet between 0 and the limit, and where it comes to each. The
+ * three axes' sides are prepared together: lanes 0 to 2, of steps 1 to 3 (origin and step are
+ * neighbours, and each load of four floats has numbers only). */
+EBPO_EIGHT unsigned ray_children(const ebpo_ray_search *r, const ebpo_bound *b, f8 *enter)
+{
+    f8 origin = f8_load_twice(b->origin), inverse = f8_load_twice(r->inverse),
+       step = f8_mul(f8_load_twice(b->origin + 2), f8_load_twice(r->step_inverse)),
+       near = f8_mul(f8_sub(origin, f8_load_twice(r->near_from)), inverse),
+       far = f8_mul(f8_sub(origin, f8_load_twice(r->far_from)), inverse);
+    f8 x = f8_spread1(step), y = f8_spread2(step), z = f8_spread3(step);
+    f8 from = f8_max(f8_max(side_at(b, r->side_at[0][0], x, f8_spread0(near)),
+                            side_at(b, r->side_at[0][1], y, f8_spread1(near))),
+                     f8_max(side_at(b, r->side_at[0][2], z, f8_spread2(near)), f8_all(0)));
+    f8 to = f8_min(f8_min(side_at(b, r->side_at[1][0], x, f8_spread0(far)),
+                          side_at(b, r->side_at[1][1], y, f8_spread1(far))),
+                   f8_min(side_at(b, r->side_at[1][2], z, f8_spread2(far)), f8_all(r->bound)));
+    *enter = from;
+    return f8_bits(f8_at_most(from, to)) & ((1u << b->count) - 1);
+}
+
+/* --- faces --- */
+
+/* Eight faces seen along the ray: x and y where the ray is the origin, z along it. */
+typedef struct seen {
+    f8 x[3], y[3], z[3];
+} seen;
+
+/* The corners on one axis, seen from the origin. */
+EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int axis, bool wide,
+                         f8 corner[3])
+{
+    if (!wide) {
+        ebpo_face_block_floats(b, axis, corner);
+        for (int i = 0; i < 3; i++)
+            corner[i] = f8_mul(f8_sub(f8_sub(corner[i], f8_all(r->from_high[axis])),
+                                      f8_all(r->from_low[axis])),
+                               f8_all((float)r->s->scale));
+        return;
+    }
+    double x[3][EBPO_BLOCK];
+    ebpo_face_block_doubles(b, axis, x);
+    for (int i = 0; i < 3; i++) {
+        float eight[EBPO_BLOCK];
+        for (int lane = 0; lane < EBPO_BLOCK; lane++)
+            eight[lane] = (float)((x[i][lane] - r->from[axis]) * r->s->scale);
+        corner[i] = f8_load(eight);
+    }
+}
+
+EBPO_EIGHT seen ray_view(const ebpo_ray_search *r, const ebpo_face_block *b, bool wide)
+{
+    seen out;
+    ray_axis(r, b, r->axis[2], wide, out.z);
+    ray_axis(r, b, r->axis[0], wide, out.x);
+    ray_axis(r, b, r->axis[1], wide, out.y);
+    for (int i = 0; i < 3; i++) {
+        out.x[i] = f8_sub(out.x[i], f8_mul(out.z[i], f8_all(r->shear[0])));
+        out.y[i] = f8_sub(out.y[i], f8_mul(out.z[i], f8_all(r->shear[1])));
+    }
+    return out;
+}
+
+/* Twice the signed areas of the triangles that the ray makes with each edge, and a bound on what
+ * rounding does to each of them. */
+typedef struct edges {
+    f8 u, v, w, least, most, error;
+} edges;
+
+EBPO_EIGHT f8 signed_area(f8 ax, f8 ay, f8 bx, f8 by)
+{
+    return f8_sub(f8_mul(ax, by), f8_mul(ay, bx));
+}
+
+EBPO_EIGHT edges ray_edges(const seen *a, f8 size_z)
+{
+    edges e;
+    f8 size = f8_all(0);
+    for (int i = 0; i < 3; i++)
+        size = f8_add(size, f8_add(f8_abs(a->x[i]), f8_abs(a->y[i])));
+    f8 wide = f8_add(f8_add(size_z, size_z), size);
+    e.u = signed_area(a->x[2], a->y[2], a->x[1], a->y[1]);
+    e.v = signed_area(a->x[0], a->y[0], a->x[2], a->y[2]);
+    e.w = signed_area(a->x[1], a->y[1], a->x[0], a->y[0]);
+    e.least = f8_min3(e.u, e.v, e.w);
+    e.most = f8_max3(e.u, e.v, e.w);
+    e.error = f8_mul(f8_add(size, f8_mul(wide, f8_all(0x1p-21f))), f8_mul(wide, f8_all(0x1p-22f)));
+    return e;
+}
+
+/* Of a block's faces: those that may be met from 0 to the limit, bounds of the t at which, those
+ * that certainly are, those whose interior the line certainly goes through from the front, the
+ * back. */
+typedef struct ray_lanes {
+    float low[8], high[8];
+    unsigned alive, sure, front, back;
+} ray_lanes;
+
+/* Comparisons are such that what is no number stays and is not sure. */
+EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *out, bool wide)
+{
+    ebpo_face_block faces = ebpo_face_block_open(r->s, block);
+    seen a = ray_view(r, &faces, wide);
+    f8 zero = f8_all(0), least_z = f8_min3(a.z[0], a.z[1], a.z[2]),
+       most_z = f8_max3(a.z[0], a.z[1], a.z[2]);
+    f8 size_z = f8_add(f8_max(f8_abs(least_z), f8_abs(most_z)), f8_all(r->blur));
+    edges e = ray_edges(&a, size_z);
+    f8 below = f8_sub(zero, e.error);
+    unsigned alive = ~f8_bits(f8_and(f8_less(e.least, below), f8_less(e.error, e.most))) &
+                     ebpo_face_block_lanes(&faces);
+    out->alive = alive;
+    if (!alive)
+        return;
+    f8 left = f8_less(e.error, e.least), right = f8_less(e.most, below), in = f8_or(left, right);
+    out->front = f8_bits(r->shear[2] > 0 ? left : right);
+    out->back = f8_bits(r->shear[2] > 0 ? right : left);
+    if (r->facing)
+        alive &= ~(r->facing > 0 ? out->back : out->front);
+    f8 per_step = f8_all(r->shear[2]), size = f8_mul(size_z, f8_all(fabsf(r->shear[2]) * 0x1p-19f));
+    f8 whole = f8_add(e.u, f8_add(e.v, e.w)), inverse = f8_div(f8_all(1), whole);
+    f8 sum = f8_add(f8_mul(e.u, a.z[0]), f8_add(f8_mul(e.v, a.z[1]), f8_mul(e.w, a.z[2])));
+    f8 t = f8_mul(f8_mul(sum, inverse), per_step);
+    f8 share = f8_min(f8_abs(f8_mul(f8_mul(e.error, f8_all(6)), inverse)), f8_all(1));
+    f8 error = f8_add(f8_mul(f8_mul(f8_sub(most_z, least_z), share), f8_abs(per_step)), size);
+    f8 one = f8_mul(least_z, per_step), other = f8_mul(most_z, per_step);
+    f8 from = f8_pick(in, f8_sub(t, error), f8_sub(f8_min(one, other), size)),
+       to = f8_pick(in, f8_add(t, error), f8_add(f8_max(one, other), size));
+    alive &= ~f8_bits(f8_or(f8_less(f8_all(r->bound), from), f8_less(to, zero)));
+    out->sure = alive & f8_bits(f8_and(f8_and(in, f8_at_most(zero, from)),
+                                       f8_at_most(to, f8_all(r->surely))));
+    out->alive = alive;
+    f8_store(out->low, from);
+    f8_store(out->high, to);
+}
+
+/* --- the walk --- */
+
+static void drop_beyond(ebpo_ray_search *r)
+{
+    int kept = 0;
+    for (int i = 0; i < r->count; i++)
+        if (!(r->waiting[i].low > r->bound))
+            r->waiting[kept++] = r->waiting[i];
+    r->count = kept;
+}
+
+EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, bool wide)
+{
+    ray_lanes found;
+    ray_faces(r, block, &found, wide);
+    if (!found.alive)
+        return;
+    if (r->wants == EBPO_WANTS_ANY && found.sure) {
+        r->met = r->done = true;
+        return;
+    }
+    for (unsigned lanes = found.alive; lanes; lanes &= lanes - 1) {
+        unsigned lane = (unsigned)__builtin_ctz(lanes);
+        int facing = (int)(found.front >> lane & 1) - (int)(found.back >> lane & 1);
+        if (r->count == EBPO_RAY_CANDIDATES)
+            drop_beyond(r);
+        if (r->count == EBPO_RAY_CANDIDATES)
+            r->judge(r);
+        r->waiting[r->count++] =
+            (ebpo_ray_candidate){ found.low[lane], block * EBPO_BLOCK + lane, facing };
+        if (r->wants == EBPO_WANTS_FIRST && found.sure >> lane & 1 && found.high[lane] < r->bound)
+            r->bound = found.high[lane];
+    }
+    if (r->wants == EBPO_WANTS_ANY && r->count)
+        r->judge(r);
+}
+
+/* Cache lines of what will be visited later, without a branch that would often be mispredicted. */
+EBPO_EIGHT void ray_fetch(const ebpo_accel *s, uint32_t child, bool wide)
+{
+    uint32_t number = child & ~EBPO_IS_BLOCK;
+    const char *node = (const char *)(s->bound + number),
+               *faces = (const char *)ebpo_accel_meshlet(s, number),
+               *at = child & EBPO_IS_BLOCK ? faces : node;
+    for (int i = 0; i < (wide ? 4 : 2); i++)
+        __builtin_prefetch(at + 64 * i);
+}
+
+/* Pushes the children of two or more lanes but the nearest, which is returned. */
+EBPO_EIGHT uint32_t ray_nearest(const ebpo_accel *s, ebpo_visit *stack, uint32_t *top,
+                                const ebpo_bound *b, unsigned lanes, f8 enter, bool wide)
+{
+    float key[8];
+    f8_store(key, enter);
+    unsigned first = (unsigned)__builtin_ctz(lanes), rest = lanes & (lanes - 1),
+             second = (unsigned)__builtin_ctz(rest);
+    if (!(rest & (rest - 1))) {
+        ebpo_visit x = ebpo_visit_make(key[first], b->child[first]),
+                   y = ebpo_visit_make(key[second], b->child[second]), far = x > y ? x : y;
+        stack[(*top)++] = far;
+        ray_fetch(s, (uint32_t)far, wide);
+        return (uint32_t)(x > y ? y : x);
+    }
+    uint32_t before = *top;
+    *top = ebpo_visit_push(stack, before, b, lanes, key) - 1;
+    for (uint32_t i = before; i < *top; i++)
+        ray_fetch(s, (uint32_t)stack[i], wide);
+    return (uint32_t)stack[*top];
+}
+
+/* Pushes the children of two or more lanes but one, which is returned, in any order. */
+EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *top,
+                             const ebpo_bound *b, unsigned lanes, bool wide)
+{
+    unsigned rest = lanes & (lanes - 1);
+    do {
+        uint32_t child = b->child[__builtin_ctz(rest)];
+        stack[(*top)++] = child;
+        ray_fetch(s, child, wide);
+    } while (rest &= rest - 1);
+    return b->child[__builtin_ctz(lanes)];
+}
+
+/* `sorted`: nearer children first, which falling limits gain from. */
+EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, bool wide, bool sorted)
+{
+    const ebpo_accel *s = r->s;
+    ebpo_visit stack[EBPO_VISITS_MOST];
+    uint32_t top = 1;
+    ray_set_boxes(r);
+    ray_set_faces(r);
+    stack[0] = ebpo_visit_make(0, s->top);
+    while (top && !r->done) {
+        ebpo_visit v = stack[--top];
+        uint32_t child = (uint32_t)v;
+        if (sorted && ebpo_visit_key(v) > r->bound)
+            continue;
+        while (!(child & EBPO_IS_BLOCK)) {
+            f8 enter;
+            const ebpo_bound *b = &s->bound[child];
+            unsigned lanes = ray_children(r, b, &enter);
+            if (!lanes)
+                break;
+            if (!(lanes & (lanes - 1)))
+                child = b->child[__builtin_ctz(lanes)];
+            else if (sorted)
+                child = ray_nearest(s, stack, &top, b, lanes, enter, wide);
+            else
+                child = ray_next(s, stack, &top, b, lanes, wide);
+        }
+        if (child & EBPO_IS_BLOCK)
+            ray_block(r, child & ~EBPO_IS_BLOCK, wide);
+    }
+    if (r->wants == EBPO_WANTS_FIRST)
+        drop_beyond(r);
+}
+
+static void ray_walk(ebpo_ray_search *r)
+{
+    bool sorted = r->wants == EBPO_WANTS_FIRST;
+    if (r->s->wide && sorted)
+        ray_walk_in(r, true, true);
+    else if (r->s->wide)
+        ray_walk_in(r, true, false);
+    else if (sorted)
+        ray_walk_in(r, false, true);
+    else
+        ray_walk_in(r, false, false);
+}
+
+const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk };

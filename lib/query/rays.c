@@ -1,0 +1,729 @@
+/* Rays: the first face that a ray meets, whether it meets any, all that it meets; and many rays on
+ * all cores.
+ *
+ * On the way down the tree tests are conservative: a node is passed over only if the ray certainly
+ * misses its cell or what it holds is beyond the limit. In an accel a filter in single precision
+ * (ray_kernels.c) leaves a few faces, about which exact predicates decide, the most promising
+ * first. Hits are ordered by t, then by the number in the file. Results do not depend on threads:
+ * of many rays each thread takes some at a time, with a context of its own. Error bounds:
+ * docs/develop/bounds.md. */
+#include "core/strict_fp.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sized.h"
+#include "core/sort_with.h"
+#include "geometry/double_double.h"
+#include "geometry/ray_triangle.h"
+#include "query/load_ahead.h"
+#include "query/query_kernels.h"
+#include "query/query_model.h"
+#include "query/query_node.h"
+
+/* A face that the ray meets, with what exact comparison needs. */
+struct ebpo_met {
+    double triangle[3][3];
+    uint64_t file_face, source_face;
+    ebpo_ray_meeting meeting;
+};
+
+typedef struct casting {
+    ebpo_context *context; /* its list of faces takes all hits */
+    ebpo_segment ray;
+    ebpo_ray_wants wants;
+    ebpo_ray_sides sides; /* only such faces count */
+    double limit;         /* t beyond which nothing matters, certain; falls while searching */
+    bool done;            /* nothing more is to be looked at */
+    bool no_memory;
+    uint64_t count;
+    ebpo_met first; /* if count > 0, unless all are wanted */
+} casting;
+
+static inline void casting_begin(casting *c, ebpo_context *context, const double origin[3],
+                                 const double direction[3], double t_max, ebpo_ray_wants wants,
+                                 ebpo_ray_sides sides)
+{
+    c->context = context;
+    memcpy(c->ray.origin, origin, sizeof c->ray.origin);
+    memcpy(c->ray.direction, direction, sizeof c->ray.direction);
+    c->ray.t_max = c->limit = t_max;
+    c->wants = wants;
+    c->sides = sides;
+    c->done = c->no_memory = false;
+    c->count = 0;
+}
+
+static inline ebpo_ray_hit hit_of(const ebpo_met *m)
+{
+    return (ebpo_ray_hit){ m->meeting.t, m->source_face, m->meeting.side };
+}
+
+/* --- one ray through one accel --- */
+
+/* Origins farther from the box than this many times its reach are moved towards it. */
+static const double near_enough = 4;
+/* Stands for infinity: finite, so that products with 0 are numbers. */
+#define BEYOND 0x1p100f
+
+/* --- limits --- */
+
+/* t in the frame, from the moved origin; `sign` 1: not less than the true one, -1: not greater. */
+static float frame_t(const ebpo_ray_search *r, double t, int sign)
+{
+    double scaled = t * r->limit_scale;
+    if (!(r->limit_scale > 0 && r->limit_scale < INFINITY && scaled < (double)BEYOND))
+        return sign > 0 || t == INFINITY ? BEYOND : -1;
+    double rest = scaled - r->moved + sign * (0x1p-50 * (scaled + r->moved) + 0x1p-90);
+    return (float)(rest + sign * fabs(rest) * 0x1p-22);
+}
+
+static void lower_bound(ebpo_ray_search *r)
+{
+    float bound = frame_t(r, r->limit, 1);
+    r->bound = bound < r->bound ? bound : r->bound;
+}
+
+/* --- the ray in the frame --- */
+
+/* Not fmax, which is a call. */
+static inline double greater_of(double a, double b) { return a > b ? a : b; }
+
+/* A direction whose longest coordinate is out of the ordinary is scaled by a power of two. That
+ * takes the processor a while before anything else can begin: most directions are left as they are.
+ */
+static void scale_direction(ebpo_ray_search *r, double longest)
+{
+    int exponent;
+    frexp(longest, &exponent);
+    for (int k = 0; k < 3; k++)
+        r->direction[k] = ldexp(r->ray->direction[k], -exponent);
+    r->limit_scale = ldexp(r->s->scale, exponent);
+}
+
+/* Returns the greatest size of a coordinate of the origin. */
+static double to_frame(ebpo_ray_search *r)
+{
+    const ebpo_accel *s = r->s;
+    double longest = 0, most = 0;
+    for (int k = 0; k < 3; k++) {
+        r->direction[k] = r->ray->direction[k];
+        longest = greater_of(longest, fabs(r->direction[k]));
+        r->from[k] = r->ray->origin[k];
+        r->origin[k] = (r->ray->origin[k] - s->centre[k]) * s->scale;
+        most = greater_of(most, fabs(r->origin[k]));
+    }
+    r->limit_scale = s->scale;
+    if (!(longest >= 0x1p-12 && longest <= 0x1p12))
+        scale_direction(r, longest);
+    r->moved = 0;
+    return most;
+}
+
+/* Where the ray comes to the cube of `reach` around all faces, somewhat before; false: nowhere.
+ * Rounding is far below what the cube is widened by as long as the origin is not so far away that
+ * the ray is blurred to the cube's size; then it stays where it is. */
+static bool enters_cube(const ebpo_ray_search *r, double reach, double *t)
+{
+    double from = 0, to = INFINITY;
+    for (int k = 0; k < 3; k++) {
+        double wall = 2 * reach * (r->direction[k] < 0 ? -1 : 1);
+        if (r->direction[k] == 0) {
+            if (fabs(r->origin[k]) > 2 * reach)
+                return false;
+            continue;
+        }
+        from = fmax(from, (-wall - r->origin[k]) / r->direction[k]);
+        to = fmin(to, (wall - r->origin[k]) / r->direction[k]);
+    }
+    *t = from;
+    return from <= to;
+}
+
+/* The origin goes along in double-double arithmetic: where the ray comes from hardly matters. */
+static bool move_origin(ebpo_ray_search *r, double *most)
+{
+    const ebpo_accel *s = r->s;
+    double t;
+    if (!enters_cube(r, s->reach, &t))
+        return false;
+    r->moved = t;
+    *most = 0;
+    for (int k = 0; k < 3; k++) {
+        ebpo_pair from = ebpo_two_difference(r->ray->origin[k], s->centre[k]),
+                  step = ebpo_two_product(t, r->direction[k]);
+        from = (ebpo_pair){ from.head * s->scale, from.tail * s->scale };
+        r->origin[k] = ebpo_pair_add(from, step).head;
+        *most = greater_of(*most, fabs(r->origin[k]));
+        r->from[k] = s->centre[k] + r->origin[k] / s->scale;
+    }
+    return true;
+}
+
+/* How far off the origin may be, in the frame: moved, brought into the frame, back into the model's
+ * unit, and split into floats there; and what replacing a small direction does.
+ * docs/develop/bounds.md, "A ray against boxes". */
+static void set_error(ebpo_ray_search *r, double most)
+{
+    const double *c = r->s->centre;
+    double unit = (fabs(c[0]) + fabs(c[1]) + fabs(c[2])) * r->s->scale;
+    r->error = 0x1p-45 * (most + unit) + 0x1p-55 * r->s->reach + 0x1p-53;
+    r->blur = most < 0x1p30 ? (float)(r->error * 0x1p23 + 0x1p-30) : INFINITY;
+    if (most < 0x1p80)
+        return;
+    r->error = (double)BEYOND; /* all boxes are open */
+    memset(r->origin, 0, sizeof r->origin);
+}
+
+/* --- candidates --- */
+
+/* The nearest first, where that may spare others. */
+static void judge_waiting(ebpo_ray_search *r)
+{
+    while (r->count && !r->done) {
+        int first = 0;
+        for (int i = 1; i < r->count && r->wants == EBPO_WANTS_FIRST; i++)
+            first = r->waiting[i].low < r->waiting[first].low ? i : first;
+        ebpo_ray_candidate c = r->waiting[first];
+        r->waiting[first] = r->waiting[--r->count];
+        if (c.low > r->bound)
+            continue;
+        double before = r->limit;
+        r->decide(r, c.slot, c.facing);
+        if (r->limit < before)
+            lower_bound(r);
+    }
+    r->count = 0;
+}
+
+/* Shows `decide` every face that may matter, the most promising first. */
+static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels,
+                             const ebpo_accel *s)
+{
+    r->s = s;
+    r->judge = judge_waiting;
+    r->count = 0;
+    r->done = r->met = false;
+    if (s->bound_count == 0)
+        return;
+    double most = to_frame(r);
+    if (!(most <= near_enough * s->reach) && most < 0x1p46 * s->reach && !move_origin(r, &most))
+        return;
+    set_error(r, most);
+    r->surely = frame_t(r, r->ray->t_max, -1);
+    r->bound = BEYOND;
+    lower_bound(r);
+    kernels->walk(r);
+    if (r->count)
+        judge_waiting(r);
+}
+
+/* Whether the ray meets m->triangle, and from a side that counts; then m->meeting says where.
+ * `facing`: where that is certain already, because the line goes through its interior; else 0. */
+static bool casting_meets(const casting *c, int facing, ebpo_met *m)
+{
+    const double(*triangle)[3] = (const double(*)[3])m->triangle;
+    if (facing)
+        ebpo_ray_interior(&c->ray, triangle, facing, &m->meeting);
+    else
+        ebpo_ray_triangle(&c->ray, triangle, &m->meeting);
+    return m->meeting.meets && (c->sides == EBPO_RAY_BOTH ||
+                                m->meeting.facing == (c->sides == EBPO_RAY_FRONT ? 1 : -1));
+}
+
+/* By t, then in the order of the file. */
+static int compare_met(const void *a, const void *b, void *ray)
+{
+    const ebpo_met *x = a, *y = b;
+    int sign = ebpo_ray_compare(ray, (const double(*)[3])x->triangle, &x->meeting,
+                                (const double(*)[3])y->triangle, &y->meeting);
+    return sign ? sign : (x->file_face > y->file_face) - (x->file_face < y->file_face);
+}
+
+static void keep_first(casting *c, const ebpo_met *m)
+{
+    if (c->count && compare_met(m, &c->first, &c->ray) >= 0)
+        return;
+    c->first = *m;
+    c->count = 1;
+    double limit = m->meeting.t * (1 + 0x1p-48) + DBL_MIN;
+    c->limit = limit < c->limit ? limit : c->limit;
+}
+
+/* A face that is met, with its numbers. */
+static void casting_keep(casting *c, const ebpo_met *m)
+{
+    ebpo_context *k = c->context;
+    if (c->wants == EBPO_WANTS_FIRST) {
+        keep_first(c, m);
+    } else if (c->wants == EBPO_WANTS_ANY) {
+        c->count = 1;
+        c->done = true;
+    } else if (ebpo_grow(&k->met, &k->met_capacity, c->count + 1, sizeof *k->met)) {
+        k->met[c->count++] = *m;
+    } else {
+        c->done = c->no_memory = true;
+    }
+}
+
+/* Mostly few, and in order but for some: what is met is found from the nearest box on. */
+static void sort_met(ebpo_met *met, uint64_t count, ebpo_segment *ray)
+{
+    if (count > 16) {
+        ebpo_sort_with(met, count, sizeof *met, compare_met, ray);
+        return;
+    }
+    for (uint64_t i = 1; i < count; i++) {
+        uint64_t at = i;
+        ebpo_met m = met[i];
+        for (; at > 0 && compare_met(&met[at - 1], &m, ray) > 0; at--)
+            met[at] = met[at - 1];
+        met[at] = m;
+    }
+}
+
+/* All hits in order, each once, into context->hits from `begin` on, up to *end. */
+static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_error *error)
+{
+    ebpo_context *k = c->context;
+    *end = begin;
+    if (!ebpo_grow(&k->hits, &k->hit_capacity, begin + c->count, sizeof *k->hits))
+        return ebpo_fail_memory(error, (begin + c->count) * sizeof *k->hits);
+    sort_met(k->met, c->count, &c->ray);
+    for (uint64_t i = 0; i < c->count; i++)
+        if (i == 0 || k->met[i].file_face != k->met[i - 1].file_face) /* subtrees share faces */
+            k->hits[(*end)++] = hit_of(&k->met[i]);
+    return EBPO_OK;
+}
+
+static const char *ray_fault_of(const ebpo_segment *ray)
+{
+    double nothing = 0, longest = 0;
+    for (int k = 0; k < 3; k++) {
+        nothing += ray->origin[k] * 0 + ray->direction[k] * 0;
+        longest = fabs(ray->direction[k]) > longest ? fabs(ray->direction[k]) : longest;
+    }
+    if (nothing != 0) /* no number: a coordinate is not a finite one */
+        return "has a coordinate that is not a finite number";
+    if (longest == 0)
+        return "needs a direction other than (0, 0, 0)";
+    return ray->t_max >= 0 ? NULL : "needs a t_max of 0 or more";
+}
+
+/* What is wrong with a ray, as the end of a sentence; NULL: nothing. */
+static inline const char *ray_fault(const ebpo_segment *ray)
+{
+    const double *o = ray->origin, *d = ray->direction;
+    double far = fabs(o[0]) + fabs(o[1]) + fabs(o[2]), size = fabs(d[0]) + fabs(d[1]) + fabs(d[2]);
+    if (size > 0 && far + size < INFINITY && ray->t_max >= 0)
+        return NULL;
+    return ray_fault_of(ray);
+}
+
+/* Interval of t in which the ray is within [low, high] widened by `slack`, cut to 0 .. limit; false
+ * when it is empty. */
+static bool meets_slabs(const double origin[3], const double direction[3], double limit,
+                        const double low[3], const double high[3], double slack, double *enter)
+{
+    double from = 0, to = limit;
+    for (int k = 0; k < 3; k++) {
+        double a = low[k] - slack - origin[k], b = high[k] + slack - origin[k];
+        if (direction[k] == 0) {
+            if (a > 0 || b < 0)
+                return false;
+            continue;
+        }
+        double t0 = a / direction[k], t1 = b / direction[k];
+        from = fmax(from, fmin(t0, t1) - fabs(fmin(t0, t1)) * 0x1p-50);
+        to = fmin(to, fmax(t0, t1) + fabs(fmax(t0, t1)) * 0x1p-50);
+    }
+    *enter = from;
+    return from <= to;
+}
+
+static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
+{
+    casting *c = r->user;
+    ebpo_met m;
+    uint32_t local = ebpo_accel_slot_face(r->s, slot);
+    ebpo_accel_fetch_face(r->s, local);
+    ebpo_accel_triangle(r->s, slot, m.triangle);
+    if (!casting_meets(c, facing, &m))
+        return;
+    m.file_face = ebpo_accel_file_face(r->s, local);
+    m.source_face = ebpo_accel_source_face(r->s, local);
+    casting_keep(c, &m);
+    r->done = c->done;
+    r->limit = c->limit;
+}
+
+static void cast_subtree(casting *c, const ebpo_accel *s)
+{
+    ebpo_ray_search r;
+    r.ray = &c->ray;
+    r.wants = c->wants;
+    r.facing = c->sides == EBPO_RAY_BOTH ? 0 : c->sides == EBPO_RAY_FRONT ? 1 : -1;
+    r.limit = c->limit;
+    r.decide = decide_face;
+    r.user = c;
+    ray_search_accel(&r, c->context->model->kernels.ray, s);
+    if (r.met) { /* only where any hit was wanted */
+        c->count = 1;
+        c->done = true;
+    }
+}
+
+/* Whether the ray comes to the node's cell before its limit; rather yes than no. */
+static bool meets_cell(const casting *c, const ebpo_box *box, const ebpo_node *node)
+{
+    double low[3], high[3], slack = 0, enter;
+    ebpo_cell_bounds(box, node->cell, low, high);
+    for (int k = 0; k < 3; k++)
+        slack = fmax(slack, (fabs(low[k]) + fabs(high[k]) + fabs(c->ray.origin[k])) * 0x1p-48);
+    return meets_slabs(c->ray.origin, c->ray.direction, c->limit, low, high, slack, &enter);
+}
+
+static bool ray_matters(void *user, const ebpo_box *box, const ebpo_node *node)
+{
+    return meets_cell(user, box, node);
+}
+
+static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, ebpo_error *error)
+{
+    const ebpo_model *m = c->context->model;
+    if (c->done || ebpo_node_is_uniform(&node) || !meets_cell(c, box, &node) ||
+        node.pruned) /* pruned: see ray_walk */
+        return EBPO_OK;
+    if (ebpo_node_is_below(&node)) {
+        ebpo_status status = ebpo_model_enter(c->context, &node, error);
+        if (status == EBPO_OK)
+            cast_subtree(c, node.subtree);
+        return status;
+    }
+    /* Children in the order in which the ray meets their cells. */
+    unsigned turn = 0;
+    for (int k = 0; k < 3; k++)
+        turn |= (unsigned)(c->ray.direction[k] < 0) << k;
+    ebpo_status status = EBPO_OK;
+    for (unsigned i = 0; i < 8 && status == EBPO_OK; i++)
+        status = cast_node(c, box, ebpo_model_child(m, &node, i ^ turn), error);
+    return status;
+}
+
+/* Shows the casting every face that may matter to it. The ray is one that makes sense. */
+static ebpo_status ray_walk(casting *c, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    if (c->context->model->whole) {
+        cast_subtree(c, c->context->model->whole);
+    } else {
+        ebpo_box box = ebpo_model_box(c->context->model);
+        status = cast_node(c, &box, ebpo_model_root(c->context->model), error);
+    }
+    if (status == EBPO_OK && !c->done && c->context->model->info->pruned)
+        status = ebpo_check_pruned(c->context, ray_matters, c, error);
+    if (status == EBPO_OK && c->no_memory)
+        status = ebpo_fail_memory(error, c->count * sizeof(ebpo_met));
+    return status;
+}
+
+/* --- one ray --- */
+
+static ebpo_status cast_ray(casting *c, ebpo_context *context, const double origin[3],
+                            const double direction[3], double t_max, ebpo_ray_wants wants,
+                            ebpo_error *error)
+{
+    casting_begin(c, context, origin, direction, t_max, wants, EBPO_RAY_BOTH);
+    ebpo_status status = ebpo_check_mesh(context->model, error);
+    const char *fault = ray_fault(&c->ray);
+    if (fault)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the ray %s", fault);
+    return status == EBPO_OK ? ray_walk(c, error) : status;
+}
+
+ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3], const double direction[3],
+                           double t_max, ebpo_ray_hit *out, bool *hit, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    casting c;
+    ebpo_status status = cast_ray(&c, context, origin, direction, t_max, EBPO_WANTS_FIRST, error);
+    *hit = status == EBPO_OK && c.count;
+    if (*hit)
+        *out = hit_of(&c.first);
+    return status;
+}
+
+ebpo_status ebpo_ray_any(ebpo_context *context, const double origin[3], const double direction[3],
+                         double t_max, bool *any, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    casting c;
+    ebpo_status status = cast_ray(&c, context, origin, direction, t_max, EBPO_WANTS_ANY, error);
+    *any = status == EBPO_OK && c.count;
+    return status;
+}
+
+ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const double direction[3],
+                         double t_max, const ebpo_ray_hit **hits, uint64_t *count,
+                         ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    casting c;
+    uint64_t end;
+    *hits = NULL;
+    *count = 0;
+    ebpo_status status = cast_ray(&c, context, origin, direction, t_max, EBPO_WANTS_ALL, error);
+    if (status == EBPO_OK)
+        status = casting_sort(&c, 0, &end, error);
+    if (status == EBPO_OK && end) {
+        *hits = context->hits;
+        *count = end;
+    }
+    return status;
+}
+
+/* --- many rays --- */
+
+/* Rays that a thread takes at a time; of a model that is not all in memory more, which are
+ * neighbours on the curve. */
+enum { PIECE = 128, PIECE_ALONG_CURVE = 1024 };
+
+/* Where the hits of a ray are, before they are put together. */
+typedef struct found {
+    unsigned worker;
+    uint64_t begin, end;
+} found;
+
+typedef struct batch {
+    const ebpo_ray *rays;
+    uint64_t count;
+    ebpo_ray_options options;
+    ebpo_ray_wants wants;
+    unsigned threads;
+    ebpo_context **context; /* [threads] the first one is the caller's */
+    uint64_t *held;         /* [threads] hits in these, if all are wanted */
+    double *entry;          /* [count][3] in the order of work; NULL: the rays' own order */
+    uint64_t *order;        /* [count] */
+    /* [count] each: one of these */
+    ebpo_ray_hit *first;
+    bool *any;
+    found *all;
+} batch;
+
+/* --- a ray of many --- */
+
+static ebpo_status answer_ray(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
+{
+    casting c;
+    const ebpo_ray *r = &b->rays[i];
+    casting_begin(&c, b->context[worker], r->origin, r->direction, r->t_max, b->wants,
+                  b->options.sides);
+    ebpo_status status = ray_walk(&c, error);
+    if (status != EBPO_OK)
+        return status;
+    if (b->wants == EBPO_WANTS_FIRST)
+        b->first[i] = c.count ? hit_of(&c.first) : (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
+    else if (b->wants == EBPO_WANTS_ANY)
+        b->any[i] = c.count;
+    else {
+        found f = { .worker = worker, .begin = b->held[worker] };
+        status = casting_sort(&c, f.begin, &f.end, error);
+        b->held[worker] = f.end;
+        b->all[i] = f;
+    }
+    return status;
+}
+
+static ebpo_status answer_piece(void *user, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
+{
+    batch *b = user;
+    ebpo_status status = EBPO_OK;
+    ebpo_batch along = { .count = 0 };
+    if (b->order)
+        ebpo_batch_begin(&along, b->context[worker], b->entry + 3 * begin, end - begin, false);
+    for (uint64_t i = 0; i < end - begin && status == EBPO_OK; i++) {
+        uint64_t k = begin + (b->order ? ebpo_batch_next(&along, i) : i);
+        status = answer_ray(b, b->order ? b->order[k] : k, worker, error);
+    }
+    ebpo_batch_end(&along);
+    return status;
+}
+
+/* --- the order of work --- */
+
+/* About where the ray comes to the box; its own beginning where that is inside, or it misses. */
+static void entry_of(const ebpo_box *box, const ebpo_ray *ray, double out[3])
+{
+    double from = 0;
+    for (int k = 0; k < 3; k++) {
+        double low = box->origin[k], high = low + box->size[k],
+               t = ((ray->direction[k] > 0 ? low : high) - ray->origin[k]) / ray->direction[k];
+        from = t > from && t <= ray->t_max ? t : from;
+    }
+    for (int k = 0; k < 3; k++) {
+        double low = box->origin[k], x = ray->origin[k] + from * ray->direction[k];
+        out[k] = x > low ? fmin(x, low + box->size[k]) : low;
+    }
+}
+
+/* Where there is no room for an order, rays are followed as they come. */
+static void put_in_order(batch *b, const ebpo_model *m)
+{
+    ebpo_box box = ebpo_model_box(m);
+    double *entry = ebpo_alloc(b->count, 3 * sizeof *entry);
+    b->entry = ebpo_alloc(b->count, 3 * sizeof *entry);
+    for (uint64_t i = 0; entry && i < b->count; i++)
+        entry_of(&box, &b->rays[i], entry + 3 * i);
+    if (entry && b->entry)
+        b->order = ebpo_curve_order(&box, entry, b->count);
+    for (uint64_t i = 0; b->order && i < b->count; i++)
+        memcpy(b->entry + 3 * i, entry + 3 * b->order[i], 3 * sizeof *entry);
+    free(entry);
+}
+
+/* --- on all cores --- */
+
+static ebpo_segment segment_of(const ebpo_ray *r)
+{
+    ebpo_segment s = { .t_max = r->t_max };
+    memcpy(s.origin, r->origin, sizeof s.origin);
+    memcpy(s.direction, r->direction, sizeof s.direction);
+    return s;
+}
+
+static ebpo_status check_rays(const batch *b, const ebpo_model *m, ebpo_error *error)
+{
+    for (uint64_t i = 0; i < b->count; i++) {
+        ebpo_segment ray = segment_of(&b->rays[i]);
+        const char *fault = ray_fault(&ray);
+        if (fault)
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "ray %" PRIu64 " %s", i, fault);
+    }
+    return ebpo_check_mesh(m, error);
+}
+
+static ebpo_status make_contexts(batch *b, ebpo_context *own, ebpo_error *error)
+{
+    b->context = ebpo_alloc_zero(b->threads, sizeof *b->context);
+    b->held = ebpo_alloc_zero(b->threads, sizeof *b->held);
+    if (!b->context || !b->held)
+        return ebpo_fail_memory(error, b->threads * sizeof *b->context);
+    b->context[0] = own;
+    ebpo_status status = EBPO_OK;
+    for (unsigned i = 1; i < b->threads && status == EBPO_OK; i++)
+        status = ebpo_context_new(own->model, &b->context[i], error);
+    return status;
+}
+
+static void clear_batch(batch *b)
+{
+    for (unsigned i = 1; b->context && i < b->threads; i++)
+        ebpo_context_free(b->context[i]);
+    free(b->context);
+    free(b->held);
+    free(b->entry);
+    free(b->order);
+    free(b->all);
+}
+
+static ebpo_status answer_all(batch *b, ebpo_context *context, const ebpo_ray_options *options,
+                              ebpo_error *error)
+{
+    const ebpo_model *m = context->model;
+    b->options = (ebpo_ray_options)EBPO_RAY_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_ray_options, &b->options, options, error);
+    if (status == EBPO_OK && b->options.sides > EBPO_RAY_BACK)
+        status = ebpo_fail_value(error);
+    if (status == EBPO_OK)
+        status = check_rays(b, m, error);
+    if (status != EBPO_OK || b->count == 0)
+        return status;
+    bool shared = m->whole || m->options.loading == EBPO_LOAD_CACHE;
+    if (!m->whole && shared && b->count > 1)
+        put_in_order(b, m);
+    uint64_t piece = b->order ? PIECE_ALONG_CURVE : PIECE, pieces = (b->count - 1) / piece + 1;
+    b->threads = shared ? ebpo_thread_count(b->options.threads) : 1;
+    if (b->threads > pieces)
+        b->threads = (unsigned)pieces;
+    status = make_contexts(b, context, error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(b->threads, NULL, b->count, piece, answer_piece, b, NULL, NULL,
+                                   error);
+    return status;
+}
+
+ebpo_status ebpo_ray_first_many(ebpo_context *context, const ebpo_ray *rays, uint64_t count,
+                                const ebpo_ray_options *options, ebpo_ray_hit *out,
+                                ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    batch b = { .rays = rays, .count = count, .wants = EBPO_WANTS_FIRST, .first = out };
+    ebpo_status status = answer_all(&b, context, options, error);
+    clear_batch(&b);
+    return status;
+}
+
+ebpo_status ebpo_ray_any_many(ebpo_context *context, const ebpo_ray *rays, uint64_t count,
+                              const ebpo_ray_options *options, bool *any, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    batch b = { .rays = rays, .count = count, .wants = EBPO_WANTS_ANY, .any = any };
+    ebpo_status status = answer_all(&b, context, options, error);
+    clear_batch(&b);
+    return status;
+}
+
+/* Puts the hits together in the order of the rays, in the caller's context. */
+static ebpo_status gather_hits(const batch *b, ebpo_context *context, ebpo_error *error)
+{
+    uint64_t total = 0;
+    if (!ebpo_grow(&context->hit_begin, &context->hit_begin_capacity, b->count + 1,
+                   sizeof *context->hit_begin))
+        return ebpo_fail_memory(error, (b->count + 1) * sizeof *context->hit_begin);
+    for (uint64_t i = 0; i < b->count; i++) {
+        context->hit_begin[i] = total;
+        total += b->all[i].end - b->all[i].begin;
+    }
+    context->hit_begin[b->count] = total;
+    ebpo_ray_hit *hits = ebpo_alloc(total, sizeof *hits);
+    if (!hits)
+        return ebpo_fail_memory(error, total * sizeof *hits);
+    for (uint64_t i = 0; i < b->count; i++) {
+        const found *f = &b->all[i];
+        if (f->end > f->begin)
+            memcpy(hits + context->hit_begin[i], b->context[f->worker]->hits + f->begin,
+                   (f->end - f->begin) * sizeof *hits);
+    }
+    free(context->hits);
+    context->hits = hits;
+    context->hit_capacity = total;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_ray_all_many(ebpo_context *context, const ebpo_ray *rays, uint64_t count,
+                              const ebpo_ray_options *options, const ebpo_ray_hit **hits,
+                              const uint64_t **begin, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    batch b = { .rays = rays, .count = count, .wants = EBPO_WANTS_ALL };
+    *hits = NULL;
+    *begin = NULL;
+    b.all = ebpo_alloc(count, sizeof *b.all);
+    ebpo_status status = b.all ? answer_all(&b, context, options, error)
+                               : ebpo_fail_memory(error, count * sizeof *b.all);
+    if (status == EBPO_OK)
+        status = gather_hits(&b, context, error);
+    if (status == EBPO_OK) {
+        *hits = context->hits;
+        *begin = context->hit_begin;
+    }
+    clear_batch(&b);
+    return status;
+}

@@ -1,0 +1,806 @@
+/* A subtree as plain arrays: what ebpo/subtree.h returns.
+ *
+ * A node is found by its octcode; what is below it is read as a slice, if a bound of its memory,
+ * from counts, is within the caller's limit. The slice has an array for each type of node; this
+ * file makes arrays with a row for each node, faces with corners and numbers, and lists of leaves.
+ * A single node can then be described in the model's coordinates: half-spaces inherited on the way
+ * from the root, and the polygons of its envelope. */
+#include "core/strict_fp.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/subtree.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
+#include "format/file_nodes.h"
+#include "format/slice.h"
+#include "geometry/cell.h"
+#include "geometry/cursor.h"
+#include "geometry/envelope_stack.h"
+#include "geometry/half_spaces.h"
+#include "geometry/node_types.h"
+#include "geometry/octcode.h"
+#include "geometry/plane_code.h"
+#include "levels/cell_to_model.h"
+#include "levels/lod_model.h"
+#include "levels/stream_node.h"
+
+typedef struct subtree_scratch subtree_scratch; /* what describing a node takes */
+
+struct ebpo_subtree {
+    ebpo_box box;
+    bool solid;
+    ebpo_rule rule;
+    ebpo_node root;
+    int level_count;
+    uint64_t level_first[EBPO_LEVELS_MAX + 1];
+    uint64_t node_count;
+    uint64_t *octcodes;
+    uint8_t *types;
+    int32_t *windings;
+    uint32_t *children;
+    bool has_planes;       /* any were read: the three below are there */
+    bool has_leaf_planes;  /* stored ones */
+    uint32_t *plane_first; /* [node_count + 1] */
+    uint32_t *planes;
+    uint32_t above_first[EBPO_LEVELS_MAX + 1];
+    uint32_t *above_planes;
+    /* Faces; without: why. */
+    const char *no_faces;
+    uint32_t outer_count;
+    ebpo_mesh mesh;
+    float *corners32;
+    double *corners64;
+    uint32_t *numbers, *source, *list_first, *list;
+    uint64_t memory;
+    subtree_scratch *scratch; /* with the first node that is asked for */
+};
+
+/* --- room --- */
+
+/* The group of a pruned node, which stands in subsets for eight nodes that are not there. */
+static bool is_pruned_group(const ebpo_slice *slice, int level, uint64_t group)
+{
+    return level && slice->pruned && slice->level[level].types[group] == 0;
+}
+
+static ebpo_status too_many(const char *what, ebpo_error *error)
+{
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the subtree has more than 2^32 - 2 %s; open the subtrees below it", what);
+}
+
+/* Nodes by level; planes in all. */
+static ebpo_status count_nodes(ebpo_subtree *s, const ebpo_slice *slice, uint64_t *planes,
+                               ebpo_error *error)
+{
+    *planes = 0;
+    s->level_count = slice->level_count;
+    for (int i = 0; i < slice->level_count; i++) {
+        const ebpo_level *level = &slice->level[i];
+        uint64_t groups = level->group_count;
+        for (uint64_t g = 0; slice->pruned && g < level->group_count; g++)
+            groups -= is_pruned_group(slice, i, g);
+        if (groups > UINT32_MAX / 8)
+            return too_many("nodes", error);
+        s->level_first[i] = s->node_count;
+        s->node_count += groups * ebpo_group_octants(i);
+        *planes += level->plane_count + level->leaf_plane_count;
+    }
+    s->level_first[s->level_count] = s->node_count;
+    return s->node_count >= UINT32_MAX ? too_many("nodes", error)
+           : *planes >= UINT32_MAX     ? too_many("planes", error)
+                                       : EBPO_OK;
+}
+
+static ebpo_status make_room(ebpo_subtree *s, uint64_t planes, ebpo_error *error)
+{
+    uint64_t nodes = s->node_count, bytes;
+    s->octcodes = ebpo_alloc(nodes, sizeof *s->octcodes);
+    s->types = ebpo_alloc(nodes, sizeof *s->types);
+    s->children = ebpo_alloc(nodes, sizeof *s->children);
+    bytes = nodes * (sizeof *s->octcodes + sizeof *s->types + sizeof *s->children);
+    if (s->solid)
+        s->windings = ebpo_alloc_zero(nodes, sizeof *s->windings);
+    if (s->has_planes) {
+        s->plane_first = ebpo_alloc(nodes + 1, sizeof *s->plane_first);
+        s->planes = ebpo_alloc(planes, sizeof *s->planes);
+    }
+    bytes += (s->solid ? nodes * sizeof *s->windings : 0) +
+             (s->has_planes ? (nodes + 1 + planes) * sizeof *s->planes : 0);
+    s->memory += sizeof *s + bytes + s->above_first[s->root.cell.level] * sizeof *s->planes;
+    bool fine = s->octcodes && s->types && s->children && (s->windings || !s->solid) &&
+                ((s->plane_first && s->planes) || !s->has_planes);
+    return fine ? EBPO_OK : ebpo_fail_memory(error, bytes);
+}
+
+/* --- one level --- */
+
+/* Running counts through a level's arrays. */
+typedef struct place {
+    uint64_t rank[4], plane, leaf_plane;
+} place;
+
+static int32_t winding_of(const ebpo_level *level, ebpo_node_type type, uint64_t rank)
+{
+    switch (type) {
+    case EBPO_WHITE: return level->white_winding ? level->white_winding[rank] : 0;
+    case EBPO_BLACK: return level->black_winding ? level->black_winding[rank] : 1;
+    case EBPO_LEAF: return level->leaf_winding ? level->leaf_winding[rank] : 0;
+    default: return 0;
+    }
+}
+
+static void take_planes(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type type, place *at,
+                        uint64_t node)
+{
+    uint32_t next = s->plane_first[node], count = 0;
+    uint64_t rank = at->rank[type];
+    if (type == EBPO_GRAY && level->plane_counts) {
+        count = level->plane_counts[rank];
+        if (count)
+            memcpy(s->planes + next, level->planes + at->plane, count * sizeof *s->planes);
+        at->plane += count;
+    } else if (type == EBPO_LEAF && level->leaf_plane_counts) {
+        count = level->leaf_plane_counts[rank];
+        if (count)
+            memcpy(s->planes + next, level->leaf_planes + at->leaf_plane,
+                   count * sizeof *s->planes);
+        at->leaf_plane += count;
+    }
+    s->plane_first[node + 1] = next + count;
+}
+
+static void take_node(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type type,
+                      uint64_t octcode, place *at, uint64_t node)
+{
+    s->octcodes[node] = octcode;
+    s->types[node] = (uint8_t)type;
+    s->children[node] = EBPO_NO_CHILDREN;
+    if (s->windings)
+        s->windings[node] = winding_of(level, type, at->rank[type]);
+    if (s->has_planes)
+        take_planes(s, level, type, at, node);
+    at->rank[type]++;
+}
+
+/* The nodes of a level below the root: the children of the gray nodes of the level before, which
+ * are linked to them. */
+static void take_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
+{
+    const ebpo_level *level = &slice->level[i];
+    place at = { .plane = 0 };
+    uint64_t node = s->level_first[i], group = 0;
+    for (uint64_t parent = s->level_first[i - 1]; parent < s->level_first[i]; parent++) {
+        if (s->types[parent] != EBPO_GRAY)
+            continue;
+        if (is_pruned_group(slice, i, group++)) {
+            at.rank[EBPO_WHITE] += 8;
+            continue;
+        }
+        s->children[parent] = (uint32_t)node;
+        for (unsigned octant = 0; octant < 8; octant++)
+            take_node(s, level, ebpo_group_type(level->types[group - 1], octant),
+                      ebpo_octcode_child(s->octcodes[parent], octant), &at, node++);
+    }
+}
+
+/* From the slice, whose arrays it takes where it can: nodes, windings, planes. */
+static ebpo_status subtree_take_nodes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
+{
+    uint64_t planes;
+    place at = { .plane = 0 };
+    ebpo_status status = count_nodes(s, slice, &planes, error);
+    if (status == EBPO_OK)
+        status = make_room(s, planes, error);
+    if (status != EBPO_OK)
+        return status;
+    if (s->has_planes)
+        s->plane_first[0] = 0;
+    take_node(s, &slice->level[0], slice->root.type, ebpo_octcode_of_cell(slice->root.cell), &at,
+              0);
+    for (int i = 1; i < slice->level_count; i++)
+        take_level(s, slice, i);
+    return EBPO_OK;
+}
+
+/* --- faces --- */
+
+/* A leaf's list: what it refers to, then its new ones, which have higher numbers. */
+static void take_list(ebpo_subtree *s, const ebpo_level *level, uint64_t leaf, uint64_t *ref,
+                      uint64_t *next)
+{
+    for (uint32_t k = 0; k < level->leaf_ref_count[leaf]; k++)
+        s->list[(*next)++] = level->leaf_refs[(*ref)++];
+    for (uint32_t k = 0; k < level->leaf_new[leaf]; k++)
+        s->list[(*next)++] = (uint32_t)level->leaf_first[leaf] + k;
+}
+
+static ebpo_status take_lists(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
+{
+    uint64_t listed = 0, next = 0;
+    for (int i = 0; i < slice->level_count; i++)
+        listed += slice->level[i].ref_count + slice->level[i].new_count;
+    if (listed >= UINT32_MAX)
+        return too_many("listed faces", error);
+    uint64_t bytes = (s->node_count + 1 + listed) * sizeof *s->list;
+    s->list_first = ebpo_alloc(s->node_count + 1, sizeof *s->list_first);
+    s->list = ebpo_alloc(listed, sizeof *s->list);
+    s->memory += bytes;
+    if (!s->list_first || !s->list)
+        return ebpo_fail_memory(error, bytes);
+    for (int i = 0; i < slice->level_count; i++) {
+        uint64_t leaf = 0, ref = 0;
+        for (uint64_t node = s->level_first[i]; node < s->level_first[i + 1]; node++) {
+            s->list_first[node] = (uint32_t)next;
+            if (s->types[node] == EBPO_LEAF)
+                take_list(s, &slice->level[i], leaf++, &ref, &next);
+        }
+    }
+    s->list_first[s->node_count] = (uint32_t)next;
+    return EBPO_OK;
+}
+
+static ebpo_status take_numbers(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
+{
+    uint64_t count = s->mesh.face_count;
+    s->numbers = ebpo_alloc(count, sizeof *s->numbers);
+    s->memory += count * sizeof *s->numbers * (s->source ? 2 : 1);
+    if (!s->numbers)
+        return ebpo_fail_memory(error, count * sizeof *s->numbers);
+    for (uint32_t i = 0; i < count; i++)
+        s->numbers[i] = (uint32_t)ebpo_slice_file_face(slice, i);
+    return EBPO_OK;
+}
+
+static ebpo_status take_corners(ebpo_subtree *s, ebpo_error *error)
+{
+    const ebpo_mesh *mesh = &s->mesh;
+    size_t row = 3 * (mesh->xyz32 ? sizeof(float) : sizeof(double));
+    const uint8_t *from = mesh->xyz32 ? (const void *)mesh->xyz32 : (const void *)mesh->xyz64;
+    uint8_t *to = ebpo_alloc(mesh->face_count, 3 * row);
+    s->memory += mesh->face_count * 3 * row;
+    if (!to)
+        return ebpo_fail_memory(error, mesh->face_count * 3 * row);
+    s->corners32 = mesh->xyz32 ? (void *)to : NULL;
+    s->corners64 = mesh->xyz32 ? NULL : (void *)to;
+    for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
+        memcpy(to + i * row, from + mesh->faces[i] * row, row);
+    return EBPO_OK;
+}
+
+/* Then faces and lists. */
+static ebpo_status subtree_take_faces(ebpo_subtree *s, ebpo_slice *slice,
+                                      const ebpo_subtree_options *options, ebpo_error *error)
+{
+    s->mesh = slice->mesh;
+    memset(&slice->mesh, 0, sizeof slice->mesh);
+    s->outer_count = slice->outer_count;
+    s->source = slice->face_source;
+    slice->face_source = NULL;
+    s->memory += s->mesh.face_count * 3 * sizeof(uint32_t) +
+                 s->mesh.vertex_count * 3 * (s->mesh.xyz32 ? sizeof(float) : sizeof(double));
+    ebpo_status status = take_lists(s, slice, error);
+    if (status == EBPO_OK)
+        status = take_numbers(s, slice, error);
+    return status == EBPO_OK && options->corners ? take_corners(s, error) : status;
+}
+
+/* --- for callers --- */
+
+ebpo_status ebpo_subtree_get_nodes(const ebpo_subtree *s, ebpo_subtree_nodes *out)
+{
+    ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
+    nodes.level = s->root.cell.level;
+    nodes.level_count = s->level_count;
+    nodes.node_count = s->node_count;
+    nodes.level_first = s->level_first;
+    nodes.octcodes = s->octcodes;
+    nodes.types = s->types;
+    nodes.windings = s->windings;
+    nodes.children = s->children;
+    nodes.plane_first = s->plane_first;
+    nodes.planes = s->planes;
+    nodes.above_first = s->has_planes ? s->above_first : NULL;
+    nodes.above_planes = s->above_planes;
+    nodes.memory = s->memory;
+    return EBPO_GIVE(ebpo_subtree_nodes, out, &nodes);
+}
+
+ebpo_status ebpo_subtree_get_faces(const ebpo_subtree *s, ebpo_subtree_faces *out,
+                                   ebpo_error *error)
+{
+    ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_subtree_faces, out, error);
+    if (status != EBPO_OK)
+        return status;
+    if (s->no_faces)
+        return ebpo_fail(error, EBPO_E_ABSENT, "%s", s->no_faces);
+    faces.face_count = s->mesh.face_count;
+    faces.outer_count = s->outer_count;
+    faces.vertex_count = s->mesh.vertex_count;
+    faces.xyz32 = s->mesh.xyz32;
+    faces.xyz64 = s->mesh.xyz64;
+    faces.faces = s->mesh.faces;
+    faces.corners32 = s->corners32;
+    faces.corners64 = s->corners64;
+    faces.numbers = s->numbers;
+    faces.source = s->source;
+    faces.list_first = s->list_first;
+    faces.list = s->list;
+    return EBPO_GIVE(ebpo_subtree_faces, out, &faces);
+}
+
+/* --- a node in the model's coordinates --- */
+
+struct subtree_scratch {
+    ebpo_envelope_stack envelopes;
+    ebpo_polytope leaf;
+    ebpo_node_buffers lent;
+    double inherited[EBPO_HALF_SPACES_MAX][4];
+    ebpo_triangle *faces; /* of a leaf */
+    uint64_t face_capacity;
+};
+
+static void subtree_free_scratch(subtree_scratch *scratch)
+{
+    if (scratch)
+        free(scratch->faces);
+    free(scratch);
+}
+
+/* --- the way from the tree's root down to a node --- */
+
+/* Planes that the node of this level has on the way to `octcode`; `node` is that node's number, and
+ * becomes the next one's, where the level is the subtree's. */
+static const uint32_t *planes_on_way(const ebpo_subtree *s, uint64_t octcode, int level,
+                                     uint64_t *node, uint32_t *count)
+{
+    int last = ebpo_octcode_level(octcode), root = s->root.cell.level;
+    *count = 0;
+    if (level < root && s->has_planes) {
+        *count = s->above_first[level + 1] - s->above_first[level];
+        return s->above_planes + s->above_first[level];
+    }
+    if (level < root)
+        return NULL;
+    uint64_t at = *node;
+    if (level < last)
+        *node = s->children[at] + (octcode >> 3 * (last - level - 1) & 7);
+    if (!s->has_planes)
+        return NULL;
+    *count = s->plane_first[at + 1] - s->plane_first[at];
+    return s->planes + s->plane_first[at];
+}
+
+static void add_inherited(ebpo_subtree *s, uint64_t octcode, ebpo_subtree_node *out)
+{
+    ebpo_cell cell = ebpo_cell_of_octcode(octcode);
+    uint64_t node = 0;
+    for (int level = 0; level < cell.level; level++) {
+        uint32_t count;
+        const uint32_t *codes = planes_on_way(s, octcode, level, &node, &count);
+        for (uint32_t i = 0; i < count; i++) {
+            int32_t n[3], d;
+            if (ebpo_plane_code_decode(codes[i], n, &d))
+                ebpo_plane_to_world(&s->box, ebpo_cell_ancestor(cell, level), n, d,
+                                    s->scratch->inherited[out->inherited_count++]);
+        }
+    }
+    out->inherited = (const double(*)[4])s->scratch->inherited;
+}
+
+/* The node's envelope, but for planes that a leaf derives. */
+static const ebpo_polytope *stored_envelope(ebpo_subtree *s, uint64_t octcode, ebpo_node_type type)
+{
+    ebpo_envelope_stack *stack = &s->scratch->envelopes;
+    const ebpo_polytope *envelope = NULL;
+    int last = ebpo_octcode_level(octcode);
+    uint64_t node = 0;
+    if (type == EBPO_BLACK)
+        return ebpo_envelope_put_cube(stack, octcode);
+    for (int level = 0; level <= last; level++) {
+        ebpo_octcode own = octcode >> 3 * (last - level);
+        uint32_t count;
+        const uint32_t *codes = planes_on_way(s, octcode, level, &node, &count);
+        envelope = ebpo_envelope_held(stack, own);
+        if (!envelope)
+            envelope = ebpo_envelope_put(stack, own, codes, count);
+    }
+    return envelope;
+}
+
+/* --- leaves --- */
+
+static ebpo_status gather_faces(ebpo_subtree *s, uint64_t leaf, uint64_t *count, ebpo_error *error)
+{
+    subtree_scratch *scratch = s->scratch;
+    uint32_t first = s->list_first[leaf];
+    *count = s->list_first[leaf + 1] - first;
+    if (!ebpo_grow(&scratch->faces, &scratch->face_capacity, *count, sizeof *scratch->faces))
+        return ebpo_fail_memory(error, *count * sizeof *scratch->faces);
+    for (uint64_t i = 0; i < 3 * *count; i++) {
+        uint64_t vertex = s->mesh.faces[3 * (uint64_t)s->list[first + i / 3] + i % 3];
+        for (uint64_t k = 0; k < 3; k++)
+            scratch->faces[i / 3].corner[i % 3][k] = s->mesh.xyz32
+                                                         ? (double)s->mesh.xyz32[3 * vertex + k]
+                                                         : s->mesh.xyz64[3 * vertex + k];
+    }
+    return EBPO_OK;
+}
+
+/* Cuts the scratch's envelope of a leaf by planes that follow from its faces. */
+static ebpo_status derive_planes(ebpo_subtree *s, uint64_t leaf, uint32_t codes[EBPO_PLANES_MAX],
+                                 unsigned *code_count, ebpo_error *error)
+{
+    ebpo_cell cell = ebpo_cell_of_octcode(s->octcodes[leaf]);
+    uint64_t count;
+    ebpo_status status = gather_faces(s, leaf, &count, error);
+    if (status != EBPO_OK)
+        return status;
+    const ebpo_triangle *faces = s->scratch->faces;
+    unsigned inside = s->windings ? ebpo_lod_inside_corners(&s->box, cell, s->rule,
+                                                            s->windings[leaf], faces, count)
+                                  : 0;
+    *code_count = (unsigned)ebpo_leaf_planes(&s->box, cell, faces, count, inside, 0,
+                                             &s->scratch->leaf, codes);
+    return EBPO_OK;
+}
+
+/* --- all of a node --- */
+
+static ebpo_status describe_node(ebpo_subtree *s, uint64_t number, bool polygons,
+                                 ebpo_subtree_node *out, ebpo_error *error)
+{
+    uint64_t octcode = s->octcodes[number];
+    ebpo_node_type type = (ebpo_node_type)s->types[number];
+    uint32_t derived[EBPO_PLANES_MAX], *codes = s->planes;
+    unsigned count = 0;
+    bool derives = type == EBPO_LEAF && !s->has_leaf_planes && !s->no_faces;
+    ebpo_node_begin(&out->node, &s->box, octcode, type);
+    out->node.winding = s->windings ? s->windings[number] : 0;
+    add_inherited(s, octcode, out);
+    const ebpo_polytope *envelope =
+        (polygons && type != EBPO_WHITE) || derives ? stored_envelope(s, octcode, type) : NULL;
+    if (s->has_planes) {
+        codes += s->plane_first[number];
+        count = s->plane_first[number + 1] - s->plane_first[number];
+    }
+    if (derives) {
+        ebpo_polytope_copy(&s->scratch->leaf, envelope);
+        ebpo_status status = derive_planes(s, number, codes = derived, &count, error);
+        if (status != EBPO_OK)
+            return status;
+        envelope = &s->scratch->leaf;
+    }
+    ebpo_node_add_planes(&out->node, &s->box, codes, count, &s->scratch->lent);
+    if (polygons && envelope)
+        ebpo_node_add_polygons(&out->node, &s->box, envelope, &s->scratch->lent);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_subtree_get_node(ebpo_subtree *s, uint64_t number, bool polygons,
+                                  ebpo_subtree_node *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_subtree_node node = EBPO_SUBTREE_NODE_INIT;
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_subtree_node, out, error);
+    if (status != EBPO_OK)
+        return status;
+    if (number >= s->node_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "there is no node number %" PRIu64 "; the subtree has %" PRIu64 " nodes",
+                         number, s->node_count);
+    if (!s->scratch && !(s->scratch = ebpo_alloc_zero(1, sizeof *s->scratch)))
+        return ebpo_fail_memory(error, sizeof *s->scratch);
+    status = describe_node(s, number, polygons, &node, error);
+    return status == EBPO_OK ? EBPO_GIVE(ebpo_subtree_node, out, &node) : status;
+}
+
+/* --- opening --- */
+
+/* --- the node of an octcode --- */
+
+static ebpo_status fail_uniform(const ebpo_chunks *chunks, uint64_t octcode, ebpo_cursor *c,
+                                ebpo_error *error)
+{
+    const char *shown = chunks->file->in.shown,
+               *type = ebpo_cursor_node(c)->type == EBPO_BLACK ? "black" : "white";
+    ebpo_octcode found = ebpo_cursor_octcode(c);
+    if (found == octcode)
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
+                              "node %" PRIu64 " is %s: no face touches it, so nothing is below it; "
+                              "ask for gray nodes and leaves",
+                              octcode, type);
+    return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
+                          "there is no node %" PRIu64 ": it would lie in node %" PRIu64
+                          ", which is %s, and no face touches it",
+                          octcode, found, type);
+}
+
+/* Whether what the cursor has come to will do. */
+static ebpo_status check_found(const ebpo_chunks *chunks, uint64_t octcode, bool or_leaf_above,
+                               ebpo_cursor *c, ebpo_error *error)
+{
+    const ebpo_node *child = NULL, *node = ebpo_cursor_node(c);
+    ebpo_octcode found = ebpo_cursor_octcode(c);
+    ebpo_status status = ebpo_cursor_children(c, &child, error); /* tells whether it is pruned */
+    if (status != EBPO_OK)
+        return status;
+    if (ebpo_node_is_uniform(node))
+        return fail_uniform(chunks, octcode, c, error);
+    if (node->pruned)
+        return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,
+                              "what is below node %" PRIu64
+                              " has been left out of this file, which is a subset; open the file "
+                              "that it was taken from",
+                              found);
+    if (found == octcode || or_leaf_above)
+        return EBPO_OK;
+    return ebpo_fail_file(error, EBPO_E_ARGUMENT, chunks->file->in.shown,
+                          "there is no node %" PRIu64 ": the tree ends above it, with leaf %" PRIu64
+                          "; open that (or_leaf_above does)",
+                          octcode, found);
+}
+
+static ebpo_status find_node(ebpo_chunks *chunks, uint64_t octcode, bool or_leaf_above,
+                             ebpo_cursor *c, ebpo_error *error)
+{
+    ebpo_node root;
+    if (!ebpo_octcode_valid(octcode))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "%" PRIu64 " is not an octcode, which is a leading 1 and three bits for "
+                         "each of at most %d levels; 1 is the root's",
+                         octcode, EBPO_LEVELS_MAX - 1);
+    ebpo_status status = ebpo_chunks_root(chunks, &root, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_cursor_begin(c, &ebpo_chunks_source, chunks, root);
+    status = ebpo_cursor_to_cell(c, ebpo_cell_of_octcode(octcode), error);
+    return status == EBPO_OK ? check_found(chunks, octcode, or_leaf_above, c, error) : status;
+}
+
+/* Planes of the nodes on the way to the subtree's root. */
+static ebpo_status take_above(ebpo_subtree *s, ebpo_cursor *c, ebpo_error *error)
+{
+    uint32_t codes[EBPO_NODE_PLANES];
+    uint64_t capacity = 0;
+    s->has_planes = true;
+    for (int depth = 0; depth < c->depth; depth++) {
+        unsigned count = 0;
+        uint32_t first = s->above_first[depth];
+        ebpo_status status = c->source->planes(c->holder, &c->at[depth].node, codes, &count, error);
+        if (status != EBPO_OK)
+            return status;
+        if (!ebpo_grow(&s->above_planes, &capacity, first + count + 1, sizeof *codes))
+            return ebpo_fail_memory(error, (first + count) * sizeof *codes);
+        memcpy(s->above_planes + first, codes, count * sizeof *codes);
+        s->above_first[depth + 1] = first + count;
+    }
+    return EBPO_OK;
+}
+
+/* --- how much memory --- */
+
+/* Decoded chunks while reading: a quarter of what is allowed, within these. */
+enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MOST = 32 << 20 };
+
+static uint64_t chunk_budget(uint64_t memory)
+{
+    return memory == 0 || memory / 4 > CHUNKS_MOST ? CHUNKS_MOST
+           : memory / 4 < CHUNKS_LEAST             ? CHUNKS_LEAST
+                                                   : memory / 4;
+}
+
+/* The least that holds so much beside the chunks. */
+static uint64_t least_memory(uint64_t bytes)
+{
+    if (bytes <= 3 * (uint64_t)CHUNKS_LEAST)
+        return bytes + CHUNKS_LEAST;
+    return bytes <= 3 * (uint64_t)CHUNKS_MOST ? bytes + bytes / 3 + 4 : bytes + CHUNKS_MOST;
+}
+
+/* Of a slice, what is made of it, and what is needed on the way: a bound, from counts. */
+static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, bool whole,
+                            bool corners)
+{
+    enum {
+        NODE = 32,      /* octcode, type, winding, children, planes, list; winding in the slice */
+        GROUP = 4,      /* types, plane counts */
+        LEAF = 24,      /* what a level has for each */
+        PLANE = 8,      /* in the slice and in the subtree */
+        REFERENCE = 52, /* in slice, list, and the table that numbers the outer ones */
+        FACE = 24,      /* corners, number, number in the source, list */
+        OLDER = 36,     /* for each corner: the table that numbers vertices of faces before */
+        ALWAYS = 1 << 20
+    };
+    uint64_t number = info->double_coordinates ? sizeof(double) : sizeof(float),
+             faces = size->new_faces + size->outer,
+             vertices = 3 * faces < info->vertex_count ? 3 * faces : info->vertex_count;
+    return ALWAYS + size->groups * (8 * NODE + GROUP) + size->leaves * LEAF + size->planes * PLANE +
+           size->refs * REFERENCE + faces * (FACE + (corners ? 9 * number : 0)) +
+           (whole ? 0 : 3 * faces * OLDER) + vertices * 3 * number;
+}
+
+/* References to faces that are new before the subtree: that many outer faces at most. Reads the
+ * lists, of which most are references within the subtree. */
+static ebpo_status count_outer(const ebpo_subtree *s, ebpo_chunks *chunks, uint64_t *outer,
+                               ebpo_error *error)
+{
+    ebpo_slice lists;
+    uint64_t first = UINT64_MAX;
+    *outer = 0;
+    ebpo_status status =
+        ebpo_slice_read_nodes(&lists, chunks, &s->root, EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH,
+                              EBPO_SLICE_ALL, error);
+    if (status != EBPO_OK)
+        return status;
+    for (int i = 0; i < lists.level_count; i++) /* ascending within a level */
+        if (lists.level[i].leaf_count && lists.level[i].leaf_first[0] < first)
+            first = lists.level[i].leaf_first[0];
+    for (int i = 0; i < lists.level_count; i++)
+        for (uint64_t k = 0; k < lists.level[i].ref_count; k++)
+            *outer += lists.level[i].leaf_refs[k] < first;
+    ebpo_slice_free(&lists);
+    return EBPO_OK;
+}
+
+static ebpo_status check_memory(const ebpo_subtree *s, ebpo_chunks *chunks, uint32_t needs,
+                                const ebpo_subtree_options *o, ebpo_error *error)
+{
+    ebpo_slice_size size;
+    const ebpo_info *info = &chunks->file->info;
+    bool whole = s->root.cell.level == 0, corners = o->corners && !s->no_faces;
+    if (o->memory == 0)
+        return EBPO_OK;
+    ebpo_status status = ebpo_slice_measure_nodes(chunks, &s->root, needs, o->levels, &size, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_slice_size lists = size;
+    lists.outer = lists.new_faces = 0;
+    uint64_t least = least_memory(bound_bytes(&size, info, whole, corners));
+    if (least > o->memory && size.outer &&
+        least_memory(bound_bytes(&lists, info, whole, corners)) <= o->memory) {
+        status = count_outer(s, chunks, &size.outer, error);
+        least = least_memory(bound_bytes(&size, info, whole, corners));
+    }
+    if (status != EBPO_OK || least <= o->memory)
+        return status;
+    return ebpo_fail_file(error, EBPO_E_LIMIT, chunks->file->in.shown,
+                          "the subtree of node %" PRIu64 " may take more than the %" PRIu64
+                          " bytes allowed; %" PRIu64 " are enough, or open the subtrees below it",
+                          ebpo_octcode_of_cell(s->root.cell), o->memory, least);
+}
+
+/* --- reading --- */
+
+/* What of the arrays is wanted; sets `no_faces`. */
+static uint32_t choose_needs(ebpo_subtree *s, const ebpo_subtree_options *o, uint32_t parts)
+{
+    uint32_t most = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES,
+             has = parts & o->parts & most;
+    s->no_faces = !(parts & EBPO_PART_MESH)
+                      ? "the file was written without its mesh; build it again with it"
+                  : !(has & EBPO_PART_MESH)
+                      ? "the subtree was opened without its faces; ask for EBPO_PART_MESH"
+                  : o->levels >= 0 ? "the subtree was opened for some levels only, which have no "
+                                     "faces; open all, with levels = -1"
+                                   : NULL;
+    has &= s->no_faces ? ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS) : ~0u;
+    s->has_leaf_planes = has & EBPO_PART_LEAF_PLANES;
+    return has | EBPO_NEEDS_ALWAYS | EBPO_NEEDS_SOLID;
+}
+
+static ebpo_status fill_arrays(ebpo_subtree *s, ebpo_chunks *chunks, ebpo_cursor *c,
+                               const ebpo_subtree_options *o, ebpo_error *error)
+{
+    ebpo_slice slice;
+    uint32_t needs = choose_needs(s, o, chunks->file->info.parts);
+    ebpo_status status = check_memory(s, chunks, needs, o, error);
+    if (status == EBPO_OK && needs & (EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES))
+        status = take_above(s, c, error);
+    if (status == EBPO_OK)
+        status = s->no_faces
+                     ? ebpo_slice_read_nodes(&slice, chunks, &s->root, needs, o->levels, error)
+                     : ebpo_slice_read_parts(&slice, chunks, &s->root, needs, error);
+    if (status != EBPO_OK)
+        return status;
+    status = subtree_take_nodes(s, &slice, error);
+    if (status == EBPO_OK && !s->no_faces)
+        status = subtree_take_faces(s, &slice, o, error);
+    ebpo_slice_free(&slice);
+    return status;
+}
+
+static ebpo_status open_below(ebpo_subtree *s, ebpo_chunks *chunks, uint64_t octcode,
+                              const ebpo_subtree_options *o, ebpo_error *error)
+{
+    ebpo_cursor *c = ebpo_alloc(1, sizeof *c);
+    if (!c)
+        return ebpo_fail_memory(error, sizeof *c);
+    ebpo_status status = find_node(chunks, octcode, o->or_leaf_above, c, error);
+    if (status == EBPO_OK) {
+        s->root = *ebpo_cursor_node(c);
+        status = fill_arrays(s, chunks, c, o, error);
+    }
+    free(c);
+    return status;
+}
+
+static ebpo_status check_options(const ebpo_subtree_options *o, ebpo_error *error)
+{
+    return o->levels < -1 ? ebpo_fail(error, EBPO_E_ARGUMENT,
+                                      "subtree options: levels are at least 0, or -1 for all; %d "
+                                      "are asked for",
+                                      o->levels)
+                          : EBPO_OK;
+}
+
+ebpo_status ebpo_subtree_open(const ebpo_file *file, uint64_t octcode,
+                              const ebpo_subtree_options *options, ebpo_subtree **out,
+                              ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_subtree_options wanted = EBPO_SUBTREE_OPTIONS_INIT;
+    ebpo_chunks *chunks = NULL;
+    *out = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_subtree_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = check_options(&wanted, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_subtree *s = ebpo_alloc_zero(1, sizeof *s);
+    if (!s)
+        return ebpo_fail_memory(error, sizeof *s);
+    const ebpo_info *info = ebpo_file_info(file);
+    s->box = ebpo_root_box(info);
+    s->solid = info->solid;
+    s->rule = info->rule;
+    status = ebpo_chunks_make(&chunks, file, chunk_budget(wanted.memory), error);
+    if (status == EBPO_OK)
+        status = open_below(s, chunks, octcode, &wanted, error);
+    ebpo_chunks_free(chunks);
+    if (status == EBPO_OK)
+        *out = s;
+    else
+        ebpo_subtree_close(s);
+    return status;
+}
+
+void ebpo_subtree_close(ebpo_subtree *s)
+{
+    if (!s)
+        return;
+    subtree_free_scratch(s->scratch);
+    free(s->octcodes);
+    free(s->types);
+    free(s->windings);
+    free(s->children);
+    free(s->plane_first);
+    free(s->planes);
+    free(s->above_planes);
+    ebpo_mesh_free(&s->mesh);
+    free(s->corners32);
+    free(s->corners64);
+    free(s->numbers);
+    free(s->source);
+    free(s->list_first);
+    free(s->list);
+    free(s);
+}
+
+uint64_t ebpo_octcode_at(const ebpo_info *info, const double point[3], int level)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_box box = ebpo_root_box(info);
+    ebpo_cell cell = { level, { 0, 0, 0 } };
+    if (level < 0 || level > box.grid_level || level >= EBPO_LEVELS_MAX ||
+        !ebpo_locate(&box, level, point, cell.at))
+        return 0;
+    return ebpo_octcode_of_cell(cell);
+}
