@@ -2,7 +2,6 @@
 
 #include "core/arrays.h"
 #include "mesh/box_tree.h"
-#include "mesh/point_tree.h"
 
 mesh_point *ebpo_point_tree_add(point_tree *tree)
 {
