@@ -8,9 +8,7 @@
 #include "core/parallel.h"
 #include "core/sort_with.h"
 #include "geometry/predicates.h"
-#include "mesh/edge_faces.h"
-#include "mesh/same_faces.h"
-#include "mesh/stars.h"
+#include "mesh/adjacency.h"
 
 enum { FACE_GRAIN = 1 << 15, INSERTION_LIMIT = 48 };
 

@@ -11,9 +11,8 @@
 #include "core/sort_with.h"
 #include "geometry/predicates.h"
 #include "mesh/component_parts.h"
-#include "mesh/edge_faces.h"
+#include "mesh/adjacency.h"
 #include "mesh/mesh_frame.h"
-#include "mesh/stars.h"
 #include "mesh/sum.h"
 
 enum { VERTEX_GRAIN = 1 << 13, COMPONENT_GRAIN = 64 };

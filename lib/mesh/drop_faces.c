@@ -12,7 +12,7 @@
 #include "mesh/component_parts.h"
 #include "mesh/mesh_check_parts.h"
 #include "mesh/positions.h"
-#include "mesh/same_faces.h"
+#include "mesh/adjacency.h"
 
 enum { GRAIN = 1 << 13, WORD = 64 };
 

@@ -13,7 +13,7 @@
 #include "mesh/mesh_check_parts.h"
 #include "mesh/mesh_frame.h"
 #include "mesh/positions.h"
-#include "mesh/same_faces.h"
+#include "mesh/adjacency.h"
 
 enum { FACE_GRAIN = 1 << 14 };
 
