@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "geometry/decimal.h"
-#include "mesh/ply_attributes.h"
+#include "mesh/ply_parts.h"
 
 _Static_assert((int)PLY_INT8 == (int)EBPO_ATTRIBUTE_INT8 &&
                    (int)PLY_FLOAT64 == (int)EBPO_ATTRIBUTE_FLOAT64,

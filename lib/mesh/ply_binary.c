@@ -8,11 +8,8 @@
 #include "core/arrays.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "mesh/ply_attributes.h"
-#include "mesh/ply_binary.h"
-#include "mesh/ply_faces.h"
+#include "mesh/ply_parts.h"
 #include "mesh/ply_header.h"
-#include "mesh/ply_state.h"
 
 /* The numbers of a binary body, of either byte order. */
 

@@ -11,9 +11,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "geometry/polygon.h"
-#include "mesh/ply_attributes.h"
-#include "mesh/ply_faces.h"
-#include "mesh/ply_unused.h"
+#include "mesh/ply_parts.h"
 
 #define MOST_FACES (UINT64_C(0xfffffffe))
 

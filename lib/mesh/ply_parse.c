@@ -13,11 +13,7 @@
 #include "core/fp_env.h"
 #include "io/file_source.h"
 #include "mesh/ply.h"
-#include "mesh/ply_ascii.h"
-#include "mesh/ply_attributes.h"
-#include "mesh/ply_binary.h"
-#include "mesh/ply_state.h"
-#include "mesh/ply_unused.h"
+#include "mesh/ply_parts.h"
 
 enum { REPORT_BYTES = 1 << 22 };
 
