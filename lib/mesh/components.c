@@ -12,7 +12,7 @@
 #include "core/sized.h"
 #include "mesh/attributes.h"
 #include "mesh/component_parts.h"
-#include "mesh/textures_named.h"
+#include "mesh/textures.h"
 
 /* ---- which faces share vertices ---- */
 

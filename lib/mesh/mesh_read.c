@@ -11,7 +11,7 @@
 #include "core/sized.h"
 #include "mesh/import.h"
 #include "mesh/stl.h"
-#include "mesh/texture_files.h"
+#include "mesh/textures.h"
 #include "io/file_source.h"
 #include "io/foreign_bytes.h"
 #include "mesh/mesh_parts.h"

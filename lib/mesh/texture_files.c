@@ -1,4 +1,4 @@
-#include "mesh/texture_files.h"
+#include "mesh/textures.h"
 
 #include <errno.h>
 #include <inttypes.h>
@@ -6,11 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "mesh/textures.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/sha256.h"
-#include "mesh/texture_names.h"
 #include "io/file_source.h"
 #include "io/open_below.h"
 

@@ -10,7 +10,6 @@
 #include "core/sha256.h"
 #include "core/sums.h"
 #include "mesh/textures.h"
-#include "mesh/textures_named.h"
 
 enum { DIGEST = 32, STEP = 1 << 20 };
 
