@@ -7,7 +7,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "mesh/colour_columns.h"
+#include "mesh/attributes.h"
 
 static ebpo_colour_column find(const ebpo_attributes *in, const char *element, const char *name)
 {
