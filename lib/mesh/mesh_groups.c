@@ -8,7 +8,6 @@
 #include "core/sort_with.h"
 #include "mesh/component_parts.h"
 #include "mesh/mesh_parts.h"
-#include "mesh/named_groups.h"
 
 /* Of faces under no name, as the OBJ format has it. */
 static const char unnamed[] = "default";

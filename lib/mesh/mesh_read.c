@@ -15,7 +15,7 @@
 #include "io/file_source.h"
 #include "io/foreign_bytes.h"
 #include "mesh/mesh_parts.h"
-#include "mesh/named_groups.h"
+#include "mesh/component_parts.h"
 #include "mesh/ply.h"
 
 enum { HASH_STEP = 1 << 22 };
