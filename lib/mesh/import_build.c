@@ -12,7 +12,6 @@
 #include "geometry/decimal.h"
 #include "geometry/polygon.h"
 #include "mesh/attributes.h"
-#include "mesh/corner_weld.h"
 #include "mesh/import_build.h"
 
 static ebpo_status fail_many(const import_build *b)
