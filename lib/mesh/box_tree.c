@@ -17,7 +17,7 @@ void ebpo_point_tree_free(point_tree *tree)
     ebpo_array_free(tree->workspace, tree->node);
 }
 
-static point_box box_of(const mesh_point *p, uint64_t count)
+static point_box box_of_points(const mesh_point *p, uint64_t count)
 {
     point_box box;
     for (int k = 0; k < 3; k++)
@@ -75,7 +75,7 @@ static void split_points(mesh_point *p, uint64_t count, uint64_t middle, int axi
 
 static void build_node(const point_tree *tree, uint64_t node, mesh_point *p, uint64_t count)
 {
-    tree->node[node] = box_of(p, count);
+    tree->node[node] = box_of_points(p, count);
     if (count <= POINT_TREE_LEAF)
         return;
     split_points(p, count, count / 2, longest_axis(&tree->node[node]));
