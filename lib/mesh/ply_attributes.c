@@ -1,4 +1,4 @@
-/* Properties become arrays of attributes; see ply_attributes.h. */
+/* Properties become arrays of attributes; see ply_parts.h. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

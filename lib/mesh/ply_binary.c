@@ -9,7 +9,6 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "mesh/ply_parts.h"
-#include "mesh/ply_header.h"
 
 /* The numbers of a binary body, of either byte order. */
 

@@ -15,7 +15,7 @@
 #include "core/text_stream.h"
 #include "io/publish.h"
 #include "mesh/attributes.h"
-#include "mesh/ply_header.h"
+#include "mesh/ply_parts.h"
 
 /* What a PLY file to be written is made of: the properties of a mesh and of its attributes, in the
  * order of the header that they were read with, or in their own. */

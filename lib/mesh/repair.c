@@ -124,8 +124,8 @@ static ebpo_status find_all(dropping *d, ebpo_error *error)
     d->gone = ebpo_array_zero(mesh->workspace, words, sizeof *d->gone);
     if (!d->gone)
         return ebpo_workspace_fail(mesh->workspace, words * sizeof *d->gone, error);
-    return ebpo_parallel_for(d->threads, mesh->workspace, mesh->vertex_count, DROP_GRAIN, find_repeated,
-                             d, NULL, "", error);
+    return ebpo_parallel_for(d->threads, mesh->workspace, mesh->vertex_count, DROP_GRAIN,
+                             find_repeated, d, NULL, "", error);
 }
 
 static ebpo_status drop(dropping *d, ebpo_error *error)
@@ -213,7 +213,7 @@ ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mesh, unsigned threads, eb
 enum { TURN_GRAIN = 1 << 14 };
 
 static ebpo_status turn_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                        ebpo_error *error)
+                              ebpo_error *error)
 {
     ebpo_mesh *mesh = context;
     (void)worker, (void)error;
@@ -226,7 +226,8 @@ ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error
 {
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(0, NULL, mesh->face_count, TURN_GRAIN, turn_faces, mesh, NULL, "", error);
+        status = ebpo_parallel_for(0, NULL, mesh->face_count, TURN_GRAIN, turn_faces, mesh, NULL,
+                                   "", error);
     if (status == EBPO_OK && record)
         record->flipped_faces += mesh->face_count;
     return status;
@@ -244,7 +245,7 @@ ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_err
 }
 
 static ebpo_status orient_mesh(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *record,
-                          ebpo_error *error)
+                               ebpo_error *error)
 {
     return steps & EBPO_MEND_EARLIER ? ebpo_mesh_make_consistent(mesh, record, NULL, error)
                                      : ebpo_mesh_orient(mesh, record, error);
