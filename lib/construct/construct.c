@@ -7,7 +7,6 @@
 
 #include "construct/arrange.h"
 #include "mesh/attributes.h"
-#include "mesh/colour_columns.h"
 #include "core/alloc.h"
 #include "core/os.h"
 #include "core/error.h"

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "mesh/colour_columns.h"
+#include "mesh/attributes.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"

@@ -1,5 +1,5 @@
 /* Arrays of attributes: making, naming and freeing them. */
-#include "mesh/attributes.h"
+#include "core/strict_fp.h"
 
 #include <inttypes.h>
 #include <stdarg.h>
@@ -8,8 +8,9 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/workspace.h"
+#include "core/arrays.h"
 #include "core/error.h"
+#include "mesh/attributes.h"
 
 static const char *const type_names[] = { "int8",  "uint8",  "int16",   "uint16",
                                           "int32", "uint32", "float32", "float64" };
@@ -216,4 +217,268 @@ ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *f
                                  ebpo_workspace *workspace, ebpo_error *error)
 {
     return make_of(out, from, workspace, copy_array, error);
+}
+
+/* Rows of attributes: others of them, in another order; lists that are columns; what values reach.
+ */
+
+typedef struct picking {
+    ebpo_workspace *workspace;
+    const ebpo_attribute *from;
+    const uint32_t *rows;
+    uint64_t count;
+    ebpo_attribute made;
+} picking;
+
+static void pick_columns(picking *p)
+{
+    size_t bytes = ebpo_attribute_row_bytes(p->from);
+    EBPO_FOR_ITEMS_SCATTERED(p->workspace, i, 0, p->count) {
+        if (p->rows[i] < p->from->rows)
+            memcpy(p->made.values + i * bytes, p->from->values + p->rows[i] * bytes, bytes);
+        else
+            memset(p->made.values + i * bytes, 0, bytes);
+    }
+}
+
+static uint64_t list_begin(const ebpo_attribute *a, uint64_t row)
+{
+    return row ? a->ends[row - 1] : 0;
+}
+
+static void pick_ends(picking *p)
+{
+    uint64_t sum = 0;
+    EBPO_FOR_ITEMS_SCATTERED(p->workspace, i, 0, p->count) {
+        uint64_t row = p->rows[i];
+        sum += row < p->from->rows ? p->from->ends[row] - list_begin(p->from, row) : 0;
+        p->made.ends[i] = sum;
+    }
+}
+
+static void pick_items(picking *p)
+{
+    size_t bytes = ebpo_attribute_bytes(p->from->type);
+    uint64_t at = 0;
+    EBPO_FOR_ITEMS_SCATTERED(p->workspace, i, 0, p->count) {
+        uint64_t count = p->made.ends[i] - at;
+        if (count)
+            memcpy(p->made.values + at * bytes,
+                   p->from->values + list_begin(p->from, p->rows[i]) * bytes, count * bytes);
+        at += count;
+    }
+}
+
+/* Into p->made, which the caller frees. */
+static bool pick(picking *p)
+{
+    const ebpo_attribute *from = p->from;
+    p->made = *from;
+    p->made.ends = NULL;
+    p->made.borrowed = false;
+    p->made.rows = p->made.row_capacity = p->count;
+    if (!from->ends) {
+        p->made.values = ebpo_array_alloc(p->workspace, p->count, ebpo_attribute_row_bytes(from));
+        if (p->made.values)
+            pick_columns(p);
+        return p->made.values != NULL;
+    }
+    p->made.values = NULL;
+    p->made.ends = ebpo_array_alloc(p->workspace, p->count, sizeof *p->made.ends);
+    if (!p->made.ends)
+        return false;
+    pick_ends(p);
+    p->made.item_capacity = ebpo_attribute_value_count(&p->made);
+    p->made.values =
+        ebpo_array_alloc(p->workspace, p->made.item_capacity, ebpo_attribute_bytes(from->type));
+    if (p->made.values)
+        pick_items(p);
+    return p->made.values != NULL;
+}
+
+ebpo_status ebpo_attributes_pick(ebpo_attributes *attributes, const char *element,
+                                 const uint32_t *rows, uint64_t count, ebpo_error *error)
+{
+    for (uint64_t i = 0; attributes && i < attributes->count; i++) {
+        ebpo_attribute *a = &attributes->array[i];
+        if (!ebpo_attribute_is_of(a, element))
+            continue;
+        picking p = { attributes->workspace, a, rows, count, { .rows = 0 } };
+        if (!pick(&p)) {
+            ebpo_array_free(attributes->workspace, p.made.ends);
+            return ebpo_workspace_fail(attributes->workspace,
+                                       count * (ebpo_attribute_row_bytes(a) + sizeof *a->ends),
+                                       error);
+        }
+        if (!a->borrowed) {
+            ebpo_array_free(attributes->workspace, a->values);
+            ebpo_array_free(attributes->workspace, a->ends);
+        }
+        *a = p.made;
+    }
+    return EBPO_OK;
+}
+
+/* Row i is moved from rows[i], which is never before it: what is written has been read. */
+static void keep_columns(ebpo_workspace *workspace, ebpo_attribute *a, const uint32_t *rows,
+                         uint64_t count)
+{
+    size_t bytes = ebpo_attribute_row_bytes(a);
+    EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, count) {
+        if (rows[i] != i)
+            memcpy(a->values + i * bytes, a->values + rows[i] * bytes, bytes);
+    }
+}
+
+static void keep_lists(ebpo_workspace *workspace, ebpo_attribute *a, const uint32_t *rows,
+                       uint64_t count)
+{
+    size_t bytes = ebpo_attribute_bytes(a->type);
+    uint64_t at = 0;
+    EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, count) {
+        uint64_t begin = list_begin(a, rows[i]), items = a->ends[rows[i]] - begin;
+        memmove(a->values + at * bytes, a->values + begin * bytes, items * bytes);
+        a->ends[i] = at += items;
+    }
+}
+
+void ebpo_attributes_keep(ebpo_attributes *attributes, const char *element, const uint32_t *rows,
+                          uint64_t count)
+{
+    for (uint64_t i = 0; i < attributes->count; i++) {
+        ebpo_attribute *a = &attributes->array[i];
+        if (!ebpo_attribute_is_of(a, element))
+            continue;
+        if (a->ends)
+            keep_lists(attributes->workspace, a, rows, count);
+        else
+            keep_columns(attributes->workspace, a, rows, count);
+        a->rows = count;
+    }
+}
+
+/* Items of a row, and where they begin. */
+static uint64_t items_of(const ebpo_attribute *a, uint64_t row, uint64_t *begin)
+{
+    *begin = a->ends ? list_begin(a, row) : row * a->columns;
+    return a->ends ? a->ends[row] - *begin : a->columns;
+}
+
+bool ebpo_attribute_same_row(const ebpo_attribute *a, uint64_t i, const ebpo_attribute *b,
+                             uint64_t k)
+{
+    size_t bytes = ebpo_attribute_bytes(a->type);
+    uint64_t x, y, count = items_of(a, i, &x);
+    return items_of(b, k, &y) == count &&
+           (!count || memcmp(a->values + x * bytes, b->values + y * bytes, count * bytes) == 0);
+}
+
+bool ebpo_attributes_equal_rows(const ebpo_attributes *attributes, const char *element, uint64_t a,
+                                uint64_t b)
+{
+    for (uint64_t i = 0; i < attributes->count; i++)
+        if (ebpo_attribute_is_of(&attributes->array[i], element) &&
+            !ebpo_attribute_same_row(&attributes->array[i], a, &attributes->array[i], b))
+            return false;
+    return true;
+}
+
+void ebpo_attribute_even_out(ebpo_workspace *workspace, ebpo_attribute *a)
+{
+    uint64_t length = a->ends && a->rows ? a->ends[0] : 0;
+    bool even = length >= 1 && length <= EBPO_ATTRIBUTE_COLUMNS;
+    EBPO_FOR_ITEMS(workspace, i, 0, even ? a->rows : 0)
+        if (a->ends[i] != (i + 1) * length) {
+            even = false;
+            break;
+        }
+    if (!even)
+        return;
+    ebpo_array_free(workspace, a->ends);
+    a->ends = NULL;
+    a->columns = (uint32_t)length;
+}
+
+/* --- ranges --- */
+
+double ebpo_attribute_number(const uint8_t *at, ebpo_attribute_type type)
+{
+    union {
+        int8_t i8;
+        uint8_t u8;
+        int16_t i16;
+        uint16_t u16;
+        int32_t i32;
+        uint32_t u32;
+        float f32;
+        double f64;
+    } v;
+    memcpy(&v, at, ebpo_attribute_bytes(type));
+    switch (type) {
+    case EBPO_ATTRIBUTE_INT8: return v.i8;
+    case EBPO_ATTRIBUTE_UINT8: return v.u8;
+    case EBPO_ATTRIBUTE_INT16: return v.i16;
+    case EBPO_ATTRIBUTE_UINT16: return v.u16;
+    case EBPO_ATTRIBUTE_INT32: return v.i32;
+    case EBPO_ATTRIBUTE_UINT32: return v.u32;
+    case EBPO_ATTRIBUTE_FLOAT32: return (double)v.f32;
+    case EBPO_ATTRIBUTE_FLOAT64: return v.f64;
+    }
+    return 0;
+}
+
+bool ebpo_attribute_range(const ebpo_attribute *a, ebpo_workspace *workspace, double range[2])
+{
+    bool found = false;
+    size_t bytes = ebpo_attribute_bytes(a->type);
+    uint64_t count = ebpo_attribute_value_count(a);
+    EBPO_FOR_ITEMS(workspace, i, 0, count) {
+        double v = ebpo_attribute_number(a->values + i * bytes, a->type);
+        if (v != v)
+            continue;
+        if (!found || v < range[0])
+            range[0] = v;
+        if (!found || v > range[1])
+            range[1] = v;
+        found = true;
+    }
+    return found;
+}
+
+/* --- names --- */
+
+/* Ends of names that go together. */
+static const char *const together[][4] = {
+    { "x", "y", "z", NULL },          { "red", "green", "blue", "alpha" },
+    { "red", "green", "blue", NULL }, { "r", "g", "b", "a" },
+    { "r", "g", "b", NULL },          { "s", "t", NULL, NULL },
+    { "u", "v", NULL, NULL },
+};
+
+/* What stands before the end; -1: it is not its end. */
+static int beginning(const ebpo_attribute_name *name, const char *end)
+{
+    size_t n = strlen(end);
+    return name->n >= n && memcmp(name->s + name->n - n, end, n) == 0 ? (int)(name->n - n) : -1;
+}
+
+static unsigned match(const char *const ends[4], const ebpo_attribute_name *names, unsigned count)
+{
+    unsigned n = 0;
+    int before = beginning(&names[0], ends[0]);
+    for (; n < 4 && ends[n]; n++)
+        if (before < 0 || n == count || beginning(&names[n], ends[n]) != before ||
+            memcmp(names[n].s, names[0].s, (size_t)before) != 0)
+            return 1;
+    return n;
+}
+
+unsigned ebpo_attribute_names_together(const ebpo_attribute_name *names, unsigned count)
+{
+    for (size_t i = 0; i < sizeof together / sizeof together[0]; i++) {
+        unsigned n = match(together[i], names, count);
+        if (n > 1)
+            return n;
+    }
+    return 1;
 }

@@ -2,7 +2,7 @@
 #ifndef EBPO_MESH_BOUNDARY_H
 #define EBPO_MESH_BOUNDARY_H
 
-#include "mesh/stars.h"
+#include "mesh/adjacency.h"
 
 /* A boundary edge in the direction in which its only face uses it. */
 typedef struct ebpo_boundary_edge {

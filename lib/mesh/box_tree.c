@@ -1,8 +1,124 @@
 #include "core/strict_fp.h"
 
+#include "core/arrays.h"
 #include "mesh/box_tree.h"
 
-#include "core/workspace.h"
+mesh_point *ebpo_point_tree_add(point_tree *tree)
+{
+    if (!ebpo_array_grow_late(tree->workspace, &tree->point, &tree->capacity, tree->count + 1,
+                              sizeof *tree->point))
+        return NULL;
+    return &tree->point[tree->count++];
+}
+
+void ebpo_point_tree_free(point_tree *tree)
+{
+    ebpo_array_free(tree->workspace, tree->point);
+    ebpo_array_free(tree->workspace, tree->node);
+}
+
+static point_box box_of_points(const mesh_point *p, uint64_t count)
+{
+    point_box box;
+    for (int k = 0; k < 3; k++)
+        box.min[k] = box.max[k] = p[0].at[k];
+    for (uint64_t i = 1; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            box.min[k] = p[i].at[k] < box.min[k] ? p[i].at[k] : box.min[k];
+            box.max[k] = p[i].at[k] > box.max[k] ? p[i].at[k] : box.max[k];
+        }
+    return box;
+}
+
+/* Halves, as their difference may be beyond the doubles. */
+static int longest_axis(const point_box *box)
+{
+    int best = 0;
+    double most = -1;
+    for (int k = 0; k < 3; k++) {
+        double length = box->max[k] / 2 - box->min[k] / 2;
+        if (length > most)
+            best = k, most = length;
+    }
+    return best;
+}
+
+static void swap_points(mesh_point *a, mesh_point *b)
+{
+    mesh_point t = *a;
+    *a = *b;
+    *b = t;
+}
+
+/* What is before p[middle] is not greater along the axis, what is behind it not less (Hoare). */
+static void split_points(mesh_point *p, uint64_t count, uint64_t middle, int axis)
+{
+    uint64_t low = 0, high = count - 1;
+    while (low < high) {
+        double pivot = p[low + (high - low) / 2].at[axis];
+        uint64_t i = low, j = high;
+        for (;;) {
+            while (p[i].at[axis] < pivot)
+                i++;
+            while (p[j].at[axis] > pivot)
+                j--;
+            if (i >= j)
+                break;
+            swap_points(&p[i++], &p[j--]);
+        }
+        if (middle <= j)
+            high = j;
+        else
+            low = j + 1;
+    }
+}
+
+static void build_node(const point_tree *tree, uint64_t node, mesh_point *p, uint64_t count)
+{
+    tree->node[node] = box_of_points(p, count);
+    if (count <= POINT_TREE_LEAF)
+        return;
+    split_points(p, count, count / 2, longest_axis(&tree->node[node]));
+    build_node(tree, 2 * node + 1, p, count / 2);
+    build_node(tree, 2 * node + 2, p + count / 2, count - count / 2);
+}
+
+bool ebpo_point_tree_build(point_tree *tree)
+{
+    uint64_t nodes = 1;
+    for (uint64_t most = tree->count; most > POINT_TREE_LEAF; most -= most / 2)
+        nodes = 2 * nodes + 1;
+    if (tree->count == 0)
+        return true;
+    if (!ebpo_array_grow_late(tree->workspace, &tree->node, &tree->node_capacity, nodes,
+                              sizeof *tree->node))
+        return false;
+    build_node(tree, 0, tree->point, tree->count);
+    return true;
+}
+
+typedef struct point_walking {
+    const point_tree *tree;
+    point_box_fn wanted;
+    points_fn visit;
+    void *user;
+} point_walking;
+
+static bool walk_points(const point_walking *w, uint64_t node, mesh_point *p, uint64_t count)
+{
+    if (!w->wanted(w->user, &w->tree->node[node]))
+        return true;
+    if (count <= POINT_TREE_LEAF)
+        return w->visit(w->user, p, count);
+    return walk_points(w, 2 * node + 1, p, count / 2) &&
+           walk_points(w, 2 * node + 2, p + count / 2, count - count / 2);
+}
+
+bool ebpo_point_tree_walk(const point_tree *tree, point_box_fn wanted, points_fn visit, void *user)
+{
+    point_walking w = { tree, wanted, visit, user };
+    return tree->count == 0 || walk_points(&w, 0, tree->point, tree->count);
+}
 
 typedef struct filling {
     box_tree *tree;
@@ -10,7 +126,7 @@ typedef struct filling {
     const void *user;
 } filling;
 
-static void join(point_box *box, const point_box *other)
+static void join_boxes(point_box *box, const point_box *other)
 {
     for (int k = 0; k < 3; k++) {
         box->min[k] = other->min[k] < box->min[k] ? other->min[k] : box->min[k];
@@ -18,21 +134,21 @@ static void join(point_box *box, const point_box *other)
     }
 }
 
-static void fill(const filling *f, uint64_t node, const mesh_point *p, uint64_t count)
+static void fill_node(const filling *f, uint64_t node, const mesh_point *p, uint64_t count)
 {
     point_box *box = &f->tree->filled[node], other;
     if (count <= POINT_TREE_LEAF) {
         f->box_of(f->user, &p[0], box);
         for (uint64_t i = 1; i < count; i++) {
             f->box_of(f->user, &p[i], &other);
-            join(box, &other);
+            join_boxes(box, &other);
         }
         return;
     }
-    fill(f, 2 * node + 1, p, count / 2);
-    fill(f, 2 * node + 2, p + count / 2, count - count / 2);
+    fill_node(f, 2 * node + 1, p, count / 2);
+    fill_node(f, 2 * node + 2, p + count / 2, count - count / 2);
     *box = f->tree->filled[2 * node + 1];
-    join(box, &f->tree->filled[2 * node + 2]);
+    join_boxes(box, &f->tree->filled[2 * node + 2]);
 }
 
 bool ebpo_box_tree_build(box_tree *tree, box_of_fn box_of, const void *user)
@@ -46,7 +162,7 @@ bool ebpo_box_tree_build(box_tree *tree, box_of_fn box_of, const void *user)
     tree->filled = ebpo_array_alloc(points->workspace, points->node_capacity, sizeof *tree->filled);
     if (!tree->filled)
         return false;
-    fill(&f, 0, points->point, points->count);
+    fill_node(&f, 0, points->point, points->count);
     return true;
 }
 
@@ -56,26 +172,26 @@ void ebpo_box_tree_free(box_tree *tree)
     ebpo_point_tree_free(&tree->points);
 }
 
-typedef struct walking {
+typedef struct box_walking {
     const box_tree *tree;
     box_node_fn wanted;
     points_fn visit;
     void *user;
-} walking;
+} box_walking;
 
-static bool walk(const walking *w, uint64_t node, mesh_point *p, uint64_t count)
+static bool walk_boxes(const box_walking *w, uint64_t node, mesh_point *p, uint64_t count)
 {
     box_node n = { &w->tree->points.node[node], &w->tree->filled[node], count };
     if (!w->wanted(w->user, &n))
         return true;
     if (count <= POINT_TREE_LEAF)
         return w->visit(w->user, p, count);
-    return walk(w, 2 * node + 1, p, count / 2) &&
-           walk(w, 2 * node + 2, p + count / 2, count - count / 2);
+    return walk_boxes(w, 2 * node + 1, p, count / 2) &&
+           walk_boxes(w, 2 * node + 2, p + count / 2, count - count / 2);
 }
 
 bool ebpo_box_tree_walk(const box_tree *tree, box_node_fn wanted, points_fn visit, void *user)
 {
-    walking w = { tree, wanted, visit, user };
-    return tree->points.count == 0 || walk(&w, 0, tree->points.point, tree->points.count);
+    box_walking w = { tree, wanted, visit, user };
+    return tree->points.count == 0 || walk_boxes(&w, 0, tree->points.point, tree->points.count);
 }

@@ -2,8 +2,10 @@
 #ifndef EBPO_MESH_COMPONENT_PARTS_H
 #define EBPO_MESH_COMPONENT_PARTS_H
 
+#include <ebpo/groups.h>
+
+#include "core/named_run.h"
 #include "mesh/mesh_parts.h"
-#include "mesh/named_groups.h"
 
 /* Faces that share vertices. */
 typedef struct mesh_component {
@@ -59,5 +61,24 @@ EBPO_MUST_USE ebpo_status ebpo_components_measure(ebpo_components *c, unsigned t
 
 /* Sets each one's host; needs what is measured. */
 EBPO_MUST_USE ebpo_status ebpo_cavities_place(const ebpo_components *c, ebpo_error *error);
+
+/* Groups of faces that a file has names for. */
+
+struct ebpo_mesh_groups {
+    ebpo_mesh_group *list; /* [count] those with faces first, in the order of these */
+    uint64_t count, with_faces, face_count;
+    char *names;
+    uint64_t *run_end; /* [run_count] the number after its last face, ascending */
+    uint32_t *run_group;
+    uint64_t run_count;
+};
+
+/* Runs of one name are one group; "" and "default" are one name. The first run's name is told only
+ * if it has faces. EBPO_E_LIMIT, EBPO_E_MEMORY. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_groups_new(const ebpo_named_run *runs, uint64_t count,
+                                               ebpo_mesh_groups **out, ebpo_error *error);
+
+/* The group of a face by its number in the source; EBPO_NO_INDEX: it is in none. */
+uint32_t ebpo_mesh_group_of(const ebpo_mesh_groups *groups, uint64_t face);
 
 #endif

@@ -7,10 +7,10 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/workspace.h"
+#include "core/arrays.h"
 #include "mesh/boundary.h"
 #include "mesh/mesh_parts.h"
-#include "mesh/stars.h"
+#include "mesh/adjacency.h"
 
 /* Vertices with more faces than this are not searched for existing edges: it keeps the work linear.
  */

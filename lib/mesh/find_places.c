@@ -1,19 +1,78 @@
-/* Every place of what checking a mesh finds: noted while checking, then sorted, then told with the
- * faces around it. */
+/* What kinds of findings are called, and their colours. */
 #include "core/strict_fp.h"
 
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <ebpo/places.h>
+
 #include "core/alloc.h"
-#include "core/workspace.h"
+#include "core/arrays.h"
+#include "core/endian.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
+#include "core/sized.h"
 #include "core/sort.h"
+#include "io/publish.h"
 #include "mesh/component_parts.h"
 #include "mesh/mesh_check_parts.h"
-#include "mesh/places_ply.h"
+
+/* A mesh with the places of findings in colours. */
+
+typedef struct ebpo_places_picture {
+    const ebpo_mesh *mesh;
+    uint8_t *face; /* the kind that each shows, as the mesh has them now */
+    ebpo_publish target;
+} ebpo_places_picture;
+
+#define EBPO_PLACES_PICTURE_INIT      \
+    {                                 \
+        NULL, NULL, EBPO_PUBLISH_INIT \
+    }
+
+EBPO_MUST_USE ebpo_status ebpo_places_picture_begin(ebpo_places_picture *picture,
+                                                    const ebpo_mesh *mesh, const char *path,
+                                                    ebpo_error *error);
+/* faces   of the mesh as it is now */
+void ebpo_places_picture_note(ebpo_places_picture *picture, const ebpo_found *found,
+                              const uint64_t *faces, uint64_t count);
+/* report   for the legend */
+EBPO_MUST_USE ebpo_status ebpo_places_picture_write(ebpo_places_picture *picture,
+                                                    const ebpo_mesh_report *report,
+                                                    ebpo_error *error);
+void ebpo_places_picture_end(ebpo_places_picture *picture);
+
+static const struct finding_kind {
+    const char *name;
+    uint8_t rgb[3];
+} kinds[EBPO_FINDING_KINDS] = {
+    [EBPO_FOUND_BOUNDARY_EDGE] = { "boundary_edges", { 255, 127, 14 } },
+    [EBPO_FOUND_NONMANIFOLD_EDGE] = { "nonmanifold_edges", { 214, 39, 40 } },
+    [EBPO_FOUND_MISORIENTED_EDGE] = { "misoriented_edges", { 148, 103, 189 } },
+    [EBPO_FOUND_UNBALANCED_EDGE] = { "unbalanced_edges", { 140, 86, 75 } },
+    [EBPO_FOUND_REPEATED_FACE] = { "repeated_faces", { 31, 119, 180 } },
+    [EBPO_FOUND_INDEX_REPEATED_FACE] = { "index_repeated_faces", { 188, 189, 34 } },
+    [EBPO_FOUND_ZERO_AREA_FACE] = { "zero_area_faces", { 255, 221, 0 } },
+    [EBPO_FOUND_BOWTIE_VERTEX] = { "bowtie_vertices", { 227, 119, 194 } },
+    [EBPO_FOUND_REPEATED_POSITION] = { "repeated_positions", { 44, 160, 44 } },
+    [EBPO_FOUND_UNREFERENCED_VERTEX] = { "unreferenced_vertices", { 23, 190, 207 } },
+};
+
+const char *ebpo_finding_name(int32_t kind)
+{
+    return kind >= 0 && kind < EBPO_FINDING_KINDS ? kinds[kind].name : NULL;
+}
+
+void ebpo_finding_colour(int32_t kind, uint8_t rgb[3])
+{
+    static const uint8_t grey[3] = { 200, 200, 200 };
+    memcpy(rgb, ebpo_finding_name(kind) ? kinds[kind].rgb : grey, 3);
+}
+
+/* Every place of what checking a mesh finds: noted while checking, then sorted, then told with the
+ * faces around it. */
 
 static bool is_vertex(uint32_t kind) { return kind >= EBPO_FOUND_BOWTIE_VERTEX; }
 
@@ -298,4 +357,171 @@ ebpo_status ebpo_mesh_places(const ebpo_mesh *mesh, const ebpo_places_options *o
     if (report)
         *report = found;
     return status;
+}
+
+enum { NOTHING = UINT8_MAX, VERTEX_BYTES = 3 * 8, FACE_BYTES = 1 + 3 * 4 + 3 };
+
+ebpo_status ebpo_places_picture_begin(ebpo_places_picture *picture, const ebpo_mesh *mesh,
+                                      const char *path, ebpo_error *error)
+{
+    picture->mesh = mesh;
+    picture->face = ebpo_array_alloc(mesh->workspace, mesh->face_count, 1);
+    if (!picture->face)
+        return ebpo_workspace_fail(mesh->workspace, mesh->face_count, error);
+    ebpo_array_fill(mesh->workspace, picture->face, NOTHING, mesh->face_count);
+    return ebpo_publish_begin(&picture->target, path, error);
+}
+
+void ebpo_places_picture_note(ebpo_places_picture *picture, const ebpo_found *found,
+                              const uint64_t *faces, uint64_t count)
+{
+    uint8_t kind = (uint8_t)found->kind;
+    for (uint64_t i = 0; i < count; i++)
+        if (kind < picture->face[faces[i]])
+            picture->face[faces[i]] = kind;
+}
+
+/* How many places there are of each kind. */
+static uint64_t count_of(const ebpo_mesh_report *r, int kind)
+{
+    const uint64_t counts[EBPO_FINDING_KINDS] = {
+        [EBPO_FOUND_BOUNDARY_EDGE] = r->boundary_edges.count,
+        [EBPO_FOUND_NONMANIFOLD_EDGE] = r->nonmanifold_edges.count,
+        [EBPO_FOUND_MISORIENTED_EDGE] = r->misoriented_edges.count,
+        [EBPO_FOUND_UNBALANCED_EDGE] = r->unbalanced_edges.count,
+        [EBPO_FOUND_REPEATED_FACE] = r->repeated_faces.count,
+        [EBPO_FOUND_INDEX_REPEATED_FACE] = r->index_repeated_faces.count,
+        [EBPO_FOUND_ZERO_AREA_FACE] = r->zero_area_faces.count,
+        [EBPO_FOUND_BOWTIE_VERTEX] = r->bowtie_vertices.count,
+        [EBPO_FOUND_REPEATED_POSITION] = r->repeated_positions.count,
+        [EBPO_FOUND_UNREFERENCED_VERTEX] = r->unreferenced_vertices.count,
+    };
+    return counts[kind];
+}
+
+static void print_header(const ebpo_places_picture *p, FILE *f, const ebpo_mesh_report *report)
+{
+    fputs("ply\nformat binary_little_endian 1.0\n", f);
+    for (int kind = 0; kind < EBPO_FINDING_KINDS; kind++) {
+        uint8_t rgb[3];
+        ebpo_finding_colour(kind, rgb);
+        if (count_of(report, kind))
+            fprintf(f, "comment %s %" PRIu64 ": %u %u %u\n", ebpo_finding_name(kind),
+                    count_of(report, kind), rgb[0], rgb[1], rgb[2]);
+    }
+    fprintf(f,
+            "element vertex %" PRIu64 "\nproperty double x\nproperty double y\nproperty double z\n"
+            "element face %" PRIu64 "\nproperty list uchar uint vertex_indices\n"
+            "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+            p->mesh->vertex_count, p->mesh->face_count);
+}
+
+/* rgb   of a kind; NOTHING is none */
+static void put_colour(uint8_t kind, uint8_t rgb[3])
+{
+    ebpo_finding_colour(kind == NOTHING ? -1 : kind, rgb);
+}
+
+/* Which of the mesh has each number of the source, ascending; numbers of dropped faces are left
+ * out. NULL when memory is short. */
+static uint32_t *in_source_order(const ebpo_mesh *mesh, const uint32_t *source, uint64_t count)
+{
+    uint64_t most = count;
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, count)
+        most = source[i] >= most ? source[i] + (uint64_t)1 : most;
+    uint32_t *order = ebpo_array_alloc(mesh->workspace, most, sizeof *order);
+    if (!order)
+        return NULL;
+    ebpo_array_fill(mesh->workspace, order, 0xff, most * sizeof *order);
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, count)
+        order[source[i]] = (uint32_t)i;
+    uint64_t kept = 0;
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, most)
+        if (order[i] != EBPO_NO_INDEX)
+            order[kept++] = order[i];
+    return order;
+}
+
+static bool put_vertex(const ebpo_places_picture *p, FILE *f, uint64_t v)
+{
+    uint8_t row[VERTEX_BYTES];
+    double x[3];
+    ebpo_mesh_position(p->mesh, v, x);
+    for (int k = 0; k < 3; k++) {
+        uint64_t bits;
+        memcpy(&bits, &x[k], sizeof bits);
+        ebpo_store64(row + 8 * k, bits);
+    }
+    return fwrite(row, 1, sizeof row, f) == sizeof row;
+}
+
+/* rank   of each vertex among those that were written; NULL: their numbers */
+static bool put_face(const ebpo_places_picture *p, FILE *f, uint64_t face, const uint32_t *rank)
+{
+    uint8_t row[FACE_BYTES] = { 3 };
+    for (int k = 0; k < 3; k++) {
+        uint32_t v = p->mesh->faces[3 * face + (unsigned)k];
+        ebpo_store32(row + 1 + 4 * k, rank ? rank[v] : v);
+    }
+    put_colour(p->face[face], row + 13);
+    return fwrite(row, 1, sizeof row, f) == sizeof row;
+}
+
+/* The order in which vertices and faces are written, and the vertices' ranks in it; NULL: as they
+ * are. */
+typedef struct written {
+    uint32_t *vertices, *faces, *rank;
+} written;
+
+static ebpo_status order_all(const ebpo_mesh *mesh, written *w, ebpo_error *error)
+{
+    const struct ebpo_arrangement *a = mesh->arrangement;
+    if (!a)
+        return EBPO_OK;
+    w->vertices = in_source_order(mesh, a->vertex_source, mesh->vertex_count);
+    w->faces = in_source_order(mesh, a->face_source, mesh->face_count);
+    w->rank = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *w->rank);
+    if (!w->vertices || !w->faces || !w->rank)
+        return ebpo_workspace_fail(mesh->workspace, mesh->face_count * sizeof *w->faces, error);
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, mesh->vertex_count)
+        w->rank[w->vertices[i]] = (uint32_t)i;
+    return EBPO_OK;
+}
+
+static bool put_all(const ebpo_places_picture *p, FILE *f, const written *w)
+{
+    const ebpo_mesh *mesh = p->mesh;
+    bool good = true;
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, mesh->vertex_count)
+        good = good && put_vertex(p, f, w->vertices ? w->vertices[i] : i);
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, mesh->face_count)
+        good = good && put_face(p, f, w->faces ? w->faces[i] : i, w->rank);
+    return good;
+}
+
+ebpo_status ebpo_places_picture_write(ebpo_places_picture *picture, const ebpo_mesh_report *report,
+                                      ebpo_error *error)
+{
+    const ebpo_mesh *mesh = picture->mesh;
+    written w = { NULL, NULL, NULL };
+    FILE *f = ebpo_publish_stream(&picture->target);
+    ebpo_status status = f ? EBPO_OK : ebpo_fail_memory(error, BUFSIZ);
+    if (status == EBPO_OK)
+        status = order_all(mesh, &w, error);
+    if (status == EBPO_OK) {
+        print_header(picture, f, report);
+        if (!put_all(picture, f, &w) || ferror(f))
+            status = ebpo_fail_errno(error, picture->target.shown, "could not be written");
+    }
+    ebpo_array_free(mesh->workspace, w.vertices);
+    ebpo_array_free(mesh->workspace, w.faces);
+    ebpo_array_free(mesh->workspace, w.rank);
+    return status == EBPO_OK ? ebpo_publish_commit(&picture->target, error) : status;
+}
+
+void ebpo_places_picture_end(ebpo_places_picture *picture)
+{
+    if (picture->mesh)
+        ebpo_array_free(picture->mesh->workspace, picture->face);
+    ebpo_publish_abort(&picture->target);
 }

@@ -6,8 +6,10 @@
 #ifndef EBPO_MESH_IMPORT_BUILD_H
 #define EBPO_MESH_IMPORT_BUILD_H
 
-#include <ebpo/mesh.h>
 #include <locale.h>
+
+#include <ebpo/base.h>
+#include <ebpo/mesh.h>
 
 #define IMPORT_MOST (UINT64_C(0xfffffffe))
 #define IMPORT_NONE UINT32_MAX /* no vertex has this number */
@@ -111,5 +113,15 @@ void ebpo_import_word_text(char text[IMPORT_WORD_TEXT], const char *s, size_t n)
 
 /* Frees all but the mesh. */
 void ebpo_import_free(import_build *b);
+
+/* Joining vertices at identical positions. */
+
+/* Moves the first vertex of each position to the front of xyz [count][3], which are doubles or
+ * floats, in order, and writes each old vertex's new number to map [count]. Positions are the same
+ * when their bits are, or both coordinates are zero (STL writers mix -0 and 0 along planes of
+ * symmetry; the first one's sign stays). count <= 2^32 - 2. *welded: vertices left. EBPO_E_MEMORY
+ * only. */
+EBPO_MUST_USE ebpo_status ebpo_import_weld(void *xyz, bool doubles, uint64_t count, uint32_t *map,
+                                           uint64_t *welded, ebpo_error *error);
 
 #endif

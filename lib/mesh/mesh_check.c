@@ -5,13 +5,386 @@
 #include <string.h>
 
 #include "core/alloc.h"
+#include "core/arrays.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/workspace.h"
-#include "mesh/mesh_frame.h"
+#include "geometry/predicates.h"
 #include "mesh/mesh_check_parts.h"
+#include "mesh/mesh_frame.h"
 #include "mesh/positions.h"
+#include "mesh/adjacency.h"
+
+/* Places while checking, a list for each worker. */
+void ebpo_found_add(const ebpo_check *check, unsigned worker, ebpo_found found)
+{
+    ebpo_found_list *list = &check->found[worker];
+    const ebpo_mesh *mesh = check->mesh;
+    if (!ebpo_array_grow(mesh->workspace, &list->item, &list->capacity, list->count + 1,
+                         sizeof *list->item)) {
+        list->short_of_memory = true;
+        return;
+    }
+    if (ebpo_found_is_edge(found.kind) &&
+        ebpo_mesh_source_vertex(mesh, found.b) < ebpo_mesh_source_vertex(mesh, found.a)) {
+        uint32_t a = found.a;
+        found.a = found.b;
+        found.b = a;
+    }
+    list->item[list->count++] = found;
+}
+
+enum { FACE_GRAIN = 1 << 14 };
+
+typedef struct face_block {
+    ebpo_sum area2, volume6; /* twice the area, six times the volume */
+    ebpo_finding zero_area, index_repeated;
+} face_block;
+
+typedef struct face_pass {
+    const ebpo_check *check;
+    face_block *blocks;
+    double centre[3];
+} face_pass;
+
+/* Root of v. Paths are halved on the way; any thread may do so, as a parent only ever moves towards
+ * the root. */
+static uint32_t find_root(uint32_t *parents, uint32_t v)
+{
+    for (;;) {
+        uint32_t parent = __atomic_load_n(&parents[v], __ATOMIC_RELAXED);
+        if (parent == v)
+            return v;
+        uint32_t grand = __atomic_load_n(&parents[parent], __ATOMIC_RELAXED);
+        if (grand != parent)
+            __atomic_compare_exchange_n(&parents[v], &parent, grand, true, __ATOMIC_RELAXED,
+                                        __ATOMIC_RELAXED);
+        v = grand;
+    }
+}
+
+/* The higher root goes below the lower one, so there are no cycles; the number of roots is the same
+ * in any order. */
+static void join(uint32_t *parents, uint32_t a, uint32_t b)
+{
+    for (;;) {
+        a = find_root(parents, a);
+        b = find_root(parents, b);
+        if (a == b)
+            return;
+        if (a < b) {
+            uint32_t t = a;
+            a = b;
+            b = t;
+        }
+        uint32_t expected = a;
+        if (__atomic_compare_exchange_n(&parents[a], &expected, b, false, __ATOMIC_RELAXED,
+                                        __ATOMIC_RELAXED))
+            return;
+    }
+}
+
+/* True when rounding cannot hide a zero: |ad - bc| against its error bound (Shewchuk
+ * 1997, 3.33e-16), and no underflow or overflow. */
+static bool surely_nonzero(double a, double b, double c, double d)
+{
+    double permanent = fabs(a * d) + fabs(b * c);
+    return permanent > 1e-280 && permanent < 1e300 && fabs(a * d - b * c) > 1e-15 * permanent;
+}
+
+static bool zero_area(const double a[3], const double b[3], const double c[3])
+{
+    double p[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
+    double q[3] = { c[0] - a[0], c[1] - a[1], c[2] - a[2] };
+    if (surely_nonzero(p[0], p[1], q[0], q[1]) || surely_nonzero(p[1], p[2], q[1], q[2]) ||
+        surely_nonzero(p[2], p[0], q[2], q[0]))
+        return false;
+    return ebpo_zero_area(a, b, c);
+}
+
+static double cross_length(const ebpo_units *u, const double cross[3])
+{
+    if (!u->scaled)
+        return sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
+    const int exponent[3] = { u->exponent[1] + u->exponent[2], u->exponent[2] + u->exponent[0],
+                              u->exponent[0] + u->exponent[1] };
+    return ebpo_scaled_length(cross, exponent, u->area);
+}
+
+static void measure(face_block *block, const ebpo_units *units, const double centre[3],
+                    const double a[3], const double cross[3])
+{
+    ebpo_sum_add(&block->area2, cross_length(units, cross));
+    ebpo_sum_add(&block->volume6, (a[0] - centre[0]) * cross[0] + (a[1] - centre[1]) * cross[1] +
+                                      (a[2] - centre[2]) * cross[2]);
+}
+
+static void note(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
+                 ebpo_finding_kind kind, uint64_t face)
+{
+    ebpo_check_note(check, worker, finding, kind, ebpo_mesh_source_face(check->mesh, face),
+                    (uint32_t)face, (uint32_t)face);
+}
+
+static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                         ebpo_error *error)
+{
+    (void)error;
+    const face_pass *pass = context;
+    const ebpo_mesh *mesh = pass->check->mesh;
+    uint32_t *parents = pass->check->parents;
+    face_block block = { .area2 = { .adds = 0 } };
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, begin, end) {
+        const uint32_t *v = mesh->faces + 3 * f;
+        join(parents, v[0], v[1]);
+        join(parents, v[1], v[2]);
+        if (ebpo_face_repeats_index(v)) {
+            note(pass->check, worker, &block.index_repeated, EBPO_FOUND_INDEX_REPEATED_FACE, f);
+            note(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
+            continue;
+        }
+        double a[3], b[3], c[3], cross[3];
+        ebpo_check_position(pass->check, v[0], a);
+        ebpo_check_position(pass->check, v[1], b);
+        ebpo_check_position(pass->check, v[2], c);
+        ebpo_face_cross(a, b, c, cross);
+        measure(&block, &pass->check->units, pass->centre, a, cross);
+        if (pass->check->units.scaled) { /* the test is exact: on the coordinates themselves */
+            ebpo_mesh_position(mesh, v[0], a);
+            ebpo_mesh_position(mesh, v[1], b);
+            ebpo_mesh_position(mesh, v[2], c);
+        }
+        if (zero_area(a, b, c))
+            note(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
+    }
+    pass->blocks[begin / FACE_GRAIN] = block;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error)
+{
+    ebpo_mesh_report *r = check->report;
+    uint64_t count = check->mesh->face_count, blocks = (count + FACE_GRAIN - 1) / FACE_GRAIN;
+    face_pass pass = { .check = check, .blocks = ebpo_alloc(blocks, sizeof *pass.blocks) };
+    if (!pass.blocks)
+        return ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
+    for (int k = 0; k < 3; k++)
+        pass.centre[k] = ldexp(0.5 * r->min[k] + 0.5 * r->max[k], -check->units.exponent[k]);
+    ebpo_status status = ebpo_parallel_for(check->threads, NULL, count, FACE_GRAIN, faces, &pass,
+                                           &check->progress, "measuring faces", error);
+    ebpo_sum area2 = { .adds = 0 }, volume6 = { .adds = 0 };
+    for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {
+        ebpo_sum_merge(&area2, &pass.blocks[i].area2);
+        ebpo_sum_merge(&volume6, &pass.blocks[i].volume6);
+        ebpo_finding_merge(&r->zero_area_faces, &pass.blocks[i].zero_area);
+        ebpo_finding_merge(&r->index_repeated_faces, &pass.blocks[i].index_repeated);
+    }
+    r->area = ldexp(ebpo_sum_value(&area2) / 2, check->units.area);
+    r->volume = ldexp(ebpo_sum_value(&volume6) / 6, check->units.volume);
+    free(pass.blocks);
+    return status;
+}
+
+enum { STAR_GRAIN = 1 << 13 };
+
+typedef struct star_block {
+    ebpo_finding boundary, nonmanifold, misoriented, unbalanced, bowtie, repeated_face;
+    ebpo_sum length;
+    uint64_t edges, components;
+} star_block;
+
+typedef struct scratch {
+    ebpo_star star;
+    uint32_t *fans; /* union-find over the star's faces */
+    uint64_t fan_capacity;
+    ebpo_same_faces same;
+    ebpo_boundary *boundary;
+    unsigned worker;
+} scratch;
+
+typedef struct star_pass {
+    ebpo_check *check;
+    star_block *blocks;
+    scratch *scratch; /* one for each worker */
+} star_pass;
+
+static uint32_t fan_root(uint32_t *fans, uint32_t i)
+{
+    while (fans[i] != i)
+        i = fans[i] = fans[fans[i]];
+    return i;
+}
+
+/* The faces of an edge that is used twice belong to one fan; returns how many fans that joined.
+ * Where more faces meet, a fan ends. */
+static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t uses)
+{
+    if (uses != 2 || links[0].entry == EBPO_NO_INDEX || links[1].entry == EBPO_NO_INDEX)
+        return 0;
+    uint32_t a = fan_root(fans, links[0].entry), b = fan_root(fans, links[1].entry);
+    fans[a] = b;
+    return a != b;
+}
+
+static bool classify_edge(const ebpo_check *check, star_block *block, const scratch *s, uint32_t v,
+                          const ebpo_link *links, uint64_t uses)
+{
+    const ebpo_mesh *mesh = check->mesh;
+    uint64_t out = 0;
+    uint32_t neighbour = ebpo_link_neighbour(&links[0]);
+    uint64_t face = UINT64_MAX; /* the lowest */
+    for (uint64_t i = 0; i < uses; i++) {
+        uint64_t source = ebpo_mesh_source_face(mesh, ebpo_link_face(&links[i]));
+        out += links[i].out;
+        face = source < face ? source : face;
+    }
+    block->edges++;
+    if (uses > 2)
+        ebpo_check_note(check, s->worker, &block->nonmanifold, EBPO_FOUND_NONMANIFOLD_EDGE, face, v,
+                        neighbour);
+    if (uses == 2 && out != 1)
+        ebpo_check_note(check, s->worker, &block->misoriented, EBPO_FOUND_MISORIENTED_EDGE, face, v,
+                        neighbour);
+    if (2 * out != uses)
+        ebpo_check_note(check, s->worker, &block->unbalanced, EBPO_FOUND_UNBALANCED_EDGE, face, v,
+                        neighbour);
+    if (uses != 1)
+        return true;
+    ebpo_check_note(check, s->worker, &block->boundary, EBPO_FOUND_BOUNDARY_EDGE, face, v,
+                    neighbour);
+    return ebpo_boundary_add(s->boundary, mesh, out ? v : neighbour, out ? neighbour : v,
+                             ebpo_link_face(&links[0]));
+}
+
+static double edge_length(const ebpo_check *check, uint32_t a, uint32_t b)
+{
+    double p[3], q[3];
+    ebpo_check_position(check, a, p);
+    ebpo_check_position(check, b, q);
+    double d[3] = { q[0] - p[0], q[1] - p[1], q[2] - p[2] };
+    if (check->units.scaled)
+        return ebpo_scaled_length(d, check->units.exponent, check->units.length);
+    return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+}
+
+static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
+{
+    const ebpo_star *star = &s->star;
+    uint64_t fans = star->faces;
+    if (!ebpo_array_grow_late(check->mesh->workspace, &s->fans, &s->fan_capacity, star->faces,
+                              sizeof *s->fans))
+        return false;
+    for (uint64_t i = 0; i < star->faces; i++)
+        s->fans[i] = (uint32_t)i;
+    for (uint64_t begin = 0, end; begin < star->count; begin = end) {
+        end = ebpo_star_run_end(star, begin);
+        fans -= join_fans(s->fans, star->links + begin, end - begin);
+        uint32_t neighbour = ebpo_link_neighbour(&star->links[begin]);
+        if (neighbour < v) /* the edge is counted at its lower end */
+            continue;
+        ebpo_sum_add(&block->length, edge_length(check, v, neighbour));
+        if (!classify_edge(check, block, s, v, star->links + begin, end - begin))
+            return false;
+    }
+    if (fans > 1)
+        ebpo_check_note(check, s->worker, &block->bowtie, EBPO_FOUND_BOWTIE_VERTEX,
+                        ebpo_mesh_source_vertex(check->mesh, v), v, v);
+    return true;
+}
+
+static bool check_repeated(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
+{
+    if (!ebpo_same_faces_gather(&s->same, &check->stars, check->mesh, v))
+        return false;
+    uint32_t first = 0; /* of the same vertices */
+    for (uint64_t i = 0; i < s->same.count; i++)
+        if (i && ebpo_same_faces_repeats(&s->same, i))
+            ebpo_check_note(check, s->worker, &block->repeated_face, EBPO_FOUND_REPEATED_FACE,
+                            s->same.item[i].source, s->same.item[i].face, first);
+        else
+            first = s->same.item[i].face;
+    return true;
+}
+
+static ebpo_status stars(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                         ebpo_error *error)
+{
+    star_pass *pass = context;
+    const ebpo_check *check = pass->check;
+    scratch *s = &pass->scratch[worker];
+    star_block block = { .edges = 0 };
+    EBPO_FOR_ITEMS_SCATTERED(check->mesh->workspace, v, begin, end) {
+        uint32_t vertex = (uint32_t)v;
+        uint64_t degree = ebpo_stars_degree(&check->stars, vertex);
+        if (degree == 0)
+            continue;
+        block.components += check->parents[v] == v;
+        if (!ebpo_star_gather(&s->star, &check->stars, check->mesh, vertex) ||
+            !check_edges(check, &block, s, vertex) || !check_repeated(check, &block, s, vertex))
+            return ebpo_workspace_fail(check->mesh->workspace, degree * 2 * sizeof *s->star.links,
+                                       error);
+    }
+    pass->blocks[begin / STAR_GRAIN] = block;
+    return EBPO_OK;
+}
+
+static void join_blocks(const ebpo_check *check, const star_block *blocks, uint64_t count)
+{
+    ebpo_mesh_report *r = check->report;
+    ebpo_sum length = { .adds = 0 };
+    for (uint64_t i = 0; i < count; i++) {
+        const star_block *b = &blocks[i];
+        ebpo_finding_merge(&r->boundary_edges, &b->boundary);
+        ebpo_finding_merge(&r->nonmanifold_edges, &b->nonmanifold);
+        ebpo_finding_merge(&r->misoriented_edges, &b->misoriented);
+        ebpo_finding_merge(&r->unbalanced_edges, &b->unbalanced);
+        ebpo_finding_merge(&r->bowtie_vertices, &b->bowtie);
+        ebpo_finding_merge(&r->repeated_faces, &b->repeated_face);
+        ebpo_sum_merge(&length, &b->length);
+        r->edges += b->edges;
+        r->components += b->components;
+    }
+    r->mean_edge =
+        r->edges ? ldexp(ebpo_sum_value(&length) / (double)r->edges, check->units.length) : 0;
+}
+
+static void free_scratch(scratch *s, ebpo_workspace *workspace)
+{
+    ebpo_star_free(&s->star);
+    ebpo_array_free(workspace, s->fans);
+    ebpo_same_faces_free(&s->same);
+}
+
+ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
+{
+    uint64_t count = check->mesh->vertex_count, blocks = (count + STAR_GRAIN - 1) / STAR_GRAIN;
+    star_pass pass = { .check = check,
+                       .blocks = ebpo_alloc(blocks, sizeof *pass.blocks),
+                       .scratch = ebpo_alloc_zero(check->threads, sizeof *pass.scratch) };
+    ebpo_boundary *boundaries = ebpo_alloc_zero(check->threads, sizeof *boundaries);
+    ebpo_status status = EBPO_OK;
+    if (!pass.blocks || !pass.scratch || !boundaries) {
+        status = ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
+        goto done;
+    }
+    for (unsigned t = 0; t < check->threads; t++)
+        pass.scratch[t].boundary = &boundaries[t], pass.scratch[t].worker = t;
+    status = ebpo_parallel_for(check->threads, NULL, count, STAR_GRAIN, stars, &pass,
+                               &check->progress, "checking edges", error);
+    if (status != EBPO_OK)
+        goto done;
+    join_blocks(check, pass.blocks, blocks);
+    status = ebpo_boundary_join(&check->boundary, boundaries, check->threads, check->mesh, error);
+done:
+    for (unsigned t = 0; pass.scratch && t < check->threads; t++)
+        free_scratch(&pass.scratch[t], check->mesh->workspace);
+    for (unsigned t = 0; boundaries && t < check->threads; t++)
+        ebpo_boundary_free(&boundaries[t]);
+    free(boundaries);
+    free(pass.scratch);
+    free(pass.blocks);
+    return status;
+}
 
 enum { VERTEX_GRAIN = 1 << 15 };
 

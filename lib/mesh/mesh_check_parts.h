@@ -8,7 +8,7 @@
 #include <ebpo/places.h>
 
 #include "mesh/boundary.h"
-#include "mesh/stars.h"
+#include "mesh/adjacency.h"
 #include "mesh/sum.h"
 
 /* Along axis k, lengths are measured in units of 2^exponent[k], where squares and cubes could leave

@@ -1,19 +1,100 @@
 #include "core/strict_fp.h"
 
-#include "mesh/off.h"
-
 #include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
-#include "mesh/attributes.h"
-#include "core/workspace.h"
+#include <ebpo/base.h>
+
+#include "core/arrays.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "geometry/decimal.h"
-#include "mesh/off_text.h"
+#include "mesh/attributes.h"
+#include "mesh/off.h"
+
+/* The words of an OFF file. */
+
+typedef struct off_text {
+    const char *at, *end;
+    uint64_t line; /* of `at`, from 1 */
+} off_text;
+
+typedef struct off_word {
+    const char *s;
+    size_t n;
+} off_word;
+
+/* The next word, past comments and ends of lines; false at the end of the file. */
+bool ebpo_off_next(off_text *t, off_word *word);
+
+/* The next word of this line; false at its end. */
+bool ebpo_off_next_here(off_text *t, off_word *word);
+
+/* Lines that have words, from the next line on. */
+uint64_t ebpo_off_lines(const off_text *t);
+
+static bool ends_line(char c) { return c == '\n' || c == '\r'; }
+
+static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
+
+/* A comment may follow a word without a blank; in 1.#INF and 1.#IND, as older programs write what
+ * is not finite, no comment begins. */
+static bool begins_comment(const char *word, const char *at, const char *end)
+{
+    return *at == '#' && !(at - word >= 2 && at[-2] == '1' && at[-1] == '.' && end - at > 1 &&
+                           at[1] && strchr("IQS", at[1]));
+}
+
+bool ebpo_off_next_here(off_text *t, off_word *word)
+{
+    while (t->at < t->end && is_blank(*t->at))
+        t->at++;
+    if (t->at < t->end && *t->at == '#')
+        while (t->at < t->end && !ends_line(*t->at))
+            t->at++;
+    const char *s = t->at;
+    while (t->at < t->end && !is_blank(*t->at) && !ends_line(*t->at) &&
+           !begins_comment(s, t->at, t->end))
+        t->at++;
+    *word = (off_word){ s, (size_t)(t->at - s) };
+    return word->n > 0;
+}
+
+/* False at the end of the file. */
+static bool next_line(off_text *t)
+{
+    if (t->at == t->end)
+        return false;
+    t->at += t->end - t->at > 1 && t->at[0] == '\r' && t->at[1] == '\n' ? 2 : 1;
+    t->line++;
+    return true;
+}
+
+bool ebpo_off_next(off_text *t, off_word *word)
+{
+    while (!ebpo_off_next_here(t, word))
+        if (!next_line(t))
+            return false;
+    return true;
+}
+
+uint64_t ebpo_off_lines(const off_text *t)
+{
+    off_text ahead = *t;
+    off_word word;
+    uint64_t lines = 0;
+    do {
+        while (ebpo_off_next_here(&ahead, &word))
+            continue;
+        if (!next_line(&ahead))
+            return lines;
+        off_text line = ahead;
+        lines += ebpo_off_next_here(&line, &word);
+    } while (true);
+}
 
 enum { MOST_REST = 16, RELEASE = 1 << 22 };
 

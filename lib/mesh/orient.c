@@ -7,11 +7,10 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/workspace.h"
-#include "mesh/edge_faces.h"
+#include "core/arrays.h"
+#include "mesh/adjacency.h"
 #include "mesh/mesh_frame.h"
 #include "mesh/mesh_parts.h"
-#include "mesh/stars.h"
 #include "mesh/sum.h"
 
 enum { FACE_GRAIN = 1 << 14, VERTEX_GRAIN = 1 << 13 };

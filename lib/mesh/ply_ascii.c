@@ -8,9 +8,7 @@
 
 #include "core/error.h"
 #include "geometry/decimal.h"
-#include "mesh/ply_ascii.h"
-#include "mesh/ply_attributes.h"
-#include "mesh/ply_faces.h"
+#include "mesh/ply_parts.h"
 
 typedef struct rows {
     ply_parser *p;

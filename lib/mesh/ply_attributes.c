@@ -1,4 +1,4 @@
-/* Properties become arrays of attributes; see ply_attributes.h. */
+/* Properties become arrays of attributes; see ply_parts.h. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -6,11 +6,11 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/workspace.h"
+#include "core/arrays.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "geometry/decimal.h"
-#include "mesh/ply_attributes.h"
+#include "mesh/ply_parts.h"
 
 _Static_assert((int)PLY_INT8 == (int)EBPO_ATTRIBUTE_INT8 &&
                    (int)PLY_FLOAT64 == (int)EBPO_ATTRIBUTE_FLOAT64,

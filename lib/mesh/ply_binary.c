@@ -1,15 +1,90 @@
-/* The body of a binary PLY file, of either byte order. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
 #include <string.h>
 
+#include <ebpo/mesh.h>
+
+#include "core/arrays.h"
 #include "core/error.h"
-#include "mesh/ply_attributes.h"
-#include "mesh/ply_binary.h"
-#include "mesh/ply_faces.h"
-#include "mesh/ply_number.h"
-#include "mesh/ply_plain.h"
+#include "core/parallel.h"
+#include "mesh/ply_parts.h"
+
+/* The numbers of a binary body, of either byte order. */
+
+static inline uint64_t ebpo_ply_load(const uint8_t *at, unsigned bytes, bool swap)
+{
+    uint8_t b1;
+    uint16_t b2;
+    uint32_t b4;
+    uint64_t b8;
+    switch (bytes) {
+    case 1: memcpy(&b1, at, 1); return b1;
+    case 2: memcpy(&b2, at, 2); return swap ? __builtin_bswap16(b2) : b2;
+    case 4: memcpy(&b4, at, 4); return swap ? __builtin_bswap32(b4) : b4;
+    default: memcpy(&b8, at, 8); return swap ? __builtin_bswap64(b8) : b8;
+    }
+}
+
+static inline int64_t ebpo_ply_load_integer(const uint8_t *at, ply_type type, bool swap)
+{
+    uint64_t raw = ebpo_ply_load(at, ebpo_ply_type_bytes(type), swap);
+    switch (type) {
+    case PLY_INT8: return (int8_t)raw;
+    case PLY_INT16: return (int16_t)raw;
+    case PLY_INT32: return (int32_t)raw;
+    default: return (int64_t)raw;
+    }
+}
+
+/* The value of an x, y or z at `at` becomes that of vertex `row`. */
+void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property *property,
+                               const uint8_t *at, bool swap);
+
+/* Rows of one size, on all cores. */
+
+/* Reads the rows from p->at on as far as all have one size, and says how many these were: all
+ * vertices or none; the faces before the first that is no triangle, or names a vertex that is not
+ * there. The others, and what is wrong with them, are the row by row reader's. */
+ebpo_status ebpo_ply_plain_vertices(ply_parser *p, const ply_element *element, bool swap,
+                                    uint64_t *done);
+ebpo_status ebpo_ply_plain_faces(ply_parser *p, const ply_element *element, bool swap,
+                                 uint64_t *done);
+
+static float load_float(const uint8_t *at, bool swap)
+{
+    uint32_t raw = (uint32_t)ebpo_ply_load(at, 4, swap);
+    float value;
+    memcpy(&value, &raw, sizeof value);
+    return value;
+}
+
+static double load_number(const uint8_t *at, ply_type type, bool swap)
+{
+    if (type == PLY_FLOAT32)
+        return (double)load_float(at, swap);
+    if (type != PLY_FLOAT64)
+        return (double)ebpo_ply_load_integer(at, type, swap);
+    uint64_t raw = ebpo_ply_load(at, 8, swap);
+    double value;
+    memcpy(&value, &raw, sizeof value);
+    return value;
+}
+
+/* Floats go through as bits: not even the payload of a NaN changes. */
+void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property *property,
+                               const uint8_t *at, bool swap)
+{
+    uint64_t place = 3 * row + (uint64_t)(property->role - PLY_ROLE_X);
+    if (mesh->xyz64) {
+        mesh->xyz64[place] = load_number(at, property->type, swap);
+    } else {
+        uint32_t raw = (uint32_t)ebpo_ply_load(at, 4, swap);
+        memcpy(&mesh->xyz32[place], &raw, sizeof raw);
+    }
+}
+
+/* The body of a binary PLY file, of either byte order. */
 
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
 enum { FOREIGN = PLY_BIG };
@@ -158,4 +233,167 @@ ebpo_status ebpo_ply_binary_element(ply_parser *p, const ply_element *element, b
             status = ebpo_ply_report(p);
     }
     return status;
+}
+
+/* Rows of one size, on all cores: vertices without lists, and faces as long as each is a triangle.
+ */
+
+enum { GRAIN = 1 << 14 };
+
+typedef struct plain {
+    ply_parser *p;
+    const ply_element *element;
+    const ply_property *corners;    /* faces */
+    uint64_t row_bytes, corners_at; /* in a row */
+    uint64_t first;                 /* face of the mesh that row 0 becomes */
+    uint64_t deviates;              /* the first row that is no triangle of vertices that exist */
+    ebpo_progress progress;
+    bool swap;
+} plain;
+
+/* Reports rows as bytes of the file, as the row-by-row reader does. */
+static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    const plain *t = user;
+    (void)total;
+    return t->p->progress->report(t->p->progress->user, stage, t->p->at + done * t->row_bytes,
+                                  t->p->size);
+}
+
+static void put(const plain *t, const ply_property *property, uint64_t row, const uint8_t *at)
+{
+    if (ebpo_ply_is_attribute(property))
+        ebpo_ply_put_value(t->p, property, row,
+                           ebpo_ply_load(at, ebpo_ply_type_bytes(property->type), t->swap));
+}
+
+static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                            ebpo_error *error)
+{
+    const plain *t = context;
+    const ply_property *property = t->p->header.property + t->element->first;
+    (void)worker, (void)error;
+    const uint8_t *at = t->p->data + t->p->at + begin * t->row_bytes;
+    for (uint64_t row = begin; row < end; row++)
+        for (uint64_t i = 0; i < t->element->properties; i++) {
+            if (property[i].role != PLY_ROLE_NONE)
+                ebpo_ply_store_coordinate(t->p->mesh, row, &property[i], at, t->swap);
+            else
+                put(t, &property[i], row, at);
+            at += ebpo_ply_type_bytes(property[i].type);
+        }
+    return EBPO_OK;
+}
+
+static ebpo_status deviate(plain *t, uint64_t row)
+{
+    uint64_t known = __atomic_load_n(&t->deviates, __ATOMIC_RELAXED);
+    while (row < known && !__atomic_compare_exchange_n(&t->deviates, &known, row, true,
+                                                       __ATOMIC_RELAXED, __ATOMIC_RELAXED))
+        ;
+    return EBPO_E_FORMAT;
+}
+
+/* The other properties of a row of a triangle. */
+static void put_face(const plain *t, uint64_t row, const uint8_t *at)
+{
+    const ply_property *property = t->p->header.property + t->element->first;
+    for (uint64_t i = 0; i < t->element->properties; i++) {
+        put(t, &property[i], t->first + row, at);
+        at += property[i].list ? ebpo_ply_type_bytes(property[i].count_type) +
+                                     3 * ebpo_ply_type_bytes(property[i].type)
+                               : ebpo_ply_type_bytes(property[i].type);
+    }
+}
+
+/* After a row that deviates nothing is where it was expected; those rows are read again. */
+static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                         ebpo_error *error)
+{
+    plain *t = context;
+    uint64_t count = t->p->header.element[t->p->header.vertex].count;
+    unsigned count_bytes = ebpo_ply_type_bytes(t->corners->count_type),
+             bytes = ebpo_ply_type_bytes(t->corners->type);
+    (void)worker, (void)error;
+    const uint8_t *at = t->p->data + t->p->at + begin * t->row_bytes + t->corners_at;
+    uint32_t *face = t->p->mesh->faces + 3 * (t->first + begin);
+    for (uint64_t row = begin; row < end; row++, at += t->row_bytes) {
+        for (unsigned k = 0; k <= 3; k++) {
+            int64_t value = k ? ebpo_ply_load_integer(at + count_bytes + (k - 1) * bytes,
+                                                      t->corners->type, t->swap)
+                              : ebpo_ply_load_integer(at, t->corners->count_type, t->swap);
+            if (k ? (uint64_t)value >= count : value != 3)
+                return deviate(t, row);
+            if (k)
+                *face++ = (uint32_t)value;
+        }
+        if (t->p->lost && t->element->properties > 1)
+            put_face(t, row, at - t->corners_at);
+    }
+    return EBPO_OK;
+}
+
+/* Fills in what is known of rows of triangles; false when rows have another list, or would not fit.
+ */
+static bool describe_triangles(plain *t)
+{
+    uint64_t at = 0;
+    for (uint64_t i = 0; i < t->element->properties; i++) {
+        const ply_property *property = t->p->header.property + t->element->first + i;
+        if (!property->list) {
+            at += ebpo_ply_type_bytes(property->type);
+            continue;
+        }
+        if (property->role != PLY_ROLE_CORNERS || t->corners)
+            return false;
+        t->corners = property;
+        t->corners_at = at;
+        at += ebpo_ply_type_bytes(property->count_type) + 3 * ebpo_ply_type_bytes(property->type);
+    }
+    t->row_bytes = at;
+    t->first = t->p->mesh->face_count;
+    return t->corners && t->element->count <= (t->p->size - t->p->at) / t->row_bytes &&
+           t->element->count <= t->p->face_capacity - t->first;
+}
+
+static ebpo_status run(plain *t, ebpo_task_fn task)
+{
+    ply_parser *p = t->p;
+    bool watched = p->progress && p->progress->report;
+    t->progress = (ebpo_progress){ watched ? report : NULL, t };
+    ebpo_status status = ebpo_parallel_for(p->threads, p->mesh->workspace, t->element->count, GRAIN,
+                                           task, t, &t->progress, "reading", NULL);
+    return status == EBPO_E_CANCELLED ? ebpo_ply_fail_stopped(p) : status;
+}
+
+ebpo_status ebpo_ply_plain_vertices(ply_parser *p, const ply_element *element, bool swap,
+                                    uint64_t *done)
+{
+    plain t = { .p = p, .element = element, .row_bytes = element->row_bytes, .swap = swap };
+    *done = 0;
+    if (element->has_list || !element->row_bytes ||
+        element->count > (p->size - p->at) / element->row_bytes)
+        return EBPO_OK;
+    ebpo_status status = run(&t, vertices);
+    if (status == EBPO_OK) {
+        *done = element->count;
+        p->at += element->count * t.row_bytes;
+    }
+    return status;
+}
+
+ebpo_status ebpo_ply_plain_faces(ply_parser *p, const ply_element *element, bool swap,
+                                 uint64_t *done)
+{
+    plain t = { .p = p, .element = element, .swap = swap, .deviates = element->count };
+    *done = 0;
+    if (!describe_triangles(&t))
+        return EBPO_OK;
+    ebpo_status status = run(&t, faces);
+    if (status != EBPO_OK && status != EBPO_E_FORMAT)
+        return status;
+    *done = t.deviates;
+    p->at += t.deviates * t.row_bytes;
+    p->mesh->face_count += t.deviates;
+    return EBPO_OK;
 }

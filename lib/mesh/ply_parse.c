@@ -1,3 +1,4 @@
+/* Reading a whole PLY file: its header, the body by elements, what is left out. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -6,16 +7,12 @@
 #include <string.h>
 
 #include "core/alloc.h"
+#include "core/arrays.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/workspace.h"
 #include "io/file_source.h"
 #include "mesh/ply.h"
-#include "mesh/ply_ascii.h"
-#include "mesh/ply_attributes.h"
-#include "mesh/ply_binary.h"
-#include "mesh/ply_state.h"
-#include "mesh/ply_unused.h"
+#include "mesh/ply_parts.h"
 
 #define MOST_VERTICES (UINT64_C(0xfffffffe))
 

@@ -1,17 +1,418 @@
-/* Writing a mesh as a binary little-endian PLY file. */
+/* The header of a PLY file to be written, and what its rows hold. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <ebpo/mesh.h>
+
 #include "core/alloc.h"
+#include "core/arrays.h"
 #include "core/endian.h"
 #include "core/error.h"
-#include "core/workspace.h"
+#include "core/text_stream.h"
 #include "io/publish.h"
-#include <ebpo/mesh.h>
-#include "mesh/ply_layout.h"
+#include "mesh/attributes.h"
+#include "mesh/ply_parts.h"
+
+/* What a PLY file to be written is made of: the properties of a mesh and of its attributes, in the
+ * order of the header that they were read with, or in their own. */
+
+typedef struct ply_out_property {
+    ply_role role;      /* of positions and corners; else an attribute's: */
+    uint32_t attribute; /* which array */
+    uint32_t column;
+    ply_type type, count_type; /* of positions: as they are written */
+} ply_out_property;
+
+typedef struct ply_out_element {
+    ply_kind kind;
+    uint64_t rows, first, properties; /* in ply_layout.property */
+} ply_out_element;
+
+typedef struct ply_layout {
+    ply_out_element *element;
+    uint64_t elements, element_capacity;
+    ply_out_property *property;
+    uint64_t properties, property_capacity;
+    char *header; /* malloc's, `header_bytes` of it */
+    size_t header_bytes;
+} ply_layout;
+
+/* `mesh` has been checked. */
+EBPO_MUST_USE ebpo_status ebpo_ply_layout_make(ply_layout *out, const ebpo_mesh *mesh,
+                                               ebpo_error *error);
+void ebpo_ply_layout_free(ply_layout *layout);
+
+typedef struct making {
+    ply_layout *out;
+    const ebpo_mesh *mesh;
+    FILE *text;  /* the header */
+    bool *taken; /* [arrays * EBPO_ATTRIBUTE_COLUMNS] columns that stand in the header */
+    ply_type index_type;
+    bool faces; /* the element of faces stands in the header */
+    bool no_memory;
+} making;
+
+static const char *const type_words[] = { "char", "uchar", "short", "ushort",
+                                          "int",  "uint",  "float", "double" };
+
+static ply_out_element *add_element(making *m, ply_kind kind, uint64_t rows)
+{
+    ply_layout *l = m->out;
+    if (!ebpo_grow(&l->element, &l->element_capacity, l->elements + 1, sizeof *l->element)) {
+        m->no_memory = true;
+        return NULL;
+    }
+    l->element[l->elements] = (ply_out_element){ kind, rows, l->properties, 0 };
+    return &l->element[l->elements++];
+}
+
+static void add_property(making *m, ply_out_property property)
+{
+    ply_layout *l = m->out;
+    if (m->no_memory ||
+        !ebpo_grow(&l->property, &l->property_capacity, l->properties + 1, sizeof *l->property)) {
+        m->no_memory = true;
+        return;
+    }
+    l->property[l->properties++] = property;
+    l->element[l->elements - 1].properties++;
+}
+
+static uint64_t array_count(const making *m)
+{
+    return m->mesh->attributes ? m->mesh->attributes->count : 0;
+}
+
+/* --- positions and corners --- */
+
+static ply_type position_type(const ebpo_mesh *mesh)
+{
+    return mesh->xyz64 ? PLY_FLOAT64 : PLY_FLOAT32;
+}
+
+/* Whether a coordinate is a value of the type, bit for bit. */
+static bool holds(ply_type type, double v)
+{
+    static const double least[] = { INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0 }, most[] = {
+        INT8_MAX, UINT8_MAX, INT16_MAX, UINT16_MAX, INT32_MAX, UINT32_MAX
+    };
+    uint64_t bits, back;
+    double again;
+    if (type == PLY_FLOAT64)
+        return true;
+    if (type != PLY_FLOAT32 && !(v >= least[type] && v <= most[type]))
+        return false;
+    again = type == PLY_FLOAT32 ? (double)(float)v : (double)(int64_t)v;
+    memcpy(&bits, &v, sizeof v);
+    memcpy(&back, &again, sizeof again);
+    return bits == back;
+}
+
+/* The type of the header, if all coordinates of the axis are values of it. */
+static ply_type axis_type(const making *m, ply_role role, ply_type wanted)
+{
+    const ebpo_mesh *mesh = m->mesh;
+    uint64_t axis = (uint64_t)(role - PLY_ROLE_X);
+    if (!mesh->xyz64)
+        return PLY_FLOAT32;
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, wanted == PLY_FLOAT64 ? 0 : mesh->vertex_count)
+        if (!holds(wanted, mesh->xyz64[3 * i + axis]))
+            return PLY_FLOAT64;
+    return wanted;
+}
+
+/* A line of the header that is followed, as it is: types have several names. */
+static void put_line(making *m, ply_word line) { fprintf(m->text, "%.*s\n", (int)line.n, line.s); }
+
+/* `line`: of the header, which names the type that is wanted; or of no length. */
+static void add_position(making *m, ply_role role, ply_type wanted, ply_word line)
+{
+    ply_type type = axis_type(m, role, wanted);
+    if (line.n && type == wanted)
+        put_line(m, line);
+    else
+        fprintf(m->text, "property %s %c\n", type_words[type], "xyz"[role - PLY_ROLE_X]);
+    add_property(m, (ply_out_property){ .role = role, .type = type });
+}
+
+static void add_corners(making *m, ply_type count, ply_type wanted, ply_word name, ply_word line)
+{
+    static const uint64_t most[] = { INT8_MAX,   UINT8_MAX, INT16_MAX,
+                                     UINT16_MAX, INT32_MAX, UINT32_MAX };
+    ply_type type = m->mesh->vertex_count <= most[wanted] ? wanted : m->index_type;
+    if (line.n && type == wanted)
+        put_line(m, line);
+    else
+        fprintf(m->text, "property list %s %s %.*s\n", type_words[count], type_words[type],
+                (int)name.n, name.s);
+    add_property(m,
+                 (ply_out_property){ .role = PLY_ROLE_CORNERS, .type = type, .count_type = count });
+}
+
+/* --- attributes --- */
+
+static bool is_word(const char *s, size_t n, ply_word word)
+{
+    return n == word.n && memcmp(s, word.s, n) == 0;
+}
+
+/* The column of that name, or -1. */
+static int find_column(const ebpo_attribute *a, const bool *taken, ply_word name)
+{
+    const char *s = a->names;
+    for (int column = 0; *s; column++) {
+        size_t n = strcspn(s, " ");
+        if (!taken[column] && is_word(s, n, name))
+            return column;
+        s += n + (s[n] == ' ');
+    }
+    return -1;
+}
+
+static void add_column(making *m, uint64_t array, uint32_t column)
+{
+    const ebpo_attribute *a = &m->mesh->attributes->array[array];
+    m->taken[array * EBPO_ATTRIBUTE_COLUMNS + column] = true;
+    add_property(m, (ply_out_property){ .role = PLY_ROLE_NONE,
+                                        .attribute = (uint32_t)array,
+                                        .column = column,
+                                        .type = (ply_type)a->type,
+                                        .count_type = (ply_type)a->list });
+}
+
+/* A property of the header becomes the column that it was read into; false: there is none. */
+static bool add_named(making *m, ply_word element, const ply_property *property)
+{
+    for (uint64_t i = 0; i < array_count(m); i++) {
+        const ebpo_attribute *a = &m->mesh->attributes->array[i];
+        bool list = a->list != EBPO_ATTRIBUTE_NO_LIST;
+        if (!is_word(a->element, strlen(a->element), element) || list != property->list ||
+            (int)a->type != (int)property->type || (list && a->list != (int)property->count_type))
+            continue;
+        int column = find_column(a, m->taken + i * EBPO_ATTRIBUTE_COLUMNS, property->name);
+        if (column < 0)
+            continue;
+        add_column(m, i, (uint32_t)column);
+        return true;
+    }
+    return false;
+}
+
+/* Columns of an element that no header names, in their own order. */
+static void add_rest(making *m, const char *element)
+{
+    for (uint64_t i = 0; i < array_count(m); i++) {
+        const ebpo_attribute *a = &m->mesh->attributes->array[i];
+        const char *s = a->names;
+        bool list = a->list != EBPO_ATTRIBUTE_NO_LIST;
+        if (!ebpo_attribute_is_of(a, element))
+            continue;
+        for (uint32_t column = 0; *s; column++) {
+            size_t n = strcspn(s, " ");
+            if (!m->taken[i * EBPO_ATTRIBUTE_COLUMNS + column]) {
+                add_column(m, i, column);
+                fprintf(m->text, "property %s%s%s%s %.*s\n", list ? "list " : "",
+                        list ? type_words[a->list] : "", list ? " " : "", type_words[a->type],
+                        (int)n, s);
+            }
+            s += n + (s[n] == ' ');
+        }
+    }
+}
+
+static uint64_t rows_of(const making *m, ply_word element)
+{
+    for (uint64_t i = 0; i < array_count(m); i++) {
+        const ebpo_attribute *a = &m->mesh->attributes->array[i];
+        if (is_word(a->element, strlen(a->element), element))
+            return a->rows;
+    }
+    return 0;
+}
+
+/* --- a header of our own --- */
+
+static void begin_faces(making *m)
+{
+    m->faces = true;
+    fprintf(m->text, "element face %" PRIu64 "\n", m->mesh->face_count);
+    add_element(m, PLY_KIND_FACE, m->mesh->face_count);
+}
+
+static void end_element(making *m, ply_kind kind)
+{
+    if (kind == PLY_KIND_VERTEX)
+        add_rest(m, "vertex");
+    else if (kind == PLY_KIND_FACE)
+        add_rest(m, "face");
+}
+
+static const ply_word usual_corners = { "vertex_indices", 14 };
+
+static void make_plain(making *m)
+{
+    fprintf(m->text, "ply\nformat binary_little_endian 1.0\nelement vertex %" PRIu64 "\n",
+            m->mesh->vertex_count);
+    add_element(m, PLY_KIND_VERTEX, m->mesh->vertex_count);
+    for (int k = 0; k < 3; k++)
+        add_position(m, (ply_role)(PLY_ROLE_X + k), position_type(m->mesh), (ply_word){ "", 0 });
+    end_element(m, PLY_KIND_VERTEX);
+    begin_faces(m);
+    add_corners(m, PLY_UINT8, m->index_type, usual_corners, (ply_word){ "", 0 });
+    end_element(m, PLY_KIND_FACE);
+    fputs("end_header\n", m->text);
+}
+
+/* --- the source's header --- */
+
+typedef struct following {
+    making *m;
+    ply_header header;
+    uint64_t element, property; /* statements met so far */
+    ply_kind kind;              /* of the element that is open, as it is written */
+    uint64_t rows;              /* of that element */
+    bool skipped;               /* it is left out */
+} following;
+
+static void close_element(following *f)
+{
+    if (f->element && !f->skipped)
+        end_element(f->m, f->kind);
+}
+
+static void follow_element(following *f)
+{
+    making *m = f->m;
+    close_element(f);
+    const ply_element *e = &f->header.element[f->element++];
+    f->kind = e->kind == PLY_KIND_STRIPS ? PLY_KIND_FACE : e->kind;
+    f->rows = e->kind == PLY_KIND_VERTEX  ? m->mesh->vertex_count
+              : e->kind == PLY_KIND_OTHER ? rows_of(m, e->name)
+                                          : m->mesh->face_count;
+    f->skipped = f->kind == PLY_KIND_FACE ? m->faces : f->rows == 0 && e->count != 0;
+    if (e->kind == PLY_KIND_STRIPS && f->header.face >= 0)
+        f->skipped = true;
+    if (f->skipped)
+        return;
+    if (f->kind == PLY_KIND_FACE) {
+        begin_faces(m);
+        return;
+    }
+    fprintf(m->text, "element %.*s %" PRIu64 "\n", (int)e->name.n, e->name.s, f->rows);
+    add_element(m, f->kind, f->rows);
+}
+
+/* An element without rows has its properties all the same. */
+static void follow_property(following *f, ply_word line)
+{
+    making *m = f->m;
+    const ply_element *e = &f->header.element[f->element - 1];
+    const ply_property *property = &f->header.property[f->property++];
+    if (f->skipped)
+        return;
+    if (property->role == PLY_ROLE_CORNERS && e->kind == PLY_KIND_STRIPS)
+        add_corners(m, PLY_UINT8, property->type, property->name, (ply_word){ "", 0 });
+    else if (property->role == PLY_ROLE_CORNERS)
+        add_corners(m, property->count_type, property->type, property->name, line);
+    else if (property->role != PLY_ROLE_NONE)
+        add_position(m, property->role, property->type, line);
+    else if (add_named(m, e->name, property) || f->rows == 0)
+        put_line(m, line);
+}
+
+static bool begins(ply_word line, const char *word)
+{
+    size_t n = strlen(word), at = 0;
+    while (at < line.n && (line.s[at] == ' ' || line.s[at] == '\t'))
+        at++;
+    return line.n - at >= n && memcmp(line.s + at, word, n) == 0 &&
+           (line.n - at == n || line.s[at + n] == ' ' || line.s[at + n] == '\t');
+}
+
+static void follow_line(following *f, ply_word line)
+{
+    if (begins(line, "format"))
+        fputs("format binary_little_endian 1.0\n", f->m->text);
+    else if (begins(line, "element"))
+        follow_element(f);
+    else if (begins(line, "property"))
+        follow_property(f, line);
+    else
+        put_line(f->m, line);
+}
+
+static void follow(following *f, const char *at, const char *end)
+{
+    while (at < end && !f->m->no_memory) {
+        const char *stop = memchr(at, '\n', (size_t)(end - at));
+        ply_word line = { at, (size_t)((stop ? stop : end) - at) };
+        if (begins(line, "end_header"))
+            close_element(f);
+        if (line.n && line.s[line.n - 1] == '\r')
+            line.n--;
+        follow_line(f, line);
+        at = stop ? stop + 1 : end;
+    }
+}
+
+/* False: there is none that can be followed. */
+static bool make_as_source(making *m)
+{
+    const ebpo_attributes *all = m->mesh->attributes;
+    following f = { .m = m };
+    if (!all || !all->header ||
+        ebpo_ply_header_parse(&f.header, (const uint8_t *)all->header, all->header_bytes, "header",
+                              NULL) != EBPO_OK)
+        return false;
+    bool usable =
+        (f.header.face >= 0 || f.header.strips >= 0) && f.header.body == all->header_bytes;
+    if (usable)
+        follow(&f, all->header, all->header + all->header_bytes);
+    ebpo_ply_header_free(&f.header);
+    return usable;
+}
+
+/* --- either --- */
+
+ebpo_status ebpo_ply_layout_make(ply_layout *out, const ebpo_mesh *mesh, ebpo_error *error)
+{
+    ebpo_text_stream header;
+    *out = (ply_layout){ .element = NULL };
+    making m = { .out = out,
+                 .mesh = mesh,
+                 .index_type = mesh->vertex_count < UINT64_C(1) << 31 ? PLY_INT32 : PLY_UINT32 };
+    m.taken = ebpo_alloc_zero(array_count(&m) + 1, EBPO_ATTRIBUTE_COLUMNS);
+    if (ebpo_text_stream_begin(&header))
+        m.text = header.file;
+    m.no_memory = !m.taken || !m.text;
+    if (!m.no_memory && !make_as_source(&m))
+        make_plain(&m);
+    if (m.text && !ebpo_text_stream_end(&header))
+        m.no_memory = true;
+    if (m.text) {
+        out->header = header.text;
+        out->header_bytes = header.bytes;
+    }
+    free(m.taken);
+    if (!m.no_memory)
+        return EBPO_OK;
+    ebpo_ply_layout_free(out);
+    return ebpo_fail_memory(error, sizeof *out);
+}
+
+void ebpo_ply_layout_free(ply_layout *layout)
+{
+    free(layout->element);
+    free(layout->property);
+    free(layout->header);
+    *layout = (ply_layout){ .element = NULL };
+}
+
+/* Writing a mesh as a binary little-endian PLY file. */
 
 enum { BUFFER = 1 << 16 };
 

@@ -1,4 +1,4 @@
-#include "mesh/texture_files.h"
+#include "mesh/textures.h"
 
 #include <errno.h>
 #include <inttypes.h>
@@ -6,12 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "mesh/textures.h"
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/checksum.h"
-#include "mesh/texture_names.h"
+#include "core/sha256.h"
 #include "io/file_source.h"
+#include "io/open_below.h"
 
 /* Of material libraries: bytes of all, and names that are tried. */
 enum { LIBRARY_BYTES = 1 << 25, LIBRARIES = 100, DIGEST = 32, STEP = 1 << 20 };

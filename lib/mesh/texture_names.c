@@ -1,9 +1,8 @@
-#include "mesh/texture_names.h"
+#include "mesh/textures.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "mesh/textures.h"
 #include "core/alloc.h"
 #include "core/hash.h"
 #include "core/text.h"

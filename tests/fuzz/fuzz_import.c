@@ -7,7 +7,7 @@
 #include <ebpo/mesh.h>
 
 #include "mesh/import.h"
-#include "mesh/texture_names.h"
+#include "mesh/textures.h"
 
 static void check(const ebpo_mesh *mesh)
 {

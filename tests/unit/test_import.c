@@ -11,7 +11,7 @@
 #include "check_main.h"
 #include "core/workspace.h"
 #include "mesh/import.h"
-#include "mesh/corner_weld.h"
+#include "mesh/import_build.h"
 
 static ebpo_status import(ebpo_mesh *mesh, const char *name, const void *data, size_t size,
                           ebpo_error *error)

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "mesh/colour_columns.h"
+#include "mesh/attributes.h"
 #include "core/error.h"
 
 /* The inverse of ebpo_colour_byte. */
