@@ -110,7 +110,7 @@ void ebpo_block_report(const ebpo_block *block, ebpo_export_report *report)
 
 /* --- columns --- */
 
-static void set(void *values, ebpo_h5_number number, uint64_t i, int64_t v)
+static void set_integer(void *values, ebpo_h5_number number, uint64_t i, int64_t v)
 {
     if (number == EBPO_H5_I64)
         ((int64_t *)values)[i] = v;
@@ -157,14 +157,14 @@ void *ebpo_column_make(const ebpo_block *block, int column, bool polygons)
     if (!values)
         return NULL;
     for (uint64_t i = 0; mesh && i < count; i++)
-        set(values, number, i, value_of_face(block, i, column));
+        set_integer(values, number, i, value_of_face(block, i, column));
     for (uint64_t i = 0; i < nodes->node_count; i++) {
         const ebpo_lod_node *node = &nodes->nodes[i];
         for (uint32_t k = 0; k < (polygons ? node->polygon_count : 1); k++, at++) {
             if (column == EBPO_COLUMN_VOLUME)
                 ((double *)values)[at] = node->volume;
             else
-                set(values, number, at, value_of(block, node, column));
+                set_integer(values, number, at, value_of(block, node, column));
         }
     }
     return values;

@@ -47,7 +47,7 @@ static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_frag
         l->reach = fmax(l->reach, ebpo_cell_frame_apart(&b->frame, p->vertex[i], l->centre));
 }
 
-static ebpo_status ask(ebpo_bounder *b, const double xi[3], double *distance)
+static ebpo_status query_distance(ebpo_bounder *b, const double xi[3], double *distance)
 {
     ebpo_distance_result result;
     double p[3];
@@ -89,7 +89,7 @@ static void pull_in(const ebpo_bounder *b, const double xi[3], double out[3])
         out[k] = xi[k] + share * (b->inner[k] - xi[k]);
 }
 
-static void learn(ebpo_bounder *b, const double xi[3], double distance)
+static void learn_distance(ebpo_bounder *b, const double xi[3], double distance)
 {
     double at[3], certain = distance - 4 * b->frame.grain;
     if (certain <= b->lo)
@@ -103,16 +103,16 @@ static void learn(ebpo_bounder *b, const double xi[3], double distance)
     b->target = fmax(b->target, b->ratio * b->lo);
 }
 
-static ebpo_status measure(ebpo_bounder *b, const ebpo_fragment *fragment, ebpo_fragment_measure *l)
+static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragment, ebpo_fragment_measure *l)
 {
     double corner = 0;
     int farthest = 0;
     find_centre(b, &fragment->p, l);
-    ebpo_status status = ask(b, l->centre, &l->distance);
+    ebpo_status status = query_distance(b, l->centre, &l->distance);
     if (status != EBPO_OK)
         return status;
     memcpy(l->face, b->context->warm_triangle, sizeof l->face);
-    learn(b, l->centre, l->distance);
+    learn_distance(b, l->centre, l->distance);
     for (int i = 0; i < fragment->p.vertex_count; i++) {
         double d =
             ebpo_cell_frame_distance(&b->frame, fragment->p.vertex[i], (const double(*)[3])l->face);
@@ -130,15 +130,15 @@ static ebpo_status measure(ebpo_bounder *b, const ebpo_fragment *fragment, ebpo_
                               1e-5 * (l->centre[k] - fragment->p.vertex[farthest][k]),
                           0),
                      1);
-    status = ask(b, xi, &d);
+    status = query_distance(b, xi, &d);
     if (status == EBPO_OK)
-        learn(b, xi, d);
+        learn_distance(b, xi, d);
     return status;
 }
 
 /* --- the search --- */
 
-static ebpo_status begin(ebpo_bounder *b)
+static ebpo_status begin_search(ebpo_bounder *b)
 {
     ebpo_node node;
     ebpo_fragment *first = NULL;
@@ -167,7 +167,7 @@ static ebpo_status begin(ebpo_bounder *b)
     return node.type == EBPO_LEAF ? ebpo_fragment_leaf_faces(b, first, &node) : EBPO_OK;
 }
 
-static ebpo_status step(ebpo_bounder *b)
+static ebpo_status search_step(ebpo_bounder *b)
 {
     ebpo_fragment fragment;
     ebpo_fragment_measure l;
@@ -182,7 +182,7 @@ static ebpo_status step(ebpo_bounder *b)
         ebpo_bound_raise(b, fragment.upper);
         return EBPO_OK;
     }
-    ebpo_status status = measure(b, &fragment, &l);
+    ebpo_status status = measure_fragment(b, &fragment, &l);
     if (status != EBPO_OK)
         return status;
     fragment.upper = l.upper;
@@ -204,10 +204,10 @@ ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_boun
     b->ratio = goal->ratio;
     b->lo = b->hi = 0;
     b->questions = 0;
-    ebpo_status status = begin(b);
+    ebpo_status status = begin_search(b);
     while (status == EBPO_OK && b->fragment_count && b->questions < goal->questions &&
            b->lo <= b->quit)
-        status = step(b);
+        status = search_step(b);
     for (uint64_t i = 0; i < b->fragment_count; i++)
         ebpo_bound_raise(b, b->fragments[i].upper);
     *out = (ebpo_reach_bound){ b->lo > 0 ? ldexp(b->lo, b->frame.exponent) : 0,
@@ -217,7 +217,7 @@ ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_boun
     return status;
 }
 
-static void merge(ebpo_reach_bound *known, const ebpo_reach_bound *found)
+static void merge_bounds(ebpo_reach_bound *known, const ebpo_reach_bound *found)
 {
     known->hi = fmin(known->hi, found->hi);
     known->questions += found->questions;
@@ -253,7 +253,7 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
             return status;
         bool stuck = found.hi >= out->hi && found.lo <= out->lo;
         asked += found.questions;
-        merge(out, &found);
+        merge_bounds(out, &found);
         if (stuck)
             return EBPO_OK; /* rounding is all there is left */
     }

@@ -119,7 +119,7 @@ static ebpo_status sort_nodes(survey *s)
 }
 
 /* What nodes first .. last - 1 in the order have brought. */
-static void gather(const survey *s, uint64_t first, uint64_t last, ebpo_deviation *out)
+static void gather_survey(const survey *s, uint64_t first, uint64_t last, ebpo_deviation *out)
 {
     for (uint64_t i = first; i < last; i++) {
         const ebpo_reach_bound *b = &s->nodes[s->order[i]].bound;
@@ -140,7 +140,7 @@ static uint64_t count_questions(const survey *s)
 
 /* Blocks are what is decided together, for any number of threads: what one block finds is known to
  * the next. */
-static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_deviation *out)
+static ebpo_status search_nodes(survey *s, const ebpo_deviation_options *o, ebpo_deviation *out)
 {
     uint64_t done = 0, block = 4, asked = count_questions(s);
     ebpo_status status = EBPO_OK;
@@ -162,7 +162,7 @@ static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_devia
         for (uint64_t i = 0; i < size; i++)
             after += s->nodes[s->order[done + i]].bound.questions;
         asked += after - before;
-        gather(s, done, done + size, out);
+        gather_survey(s, done, done + size, out);
         done += size;
         block = block < BLOCK_MOST ? 2 * block : block;
         if (status == EBPO_OK &&
@@ -213,8 +213,8 @@ static ebpo_status bound_level(survey *s, const ebpo_deviation_options *o, ebpo_
         status = sort_nodes(s);
     if (status != EBPO_OK)
         return status;
-    gather(s, 0, s->count, out);
-    status = search(s, o, out);
+    gather_survey(s, 0, s->count, out);
+    status = search_nodes(s, o, out);
     for (uint64_t i = 0; i < s->count; i++)
         out->hi = fmax(out->hi, s->nodes[i].bound.hi);
     out->questions = count_questions(s);
@@ -274,7 +274,7 @@ static const char *find_difference(const ebpo_info *info, const ebpo_info *model
     return NULL;
 }
 
-static ebpo_status check(const ebpo_info *info, const ebpo_info *model, int level,
+static ebpo_status check_deviation(const ebpo_info *info, const ebpo_info *model, int level,
                          const ebpo_deviation_options *o, ebpo_error *error)
 {
     if (level < 0 || level >= info->level_count)
@@ -321,7 +321,7 @@ ebpo_status ebpo_deviation_level(ebpo_model *model, const ebpo_file *file, int l
                  .error = error,
                  .whole = &whole,
                  .tree = &whole };
-    status = check(ebpo_file_info(file), model->info, level, o, error);
+    status = check_deviation(ebpo_file_info(file), model->info, level, o, error);
     if (status == EBPO_OK)
         status = ebpo_tree_read_whole(&whole, model->file, s.threads, error);
     if (status == EBPO_OK && file != model->file) {

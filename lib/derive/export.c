@@ -34,7 +34,7 @@ bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *
     return length >= 0 && (size_t)length < capacity;
 }
 
-static ebpo_status check(const ebpo_info *info, ebpo_export_format format,
+static ebpo_status check_export(const ebpo_info *info, ebpo_export_format format,
                          const ebpo_export_options *o, ebpo_error *error)
 {
     int blocks = ebpo_block_count(o),
@@ -82,7 +82,7 @@ ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_for
     if (status == EBPO_OK && report)
         status = EBPO_CHECK_SIZED(ebpo_export_report, report, error);
     if (status == EBPO_OK)
-        status = check(ebpo_file_info(file), format, &wanted, error);
+        status = check_export(ebpo_file_info(file), format, &wanted, error);
     if (status != EBPO_OK)
         return status;
     if (!ebpo_export_second_file(format, path, second, sizeof second))

@@ -100,7 +100,7 @@ static uint64_t bin_bytes(const model *m)
     return sum;
 }
 
-static ebpo_status gather(model *m, const ebpo_export_job *job, ebpo_error *error)
+static ebpo_status gather_model(model *m, const ebpo_export_job *job, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     const ebpo_info *info = ebpo_file_info(job->file);
@@ -370,7 +370,7 @@ ebpo_status ebpo_export_gltf(const ebpo_export_job *job, ebpo_error *error)
     if (status == EBPO_OK && m->bin_name)
         status = ebpo_publish_begin(&heavy, job->second, error);
     if (status == EBPO_OK)
-        status = gather(m, job, error);
+        status = gather_model(m, job, error);
     if (status == EBPO_OK)
         status = write_files(m, job, &light, &heavy, error);
     ebpo_publish_abort(&heavy);

@@ -94,7 +94,7 @@ static void put_usual(const ebpo_kept_column *c, uint64_t to)
     }
 }
 
-static uint64_t items(const ebpo_kept_counts *c, uint64_t rank)
+static uint64_t kept_items(const ebpo_kept_counts *c, uint64_t rank)
 {
     uint32_t count;
     if (!c->counts || c->size == 1)
@@ -104,7 +104,7 @@ static uint64_t items(const ebpo_kept_counts *c, uint64_t rank)
 }
 
 /* The place of a node that joins the level. */
-static uint64_t grow(ebpo_level *level, ebpo_node_type type)
+static uint64_t grow_level(ebpo_level *level, ebpo_node_type type)
 {
     uint64_t place = ebpo_level_count(level, per_of(type));
     ebpo_level_set_count(level, per_of(type), place + 1);
@@ -122,19 +122,19 @@ static void copy_items(const ebpo_kept_nodes *kept, const ebpo_kept_list *list,
 
 void ebpo_kept_take(ebpo_kept_nodes *kept, ebpo_node_type type)
 {
-    uint64_t place = grow(kept->to, type), rank = kept->next[type];
+    uint64_t place = grow_level(kept->to, type), rank = kept->next[type];
     for (unsigned i = 0; i < kept->of_type[type].columns; i++)
         copy_row(&kept->of_type[type].column[i], rank, place);
     for (unsigned i = 0; i < kept->of_type[type].lists; i++) {
         const ebpo_kept_list *list = &kept->of_type[type].list[i];
         const ebpo_kept_counts *c = &kept->of_type[type].count[list->counts];
-        uint64_t count = items(c, rank);
+        uint64_t count = kept_items(c, rank);
         if (count)
             copy_items(kept, list, c, count);
     }
     for (unsigned i = 0; i < kept->of_type[type].counts; i++) {
         const ebpo_kept_counts *c = &kept->of_type[type].count[i];
-        ebpo_level_set_count(kept->to, c->per, ebpo_level_count(kept->to, c->per) + items(c, rank));
+        ebpo_level_set_count(kept->to, c->per, ebpo_level_count(kept->to, c->per) + kept_items(c, rank));
     }
     ebpo_kept_pass(kept, type);
 }
@@ -144,13 +144,13 @@ void ebpo_kept_pass(ebpo_kept_nodes *kept, ebpo_node_type type)
     uint64_t rank = kept->next[type]++;
     for (unsigned i = 0; i < kept->of_type[type].counts; i++) {
         const ebpo_kept_counts *c = &kept->of_type[type].count[i];
-        kept->read[c->per] += items(c, rank);
+        kept->read[c->per] += kept_items(c, rank);
     }
 }
 
 void ebpo_kept_add(ebpo_kept_nodes *kept, ebpo_node_type type)
 {
-    uint64_t place = grow(kept->to, type);
+    uint64_t place = grow_level(kept->to, type);
     for (unsigned i = 0; i < kept->of_type[type].columns; i++)
         put_usual(&kept->of_type[type].column[i], place);
 }

@@ -98,7 +98,7 @@ static bool take_node(const job *j, scratch *s, const ebpo_node *node)
     return good;
 }
 
-static int compare(const void *a, const void *b)
+static int compare_faces(const void *a, const void *b)
 {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x > y) - (x < y);
@@ -108,7 +108,7 @@ static bool take_faces(const job *j, scratch *s)
 {
     const ebpo_mesh *m = &j->mesh;
     uint64_t kept = 0;
-    qsort(s->list, s->list_count, sizeof *s->list, compare);
+    qsort(s->list, s->list_count, sizeof *s->list, compare_faces);
     for (uint64_t i = 0; i < s->list_count; i++)
         if (i == 0 || s->list[i] != s->list[i - 1])
             s->list[kept++] = s->list[i];
@@ -166,7 +166,7 @@ static bool add_faces(const job *j, scratch *s, ebpo_cell cell)
     return true;
 }
 
-static ebpo_status hulls(void *context, uint64_t begin, uint64_t end, unsigned worker,
+static ebpo_status measure_hulls(void *context, uint64_t begin, uint64_t end, unsigned worker,
                          ebpo_error *error)
 {
     job *j = context;
@@ -184,7 +184,7 @@ static ebpo_status hulls(void *context, uint64_t begin, uint64_t end, unsigned w
 
 /* --- all of it --- */
 
-static ebpo_status check(const ebpo_file *file, int level, ebpo_error *error)
+static ebpo_status check_level(const ebpo_file *file, int level, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     if (level < 0 || level >= info->level_count)
@@ -197,7 +197,7 @@ static ebpo_status check(const ebpo_file *file, int level, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status prepare(job *j, const ebpo_file *file, int level, unsigned threads,
+static ebpo_status prepare_job(job *j, const ebpo_file *file, int level, unsigned threads,
                            ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
@@ -247,14 +247,14 @@ ebpo_status ebpo_limit_level(const ebpo_file *file, int level, const ebpo_limit_
     if (status == EBPO_OK)
         status = EBPO_CHECK_SIZED(ebpo_limit, out, error);
     if (status == EBPO_OK)
-        status = check(file, level, error);
+        status = check_level(file, level, error);
     if (status != EBPO_OK)
         return status;
     unsigned threads = ebpo_thread_count(asked.threads);
     j.in_root_cells = asked.in_root_cells != 0;
-    status = prepare(&j, file, level, threads, error);
+    status = prepare_job(&j, file, level, threads, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, j.node_count, 1, hulls, &j, &asked.progress,
+        status = ebpo_parallel_for(threads, NULL, j.node_count, 1, measure_hulls, &j, &asked.progress,
                                    "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
         /* not 0 times infinity */

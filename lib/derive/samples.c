@@ -40,19 +40,19 @@ static double random_unit(uint64_t seed, uint64_t place)
     return ebpo_random_unit(ebpo_random_mix(number * EBPO_RANDOM_STEP));
 }
 
-static const double *corner(const sampling *s, uint64_t triangle, int i)
+static const double *triangle_corner(const sampling *s, uint64_t triangle, int i)
 {
     return s->mesh.xyz64 + 3 * (uint64_t)s->mesh.faces[3 * triangle + (uint64_t)i];
 }
 
-static double area(const sampling *s, uint64_t triangle)
+static double triangle_area(const sampling *s, uint64_t triangle)
 {
     double u[3], v[3], n[3];
     for (int k = 0; k < 3; k++) {
         u[k] = ebpo_cell_frame_length(&s->frame,
-                                      corner(s, triangle, 1)[k] - corner(s, triangle, 0)[k]);
+                                      triangle_corner(s, triangle, 1)[k] - triangle_corner(s, triangle, 0)[k]);
         v[k] = ebpo_cell_frame_length(&s->frame,
-                                      corner(s, triangle, 2)[k] - corner(s, triangle, 0)[k]);
+                                      triangle_corner(s, triangle, 2)[k] - triangle_corner(s, triangle, 0)[k]);
     }
     for (int k = 0; k < 3; k++)
         n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
@@ -65,13 +65,13 @@ static void share_out(sampling *s)
     double total = 0, below = 0;
     uint64_t t = 0;
     for (uint64_t i = 0; i < s->mesh.face_count; i++)
-        total += area(s, i);
-    double next = s->mesh.face_count ? area(s, 0) : 0;
+        total += triangle_area(s, i);
+    double next = s->mesh.face_count ? triangle_area(s, 0) : 0;
     for (uint64_t i = 0; i < s->o->samples; i++) {
         double at = ((double)i + random_unit(s->o->seed, 3 * i)) / (double)s->o->samples * total;
         while (below + next <= at && t + 1 < s->mesh.face_count) {
             below += next;
-            next = area(s, ++t);
+            next = triangle_area(s, ++t);
         }
         s->triangle[i] = (uint32_t)t;
     }
@@ -108,8 +108,8 @@ static bool unit_normal(const sampling *s, uint64_t triangle, double n[3])
 {
     double u[3], v[3], length = 0;
     for (int k = 0; k < 3; k++) {
-        u[k] = (corner(s, triangle, 1)[k] - corner(s, triangle, 0)[k]) / s->box.size[k];
-        v[k] = (corner(s, triangle, 2)[k] - corner(s, triangle, 0)[k]) / s->box.size[k];
+        u[k] = (triangle_corner(s, triangle, 1)[k] - triangle_corner(s, triangle, 0)[k]) / s->box.size[k];
+        v[k] = (triangle_corner(s, triangle, 2)[k] - triangle_corner(s, triangle, 0)[k]) / s->box.size[k];
     }
     for (int k = 0; k < 3; k++)
         n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
@@ -119,7 +119,7 @@ static bool unit_normal(const sampling *s, uint64_t triangle, double n[3])
     return length > 0;
 }
 
-static bool holds(const sampling *s, uint64_t node, const double p[3])
+static bool node_holds(const sampling *s, uint64_t node, const double p[3])
 {
     double slack = 1e-9 * ebpo_half_power(s->level);
     for (uint64_t t = s->first_triangle[node]; t < s->first_triangle[node + 1]; t++) {
@@ -127,7 +127,7 @@ static bool holds(const sampling *s, uint64_t node, const double p[3])
         if (!unit_normal(s, t, n))
             continue;
         for (int k = 0; k < 3; k++)
-            out += n[k] * ((p[k] - corner(s, t, 0)[k]) / s->box.size[k]);
+            out += n[k] * ((p[k] - triangle_corner(s, t, 0)[k]) / s->box.size[k]);
         if (out > slack)
             return false;
     }
@@ -148,14 +148,14 @@ static bool in_another(const sampling *s, uint64_t own, const double p[3])
             cell.at[k] = (uint32_t)(xi[k] * (double)(1u << level));
         uint64_t node = find_node(s, ebpo_octcode_of_cell(cell));
         if (node < s->nodes.node_count)
-            return node != own && holds(s, node, p);
+            return node != own && node_holds(s, node, p);
     }
     return false;
 }
 
 /* --- --- */
 
-static ebpo_status sample(sampling *s, uint64_t i, ebpo_context *context, ebpo_error *error)
+static ebpo_status measure_sample(sampling *s, uint64_t i, ebpo_context *context, ebpo_error *error)
 {
     double a = sqrt(random_unit(s->o->seed, 3 * i + 1)), b = random_unit(s->o->seed, 3 * i + 2),
            p[3], n[3], q[3];
@@ -168,8 +168,8 @@ static ebpo_status sample(sampling *s, uint64_t i, ebpo_context *context, ebpo_e
             fmax(1e-6 * ebpo_half_power(s->level) * s->box.size[k],
                  16 * DBL_EPSILON *
                      fmax(fabs(s->box.origin[k]), fabs(s->box.origin[k] + s->box.size[k])));
-        p[k] = (1 - a) * corner(s, t, 0)[k] +
-               a * ((1 - b) * corner(s, t, 1)[k] + b * corner(s, t, 2)[k]);
+        p[k] = (1 - a) * triangle_corner(s, t, 0)[k] +
+               a * ((1 - b) * triangle_corner(s, t, 1)[k] + b * triangle_corner(s, t, 2)[k]);
         q[k] = p[k] + n[k] * step;
     }
     if (in_another(s, node_of_triangle(s, t), q))
@@ -186,7 +186,7 @@ static ebpo_status sample_some(void *context, uint64_t begin, uint64_t end, unsi
     sampling *s = context;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
-        status = sample(s, i, s->contexts[worker], error);
+        status = measure_sample(s, i, s->contexts[worker], error);
     return status;
 }
 

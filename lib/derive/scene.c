@@ -146,7 +146,7 @@ static void scene_free(scene *s)
     free(s);
 }
 
-static ebpo_status gather(scene *s, const ebpo_export_job *job, ebpo_error *error)
+static ebpo_status gather_scene(scene *s, const ebpo_export_job *job, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(job->file);
     /* Of the mesh known before anything is read. */
@@ -199,7 +199,7 @@ ebpo_status ebpo_export_scene(const ebpo_export_job *job, ebpo_error *error)
     /* Before the work, so that a folder which cannot be written is found out at once. */
     ebpo_status status = ebpo_publish_begin(&file.publish, job->path, error);
     if (status == EBPO_OK)
-        status = gather(s, job, error);
+        status = gather_scene(s, job, error);
     if (status == EBPO_OK)
         status = write_scene(s, job, &file, error);
     if (status == EBPO_OK)

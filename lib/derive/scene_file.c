@@ -41,13 +41,13 @@ static size_t read_bytes(struct aiFile *file, char *to, size_t size, size_t coun
     return 0;
 }
 
-static size_t tell(struct aiFile *file)
+static size_t tell_stream(struct aiFile *file)
 {
     off_t at = ftello(cursor_of(file)->stream);
     return at > 0 ? (size_t)at : 0;
 }
 
-static enum aiReturn seek(struct aiFile *file, size_t offset, enum aiOrigin origin)
+static enum aiReturn seek_stream(struct aiFile *file, size_t offset, enum aiOrigin origin)
 {
     int whence = origin == aiOrigin_SET ? SEEK_SET : origin == aiOrigin_CUR ? SEEK_CUR : SEEK_END;
     return fseeko(cursor_of(file)->stream, (off_t)offset, whence) == 0 ? aiReturn_SUCCESS
@@ -56,14 +56,14 @@ static enum aiReturn seek(struct aiFile *file, size_t offset, enum aiOrigin orig
 
 static size_t file_size(struct aiFile *file)
 {
-    size_t at = tell(file), end;
-    (void)seek(file, 0, aiOrigin_END);
-    end = tell(file);
-    (void)seek(file, at, aiOrigin_SET);
+    size_t at = tell_stream(file), end;
+    (void)seek_stream(file, 0, aiOrigin_END);
+    end = tell_stream(file);
+    (void)seek_stream(file, at, aiOrigin_SET);
     return end;
 }
 
-static void flush(struct aiFile *file)
+static void flush_stream(struct aiFile *file)
 {
     if (fflush(cursor_of(file)->stream) != 0)
         note_failure(cursor_of(file)->target);
@@ -89,15 +89,15 @@ static struct aiFile *open_file(struct aiFileIO *io, const char *name, const cha
     }
     target->stream = stream;
     *c = (cursor){ target, stream };
-    *file = (struct aiFile){ read_bytes, write_bytes,          tell, file_size, seek,
-                             flush,      (aiUserData)(void *)c };
+    *file = (struct aiFile){ read_bytes, write_bytes,          tell_stream, file_size, seek_stream,
+                             flush_stream,      (aiUserData)(void *)c };
     return file;
 }
 
 static void close_file(struct aiFileIO *io, struct aiFile *file)
 {
     (void)io;
-    flush(file);
+    flush_stream(file);
     free(file->UserData);
     free(file);
 }

@@ -89,7 +89,7 @@ static ebpo_status resolve_options(ebpo_cutting *c)
 }
 
 /* Without a box whole arrays will be read: a source far away then fetches them in few requests. */
-static void announce(const ebpo_cutting *c)
+static void announce_cut(const ebpo_cutting *c)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
     if (c->last_level > c->from->subtree_level)
@@ -141,7 +141,7 @@ ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_file *file,
     memset(out, 0, sizeof *out);
     ebpo_status status = resolve_options(&c);
     if (status == EBPO_OK)
-        announce(&c);
+        announce_cut(&c);
     if (status == EBPO_OK)
         status = ebpo_chunks_make(&c.chunks, file, CHUNK_BUDGET, error);
     if (status == EBPO_OK)

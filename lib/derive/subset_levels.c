@@ -67,7 +67,7 @@ static void expect_subtrees(const descent *d)
     free(roots);
 }
 
-static ebpo_status pick(descent *d)
+static ebpo_status pick_level(descent *d)
 {
     uint64_t count = 0;
     if (d->c->from->subtree_level && d->level == d->c->from->subtree_level + 1 &&
@@ -212,7 +212,7 @@ static void take_group(descent *d, uint64_t number, uint16_t types)
 
 /* --- how close envelopes are, all of a level at once --- */
 
-static ebpo_status judge(descent *d)
+static ebpo_status judge_level(descent *d)
 {
     uint64_t next = 0, count = 0;
     d->next_judged = 0;
@@ -242,11 +242,11 @@ static ebpo_status judge(descent *d)
 /* The parents are done for good after this. */
 static ebpo_status cut_level(descent *d)
 {
-    ebpo_status status = pick(d);
+    ebpo_status status = pick_level(d);
     if (status == EBPO_OK)
         status = make_room(d);
     if (status == EBPO_OK)
-        status = judge(d);
+        status = judge_level(d);
     uint64_t next = 0;
     d->to->group_count = d->parent_count;
     for (uint64_t i = 0; i < d->parent_count && status == EBPO_OK; i++) {

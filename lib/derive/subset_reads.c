@@ -27,7 +27,7 @@ static void count_subtree(counting *c, uint64_t number)
 }
 
 /* Gray nodes that meet the box, down to the subtrees' roots. */
-static ebpo_status descend(counting *c, const ebpo_node *gray)
+static ebpo_status descend_to_subtrees(counting *c, const ebpo_node *gray)
 {
     const ebpo_subset_options *o = c->options;
     uint16_t types;
@@ -42,7 +42,7 @@ static ebpo_status descend(counting *c, const ebpo_node *gray)
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         ebpo_node child = ebpo_node_child(gray, octant, types, ranks);
         if (child.type == EBPO_GRAY)
-            status = descend(c, &child);
+            status = descend_to_subtrees(c, &child);
     }
     return status;
 }
@@ -56,7 +56,7 @@ static ebpo_status count_subtrees(counting *c)
     if (status == EBPO_OK)
         status = ebpo_chunks_root(c->top, &root, c->error);
     if (status == EBPO_OK && root.type == EBPO_GRAY)
-        status = descend(c, &root);
+        status = descend_to_subtrees(c, &root);
     ebpo_chunks_free(c->top);
     ebpo_chunks_free(c->below);
     return status;

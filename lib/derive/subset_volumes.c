@@ -15,7 +15,7 @@ typedef struct measuring {
 } measuring;
 
 /* Cuts the envelope by the node's own planes. */
-static void cut(ebpo_polytope *envelope, const uint8_t *counts, const uint32_t *planes,
+static void cut_envelope(ebpo_polytope *envelope, const uint8_t *counts, const uint32_t *planes,
                 uint64_t *node, uint64_t *plane)
 {
     uint64_t count = counts ? counts[*node] : 0;
@@ -40,9 +40,9 @@ static void measure_group(measuring *m, int level, const ebpo_polytope *parent)
         else
             ebpo_polytope_cube(&own);
         if (type == EBPO_GRAY)
-            cut(&own, l->plane_counts, l->planes, &m->gray[level], &m->plane[level]);
+            cut_envelope(&own, l->plane_counts, l->planes, &m->gray[level], &m->plane[level]);
         else
-            cut(&own, l->leaf_plane_counts, l->leaf_planes, &m->leaf[level], &m->leaf_plane[level]);
+            cut_envelope(&own, l->leaf_plane_counts, l->leaf_planes, &m->leaf[level], &m->leaf_plane[level]);
         *(type == EBPO_GRAY ? &l->gray_volume : &l->leaf_volume) +=
             ebpo_polytope_volume(&own) * ebpo_cell_volume(&m->c->box, level);
         if (type == EBPO_GRAY && level + 1 < tree->info.level_count)

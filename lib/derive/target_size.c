@@ -58,7 +58,7 @@ static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool
 
 /* From the coarsest file on, until one is too large or nothing is pruned any more (*pruned false).
  * `too_large` stays 0 when none is. */
-static ebpo_status bracket(fitting *f, bool *pruned)
+static ebpo_status bracket_size(fitting *f, bool *pruned)
 {
     uint64_t bytes = 0;
     double coarsest = 0;
@@ -108,7 +108,7 @@ static ebpo_status find_error(fitting *f)
     ebpo_status status = may_fit ? try_error(f, 0, &bytes, &pruned) : EBPO_OK;
     if (status != EBPO_OK || (may_fit && bytes <= f->options->target_bytes))
         return status;
-    status = bracket(f, &pruned);
+    status = bracket_size(f, &pruned);
     /* Envelopes that coincide with the solid are pruned for any max_error. */
     if (status == EBPO_OK && f->too_large == 0 && pruned && !tried)
         return try_error(f, 0, &bytes, &pruned);

@@ -92,7 +92,7 @@ void ebpo_tolerance_close(ebpo_tolerance *n)
     free(n);
 }
 
-static ebpo_status judge(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance_node *node,
+static ebpo_status judge_node(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance_node *node,
                          ebpo_error *error)
 {
     ebpo_node own;
@@ -133,7 +133,7 @@ static ebpo_status judge_some(void *context, uint64_t begin, uint64_t end, unsig
     ebpo_tolerance *n = context;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
-        status = judge(n, &n->bounders[worker], &n->nodes[i], error);
+        status = judge_node(n, &n->bounders[worker], &n->nodes[i], error);
     return status;
 }
 
@@ -162,7 +162,7 @@ ebpo_status ebpo_tolerance_most(ebpo_tolerance *n, double *out, ebpo_error *erro
     *out = most;
     for (double more = 0x1p-30; status == EBPO_OK && !node.enough; more *= 2) {
         n->max_error = *out;
-        status = judge(n, &n->bounders[0], &node, error);
+        status = judge_node(n, &n->bounders[0], &node, error);
         if (!node.enough)
             *out = most * (1 + more);
     }

@@ -86,7 +86,7 @@ static ebpo_status make_tables(writer *w, bool floats, ebpo_error *error)
 }
 
 /* Appends and frees. NULL: memory was short. */
-static ebpo_status append(writer *w, int table, void *values, uint64_t count, ebpo_error *error)
+static ebpo_status append_table(writer *w, int table, void *values, uint64_t count, ebpo_error *error)
 {
     ebpo_status status = values ? ebpo_h5_append(&w->out, &w->table[table], values, count, error)
                                 : ebpo_fail_memory(error, count * 8);
@@ -100,7 +100,7 @@ static ebpo_status append_points(writer *w, const ebpo_mesh *mesh, ebpo_error *e
         double *wide = ebpo_alloc(mesh->vertex_count, 3 * sizeof *wide);
         for (uint64_t i = 0; wide && i < 3 * mesh->vertex_count; i++)
             wide[i] = (double)mesh->xyz32[i];
-        return append(w, POINTS, wide, mesh->vertex_count, error);
+        return append_table(w, POINTS, wide, mesh->vertex_count, error);
     }
     return ebpo_h5_append(&w->out, &w->table[POINTS],
                           mesh->xyz32 ? (const void *)mesh->xyz32 : mesh->xyz64, mesh->vertex_count,
@@ -126,19 +126,19 @@ static ebpo_status append_cells(writer *w, const ebpo_block *block, uint64_t cel
     }
     if (offsets)
         offsets[cells] = (int64_t)corners;
-    ebpo_status status = append(w, CONNECTIVITY, connectivity, corners, error);
+    ebpo_status status = append_table(w, CONNECTIVITY, connectivity, corners, error);
     if (status == EBPO_OK)
-        status = append(w, OFFSETS, offsets, cells + 1, error);
+        status = append_table(w, OFFSETS, offsets, cells + 1, error);
     else
         free(offsets);
     if (status == EBPO_OK)
-        return append(w, TYPES, types, cells, error);
+        return append_table(w, TYPES, types, cells, error);
     free(types);
     return status;
 }
 
 /* White up to so many rows: of blocks without colours. */
-static ebpo_status pad(writer *w, int table, uint64_t rows, ebpo_error *error)
+static ebpo_status pad_colours(writer *w, int table, uint64_t rows, ebpo_error *error)
 {
     uint8_t white[4 * 1024];
     memset(white, 255, sizeof white);
@@ -163,7 +163,7 @@ static ebpo_status append_rgba(writer *w, int table, const uint8_t *rgba, uint64
                                     layout[table].cols, &w->table[table], error);
     *begun = true;
     if (status == EBPO_OK)
-        status = pad(w, table, rgba ? all - rows : all, error);
+        status = pad_colours(w, table, rgba ? all - rows : all, error);
     return status == EBPO_OK && rgba ? ebpo_h5_append(&w->out, &w->table[table], rgba, rows, error)
                                      : status;
 }
@@ -191,10 +191,10 @@ static ebpo_status append_block(writer *w, const ebpo_block *block, ebpo_error *
     for (int i = 0; i < 3 && status == EBPO_OK; i++)
         status = ebpo_h5_append(&w->out, &w->table[POINT_COUNT + i], &count[i], 1, error);
     if (status == EBPO_OK)
-        status = append(w, SOURCE_VERTEX, ebpo_column_of_vertices(block), block->mesh.vertex_count,
+        status = append_table(w, SOURCE_VERTEX, ebpo_column_of_vertices(block), block->mesh.vertex_count,
                         error);
     for (int i = 0; i < EBPO_COLUMNS && status == EBPO_OK; i++)
-        status = append(w, FIRST_COLUMN + i, ebpo_column_make(block, i, true), cells, error);
+        status = append_table(w, FIRST_COLUMN + i, ebpo_column_make(block, i, true), cells, error);
     return status == EBPO_OK ? append_colours(w, block, error) : status;
 }
 

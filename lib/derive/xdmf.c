@@ -29,7 +29,7 @@ static void print_escaped(FILE *f, const char *s)
 }
 
 /* Writes the array and names it in the text. NULL: memory was short. */
-static ebpo_status put(writer *w, const ebpo_block *block, const char *name, ebpo_h5_number number,
+static ebpo_status put_array(writer *w, const ebpo_block *block, const char *name, ebpo_h5_number number,
                        uint32_t cols, const void *values, uint64_t rows, ebpo_error *error)
 {
     char path[64];
@@ -58,7 +58,7 @@ static ebpo_status put_attribute(writer *w, const ebpo_block *block, const char 
     fprintf(w->text,
             "        <Attribute Name=\"%s\" AttributeType=\"Scalar\" Center=\"%s\">\n          ",
             name, centre);
-    ebpo_status status = put(w, block, name, number, 0, values, rows, error);
+    ebpo_status status = put_array(w, block, name, number, 0, values, rows, error);
     fprintf(w->text, "        </Attribute>\n");
     free(values);
     return status;
@@ -88,7 +88,7 @@ static ebpo_status put_polyhedra(writer *w, const ebpo_block *block, ebpo_error 
             "        <Topology TopologyType=\"Mixed\" NumberOfElements=\"%" PRIu64
             "\">\n          ",
             nodes->node_count);
-    ebpo_status status = put(w, block, "cells", EBPO_H5_I64, 0, cells, size, error);
+    ebpo_status status = put_array(w, block, "cells", EBPO_H5_I64, 0, cells, size, error);
     free(cells);
     return status;
 }
@@ -104,7 +104,7 @@ static ebpo_status put_triangles(writer *w, const ebpo_block *block, ebpo_error 
             "        <Topology TopologyType=\"Triangle\" NumberOfElements=\"%" PRIu64
             "\">\n          ",
             count);
-    ebpo_status status = put(w, block, "cells", EBPO_H5_I64, 3, cells, count, error);
+    ebpo_status status = put_array(w, block, "cells", EBPO_H5_I64, 3, cells, count, error);
     free(cells);
     return status;
 }
@@ -119,7 +119,7 @@ static ebpo_status put_colours(writer *w, const ebpo_block *block, const char *n
             "        <Attribute Name=\"rgba\" AttributeType=\"Matrix\" Center=\"%s\">\n"
             "          ",
             centre);
-    ebpo_status status = put(w, block, name, EBPO_H5_U8, 4, rgba, rows, error);
+    ebpo_status status = put_array(w, block, name, EBPO_H5_U8, 4, rgba, rows, error);
     fprintf(w->text, "        </Attribute>\n");
     return status;
 }
@@ -168,7 +168,7 @@ static ebpo_status put_block(writer *w, const ebpo_block *block, ebpo_error *err
     fprintf(w->text, "        </Topology>\n        <Geometry GeometryType=\"XYZ\">\n          ");
     if (status == EBPO_OK)
         status =
-            put(w, block, "points", mesh->xyz32 ? EBPO_H5_F32 : EBPO_H5_F64, 3,
+            put_array(w, block, "points", mesh->xyz32 ? EBPO_H5_F32 : EBPO_H5_F64, 3,
                 mesh->xyz32 ? (const void *)mesh->xyz32 : mesh->xyz64, mesh->vertex_count, error);
     fprintf(w->text, "        </Geometry>\n");
     if (status == EBPO_OK)

@@ -4,7 +4,7 @@
 #include "core/sized.h"
 #include "format/file_in.h"
 
-static const ebpo_array_in *find(const ebpo_file *file, unsigned n)
+static const ebpo_array_in *find_present_array(const ebpo_file *file, unsigned n)
 {
     for (int level = 0; level < file->info.level_count; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
@@ -29,7 +29,7 @@ uint64_t ebpo_reader_stored_bytes(const ebpo_file *file, const ebpo_array_in *ar
 
 bool ebpo_file_array(const ebpo_file *file, unsigned n, ebpo_array_facts *out)
 {
-    const ebpo_array_in *array = find(file, n);
+    const ebpo_array_in *array = find_present_array(file, n);
     if (!array)
         return false;
     ebpo_array_facts facts = { .rows = array->shape.rows,

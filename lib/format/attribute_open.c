@@ -11,7 +11,7 @@
 #include "format/attribute_paths.h"
 #include "format/head_facts.h"
 
-static ebpo_status wrong(const ebpo_file *file, const char *path, const char *what,
+static ebpo_status attribute_head_wrong(const ebpo_file *file, const char *path, const char *what,
                          ebpo_error *error)
 {
     return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, path, -1,
@@ -19,14 +19,14 @@ static ebpo_status wrong(const ebpo_file *file, const char *path, const char *wh
 }
 
 /* A required attribute that is absent has no message yet. */
-static ebpo_status required(const ebpo_file *file, const char *path, ebpo_status status,
+static ebpo_status required_value(const ebpo_file *file, const char *path, ebpo_status status,
                             const char *name, ebpo_error *error)
 {
     char what[64];
     if (status != EBPO_E_ABSENT)
         return status;
     snprintf(what, sizeof what, "attribute %s is missing", name);
-    return wrong(file, path, what, error);
+    return attribute_head_wrong(file, path, what, error);
 }
 
 static ebpo_status get_type(ebpo_file *file, ebpo_head *head, ebpo_head_object id, const char *path,
@@ -38,7 +38,7 @@ static ebpo_status get_type(ebpo_file *file, ebpo_head *head, ebpo_head_object i
         return status;
     *type = ebpo_attribute_type_of(word);
     return *type >= 0 ? EBPO_OK
-                      : wrong(file, path, "a type of numbers is none that the format has", error);
+                      : attribute_head_wrong(file, path, "a type of numbers is none that the format has", error);
 }
 
 static ebpo_status get_list(ebpo_file *file, ebpo_head *head, ebpo_head_object id, const char *path,
@@ -51,13 +51,13 @@ static ebpo_status get_list(ebpo_file *file, ebpo_head *head, ebpo_head_object i
     if (status == EBPO_E_ABSENT)
         return EBPO_OK;
     if (status == EBPO_OK && a->list >= EBPO_ATTRIBUTE_FLOAT32)
-        status = wrong(file, path, "a list's length is no whole number", error);
+        status = attribute_head_wrong(file, path, "a list's length is no whole number", error);
     if (status == EBPO_OK)
         status =
-            required(file, path, ebpo_head_get_count(head, id, path, "different", &differ, error),
+            required_value(file, path, ebpo_head_get_count(head, id, path, "different", &differ, error),
                      "different", error);
     if (status == EBPO_OK && differ > 1)
-        status = wrong(file, path, "attribute different is neither 0 nor 1", error);
+        status = attribute_head_wrong(file, path, "attribute different is neither 0 nor 1", error);
     *different = differ;
     return status;
 }
@@ -70,17 +70,17 @@ static ebpo_status get_head(ebpo_file *file, ebpo_head *head, const char *path,
     int type = 0;
     ebpo_status status = ebpo_head_open_array(head, path, &id, error);
     if (status == EBPO_OK)
-        status = required(file, path,
+        status = required_value(file, path,
                           ebpo_head_get_text(head, id, path, "element", a->element,
                                              sizeof a->element, error),
                           "element", error);
     if (status == EBPO_OK)
         status =
-            required(file, path,
+            required_value(file, path,
                      ebpo_head_get_text(head, id, path, "names", a->names, sizeof a->names, error),
                      "names", error);
     if (status == EBPO_OK)
-        status = required(file, path, get_type(file, head, id, path, "type", &type, error), "type",
+        status = required_value(file, path, get_type(file, head, id, path, "type", &type, error), "type",
                           error);
     a->type = (ebpo_attribute_type)type;
     if (status == EBPO_OK)
@@ -107,9 +107,9 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
     if (!a->chunks)
         atomic_store(&file->located, false);
     if (strcmp(coding, a->coding) != 0)
-        return wrong(file, a->path, "the array's coding is none that the format has for it", error);
+        return attribute_head_wrong(file, a->path, "the array's coding is none that the format has for it", error);
     return a->shape.is_signed
-               ? wrong(file, a->path, "the array has the wrong type or the wrong number of columns",
+               ? attribute_head_wrong(file, a->path, "the array has the wrong type or the wrong number of columns",
                        error)
                : EBPO_OK;
 }
@@ -171,7 +171,7 @@ static ebpo_status open_items(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo
     if (status == EBPO_OK &&
         (items->shape.cols ||
          items->shape.element_size != ebpo_attribute_bytes(file->attributes.head[n].head.type)))
-        status = wrong(file, items->path, "the array is not as wide as its type", error);
+        status = attribute_head_wrong(file, items->path, "the array is not as wide as its type", error);
     return status;
 }
 
@@ -190,12 +190,12 @@ static ebpo_status open_one(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo_e
     if (status == EBPO_OK && !what)
         what = check_element(file, n);
     if (what)
-        return wrong(file, values->path, what, error);
+        return attribute_head_wrong(file, values->path, what, error);
     ebpo_attribute_path(ebpo_items_number(n), path);
     if (status == EBPO_OK && to->different && ebpo_head_look(head, path) != EBPO_HEAD_ABSENT)
         status = open_items(file, head, n, error);
     what = status == EBPO_OK ? check_textures(to, items) : NULL;
-    return what ? wrong(file, values->path, what, error) : status;
+    return what ? attribute_head_wrong(file, values->path, what, error) : status;
 }
 
 static ebpo_status open_header(ebpo_file *file, ebpo_head *head, ebpo_error *error)
@@ -209,7 +209,7 @@ static ebpo_status open_header(ebpo_file *file, ebpo_head *head, ebpo_error *err
     if (status == EBPO_OK &&
         (header->shape.cols || header->shape.element_size != 1 ||
          header->coding != ebpo_coding_plain || header->shape.rows > EBPO_ATTRIBUTE_HEADER))
-        status = wrong(file, path, "the header is not of bytes, or longer than it can be", error);
+        status = attribute_head_wrong(file, path, "the header is not of bytes, or longer than it can be", error);
     return status;
 }
 
@@ -221,12 +221,12 @@ static ebpo_status open_group(ebpo_file *file, ebpo_head *head, ebpo_error *erro
     ebpo_status status = ebpo_head_open_group(head, path, &id, error);
     if (status != EBPO_OK)
         return status;
-    status = required(file, path, ebpo_head_get_count(head, id, path, "arrays", &all->count, error),
+    status = required_value(file, path, ebpo_head_get_count(head, id, path, "arrays", &all->count, error),
                       "arrays", error);
     if (status == EBPO_OK)
         status = ebpo_facts_get_digest(head, id, path, "sha256", all->sha256, error);
     if (status == EBPO_OK && all->count > EBPO_ATTRIBUTE_ARRAYS)
-        status = wrong(file, path, "there are more arrays than there can be", error);
+        status = attribute_head_wrong(file, path, "there are more arrays than there can be", error);
     if (status != EBPO_OK)
         return status;
     all->array = ebpo_alloc_zero(1 + 2 * all->count, sizeof *all->array);

@@ -15,7 +15,7 @@ typedef struct picking {
     ebpo_error *error;
 } picking;
 
-static ebpo_status take(const picking *p, int number, const uint32_t *rows, uint64_t count,
+static ebpo_status copy_picked_rows(const picking *p, int number, const uint32_t *rows, uint64_t count,
                         void *out)
 {
     return ebpo_pick_attribute_rows(p->chunks, number, rows, count, p->threads, out, p->error);
@@ -25,7 +25,7 @@ static ebpo_status pick_columns(const picking *p, uint64_t n, ebpo_attribute *a)
 {
     uint64_t bytes = a->columns * (uint64_t)ebpo_attribute_bytes(a->type);
     a->values = ebpo_alloc(p->count, bytes);
-    return a->values ? take(p, ebpo_values_number(n), p->rows, p->count, a->values)
+    return a->values ? copy_picked_rows(p, ebpo_values_number(n), p->rows, p->count, a->values)
                      : ebpo_fail_memory(p->error, p->count * bytes);
 }
 
@@ -63,7 +63,7 @@ static ebpo_status pick_before(const picking *p, uint64_t n, uint64_t *before)
         return ebpo_fail_memory(p->error, p->count * sizeof *rows);
     for (uint64_t i = 0; i < p->count; i++)
         rows[i] = p->rows[i] ? p->rows[i] - 1 : 0;
-    ebpo_status status = take(p, ebpo_values_number(n), rows, p->count, before);
+    ebpo_status status = copy_picked_rows(p, ebpo_values_number(n), rows, p->count, before);
     for (uint64_t i = 0; i < p->count; i++)
         if (p->rows[i] == 0)
             before[i] = 0;
@@ -78,7 +78,7 @@ static ebpo_status pick_lists(const picking *p, uint64_t n, ebpo_attribute *a)
     uint64_t *before = ebpo_alloc(p->count, sizeof *before);
     a->ends = ebpo_alloc(p->count, sizeof *a->ends);
     ebpo_status status = before && a->ends
-                             ? take(p, ebpo_values_number(n), p->rows, p->count, a->ends)
+                             ? copy_picked_rows(p, ebpo_values_number(n), p->rows, p->count, a->ends)
                              : ebpo_fail_memory(p->error, p->count * 2 * sizeof *before);
     if (status == EBPO_OK)
         status = pick_before(p, n, before);
@@ -90,7 +90,7 @@ static ebpo_status pick_lists(const picking *p, uint64_t n, ebpo_attribute *a)
         status = a->values ? EBPO_OK : ebpo_fail_memory(p->error, count * bytes);
     }
     if (status == EBPO_OK && count)
-        status = take(p, ebpo_items_number(n), items, count, a->values);
+        status = copy_picked_rows(p, ebpo_items_number(n), items, count, a->values);
     free(items);
     free(before);
     return status;

@@ -124,7 +124,7 @@ uint64_t ebpo_attributes_planned(const ebpo_plan *plan)
     return plan->attributes ? 1 + 2 * plan->attributes->count : 0;
 }
 
-static void add(ebpo_plan *plan, int number, const void *values, uint64_t rows, uint32_t cols,
+static void add_attribute_array(ebpo_plan *plan, int number, const void *values, uint64_t rows, uint32_t cols,
                 unsigned size, ebpo_pipeline pipeline)
 {
     ebpo_array_out *a = &plan->array[plan->count++];
@@ -148,9 +148,9 @@ static void add_one(ebpo_plan *plan, uint64_t n, ebpo_pipeline pipeline)
     uint64_t items = a->ends ? ebpo_attribute_value_count(a) : 0;
     bool flat = a->ends || (a->columns == 1 && a->list == EBPO_ATTRIBUTE_NO_LIST);
     if (a->ends)
-        add(plan, ebpo_values_number(n), a->ends, a->rows, 0, sizeof *a->ends, pipeline);
+        add_attribute_array(plan, ebpo_values_number(n), a->ends, a->rows, 0, sizeof *a->ends, pipeline);
     else
-        add(plan, ebpo_values_number(n), a->values, a->rows, flat ? 0 : a->columns, bytes,
+        add_attribute_array(plan, ebpo_values_number(n), a->values, a->rows, flat ? 0 : a->columns, bytes,
             pipeline);
     ebpo_array_out *made = &plan->array[plan->count - 1];
     made->columns = plan->attribute[n].columns;
@@ -158,7 +158,7 @@ static void add_one(ebpo_plan *plan, uint64_t n, ebpo_pipeline pipeline)
         made->rows_of = ebpo_attribute_is_of(a, "vertex") ? EBPO_A_VERTICES : EBPO_A_FACES;
     if (!items)
         return;
-    add(plan, ebpo_items_number(n), a->values, items, 0, bytes, pipeline);
+    add_attribute_array(plan, ebpo_items_number(n), a->values, items, 0, bytes, pipeline);
     plan->array[plan->count - 1].columns = plan->attribute[n].items_columns;
 }
 
@@ -168,7 +168,7 @@ void ebpo_attributes_add_arrays(ebpo_plan *plan, ebpo_pipeline pipeline)
     if (!all)
         return;
     if (all->header)
-        add(plan, 0, all->header, all->header_bytes, 0, 1, pipeline);
+        add_attribute_array(plan, 0, all->header, all->header_bytes, 0, 1, pipeline);
     for (uint64_t i = 0; i < all->count; i++)
         add_one(plan, i, pipeline);
 }

@@ -24,7 +24,7 @@ typedef struct content_job {
     ebpo_read_options alone; /* chunks in order */
 } content_job;
 
-static ebpo_status take(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row,
+static ebpo_status digest_rows(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row,
                         uint64_t rows, const uint8_t *bytes, ebpo_error *error)
 {
     taking *t = context;
@@ -43,13 +43,13 @@ static ebpo_status digest_arrays(void *context, uint64_t begin, uint64_t end, un
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         taking t = { .info = &j->file->info };
         ebpo_array_digest_begin(&t.digest);
-        status = ebpo_reader_rows(j->file, j->array[i], &j->alone, take, &t, error);
+        status = ebpo_reader_rows(j->file, j->array[i], &j->alone, digest_rows, &t, error);
         ebpo_array_digest_end(&t.digest, j->digest[i]);
     }
     return status;
 }
 
-static ebpo_status compare(content_job *j, int which, const uint8_t stated[32], const char *name,
+static ebpo_status compare_digest(content_job *j, int which, const uint8_t stated[32], const char *name,
                            ebpo_error *error)
 {
     ebpo_content content = { .entries = NULL };
@@ -95,9 +95,9 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
         ebpo_parallel_for(read.threads, NULL, j.count, 1, digest_arrays, &j, NULL, "check", error);
     if (status == EBPO_OK)
         status =
-            compare(&j, EBPO_DIGEST_CONTENT, file->info.content_sha256, "content_sha256", error);
+            compare_digest(&j, EBPO_DIGEST_CONTENT, file->info.content_sha256, "content_sha256", error);
     if (status == EBPO_OK && file->info.parts & EBPO_PART_COLOURS)
-        status = compare(&j, EBPO_DIGEST_COLOURS, file->info.colours_sha256, ebpo_colours_fact.name,
+        status = compare_digest(&j, EBPO_DIGEST_COLOURS, file->info.colours_sha256, ebpo_colours_fact.name,
                          error);
     return status == EBPO_OK ? ebpo_attributes_check(file, &read, error) : status;
 }

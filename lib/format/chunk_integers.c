@@ -8,7 +8,7 @@
 #include "hdf5_read/coding.h"
 #include "format/chunks.h"
 
-static void widen(const ebpo_shape *shape, const uint8_t *rows, uint64_t numbers, uint8_t *values,
+static void widen_integers(const ebpo_shape *shape, const uint8_t *rows, uint64_t numbers, uint8_t *values,
                   size_t size)
 {
     if (shape->element_size == size && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__)
@@ -54,7 +54,7 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
         if (status != EBPO_OK)
             break;
         uint64_t here = view.end - row < rows ? view.end - row : rows;
-        widen(&array->shape, view.rows + (row - view.begin) * ebpo_shape_row_bytes(&array->shape),
+        widen_integers(&array->shape, view.rows + (row - view.begin) * ebpo_shape_row_bytes(&array->shape),
               here * cols, out, size);
         out += here * cols * size;
         row += here;

@@ -41,7 +41,7 @@ static bool is_of_faces(ebpo_array_id id)
            id == EBPO_A_LEAF_REFS;
 }
 
-static bool chosen(const choice *c, const ebpo_array_out *a)
+static bool is_chosen(const choice *c, const ebpo_array_out *a)
 {
     bool of_level = a->id < EBPO_LEVEL_ARRAYS,
          here = of_level && a->level >= c->first_level && a->level <= c->last_level,
@@ -63,17 +63,17 @@ static bool chosen(const choice *c, const ebpo_array_out *a)
     return false;
 }
 
-static void add(ordering *o, const choice *c)
+static void add_chosen_chunks(ordering *o, const choice *c)
 {
     for (unsigned i = 0; i < o->plan->count; i++)
-        if (chosen(c, &o->plan->array[i]))
+        if (is_chosen(c, &o->plan->array[i]))
             add_array(o, i);
 }
 
 static void add_by_subtree(ordering *o, const choice *c)
 {
     uint64_t begin = o->out->count;
-    add(o, c);
+    add_chosen_chunks(o, c);
     for (uint64_t i = begin; i < o->out->count; i++) {
         ebpo_ordered_chunk *chunk = &o->out->chunk[i];
         const ebpo_array_out *a = &o->plan->array[chunk->array];
@@ -92,10 +92,10 @@ static void order_subtrees(ordering *o)
     const ebpo_info *info = &o->plan->info;
     int whole = ebpo_last_whole_level(info), deep = ebpo_first_deep_level(info),
         last = info->level_count - 1;
-    add(o, &(choice){ 0, whole, WHOLE });
-    add(o, &(choice){ whole + 1, last, TOP_INDEXES });
+    add_chosen_chunks(o, &(choice){ 0, whole, WHOLE });
+    add_chosen_chunks(o, &(choice){ whole + 1, last, TOP_INDEXES });
     o->out->top = o->out->count;
-    add(o, &(choice){ 0, 0, TABLE });
+    add_chosen_chunks(o, &(choice){ 0, 0, TABLE });
     for (int level = whole + 1; level < deep; level++)
         add_by_subtree(o, &(choice){ level, level, NODES });
     add_by_subtree(o, &(choice){ whole + 1, deep - 1, LISTS });
@@ -104,7 +104,7 @@ static void order_subtrees(ordering *o)
     add_by_subtree(o, &(choice){ 0, 0, MESH });
     add_by_subtree(o, &(choice){ 0, 0, MAPS });
     add_by_subtree(o, &(choice){ 0, 0, OF_MESH });
-    add(o, &(choice){ 0, 0, REST });
+    add_chosen_chunks(o, &(choice){ 0, 0, REST });
 }
 
 ebpo_status ebpo_chunk_order_make(ebpo_chunk_order *out, const ebpo_plan *plan, ebpo_error *error)

@@ -45,7 +45,7 @@ static uint64_t chunk_rows(const ebpo_array_in *array, uint64_t chunk)
     return left < array->shape.chunk_rows ? left : array->shape.chunk_rows;
 }
 
-static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
+static ebpo_status estimate_chunk(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                             ebpo_error *error)
 {
     const ebpo_array_in *array = array_of(user, key);
@@ -108,7 +108,7 @@ static ebpo_status decode_map(const ebpo_chunks *c, ebpo_array_id id, uint64_t r
 }
 
 /* Once for each load, so that using a chunk again costs nothing but finding it. */
-static ebpo_status decode(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk,
+static ebpo_status decode_item(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk,
                           const uint8_t *raw, void *item, ebpo_error *error)
 {
     uint64_t rows = chunk_rows(array, chunk);
@@ -176,13 +176,13 @@ static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64
     return again + index + ebpo_reader_chunk_bound(array);
 }
 
-static bool fits(const ebpo_chunks *c, uint64_t more)
+static bool fits_budget(const ebpo_chunks *c, uint64_t more)
 {
     uint64_t taken = atomic_load(&c->file->in.bytes) + c->ahead_bytes;
     return taken <= c->limit && more <= c->limit - taken;
 }
 
-static ebpo_status refuse(ebpo_chunks *c, const ebpo_array_in *array, ebpo_error *error)
+static ebpo_status refuse_load(ebpo_chunks *c, const ebpo_array_in *array, ebpo_error *error)
 {
     c->refused = true;
     return ebpo_fail_at(error, EBPO_E_LIMIT, c->file->in.shown, array->path, -1,
@@ -190,7 +190,7 @@ static ebpo_status refuse(ebpo_chunks *c, const ebpo_array_in *array, ebpo_error
 }
 
 /* Called before a chunk is read: what was announced has been counted then. */
-static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key,
+static ebpo_status admit_load(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key,
                          ebpo_error *error)
 {
     uint64_t cost = cost_of(c, array, chunk_of(key));
@@ -200,7 +200,7 @@ static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t ke
             c->ahead_bytes -= cost;
             return EBPO_OK;
         }
-    return fits(c, cost) ? EBPO_OK : refuse(c, array, error);
+    return fits_budget(c, cost) ? EBPO_OK : refuse_load(c, array, error);
 }
 
 static bool is_ahead(const ebpo_chunks *c, uint64_t key)
@@ -211,7 +211,7 @@ static bool is_ahead(const ebpo_chunks *c, uint64_t key)
     return false;
 }
 
-static uint64_t least(uint64_t a, uint64_t b) { return a < b ? a : b; }
+static uint64_t smaller_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
 /* A share of what the limit leaves, less what waits to be read. What waits may wait for long, as a
  * view turns to others first: a smaller share is left for each batch, or each would be one chunk.
@@ -220,8 +220,8 @@ uint64_t ebpo_chunks_room(const ebpo_chunks *c)
 {
     uint64_t taken = atomic_load(&c->file->in.bytes),
              left = c->limit > taken ? c->limit - taken : 0,
-             share = least(left / AHEAD_SHARE, AHEAD_MOST);
-    uint64_t batch = least(left / BATCH_SHARE, AHEAD_MOST / BATCH_SHARE);
+             share = smaller_of(left / AHEAD_SHARE, AHEAD_MOST);
+    uint64_t batch = smaller_of(left / BATCH_SHARE, AHEAD_MOST / BATCH_SHARE);
     return share > c->ahead_bytes + batch ? share - c->ahead_bytes : batch;
 }
 
@@ -234,7 +234,7 @@ void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, un
         if (ebpo_shape_chunks(&array->shape) > 1 && !atomic_load(&c->file->located))
             continue; /* where it lies is not known yet */
         uint64_t cost = cost_of(c, array, chunk_of(keys[i]));
-        if (is_ahead(c, keys[i]) || !fits(c, cost) || (i >= now && cost > room) ||
+        if (is_ahead(c, keys[i]) || !fits_budget(c, cost) || (i >= now && cost > room) ||
             !ebpo_grow(&c->ahead, &c->ahead_capacity, c->ahead_count + 1, sizeof *c->ahead))
             continue;
         room -= i >= now ? cost : 0;
@@ -343,8 +343,8 @@ static ebpo_status read_seen(ebpo_chunks *c, ebpo_error *error)
     ebpo_read_options read = ebpo_read_threads(1);
     for (uint64_t i = 0; c->counted && index->present && i < ebpo_shape_chunks(&index->shape); i++)
         cost += cost_of(c, index, i);
-    if (c->counted && !fits(c, cost))
-        return refuse(c, index, error);
+    if (c->counted && !fits_budget(c, cost))
+        return refuse_load(c, index, error);
     return ebpo_reader_make(c->file, EBPO_A_FACES_INDEX, 0, &read, sizeof *c->seen, &c->seen,
                             error);
 }
@@ -357,7 +357,7 @@ void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes)
 
 bool ebpo_chunks_refused(const ebpo_chunks *chunks) { return chunks->refused; }
 
-static ebpo_status load(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
+static ebpo_status load_chunk(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
                         ebpo_error *error)
 {
     (void)most;
@@ -366,7 +366,7 @@ static ebpo_status load(void *user, uint64_t key, uint64_t most, void **item, ui
     ebpo_status allowed =
         c->counted && array->id == EBPO_A_FACES && !c->seen ? read_seen(c, error) : EBPO_OK;
     if (allowed == EBPO_OK && c->counted)
-        allowed = admit(c, array, key, error);
+        allowed = admit_load(c, array, key, error);
     if (allowed != EBPO_OK)
         return allowed;
     uint64_t rows = chunk_rows(array, chunk_of(key));
@@ -382,7 +382,7 @@ static ebpo_status load(void *user, uint64_t key, uint64_t most, void **item, ui
         status =
             ebpo_reader_chunk(c->file, array, chunk_of(key), &reader->reader, reader->raw, error);
     if (status == EBPO_OK)
-        status = decode(c, array, chunk_of(key), reader->raw, made, error);
+        status = decode_item(c, array, chunk_of(key), reader->raw, made, error);
     ebpo_idle_readers_give(idle, reader);
     if (status == EBPO_OK) {
         *item = made;
@@ -393,14 +393,14 @@ static ebpo_status load(void *user, uint64_t key, uint64_t most, void **item, ui
     return status;
 }
 
-static void release(void *user, void *item)
+static void release_chunk(void *user, void *item)
 {
     (void)user;
     free(item);
 }
 
 /* pool: NULL, or what the budget is of. */
-static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
+static ebpo_status make_chunks(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
                         ebpo_cache_pool *pool, bool counted, ebpo_error *error)
 {
     *out = NULL;
@@ -411,7 +411,7 @@ static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budge
     c->counted = counted;
     c->limit = UINT64_MAX;
     pthread_mutex_init(&c->lock, NULL);
-    ebpo_cache_source source = { c, estimate, load, release };
+    ebpo_cache_source source = { c, estimate_chunk, load_chunk, release_chunk };
     ebpo_status status = counted ? EBPO_OK : read_seen(c, error);
     if (status == EBPO_OK)
         status = pool ? ebpo_cache_make_in(&c->cache, &source, "chunk", pool, error)
@@ -426,19 +426,19 @@ static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budge
 ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
                              ebpo_error *error)
 {
-    return make(out, file, budget, NULL, false, error);
+    return make_chunks(out, file, budget, NULL, false, error);
 }
 
 ebpo_status ebpo_chunks_make_in(ebpo_chunks **out, const ebpo_file *file, ebpo_cache_pool *pool,
                                 ebpo_error *error)
 {
-    return make(out, file, 0, pool, false, error);
+    return make_chunks(out, file, 0, pool, false, error);
 }
 
 ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
                                      ebpo_error *error)
 {
-    return make(out, file, budget, NULL, true, error);
+    return make_chunks(out, file, budget, NULL, true, error);
 }
 
 void ebpo_chunks_free(ebpo_chunks *chunks)

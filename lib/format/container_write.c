@@ -105,7 +105,7 @@ static ebpo_status compress_gates(slot *s, ebpo_chunk_coder *coder, int level)
                                      EBPO_GATES_ENDS, s->stored, &s->stored_bytes);
 }
 
-static ebpo_status compress(slot *s, ebpo_chunk_coder *coder, int level)
+static ebpo_status compress_chunk(slot *s, ebpo_chunk_coder *coder, int level)
 {
     const ebpo_shape *shape = &s->array->shape;
     return s->array->gates ? compress_gates(s, coder, level)
@@ -124,7 +124,7 @@ static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, un
             continue;
         }
         slot *s = &w->slots[i - 1];
-        ebpo_status status = compress(s, &w->coders[worker], w->options->codec_level);
+        ebpo_status status = compress_chunk(s, &w->coders[worker], w->options->codec_level);
         if (status != EBPO_OK)
             return ebpo_fail_at(error, status, w->head.out.shown, s->array->path, -1,
                                 "a chunk could not be compressed");

@@ -26,15 +26,15 @@ void ebpo_array_digest_end(ebpo_array_digest *digest, uint8_t out[32])
     ebpo_sha256_end(&digest->state, out);
 }
 
-static uint64_t load(const uint8_t *at, unsigned size)
+static uint64_t load_integer(const uint8_t *at, unsigned size)
 {
     return size == 4 ? ebpo_load32(at) : ebpo_load64(at);
 }
 
 /* The value of a difference, and the other way round; modulo 2 to the bits of `size`. */
-static uint64_t unzigzag(uint64_t code) { return (code >> 1) ^ (0 - (code & 1)); }
+static uint64_t decode_zigzag(uint64_t code) { return (code >> 1) ^ (0 - (code & 1)); }
 
-static uint64_t zigzag(uint64_t value, unsigned size)
+static uint64_t encode_zigzag(uint64_t value, unsigned size)
 {
     return size == 4 ? (uint32_t)((uint32_t)value << 1 ^ (0 - ((uint32_t)value >> 31)))
                      : value << 1 ^ (0 - (value >> 63));
@@ -48,9 +48,9 @@ static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool
     for (unsigned k = 0; k < cols; k++) {
         const uint8_t *column = bytes + k * size;
         uint64_t sum = 0, from = goes_on ? digest->last[k] : 0,
-                 code = zigzag(unzigzag(load(column, size)) - from, size);
+                 code = encode_zigzag(decode_zigzag(load_integer(column, size)) - from, size);
         for (uint64_t i = 0; i < rows; i++)
-            sum += unzigzag(load(column + i * cols * size, size));
+            sum += decode_zigzag(load_integer(column + i * cols * size, size));
         digest->last[k] = sum;
         if (size == 4)
             ebpo_store32(joined + k * size, (uint32_t)code);

@@ -4,7 +4,7 @@
 #include "core/alloc.h"
 #include "format/reader.h"
 
-static void add(ebpo_expected *e, uint64_t offset, uint64_t size)
+static void add_range(ebpo_expected *e, uint64_t offset, uint64_t size)
 {
     ebpo_range *last = e->count ? &e->range[e->count - 1] : NULL;
     if (last && last->offset + last->size == offset)
@@ -30,7 +30,7 @@ void ebpo_expect_chunks(ebpo_expected *e, const ebpo_array_in *array, uint64_t b
     if (e->failed)
         return;
     for (uint64_t i = begin; i < end; i++)
-        add(e, array->chunks[i].address, array->chunks[i].bytes);
+        add_range(e, array->chunks[i].address, array->chunks[i].bytes);
 }
 
 void ebpo_expect_array(ebpo_expected *e, const ebpo_array_in *array)
@@ -84,7 +84,7 @@ static void join_ranges(ebpo_expected *e, uint64_t between)
 }
 
 /* Each takes a call of the system. */
-static void hint(ebpo_expected *e)
+static void hint_system(ebpo_expected *e)
 {
     enum { BETWEEN = 16 << 10 };
     join_ranges(e, BETWEEN);
@@ -117,11 +117,11 @@ static ebpo_range where_sums(const ebpo_file *file)
 void ebpo_expect_all(ebpo_expected *e)
 {
     if (e->count && wants_sums(e->file))
-        add(e, where_sums(e->file).offset, where_sums(e->file).size);
+        add_range(e, where_sums(e->file).offset, where_sums(e->file).size);
     if (ebpo_input_expects(&e->file->in))
         ebpo_input_expect(&ebpo_reader_own(e->file)->in, e->range, e->count);
     else
-        hint(e);
+        hint_system(e);
     free(e->range);
     *e = (ebpo_expected)EBPO_EXPECTED_INIT(e->file);
 }

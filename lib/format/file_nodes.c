@@ -163,7 +163,7 @@ ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *e
     return status;
 }
 
-static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error)
+static ebpo_status source_children(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error)
 {
     ebpo_chunks *chunks = holder;
     uint16_t types;
@@ -177,7 +177,7 @@ static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], e
     return EBPO_OK;
 }
 
-static ebpo_status planes(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
+static ebpo_status source_planes(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
                           unsigned *count, ebpo_error *error)
 {
     *count = 0;
@@ -185,9 +185,9 @@ static ebpo_status planes(void *holder, const ebpo_node *node, uint32_t codes[EB
                                       : ebpo_chunks_planes(holder, node, codes, count, error);
 }
 
-static ebpo_status winding(void *holder, const ebpo_node *uniform, int32_t *out, ebpo_error *error)
+static ebpo_status source_winding(void *holder, const ebpo_node *uniform, int32_t *out, ebpo_error *error)
 {
     return ebpo_chunks_winding(holder, uniform, out, error);
 }
 
-const ebpo_node_source ebpo_chunks_source = { children, planes, winding };
+const ebpo_node_source ebpo_chunks_source = { source_children, source_planes, source_winding };

@@ -231,7 +231,7 @@ static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_
 
 /* Adds the chunks for which reading the group would wait next; false: for none. Reads from memory
  * only, and leaves errors to the reading. */
-static bool missing(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted,
+static bool group_is_missing(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted,
                     ebpo_chunk_keys *keys)
 {
     uint32_t parts = chunks->file->info.parts;
@@ -271,7 +271,7 @@ bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_number *number, uns
 {
     ebpo_chunk_keys keys;
     ebpo_chunk_keys_begin(&keys);
-    return ebpo_input_expects(&chunks->file->in) && missing(chunks, number, wanted, &keys);
+    return ebpo_input_expects(&chunks->file->in) && group_is_missing(chunks, number, wanted, &keys);
 }
 
 ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *groups, unsigned count,
@@ -285,7 +285,7 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
     for (int stage = 0; stage < STAGES && status == EBPO_OK; stage++) {
         ebpo_chunk_keys keys;
         ebpo_chunk_keys_begin(&keys);
-        if (!missing(chunks, &groups[0], wanted, &keys))
+        if (!group_is_missing(chunks, &groups[0], wanted, &keys))
             break;
         unsigned own = keys.count;
         uint64_t small = 0;
@@ -294,7 +294,7 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
              level++)
             small += add_small(chunks, level, wanted, &keys);
         for (unsigned i = 1; i < count; i++)
-            (void)missing(chunks, &groups[i], wanted, &keys);
+            (void)group_is_missing(chunks, &groups[i], wanted, &keys);
         status = ebpo_chunks_fetch(chunks, &keys, own, error);
     }
     return status;

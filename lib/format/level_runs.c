@@ -28,12 +28,12 @@ typedef struct reading {
     ebpo_error *error;
 } reading;
 
-static ebpo_status fail(const reading *r, ebpo_array_id id, const char *what)
+static ebpo_status runs_wrong(const reading *r, ebpo_array_id id, const char *what)
 {
     return ebpo_chunks_fail(r->chunks, r->level, id, what, r->error);
 }
 
-static bool wanted(const reading *r, int id)
+static bool is_wanted_array(const reading *r, int id)
 {
     return ebpo_schema_is_held(id) && ebpo_schema[id].needs & r->needs &&
            ebpo_reader_array(r->chunks->file, (ebpo_array_id)id, r->level)->present;
@@ -77,7 +77,7 @@ void ebpo_runs_expect(ebpo_chunks *chunks, ebpo_expected *expected, int level, c
     };
     for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
         int type = ebpo_schema_node_type(ebpo_schema[id].per);
-        if (type >= 0 && wanted(&r, id))
+        if (type >= 0 && is_wanted_array(&r, id))
             expect_column(&r, expected, id, type);
     }
 }
@@ -155,7 +155,7 @@ static ebpo_status find_spans(const reading *r, int id, const ebpo_list_spec *li
         s->count = sum_counts(r, list->counts, node, r->run[i].count[type]);
         if (status == EBPO_OK && (s->first > all || s->count > all - s->first))
             status =
-                fail(r, list->counts,
+                runs_wrong(r, list->counts,
                      per == EBPO_PER_REF ? "the counts do not add up to the number of references"
                                          : "the counts do not add up to the number of planes");
         total += s->count;
@@ -200,7 +200,7 @@ static ebpo_status check_codes(const reading *r, ebpo_array_id id)
     for (uint64_t i = 0; i < count; i++) {
         int32_t n[3], d;
         if (!ebpo_plane_code_decode(codes[i], n, &d))
-            return fail(r, id, "a code stands for no plane");
+            return runs_wrong(r, id, "a code stands for no plane");
     }
     return EBPO_OK;
 }
@@ -210,7 +210,7 @@ static ebpo_status check_colours(const reading *r)
     const uint32_t *colour = r->out->gray_colours;
     for (uint64_t i = 0; colour && i < r->out->gray_count; i++)
         if (colour[i] >> 24)
-            return fail(r, EBPO_A_GRAY_COLOURS, "a colour is above 2^24 - 1");
+            return runs_wrong(r, EBPO_A_GRAY_COLOURS, "a colour is above 2^24 - 1");
     return EBPO_OK;
 }
 
@@ -220,7 +220,7 @@ static ebpo_status check_windings(const reading *r, ebpo_array_id id, bool insid
     uint64_t count = winding ? ebpo_level_rows(r->out, id) : 0;
     for (uint64_t i = 0; i < count; i++)
         if (ebpo_rule_inside(r->chunks->file->info.rule, winding[i]) != inside)
-            return fail(r, id,
+            return runs_wrong(r, id,
                         inside ? "a black node lies outside by the winding rule"
                                : "a white node lies inside by the winding rule");
     return EBPO_OK;
@@ -234,7 +234,7 @@ static ebpo_status add_up_skips(const reading *r, uint64_t begin, uint64_t leave
     for (uint64_t i = begin; i < begin + leaves; i++) {
         uint64_t skip = out->leaf_first[i];
         if (end > faces || skip > faces - end || out->leaf_new[i] > faces - end - skip)
-            return fail(r, EBPO_A_LEAF_SKIP, "a leaf's new faces lie beyond the last face");
+            return runs_wrong(r, EBPO_A_LEAF_SKIP, "a leaf's new faces lie beyond the last face");
         out->leaf_first[i] = end + skip;
         end += skip + out->leaf_new[i];
         out->new_count += out->leaf_new[i];
@@ -256,7 +256,7 @@ static ebpo_status decode_faces(const reading *r)
     for (uint64_t i = 0; i < out->leaf_count && status == EBPO_OK; at += out->leaf_ref_count[i++])
         if (out->leaf_ref_count[i] &&
             !ebpo_refs_decode(out->leaf_refs + at, out->leaf_ref_count[i], out->leaf_first[i]))
-            status = fail(r, EBPO_A_LEAF_REFS,
+            status = runs_wrong(r, EBPO_A_LEAF_REFS,
                           "a reference does not lead to a face before the leaf's own");
     return status;
 }
@@ -280,7 +280,7 @@ static ebpo_status read_array(const reading *r, int id)
     const ebpo_list_spec *list = ebpo_schema_list(ebpo_schema[id].per);
     int type = ebpo_schema_node_type(ebpo_schema[id].per);
     ebpo_status status = EBPO_OK;
-    if (type >= 0 && wanted(r, id))
+    if (type >= 0 && is_wanted_array(r, id))
         status = read_column(r, id, type);
     else if (list && ebpo_level_array(r->out, list->counts)) /* also a list of nothing */
         status = read_list(r, id, list);

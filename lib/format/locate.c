@@ -147,7 +147,7 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
 }
 
 /* A list half read is none. */
-static void forget(ebpo_file *file)
+static void forget_places(ebpo_file *file)
 {
     for (int i = 0; i < ebpo_all_arrays(file); i++) {
         ebpo_array_in *a = ebpo_array_number(file, i);
@@ -167,13 +167,13 @@ static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
         status = list_chunks(file, places, a->shape.rows, error);
     free(places);
     if (status != EBPO_OK)
-        forget(file);
+        forget_places(file);
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 
 /* --- either way --- */
 
-static ebpo_status locate(ebpo_file *file, ebpo_error *error)
+static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     pthread_mutex_lock(&file->lock);
@@ -191,7 +191,7 @@ ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out, ebpo
     ebpo_stored_sizes sizes = EBPO_STORED_SIZES_INIT;
     ebpo_status status = out ? EBPO_CHECK_SIZED(ebpo_stored_sizes, out, error) : EBPO_OK;
     if (status == EBPO_OK && !atomic_load(&file->located))
-        status = locate(ebpo_reader_own(file), error);
+        status = locate_all(ebpo_reader_own(file), error);
     if (status == EBPO_OK && out)
         sizes = ebpo_reader_sizes(file);
     if (out)

@@ -11,7 +11,7 @@ static const uint64_t LONGEST = PTRDIFF_MAX / 8 / 3;
 
 /* The elements' size as the pipeline sees it: the coder's scratch is too small for shuffling a long
  * list, which is done here. */
-static bool shuffled(ebpo_pipeline pipeline)
+static bool is_shuffled(ebpo_pipeline pipeline)
 {
     return pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE;
 }
@@ -30,11 +30,11 @@ ebpo_status ebpo_long_chunk_encode(const uint64_t *values, uint64_t count, ebpo_
     ebpo_status status = coder && raw && turned && *stored ? EBPO_OK : EBPO_E_MEMORY;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         ebpo_store64(raw + 8 * i, values[i]);
-    if (status == EBPO_OK && shuffled(pipeline))
+    if (status == EBPO_OK && is_shuffled(pipeline))
         ebpo_shuffle(raw, size, 8, turned);
     if (status == EBPO_OK)
         status = ebpo_chunk_encode(coder, pipeline, codec_level, 1,
-                                   shuffled(pipeline) ? turned : raw, size, *stored, bytes);
+                                   is_shuffled(pipeline) ? turned : raw, size, *stored, bytes);
     if (coder)
         ebpo_chunk_coder_clear(coder);
     free(coder);
@@ -61,10 +61,10 @@ ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t stored_bytes,
     ebpo_status status = coder && raw && turned && *values ? EBPO_OK : EBPO_E_MEMORY;
     if (status == EBPO_OK)
         status = ebpo_chunk_decode(coder, pipeline, 1, stored, stored_bytes, raw, size, why);
-    if (status == EBPO_OK && shuffled(pipeline))
+    if (status == EBPO_OK && is_shuffled(pipeline))
         ebpo_unshuffle(raw, size, 8, turned);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        (*values)[i] = ebpo_load64((shuffled(pipeline) ? turned : raw) + 8 * i);
+        (*values)[i] = ebpo_load64((is_shuffled(pipeline) ? turned : raw) + 8 * i);
     if (coder)
         ebpo_chunk_coder_clear(coder);
     free(coder);

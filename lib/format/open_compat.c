@@ -62,7 +62,7 @@ static ebpo_status write_piece(int fd, const char *shown, uint64_t at, const uin
 }
 
 /* Everything of a URL, into a file without a name. */
-static ebpo_status fetch(const char *url, const ebpo_http_options *http, const char *shown, int to,
+static ebpo_status fetch_url(const char *url, const ebpo_http_options *http, const char *shown, int to,
                          ebpo_error *error)
 {
     ebpo_source source = EBPO_SOURCE_INIT;
@@ -96,7 +96,7 @@ static ebpo_status find_from(const char *path, const ebpo_http_options *http, co
     if (ebpo_is_url(path))
         status = make_temporary(fetched, shown, error);
     if (status == EBPO_OK && ebpo_is_url(path))
-        status = fetch(path, http, shown, fetched->fd, error);
+        status = fetch_url(path, http, shown, fetched->fd, error);
     *from = ebpo_is_url(path) ? fetched->name : path;
     if (status == EBPO_OK && (stat(*from, &facts) != 0 || !S_ISREG(facts.st_mode)))
         return ebpo_fail_errno(error, shown, "cannot be opened");
@@ -130,7 +130,7 @@ static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_option
 }
 
 /* Returns whether the copy lacks what an error is about. */
-static bool lacks(int copy, const char *shown, const char *object)
+static bool copy_lacks(int copy, const char *shown, const char *object)
 {
     char name[32];
     ebpo_source source = EBPO_SOURCE_INIT;
@@ -168,7 +168,7 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
         status = ebpo_h5_clean_copy(from, fetched.fd >= 0, copy.name, shown,
                                     ebpo_rows_of_foreign_chunk, &limits, &left_out, error);
     if (status == EBPO_OK && open_copy(copy.fd, shown, o, out, &why) != EBPO_OK)
-        status = ebpo_fail_with(error, *left_out.message && lacks(copy.fd, shown, why.object)
+        status = ebpo_fail_with(error, *left_out.message && copy_lacks(copy.fd, shown, why.object)
                                            ? &left_out /* it was there, and here is what it is */
                                            : &why);
     remove_temporary(&copy);

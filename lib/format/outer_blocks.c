@@ -29,7 +29,7 @@ void ebpo_outer_blocks_free(ebpo_outer_blocks *blocks)
     free(blocks->vertex_block);
 }
 
-static void list(uint32_t *rounds, uint32_t round, uint64_t block, uint32_t *blocks,
+static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_t *blocks,
                  uint64_t *count)
 {
     if (rounds[block] == round)
@@ -44,7 +44,7 @@ static void use_face(ebpo_outer_blocks *b, const ebpo_mesh *mesh, const ebpo_out
     for (int k = 0; k < 3; k++) {
         uint32_t vertex = mesh->faces[3 * face + (uint64_t)k];
         if (vertex < own->vertex)
-            list(b->vertex_round, b->round, vertex / EBPO_VERTEX_BLOCK, b->vertex_block,
+            list_block(b->vertex_round, b->round, vertex / EBPO_VERTEX_BLOCK, b->vertex_block,
                  &b->vertex_blocks);
     }
 }
@@ -54,7 +54,7 @@ void ebpo_outer_blocks_refer(ebpo_outer_blocks *b, const ebpo_mesh *mesh,
 {
     for (uint64_t i = 0; i < count; i++)
         if (refs[i] < own->face) {
-            list(b->face_round, b->round, refs[i] / EBPO_FACE_BLOCK, b->face_block,
+            list_block(b->face_round, b->round, refs[i] / EBPO_FACE_BLOCK, b->face_block,
                  &b->face_blocks);
             use_face(b, mesh, own, refs[i]);
         }
@@ -66,17 +66,17 @@ void ebpo_outer_blocks_use(ebpo_outer_blocks *b, const ebpo_mesh *mesh, const eb
         use_face(b, mesh, own, face);
 }
 
-static int descending(const void *a, const void *b)
+static int compare_descending(const void *a, const void *b)
 {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x < y) - (x > y);
 }
 
-static uint64_t take(uint32_t *blocks, uint64_t count, uint64_t from, uint32_t *out)
+static uint64_t take_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uint32_t *out)
 {
     uint64_t taken = 0;
     if (count)
-        qsort(blocks, count, sizeof *blocks, descending);
+        qsort(blocks, count, sizeof *blocks, compare_descending);
     for (uint64_t i = 0; i < count; i++)
         if (blocks[i] <= from)
             out[taken++] = (uint32_t)(from - blocks[i]);
@@ -86,9 +86,9 @@ static uint64_t take(uint32_t *blocks, uint64_t count, uint64_t from, uint32_t *
 void ebpo_outer_blocks_take(ebpo_outer_blocks *b, const ebpo_outer_range *own, uint32_t *out,
                             const uint64_t *before, uint64_t *after)
 {
-    uint64_t faces = take(b->face_block, b->face_blocks, own->face / EBPO_FACE_BLOCK, out);
+    uint64_t faces = take_blocks(b->face_block, b->face_blocks, own->face / EBPO_FACE_BLOCK, out);
     uint64_t vertices =
-        take(b->vertex_block, b->vertex_blocks, own->vertex / EBPO_VERTEX_BLOCK, out + faces);
+        take_blocks(b->vertex_block, b->vertex_blocks, own->vertex / EBPO_VERTEX_BLOCK, out + faces);
     after[EBPO_S_OUTER_FACES] = before[EBPO_S_OUTER_FACES] + faces;
     after[EBPO_S_OUTER_VERTICES] = before[EBPO_S_OUTER_VERTICES] + vertices;
     b->face_blocks = b->vertex_blocks = 0;

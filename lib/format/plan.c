@@ -29,7 +29,7 @@ void ebpo_plan_free(ebpo_plan *plan)
     memset(plan, 0, sizeof *plan);
 }
 
-static void summarise(ebpo_info *info, const ebpo_tree *tree)
+static void summarise_levels(ebpo_info *info, const ebpo_tree *tree)
 {
     for (int i = 0; i < info->level_count; i++) {
         info->level[i] = ebpo_level_summarise(&tree->level[i], info->parts);
@@ -108,7 +108,7 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
         return ebpo_check_fail(check, -1, "/",
                                "a name, unit, CRS or date is not UTF-8 without control characters",
                                error);
-    summarise(info, tree);
+    summarise_levels(info, tree);
     info->subtree_level = ebpo_subtree_level_for(info, options->subtree_faces);
     info->gates = gates_wanted(info, tree->info.gates, options->face_coding);
     return ebpo_facts_check(info, check->shown, check->as, error);

@@ -6,14 +6,14 @@
 #include "format/schema.h"
 #include "geometry/node_types.h"
 
-static uint64_t *make(uint64_t count, unsigned cols)
+static uint64_t *make_index(uint64_t count, unsigned cols)
 {
     return ebpo_alloc_zero((count / EBPO_INDEX_ROWS + 1) * cols, sizeof(uint64_t));
 }
 
 uint64_t *ebpo_index_types(const ebpo_level *level, bool root)
 {
-    uint64_t *index = make(level->group_count, 4);
+    uint64_t *index = make_index(level->group_count, 4);
     uint64_t before[4] = { 0, 0, 0, 0 };
     EBPO_FOR_ITEMS(level->workspace, i, 0, index ? level->group_count : 0) {
         if (i % EBPO_INDEX_ROWS == 0)
@@ -27,7 +27,7 @@ uint64_t *ebpo_index_types(const ebpo_level *level, bool root)
 
 uint64_t *ebpo_index_gray(const ebpo_level *level)
 {
-    uint64_t *index = make(level->gray_count, 1);
+    uint64_t *index = make_index(level->gray_count, 1);
     uint64_t planes = 0;
     for (uint64_t i = 0; index && i < level->gray_count; i++) {
         if (i % EBPO_INDEX_ROWS == 0)
@@ -39,7 +39,7 @@ uint64_t *ebpo_index_gray(const ebpo_level *level)
 
 uint64_t *ebpo_index_leaves(const ebpo_level *level)
 {
-    uint64_t *index = make(level->leaf_count, 3);
+    uint64_t *index = make_index(level->leaf_count, 3);
     uint64_t end = 0, refs = 0, planes = 0;
     EBPO_FOR_ITEMS(level->workspace, i, 0, index ? level->leaf_count : 0) {
         if (i % EBPO_INDEX_ROWS == 0) {

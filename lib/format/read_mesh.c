@@ -24,7 +24,7 @@ void ebpo_tree_free(ebpo_tree *tree)
     memset(tree, 0, sizeof *tree);
 }
 
-static ebpo_status absent(const ebpo_file *file, const char *part, ebpo_error *error)
+static ebpo_status part_absent(const ebpo_file *file, const char *part, ebpo_error *error)
 {
     return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
                           "the file was written without its %s; build it again with that part",
@@ -129,7 +129,7 @@ ebpo_status ebpo_file_read_mesh(const ebpo_file *file, const ebpo_read_options *
     if (status != EBPO_OK)
         return status;
     if (!(file->info.parts & EBPO_PART_MESH))
-        return absent(file, "mesh", error);
+        return part_absent(file, "mesh", error);
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
     ebpo_expect_root(&expected, EBPO_NEEDS_MESH);
     if (read.attributes)
@@ -192,7 +192,7 @@ ebpo_status ebpo_file_read_maps(const ebpo_file *file, const ebpo_read_options *
     if (status != EBPO_OK)
         return status;
     if (!(file->info.parts & EBPO_PART_MAPS))
-        return absent(file, "maps to the source's numbers", error);
+        return part_absent(file, "maps to the source's numbers", error);
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
     ebpo_expect_root(&expected, EBPO_NEEDS_MAPS);
     ebpo_expect_all(&expected);

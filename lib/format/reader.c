@@ -28,7 +28,7 @@ typedef struct job {
 
 /* Bytes [address, address + bytes) of the file to reader->stored, with room for at least
  * `capacity`. */
-static ebpo_status fetch(const ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address,
+static ebpo_status fetch_stored(const ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address,
                          size_t bytes, size_t capacity, ebpo_error *error)
 {
     if (capacity < bytes)
@@ -43,7 +43,7 @@ static ebpo_status fetch(const ebpo_file *file, ebpo_chunk_reader *reader, uint6
     return ebpo_input_read(&ebpo_reader_own(file)->in, address, bytes, reader->stored, error);
 }
 
-static ebpo_status damaged(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+static ebpo_status chunk_damaged(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                            const char *why, ebpo_error *error)
 {
     return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, array->path, -1,
@@ -52,7 +52,7 @@ static ebpo_status damaged(const ebpo_file *file, const ebpo_array_in *array, ui
 }
 
 /* As HDF5 would give it. */
-static ebpo_status unpack(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+static ebpo_status unpack_stored(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                           ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
                           ebpo_error *error)
 {
@@ -60,12 +60,12 @@ static ebpo_status unpack(const ebpo_file *file, const ebpo_array_in *array, uin
     size_t bytes = shape.chunk_rows * ebpo_shape_row_bytes(&shape);
     const char *why;
     if (!ebpo_chunk_fits(file, array, chunk, stored, array->chunks[chunk].bytes))
-        return damaged(file, array, chunk, "it is not the one that was written there", error);
+        return chunk_damaged(file, array, chunk, "it is not the one that was written there", error);
     ebpo_status status = ebpo_chunk_decode(coder, shape.pipeline, shape.element_size, stored,
                                            array->chunks[chunk].bytes, raw, bytes, &why);
     if (status == EBPO_E_MEMORY)
         return ebpo_fail_memory(error, bytes);
-    return status == EBPO_OK ? EBPO_OK : damaged(file, array, chunk, why, error);
+    return status == EBPO_OK ? EBPO_OK : chunk_damaged(file, array, chunk, why, error);
 }
 
 /* From gates to codes of high-water, with filling. Single bytes are not shuffled: the coder's room
@@ -77,21 +77,21 @@ static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *arra
     uint64_t left = array->shape.rows - chunk * array->shape.chunk_rows,
              rows = left < array->shape.chunk_rows ? left : array->shape.chunk_rows;
     size_t row = ebpo_shape_row_bytes(&array->shape);
-    ebpo_status status = unpack(file, array, chunk, coder, stored, coder->scratch, error);
+    ebpo_status status = unpack_stored(file, array, chunk, coder, stored, coder->scratch, error);
     if (status != EBPO_OK)
         return status;
     memset(codes + rows * row, 0, (array->shape.chunk_rows - rows) * row);
     return ebpo_gates_decode(coder->scratch, (uint32_t)rows, codes)
                ? EBPO_OK
-               : damaged(file, array, chunk, "its streams are those of no faces", error);
+               : chunk_damaged(file, array, chunk, "its streams are those of no faces", error);
 }
 
-static ebpo_status decode(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+static ebpo_status decode_stored(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                           ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
                           ebpo_error *error)
 {
     return array->gates ? unpack_gates(file, array, chunk, coder, stored, raw, error)
-                        : unpack(file, array, chunk, coder, stored, raw, error);
+                        : unpack_stored(file, array, chunk, coder, stored, raw, error);
 }
 
 static ebpo_status fetch_chunk(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
@@ -103,7 +103,7 @@ static ebpo_status fetch_chunk(const ebpo_file *file, const ebpo_array_in *array
     if (status != EBPO_OK)
         return status;
     const ebpo_chunk_place *at = &array->chunks[chunk];
-    return fetch(file, reader, at->address, at->bytes, ebpo_reader_chunk_bound(array), error);
+    return fetch_stored(file, reader, at->address, at->bytes, ebpo_reader_chunk_bound(array), error);
 }
 
 ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
@@ -111,7 +111,7 @@ ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_array_in *array,
 {
     ebpo_status status = fetch_chunk(file, array, chunk, reader, error);
     return status == EBPO_OK
-               ? decode(file, array, chunk, &reader->coder, reader->stored, raw, error)
+               ? decode_stored(file, array, chunk, &reader->coder, reader->stored, raw, error)
                : status;
 }
 
@@ -121,7 +121,7 @@ ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk, ebpo_chunk_
     const ebpo_array_in *array = ebpo_reader_array(file, EBPO_A_FACES, 0);
     ebpo_status status = fetch_chunk(file, array, chunk, reader, error);
     return status == EBPO_OK
-               ? unpack(file, array, chunk, &reader->coder, reader->stored, raw, error)
+               ? unpack_stored(file, array, chunk, &reader->coder, reader->stored, raw, error)
                : status;
 }
 
@@ -142,11 +142,11 @@ static ebpo_status read_run(job *j, ebpo_idle_reader *s, uint64_t begin, uint64_
                             ebpo_error *error)
 {
     const ebpo_array_in *a = j->array;
-    ebpo_status status = fetch(j->file, &s->reader, a->chunks[begin].address, bytes, 0, error);
+    ebpo_status status = fetch_stored(j->file, &s->reader, a->chunks[begin].address, bytes, 0, error);
     size_t at = 0;
     for (uint64_t chunk = begin; chunk < end && status == EBPO_OK; chunk++) {
         uint64_t row = chunk * a->shape.chunk_rows, left = a->shape.rows - row;
-        status = decode(j->file, a, chunk, &s->reader.coder, s->reader.stored + at, s->raw, error);
+        status = decode_stored(j->file, a, chunk, &s->reader.coder, s->reader.stored + at, s->raw, error);
         if (status == EBPO_OK)
             status =
                 j->take(j->context, a, chunk, row,

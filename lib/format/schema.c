@@ -137,7 +137,7 @@ static uint64_t face_chunks(const ebpo_info *info)
     return faces > rows ? (faces - 1) / rows + 1 : 0;
 }
 
-static uint64_t subtrees(const ebpo_info *info)
+static uint64_t subtree_rows(const ebpo_info *info)
 {
     return info->level[info->subtree_level].gray_count;
 }
@@ -145,7 +145,7 @@ static uint64_t subtrees(const ebpo_info *info)
 static uint64_t subtree_chunks(const ebpo_info *info)
 {
     uint64_t rows = ebpo_subtree_rows(info);
-    return (subtrees(info) + rows - 1) / rows;
+    return (subtree_rows(info) + rows - 1) / rows;
 }
 
 uint32_t ebpo_subtree_rows(const ebpo_info *info)
@@ -164,14 +164,14 @@ uint32_t ebpo_schema_cols(const ebpo_info *info, ebpo_array_id id)
                : ebpo_schema[id].cols;
 }
 
-static uint64_t load(const void *record, size_t offset)
+static uint64_t load_field(const void *record, size_t offset)
 {
     uint64_t value;
     memcpy(&value, (const char *)record + offset, sizeof value);
     return value;
 }
 
-static void store(void *record, size_t offset, uint64_t value)
+static void store_field(void *record, size_t offset, uint64_t value)
 {
     memcpy((char *)record + offset, &value, sizeof value);
 }
@@ -191,10 +191,10 @@ uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level)
     case EBPO_PER_FACE: return info->face_count;
     case EBPO_PER_FACE_CHUNK: return face_chunks(info);
     case EBPO_PER_SUBTREE_CHUNK: return subtree_chunks(info);
-    case EBPO_PER_SUBTREE: return subtrees(info);
+    case EBPO_PER_SUBTREE: return subtree_rows(info);
     case EBPO_PER_OUTER_BLOCK:
     case EBPO_PER_CHUNK: return EBPO_ROWS_STATED;
-    default: return load(l, ebpo_counts[per].in_summary);
+    default: return load_field(l, ebpo_counts[per].in_summary);
     }
 }
 
@@ -220,13 +220,13 @@ int ebpo_schema_node_type(ebpo_per per)
 
 uint64_t ebpo_level_count(const ebpo_level *level, ebpo_per per)
 {
-    return per < EBPO_COUNTS ? load(level, ebpo_counts[per].in_level) : level->group_count;
+    return per < EBPO_COUNTS ? load_field(level, ebpo_counts[per].in_level) : level->group_count;
 }
 
 void ebpo_level_set_count(ebpo_level *level, ebpo_per per, uint64_t count)
 {
     if (per < EBPO_COUNTS)
-        store(level, ebpo_counts[per].in_level, count);
+        store_field(level, ebpo_counts[per].in_level, count);
     else
         level->group_count = count;
 }
@@ -275,7 +275,7 @@ ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts)
                                .leaf_volume = level->leaf_volume };
     for (int i = 0; i < EBPO_COUNTS; i++)
         if (ebpo_counts[i].needs & (parts | EBPO_NEEDS_ALWAYS))
-            store(&out, ebpo_counts[i].in_summary, load(level, ebpo_counts[i].in_level));
+            store_field(&out, ebpo_counts[i].in_summary, load_field(level, ebpo_counts[i].in_level));
     return out;
 }
 
@@ -287,6 +287,6 @@ ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level)
                        .leaf_volume = s->leaf_volume,
                        .pruned_count = s->pruned_count };
     for (int i = 0; i < EBPO_COUNTS; i++)
-        store(&out, ebpo_counts[i].in_level, load(s, ebpo_counts[i].in_summary));
+        store_field(&out, ebpo_counts[i].in_level, load_field(s, ebpo_counts[i].in_summary));
     return out;
 }

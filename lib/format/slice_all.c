@@ -8,7 +8,7 @@
 #include "format/slice.h"
 
 /* What a slice does not have. */
-static void drop(ebpo_level *level)
+static void drop_arrays(ebpo_level *level)
 {
     ebpo_level_drop(level, EBPO_NEEDS_LEAF_PLANES);
     level->leaf_plane_count = 0;
@@ -30,7 +30,7 @@ ebpo_status ebpo_slice_read_all(ebpo_slice *out, const ebpo_file *file, unsigned
     out->level_count = file->info.level_count;
     out->pruned = file->info.pruned;
     for (int i = 0; i < out->level_count; i++) {
-        drop(&tree.level[i]);
+        drop_arrays(&tree.level[i]);
         out->level[i] = tree.level[i];
         memset(&tree.level[i], 0, sizeof tree.level[i]);
     }

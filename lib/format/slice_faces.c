@@ -31,7 +31,7 @@ static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *s
 
 /* Rows of a decoded array: those of `single` (ascending), then [first, first + rows). Chunks stay
  * pinned while rows are in them. */
-static ebpo_status gather(ebpo_chunks *chunks, ebpo_array_id id, size_t row_bytes,
+static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row_bytes,
                           const uint32_t *single, uint64_t singles, uint64_t first, uint64_t rows,
                           void *out, ebpo_error *error)
 {
@@ -76,7 +76,7 @@ static ebpo_status collect_outer(ebpo_slice *slice, ebpo_compact *outer, ebpo_ro
     return ebpo_compact_sort(outer, error);
 }
 
-static void localise(ebpo_slice *slice, const ebpo_compact *outer)
+static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
 {
     /* the outer faces are some of those before the first */
     uint64_t less = slice->first_face - outer->count;
@@ -98,7 +98,7 @@ static ebpo_status number_faces(ebpo_slice *slice, ebpo_room *room, ebpo_error *
     ebpo_compact outer = { .slot = NULL };
     ebpo_status status = collect_outer(slice, &outer, room, error);
     if (status == EBPO_OK)
-        localise(slice, &outer);
+        localise_faces(slice, &outer);
     if (status == EBPO_OK && outer.count) {
         uint32_t *fit = ebpo_realloc(outer.sorted, outer.count, sizeof *fit);
         slice->outer = fit ? fit : outer.sorted;
@@ -154,7 +154,7 @@ static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_roo
 }
 
 /* Older vertices first, then the new ones: the order of the file. */
-static void renumber(ebpo_mesh *mesh, uint64_t begin, const ebpo_compact *older)
+static void renumber_vertices(ebpo_mesh *mesh, uint64_t begin, const ebpo_compact *older)
 {
     uint32_t less = (uint32_t)(begin - older->count);
     for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
@@ -180,11 +180,11 @@ static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_ro
     if (status == EBPO_OK)
         status = ebpo_room_take(room, mesh->vertex_count * row_bytes, error);
     if (status == EBPO_OK) {
-        renumber(mesh, begin, &older);
+        renumber_vertices(mesh, begin, &older);
         void *xyz = ebpo_alloc(mesh->vertex_count, row_bytes);
         mesh->xyz32 = wide ? NULL : xyz;
         mesh->xyz64 = wide ? xyz : NULL;
-        status = xyz ? gather(chunks, EBPO_A_VERTICES, row_bytes, older.sorted, older.count, begin,
+        status = xyz ? gather_rows(chunks, EBPO_A_VERTICES, row_bytes, older.sorted, older.count, begin,
                               end - begin, xyz, error)
                      : ebpo_fail_memory(error, mesh->vertex_count * row_bytes);
     }
@@ -199,7 +199,7 @@ static ebpo_status take_source(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_erro
     slice->face_source = ebpo_alloc(slice->mesh.face_count, sizeof *slice->face_source);
     if (!slice->face_source)
         return ebpo_fail_memory(error, slice->mesh.face_count * sizeof *slice->face_source);
-    return gather(chunks, EBPO_A_FACE_SOURCE, sizeof *slice->face_source, slice->outer,
+    return gather_rows(chunks, EBPO_A_FACE_SOURCE, sizeof *slice->face_source, slice->outer,
                   slice->outer_count, slice->first_face, slice->face_count, slice->face_source,
                   error);
 }
@@ -220,7 +220,7 @@ ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool m
     slice->mesh.faces = ebpo_alloc(slice->mesh.face_count, ROW);
     if (!slice->mesh.faces)
         return ebpo_fail_memory(error, slice->mesh.face_count * ROW);
-    status = gather(chunks, EBPO_A_FACES, ROW, slice->outer, slice->outer_count, slice->first_face,
+    status = gather_rows(chunks, EBPO_A_FACES, ROW, slice->outer, slice->outer_count, slice->first_face,
                     slice->face_count, slice->mesh.faces, error);
     if (status == EBPO_OK)
         status = take_vertices(slice, chunks, room, error);

@@ -13,14 +13,14 @@ typedef struct telling {
     int last_level;
 } telling;
 
-static void rows(const telling *t, ebpo_array_id id, int level, uint64_t begin, uint64_t end)
+static void expect_rows(const telling *t, ebpo_array_id id, int level, uint64_t begin, uint64_t end)
 {
     if (end > begin)
         ebpo_chunks_expect(t->chunks, t->expected, id, level, begin, end - begin);
 }
 
 /* The level's sums of a column before the subtrees and behind them. */
-static uint64_t sum(const telling *t, int level, unsigned what, bool after)
+static uint64_t subtree_sum(const telling *t, int level, unsigned what, bool after)
 {
     unsigned column = ebpo_subtree_column(&t->chunks->file->info, level, what);
     return after ? t->last->after[column] : t->first->before[column];
@@ -32,15 +32,15 @@ static uint64_t sum_of(const telling *t, ebpo_per per, int level, bool after)
     uint64_t groups = ebpo_subtree_groups(info, after ? t->last : t->first, level, after);
     switch (per) {
     case EBPO_PER_GROUP: return groups;
-    case EBPO_PER_GRAY: return sum(t, level, EBPO_S_GRAY, after);
-    case EBPO_PER_LEAF: return sum(t, level, EBPO_S_LEAF, after);
-    case EBPO_PER_BLACK: return sum(t, level, EBPO_S_BLACK, after);
+    case EBPO_PER_GRAY: return subtree_sum(t, level, EBPO_S_GRAY, after);
+    case EBPO_PER_LEAF: return subtree_sum(t, level, EBPO_S_LEAF, after);
+    case EBPO_PER_BLACK: return subtree_sum(t, level, EBPO_S_BLACK, after);
     case EBPO_PER_WHITE:
-        return 8 * groups - sum(t, level, EBPO_S_GRAY, after) - sum(t, level, EBPO_S_LEAF, after) -
-               sum(t, level, EBPO_S_BLACK, after);
-    case EBPO_PER_PLANE: return sum(t, level, EBPO_S_PLANES, after);
-    case EBPO_PER_LEAF_PLANE: return sum(t, level, EBPO_S_LEAF_PLANES, after);
-    case EBPO_PER_REF: return sum(t, level, EBPO_S_REFS, after);
+        return 8 * groups - subtree_sum(t, level, EBPO_S_GRAY, after) - subtree_sum(t, level, EBPO_S_LEAF, after) -
+               subtree_sum(t, level, EBPO_S_BLACK, after);
+    case EBPO_PER_PLANE: return subtree_sum(t, level, EBPO_S_PLANES, after);
+    case EBPO_PER_LEAF_PLANE: return subtree_sum(t, level, EBPO_S_LEAF_PLANES, after);
+    case EBPO_PER_REF: return subtree_sum(t, level, EBPO_S_REFS, after);
     default: return 0; /* index arrays, which the table stands for */
     }
 }
@@ -52,7 +52,7 @@ static void tell_nodes(const telling *t)
          level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             if (ebpo_schema[id].needs & t->needs)
-                rows(t, (ebpo_array_id)id, level, sum_of(t, ebpo_schema[id].per, level, false),
+                expect_rows(t, (ebpo_array_id)id, level, sum_of(t, ebpo_schema[id].per, level, false),
                      sum_of(t, ebpo_schema[id].per, level, true));
 }
 
@@ -63,9 +63,9 @@ static void tell_block(const telling *t, ebpo_array_id id, uint64_t from, uint64
     uint64_t block = from / block_rows;
     if (distance > block)
         return;
-    rows(t, id, 0, (block - distance) * block_rows, (block - distance) * block_rows + 1);
+    expect_rows(t, id, 0, (block - distance) * block_rows, (block - distance) * block_rows + 1);
     if (id == EBPO_A_FACES && t->needs & EBPO_NEEDS_MAPS)
-        rows(t, EBPO_A_FACE_SOURCE, 0, (block - distance) * block_rows,
+        expect_rows(t, EBPO_A_FACE_SOURCE, 0, (block - distance) * block_rows,
              (block - distance) * block_rows + block_rows);
 }
 
@@ -73,10 +73,10 @@ static void tell_own_faces(const telling *t)
 {
     uint64_t faces = t->last->after[EBPO_S_FACES_BEFORE] + t->last->after[EBPO_S_FACES],
              vertices = t->last->after[EBPO_S_VERTICES_BEFORE] + t->last->after[EBPO_S_VERTICES];
-    rows(t, EBPO_A_FACES, 0, t->first->face, faces);
-    rows(t, EBPO_A_VERTICES, 0, t->first->vertex, vertices);
+    expect_rows(t, EBPO_A_FACES, 0, t->first->face, faces);
+    expect_rows(t, EBPO_A_VERTICES, 0, t->first->vertex, vertices);
     if (t->needs & EBPO_NEEDS_MAPS)
-        rows(t, EBPO_A_FACE_SOURCE, 0, t->first->face, faces);
+        expect_rows(t, EBPO_A_FACE_SOURCE, 0, t->first->face, faces);
 }
 
 /* The rows of `outer` are hints: of any value, and of any number. */

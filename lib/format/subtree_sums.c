@@ -180,7 +180,7 @@ static ebpo_status list_outer(const counting *c, ebpo_error *error)
 }
 
 /* Differences, and every so many-th sum. False: a subtree has more than a count holds. */
-static bool split(const counting *c)
+static bool split_sums(const counting *c)
 {
     ebpo_subtree_sums *s = c->sums;
     uint32_t rows = ebpo_subtree_rows(c->info);
@@ -217,7 +217,7 @@ ebpo_status ebpo_subtree_sums_make(ebpo_subtree_sums *out, const ebpo_tree *tree
         count_vertices(&c);
         status = list_outer(&c, error);
     }
-    if (status == EBPO_OK && !split(&c))
+    if (status == EBPO_OK && !split_sums(&c))
         status = ebpo_fail(error, EBPO_E_LIMIT,
                            "a subtree has more than 4,294,967,295 items of a kind; write the file "
                            "without subtrees");

@@ -13,7 +13,7 @@ static ebpo_status table_fails(const ebpo_chunks *chunks, ebpo_array_id id, cons
 }
 
 /* What a column adds up to at most; whether it must be all of it. */
-static uint64_t total(const ebpo_file *file, unsigned column, bool *exact)
+static uint64_t column_total(const ebpo_file *file, unsigned column, bool *exact)
 {
     const ebpo_info *info = &file->info;
     bool mesh = info->parts & EBPO_PART_MESH, planes = info->parts & EBPO_PART_PLANES,
@@ -48,14 +48,14 @@ static ebpo_status sums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t col
     ebpo_status status = EBPO_OK;
     if (chunk == index->shape.rows) {
         for (uint32_t k = 0; k < cols; k++)
-            sums[k] = total(chunks->file, k, &exact);
+            sums[k] = column_total(chunks->file, k, &exact);
         return EBPO_OK;
     }
     ebpo_held_chunk view = { .array = index };
     status = ebpo_held_chunk_move(chunks, &view, chunk, error);
     for (uint32_t k = 0; k < cols && status == EBPO_OK; k++) {
         sums[k] = ebpo_load64(view.rows + ((chunk - view.begin) * cols + k) * 8);
-        if (sums[k] > total(chunks->file, k, &exact) || (chunk == 0 && sums[k]))
+        if (sums[k] > column_total(chunks->file, k, &exact) || (chunk == 0 && sums[k]))
             status = table_fails(chunks, EBPO_A_SUBTREE_INDEX,
                                  "the sums contradict the counts in the head", error);
     }
@@ -103,7 +103,7 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, counts *c,
         status = table_fails(chunks, EBPO_A_SUBTREE_OUTER,
                              "it has not the rows that the table's counts add up to", error);
     for (uint32_t k = 0; k < c->cols && status == EBPO_OK; k++) {
-        (void)total(chunks->file, k, &exact);
+        (void)column_total(chunks->file, k, &exact);
         if (last && !exact ? sums[k] > c->end[k] : sums[k] != c->end[k])
             status = table_fails(chunks, EBPO_A_SUBTREE_COUNTS,
                                  "the rows do not add up to the sums in the index", error);
@@ -167,7 +167,7 @@ struct ebpo_kept_rows {
     unsigned count, next;
 };
 
-static bool holds(const ebpo_subtree_row *row, unsigned column, uint64_t item)
+static bool row_holds(const ebpo_subtree_row *row, unsigned column, uint64_t item)
 {
     return column == BY_NUMBER ? row->subtree == item
                                : row->before[column] <= item && item < row->after[column];
@@ -180,7 +180,7 @@ static bool find_kept(ebpo_chunks *chunks, unsigned column, uint64_t item, ebpo_
     pthread_mutex_lock(&chunks->lock);
     const struct ebpo_kept_rows *kept = chunks->rows;
     for (unsigned i = 0; kept && i < kept->count && !found; i++)
-        if ((found = holds(&kept->row[i], column, item)))
+        if ((found = row_holds(&kept->row[i], column, item)))
             *out = kept->row[i];
     pthread_mutex_unlock(&chunks->lock);
     return found;
