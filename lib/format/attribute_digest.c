@@ -4,7 +4,7 @@
 #include "core/array_loops.h"
 #include "hdf5_read/coding.h"
 #include "format/attribute_digest.h"
-#include "format/attribute_paths.h"
+#include "format/schema.h"
 #include "format/content.h"
 
 enum { PIECE = 1 << 16 };

@@ -8,7 +8,7 @@
 #include "core/error.h"
 #include "core/sized.h"
 #include "format/attribute_open.h"
-#include "format/attribute_paths.h"
+#include "format/schema.h"
 #include "format/head_facts.h"
 
 static ebpo_status attribute_head_wrong(const ebpo_file *file, const char *path, const char *what,

@@ -4,7 +4,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "format/attribute_paths.h"
+#include "format/schema.h"
 #include "format/pick.h"
 
 typedef struct picking {

@@ -9,7 +9,7 @@
 #include "core/text.h"
 #include "hdf5_read/coding.h"
 #include "format/attribute_digest.h"
-#include "format/attribute_paths.h"
+#include "format/schema.h"
 #include "format/attribute_plan.h"
 #include "format/chunk_rows.h"
 

@@ -10,7 +10,7 @@
 #include "core/sums.h"
 #include "hdf5_read/coding.h"
 #include "format/attribute_digest.h"
-#include "format/attribute_paths.h"
+#include "format/schema.h"
 #include "format/attribute_read.h"
 #include "format/reader.h"
 

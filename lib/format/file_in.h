@@ -7,9 +7,8 @@
 #include <stdatomic.h>
 
 #include "mesh/attributes.h"
-#include "format/array_check.h"
-#include "format/idle_readers.h"
 #include "format/schema.h"
+#include "format/idle_readers.h"
 #include "hdf5_read/head.h"
 #include "io/byte_source.h"
 

@@ -10,7 +10,7 @@
 #include "core/arrays.h"
 #include "core/text.h"
 #include "hdf5_read/coding.h"
-#include "format/array_check.h"
+#include "format/schema.h"
 #include "format/attribute_plan.h"
 #include "format/chunk_rows.h"
 #include "format/head_facts.h"
