@@ -7,7 +7,7 @@
 #include "core/sums.h"
 #include "format/attribute_read.h"
 #include "format/content.h"
-#include "format/head_facts_table.h"
+#include "format/head_facts.h"
 #include "format/reader.h"
 
 /* Arrays are independent, so threads take whole ones; chunks within one must come in order. */

@@ -21,7 +21,7 @@ for row in re.findall(r"^\| (`.*) \|$", section, re.M):
     cells = [cell.strip() for cell in row.split(" | ")]
     if len(cells) == 7:
         said.update({name: cells for name in re.findall(r"`([a-z0-9_]+)`", cells[0])})
-table = (root / "lib/format/head_facts_table.c").read_text()
+table = (root / "lib/format/head_facts.c").read_text()
 written = dict(re.findall(r'\{ "(\w+)", EBPO_FACT_(\w+),', table))
 room = {name: int(size) - 1 for name, size in
         re.findall(r"\b(\w+)\[(\d+)\][,;]", (root / "lib/include/ebpo/file.h").read_text())}
