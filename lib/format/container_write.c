@@ -11,7 +11,7 @@
 #include "core/arrays.h"
 #include "core/sized.h"
 #include "hdf5_read/face_gates.h"
-#include "format/chunk_order.h"
+#include "format/chunk_layout.h"
 #include "format/chunk_sums.h"
 #include "format/content.h"
 #include "format/head_facts.h"

@@ -2,7 +2,7 @@
 
 #include <stdio.h>
 
-#include "format/attribute_plan.h"
+#include "format/write_plan.h"
 #include "format/head_facts.h"
 
 /* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that

@@ -3,7 +3,7 @@
 #ifndef EBPO_FORMAT_HEADERS_WRITE_H
 #define EBPO_FORMAT_HEADERS_WRITE_H
 
-#include "format/plan.h"
+#include "format/write_plan.h"
 
 /* In the order of the file. */
 typedef enum ebpo_list { EBPO_LIST_SUMS, EBPO_LIST_PLACES, EBPO_LISTS } ebpo_list;

@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/sized.h"
-#include "format/chunk_rows.h"
+#include "format/chunk_layout.h"
 #include "hdf5_write/compat.h"
 #include "hdf5_read/head.h"
 #include "io/http_source.h"

@@ -8,9 +8,8 @@
 #include "core/parallel.h"
 #include "core/sized.h"
 #include "core/arrays.h"
-#include "format/plan.h"
+#include "format/write_plan.h"
 #include "format/reader.h"
-#include "format/rank_index.h"
 
 /* leaf_first holds skips; each leaf's new faces end before the next one's begin. */
 static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *level,
