@@ -3,7 +3,7 @@
 
 #include "core/fp_env.h"
 #include "core/sized.h"
-#include "format/container_write.h"
+#include "format/write_file.h"
 #include "io/publish.h"
 #include "derive/subset_parts.h"
 

@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "format/reader.h"
-#include "format/container_write.h"
+#include "format/write_file.h"
 #include "io/publish.h"
 #include "derive/subset_parts.h"
 

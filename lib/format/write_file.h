@@ -1,6 +1,6 @@
 /* Writing for files that may not stay. */
-#ifndef EBPO_FORMAT_CONTAINER_WRITE_H
-#define EBPO_FORMAT_CONTAINER_WRITE_H
+#ifndef EBPO_FORMAT_WRITE_FILE_H
+#define EBPO_FORMAT_WRITE_FILE_H
 
 #include <ebpo/file.h>
 

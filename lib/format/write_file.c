@@ -1,25 +1,276 @@
-/* ebpo_tree_write: headers, the chunks of the first levels, the index of large arrays' chunks, and
- * all other chunks, in one go. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <ebpo/file.h>
+
 #include "core/alloc.h"
+#include "core/arrays.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "core/sha256.h"
-#include "core/arrays.h"
 #include "core/sized.h"
-#include "hdf5_read/face_gates.h"
 #include "format/chunk_layout.h"
 #include "format/chunk_sums.h"
 #include "format/content.h"
 #include "format/head_facts.h"
-#include "format/container_write.h"
-#include "format/headers_write.h"
 #include "format/long_chunk.h"
 #include "format/places.h"
+#include "format/reader.h"
+#include "format/write_file.h"
+#include "format/write_plan.h"
+#include "hdf5_read/face_gates.h"
 #include "io/publish.h"
+
+/* For writing: all of a file but its chunks: groups, arrays' headers, attributes, and the indexes
+ * of chunks; how many bytes these take is learned from a trial in memory. */
+
+/* In the order of the file. */
+typedef enum ebpo_list { EBPO_LIST_SUMS, EBPO_LIST_PLACES, EBPO_LISTS } ebpo_list;
+
+typedef struct ebpo_headers {
+    ebpo_plan *plan; /* whose arrays get handles */
+    ebpo_h5_out out;
+    ebpo_h5_id root;
+    /* lists about all chunks, the last chunks of the file; without rows they are not written */
+    ebpo_array_out list[EBPO_LISTS];
+    uint64_t chunks; /* of the plan's arrays */
+    int codec_level;
+    uint64_t head_bytes;  /* headers */
+    uint64_t index_bytes; /* of arrays of several chunks; 0: there are none */
+} ebpo_headers;
+
+/* The file's first chunk (of the root's type): it is written with the headers. */
+typedef struct ebpo_first_chunk {
+    const void *data;
+    size_t bytes;
+} ebpo_first_chunk;
+
+/* The plan stays the caller's. End with ebpo_headers_close, and ebpo_h5_finish or ebpo_h5_discard.
+ */
+void ebpo_headers_plan(ebpo_headers *h, ebpo_plan *plan, uint64_t chunks,
+                       const ebpo_write_options *options);
+
+/* Sizes of headers and indexes: the same file in memory, with chunks of one byte. */
+EBPO_MUST_USE ebpo_status ebpo_headers_measure(ebpo_headers *h, const char *shown,
+                                               ebpo_error *error);
+
+/* Then the file, which is left open. `shown`: for messages. */
+EBPO_MUST_USE ebpo_status ebpo_headers_lay_out(ebpo_headers *h, const char *path, const char *shown,
+                                               ebpo_first_chunk first, ebpo_error *error);
+
+/* With index_bytes: what comes now is in a piece of its own, once the first array of several chunks
+ * calls for it. */
+EBPO_MUST_USE ebpo_status ebpo_headers_begin_index(ebpo_headers *h, ebpo_error *error);
+
+/* Of a list: its own place and the file's size, which tell readers whether it still holds. */
+EBPO_MUST_USE ebpo_status ebpo_headers_put_holds(ebpo_headers *h, ebpo_list list,
+                                                 uint64_t file_bytes, uint64_t offset,
+                                                 ebpo_error *error);
+
+/* Closes root and arrays, not the file. */
+void ebpo_headers_close(ebpo_headers *h);
+
+/* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that
+ * where no other header follows. */
+enum { ALONE_BYTES = 4096 };
+
+static bool has_index(const ebpo_plan *plan)
+{
+    for (unsigned i = 0; i < plan->count; i++)
+        if (ebpo_shape_chunks(&plan->array[i].shape) > 1)
+            return true;
+    return false;
+}
+
+static void plan_list(ebpo_headers *h, ebpo_list list, ebpo_array_id id, uint64_t rows)
+{
+    ebpo_array_out *a = &h->list[list];
+    *a = (ebpo_array_out){ .id = id, .handle = -1 };
+    ebpo_schema_path(id, 0, a->path);
+    if (rows)
+        a->shape = (ebpo_shape){ .rows = rows,
+                                 .chunk_rows = (uint32_t)rows,
+                                 .element_size = ebpo_schema[id].sizes,
+                                 .pipeline = h->plan->array[0].shape.pipeline };
+}
+
+void ebpo_headers_plan(ebpo_headers *h, ebpo_plan *plan, uint64_t chunks,
+                       const ebpo_write_options *options)
+{
+    bool summed = options->chunk_sums == EBPO_SUMS_USUAL;
+    *h = (ebpo_headers){
+        .plan = plan, .root = -1, .chunks = chunks, .codec_level = options->codec_level
+    };
+    h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
+    plan_list(h, EBPO_LIST_SUMS, EBPO_A_CHUNK_SUMS, summed ? chunks : 0);
+    plan_list(h, EBPO_LIST_PLACES, EBPO_A_PLACES,
+              plan->info.subtree_level ? chunks + has_index(plan) + summed : 0);
+}
+
+static ebpo_status make_level_groups(ebpo_headers *h, ebpo_error *error)
+{
+    const ebpo_info *info = &h->plan->info;
+    ebpo_h5_id id;
+    ebpo_status status =
+        ebpo_h5_make_group(&h->out, "/levels", (unsigned)info->level_count, &id, error);
+    ebpo_h5_close_id(&h->out, status == EBPO_OK ? id : -1);
+    for (int level = 0; level < info->level_count && status == EBPO_OK; level++) {
+        char path[EBPO_PATH_BYTES];
+        unsigned links = 0;
+        for (unsigned i = 0; i < h->plan->count; i++)
+            links += h->plan->array[i].id < EBPO_LEVEL_ARRAYS && h->plan->array[i].level == level;
+        snprintf(path, sizeof path, "/levels/%02d", level);
+        status = ebpo_h5_make_group(&h->out, path, links, &id, error);
+        if (status == EBPO_OK)
+            status = ebpo_facts_put_level(&h->out, id, &info->level[level], error);
+        ebpo_h5_close_id(&h->out, id);
+    }
+    return status;
+}
+
+/* A group of the root, if what it is there for is, with room for all arrays that it may have. */
+static ebpo_status make_root_group(ebpo_headers *h, const char *path, uint32_t need,
+                                   ebpo_error *error)
+{
+    unsigned links = 0;
+    ebpo_h5_id id = -1;
+    if (!(ebpo_schema_has(&h->plan->info) & need))
+        return EBPO_OK;
+    for (int k = EBPO_LEVEL_ARRAYS; k < EBPO_ARRAYS; k++)
+        links += (ebpo_schema[k].needs & need) != 0;
+    ebpo_status status = ebpo_h5_make_group(&h->out, path, links, &id, error);
+    ebpo_h5_close_id(&h->out, id);
+    return status;
+}
+
+ebpo_status ebpo_headers_put_holds(ebpo_headers *h, ebpo_list list, uint64_t file_bytes,
+                                   uint64_t offset, ebpo_error *error)
+{
+    ebpo_h5_id id = h->list[list].handle;
+    ebpo_status status = ebpo_h5_put_count(&h->out, id, "file_bytes", file_bytes, error);
+    return status == EBPO_OK ? ebpo_h5_put_count(&h->out, id, "offset", offset, error) : status;
+}
+
+static ebpo_status make_array(ebpo_headers *h, ebpo_array_out *a, const ebpo_first_chunk *first,
+                              ebpo_error *error)
+{
+    ebpo_shape shape = ebpo_stored_shape(&a->shape, a->gates);
+    ebpo_status status = ebpo_h5_make_array(&h->out, a->path, &shape, &a->handle, error);
+    if (status == EBPO_OK && first)
+        status = ebpo_h5_put_chunk(&h->out, a->path, a->handle, &a->shape, 0, first->data,
+                                   first->bytes, error);
+    if (status == EBPO_OK && a->id == EBPO_A_ATTRIBUTE)
+        return ebpo_attributes_put_array(&h->out, h->plan, a, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_put_text(&h->out, a->handle, "coding",
+                                  a->gates ? EBPO_GATES_CODING : ebpo_schema[a->id].coding, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_put_text(&h->out, a->handle, "about", ebpo_schema[a->id].about, error);
+    return status;
+}
+
+/* Everything but the chunks, and the first of these: before the first header grows by attributes:
+ * HDF5 then cannot grow the metadata block at the end of the file, but only fill it. */
+static ebpo_status lay_out(ebpo_headers *h, const char *path, const char *shown,
+                           uint64_t head_bytes, ebpo_first_chunk first, ebpo_error *error)
+{
+    ebpo_plan *plan = h->plan;
+    h->out.codec_level = h->codec_level;
+    ebpo_status status =
+        ebpo_h5_create(&h->out, path, shown, head_bytes,
+                       3 + (h->list[EBPO_LIST_SUMS].shape.rows != 0) +
+                           (plan->info.subtree_level != 0) + (plan->attributes != NULL),
+                       error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_root(&h->out, &h->root, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_put(&h->out, h->root, &plan->info, error);
+    if (status == EBPO_OK)
+        status = make_level_groups(h, error);
+    if (status == EBPO_OK)
+        status = make_root_group(h, "/mesh", EBPO_NEEDS_MESH, error);
+    if (status == EBPO_OK)
+        status = make_root_group(h, "/maps", EBPO_NEEDS_MAPS, error);
+    if (status == EBPO_OK)
+        status = make_root_group(h, "/subtrees", EBPO_NEEDS_SUBTREES, error);
+    if (status == EBPO_OK)
+        status = ebpo_attributes_put_group(&h->out, plan, error);
+    for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)
+        status = make_array(h, &plan->array[i], i == 0 ? &first : NULL, error);
+    for (ebpo_list l = 0; l < EBPO_LISTS && status == EBPO_OK; l++) {
+        if (h->list[l].shape.rows == 0)
+            continue;
+        status = make_array(h, &h->list[l], NULL, error);
+        if (status == EBPO_OK)
+            status = ebpo_headers_put_holds(h, l, 0, 0, error);
+    }
+    return status;
+}
+
+void ebpo_headers_close(ebpo_headers *h)
+{
+    for (unsigned i = 0; i < h->plan->count; i++) {
+        ebpo_h5_close_id(&h->out, h->plan->array[i].handle);
+        h->plan->array[i].handle = -1;
+    }
+    for (ebpo_list l = 0; l < EBPO_LISTS; l++) {
+        ebpo_h5_close_id(&h->out, h->list[l].handle);
+        h->list[l].handle = -1;
+    }
+    ebpo_h5_close_id(&h->out, h->root);
+    h->root = -1;
+}
+
+ebpo_status ebpo_headers_lay_out(ebpo_headers *h, const char *path, const char *shown,
+                                 ebpo_first_chunk first, ebpo_error *error)
+{
+    return lay_out(h, path, shown, h->head_bytes, first, error);
+}
+
+ebpo_status ebpo_headers_measure(ebpo_headers *h, const char *shown, ebpo_error *error)
+{
+    ebpo_plan *plan = h->plan;
+    uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * h->chunks,
+             headers = 0, all = 0;
+    ebpo_status status = lay_out(h, NULL, shown, capacity, (ebpo_first_chunk){ "", 1 }, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_head_used(&h->out, capacity, &headers, error);
+    for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++) {
+        const ebpo_array_out *a = &plan->array[i];
+        for (uint64_t k = i == 0; k < ebpo_shape_chunks(&a->shape) && status == EBPO_OK; k++)
+            status = ebpo_h5_put_chunk(&h->out, a->path, a->handle, &a->shape, k, "", 1, error);
+    }
+    ebpo_headers_close(h);
+    if (status == EBPO_OK)
+        status = ebpo_h5_head_used(&h->out, capacity, &all, error);
+    ebpo_h5_discard(&h->out);
+    h->head_bytes = (headers + 8 + 7) / 8 * 8; /* the last checksum may end in zero bytes */
+    if (plan->count == 1)
+        h->head_bytes += ALONE_BYTES;
+    /* not by the sizes, which are too small where a checksum ends in zero bytes */
+    h->index_bytes = has_index(plan) ? (all - headers + 8 + 7) / 8 * 8 : 0;
+    return status;
+}
+
+ebpo_status ebpo_headers_begin_index(ebpo_headers *h, ebpo_error *error)
+{
+    ebpo_headers_close(h);
+    ebpo_status status = ebpo_h5_reopen(&h->out, h->index_bytes, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_root(&h->out, &h->root, error);
+    for (unsigned i = 0; i < h->plan->count && status == EBPO_OK; i++)
+        status =
+            ebpo_h5_open_array(&h->out, h->plan->array[i].path, &h->plan->array[i].handle, error);
+    for (ebpo_list l = 0; l < EBPO_LISTS && status == EBPO_OK; l++)
+        if (h->list[l].shape.rows)
+            status = ebpo_h5_open_array(&h->out, h->list[l].path, &h->list[l].handle, error);
+    return status;
+}
+
+/* ebpo_tree_write: headers, the chunks of the first levels, the index of large arrays' chunks, and
+ * all other chunks, in one go. */
 
 /* Chunks that are in memory at a time: 8 MiB raw and as much encoded. */
 enum { WINDOW = 128 };
@@ -405,4 +656,58 @@ ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const 
                                  const ebpo_write_options *options, ebpo_error *error)
 {
     return write_tree(tree, path, shown, NULL, options, error);
+}
+
+/* A file written anew, which holds what it held. */
+
+/* What is on the disk, against the content of the file that was read. */
+static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
+                                 const ebpo_read_options *read, ebpo_error *error)
+{
+    ebpo_file *file;
+    ebpo_status status = ebpo_open_own(ebpo_publish_path(out), &file, error);
+    if (status != EBPO_OK)
+        return status;
+    bool same = memcmp(file->info.content_sha256, from->info.content_sha256,
+                       sizeof file->info.content_sha256) == 0 &&
+                memcmp(file->attributes.sha256, from->attributes.sha256,
+                       sizeof file->attributes.sha256) == 0;
+    if (same)
+        status = ebpo_file_check_content(file, read, error);
+    ebpo_close(file);
+    if (status != EBPO_OK || same)
+        return status;
+    status = ebpo_file_check_content(from, read, error);
+    return status != EBPO_OK
+               ? status
+               : ebpo_fail_file(error, EBPO_E_UNSUPPORTED, from->in.shown,
+                                "written anew it would have another content checksum, although "
+                                "its own is right; another program has stored its arrays in ways "
+                                "that this one does not write. Nothing was written");
+}
+
+ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo_read_options *read,
+                             const ebpo_write_options *write, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_write_options wanted = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_publish out = EBPO_PUBLISH_INIT;
+    ebpo_tree tree = { 0 };
+    ebpo_status status = EBPO_TAKE(ebpo_write_options, &wanted, write, error);
+    wanted.parts = ~0u;
+    if (status == EBPO_OK)
+        status = ebpo_publish_begin(&out, path, error); /* before what may take long */
+    if (status == EBPO_OK) {
+        ebpo_publish_expect_input(&out, &file->in);
+        status = ebpo_file_read_tree(file, read, &tree, error);
+    }
+    if (status == EBPO_OK)
+        status = ebpo_tree_write_into(&tree, ebpo_publish_path(&out), path, &wanted, error);
+    ebpo_tree_free(&tree);
+    if (status == EBPO_OK)
+        status = check_written(file, &out, read, error);
+    if (status == EBPO_OK)
+        status = ebpo_publish_commit(&out, error);
+    ebpo_publish_abort(&out);
+    return status;
 }
