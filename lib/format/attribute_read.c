@@ -9,7 +9,7 @@
 #include "core/sized.h"
 #include "core/sums.h"
 #include "hdf5_read/coding.h"
-#include "format/attribute_digest.h"
+#include "format/content_checksum.h"
 #include "format/schema.h"
 #include "format/attribute_read.h"
 #include "format/reader.h"

@@ -6,7 +6,7 @@
 #include "core/sized.h"
 #include "core/sums.h"
 #include "format/attribute_read.h"
-#include "format/content.h"
+#include "format/content_checksum.h"
 #include "format/head_facts.h"
 #include "format/reader.h"
 

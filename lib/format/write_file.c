@@ -13,7 +13,7 @@
 #include "core/sized.h"
 #include "format/chunk_layout.h"
 #include "format/chunk_sums.h"
-#include "format/content.h"
+#include "format/content_checksum.h"
 #include "format/head_facts.h"
 #include "format/long_chunk.h"
 #include "format/places.h"

@@ -12,7 +12,7 @@
 #include "core/sha256.h"
 #include "core/text.h"
 #include "ebpo_config.h"
-#include "format/attribute_digest.h"
+#include "format/content_checksum.h"
 #include "format/chunk_layout.h"
 #include "format/head_facts.h"
 #include "format/schema.h"

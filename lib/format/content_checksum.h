@@ -1,14 +1,15 @@
 /* The content checksum: over all arrays of a file, sorted by path: path, a zero byte, SHA-256 of
  * the array as stored before shuffle and compression. It does not depend on codec, chunks or HDF5,
  * and a few lines of Python compute it. */
-#ifndef EBPO_FORMAT_CONTENT_H
-#define EBPO_FORMAT_CONTENT_H
+#ifndef EBPO_FORMAT_CONTENT_CHECKSUM_H
+#define EBPO_FORMAT_CONTENT_CHECKSUM_H
 
 #include <ebpo/base.h>
 
 #include "core/sha256.h"
 #include "format/schema.h"
 #include "hdf5_read/shape.h"
+#include "mesh/attributes.h"
 
 typedef struct ebpo_content_entry {
     char path[EBPO_PATH_BYTES];
@@ -51,5 +52,10 @@ void ebpo_content_put(ebpo_content *content, const char *path, const uint8_t dig
 EBPO_MUST_USE ebpo_status ebpo_content_end(ebpo_content *content, uint8_t digest[32],
                                            ebpo_error *error);
 void ebpo_content_free(ebpo_content *content);
+
+/* The checksum of the part `attributes`. */
+
+EBPO_MUST_USE ebpo_status ebpo_attributes_digest(const ebpo_attributes *attributes,
+                                                 uint8_t digest[32], ebpo_error *error);
 
 #endif
