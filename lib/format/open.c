@@ -10,7 +10,7 @@
 #include "core/sized.h"
 #include "format/attribute_open.h"
 #include "format/head_facts.h"
-#include "format/stored_sizes.h"
+#include "format/chunk_directory.h"
 #include "io/http_source.h"
 #include "mesh/import.h"
 #include "mesh/stl_binary.h"

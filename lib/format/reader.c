@@ -10,7 +10,7 @@
 #include "core/arrays.h"
 #include "hdf5_read/coding.h"
 #include "hdf5_read/face_gates.h"
-#include "format/chunk_sums.h"
+#include "format/chunk_directory.h"
 
 enum {
     RUN_BYTES = 1 << 20, /* of one read, at most */

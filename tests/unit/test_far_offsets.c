@@ -13,7 +13,7 @@
 #include "core/arrays.h"
 #include "check_main.h"
 #include "hdf5_read/coding.h"
-#include "format/long_chunk.h"
+#include "format/chunk_directory.h"
 #include "format/write_plan.h"
 #include "format/reader.h"
 #include "core/endian.h"

@@ -8,7 +8,7 @@
 #include <ebpo/subset.h>
 
 #include "check_main.h"
-#include "format/places.h"
+#include "format/chunk_directory.h"
 #include "format/slice.h"
 #include "format/subtree_table.h"
 #include "counted_source.h"
