@@ -9,7 +9,7 @@
 #include "mesh/attributes.h"
 #include "core/alloc.h"
 #include "core/error.h"
-#include "format/attribute_read.h"
+#include "format/read_attributes.h"
 #include "geometry/node_types.h"
 #include "derive/subset_parts.h"
 

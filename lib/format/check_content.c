@@ -5,7 +5,7 @@
 #include "core/parallel.h"
 #include "core/sized.h"
 #include "core/sums.h"
-#include "format/attribute_read.h"
+#include "format/read_attributes.h"
 #include "format/content_checksum.h"
 #include "format/head_facts.h"
 #include "format/reader.h"

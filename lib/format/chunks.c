@@ -9,7 +9,7 @@
 #include "core/arrays.h"
 #include "core/hash.h"
 #include "hdf5_read/coding.h"
-#include "format/attribute_read.h"
+#include "format/read_attributes.h"
 #include "format/chunks.h"
 
 enum { CHUNK_BITS = 48, AROUND = 4 };

@@ -8,7 +8,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/sized.h"
-#include "format/attribute_open.h"
+#include "format/read_attributes.h"
 #include "format/head_facts.h"
 #include "format/chunk_directory.h"
 #include "io/http_source.h"

@@ -9,7 +9,7 @@
 #include "core/sized.h"
 #include "core/arrays.h"
 #include "hdf5_read/coding.h"
-#include "format/attribute_read.h"
+#include "format/read_attributes.h"
 #include "format/reader.h"
 
 void ebpo_tree_free(ebpo_tree *tree)

@@ -10,7 +10,7 @@
 
 #include "mesh/attributes.h"
 #include "check_main.h"
-#include "format/attribute_read.h"
+#include "format/read_attributes.h"
 #include "format/chunks.h"
 #include "format/pick.h"
 #include "mesh/ply.h"

@@ -1,6 +1,6 @@
 /* Attributes out of a file. */
-#ifndef EBPO_FORMAT_ATTRIBUTE_READ_H
-#define EBPO_FORMAT_ATTRIBUTE_READ_H
+#ifndef EBPO_FORMAT_READ_ATTRIBUTES_H
+#define EBPO_FORMAT_READ_ATTRIBUTES_H
 
 #include "format/file_in.h"
 
@@ -22,5 +22,11 @@ void ebpo_attribute_decode(const ebpo_file *file, const ebpo_array_in *array, ui
  * it. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_check(const ebpo_file *file,
                                                 const ebpo_read_options *read, ebpo_error *error);
+
+/* The arrays of attributes of a file that is being opened. */
+
+/* The part's arrays, with their head; nothing, if the file does not have the part. */
+EBPO_MUST_USE ebpo_status ebpo_attributes_open(ebpo_file *file, ebpo_head *head, ebpo_error *error);
+void ebpo_attributes_close(ebpo_file *file);
 
 #endif
