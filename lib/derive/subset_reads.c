@@ -1,7 +1,7 @@
 #include "derive/subset_reads.h"
 
 #include "format/file_nodes.h"
-#include "format/subtree_expect.h"
+#include "format/subtree_index.h"
 #include "geometry/cells.h"
 
 enum { CHUNK_BUDGET = 16 << 20 };

@@ -5,8 +5,7 @@
 
 #include "core/error.h"
 #include "format/chunks.h"
-#include "format/ranks.h"
-#include "format/subtree_table.h"
+#include "format/subtree_index.h"
 #include "geometry/plane_code.h"
 #include "geometry/node_types.h"
 #include "geometry/rule.h"

@@ -5,8 +5,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "format/ranks.h"
-#include "format/subtree_table.h"
+#include "format/subtree_index.h"
 #include "geometry/plane_code.h"
 #include "geometry/rule.h"
 

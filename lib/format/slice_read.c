@@ -11,10 +11,8 @@
 #include "format/chunks.h"
 #include "format/file_nodes.h"
 #include "format/level_runs.h"
-#include "format/ranks.h"
+#include "format/subtree_index.h"
 #include "format/slice_faces.h"
-#include "format/subtree_expect.h"
-#include "format/subtree_table.h"
 #include "geometry/node_types.h"
 
 void ebpo_slice_free(ebpo_slice *slice)

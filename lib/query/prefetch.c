@@ -9,8 +9,7 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "format/subtree_expect.h"
-#include "format/subtree_table.h"
+#include "format/subtree_index.h"
 #include "query/query_node.h"
 
 typedef struct wanted {
