@@ -4,7 +4,7 @@
 
 #include <ebpo/subset.h>
 
-#include "format/pick.h"
+#include "format/pick_rows.h"
 #include "derive/tolerance.h"
 #include "geometry/cell.h"
 

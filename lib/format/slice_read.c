@@ -10,7 +10,7 @@
 #include "core/arrays.h"
 #include "format/chunks.h"
 #include "format/file_nodes.h"
-#include "format/level_runs.h"
+#include "format/pick_rows.h"
 #include "format/subtree_index.h"
 #include "format/slice_faces.h"
 #include "geometry/node_types.h"

@@ -1,11 +1,33 @@
+/* What runs of nodes have in a level's arrays: all that the table of arrays lists, read through a
+ * cache of chunks and checked. */
+#ifndef EBPO_FORMAT_PICK_ROWS_H
+#define EBPO_FORMAT_PICK_ROWS_H
+
+#include "core/room.h"
+#include "format/chunks.h"
+#include "mesh/attributes.h"
+
+/* Groups [group, group + groups) of a level; level 0 has group 0. Its nodes by type: those of type
+ * k are [rank[k], rank[k] + count[k]). */
+typedef struct ebpo_run {
+    uint64_t group, groups;
+    uint64_t rank[4], count[4];
+} ebpo_run;
+
+/* Collects what ebpo_runs_read begins with, for sources far away. */
+void ebpo_runs_expect(ebpo_chunks *chunks, ebpo_expected *expected, int level, const ebpo_run *runs,
+                      uint64_t run_count, uint32_t needs);
+
+/* Arrays of the nodes of ascending runs, one behind the other, and their counts into `out`, which
+ * has the types already. Those that are there for any of `needs`; faces have the numbers of the
+ * file. What they take is taken of `room` (NULL: no limit) first. */
+EBPO_MUST_USE ebpo_status ebpo_runs_read(ebpo_chunks *chunks, int level, const ebpo_run *runs,
+                                         uint64_t run_count, uint32_t needs, ebpo_room *room,
+                                         ebpo_level *out, ebpo_error *error);
+
 /* Picking here and there: runs of sibling groups of one level, and rows of the mesh's arrays, each
  * chunk fetched once and what is needed announced together. Everything that comes out has been
  * checked, as in slice.h. */
-#ifndef EBPO_FORMAT_PICK_H
-#define EBPO_FORMAT_PICK_H
-
-#include "mesh/attributes.h"
-#include "format/level_runs.h"
 
 /* All nodes of ascending runs that do not overlap, as one level: group_count is the sum of the
  * runs', whose ranks and counts are filled in. Every array that is there for one of `parts` (face
