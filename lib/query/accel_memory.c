@@ -9,7 +9,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "query/accel_parts.h"
-#include "format/compact.h"
+#include "format/slice.h"
 
 bool ebpo_accel_needs_doubles(const ebpo_info *info)
 {

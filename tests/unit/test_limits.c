@@ -12,7 +12,6 @@
 #include "construct/partition.h"
 #include "format/head_facts.h"
 #include "format/write_plan.h"
-#include "format/compact.h"
 #include "format/slice.h"
 #include "derive/formats.h"
 #include "core/strict_fp.h"
