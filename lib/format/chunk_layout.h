@@ -5,7 +5,6 @@
 
 #include <ebpo/file.h>
 
-#include "format/write_plan.h"
 #include "format/schema.h"
 #include "hdf5_read/shape.h"
 #include "hdf5_write/h5.h"

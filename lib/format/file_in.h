@@ -1,5 +1,4 @@
-/* Readers of chunks that wait for the next thread: setting up a decoder takes longer than a chunk.
- * They stay with the file, a few of them, and count to no budget. */
+/* An open file, and where its arrays are. */
 #ifndef EBPO_FORMAT_FILE_IN_H
 #define EBPO_FORMAT_FILE_IN_H
 
@@ -29,21 +28,13 @@ struct ebpo_idle_reader {
     uint8_t raw[EBPO_CHUNK_BYTES_MAX];
 };
 
+/* Readers of chunks that wait for the next thread: setting up a decoder takes longer than decoding
+ * a chunk. They stay with the file, a few of them, and count to no budget. */
 typedef struct ebpo_idle_readers {
     pthread_mutex_t lock; /* of what follows */
     ebpo_idle_reader *first;
     unsigned count;
 } ebpo_idle_readers;
-
-void ebpo_idle_readers_make(ebpo_idle_readers *readers);
-/* Those that wait. */
-void ebpo_idle_readers_free(ebpo_idle_readers *readers);
-/* One that waits, or a new one; NULL: no memory. The caller's until it is given back. */
-ebpo_idle_reader *ebpo_idle_readers_take(ebpo_idle_readers *readers);
-/* NULL is nothing. */
-void ebpo_idle_readers_give(ebpo_idle_readers *readers, ebpo_idle_reader *reader);
-
-/* An open file, and where its arrays are. */
 
 typedef struct ebpo_array_in {
     bool present;

@@ -3,7 +3,6 @@
 #define EBPO_FORMAT_FILE_NODES_H
 
 #include "format/chunks.h"
-#include "format/slice.h"
 #include "geometry/node_source.h"
 
 /* A node that the file has, as far as the head tells; else EBPO_E_ARGUMENT. */

@@ -17,6 +17,7 @@
 #include "format/chunk_layout.h"
 #include "format/head_facts.h"
 #include "format/read_attributes.h"
+#include "format/reader.h"
 #include "hdf5_read/head.h"
 #include "hdf5_write/compat.h"
 #include "io/byte_source.h"

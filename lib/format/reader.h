@@ -91,4 +91,12 @@ EBPO_MUST_USE ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id 
  * False when one falls below 0. */
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first);
 
+void ebpo_idle_readers_make(ebpo_idle_readers *readers);
+/* Frees the readers that wait. */
+void ebpo_idle_readers_free(ebpo_idle_readers *readers);
+/* One that waits, or a new one; NULL: no memory. The caller's until it is given back. */
+ebpo_idle_reader *ebpo_idle_readers_take(ebpo_idle_readers *readers);
+/* NULL is nothing. */
+void ebpo_idle_readers_give(ebpo_idle_readers *readers, ebpo_idle_reader *reader);
+
 #endif
