@@ -4,8 +4,8 @@
 
 #include <ebpo/subset.h>
 
-#include "format/pick_rows.h"
 #include "derive/tolerance.h"
+#include "format/pick_rows.h"
 #include "geometry/cell.h"
 
 typedef struct ebpo_cutting {
@@ -48,5 +48,17 @@ ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options)
 /* The tree that would be written; for tests too. */
 EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
                                            const ebpo_subset_options *options, ebpo_error *error);
+
+/* What a subset would take of its file, told from heads and tables, without cutting it. */
+
+typedef struct ebpo_subset_reads {
+    uint64_t subtrees, of_subtrees; /* that meet the box, and all; 0, 0: the file has none */
+    uint64_t bytes;                 /* of the chunks that hold it, each counted once */
+} ebpo_subset_reads;
+
+/* Of the options the parts, the box and last_level count. Where the mesh goes, all levels do. */
+EBPO_MUST_USE ebpo_status ebpo_subset_count_reads(const ebpo_file *file,
+                                                  const ebpo_subset_options *options,
+                                                  ebpo_subset_reads *out, ebpo_error *error);
 
 #endif
