@@ -4,7 +4,7 @@
 
 #include <ebpo/subset.h>
 
-#include "derive/tolerance.h"
+#include "derive/error_bound.h"
 #include "format/pick_rows.h"
 #include "geometry/cell.h"
 

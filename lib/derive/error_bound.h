@@ -1,8 +1,11 @@
 /* How far one envelope reaches beyond the model, as bounds. */
-#ifndef EBPO_DERIVE_BOUND_H
-#define EBPO_DERIVE_BOUND_H
+#ifndef EBPO_DERIVE_ERROR_BOUND_H
+#define EBPO_DERIVE_ERROR_BOUND_H
 
-#include "derive/bounder.h"
+#include <ebpo/query.h>
+
+#include "derive/fragments.h"
+#include "geometry/cell.h"
 
 /* What is wanted; lengths in the model's unit. */
 typedef struct ebpo_bound_goal {
@@ -40,5 +43,33 @@ EBPO_MUST_USE ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell,
 EBPO_MUST_USE ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell,
                                              const ebpo_bound_goal *goal, ebpo_reach_bound *out,
                                              ebpo_error *error);
+
+/* Which envelopes are close enough to the model, for choosing by need: what was found out is
+ * remembered for other limits. */
+
+typedef struct ebpo_tolerance ebpo_tolerance;
+
+/* A gray node, as stored; or a leaf, with its parent's envelope in its cell. */
+typedef struct ebpo_tolerance_node {
+    ebpo_cell cell;
+    bool asked;  /* else the answer does not matter */
+    bool enough; /* the answer; false where none was asked for */
+} ebpo_tolerance_node;
+
+/* EBPO_E_ABSENT for a file without mesh or a subset. Opens a model of all of the file. `planes`
+ * false: envelopes are cells. The file stays open as long. */
+EBPO_MUST_USE ebpo_status ebpo_tolerance_open(ebpo_tolerance **out, const ebpo_file *file,
+                                              bool planes, unsigned threads, ebpo_progress progress,
+                                              ebpo_error *error);
+void ebpo_tolerance_close(ebpo_tolerance *need);
+
+/* node[i].enough: its envelope certainly reaches at most max_error beyond the model. What is enough
+ * for one max_error is so for every larger one, and the answers do not depend on what was asked
+ * before, nor on threads. */
+EBPO_MUST_USE ebpo_status ebpo_tolerance_judge(ebpo_tolerance *need, ebpo_tolerance_node *nodes,
+                                               uint64_t count, double max_error, ebpo_error *error);
+
+/* A max_error for which the root is enough. */
+EBPO_MUST_USE ebpo_status ebpo_tolerance_most(ebpo_tolerance *need, double *out, ebpo_error *error);
 
 #endif
