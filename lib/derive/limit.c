@@ -8,20 +8,118 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "ebpo_config.h"
+
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "core/sized.h"
-#include "derive/qhull.h"
 #include "levels/lod_model.h"
 #include "geometry/cells.h"
 #include "geometry/node_types.h"
 #include "geometry/rule.h"
 
+#if EBPO_HAVE_QHULL
+#include <limits.h>
+#include <setjmp.h>
+#include <stdbool.h>
+#include <stdio.h>
+
+#include <libqhull_r/qhull_ra.h>
+#endif
+
+/* --- the volume of a convex hull, by qhull where the library has it --- */
+
+#if EBPO_HAVE_QHULL
+
+/* One for each thread. */
+typedef struct hull {
+    FILE *silence; /* qhull explains at length what is wrong with flat sets */
+    qhT qhull;
+} hull;
+
+static ebpo_status hull_new(hull **out, ebpo_error *error)
+{
+    hull *h = *out = ebpo_alloc_zero(1, sizeof *h);
+    if (!h)
+        return ebpo_fail_memory(error, sizeof *h);
+    h->silence = fopen("/dev/null", "w");
+    if (h->silence)
+        return EBPO_OK;
+    free(h);
+    *out = NULL;
+    return ebpo_fail(error, EBPO_E_IO, "/dev/null cannot be opened for qhull's messages");
+}
+
+static void hull_free(hull *h)
+{
+    if (h && h->silence)
+        fclose(h->silence);
+    free(h);
+}
+
+static double volume_by(hull *h, double *points, int count, char *command, bool *failed)
+{
+    qhT *qh = &h->qhull;
+    volatile double volume = 0; /* set between setjmp and a jump */
+    volatile bool wrong = true;
+    qh_zero(qh, h->silence);
+    if (qh_new_qhull(qh, 3, count, points, False, command, NULL, h->silence) == 0) {
+        if (setjmp(qh->errexit) == 0) { /* qhull's errors jump */
+            qh->NOerrexit = False;
+            qh_getarea(qh, qh->facet_list);
+            volume = qh->totvol;
+            wrong = false;
+        }
+        qh->NOerrexit = True;
+    }
+    int left, size;
+    qh_freeqhull(qh, !qh_ALL);
+    qh_memfreeshort(qh, &left, &size);
+    *failed = wrong;
+    return volume > 0 ? volume : 0;
+}
+
+/* Returns the volume of the hull of `count` points [count][3], of the order of 1; 0 when they are in
+ * a plane, or so nearly that rounding decides. */
+static double hull_volume(hull *h, double *points, uint64_t count)
+{
+    static char merged[] = "qhull Qt Pp", joggled[] = "qhull QJ Pp";
+    bool failed;
+    if (count < 4 || count > INT_MAX / 3)
+        return 0;
+    double volume = volume_by(h, points, (int)count, merged, &failed);
+    /* Thin hulls whose facets merge into nothing: with points moved by some 1e-11 they have a
+     * volume; flat ones have next to none then. */
+    return failed ? volume_by(h, points, (int)count, joggled, &failed) : volume;
+}
+
+#else
+
+typedef struct hull hull;
+
+static ebpo_status hull_new(hull **out, ebpo_error *error)
+{
+    *out = NULL;
+    return ebpo_fail(error, EBPO_E_ABSENT,
+                     "this library was built without qhull, so it cannot compute convex hulls; "
+                     "build it with -Dqhull=enabled");
+}
+
+static void hull_free(hull *h) { (void)h; }
+
+static double hull_volume(hull *h, double *points, uint64_t count)
+{
+    (void)h, (void)points, (void)count;
+    return 0;
+}
+
+#endif
+
 /* One for each thread. */
 typedef struct scratch {
-    ebpo_hull *hull;
+    hull *hull;
     uint32_t *list;
     ebpo_triangle *faces;
     double *points;
@@ -177,7 +275,7 @@ static ebpo_status measure_hulls(void *context, uint64_t begin, uint64_t end, un
         if (!take_node(j, s, w) || !take_faces(j, s) || !add_corners(j, s, w) ||
             !add_faces(j, s, w->cell))
             return ebpo_fail_memory(error, s->list_count * sizeof *s->faces);
-        j->volume[i] = ebpo_hull_volume(s->hull, s->points, s->point_count);
+        j->volume[i] = hull_volume(s->hull, s->points, s->point_count);
     }
     return EBPO_OK;
 }
@@ -215,7 +313,7 @@ static ebpo_status prepare_job(job *j, const ebpo_file *file, int level, unsigne
             status = ebpo_fail_memory(error, j->node_count * sizeof *j->nodes);
     }
     for (unsigned i = 0; i < threads && status == EBPO_OK; i++)
-        status = ebpo_hull_new(&j->scratch[i].hull, error);
+        status = hull_new(&j->scratch[i].hull, error);
     if (status == EBPO_OK && !(j->volume = ebpo_alloc(j->node_count, sizeof *j->volume)))
         status = ebpo_fail_memory(error, j->node_count * sizeof *j->volume);
     return status;
@@ -224,7 +322,7 @@ static ebpo_status prepare_job(job *j, const ebpo_file *file, int level, unsigne
 static void job_free(job *j, unsigned threads)
 {
     for (unsigned i = 0; j->scratch && i < threads; i++) {
-        ebpo_hull_free(j->scratch[i].hull);
+        hull_free(j->scratch[i].hull);
         free(j->scratch[i].list);
         free(j->scratch[i].faces);
         free(j->scratch[i].points);

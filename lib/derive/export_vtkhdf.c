@@ -8,7 +8,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "derive/formats.h"
+#include "derive/export_job.h"
 #include "io/publish.h"
 
 enum { VTK_TRIANGLE = 5, VTK_POLYGON = 7 };

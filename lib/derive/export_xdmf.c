@@ -6,7 +6,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "derive/formats.h"
+#include "derive/export_job.h"
 #include "io/file_source.h"
 #include "io/publish.h"
 

@@ -1,22 +1,9 @@
-/* OBJ and STL through assimp's exporters. All that they keep of a coordinate is a float32. */
+/* OBJ and STL through assimp's exporters, which write float32 coordinates. The blocks of a job become
+ * one assimp scene, whose arrays are lent to assimp for the call. assimp writes one file only, under
+ * a temporary name until it is complete; every other name that it asks for is an error. A build
+ * without assimp does not compile this file, and the table in export.c has no function for these
+ * formats. */
 #include "core/strict_fp.h"
-
-#include "derive/formats.h"
-
-#include "core/error.h"
-#include "ebpo_config.h"
-
-#if !EBPO_HAVE_ASSIMP
-
-ebpo_status ebpo_export_scene(const ebpo_export_job *job, ebpo_error *error)
-{
-    return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, job->path,
-                          "this build has no assimp, which writes %s; build it with libassimp-dev "
-                          "installed, or export XDMF or VTKHDF",
-                          ebpo_export_format_name(job->format));
-}
-
-#else
 
 #include <assimp/cexport.h>
 #include <assimp/cfileio.h>
@@ -24,13 +11,151 @@ ebpo_status ebpo_export_scene(const ebpo_export_job *job, ebpo_error *error)
 #include <assimp/material.h>
 #include <assimp/mesh.h>
 #include <assimp/scene.h>
+#include <errno.h>
 #include <pthread.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/alloc.h"
-#include "derive/floats.h"
-#include "derive/scene_file.h"
+#include "core/error.h"
+#include "derive/export_job.h"
 #include "io/file_source.h"
+#include "io/publish.h"
+
+/* --- the file that assimp writes --- */
+
+typedef struct scene_file {
+    const char *path; /* lent */
+    ebpo_publish publish;
+    FILE *stream; /* NULL: assimp has not opened it */
+    bool failed;  /* a write came short; `why` is its errno */
+    int why;
+    char unknown[128]; /* another name that assimp wanted to write to, or "" */
+} scene_file;
+
+typedef struct cursor {
+    scene_file *target;
+    FILE *stream;
+} cursor;
+
+static cursor *cursor_of(struct aiFile *file) { return (cursor *)(void *)file->UserData; }
+
+/* assimp ignores what this returns, so the failure is kept. */
+static void note_failure(scene_file *target)
+{
+    target->why = target->failed ? target->why : errno;
+    target->failed = true;
+}
+
+static size_t write_bytes(struct aiFile *file, const char *from, size_t size, size_t count)
+{
+    cursor *c = cursor_of(file);
+    size_t done = fwrite(from, size, count, c->stream);
+    if (done != count && size)
+        note_failure(c->target);
+    return done;
+}
+
+static size_t read_bytes(struct aiFile *file, char *to, size_t size, size_t count)
+{
+    (void)file, (void)to, (void)size, (void)count;
+    return 0;
+}
+
+static size_t tell_stream(struct aiFile *file)
+{
+    off_t at = ftello(cursor_of(file)->stream);
+    return at > 0 ? (size_t)at : 0;
+}
+
+static enum aiReturn seek_stream(struct aiFile *file, size_t offset, enum aiOrigin origin)
+{
+    int whence = origin == aiOrigin_SET ? SEEK_SET : origin == aiOrigin_CUR ? SEEK_CUR : SEEK_END;
+    return fseeko(cursor_of(file)->stream, (off_t)offset, whence) == 0 ? aiReturn_SUCCESS
+                                                                       : aiReturn_FAILURE;
+}
+
+static size_t file_size(struct aiFile *file)
+{
+    size_t at = tell_stream(file), end;
+    (void)seek_stream(file, 0, aiOrigin_END);
+    end = tell_stream(file);
+    (void)seek_stream(file, at, aiOrigin_SET);
+    return end;
+}
+
+static void flush_stream(struct aiFile *file)
+{
+    if (fflush(cursor_of(file)->stream) != 0)
+        note_failure(cursor_of(file)->target);
+}
+
+static struct aiFile *open_file(struct aiFileIO *io, const char *name, const char *mode)
+{
+    scene_file *target = (scene_file *)(void *)io->UserData;
+    if (mode[0] != 'w')
+        return NULL;
+    bool known = strcmp(ebpo_path_name(target->path), ebpo_path_name(name)) == 0;
+    FILE *stream = known ? ebpo_publish_stream(&target->publish) : NULL;
+    if (!known)
+        snprintf(target->unknown, sizeof target->unknown, "%s", name);
+    struct aiFile *file = calloc(1, sizeof *file);
+    cursor *c = calloc(1, sizeof *c);
+    if (!stream || !file || !c) {
+        free(file);
+        free(c);
+        target->failed = true;
+        target->why = ENOMEM;
+        return NULL;
+    }
+    target->stream = stream;
+    *c = (cursor){ target, stream };
+    *file = (struct aiFile){ read_bytes, write_bytes,          tell_stream, file_size, seek_stream,
+                             flush_stream,      (aiUserData)(void *)c };
+    return file;
+}
+
+static void close_file(struct aiFileIO *io, struct aiFile *file)
+{
+    (void)io;
+    flush_stream(file);
+    free(file->UserData);
+    free(file);
+}
+
+static void scene_file_begin(scene_file *file, const char *path)
+{
+    *file = (scene_file){ .path = path, .publish = EBPO_PUBLISH_INIT };
+}
+
+/* Hands the file to assimp by the last part of its name; no other name exists for it. `io` points
+ * into `file`. */
+static void scene_file_offer(scene_file *file, struct aiFileIO *io)
+{
+    *io = (struct aiFileIO){ open_file, close_file, (aiUserData)(void *)file };
+}
+
+static ebpo_status scene_file_commit(scene_file *file, ebpo_error *error)
+{
+    if (file->unknown[0])
+        return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, file->path,
+                              "this assimp wants to write a file '%s' too, which nobody knows of; "
+                              "take another format",
+                              file->unknown);
+    if (file->failed) {
+        errno = file->why;
+        return ebpo_fail_errno(error, file->path, "could not be written");
+    }
+    if (!file->stream)
+        return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, file->path,
+                              "this assimp has written nothing; take another format");
+    return ebpo_publish_commit(&file->publish, error);
+}
+
+/* Removes it, unless it was committed. */
+static void scene_file_abort(scene_file *file) { ebpo_publish_abort(&file->publish); }
+
+/* --- the scene that assimp is lent --- */
 
 enum { PARTS_MAX = EBPO_LEVELS_MAX + 1 };
 
@@ -172,13 +297,13 @@ static ebpo_status gather_scene(scene *s, const ebpo_export_job *job, ebpo_error
     return status;
 }
 
-static ebpo_status write_scene(const scene *s, const ebpo_export_job *job, ebpo_scene_file *file,
+static ebpo_status write_scene(const scene *s, const ebpo_export_job *job, scene_file *file,
                                ebpo_error *error)
 {
     const char *id = job->format == EBPO_EXPORT_OBJ ? "objnomtl" : "stlb";
     struct aiFileIO io;
     ebpo_status status = EBPO_OK;
-    ebpo_scene_file_offer(file, &io);
+    scene_file_offer(file, &io);
     pthread_mutex_lock(&assimp_mutex);
     if (aiExportSceneEx(&s->root, id, ebpo_path_name(job->path), &io, 0) != aiReturn_SUCCESS &&
         !file->failed)
@@ -189,10 +314,10 @@ static ebpo_status write_scene(const scene *s, const ebpo_export_job *job, ebpo_
     return status;
 }
 
-ebpo_status ebpo_export_scene(const ebpo_export_job *job, ebpo_error *error)
+ebpo_status ebpo_export_assimp(const ebpo_export_job *job, ebpo_error *error)
 {
-    ebpo_scene_file file;
-    ebpo_scene_file_begin(&file, job->path);
+    scene_file file;
+    scene_file_begin(&file, job->path);
     scene *s = ebpo_alloc_zero(1, sizeof *s);
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
@@ -203,10 +328,8 @@ ebpo_status ebpo_export_scene(const ebpo_export_job *job, ebpo_error *error)
     if (status == EBPO_OK)
         status = write_scene(s, job, &file, error);
     if (status == EBPO_OK)
-        status = ebpo_scene_file_commit(&file, error);
-    ebpo_scene_file_abort(&file);
+        status = scene_file_commit(&file, error);
+    scene_file_abort(&file);
     scene_free(s);
     return status;
 }
-
-#endif

@@ -14,8 +14,7 @@
 #include "core/arrays.h"
 #include "core/error.h"
 #include "core/text_stream.h"
-#include "derive/floats.h"
-#include "derive/formats.h"
+#include "derive/export_job.h"
 #include "io/file_source.h"
 #include "io/publish.h"
 
