@@ -317,22 +317,38 @@ static ebpo_status read_mesh(const ebpo_file *file, ebpo_mesh *out, const ebpo_r
     return status;
 }
 
+/* Copies the caller's options to *read, and checks that the file has the part. */
+static ebpo_status take_options(const ebpo_file *file, const ebpo_read_options *options,
+                                uint32_t part, const char *name, ebpo_read_options *read,
+                                ebpo_error *error)
+{
+    ebpo_status status = EBPO_TAKE(ebpo_read_options, read, options, error);
+    if (status == EBPO_OK && !(file->info.parts & part))
+        status = part_absent(file, name, error);
+    return status;
+}
+
+/* Announces the root's arrays that these needs name, and the attributes. */
+static void announce_root(const ebpo_file *file, uint32_t needs, bool attributes)
+{
+    ebpo_expected expected = EBPO_EXPECTED_INIT(file);
+    ebpo_expect_root(&expected, needs);
+    if (attributes)
+        ebpo_expect_attributes(&expected);
+    ebpo_expect_all(&expected);
+}
+
 ebpo_status ebpo_file_read_mesh(const ebpo_file *file, const ebpo_read_options *options,
                                 ebpo_mesh *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
+    ebpo_status status =
+        take_options(file, options, EBPO_PART_MESH, "mesh", &read, error);
     if (status != EBPO_OK)
         return status;
-    if (!(file->info.parts & EBPO_PART_MESH))
-        return part_absent(file, "mesh", error);
-    ebpo_expected expected = EBPO_EXPECTED_INIT(file);
-    ebpo_expect_root(&expected, EBPO_NEEDS_MESH);
-    if (read.attributes)
-        ebpo_expect_attributes(&expected);
-    ebpo_expect_all(&expected);
+    announce_root(file, EBPO_NEEDS_MESH, read.attributes);
     status = read_mesh(file, out, &read, error);
     if (status == EBPO_OK && read.attributes)
         status = ebpo_attributes_read(file, &read, &out->attributes, error);
@@ -386,14 +402,11 @@ ebpo_status ebpo_file_read_maps(const ebpo_file *file, const ebpo_read_options *
     EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
+    ebpo_status status =
+        take_options(file, options, EBPO_PART_MAPS, "maps to the source's numbers", &read, error);
     if (status != EBPO_OK)
         return status;
-    if (!(file->info.parts & EBPO_PART_MAPS))
-        return part_absent(file, "maps to the source's numbers", error);
-    ebpo_expected expected = EBPO_EXPECTED_INIT(file);
-    ebpo_expect_root(&expected, EBPO_NEEDS_MAPS);
-    ebpo_expect_all(&expected);
+    announce_root(file, EBPO_NEEDS_MAPS, false);
     out->workspace = read.workspace;
     status = read_map(file, EBPO_A_VERTEX_SOURCE, file->info.source_vertex_count, &read,
                       &out->vertex_source, error);
@@ -573,11 +586,7 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
         *source_order = false;
     if (status != EBPO_OK)
         return status;
-    ebpo_expected expected = EBPO_EXPECTED_INIT(file);
-    ebpo_expect_root(&expected, EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS);
-    if (read.attributes)
-        ebpo_expect_attributes(&expected);
-    ebpo_expect_all(&expected);
+    announce_root(file, EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS, read.attributes);
     status = ebpo_file_read_mesh(file, &read, out, error);
     if (status == EBPO_OK && maps)
         status = to_source_order(file, out, &read, error);

@@ -13,7 +13,7 @@
 #include "format/head_facts.h"
 #include "format/write_plan.h"
 #include "format/slice.h"
-#include "derive/formats.h"
+#include "derive/export_job.h"
 #include "core/strict_fp.h"
 #include "levels/polyhedra.h"
 #include "mesh/mesh_parts.h"
