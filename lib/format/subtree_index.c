@@ -65,25 +65,25 @@ static ebpo_status sums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t col
     return status;
 }
 
-typedef struct counts {
+typedef struct subtree_counts {
     ebpo_held_chunk view;
     uint32_t cols;
     uint64_t begin[EBPO_SUBTREE_COLS], end[EBPO_SUBTREE_COLS]; /* before and after the chunk */
-} counts;
+} subtree_counts;
 
-static uint32_t count_at(const counts *c, uint64_t subtree, uint32_t column)
+static uint32_t count_at(const subtree_counts *c, uint64_t subtree, uint32_t column)
 {
     return ebpo_load32(c->view.rows + ((subtree - c->view.begin) * c->cols + column) * 4);
 }
 
-static void add_row(const counts *c, uint64_t subtree, uint64_t *sums)
+static void add_row(const subtree_counts *c, uint64_t subtree, uint64_t *sums)
 {
     for (uint32_t k = 0; k < c->cols; k++)
         sums[k] += count_at(c, subtree, k);
 }
 
 /* The chunk of rows that holds a subtree; it adds up to what comes after it. */
-static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, counts *c, ebpo_error *error)
+static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_counts *c, ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0);
     uint64_t rows = array->shape.chunk_rows, chunk = subtree / rows, sums[EBPO_SUBTREE_COLS];
@@ -115,7 +115,7 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, counts *c,
     return status;
 }
 
-static void take_row(const counts *c, uint64_t subtree, ebpo_subtree_row *out)
+static void take_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row *out)
 {
     out->subtree = subtree;
     memcpy(out->before, c->begin, sizeof out->before);
@@ -209,7 +209,7 @@ static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, eb
 ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree, ebpo_subtree_row *out,
                                    ebpo_error *error)
 {
-    counts c;
+    subtree_counts c;
     if (find_kept(chunks, BY_NUMBER, subtree, out))
         return EBPO_OK;
     ebpo_status status = open_counts(chunks, subtree, &c, error);
@@ -244,7 +244,7 @@ ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column, uint64
 {
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0);
     uint64_t chunk = 0;
-    counts c;
+    subtree_counts c;
     if (find_kept(chunks, column, item, out))
         return EBPO_OK;
     ebpo_status status = find_chunk(chunks, column, item, &chunk, error);
