@@ -21,11 +21,6 @@
 #include "geometry/octcode.h"
 #include "query/query_model.h"
 
-/* Sets out->mean, rms and samples. */
-EBPO_MUST_USE ebpo_status ebpo_deviation_sample(ebpo_model *model, const ebpo_file *file, int level,
-                                                const ebpo_deviation_options *options,
-                                                ebpo_deviation *out, ebpo_error *error);
-
 typedef struct sampling {
     const ebpo_deviation_options *o;
     int level;
@@ -56,10 +51,10 @@ static double triangle_area(const sampling *s, uint64_t triangle)
 {
     double u[3], v[3], n[3];
     for (int k = 0; k < 3; k++) {
-        u[k] = ebpo_cell_frame_length(&s->frame,
-                                      triangle_corner(s, triangle, 1)[k] - triangle_corner(s, triangle, 0)[k]);
-        v[k] = ebpo_cell_frame_length(&s->frame,
-                                      triangle_corner(s, triangle, 2)[k] - triangle_corner(s, triangle, 0)[k]);
+        u[k] = ebpo_cell_frame_length(&s->frame, triangle_corner(s, triangle, 1)[k] -
+                                                     triangle_corner(s, triangle, 0)[k]);
+        v[k] = ebpo_cell_frame_length(&s->frame, triangle_corner(s, triangle, 2)[k] -
+                                                     triangle_corner(s, triangle, 0)[k]);
     }
     for (int k = 0; k < 3; k++)
         n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
@@ -115,8 +110,10 @@ static bool unit_normal(const sampling *s, uint64_t triangle, double n[3])
 {
     double u[3], v[3], length = 0;
     for (int k = 0; k < 3; k++) {
-        u[k] = (triangle_corner(s, triangle, 1)[k] - triangle_corner(s, triangle, 0)[k]) / s->box.size[k];
-        v[k] = (triangle_corner(s, triangle, 2)[k] - triangle_corner(s, triangle, 0)[k]) / s->box.size[k];
+        u[k] = (triangle_corner(s, triangle, 1)[k] - triangle_corner(s, triangle, 0)[k]) /
+               s->box.size[k];
+        v[k] = (triangle_corner(s, triangle, 2)[k] - triangle_corner(s, triangle, 0)[k]) /
+               s->box.size[k];
     }
     for (int k = 0; k < 3; k++)
         n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
@@ -233,9 +230,10 @@ static ebpo_status make_room(sampling *s, ebpo_model *model, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_deviation_sample(ebpo_model *model, const ebpo_file *file, int level,
-                                  const ebpo_deviation_options *options, ebpo_deviation *out,
-                                  ebpo_error *error)
+/* Sets out->mean, rms and samples. */
+static ebpo_status deviation_sample(ebpo_model *model, const ebpo_file *file, int level,
+                                    const ebpo_deviation_options *options, ebpo_deviation *out,
+                                    ebpo_error *error)
 {
     sampling s = { .o = options,
                    .level = level,
@@ -526,7 +524,7 @@ static const char *find_difference(const ebpo_info *info, const ebpo_info *model
 }
 
 static ebpo_status check_deviation(const ebpo_info *info, const ebpo_info *model, int level,
-                         const ebpo_deviation_options *o, ebpo_error *error)
+                                   const ebpo_deviation_options *o, ebpo_error *error)
 {
     if (level < 0 || level >= info->level_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -592,7 +590,7 @@ ebpo_status ebpo_deviation_level(ebpo_model *model, const ebpo_file *file, int l
     free(s.nodes);
     free(s.order);
     if (status == EBPO_OK && o->samples)
-        status = ebpo_deviation_sample(model, file, level, o, &found, error);
+        status = deviation_sample(model, file, level, o, &found, error);
     EBPO_GIVE(ebpo_deviation, out, &found);
     ebpo_lod_model_free(&own);
     ebpo_lod_model_free(&whole);

@@ -104,7 +104,8 @@ static void learn_distance(ebpo_bounder *b, const double xi[3], double distance)
     b->target = fmax(b->target, b->ratio * b->lo);
 }
 
-static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragment, ebpo_fragment_measure *l)
+static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragment,
+                                    ebpo_fragment_measure *l)
 {
     double corner = 0;
     int farthest = 0;
@@ -342,7 +343,7 @@ void ebpo_tolerance_close(ebpo_tolerance *n)
 }
 
 static ebpo_status judge_node(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance_node *node,
-                         ebpo_error *error)
+                              ebpo_error *error)
 {
     ebpo_node own;
     ebpo_reach_bound found;

@@ -1,7 +1,7 @@
-/* Exports of levels and of the mesh in other programs' formats. The table below has one row for each
- * format: its name, its second file, what it holds, and the function that writes it. A new format is
- * a value of ebpo_export_format, a row here, and a file export_NAME.c with the function, which is
- * declared in export_job.h. Functions that all writers share are in export_job.c. */
+/* Exports of levels and of the mesh in other programs' formats. The table below has one row for
+ * each format: its name, its second file, what it holds, and the function that writes it. A new
+ * format is a value of ebpo_export_format, a row here, and a file export_NAME.c with the function,
+ * which is declared in export_job.h. Functions that all writers share are in export_job.c. */
 #include <ebpo/export.h>
 
 #include <stdio.h>
@@ -81,7 +81,7 @@ bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *
 }
 
 static ebpo_status check_export(const ebpo_info *info, const ebpo_export_row *row,
-                         const ebpo_export_options *o, ebpo_error *error)
+                                const ebpo_export_options *o, ebpo_error *error)
 {
     int blocks = ebpo_block_count(o),
         asked = o->first_level < 0 || o->first_level >= info->level_count ? o->first_level
@@ -136,8 +136,8 @@ ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_for
                               "choose another name");
     if (wanted.first_level <= wanted.last_level)
         ebpo_file_prefetch_levels(file, 0, wanted.last_level);
-    status = write_format(
-        &(ebpo_export_job){ file, path, second, format, row, &wanted, &own }, error);
+    status =
+        write_format(&(ebpo_export_job){ file, path, second, format, row, &wanted, &own }, error);
     if (report)
         EBPO_GIVE(ebpo_export_report, report, &own);
     return status;

@@ -1,8 +1,8 @@
-/* OBJ and STL through assimp's exporters, which write float32 coordinates. The blocks of a job become
- * one assimp scene, whose arrays are lent to assimp for the call. assimp writes one file only, under
- * a temporary name until it is complete; every other name that it asks for is an error. A build
- * without assimp does not compile this file, and the table in export.c has no function for these
- * formats. */
+/* OBJ and STL through assimp's exporters, which write float32 coordinates. The blocks of a job
+ * become one assimp scene, whose arrays are lent to assimp for the call. assimp writes one file
+ * only, under a temporary name until it is complete; every other name that it asks for is an error.
+ * A build without assimp does not compile this file, and the table in export.c has no function for
+ * these formats. */
 #include "core/strict_fp.h"
 
 #include <assimp/cexport.h>
@@ -110,8 +110,8 @@ static struct aiFile *open_file(struct aiFileIO *io, const char *name, const cha
     }
     target->stream = stream;
     *c = (cursor){ target, stream };
-    *file = (struct aiFile){ read_bytes, write_bytes,          tell_stream, file_size, seek_stream,
-                             flush_stream,      (aiUserData)(void *)c };
+    *file = (struct aiFile){ read_bytes,  write_bytes,  tell_stream,          file_size,
+                             seek_stream, flush_stream, (aiUserData)(void *)c };
     return file;
 }
 

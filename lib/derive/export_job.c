@@ -71,9 +71,9 @@ static ebpo_status read_mesh(ebpo_block *out, const ebpo_file *file, ebpo_block_
     return status;
 }
 
-ebpo_status ebpo_block_read(ebpo_block *out, const ebpo_file *file, int level,
-                            ebpo_block_order order, const ebpo_export_options *options,
-                            ebpo_error *error)
+static ebpo_status block_read(ebpo_block *out, const ebpo_file *file, int level,
+                              ebpo_block_order order, const ebpo_export_options *options,
+                              ebpo_error *error)
 {
     *out = (ebpo_block){ .level = level };
     if (level < 0)
@@ -98,7 +98,7 @@ void ebpo_block_free(ebpo_block *block)
     memset(block, 0, sizeof *block);
 }
 
-void ebpo_block_report(const ebpo_block *block, ebpo_export_report *report)
+static void block_report(const ebpo_block *block, ebpo_export_report *report)
 {
     bool mesh = block->level < 0;
     report->block[report->block_count++] =
@@ -220,10 +220,10 @@ ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i, ebpo_block
     if (!ebpo_progress_step(&job->options->progress, "exporting", (uint64_t)i,
                             (uint64_t)ebpo_block_count(job->options), error))
         return EBPO_E_CANCELLED;
-    ebpo_status status = ebpo_block_read(out, job->file, ebpo_block_level(job->options, i), order,
-                                         job->options, error);
+    ebpo_status status =
+        block_read(out, job->file, ebpo_block_level(job->options, i), order, job->options, error);
     if (status == EBPO_OK)
-        ebpo_block_report(out, job->report);
+        block_report(out, job->report);
     if (status == EBPO_OK)
         report_colours(job, &out->colours);
     return status;

@@ -25,11 +25,7 @@ int ebpo_block_level(const ebpo_export_options *options, int i);
 /* `level` -1: the mesh, in the file's order with the source's numbers, or in the source's order
  * where the maps are there. Freed by ebpo_block_free, on failure too. */
 typedef enum ebpo_block_order { EBPO_FILE_ORDER, EBPO_SOURCE_ORDER } ebpo_block_order;
-EBPO_MUST_USE ebpo_status ebpo_block_read(ebpo_block *out, const ebpo_file *file, int level,
-                                          ebpo_block_order order,
-                                          const ebpo_export_options *options, ebpo_error *error);
 void ebpo_block_free(ebpo_block *block);
-void ebpo_block_report(const ebpo_block *block, ebpo_export_report *report);
 
 /* A number for each node, or for each polygon that of its node; of the mesh, for each triangle. */
 typedef struct ebpo_column {

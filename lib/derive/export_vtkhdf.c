@@ -86,7 +86,8 @@ static ebpo_status make_tables(writer *w, bool floats, ebpo_error *error)
 }
 
 /* Appends and frees. NULL: memory was short. */
-static ebpo_status append_table(writer *w, int table, void *values, uint64_t count, ebpo_error *error)
+static ebpo_status append_table(writer *w, int table, void *values, uint64_t count,
+                                ebpo_error *error)
 {
     ebpo_status status = values ? ebpo_h5_append(&w->out, &w->table[table], values, count, error)
                                 : ebpo_fail_memory(error, count * 8);
@@ -191,8 +192,8 @@ static ebpo_status append_block(writer *w, const ebpo_block *block, ebpo_error *
     for (int i = 0; i < 3 && status == EBPO_OK; i++)
         status = ebpo_h5_append(&w->out, &w->table[POINT_COUNT + i], &count[i], 1, error);
     if (status == EBPO_OK)
-        status = append_table(w, SOURCE_VERTEX, ebpo_column_of_vertices(block), block->mesh.vertex_count,
-                        error);
+        status = append_table(w, SOURCE_VERTEX, ebpo_column_of_vertices(block),
+                              block->mesh.vertex_count, error);
     for (int i = 0; i < EBPO_COLUMNS && status == EBPO_OK; i++)
         status = append_table(w, FIRST_COLUMN + i, ebpo_column_make(block, i, true), cells, error);
     return status == EBPO_OK ? append_colours(w, block, error) : status;

@@ -29,8 +29,9 @@ static void print_escaped(FILE *f, const char *s)
 }
 
 /* Writes the array and names it in the text. NULL: memory was short. */
-static ebpo_status put_array(writer *w, const ebpo_block *block, const char *name, ebpo_h5_number number,
-                       uint32_t cols, const void *values, uint64_t rows, ebpo_error *error)
+static ebpo_status put_array(writer *w, const ebpo_block *block, const char *name,
+                             ebpo_h5_number number, uint32_t cols, const void *values,
+                             uint64_t rows, ebpo_error *error)
 {
     char path[64];
     snprintf(path, sizeof path, "/%s/%s", block->name, name);
@@ -167,9 +168,9 @@ static ebpo_status put_block(writer *w, const ebpo_block *block, ebpo_error *err
     status = block->level < 0 ? put_triangles(w, block, error) : put_polyhedra(w, block, error);
     fprintf(w->text, "        </Topology>\n        <Geometry GeometryType=\"XYZ\">\n          ");
     if (status == EBPO_OK)
-        status =
-            put_array(w, block, "points", mesh->xyz32 ? EBPO_H5_F32 : EBPO_H5_F64, 3,
-                mesh->xyz32 ? (const void *)mesh->xyz32 : mesh->xyz64, mesh->vertex_count, error);
+        status = put_array(w, block, "points", mesh->xyz32 ? EBPO_H5_F32 : EBPO_H5_F64, 3,
+                           mesh->xyz32 ? (const void *)mesh->xyz32 : mesh->xyz64,
+                           mesh->vertex_count, error);
     fprintf(w->text, "        </Geometry>\n");
     if (status == EBPO_OK)
         status = put_data(w, block, error);

@@ -87,8 +87,9 @@ double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
     return bounds.hi + f->grain;
 }
 
-double ebpo_cell_frame_triangle(const ebpo_cell_frame *f, const double triangle[3][3],
-                                double out[3][3])
+/* A triangle of the model in cell coordinates; returns a bound on their error. */
+static double cell_frame_triangle(const ebpo_cell_frame *f, const double triangle[3][3],
+                                  double out[3][3])
 {
     double largest = 1, least = INFINITY;
     for (int k = 0; k < 3; k++) {
@@ -115,7 +116,9 @@ void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out)
     }
 }
 
-bool ebpo_cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_polytope *out)
+/* The part with x[axis] <= at (side 0) or >= at (side 1), and what of the other side is thin.
+ * False: there is none, or it is thin. */
+static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_polytope *out)
 {
     double n[3] = { 0, 0, 0 };
     ebpo_extent e;
@@ -134,7 +137,8 @@ bool ebpo_cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_p
     return true;
 }
 
-bool ebpo_cut_plane(const ebpo_polytope *p, const double n[3], double d, ebpo_polytope *out)
+/* The part with n . x <= d, |n| = 1; false when clipping gives up. */
+static bool cut_plane(const ebpo_polytope *p, const double n[3], double d, ebpo_polytope *out)
 {
     ebpo_polytope_copy(out, p);
     return ebpo_polytope_clip(out, n, d + EBPO_CUT_SLACK, CUT_TAG) != EBPO_CLIP_REFUSED;
@@ -253,7 +257,7 @@ static ebpo_status give_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t
         return ebpo_fail_memory(b->error, (b->face_count + count) * sizeof *b->faces);
     for (uint64_t i = first; i < first + count; i++) {
         double t[3][3],
-            error = ebpo_cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[i], t) + 1e-9;
+            error = cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[i], t) + 1e-9;
         bool meets = true;
         for (int k = 0; k < 3; k++)
             meets = meets && fmin(fmin(t[0][k], t[1][k]), t[2][k]) <= e.max[k] + error &&
@@ -337,9 +341,9 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         ebpo_node child = ebpo_level_child(&nodes, &fragment->node, octant);
         ebpo_fragment *next = NULL;
-        if (!ebpo_cut_axis(&fragment->p, 2, octant >> 2 & 1, low[2] + half, &z) ||
-            !ebpo_cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
-            !ebpo_cut_axis(&y, 0, octant & 1, low[0] + half, &x))
+        if (!cut_axis(&fragment->p, 2, octant >> 2 & 1, low[2] + half, &z) ||
+            !cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
+            !cut_axis(&y, 0, octant & 1, low[0] + half, &x))
             continue;
         if (child.type == EBPO_BLACK) {
             bound_black(b, &x, child.cell, fragment->levels + 1);
@@ -375,7 +379,7 @@ static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_fragment *fragment,
     for (int side = 0; side < 2 && status == EBPO_OK; side++) {
         ebpo_polytope part;
         ebpo_fragment *next = NULL;
-        if (!ebpo_cut_axis(&fragment->p, axis, side, .5 * e.min[axis] + .5 * e.max[axis], &part))
+        if (!cut_axis(&fragment->p, axis, side, .5 * e.min[axis] + .5 * e.max[axis], &part))
             continue;
         status = push_polytope(b, kind, fragment, &part, &next);
         if (status == EBPO_OK && kind == EBPO_FRAGMENT_LEAF)
@@ -389,7 +393,7 @@ static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_fragment *fragment,
 static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double *d)
 {
     double t[3][3], u[3], v[3],
-        error = ebpo_cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[face], t);
+        error = cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[face], t);
     for (int k = 0; k < 3; k++) {
         u[k] = t[1][k] - t[0][k];
         v[k] = t[2][k] - t[0][k];
@@ -416,8 +420,7 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
     ebpo_polytope side[2];
     double back[3] = { -n[0], -n[1], -n[2] };
     ebpo_status status = EBPO_OK;
-    *done = ebpo_cut_plane(&fragment->p, n, d, &side[0]) &&
-            ebpo_cut_plane(&fragment->p, back, -d, &side[1]);
+    *done = cut_plane(&fragment->p, n, d, &side[0]) && cut_plane(&fragment->p, back, -d, &side[1]);
     for (int i = 0; i < 2 && *done && status == EBPO_OK; i++) {
         ebpo_fragment *next = NULL;
         status = push_polytope(b, kind, fragment, &side[i], &next);
@@ -435,7 +438,7 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
     double t[3][3], edge[3][3], normal[3], longest = 0;
     bool done = false;
     ebpo_status status = EBPO_OK;
-    (void)ebpo_cell_frame_triangle(&b->frame, l->face, t);
+    (void)cell_frame_triangle(&b->frame, l->face, t);
     for (int i = 0; i < 3; i++) {
         double sum = 0;
         for (int k = 0; k < 3; k++) {

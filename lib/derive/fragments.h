@@ -40,10 +40,6 @@ double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels);
 double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
                                 const double triangle[3][3]);
 
-/* A triangle of the model in cell coordinates; returns a bound on their error. */
-double ebpo_cell_frame_triangle(const ebpo_cell_frame *f, const double triangle[3][3],
-                                double out[3][3]);
-
 /* Pieces of an envelope: convex polytopes in the cell coordinates of the node, which together cover
  * it. Every cut leaves a little too much on both sides, so that nothing is lost between them to the
  * tolerances of ebpo_polytope_clip. */
@@ -61,13 +57,6 @@ void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out);
 /* A part of so little width goes with the other side; less than a quarter of the smallest piece
  * that is cut. */
 #define EBPO_CUT_THIN 1.2e-7 /* ebpo_polytope_clip refuses 1e-7 */
-
-/* The part with x[axis] <= at (side 0) or >= at (side 1), and what of the other side is thin.
- * False: there is none, or it is thin. */
-bool ebpo_cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_polytope *out);
-
-/* The part with n . x <= d, |n| = 1; false when clipping gives up. */
-bool ebpo_cut_plane(const ebpo_polytope *p, const double n[3], double d, ebpo_polytope *out);
 
 /* The trees behind the bounds: that whose envelopes are asked about, and the whole model's, which
  * tells what is solid. */

@@ -81,8 +81,8 @@ static double volume_by(hull *h, double *points, int count, char *command, bool 
     return volume > 0 ? volume : 0;
 }
 
-/* Returns the volume of the hull of `count` points [count][3], of the order of 1; 0 when they are in
- * a plane, or so nearly that rounding decides. */
+/* Returns the volume of the hull of `count` points [count][3], of the order of 1; 0 when they are
+ * in a plane, or so nearly that rounding decides. */
 static double hull_volume(hull *h, double *points, uint64_t count)
 {
     static char merged[] = "qhull Qt Pp", joggled[] = "qhull QJ Pp";
@@ -265,7 +265,7 @@ static bool add_faces(const job *j, scratch *s, ebpo_cell cell)
 }
 
 static ebpo_status measure_hulls(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                         ebpo_error *error)
+                                 ebpo_error *error)
 {
     job *j = context;
     scratch *s = &j->scratch[worker];
@@ -296,7 +296,7 @@ static ebpo_status check_level(const ebpo_file *file, int level, ebpo_error *err
 }
 
 static ebpo_status prepare_job(job *j, const ebpo_file *file, int level, unsigned threads,
-                           ebpo_error *error)
+                               ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     j->level = level;
@@ -352,8 +352,8 @@ ebpo_status ebpo_limit_level(const ebpo_file *file, int level, const ebpo_limit_
     j.in_root_cells = asked.in_root_cells != 0;
     status = prepare_job(&j, file, level, threads, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, j.node_count, 1, measure_hulls, &j, &asked.progress,
-                                   "convex hulls", error);
+        status = ebpo_parallel_for(threads, NULL, j.node_count, 1, measure_hulls, &j,
+                                   &asked.progress, "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
         /* not 0 times infinity */
         double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0;

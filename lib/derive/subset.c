@@ -224,23 +224,11 @@ static void name_mesh(ebpo_tree *out)
     out->mesh.source_size = out->info.source_size;
 }
 
-ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
-                             const ebpo_subset_options *options, ebpo_error *error)
-{
-    ebpo_tolerance *need = NULL;
-    ebpo_status status = EBPO_OK;
-    if (options->max_error > 0)
-        status = ebpo_tolerance_open(&need, file, options->parts & EBPO_PART_PLANES,
-                                     options->threads, options->progress, error);
-    if (status == EBPO_OK)
-        status = ebpo_subset_tree_within(out, file, options, need, error);
-    ebpo_tolerance_close(need);
-    return status;
-}
-
-ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_file *file,
-                                    const ebpo_subset_options *options, ebpo_tolerance *need,
-                                    ebpo_error *error)
+/* Makes the tree of the subset. `need`: what is known of this file's envelopes, with the planes
+ * that are kept; or NULL. */
+static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
+                                      const ebpo_subset_options *options, ebpo_tolerance *need,
+                                      ebpo_error *error)
 {
     ebpo_cutting c = { .file = file,
                        .from = ebpo_file_info(file),
@@ -276,7 +264,22 @@ ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_file *file,
     return EBPO_OK;
 }
 
-ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options)
+ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
+                             const ebpo_subset_options *options, ebpo_error *error)
+{
+    ebpo_tolerance *need = NULL;
+    ebpo_status status = EBPO_OK;
+    if (options->max_error > 0)
+        status = ebpo_tolerance_open(&need, file, options->parts & EBPO_PART_PLANES,
+                                     options->threads, options->progress, error);
+    if (status == EBPO_OK)
+        status = subset_tree_within(out, file, options, need, error);
+    ebpo_tolerance_close(need);
+    return status;
+}
+
+/* How the subset is written: all parts that its tree has. */
+static ebpo_write_options subset_write_options(const ebpo_subset_options *options)
 {
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     write.codec = options->codec;
@@ -314,11 +317,11 @@ static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool
     struct stat st;
     ebpo_subset_options o = *f->options;
     o.max_error = max_error;
-    ebpo_status status = ebpo_subset_tree_within(&tree, f->file, &o, f->need, f->error);
+    ebpo_status status = subset_tree_within(&tree, f->file, &o, f->need, f->error);
     if (status != EBPO_OK)
         return status;
     *pruned = tree.info.pruned;
-    ebpo_write_options write = ebpo_subset_write_options(&o);
+    ebpo_write_options write = subset_write_options(&o);
     status =
         ebpo_tree_write_into(&tree, ebpo_publish_path(&f->trial), f->trial.shown, &write, f->error);
     ebpo_tree_free(&tree);
@@ -421,8 +424,10 @@ static ebpo_status choose_parts(fitting *f, bool *found)
     return status;
 }
 
-ebpo_status ebpo_subset_fit(const ebpo_file *file, const char *path, ebpo_subset_options *options,
-                            ebpo_error *error)
+/* --- target_size.c: the subset for options->target_bytes, published as `path`; trials are written
+ * beside it. Changes max_error and parts of the options --- */
+static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subset_options *options,
+                              ebpo_error *error)
 {
     fitting f = { .file = file,
                   .options = options,
@@ -477,11 +482,11 @@ ebpo_status ebpo_subset(const ebpo_file *file, const char *path, const ebpo_subs
     if (status != EBPO_OK)
         return status;
     if (wanted.target_bytes)
-        return ebpo_subset_fit(file, path, &wanted, error);
+        return subset_fit(file, path, &wanted, error);
     status = ebpo_subset_tree(&tree, file, &wanted, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_write_options write = ebpo_subset_write_options(&wanted);
+    ebpo_write_options write = subset_write_options(&wanted);
     status = ebpo_publish_begin(&out, path, error);
     if (status == EBPO_OK) {
         ebpo_publish_expect_input(&out, &file->in);
@@ -502,7 +507,7 @@ ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path,
     ebpo_publish whole = EBPO_PUBLISH_INIT;
     ebpo_file *file = NULL;
     ebpo_status status = EBPO_TAKE(ebpo_subset_options, &wanted, options, error);
-    ebpo_write_options write = ebpo_subset_write_options(&wanted);
+    ebpo_write_options write = subset_write_options(&wanted);
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&whole, path, error);
     if (status == EBPO_OK)

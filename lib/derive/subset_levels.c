@@ -53,18 +53,6 @@ typedef struct ebpo_kept_nodes {
     uint64_t read[EBPO_COUNTS]; /* of each list: its next item */
 } ebpo_kept_nodes;
 
-/* Makes the arrays of `to` that are there for any of `needs`, with room for all of `from` and for
- * `more` nodes of each type (and, `more` gray ones being leaves before, for their planes). False:
- * out of memory. */
-bool ebpo_kept_begin(ebpo_kept_nodes *kept, const ebpo_level *from, ebpo_level *to, uint32_t needs,
-                     const uint64_t more[4]);
-
-/* The next node of a type stays; is left out. */
-void ebpo_kept_take(ebpo_kept_nodes *kept, ebpo_node_type type);
-void ebpo_kept_pass(ebpo_kept_nodes *kept, ebpo_node_type type);
-/* A node that is not one of `from`: usual values, empty lists. */
-void ebpo_kept_add(ebpo_kept_nodes *kept, ebpo_node_type type);
-
 static ebpo_per per_of(ebpo_node_type type)
 {
     static const ebpo_per per[] = { [EBPO_WHITE] = EBPO_PER_WHITE,
@@ -115,8 +103,11 @@ static void note_list(ebpo_kept_nodes *kept, int id, const ebpo_list_spec *list)
                           .size = ebpo_schema[id].held_size };
 }
 
-bool ebpo_kept_begin(ebpo_kept_nodes *kept, const ebpo_level *from, ebpo_level *to, uint32_t needs,
-                     const uint64_t more[4])
+/* Makes the arrays of `to` that are there for any of `needs`, with room for all of `from` and for
+ * `more` nodes of each type (and, `more` gray ones being leaves before, for their planes). False:
+ * out of memory. */
+static bool kept_begin(ebpo_kept_nodes *kept, const ebpo_level *from, ebpo_level *to,
+                       uint32_t needs, const uint64_t more[4])
 {
     *kept = (ebpo_kept_nodes){ .from = from, .to = to };
     for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
@@ -183,7 +174,18 @@ static void copy_items(const ebpo_kept_nodes *kept, const ebpo_kept_list *list,
            count * list->size);
 }
 
-void ebpo_kept_take(ebpo_kept_nodes *kept, ebpo_node_type type)
+/* The next node of a type is left out. */
+static void kept_pass(ebpo_kept_nodes *kept, ebpo_node_type type)
+{
+    uint64_t rank = kept->next[type]++;
+    for (unsigned i = 0; i < kept->of_type[type].counts; i++) {
+        const ebpo_kept_counts *c = &kept->of_type[type].count[i];
+        kept->read[c->per] += kept_items(c, rank);
+    }
+}
+
+/* The next node of a type stays. */
+static void kept_take(ebpo_kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t place = grow_level(kept->to, type), rank = kept->next[type];
     for (unsigned i = 0; i < kept->of_type[type].columns; i++)
@@ -197,21 +199,14 @@ void ebpo_kept_take(ebpo_kept_nodes *kept, ebpo_node_type type)
     }
     for (unsigned i = 0; i < kept->of_type[type].counts; i++) {
         const ebpo_kept_counts *c = &kept->of_type[type].count[i];
-        ebpo_level_set_count(kept->to, c->per, ebpo_level_count(kept->to, c->per) + kept_items(c, rank));
+        ebpo_level_set_count(kept->to, c->per,
+                             ebpo_level_count(kept->to, c->per) + kept_items(c, rank));
     }
-    ebpo_kept_pass(kept, type);
+    kept_pass(kept, type);
 }
 
-void ebpo_kept_pass(ebpo_kept_nodes *kept, ebpo_node_type type)
-{
-    uint64_t rank = kept->next[type]++;
-    for (unsigned i = 0; i < kept->of_type[type].counts; i++) {
-        const ebpo_kept_counts *c = &kept->of_type[type].count[i];
-        kept->read[c->per] += kept_items(c, rank);
-    }
-}
-
-void ebpo_kept_add(ebpo_kept_nodes *kept, ebpo_node_type type)
+/* A node that is not one of `from`: usual values, empty lists. */
+static void kept_add(ebpo_kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t place = grow_level(kept->to, type);
     for (unsigned i = 0; i < kept->of_type[type].columns; i++)
@@ -320,7 +315,7 @@ static ebpo_status make_room(descent *d)
              more[4] = { [EBPO_WHITE] = whites, [EBPO_GRAY] = f->leaf_count };
     uint32_t needs = d->c->parts | (d->c->from->solid ? EBPO_NEEDS_SOLID : 0) | EBPO_NEEDS_ALWAYS;
     d->to->types = ebpo_alloc_zero(d->parent_count, sizeof *d->to->types);
-    return d->to->types && ebpo_kept_begin(&d->kept, f, d->to, needs, more)
+    return d->to->types && kept_begin(&d->kept, f, d->to, needs, more)
                ? EBPO_OK
                : ebpo_fail_memory(d->c->error,
                                   f->leaf_count * 28 + (f->gray_count + f->ref_count + whites) * 4);
@@ -344,7 +339,7 @@ static void take_gray(descent *d, ebpo_cell cell)
     bool enough = is_enough(d);
     if (enough || !may_go_on(d->c, d->level) || !meets_box(d->c, cell))
         group = NOTHING;
-    ebpo_kept_take(&d->kept, EBPO_GRAY);
+    kept_take(&d->kept, EBPO_GRAY);
     add_child(d, cell, group);
 }
 
@@ -378,14 +373,14 @@ static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
 {
     bool enough = is_enough(d);
     if (!enough && meets_box(d->c, cell)) {
-        ebpo_kept_take(&d->kept, EBPO_LEAF);
+        kept_take(&d->kept, EBPO_LEAF);
         return EBPO_LEAF;
     }
-    ebpo_kept_add(&d->kept, EBPO_GRAY);
+    kept_add(&d->kept, EBPO_GRAY);
     if (!enough)
         add_leaf_planes(d);
     add_colour(d);
-    ebpo_kept_pass(&d->kept, EBPO_LEAF);
+    kept_pass(&d->kept, EBPO_LEAF);
     add_child(d, cell, NOTHING);
     return EBPO_GRAY;
 }
@@ -397,7 +392,7 @@ static ebpo_node_type take_node(descent *d, ebpo_node_type type, ebpo_cell cell)
     if (type == EBPO_GRAY)
         take_gray(d, cell);
     else
-        ebpo_kept_take(&d->kept, type);
+        kept_take(&d->kept, type);
     return type;
 }
 
@@ -460,7 +455,7 @@ static ebpo_status cut_level(descent *d)
     for (uint64_t i = 0; i < d->parent_count && status == EBPO_OK; i++) {
         if (d->parent[i].group == NOTHING)
             for (int k = 0; k < 8; k++) /* the places of children that are not here */
-                ebpo_kept_add(&d->kept, EBPO_WHITE);
+                kept_add(&d->kept, EBPO_WHITE);
         else
             take_group(d, i, d->from.types[next++]);
         d->filled += d->to->types[i] != 0;
@@ -531,7 +526,7 @@ typedef struct measuring {
 
 /* Cuts the envelope by the node's own planes. */
 static void cut_envelope(ebpo_polytope *envelope, const uint8_t *counts, const uint32_t *planes,
-                uint64_t *node, uint64_t *plane)
+                         uint64_t *node, uint64_t *plane)
 {
     uint64_t count = counts ? counts[*node] : 0;
     if (count)
@@ -557,7 +552,8 @@ static void measure_group(measuring *m, int level, const ebpo_polytope *parent)
         if (type == EBPO_GRAY)
             cut_envelope(&own, l->plane_counts, l->planes, &m->gray[level], &m->plane[level]);
         else
-            cut_envelope(&own, l->leaf_plane_counts, l->leaf_planes, &m->leaf[level], &m->leaf_plane[level]);
+            cut_envelope(&own, l->leaf_plane_counts, l->leaf_planes, &m->leaf[level],
+                         &m->leaf_plane[level]);
         *(type == EBPO_GRAY ? &l->gray_volume : &l->leaf_volume) +=
             ebpo_polytope_volume(&own) * ebpo_cell_volume(&m->c->box, level);
         if (type == EBPO_GRAY && level + 1 < tree->info.level_count)

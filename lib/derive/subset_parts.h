@@ -31,20 +31,6 @@ EBPO_MUST_USE ebpo_status ebpo_cut_faces(ebpo_cutting *c);
 /* --- subset_volumes.c: of the envelopes of the nodes that remain --- */
 void ebpo_cut_volumes(ebpo_cutting *c);
 
-/* The same with what is known of envelopes already: `need` of this file, for the planes that are
- * kept. */
-EBPO_MUST_USE ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_file *file,
-                                                  const ebpo_subset_options *options,
-                                                  ebpo_tolerance *need, ebpo_error *error);
-
-/* --- target_size.c: the subset for options->target_bytes, published as `path`; trials are written
- * beside it. Changes max_error and parts of the options --- */
-EBPO_MUST_USE ebpo_status ebpo_subset_fit(const ebpo_file *file, const char *path,
-                                          ebpo_subset_options *options, ebpo_error *error);
-
-/* How the subset is written: all parts that its tree has. */
-ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options);
-
 /* The tree that would be written; for tests too. */
 EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
                                            const ebpo_subset_options *options, ebpo_error *error);

@@ -25,7 +25,7 @@ uint32_t ebpo_place_number(ebpo_array_id id, int level)
                                        : TABLE_NUMBERS + (uint32_t)(id - EBPO_A_SUBTREE_INDEX);
 }
 
-ebpo_array_id ebpo_place_array(uint32_t number, int *level)
+static ebpo_array_id place_array(uint32_t number, int *level)
 {
     *level = 0;
     if (number < MESH_NUMBERS) {
@@ -115,8 +115,9 @@ ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t stored_bytes,
     return status == EBPO_E_MEMORY ? ebpo_fail_memory(error, size * 3) : status;
 }
 
-ebpo_status ebpo_long_chunk_fail(const ebpo_file *file, ebpo_array_id list, const char *what,
-                                 const char *path, ebpo_error *error)
+/* EBPO_E_FORMAT: what such a list says of `path` is wrong. */
+static ebpo_status long_chunk_fail(const ebpo_file *file, ebpo_array_id list, const char *what,
+                                   const char *path, ebpo_error *error)
 {
     return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, file->root_array[list].path, -1,
                         "%s %s; get a fresh copy of the file", what, path);
@@ -129,8 +130,8 @@ ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *a, 
     const char *why = "";
     *values = NULL;
     if (a->shape.rows > file->info.file_bytes)
-        return ebpo_long_chunk_fail(file, a->id, "the list has more rows than",
-                                    "the file has bytes", error);
+        return long_chunk_fail(file, a->id, "the list has more rows than", "the file has bytes",
+                               error);
     uint8_t *stored = ebpo_alloc(chunk.bytes, 1);
     ebpo_status status = stored ? ebpo_input_read(&ebpo_reader_own(file)->in, chunk.address,
                                                   chunk.bytes, stored, error)
@@ -139,7 +140,7 @@ ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *a, 
         status = ebpo_long_chunk_decode(stored, chunk.bytes, a->shape.pipeline, a->shape.rows,
                                         values, &why, error);
         if (status == EBPO_E_FORMAT)
-            status = ebpo_long_chunk_fail(file, a->id, "the chunk is damaged:", why, error);
+            status = long_chunk_fail(file, a->id, "the chunk is damaged:", why, error);
     }
     free(stored);
     return status;
@@ -165,7 +166,7 @@ uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
 }
 
 /* Of the arrays whose chunks are known. */
-ebpo_stored_sizes ebpo_reader_sizes(const ebpo_file *file)
+static ebpo_stored_sizes reader_sizes(const ebpo_file *file)
 {
     ebpo_stored_sizes sizes = { .map_bytes = 0 };
     for (int level = 0; level < file->info.level_count; level++)
@@ -180,7 +181,7 @@ ebpo_stored_sizes ebpo_reader_sizes(const ebpo_file *file)
 
 ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
 {
-    ebpo_stored_sizes sizes = ebpo_reader_sizes(file);
+    ebpo_stored_sizes sizes = reader_sizes(file);
     uint64_t stored = sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes +
                       sizes.subtree_bytes + sizes.attribute_bytes + sizes.sum_bytes;
     for (int level = 0; level < file->info.level_count; level++)
@@ -232,8 +233,8 @@ static ebpo_status find_rows(const ebpo_file *file, ebpo_array_in *a, const uint
         ++*row;
     return *row - a->first_sum == chunks
                ? EBPO_OK
-               : ebpo_long_chunk_fail(file, EBPO_A_CHUNK_SUMS,
-                                      "the list has more or fewer chunks than", a->path, error);
+               : long_chunk_fail(file, EBPO_A_CHUNK_SUMS, "the list has more or fewer chunks than",
+                                 a->path, error);
 }
 
 static ebpo_status find_all(ebpo_file *file, const uint64_t *list, uint64_t rows, ebpo_error *error)
@@ -242,8 +243,8 @@ static ebpo_status find_all(ebpo_file *file, const uint64_t *list, uint64_t rows
     uint64_t row = 0;
     for (uint64_t i = 1; i < rows; i++)
         if (ebpo_place_number_of(list[i]) < ebpo_place_number_of(list[i - 1]))
-            return ebpo_long_chunk_fail(file, EBPO_A_CHUNK_SUMS, "the list is not in the order of",
-                                        "arrays' numbers", error);
+            return long_chunk_fail(file, EBPO_A_CHUNK_SUMS, "the list is not in the order of",
+                                   "arrays' numbers", error);
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
         if (ebpo_array_number(file, i)->present &&
             !ebpo_schema_is_list(ebpo_array_number(file, i)->id))
@@ -347,14 +348,14 @@ static uint64_t *seen_of(listing *l, ebpo_array_id id, int level)
 static ebpo_status list_fails(const ebpo_file *file, const char *what, const char *path,
                               ebpo_error *error)
 {
-    return ebpo_long_chunk_fail(file, EBPO_A_PLACES, what, path, error);
+    return long_chunk_fail(file, EBPO_A_PLACES, what, path, error);
 }
 
 static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_place chunk,
                               ebpo_error *error)
 {
     int level;
-    ebpo_array_id id = ebpo_place_array(number, &level);
+    ebpo_array_id id = place_array(number, &level);
     if (id == EBPO_ARRAYS || (id == EBPO_A_ATTRIBUTE && level >= l->file->attributes.arrays))
         return EBPO_OK; /* a gap, or of a part that is not known, or not listed */
     ebpo_array_in *a = id < EBPO_LEVEL_ARRAYS   ? &l->file->level_array[level][id]
@@ -471,7 +472,7 @@ ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out, ebpo
     if (status == EBPO_OK && !atomic_load(&file->located))
         status = locate_all(ebpo_reader_own(file), error);
     if (status == EBPO_OK && out)
-        sizes = ebpo_reader_sizes(file);
+        sizes = reader_sizes(file);
     if (out)
         EBPO_GIVE(ebpo_stored_sizes, out, &sizes);
     return status;

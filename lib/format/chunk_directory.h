@@ -68,15 +68,8 @@ EBPO_MUST_USE ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t s
 EBPO_MUST_USE ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *array,
                                                uint64_t **values, ebpo_error *error);
 
-/* EBPO_E_FORMAT: what such a list says of `path` is wrong. */
-EBPO_MUST_USE ebpo_status ebpo_long_chunk_fail(const ebpo_file *file, ebpo_array_id list,
-                                               const char *what, const char *path,
-                                               ebpo_error *error);
-
 /* How many bytes of a file its arrays take. */
 
-/* Of the arrays whose chunks are known; and whether these fit the file. */
-ebpo_stored_sizes ebpo_reader_sizes(const ebpo_file *file);
 EBPO_MUST_USE ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error);
 
 /* EBPO_E_LIMIT: decoded they take more than `most` times the file's bytes, and more than

@@ -28,21 +28,6 @@ typedef struct ebpo_outer_blocks {
     uint64_t face_blocks, vertex_blocks;
 } ebpo_outer_blocks;
 
-EBPO_MUST_USE ebpo_status ebpo_outer_blocks_make(ebpo_outer_blocks *out, const ebpo_info *info,
-                                                 ebpo_error *error);
-void ebpo_outer_blocks_free(ebpo_outer_blocks *blocks);
-
-/* Faces that its leaves refer to, own ones among them; and all its own faces. */
-void ebpo_outer_blocks_refer(ebpo_outer_blocks *blocks, const ebpo_mesh *mesh,
-                             const ebpo_outer_range *own, const uint32_t *refs, uint64_t count);
-void ebpo_outer_blocks_use(ebpo_outer_blocks *blocks, const ebpo_mesh *mesh,
-                           const ebpo_outer_range *own);
-
-/* Distances into `out`, faces first; adds how many there are to the sums before the subtree. Then
- * the lists are empty. */
-void ebpo_outer_blocks_take(ebpo_outer_blocks *blocks, const ebpo_outer_range *own, uint32_t *out,
-                            const uint64_t *before, uint64_t *after);
-
 enum {
     FIRST_LEVELS = 5,    /* these lie together, whatever the subtrees */
     LEAVES_OF_DEEP = 64, /* a deep level has a leaf for each so many faces */
@@ -55,14 +40,16 @@ enum {
     ATTRIBUTE_ROWS = 2048
 };
 
-int ebpo_last_whole_level(const ebpo_info *info)
+/* With subtrees: levels up to the first one lie as they are, from the second one on they are deep.
+ */
+static int last_whole_level(const ebpo_info *info)
 {
     return info->subtree_level > FIRST_LEVELS ? info->subtree_level : FIRST_LEVELS;
 }
 
-int ebpo_first_deep_level(const ebpo_info *info)
+static int first_deep_level(const ebpo_info *info)
 {
-    int level = ebpo_last_whole_level(info) + 1;
+    int level = last_whole_level(info) + 1;
     while (level < info->level_count &&
            info->level[level].leaf_count < info->face_count / LEAVES_OF_DEEP)
         level++;
@@ -98,7 +85,7 @@ static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, 
     case EBPO_A_ATTRIBUTE: return ATTRIBUTE_ROWS;
     default: break;
     }
-    if (id >= EBPO_LEVEL_ARRAYS || level <= ebpo_last_whole_level(info) || ebpo_schema_is_index(id))
+    if (id >= EBPO_LEVEL_ARRAYS || level <= last_whole_level(info) || ebpo_schema_is_index(id))
         return UINT64_MAX;
     uint64_t found = rows_for_faces(info, rows);
     while (found * row_bytes < CHUNK_LEAST)
@@ -146,7 +133,8 @@ uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, 
     return rows;
 }
 
-ebpo_status ebpo_outer_blocks_make(ebpo_outer_blocks *out, const ebpo_info *info, ebpo_error *error)
+static ebpo_status outer_blocks_make(ebpo_outer_blocks *out, const ebpo_info *info,
+                                     ebpo_error *error)
 {
     uint64_t faces = info->face_count / EBPO_FACE_BLOCK + 1,
              vertices = info->vertex_count / EBPO_VERTEX_BLOCK + 1;
@@ -160,7 +148,7 @@ ebpo_status ebpo_outer_blocks_make(ebpo_outer_blocks *out, const ebpo_info *info
     return EBPO_OK;
 }
 
-void ebpo_outer_blocks_free(ebpo_outer_blocks *blocks)
+static void outer_blocks_free(ebpo_outer_blocks *blocks)
 {
     free(blocks->face_round);
     free(blocks->vertex_round);
@@ -169,7 +157,7 @@ void ebpo_outer_blocks_free(ebpo_outer_blocks *blocks)
 }
 
 static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_t *blocks,
-                 uint64_t *count)
+                       uint64_t *count)
 {
     if (rounds[block] == round)
         return;
@@ -184,22 +172,24 @@ static void use_face(ebpo_outer_blocks *b, const ebpo_mesh *mesh, const ebpo_out
         uint32_t vertex = mesh->faces[3 * face + (uint64_t)k];
         if (vertex < own->vertex)
             list_block(b->vertex_round, b->round, vertex / EBPO_VERTEX_BLOCK, b->vertex_block,
-                 &b->vertex_blocks);
+                       &b->vertex_blocks);
     }
 }
 
-void ebpo_outer_blocks_refer(ebpo_outer_blocks *b, const ebpo_mesh *mesh,
-                             const ebpo_outer_range *own, const uint32_t *refs, uint64_t count)
+/* Faces that its leaves refer to, own ones among them; and all its own faces. */
+static void outer_blocks_refer(ebpo_outer_blocks *b, const ebpo_mesh *mesh,
+                               const ebpo_outer_range *own, const uint32_t *refs, uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++)
         if (refs[i] < own->face) {
             list_block(b->face_round, b->round, refs[i] / EBPO_FACE_BLOCK, b->face_block,
-                 &b->face_blocks);
+                       &b->face_blocks);
             use_face(b, mesh, own, refs[i]);
         }
 }
 
-void ebpo_outer_blocks_use(ebpo_outer_blocks *b, const ebpo_mesh *mesh, const ebpo_outer_range *own)
+static void outer_blocks_use(ebpo_outer_blocks *b, const ebpo_mesh *mesh,
+                             const ebpo_outer_range *own)
 {
     for (uint64_t face = own->face; face < own->face_end; face++)
         use_face(b, mesh, own, face);
@@ -222,12 +212,14 @@ static uint64_t take_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uin
     return taken;
 }
 
-void ebpo_outer_blocks_take(ebpo_outer_blocks *b, const ebpo_outer_range *own, uint32_t *out,
-                            const uint64_t *before, uint64_t *after)
+/* Distances into `out`, faces first; adds how many there are to the sums before the subtree. Then
+ * the lists are empty. */
+static void outer_blocks_take(ebpo_outer_blocks *b, const ebpo_outer_range *own, uint32_t *out,
+                              const uint64_t *before, uint64_t *after)
 {
     uint64_t faces = take_blocks(b->face_block, b->face_blocks, own->face / EBPO_FACE_BLOCK, out);
-    uint64_t vertices =
-        take_blocks(b->vertex_block, b->vertex_blocks, own->vertex / EBPO_VERTEX_BLOCK, out + faces);
+    uint64_t vertices = take_blocks(b->vertex_block, b->vertex_blocks,
+                                    own->vertex / EBPO_VERTEX_BLOCK, out + faces);
     after[EBPO_S_OUTER_FACES] = before[EBPO_S_OUTER_FACES] + faces;
     after[EBPO_S_OUTER_VERTICES] = before[EBPO_S_OUTER_VERTICES] + vertices;
     b->face_blocks = b->vertex_blocks = 0;
@@ -373,7 +365,7 @@ static void count_vertices(const counting *c)
 static ebpo_status list_outer(const counting *c, ebpo_error *error)
 {
     ebpo_outer_blocks blocks;
-    ebpo_status status = ebpo_outer_blocks_make(&blocks, c->info, error);
+    ebpo_status status = outer_blocks_make(&blocks, c->info, error);
     EBPO_FOR_ITEMS_EVERY(c->tree->mesh.workspace, SUBTREES_A_TIME, i, 0, c->sums->subtrees) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
         ebpo_outer_range own = {
@@ -387,20 +379,20 @@ static ebpo_status list_outer(const counting *c, ebpo_error *error)
             uint64_t first = level_sum(c, i, l, EBPO_S_REFS),
                      end = level_sum(c, i + 1, l, EBPO_S_REFS);
             if (end > first) /* a level without any has no array */
-                ebpo_outer_blocks_refer(&blocks, &c->tree->mesh, &own,
-                                        c->tree->level[l].leaf_refs + first, end - first);
+                outer_blocks_refer(&blocks, &c->tree->mesh, &own,
+                                   c->tree->level[l].leaf_refs + first, end - first);
         }
-        ebpo_outer_blocks_use(&blocks, &c->tree->mesh, &own);
+        outer_blocks_use(&blocks, &c->tree->mesh, &own);
         if (!ebpo_grow(&c->sums->outer, &c->sums->outer_capacity,
                        c->sums->outer_count + blocks.face_blocks + blocks.vertex_blocks +
                            1, /* never NULL */
                        sizeof *c->sums->outer))
             status = ebpo_fail_memory(error, c->sums->outer_count * sizeof *c->sums->outer);
         else
-            ebpo_outer_blocks_take(&blocks, &own, c->sums->outer + c->sums->outer_count, from, to);
+            outer_blocks_take(&blocks, &own, c->sums->outer + c->sums->outer_count, from, to);
         c->sums->outer_count = to[EBPO_S_OUTER_FACES] + to[EBPO_S_OUTER_VERTICES];
     }
-    ebpo_outer_blocks_free(&blocks);
+    outer_blocks_free(&blocks);
     return status;
 }
 
@@ -471,8 +463,10 @@ static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint
     }
 }
 
-uint64_t ebpo_subtree_of_row(const ebpo_subtree_sums *sums, const ebpo_info *info, ebpo_array_id id,
-                             int level, uint64_t row)
+/* The subtree that a row of an array belongs to: arrays of levels below the roots, the mesh, the
+ * maps. Rows before the first subtree belong to it. */
+static uint64_t subtree_of_row(const ebpo_subtree_sums *sums, const ebpo_info *info,
+                               ebpo_array_id id, int level, uint64_t row)
 {
     counting c = { (ebpo_subtree_sums *)sums, NULL, info };
     uint64_t low = 0, high = sums->subtrees - 1;
@@ -560,8 +554,8 @@ static void add_by_subtree(ordering *o, const choice *c)
         uint64_t row = (uint64_t)chunk->chunk * a->shape.chunk_rows;
         chunk->subtree =
             a->id == EBPO_A_ATTRIBUTE
-                ? ebpo_subtree_of_row(&o->plan->subtrees, &o->plan->info, a->rows_of, 0, row)
-                : ebpo_subtree_of_row(&o->plan->subtrees, &o->plan->info, a->id, a->level, row);
+                ? subtree_of_row(&o->plan->subtrees, &o->plan->info, a->rows_of, 0, row)
+                : subtree_of_row(&o->plan->subtrees, &o->plan->info, a->id, a->level, row);
     }
     if (o->out->count > begin)
         qsort(o->out->chunk + begin, o->out->count - begin, sizeof *o->out->chunk, by_subtree);
@@ -570,8 +564,7 @@ static void add_by_subtree(ordering *o, const choice *c)
 static void order_subtrees(ordering *o)
 {
     const ebpo_info *info = &o->plan->info;
-    int whole = ebpo_last_whole_level(info), deep = ebpo_first_deep_level(info),
-        last = info->level_count - 1;
+    int whole = last_whole_level(info), deep = first_deep_level(info), last = info->level_count - 1;
     add_chosen_chunks(o, &(choice){ 0, whole, WHOLE });
     add_chosen_chunks(o, &(choice){ whole + 1, last, TOP_INDEXES });
     o->out->top = o->out->count;

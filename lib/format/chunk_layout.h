@@ -29,11 +29,6 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_sums_make(ebpo_subtree_sums *out, const e
                                                  const ebpo_info *info, ebpo_error *error);
 void ebpo_subtree_sums_free(ebpo_subtree_sums *sums);
 
-/* The subtree that a row of an array belongs to: arrays of levels below the roots, the mesh, the
- * maps. Rows before the first subtree belong to it. */
-uint64_t ebpo_subtree_of_row(const ebpo_subtree_sums *sums, const ebpo_info *info, ebpo_array_id id,
-                             int level, uint64_t row);
-
 /* What is about to be written: the list of arrays. */
 
 typedef struct ebpo_array_out {
@@ -73,11 +68,6 @@ typedef struct ebpo_plan {
 
 /* For writing: how many rows chunks have, and which levels are laid out alike.
  * format-spec/README.md, section 9, "Order". */
-
-/* With subtrees: levels up to the first one lie as they are, from the second one on they are deep.
- */
-int ebpo_last_whole_level(const ebpo_info *info);
-int ebpo_first_deep_level(const ebpo_info *info);
 
 /* Rows of an array's chunks, all or a power of two; `rows` are those of the array. */
 uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,

@@ -46,7 +46,7 @@ static uint64_t chunk_rows(const ebpo_array_in *array, uint64_t chunk)
 }
 
 static ebpo_status estimate_chunk(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
-                            ebpo_error *error)
+                                  ebpo_error *error)
 {
     const ebpo_array_in *array = array_of(user, key);
     (void)error;
@@ -109,7 +109,7 @@ static ebpo_status decode_map(const ebpo_chunks *c, ebpo_array_id id, uint64_t r
 
 /* Once for each load, so that using a chunk again costs nothing but finding it. */
 static ebpo_status decode_item(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk,
-                          const uint8_t *raw, void *item, ebpo_error *error)
+                               const uint8_t *raw, void *item, ebpo_error *error)
 {
     uint64_t rows = chunk_rows(array, chunk);
     switch (array->id) {
@@ -191,7 +191,7 @@ static ebpo_status refuse_load(ebpo_chunks *c, const ebpo_array_in *array, ebpo_
 
 /* Called before a chunk is read: what was announced has been counted then. */
 static ebpo_status admit_load(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key,
-                         ebpo_error *error)
+                              ebpo_error *error)
 {
     uint64_t cost = cost_of(c, array, chunk_of(key));
     for (uint64_t i = 0; i < c->ahead_count; i++)
@@ -225,7 +225,11 @@ uint64_t ebpo_chunks_room(const ebpo_chunks *c)
     return share > c->ahead_bytes + batch ? share - c->ahead_bytes : batch;
 }
 
-void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
+/* Announces chunks of counted arrays to the source, as far as the limit allows: from then on they
+ * count as read. The first `now` are needed at once; the others only as far as what has been
+ * announced and not been read stays small, also beside what the limit leaves, and a little more
+ * each time (ebpo_chunks_room). */
+static void chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
     uint64_t room = ebpo_chunks_room(c);
@@ -323,7 +327,7 @@ ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsig
                               ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    ebpo_chunks_announce(c, keys->key, now, keys->count);
+    chunks_announce(c, keys->key, now, keys->count);
     for (unsigned i = 0; i < keys->count && status == EBPO_OK; i++) {
         void *item;
         if (i >= now && !(tells_more(c, keys->key[i]) && is_ahead(c, keys->key[i])))
@@ -358,7 +362,7 @@ void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes)
 bool ebpo_chunks_refused(const ebpo_chunks *chunks) { return chunks->refused; }
 
 static ebpo_status load_chunk(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
-                        ebpo_error *error)
+                              ebpo_error *error)
 {
     (void)most;
     ebpo_chunks *c = user;
@@ -401,7 +405,7 @@ static void release_chunk(void *user, void *item)
 
 /* pool: NULL, or what the budget is of. */
 static ebpo_status make_chunks(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
-                        ebpo_cache_pool *pool, bool counted, ebpo_error *error)
+                               ebpo_cache_pool *pool, bool counted, ebpo_error *error)
 {
     *out = NULL;
     ebpo_chunks *c = ebpo_alloc_zero(1, sizeof *c);
@@ -488,8 +492,8 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
 
 /* Rows of plain arrays, out of decoded chunks. */
 
-static void widen_integers(const ebpo_shape *shape, const uint8_t *rows, uint64_t numbers, uint8_t *values,
-                  size_t size)
+static void widen_integers(const ebpo_shape *shape, const uint8_t *rows, uint64_t numbers,
+                           uint8_t *values, size_t size)
 {
     if (shape->element_size == size && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__)
         memcpy(values, rows, numbers * size);
@@ -534,8 +538,9 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
         if (status != EBPO_OK)
             break;
         uint64_t here = view.end - row < rows ? view.end - row : rows;
-        widen_integers(&array->shape, view.rows + (row - view.begin) * ebpo_shape_row_bytes(&array->shape),
-              here * cols, out, size);
+        widen_integers(&array->shape,
+                       view.rows + (row - view.begin) * ebpo_shape_row_bytes(&array->shape),
+                       here * cols, out, size);
         out += here * cols * size;
         row += here;
         rows -= here;

@@ -164,7 +164,8 @@ ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *e
     return status;
 }
 
-static ebpo_status source_children(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error)
+static ebpo_status source_children(void *holder, ebpo_node *gray, ebpo_node child[8],
+                                   ebpo_error *error)
 {
     ebpo_chunks *chunks = holder;
     uint16_t types;
@@ -178,15 +179,17 @@ static ebpo_status source_children(void *holder, ebpo_node *gray, ebpo_node chil
     return EBPO_OK;
 }
 
-static ebpo_status source_planes(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
-                          unsigned *count, ebpo_error *error)
+static ebpo_status source_planes(void *holder, const ebpo_node *node,
+                                 uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
+                                 ebpo_error *error)
 {
     *count = 0;
     return ebpo_node_is_uniform(node) ? EBPO_OK
                                       : ebpo_chunks_planes(holder, node, codes, count, error);
 }
 
-static ebpo_status source_winding(void *holder, const ebpo_node *uniform, int32_t *out, ebpo_error *error)
+static ebpo_status source_winding(void *holder, const ebpo_node *uniform, int32_t *out,
+                                  ebpo_error *error)
 {
     return ebpo_chunks_winding(holder, uniform, out, error);
 }
@@ -414,7 +417,7 @@ static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_
 /* Adds the chunks for which reading the group would wait next; false: for none. Reads from memory
  * only, and leaves errors to the reading. */
 static bool group_is_missing(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted,
-                    ebpo_chunk_keys *keys)
+                             ebpo_chunk_keys *keys)
 {
     uint32_t parts = chunks->file->info.parts;
     int level = number->level;

@@ -12,6 +12,47 @@
 #include "format/schema.h"
 #include "geometry/cell.h"
 
+#define FORMAT_NAME "EBP-Octree in HDF5"
+
+/* How a field of ebpo_info becomes an attribute. */
+typedef enum fact_kind {
+    FACT_TEXT,    /* char[size], required */
+    FACT_NOTE,    /* char[size], left out when empty */
+    FACT_DIGEST,  /* uint8_t[32] as hexadecimal text */
+    FACT_NUMBER,  /* int as i64 */
+    FACT_INTEGER, /* int64_t as i64 */
+    FACT_COUNT32, /* uint32_t as u64 */
+    FACT_COUNT,   /* uint64_t as u64 */
+    FACT_HINT,    /* the same, may be absent */
+    FACT_YES_NO,  /* bool as u64 0 or 1 */
+    FACT_REAL,    /* double */
+    FACT_REAL3,   /* double[3] */
+    FACT_WORD     /* enumeration in a word, see `words` */
+} fact_kind;
+
+typedef struct fact {
+    const char *name;
+    fact_kind kind;
+    size_t offset, size;
+    const char *const *words;
+} fact;
+
+#define FACT_AT(field) offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), NULL
+
+enum { WELD_FACTS = 3 };
+/* A reader that does not know an optional part is none the wiser, but right; without a required one
+ * it would be wrong. */
+typedef struct part_word {
+    const char *word;
+    unsigned part; /* an ebpo_part, or: */
+    bool required;
+} part_word;
+
+/* info.pruned, subtree_level and gates: words in the list of parts, but nothing that one could
+ * leave out.
+ */
+enum { WORD_PRUNED = 1 << 30, WORD_SUBTREES = 1 << 29, WORD_GATES = 1 << 28 };
+
 static const char *const KINDS[] = { "surface", "solid", NULL }; /* by info.solid */
 static const char *const COORDINATES[] = { "float32", "float64",
                                            NULL }; /* by info.double_coordinates */
@@ -19,80 +60,81 @@ static const char *const RULES[] = { "nonzero", "evenodd", "positive", NULL };
 
 #define WORDS(field, words) offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), words
 
-const ebpo_fact ebpo_facts[] = {
-    { "generator", EBPO_FACT_TEXT, EBPO_FACT_AT(generator) },
-    { "source_name", EBPO_FACT_NOTE, EBPO_FACT_AT(source_name) },
-    { "source_format", EBPO_FACT_NOTE, EBPO_FACT_AT(source_format) },
-    { "source_sha256", EBPO_FACT_DIGEST, EBPO_FACT_AT(source_sha256) },
-    { "source_size", EBPO_FACT_COUNT, EBPO_FACT_AT(source_size) },
-    { "unit", EBPO_FACT_NOTE, EBPO_FACT_AT(unit) },
-    { "crs", EBPO_FACT_NOTE, EBPO_FACT_AT(crs) },
-    { "date", EBPO_FACT_NOTE, EBPO_FACT_AT(date) },
-    { "kind", EBPO_FACT_WORD, WORDS(solid, KINDS) },
-    { "winding_rule", EBPO_FACT_WORD, WORDS(rule, RULES) },
-    { "coordinate_type", EBPO_FACT_WORD, WORDS(double_coordinates, COORDINATES) },
-    { "vertex_count", EBPO_FACT_COUNT, EBPO_FACT_AT(vertex_count) },
-    { "face_count", EBPO_FACT_COUNT, EBPO_FACT_AT(face_count) },
-    { "source_vertex_count", EBPO_FACT_COUNT, EBPO_FACT_AT(source_vertex_count) },
-    { "source_face_count", EBPO_FACT_COUNT, EBPO_FACT_AT(source_face_count) },
-    { "box_origin", EBPO_FACT_REAL3, EBPO_FACT_AT(box_origin) },
-    { "box_size", EBPO_FACT_REAL3, EBPO_FACT_AT(box_size) },
-    { "grid_level", EBPO_FACT_NUMBER, EBPO_FACT_AT(grid_level) },
-    { "max_level", EBPO_FACT_NUMBER, EBPO_FACT_AT(max_level) },
-    { "level_count", EBPO_FACT_NUMBER, EBPO_FACT_AT(level_count) },
-    { "leaf_faces", EBPO_FACT_COUNT32, EBPO_FACT_AT(leaf_faces) },
-    { "epsilon", EBPO_FACT_REAL, EBPO_FACT_AT(epsilon) },
-    { "mend_weld", EBPO_FACT_YES_NO, EBPO_FACT_AT(mend.weld) },
-    { "mend_orient", EBPO_FACT_YES_NO, EBPO_FACT_AT(mend.orient) },
-    { "mend_fill_holes", EBPO_FACT_YES_NO, EBPO_FACT_AT(mend.fill_holes) },
-    { "mend_welded_vertices", EBPO_FACT_COUNT, EBPO_FACT_AT(mend.welded_vertices) },
-    { "mend_flipped_faces", EBPO_FACT_COUNT, EBPO_FACT_AT(mend.flipped_faces) },
-    { "mend_unorientable", EBPO_FACT_COUNT, EBPO_FACT_AT(mend.unorientable_components) },
-    { "mend_filled_holes", EBPO_FACT_COUNT, EBPO_FACT_AT(mend.filled_holes) },
-    { "mend_added_faces", EBPO_FACT_COUNT, EBPO_FACT_AT(mend.added_faces) },
-    { "mend_unfilled_holes", EBPO_FACT_COUNT, EBPO_FACT_AT(mend.unfilled_holes) },
-    { "mesh_balanced", EBPO_FACT_YES_NO, EBPO_FACT_AT(report.balanced) },
-    { "mesh_manifold", EBPO_FACT_YES_NO, EBPO_FACT_AT(report.manifold) },
-    { "mesh_boundary_edges", EBPO_FACT_COUNT, EBPO_FACT_AT(report.boundary_edges.count) },
-    { "mesh_nonmanifold_edges", EBPO_FACT_COUNT, EBPO_FACT_AT(report.nonmanifold_edges.count) },
-    { "mesh_misoriented_edges", EBPO_FACT_COUNT, EBPO_FACT_AT(report.misoriented_edges.count) },
-    { "mesh_unbalanced_edges", EBPO_FACT_COUNT, EBPO_FACT_AT(report.unbalanced_edges.count) },
-    { "mesh_bowtie_vertices", EBPO_FACT_COUNT, EBPO_FACT_AT(report.bowtie_vertices.count) },
-    { "mesh_zero_area_faces", EBPO_FACT_COUNT, EBPO_FACT_AT(report.zero_area_faces.count) },
-    { "mesh_index_repeated_faces", EBPO_FACT_COUNT,
-      EBPO_FACT_AT(report.index_repeated_faces.count) },
-    { "mesh_repeated_faces", EBPO_FACT_COUNT, EBPO_FACT_AT(report.repeated_faces.count) },
-    { "mesh_unreferenced_vertices", EBPO_FACT_COUNT,
-      EBPO_FACT_AT(report.unreferenced_vertices.count) },
-    { "mesh_repeated_positions", EBPO_FACT_COUNT, EBPO_FACT_AT(report.repeated_positions.count) },
-    { "mesh_edges", EBPO_FACT_COUNT, EBPO_FACT_AT(report.edges) },
-    { "mesh_components", EBPO_FACT_COUNT, EBPO_FACT_AT(report.components) },
-    { "mesh_boundary_loops", EBPO_FACT_COUNT, EBPO_FACT_AT(report.boundary_loops) },
-    { "mesh_genus_known", EBPO_FACT_YES_NO, EBPO_FACT_AT(report.genus_known) },
-    { "mesh_genus", EBPO_FACT_INTEGER, EBPO_FACT_AT(report.genus) },
-    { "mesh_area", EBPO_FACT_REAL, EBPO_FACT_AT(report.area) },
-    { "mesh_volume", EBPO_FACT_REAL, EBPO_FACT_AT(report.volume) },
-    { "mesh_mean_edge", EBPO_FACT_REAL, EBPO_FACT_AT(report.mean_edge) },
-    { "mesh_min", EBPO_FACT_REAL3, EBPO_FACT_AT(report.min) },
-    { "mesh_max", EBPO_FACT_REAL3, EBPO_FACT_AT(report.max) },
-    { "content_sha256", EBPO_FACT_DIGEST, EBPO_FACT_AT(content_sha256) },
-    { "chunk_index_offset", EBPO_FACT_HINT, EBPO_FACT_AT(chunk_index_offset) },
-    { "chunk_index_bytes", EBPO_FACT_HINT, EBPO_FACT_AT(chunk_index_bytes) },
+/* Attributes of the root, in every file. */
+static const fact root_facts[] = {
+    { "generator", FACT_TEXT, FACT_AT(generator) },
+    { "source_name", FACT_NOTE, FACT_AT(source_name) },
+    { "source_format", FACT_NOTE, FACT_AT(source_format) },
+    { "source_sha256", FACT_DIGEST, FACT_AT(source_sha256) },
+    { "source_size", FACT_COUNT, FACT_AT(source_size) },
+    { "unit", FACT_NOTE, FACT_AT(unit) },
+    { "crs", FACT_NOTE, FACT_AT(crs) },
+    { "date", FACT_NOTE, FACT_AT(date) },
+    { "kind", FACT_WORD, WORDS(solid, KINDS) },
+    { "winding_rule", FACT_WORD, WORDS(rule, RULES) },
+    { "coordinate_type", FACT_WORD, WORDS(double_coordinates, COORDINATES) },
+    { "vertex_count", FACT_COUNT, FACT_AT(vertex_count) },
+    { "face_count", FACT_COUNT, FACT_AT(face_count) },
+    { "source_vertex_count", FACT_COUNT, FACT_AT(source_vertex_count) },
+    { "source_face_count", FACT_COUNT, FACT_AT(source_face_count) },
+    { "box_origin", FACT_REAL3, FACT_AT(box_origin) },
+    { "box_size", FACT_REAL3, FACT_AT(box_size) },
+    { "grid_level", FACT_NUMBER, FACT_AT(grid_level) },
+    { "max_level", FACT_NUMBER, FACT_AT(max_level) },
+    { "level_count", FACT_NUMBER, FACT_AT(level_count) },
+    { "leaf_faces", FACT_COUNT32, FACT_AT(leaf_faces) },
+    { "epsilon", FACT_REAL, FACT_AT(epsilon) },
+    { "mend_weld", FACT_YES_NO, FACT_AT(mend.weld) },
+    { "mend_orient", FACT_YES_NO, FACT_AT(mend.orient) },
+    { "mend_fill_holes", FACT_YES_NO, FACT_AT(mend.fill_holes) },
+    { "mend_welded_vertices", FACT_COUNT, FACT_AT(mend.welded_vertices) },
+    { "mend_flipped_faces", FACT_COUNT, FACT_AT(mend.flipped_faces) },
+    { "mend_unorientable", FACT_COUNT, FACT_AT(mend.unorientable_components) },
+    { "mend_filled_holes", FACT_COUNT, FACT_AT(mend.filled_holes) },
+    { "mend_added_faces", FACT_COUNT, FACT_AT(mend.added_faces) },
+    { "mend_unfilled_holes", FACT_COUNT, FACT_AT(mend.unfilled_holes) },
+    { "mesh_balanced", FACT_YES_NO, FACT_AT(report.balanced) },
+    { "mesh_manifold", FACT_YES_NO, FACT_AT(report.manifold) },
+    { "mesh_boundary_edges", FACT_COUNT, FACT_AT(report.boundary_edges.count) },
+    { "mesh_nonmanifold_edges", FACT_COUNT, FACT_AT(report.nonmanifold_edges.count) },
+    { "mesh_misoriented_edges", FACT_COUNT, FACT_AT(report.misoriented_edges.count) },
+    { "mesh_unbalanced_edges", FACT_COUNT, FACT_AT(report.unbalanced_edges.count) },
+    { "mesh_bowtie_vertices", FACT_COUNT, FACT_AT(report.bowtie_vertices.count) },
+    { "mesh_zero_area_faces", FACT_COUNT, FACT_AT(report.zero_area_faces.count) },
+    { "mesh_index_repeated_faces", FACT_COUNT, FACT_AT(report.index_repeated_faces.count) },
+    { "mesh_repeated_faces", FACT_COUNT, FACT_AT(report.repeated_faces.count) },
+    { "mesh_unreferenced_vertices", FACT_COUNT, FACT_AT(report.unreferenced_vertices.count) },
+    { "mesh_repeated_positions", FACT_COUNT, FACT_AT(report.repeated_positions.count) },
+    { "mesh_edges", FACT_COUNT, FACT_AT(report.edges) },
+    { "mesh_components", FACT_COUNT, FACT_AT(report.components) },
+    { "mesh_boundary_loops", FACT_COUNT, FACT_AT(report.boundary_loops) },
+    { "mesh_genus_known", FACT_YES_NO, FACT_AT(report.genus_known) },
+    { "mesh_genus", FACT_INTEGER, FACT_AT(report.genus) },
+    { "mesh_area", FACT_REAL, FACT_AT(report.area) },
+    { "mesh_volume", FACT_REAL, FACT_AT(report.volume) },
+    { "mesh_mean_edge", FACT_REAL, FACT_AT(report.mean_edge) },
+    { "mesh_min", FACT_REAL3, FACT_AT(report.min) },
+    { "mesh_max", FACT_REAL3, FACT_AT(report.max) },
+    { "content_sha256", FACT_DIGEST, FACT_AT(content_sha256) },
+    { "chunk_index_offset", FACT_HINT, FACT_AT(chunk_index_offset) },
+    { "chunk_index_bytes", FACT_HINT, FACT_AT(chunk_index_bytes) },
 };
-const int ebpo_fact_count = sizeof ebpo_facts / sizeof ebpo_facts[0];
+static const int root_fact_count = sizeof root_facts / sizeof root_facts[0];
 
+/* Attributes of a level's group. */
 #define LEVEL_AT(field) \
     offsetof(ebpo_level_summary, field), sizeof(((ebpo_level_summary *)0)->field), NULL
-const ebpo_fact ebpo_level_facts[] = {
-#define LEVEL_COUNT(ID, attribute, field, needs) { #attribute, EBPO_FACT_COUNT, LEVEL_AT(field) },
+static const fact level_facts[] = {
+#define LEVEL_COUNT(ID, attribute, field, needs) { #attribute, FACT_COUNT, LEVEL_AT(field) },
 #include "format/array_table.inc"
-    { "gray_volume", EBPO_FACT_REAL, LEVEL_AT(gray_volume) },
-    { "leaf_volume", EBPO_FACT_REAL, LEVEL_AT(leaf_volume) },
+    { "gray_volume", FACT_REAL, LEVEL_AT(gray_volume) },
+    { "leaf_volume", FACT_REAL, LEVEL_AT(leaf_volume) },
 };
-const int ebpo_level_fact_count = sizeof ebpo_level_facts / sizeof ebpo_level_facts[0];
-const ebpo_fact ebpo_pruned_fact = { "pruned", EBPO_FACT_COUNT, LEVEL_AT(pruned_count) };
+static const int level_fact_count = sizeof level_facts / sizeof level_facts[0];
+/* Of a level; left out when 0. */
+static const fact pruned_fact = { "pruned", FACT_COUNT, LEVEL_AT(pruned_count) };
 
-const ebpo_part_word ebpo_part_words[] = {
+static const part_word part_words[] = {
     { "levels", 0, true },
     { "mesh", EBPO_PART_MESH, true },
     { "planes", EBPO_PART_PLANES, false },
@@ -100,34 +142,36 @@ const ebpo_part_word ebpo_part_words[] = {
     { "leaf-planes", EBPO_PART_LEAF_PLANES, false },
     { "attributes", EBPO_PART_ATTRIBUTES, false },
     { "colours", EBPO_PART_COLOURS, false },
-    { "subtrees", EBPO_WORD_SUBTREES, true },
-    { "gates", EBPO_WORD_GATES, true },
-    { "pruned", EBPO_WORD_PRUNED, true },
+    { "subtrees", WORD_SUBTREES, true },
+    { "gates", WORD_GATES, true },
+    { "pruned", WORD_PRUNED, true },
 };
-const int ebpo_part_word_count = sizeof ebpo_part_words / sizeof ebpo_part_words[0];
+static const int part_word_count = sizeof part_words / sizeof part_words[0];
 
-const char *const ebpo_normals_words[] = { "spherical", "angle", NULL };
-const ebpo_fact ebpo_selection_facts[] = {
-    { "selection_percent", EBPO_FACT_REAL, EBPO_FACT_AT(percent) },
-    { "selection_k_root", EBPO_FACT_REAL, EBPO_FACT_AT(k_root) },
-    { "selection_seed", EBPO_FACT_COUNT, EBPO_FACT_AT(seed) },
+/* How planes were selected, where that was not the default; no reader needs these. */
+static const char *const normals_words[] = { "spherical", "angle", NULL };
+static const fact selection_facts[] = {
+    { "selection_percent", FACT_REAL, FACT_AT(percent) },
+    { "selection_k_root", FACT_REAL, FACT_AT(k_root) },
+    { "selection_seed", FACT_COUNT, FACT_AT(seed) },
 };
-const int ebpo_selection_fact_count = sizeof ebpo_selection_facts / sizeof ebpo_selection_facts[0];
+static const int selection_fact_count = sizeof selection_facts / sizeof selection_facts[0];
 
-const ebpo_fact ebpo_dropped_faces_fact = { "mend_dropped_faces", EBPO_FACT_COUNT,
-                                            EBPO_FACT_AT(mend.dropped_faces) };
+/* Left out when 0. */
+static const fact dropped_faces_fact = { "mend_dropped_faces", FACT_COUNT,
+                                         FACT_AT(mend.dropped_faces) };
 
-const ebpo_fact ebpo_weld_facts[EBPO_WELD_FACTS] = {
-    { "mend_weld_distance", EBPO_FACT_REAL, EBPO_FACT_AT(mend.weld_distance) },
-    { "mend_weld_moved", EBPO_FACT_REAL, EBPO_FACT_AT(mend.weld_moved) },
-    { "mend_collapsed_faces", EBPO_FACT_COUNT, EBPO_FACT_AT(mend.collapsed_faces) },
+/* Of files whose vertices were welded within a distance. */
+static const fact weld_facts[WELD_FACTS] = {
+    { "mend_weld_distance", FACT_REAL, FACT_AT(mend.weld_distance) },
+    { "mend_weld_moved", FACT_REAL, FACT_AT(mend.weld_moved) },
+    { "mend_collapsed_faces", FACT_COUNT, FACT_AT(mend.collapsed_faces) },
 };
 
-const ebpo_fact ebpo_subtree_level_fact = { "subtree_level", EBPO_FACT_NUMBER,
-                                            EBPO_FACT_AT(subtree_level) },
-                ebpo_colours_fact = { "colours_sha256", EBPO_FACT_DIGEST,
-                                      EBPO_FACT_AT(colours_sha256) },
-                ebpo_top_bytes_fact = { "top_bytes", EBPO_FACT_HINT, EBPO_FACT_AT(top_bytes) };
+/* Of files with subtrees, or with colours. */
+static const fact subtree_level_fact = { "subtree_level", FACT_NUMBER, FACT_AT(subtree_level) },
+                  colours_fact = { "colours_sha256", FACT_DIGEST, FACT_AT(colours_sha256) },
+                  top_bytes_fact = { "top_bytes", FACT_HINT, FACT_AT(top_bytes) };
 
 /* What files and commands call the selections of planes, and which settings each takes. The
  * functions are in the construction's table (construct/selections.c). */
@@ -272,7 +316,7 @@ static const char ABOUT[] = "A triangle mesh with an octree of convex envelopes 
                             "then /mesh, then /maps. Each array's attributes name its coding; the "
                             "specification is format-spec/README.md of ebpo.";
 
-static ebpo_status put_word(ebpo_h5_out *out, ebpo_h5_id id, const ebpo_fact *f, const void *field,
+static ebpo_status put_word(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, const void *field,
                             ebpo_error *error)
 {
     size_t value =
@@ -288,27 +332,24 @@ static ebpo_status put_digest(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
     return ebpo_h5_put_text(out, id, name, hex, error);
 }
 
-static ebpo_status put_fact(ebpo_h5_out *out, ebpo_h5_id id, const ebpo_fact *f, const void *record,
+static ebpo_status put_fact(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, const void *record,
                             ebpo_error *error)
 {
     const void *field = (const char *)record + f->offset;
     switch (f->kind) {
-    case EBPO_FACT_TEXT: return ebpo_h5_put_text(out, id, f->name, field, error);
-    case EBPO_FACT_NOTE:
+    case FACT_TEXT: return ebpo_h5_put_text(out, id, f->name, field, error);
+    case FACT_NOTE:
         return *(const char *)field ? ebpo_h5_put_text(out, id, f->name, field, error) : EBPO_OK;
-    case EBPO_FACT_DIGEST: return put_digest(out, id, f->name, field, error);
-    case EBPO_FACT_NUMBER: return ebpo_h5_put_int(out, id, f->name, *(const int *)field, error);
-    case EBPO_FACT_INTEGER:
-        return ebpo_h5_put_int(out, id, f->name, *(const int64_t *)field, error);
-    case EBPO_FACT_COUNT32:
-        return ebpo_h5_put_count(out, id, f->name, *(const uint32_t *)field, error);
-    case EBPO_FACT_HINT:
-    case EBPO_FACT_COUNT:
-        return ebpo_h5_put_count(out, id, f->name, *(const uint64_t *)field, error);
-    case EBPO_FACT_YES_NO: return ebpo_h5_put_count(out, id, f->name, *(const bool *)field, error);
-    case EBPO_FACT_REAL: return ebpo_h5_put_real(out, id, f->name, field, 0, error);
-    case EBPO_FACT_REAL3: return ebpo_h5_put_real(out, id, f->name, field, 3, error);
-    case EBPO_FACT_WORD: return put_word(out, id, f, field, error);
+    case FACT_DIGEST: return put_digest(out, id, f->name, field, error);
+    case FACT_NUMBER: return ebpo_h5_put_int(out, id, f->name, *(const int *)field, error);
+    case FACT_INTEGER: return ebpo_h5_put_int(out, id, f->name, *(const int64_t *)field, error);
+    case FACT_COUNT32: return ebpo_h5_put_count(out, id, f->name, *(const uint32_t *)field, error);
+    case FACT_HINT:
+    case FACT_COUNT: return ebpo_h5_put_count(out, id, f->name, *(const uint64_t *)field, error);
+    case FACT_YES_NO: return ebpo_h5_put_count(out, id, f->name, *(const bool *)field, error);
+    case FACT_REAL: return ebpo_h5_put_real(out, id, f->name, field, 0, error);
+    case FACT_REAL3: return ebpo_h5_put_real(out, id, f->name, field, 3, error);
+    case FACT_WORD: return put_word(out, id, f, field, error);
     }
     return EBPO_E_ARGUMENT;
 }
@@ -317,15 +358,14 @@ static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info 
                              bool required, ebpo_error *error)
 {
     char words[128] = "";
-    uint32_t has = info->parts | (info->pruned ? EBPO_WORD_PRUNED : 0) |
-                   (info->subtree_level ? EBPO_WORD_SUBTREES : 0) |
-                   (info->gates ? EBPO_WORD_GATES : 0);
-    for (int i = 0; i < ebpo_part_word_count; i++)
-        if (ebpo_part_words[i].required == required &&
-            (!ebpo_part_words[i].part || has & ebpo_part_words[i].part)) {
+    uint32_t has = info->parts | (info->pruned ? WORD_PRUNED : 0) |
+                   (info->subtree_level ? WORD_SUBTREES : 0) | (info->gates ? WORD_GATES : 0);
+    for (int i = 0; i < part_word_count; i++)
+        if (part_words[i].required == required &&
+            (!part_words[i].part || has & part_words[i].part)) {
             size_t used = strlen(words);
             snprintf(words + used, sizeof words - used, "%s%s", used ? " " : "",
-                     ebpo_part_words[i].word);
+                     part_words[i].word);
         }
     return ebpo_h5_put_text(out, root, required ? "required_parts" : "optional_parts", words,
                             error);
@@ -339,18 +379,18 @@ static ebpo_status put_selection(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_i
         return EBPO_OK;
     ebpo_status status = ebpo_h5_put_text(out, root, "selection", traits->name, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_put_text(out, root, "selection_normals", ebpo_normals_words[info->normals],
-                                  error);
-    for (int i = 0; i < ebpo_selection_fact_count && status == EBPO_OK; i++)
-        status = put_fact(out, root, &ebpo_selection_facts[i], info, error);
+        status =
+            ebpo_h5_put_text(out, root, "selection_normals", normals_words[info->normals], error);
+    for (int i = 0; i < selection_fact_count && status == EBPO_OK; i++)
+        status = put_fact(out, root, &selection_facts[i], info, error);
     return status;
 }
 
 static ebpo_status put_subtrees(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
                                 ebpo_error *error)
 {
-    ebpo_status status = put_fact(out, root, &ebpo_subtree_level_fact, info, error);
-    return status == EBPO_OK ? put_fact(out, root, &ebpo_top_bytes_fact, info, error) : status;
+    ebpo_status status = put_fact(out, root, &subtree_level_fact, info, error);
+    return status == EBPO_OK ? put_fact(out, root, &top_bytes_fact, info, error) : status;
 }
 
 /* Only in subsets: other files stay as they are. */
@@ -370,7 +410,7 @@ static ebpo_status put_subset(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info
 ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
                            ebpo_error *error)
 {
-    ebpo_status status = ebpo_h5_put_text(out, root, "format", EBPO_FORMAT_NAME, error);
+    ebpo_status status = ebpo_h5_put_text(out, root, "format", FORMAT_NAME, error);
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(out, root, "format_version", FORMAT_VERSION, error);
     if (status == EBPO_OK)
@@ -383,16 +423,16 @@ ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *i
         status = put_parts(out, root, info, false, error);
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(out, root, "about", ABOUT, error);
-    for (int i = 0; i < ebpo_fact_count && status == EBPO_OK; i++)
-        status = put_fact(out, root, &ebpo_facts[i], info, error);
+    for (int i = 0; i < root_fact_count && status == EBPO_OK; i++)
+        status = put_fact(out, root, &root_facts[i], info, error);
     if (status == EBPO_OK)
         status = put_selection(out, root, info, error);
     if (status == EBPO_OK && info->mend.dropped_faces)
-        status = put_fact(out, root, &ebpo_dropped_faces_fact, info, error);
-    for (int i = 0; i < EBPO_WELD_FACTS && status == EBPO_OK && info->mend.weld_distance > 0; i++)
-        status = put_fact(out, root, &ebpo_weld_facts[i], info, error);
+        status = put_fact(out, root, &dropped_faces_fact, info, error);
+    for (int i = 0; i < WELD_FACTS && status == EBPO_OK && info->mend.weld_distance > 0; i++)
+        status = put_fact(out, root, &weld_facts[i], info, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
-        status = put_fact(out, root, &ebpo_colours_fact, info, error);
+        status = put_fact(out, root, &colours_fact, info, error);
     if (status == EBPO_OK && info->subtree_level)
         status = put_subtrees(out, root, info, error);
     if (status == EBPO_OK && info->pruned)
@@ -409,7 +449,7 @@ ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root, const uint8
 ebpo_status ebpo_facts_put_colours_digest(ebpo_h5_out *out, ebpo_h5_id root,
                                           const uint8_t digest[32], ebpo_error *error)
 {
-    return put_digest(out, root, ebpo_colours_fact.name, digest, error);
+    return put_digest(out, root, colours_fact.name, digest, error);
 }
 
 ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset, uint64_t bytes,
@@ -422,17 +462,17 @@ ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t off
 
 ebpo_status ebpo_facts_put_top(ebpo_h5_out *out, ebpo_h5_id root, uint64_t bytes, ebpo_error *error)
 {
-    return ebpo_h5_put_count(out, root, ebpo_top_bytes_fact.name, bytes, error);
+    return ebpo_h5_put_count(out, root, top_bytes_fact.name, bytes, error);
 }
 
 ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group,
                                  const ebpo_level_summary *level, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    for (int i = 0; i < ebpo_level_fact_count && status == EBPO_OK; i++)
-        status = put_fact(out, group, &ebpo_level_facts[i], level, error);
+    for (int i = 0; i < level_fact_count && status == EBPO_OK; i++)
+        status = put_fact(out, group, &level_facts[i], level, error);
     if (status == EBPO_OK && level->pruned_count)
-        status = put_fact(out, group, &ebpo_pruned_fact, level, error);
+        status = put_fact(out, group, &pruned_fact, level, error);
     return status;
 }
 
@@ -447,8 +487,8 @@ static ebpo_status wrong_value(ebpo_head *in, const char *object, const char *na
                         name);
 }
 
-static ebpo_status get_word(ebpo_head *in, ebpo_head_object id, const char *object,
-                            const ebpo_fact *f, void *field, ebpo_error *error)
+static ebpo_status get_word(ebpo_head *in, ebpo_head_object id, const char *object, const fact *f,
+                            void *field, ebpo_error *error)
 {
     char word[32];
     ebpo_status status = ebpo_head_get_text(in, id, object, f->name, word, sizeof word, error);
@@ -500,63 +540,54 @@ ebpo_status ebpo_facts_get_digest(ebpo_head *in, ebpo_head_object id, const char
 }
 
 static ebpo_status get_limited(ebpo_head *in, ebpo_head_object id, const char *object,
-                               const ebpo_fact *f, void *field, ebpo_error *error)
+                               const fact *f, void *field, ebpo_error *error)
 {
     int64_t number = 0;
     uint64_t count = 0;
-    bool is_int = f->kind == EBPO_FACT_NUMBER;
+    bool is_int = f->kind == FACT_NUMBER;
     ebpo_status status = is_int ? ebpo_head_get_int(in, id, object, f->name, &number, error)
                                 : ebpo_head_get_count(in, id, object, f->name, &count, error);
     if (status != EBPO_OK)
         return status;
-    if ((f->kind == EBPO_FACT_YES_NO && count > 1) ||
-        (f->kind == EBPO_FACT_COUNT32 && count > UINT32_MAX) ||
+    if ((f->kind == FACT_YES_NO && count > 1) || (f->kind == FACT_COUNT32 && count > UINT32_MAX) ||
         (is_int && (number < 0 || number > 1 << 20)))
         return wrong_value(in, object, f->name, error);
-    if (f->kind == EBPO_FACT_YES_NO)
+    if (f->kind == FACT_YES_NO)
         *(bool *)field = count;
-    else if (f->kind == EBPO_FACT_COUNT32)
+    else if (f->kind == FACT_COUNT32)
         *(uint32_t *)field = (uint32_t)count;
     else
         *(int *)field = (int)number;
     return EBPO_OK;
 }
 
-static ebpo_status get_fact(ebpo_head *in, ebpo_head_object id, const char *object,
-                            const ebpo_fact *f, void *record, ebpo_error *error)
+static ebpo_status get_fact(ebpo_head *in, ebpo_head_object id, const char *object, const fact *f,
+                            void *record, ebpo_error *error)
 {
     void *field = (char *)record + f->offset;
     ebpo_status status = EBPO_E_ARGUMENT;
     switch (f->kind) {
-    case EBPO_FACT_TEXT:
-    case EBPO_FACT_NOTE:
+    case FACT_TEXT:
+    case FACT_NOTE:
         status = ebpo_head_get_text(in, id, object, f->name, field, f->size, error);
         break;
-    case EBPO_FACT_DIGEST: status = get_digest(in, id, object, f->name, field, error); break;
-    case EBPO_FACT_NUMBER:
-    case EBPO_FACT_COUNT32:
-    case EBPO_FACT_YES_NO: status = get_limited(in, id, object, f, field, error); break;
-    case EBPO_FACT_INTEGER:
-        status = ebpo_head_get_int(in, id, object, f->name, field, error);
-        break;
-    case EBPO_FACT_HINT:
+    case FACT_DIGEST: status = get_digest(in, id, object, f->name, field, error); break;
+    case FACT_NUMBER:
+    case FACT_COUNT32:
+    case FACT_YES_NO: status = get_limited(in, id, object, f, field, error); break;
+    case FACT_INTEGER: status = ebpo_head_get_int(in, id, object, f->name, field, error); break;
+    case FACT_HINT:
         if (ebpo_head_get_count(in, id, object, f->name, field, NULL) != EBPO_OK)
             *(uint64_t *)field = 0; /* absent, or of another program's type: no hint */
         return EBPO_OK;
-    case EBPO_FACT_COUNT:
-        status = ebpo_head_get_count(in, id, object, f->name, field, error);
-        break;
-    case EBPO_FACT_REAL:
-        status = ebpo_head_get_real(in, id, object, f->name, field, 0, error);
-        break;
-    case EBPO_FACT_REAL3:
-        status = ebpo_head_get_real(in, id, object, f->name, field, 3, error);
-        break;
-    case EBPO_FACT_WORD: status = get_word(in, id, object, f, field, error); break;
+    case FACT_COUNT: status = ebpo_head_get_count(in, id, object, f->name, field, error); break;
+    case FACT_REAL: status = ebpo_head_get_real(in, id, object, f->name, field, 0, error); break;
+    case FACT_REAL3: status = ebpo_head_get_real(in, id, object, f->name, field, 3, error); break;
+    case FACT_WORD: status = get_word(in, id, object, f, field, error); break;
     }
     if (status != EBPO_E_ABSENT)
         return status;
-    if (f->kind == EBPO_FACT_NOTE)
+    if (f->kind == FACT_NOTE)
         return EBPO_OK;
     return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, object, -1,
                         "attribute %s is missing; get a fresh copy of the file", f->name);
@@ -565,19 +596,17 @@ static ebpo_status get_fact(ebpo_head *in, ebpo_head_object id, const char *obje
 static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                ebpo_error *error)
 {
-    static const ebpo_fact major = { "format_version_major", EBPO_FACT_NUMBER,
-                                     EBPO_FACT_AT(version_major) };
-    static const ebpo_fact minor = { "format_version_minor", EBPO_FACT_NUMBER,
-                                     EBPO_FACT_AT(version_minor) };
+    static const fact major = { "format_version_major", FACT_NUMBER, FACT_AT(version_major) };
+    static const fact minor = { "format_version_minor", FACT_NUMBER, FACT_AT(version_minor) };
     char format[32];
     ebpo_status status = ebpo_head_get_text(in, root, "/", "format", format, sizeof format, error);
     if (status == EBPO_E_MEMORY)
         return status;
-    if (status != EBPO_OK || strcmp(format, EBPO_FORMAT_NAME) != 0)
+    if (status != EBPO_OK || strcmp(format, FORMAT_NAME) != 0)
         return ebpo_fail_file(error, EBPO_E_FORMAT, in->shown,
                               "an HDF5 file, but not an EBP-Octree (its root attribute format does "
                               "not say \"%s\"); %s",
-                              EBPO_FORMAT_NAME,
+                              FORMAT_NAME,
                               status == EBPO_OK && strncmp(format, "EBP-Octree paint", 16) == 0
                                   ? "it is paint: `ebpo paint` tells of which model"
                                   : "make one with `ebpo convert`");
@@ -605,8 +634,8 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
 static ebpo_status take_part(ebpo_head *in, const char *word, bool required, unsigned *seen,
                              ebpo_error *error)
 {
-    for (int i = 0; i < ebpo_part_word_count; i++) {
-        if (strcmp(word, ebpo_part_words[i].word) != 0)
+    for (int i = 0; i < part_word_count; i++) {
+        if (strcmp(word, part_words[i].word) != 0)
             continue;
         if (*seen >> i & 1)
             return ebpo_fail_file(error, EBPO_E_FORMAT, in->shown,
@@ -646,22 +675,22 @@ static ebpo_status get_parts(ebpo_head *in, ebpo_head_object root, ebpo_info *in
         if (status != EBPO_OK)
             return status;
     }
-    for (int i = 0; i < ebpo_part_word_count; i++)
+    for (int i = 0; i < part_word_count; i++)
         if (seen >> i & 1)
-            info->parts |= ebpo_part_words[i].part;
-    info->pruned = info->parts & EBPO_WORD_PRUNED;
-    info->subtree_level = info->parts & EBPO_WORD_SUBTREES ? 1 : 0; /* until get_subtrees */
-    info->gates = info->parts & EBPO_WORD_GATES;
-    info->parts &= ~(uint32_t)(EBPO_WORD_PRUNED | EBPO_WORD_SUBTREES | EBPO_WORD_GATES);
+            info->parts |= part_words[i].part;
+    info->pruned = info->parts & WORD_PRUNED;
+    info->subtree_level = info->parts & WORD_SUBTREES ? 1 : 0; /* until get_subtrees */
+    info->gates = info->parts & WORD_GATES;
+    info->parts &= ~(uint32_t)(WORD_PRUNED | WORD_SUBTREES | WORD_GATES);
     return seen & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
 }
 
 static ebpo_status get_subtrees(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                 ebpo_error *error)
 {
-    ebpo_status status = get_fact(in, root, "/", &ebpo_subtree_level_fact, info, error);
+    ebpo_status status = get_fact(in, root, "/", &subtree_level_fact, info, error);
     if (status == EBPO_OK)
-        status = get_fact(in, root, "/", &ebpo_top_bytes_fact, info, error);
+        status = get_fact(in, root, "/", &top_bytes_fact, info, error);
     if (status == EBPO_OK && (info->subtree_level < 1 || info->level_count > EBPO_LEVELS_MAX ||
                               info->subtree_level > info->level_count - 2))
         status = wrong_value(in, "/", "subtree_level", error);
@@ -717,7 +746,7 @@ static const char *selection_word(int selection)
     return traits ? traits->name : NULL;
 }
 
-static const char *normals_word(int normals) { return ebpo_normals_words[normals]; }
+static const char *normals_word(int normals) { return normals_words[normals]; }
 
 static ebpo_status get_selection(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                  ebpo_error *error)
@@ -725,8 +754,8 @@ static ebpo_status get_selection(ebpo_head *in, ebpo_head_object root, ebpo_info
     ebpo_status status = get_known(in, root, "selection", selection_word, &info->selection, error);
     if (status == EBPO_OK)
         status = get_known(in, root, "selection_normals", normals_word, &info->normals, error);
-    for (int i = 0; i < ebpo_selection_fact_count && status == EBPO_OK && info->selection > 0; i++)
-        status = get_fact(in, root, "/", &ebpo_selection_facts[i], info, error);
+    for (int i = 0; i < selection_fact_count && status == EBPO_OK && info->selection > 0; i++)
+        status = get_fact(in, root, "/", &selection_facts[i], info, error);
     return status;
 }
 
@@ -735,8 +764,7 @@ static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *
                                ebpo_error *error)
 {
     uint64_t count = 0;
-    ebpo_status status =
-        ebpo_head_get_count(in, root, "/", ebpo_dropped_faces_fact.name, &count, error);
+    ebpo_status status = ebpo_head_get_count(in, root, "/", dropped_faces_fact.name, &count, error);
     if (status == EBPO_E_ABSENT)
         return EBPO_OK;
     info->mend.dropped_faces = count;
@@ -749,14 +777,13 @@ static ebpo_status get_weld(ebpo_head *in, ebpo_head_object root, ebpo_info *inf
                             ebpo_error *error)
 {
     double distance = 0;
-    ebpo_status status =
-        ebpo_head_get_real(in, root, "/", ebpo_weld_facts[0].name, &distance, 0, error);
+    ebpo_status status = ebpo_head_get_real(in, root, "/", weld_facts[0].name, &distance, 0, error);
     if (status == EBPO_E_ABSENT)
         return EBPO_OK;
     if (status == EBPO_OK && !(distance > 0)) /* 0 would be none */
-        return wrong_value(in, "/", ebpo_weld_facts[0].name, error);
-    for (int i = 0; i < EBPO_WELD_FACTS && status == EBPO_OK; i++)
-        status = get_fact(in, root, "/", &ebpo_weld_facts[i], info, error);
+        return wrong_value(in, "/", weld_facts[0].name, error);
+    for (int i = 0; i < WELD_FACTS && status == EBPO_OK; i++)
+        status = get_fact(in, root, "/", &weld_facts[i], info, error);
     return status;
 }
 
@@ -765,8 +792,8 @@ ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info
     ebpo_status status = get_version(in, root, info, error);
     if (status == EBPO_OK)
         status = get_parts(in, root, info, error);
-    for (int i = 0; i < ebpo_fact_count && status == EBPO_OK; i++)
-        status = get_fact(in, root, "/", &ebpo_facts[i], info, error);
+    for (int i = 0; i < root_fact_count && status == EBPO_OK; i++)
+        status = get_fact(in, root, "/", &root_facts[i], info, error);
     if (status == EBPO_OK)
         status = get_selection(in, root, info, error);
     if (status == EBPO_OK)
@@ -774,7 +801,7 @@ ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info
     if (status == EBPO_OK)
         status = get_weld(in, root, info, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
-        status = get_fact(in, root, "/", &ebpo_colours_fact, info, error);
+        status = get_fact(in, root, "/", &colours_fact, info, error);
     if (status == EBPO_OK && info->subtree_level)
         status = get_subtrees(in, root, info, error);
     return status == EBPO_OK && info->pruned ? get_subset(in, root, info, error) : status;
@@ -784,10 +811,10 @@ ebpo_status ebpo_facts_get_level(ebpo_head *in, ebpo_head_object group, const ch
                                  ebpo_level_summary *level, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    for (int i = 0; i < ebpo_level_fact_count && status == EBPO_OK; i++)
-        status = get_fact(in, group, path, &ebpo_level_facts[i], level, error);
+    for (int i = 0; i < level_fact_count && status == EBPO_OK; i++)
+        status = get_fact(in, group, path, &level_facts[i], level, error);
     if (status == EBPO_OK)
-        status = ebpo_head_get_count(in, group, path, ebpo_pruned_fact.name, &level->pruned_count,
-                                     error);
+        status =
+            ebpo_head_get_count(in, group, path, pruned_fact.name, &level->pruned_count, error);
     return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }

@@ -476,8 +476,8 @@ static ebpo_status write_piece(int fd, const char *shown, uint64_t at, const uin
 }
 
 /* Everything of a URL, into a file without a name. */
-static ebpo_status fetch_url(const char *url, const ebpo_http_options *http, const char *shown, int to,
-                         ebpo_error *error)
+static ebpo_status fetch_url(const char *url, const ebpo_http_options *http, const char *shown,
+                             int to, ebpo_error *error)
 {
     ebpo_source source = EBPO_SOURCE_INIT;
     ebpo_input input;

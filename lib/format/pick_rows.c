@@ -156,10 +156,10 @@ static ebpo_status find_spans(const reading *r, int id, const ebpo_list_spec *li
         status = find_span(r, per, r->run[i].rank[type], s);
         s->count = sum_counts(r, list->counts, node, r->run[i].count[type]);
         if (status == EBPO_OK && (s->first > all || s->count > all - s->first))
-            status =
-                runs_wrong(r, list->counts,
-                     per == EBPO_PER_REF ? "the counts do not add up to the number of references"
-                                         : "the counts do not add up to the number of planes");
+            status = runs_wrong(r, list->counts,
+                                per == EBPO_PER_REF
+                                    ? "the counts do not add up to the number of references"
+                                    : "the counts do not add up to the number of planes");
         total += s->count;
     }
     ebpo_level_set_count(r->out, per, total);
@@ -223,8 +223,8 @@ static ebpo_status check_windings(const reading *r, ebpo_array_id id, bool insid
     for (uint64_t i = 0; i < count; i++)
         if (ebpo_rule_inside(r->chunks->file->info.rule, winding[i]) != inside)
             return runs_wrong(r, id,
-                        inside ? "a black node lies outside by the winding rule"
-                               : "a white node lies inside by the winding rule");
+                              inside ? "a black node lies outside by the winding rule"
+                                     : "a white node lies inside by the winding rule");
     return EBPO_OK;
 }
 
@@ -259,7 +259,7 @@ static ebpo_status decode_faces(const reading *r)
         if (out->leaf_ref_count[i] &&
             !ebpo_refs_decode(out->leaf_refs + at, out->leaf_ref_count[i], out->leaf_first[i]))
             status = runs_wrong(r, EBPO_A_LEAF_REFS,
-                          "a reference does not lead to a face before the leaf's own");
+                                "a reference does not lead to a face before the leaf's own");
     return status;
 }
 
@@ -525,8 +525,10 @@ ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t
                      error);
 }
 
-ebpo_status ebpo_pick_attribute_rows(ebpo_chunks *chunks, int number, const uint32_t *rows,
-                                     uint64_t count, unsigned threads, void *out, ebpo_error *error)
+/* The same of an array of attributes (attribute_arrays.h): values, ends or items. */
+static ebpo_status pick_attribute_rows(ebpo_chunks *chunks, int number, const uint32_t *rows,
+                                       uint64_t count, unsigned threads, void *out,
+                                       ebpo_error *error)
 {
     return pick_rows(chunks, ebpo_reader_array(chunks->file, EBPO_A_ATTRIBUTE, number), rows, count,
                      threads, out, error);
@@ -542,10 +544,10 @@ typedef struct attribute_picking {
     ebpo_error *error;
 } attribute_picking;
 
-static ebpo_status copy_picked_rows(const attribute_picking *p, int number, const uint32_t *rows, uint64_t count,
-                        void *out)
+static ebpo_status copy_picked_rows(const attribute_picking *p, int number, const uint32_t *rows,
+                                    uint64_t count, void *out)
 {
-    return ebpo_pick_attribute_rows(p->chunks, number, rows, count, p->threads, out, p->error);
+    return pick_attribute_rows(p->chunks, number, rows, count, p->threads, out, p->error);
 }
 
 static ebpo_status pick_columns(const attribute_picking *p, uint64_t n, ebpo_attribute *a)
@@ -557,8 +559,8 @@ static ebpo_status pick_columns(const attribute_picking *p, uint64_t n, ebpo_att
 }
 
 /* Numbers of the items of all lists: a list begins where the one before it in the file ends. */
-static ebpo_status number_items(const attribute_picking *p, ebpo_attribute *a, const uint64_t *before,
-                                uint32_t **items)
+static ebpo_status number_items(const attribute_picking *p, ebpo_attribute *a,
+                                const uint64_t *before, uint32_t **items)
 {
     uint64_t sum = 0;
     for (uint64_t i = 0; i < p->count; i++) {
@@ -604,9 +606,9 @@ static ebpo_status pick_lists(const attribute_picking *p, uint64_t n, ebpo_attri
     uint32_t *items = NULL;
     uint64_t *before = ebpo_alloc(p->count, sizeof *before);
     a->ends = ebpo_alloc(p->count, sizeof *a->ends);
-    ebpo_status status = before && a->ends
-                             ? copy_picked_rows(p, ebpo_values_number(n), p->rows, p->count, a->ends)
-                             : ebpo_fail_memory(p->error, p->count * 2 * sizeof *before);
+    ebpo_status status =
+        before && a->ends ? copy_picked_rows(p, ebpo_values_number(n), p->rows, p->count, a->ends)
+                          : ebpo_fail_memory(p->error, p->count * 2 * sizeof *before);
     if (status == EBPO_OK)
         status = pick_before(p, n, before);
     if (status == EBPO_OK)

@@ -43,11 +43,6 @@ EBPO_MUST_USE ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id,
                                          const uint32_t *rows, uint64_t count, unsigned threads,
                                          void *out, ebpo_error *error);
 
-/* The same of an array of attributes (attribute_arrays.h): values, ends or items. */
-EBPO_MUST_USE ebpo_status ebpo_pick_attribute_rows(ebpo_chunks *chunks, int number,
-                                                   const uint32_t *rows, uint64_t count,
-                                                   unsigned threads, void *out, ebpo_error *error);
-
 /* Rows of all attributes of an element into `to`, which has the file's arrays without values and
  * no workspace. */
 EBPO_MUST_USE ebpo_status ebpo_pick_attributes(ebpo_chunks *chunks, ebpo_attributes *to,

@@ -17,7 +17,7 @@
 #include "mesh/textures.h"
 
 static ebpo_status attribute_head_wrong(const ebpo_file *file, const char *path, const char *what,
-                         ebpo_error *error)
+                                        ebpo_error *error)
 {
     return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, path, -1,
                         "%s; get a fresh copy of the file", what);
@@ -25,7 +25,7 @@ static ebpo_status attribute_head_wrong(const ebpo_file *file, const char *path,
 
 /* A required attribute that is absent has no message yet. */
 static ebpo_status required_value(const ebpo_file *file, const char *path, ebpo_status status,
-                            const char *name, ebpo_error *error)
+                                  const char *name, ebpo_error *error)
 {
     char what[64];
     if (status != EBPO_E_ABSENT)
@@ -42,8 +42,10 @@ static ebpo_status get_type(ebpo_file *file, ebpo_head *head, ebpo_head_object i
     if (status != EBPO_OK)
         return status;
     *type = ebpo_attribute_type_of(word);
-    return *type >= 0 ? EBPO_OK
-                      : attribute_head_wrong(file, path, "a type of numbers is none that the format has", error);
+    return *type >= 0
+               ? EBPO_OK
+               : attribute_head_wrong(file, path, "a type of numbers is none that the format has",
+                                      error);
 }
 
 static ebpo_status get_list(ebpo_file *file, ebpo_head *head, ebpo_head_object id, const char *path,
@@ -58,9 +60,9 @@ static ebpo_status get_list(ebpo_file *file, ebpo_head *head, ebpo_head_object i
     if (status == EBPO_OK && a->list >= EBPO_ATTRIBUTE_FLOAT32)
         status = attribute_head_wrong(file, path, "a list's length is no whole number", error);
     if (status == EBPO_OK)
-        status =
-            required_value(file, path, ebpo_head_get_count(head, id, path, "different", &differ, error),
-                     "different", error);
+        status = required_value(file, path,
+                                ebpo_head_get_count(head, id, path, "different", &differ, error),
+                                "different", error);
     if (status == EBPO_OK && differ > 1)
         status = attribute_head_wrong(file, path, "attribute different is neither 0 nor 1", error);
     *different = differ;
@@ -76,17 +78,17 @@ static ebpo_status get_head(ebpo_file *file, ebpo_head *head, const char *path,
     ebpo_status status = ebpo_head_open_array(head, path, &id, error);
     if (status == EBPO_OK)
         status = required_value(file, path,
-                          ebpo_head_get_text(head, id, path, "element", a->element,
-                                             sizeof a->element, error),
-                          "element", error);
+                                ebpo_head_get_text(head, id, path, "element", a->element,
+                                                   sizeof a->element, error),
+                                "element", error);
     if (status == EBPO_OK)
-        status =
-            required_value(file, path,
-                     ebpo_head_get_text(head, id, path, "names", a->names, sizeof a->names, error),
-                     "names", error);
+        status = required_value(file, path,
+                                ebpo_head_get_text(head, id, path, "names", a->names,
+                                                   sizeof a->names, error),
+                                "names", error);
     if (status == EBPO_OK)
-        status = required_value(file, path, get_type(file, head, id, path, "type", &type, error), "type",
-                          error);
+        status = required_value(file, path, get_type(file, head, id, path, "type", &type, error),
+                                "type", error);
     a->type = (ebpo_attribute_type)type;
     if (status == EBPO_OK)
         status = get_list(file, head, id, path, a, &to->different, error);
@@ -112,10 +114,12 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
     if (!a->chunks)
         atomic_store(&file->located, false);
     if (strcmp(coding, a->coding) != 0)
-        return attribute_head_wrong(file, a->path, "the array's coding is none that the format has for it", error);
+        return attribute_head_wrong(file, a->path,
+                                    "the array's coding is none that the format has for it", error);
     return a->shape.is_signed
-               ? attribute_head_wrong(file, a->path, "the array has the wrong type or the wrong number of columns",
-                       error)
+               ? attribute_head_wrong(file, a->path,
+                                      "the array has the wrong type or the wrong number of columns",
+                                      error)
                : EBPO_OK;
 }
 
@@ -176,7 +180,8 @@ static ebpo_status open_items(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo
     if (status == EBPO_OK &&
         (items->shape.cols ||
          items->shape.element_size != ebpo_attribute_bytes(file->attributes.head[n].head.type)))
-        status = attribute_head_wrong(file, items->path, "the array is not as wide as its type", error);
+        status =
+            attribute_head_wrong(file, items->path, "the array is not as wide as its type", error);
     return status;
 }
 
@@ -214,7 +219,9 @@ static ebpo_status open_header(ebpo_file *file, ebpo_head *head, ebpo_error *err
     if (status == EBPO_OK &&
         (header->shape.cols || header->shape.element_size != 1 ||
          header->coding != ebpo_coding_plain || header->shape.rows > EBPO_ATTRIBUTE_HEADER))
-        status = attribute_head_wrong(file, path, "the header is not of bytes, or longer than it can be", error);
+        status =
+            attribute_head_wrong(file, path, "the header is not of bytes, or longer than it can be",
+                                 error);
     return status;
 }
 
@@ -226,8 +233,9 @@ static ebpo_status open_group(ebpo_file *file, ebpo_head *head, ebpo_error *erro
     ebpo_status status = ebpo_head_open_group(head, path, &id, error);
     if (status != EBPO_OK)
         return status;
-    status = required_value(file, path, ebpo_head_get_count(head, id, path, "arrays", &all->count, error),
-                      "arrays", error);
+    status = required_value(file, path,
+                            ebpo_head_get_count(head, id, path, "arrays", &all->count, error),
+                            "arrays", error);
     if (status == EBPO_OK)
         status = ebpo_facts_get_digest(head, id, path, "sha256", all->sha256, error);
     if (status == EBPO_OK && all->count > EBPO_ATTRIBUTE_ARRAYS)
@@ -313,8 +321,9 @@ typedef struct target {
     uint8_t *values;
 } target;
 
-static ebpo_status take_attribute_rows(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row,
-                        uint64_t rows, const uint8_t *bytes, ebpo_error *error)
+static ebpo_status take_attribute_rows(void *context, const ebpo_array_in *array, uint64_t chunk,
+                                       uint64_t row, uint64_t rows, const uint8_t *bytes,
+                                       ebpo_error *error)
 {
     const target *t = context;
     (void)chunk, (void)error;

@@ -11,7 +11,6 @@
 #include "core/sized.h"
 #include "core/sums.h"
 #include "format/content_checksum.h"
-#include "format/head_facts.h"
 #include "format/read_attributes.h"
 #include "format/reader.h"
 #include "format/write_plan.h"
@@ -344,8 +343,7 @@ ebpo_status ebpo_file_read_mesh(const ebpo_file *file, const ebpo_read_options *
     EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
-    ebpo_status status =
-        take_options(file, options, EBPO_PART_MESH, "mesh", &read, error);
+    ebpo_status status = take_options(file, options, EBPO_PART_MESH, "mesh", &read, error);
     if (status != EBPO_OK)
         return status;
     announce_root(file, EBPO_NEEDS_MESH, read.attributes);
@@ -615,8 +613,8 @@ typedef struct content_job {
     ebpo_read_options alone; /* chunks in order */
 } content_job;
 
-static ebpo_status digest_rows(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row,
-                        uint64_t rows, const uint8_t *bytes, ebpo_error *error)
+static ebpo_status digest_rows(void *context, const ebpo_array_in *array, uint64_t chunk,
+                               uint64_t row, uint64_t rows, const uint8_t *bytes, ebpo_error *error)
 {
     taking *t = context;
     (void)chunk;
@@ -640,8 +638,8 @@ static ebpo_status digest_arrays(void *context, uint64_t begin, uint64_t end, un
     return status;
 }
 
-static ebpo_status compare_digest(content_job *j, int which, const uint8_t stated[32], const char *name,
-                           ebpo_error *error)
+static ebpo_status compare_digest(content_job *j, int which, const uint8_t stated[32],
+                                  const char *name, ebpo_error *error)
 {
     ebpo_content content = { .entries = NULL };
     uint8_t digest[32];
@@ -685,10 +683,10 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
     status =
         ebpo_parallel_for(read.threads, NULL, j.count, 1, digest_arrays, &j, NULL, "check", error);
     if (status == EBPO_OK)
-        status =
-            compare_digest(&j, EBPO_DIGEST_CONTENT, file->info.content_sha256, "content_sha256", error);
+        status = compare_digest(&j, EBPO_DIGEST_CONTENT, file->info.content_sha256,
+                                "content_sha256", error);
     if (status == EBPO_OK && file->info.parts & EBPO_PART_COLOURS)
-        status = compare_digest(&j, EBPO_DIGEST_COLOURS, file->info.colours_sha256, ebpo_colours_fact.name,
-                         error);
+        status = compare_digest(&j, EBPO_DIGEST_COLOURS, file->info.colours_sha256,
+                                "colours_sha256", error);
     return status == EBPO_OK ? ebpo_attributes_check(file, &read, error) : status;
 }

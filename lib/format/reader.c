@@ -272,7 +272,7 @@ typedef struct job {
 /* Bytes [address, address + bytes) of the file to reader->stored, with room for at least
  * `capacity`. */
 static ebpo_status fetch_stored(const ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address,
-                         size_t bytes, size_t capacity, ebpo_error *error)
+                                size_t bytes, size_t capacity, ebpo_error *error)
 {
     if (capacity < bytes)
         capacity = bytes;
@@ -287,7 +287,7 @@ static ebpo_status fetch_stored(const ebpo_file *file, ebpo_chunk_reader *reader
 }
 
 static ebpo_status chunk_damaged(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
-                           const char *why, ebpo_error *error)
+                                 const char *why, ebpo_error *error)
 {
     return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, array->path, -1,
                         "chunk %" PRIu64 " is damaged: %s; get a fresh copy of the file", chunk,
@@ -296,8 +296,8 @@ static ebpo_status chunk_damaged(const ebpo_file *file, const ebpo_array_in *arr
 
 /* As HDF5 would give it. */
 static ebpo_status unpack_stored(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
-                          ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
-                          ebpo_error *error)
+                                 ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
+                                 ebpo_error *error)
 {
     ebpo_shape shape = ebpo_stored_shape(&array->shape, array->gates);
     size_t bytes = shape.chunk_rows * ebpo_shape_row_bytes(&shape);
@@ -330,8 +330,8 @@ static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *arra
 }
 
 static ebpo_status decode_stored(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
-                          ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
-                          ebpo_error *error)
+                                 ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
+                                 ebpo_error *error)
 {
     return array->gates ? unpack_gates(file, array, chunk, coder, stored, raw, error)
                         : unpack_stored(file, array, chunk, coder, stored, raw, error);
@@ -346,7 +346,8 @@ static ebpo_status fetch_chunk(const ebpo_file *file, const ebpo_array_in *array
     if (status != EBPO_OK)
         return status;
     const ebpo_chunk_place *at = &array->chunks[chunk];
-    return fetch_stored(file, reader, at->address, at->bytes, ebpo_reader_chunk_bound(array), error);
+    return fetch_stored(file, reader, at->address, at->bytes, ebpo_reader_chunk_bound(array),
+                        error);
 }
 
 ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
@@ -385,11 +386,13 @@ static ebpo_status read_run(job *j, ebpo_idle_reader *s, uint64_t begin, uint64_
                             ebpo_error *error)
 {
     const ebpo_array_in *a = j->array;
-    ebpo_status status = fetch_stored(j->file, &s->reader, a->chunks[begin].address, bytes, 0, error);
+    ebpo_status status =
+        fetch_stored(j->file, &s->reader, a->chunks[begin].address, bytes, 0, error);
     size_t at = 0;
     for (uint64_t chunk = begin; chunk < end && status == EBPO_OK; chunk++) {
         uint64_t row = chunk * a->shape.chunk_rows, left = a->shape.rows - row;
-        status = decode_stored(j->file, a, chunk, &s->reader.coder, s->reader.stored + at, s->raw, error);
+        status = decode_stored(j->file, a, chunk, &s->reader.coder, s->reader.stored + at, s->raw,
+                               error);
         if (status == EBPO_OK)
             status =
                 j->take(j->context, a, chunk, row,
@@ -466,9 +469,10 @@ static ebpo_status take_integers(void *context, const ebpo_array_in *array, uint
     return EBPO_OK;
 }
 
-ebpo_status ebpo_reader_integers(const ebpo_file *file, const ebpo_array_in *array,
-                                 const ebpo_read_options *options, void *values, size_t size,
-                                 ebpo_error *error)
+/* Reads integers into `values`, of `size` bytes each. */
+static ebpo_status reader_integers(const ebpo_file *file, const ebpo_array_in *array,
+                                   const ebpo_read_options *options, void *values, size_t size,
+                                   ebpo_error *error)
 {
     target t = { values, size };
     return ebpo_reader_rows(file, array, options, take_integers, &t, error);
@@ -484,7 +488,7 @@ ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id id, int level,
     if (array->present) {
         uint64_t cols = array->shape.cols ? array->shape.cols : 1;
         values = ebpo_array_alloc(options->workspace, array->shape.rows, size * cols);
-        status = values ? ebpo_reader_integers(file, array, options, values, size, error)
+        status = values ? reader_integers(file, array, options, values, size, error)
                         : ebpo_workspace_fail(options->workspace, array->shape.rows * size * cols,
                                               error);
     }

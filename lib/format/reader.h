@@ -77,11 +77,6 @@ EBPO_MUST_USE ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_arr
                                            const ebpo_read_options *options, ebpo_rows_fn take,
                                            void *context, ebpo_error *error);
 
-/* Reads integers into `values`, of `size` bytes each. */
-EBPO_MUST_USE ebpo_status ebpo_reader_integers(const ebpo_file *file, const ebpo_array_in *array,
-                                               const ebpo_read_options *options, void *values,
-                                               size_t size, ebpo_error *error);
-
 /* The same into new memory: NULL when the array is absent. The workspace of the options owns it. */
 EBPO_MUST_USE ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id id, int level,
                                            const ebpo_read_options *options, size_t size,

@@ -284,7 +284,8 @@ ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts)
                                .leaf_volume = level->leaf_volume };
     for (int i = 0; i < EBPO_COUNTS; i++)
         if (ebpo_counts[i].needs & (parts | EBPO_NEEDS_ALWAYS))
-            store_field(&out, ebpo_counts[i].in_summary, load_field(level, ebpo_counts[i].in_level));
+            store_field(&out, ebpo_counts[i].in_summary,
+                        load_field(level, ebpo_counts[i].in_level));
     return out;
 }
 

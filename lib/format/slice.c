@@ -16,17 +16,19 @@
 
 /* The faces and vertices of a slice. */
 
-/* From levels with numbers of the file, and first_face and face_count: everything else, with `maps`
- * numbers in the source, too, and local numbers in the levels. `room`: ebpo_slice_read_within. */
-EBPO_MUST_USE ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool maps,
-                                                ebpo_room *room, ebpo_error *error);
-
 static const uint32_t FREE = UINT32_MAX;
 
 uint64_t ebpo_compact_bytes(uint64_t capacity)
 {
     const ebpo_compact *c = NULL;
     return ebpo_hash_slots(2 * capacity) * sizeof *c->slot + capacity * 2 * sizeof *c->sorted;
+}
+
+static void compact_free(ebpo_compact *compact)
+{
+    free(compact->slot);
+    free(compact->sorted);
+    *compact = (ebpo_compact){ .slot = NULL };
 }
 
 ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity, ebpo_error *error)
@@ -42,18 +44,11 @@ ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity, ebpo_error *
     out->slot = ebpo_alloc(slots, sizeof *out->slot);
     out->sorted = ebpo_alloc(capacity, sizeof *out->sorted);
     if (!out->slot || !out->sorted) {
-        ebpo_compact_free(out);
+        compact_free(out);
         return ebpo_fail_memory(error, slots * sizeof *out->slot + capacity * sizeof *out->sorted);
     }
     memset(out->slot, 0xff, slots * sizeof *out->slot);
     return EBPO_OK;
-}
-
-void ebpo_compact_free(ebpo_compact *compact)
-{
-    free(compact->slot);
-    free(compact->sorted);
-    *compact = (ebpo_compact){ .slot = NULL };
 }
 
 /* Where a number is, or would be. */
@@ -65,7 +60,7 @@ static uint64_t slot_of(const ebpo_compact *c, uint32_t number)
     return at;
 }
 
-void ebpo_compact_add(ebpo_compact *compact, uint32_t number)
+static void compact_add(ebpo_compact *compact, uint32_t number)
 {
     uint64_t at = slot_of(compact, number);
     if (compact->slot[at].number == number)
@@ -101,7 +96,8 @@ static void sort_numbers(uint32_t *numbers, uint32_t *other, uint64_t count)
         memcpy(numbers, from, count * sizeof *numbers);
 }
 
-ebpo_status ebpo_compact_sort(ebpo_compact *compact, ebpo_error *error)
+/* After the last add: sorts. */
+static ebpo_status compact_sort(ebpo_compact *compact, ebpo_error *error)
 {
     if (compact->count == 0)
         return EBPO_OK;
@@ -115,7 +111,8 @@ ebpo_status ebpo_compact_sort(ebpo_compact *compact, ebpo_error *error)
     return EBPO_OK;
 }
 
-uint32_t ebpo_compact_find(const ebpo_compact *compact, uint32_t number)
+/* Place of a number that was added. */
+static uint32_t compact_find(const ebpo_compact *compact, uint32_t number)
 {
     return compact->slot[slot_of(compact, number)].place;
 }
@@ -145,8 +142,8 @@ static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *s
 /* Rows of a decoded array: those of `single` (ascending), then [first, first + rows). Chunks stay
  * pinned while rows are in them. */
 static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row_bytes,
-                          const uint32_t *single, uint64_t singles, uint64_t first, uint64_t rows,
-                          void *out, ebpo_error *error)
+                               const uint32_t *single, uint64_t singles, uint64_t first,
+                               uint64_t rows, void *out, ebpo_error *error)
 {
     ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, id, 0) };
     ebpo_status status = EBPO_OK;
@@ -185,8 +182,8 @@ static ebpo_status collect_outer(ebpo_slice *slice, ebpo_compact *outer, ebpo_ro
     for (int i = 0; i < slice->level_count; i++)
         for (uint64_t k = 0; k < slice->level[i].ref_count; k++)
             if (slice->level[i].leaf_refs[k] < slice->first_face)
-                ebpo_compact_add(outer, slice->level[i].leaf_refs[k]);
-    return ebpo_compact_sort(outer, error);
+                compact_add(outer, slice->level[i].leaf_refs[k]);
+    return compact_sort(outer, error);
 }
 
 static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
@@ -200,7 +197,7 @@ static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
         for (uint64_t k = 0; k < level->ref_count; k++) {
             uint32_t ref = level->leaf_refs[k];
             level->leaf_refs[k] =
-                ref < slice->first_face ? ebpo_compact_find(outer, ref) : (uint32_t)(ref - less);
+                ref < slice->first_face ? compact_find(outer, ref) : (uint32_t)(ref - less);
         }
     }
 }
@@ -218,7 +215,7 @@ static ebpo_status number_faces(ebpo_slice *slice, ebpo_room *room, ebpo_error *
         slice->outer_count = (uint32_t)outer.count;
         outer.sorted = NULL;
     }
-    ebpo_compact_free(&outer);
+    compact_free(&outer);
     return status;
 }
 
@@ -262,8 +259,8 @@ static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_roo
         status = ebpo_compact_make(older, capacity, error);
     for (uint64_t i = 0; i < corners && status == EBPO_OK; i++)
         if (mesh->faces[i] < begin)
-            ebpo_compact_add(older, mesh->faces[i]);
-    return status == EBPO_OK ? ebpo_compact_sort(older, error) : status;
+            compact_add(older, mesh->faces[i]);
+    return status == EBPO_OK ? compact_sort(older, error) : status;
 }
 
 /* Older vertices first, then the new ones: the order of the file. */
@@ -271,8 +268,8 @@ static void renumber_vertices(ebpo_mesh *mesh, uint64_t begin, const ebpo_compac
 {
     uint32_t less = (uint32_t)(begin - older->count);
     for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
-        mesh->faces[i] = mesh->faces[i] < begin ? ebpo_compact_find(older, mesh->faces[i])
-                                                : mesh->faces[i] - less;
+        mesh->faces[i] =
+            mesh->faces[i] < begin ? compact_find(older, mesh->faces[i]) : mesh->faces[i] - less;
 }
 
 static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_room *room,
@@ -297,11 +294,11 @@ static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_ro
         void *xyz = ebpo_alloc(mesh->vertex_count, row_bytes);
         mesh->xyz32 = wide ? NULL : xyz;
         mesh->xyz64 = wide ? xyz : NULL;
-        status = xyz ? gather_rows(chunks, EBPO_A_VERTICES, row_bytes, older.sorted, older.count, begin,
-                              end - begin, xyz, error)
+        status = xyz ? gather_rows(chunks, EBPO_A_VERTICES, row_bytes, older.sorted, older.count,
+                                   begin, end - begin, xyz, error)
                      : ebpo_fail_memory(error, mesh->vertex_count * row_bytes);
     }
-    ebpo_compact_free(&older);
+    compact_free(&older);
     return status;
 }
 
@@ -313,12 +310,14 @@ static ebpo_status take_source(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_erro
     if (!slice->face_source)
         return ebpo_fail_memory(error, slice->mesh.face_count * sizeof *slice->face_source);
     return gather_rows(chunks, EBPO_A_FACE_SOURCE, sizeof *slice->face_source, slice->outer,
-                  slice->outer_count, slice->first_face, slice->face_count, slice->face_source,
-                  error);
+                       slice->outer_count, slice->first_face, slice->face_count, slice->face_source,
+                       error);
 }
 
-ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool maps,
-                                  ebpo_room *room, ebpo_error *error)
+/* From levels with numbers of the file, and first_face and face_count: everything else, with `maps`
+ * numbers in the source, too, and local numbers in the levels. `room`: ebpo_slice_read_within. */
+static ebpo_status slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool maps,
+                                    ebpo_room *room, ebpo_error *error)
 {
     enum { ROW = 3 * sizeof(uint32_t), NUMBER = sizeof(uint32_t) };
     ebpo_status status = number_faces(slice, room, error);
@@ -333,8 +332,8 @@ ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool m
     slice->mesh.faces = ebpo_alloc(slice->mesh.face_count, ROW);
     if (!slice->mesh.faces)
         return ebpo_fail_memory(error, slice->mesh.face_count * ROW);
-    status = gather_rows(chunks, EBPO_A_FACES, ROW, slice->outer, slice->outer_count, slice->first_face,
-                    slice->face_count, slice->mesh.faces, error);
+    status = gather_rows(chunks, EBPO_A_FACES, ROW, slice->outer, slice->outer_count,
+                         slice->first_face, slice->face_count, slice->mesh.faces, error);
     if (status == EBPO_OK)
         status = take_vertices(slice, chunks, room, error);
     return status == EBPO_OK && maps ? take_source(slice, chunks, error) : status;
@@ -584,7 +583,7 @@ ebpo_status ebpo_slice_read_within(ebpo_slice *out, ebpo_chunks *chunks, const e
     if (status == EBPO_OK)
         status = check_own_faces(out, chunks, &x, error);
     if (status == EBPO_OK)
-        status = ebpo_slice_take_faces(out, chunks, needs & EBPO_NEEDS_MAPS, room, error);
+        status = slice_take_faces(out, chunks, needs & EBPO_NEEDS_MAPS, room, error);
     if (status != EBPO_OK)
         ebpo_slice_free(out);
     return status;

@@ -101,11 +101,5 @@ uint64_t ebpo_compact_bytes(uint64_t capacity);
 /* For at most `capacity` calls of add. Numbers are below 2^32 - 1. */
 EBPO_MUST_USE ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity,
                                             ebpo_error *error);
-void ebpo_compact_free(ebpo_compact *compact);
-void ebpo_compact_add(ebpo_compact *compact, uint32_t number);
-/* After the last add: sorts. */
-EBPO_MUST_USE ebpo_status ebpo_compact_sort(ebpo_compact *compact, ebpo_error *error);
-/* Place of a number that was added. */
-uint32_t ebpo_compact_find(const ebpo_compact *compact, uint32_t number);
 
 #endif

@@ -83,7 +83,8 @@ static void add_row(const subtree_counts *c, uint64_t subtree, uint64_t *sums)
 }
 
 /* The chunk of rows that holds a subtree; it adds up to what comes after it. */
-static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_counts *c, ebpo_error *error)
+static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_counts *c,
+                               ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0);
     uint64_t rows = array->shape.chunk_rows, chunk = subtree / rows, sums[EBPO_SUBTREE_COLS];
@@ -674,7 +675,8 @@ static uint64_t sum_of(const telling *t, ebpo_per per, int level, bool after)
     case EBPO_PER_LEAF: return subtree_sum(t, level, EBPO_S_LEAF, after);
     case EBPO_PER_BLACK: return subtree_sum(t, level, EBPO_S_BLACK, after);
     case EBPO_PER_WHITE:
-        return 8 * groups - subtree_sum(t, level, EBPO_S_GRAY, after) - subtree_sum(t, level, EBPO_S_LEAF, after) -
+        return 8 * groups - subtree_sum(t, level, EBPO_S_GRAY, after) -
+               subtree_sum(t, level, EBPO_S_LEAF, after) -
                subtree_sum(t, level, EBPO_S_BLACK, after);
     case EBPO_PER_PLANE: return subtree_sum(t, level, EBPO_S_PLANES, after);
     case EBPO_PER_LEAF_PLANE: return subtree_sum(t, level, EBPO_S_LEAF_PLANES, after);
@@ -690,8 +692,9 @@ static void tell_nodes(const telling *t)
          level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             if (ebpo_schema[id].needs & t->needs)
-                expect_rows(t, (ebpo_array_id)id, level, sum_of(t, ebpo_schema[id].per, level, false),
-                     sum_of(t, ebpo_schema[id].per, level, true));
+                expect_rows(t, (ebpo_array_id)id, level,
+                            sum_of(t, ebpo_schema[id].per, level, false),
+                            sum_of(t, ebpo_schema[id].per, level, true));
 }
 
 /* A chunk of faces or vertices, `distance` blocks before `from`. */
@@ -704,7 +707,7 @@ static void tell_block(const telling *t, ebpo_array_id id, uint64_t from, uint64
     expect_rows(t, id, 0, (block - distance) * block_rows, (block - distance) * block_rows + 1);
     if (id == EBPO_A_FACES && t->needs & EBPO_NEEDS_MAPS)
         expect_rows(t, EBPO_A_FACE_SOURCE, 0, (block - distance) * block_rows,
-             (block - distance) * block_rows + block_rows);
+                    (block - distance) * block_rows + block_rows);
 }
 
 static void tell_own_faces(const telling *t)

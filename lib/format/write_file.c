@@ -45,31 +45,6 @@ typedef struct ebpo_first_chunk {
     size_t bytes;
 } ebpo_first_chunk;
 
-/* The plan stays the caller's. End with ebpo_headers_close, and ebpo_h5_finish or ebpo_h5_discard.
- */
-void ebpo_headers_plan(ebpo_headers *h, ebpo_plan *plan, uint64_t chunks,
-                       const ebpo_write_options *options);
-
-/* Sizes of headers and indexes: the same file in memory, with chunks of one byte. */
-EBPO_MUST_USE ebpo_status ebpo_headers_measure(ebpo_headers *h, const char *shown,
-                                               ebpo_error *error);
-
-/* Then the file, which is left open. `shown`: for messages. */
-EBPO_MUST_USE ebpo_status ebpo_headers_lay_out(ebpo_headers *h, const char *path, const char *shown,
-                                               ebpo_first_chunk first, ebpo_error *error);
-
-/* With index_bytes: what comes now is in a piece of its own, once the first array of several chunks
- * calls for it. */
-EBPO_MUST_USE ebpo_status ebpo_headers_begin_index(ebpo_headers *h, ebpo_error *error);
-
-/* Of a list: its own place and the file's size, which tell readers whether it still holds. */
-EBPO_MUST_USE ebpo_status ebpo_headers_put_holds(ebpo_headers *h, ebpo_list list,
-                                                 uint64_t file_bytes, uint64_t offset,
-                                                 ebpo_error *error);
-
-/* Closes root and arrays, not the file. */
-void ebpo_headers_close(ebpo_headers *h);
-
 /* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that
  * where no other header follows. */
 enum { ALONE_BYTES = 4096 };
@@ -94,8 +69,10 @@ static void plan_list(ebpo_headers *h, ebpo_list list, ebpo_array_id id, uint64_
                                  .pipeline = h->plan->array[0].shape.pipeline };
 }
 
-void ebpo_headers_plan(ebpo_headers *h, ebpo_plan *plan, uint64_t chunks,
-                       const ebpo_write_options *options)
+/* The plan stays the caller's. End with headers_close, and ebpo_h5_finish or ebpo_h5_discard.
+ */
+static void headers_plan(ebpo_headers *h, ebpo_plan *plan, uint64_t chunks,
+                         const ebpo_write_options *options)
 {
     bool summed = options->chunk_sums == EBPO_SUMS_USUAL;
     *h = (ebpo_headers){
@@ -143,8 +120,9 @@ static ebpo_status make_root_group(ebpo_headers *h, const char *path, uint32_t n
     return status;
 }
 
-ebpo_status ebpo_headers_put_holds(ebpo_headers *h, ebpo_list list, uint64_t file_bytes,
-                                   uint64_t offset, ebpo_error *error)
+/* Of a list: its own place and the file's size, which tell readers whether it still holds. */
+static ebpo_status headers_put_holds(ebpo_headers *h, ebpo_list list, uint64_t file_bytes,
+                                     uint64_t offset, ebpo_error *error)
 {
     ebpo_h5_id id = h->list[list].handle;
     ebpo_status status = ebpo_h5_put_count(&h->out, id, "file_bytes", file_bytes, error);
@@ -202,12 +180,13 @@ static ebpo_status lay_out(ebpo_headers *h, const char *path, const char *shown,
             continue;
         status = make_array(h, &h->list[l], NULL, error);
         if (status == EBPO_OK)
-            status = ebpo_headers_put_holds(h, l, 0, 0, error);
+            status = headers_put_holds(h, l, 0, 0, error);
     }
     return status;
 }
 
-void ebpo_headers_close(ebpo_headers *h)
+/* Closes root and arrays, not the file. */
+static void headers_close(ebpo_headers *h)
 {
     for (unsigned i = 0; i < h->plan->count; i++) {
         ebpo_h5_close_id(&h->out, h->plan->array[i].handle);
@@ -221,13 +200,15 @@ void ebpo_headers_close(ebpo_headers *h)
     h->root = -1;
 }
 
-ebpo_status ebpo_headers_lay_out(ebpo_headers *h, const char *path, const char *shown,
-                                 ebpo_first_chunk first, ebpo_error *error)
+/* Then the file, which is left open. `shown`: for messages. */
+static ebpo_status headers_lay_out(ebpo_headers *h, const char *path, const char *shown,
+                                   ebpo_first_chunk first, ebpo_error *error)
 {
     return lay_out(h, path, shown, h->head_bytes, first, error);
 }
 
-ebpo_status ebpo_headers_measure(ebpo_headers *h, const char *shown, ebpo_error *error)
+/* Sizes of headers and indexes: the same file in memory, with chunks of one byte. */
+static ebpo_status headers_measure(ebpo_headers *h, const char *shown, ebpo_error *error)
 {
     ebpo_plan *plan = h->plan;
     uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * h->chunks,
@@ -240,7 +221,7 @@ ebpo_status ebpo_headers_measure(ebpo_headers *h, const char *shown, ebpo_error 
         for (uint64_t k = i == 0; k < ebpo_shape_chunks(&a->shape) && status == EBPO_OK; k++)
             status = ebpo_h5_put_chunk(&h->out, a->path, a->handle, &a->shape, k, "", 1, error);
     }
-    ebpo_headers_close(h);
+    headers_close(h);
     if (status == EBPO_OK)
         status = ebpo_h5_head_used(&h->out, capacity, &all, error);
     ebpo_h5_discard(&h->out);
@@ -252,9 +233,11 @@ ebpo_status ebpo_headers_measure(ebpo_headers *h, const char *shown, ebpo_error 
     return status;
 }
 
-ebpo_status ebpo_headers_begin_index(ebpo_headers *h, ebpo_error *error)
+/* With index_bytes: what comes now is in a piece of its own, once the first array of several chunks
+ * calls for it. */
+static ebpo_status headers_begin_index(ebpo_headers *h, ebpo_error *error)
 {
-    ebpo_headers_close(h);
+    headers_close(h);
     ebpo_status status = ebpo_h5_reopen(&h->out, h->index_bytes, error);
     if (status == EBPO_OK)
         status = ebpo_h5_root(&h->out, &h->root, error);
@@ -485,8 +468,7 @@ static ebpo_status write_lists(writer *w, ebpo_error *error)
         status == EBPO_OK && size == offset + bytes[EBPO_LIST_SUMS] + bytes[EBPO_LIST_PLACES];
     for (ebpo_list l = 0; l < EBPO_LISTS && status == EBPO_OK; l++) {
         if (w->head.list[l].shape.rows)
-            status =
-                ebpo_headers_put_holds(&w->head, l, holds ? size : 0, holds ? offset : 0, error);
+            status = headers_put_holds(&w->head, l, holds ? size : 0, holds ? offset : 0, error);
         offset += bytes[l];
     }
     return status;
@@ -552,12 +534,12 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
     size_t first_bytes = 0;
     ebpo_status status = encode_first(w, first, &first_bytes, error);
     if (status == EBPO_OK)
-        status = ebpo_headers_measure(&w->head, shown, error);
+        status = headers_measure(&w->head, shown, error);
     if (status == EBPO_OK)
-        status = ebpo_headers_lay_out(&w->head, path, shown,
-                                      (ebpo_first_chunk){ first, first_bytes }, error);
+        status =
+            headers_lay_out(&w->head, path, shown, (ebpo_first_chunk){ first, first_bytes }, error);
     if (status == EBPO_OK && w->head.index_bytes)
-        status = ebpo_headers_begin_index(&w->head, error);
+        status = headers_begin_index(&w->head, error);
     if (status == EBPO_OK)
         status = write_chunks(w, error);
     if (status == EBPO_OK)
@@ -569,7 +551,7 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
                                       error);
     if (status == EBPO_OK && w->plan.info.subtree_level)
         status = ebpo_facts_put_top(&w->head.out, w->head.root, w->top_bytes, error);
-    ebpo_headers_close(&w->head);
+    headers_close(&w->head);
     if (status == EBPO_OK)
         /* another libhdf5 may have placed metadata otherwise: no reader relies on it, tests do */
         status = ebpo_h5_finish(&w->head.out, error);
@@ -613,14 +595,14 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
         status = ebpo_plan_make(&w->plan, tree, w->options, shown, error);
     if (status == EBPO_OK)
         status = ebpo_chunk_order_make(&w->order, &w->plan, error);
-    ebpo_headers_plan(&w->head, &w->plan, w->order.count, w->options);
+    headers_plan(&w->head, &w->plan, w->order.count, w->options);
     if (status == EBPO_OK)
         status = make_window(w, error);
     if (status == EBPO_OK && publish)
         status = ebpo_publish_begin(publish, path, error);
     if (status == EBPO_OK)
         status = write_file(w, publish ? ebpo_publish_path(publish) : path, shown, error);
-    ebpo_headers_close(&w->head);
+    headers_close(&w->head);
     ebpo_h5_discard(&w->head.out);
     if (status == EBPO_OK && publish)
         status = ebpo_publish_commit(publish, error);

@@ -145,7 +145,8 @@ static void choose_codings(ebpo_attribute_plan *to, const ebpo_attribute *a,
         a->ends && count && columns_are_less(coder, a->values, bytes, floats, count, 1);
 }
 
-ebpo_status ebpo_attributes_plan(ebpo_plan *plan, const char *shown, ebpo_error *error)
+/* Checks what is to be written (EBPO_E_ARGUMENT), and finds out what stands in its head. */
+static ebpo_status attributes_plan(ebpo_plan *plan, const char *shown, ebpo_error *error)
 {
     const ebpo_attributes *all = plan->attributes;
     if (!all)
@@ -178,13 +179,14 @@ ebpo_status ebpo_attributes_plan(ebpo_plan *plan, const char *shown, ebpo_error 
 
 /* --- arrays --- */
 
-uint64_t ebpo_attributes_planned(const ebpo_plan *plan)
+/* Adds its arrays to the plan, which has room for attributes_planned of them. */
+static uint64_t attributes_planned(const ebpo_plan *plan)
 {
     return plan->attributes ? 1 + 2 * plan->attributes->count : 0;
 }
 
-static void add_attribute_array(ebpo_plan *plan, int number, const void *values, uint64_t rows, uint32_t cols,
-                unsigned size, ebpo_pipeline pipeline)
+static void add_attribute_array(ebpo_plan *plan, int number, const void *values, uint64_t rows,
+                                uint32_t cols, unsigned size, ebpo_pipeline pipeline)
 {
     ebpo_array_out *a = &plan->array[plan->count++];
     *a = (ebpo_array_out){ .id = EBPO_A_ATTRIBUTE,
@@ -207,10 +209,11 @@ static void add_one(ebpo_plan *plan, uint64_t n, ebpo_pipeline pipeline)
     uint64_t items = a->ends ? ebpo_attribute_value_count(a) : 0;
     bool flat = a->ends || (a->columns == 1 && a->list == EBPO_ATTRIBUTE_NO_LIST);
     if (a->ends)
-        add_attribute_array(plan, ebpo_values_number(n), a->ends, a->rows, 0, sizeof *a->ends, pipeline);
+        add_attribute_array(plan, ebpo_values_number(n), a->ends, a->rows, 0, sizeof *a->ends,
+                            pipeline);
     else
-        add_attribute_array(plan, ebpo_values_number(n), a->values, a->rows, flat ? 0 : a->columns, bytes,
-            pipeline);
+        add_attribute_array(plan, ebpo_values_number(n), a->values, a->rows, flat ? 0 : a->columns,
+                            bytes, pipeline);
     ebpo_array_out *made = &plan->array[plan->count - 1];
     made->columns = plan->attribute[n].columns;
     if (ebpo_attribute_is_of_mesh(a))
@@ -221,7 +224,7 @@ static void add_one(ebpo_plan *plan, uint64_t n, ebpo_pipeline pipeline)
     plan->array[plan->count - 1].columns = plan->attribute[n].items_columns;
 }
 
-void ebpo_attributes_add_arrays(ebpo_plan *plan, ebpo_pipeline pipeline)
+static void attributes_add_arrays(ebpo_plan *plan, ebpo_pipeline pipeline)
 {
     const ebpo_attributes *all = plan->attributes;
     if (!all)
@@ -239,8 +242,8 @@ static bool floats_in(const ebpo_plan *plan, const ebpo_array_out *array)
     return !ends && ebpo_attribute_is_float(a->type);
 }
 
-void ebpo_attributes_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
-                            uint64_t rows, uint8_t *file)
+static void attributes_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
+                              uint64_t rows, uint8_t *file)
 {
     uint32_t cols = array->shape.cols ? array->shape.cols : 1;
     const uint8_t *values = array->values;
@@ -375,7 +378,7 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
         (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &seen, file);
         break;
     case EBPO_A_VERTEX_SOURCE: ebpo_numbers_encode(tree->vertex_source + row, rows, file); break;
-    case EBPO_A_ATTRIBUTE: ebpo_attributes_encode(plan, array, row, rows, file); break;
+    case EBPO_A_ATTRIBUTE: attributes_encode(plan, array, row, rows, file); break;
     case EBPO_A_FACE_SOURCE: ebpo_numbers_encode(tree->face_source + row, rows, file); break;
     default: {
         uint64_t cols = array->shape.cols ? array->shape.cols : 1;
@@ -641,11 +644,11 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
     if (status == EBPO_OK && plan->info.subtree_level)
         status = ebpo_subtree_sums_make(&plan->subtrees, tree, &plan->info, error);
     if (status == EBPO_OK)
-        status = ebpo_attributes_plan(plan, shown, error);
+        status = attributes_plan(plan, shown, error);
     if (status != EBPO_OK)
         goto done;
     plan->array = ebpo_alloc((uint64_t)plan->info.level_count * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS +
-                                 ebpo_attributes_planned(plan),
+                                 attributes_planned(plan),
                              sizeof *plan->array);
     if (!plan->array) {
         status = ebpo_fail_memory(error, sizeof *plan->array);
@@ -656,7 +659,7 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
             add_array(plan, (ebpo_array_id)id, level);
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES; id++)
         add_array(plan, (ebpo_array_id)id, 0);
-    ebpo_attributes_add_arrays(plan, pipeline_of(plan->info.codec));
+    attributes_add_arrays(plan, pipeline_of(plan->info.codec));
 done:
     if (status != EBPO_OK)
         ebpo_plan_free(plan);
