@@ -1,5 +1,9 @@
-/* Points by area on the level's polygons. One counts if a point a little outside of its polygon is
- * in no other envelope. */
+/* The deviation of a level from the model: the largest distance that its envelopes reach beyond
+ * the model, as bounds, and the mean distance, from samples. A level's bounds are those of its
+ * nodes. A short search for each node gives bounds that dismiss most of them; the others are
+ * searched in the order of what they may reach. Samples are points on the level's polygons,
+ * distributed by area, one in each of equal parts of the area; a sample counts if a point
+ * slightly outside of its polygon is in no other envelope. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -263,8 +267,7 @@ static ebpo_status deviation_sample(ebpo_model *model, const ebpo_file *file, in
     return status;
 }
 
-/* A level's bounds are those of its nodes. A short look at each gives bounds that dismiss most; the
- * others are searched in the order of what they may reach. */
+/* --- bounds --- */
 
 /* of one node: what is left to find then lies in flat places, close to the model */
 enum { BLOCK_MOST = 512, QUESTIONS_MOST = 1 << 16 };

@@ -1,3 +1,8 @@
+/* Bounds of the distance that an envelope reaches beyond the model. ebpo_bound_envelope is a
+ * branch and bound over the pieces of fragments.c: each piece has an upper bound from the
+ * distance of its centre and from its nearest face, and the largest distance found is the lower
+ * bound. The second part decides for the nodes of a level whether their envelopes are within
+ * max_error, on several threads, and keeps what it found for other limits. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -265,7 +270,7 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
 enum { QUESTIONS = 4096 };
 
 /* The least max_error that was found to be enough, the largest one that was not, and a certain
- * lower bound. A search for a larger max_error asks no more and accepts no more (bound.h), so
+ * lower bound. A search for a larger max_error asks no more and accepts no more (error_bound.h), so
  * these tell what it would find; an upper bound from another search would not, as this one might
  * run out of questions just above it. */
 typedef struct memory {

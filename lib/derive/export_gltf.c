@@ -1,6 +1,7 @@
-/* glTF 2.0, as one file (GLB) or as a text with a .bin beside it. Not through assimp: its exporter
- * joins vertices that are less than 1e-5 apart, whatever the model's size. Source: Khronos,
- * "glTF 2.0 specification", sections 3 and 4. */
+/* glTF 2.0, as one file (GLB) or as a text with a .bin beside it. Coordinates are float32
+ * relative to the middle of the root cell, which is the translation of the nodes. assimp is not
+ * used here: its exporter joins vertices that are less than 1e-5 apart, whatever the size of the
+ * model. Source: Khronos, "glTF 2.0 Specification", sections 3 and 4. */
 #include "core/strict_fp.h"
 
 #include <float.h>

@@ -1,3 +1,7 @@
+/* What all export formats share: a block (one level with its nodes, or the mesh with its
+ * source's numbers, and colours) read from the file, its columns of numbers for each node or
+ * polygon, its coordinates as float32 for the formats that contain no more, and the entries in
+ * the report. Limits of formats are checked before anything is read where the counts are known. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

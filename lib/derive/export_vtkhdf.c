@@ -1,6 +1,6 @@
-/* VTKHDF 1.0: one unstructured grid of polygons. This version has neither blocks (2.1 has) nor
- * polyhedra (2.5), so levels are distinguished by the cell array `lod`, and by being partitions.
- * Source: VTK's documentation, "VTKHDF file format". */
+/* VTKHDF 1.0: a file with one unstructured grid of polygons. This version has neither blocks
+ * (2.1 has) nor polyhedra (2.5 has), so levels are distinguished by the cell array `lod`, and
+ * each level and the mesh is a partition. Source: VTK's documentation, "VTKHDF file format". */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

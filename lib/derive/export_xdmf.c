@@ -1,5 +1,6 @@
-/* XDMF 3: a text that names arrays in an HDF5 file beside it. Levels are polyhedra, one for each
- * node; VTK reads these with its Xdmf3 readers, not with the older XDMF reader. */
+/* XDMF 3: a text that refers to arrays in an HDF5 file beside it. Each level is a grid of
+ * polyhedra, one for each node, and the mesh a grid of triangles. VTK reads polyhedra with its
+ * Xdmf3 readers, not with the older XDMF reader. Both files are published together. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,3 +1,11 @@
+/* Pieces of an envelope, for bounds of its distance to the model: convex polytopes in the cell
+ * coordinates of a node, which together cover the envelope. Lengths are in units of a power of
+ * two near the cell's longest side, so that nothing overflows or vanishes. Every cut leaves
+ * slightly too much on both sides, so that nothing is lost to the tolerances of
+ * ebpo_polytope_clip. Pieces follow the model's tree down to leaves and are then cut along the
+ * planes of faces, or halved, until each is inside, outside, or small. The file also reads the
+ * trees: the one whose envelopes are measured, and the whole model's, which determines what is
+ * solid. */
 #include "core/strict_fp.h"
 
 #include <math.h>

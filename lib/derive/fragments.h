@@ -101,7 +101,7 @@ typedef struct ebpo_bounder {
     ebpo_error *error;
 } ebpo_bounder;
 
-/* The pieces that bound.c searches: a stack, and how a piece is cut. */
+/* The pieces that error_bound.c searches: a stack, and how a piece is cut. */
 
 #define EBPO_FRAGMENT_LEAST 1e-6 /* pieces are not cut below this, in sides of the cell */
 

@@ -1,5 +1,8 @@
-/* The convex hull of the solid in each cell. Its extreme points are mesh vertices in the cell,
- * corners of what faces leave on the cell's walls, and the cell's corners that lie inside. */
+/* The limit of what convex envelopes can achieve: the volume of the convex hull of the solid in
+ * each cell of a level. The extreme points of a hull are mesh vertices in the cell, corners of
+ * what faces leave on the cell faces, and those corners of the cell that are inside. qhull
+ * computes the volumes; a build without it reports EBPO_E_ABSENT. Volumes are kept for each node
+ * and added in that order. */
 #include "core/strict_fp.h"
 
 #include <ebpo/limit.h>

@@ -1,3 +1,11 @@
+/* Subsets: a smaller file that contains selected levels, parts, a box, or the envelopes that are
+ * close enough to the model. The parts of this file: the number of bytes that a subset needs of
+ * its file, counted from heads and tables alone; resolving the options and cutting the tree,
+ * whose levels, faces and volumes the other subset files cut; the search for the smallest
+ * max_error whose file fits a target size; and publishing the result. The size falls as
+ * max_error grows; coarse files are tried first, as they are small and quick to make, and what
+ * is known of envelopes serves all trials. Trials are written beside the output, and the best
+ * that fits is published, so that the published file is the one that was measured. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -291,10 +299,7 @@ static ebpo_write_options subset_write_options(const ebpo_subset_options *option
     return write;
 }
 
-/* Choosing by size: the file's size falls as max_error grows, so the least max_error that fits is
- * found by trying. Coarse files come first, as they are small and quick to make; what is known of
- * envelopes serves all trials. The best file that fitted is kept and published, so what was
- * measured is what is there. */
+/* --- subsets for a target size --- */
 
 /* below that share of the coarsest nothing but the whole is tried */
 static const double precision = 1.01, finest = 0x1p-40;
@@ -424,8 +429,8 @@ static ebpo_status choose_parts(fitting *f, bool *found)
     return status;
 }
 
-/* --- target_size.c: the subset for options->target_bytes, published as `path`; trials are written
- * beside it. Changes max_error and parts of the options --- */
+/* Makes the subset for options->target_bytes, and publishes it as `path`. Changes max_error and
+ * parts of the options. */
 static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subset_options *options,
                               ebpo_error *error)
 {
@@ -458,7 +463,7 @@ static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subs
     return status;
 }
 
-/* A subset becomes a file. */
+/* --- publishing --- */
 
 uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces)
 {

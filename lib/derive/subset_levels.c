@@ -1,3 +1,10 @@
+/* The levels of a subset: the nodes that remain, and their volumes. Levels are cut from the root
+ * downwards; the level above determines which groups are needed, so only these are read. Nodes
+ * below which something is left out become pruned nodes. Arrays of remaining nodes are copied
+ * node by node, all arrays that the table of arrays lists; face numbers remain those of the
+ * source until subset_faces.c renumbers them. With max_error, the envelopes of a level are
+ * evaluated together. Volumes are computed as ebpo_lod_level cuts envelopes: leaves by stored
+ * planes or not at all. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -14,44 +21,43 @@
 #include "geometry/plane_clip.h"
 #include "levels/lod_model.h"
 
-/* The arrays of the nodes that stay, copied from one level to another node by node: all that the
- * table of arrays lists, but for the types of groups. */
+/* --- copying the arrays of remaining nodes --- */
 
 /* A row for each node. */
-typedef struct ebpo_kept_column {
+typedef struct kept_column {
     const uint8_t *from;
     uint8_t *to;
     uint8_t size;
     int8_t usual; /* of nodes that are new */
-} ebpo_kept_column;
+} kept_column;
 
 /* So many items for each node: u8, or u32. */
-typedef struct ebpo_kept_counts {
+typedef struct kept_counts {
     ebpo_per per;
     const uint8_t *counts;
     uint8_t size;
-} ebpo_kept_counts;
+} kept_counts;
 
 /* An array of such items; several may share their counts. */
-typedef struct ebpo_kept_list {
+typedef struct kept_list {
     unsigned counts; /* which of the type's */
     const uint8_t *from;
     uint8_t *to;
     uint8_t size;
-} ebpo_kept_list;
+} kept_list;
 
-typedef struct ebpo_kept_nodes {
+typedef struct kept_nodes {
     const ebpo_level *from;
     ebpo_level *to;
     struct {
-        ebpo_kept_column column[EBPO_LEVEL_ARRAYS];
-        ebpo_kept_counts count[EBPO_LEVEL_ARRAYS];
-        ebpo_kept_list list[EBPO_LEVEL_ARRAYS];
+        kept_column column[EBPO_LEVEL_ARRAYS];
+        kept_counts count[EBPO_LEVEL_ARRAYS];
+        kept_list list[EBPO_LEVEL_ARRAYS];
         unsigned columns, counts, lists;
     } of_type[4];
     uint64_t next[4];           /* of each type: the next node of `from` */
     uint64_t read[EBPO_COUNTS]; /* of each list: its next item */
-} ebpo_kept_nodes;
+} kept_nodes;
 
 static ebpo_per per_of(ebpo_node_type type)
 {
@@ -69,17 +75,17 @@ static uint64_t capacity_of(const ebpo_level *from, ebpo_per per, const uint64_t
     return ebpo_level_count(from, per) + leaf_planes + (type >= 0 ? more[type] : 0);
 }
 
-static void note_column(ebpo_kept_nodes *kept, int id, int type)
+static void note_column(kept_nodes *kept, int id, int type)
 {
     kept->of_type[type].column[kept->of_type[type].columns++] =
-        (ebpo_kept_column){ .from = ebpo_level_array(kept->from, id),
-                            .to = ebpo_level_array(kept->to, id),
-                            .size = ebpo_schema[id].held_size,
-                            .usual = ebpo_schema[id].usual };
+        (kept_column){ .from = ebpo_level_array(kept->from, id),
+                       .to = ebpo_level_array(kept->to, id),
+                       .size = ebpo_schema[id].held_size,
+                       .usual = ebpo_schema[id].usual };
 }
 
 /* Place of the counts of a list, noted when first met. */
-static unsigned note_counts(ebpo_kept_nodes *kept, ebpo_per per, const ebpo_list_spec *list)
+static unsigned note_counts(kept_nodes *kept, ebpo_per per, const ebpo_list_spec *list)
 {
     int type = ebpo_schema_node_type(list->of);
     unsigned i = 0, known = kept->of_type[type].counts;
@@ -87,29 +93,29 @@ static unsigned note_counts(ebpo_kept_nodes *kept, ebpo_per per, const ebpo_list
         i++;
     if (i == known)
         kept->of_type[type].count[kept->of_type[type].counts++] =
-            (ebpo_kept_counts){ .per = per,
-                                .counts = ebpo_level_array(kept->from, list->counts),
-                                .size = ebpo_schema[list->counts].held_size };
+            (kept_counts){ .per = per,
+                           .counts = ebpo_level_array(kept->from, list->counts),
+                           .size = ebpo_schema[list->counts].held_size };
     return i;
 }
 
-static void note_list(ebpo_kept_nodes *kept, int id, const ebpo_list_spec *list)
+static void note_list(kept_nodes *kept, int id, const ebpo_list_spec *list)
 {
     int type = ebpo_schema_node_type(list->of);
     kept->of_type[type].list[kept->of_type[type].lists++] =
-        (ebpo_kept_list){ .counts = note_counts(kept, ebpo_schema[id].per, list),
-                          .from = ebpo_level_array(kept->from, id),
-                          .to = ebpo_level_array(kept->to, id),
-                          .size = ebpo_schema[id].held_size };
+        (kept_list){ .counts = note_counts(kept, ebpo_schema[id].per, list),
+                     .from = ebpo_level_array(kept->from, id),
+                     .to = ebpo_level_array(kept->to, id),
+                     .size = ebpo_schema[id].held_size };
 }
 
 /* Makes the arrays of `to` that are there for any of `needs`, with room for all of `from` and for
  * `more` nodes of each type (and, `more` gray ones being leaves before, for their planes). False:
  * out of memory. */
-static bool kept_begin(ebpo_kept_nodes *kept, const ebpo_level *from, ebpo_level *to,
-                       uint32_t needs, const uint64_t more[4])
+static bool kept_begin(kept_nodes *kept, const ebpo_level *from, ebpo_level *to, uint32_t needs,
+                       const uint64_t more[4])
 {
-    *kept = (ebpo_kept_nodes){ .from = from, .to = to };
+    *kept = (kept_nodes){ .from = from, .to = to };
     for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
         const ebpo_array_spec *spec = &ebpo_schema[id];
         const ebpo_list_spec *list = ebpo_schema_list(spec->per);
@@ -128,7 +134,7 @@ static bool kept_begin(ebpo_kept_nodes *kept, const ebpo_level *from, ebpo_level
     return true;
 }
 
-static void copy_row(const ebpo_kept_column *c, uint64_t from, uint64_t to)
+static void copy_row(const kept_column *c, uint64_t from, uint64_t to)
 {
     switch (c->size) {
     case 1: c->to[to] = c->from[from]; break;
@@ -137,7 +143,7 @@ static void copy_row(const ebpo_kept_column *c, uint64_t from, uint64_t to)
     }
 }
 
-static void put_usual(const ebpo_kept_column *c, uint64_t to)
+static void put_usual(const kept_column *c, uint64_t to)
 {
     int64_t value = c->usual;
     switch (c->size) {
@@ -148,7 +154,7 @@ static void put_usual(const ebpo_kept_column *c, uint64_t to)
     }
 }
 
-static uint64_t kept_items(const ebpo_kept_counts *c, uint64_t rank)
+static uint64_t kept_items(const kept_counts *c, uint64_t rank)
 {
     uint32_t count;
     if (!c->counts || c->size == 1)
@@ -166,8 +172,8 @@ static uint64_t grow_level(ebpo_level *level, ebpo_node_type type)
 }
 
 /* The items of a node that stays, behind those that stay already. */
-static void copy_items(const ebpo_kept_nodes *kept, const ebpo_kept_list *list,
-                       const ebpo_kept_counts *c, uint64_t count)
+static void copy_items(const kept_nodes *kept, const kept_list *list, const kept_counts *c,
+                       uint64_t count)
 {
     uint64_t end = ebpo_level_count(kept->to, c->per);
     memcpy(list->to + end * list->size, list->from + kept->read[c->per] * list->size,
@@ -175,30 +181,30 @@ static void copy_items(const ebpo_kept_nodes *kept, const ebpo_kept_list *list,
 }
 
 /* The next node of a type is left out. */
-static void kept_pass(ebpo_kept_nodes *kept, ebpo_node_type type)
+static void kept_pass(kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t rank = kept->next[type]++;
     for (unsigned i = 0; i < kept->of_type[type].counts; i++) {
-        const ebpo_kept_counts *c = &kept->of_type[type].count[i];
+        const kept_counts *c = &kept->of_type[type].count[i];
         kept->read[c->per] += kept_items(c, rank);
     }
 }
 
 /* The next node of a type stays. */
-static void kept_take(ebpo_kept_nodes *kept, ebpo_node_type type)
+static void kept_take(kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t place = grow_level(kept->to, type), rank = kept->next[type];
     for (unsigned i = 0; i < kept->of_type[type].columns; i++)
         copy_row(&kept->of_type[type].column[i], rank, place);
     for (unsigned i = 0; i < kept->of_type[type].lists; i++) {
-        const ebpo_kept_list *list = &kept->of_type[type].list[i];
-        const ebpo_kept_counts *c = &kept->of_type[type].count[list->counts];
+        const kept_list *list = &kept->of_type[type].list[i];
+        const kept_counts *c = &kept->of_type[type].count[list->counts];
         uint64_t count = kept_items(c, rank);
         if (count)
             copy_items(kept, list, c, count);
     }
     for (unsigned i = 0; i < kept->of_type[type].counts; i++) {
-        const ebpo_kept_counts *c = &kept->of_type[type].count[i];
+        const kept_counts *c = &kept->of_type[type].count[i];
         ebpo_level_set_count(kept->to, c->per,
                              ebpo_level_count(kept->to, c->per) + kept_items(c, rank));
     }
@@ -206,15 +212,14 @@ static void kept_take(ebpo_kept_nodes *kept, ebpo_node_type type)
 }
 
 /* A node that is not one of `from`: usual values, empty lists. */
-static void kept_add(ebpo_kept_nodes *kept, ebpo_node_type type)
+static void kept_add(kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t place = grow_level(kept->to, type);
     for (unsigned i = 0; i < kept->of_type[type].columns; i++)
         put_usual(&kept->of_type[type].column[i], place);
 }
 
-/* From level to level: which groups are wanted is known from the level above, so only these are
- * read. */
+/* --- cutting levels --- */
 
 static const uint64_t NOTHING = UINT64_MAX;
 
@@ -228,7 +233,7 @@ typedef struct descent {
     ebpo_cutting *c;
     int level;
     ebpo_level from, *to;
-    ebpo_kept_nodes kept; /* of the one for the other */
+    kept_nodes kept; /* of the one for the other */
     gray *parent, *child;
     ebpo_tolerance_node *judged; /* gray nodes and leaves as they come, with max_error; else NULL */
     uint64_t next_judged;
@@ -516,7 +521,7 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
     return EBPO_OK;
 }
 
-/* Envelopes are cut as a reader of levels cuts them: leaves by stored planes or not at all. */
+/* --- volumes of envelopes --- */
 
 typedef struct measuring {
     ebpo_cutting *c;

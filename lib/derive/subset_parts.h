@@ -28,7 +28,7 @@ EBPO_MUST_USE ebpo_status ebpo_cut_levels(ebpo_cutting *c);
  * and maps. Without any, the parts are taken off --- */
 EBPO_MUST_USE ebpo_status ebpo_cut_faces(ebpo_cutting *c);
 
-/* --- subset_volumes.c: of the envelopes of the nodes that remain --- */
+/* Computes the volumes of the envelopes of the nodes that remain. */
 void ebpo_cut_volumes(ebpo_cutting *c);
 
 /* The tree that would be written; for tests too. */

@@ -1,3 +1,10 @@
+/* The chunk directory: the offset, the stored size and the checksum of every chunk of an open
+ * file. Offsets are read from the file's list of all chunks (/subtrees/places), or from HDF5's
+ * index of each array; both are read late, as they may be long or far away, and once, under the
+ * file's lock. The checksums (/chunk_sums) detect a chunk that is intact but belongs to another
+ * position or another version of the file. Both lists are single chunks, however long, so they
+ * have a separate encoder and decoder. Sums of stored sizes are checked against the size of the
+ * file before chunks are decoded. Source: format-spec/README.md, sections 9 and 20. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -146,7 +153,7 @@ ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *a, 
     return status;
 }
 
-/* How many bytes of a file its arrays take. */
+/* --- stored sizes --- */
 
 static uint64_t level_bytes(const ebpo_file *file, int level, bool located)
 {
@@ -286,7 +293,7 @@ ebpo_status ebpo_chunk_sums_read(const ebpo_file *file, ebpo_error *error)
     return status;
 }
 
-/* Where chunks lie: what the opening left for later, as it may be far away or long. */
+/* --- offsets --- */
 
 /* --- by HDF5's index --- */
 
@@ -484,7 +491,7 @@ ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array
     return ebpo_shape_chunks(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, NULL, error);
 }
 
-/* What the head tells of each array. */
+/* --- what the head states of each array --- */
 
 static const ebpo_array_in *find_present_array(const ebpo_file *file, unsigned n)
 {

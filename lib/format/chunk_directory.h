@@ -1,5 +1,5 @@
 /* All arrays that a file can have, by one number, in the order of the numbers that the format gives
- * them (places.h). */
+ * them (ebpo_place_number). */
 #ifndef EBPO_FORMAT_CHUNK_DIRECTORY_H
 #define EBPO_FORMAT_CHUNK_DIRECTORY_H
 

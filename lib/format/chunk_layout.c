@@ -1,3 +1,10 @@
+/* The layout of a file's chunks, for the writer: how many rows the chunks of each array have, in
+ * which order chunks are stored, and which chunks each subtree needs. Levels near the root are
+ * stored whole; deep levels are stored subtree by subtree, so that one subtree is one range of
+ * bytes, except for the chunks of faces and vertices that it shares with subtrees before it.
+ * These shared chunks are listed in /subtrees/outer, and the sums before each subtree in
+ * /subtrees/counts. All of it is computed in integers, because the bytes of a file depend on it.
+ * Source: format-spec/README.md, section 9. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,21 +19,20 @@
 #include "geometry/node_types.h"
 #include "hdf5_read/shape.h"
 
-/* For writing: the chunks of faces and vertices that a subtree shares with those before it. One
- * subtree after the other. */
+/* --- the chunks that a subtree shares with those before it, one subtree after the other --- */
 
 /* A subtree's own: faces [face, face_end), vertices from `vertex` on. */
-typedef struct ebpo_outer_range {
+typedef struct outer_range {
     uint64_t face, face_end, vertex;
-} ebpo_outer_range;
+} outer_range;
 
-typedef struct ebpo_outer_blocks {
+typedef struct outer_blocks {
     /* [blocks of the mesh] the round in which a block was last listed */
     uint32_t *face_round, *vertex_round;
     uint32_t round;
     uint32_t *face_block, *vertex_block; /* [blocks of the mesh] those listed */
     uint64_t face_blocks, vertex_blocks;
-} ebpo_outer_blocks;
+} outer_blocks;
 
 enum {
     FIRST_LEVELS = 5,    /* these lie together, whatever the subtrees */
@@ -133,12 +139,11 @@ uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, 
     return rows;
 }
 
-static ebpo_status outer_blocks_make(ebpo_outer_blocks *out, const ebpo_info *info,
-                                     ebpo_error *error)
+static ebpo_status outer_blocks_make(outer_blocks *out, const ebpo_info *info, ebpo_error *error)
 {
     uint64_t faces = info->face_count / EBPO_FACE_BLOCK + 1,
              vertices = info->vertex_count / EBPO_VERTEX_BLOCK + 1;
-    *out = (ebpo_outer_blocks){ .round = 1 };
+    *out = (outer_blocks){ .round = 1 };
     out->face_round = ebpo_alloc_zero(faces, sizeof *out->face_round);
     out->vertex_round = ebpo_alloc_zero(vertices, sizeof *out->vertex_round);
     out->face_block = ebpo_alloc(faces, sizeof *out->face_block);
@@ -148,7 +153,7 @@ static ebpo_status outer_blocks_make(ebpo_outer_blocks *out, const ebpo_info *in
     return EBPO_OK;
 }
 
-static void outer_blocks_free(ebpo_outer_blocks *blocks)
+static void outer_blocks_free(outer_blocks *blocks)
 {
     free(blocks->face_round);
     free(blocks->vertex_round);
@@ -165,8 +170,7 @@ static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_
     blocks[(*count)++] = (uint32_t)block;
 }
 
-static void use_face(ebpo_outer_blocks *b, const ebpo_mesh *mesh, const ebpo_outer_range *own,
-                     uint64_t face)
+static void use_face(outer_blocks *b, const ebpo_mesh *mesh, const outer_range *own, uint64_t face)
 {
     for (int k = 0; k < 3; k++) {
         uint32_t vertex = mesh->faces[3 * face + (uint64_t)k];
@@ -177,8 +181,8 @@ static void use_face(ebpo_outer_blocks *b, const ebpo_mesh *mesh, const ebpo_out
 }
 
 /* Faces that its leaves refer to, own ones among them; and all its own faces. */
-static void outer_blocks_refer(ebpo_outer_blocks *b, const ebpo_mesh *mesh,
-                               const ebpo_outer_range *own, const uint32_t *refs, uint64_t count)
+static void outer_blocks_refer(outer_blocks *b, const ebpo_mesh *mesh, const outer_range *own,
+                               const uint32_t *refs, uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++)
         if (refs[i] < own->face) {
@@ -188,8 +192,7 @@ static void outer_blocks_refer(ebpo_outer_blocks *b, const ebpo_mesh *mesh,
         }
 }
 
-static void outer_blocks_use(ebpo_outer_blocks *b, const ebpo_mesh *mesh,
-                             const ebpo_outer_range *own)
+static void outer_blocks_use(outer_blocks *b, const ebpo_mesh *mesh, const outer_range *own)
 {
     for (uint64_t face = own->face; face < own->face_end; face++)
         use_face(b, mesh, own, face);
@@ -214,7 +217,7 @@ static uint64_t take_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uin
 
 /* Distances into `out`, faces first; adds how many there are to the sums before the subtree. Then
  * the lists are empty. */
-static void outer_blocks_take(ebpo_outer_blocks *b, const ebpo_outer_range *own, uint32_t *out,
+static void outer_blocks_take(outer_blocks *b, const outer_range *own, uint32_t *out,
                               const uint64_t *before, uint64_t *after)
 {
     uint64_t faces = take_blocks(b->face_block, b->face_blocks, own->face / EBPO_FACE_BLOCK, out);
@@ -364,11 +367,11 @@ static void count_vertices(const counting *c)
 
 static ebpo_status list_outer(const counting *c, ebpo_error *error)
 {
-    ebpo_outer_blocks blocks;
+    outer_blocks blocks;
     ebpo_status status = outer_blocks_make(&blocks, c->info, error);
     EBPO_FOR_ITEMS_EVERY(c->tree->mesh.workspace, SUBTREES_A_TIME, i, 0, c->sums->subtrees) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
-        ebpo_outer_range own = {
+        outer_range own = {
             .face = to[EBPO_S_FACES_BEFORE] + from[EBPO_S_FACES],
             .face_end = to[EBPO_S_FACES_BEFORE] + to[EBPO_S_FACES],
             .vertex = to[EBPO_S_VERTICES_BEFORE] + from[EBPO_S_VERTICES],

@@ -1,4 +1,8 @@
-/* Decoded chunks through a cache. */
+/* Ranges of rows of a file's arrays, through a cache of decoded chunks under a budget. Each
+ * chunk is decoded and checked once, when it is loaded, so that using it again costs no more
+ * than finding it. Any number of threads share the cache. A counted cache belongs to one thread,
+ * reads and announces only what its user requests, and refuses loads beyond a limit of bytes
+ * read (EBPO_E_LIMIT). */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -490,7 +494,7 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
     return EBPO_OK;
 }
 
-/* Rows of plain arrays, out of decoded chunks. */
+/* --- rows of plain arrays --- */
 
 static void widen_integers(const ebpo_shape *shape, const uint8_t *rows, uint64_t numbers,
                            uint8_t *values, size_t size)

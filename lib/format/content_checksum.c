@@ -1,3 +1,9 @@
+/* The content checksum: over all arrays of a file, sorted by path, the SHA-256 of the array as
+ * stored before shuffle and compression. It does not depend on the codec, on chunks or on HDF5.
+ * Where a coding depends on the chunks (vertex numbers in faces), the rows are recoded as those
+ * of a file without subtrees. The part `attributes` has a separate checksum of its values, so
+ * that the content checksum is the same with and without it. Source: format-spec/README.md,
+ * section 8. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -127,7 +133,7 @@ void ebpo_content_free(ebpo_content *content)
     memset(content, 0, sizeof *content);
 }
 
-/* The checksum of the part `attributes`: of the values, however they are stored. */
+/* --- the part `attributes`: its values, however they are stored --- */
 
 enum { PIECE = 1 << 16 };
 

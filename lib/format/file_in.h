@@ -69,7 +69,7 @@ typedef struct ebpo_attribute_in {
 typedef struct ebpo_attributes_in {
     uint64_t count;
     ebpo_attribute_in *head; /* [count] */
-    ebpo_array_in *array;    /* [arrays], see attribute_arrays.h */
+    ebpo_array_in *array;    /* [arrays], see ebpo_attribute_path */
     int arrays;
     uint8_t sha256[32];
 } ebpo_attributes_in;
@@ -83,7 +83,7 @@ struct ebpo_file {
     pthread_mutex_t lock;
     atomic_bool located; /* the chunks of all arrays are known */
     bool has_places;     /* a list says where they are */
-    bool has_sums;       /* a list says how each chunk ends: chunk_sums.h */
+    bool has_sums;       /* a list says how each chunk ends: chunk_directory.h */
     atomic_bool summed;  /* it has been read */
     uint32_t *sums;
     ebpo_idle_readers idle;

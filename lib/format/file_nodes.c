@@ -1,4 +1,8 @@
-/* Nodes of a file: children, planes, winding number. */
+/* Single nodes of a file, read through a cache of chunks: the children of a gray node, the
+ * planes and the winding number of a node; and groups of eight siblings with all of these, which
+ * is what a stream reads that does not follow the file's order. Each function reads only the
+ * chunks that contain the node, and checks the values against the head and the index. For remote
+ * files, a missing group and those after it are fetched together. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>

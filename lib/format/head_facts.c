@@ -1,3 +1,9 @@
+/* The attributes of a file's root and of its levels: ebpo_info except for what the reader
+ * measures. The tables in the first part have one row for each attribute; writing and reading
+ * are loops over these rows, so that both agree on names and types. A reader refuses a newer
+ * version and unknown required parts before it looks at anything else. Before any memory is
+ * sized by the attributes, check_ functions test whether they can be true together: ranges, and
+ * sums over the levels. Source: format-spec/README.md, section 3. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -173,8 +179,8 @@ static const fact subtree_level_fact = { "subtree_level", FACT_NUMBER, FACT_AT(s
                   colours_fact = { "colours_sha256", FACT_DIGEST, FACT_AT(colours_sha256) },
                   top_bytes_fact = { "top_bytes", FACT_HINT, FACT_AT(top_bytes) };
 
-/* What files and commands call the selections of planes, and which settings each takes. The
- * functions are in the construction's table (construct/selections.c). */
+/* --- selections of planes: their names, and which settings each takes; their functions are in
+ * construct/selections.c --- */
 
 static const ebpo_selection_traits selection_traits[] = {
     [EBPO_SELECT_INHERIT] = { .name = "inherit" },
@@ -193,7 +199,7 @@ const ebpo_selection_traits *ebpo_selection_describe(ebpo_selection selection)
     return (unsigned)selection < EBPO_SELECTION_COUNT ? &selection_traits[selection] : NULL;
 }
 
-/* Whether the facts in a file's head can be true together: before anything is sized by them. */
+/* --- can the attributes be true together? --- */
 
 static const uint64_t MESH_MAX = UINT32_MAX - 1, NODES_MAX = UINT64_C(1) << 40;
 
@@ -308,7 +314,7 @@ ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_stat
                                             : "the tree was not written");
 }
 
-/* Writing the attributes of a head. */
+/* --- writing --- */
 
 static const char FORMAT_VERSION[] = "1.1";
 static const char ABOUT[] = "A triangle mesh with an octree of convex envelopes (EBP-Octree), "
@@ -476,7 +482,7 @@ ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group,
     return status;
 }
 
-/* Reading the attributes of a head. */
+/* --- reading --- */
 
 static ebpo_status wrong_value(ebpo_head *in, const char *object, const char *name,
                                ebpo_error *error)

@@ -1,5 +1,9 @@
-/* Opening a file: the head, and whether every array is there in the shape that the head's counts
- * call for. */
+/* Opening a file: read the head, and check that every array is present in the shape that the
+ * counts in the head require. Nothing is sized by a count before head_facts.c has checked it,
+ * and the decoded size is limited relative to the size of the file. The second part opens files
+ * that other programs have rewritten with another HDF5 layout: libhdf5 copies these, in a
+ * separate process with limits of memory, time and bytes written, and the copy is opened like
+ * any other file. Source: format-spec/README.md, sections 2 and 3; docs/develop/threats.md. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -430,8 +434,7 @@ const ebpo_info *ebpo_file_info(const ebpo_file *file) { return &file->info; }
 
 ebpo_status ebpo_register_filters(ebpo_error *error) { return ebpo_h5_register(error); }
 
-/* Opening files that other programs have laid out: what they have is written anew through libhdf5,
- * in a process of its own, and the copy opened as every other file. */
+/* --- files that other programs have rewritten --- */
 
 enum { PIECE = 4 << 20, BYTES_A_SECOND = 4 << 20 };
 

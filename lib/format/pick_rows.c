@@ -1,3 +1,8 @@
+/* Selected rows of a file's arrays. A run is a range of sibling groups of one level; reading
+ * runs returns all arrays of the level for these nodes, with lists behind counts, and checks the
+ * values as schema.c checks whole levels. Rows of the mesh's arrays and of attributes are read
+ * in any order, chunk by chunk. Chunks are announced together first, and each is fetched once.
+ * Source: format-spec/README.md, sections 4 and 5. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -375,7 +380,7 @@ ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs, uint
     return status;
 }
 
-/* Rows of the mesh's arrays, in any order: chunk by chunk. */
+/* --- rows of the mesh's arrays, in any order --- */
 
 /* --- announcing --- */
 
@@ -525,7 +530,7 @@ ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t
                      error);
 }
 
-/* The same of an array of attributes (attribute_arrays.h): values, ends or items. */
+/* The same of an array of attributes (/attributes): values, ends or items. */
 static ebpo_status pick_attribute_rows(ebpo_chunks *chunks, int number, const uint32_t *rows,
                                        uint64_t count, unsigned threads, void *out,
                                        ebpo_error *error)
@@ -534,7 +539,7 @@ static ebpo_status pick_attribute_rows(ebpo_chunks *chunks, int number, const ui
                      threads, out, error);
 }
 
-/* Some rows of attributes, chunk by chunk: for subsets. */
+/* --- rows of attributes --- */
 
 typedef struct attribute_picking {
     ebpo_chunks *chunks;

@@ -1,4 +1,7 @@
-/* Opening: the arrays of /attributes and what their heads say. */
+/* Reading attributes of vertices, faces and other elements. Opening a file finds the arrays of
+ * /attributes and checks what their heads state (names, types, ranges, lists of different
+ * lengths); values are read later, as whole arrays, and compared with the checksum of the part.
+ * Source: format-spec/README.md, "Attributes". */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -294,7 +297,7 @@ const char *ebpo_attribute_type_text(uint64_t type)
                                           : NULL;
 }
 
-/* Reading attributes: whole arrays, and whether they are what the checksum says. */
+/* --- reading whole arrays, and their checksum --- */
 
 static bool floats_in(const ebpo_file *file, const ebpo_array_in *array)
 {

@@ -1,4 +1,8 @@
-/* One level from its arrays. */
+/* Reading whole parts of a file into memory: a level, the mesh, the maps to the source's
+ * numbers, the mesh in the source's order, and the whole tree. Levels and meshes are checked
+ * while they are read, so that a caller can use every index in them. Chunks are decoded on
+ * several threads directly into the result, which may be in a workspace on disk. The last part
+ * recomputes a file's checksums and compares them with those stated. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -207,7 +211,7 @@ ebpo_status ebpo_file_read_level(const ebpo_file *file, int level, const ebpo_re
     return status;
 }
 
-/* The mesh, its maps, the source's order, and whole trees. */
+/* --- the mesh, its maps, and whole trees --- */
 
 void ebpo_tree_free(ebpo_tree *tree)
 {
@@ -597,7 +601,7 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
     return status;
 }
 
-/* Recomputing a file's checksums. */
+/* --- recomputing checksums --- */
 
 /* Arrays are independent, so threads take whole ones; chunks within one must come in order. */
 typedef struct taking {

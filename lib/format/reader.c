@@ -1,3 +1,9 @@
+/* Reading chunks of an open file: fetch the stored bytes, compare their checksum, decompress and
+ * unshuffle them. Chunks are independent, so several threads read at once, each with its own
+ * decoding state; idle states stay with the file, because setting up a decoder takes longer than
+ * decoding a chunk. Before a reading, callers collect the chunks that they will read
+ * (ebpo_expected) and announce them as prefetch hints, so that a remote source fetches them in
+ * few requests; a hint never fails a reading. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -82,7 +88,7 @@ void ebpo_idle_readers_give(ebpo_idle_readers *readers, ebpo_idle_reader *r)
         free_reader(r);
 }
 
-/* Telling the source what will be read. */
+/* --- prefetch hints --- */
 
 static void add_range(ebpo_expected *e, uint64_t offset, uint64_t size)
 {

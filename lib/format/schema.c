@@ -1,3 +1,10 @@
+/* The arrays of a file, as a table in memory, and the constraints on them. array_table.inc lists
+ * all arrays and counts; this file makes the tables of them, and from these the paths, shapes,
+ * codings and needs that the writer, the reader and the subsets use, so that none of them names
+ * an array twice. The second part checks the arrays of a tree, whether it was read from a file
+ * (EBPO_E_FORMAT) or comes from a caller who writes it (EBPO_E_ARGUMENT): each check names the
+ * level, the array and the constraint. Source: format-spec/README.md, "Arrays" and
+ * "Constraints". */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -83,7 +90,13 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
                            .about = "" },
 };
 
-const ebpo_count_spec ebpo_counts[EBPO_COUNTS] = {
+typedef struct count_spec {
+    const char *name; /* attribute */
+    uint32_t needs;
+    uint16_t in_level, in_summary; /* offsets */
+} count_spec;
+
+static const count_spec level_counts[EBPO_COUNTS] = {
 #define LEVEL_COUNT(ID, attribute, field, needs)                                     \
     [EBPO_PER_##ID] = { #attribute, EBPO_NEEDS_##needs, offsetof(ebpo_level, field), \
                         offsetof(ebpo_level_summary, field) },
@@ -203,7 +216,7 @@ uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level)
     case EBPO_PER_SUBTREE: return subtree_rows(info);
     case EBPO_PER_OUTER_BLOCK:
     case EBPO_PER_CHUNK: return EBPO_ROWS_STATED;
-    default: return load_field(l, ebpo_counts[per].in_summary);
+    default: return load_field(l, level_counts[per].in_summary);
     }
 }
 
@@ -229,13 +242,13 @@ int ebpo_schema_node_type(ebpo_per per)
 
 uint64_t ebpo_level_count(const ebpo_level *level, ebpo_per per)
 {
-    return per < EBPO_COUNTS ? load_field(level, ebpo_counts[per].in_level) : level->group_count;
+    return per < EBPO_COUNTS ? load_field(level, level_counts[per].in_level) : level->group_count;
 }
 
 void ebpo_level_set_count(ebpo_level *level, ebpo_per per, uint64_t count)
 {
     if (per < EBPO_COUNTS)
-        store_field(level, ebpo_counts[per].in_level, count);
+        store_field(level, level_counts[per].in_level, count);
     else
         level->group_count = count;
 }
@@ -283,9 +296,9 @@ ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts)
     ebpo_level_summary out = { .gray_volume = level->gray_volume,
                                .leaf_volume = level->leaf_volume };
     for (int i = 0; i < EBPO_COUNTS; i++)
-        if (ebpo_counts[i].needs & (parts | EBPO_NEEDS_ALWAYS))
-            store_field(&out, ebpo_counts[i].in_summary,
-                        load_field(level, ebpo_counts[i].in_level));
+        if (level_counts[i].needs & (parts | EBPO_NEEDS_ALWAYS))
+            store_field(&out, level_counts[i].in_summary,
+                        load_field(level, level_counts[i].in_level));
     return out;
 }
 
@@ -297,7 +310,7 @@ ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level)
                        .leaf_volume = s->leaf_volume,
                        .pruned_count = s->pruned_count };
     for (int i = 0; i < EBPO_COUNTS; i++)
-        store_field(&out, ebpo_counts[i].in_level, load_field(s, ebpo_counts[i].in_summary));
+        store_field(&out, level_counts[i].in_level, load_field(s, level_counts[i].in_summary));
     return out;
 }
 
@@ -546,7 +559,7 @@ ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh, eb
                                     "a coordinate is not a finite number", error);
 }
 
-/* The names of the arrays of attributes, and of their codings. */
+/* --- names of the arrays of attributes, and of their codings --- */
 
 const char ebpo_coding_plain[] = "plain", ebpo_coding_columns[] = "columns";
 
@@ -559,7 +572,7 @@ void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES])
                  number % 2 ? "" : "_items");
 }
 
-/* The public name of the plane code's decoder. */
+/* --- plane codes --- */
 
 bool ebpo_plane_decode(uint32_t code, int32_t n[3], int32_t *d)
 {

@@ -21,7 +21,7 @@ typedef enum ebpo_array_id {
 #define SUM_ARRAY(ID, ...)   EBPO_A_##ID,
 #include "format/array_table.inc"
     /* all arrays of /attributes, which files have as many of as they like: the `level` is then the
-     * number of the array there (attribute_arrays.h) */
+     * number of the array there */
     EBPO_A_ATTRIBUTE,
     EBPO_ARRAYS
 } ebpo_array_id;
@@ -125,14 +125,6 @@ typedef struct ebpo_array_spec {
 } ebpo_array_spec;
 
 extern const ebpo_array_spec ebpo_schema[EBPO_ARRAYS];
-
-typedef struct ebpo_count_spec {
-    const char *name; /* attribute */
-    uint32_t needs;
-    uint16_t in_level, in_summary; /* offsets */
-} ebpo_count_spec;
-
-extern const ebpo_count_spec ebpo_counts[EBPO_COUNTS];
 
 /* How an array is stored whose values are of the shape `given`: as that, or as gates. */
 #define EBPO_GATES_CODING "gates"

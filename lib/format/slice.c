@@ -1,4 +1,9 @@
-/* Numbers that are picked here and there out of a large range, made dense in their own order. */
+/* Slices: whole subtrees as one piece, or the whole tree. A subtree is a contiguous range of the
+ * nodes of every level. A slice contains these ranges, the faces that its leaves list, and their
+ * vertices, with local numbers: first faces that are new in leaves before the subtree, in
+ * ascending order, then its own. Numbers that are scattered over a large range become dense by a
+ * hash table (ebpo_compact). A caller may limit the memory (ebpo_room), which is taken before
+ * each array is made. Source: format-spec/README.md, sections 4 and 5. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,8 +18,6 @@
 #include "format/slice.h"
 #include "format/subtree_index.h"
 #include "geometry/node_types.h"
-
-/* The faces and vertices of a slice. */
 
 static const uint32_t FREE = UINT32_MAX;
 
@@ -117,8 +120,7 @@ static uint32_t compact_find(const ebpo_compact *compact, uint32_t number)
     return compact->slot[slot_of(compact, number)].place;
 }
 
-/* The faces of a slice: its own, those that it only refers to, their vertices, and local numbers
- * for all. */
+/* --- faces --- */
 
 static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *single,
                         uint64_t singles, uint64_t first, uint64_t rows)
@@ -339,8 +341,7 @@ static ebpo_status slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool
     return status == EBPO_OK && maps ? take_source(slice, chunks, error) : status;
 }
 
-/* Subtrees as one piece: a subtree is a contiguous range of every level's nodes.
- * format-spec/README.md, sections 4 and 5. */
+/* --- subtrees --- */
 
 void ebpo_slice_free(ebpo_slice *slice)
 {
@@ -694,7 +695,7 @@ ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root, ebpo_
     return ebpo_slice_measure_nodes(chunks, root, EBPO_NEEDS_MESH, EBPO_SLICE_ALL, out, error);
 }
 
-/* The whole tree as a slice. */
+/* --- the whole tree --- */
 
 /* What a slice does not have. */
 static void drop_arrays(ebpo_level *level)

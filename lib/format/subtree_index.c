@@ -1,3 +1,10 @@
+/* Where subtrees and nodes begin in every array. The first part reads the file's table of
+ * subtrees: for each subtree the sums of all counts before it, from sums stored for some rows
+ * and counts in between; rows used last are kept. The second part computes ranks: the planes,
+ * faces and nodes of each type before a node. Levels below the roots of subtrees begin at the
+ * subtree's row; other levels have an index row for every 4,096 items, and counting continues
+ * from there. Results are checked against the counts in the head. The last part announces the
+ * chunks that subtrees need. Source: format-spec/README.md, sections 4 and 9. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -338,9 +345,7 @@ void ebpo_subtree_table_expect(ebpo_chunks *chunks, const uint64_t *subtrees, ui
     ebpo_expect_all(&e);
 }
 
-/* Ranks: where a node's group, planes and faces begin. Of levels below the roots of subtrees the
- * table tells where each subtree begins; of others an index has a row each 4,096 items. Counting
- * goes on from there. */
+/* --- ranks --- */
 
 ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group, uint64_t groups,
                                   uint64_t counts[4], ebpo_error *error)

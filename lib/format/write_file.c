@@ -1,3 +1,10 @@
+/* Writing a file: ebpo_tree_write. The headers come first (groups, arrays' headers, attributes,
+ * and HDF5's indexes of chunks); their size is learned from a trial in memory. Then the chunks
+ * are encoded and compressed in windows of some chunks, on several threads, and appended in the
+ * order of chunk_layout.c: first those of the top levels, which looking up a subtree takes, then
+ * all others. The lists of chunk offsets and chunk checksums are the last chunks. Checksums of
+ * the content are computed on the way. ebpo_repack reads a file and writes it again with other
+ * options. Source: format-spec/README.md, sections 2, 9 and 20. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,29 +28,28 @@
 #include "hdf5_read/face_gates.h"
 #include "io/publish.h"
 
-/* For writing: all of a file but its chunks: groups, arrays' headers, attributes, and the indexes
- * of chunks; how many bytes these take is learned from a trial in memory. */
+/* --- headers --- */
 
 /* In the order of the file. */
-typedef enum ebpo_list { EBPO_LIST_SUMS, EBPO_LIST_PLACES, EBPO_LISTS } ebpo_list;
+typedef enum header_list { LIST_SUMS, LIST_PLACES, LISTS } header_list;
 
-typedef struct ebpo_headers {
+typedef struct file_headers {
     ebpo_plan *plan; /* whose arrays get handles */
     ebpo_h5_out out;
     ebpo_h5_id root;
     /* lists about all chunks, the last chunks of the file; without rows they are not written */
-    ebpo_array_out list[EBPO_LISTS];
+    ebpo_array_out list[LISTS];
     uint64_t chunks; /* of the plan's arrays */
     int codec_level;
     uint64_t head_bytes;  /* headers */
     uint64_t index_bytes; /* of arrays of several chunks; 0: there are none */
-} ebpo_headers;
+} file_headers;
 
 /* The file's first chunk (of the root's type): it is written with the headers. */
-typedef struct ebpo_first_chunk {
+typedef struct first_chunk {
     const void *data;
     size_t bytes;
-} ebpo_first_chunk;
+} first_chunk;
 
 /* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that
  * where no other header follows. */
@@ -57,7 +63,7 @@ static bool has_index(const ebpo_plan *plan)
     return false;
 }
 
-static void plan_list(ebpo_headers *h, ebpo_list list, ebpo_array_id id, uint64_t rows)
+static void plan_list(file_headers *h, header_list list, ebpo_array_id id, uint64_t rows)
 {
     ebpo_array_out *a = &h->list[list];
     *a = (ebpo_array_out){ .id = id, .handle = -1 };
@@ -71,20 +77,20 @@ static void plan_list(ebpo_headers *h, ebpo_list list, ebpo_array_id id, uint64_
 
 /* The plan stays the caller's. End with headers_close, and ebpo_h5_finish or ebpo_h5_discard.
  */
-static void headers_plan(ebpo_headers *h, ebpo_plan *plan, uint64_t chunks,
+static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
                          const ebpo_write_options *options)
 {
     bool summed = options->chunk_sums == EBPO_SUMS_USUAL;
-    *h = (ebpo_headers){
+    *h = (file_headers){
         .plan = plan, .root = -1, .chunks = chunks, .codec_level = options->codec_level
     };
     h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
-    plan_list(h, EBPO_LIST_SUMS, EBPO_A_CHUNK_SUMS, summed ? chunks : 0);
-    plan_list(h, EBPO_LIST_PLACES, EBPO_A_PLACES,
+    plan_list(h, LIST_SUMS, EBPO_A_CHUNK_SUMS, summed ? chunks : 0);
+    plan_list(h, LIST_PLACES, EBPO_A_PLACES,
               plan->info.subtree_level ? chunks + has_index(plan) + summed : 0);
 }
 
-static ebpo_status make_level_groups(ebpo_headers *h, ebpo_error *error)
+static ebpo_status make_level_groups(file_headers *h, ebpo_error *error)
 {
     const ebpo_info *info = &h->plan->info;
     ebpo_h5_id id;
@@ -106,7 +112,7 @@ static ebpo_status make_level_groups(ebpo_headers *h, ebpo_error *error)
 }
 
 /* A group of the root, if what it is there for is, with room for all arrays that it may have. */
-static ebpo_status make_root_group(ebpo_headers *h, const char *path, uint32_t need,
+static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t need,
                                    ebpo_error *error)
 {
     unsigned links = 0;
@@ -121,7 +127,7 @@ static ebpo_status make_root_group(ebpo_headers *h, const char *path, uint32_t n
 }
 
 /* Of a list: its own place and the file's size, which tell readers whether it still holds. */
-static ebpo_status headers_put_holds(ebpo_headers *h, ebpo_list list, uint64_t file_bytes,
+static ebpo_status headers_put_holds(file_headers *h, header_list list, uint64_t file_bytes,
                                      uint64_t offset, ebpo_error *error)
 {
     ebpo_h5_id id = h->list[list].handle;
@@ -129,7 +135,7 @@ static ebpo_status headers_put_holds(ebpo_headers *h, ebpo_list list, uint64_t f
     return status == EBPO_OK ? ebpo_h5_put_count(&h->out, id, "offset", offset, error) : status;
 }
 
-static ebpo_status make_array(ebpo_headers *h, ebpo_array_out *a, const ebpo_first_chunk *first,
+static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_chunk *first,
                               ebpo_error *error)
 {
     ebpo_shape shape = ebpo_stored_shape(&a->shape, a->gates);
@@ -149,15 +155,15 @@ static ebpo_status make_array(ebpo_headers *h, ebpo_array_out *a, const ebpo_fir
 
 /* Everything but the chunks, and the first of these: before the first header grows by attributes:
  * HDF5 then cannot grow the metadata block at the end of the file, but only fill it. */
-static ebpo_status lay_out(ebpo_headers *h, const char *path, const char *shown,
-                           uint64_t head_bytes, ebpo_first_chunk first, ebpo_error *error)
+static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
+                           uint64_t head_bytes, first_chunk first, ebpo_error *error)
 {
     ebpo_plan *plan = h->plan;
     h->out.codec_level = h->codec_level;
     ebpo_status status =
         ebpo_h5_create(&h->out, path, shown, head_bytes,
-                       3 + (h->list[EBPO_LIST_SUMS].shape.rows != 0) +
-                           (plan->info.subtree_level != 0) + (plan->attributes != NULL),
+                       3 + (h->list[LIST_SUMS].shape.rows != 0) + (plan->info.subtree_level != 0) +
+                           (plan->attributes != NULL),
                        error);
     if (status == EBPO_OK)
         status = ebpo_h5_root(&h->out, &h->root, error);
@@ -175,7 +181,7 @@ static ebpo_status lay_out(ebpo_headers *h, const char *path, const char *shown,
         status = ebpo_attributes_put_group(&h->out, plan, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)
         status = make_array(h, &plan->array[i], i == 0 ? &first : NULL, error);
-    for (ebpo_list l = 0; l < EBPO_LISTS && status == EBPO_OK; l++) {
+    for (header_list l = 0; l < LISTS && status == EBPO_OK; l++) {
         if (h->list[l].shape.rows == 0)
             continue;
         status = make_array(h, &h->list[l], NULL, error);
@@ -186,13 +192,13 @@ static ebpo_status lay_out(ebpo_headers *h, const char *path, const char *shown,
 }
 
 /* Closes root and arrays, not the file. */
-static void headers_close(ebpo_headers *h)
+static void headers_close(file_headers *h)
 {
     for (unsigned i = 0; i < h->plan->count; i++) {
         ebpo_h5_close_id(&h->out, h->plan->array[i].handle);
         h->plan->array[i].handle = -1;
     }
-    for (ebpo_list l = 0; l < EBPO_LISTS; l++) {
+    for (header_list l = 0; l < LISTS; l++) {
         ebpo_h5_close_id(&h->out, h->list[l].handle);
         h->list[l].handle = -1;
     }
@@ -201,19 +207,19 @@ static void headers_close(ebpo_headers *h)
 }
 
 /* Then the file, which is left open. `shown`: for messages. */
-static ebpo_status headers_lay_out(ebpo_headers *h, const char *path, const char *shown,
-                                   ebpo_first_chunk first, ebpo_error *error)
+static ebpo_status headers_lay_out(file_headers *h, const char *path, const char *shown,
+                                   first_chunk first, ebpo_error *error)
 {
     return lay_out(h, path, shown, h->head_bytes, first, error);
 }
 
 /* Sizes of headers and indexes: the same file in memory, with chunks of one byte. */
-static ebpo_status headers_measure(ebpo_headers *h, const char *shown, ebpo_error *error)
+static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_error *error)
 {
     ebpo_plan *plan = h->plan;
     uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * h->chunks,
              headers = 0, all = 0;
-    ebpo_status status = lay_out(h, NULL, shown, capacity, (ebpo_first_chunk){ "", 1 }, error);
+    ebpo_status status = lay_out(h, NULL, shown, capacity, (first_chunk){ "", 1 }, error);
     if (status == EBPO_OK)
         status = ebpo_h5_head_used(&h->out, capacity, &headers, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++) {
@@ -235,7 +241,7 @@ static ebpo_status headers_measure(ebpo_headers *h, const char *shown, ebpo_erro
 
 /* With index_bytes: what comes now is in a piece of its own, once the first array of several chunks
  * calls for it. */
-static ebpo_status headers_begin_index(ebpo_headers *h, ebpo_error *error)
+static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 {
     headers_close(h);
     ebpo_status status = ebpo_h5_reopen(&h->out, h->index_bytes, error);
@@ -244,14 +250,13 @@ static ebpo_status headers_begin_index(ebpo_headers *h, ebpo_error *error)
     for (unsigned i = 0; i < h->plan->count && status == EBPO_OK; i++)
         status =
             ebpo_h5_open_array(&h->out, h->plan->array[i].path, &h->plan->array[i].handle, error);
-    for (ebpo_list l = 0; l < EBPO_LISTS && status == EBPO_OK; l++)
+    for (header_list l = 0; l < LISTS && status == EBPO_OK; l++)
         if (h->list[l].shape.rows)
             status = ebpo_h5_open_array(&h->out, h->list[l].path, &h->list[l].handle, error);
     return status;
 }
 
-/* ebpo_tree_write: headers, the chunks of the first levels, the index of large arrays' chunks, and
- * all other chunks, in one go. */
+/* --- chunks --- */
 
 /* Chunks that are in memory at a time: 8 MiB raw and as much encoded. */
 enum { WINDOW = 128 };
@@ -268,7 +273,7 @@ typedef struct writer {
     ebpo_plan plan;
     const ebpo_write_options *options;
     unsigned threads;
-    ebpo_headers head;
+    file_headers head;
     slot slots[WINDOW];
     unsigned used;            /* slots */
     ebpo_chunk_coder *coders; /* one for each thread */
@@ -377,7 +382,7 @@ static ebpo_status encode_window(writer *w, ebpo_error *error)
 
 static void note_place(writer *w, uint32_t number, uint64_t bytes)
 {
-    if (!w->head.list[EBPO_LIST_PLACES].shape.rows)
+    if (!w->head.list[LIST_PLACES].shape.rows)
         return;
     w->place[w->place_count++] = ebpo_place(number, bytes);
 }
@@ -391,7 +396,7 @@ static void place_chunk(writer *w, const slot *s)
     }
     uint32_t number = ebpo_place_number(s->array->id, s->array->level);
     note_place(w, number, s->stored_bytes);
-    if (w->head.list[EBPO_LIST_SUMS].shape.rows)
+    if (w->head.list[LIST_SUMS].shape.rows)
         w->sum[w->first_sum[s->array - w->plan.array] + s->chunk] =
             ebpo_place(number, ebpo_chunk_sum(s->stored, s->stored_bytes));
     w->chunk_bytes += s->stored_bytes;
@@ -431,7 +436,7 @@ static ebpo_status write_chunks(writer *w, ebpo_error *error)
     return status == EBPO_OK && w->used ? flush_window(w, error) : status;
 }
 
-static ebpo_status write_list(writer *w, ebpo_list list, const uint64_t *values, size_t *bytes,
+static ebpo_status write_list(writer *w, header_list list, const uint64_t *values, size_t *bytes,
                               ebpo_error *error)
 {
     const ebpo_array_out *a = &w->head.list[list];
@@ -452,21 +457,18 @@ static ebpo_status write_list(writer *w, ebpo_list list, const uint64_t *values,
  * they do not hold. */
 static ebpo_status write_lists(writer *w, ebpo_error *error)
 {
-    size_t bytes[EBPO_LISTS];
+    size_t bytes[LISTS];
     uint64_t offset = w->head.head_bytes + w->chunk_bytes + w->head.index_bytes, size = 0;
-    const uint64_t *values[EBPO_LISTS] = { w->sum, w->place };
-    ebpo_status status =
-        write_list(w, EBPO_LIST_SUMS, values[EBPO_LIST_SUMS], &bytes[EBPO_LIST_SUMS], error);
-    if (status == EBPO_OK && bytes[EBPO_LIST_SUMS])
-        note_place(w, ebpo_place_number(EBPO_A_CHUNK_SUMS, 0), bytes[EBPO_LIST_SUMS]);
+    const uint64_t *values[LISTS] = { w->sum, w->place };
+    ebpo_status status = write_list(w, LIST_SUMS, values[LIST_SUMS], &bytes[LIST_SUMS], error);
+    if (status == EBPO_OK && bytes[LIST_SUMS])
+        note_place(w, ebpo_place_number(EBPO_A_CHUNK_SUMS, 0), bytes[LIST_SUMS]);
     if (status == EBPO_OK)
-        status = write_list(w, EBPO_LIST_PLACES, values[EBPO_LIST_PLACES], &bytes[EBPO_LIST_PLACES],
-                            error);
+        status = write_list(w, LIST_PLACES, values[LIST_PLACES], &bytes[LIST_PLACES], error);
     if (status == EBPO_OK)
         status = ebpo_h5_size(&w->head.out, &size, error);
-    bool holds =
-        status == EBPO_OK && size == offset + bytes[EBPO_LIST_SUMS] + bytes[EBPO_LIST_PLACES];
-    for (ebpo_list l = 0; l < EBPO_LISTS && status == EBPO_OK; l++) {
+    bool holds = status == EBPO_OK && size == offset + bytes[LIST_SUMS] + bytes[LIST_PLACES];
+    for (header_list l = 0; l < LISTS && status == EBPO_OK; l++) {
         if (w->head.list[l].shape.rows)
             status = headers_put_holds(&w->head, l, holds ? size : 0, holds ? offset : 0, error);
         offset += bytes[l];
@@ -484,8 +486,8 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
     uint8_t *block = ebpo_alloc(wanted, slot_bytes);
     w->slots[0].raw = block;
     w->digest = ebpo_alloc(w->plan.count, sizeof *w->digest);
-    w->place = ebpo_alloc(w->head.list[EBPO_LIST_PLACES].shape.rows, sizeof *w->place);
-    w->sum = ebpo_alloc(w->head.list[EBPO_LIST_SUMS].shape.rows, sizeof *w->sum);
+    w->place = ebpo_alloc(w->head.list[LIST_PLACES].shape.rows, sizeof *w->place);
+    w->sum = ebpo_alloc(w->head.list[LIST_SUMS].shape.rows, sizeof *w->sum);
     w->first_sum = ebpo_alloc(w->plan.count, sizeof *w->first_sum);
     if (!w->coders || !block || !w->digest || !w->place || !w->sum || !w->first_sum)
         return ebpo_fail_memory(error, wanted * slot_bytes);
@@ -536,8 +538,7 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
     if (status == EBPO_OK)
         status = headers_measure(&w->head, shown, error);
     if (status == EBPO_OK)
-        status =
-            headers_lay_out(&w->head, path, shown, (ebpo_first_chunk){ first, first_bytes }, error);
+        status = headers_lay_out(&w->head, path, shown, (first_chunk){ first, first_bytes }, error);
     if (status == EBPO_OK && w->head.index_bytes)
         status = headers_begin_index(&w->head, error);
     if (status == EBPO_OK)
@@ -638,7 +639,7 @@ ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const 
     return write_tree(tree, path, shown, NULL, options, error);
 }
 
-/* A file written anew, which holds what it held. */
+/* --- repacking --- */
 
 /* What is on the disk, against the content of the file that was read. */
 static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,

@@ -1,5 +1,9 @@
-/* Prefix sums that let a reader start in the middle of a level. Arrays of an absent part count as
- * zeros. */
+/* The plan of a file to be written: the list of its arrays with their shapes and codings, and
+ * the function that encodes rows of an array to bytes. The plan refers to the caller's tree,
+ * which has been checked, and owns only derived arrays: prefix sums that let a reader start in
+ * the middle of a level (arrays of an absent part count as zeros), sums before subtrees, and
+ * codings of attributes. Encoding depends on nothing but the plan and the rows, so that threads
+ * encode chunks independently. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -70,7 +74,7 @@ uint64_t *ebpo_index_leaves(const ebpo_level *level)
     return index;
 }
 
-/* Attributes on their way into a file: what is checked, how they are coded, and their head. */
+/* --- attributes: checks, codings and heads --- */
 
 /* --- checking --- */
 
@@ -311,7 +315,7 @@ ebpo_status ebpo_attributes_put_array(ebpo_h5_out *out, const ebpo_plan *plan,
     return status;
 }
 
-/* Rows to bytes, see plan.h. */
+/* --- encoding rows --- */
 
 static void encode_skips(const ebpo_level *level, const ebpo_shape *shape, uint64_t row,
                          uint64_t rows, uint8_t *file)
