@@ -1,5 +1,5 @@
-/* What is exported: a level's envelopes with their nodes, or the mesh with its source's numbers;
- * and colours. */
+/* What all export formats share: blocks (a level's envelopes with their nodes, or the mesh with its
+ * source's numbers; and colours), the job that a writer is called with, and the writers. */
 #ifndef EBPO_DERIVE_EXPORT_JOB_H
 #define EBPO_DERIVE_EXPORT_JOB_H
 
@@ -57,7 +57,7 @@ void *ebpo_column_make(const ebpo_block *block, int column, bool polygons);
  * is short. */
 void *ebpo_column_of_vertices(const ebpo_block *block);
 
-/* Inside lib/derive: what a writer is asked for, and what all of them do with it. */
+/* --- jobs and formats --- */
 
 typedef struct ebpo_export_job ebpo_export_job;
 

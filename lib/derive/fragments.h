@@ -79,7 +79,7 @@ EBPO_MUST_USE ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebp
                                            ebpo_leaf_scratch *scratch, ebpo_half_spaces *halves,
                                            ebpo_error *error);
 
-/* What one thread works with while it bounds how far an envelope reaches. */
+/* --- what one thread works with while it bounds how far an envelope reaches --- */
 
 typedef struct ebpo_fragment ebpo_fragment;
 
@@ -101,7 +101,7 @@ typedef struct ebpo_bounder {
     ebpo_error *error;
 } ebpo_bounder;
 
-/* The pieces that error_bound.c searches: a stack, and how a piece is cut. */
+/* --- the pieces that error_bound.c searches: a stack, and how a piece is cut --- */
 
 #define EBPO_FRAGMENT_LEAST 1e-6 /* pieces are not cut below this, in sides of the cell */
 

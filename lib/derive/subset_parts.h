@@ -1,4 +1,4 @@
-/* What the files of the subset share. */
+/* What the files that cut subsets share. */
 #ifndef EBPO_DERIVE_SUBSET_PARTS_H
 #define EBPO_DERIVE_SUBSET_PARTS_H
 
@@ -21,11 +21,11 @@ typedef struct ebpo_cutting {
     ebpo_error *error;
 } ebpo_cutting;
 
-/* --- subset_levels.c: the levels that remain, with face numbers of the source --- */
+/* In subset_levels.c. Cuts the levels that remain, with face numbers of the source. */
 EBPO_MUST_USE ebpo_status ebpo_cut_levels(ebpo_cutting *c);
 
-/* --- subset_faces.c: the faces that the remaining leaves list, numbered anew, and their vertices
- * and maps. Without any, the parts are taken off --- */
+/* In subset_faces.c. Renumbers the faces that the remaining leaves list, with their vertices and
+ * maps. Without any faces, these parts are removed. */
 EBPO_MUST_USE ebpo_status ebpo_cut_faces(ebpo_cutting *c);
 
 /* Computes the volumes of the envelopes of the nodes that remain. */
@@ -35,7 +35,7 @@ void ebpo_cut_volumes(ebpo_cutting *c);
 EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
                                            const ebpo_subset_options *options, ebpo_error *error);
 
-/* What a subset would take of its file, told from heads and tables, without cutting it. */
+/* --- the bytes that a subset needs of its file, from heads and tables, without cutting it --- */
 
 typedef struct ebpo_subset_reads {
     uint64_t subtrees, of_subtrees; /* that meet the box, and all; 0, 0: the file has none */

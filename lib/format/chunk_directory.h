@@ -1,5 +1,5 @@
-/* All arrays that a file can have, by one number, in the order of the numbers that the format gives
- * them (ebpo_place_number). */
+/* The offset, stored size and checksum of every chunk of an open file.
+ * format-spec/README.md, sections 9 and 20. */
 #ifndef EBPO_FORMAT_CHUNK_DIRECTORY_H
 #define EBPO_FORMAT_CHUNK_DIRECTORY_H
 
@@ -10,6 +10,8 @@
 #include "format/schema.h"
 #include "hdf5_read/chunk.h"
 
+/* All arrays that a file can have, by one index, in the order of the numbers that the format gives
+ * them (ebpo_place_number). */
 enum {
     EBPO_ARRAYS_OF_LEVELS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS,
     EBPO_ARRAYS_OF_FORMAT = EBPO_ARRAYS_OF_LEVELS + EBPO_ARRAYS - EBPO_LEVEL_ARRAYS
@@ -31,7 +33,7 @@ static inline ebpo_array_in *ebpo_array_number(ebpo_file *file, int i)
                : &file->attributes.array[i - EBPO_ARRAYS_OF_FORMAT];
 }
 
-/* Where every chunk of a file lies, in one list. format-spec/README.md, section 9, "Places". */
+/* --- the list of all chunks, /subtrees/places: format-spec/README.md, section 9, "Places" --- */
 
 /* Stands for a gap. */
 #define EBPO_PLACE_GAP UINT32_MAX
@@ -49,7 +51,7 @@ static inline uint64_t ebpo_place(uint32_t number, uint64_t bytes)
 static inline uint32_t ebpo_place_number_of(uint64_t place) { return (uint32_t)(place >> 32); }
 static inline uint32_t ebpo_place_bytes_of(uint64_t place) { return (uint32_t)place; }
 
-/* A list of u64 that is a single chunk, however long: of what tells of all chunks of a file. */
+/* --- lists of u64 in a single chunk, however long --- */
 
 /* `bytes`: of the encoded list, which the caller frees. `codec_level`: as in ebpo_write_options. */
 EBPO_MUST_USE ebpo_status ebpo_long_chunk_encode(const uint64_t *values, uint64_t count,
@@ -68,8 +70,9 @@ EBPO_MUST_USE ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t s
 EBPO_MUST_USE ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *array,
                                                uint64_t **values, ebpo_error *error);
 
-/* How many bytes of a file its arrays take. */
+/* --- stored sizes --- */
 
+/* EBPO_E_FORMAT: the arrays whose chunks are known take more bytes than the file has. */
 EBPO_MUST_USE ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error);
 
 /* EBPO_E_LIMIT: decoded they take more than `most` times the file's bytes, and more than
@@ -77,9 +80,9 @@ EBPO_MUST_USE ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *e
 EBPO_MUST_USE ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uint64_t most,
                                                       ebpo_error *error);
 
-/* How every chunk of a file ends, in one list: a chunk's own checksum does not tell which chunk it
- * is, so one in another's place, or from another version of the file, would be taken for the right
- * one. format-spec/README.md, section 20. */
+/* --- checksums: how every chunk of a file ends, in one list. A chunk's own checksum does not tell
+ * which chunk it is, so one in another's place, or from another version of the file, would be taken
+ * for the right one. format-spec/README.md, section 20 --- */
 
 /* What the list says of a chunk: its last four bytes, which are its checksum in every pipeline that
  * has one. `bytes`: as stored, four or more. */

@@ -1,5 +1,5 @@
-/* For writing: where each subtree begins in every array, and which chunks from elsewhere it needs.
- * format-spec/README.md, section 9. */
+/* For writing: the list of arrays, the rows and the order of their chunks, and the counts of
+ * subtrees. format-spec/README.md, section 9. */
 #ifndef EBPO_FORMAT_CHUNK_LAYOUT_H
 #define EBPO_FORMAT_CHUNK_LAYOUT_H
 
@@ -29,7 +29,7 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_sums_make(ebpo_subtree_sums *out, const e
                                                  const ebpo_info *info, ebpo_error *error);
 void ebpo_subtree_sums_free(ebpo_subtree_sums *sums);
 
-/* What is about to be written: the list of arrays. */
+/* --- the arrays to be written --- */
 
 typedef struct ebpo_array_out {
     ebpo_array_id id;
@@ -66,8 +66,7 @@ typedef struct ebpo_plan {
     uint8_t attributes_sha256[32];
 } ebpo_plan;
 
-/* For writing: how many rows chunks have, and which levels are laid out alike.
- * format-spec/README.md, section 9, "Order". */
+/* --- rows of chunks --- */
 
 /* Rows of an array's chunks, all or a power of two; `rows` are those of the array. */
 uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
@@ -79,8 +78,7 @@ uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, 
 uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, bool subtrees,
                                     bool kept);
 
-/* For writing: the order of chunks in the file.
- * format-spec/README.md, section 9. */
+/* --- the order of chunks --- */
 
 typedef struct ebpo_ordered_chunk {
     uint32_t array; /* of the plan */

@@ -53,7 +53,7 @@ EBPO_MUST_USE ebpo_status ebpo_content_end(ebpo_content *content, uint8_t digest
                                            ebpo_error *error);
 void ebpo_content_free(ebpo_content *content);
 
-/* The checksum of the part `attributes`. */
+/* --- the checksum of the part `attributes` --- */
 
 EBPO_MUST_USE ebpo_status ebpo_attributes_digest(const ebpo_attributes *attributes,
                                                  uint8_t digest[32], ebpo_error *error);

@@ -1,4 +1,4 @@
-/* Nodes of a file, read through its chunks. */
+/* Single nodes and groups of siblings of a file, read through a cache of chunks. */
 #ifndef EBPO_FORMAT_FILE_NODES_H
 #define EBPO_FORMAT_FILE_NODES_H
 
@@ -32,8 +32,7 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root,
 
 extern const ebpo_node_source ebpo_chunks_source;
 
-/* The children of one gray node, read by themselves: what a stream in any other order than that of
- * the file takes. */
+/* --- groups: the children of one gray node, for streams that do not follow the file's order --- */
 
 enum { EBPO_GROUP_CODES = 8 * 255, EBPO_GROUP_BLOCK = EBPO_INDEX_ROWS };
 

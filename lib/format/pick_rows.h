@@ -1,5 +1,6 @@
-/* What runs of nodes have in a level's arrays: all that the table of arrays lists, read through a
- * cache of chunks and checked. */
+/* Selected rows of a file's arrays: runs of sibling groups of a level, and rows of the mesh's
+ * arrays and of attributes. Chunks are announced together, and each is fetched once; values are
+ * checked. */
 #ifndef EBPO_FORMAT_PICK_ROWS_H
 #define EBPO_FORMAT_PICK_ROWS_H
 
@@ -24,10 +25,6 @@ void ebpo_runs_expect(ebpo_chunks *chunks, ebpo_expected *expected, int level, c
 EBPO_MUST_USE ebpo_status ebpo_runs_read(ebpo_chunks *chunks, int level, const ebpo_run *runs,
                                          uint64_t run_count, uint32_t needs, ebpo_room *room,
                                          ebpo_level *out, ebpo_error *error);
-
-/* Picking here and there: runs of sibling groups of one level, and rows of the mesh's arrays, each
- * chunk fetched once and what is needed announced together. Everything that comes out has been
- * checked, as in slice.h. */
 
 /* All nodes of ascending runs that do not overlap, as one level: group_count is the sum of the
  * runs', whose ranks and counts are filled in. Every array that is there for one of `parts` (face

@@ -1,4 +1,4 @@
-/* Attributes out of a file. */
+/* Reading attributes of vertices, faces and other elements. */
 #ifndef EBPO_FORMAT_READ_ATTRIBUTES_H
 #define EBPO_FORMAT_READ_ATTRIBUTES_H
 
@@ -23,9 +23,7 @@ void ebpo_attribute_decode(const ebpo_file *file, const ebpo_array_in *array, ui
 EBPO_MUST_USE ebpo_status ebpo_attributes_check(const ebpo_file *file,
                                                 const ebpo_read_options *read, ebpo_error *error);
 
-/* The arrays of attributes of a file that is being opened. */
-
-/* The part's arrays, with their head; nothing, if the file does not have the part. */
+/* For opening a file: the part's arrays, with their head; nothing, if the file does not have it. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_open(ebpo_file *file, ebpo_head *head, ebpo_error *error);
 void ebpo_attributes_close(ebpo_file *file);
 

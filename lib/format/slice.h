@@ -83,7 +83,7 @@ static inline uint64_t ebpo_slice_file_face(const ebpo_slice *slice, uint32_t lo
                                       : slice->first_face + (local - slice->outer_count);
 }
 
-/* Different numbers out of a large range, sorted, and the position of each. */
+/* --- distinct numbers from a large range, sorted, and the position of each --- */
 
 typedef struct ebpo_compact {
     /* open addressing, at most half full; number UINT32_MAX: free */

@@ -1,5 +1,5 @@
-/* Where subtrees begin in every array, from the file's table: format-spec/README.md, section 9.
- * What comes out fits the counts of the head. Any thread. */
+/* Where subtrees, groups, planes and faces begin in every array. Results fit the counts in the
+ * head. Any thread. format-spec/README.md, sections 4 and 9. */
 #ifndef EBPO_FORMAT_SUBTREE_INDEX_H
 #define EBPO_FORMAT_SUBTREE_INDEX_H
 
@@ -42,7 +42,7 @@ bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, ui
 void ebpo_subtree_table_expect(ebpo_chunks *chunks, const uint64_t *subtrees, uint64_t count);
 void ebpo_subtree_table_expect_run(ebpo_chunks *chunks, uint64_t first, uint64_t count);
 
-/* Ranks: from the nearest row of an index, and counting from there. */
+/* --- ranks: from the nearest row of an index, and counting from there --- */
 
 /* Sum of rows of an unsigned array; EBPO_E_FORMAT when it is beyond 2^62. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level,
@@ -71,7 +71,7 @@ EBPO_MUST_USE ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64
 EBPO_MUST_USE ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf,
                                                  uint64_t *planes, ebpo_error *error);
 
-/* Telling the source all that subtrees take, at once. */
+/* --- prefetch hints --- */
 
 /* All chunks of the subtrees [first, first + count) that are not in memory: nodes below their
  * roots, of the arrays that are there for `needs`; with EBPO_NEEDS_MESH the faces that their leaves

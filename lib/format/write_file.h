@@ -1,4 +1,4 @@
-/* Writing for files that may not stay. */
+/* Writing a file without publishing it. */
 #ifndef EBPO_FORMAT_WRITE_FILE_H
 #define EBPO_FORMAT_WRITE_FILE_H
 

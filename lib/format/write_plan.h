@@ -18,17 +18,14 @@ void ebpo_plan_free(ebpo_plan *plan);
 void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
                       uint64_t rows, uint8_t *file);
 
-/* Prefix sums that let a reader start in the middle of a level. */
-
-/* Index arrays (also what readers compare against), one row for each EBPO_INDEX_ROWS items, at
+/* Prefix sums that let a reader start in the middle of a level, which readers compare with those of
+ * the file: one row for each EBPO_INDEX_ROWS items, at
  * least one; NULL when memory is short. */
 uint64_t *ebpo_index_types(const ebpo_level *level, bool root);
 uint64_t *ebpo_index_gray(const ebpo_level *level);
 uint64_t *ebpo_index_leaves(const ebpo_level *level);
 
-/* Attributes on their way into a file. */
-
-/* The attributes of the group, and those of an array beside `about`. */
+/* Writes the HDF5 attributes of /attributes, and those of an array there beside `about`. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_put_group(ebpo_h5_out *out, const ebpo_plan *plan,
                                                     ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_attributes_put_array(ebpo_h5_out *out, const ebpo_plan *plan,
