@@ -1,4 +1,4 @@
-/* The function of each selection; its name and settings: format/selection_traits.c. */
+/* The function of each selection; its name and settings: format/head_facts.c. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -1,40 +1,87 @@
-/* Levels and the mesh in other programs' formats: what is the same for all. */
+/* Exports of levels and of the mesh in other programs' formats. The table below has one row for
+ * each format: its name, its second file, what it holds, and the function that writes it. A new
+ * format is a value of ebpo_export_format, a row here, and a file export_NAME.c with the function,
+ * which is declared in export_job.h. Functions that all writers share are in export_job.c. */
 #include <ebpo/export.h>
 
 #include <stdio.h>
 #include <string.h>
 
+#include "ebpo_config.h"
+
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "derive/formats.h"
+#include "core/sized.h"
+#include "derive/export_job.h"
 #include "io/file_source.h"
+
+#if EBPO_HAVE_ASSIMP
+#define WRITE_BY_ASSIMP ebpo_export_assimp
+#else
+#define WRITE_BY_ASSIMP NULL
+#endif
+
+/* In the order of ebpo_export_format. */
+static const ebpo_export_row formats[] = {
+    [EBPO_EXPORT_XDMF] = { .name = "xdmf",
+                           .second_ending = ".h5",
+                           .holds_vertex_colours = true,
+                           .holds_face_colours = true,
+                           .write = ebpo_export_xdmf },
+    [EBPO_EXPORT_VTKHDF] = { .name = "vtkhdf",
+                             .holds_vertex_colours = true,
+                             .holds_face_colours = true,
+                             .write = ebpo_export_vtkhdf },
+    [EBPO_EXPORT_GLTF] = { .name = "gltf",
+                           .second_ending = ".bin",
+                           .replaces_ending = true,
+                           .holds_vertex_colours = true,
+                           .takes_colours = true,
+                           .write = ebpo_export_gltf },
+    [EBPO_EXPORT_GLB] = { .name = "glb",
+                          .holds_vertex_colours = true,
+                          .takes_colours = true,
+                          .write = ebpo_export_gltf },
+    [EBPO_EXPORT_OBJ] = { .name = "obj",
+                          .holds_vertex_colours = true,
+                          .takes_colours = true,
+                          .write = WRITE_BY_ASSIMP },
+    [EBPO_EXPORT_STL] = { .name = "stl", .one_block = true, .write = WRITE_BY_ASSIMP },
+};
+
+/* Returns NULL for a value that is no format. */
+static const ebpo_export_row *format_row(ebpo_export_format format)
+{
+    return (unsigned)format < sizeof formats / sizeof *formats ? &formats[format] : NULL;
+}
 
 const char *ebpo_export_format_name(ebpo_export_format format)
 {
-    static const char *const names[] = { "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl" };
-    return (unsigned)format < sizeof names / sizeof *names ? names[format] : NULL;
+    const ebpo_export_row *row = format_row(format);
+    return row ? row->name : NULL;
 }
 
 bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *out,
                              size_t capacity)
 {
+    const ebpo_export_row *row = format_row(format);
     const char *name = ebpo_path_name(path), *dot = strrchr(name, '.');
     int length = -1;
     if (capacity)
         *out = 0;
-    if (format == EBPO_EXPORT_XDMF) /* readers take what follows the first ":" as the path within
-                                       the HDF5 file */
-        length = strchr(name, ':') ? -1 : snprintf(out, capacity, "%s.h5", path);
-    else if (format == EBPO_EXPORT_GLTF)
-        length = snprintf(out, capacity, "%.*s.bin",
-                          (int)(dot && dot != name ? dot - path : (int)strlen(path)), path);
-    else
+    if (!row || !row->second_ending)
         return true;
+    if (row->replaces_ending)
+        length = snprintf(out, capacity, "%.*s%s",
+                          (int)(dot && dot != name ? dot - path : (int)strlen(path)), path,
+                          row->second_ending);
+    else /* readers take what follows the first ":" as the path within the HDF5 file */
+        length = strchr(name, ':') ? -1 : snprintf(out, capacity, "%s%s", path, row->second_ending);
     return length >= 0 && (size_t)length < capacity;
 }
 
-static ebpo_status check(const ebpo_info *info, ebpo_export_format format,
-                         const ebpo_export_options *o, ebpo_error *error)
+static ebpo_status check_export(const ebpo_info *info, const ebpo_export_row *row,
+                                const ebpo_export_options *o, ebpo_error *error)
 {
     int blocks = ebpo_block_count(o),
         asked = o->first_level < 0 || o->first_level >= info->level_count ? o->first_level
@@ -46,27 +93,25 @@ static ebpo_status check(const ebpo_info *info, ebpo_export_format format,
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "there is no level %d; this file has levels 0 to %d", asked,
                          info->level_count - 1);
-    if (o->vertex_colours && (!o->mesh || (format != EBPO_EXPORT_GLTF &&
-                                           format != EBPO_EXPORT_GLB && format != EBPO_EXPORT_OBJ)))
+    if (o->vertex_colours && (!o->mesh || !row || !row->takes_colours))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "colours can be given to the mesh in glTF, GLB and OBJ only");
-    if (format == EBPO_EXPORT_STL && blocks > 1)
+    if (row && row->one_block && blocks > 1)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "an STL file holds one thing: one level, or the mesh");
     return EBPO_OK;
 }
 
-static ebpo_status write_format(ebpo_export_job *job, ebpo_error *error)
+static ebpo_status write_format(const ebpo_export_job *job, ebpo_error *error)
 {
-    switch (job->format) {
-    case EBPO_EXPORT_XDMF: return ebpo_export_xdmf(job, error);
-    case EBPO_EXPORT_VTKHDF: return ebpo_export_vtkhdf(job, error);
-    case EBPO_EXPORT_GLTF:
-    case EBPO_EXPORT_GLB: return ebpo_export_gltf(job, error);
-    case EBPO_EXPORT_OBJ:
-    case EBPO_EXPORT_STL: return ebpo_export_scene(job, error);
-    }
-    return ebpo_fail(error, EBPO_E_ARGUMENT, "%d is not an export format", (int)job->format);
+    if (!job->row)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%d is not an export format", (int)job->format);
+    if (!job->row->write)
+        return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, job->path,
+                              "this build has no assimp, which writes %s; build it with "
+                              "libassimp-dev installed, or export XDMF or VTKHDF",
+                              job->row->name);
+    return job->row->write(job, error);
 }
 
 ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_format format,
@@ -76,12 +121,13 @@ ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_for
     EBPO_DEFAULT_FP;
     ebpo_export_options wanted = EBPO_EXPORT_OPTIONS_INIT;
     ebpo_export_report own = EBPO_EXPORT_REPORT_INIT;
+    const ebpo_export_row *row = format_row(format);
     char second[4096];
     ebpo_status status = EBPO_TAKE(ebpo_export_options, &wanted, options, error);
     if (status == EBPO_OK && report)
         status = EBPO_CHECK_SIZED(ebpo_export_report, report, error);
     if (status == EBPO_OK)
-        status = check(ebpo_file_info(file), format, &wanted, error);
+        status = check_export(ebpo_file_info(file), row, &wanted, error);
     if (status != EBPO_OK)
         return status;
     if (!ebpo_export_second_file(format, path, second, sizeof second))
@@ -90,7 +136,8 @@ ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_for
                               "choose another name");
     if (wanted.first_level <= wanted.last_level)
         ebpo_file_prefetch_levels(file, 0, wanted.last_level);
-    status = write_format(&(ebpo_export_job){ file, path, second, format, &wanted, &own }, error);
+    status =
+        write_format(&(ebpo_export_job){ file, path, second, format, row, &wanted, &own }, error);
     if (report)
         EBPO_GIVE(ebpo_export_report, report, &own);
     return status;

@@ -1,24 +1,220 @@
-#include "derive/export_job.h"
+/* What all export formats share: a block (one level with its nodes, or the mesh with its
+ * source's numbers, and colours) read from the file, its columns of numbers for each node or
+ * polygon, its coordinates as float32 for the formats that contain no more, and the entries in
+ * the report. Limits of formats are checked before anything is read where the counts are known. */
+#include "core/strict_fp.h"
 
 #include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
+#include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "derive/export_job.h"
+#include "geometry/octcode.h"
+#include "mesh/attributes.h"
 
-static bool holds_colours(ebpo_export_format format, bool of_faces)
+const ebpo_column ebpo_columns[EBPO_COLUMNS] = {
+    { "octcode", EBPO_H5_I64 },     /* of the node; mesh 0 */
+    { "level", EBPO_H5_I32 },       /* of the node in the octree; mesh -1 */
+    { "type", EBPO_H5_I32 },        /* as in ebpo_node_type; mesh -1 */
+    { "winding", EBPO_H5_I32 },     /* black: in the cell; leaf: at its lowest corner; else 0 */
+    { "volume", EBPO_H5_F64 },      /* of the envelope; mesh 0 */
+    { "source_face", EBPO_H5_I64 }, /* number in the source mesh; envelopes, and without maps: -1 */
+    { "lod", EBPO_H5_I32 },         /* level of detail that it belongs to; mesh -1 */
+};
+
+int ebpo_block_count(const ebpo_export_options *o)
 {
-    return format == EBPO_EXPORT_XDMF || format == EBPO_EXPORT_VTKHDF ||
-           (!of_faces && format != EBPO_EXPORT_STL);
+    return (o->first_level <= o->last_level ? o->last_level - o->first_level + 1 : 0) + o->mesh;
+}
+
+int ebpo_block_level(const ebpo_export_options *o, int i)
+{
+    return o->first_level <= o->last_level && i <= o->last_level - o->first_level
+               ? o->first_level + i
+               : -1;
+}
+
+/* Those that the caller gave, in place of the mesh's own. */
+static ebpo_status take_colours(ebpo_block *out, const uint8_t *rgba, ebpo_error *error)
+{
+    uint64_t bytes = 4 * out->mesh.vertex_count;
+    uint8_t *copy = ebpo_alloc(bytes, 1);
+    if (!copy)
+        return ebpo_fail_memory(error, bytes);
+    memcpy(copy, rgba, bytes);
+    free(out->colours.vertex);
+    out->colours.vertex = copy;
+    out->colours.by_face = 0;
+    return EBPO_OK;
+}
+
+static ebpo_status read_mesh(ebpo_block *out, const ebpo_file *file, ebpo_block_order order,
+                             const ebpo_export_options *options, ebpo_error *error)
+{
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    read.threads = options->threads;
+    read.attributes = 1;
+    snprintf(out->name, sizeof out->name, "mesh");
+    ebpo_status status = order == EBPO_SOURCE_ORDER
+                             ? ebpo_file_read_source_mesh(file, &read, &out->mesh, NULL, error)
+                             : ebpo_file_read_mesh(file, &read, &out->mesh, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_colours(&out->mesh, &out->colours, error);
+    if (status == EBPO_OK && options->vertex_colours)
+        status = take_colours(out, options->vertex_colours, error);
+    ebpo_attributes_free(out->mesh.attributes); /* other ones are not exported */
+    out->mesh.attributes = NULL;
+    if (status == EBPO_OK && order == EBPO_FILE_ORDER &&
+        ebpo_file_info(file)->parts & EBPO_PART_MAPS)
+        status = ebpo_file_read_maps(file, &read, &out->maps, error);
+    return status;
+}
+
+static ebpo_status block_read(ebpo_block *out, const ebpo_file *file, int level,
+                              ebpo_block_order order, const ebpo_export_options *options,
+                              ebpo_error *error)
+{
+    *out = (ebpo_block){ .level = level };
+    if (level < 0)
+        return read_mesh(out, file, order, options, error);
+    ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
+    lod.threads = options->threads;
+    lod.progress = options->progress;
+    snprintf(out->name, sizeof out->name, "level_%02d", level);
+    ebpo_status status =
+        ebpo_lod_level_nodes(file, level, &lod, &out->mesh, &out->nodes, &out->volume, error);
+    return status == EBPO_OK
+               ? ebpo_lod_colours(&out->nodes, out->mesh.vertex_count, &out->colours, error)
+               : status;
+}
+
+void ebpo_block_free(ebpo_block *block)
+{
+    ebpo_mesh_free(&block->mesh);
+    ebpo_lod_nodes_free(&block->nodes);
+    ebpo_maps_free(&block->maps);
+    ebpo_colours_free(&block->colours);
+    memset(block, 0, sizeof *block);
+}
+
+static void block_report(const ebpo_block *block, ebpo_export_report *report)
+{
+    bool mesh = block->level < 0;
+    report->block[report->block_count++] =
+        (ebpo_export_block){ block->level,
+                             block->nodes.node_count,
+                             mesh ? block->mesh.face_count : block->nodes.polygon_count,
+                             block->mesh.face_count,
+                             block->mesh.vertex_count,
+                             block->volume };
+}
+
+/* --- columns --- */
+
+static void set_integer(void *values, ebpo_h5_number number, uint64_t i, int64_t v)
+{
+    if (number == EBPO_H5_I64)
+        ((int64_t *)values)[i] = v;
+    else if (number == EBPO_H5_F64)
+        ((double *)values)[i] = (double)v;
+    else
+        ((int32_t *)values)[i] = (int32_t)v;
+}
+
+static int64_t value_of(const ebpo_block *block, const ebpo_lod_node *node, int column)
+{
+    switch (column) {
+    case EBPO_COLUMN_OCTCODE: return (int64_t)node->octcode;
+    case EBPO_COLUMN_LEVEL: return ebpo_octcode_level(node->octcode);
+    case EBPO_COLUMN_TYPE: return node->type;
+    case EBPO_COLUMN_WINDING: return node->winding;
+    case EBPO_COLUMN_LOD: return block->level;
+    default: return -1;
+    }
+}
+
+static int64_t value_of_face(const ebpo_block *block, uint64_t face, int column)
+{
+    switch (column) {
+    case EBPO_COLUMN_SOURCE_FACE:
+        return block->maps.face_source ? (int64_t)block->maps.face_source[face] : -1;
+    case EBPO_COLUMN_LEVEL:
+    case EBPO_COLUMN_TYPE:
+    case EBPO_COLUMN_LOD: return -1;
+    default: return 0;
+    }
+}
+
+void *ebpo_column_make(const ebpo_block *block, int column, bool polygons)
+{
+    const ebpo_lod_nodes *nodes = &block->nodes;
+    ebpo_h5_number number = ebpo_columns[column].number;
+    bool mesh = block->level < 0;
+    uint64_t count = mesh       ? block->mesh.face_count
+                     : polygons ? nodes->polygon_count
+                                : nodes->node_count,
+             at = 0;
+    void *values = ebpo_alloc(count, ebpo_h5_number_bytes(number));
+    if (!values)
+        return NULL;
+    for (uint64_t i = 0; mesh && i < count; i++)
+        set_integer(values, number, i, value_of_face(block, i, column));
+    for (uint64_t i = 0; i < nodes->node_count; i++) {
+        const ebpo_lod_node *node = &nodes->nodes[i];
+        for (uint32_t k = 0; k < (polygons ? node->polygon_count : 1); k++, at++) {
+            if (column == EBPO_COLUMN_VOLUME)
+                ((double *)values)[at] = node->volume;
+            else
+                set_integer(values, number, at, value_of(block, node, column));
+        }
+    }
+    return values;
+}
+
+void *ebpo_column_of_vertices(const ebpo_block *block)
+{
+    uint64_t count = block->mesh.vertex_count;
+    int64_t *values = ebpo_alloc(count, sizeof *values);
+    for (uint64_t i = 0; values && i < count; i++)
+        values[i] = block->maps.vertex_source ? (int64_t)block->maps.vertex_source[i] : -1;
+    return values;
+}
+
+ebpo_status ebpo_mesh_floats(float **out, const ebpo_mesh *mesh, const double origin[3],
+                             double *largest_change, ebpo_error *error)
+{
+    float *xyz = *out = ebpo_alloc(mesh->vertex_count, 3 * sizeof *xyz);
+    if (!xyz)
+        return ebpo_fail_memory(error, mesh->vertex_count * 3 * sizeof *xyz);
+    for (uint64_t i = 0; i < 3 * mesh->vertex_count; i++) {
+        double at = mesh->xyz32 ? (double)mesh->xyz32[i] : mesh->xyz64[i];
+        xyz[i] = (float)(at - origin[i % 3]);
+        *largest_change = fmax(*largest_change, fabs((double)xyz[i] + origin[i % 3] - at));
+        if (!isfinite(xyz[i])) {
+            free(xyz);
+            *out = NULL;
+            return ebpo_fail(error, EBPO_E_LIMIT,
+                             "a coordinate of %g is beyond what a float32 holds; export XDMF or "
+                             "VTKHDF, or scale the model",
+                             at);
+        }
+    }
+    return EBPO_OK;
 }
 
 static void report_colours(const ebpo_export_job *job, const ebpo_colours *colours)
 {
     if (colours->vertex)
         job->report->vertex_colours =
-            holds_colours(job->format, false) ? EBPO_EXPORT_WRITTEN : EBPO_EXPORT_LEFT_OUT;
+            job->row->holds_vertex_colours ? EBPO_EXPORT_WRITTEN : EBPO_EXPORT_LEFT_OUT;
     if (colours->face)
         job->report->face_colours =
-            holds_colours(job->format, true) ? EBPO_EXPORT_WRITTEN : EBPO_EXPORT_LEFT_OUT;
+            job->row->holds_face_colours ? EBPO_EXPORT_WRITTEN : EBPO_EXPORT_LEFT_OUT;
 }
 
 ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i, ebpo_block_order order,
@@ -28,10 +224,10 @@ ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i, ebpo_block
     if (!ebpo_progress_step(&job->options->progress, "exporting", (uint64_t)i,
                             (uint64_t)ebpo_block_count(job->options), error))
         return EBPO_E_CANCELLED;
-    ebpo_status status = ebpo_block_read(out, job->file, ebpo_block_level(job->options, i), order,
-                                         job->options, error);
+    ebpo_status status =
+        block_read(out, job->file, ebpo_block_level(job->options, i), order, job->options, error);
     if (status == EBPO_OK)
-        ebpo_block_report(out, job->report);
+        block_report(out, job->report);
     if (status == EBPO_OK)
         report_colours(job, &out->colours);
     return status;

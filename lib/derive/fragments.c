@@ -1,12 +1,218 @@
+/* Pieces of an envelope, for bounds of its distance to the model: convex polytopes in the cell
+ * coordinates of a node, which together cover the envelope. Lengths are in units of a power of
+ * two near the cell's longest side, so that nothing overflows or vanishes. Every cut leaves
+ * slightly too much on both sides, so that nothing is lost to the tolerances of
+ * ebpo_polytope_clip. Pieces follow the model's tree down to leaves and are then cut along the
+ * planes of faces, or halved, until each is inside, outside, or small. The file also reads the
+ * trees: the one whose envelopes are measured, and the whole model's, which determines what is
+ * solid. */
 #include "core/strict_fp.h"
-
-#include "derive/fragments.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "derive/fragments.h"
+#include "format/reader.h"
+#include "geometry/distance.h"
+
+/* outweighs the few roundings of a sum of squares and its root */
+static const double up = 1 + 0x1p-40;
+
+void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell cell)
+{
+    double longest = 0, largest = 0;
+    out->cell = cell;
+    for (int k = 0; k < 3; k++) {
+        out->low[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
+        out->high[k] = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
+        out->size[k] = box->size[k] * ebpo_half_power(cell.level);
+        longest = fmax(longest, out->size[k]);
+        largest = fmax(largest, fmax(fabs(out->low[k]), fabs(out->high[k])));
+    }
+    frexp(longest, &out->exponent);
+    out->factor[0] = ldexp(1, -out->exponent / 2);
+    out->factor[1] = ldexp(1, -out->exponent - -out->exponent / 2);
+    for (int k = 0; k < 3; k++)
+        out->side[k] = out->size[k] * out->factor[0] * out->factor[1];
+    /* A few ulp of the largest coordinate, and of the least number there is. */
+    out->grain = 0x1p-49 * ebpo_cell_frame_length(out, largest) + 0x1p-50 +
+                 ebpo_cell_frame_length(out, 0x1p-1070);
+}
+
+void ebpo_cell_frame_point(const ebpo_cell_frame *f, const double xi[3], double out[3])
+{
+    for (int k = 0; k < 3; k++) {
+        double x = xi[k] <= 0   ? f->low[k]
+                   : xi[k] >= 1 ? f->high[k]
+                                : f->low[k] + xi[k] * f->size[k];
+        out[k] = fmin(fmax(x, f->low[k]), f->high[k]);
+    }
+}
+
+double ebpo_cell_frame_length(const ebpo_cell_frame *f, double length)
+{
+    return length * f->factor[0] * f->factor[1];
+}
+
+double ebpo_cell_frame_model_length(const ebpo_cell_frame *f, double length)
+{
+    double out = ldexp(length, f->exponent);
+    return length > 0 && ebpo_cell_frame_length(f, out) < length ? nextafter(out, INFINITY) : out;
+}
+
+double ebpo_cell_frame_apart(const ebpo_cell_frame *f, const double a[3], const double b[3])
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++) {
+        double d = (a[k] - b[k]) * f->side[k];
+        sum += d * d;
+    }
+    return sqrt(sum) * up + f->grain;
+}
+
+double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++)
+        sum += f->side[k] * f->side[k];
+    return sqrt(sum) * up * (1 + 1 / 128.0) * ebpo_half_power(levels) + f->grain;
+}
+
+double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
+                                const double triangle[3][3])
+{
+    double p[3], t[3][3];
+    ebpo_distance_bounds bounds;
+    ebpo_cell_frame_point(f, xi, p);
+    for (int k = 0; k < 3; k++) {
+        p[k] = ebpo_cell_frame_length(f, p[k]);
+        for (int i = 0; i < 3; i++)
+            t[i][k] = ebpo_cell_frame_length(f, triangle[i][k]);
+    }
+    ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &bounds);
+    return bounds.hi + f->grain;
+}
+
+/* A triangle of the model in cell coordinates; returns a bound on their error. */
+static double cell_frame_triangle(const ebpo_cell_frame *f, const double triangle[3][3],
+                                  double out[3][3])
+{
+    double largest = 1, least = INFINITY;
+    for (int k = 0; k < 3; k++) {
+        least = fmin(least, f->side[k]);
+        for (int i = 0; i < 3; i++) {
+            out[i][k] = (triangle[i][k] - f->low[k]) / f->size[k];
+            largest = fmax(largest, fabs(out[i][k]));
+        }
+    }
+    return 0x1p-50 * largest + f->grain / least;
+}
+
+enum { CUT_TAG = 1 << 20 };
+
+void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out)
+{
+    for (int k = 0; k < 3; k++) {
+        out->min[k] = INFINITY;
+        out->max[k] = -INFINITY;
+        for (int i = 0; i < p->vertex_count; i++) {
+            out->min[k] = fmin(out->min[k], p->vertex[i][k]);
+            out->max[k] = fmax(out->max[k], p->vertex[i][k]);
+        }
+    }
+}
+
+/* The part with x[axis] <= at (side 0) or >= at (side 1), and what of the other side is thin.
+ * False: there is none, or it is thin. */
+static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_polytope *out)
+{
+    double n[3] = { 0, 0, 0 };
+    ebpo_extent e;
+    ebpo_extent_of(p, &e);
+    /* Clipping gives up where next to nothing would be left, and a box around a thin part reaches
+     * far beyond it. So thin parts go with the thick ones. */
+    bool high_is_thin = e.max[axis] - at <= EBPO_CUT_THIN,
+         low_is_thin = !high_is_thin && at - e.min[axis] <= EBPO_CUT_THIN;
+    if (side ? high_is_thin : low_is_thin)
+        return false;
+    ebpo_polytope_copy(out, p);
+    n[axis] = side ? -1 : 1;
+    if (!high_is_thin && !low_is_thin)
+        /* where it gives up all the same, too much is kept */
+        (void)ebpo_polytope_clip(out, n, (side ? -at : at) + EBPO_CUT_SLACK, CUT_TAG);
+    return true;
+}
+
+/* The part with n . x <= d, |n| = 1; false when clipping gives up. */
+static bool cut_plane(const ebpo_polytope *p, const double n[3], double d, ebpo_polytope *out)
+{
+    ebpo_polytope_copy(out, p);
+    return ebpo_polytope_clip(out, n, d + EBPO_CUT_SLACK, CUT_TAG) != EBPO_CLIP_REFUSED;
+}
+
+ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_file *file, unsigned threads,
+                                 ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    if (!(info->parts & EBPO_PART_MESH))
+        return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
+                              "how far envelopes reach beyond the model is measured against its "
+                              "mesh, which the file does not have; use a file with it "
+                              "(`ebpo convert`)");
+    if (info->pruned)
+        return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
+                              "is a subset, and how far envelopes reach beyond the model is "
+                              "measured against all of its mesh; use the original");
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    read.threads = threads;
+    ebpo_status status = ebpo_lod_model_read(out, file, info->level_count - 1, &read, error);
+    if (status == EBPO_OK && !out->mesh.faces)
+        status = ebpo_file_read_mesh(file, &read, &out->mesh, error);
+    if (status != EBPO_OK)
+        ebpo_lod_model_free(out);
+    return status;
+}
+
+static bool go_to(ebpo_cursor *c, ebpo_level_nodes *nodes, ebpo_cell cell, ebpo_node *out)
+{
+    ebpo_cursor_begin(c, &ebpo_level_source, nodes, ebpo_level_root(nodes));
+    bool good = ebpo_cursor_to_cell(c, cell, NULL) == EBPO_OK;
+    *out = *ebpo_cursor_node(c);
+    return good && out->cell.level == cell.level;
+}
+
+bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out)
+{
+    ebpo_level_nodes nodes = ebpo_lod_model_nodes(tree);
+    ebpo_cursor c;
+    return go_to(&c, &nodes, cell, out);
+}
+
+bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool own, ebpo_node *out,
+                      ebpo_half_spaces *halves)
+{
+    ebpo_level_nodes nodes = ebpo_lod_model_nodes(tree);
+    ebpo_cursor c;
+    return go_to(&c, &nodes, cell, out) &&
+           ebpo_cursor_half_spaces(&c, own, halves, NULL) == EBPO_OK;
+}
+
+ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
+                             ebpo_leaf_scratch *scratch, ebpo_half_spaces *halves,
+                             ebpo_error *error)
+{
+    ebpo_polytope inherited;
+    uint32_t codes[EBPO_PLANES_MAX];
+    int count = 0;
+    ebpo_half_spaces_cut(halves, 0, &inherited);
+    ebpo_status status = ebpo_lod_leaf_planes(tree, leaf->cell, leaf->rank, scratch, &inherited,
+                                              codes, &count, error);
+    if (status == EBPO_OK)
+        ebpo_half_spaces_add(halves, codes, (uint64_t)count);
+    return status;
+}
 
 /* so many faces are cut along; with more, halving makes them fewer */
 enum { CUT_FACES = 64 };
@@ -59,7 +265,7 @@ static ebpo_status give_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t
         return ebpo_fail_memory(b->error, (b->face_count + count) * sizeof *b->faces);
     for (uint64_t i = first; i < first + count; i++) {
         double t[3][3],
-            error = ebpo_cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[i], t) + 1e-9;
+            error = cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[i], t) + 1e-9;
         bool meets = true;
         for (int k = 0; k < 3; k++)
             meets = meets && fmin(fmin(t[0][k], t[1][k]), t[2][k]) <= e.max[k] + error &&
@@ -143,9 +349,9 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         ebpo_node child = ebpo_level_child(&nodes, &fragment->node, octant);
         ebpo_fragment *next = NULL;
-        if (!ebpo_cut_axis(&fragment->p, 2, octant >> 2 & 1, low[2] + half, &z) ||
-            !ebpo_cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
-            !ebpo_cut_axis(&y, 0, octant & 1, low[0] + half, &x))
+        if (!cut_axis(&fragment->p, 2, octant >> 2 & 1, low[2] + half, &z) ||
+            !cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
+            !cut_axis(&y, 0, octant & 1, low[0] + half, &x))
             continue;
         if (child.type == EBPO_BLACK) {
             bound_black(b, &x, child.cell, fragment->levels + 1);
@@ -181,7 +387,7 @@ static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_fragment *fragment,
     for (int side = 0; side < 2 && status == EBPO_OK; side++) {
         ebpo_polytope part;
         ebpo_fragment *next = NULL;
-        if (!ebpo_cut_axis(&fragment->p, axis, side, .5 * e.min[axis] + .5 * e.max[axis], &part))
+        if (!cut_axis(&fragment->p, axis, side, .5 * e.min[axis] + .5 * e.max[axis], &part))
             continue;
         status = push_polytope(b, kind, fragment, &part, &next);
         if (status == EBPO_OK && kind == EBPO_FRAGMENT_LEAF)
@@ -195,7 +401,7 @@ static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_fragment *fragment,
 static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double *d)
 {
     double t[3][3], u[3], v[3],
-        error = ebpo_cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[face], t);
+        error = cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[face], t);
     for (int k = 0; k < 3; k++) {
         u[k] = t[1][k] - t[0][k];
         v[k] = t[2][k] - t[0][k];
@@ -222,8 +428,7 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
     ebpo_polytope side[2];
     double back[3] = { -n[0], -n[1], -n[2] };
     ebpo_status status = EBPO_OK;
-    *done = ebpo_cut_plane(&fragment->p, n, d, &side[0]) &&
-            ebpo_cut_plane(&fragment->p, back, -d, &side[1]);
+    *done = cut_plane(&fragment->p, n, d, &side[0]) && cut_plane(&fragment->p, back, -d, &side[1]);
     for (int i = 0; i < 2 && *done && status == EBPO_OK; i++) {
         ebpo_fragment *next = NULL;
         status = push_polytope(b, kind, fragment, &side[i], &next);
@@ -241,7 +446,7 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
     double t[3][3], edge[3][3], normal[3], longest = 0;
     bool done = false;
     ebpo_status status = EBPO_OK;
-    (void)ebpo_cell_frame_triangle(&b->frame, l->face, t);
+    (void)cell_frame_triangle(&b->frame, l->face, t);
     for (int i = 0; i < 3; i++) {
         double sum = 0;
         for (int k = 0; k < 3; k++) {

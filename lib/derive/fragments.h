@@ -1,8 +1,107 @@
-/* The pieces that bound.c searches: a stack, and how a piece is cut. */
+/* A node's cell in the model: lengths are in units of a power of two near the cell's longest side,
+ * so that nothing overflows or vanishes. */
 #ifndef EBPO_DERIVE_FRAGMENTS_H
 #define EBPO_DERIVE_FRAGMENTS_H
 
-#include "derive/bounder.h"
+#include <ebpo/query.h>
+
+#include "geometry/cell.h"
+#include "geometry/cursor.h"
+#include "geometry/polytope.h"
+#include "levels/lod_model.h"
+
+typedef struct ebpo_cell_frame {
+    ebpo_cell cell;
+    int exponent;                    /* the unit is 2^exponent in the model's */
+    double factor[2];                /* 2^-exponent in two steps, as one may not hold it */
+    double low[3], high[3], size[3]; /* of the cell, in the model's unit */
+    double side[3];                  /* of the cell, in ours */
+    /* what rounding of coordinates may move a point or change a distance, in ours */
+    double grain;
+} ebpo_cell_frame;
+
+void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell cell);
+
+/* From cell coordinates to the model's: rounded by less than the grain. */
+void ebpo_cell_frame_point(const ebpo_cell_frame *f, const double xi[3], double out[3]);
+
+/* A length of the model in our unit, and back (rounded up). INFINITY stays. */
+double ebpo_cell_frame_length(const ebpo_cell_frame *f, double length);
+double ebpo_cell_frame_model_length(const ebpo_cell_frame *f, double length);
+
+/* At least the distance of two points given in cell coordinates, in our unit. */
+double ebpo_cell_frame_apart(const ebpo_cell_frame *f, const double a[3], const double b[3]);
+
+/* At least the distance of every point of the cell, or of one `levels` below, to a face that it is
+ * known to touch or nearly so (format-spec, section 5). */
+double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels);
+
+/* At least the distance of a point (cell coordinates) to a triangle of the model, in our unit. */
+double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
+                                const double triangle[3][3]);
+
+/* Pieces of an envelope: convex polytopes in the cell coordinates of the node, which together cover
+ * it. Every cut leaves a little too much on both sides, so that nothing is lost between them to the
+ * tolerances of ebpo_polytope_clip. */
+
+/* How much: more than the clipping's tolerance, for normals of Euclidean length 1/sqrt(3) and up.
+ */
+#define EBPO_CUT_SLACK 4e-10
+
+typedef struct ebpo_extent {
+    double min[3], max[3];
+} ebpo_extent;
+
+void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out);
+
+/* A part of so little width goes with the other side; less than a quarter of the smallest piece
+ * that is cut. */
+#define EBPO_CUT_THIN 1.2e-7 /* ebpo_polytope_clip refuses 1e-7 */
+
+/* The trees behind the bounds: that whose envelopes are asked about, and the whole model's, which
+ * tells what is solid. */
+
+/* Reads the whole model of a file that has a mesh and is no subset, else EBPO_E_ABSENT. Freed by
+ * ebpo_lod_model_free. */
+EBPO_MUST_USE ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_file *file,
+                                               unsigned threads, ebpo_error *error);
+
+/* The node of `cell`; false: there is no such node. */
+bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out);
+
+/* The same, with the half-spaces of its ancestors in the cell's
+ * coordinates, and with `own` those that the file stores for the node. */
+bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool own, ebpo_node *out,
+                      ebpo_half_spaces *halves);
+
+/* Adds the half-spaces that ebpo_lod_level derives for a leaf of a file without stored ones. */
+EBPO_MUST_USE ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
+                                           ebpo_leaf_scratch *scratch, ebpo_half_spaces *halves,
+                                           ebpo_error *error);
+
+/* --- what one thread works with while it bounds how far an envelope reaches --- */
+
+typedef struct ebpo_fragment ebpo_fragment;
+
+typedef struct ebpo_bounder {
+    const ebpo_lod_model *whole; /* the model's tree: what is solid */
+    ebpo_context *context;       /* of the same file */
+    ebpo_leaf_scratch scratch;
+    ebpo_half_spaces halves;  /* of the envelope */
+    ebpo_fragment *fragments; /* a stack */
+    uint64_t fragment_capacity, fragment_count;
+    /* faces of pieces within leaves, in the model's unit: a stack as well */
+    double (*faces)[3][3];
+    uint64_t face_capacity, face_count;
+    /* The node at hand: */
+    ebpo_cell_frame frame;
+    double target, quit, ratio, lo, hi, place[3];
+    double inner[3]; /* about the envelope's middle, in cell coordinates */
+    uint64_t questions;
+    ebpo_error *error;
+} ebpo_bounder;
+
+/* --- the pieces that error_bound.c searches: a stack, and how a piece is cut --- */
 
 #define EBPO_FRAGMENT_LEAST 1e-6 /* pieces are not cut below this, in sides of the cell */
 

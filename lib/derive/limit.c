@@ -1,5 +1,8 @@
-/* The convex hull of the solid in each cell. Its extreme points are mesh vertices in the cell,
- * corners of what faces leave on the cell's walls, and the cell's corners that lie inside. */
+/* The limit of what convex envelopes can achieve: the volume of the convex hull of the solid in
+ * each cell of a level. The extreme points of a hull are mesh vertices in the cell, corners of
+ * what faces leave on the cell faces, and those corners of the cell that are inside. qhull
+ * computes the volumes; a build without it reports EBPO_E_ABSENT. Volumes are kept for each node
+ * and added in that order. */
 #include "core/strict_fp.h"
 
 #include <ebpo/limit.h>
@@ -8,19 +11,118 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "ebpo_config.h"
+
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "derive/qhull.h"
+#include "core/sized.h"
 #include "levels/lod_model.h"
 #include "geometry/cells.h"
 #include "geometry/node_types.h"
 #include "geometry/rule.h"
 
+#if EBPO_HAVE_QHULL
+#include <limits.h>
+#include <setjmp.h>
+#include <stdbool.h>
+#include <stdio.h>
+
+#include <libqhull_r/qhull_ra.h>
+#endif
+
+/* --- the volume of a convex hull, by qhull where the library has it --- */
+
+#if EBPO_HAVE_QHULL
+
+/* One for each thread. */
+typedef struct hull {
+    FILE *silence; /* qhull explains at length what is wrong with flat sets */
+    qhT qhull;
+} hull;
+
+static ebpo_status hull_new(hull **out, ebpo_error *error)
+{
+    hull *h = *out = ebpo_alloc_zero(1, sizeof *h);
+    if (!h)
+        return ebpo_fail_memory(error, sizeof *h);
+    h->silence = fopen("/dev/null", "w");
+    if (h->silence)
+        return EBPO_OK;
+    free(h);
+    *out = NULL;
+    return ebpo_fail(error, EBPO_E_IO, "/dev/null cannot be opened for qhull's messages");
+}
+
+static void hull_free(hull *h)
+{
+    if (h && h->silence)
+        fclose(h->silence);
+    free(h);
+}
+
+static double volume_by(hull *h, double *points, int count, char *command, bool *failed)
+{
+    qhT *qh = &h->qhull;
+    volatile double volume = 0; /* set between setjmp and a jump */
+    volatile bool wrong = true;
+    qh_zero(qh, h->silence);
+    if (qh_new_qhull(qh, 3, count, points, False, command, NULL, h->silence) == 0) {
+        if (setjmp(qh->errexit) == 0) { /* qhull's errors jump */
+            qh->NOerrexit = False;
+            qh_getarea(qh, qh->facet_list);
+            volume = qh->totvol;
+            wrong = false;
+        }
+        qh->NOerrexit = True;
+    }
+    int left, size;
+    qh_freeqhull(qh, !qh_ALL);
+    qh_memfreeshort(qh, &left, &size);
+    *failed = wrong;
+    return volume > 0 ? volume : 0;
+}
+
+/* Returns the volume of the hull of `count` points [count][3], of the order of 1; 0 when they are
+ * in a plane, or so nearly that rounding decides. */
+static double hull_volume(hull *h, double *points, uint64_t count)
+{
+    static char merged[] = "qhull Qt Pp", joggled[] = "qhull QJ Pp";
+    bool failed;
+    if (count < 4 || count > INT_MAX / 3)
+        return 0;
+    double volume = volume_by(h, points, (int)count, merged, &failed);
+    /* Thin hulls whose facets merge into nothing: with points moved by some 1e-11 they have a
+     * volume; flat ones have next to none then. */
+    return failed ? volume_by(h, points, (int)count, joggled, &failed) : volume;
+}
+
+#else
+
+typedef struct hull hull;
+
+static ebpo_status hull_new(hull **out, ebpo_error *error)
+{
+    *out = NULL;
+    return ebpo_fail(error, EBPO_E_ABSENT,
+                     "this library was built without qhull, so it cannot compute convex hulls; "
+                     "build it with -Dqhull=enabled");
+}
+
+static void hull_free(hull *h) { (void)h; }
+
+static double hull_volume(hull *h, double *points, uint64_t count)
+{
+    (void)h, (void)points, (void)count;
+    return 0;
+}
+
+#endif
+
 /* One for each thread. */
 typedef struct scratch {
-    ebpo_hull *hull;
+    hull *hull;
     uint32_t *list;
     ebpo_triangle *faces;
     double *points;
@@ -97,7 +199,7 @@ static bool take_node(const job *j, scratch *s, const ebpo_node *node)
     return good;
 }
 
-static int compare(const void *a, const void *b)
+static int compare_faces(const void *a, const void *b)
 {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x > y) - (x < y);
@@ -107,7 +209,7 @@ static bool take_faces(const job *j, scratch *s)
 {
     const ebpo_mesh *m = &j->mesh;
     uint64_t kept = 0;
-    qsort(s->list, s->list_count, sizeof *s->list, compare);
+    qsort(s->list, s->list_count, sizeof *s->list, compare_faces);
     for (uint64_t i = 0; i < s->list_count; i++)
         if (i == 0 || s->list[i] != s->list[i - 1])
             s->list[kept++] = s->list[i];
@@ -165,8 +267,8 @@ static bool add_faces(const job *j, scratch *s, ebpo_cell cell)
     return true;
 }
 
-static ebpo_status hulls(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                         ebpo_error *error)
+static ebpo_status measure_hulls(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     job *j = context;
     scratch *s = &j->scratch[worker];
@@ -176,14 +278,14 @@ static ebpo_status hulls(void *context, uint64_t begin, uint64_t end, unsigned w
         if (!take_node(j, s, w) || !take_faces(j, s) || !add_corners(j, s, w) ||
             !add_faces(j, s, w->cell))
             return ebpo_fail_memory(error, s->list_count * sizeof *s->faces);
-        j->volume[i] = ebpo_hull_volume(s->hull, s->points, s->point_count);
+        j->volume[i] = hull_volume(s->hull, s->points, s->point_count);
     }
     return EBPO_OK;
 }
 
 /* --- all of it --- */
 
-static ebpo_status check(const ebpo_file *file, int level, ebpo_error *error)
+static ebpo_status check_level(const ebpo_file *file, int level, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     if (level < 0 || level >= info->level_count)
@@ -196,8 +298,8 @@ static ebpo_status check(const ebpo_file *file, int level, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status prepare(job *j, const ebpo_file *file, int level, unsigned threads,
-                           ebpo_error *error)
+static ebpo_status prepare_job(job *j, const ebpo_file *file, int level, unsigned threads,
+                               ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     j->level = level;
@@ -214,7 +316,7 @@ static ebpo_status prepare(job *j, const ebpo_file *file, int level, unsigned th
             status = ebpo_fail_memory(error, j->node_count * sizeof *j->nodes);
     }
     for (unsigned i = 0; i < threads && status == EBPO_OK; i++)
-        status = ebpo_hull_new(&j->scratch[i].hull, error);
+        status = hull_new(&j->scratch[i].hull, error);
     if (status == EBPO_OK && !(j->volume = ebpo_alloc(j->node_count, sizeof *j->volume)))
         status = ebpo_fail_memory(error, j->node_count * sizeof *j->volume);
     return status;
@@ -223,7 +325,7 @@ static ebpo_status prepare(job *j, const ebpo_file *file, int level, unsigned th
 static void job_free(job *j, unsigned threads)
 {
     for (unsigned i = 0; j->scratch && i < threads; i++) {
-        ebpo_hull_free(j->scratch[i].hull);
+        hull_free(j->scratch[i].hull);
         free(j->scratch[i].list);
         free(j->scratch[i].faces);
         free(j->scratch[i].points);
@@ -246,15 +348,15 @@ ebpo_status ebpo_limit_level(const ebpo_file *file, int level, const ebpo_limit_
     if (status == EBPO_OK)
         status = EBPO_CHECK_SIZED(ebpo_limit, out, error);
     if (status == EBPO_OK)
-        status = check(file, level, error);
+        status = check_level(file, level, error);
     if (status != EBPO_OK)
         return status;
     unsigned threads = ebpo_thread_count(asked.threads);
     j.in_root_cells = asked.in_root_cells != 0;
-    status = prepare(&j, file, level, threads, error);
+    status = prepare_job(&j, file, level, threads, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, j.node_count, 1, hulls, &j, &asked.progress,
-                                   "convex hulls", error);
+        status = ebpo_parallel_for(threads, NULL, j.node_count, 1, measure_hulls, &j,
+                                   &asked.progress, "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
         /* not 0 times infinity */
         double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0;

@@ -1,12 +1,130 @@
-#include <ebpo/subset.h>
+/* Subsets: a smaller file that contains selected levels, parts, a box, or the envelopes that are
+ * close enough to the model. The parts of this file: the number of bytes that a subset needs of
+ * its file, counted from heads and tables alone; resolving the options and cutting the tree,
+ * whose levels, faces and volumes the other subset files cut; the search for the smallest
+ * max_error whose file fits a target size; and publishing the result. The size falls as
+ * max_error grows; coarse files are tried first, as they are small and quick to make, and what
+ * is known of envelopes serves all trials. Trials are written beside the output, and the best
+ * that fits is published, so that the published file is the one that was measured. */
+#include "core/strict_fp.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <string.h>
+#include <sys/stat.h>
+
+#include <ebpo/subset.h>
 
 #include "core/error.h"
-#include "format/reader.h"
-#include "geometry/cells.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
 #include "derive/subset_parts.h"
+#include "format/file_nodes.h"
+#include "format/reader.h"
+#include "format/subtree_index.h"
+#include "format/write_file.h"
+#include "geometry/cells.h"
+#include "io/publish.h"
+
+enum { COUNTING_BUDGET = 16 << 20 };
+
+typedef struct counting {
+    const ebpo_file *file;
+    const ebpo_subset_options *options;
+    ebpo_box box;
+    ebpo_chunks *top;   /* what is read to find subtrees */
+    ebpo_chunks *below; /* a cache that has nothing of them: all of it counts */
+    ebpo_expected expected;
+    uint32_t needs;
+    int last_level;
+    ebpo_subset_reads *out;
+    ebpo_error *error;
+} counting;
+
+static void count_subtree(counting *c, uint64_t number)
+{
+    c->out->subtrees++;
+    ebpo_subtrees_expect(c->below, &c->expected, number, 1, c->needs, c->last_level,
+                         c->needs & EBPO_NEEDS_MESH);
+}
+
+/* Gray nodes that meet the box, down to the subtrees' roots. */
+static ebpo_status descend_to_subtrees(counting *c, const ebpo_node *gray)
+{
+    const ebpo_subset_options *o = c->options;
+    uint16_t types;
+    uint64_t ranks[4];
+    if (o->boxed && !ebpo_cell_meets(&c->box, gray->cell, o->min, o->max))
+        return EBPO_OK;
+    if (gray->cell.level == c->file->info.subtree_level) {
+        count_subtree(c, gray->rank);
+        return EBPO_OK;
+    }
+    ebpo_status status = ebpo_chunks_children(c->top, gray, &types, ranks, c->error);
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+        ebpo_node child = ebpo_node_child(gray, octant, types, ranks);
+        if (child.type == EBPO_GRAY)
+            status = descend_to_subtrees(c, &child);
+    }
+    return status;
+}
+
+static ebpo_status count_subtrees(counting *c)
+{
+    ebpo_node root;
+    ebpo_status status = ebpo_chunks_make(&c->top, c->file, COUNTING_BUDGET, c->error);
+    if (status == EBPO_OK)
+        status = ebpo_chunks_make(&c->below, c->file, COUNTING_BUDGET, c->error);
+    if (status == EBPO_OK)
+        status = ebpo_chunks_root(c->top, &root, c->error);
+    if (status == EBPO_OK && root.type == EBPO_GRAY)
+        status = descend_to_subtrees(c, &root);
+    ebpo_chunks_free(c->top);
+    ebpo_chunks_free(c->below);
+    return status;
+}
+
+static void count_levels(counting *c, int last)
+{
+    for (int level = 0; level <= last; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            if (ebpo_schema[id].needs & c->needs)
+                ebpo_expect_array(&c->expected, &c->file->level_array[level][id]);
+}
+
+ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_options *options,
+                                    ebpo_subset_reads *out, ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    int deepest = info->level_count - 1;
+    counting c = { .file = file,
+                   .options = options,
+                   .box = ebpo_root_box(info),
+                   .expected = EBPO_EXPECTED_INIT(file),
+                   .needs = (info->parts & options->parts) | EBPO_NEEDS_ALWAYS |
+                            (info->solid ? EBPO_NEEDS_SOLID : 0),
+                   .last_level = options->last_level,
+                   .out = out,
+                   .error = error };
+    *out = (ebpo_subset_reads){ 0 };
+    ebpo_status status = ebpo_file_locate(file, NULL, error);
+    if (status != EBPO_OK)
+        return status;
+    if (c.last_level < 0 || c.last_level > deepest || c.needs & EBPO_NEEDS_MESH)
+        c.last_level = deepest;
+    c.expected.summed = true;
+    bool divided = options->boxed && info->subtree_level && c.last_level > info->subtree_level;
+    out->of_subtrees = info->subtree_level ? info->level[info->subtree_level].gray_count : 0;
+    if (!divided && c.last_level > info->subtree_level)
+        out->subtrees = out->of_subtrees;
+    count_levels(&c, divided ? info->subtree_level : c.last_level);
+    if (divided)
+        status = count_subtrees(&c);
+    else
+        ebpo_expect_root(&c.expected, c.needs);
+    out->bytes = ebpo_expected_bytes(&c.expected);
+    return status;
+}
 
 enum { CHUNK_BUDGET = 64 << 20 };
 
@@ -89,7 +207,7 @@ static ebpo_status resolve_options(ebpo_cutting *c)
 }
 
 /* Without a box whole arrays will be read: a source far away then fetches them in few requests. */
-static void announce(const ebpo_cutting *c)
+static void announce_cut(const ebpo_cutting *c)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
     if (c->last_level > c->from->subtree_level)
@@ -114,23 +232,11 @@ static void name_mesh(ebpo_tree *out)
     out->mesh.source_size = out->info.source_size;
 }
 
-ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
-                             const ebpo_subset_options *options, ebpo_error *error)
-{
-    ebpo_tolerance *need = NULL;
-    ebpo_status status = EBPO_OK;
-    if (options->max_error > 0)
-        status = ebpo_tolerance_open(&need, file, options->parts & EBPO_PART_PLANES,
-                                     options->threads, options->progress, error);
-    if (status == EBPO_OK)
-        status = ebpo_subset_tree_within(out, file, options, need, error);
-    ebpo_tolerance_close(need);
-    return status;
-}
-
-ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_file *file,
-                                    const ebpo_subset_options *options, ebpo_tolerance *need,
-                                    ebpo_error *error)
+/* Makes the tree of the subset. `need`: what is known of this file's envelopes, with the planes
+ * that are kept; or NULL. */
+static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
+                                      const ebpo_subset_options *options, ebpo_tolerance *need,
+                                      ebpo_error *error)
 {
     ebpo_cutting c = { .file = file,
                        .from = ebpo_file_info(file),
@@ -141,7 +247,7 @@ ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_file *file,
     memset(out, 0, sizeof *out);
     ebpo_status status = resolve_options(&c);
     if (status == EBPO_OK)
-        announce(&c);
+        announce_cut(&c);
     if (status == EBPO_OK)
         status = ebpo_chunks_make(&c.chunks, file, CHUNK_BUDGET, error);
     if (status == EBPO_OK)
@@ -166,7 +272,22 @@ ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_file *file,
     return EBPO_OK;
 }
 
-ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options)
+ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
+                             const ebpo_subset_options *options, ebpo_error *error)
+{
+    ebpo_tolerance *need = NULL;
+    ebpo_status status = EBPO_OK;
+    if (options->max_error > 0)
+        status = ebpo_tolerance_open(&need, file, options->parts & EBPO_PART_PLANES,
+                                     options->threads, options->progress, error);
+    if (status == EBPO_OK)
+        status = subset_tree_within(out, file, options, need, error);
+    ebpo_tolerance_close(need);
+    return status;
+}
+
+/* How the subset is written: all parts that its tree has. */
+static ebpo_write_options subset_write_options(const ebpo_subset_options *options)
 {
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     write.codec = options->codec;
@@ -176,4 +297,232 @@ ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options)
     write.subtree_faces = options->subtree_faces;
     write.face_coding = options->face_coding;
     return write;
+}
+
+/* --- subsets for a target size --- */
+
+/* below that share of the coarsest nothing but the whole is tried */
+static const double precision = 1.01, finest = 0x1p-40;
+
+typedef struct fitting {
+    const ebpo_file *file;
+    ebpo_subset_options *options;
+    ebpo_publish trial, best; /* best: the finest that fitted, once there is one */
+    ebpo_tolerance *need;
+    double fits, too_large;          /* max_error */
+    uint64_t fit_bytes, large_bytes; /* and the sizes with these */
+    ebpo_error *error;
+} fitting;
+
+/* Bytes of the file for a max_error, which is the best if it fits, as each is finer than those that
+ * fitted before; *pruned: max_error has made a difference. */
+static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool *pruned)
+{
+    ebpo_tree tree;
+    struct stat st;
+    ebpo_subset_options o = *f->options;
+    o.max_error = max_error;
+    ebpo_status status = subset_tree_within(&tree, f->file, &o, f->need, f->error);
+    if (status != EBPO_OK)
+        return status;
+    *pruned = tree.info.pruned;
+    ebpo_write_options write = subset_write_options(&o);
+    status =
+        ebpo_tree_write_into(&tree, ebpo_publish_path(&f->trial), f->trial.shown, &write, f->error);
+    ebpo_tree_free(&tree);
+    if (status == EBPO_OK && stat(ebpo_publish_path(&f->trial), &st) != 0)
+        status =
+            ebpo_fail_errno(f->error, f->trial.shown, "the file in the making cannot be looked at");
+    if (status != EBPO_OK)
+        return status;
+    *bytes = (uint64_t)st.st_size;
+    if (*bytes <= f->options->target_bytes) {
+        ebpo_publish other = f->best;
+        f->best = f->trial;
+        f->trial = other;
+    }
+    return EBPO_OK;
+}
+
+/* From the coarsest file on, until one is too large or nothing is pruned any more (*pruned false).
+ * `too_large` stays 0 when none is. */
+static ebpo_status bracket_size(fitting *f, bool *pruned)
+{
+    uint64_t bytes = 0;
+    double coarsest = 0;
+    ebpo_status status = ebpo_tolerance_most(f->need, &coarsest, f->error);
+    *pruned = true;
+    if (status == EBPO_OK)
+        status = try_error(f, coarsest, &bytes, pruned);
+    if (status == EBPO_OK && bytes > f->options->target_bytes)
+        return ebpo_fail_file(f->error, EBPO_E_ARGUMENT, f->file->in.shown,
+                              "no subset with these parts has at most %" PRIu64
+                              " bytes; the least has %" PRIu64,
+                              f->options->target_bytes, bytes);
+    f->fits = coarsest;
+    f->fit_bytes = bytes;
+    f->too_large = 0;
+    for (double e = coarsest / 2;
+         status == EBPO_OK && *pruned && f->too_large == 0 && e > coarsest * finest; e /= 2) {
+        status = try_error(f, e, &bytes, pruned);
+        bool fits = bytes <= f->options->target_bytes;
+        *(fits ? &f->fits : &f->too_large) = e;
+        *(fits ? &f->fit_bytes : &f->large_bytes) = bytes;
+    }
+    return status;
+}
+
+/* Sizes go about straight from one end to the other, which are a factor of 2 apart: halfway between
+ * that guess and the middle, so that neither end stays for long. No functions of libm, as the
+ * result is stored. */
+static double next_guess(const fitting *f)
+{
+    double share = .5;
+    if (f->large_bytes > f->fit_bytes)
+        share = (double)(f->large_bytes - f->options->target_bytes) /
+                (double)(f->large_bytes - f->fit_bytes);
+    share = .5 * share + .25;
+    return f->too_large + share * (f->fits - f->too_large);
+}
+
+static ebpo_status find_error(fitting *f)
+{
+    uint64_t bytes = 0;
+    bool pruned = false;
+    /* With less than a quarter of the source wanted, it is hardly worth writing everything. */
+    bool may_fit =
+             !f->options->choose_parts && f->options->target_bytes >= f->file->info.file_bytes / 4,
+         tried = f->options->choose_parts || may_fit;
+    ebpo_status status = may_fit ? try_error(f, 0, &bytes, &pruned) : EBPO_OK;
+    if (status != EBPO_OK || (may_fit && bytes <= f->options->target_bytes))
+        return status;
+    status = bracket_size(f, &pruned);
+    /* Envelopes that coincide with the solid are pruned for any max_error. */
+    if (status == EBPO_OK && f->too_large == 0 && pruned && !tried)
+        return try_error(f, 0, &bytes, &pruned);
+    while (status == EBPO_OK && f->too_large > 0 && f->fits > precision * f->too_large) {
+        double e = next_guess(f);
+        if (!(e > f->too_large) || !(e < f->fits))
+            break;
+        status = try_error(f, e, &bytes, &pruned);
+        bool fits = bytes <= f->options->target_bytes;
+        *(fits ? &f->fits : &f->too_large) = e;
+        *(fits ? &f->fit_bytes : &f->large_bytes) = bytes;
+    }
+    return status;
+}
+
+/* The profiles of which the file has all, from the largest on. */
+static ebpo_status choose_parts(fitting *f, bool *found)
+{
+    static const ebpo_profile order[] = { EBPO_PROFILE_FULL, EBPO_PROFILE_COLLISION,
+                                          EBPO_PROFILE_LOD };
+    ebpo_status status = EBPO_OK;
+    *found = false;
+    for (size_t i = 0; i < sizeof order / sizeof *order && status == EBPO_OK && !*found; i++) {
+        uint64_t bytes = 0;
+        bool pruned = false;
+        f->options->parts = ebpo_profile_parts(order[i]);
+        status = try_error(f, 0, &bytes, &pruned);
+        *found = status == EBPO_OK && bytes <= f->options->target_bytes;
+    }
+    return status;
+}
+
+/* Makes the subset for options->target_bytes, and publishes it as `path`. Changes max_error and
+ * parts of the options. */
+static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subset_options *options,
+                              ebpo_error *error)
+{
+    fitting f = { .file = file,
+                  .options = options,
+                  .trial = EBPO_PUBLISH_INIT,
+                  .best = EBPO_PUBLISH_INIT,
+                  .error = error };
+    bool done = false;
+    if (options->max_error != 0)
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, file->in.shown,
+                              "a maximum error and a target size exclude each other");
+    ebpo_status status = ebpo_publish_begin(&f.trial, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_publish_begin(&f.best, path, error);
+    if (status == EBPO_OK && options->choose_parts)
+        status = choose_parts(&f, &done);
+    if (status == EBPO_OK && !done)
+        status = ebpo_tolerance_open(&f.need, file, options->parts & EBPO_PART_PLANES,
+                                     options->threads, options->progress, error);
+    if (status == EBPO_OK && !done)
+        status = find_error(&f);
+    ebpo_tolerance_close(f.need);
+    if (status == EBPO_OK) {
+        ebpo_publish_expect_input(&f.best, &file->in);
+        status = ebpo_publish_commit(&f.best, error);
+    }
+    ebpo_publish_abort(&f.best);
+    ebpo_publish_abort(&f.trial);
+    return status;
+}
+
+/* --- publishing --- */
+
+uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces)
+{
+    /* bytes a face, measured: the mesh and what is known of it, and that of leaves, the more of
+     * them the smaller they are */
+    enum { OF_MESH = 130, OF_LEAVES = 1800, OF_LEAVES_MOST = 430, ANYHOW = 16 << 20 };
+    double leaves = OF_LEAVES / (double)leaf_faces;
+    return (uint64_t)((double)face_count *
+                          (OF_MESH + (leaves < OF_LEAVES_MOST ? leaves : OF_LEAVES_MOST)) +
+                      ANYHOW);
+}
+
+ebpo_status ebpo_subset(const ebpo_file *file, const char *path, const ebpo_subset_options *options,
+                        ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_subset_options wanted = EBPO_SUBSET_OPTIONS_INIT;
+    ebpo_publish out = EBPO_PUBLISH_INIT;
+    ebpo_tree tree;
+    ebpo_status status = EBPO_TAKE(ebpo_subset_options, &wanted, options, error);
+    if (status != EBPO_OK)
+        return status;
+    if (wanted.target_bytes)
+        return subset_fit(file, path, &wanted, error);
+    status = ebpo_subset_tree(&tree, file, &wanted, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_write_options write = subset_write_options(&wanted);
+    status = ebpo_publish_begin(&out, path, error);
+    if (status == EBPO_OK) {
+        ebpo_publish_expect_input(&out, &file->in);
+        status = ebpo_tree_write_into(&tree, ebpo_publish_path(&out), path, &write, error);
+    }
+    ebpo_tree_free(&tree);
+    if (status == EBPO_OK)
+        status = ebpo_publish_commit(&out, error);
+    ebpo_publish_abort(&out);
+    return status;
+}
+
+ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path,
+                                const ebpo_subset_options *options, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_subset_options wanted = EBPO_SUBSET_OPTIONS_INIT;
+    ebpo_publish whole = EBPO_PUBLISH_INIT;
+    ebpo_file *file = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_subset_options, &wanted, options, error);
+    ebpo_write_options write = subset_write_options(&wanted);
+    if (status == EBPO_OK)
+        status = ebpo_publish_begin(&whole, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_tree_write_into(tree, ebpo_publish_path(&whole), path, &write, error);
+    ebpo_tree_free(tree);
+    if (status == EBPO_OK)
+        status = ebpo_open_own(ebpo_publish_path(&whole), &file, error);
+    if (status == EBPO_OK)
+        status = ebpo_subset(file, path, &wanted, error);
+    ebpo_close(file);
+    ebpo_publish_abort(&whole);
+    return status;
 }

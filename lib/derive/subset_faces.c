@@ -1,6 +1,8 @@
-/* Depth first through what remains, as the specification numbers faces. Maps from old numbers to
- * new ones are as long as the source's mesh, but pages that nothing is written to take no memory,
- * and what lies close together in space does so in numbers. */
+/* The faces, vertices, maps and attributes of a subset. Depth first through the remaining
+ * leaves, faces and vertices get new numbers in the order that the specification prescribes.
+ * Arrays from old numbers to new ones are as long as the source's mesh, but pages that are never
+ * written to take no memory, and faces that are close in space have close numbers. Source:
+ * format-spec/README.md, section 5. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -9,7 +11,7 @@
 #include "mesh/attributes.h"
 #include "core/alloc.h"
 #include "core/error.h"
-#include "format/attribute_read.h"
+#include "format/read_attributes.h"
 #include "geometry/node_types.h"
 #include "derive/subset_parts.h"
 

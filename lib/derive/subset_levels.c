@@ -1,17 +1,225 @@
-/* From level to level: which groups are wanted is known from the level above, so only these are
- * read. */
+/* The levels of a subset: the nodes that remain, and their volumes. Levels are cut from the root
+ * downwards; the level above determines which groups are needed, so only these are read. Nodes
+ * below which something is left out become pruned nodes. Arrays of remaining nodes are copied
+ * node by node, all arrays that the table of arrays lists; face numbers remain those of the
+ * source until subset_faces.c renumbers them. With max_error, the envelopes of a level are
+ * evaluated together. Volumes are computed as ebpo_lod_level cuts envelopes: leaves by stored
+ * planes or not at all. */
+#include "core/strict_fp.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "format/subtree_expect.h"
-#include "format/subtree_table.h"
+#include "derive/subset_parts.h"
+#include "format/schema.h"
+#include "format/subtree_index.h"
 #include "geometry/cells.h"
 #include "geometry/node_types.h"
-#include "derive/kept_nodes.h"
-#include "derive/subset_parts.h"
+#include "geometry/plane_clip.h"
+#include "levels/lod_model.h"
+
+/* --- copying the arrays of remaining nodes --- */
+
+/* A row for each node. */
+typedef struct kept_column {
+    const uint8_t *from;
+    uint8_t *to;
+    uint8_t size;
+    int8_t usual; /* of nodes that are new */
+} kept_column;
+
+/* So many items for each node: u8, or u32. */
+typedef struct kept_counts {
+    ebpo_per per;
+    const uint8_t *counts;
+    uint8_t size;
+} kept_counts;
+
+/* An array of such items; several may share their counts. */
+typedef struct kept_list {
+    unsigned counts; /* which of the type's */
+    const uint8_t *from;
+    uint8_t *to;
+    uint8_t size;
+} kept_list;
+
+typedef struct kept_nodes {
+    const ebpo_level *from;
+    ebpo_level *to;
+    struct {
+        kept_column column[EBPO_LEVEL_ARRAYS];
+        kept_counts count[EBPO_LEVEL_ARRAYS];
+        kept_list list[EBPO_LEVEL_ARRAYS];
+        unsigned columns, counts, lists;
+    } of_type[4];
+    uint64_t next[4];           /* of each type: the next node of `from` */
+    uint64_t read[EBPO_COUNTS]; /* of each list: its next item */
+} kept_nodes;
+
+static ebpo_per per_of(ebpo_node_type type)
+{
+    static const ebpo_per per[] = { [EBPO_WHITE] = EBPO_PER_WHITE,
+                                    [EBPO_BLACK] = EBPO_PER_BLACK,
+                                    [EBPO_LEAF] = EBPO_PER_LEAF,
+                                    [EBPO_GRAY] = EBPO_PER_GRAY };
+    return per[type];
+}
+
+static uint64_t capacity_of(const ebpo_level *from, ebpo_per per, const uint64_t more[4])
+{
+    int type = ebpo_schema_node_type(per);
+    uint64_t leaf_planes = per == EBPO_PER_PLANE ? from->leaf_plane_count : 0;
+    return ebpo_level_count(from, per) + leaf_planes + (type >= 0 ? more[type] : 0);
+}
+
+static void note_column(kept_nodes *kept, int id, int type)
+{
+    kept->of_type[type].column[kept->of_type[type].columns++] =
+        (kept_column){ .from = ebpo_level_array(kept->from, id),
+                       .to = ebpo_level_array(kept->to, id),
+                       .size = ebpo_schema[id].held_size,
+                       .usual = ebpo_schema[id].usual };
+}
+
+/* Place of the counts of a list, noted when first met. */
+static unsigned note_counts(kept_nodes *kept, ebpo_per per, const ebpo_list_spec *list)
+{
+    int type = ebpo_schema_node_type(list->of);
+    unsigned i = 0, known = kept->of_type[type].counts;
+    while (i < known && kept->of_type[type].count[i].per != per)
+        i++;
+    if (i == known)
+        kept->of_type[type].count[kept->of_type[type].counts++] =
+            (kept_counts){ .per = per,
+                           .counts = ebpo_level_array(kept->from, list->counts),
+                           .size = ebpo_schema[list->counts].held_size };
+    return i;
+}
+
+static void note_list(kept_nodes *kept, int id, const ebpo_list_spec *list)
+{
+    int type = ebpo_schema_node_type(list->of);
+    kept->of_type[type].list[kept->of_type[type].lists++] =
+        (kept_list){ .counts = note_counts(kept, ebpo_schema[id].per, list),
+                     .from = ebpo_level_array(kept->from, id),
+                     .to = ebpo_level_array(kept->to, id),
+                     .size = ebpo_schema[id].held_size };
+}
+
+/* Makes the arrays of `to` that are there for any of `needs`, with room for all of `from` and for
+ * `more` nodes of each type (and, `more` gray ones being leaves before, for their planes). False:
+ * out of memory. */
+static bool kept_begin(kept_nodes *kept, const ebpo_level *from, ebpo_level *to, uint32_t needs,
+                       const uint64_t more[4])
+{
+    *kept = (kept_nodes){ .from = from, .to = to };
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
+        const ebpo_array_spec *spec = &ebpo_schema[id];
+        const ebpo_list_spec *list = ebpo_schema_list(spec->per);
+        if (spec->per == EBPO_PER_GROUP || !ebpo_schema_is_held(id) || !(spec->needs & needs) ||
+            (spec->if_needed && !ebpo_level_array(from, id)))
+            continue;
+        void *array = ebpo_alloc(capacity_of(from, spec->per, more), spec->held_size);
+        if (!array)
+            return false;
+        ebpo_level_set_array(to, id, array);
+        if (list)
+            note_list(kept, id, list);
+        else
+            note_column(kept, id, ebpo_schema_node_type(spec->per));
+    }
+    return true;
+}
+
+static void copy_row(const kept_column *c, uint64_t from, uint64_t to)
+{
+    switch (c->size) {
+    case 1: c->to[to] = c->from[from]; break;
+    case 4: memcpy(c->to + 4 * to, c->from + 4 * from, 4); break;
+    default: memcpy(c->to + c->size * to, c->from + c->size * from, c->size);
+    }
+}
+
+static void put_usual(const kept_column *c, uint64_t to)
+{
+    int64_t value = c->usual;
+    switch (c->size) {
+    case 1: memcpy(c->to + to, &(int8_t){ c->usual }, 1); break;
+    case 2: memcpy(c->to + 2 * to, &(int16_t){ c->usual }, 2); break;
+    case 4: memcpy(c->to + 4 * to, &(int32_t){ c->usual }, 4); break;
+    default: memcpy(c->to + 8 * to, &value, 8);
+    }
+}
+
+static uint64_t kept_items(const kept_counts *c, uint64_t rank)
+{
+    uint32_t count;
+    if (!c->counts || c->size == 1)
+        return c->counts ? c->counts[rank] : 0;
+    memcpy(&count, c->counts + 4 * rank, 4);
+    return count;
+}
+
+/* The place of a node that joins the level. */
+static uint64_t grow_level(ebpo_level *level, ebpo_node_type type)
+{
+    uint64_t place = ebpo_level_count(level, per_of(type));
+    ebpo_level_set_count(level, per_of(type), place + 1);
+    return place;
+}
+
+/* The items of a node that stays, behind those that stay already. */
+static void copy_items(const kept_nodes *kept, const kept_list *list, const kept_counts *c,
+                       uint64_t count)
+{
+    uint64_t end = ebpo_level_count(kept->to, c->per);
+    memcpy(list->to + end * list->size, list->from + kept->read[c->per] * list->size,
+           count * list->size);
+}
+
+/* The next node of a type is left out. */
+static void kept_pass(kept_nodes *kept, ebpo_node_type type)
+{
+    uint64_t rank = kept->next[type]++;
+    for (unsigned i = 0; i < kept->of_type[type].counts; i++) {
+        const kept_counts *c = &kept->of_type[type].count[i];
+        kept->read[c->per] += kept_items(c, rank);
+    }
+}
+
+/* The next node of a type stays. */
+static void kept_take(kept_nodes *kept, ebpo_node_type type)
+{
+    uint64_t place = grow_level(kept->to, type), rank = kept->next[type];
+    for (unsigned i = 0; i < kept->of_type[type].columns; i++)
+        copy_row(&kept->of_type[type].column[i], rank, place);
+    for (unsigned i = 0; i < kept->of_type[type].lists; i++) {
+        const kept_list *list = &kept->of_type[type].list[i];
+        const kept_counts *c = &kept->of_type[type].count[list->counts];
+        uint64_t count = kept_items(c, rank);
+        if (count)
+            copy_items(kept, list, c, count);
+    }
+    for (unsigned i = 0; i < kept->of_type[type].counts; i++) {
+        const kept_counts *c = &kept->of_type[type].count[i];
+        ebpo_level_set_count(kept->to, c->per,
+                             ebpo_level_count(kept->to, c->per) + kept_items(c, rank));
+    }
+    kept_pass(kept, type);
+}
+
+/* A node that is not one of `from`: usual values, empty lists. */
+static void kept_add(kept_nodes *kept, ebpo_node_type type)
+{
+    uint64_t place = grow_level(kept->to, type);
+    for (unsigned i = 0; i < kept->of_type[type].columns; i++)
+        put_usual(&kept->of_type[type].column[i], place);
+}
+
+/* --- cutting levels --- */
 
 static const uint64_t NOTHING = UINT64_MAX;
 
@@ -25,7 +233,7 @@ typedef struct descent {
     ebpo_cutting *c;
     int level;
     ebpo_level from, *to;
-    ebpo_kept_nodes kept; /* of the one for the other */
+    kept_nodes kept; /* of the one for the other */
     gray *parent, *child;
     ebpo_tolerance_node *judged; /* gray nodes and leaves as they come, with max_error; else NULL */
     uint64_t next_judged;
@@ -67,7 +275,7 @@ static void expect_subtrees(const descent *d)
     free(roots);
 }
 
-static ebpo_status pick(descent *d)
+static ebpo_status pick_level(descent *d)
 {
     uint64_t count = 0;
     if (d->c->from->subtree_level && d->level == d->c->from->subtree_level + 1 &&
@@ -112,7 +320,7 @@ static ebpo_status make_room(descent *d)
              more[4] = { [EBPO_WHITE] = whites, [EBPO_GRAY] = f->leaf_count };
     uint32_t needs = d->c->parts | (d->c->from->solid ? EBPO_NEEDS_SOLID : 0) | EBPO_NEEDS_ALWAYS;
     d->to->types = ebpo_alloc_zero(d->parent_count, sizeof *d->to->types);
-    return d->to->types && ebpo_kept_begin(&d->kept, f, d->to, needs, more)
+    return d->to->types && kept_begin(&d->kept, f, d->to, needs, more)
                ? EBPO_OK
                : ebpo_fail_memory(d->c->error,
                                   f->leaf_count * 28 + (f->gray_count + f->ref_count + whites) * 4);
@@ -136,7 +344,7 @@ static void take_gray(descent *d, ebpo_cell cell)
     bool enough = is_enough(d);
     if (enough || !may_go_on(d->c, d->level) || !meets_box(d->c, cell))
         group = NOTHING;
-    ebpo_kept_take(&d->kept, EBPO_GRAY);
+    kept_take(&d->kept, EBPO_GRAY);
     add_child(d, cell, group);
 }
 
@@ -170,14 +378,14 @@ static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
 {
     bool enough = is_enough(d);
     if (!enough && meets_box(d->c, cell)) {
-        ebpo_kept_take(&d->kept, EBPO_LEAF);
+        kept_take(&d->kept, EBPO_LEAF);
         return EBPO_LEAF;
     }
-    ebpo_kept_add(&d->kept, EBPO_GRAY);
+    kept_add(&d->kept, EBPO_GRAY);
     if (!enough)
         add_leaf_planes(d);
     add_colour(d);
-    ebpo_kept_pass(&d->kept, EBPO_LEAF);
+    kept_pass(&d->kept, EBPO_LEAF);
     add_child(d, cell, NOTHING);
     return EBPO_GRAY;
 }
@@ -189,7 +397,7 @@ static ebpo_node_type take_node(descent *d, ebpo_node_type type, ebpo_cell cell)
     if (type == EBPO_GRAY)
         take_gray(d, cell);
     else
-        ebpo_kept_take(&d->kept, type);
+        kept_take(&d->kept, type);
     return type;
 }
 
@@ -212,7 +420,7 @@ static void take_group(descent *d, uint64_t number, uint16_t types)
 
 /* --- how close envelopes are, all of a level at once --- */
 
-static ebpo_status judge(descent *d)
+static ebpo_status judge_level(descent *d)
 {
     uint64_t next = 0, count = 0;
     d->next_judged = 0;
@@ -242,17 +450,17 @@ static ebpo_status judge(descent *d)
 /* The parents are done for good after this. */
 static ebpo_status cut_level(descent *d)
 {
-    ebpo_status status = pick(d);
+    ebpo_status status = pick_level(d);
     if (status == EBPO_OK)
         status = make_room(d);
     if (status == EBPO_OK)
-        status = judge(d);
+        status = judge_level(d);
     uint64_t next = 0;
     d->to->group_count = d->parent_count;
     for (uint64_t i = 0; i < d->parent_count && status == EBPO_OK; i++) {
         if (d->parent[i].group == NOTHING)
             for (int k = 0; k < 8; k++) /* the places of children that are not here */
-                ebpo_kept_add(&d->kept, EBPO_WHITE);
+                kept_add(&d->kept, EBPO_WHITE);
         else
             take_group(d, i, d->from.types[next++]);
         d->filled += d->to->types[i] != 0;
@@ -311,4 +519,57 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
     for (int i = 0; i < info->level_count && !info->pruned; i++)
         c->out->level[i].pruned_count = 0;
     return EBPO_OK;
+}
+
+/* --- volumes of envelopes --- */
+
+typedef struct measuring {
+    ebpo_cutting *c;
+    uint64_t group[EBPO_LEVELS_MAX], gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX],
+        plane[EBPO_LEVELS_MAX], leaf_plane[EBPO_LEVELS_MAX];
+} measuring;
+
+/* Cuts the envelope by the node's own planes. */
+static void cut_envelope(ebpo_polytope *envelope, const uint8_t *counts, const uint32_t *planes,
+                         uint64_t *node, uint64_t *plane)
+{
+    uint64_t count = counts ? counts[*node] : 0;
+    if (count)
+        ebpo_planes_cut(envelope, planes + *plane, count);
+    *plane += count;
+    ++*node;
+}
+
+static void measure_group(measuring *m, int level, const ebpo_polytope *parent)
+{
+    ebpo_tree *tree = m->c->out;
+    ebpo_level *l = &tree->level[level];
+    uint16_t types = l->types[m->group[level]++];
+    for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++) {
+        ebpo_node_type type = ebpo_group_type(types, octant);
+        ebpo_polytope own;
+        if (type != EBPO_GRAY && type != EBPO_LEAF)
+            continue;
+        if (parent)
+            (void)ebpo_polytope_child(parent, octant, &own);
+        else
+            ebpo_polytope_cube(&own);
+        if (type == EBPO_GRAY)
+            cut_envelope(&own, l->plane_counts, l->planes, &m->gray[level], &m->plane[level]);
+        else
+            cut_envelope(&own, l->leaf_plane_counts, l->leaf_planes, &m->leaf[level],
+                         &m->leaf_plane[level]);
+        *(type == EBPO_GRAY ? &l->gray_volume : &l->leaf_volume) +=
+            ebpo_polytope_volume(&own) * ebpo_cell_volume(&m->c->box, level);
+        if (type == EBPO_GRAY && level + 1 < tree->info.level_count)
+            measure_group(m, level + 1, &own);
+    }
+}
+
+void ebpo_cut_volumes(ebpo_cutting *c)
+{
+    measuring m = { .c = c };
+    for (int i = 0; i < c->out->info.level_count; i++)
+        c->out->level[i].gray_volume = c->out->level[i].leaf_volume = 0;
+    measure_group(&m, 0, NULL);
 }

@@ -1,11 +1,11 @@
-/* What the files of the subset share. */
+/* What the files that cut subsets share. */
 #ifndef EBPO_DERIVE_SUBSET_PARTS_H
 #define EBPO_DERIVE_SUBSET_PARTS_H
 
 #include <ebpo/subset.h>
 
-#include "format/pick.h"
-#include "derive/tolerance.h"
+#include "derive/error_bound.h"
+#include "format/pick_rows.h"
 #include "geometry/cell.h"
 
 typedef struct ebpo_cutting {
@@ -21,32 +21,30 @@ typedef struct ebpo_cutting {
     ebpo_error *error;
 } ebpo_cutting;
 
-/* --- subset_levels.c: the levels that remain, with face numbers of the source --- */
+/* In subset_levels.c. Cuts the levels that remain, with face numbers of the source. */
 EBPO_MUST_USE ebpo_status ebpo_cut_levels(ebpo_cutting *c);
 
-/* --- subset_faces.c: the faces that the remaining leaves list, numbered anew, and their vertices
- * and maps. Without any, the parts are taken off --- */
+/* In subset_faces.c. Renumbers the faces that the remaining leaves list, with their vertices and
+ * maps. Without any faces, these parts are removed. */
 EBPO_MUST_USE ebpo_status ebpo_cut_faces(ebpo_cutting *c);
 
-/* --- subset_volumes.c: of the envelopes of the nodes that remain --- */
+/* Computes the volumes of the envelopes of the nodes that remain. */
 void ebpo_cut_volumes(ebpo_cutting *c);
-
-/* The same with what is known of envelopes already: `need` of this file, for the planes that are
- * kept. */
-EBPO_MUST_USE ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_file *file,
-                                                  const ebpo_subset_options *options,
-                                                  ebpo_tolerance *need, ebpo_error *error);
-
-/* --- target_size.c: the subset for options->target_bytes, published as `path`; trials are written
- * beside it. Changes max_error and parts of the options --- */
-EBPO_MUST_USE ebpo_status ebpo_subset_fit(const ebpo_file *file, const char *path,
-                                          ebpo_subset_options *options, ebpo_error *error);
-
-/* How the subset is written: all parts that its tree has. */
-ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options);
 
 /* The tree that would be written; for tests too. */
 EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
                                            const ebpo_subset_options *options, ebpo_error *error);
+
+/* --- the bytes that a subset needs of its file, from heads and tables, without cutting it --- */
+
+typedef struct ebpo_subset_reads {
+    uint64_t subtrees, of_subtrees; /* that meet the box, and all; 0, 0: the file has none */
+    uint64_t bytes;                 /* of the chunks that hold it, each counted once */
+} ebpo_subset_reads;
+
+/* Of the options the parts, the box and last_level count. Where the mesh goes, all levels do. */
+EBPO_MUST_USE ebpo_status ebpo_subset_count_reads(const ebpo_file *file,
+                                                  const ebpo_subset_options *options,
+                                                  ebpo_subset_reads *out, ebpo_error *error);
 
 #endif

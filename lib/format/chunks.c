@@ -1,16 +1,20 @@
-/* Decoded chunks through a cache. */
+/* Ranges of rows of a file's arrays, through a cache of decoded chunks under a budget. Each
+ * chunk is decoded and checked once, when it is loaded, so that using it again costs no more
+ * than finding it. Any number of threads share the cache. A counted cache belongs to one thread,
+ * reads and announces only what its user requests, and refuses loads beyond a limit of bytes
+ * read (EBPO_E_LIMIT). */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
+#include "core/arrays.h"
 #include "core/error.h"
-#include "core/workspace.h"
 #include "core/hash.h"
-#include "hdf5_read/coding.h"
-#include "format/attribute_read.h"
 #include "format/chunks.h"
+#include "format/read_attributes.h"
+#include "hdf5_read/coding.h"
 
 enum { CHUNK_BITS = 48, AROUND = 4 };
 /* Announced for later: at most so much, and a share of what a limit leaves. */
@@ -45,8 +49,8 @@ static uint64_t chunk_rows(const ebpo_array_in *array, uint64_t chunk)
     return left < array->shape.chunk_rows ? left : array->shape.chunk_rows;
 }
 
-static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
-                            ebpo_error *error)
+static ebpo_status estimate_chunk(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
+                                  ebpo_error *error)
 {
     const ebpo_array_in *array = array_of(user, key);
     (void)error;
@@ -108,8 +112,8 @@ static ebpo_status decode_map(const ebpo_chunks *c, ebpo_array_id id, uint64_t r
 }
 
 /* Once for each load, so that using a chunk again costs nothing but finding it. */
-static ebpo_status decode(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk,
-                          const uint8_t *raw, void *item, ebpo_error *error)
+static ebpo_status decode_item(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk,
+                               const uint8_t *raw, void *item, ebpo_error *error)
 {
     uint64_t rows = chunk_rows(array, chunk);
     switch (array->id) {
@@ -176,13 +180,13 @@ static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64
     return again + index + ebpo_reader_chunk_bound(array);
 }
 
-static bool fits(const ebpo_chunks *c, uint64_t more)
+static bool fits_budget(const ebpo_chunks *c, uint64_t more)
 {
     uint64_t taken = atomic_load(&c->file->in.bytes) + c->ahead_bytes;
     return taken <= c->limit && more <= c->limit - taken;
 }
 
-static ebpo_status refuse(ebpo_chunks *c, const ebpo_array_in *array, ebpo_error *error)
+static ebpo_status refuse_load(ebpo_chunks *c, const ebpo_array_in *array, ebpo_error *error)
 {
     c->refused = true;
     return ebpo_fail_at(error, EBPO_E_LIMIT, c->file->in.shown, array->path, -1,
@@ -190,8 +194,8 @@ static ebpo_status refuse(ebpo_chunks *c, const ebpo_array_in *array, ebpo_error
 }
 
 /* Called before a chunk is read: what was announced has been counted then. */
-static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key,
-                         ebpo_error *error)
+static ebpo_status admit_load(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key,
+                              ebpo_error *error)
 {
     uint64_t cost = cost_of(c, array, chunk_of(key));
     for (uint64_t i = 0; i < c->ahead_count; i++)
@@ -200,7 +204,7 @@ static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t ke
             c->ahead_bytes -= cost;
             return EBPO_OK;
         }
-    return fits(c, cost) ? EBPO_OK : refuse(c, array, error);
+    return fits_budget(c, cost) ? EBPO_OK : refuse_load(c, array, error);
 }
 
 static bool is_ahead(const ebpo_chunks *c, uint64_t key)
@@ -211,7 +215,7 @@ static bool is_ahead(const ebpo_chunks *c, uint64_t key)
     return false;
 }
 
-static uint64_t least(uint64_t a, uint64_t b) { return a < b ? a : b; }
+static uint64_t smaller_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
 /* A share of what the limit leaves, less what waits to be read. What waits may wait for long, as a
  * view turns to others first: a smaller share is left for each batch, or each would be one chunk.
@@ -220,12 +224,16 @@ uint64_t ebpo_chunks_room(const ebpo_chunks *c)
 {
     uint64_t taken = atomic_load(&c->file->in.bytes),
              left = c->limit > taken ? c->limit - taken : 0,
-             share = least(left / AHEAD_SHARE, AHEAD_MOST);
-    uint64_t batch = least(left / BATCH_SHARE, AHEAD_MOST / BATCH_SHARE);
+             share = smaller_of(left / AHEAD_SHARE, AHEAD_MOST);
+    uint64_t batch = smaller_of(left / BATCH_SHARE, AHEAD_MOST / BATCH_SHARE);
     return share > c->ahead_bytes + batch ? share - c->ahead_bytes : batch;
 }
 
-void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
+/* Announces chunks of counted arrays to the source, as far as the limit allows: from then on they
+ * count as read. The first `now` are needed at once; the others only as far as what has been
+ * announced and not been read stays small, also beside what the limit leaves, and a little more
+ * each time (ebpo_chunks_room). */
+static void chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
     uint64_t room = ebpo_chunks_room(c);
@@ -234,7 +242,7 @@ void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, un
         if (ebpo_shape_chunks(&array->shape) > 1 && !atomic_load(&c->file->located))
             continue; /* where it lies is not known yet */
         uint64_t cost = cost_of(c, array, chunk_of(keys[i]));
-        if (is_ahead(c, keys[i]) || !fits(c, cost) || (i >= now && cost > room) ||
+        if (is_ahead(c, keys[i]) || !fits_budget(c, cost) || (i >= now && cost > room) ||
             !ebpo_grow(&c->ahead, &c->ahead_capacity, c->ahead_count + 1, sizeof *c->ahead))
             continue;
         room -= i >= now ? cost : 0;
@@ -323,7 +331,7 @@ ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsig
                               ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    ebpo_chunks_announce(c, keys->key, now, keys->count);
+    chunks_announce(c, keys->key, now, keys->count);
     for (unsigned i = 0; i < keys->count && status == EBPO_OK; i++) {
         void *item;
         if (i >= now && !(tells_more(c, keys->key[i]) && is_ahead(c, keys->key[i])))
@@ -343,8 +351,8 @@ static ebpo_status read_seen(ebpo_chunks *c, ebpo_error *error)
     ebpo_read_options read = ebpo_read_threads(1);
     for (uint64_t i = 0; c->counted && index->present && i < ebpo_shape_chunks(&index->shape); i++)
         cost += cost_of(c, index, i);
-    if (c->counted && !fits(c, cost))
-        return refuse(c, index, error);
+    if (c->counted && !fits_budget(c, cost))
+        return refuse_load(c, index, error);
     return ebpo_reader_make(c->file, EBPO_A_FACES_INDEX, 0, &read, sizeof *c->seen, &c->seen,
                             error);
 }
@@ -357,8 +365,8 @@ void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes)
 
 bool ebpo_chunks_refused(const ebpo_chunks *chunks) { return chunks->refused; }
 
-static ebpo_status load(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
-                        ebpo_error *error)
+static ebpo_status load_chunk(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
+                              ebpo_error *error)
 {
     (void)most;
     ebpo_chunks *c = user;
@@ -366,7 +374,7 @@ static ebpo_status load(void *user, uint64_t key, uint64_t most, void **item, ui
     ebpo_status allowed =
         c->counted && array->id == EBPO_A_FACES && !c->seen ? read_seen(c, error) : EBPO_OK;
     if (allowed == EBPO_OK && c->counted)
-        allowed = admit(c, array, key, error);
+        allowed = admit_load(c, array, key, error);
     if (allowed != EBPO_OK)
         return allowed;
     uint64_t rows = chunk_rows(array, chunk_of(key));
@@ -382,7 +390,7 @@ static ebpo_status load(void *user, uint64_t key, uint64_t most, void **item, ui
         status =
             ebpo_reader_chunk(c->file, array, chunk_of(key), &reader->reader, reader->raw, error);
     if (status == EBPO_OK)
-        status = decode(c, array, chunk_of(key), reader->raw, made, error);
+        status = decode_item(c, array, chunk_of(key), reader->raw, made, error);
     ebpo_idle_readers_give(idle, reader);
     if (status == EBPO_OK) {
         *item = made;
@@ -393,15 +401,15 @@ static ebpo_status load(void *user, uint64_t key, uint64_t most, void **item, ui
     return status;
 }
 
-static void release(void *user, void *item)
+static void release_chunk(void *user, void *item)
 {
     (void)user;
     free(item);
 }
 
 /* pool: NULL, or what the budget is of. */
-static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
-                        ebpo_cache_pool *pool, bool counted, ebpo_error *error)
+static ebpo_status make_chunks(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
+                               ebpo_cache_pool *pool, bool counted, ebpo_error *error)
 {
     *out = NULL;
     ebpo_chunks *c = ebpo_alloc_zero(1, sizeof *c);
@@ -411,7 +419,7 @@ static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budge
     c->counted = counted;
     c->limit = UINT64_MAX;
     pthread_mutex_init(&c->lock, NULL);
-    ebpo_cache_source source = { c, estimate, load, release };
+    ebpo_cache_source source = { c, estimate_chunk, load_chunk, release_chunk };
     ebpo_status status = counted ? EBPO_OK : read_seen(c, error);
     if (status == EBPO_OK)
         status = pool ? ebpo_cache_make_in(&c->cache, &source, "chunk", pool, error)
@@ -426,19 +434,19 @@ static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budge
 ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
                              ebpo_error *error)
 {
-    return make(out, file, budget, NULL, false, error);
+    return make_chunks(out, file, budget, NULL, false, error);
 }
 
 ebpo_status ebpo_chunks_make_in(ebpo_chunks **out, const ebpo_file *file, ebpo_cache_pool *pool,
                                 ebpo_error *error)
 {
-    return make(out, file, 0, pool, false, error);
+    return make_chunks(out, file, 0, pool, false, error);
 }
 
 ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
                                      ebpo_error *error)
 {
-    return make(out, file, budget, NULL, true, error);
+    return make_chunks(out, file, budget, NULL, true, error);
 }
 
 void ebpo_chunks_free(ebpo_chunks *chunks)
@@ -484,4 +492,84 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
     view->end = view->begin + chunk_rows(view->array, chunk);
     view->rows = item;
     return EBPO_OK;
+}
+
+/* --- rows of plain arrays --- */
+
+static void widen_integers(const ebpo_shape *shape, const uint8_t *rows, uint64_t numbers,
+                           uint8_t *values, size_t size)
+{
+    if (shape->element_size == size && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__)
+        memcpy(values, rows, numbers * size);
+    else
+        ebpo_integers_decode(rows, shape->element_size, shape->is_signed, numbers, values, size);
+}
+
+static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
+                              uint64_t rows, size_t size, ebpo_error *error)
+{
+    const char *shown = chunks->file->in.shown;
+    if ((id >= EBPO_LEVEL_ARRAYS && id != EBPO_A_SUBTREE_OUTER) || level < 0 ||
+        level >= chunks->file->info.level_count)
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
+                              "level %d has no array number %d of integers", level, (int)id);
+    const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
+    if (!array->present || row > array->shape.rows || rows > array->shape.rows - row ||
+        size < array->shape.element_size)
+        return ebpo_fail_at(error, EBPO_E_ARGUMENT, shown, array->path, -1,
+                            "rows %" PRIu64 " to %" PRIu64
+                            " of %zu bytes are asked for, and the array has %" PRIu64 " of %d",
+                            row, row + rows, size, array->shape.rows, array->shape.element_size);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
+                                 uint64_t rows, void *values, size_t size, ebpo_error *error)
+{
+    ebpo_status status = check_rows(chunks, id, level, row, rows, size, error);
+    if (status != EBPO_OK)
+        return status;
+    const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
+    ebpo_expected expected = EBPO_EXPECTED_INIT(chunks->file);
+    if (!chunks->counted)
+        ebpo_chunks_expect(chunks, &expected, id, level, row, rows);
+    ebpo_expect_all(&expected);
+    ebpo_held_chunk view = { .array = array };
+    uint64_t cols = array->shape.cols ? array->shape.cols : 1;
+    uint8_t *out = values;
+    while (rows && status == EBPO_OK) {
+        status = ebpo_held_chunk_move(chunks, &view, row, error);
+        if (status != EBPO_OK)
+            break;
+        uint64_t here = view.end - row < rows ? view.end - row : rows;
+        widen_integers(&array->shape,
+                       view.rows + (row - view.begin) * ebpo_shape_row_bytes(&array->shape),
+                       here * cols, out, size);
+        out += here * cols * size;
+        row += here;
+        rows -= here;
+    }
+    ebpo_held_chunk_release(chunks, &view);
+    return status;
+}
+
+ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
+                             uint64_t rows, size_t size, void *values_out, ebpo_error *error)
+{
+    void *values = NULL;
+    /* before room is made */
+    ebpo_status status = rows ? check_rows(chunks, id, level, row, rows, size, error) : EBPO_OK;
+    if (status == EBPO_OK && rows) {
+        const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
+        uint64_t cols = array->shape.cols ? array->shape.cols : 1;
+        values = ebpo_alloc(rows, size * cols);
+        status = values ? ebpo_chunks_integers(chunks, id, level, row, rows, values, size, error)
+                        : ebpo_fail_memory(error, rows * size * cols);
+    }
+    if (status != EBPO_OK) {
+        free(values);
+        values = NULL;
+    }
+    memcpy(values_out, &values, sizeof values);
+    return status;
 }

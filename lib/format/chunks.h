@@ -98,11 +98,6 @@ void ebpo_chunk_keys_begin(ebpo_chunk_keys *keys);
  * true if there are any. */
 bool ebpo_chunks_missing(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
                          uint64_t rows, ebpo_chunk_keys *keys);
-/* Announces chunks of counted arrays to the source, as far as the limit allows: from then on they
- * count as read. The first `now` are needed at once; the others only as far as what has been
- * announced and not been read stays small, also beside what the limit leaves, and a little more
- * each time (ebpo_chunks_room). */
-void ebpo_chunks_announce(ebpo_chunks *chunks, const uint64_t *keys, unsigned now, unsigned count);
 
 /* How many bytes may be announced now for later. */
 uint64_t ebpo_chunks_room(const ebpo_chunks *chunks);

@@ -2,16 +2,39 @@
 #ifndef EBPO_FORMAT_FILE_IN_H
 #define EBPO_FORMAT_FILE_IN_H
 
-#include <ebpo/file.h>
 #include <pthread.h>
 #include <stdatomic.h>
 
-#include "mesh/attributes.h"
-#include "format/array_check.h"
-#include "format/idle_readers.h"
+#include <ebpo/file.h>
+
 #include "format/schema.h"
+#include "hdf5_read/chunk.h"
 #include "hdf5_read/head.h"
 #include "io/byte_source.h"
+#include "mesh/attributes.h"
+
+/* Decoding state and room for one stored chunk, of one thread. */
+typedef struct ebpo_chunk_reader {
+    ebpo_chunk_coder coder;
+    uint8_t *stored;
+    size_t capacity;
+} ebpo_chunk_reader;
+
+/* What one thread needs. */
+typedef struct ebpo_idle_reader ebpo_idle_reader;
+struct ebpo_idle_reader {
+    ebpo_idle_reader *next;
+    ebpo_chunk_reader reader;
+    uint8_t raw[EBPO_CHUNK_BYTES_MAX];
+};
+
+/* Readers of chunks that wait for the next thread: setting up a decoder takes longer than decoding
+ * a chunk. They stay with the file, a few of them, and count to no budget. */
+typedef struct ebpo_idle_readers {
+    pthread_mutex_t lock; /* of what follows */
+    ebpo_idle_reader *first;
+    unsigned count;
+} ebpo_idle_readers;
 
 typedef struct ebpo_array_in {
     bool present;
@@ -46,7 +69,7 @@ typedef struct ebpo_attribute_in {
 typedef struct ebpo_attributes_in {
     uint64_t count;
     ebpo_attribute_in *head; /* [count] */
-    ebpo_array_in *array;    /* [arrays], see attribute_arrays.h */
+    ebpo_array_in *array;    /* [arrays], see ebpo_attribute_path */
     int arrays;
     uint8_t sha256[32];
 } ebpo_attributes_in;
@@ -60,7 +83,7 @@ struct ebpo_file {
     pthread_mutex_t lock;
     atomic_bool located; /* the chunks of all arrays are known */
     bool has_places;     /* a list says where they are */
-    bool has_sums;       /* a list says how each chunk ends: chunk_sums.h */
+    bool has_sums;       /* a list says how each chunk ends: chunk_directory.h */
     atomic_bool summed;  /* it has been read */
     uint32_t *sums;
     ebpo_idle_readers idle;

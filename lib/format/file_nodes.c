@@ -1,13 +1,18 @@
-/* Nodes of a file: children, planes, winding number. */
+/* Single nodes of a file, read through a cache of chunks: the children of a gray node, the
+ * planes and the winding number of a node; and groups of eight siblings with all of these, which
+ * is what a stream reads that does not follow the file's order. Each function reads only the
+ * chunks that contain the node, and checks the values against the head and the index. For remote
+ * files, a missing group and those after it are fetched together. */
 #include <inttypes.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/error.h"
 #include "format/chunks.h"
 #include "format/file_nodes.h"
-#include "format/ranks.h"
-#include "geometry/plane_code.h"
+#include "format/subtree_index.h"
 #include "geometry/node_types.h"
+#include "geometry/plane_code.h"
 #include "geometry/rule.h"
 
 ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *node,
@@ -163,7 +168,8 @@ ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *e
     return status;
 }
 
-static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error)
+static ebpo_status source_children(void *holder, ebpo_node *gray, ebpo_node child[8],
+                                   ebpo_error *error)
 {
     ebpo_chunks *chunks = holder;
     uint16_t types;
@@ -177,17 +183,308 @@ static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], e
     return EBPO_OK;
 }
 
-static ebpo_status planes(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
-                          unsigned *count, ebpo_error *error)
+static ebpo_status source_planes(void *holder, const ebpo_node *node,
+                                 uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
+                                 ebpo_error *error)
 {
     *count = 0;
     return ebpo_node_is_uniform(node) ? EBPO_OK
                                       : ebpo_chunks_planes(holder, node, codes, count, error);
 }
 
-static ebpo_status winding(void *holder, const ebpo_node *uniform, int32_t *out, ebpo_error *error)
+static ebpo_status source_winding(void *holder, const ebpo_node *uniform, int32_t *out,
+                                  ebpo_error *error)
 {
     return ebpo_chunks_winding(holder, uniform, out, error);
 }
 
-const ebpo_node_source ebpo_chunks_source = { children, planes, winding };
+const ebpo_node_source ebpo_chunks_source = { source_children, source_planes, source_winding };
+
+static uint64_t block_of(uint64_t item) { return item / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS; }
+
+static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, ebpo_group *out,
+                              uint64_t counts[4], ebpo_error *error)
+{
+    ebpo_status status = ebpo_ranks_before(chunks, level, group, out->rank, error);
+    if (status == EBPO_OK)
+        status = ebpo_chunks_integers(chunks, EBPO_A_TYPES, level, group, 1, &out->types,
+                                      sizeof out->types, error);
+    if (status != EBPO_OK)
+        return status;
+    if (level && out->types == 0 && !chunks->file->info.pruned)
+        return ebpo_chunks_fail(chunks, level, EBPO_A_TYPES,
+                                "a group is 0: all children of a gray node are white", error);
+    ebpo_groups_count(&out->types, 1, counts);
+    if (level == 0)
+        counts[EBPO_WHITE] =
+            ebpo_group_type(out->types, 0) == EBPO_WHITE; /* octants 1 to 7 do not exist */
+    return ebpo_ranks_check(chunks, level, out->rank, counts, error);
+}
+
+/* --- planes --- */
+
+static ebpo_status take_codes(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t first,
+                              uint64_t all, const uint8_t *counts, uint64_t nodes, ebpo_group *out,
+                              ebpo_node_type type, ebpo_error *error)
+{
+    uint32_t codes[EBPO_GROUP_CODES];
+    uint64_t sum = 0;
+    for (uint64_t i = 0; i < nodes; i++)
+        sum += counts[i];
+    if (first > all || sum > all - first)
+        return ebpo_chunks_fail(chunks, level, id,
+                                "the counts do not add up to the number of planes", error);
+    ebpo_status status =
+        sum ? ebpo_chunks_integers(chunks, id, level, first, sum, codes, sizeof *codes, error)
+            : EBPO_OK;
+    for (uint64_t i = 0; i < sum && status == EBPO_OK; i++) {
+        int32_t n[3], d;
+        if (!ebpo_plane_code_decode(codes[i], n, &d))
+            status = ebpo_chunks_fail(chunks, level, id, "a code stands for no plane", error);
+    }
+    for (unsigned octant = 0, i = 0; octant < 8 && status == EBPO_OK; octant++)
+        if (ebpo_group_type(out->types, octant) == type && (level || octant == 0))
+            out->plane_count[octant] = counts[i++];
+    if (status == EBPO_OK)
+        memcpy(out->codes + out->code_count, codes, sum * sizeof *codes);
+    out->code_count += status == EBPO_OK ? (unsigned)sum : 0;
+    return status;
+}
+
+static ebpo_status read_gray_planes(ebpo_chunks *chunks, int level, uint64_t count, ebpo_group *out,
+                                    ebpo_error *error)
+{
+    uint64_t first, rank = out->rank[EBPO_GRAY];
+    uint8_t counts[8];
+    if (!(chunks->file->info.parts & EBPO_PART_PLANES) || count == 0)
+        return EBPO_OK;
+    ebpo_status status = ebpo_ranks_planes(chunks, level, rank, &first, error);
+    if (status == EBPO_OK)
+        status = ebpo_chunks_integers(chunks, EBPO_A_PLANE_COUNTS, level, rank, count, counts,
+                                      sizeof *counts, error);
+    if (status != EBPO_OK)
+        return status;
+    return take_codes(chunks, EBPO_A_PLANES, level, first,
+                      chunks->file->info.level[level].plane_count, counts, count, out, EBPO_GRAY,
+                      error);
+}
+
+static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t count, ebpo_group *out,
+                                    ebpo_error *error)
+{
+    uint64_t first, rank = out->rank[EBPO_LEAF];
+    uint8_t counts[8];
+    if (!(chunks->file->info.parts & EBPO_PART_LEAF_PLANES) || count == 0)
+        return EBPO_OK;
+    ebpo_status status = ebpo_ranks_leaf_planes(chunks, level, rank, &first, error);
+    if (status == EBPO_OK)
+        status = ebpo_chunks_integers(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, rank, count, counts,
+                                      sizeof *counts, error);
+    if (status != EBPO_OK)
+        return status;
+    return take_codes(chunks, EBPO_A_LEAF_PLANES, level, first,
+                      chunks->file->info.level[level].leaf_plane_count, counts, count, out,
+                      EBPO_LEAF, error);
+}
+
+/* Gray nodes' codes were put first, then the leaves': brings them in the order of the nodes. */
+static void sort_codes(ebpo_group *group, unsigned gray_codes)
+{
+    uint32_t sorted[EBPO_GROUP_CODES];
+    unsigned at = 0, next[4] = { [EBPO_GRAY] = 0, [EBPO_LEAF] = gray_codes };
+    for (unsigned octant = 0; octant < 8; octant++) {
+        unsigned count = group->plane_count[octant],
+                 *from = &next[ebpo_group_type(group->types, octant)];
+        memcpy(sorted + at, group->codes + *from, count * sizeof *sorted);
+        *from += count;
+        at += count;
+    }
+    memcpy(group->codes, sorted, at * sizeof *sorted);
+}
+
+/* --- winding numbers --- */
+
+static const ebpo_array_id windings[3] = { EBPO_A_WHITE_WINDING, EBPO_A_BLACK_WINDING,
+                                           EBPO_A_LEAF_WINDING };
+
+static ebpo_status read_windings(ebpo_chunks *chunks, int level, const uint64_t counts[4],
+                                 ebpo_group *out, ebpo_error *error)
+{
+    const ebpo_info *info = &chunks->file->info;
+    int32_t of_type[3][8];
+    ebpo_status status = EBPO_OK;
+    for (unsigned type = 0; type < 3 && status == EBPO_OK; type++) {
+        for (unsigned i = 0; i < 8; i++)
+            of_type[type][i] = type == EBPO_BLACK;
+        if (counts[type] && info->solid &&
+            ebpo_reader_array(chunks->file, windings[type], level)->present)
+            status = ebpo_chunks_integers(chunks, windings[type], level, out->rank[type],
+                                          counts[type], of_type[type], sizeof **of_type, error);
+        for (uint64_t i = 0;
+             i < counts[type] && status == EBPO_OK && info->solid && type != EBPO_LEAF; i++)
+            if (ebpo_rule_inside(info->rule, of_type[type][i]) != (type == EBPO_BLACK))
+                status = ebpo_chunks_fail(chunks, level, windings[type],
+                                          "a node's winding number contradicts its type", error);
+    }
+    unsigned next[3] = { 0, 0, 0 };
+    for (unsigned octant = 0; octant < ebpo_group_octants(level) && status == EBPO_OK; octant++) {
+        unsigned type = ebpo_group_type(out->types, octant);
+        out->winding[octant] = type == EBPO_GRAY ? 0 : of_type[type][next[type]++];
+    }
+    return status;
+}
+
+ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group, unsigned wanted,
+                            ebpo_group *out, ebpo_error *error)
+{
+    uint64_t counts[4];
+    memset(out->plane_count, 0, sizeof out->plane_count);
+    memset(out->winding, 0, sizeof out->winding);
+    out->code_count = 0;
+    ebpo_status status = read_types(chunks, level, group, out, counts, error);
+    if (status == EBPO_OK && wanted & EBPO_GROUP_PLANES) {
+        status = read_gray_planes(chunks, level, counts[EBPO_GRAY], out, error);
+        unsigned gray_codes = out->code_count;
+        if (status == EBPO_OK)
+            status = read_leaf_planes(chunks, level, counts[EBPO_LEAF], out, error);
+        if (status == EBPO_OK && gray_codes && out->code_count > gray_codes)
+            sort_codes(out, gray_codes);
+    }
+    return status == EBPO_OK && wanted & EBPO_GROUP_WINDINGS
+               ? read_windings(chunks, level, counts, out, error)
+               : status;
+}
+
+/* --- what reading would take --- */
+
+/* Where an item's number among others is counted from, and the items themselves. */
+static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array_id counts,
+                            int level, uint64_t item, uint64_t items, ebpo_chunk_keys *keys)
+{
+    uint64_t first;
+    if (ebpo_subtree_table_has(chunks->file, level))
+        return ebpo_subtree_table_missing(chunks, level, ebpo_schema[counts].per, item, keys,
+                                          &first) ||
+               ebpo_chunks_missing(chunks, counts, level, first, item - first + items, keys);
+    bool missing = item >= EBPO_INDEX_ROWS &&
+                   ebpo_chunks_missing(chunks, index, level, item / EBPO_INDEX_ROWS, 1, keys);
+    return ebpo_chunks_missing(chunks, counts, level, block_of(item), item - block_of(item) + items,
+                               keys) ||
+           missing;
+}
+
+static bool missing_codes(ebpo_chunks *chunks, ebpo_array_id counts, ebpo_array_id codes, int level,
+                          uint64_t rank, uint64_t count, uint64_t first, ebpo_chunk_keys *keys)
+{
+    uint8_t own[8];
+    uint64_t sum = 0;
+    if (ebpo_chunks_integers(chunks, counts, level, rank, count, own, sizeof *own, NULL) != EBPO_OK)
+        return false;
+    for (uint64_t i = 0; i < count; i++)
+        sum += own[i];
+    return ebpo_chunks_missing(chunks, codes, level, first, sum, keys);
+}
+
+static uint64_t chunks_of(const ebpo_array_in *array)
+{
+    return array->present ? ebpo_shape_chunks(&array->shape) : 0;
+}
+
+/* Of a level, the arrays of a single chunk: they will be needed, whichever group is read. Returns
+ * their bytes. */
+static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_chunk_keys *keys)
+{
+    static const struct {
+        ebpo_array_id id;
+        unsigned wanted;
+    } arrays[] = {
+        { EBPO_A_TYPES, ~0u },
+        { EBPO_A_PLANE_COUNTS, EBPO_GROUP_PLANES },
+        { EBPO_A_PLANES, EBPO_GROUP_PLANES },
+        { EBPO_A_LEAF_WINDING, EBPO_GROUP_WINDINGS },
+        { EBPO_A_BLACK_WINDING, EBPO_GROUP_WINDINGS },
+        { EBPO_A_WHITE_WINDING, EBPO_GROUP_WINDINGS },
+        { EBPO_A_LEAF_PLANE_COUNTS, EBPO_GROUP_PLANES },
+        { EBPO_A_LEAF_PLANES, EBPO_GROUP_PLANES },
+    };
+    uint64_t bytes = 0;
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
+        const ebpo_array_in *array = ebpo_reader_array(chunks->file, arrays[i].id, level);
+        if (!(arrays[i].wanted & wanted) && arrays[i].wanted != ~0u)
+            continue;
+        if (chunks_of(array) == 1 && ebpo_chunks_missing(chunks, arrays[i].id, level, 0, 1, keys))
+            bytes += array->chunks[0].bytes;
+    }
+    return bytes;
+}
+
+/* Adds the chunks for which reading the group would wait next; false: for none. Reads from memory
+ * only, and leaves errors to the reading. */
+static bool group_is_missing(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted,
+                             ebpo_chunk_keys *keys)
+{
+    uint32_t parts = chunks->file->info.parts;
+    int level = number->level;
+    uint64_t counts[4], first;
+    ebpo_group group;
+    if (missing_counted(chunks, EBPO_A_TYPES_INDEX, EBPO_A_TYPES, level, number->group, 1, keys)) {
+        (void)add_small(chunks, level, wanted, keys);
+        return true;
+    }
+    if (read_types(chunks, level, number->group, &group, counts, NULL) != EBPO_OK)
+        return false;
+    bool gray = wanted & EBPO_GROUP_PLANES && parts & EBPO_PART_PLANES && counts[EBPO_GRAY];
+    bool leaf = wanted & EBPO_GROUP_PLANES && parts & EBPO_PART_LEAF_PLANES && counts[EBPO_LEAF],
+         any = false;
+    const uint64_t *rank = group.rank;
+    if (gray)
+        any |= missing_counted(chunks, EBPO_A_GRAY_INDEX, EBPO_A_PLANE_COUNTS, level,
+                               rank[EBPO_GRAY], counts[EBPO_GRAY], keys);
+    if (leaf)
+        any |= missing_counted(chunks, EBPO_A_LEAF_INDEX, EBPO_A_LEAF_PLANE_COUNTS, level,
+                               rank[EBPO_LEAF], counts[EBPO_LEAF], keys);
+    for (unsigned type = 0; type < 3 && wanted & EBPO_GROUP_WINDINGS; type++)
+        any |= ebpo_chunks_missing(chunks, windings[type], level, rank[type], counts[type], keys);
+    if (any)
+        return true;
+    if (gray && ebpo_ranks_planes(chunks, level, rank[EBPO_GRAY], &first, NULL) == EBPO_OK)
+        any |= missing_codes(chunks, EBPO_A_PLANE_COUNTS, EBPO_A_PLANES, level, rank[EBPO_GRAY],
+                             counts[EBPO_GRAY], first, keys);
+    if (leaf && ebpo_ranks_leaf_planes(chunks, level, rank[EBPO_LEAF], &first, NULL) == EBPO_OK)
+        any |= missing_codes(chunks, EBPO_A_LEAF_PLANE_COUNTS, EBPO_A_LEAF_PLANES, level,
+                             rank[EBPO_LEAF], counts[EBPO_LEAF], first, keys);
+    return any;
+}
+
+bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted)
+{
+    ebpo_chunk_keys keys;
+    ebpo_chunk_keys_begin(&keys);
+    return ebpo_input_expects(&chunks->file->in) && group_is_missing(chunks, number, wanted, &keys);
+}
+
+ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *groups, unsigned count,
+                             unsigned wanted, ebpo_error *error)
+{
+    enum {
+        STAGES = 4 /* where its subtree begins, types, counts, planes */,
+        FIRST_BYTES = 32 << 10 /* of the first levels, which everyone needs */
+    };
+    ebpo_status status = EBPO_OK;
+    for (int stage = 0; stage < STAGES && status == EBPO_OK; stage++) {
+        ebpo_chunk_keys keys;
+        ebpo_chunk_keys_begin(&keys);
+        if (!group_is_missing(chunks, &groups[0], wanted, &keys))
+            break;
+        unsigned own = keys.count;
+        uint64_t small = 0;
+        for (int level = 1;
+             groups[0].level == 0 && level < chunks->file->info.level_count && small < FIRST_BYTES;
+             level++)
+            small += add_small(chunks, level, wanted, &keys);
+        for (unsigned i = 1; i < count; i++)
+            (void)group_is_missing(chunks, &groups[i], wanted, &keys);
+        status = ebpo_chunks_fetch(chunks, &keys, own, error);
+    }
+    return status;
+}

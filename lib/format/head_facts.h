@@ -3,10 +3,12 @@
 #ifndef EBPO_FORMAT_HEAD_FACTS_H
 #define EBPO_FORMAT_HEAD_FACTS_H
 
+#include <stddef.h>
+
 #include <ebpo/file.h>
 
-#include "hdf5_write/h5.h"
 #include "hdf5_read/head.h"
+#include "hdf5_write/h5.h"
 
 /* Writes the root's attributes; checksums and chunk_index_* as they stand (put them again
  * later). */

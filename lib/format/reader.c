@@ -1,16 +1,265 @@
-#include "format/reader.h"
-
+/* Reading chunks of an open file: fetch the stored bytes, compare their checksum, decompress and
+ * unshuffle them. Chunks are independent, so several threads read at once, each with its own
+ * decoding state; idle states stay with the file, because setting up a decoder takes longer than
+ * decoding a chunk. Before a reading, callers collect the chunks that they will read
+ * (ebpo_expected) and announce them as prefetch hints, so that a remote source fetches them in
+ * few requests; a hint never fails a reading. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
+#include "core/arrays.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/workspace.h"
+#include "format/chunk_directory.h"
+#include "format/file_in.h"
+#include "format/reader.h"
 #include "hdf5_read/coding.h"
 #include "hdf5_read/face_gates.h"
-#include "format/chunk_sums.h"
+
+/* At most so many wait, each with at most so much room for what is stored. */
+enum { IDLE_MAX = 4, STORED_MAX = 1 << 18 };
+
+void ebpo_idle_readers_make(ebpo_idle_readers *readers)
+{
+    *readers = (ebpo_idle_readers){ .first = NULL };
+    pthread_mutex_init(&readers->lock, NULL);
+}
+
+static void free_reader(ebpo_idle_reader *r)
+{
+    ebpo_chunk_coder_clear(&r->reader.coder);
+    free(r->reader.stored);
+    free(r);
+}
+
+void ebpo_idle_readers_free(ebpo_idle_readers *readers)
+{
+    for (ebpo_idle_reader *r = readers->first, *next; r; r = next) {
+        next = r->next;
+        free_reader(r);
+    }
+    pthread_mutex_destroy(&readers->lock);
+}
+
+/* Its large members need no zeros. */
+static ebpo_idle_reader *new_reader(void)
+{
+    ebpo_idle_reader *r = ebpo_alloc(1, sizeof *r);
+    if (r) {
+        r->reader.coder.zstd_in = r->reader.coder.zstd_out = NULL;
+        r->reader.stored = NULL;
+        r->reader.capacity = 0;
+    }
+    return r;
+}
+
+ebpo_idle_reader *ebpo_idle_readers_take(ebpo_idle_readers *readers)
+{
+    pthread_mutex_lock(&readers->lock);
+    ebpo_idle_reader *r = readers->first;
+    if (r) {
+        readers->first = r->next;
+        readers->count--;
+    }
+    pthread_mutex_unlock(&readers->lock);
+    return r ? r : new_reader();
+}
+
+void ebpo_idle_readers_give(ebpo_idle_readers *readers, ebpo_idle_reader *r)
+{
+    if (!r)
+        return;
+    if (r->reader.capacity > STORED_MAX) {
+        free(r->reader.stored);
+        r->reader.stored = NULL;
+        r->reader.capacity = 0;
+    }
+    pthread_mutex_lock(&readers->lock);
+    bool keep = readers->count < IDLE_MAX;
+    if (keep) {
+        r->next = readers->first;
+        readers->first = r;
+        readers->count++;
+    }
+    pthread_mutex_unlock(&readers->lock);
+    if (!keep)
+        free_reader(r);
+}
+
+/* --- prefetch hints --- */
+
+static void add_range(ebpo_expected *e, uint64_t offset, uint64_t size)
+{
+    ebpo_range *last = e->count ? &e->range[e->count - 1] : NULL;
+    if (last && last->offset + last->size == offset)
+        last->size += size;
+    else if (ebpo_grow(&e->range, &e->capacity, e->count + 1,
+                       sizeof *e->range)) /* else it is read without having been announced */
+        e->range[e->count++] = (ebpo_range){ offset, size };
+}
+
+bool ebpo_expected_wanted(const ebpo_expected *e)
+{
+    return e->summed || ebpo_input_expects(&e->file->in) ||
+           (e->near && ebpo_input_hints(&e->file->in));
+}
+
+void ebpo_expect_chunks(ebpo_expected *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
+{
+    /* A failure is the reading's to tell. */
+    if (!ebpo_expected_wanted(e) || !array->present || e->failed)
+        return;
+    /* not again and again: each time would take all retries */
+    e->failed = ebpo_reader_locate(e->file, array, NULL) != EBPO_OK;
+    if (e->failed)
+        return;
+    for (uint64_t i = begin; i < end; i++)
+        add_range(e, array->chunks[i].address, array->chunks[i].bytes);
+}
+
+void ebpo_expect_array(ebpo_expected *e, const ebpo_array_in *array)
+{
+    ebpo_expect_chunks(e, array, 0, array->present ? ebpo_shape_chunks(&array->shape) : 0);
+}
+
+void ebpo_expect_level(ebpo_expected *e, int level, uint32_t without)
+{
+    uint32_t needs = ebpo_schema_has(&e->file->info) & ~without;
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+        if (ebpo_schema[id].needs & needs)
+            ebpo_expect_array(e, &e->file->level_array[level][id]);
+}
+
+void ebpo_expect_root(ebpo_expected *e, uint32_t needs)
+{
+    /* the list of sums comes with whatever is read first */
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_CHUNK_SUMS; id++)
+        if (ebpo_schema[id].needs & needs)
+            ebpo_expect_array(e, &e->file->root_array[id]);
+}
+
+void ebpo_expect_attributes(ebpo_expected *e)
+{
+    for (int i = 0; i < e->file->attributes.arrays; i++)
+        ebpo_expect_array(e, &e->file->attributes.array[i]);
+}
+
+static int compare_ranges(const void *a, const void *b)
+{
+    uint64_t x = ((const ebpo_range *)a)->offset, y = ((const ebpo_range *)b)->offset;
+    return (x > y) - (x < y);
+}
+
+/* By place, joined where at most so many bytes lie between them. */
+static void join_ranges(ebpo_expected *e, uint64_t between)
+{
+    uint64_t kept = 0;
+    if (e->count)
+        qsort(e->range, e->count, sizeof *e->range, compare_ranges);
+    for (uint64_t i = 0; i < e->count; i++) {
+        ebpo_range *last = kept ? &e->range[kept - 1] : NULL, next = e->range[i];
+        uint64_t end = next.offset + next.size;
+        if (last && next.offset <= last->offset + last->size + between)
+            last->size = end > last->offset + last->size ? end - last->offset : last->size;
+        else
+            e->range[kept++] = next;
+    }
+    e->count = kept;
+}
+
+/* Each takes a call of the system. */
+static void hint_system(ebpo_expected *e)
+{
+    enum { BETWEEN = 16 << 10 };
+    join_ranges(e, BETWEEN);
+    ebpo_input_hint(&ebpo_reader_own(e->file)->in, e->range, e->count);
+}
+
+uint64_t ebpo_expected_bytes(ebpo_expected *e)
+{
+    uint64_t sum = 0;
+    join_ranges(e, 0);
+    for (uint64_t i = 0; i < e->count; i++)
+        sum += e->range[i].size;
+    free(e->range);
+    *e = (ebpo_expected)EBPO_EXPECTED_INIT(e->file);
+    return sum;
+}
+
+/* Without the list of sums nothing is read. */
+static bool wants_sums(const ebpo_file *file)
+{
+    return file->has_sums && !atomic_load(&file->summed);
+}
+
+static ebpo_range where_sums(const ebpo_file *file)
+{
+    const ebpo_chunk_place *at = file->root_array[EBPO_A_CHUNK_SUMS].chunks;
+    return (ebpo_range){ at->address, at->bytes };
+}
+
+void ebpo_expect_all(ebpo_expected *e)
+{
+    if (e->count && wants_sums(e->file))
+        add_range(e, where_sums(e->file).offset, where_sums(e->file).size);
+    if (ebpo_input_expects(&e->file->in))
+        ebpo_input_expect(&ebpo_reader_own(e->file)->in, e->range, e->count);
+    else
+        hint_system(e);
+    free(e->range);
+    *e = (ebpo_expected)EBPO_EXPECTED_INIT(e->file);
+}
+
+/* Not of a size that no file has for its first levels. */
+static bool is_top(const ebpo_info *info)
+{
+    enum { SHARE = 16, ANYWAY = 1 << 20 };
+    return info->top_bytes <= info->file_bytes / SHARE + ANYWAY;
+}
+
+void ebpo_expect_top(const ebpo_file *file)
+{
+    const ebpo_info *info = &file->info;
+    ebpo_file *own = ebpo_reader_own(file);
+    uint64_t index_end = info->chunk_index_offset + info->chunk_index_bytes, from,
+             top = info->top_bytes < info->file_bytes ? info->top_bytes : info->file_bytes;
+    if (!ebpo_input_expects(&file->in) || !file->has_places || atomic_load(&file->located) ||
+        !is_top(info))
+        return;
+    const ebpo_chunk_place *places = file->root_array[EBPO_A_PLACES].chunks;
+    ebpo_range range[4] = { { places->address, places->bytes } };
+    size_t count = 1;
+    if (wants_sums(file))
+        range[count++] = where_sums(file);
+    from = file->in.source.prefetched;
+    if (from < info->chunk_index_offset && info->chunk_index_offset <= top)
+        range[count++] = (ebpo_range){ from, info->chunk_index_offset - from };
+    from = from > index_end ? from : index_end;
+    if (from < top)
+        range[count++] = (ebpo_range){ from, top - from };
+    ebpo_input_expect(&own->in, range, count);
+}
+
+void ebpo_file_prefetch_levels(const ebpo_file *file, int first, int last)
+{
+    ebpo_expected e = EBPO_EXPECTED_INIT(file);
+    int end = last < file->info.level_count - 1 ? last : file->info.level_count - 1;
+    for (int level = first < 0 ? 0 : first; level <= end; level++)
+        ebpo_expect_level(&e, level, 0);
+    ebpo_expect_all(&e);
+}
+
+void ebpo_expect_tree(const ebpo_file *file)
+{
+    ebpo_expected e = EBPO_EXPECTED_INIT(file);
+    for (int level = 0; level < file->info.level_count; level++)
+        ebpo_expect_level(&e, level, 0);
+    ebpo_expect_root(&e, ~0u);
+    ebpo_expect_attributes(&e);
+    ebpo_expect_all(&e);
+}
 
 enum {
     RUN_BYTES = 1 << 20, /* of one read, at most */
@@ -28,8 +277,8 @@ typedef struct job {
 
 /* Bytes [address, address + bytes) of the file to reader->stored, with room for at least
  * `capacity`. */
-static ebpo_status fetch(const ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address,
-                         size_t bytes, size_t capacity, ebpo_error *error)
+static ebpo_status fetch_stored(const ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address,
+                                size_t bytes, size_t capacity, ebpo_error *error)
 {
     if (capacity < bytes)
         capacity = bytes;
@@ -43,8 +292,8 @@ static ebpo_status fetch(const ebpo_file *file, ebpo_chunk_reader *reader, uint6
     return ebpo_input_read(&ebpo_reader_own(file)->in, address, bytes, reader->stored, error);
 }
 
-static ebpo_status damaged(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
-                           const char *why, ebpo_error *error)
+static ebpo_status chunk_damaged(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                                 const char *why, ebpo_error *error)
 {
     return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, array->path, -1,
                         "chunk %" PRIu64 " is damaged: %s; get a fresh copy of the file", chunk,
@@ -52,20 +301,20 @@ static ebpo_status damaged(const ebpo_file *file, const ebpo_array_in *array, ui
 }
 
 /* As HDF5 would give it. */
-static ebpo_status unpack(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
-                          ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
-                          ebpo_error *error)
+static ebpo_status unpack_stored(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                                 ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
+                                 ebpo_error *error)
 {
     ebpo_shape shape = ebpo_stored_shape(&array->shape, array->gates);
     size_t bytes = shape.chunk_rows * ebpo_shape_row_bytes(&shape);
     const char *why;
     if (!ebpo_chunk_fits(file, array, chunk, stored, array->chunks[chunk].bytes))
-        return damaged(file, array, chunk, "it is not the one that was written there", error);
+        return chunk_damaged(file, array, chunk, "it is not the one that was written there", error);
     ebpo_status status = ebpo_chunk_decode(coder, shape.pipeline, shape.element_size, stored,
                                            array->chunks[chunk].bytes, raw, bytes, &why);
     if (status == EBPO_E_MEMORY)
         return ebpo_fail_memory(error, bytes);
-    return status == EBPO_OK ? EBPO_OK : damaged(file, array, chunk, why, error);
+    return status == EBPO_OK ? EBPO_OK : chunk_damaged(file, array, chunk, why, error);
 }
 
 /* From gates to codes of high-water, with filling. Single bytes are not shuffled: the coder's room
@@ -77,21 +326,21 @@ static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *arra
     uint64_t left = array->shape.rows - chunk * array->shape.chunk_rows,
              rows = left < array->shape.chunk_rows ? left : array->shape.chunk_rows;
     size_t row = ebpo_shape_row_bytes(&array->shape);
-    ebpo_status status = unpack(file, array, chunk, coder, stored, coder->scratch, error);
+    ebpo_status status = unpack_stored(file, array, chunk, coder, stored, coder->scratch, error);
     if (status != EBPO_OK)
         return status;
     memset(codes + rows * row, 0, (array->shape.chunk_rows - rows) * row);
     return ebpo_gates_decode(coder->scratch, (uint32_t)rows, codes)
                ? EBPO_OK
-               : damaged(file, array, chunk, "its streams are those of no faces", error);
+               : chunk_damaged(file, array, chunk, "its streams are those of no faces", error);
 }
 
-static ebpo_status decode(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
-                          ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
-                          ebpo_error *error)
+static ebpo_status decode_stored(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                                 ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
+                                 ebpo_error *error)
 {
     return array->gates ? unpack_gates(file, array, chunk, coder, stored, raw, error)
-                        : unpack(file, array, chunk, coder, stored, raw, error);
+                        : unpack_stored(file, array, chunk, coder, stored, raw, error);
 }
 
 static ebpo_status fetch_chunk(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
@@ -103,7 +352,8 @@ static ebpo_status fetch_chunk(const ebpo_file *file, const ebpo_array_in *array
     if (status != EBPO_OK)
         return status;
     const ebpo_chunk_place *at = &array->chunks[chunk];
-    return fetch(file, reader, at->address, at->bytes, ebpo_reader_chunk_bound(array), error);
+    return fetch_stored(file, reader, at->address, at->bytes, ebpo_reader_chunk_bound(array),
+                        error);
 }
 
 ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
@@ -111,7 +361,7 @@ ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_array_in *array,
 {
     ebpo_status status = fetch_chunk(file, array, chunk, reader, error);
     return status == EBPO_OK
-               ? decode(file, array, chunk, &reader->coder, reader->stored, raw, error)
+               ? decode_stored(file, array, chunk, &reader->coder, reader->stored, raw, error)
                : status;
 }
 
@@ -121,7 +371,7 @@ ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk, ebpo_chunk_
     const ebpo_array_in *array = ebpo_reader_array(file, EBPO_A_FACES, 0);
     ebpo_status status = fetch_chunk(file, array, chunk, reader, error);
     return status == EBPO_OK
-               ? unpack(file, array, chunk, &reader->coder, reader->stored, raw, error)
+               ? unpack_stored(file, array, chunk, &reader->coder, reader->stored, raw, error)
                : status;
 }
 
@@ -142,11 +392,13 @@ static ebpo_status read_run(job *j, ebpo_idle_reader *s, uint64_t begin, uint64_
                             ebpo_error *error)
 {
     const ebpo_array_in *a = j->array;
-    ebpo_status status = fetch(j->file, &s->reader, a->chunks[begin].address, bytes, 0, error);
+    ebpo_status status =
+        fetch_stored(j->file, &s->reader, a->chunks[begin].address, bytes, 0, error);
     size_t at = 0;
     for (uint64_t chunk = begin; chunk < end && status == EBPO_OK; chunk++) {
         uint64_t row = chunk * a->shape.chunk_rows, left = a->shape.rows - row;
-        status = decode(j->file, a, chunk, &s->reader.coder, s->reader.stored + at, s->raw, error);
+        status = decode_stored(j->file, a, chunk, &s->reader.coder, s->reader.stored + at, s->raw,
+                               error);
         if (status == EBPO_OK)
             status =
                 j->take(j->context, a, chunk, row,
@@ -223,9 +475,10 @@ static ebpo_status take_integers(void *context, const ebpo_array_in *array, uint
     return EBPO_OK;
 }
 
-ebpo_status ebpo_reader_integers(const ebpo_file *file, const ebpo_array_in *array,
-                                 const ebpo_read_options *options, void *values, size_t size,
-                                 ebpo_error *error)
+/* Reads integers into `values`, of `size` bytes each. */
+static ebpo_status reader_integers(const ebpo_file *file, const ebpo_array_in *array,
+                                   const ebpo_read_options *options, void *values, size_t size,
+                                   ebpo_error *error)
 {
     target t = { values, size };
     return ebpo_reader_rows(file, array, options, take_integers, &t, error);
@@ -241,7 +494,7 @@ ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id id, int level,
     if (array->present) {
         uint64_t cols = array->shape.cols ? array->shape.cols : 1;
         values = ebpo_array_alloc(options->workspace, array->shape.rows, size * cols);
-        status = values ? ebpo_reader_integers(file, array, options, values, size, error)
+        status = values ? reader_integers(file, array, options, values, size, error)
                         : ebpo_workspace_fail(options->workspace, array->shape.rows * size * cols,
                                               error);
     }

@@ -77,11 +77,6 @@ EBPO_MUST_USE ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_arr
                                            const ebpo_read_options *options, ebpo_rows_fn take,
                                            void *context, ebpo_error *error);
 
-/* Reads integers into `values`, of `size` bytes each. */
-EBPO_MUST_USE ebpo_status ebpo_reader_integers(const ebpo_file *file, const ebpo_array_in *array,
-                                               const ebpo_read_options *options, void *values,
-                                               size_t size, ebpo_error *error);
-
 /* The same into new memory: NULL when the array is absent. The workspace of the options owns it. */
 EBPO_MUST_USE ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id id, int level,
                                            const ebpo_read_options *options, size_t size,
@@ -90,5 +85,13 @@ EBPO_MUST_USE ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id 
 /* A leaf's references in place: gaps, counted down from its first new face, to ascending numbers.
  * False when one falls below 0. */
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first);
+
+void ebpo_idle_readers_make(ebpo_idle_readers *readers);
+/* Frees the readers that wait. */
+void ebpo_idle_readers_free(ebpo_idle_readers *readers);
+/* One that waits, or a new one; NULL: no memory. The caller's until it is given back. */
+ebpo_idle_reader *ebpo_idle_readers_take(ebpo_idle_readers *readers);
+/* NULL is nothing. */
+void ebpo_idle_readers_give(ebpo_idle_readers *readers, ebpo_idle_reader *reader);
 
 #endif

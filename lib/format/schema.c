@@ -1,9 +1,25 @@
-#include "format/schema.h"
-
+/* The arrays of a file, as a table in memory, and the constraints on them. array_table.inc lists
+ * all arrays and counts; this file makes the tables of them, and from these the paths, shapes,
+ * codings and needs that the writer, the reader and the subsets use, so that none of them names
+ * an array twice. The second part checks the arrays of a tree, whether it was read from a file
+ * (EBPO_E_FORMAT) or comes from a caller who writes it (EBPO_E_ARGUMENT): each check names the
+ * level, the array and the constraint. Source: format-spec/README.md, "Arrays" and
+ * "Constraints". */
+#include <inttypes.h>
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
 
-#include "core/workspace.h"
+#include <ebpo/file.h>
+
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "format/schema.h"
+#include "geometry/node_types.h"
+#include "geometry/plane_code.h"
+#include "geometry/rule.h"
 #include "hdf5_read/face_gates.h"
 
 #define REQUIRED       .if_needed = false
@@ -74,7 +90,13 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
                            .about = "" },
 };
 
-const ebpo_count_spec ebpo_counts[EBPO_COUNTS] = {
+typedef struct count_spec {
+    const char *name; /* attribute */
+    uint32_t needs;
+    uint16_t in_level, in_summary; /* offsets */
+} count_spec;
+
+static const count_spec level_counts[EBPO_COUNTS] = {
 #define LEVEL_COUNT(ID, attribute, field, needs)                                     \
     [EBPO_PER_##ID] = { #attribute, EBPO_NEEDS_##needs, offsetof(ebpo_level, field), \
                         offsetof(ebpo_level_summary, field) },
@@ -137,7 +159,7 @@ static uint64_t face_chunks(const ebpo_info *info)
     return faces > rows ? (faces - 1) / rows + 1 : 0;
 }
 
-static uint64_t subtrees(const ebpo_info *info)
+static uint64_t subtree_rows(const ebpo_info *info)
 {
     return info->level[info->subtree_level].gray_count;
 }
@@ -145,7 +167,7 @@ static uint64_t subtrees(const ebpo_info *info)
 static uint64_t subtree_chunks(const ebpo_info *info)
 {
     uint64_t rows = ebpo_subtree_rows(info);
-    return (subtrees(info) + rows - 1) / rows;
+    return (subtree_rows(info) + rows - 1) / rows;
 }
 
 uint32_t ebpo_subtree_rows(const ebpo_info *info)
@@ -164,14 +186,14 @@ uint32_t ebpo_schema_cols(const ebpo_info *info, ebpo_array_id id)
                : ebpo_schema[id].cols;
 }
 
-static uint64_t load(const void *record, size_t offset)
+static uint64_t load_field(const void *record, size_t offset)
 {
     uint64_t value;
     memcpy(&value, (const char *)record + offset, sizeof value);
     return value;
 }
 
-static void store(void *record, size_t offset, uint64_t value)
+static void store_field(void *record, size_t offset, uint64_t value)
 {
     memcpy((char *)record + offset, &value, sizeof value);
 }
@@ -191,10 +213,10 @@ uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level)
     case EBPO_PER_FACE: return info->face_count;
     case EBPO_PER_FACE_CHUNK: return face_chunks(info);
     case EBPO_PER_SUBTREE_CHUNK: return subtree_chunks(info);
-    case EBPO_PER_SUBTREE: return subtrees(info);
+    case EBPO_PER_SUBTREE: return subtree_rows(info);
     case EBPO_PER_OUTER_BLOCK:
     case EBPO_PER_CHUNK: return EBPO_ROWS_STATED;
-    default: return load(l, ebpo_counts[per].in_summary);
+    default: return load_field(l, level_counts[per].in_summary);
     }
 }
 
@@ -220,13 +242,13 @@ int ebpo_schema_node_type(ebpo_per per)
 
 uint64_t ebpo_level_count(const ebpo_level *level, ebpo_per per)
 {
-    return per < EBPO_COUNTS ? load(level, ebpo_counts[per].in_level) : level->group_count;
+    return per < EBPO_COUNTS ? load_field(level, level_counts[per].in_level) : level->group_count;
 }
 
 void ebpo_level_set_count(ebpo_level *level, ebpo_per per, uint64_t count)
 {
     if (per < EBPO_COUNTS)
-        store(level, ebpo_counts[per].in_level, count);
+        store_field(level, level_counts[per].in_level, count);
     else
         level->group_count = count;
 }
@@ -274,8 +296,9 @@ ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts)
     ebpo_level_summary out = { .gray_volume = level->gray_volume,
                                .leaf_volume = level->leaf_volume };
     for (int i = 0; i < EBPO_COUNTS; i++)
-        if (ebpo_counts[i].needs & (parts | EBPO_NEEDS_ALWAYS))
-            store(&out, ebpo_counts[i].in_summary, load(level, ebpo_counts[i].in_level));
+        if (level_counts[i].needs & (parts | EBPO_NEEDS_ALWAYS))
+            store_field(&out, level_counts[i].in_summary,
+                        load_field(level, level_counts[i].in_level));
     return out;
 }
 
@@ -287,6 +310,271 @@ ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level)
                        .leaf_volume = s->leaf_volume,
                        .pruned_count = s->pruned_count };
     for (int i = 0; i < EBPO_COUNTS; i++)
-        store(&out, ebpo_counts[i].in_level, load(s, ebpo_counts[i].in_summary));
+        store_field(&out, level_counts[i].in_level, load_field(s, level_counts[i].in_summary));
     return out;
+}
+
+static const char *next_step(const ebpo_check *check)
+{
+    return check->as == EBPO_E_FORMAT ? "get a fresh copy of the file" : "the tree was not written";
+}
+
+ebpo_status ebpo_check_fail(const ebpo_check *check, int level, const char *array, const char *what,
+                            ebpo_error *error)
+{
+    char path[64];
+    if (level >= 0)
+        snprintf(path, sizeof path, "/levels/%02d/%s", level, array);
+    else
+        snprintf(path, sizeof path, "%s", array);
+    return ebpo_fail_at(error, check->as, check->shown, path, -1, "%s; %s", what, next_step(check));
+}
+
+static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, int level,
+                               const ebpo_level *arrays, ebpo_error *error)
+{
+    uint64_t counts[4] = { 0, 0, 0, 0 };
+    uint64_t groups = ebpo_schema_groups(info, level);
+    if (arrays->group_count != groups || !arrays->types)
+        return ebpo_check_fail(check, level, "types",
+                               "there is not one group for each gray node of the level above",
+                               error);
+    if (level == 0 && arrays->types[0] > 3)
+        return ebpo_check_fail(check, level, "types", "the root has siblings", error);
+    uint64_t empty = 0;
+    EBPO_FOR_ITEMS(check->workspace, i, 0, groups) {
+        for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++)
+            counts[ebpo_group_type(arrays->types[i], octant)]++;
+    }
+    for (uint64_t i = 0; i < groups; i++)
+        empty += arrays->types[i] == 0;
+    if (level && empty != info->level[level - 1].pruned_count)
+        return ebpo_check_fail(
+            check, level, "types",
+            info->pruned ? "there is not one empty group for each pruned node of the level above"
+                         : "a group is 0: all children of a gray node are white",
+            error);
+    const ebpo_level_summary *s = &info->level[level];
+    if (counts[EBPO_WHITE] != s->white_count || counts[EBPO_BLACK] != s->black_count ||
+        counts[EBPO_LEAF] != s->leaf_count || counts[EBPO_GRAY] != s->gray_count)
+        return ebpo_check_fail(check, level, "types",
+                               "the types do not add up to the counts in the head", error);
+    return EBPO_OK;
+}
+
+/* Whether the arrays are there that must be, and none that cannot be. */
+static ebpo_status check_presence(const ebpo_check *check, const ebpo_info *info, int level,
+                                  const ebpo_level *arrays, ebpo_error *error)
+{
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
+        const ebpo_array_spec *spec = &ebpo_schema[id];
+        bool called_for = ebpo_schema_rows(info, (ebpo_array_id)id, level) != 0;
+        if (!ebpo_schema_is_held(id))
+            continue;
+        if (called_for && !spec->if_needed && !ebpo_level_array(arrays, id))
+            return ebpo_check_fail(check, level, spec->name, "the array is missing", error);
+        if (!info->solid && spec->needs == EBPO_NEEDS_SOLID && ebpo_level_array(arrays, id))
+            return ebpo_check_fail(check, level, spec->name, "a surface has no winding numbers",
+                                   error);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status check_planes(const ebpo_check *check, int level, const char *counts_name,
+                                const uint8_t *counts, uint64_t nodes, const char *planes_name,
+                                const uint32_t *planes, uint64_t plane_count, ebpo_error *error)
+{
+    uint64_t sum = 0;
+    for (uint64_t i = 0; i < nodes; i++)
+        sum += counts[i];
+    if (sum != plane_count)
+        return ebpo_check_fail(check, level, counts_name,
+                               "the counts do not add up to the number of planes", error);
+    EBPO_FOR_ITEMS(check->workspace, i, 0, plane_count) {
+        int32_t n[3], d;
+        if (!ebpo_plane_code_decode(planes[i], n, &d))
+            return ebpo_check_fail(check, level, planes_name, "a code stands for no plane", error);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status check_colours(const ebpo_check *check, int level, const ebpo_level *arrays,
+                                 ebpo_error *error)
+{
+    EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->gray_count)
+        if (arrays->gray_colours[i] >> 24)
+            return ebpo_check_fail(check, level, "gray_colours", "a colour is above 2^24 - 1",
+                                   error);
+    return EBPO_OK;
+}
+
+static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info, int level,
+                                  const ebpo_level *arrays, ebpo_error *error)
+{
+    if (arrays->black_winding)
+        EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->black_count)
+            if (!ebpo_rule_inside(info->rule, arrays->black_winding[i]))
+                return ebpo_check_fail(check, level, "black_winding",
+                                       "a black node lies outside by the winding rule", error);
+    if (arrays->white_winding)
+        EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->white_count)
+            if (ebpo_rule_inside(info->rule, arrays->white_winding[i]))
+                return ebpo_check_fail(check, level, "white_winding",
+                                       "a white node lies inside by the winding rule", error);
+    return EBPO_OK;
+}
+
+static ebpo_status check_refs(const ebpo_check *check, int level, const uint32_t *refs,
+                              uint64_t count, uint64_t first, ebpo_error *error)
+{
+    for (uint64_t k = 0; k < count; k++)
+        if (refs[k] >= first || (k && refs[k] <= refs[k - 1]))
+            return ebpo_check_fail(
+                check, level, "leaf_refs",
+                "a leaf refers to faces out of order, or to one that does not come before its own",
+                error);
+    return EBPO_OK;
+}
+
+static ebpo_status check_leaves(const ebpo_check *check, const ebpo_info *info, int level,
+                                const ebpo_level *arrays, ebpo_error *error)
+{
+    const ebpo_level_summary *s = &info->level[level];
+    uint64_t end = 0, news = 0, refs = 0;
+    EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->leaf_count) {
+        uint64_t first = arrays->leaf_first[i];
+        if (first < end || first > info->face_count ||
+            arrays->leaf_new[i] > info->face_count - first)
+            return ebpo_check_fail(
+                check, level, "leaf_skip",
+                "a leaf's new faces overlap another's or lie beyond the last face", error);
+        end = first + arrays->leaf_new[i];
+        news += arrays->leaf_new[i];
+        if (arrays->leaf_ref_count[i] > s->ref_count - refs)
+            return ebpo_check_fail(check, level, "leaf_ref_count",
+                                   "the counts exceed the number of references", error);
+        ebpo_status status =
+            check_refs(check, level, arrays->leaf_refs ? arrays->leaf_refs + refs : NULL,
+                       arrays->leaf_ref_count[i], first, error);
+        if (status != EBPO_OK)
+            return status;
+        refs += arrays->leaf_ref_count[i];
+    }
+    if (news != s->new_count || refs != s->ref_count)
+        return ebpo_check_fail(check, level, "leaf_new",
+                               "the leaves' counts do not add up to those in the head", error);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info, int level,
+                             const ebpo_level *arrays, ebpo_error *error)
+{
+    ebpo_status status = check_types(check, info, level, arrays, error);
+    if (status == EBPO_OK)
+        status = check_presence(check, info, level, arrays, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_PLANES)
+        status =
+            check_planes(check, level, "plane_counts", arrays->plane_counts, arrays->gray_count,
+                         "planes", arrays->planes, arrays->plane_count, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_LEAF_PLANES)
+        status = check_planes(check, level, "leaf_plane_counts", arrays->leaf_plane_counts,
+                              arrays->leaf_count, "leaf_planes", arrays->leaf_planes,
+                              arrays->leaf_plane_count, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
+        status = check_colours(check, level, arrays, error);
+    if (status == EBPO_OK)
+        status = check_windings(check, info, level, arrays, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_MESH)
+        status = check_leaves(check, info, level, arrays, error);
+    return status;
+}
+
+typedef struct walk {
+    const ebpo_check *check;
+    const ebpo_tree *tree;
+    /* next of each level: depth-first order passes them in octcode order */
+    uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
+    uint64_t seen;
+} walk;
+
+static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
+{
+    const ebpo_level *arrays = &w->tree->level[level];
+    uint16_t types = arrays->types[w->group[level]++];
+    for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++) {
+        ebpo_node_type type = ebpo_group_type(types, octant);
+        if (type == EBPO_GRAY && level + 1 < w->tree->info.level_count) {
+            ebpo_status status = walk_group(w, level + 1, error);
+            if (status != EBPO_OK)
+                return status;
+        } else if (type == EBPO_LEAF) {
+            uint64_t i = w->leaf[level]++;
+            if (arrays->leaf_first[i] != w->seen)
+                return ebpo_check_fail(w->check, level, "leaf_skip",
+                                       "the leaves' new faces are not in depth-first order", error);
+            w->seen += arrays->leaf_new[i];
+        }
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree, ebpo_error *error)
+{
+    walk w = { .check = check, .tree = tree };
+    ebpo_status status = walk_group(&w, 0, error);
+    if (status == EBPO_OK && w.seen != tree->info.face_count)
+        return ebpo_check_fail(check, 0, "leaf_new",
+                               "the leaves do not have every face as a new one once", error);
+    return status;
+}
+
+ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uint32_t *map,
+                           uint64_t count, uint64_t limit, ebpo_error *error)
+{
+    limit = limit <= UINT32_MAX ? limit : UINT64_C(1) << 32; /* all that 32 bits can name */
+    uint64_t *seen = ebpo_alloc_zero(limit / 64 + 1, sizeof *seen);
+    if (!seen)
+        return ebpo_fail_memory(error, limit / 8);
+    ebpo_status status = EBPO_OK;
+    EBPO_FOR_ITEMS(check->workspace, i, 0, count) {
+        uint64_t bit = UINT64_C(1) << map[i] % 64;
+        if (map[i] >= limit || seen[map[i] / 64] & bit) {
+            status = ebpo_check_fail(check, -1, array,
+                                     "a source number is out of range or used twice", error);
+            break;
+        }
+        seen[map[i] / 64] |= bit;
+    }
+    free(seen);
+    return status;
+}
+
+ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh, ebpo_error *error)
+{
+    bool finite = true;
+    EBPO_FOR_ITEMS(check->workspace, i, 0, mesh->vertex_count * 3)
+        finite &= mesh->xyz32 ? isfinite(mesh->xyz32[i]) : isfinite(mesh->xyz64[i]);
+    return finite ? EBPO_OK
+                  : ebpo_check_fail(check, -1, "/mesh/vertices",
+                                    "a coordinate is not a finite number", error);
+}
+
+/* --- names of the arrays of attributes, and of their codings --- */
+
+const char ebpo_coding_plain[] = "plain", ebpo_coding_columns[] = "columns";
+
+void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES])
+{
+    if (number == 0)
+        snprintf(path, EBPO_PATH_BYTES, "/attributes/header");
+    else
+        snprintf(path, EBPO_PATH_BYTES, "/attributes/%03d%s", (number - 1) / 2,
+                 number % 2 ? "" : "_items");
+}
+
+/* --- plane codes --- */
+
+bool ebpo_plane_decode(uint32_t code, int32_t n[3], int32_t *d)
+{
+    return ebpo_plane_code_decode(code, n, d);
 }

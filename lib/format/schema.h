@@ -7,7 +7,7 @@
 
 #include <ebpo/file.h>
 
-#include "hdf5_read/chunk.h"
+#include "hdf5_read/shape.h"
 
 /* In the order in which they lie in the file. Up to EBPO_LEVEL_ARRAYS once for each level. */
 typedef enum ebpo_array_id {
@@ -21,7 +21,7 @@ typedef enum ebpo_array_id {
 #define SUM_ARRAY(ID, ...)   EBPO_A_##ID,
 #include "format/array_table.inc"
     /* all arrays of /attributes, which files have as many of as they like: the `level` is then the
-     * number of the array there (attribute_arrays.h) */
+     * number of the array there */
     EBPO_A_ATTRIBUTE,
     EBPO_ARRAYS
 } ebpo_array_id;
@@ -126,14 +126,6 @@ typedef struct ebpo_array_spec {
 
 extern const ebpo_array_spec ebpo_schema[EBPO_ARRAYS];
 
-typedef struct ebpo_count_spec {
-    const char *name; /* attribute */
-    uint32_t needs;
-    uint16_t in_level, in_summary; /* offsets */
-} ebpo_count_spec;
-
-extern const ebpo_count_spec ebpo_counts[EBPO_COUNTS];
-
 /* How an array is stored whose values are of the shape `given`: as that, or as gates. */
 #define EBPO_GATES_CODING "gates"
 ebpo_shape ebpo_stored_shape(const ebpo_shape *given, bool gates);
@@ -224,5 +216,47 @@ void ebpo_level_drop(ebpo_level *level, uint32_t needs);
  * level without arrays that is what the head states. */
 ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts);
 ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level);
+
+/* What must hold of a tree, whether it comes from a file or from a caller about to write one:
+ * format-spec/README.md, "Constraints". */
+
+/* Who is being checked: a file (EBPO_E_FORMAT) or a caller's tree (EBPO_E_ARGUMENT). */
+typedef struct ebpo_check {
+    const char *shown; /* the file's name */
+    ebpo_status as;
+    ebpo_workspace *workspace; /* what the arrays may be in, or NULL */
+} ebpo_check;
+
+/* One array of one level is wrong: "shown: /levels/03/planes: what; next". */
+ebpo_status ebpo_check_fail(const ebpo_check *check, int level, const char *array, const char *what,
+                            ebpo_error *error);
+
+/* A level's arrays against the head's counts, and against themselves. */
+EBPO_MUST_USE ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info,
+                                           int level, const ebpo_level *arrays, ebpo_error *error);
+
+/* Leaves in depth-first order have faces 0 .. face_count - 1 as their new ones, in order. For trees
+ * with their face lists. */
+EBPO_MUST_USE ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree,
+                                           ebpo_error *error);
+
+/* A map's values are distinct and below `limit`. */
+EBPO_MUST_USE ebpo_status ebpo_check_map(const ebpo_check *check, const char *array,
+                                         const uint32_t *map, uint64_t count, uint64_t limit,
+                                         ebpo_error *error);
+
+/* Vertices are finite and faces name vertices that exist, in first-use order. */
+EBPO_MUST_USE ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh,
+                                            ebpo_error *error);
+
+/* The arrays of /attributes in a file: a header, then of each array of attributes its values and,
+ * of lists of different lengths, their items. format-spec/README.md, "Attributes". */
+
+/* Numbers of arrays, and their paths. */
+static inline int ebpo_values_number(uint64_t n) { return 1 + 2 * (int)n; }
+static inline int ebpo_items_number(uint64_t n) { return 2 + 2 * (int)n; }
+void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES]);
+
+extern const char ebpo_coding_plain[], ebpo_coding_columns[];
 
 #endif

@@ -3,9 +3,10 @@
 #ifndef EBPO_FORMAT_SLICE_H
 #define EBPO_FORMAT_SLICE_H
 
+#include <ebpo/base.h>
 #include <ebpo/file.h>
 
-#include "core/alloc.h"
+#include "core/room.h"
 #include "format/chunks.h"
 #include "format/file_nodes.h"
 
@@ -81,5 +82,24 @@ static inline uint64_t ebpo_slice_file_face(const ebpo_slice *slice, uint32_t lo
     return local < slice->outer_count ? slice->outer[local]
                                       : slice->first_face + (local - slice->outer_count);
 }
+
+/* --- distinct numbers from a large range, sorted, and the position of each --- */
+
+typedef struct ebpo_compact {
+    /* open addressing, at most half full; number UINT32_MAX: free */
+    struct {
+        uint32_t number, place;
+    } * slot;
+    uint64_t mask;
+    uint32_t *sorted; /* [count] */
+    uint64_t count;
+} ebpo_compact;
+
+/* What that takes of memory at most, sorting included. */
+uint64_t ebpo_compact_bytes(uint64_t capacity);
+
+/* For at most `capacity` calls of add. Numbers are below 2^32 - 1. */
+EBPO_MUST_USE ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity,
+                                            ebpo_error *error);
 
 #endif

@@ -37,7 +37,7 @@ EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, ui
                                           void *data, ebpo_error *error);
 
 /* Returns the descriptor of the file that it reads, which stays the input's; -1: it reads none, or
- * a copy in place of the file that it is named after (open_compat.c). */
+ * a copy in place of the file that it is named after (open_file.c). */
 int ebpo_input_descriptor(const ebpo_input *input);
 
 /* True when announcing is of use. */

@@ -3,7 +3,7 @@
 #ifndef EBPO_LEVELS_PARTIAL_TREE_H
 #define EBPO_LEVELS_PARTIAL_TREE_H
 
-#include "format/group.h"
+#include "format/file_nodes.h"
 #include "geometry/node_types.h"
 #include "levels/stream_node.h"
 #include "levels/level_walk.h"

@@ -4,7 +4,7 @@
 
 #include <ebpo/view.h>
 
-#include "format/group.h"
+#include "format/file_nodes.h"
 #include "format/slice.h"
 
 /* Of the siblings that are being delivered, and which faces have been. */

@@ -1,7 +1,6 @@
 #include "levels/view_fetch.h"
 
-#include "format/subtree_expect.h"
-#include "format/subtree_table.h"
+#include "format/subtree_index.h"
 #include "geometry/octcode.h"
 
 typedef struct fetching {

@@ -5,8 +5,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "format/long_chunk.h"
-#include "format/places.h"
+#include "format/chunk_directory.h"
 #include "format/reader.h"
 #include "verify/verify_subtrees.h"
 

@@ -5,7 +5,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "format/long_chunk.h"
+#include "format/chunk_directory.h"
 #include "hdf5_read/head.h"
 #include "verify/verify_subtrees.h"
 

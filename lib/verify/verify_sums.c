@@ -4,7 +4,7 @@
 
 #include "core/endian.h"
 #include "core/error.h"
-#include "format/long_chunk.h"
+#include "format/chunk_directory.h"
 #include "verify/verify_subtrees.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)

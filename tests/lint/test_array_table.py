@@ -93,7 +93,7 @@ def check_parts(root):
     parts = re.findall(r"^    EBPO_PART_(\w+) = \d+",
                        (root / "lib/include/ebpo/file.h").read_text(), re.M)
     places = {"lib/format/schema.h": "EBPO_NEEDS_{0} = EBPO_PART_{0},",
-              "lib/format/head_facts_table.c": ", EBPO_PART_{0}, ",
+              "lib/format/head_facts.c": ", EBPO_PART_{0}, ",
               "tools/cli/words.c": '"{1}"', "tools/web/reader/facts.js": "'{1}'",
               "format-spec/README.md": "| `{1}` |"}
     return [f"{place}: part {part} is not named" for part in parts for place, form in places.items()

@@ -21,8 +21,8 @@ for row in re.findall(r"^\| (`.*) \|$", section, re.M):
     cells = [cell.strip() for cell in row.split(" | ")]
     if len(cells) == 7:
         said.update({name: cells for name in re.findall(r"`([a-z0-9_]+)`", cells[0])})
-table = (root / "lib/format/head_facts_table.c").read_text()
-written = dict(re.findall(r'\{ "(\w+)", EBPO_FACT_(\w+),', table))
+table = (root / "lib/format/head_facts.c").read_text()
+written = dict(re.findall(r'\{ "(\w+)", FACT_(\w+),', table))
 room = {name: int(size) - 1 for name, size in
         re.findall(r"\b(\w+)\[(\d+)\][,;]", (root / "lib/include/ebpo/file.h").read_text())}
 problems = []
@@ -36,12 +36,12 @@ for name, kind in written.items():
         problems.append(f"{name}: {said[name][1:3]}, and it is {kind_said}, required: {required}")
     elif kind in ("TEXT", "NOTE") and f".. {room[name]} bytes" not in said[name][3]:
         problems.append(f"{name}: {said[name][3]}, and the library has room for {room[name]} bytes")
-for source in ("head_facts_put.c", "head_facts_get.c"):
+for source in ("head_facts.c",):
     named = re.findall(r'(?:put|get)_\w+\([^;]*?"([a-z0-9_]+)"',
                        (root / "lib/format" / source).read_text())
     problems += [f"{name} ({source}): no row" for name in set(named)
                  if name not in said and "_" in name]
 if len(written) < 50:
-    problems.append(f"only {len(written)} attributes found in head_facts_table.c")
+    problems.append(f"only {len(written)} attributes found in head_facts.c")
 print("\n".join(problems) or f"{len(written)} attributes, all in the table")
 sys.exit(1 if problems else 0)

@@ -6,7 +6,7 @@ import re
 import sys
 
 root = pathlib.Path(sys.argv[1])
-table = (root / "lib/format/selection_traits.c").read_text(encoding="utf-8")
+table = (root / "lib/format/head_facts.c").read_text(encoding="utf-8")
 names = re.findall(r'\.name = "(\w+)"', table)
 spec = next(line for line in (root / "format-spec/README.md").read_text(encoding="utf-8").splitlines()
             if line.startswith("| `selection`"))

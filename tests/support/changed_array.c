@@ -6,7 +6,7 @@
 
 #include "core/endian.h"
 #include "hdf5_read/chunk.h"
-#include "format/chunk_sums.h"
+#include "format/chunk_directory.h"
 #include "format/reader.h"
 
 void changeable_load(changeable *c, const char *path)

@@ -5,7 +5,7 @@
 
 #include "core/endian.h"
 #include "check_main.h"
-#include "format/long_chunk.h"
+#include "format/chunk_directory.h"
 #include "format/reader.h"
 #include "model_file.h"
 #include "scratch.h"

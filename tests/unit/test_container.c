@@ -10,7 +10,7 @@
 #include "read_by.h"
 #include "hdf5_read/chunk.h"
 #include "hdf5_read/coding.h"
-#include "format/content.h"
+#include "format/content_checksum.h"
 #include "format/reader.h"
 #include "hdf5_write/h5.h"
 #include "random_tree.h"

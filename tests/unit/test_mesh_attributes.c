@@ -10,9 +10,9 @@
 
 #include "mesh/attributes.h"
 #include "check_main.h"
-#include "format/attribute_read.h"
+#include "format/read_attributes.h"
 #include "format/chunks.h"
-#include "format/pick.h"
+#include "format/pick_rows.h"
 #include "mesh/ply.h"
 #include "scratch.h"
 #include "solids.h"

@@ -8,9 +8,9 @@
 #include <ebpo/subset.h>
 
 #include "check_main.h"
-#include "format/places.h"
+#include "format/chunk_directory.h"
 #include "format/slice.h"
-#include "format/subtree_table.h"
+#include "format/subtree_index.h"
 #include "counted_source.h"
 #include "expect.h"
 #include "geometry/node_types.h"

@@ -15,7 +15,7 @@
 #include "core/workspace.h"
 #include "extras/collide/collider.h"
 #include "extras/collide/red_mesh.h"
-#include "format/container_write.h"
+#include "format/write_file.h"
 #include "extras/collide/contact.h"
 #include "extras/collide/pair_distance.h"
 

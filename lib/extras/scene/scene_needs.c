@@ -12,7 +12,7 @@
 #include "extras/scene/asked_pairs.h"
 #include "extras/scene/pair_motion.h"
 #include "extras/scene/scene_needs.h"
-#include "derive/subset_reads.h"
+#include "derive/subset_parts.h"
 
 enum { HALVINGS = 12 };
 

@@ -8,7 +8,7 @@
 #include <ebpo/verify.h>
 
 #include "check_main.h"
-#include "format/pick.h"
+#include "format/pick_rows.h"
 #include "format/slice.h"
 #include "geometry/node_types.h"
 #include "random_tree.h"

@@ -1,0 +1,425 @@
+/* Bounds of the distance that an envelope reaches beyond the model. ebpo_bound_envelope is a
+ * branch and bound over the pieces of fragments.c: each piece has an upper bound from the
+ * distance of its centre and from its nearest face, and the largest distance found is the lower
+ * bound. The second part decides for the nodes of a level whether their envelopes are within
+ * max_error, on several threads, and keeps what it found for other limits. */
+#include "core/strict_fp.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "derive/error_bound.h"
+#include "derive/fragments.h"
+#include "geometry/plane_clip.h"
+#include "query/query_model.h"
+
+ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_model *whole, ebpo_model *model,
+                              ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    out->whole = whole;
+    return ebpo_context_new(model, &out->context, error);
+}
+
+void ebpo_bounder_free(ebpo_bounder *b)
+{
+    ebpo_context_free(b->context);
+    free(b->scratch.faces);
+    free(b->fragments);
+    free(b->faces);
+    memset(b, 0, sizeof *b);
+}
+
+/* --- what is known of a piece --- */
+
+static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_fragment_measure *l)
+{
+    ebpo_extent e;
+    ebpo_extent_of(p, &e);
+    l->reach = 0;
+    for (int k = 0; k < 3; k++) {
+        l->centre[k] = 0;
+        for (int i = 0; i < p->vertex_count; i++)
+            l->centre[k] += p->vertex[i][k];
+        l->centre[k] =
+            fmin(fmax(l->centre[k] / p->vertex_count, fmax(e.min[k], 0)), fmin(e.max[k], 1));
+    }
+    for (int i = 0; i < p->vertex_count; i++)
+        l->reach = fmax(l->reach, ebpo_cell_frame_apart(&b->frame, p->vertex[i], l->centre));
+}
+
+static ebpo_status query_distance(ebpo_bounder *b, const double xi[3], double *distance)
+{
+    ebpo_distance_result result;
+    double p[3];
+    ebpo_cell_frame_point(&b->frame, xi, p);
+    b->questions++;
+    ebpo_status status = ebpo_distance(b->context, p, NULL, &result, b->error);
+    *distance = ebpo_cell_frame_length(&b->frame, result.distance);
+    return status;
+}
+
+/* Without doubt in the envelope, whatever was rounded. */
+static bool is_in_envelope(const ebpo_bounder *b, const double xi[3])
+{
+    for (int i = 0; i < b->halves.count; i++) {
+        double n[3], d = ebpo_plane_as_double(b->halves.at[i].n, b->halves.at[i].d, n);
+        if (n[0] * xi[0] + n[1] * xi[1] + n[2] * xi[2] > d - 1e-12)
+            return false;
+    }
+    return true;
+}
+
+/* Pieces reach a little beyond the envelope, and where it is sharp all of a piece may lie there. So
+ * a point outside is pulled towards the middle until it is inside: its distance changes by no more
+ * than it was moved. */
+static void pull_in(const ebpo_bounder *b, const double xi[3], double out[3])
+{
+    double share = 0;
+    for (int i = 0; i < b->halves.count; i++) {
+        double n[3], d = ebpo_plane_as_double(b->halves.at[i].n, b->halves.at[i].d, n) - 2e-12,
+                     at = -d, middle = -d;
+        for (int k = 0; k < 3; k++) {
+            at += n[k] * xi[k];
+            middle += n[k] * b->inner[k];
+        }
+        if (at > 0)
+            share = middle < 0 ? fmax(share, at / (at - middle)) : 1;
+    }
+    for (int k = 0; k < 3; k++)
+        out[k] = xi[k] + share * (b->inner[k] - xi[k]);
+}
+
+static void learn_distance(ebpo_bounder *b, const double xi[3], double distance)
+{
+    double at[3], certain = distance - 4 * b->frame.grain;
+    if (certain <= b->lo)
+        return;
+    pull_in(b, xi, at);
+    certain -= ebpo_cell_frame_apart(&b->frame, xi, at);
+    if (certain <= b->lo || !is_in_envelope(b, at))
+        return;
+    b->lo = certain;
+    ebpo_cell_frame_point(&b->frame, at, b->place);
+    b->target = fmax(b->target, b->ratio * b->lo);
+}
+
+static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragment,
+                                    ebpo_fragment_measure *l)
+{
+    double corner = 0;
+    int farthest = 0;
+    find_centre(b, &fragment->p, l);
+    ebpo_status status = query_distance(b, l->centre, &l->distance);
+    if (status != EBPO_OK)
+        return status;
+    memcpy(l->face, b->context->warm_triangle, sizeof l->face);
+    learn_distance(b, l->centre, l->distance);
+    for (int i = 0; i < fragment->p.vertex_count; i++) {
+        double d =
+            ebpo_cell_frame_distance(&b->frame, fragment->p.vertex[i], (const double(*)[3])l->face);
+        farthest = d > corner ? i : farthest;
+        corner = fmax(corner, d);
+    }
+    l->upper =
+        fmin(fmin(fragment->upper, corner), fmax(0, l->distance + l->reach)) + 4 * b->frame.grain;
+    if (l->upper <= b->target || (l->distance < 0 && corner <= -l->distance))
+        return EBPO_OK;
+    /* The likeliest place of the largest distance: that corner, moved off the rounded surface. */
+    double xi[3], d;
+    for (int k = 0; k < 3; k++)
+        xi[k] = fmin(fmax(fragment->p.vertex[farthest][k] +
+                              1e-5 * (l->centre[k] - fragment->p.vertex[farthest][k]),
+                          0),
+                     1);
+    status = query_distance(b, xi, &d);
+    if (status == EBPO_OK)
+        learn_distance(b, xi, d);
+    return status;
+}
+
+/* --- the search --- */
+
+static ebpo_status begin_search(ebpo_bounder *b)
+{
+    ebpo_node node;
+    ebpo_fragment *first = NULL;
+    if (!ebpo_tree_find(b->whole, b->frame.cell, &node))
+        return ebpo_fail(b->error, EBPO_E_ARGUMENT,
+                         "the model has no node of level %d where the level has one: they are not "
+                         "of the same file",
+                         b->frame.cell.level);
+    b->fragment_count = b->face_count = 0;
+    if (node.type == EBPO_BLACK)
+        return EBPO_OK;
+    ebpo_status status = ebpo_fragment_push(b,
+                                            node.type == EBPO_GRAY   ? EBPO_FRAGMENT_GRAY
+                                            : node.type == EBPO_LEAF ? EBPO_FRAGMENT_LEAF
+                                                                     : EBPO_FRAGMENT_OUTSIDE,
+                                            NULL, &first);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_half_spaces_cut(&b->halves, EBPO_CUT_SLACK, &first->p);
+    first->node = node;
+    for (int k = 0; k < 3; k++) {
+        b->inner[k] = 0;
+        for (int i = 0; i < first->p.vertex_count; i++)
+            b->inner[k] += first->p.vertex[i][k] / first->p.vertex_count;
+    }
+    return node.type == EBPO_LEAF ? ebpo_fragment_leaf_faces(b, first, &node) : EBPO_OK;
+}
+
+static ebpo_status search_step(ebpo_bounder *b)
+{
+    ebpo_fragment fragment;
+    ebpo_fragment_measure l;
+    const ebpo_fragment *top = &b->fragments[--b->fragment_count];
+    memcpy(&fragment, top, offsetof(ebpo_fragment, p));
+    ebpo_polytope_copy(&fragment.p, &top->p);
+    b->face_count = fragment.face_first + fragment.face_count;
+    if (fragment.kind != EBPO_FRAGMENT_OUTSIDE)
+        fragment.upper = fmin(fragment.upper, ebpo_cell_frame_diagonal(&b->frame, fragment.levels) +
+                                                  fragment.beyond);
+    if (fragment.upper <= b->target) {
+        ebpo_bound_raise(b, fragment.upper);
+        return EBPO_OK;
+    }
+    ebpo_status status = measure_fragment(b, &fragment, &l);
+    if (status != EBPO_OK)
+        return status;
+    fragment.upper = l.upper;
+    if (l.upper <= b->target || l.reach < EBPO_FRAGMENT_LEAST) {
+        ebpo_bound_raise(b, l.upper);
+        return EBPO_OK;
+    }
+    return ebpo_fragment_cut(b, &fragment, &l);
+}
+
+ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_goal *goal,
+                                ebpo_reach_bound *out, ebpo_error *error)
+{
+    ebpo_box box = b->whole->box;
+    ebpo_cell_frame_make(&b->frame, &box, cell);
+    b->error = error;
+    b->target = ebpo_cell_frame_length(&b->frame, goal->enough) * (1 - 0x1p-40);
+    b->quit = ebpo_cell_frame_length(&b->frame, goal->too_much);
+    b->ratio = goal->ratio;
+    b->lo = b->hi = 0;
+    b->questions = 0;
+    ebpo_status status = begin_search(b);
+    while (status == EBPO_OK && b->fragment_count && b->questions < goal->questions &&
+           b->lo <= b->quit)
+        status = search_step(b);
+    for (uint64_t i = 0; i < b->fragment_count; i++)
+        ebpo_bound_raise(b, b->fragments[i].upper);
+    *out = (ebpo_reach_bound){ b->lo > 0 ? ldexp(b->lo, b->frame.exponent) : 0,
+                               ebpo_cell_frame_model_length(&b->frame, b->hi),
+                               { b->place[0], b->place[1], b->place[2] },
+                               b->questions };
+    return status;
+}
+
+static void merge_bounds(ebpo_reach_bound *known, const ebpo_reach_bound *found)
+{
+    known->hi = fmin(known->hi, found->hi);
+    known->questions += found->questions;
+    if (found->lo <= known->lo)
+        return;
+    known->lo = found->lo;
+    memcpy(known->place, found->place, sizeof known->place);
+}
+
+ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_goal *goal,
+                               ebpo_reach_bound *out, ebpo_error *error)
+{
+    ebpo_reach_bound found;
+    ebpo_bound_goal now = *goal;
+    uint64_t asked = 0;
+    ebpo_status status = EBPO_OK;
+    if (isinf(out->hi)) {
+        ebpo_cell_frame frame;
+        ebpo_box box = b->whole->box;
+        ebpo_cell_frame_make(&frame, &box, cell);
+        /* a gray node or leaf touches a face */
+        out->hi = ebpo_cell_frame_model_length(&frame, ebpo_cell_frame_diagonal(&frame, 0));
+    }
+    for (;;) {
+        double good = fmax(goal->enough, goal->ratio * out->lo);
+        if (status != EBPO_OK || out->hi <= good || asked >= goal->questions ||
+            out->lo > goal->too_much)
+            return status;
+        now.enough = fmax(out->hi / 2, good);
+        now.questions = goal->questions - asked;
+        status = ebpo_bound_envelope(b, cell, &now, &found, error);
+        if (status != EBPO_OK)
+            return status;
+        bool stuck = found.hi >= out->hi && found.lo <= out->lo;
+        asked += found.questions;
+        merge_bounds(out, &found);
+        if (stuck)
+            return EBPO_OK; /* rounding is all there is left */
+    }
+}
+
+/* a node that takes more is refined: its children's envelopes are smaller and closer */
+enum { QUESTIONS = 4096 };
+
+/* The least max_error that was found to be enough, the largest one that was not, and a certain
+ * lower bound. A search for a larger max_error asks no more and accepts no more (error_bound.h), so
+ * these tell what it would find; an upper bound from another search would not, as this one might
+ * run out of questions just above it. */
+typedef struct memory {
+    double enough, failed, lo;
+} memory;
+
+struct ebpo_tolerance {
+    ebpo_model *model;
+    ebpo_lod_model tree;
+    bool planes;
+    unsigned threads;
+    ebpo_progress progress;
+    memory *gray[EBPO_LEVELS_MAX], *leaf[EBPO_LEVELS_MAX];
+    ebpo_bounder *bounders;     /* [threads] */
+    ebpo_tolerance_node *nodes; /* of the call at hand */
+    double max_error;
+};
+
+static memory *new_memory(uint64_t count)
+{
+    memory *out = ebpo_alloc(count, sizeof *out);
+    for (uint64_t i = 0; out && i < count; i++)
+        out[i] = (memory){ INFINITY, -1, 0 };
+    return out;
+}
+
+ebpo_status ebpo_tolerance_open(ebpo_tolerance **out, const ebpo_file *file, bool planes,
+                                unsigned threads, ebpo_progress progress, ebpo_error *error)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_tolerance *n = *out = ebpo_alloc_zero(1, sizeof *n);
+    if (!n)
+        return ebpo_fail_memory(error, sizeof *n);
+    n->planes = planes;
+    n->threads = ebpo_thread_count(threads);
+    n->progress = progress;
+    options.threads = threads;
+    options.progress = progress;
+    ebpo_status status = ebpo_tree_read_whole(&n->tree, file, threads, error);
+    if (status == EBPO_OK)
+        status = ebpo_model_new(file, &options, &n->model, error);
+    if (status == EBPO_OK && !(n->bounders = ebpo_alloc_zero(n->threads, sizeof *n->bounders)))
+        status = ebpo_fail_memory(error, n->threads * sizeof *n->bounders);
+    for (unsigned i = 0; i < n->threads && status == EBPO_OK; i++)
+        status = ebpo_bounder_make(&n->bounders[i], &n->tree, n->model, error);
+    for (int i = 0; i <= n->tree.target && status == EBPO_OK; i++) {
+        n->gray[i] = new_memory(n->tree.level[i].gray_count);
+        n->leaf[i] = new_memory(n->tree.level[i].leaf_count);
+        if (!n->gray[i] || !n->leaf[i])
+            status = ebpo_fail_memory(error,
+                                      (n->tree.level[i].gray_count + n->tree.level[i].leaf_count) *
+                                          sizeof(memory));
+    }
+    if (status != EBPO_OK) {
+        ebpo_tolerance_close(n);
+        *out = NULL;
+    }
+    return status;
+}
+
+void ebpo_tolerance_close(ebpo_tolerance *n)
+{
+    if (!n)
+        return;
+    for (unsigned i = 0; n->bounders && i < n->threads; i++)
+        ebpo_bounder_free(&n->bounders[i]);
+    for (int i = 0; i < EBPO_LEVELS_MAX; i++) {
+        free(n->gray[i]);
+        free(n->leaf[i]);
+    }
+    free(n->bounders);
+    ebpo_model_free(n->model);
+    ebpo_lod_model_free(&n->tree);
+    free(n);
+}
+
+static ebpo_status judge_node(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance_node *node,
+                              ebpo_error *error)
+{
+    ebpo_node own;
+    ebpo_reach_bound found;
+    ebpo_bound_goal goal = { n->max_error, n->max_error, 0, QUESTIONS };
+    node->enough = false;
+    if (!node->asked)
+        return EBPO_OK;
+    if (!ebpo_tree_find(&n->tree, node->cell, &own) ||
+        (own.type != EBPO_GRAY && own.type != EBPO_LEAF))
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "level %d: a node is missing in its tree; run ebpo verify",
+                         node->cell.level);
+    memory *m = own.type == EBPO_GRAY ? &n->gray[node->cell.level][own.rank]
+                                      : &n->leaf[node->cell.level][own.rank];
+    node->enough = n->max_error >= m->enough;
+    if (node->enough || n->max_error <= m->failed || n->max_error < m->lo)
+        return EBPO_OK;
+    if (n->planes)
+        (void)ebpo_tree_bounds(&n->tree, node->cell, own.type == EBPO_GRAY, &own, &b->halves);
+    else
+        b->halves.count = 0;
+    ebpo_status status = ebpo_bound_envelope(b, node->cell, &goal, &found, error);
+    if (status != EBPO_OK)
+        return status;
+    node->enough = found.hi <= n->max_error;
+    m->lo = fmax(m->lo, found.lo);
+    if (node->enough)
+        m->enough = fmin(m->enough, n->max_error);
+    else
+        m->failed = fmax(m->failed, n->max_error);
+    return EBPO_OK;
+}
+
+static ebpo_status judge_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
+{
+    ebpo_tolerance *n = context;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
+        status = judge_node(n, &n->bounders[worker], &n->nodes[i], error);
+    return status;
+}
+
+ebpo_status ebpo_tolerance_judge(ebpo_tolerance *n, ebpo_tolerance_node *nodes, uint64_t count,
+                                 double max_error, ebpo_error *error)
+{
+    n->nodes = nodes;
+    n->max_error = max_error;
+    return ebpo_parallel_for(n->threads, NULL, count, 8, judge_some, n, &n->progress,
+                             "judging envelopes", error);
+}
+
+ebpo_status ebpo_tolerance_most(ebpo_tolerance *n, double *out, ebpo_error *error)
+{
+    ebpo_node own;
+    ebpo_reach_bound found = { 0, INFINITY, { 0, 0, 0 }, 0 };
+    ebpo_cell root = { 0, { 0, 0, 0 } };
+    ebpo_bound_goal goal = { 0, INFINITY, 1.02, QUESTIONS };
+    (void)ebpo_tree_bounds(&n->tree, root, true, &own, &n->bounders[0].halves);
+    if (own.type == EBPO_LEAF || !n->planes)
+        n->bounders[0].halves.count = 0;
+    ebpo_status status = ebpo_bound_closely(&n->bounders[0], root, &goal, &found, error);
+    /* A search of its own may need a little more; with the root cell's diagonal none is left. */
+    ebpo_tolerance_node node = { root, true, false };
+    double most = found.hi > 0 ? found.hi : DBL_MIN;
+    *out = most;
+    for (double more = 0x1p-30; status == EBPO_OK && !node.enough; more *= 2) {
+        n->max_error = *out;
+        status = judge_node(n, &n->bounders[0], &node, error);
+        if (!node.enough)
+            *out = most * (1 + more);
+    }
+    return status;
+}

@@ -1,0 +1,335 @@
+/* OBJ and STL through assimp's exporters, which write float32 coordinates. The blocks of a job
+ * become one assimp scene, whose arrays are lent to assimp for the call. assimp writes one file
+ * only, under a temporary name until it is complete; every other name that it asks for is an error.
+ * A build without assimp does not compile this file, and the table in export.c has no function for
+ * these formats. */
+#include "core/strict_fp.h"
+
+#include <assimp/cexport.h>
+#include <assimp/cfileio.h>
+#include <assimp/cimport.h>
+#include <assimp/material.h>
+#include <assimp/mesh.h>
+#include <assimp/scene.h>
+#include <errno.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "derive/export_job.h"
+#include "io/file_source.h"
+#include "io/publish.h"
+
+/* --- the file that assimp writes --- */
+
+typedef struct scene_file {
+    const char *path; /* lent */
+    ebpo_publish publish;
+    FILE *stream; /* NULL: assimp has not opened it */
+    bool failed;  /* a write came short; `why` is its errno */
+    int why;
+    char unknown[128]; /* another name that assimp wanted to write to, or "" */
+} scene_file;
+
+typedef struct cursor {
+    scene_file *target;
+    FILE *stream;
+} cursor;
+
+static cursor *cursor_of(struct aiFile *file) { return (cursor *)(void *)file->UserData; }
+
+/* assimp ignores what this returns, so the failure is kept. */
+static void note_failure(scene_file *target)
+{
+    target->why = target->failed ? target->why : errno;
+    target->failed = true;
+}
+
+static size_t write_bytes(struct aiFile *file, const char *from, size_t size, size_t count)
+{
+    cursor *c = cursor_of(file);
+    size_t done = fwrite(from, size, count, c->stream);
+    if (done != count && size)
+        note_failure(c->target);
+    return done;
+}
+
+static size_t read_bytes(struct aiFile *file, char *to, size_t size, size_t count)
+{
+    (void)file, (void)to, (void)size, (void)count;
+    return 0;
+}
+
+static size_t tell_stream(struct aiFile *file)
+{
+    off_t at = ftello(cursor_of(file)->stream);
+    return at > 0 ? (size_t)at : 0;
+}
+
+static enum aiReturn seek_stream(struct aiFile *file, size_t offset, enum aiOrigin origin)
+{
+    int whence = origin == aiOrigin_SET ? SEEK_SET : origin == aiOrigin_CUR ? SEEK_CUR : SEEK_END;
+    return fseeko(cursor_of(file)->stream, (off_t)offset, whence) == 0 ? aiReturn_SUCCESS
+                                                                       : aiReturn_FAILURE;
+}
+
+static size_t file_size(struct aiFile *file)
+{
+    size_t at = tell_stream(file), end;
+    (void)seek_stream(file, 0, aiOrigin_END);
+    end = tell_stream(file);
+    (void)seek_stream(file, at, aiOrigin_SET);
+    return end;
+}
+
+static void flush_stream(struct aiFile *file)
+{
+    if (fflush(cursor_of(file)->stream) != 0)
+        note_failure(cursor_of(file)->target);
+}
+
+static struct aiFile *open_file(struct aiFileIO *io, const char *name, const char *mode)
+{
+    scene_file *target = (scene_file *)(void *)io->UserData;
+    if (mode[0] != 'w')
+        return NULL;
+    bool known = strcmp(ebpo_path_name(target->path), ebpo_path_name(name)) == 0;
+    FILE *stream = known ? ebpo_publish_stream(&target->publish) : NULL;
+    if (!known)
+        snprintf(target->unknown, sizeof target->unknown, "%s", name);
+    struct aiFile *file = calloc(1, sizeof *file);
+    cursor *c = calloc(1, sizeof *c);
+    if (!stream || !file || !c) {
+        free(file);
+        free(c);
+        target->failed = true;
+        target->why = ENOMEM;
+        return NULL;
+    }
+    target->stream = stream;
+    *c = (cursor){ target, stream };
+    *file = (struct aiFile){ read_bytes,  write_bytes,  tell_stream,          file_size,
+                             seek_stream, flush_stream, (aiUserData)(void *)c };
+    return file;
+}
+
+static void close_file(struct aiFileIO *io, struct aiFile *file)
+{
+    (void)io;
+    flush_stream(file);
+    free(file->UserData);
+    free(file);
+}
+
+static void scene_file_begin(scene_file *file, const char *path)
+{
+    *file = (scene_file){ .path = path, .publish = EBPO_PUBLISH_INIT };
+}
+
+/* Hands the file to assimp by the last part of its name; no other name exists for it. `io` points
+ * into `file`. */
+static void scene_file_offer(scene_file *file, struct aiFileIO *io)
+{
+    *io = (struct aiFileIO){ open_file, close_file, (aiUserData)(void *)file };
+}
+
+static ebpo_status scene_file_commit(scene_file *file, ebpo_error *error)
+{
+    if (file->unknown[0])
+        return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, file->path,
+                              "this assimp wants to write a file '%s' too, which nobody knows of; "
+                              "take another format",
+                              file->unknown);
+    if (file->failed) {
+        errno = file->why;
+        return ebpo_fail_errno(error, file->path, "could not be written");
+    }
+    if (!file->stream)
+        return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, file->path,
+                              "this assimp has written nothing; take another format");
+    return ebpo_publish_commit(&file->publish, error);
+}
+
+/* Removes it, unless it was committed. */
+static void scene_file_abort(scene_file *file) { ebpo_publish_abort(&file->publish); }
+
+/* --- the scene that assimp is lent --- */
+
+enum { PARTS_MAX = EBPO_LEVELS_MAX + 1 };
+
+/* assimp has one error text for the whole process. */
+static pthread_mutex_t assimp_mutex = PTHREAD_MUTEX_INITIALIZER;
+
+/* All that assimp is lent. It copies before it changes anything. */
+typedef struct scene {
+    struct aiScene root;
+    struct aiNode top, node[PARTS_MAX], *children[PARTS_MAX];
+    struct aiMesh mesh[PARTS_MAX], *meshes[PARTS_MAX];
+    struct aiMaterial material, *materials;
+    unsigned number[PARTS_MAX], count;
+    double largest_change;
+} scene;
+
+static void set_name(struct aiString *to, const char *name)
+{
+    to->length = (ai_uint32)snprintf(to->data, sizeof to->data, "%s", name);
+}
+
+static const struct aiMatrix4x4 identity = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
+
+static ebpo_status add_vertices(scene *s, struct aiMesh *to, const ebpo_mesh *from,
+                                ebpo_error *error)
+{
+    static const double origin[3] = { 0, 0, 0 };
+    float *xyz = NULL;
+    ebpo_status status = ebpo_mesh_floats(&xyz, from, origin, &s->largest_change, error);
+    if (status != EBPO_OK)
+        return status;
+    to->mNumVertices = (unsigned)from->vertex_count;
+    to->mVertices = ebpo_alloc(from->vertex_count, sizeof *to->mVertices);
+    if (!to->mVertices)
+        status = ebpo_fail_memory(error, from->vertex_count * sizeof *to->mVertices);
+    for (uint64_t i = 0; to->mVertices && i < from->vertex_count; i++)
+        to->mVertices[i] = (struct aiVector3D){ xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2] };
+    free(xyz);
+    return status;
+}
+
+/* assimp writes them behind the positions. */
+static ebpo_status add_colours(struct aiMesh *to, const ebpo_block *block, ebpo_error *error)
+{
+    const uint8_t *rgba = block->colours.vertex;
+    uint64_t count = block->mesh.vertex_count;
+    struct aiColor4D *colours = rgba ? ebpo_alloc(count, sizeof *colours) : NULL;
+    if (rgba && !colours)
+        return ebpo_fail_memory(error, count * sizeof *colours);
+    for (uint64_t i = 0; colours && i < count; i++, rgba += 4)
+        colours[i] = (struct aiColor4D){ (float)rgba[0] / 255, (float)rgba[1] / 255,
+                                         (float)rgba[2] / 255, (float)rgba[3] / 255 };
+    to->mColors[0] = colours;
+    return EBPO_OK;
+}
+
+/* Takes the triangles over from the block. */
+static ebpo_status add_faces(struct aiMesh *to, ebpo_mesh *from, ebpo_error *error)
+{
+    to->mNumFaces = (unsigned)from->face_count;
+    to->mFaces = ebpo_alloc(from->face_count, sizeof *to->mFaces);
+    if (!to->mFaces)
+        return ebpo_fail_memory(error, from->face_count * sizeof *to->mFaces);
+    for (uint64_t i = 0; i < from->face_count; i++)
+        to->mFaces[i] = (struct aiFace){ 3, from->faces + 3 * i };
+    from->faces = NULL;
+    return EBPO_OK;
+}
+
+static ebpo_status add_block(scene *s, ebpo_block *block, ebpo_error *error)
+{
+    struct aiMesh *mesh = &s->mesh[s->count];
+    struct aiNode *node = &s->node[s->count];
+    mesh->mPrimitiveTypes = aiPrimitiveType_TRIANGLE;
+    set_name(&mesh->mName, block->name);
+    node->mName = mesh->mName;
+    node->mTransformation = identity;
+    node->mParent = &s->top;
+    node->mNumMeshes = 1;
+    node->mMeshes = &s->number[s->count];
+    s->number[s->count] = s->count;
+    s->children[s->count] = node;
+    s->meshes[s->count++] = mesh;
+    ebpo_status status = add_vertices(s, mesh, &block->mesh, error);
+    if (status == EBPO_OK)
+        status = add_colours(mesh, block, error);
+    return status == EBPO_OK ? add_faces(mesh, &block->mesh, error) : status;
+}
+
+static void finish_scene(scene *s)
+{
+    set_name(&s->top.mName, "ebpo");
+    s->top.mTransformation = identity;
+    s->top.mNumChildren = s->count;
+    s->top.mChildren = s->children;
+    s->materials = &s->material;
+    s->root.mRootNode = &s->top;
+    s->root.mNumMeshes = s->count;
+    s->root.mMeshes = s->meshes;
+    s->root.mNumMaterials = 1;
+    s->root.mMaterials = &s->materials;
+}
+
+static void scene_free(scene *s)
+{
+    for (unsigned i = 0; i < s->count; i++) {
+        if (s->mesh[i].mFaces)
+            free(s->mesh[i].mFaces[0].mIndices);
+        free(s->mesh[i].mFaces);
+        free(s->mesh[i].mVertices);
+        free(s->mesh[i].mColors[0]);
+    }
+    free(s);
+}
+
+static ebpo_status gather_scene(scene *s, const ebpo_export_job *job, ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(job->file);
+    /* Of the mesh known before anything is read. */
+    ebpo_status status = job->options->mesh ? ebpo_export_check_scene(job->path, info->vertex_count,
+                                                                      info->face_count, error)
+                                            : EBPO_OK;
+    uint64_t vertices = 0, faces = 0;
+    for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
+        ebpo_block block;
+        status = ebpo_export_read_block(job, i, EBPO_SOURCE_ORDER, &block, error);
+        if (status == EBPO_OK)
+            status = ebpo_export_check_scene(job->path, vertices += block.mesh.vertex_count,
+                                             faces += block.mesh.face_count, error);
+        if (status == EBPO_OK && block.mesh.face_count)
+            status = add_block(s, &block, error);
+        ebpo_block_free(&block);
+    }
+    if (status == EBPO_OK && s->count == 0)
+        status =
+            ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path, "there would be no triangle in it");
+    finish_scene(s);
+    job->report->largest_change = s->largest_change;
+    return status;
+}
+
+static ebpo_status write_scene(const scene *s, const ebpo_export_job *job, scene_file *file,
+                               ebpo_error *error)
+{
+    const char *id = job->format == EBPO_EXPORT_OBJ ? "objnomtl" : "stlb";
+    struct aiFileIO io;
+    ebpo_status status = EBPO_OK;
+    scene_file_offer(file, &io);
+    pthread_mutex_lock(&assimp_mutex);
+    if (aiExportSceneEx(&s->root, id, ebpo_path_name(job->path), &io, 0) != aiReturn_SUCCESS &&
+        !file->failed)
+        status = ebpo_fail_file(error, EBPO_E_UNSUPPORTED, job->path,
+                                "assimp cannot write it (%.200s); take another format",
+                                aiGetErrorString());
+    pthread_mutex_unlock(&assimp_mutex);
+    return status;
+}
+
+ebpo_status ebpo_export_assimp(const ebpo_export_job *job, ebpo_error *error)
+{
+    scene_file file;
+    scene_file_begin(&file, job->path);
+    scene *s = ebpo_alloc_zero(1, sizeof *s);
+    if (!s)
+        return ebpo_fail_memory(error, sizeof *s);
+    /* Before the work, so that a folder which cannot be written is found out at once. */
+    ebpo_status status = ebpo_publish_begin(&file.publish, job->path, error);
+    if (status == EBPO_OK)
+        status = gather_scene(s, job, error);
+    if (status == EBPO_OK)
+        status = write_scene(s, job, &file, error);
+    if (status == EBPO_OK)
+        status = scene_file_commit(&file, error);
+    scene_file_abort(&file);
+    scene_free(s);
+    return status;
+}

@@ -1,0 +1,384 @@
+/* glTF 2.0, as one file (GLB) or as a text with a .bin beside it. Coordinates are float32
+ * relative to the middle of the root cell, which is the translation of the nodes. assimp is not
+ * used here: its exporter joins vertices that are less than 1e-5 apart, whatever the size of the
+ * model. Source: Khronos, "glTF 2.0 Specification", sections 3 and 4. */
+#include "core/strict_fp.h"
+
+#include <float.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/endian.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/text_stream.h"
+#include "derive/export_job.h"
+#include "io/file_source.h"
+#include "io/publish.h"
+
+enum {
+    PARTS_MAX = EBPO_LEVELS_MAX + 1,
+    FLOAT32 = 5126,
+    UINT32 = 5125,
+    UINT16 = 5123,
+    VERTICES = 34962,
+    INDICES = 34963,
+    BUFFER = 1 << 14
+};
+
+typedef struct part {
+    ebpo_block block; /* its positions are in xyz only */
+    float *xyz, low[3], high[3];
+} part;
+
+typedef struct model {
+    part parts[PARTS_MAX];
+    int count;
+    double origin[3], largest_change;
+    const char *bin_name; /* NULL: in the same file */
+} model;
+
+/* --- what is to be written --- */
+
+/* Far from zero a float32 has few digits left for the model: then vertices are relative to the
+ * middle of the box, which becomes the nodes' translation. */
+static void choose_origin(model *m, const ebpo_info *info)
+{
+    double size = 0, far = 0;
+    for (int k = 0; k < 3; k++) {
+        size = fmax(size, info->box_size[k]);
+        far = fmax(far,
+                   fmax(fabs(info->box_origin[k]), fabs(info->box_origin[k] + info->box_size[k])));
+    }
+    for (int k = 0; k < 3 && far > 16 * size; k++) {
+        /* readers keep a translation as float32 */
+        float middle = (float)(info->box_origin[k] + info->box_size[k] / 2);
+        m->origin[k] = isfinite(middle) ? (double)middle : 0;
+    }
+}
+
+static void find_bounds(part *p)
+{
+    for (int k = 0; k < 3; k++)
+        p->low[k] = p->high[k] = p->xyz[k];
+    for (uint64_t i = 0; i < 3 * p->block.mesh.vertex_count; i++) {
+        p->low[i % 3] = fminf(p->low[i % 3], p->xyz[i]);
+        p->high[i % 3] = fmaxf(p->high[i % 3], p->xyz[i]);
+    }
+}
+
+/* Views of a part, in this order; each its own accessor. */
+enum { VIEW_POSITIONS, VIEW_CORNERS, VIEW_COLOURS, VIEWS };
+
+static uint64_t view_bytes(const part *p, int view)
+{
+    const ebpo_block *block = &p->block;
+    return view == VIEW_POSITIONS  ? 12 * block->mesh.vertex_count
+           : view == VIEW_CORNERS  ? 12 * block->mesh.face_count
+           : block->colours.vertex ? 8 * block->mesh.vertex_count
+                                   : 0;
+}
+
+/* The number of a part's first accessor, and of its first view. */
+static int first_view(const model *m, int number)
+{
+    int n = 0;
+    for (int i = 0; i < number; i++)
+        n += m->parts[i].block.colours.vertex ? VIEWS : VIEW_COLOURS;
+    return n;
+}
+
+static uint64_t bin_bytes(const model *m)
+{
+    uint64_t sum = 0;
+    for (int i = 0; i < m->count; i++)
+        for (int v = 0; v < VIEWS; v++)
+            sum += view_bytes(&m->parts[i], v);
+    return sum;
+}
+
+static ebpo_status gather_model(model *m, const ebpo_export_job *job, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    const ebpo_info *info = ebpo_file_info(job->file);
+    choose_origin(m, info);
+    if (!m->bin_name && job->options->mesh) /* known before anything is read */
+        status = ebpo_export_check_glb(job->path, 0, 12 * (info->vertex_count + info->face_count),
+                                       error);
+    for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
+        part *p = &m->parts[m->count];
+        status = ebpo_export_read_block(job, i, EBPO_SOURCE_ORDER, &p->block, error);
+        if (status != EBPO_OK || p->block.mesh.face_count == 0) {
+            ebpo_block_free(&p->block);
+            continue;
+        }
+        m->count++;
+        /* before more is read */
+        status = m->bin_name ? EBPO_OK : ebpo_export_check_glb(job->path, 0, bin_bytes(m), error);
+        if (status != EBPO_OK)
+            return status;
+        status = ebpo_mesh_floats(&p->xyz, &p->block.mesh, m->origin, &m->largest_change, error);
+        if (status != EBPO_OK)
+            return status;
+        ebpo_array_free(p->block.mesh.workspace, p->block.mesh.xyz32);
+        ebpo_array_free(p->block.mesh.workspace, p->block.mesh.xyz64);
+        p->block.mesh.xyz32 = NULL;
+        p->block.mesh.xyz64 = NULL;
+        find_bounds(p);
+    }
+    memcpy(job->report->origin, m->origin, sizeof m->origin);
+    job->report->largest_change = m->largest_change;
+    if (status == EBPO_OK && m->count == 0)
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path,
+                              "there would be no triangle in it");
+    return status;
+}
+
+/* --- the text --- */
+
+static void print_name(FILE *f, const char *name)
+{
+    static const char hex[] = "0123456789ABCDEF"; /* a URI: what is not plain is written as %XX */
+    for (; *name; name++) {
+        unsigned char c = (unsigned char)*name;
+        if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+            strchr("-._~", c))
+            fputc(c, f);
+        else
+            fprintf(f, "%%%c%c", hex[c >> 4], hex[c & 15]);
+    }
+}
+
+/* Three numbers as JSON wants them, in any locale. */
+static void print_three(FILE *f, const char *before, const double x[3])
+{
+    fputs(before, f);
+    for (int k = 0; k < 3; k++) {
+        char text[40];
+        snprintf(text, sizeof text, "%.17g", x[k]);
+        for (char *c = text; *c; c++)
+            if (!strchr("+-0123456789eE", *c))
+                *c = '.';
+        fprintf(f, "%s%s", k ? "," : "[", text);
+    }
+    fputc(']', f);
+}
+
+static void print_mesh(FILE *f, const model *m, int i)
+{
+    const ebpo_block *block = &m->parts[i].block;
+    int first = first_view(m, i);
+    bool coloured = block->colours.vertex != NULL;
+    fprintf(f, "%s{\"name\":\"%s\",\"primitives\":[{\"attributes\":{\"POSITION\":%d",
+            i ? ",\n" : "", block->name, first);
+    if (coloured)
+        fprintf(f, ",\"COLOR_0\":%d", first + VIEW_COLOURS);
+    fprintf(f, "},\"indices\":%d,\"material\":%d}]}", first + VIEW_CORNERS, coloured);
+}
+
+static void print_nodes(FILE *f, const model *m)
+{
+    const double *o = m->origin;
+    fprintf(f, "\"scene\":0,\"scenes\":[{\"nodes\":[");
+    for (int i = 0; i < m->count; i++)
+        fprintf(f, "%s%d", i ? "," : "", i);
+    fprintf(f, "]}],\n\"nodes\":[");
+    for (int i = 0; i < m->count; i++) {
+        fprintf(f, "%s{\"name\":\"%s\",\"mesh\":%d", i ? ",\n" : "", m->parts[i].block.name, i);
+        if (o[0] != 0 || o[1] != 0 || o[2] != 0)
+            print_three(f, ",\"translation\":", o);
+        fputc('}', f);
+    }
+    fprintf(f, "],\n\"meshes\":[");
+    for (int i = 0; i < m->count; i++)
+        print_mesh(f, m, i);
+    fprintf(f,
+            "],\n\"materials\":[{\"name\":\"plain\",\"pbrMetallicRoughness\":{\"baseColorFactor\":["
+            "0.6,0.7,0.8,1],\"metallicFactor\":0,\"roughnessFactor\":0.8}}");
+    if (first_view(m, m->count) > VIEW_COLOURS * m->count) /* factors multiply colours */
+        fprintf(f, ",\n{\"name\":\"coloured\",\"pbrMetallicRoughness\":{\"metallicFactor\":0,"
+                   "\"roughnessFactor\":0.8}}");
+    fprintf(f, "],\n");
+}
+
+static void print_accessors(FILE *f, const model *m, int i)
+{
+    const part *p = &m->parts[i];
+    int first = first_view(m, i);
+    const double low[3] = { (double)p->low[0], (double)p->low[1], (double)p->low[2] },
+                 high[3] = { (double)p->high[0], (double)p->high[1], (double)p->high[2] };
+    fprintf(f, "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"VEC3\"",
+            i ? ",\n" : "", first, FLOAT32, p->block.mesh.vertex_count);
+    print_three(f, ",\"min\":", low);
+    print_three(f, ",\"max\":", high);
+    fprintf(f,
+            "},\n{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64
+            ",\"type\":\"SCALAR\"}",
+            first + VIEW_CORNERS, UINT32, 3 * p->block.mesh.face_count);
+    if (p->block.colours.vertex)
+        fprintf(f,
+                ",\n{\"bufferView\":%d,\"componentType\":%d,\"normalized\":true,\"count\":%" PRIu64
+                ",\"type\":\"VEC4\"}",
+                first + VIEW_COLOURS, UINT16, p->block.mesh.vertex_count);
+}
+
+static void print_data(FILE *f, const model *m)
+{
+    uint64_t at = 0;
+    fprintf(f, "\"accessors\":[");
+    for (int i = 0; i < m->count; i++)
+        print_accessors(f, m, i);
+    fprintf(f, "],\n\"bufferViews\":[");
+    for (int i = 0; i < m->count; i++) {
+        for (int k = 0; k < VIEWS; k++) {
+            uint64_t size = view_bytes(&m->parts[i], k);
+            if (size)
+                fprintf(f,
+                        "%s{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64
+                        ",\"target\":%d}",
+                        at ? ",\n" : "", at, size, k == VIEW_CORNERS ? INDICES : VERTICES);
+            at += size;
+        }
+    }
+    fprintf(f, "],\n\"buffers\":[{\"byteLength\":%" PRIu64, at);
+    if (m->bin_name) {
+        fprintf(f, ",\"uri\":\"");
+        print_name(f, m->bin_name);
+        fputc('"', f);
+    }
+    fprintf(f, "}]");
+}
+
+static void print_text(FILE *f, const model *m)
+{
+    fprintf(f, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"ebpo %s\"},\n", ebpo_version());
+    print_nodes(f, m);
+    print_data(f, m);
+    fprintf(f, "}\n");
+}
+
+/* --- the numbers, little-endian --- */
+
+static void write_words(FILE *f, const void *words, uint64_t count)
+{
+    uint8_t buffer[4 * BUFFER];
+    const uint8_t *from = words;
+    for (uint64_t done = 0; done < count;) {
+        size_t n = count - done < BUFFER ? (size_t)(count - done) : BUFFER;
+        for (size_t i = 0; i < n; i++) {
+            uint32_t word;
+            memcpy(&word, from + 4 * (done + i), 4);
+            ebpo_store32(buffer + 4 * i, word);
+        }
+        fwrite(buffer, 4, n, f); /* failures show in ferror */
+        done += n;
+    }
+}
+
+/* COLOR_0 is linear, where a mesh's colours are sRGB; 16 bits keep all of these apart. */
+static void write_colours(FILE *f, const uint8_t *rgba, uint64_t count)
+{
+    uint16_t linear[256];
+    for (int i = 0; i < 256; i++) {
+        double c = i / 255.0;
+        linear[i] =
+            (uint16_t)(65535 * (c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4)) + 0.5);
+    }
+    for (uint64_t i = 0; i < count; i++, rgba += 4) {
+        uint8_t row[8];
+        for (int k = 0; k < 4; k++)
+            ebpo_store16(row + 2 * k, k < 3 ? linear[rgba[k]] : (uint16_t)(257 * rgba[k]));
+        fwrite(row, 1, sizeof row, f);
+    }
+}
+
+static void write_bin(FILE *f, const model *m)
+{
+    for (int i = 0; i < m->count; i++) {
+        write_words(f, m->parts[i].xyz, 3 * m->parts[i].block.mesh.vertex_count);
+        write_words(f, m->parts[i].block.mesh.faces, 3 * m->parts[i].block.mesh.face_count);
+        if (m->parts[i].block.colours.vertex)
+            write_colours(f, m->parts[i].block.colours.vertex, m->parts[i].block.mesh.vertex_count);
+    }
+}
+
+/* --- the files --- */
+
+static ebpo_status write_glb(FILE *f, const model *m, const char *path, ebpo_error *error)
+{
+    ebpo_text_stream t;
+    if (!ebpo_text_stream_begin(&t))
+        return ebpo_fail_memory(error, BUFSIZ);
+    print_text(t.file, m);
+    if (!ebpo_text_stream_end(&t))
+        return ebpo_fail_memory(error, t.bytes);
+    char *text = t.text;
+    uint64_t length = t.bytes;
+    size_t padding = -length & 3;
+    uint64_t bin = bin_bytes(m), total = EBPO_GLB_HEADS + length + padding + bin;
+    ebpo_status status = ebpo_export_check_glb(path, length, bin, error);
+    if (status != EBPO_OK) {
+        free(text);
+        return status;
+    }
+    const uint32_t head[5] = { 0x46546C67 /* glTF */, 2, (uint32_t)total,
+                               (uint32_t)(length + padding), 0x4E4F534A /* JSON */ };
+    const uint32_t bin_head[2] = { (uint32_t)bin, 0x004E4942 /* BIN */ };
+    write_words(f, head, 5);
+    fwrite(text, 1, length, f);
+    fwrite("   ", 1, padding, f);
+    write_words(f, bin_head, 2);
+    write_bin(f, m);
+    free(text);
+    return EBPO_OK;
+}
+
+static ebpo_status write_files(const model *m, const ebpo_export_job *job, ebpo_publish *light,
+                               ebpo_publish *heavy, ebpo_error *error)
+{
+    FILE *f = ebpo_publish_stream(light), *b = m->bin_name ? ebpo_publish_stream(heavy) : NULL;
+    ebpo_status status = EBPO_OK;
+    if (!f || (m->bin_name && !b))
+        return ebpo_fail_memory(error, BUFSIZ);
+    if (b) {
+        write_bin(b, m);
+        print_text(f, m);
+    } else {
+        status = write_glb(f, m, job->path, error);
+    }
+    if (status == EBPO_OK && b && (ferror(b) || fflush(b) != 0))
+        status = ebpo_fail_errno(error, job->second, "could not be written");
+    if (status == EBPO_OK && (ferror(f) || fflush(f) != 0))
+        status = ebpo_fail_errno(error, job->path, "could not be written");
+    if (status != EBPO_OK)
+        return status;
+    return b ? ebpo_publish_commit_pair(heavy, light, error) : ebpo_publish_commit(light, error);
+}
+
+ebpo_status ebpo_export_gltf(const ebpo_export_job *job, ebpo_error *error)
+{
+    ebpo_publish light = EBPO_PUBLISH_INIT, heavy = EBPO_PUBLISH_INIT;
+    model *m = ebpo_alloc_zero(1, sizeof *m);
+    if (!m)
+        return ebpo_fail_memory(error, sizeof *m);
+    m->bin_name = *job->second ? ebpo_path_name(job->second) : NULL;
+    /* Before the work, so that a folder which cannot be written is found out at once. */
+    ebpo_status status = ebpo_publish_begin(&light, job->path, error);
+    if (status == EBPO_OK && m->bin_name)
+        status = ebpo_publish_begin(&heavy, job->second, error);
+    if (status == EBPO_OK)
+        status = gather_model(m, job, error);
+    if (status == EBPO_OK)
+        status = write_files(m, job, &light, &heavy, error);
+    ebpo_publish_abort(&heavy);
+    ebpo_publish_abort(&light);
+    for (int i = 0; i < m->count; i++) {
+        ebpo_block_free(&m->parts[i].block);
+        free(m->parts[i].xyz);
+    }
+    free(m);
+    return status;
+}

@@ -1,0 +1,534 @@
+/* The chunk directory: the offset, the stored size and the checksum of every chunk of an open
+ * file. Offsets are read from the file's list of all chunks (/subtrees/places), or from HDF5's
+ * index of each array; both are read late, as they may be long or far away, and once, under the
+ * file's lock. The checksums (/chunk_sums) detect a chunk that is intact but belongs to another
+ * position or another version of the file. Both lists are single chunks, however long, so they
+ * have a separate encoder and decoder. Sums of stored sizes are checked against the size of the
+ * file before chunks are decoded. Source: format-spec/README.md, sections 9 and 20. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "core/alloc.h"
+#include "core/endian.h"
+#include "core/error.h"
+#include "core/sized.h"
+#include "format/chunk_directory.h"
+#include "format/file_in.h"
+#include "mesh/attributes.h"
+
+enum { LEVEL_NUMBERS = 64, MESH_NUMBERS = 4096, TABLE_NUMBERS = 4112, ATTRIBUTE_NUMBERS = 8191 };
+_Static_assert(EBPO_A_TYPES == 0 && EBPO_A_PLANES == 2 && EBPO_A_LEAF_REFS == 9 &&
+                   EBPO_A_LEAF_INDEX == 12 && EBPO_A_LEAF_PLANES == 14 &&
+                   EBPO_A_GRAY_COLOURS == 15 && EBPO_A_FACE_SOURCE - EBPO_A_VERTICES == 4 &&
+                   EBPO_A_SUBTREE_OUTER - EBPO_A_SUBTREE_INDEX == 2,
+               "arrays in files have these numbers: a new row of array_table.inc goes behind them");
+
+uint32_t ebpo_place_number(ebpo_array_id id, int level)
+{
+    if (id == EBPO_A_ATTRIBUTE)
+        return ATTRIBUTE_NUMBERS + (uint32_t)level;
+    return id < EBPO_LEVEL_ARRAYS      ? (uint32_t)level * LEVEL_NUMBERS + (uint32_t)id
+           : id < EBPO_A_SUBTREE_INDEX ? MESH_NUMBERS + (uint32_t)(id - EBPO_LEVEL_ARRAYS)
+                                       : TABLE_NUMBERS + (uint32_t)(id - EBPO_A_SUBTREE_INDEX);
+}
+
+static ebpo_array_id place_array(uint32_t number, int *level)
+{
+    *level = 0;
+    if (number < MESH_NUMBERS) {
+        *level = (int)(number / LEVEL_NUMBERS);
+        return number % LEVEL_NUMBERS < EBPO_LEVEL_ARRAYS && *level < EBPO_LEVELS_MAX
+                   ? (ebpo_array_id)(number % LEVEL_NUMBERS)
+                   : EBPO_ARRAYS;
+    }
+    if (number >= ATTRIBUTE_NUMBERS && number - ATTRIBUTE_NUMBERS <= 2 * EBPO_ATTRIBUTE_ARRAYS) {
+        *level = (int)(number - ATTRIBUTE_NUMBERS);
+        return EBPO_A_ATTRIBUTE;
+    }
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES; id++)
+        if (ebpo_place_number((ebpo_array_id)id, 0) == number)
+            return (ebpo_array_id)id;
+    return EBPO_ARRAYS;
+}
+
+/* Its bytes are three times in memory, coded and plain. */
+static const uint64_t LONGEST = PTRDIFF_MAX / 8 / 3;
+
+/* The elements' size as the pipeline sees it: the coder's scratch is too small for shuffling a long
+ * list, which is done here. */
+static bool is_shuffled(ebpo_pipeline pipeline)
+{
+    return pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE;
+}
+
+ebpo_status ebpo_long_chunk_encode(const uint64_t *values, uint64_t count, ebpo_pipeline pipeline,
+                                   int codec_level, uint8_t **stored, size_t *bytes,
+                                   ebpo_error *error)
+{
+    *stored = NULL;
+    if (count > LONGEST)
+        return ebpo_fail_memory(error, count * 8);
+    size_t size = (size_t)count * 8;
+    ebpo_chunk_coder *coder = ebpo_alloc_zero(1, sizeof *coder);
+    uint8_t *raw = ebpo_alloc(size, 1), *turned = ebpo_alloc(size, 1);
+    *stored = ebpo_alloc(ebpo_chunk_bound(size), 1);
+    ebpo_status status = coder && raw && turned && *stored ? EBPO_OK : EBPO_E_MEMORY;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        ebpo_store64(raw + 8 * i, values[i]);
+    if (status == EBPO_OK && is_shuffled(pipeline))
+        ebpo_shuffle(raw, size, 8, turned);
+    if (status == EBPO_OK)
+        status = ebpo_chunk_encode(coder, pipeline, codec_level, 1,
+                                   is_shuffled(pipeline) ? turned : raw, size, *stored, bytes);
+    if (coder)
+        ebpo_chunk_coder_clear(coder);
+    free(coder);
+    free(raw);
+    free(turned);
+    if (status == EBPO_OK)
+        return EBPO_OK;
+    free(*stored);
+    *stored = NULL;
+    return ebpo_fail_memory(error, size * 3);
+}
+
+ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t stored_bytes,
+                                   ebpo_pipeline pipeline, uint64_t count, uint64_t **values,
+                                   const char **why, ebpo_error *error)
+{
+    *values = NULL;
+    if (count > LONGEST)
+        return ebpo_fail_memory(error, count * 8);
+    size_t size = (size_t)count * 8;
+    ebpo_chunk_coder *coder = ebpo_alloc_zero(1, sizeof *coder);
+    uint8_t *raw = ebpo_alloc(size, 1), *turned = ebpo_alloc(size, 1);
+    *values = ebpo_alloc(count, sizeof **values);
+    ebpo_status status = coder && raw && turned && *values ? EBPO_OK : EBPO_E_MEMORY;
+    if (status == EBPO_OK)
+        status = ebpo_chunk_decode(coder, pipeline, 1, stored, stored_bytes, raw, size, why);
+    if (status == EBPO_OK && is_shuffled(pipeline))
+        ebpo_unshuffle(raw, size, 8, turned);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        (*values)[i] = ebpo_load64((is_shuffled(pipeline) ? turned : raw) + 8 * i);
+    if (coder)
+        ebpo_chunk_coder_clear(coder);
+    free(coder);
+    free(raw);
+    free(turned);
+    if (status == EBPO_OK)
+        return EBPO_OK;
+    free(*values);
+    *values = NULL;
+    return status == EBPO_E_MEMORY ? ebpo_fail_memory(error, size * 3) : status;
+}
+
+/* EBPO_E_FORMAT: what such a list says of `path` is wrong. */
+static ebpo_status long_chunk_fail(const ebpo_file *file, ebpo_array_id list, const char *what,
+                                   const char *path, ebpo_error *error)
+{
+    return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, file->root_array[list].path, -1,
+                        "%s %s; get a fresh copy of the file", what, path);
+}
+
+ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *a, uint64_t **values,
+                                 ebpo_error *error)
+{
+    ebpo_chunk_place chunk = a->chunks[0];
+    const char *why = "";
+    *values = NULL;
+    if (a->shape.rows > file->info.file_bytes)
+        return long_chunk_fail(file, a->id, "the list has more rows than", "the file has bytes",
+                               error);
+    uint8_t *stored = ebpo_alloc(chunk.bytes, 1);
+    ebpo_status status = stored ? ebpo_input_read(&ebpo_reader_own(file)->in, chunk.address,
+                                                  chunk.bytes, stored, error)
+                                : ebpo_fail_memory(error, chunk.bytes);
+    if (status == EBPO_OK) {
+        status = ebpo_long_chunk_decode(stored, chunk.bytes, a->shape.pipeline, a->shape.rows,
+                                        values, &why, error);
+        if (status == EBPO_E_FORMAT)
+            status = long_chunk_fail(file, a->id, "the chunk is damaged:", why, error);
+    }
+    free(stored);
+    return status;
+}
+
+/* --- stored sizes --- */
+
+static uint64_t level_bytes(const ebpo_file *file, int level, bool located)
+{
+    uint64_t bytes = 0;
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
+        const ebpo_array_in *a = &file->level_array[level][id];
+        if (located || (a->present && ebpo_shape_chunks(&a->shape) == 1))
+            bytes += a->stored_bytes;
+    }
+    return bytes;
+}
+
+/* Another thread may be locating the chunks: until then only those count that opening tells. */
+uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
+{
+    return level_bytes(file, level, atomic_load(&file->located));
+}
+
+/* Of the arrays whose chunks are known. */
+static ebpo_stored_sizes reader_sizes(const ebpo_file *file)
+{
+    ebpo_stored_sizes sizes = { .map_bytes = 0 };
+    for (int level = 0; level < file->info.level_count; level++)
+        sizes.level_bytes[level] = level_bytes(file, level, true);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        *(uint64_t *)(void *)((char *)&sizes + ebpo_schema[id].bytes) +=
+            file->root_array[id].stored_bytes;
+    for (int i = 0; i < file->attributes.arrays; i++)
+        sizes.attribute_bytes += file->attributes.array[i].stored_bytes;
+    return sizes;
+}
+
+ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_stored_sizes sizes = reader_sizes(file);
+    uint64_t stored = sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes +
+                      sizes.subtree_bytes + sizes.attribute_bytes + sizes.sum_bytes;
+    for (int level = 0; level < file->info.level_count; level++)
+        stored += sizes.level_bytes[level];
+    if (stored > file->info.file_bytes)
+        return ebpo_fail_file(
+            error, EBPO_E_FORMAT, file->in.shown,
+            "the arrays' chunks take more room than the file has; get a fresh copy of the file");
+    return EBPO_OK;
+}
+
+static double decoded_bytes(const ebpo_array_in *a)
+{
+    return a->present ? (double)a->shape.rows * (double)ebpo_shape_row_bytes(&a->shape) : 0;
+}
+
+ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uint64_t most, ebpo_error *error)
+{
+    double bytes = 0, room = (double)file->info.file_bytes;
+    for (int level = 0; level < file->info.level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            bytes += decoded_bytes(&file->level_array[level][id]);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        bytes += decoded_bytes(&file->root_array[id]);
+    for (int i = 0; i < file->attributes.arrays; i++)
+        bytes += decoded_bytes(&file->attributes.array[i]);
+    most = most ? most : EBPO_EXPANSION_MOST;
+    if (most == UINT64_MAX || bytes <= (double)EBPO_EXPANSION_FREE || bytes <= (double)most * room)
+        return EBPO_OK;
+    return ebpo_fail_file(
+        error, EBPO_E_LIMIT, file->in.shown,
+        "decoded, its arrays take %.0f MB, %.0f times the file and more than %llu "
+        "times: it may be made to exhaust memory; if you trust it, read it with "
+        "--most-expansion %.0f",
+        bytes / 1e6, bytes / room, (unsigned long long)most, bytes / room + 1);
+}
+
+/* Finds the rows of one array from *row on, and goes on behind them. Rows of arrays that nobody
+ * here knows lie in between. */
+static ebpo_status find_rows(const ebpo_file *file, ebpo_array_in *a, const uint64_t *list,
+                             uint64_t rows, uint64_t *row, ebpo_error *error)
+{
+    uint32_t number = ebpo_place_number(a->id, a->level);
+    uint64_t chunks = ebpo_shape_chunks(&a->shape);
+    while (*row < rows && ebpo_place_number_of(list[*row]) < number)
+        ++*row;
+    a->first_sum = *row;
+    while (*row < rows && ebpo_place_number_of(list[*row]) == number)
+        ++*row;
+    return *row - a->first_sum == chunks
+               ? EBPO_OK
+               : long_chunk_fail(file, EBPO_A_CHUNK_SUMS, "the list has more or fewer chunks than",
+                                 a->path, error);
+}
+
+static ebpo_status find_all(ebpo_file *file, const uint64_t *list, uint64_t rows, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    uint64_t row = 0;
+    for (uint64_t i = 1; i < rows; i++)
+        if (ebpo_place_number_of(list[i]) < ebpo_place_number_of(list[i - 1]))
+            return long_chunk_fail(file, EBPO_A_CHUNK_SUMS, "the list is not in the order of",
+                                   "arrays' numbers", error);
+    for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
+        if (ebpo_array_number(file, i)->present &&
+            !ebpo_schema_is_list(ebpo_array_number(file, i)->id))
+            status = find_rows(file, ebpo_array_number(file, i), list, rows, &row, error);
+    return status;
+}
+
+static ebpo_status read_sums(ebpo_file *file, ebpo_error *error)
+{
+    const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_SUMS];
+    uint64_t *list;
+    ebpo_status status = ebpo_long_chunk_read(file, a, &list, error);
+    if (status == EBPO_OK)
+        status = find_all(file, list, a->shape.rows, error);
+    uint32_t *sums = status == EBPO_OK ? ebpo_alloc(a->shape.rows, sizeof *sums) : NULL;
+    if (status == EBPO_OK && !sums)
+        status = ebpo_fail_memory(error, a->shape.rows * sizeof *sums);
+    for (uint64_t i = 0; i < a->shape.rows && status == EBPO_OK; i++)
+        sums[i] = (uint32_t)list[i];
+    free(list);
+    if (status == EBPO_OK)
+        file->sums = sums;
+    return status;
+}
+
+ebpo_status ebpo_chunk_sums_read(const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_file *own = ebpo_reader_own(file);
+    ebpo_status status = EBPO_OK;
+    if (!file->has_sums || atomic_load(&file->summed))
+        return EBPO_OK;
+    pthread_mutex_lock(&own->lock);
+    if (!atomic_load(&own->summed)) {
+        status = read_sums(own, error);
+        if (status == EBPO_OK)
+            atomic_store(&own->summed, true);
+    }
+    pthread_mutex_unlock(&own->lock);
+    return status;
+}
+
+/* --- offsets --- */
+
+/* --- by HDF5's index --- */
+
+static ebpo_status locate_array(ebpo_file *file, ebpo_head *head, ebpo_array_in *a,
+                                ebpo_error *error)
+{
+    ebpo_shape shape;
+    ebpo_chunk_place *chunks;
+    uint64_t stored;
+    if (!a->present || a->chunks)
+        return EBPO_OK;
+    ebpo_status status =
+        ebpo_head_read_array(head, a->path, UINT64_MAX, ebpo_reader_rows_of_chunk(file, a->id),
+                             &shape, NULL, &chunks, &stored, error);
+    if (status != EBPO_OK)
+        return status;
+    if (shape.rows != a->shape.rows || shape.cols != a->shape.cols ||
+        shape.element_size != a->shape.element_size || shape.pipeline != a->shape.pipeline) {
+        free(chunks);
+        return ebpo_fail_at(error, EBPO_E_IO, file->in.shown, a->path, -1,
+                            "the file has changed while it was open; open it again");
+    }
+    a->chunks = chunks;
+    a->stored_bytes = stored;
+    return EBPO_OK;
+}
+
+static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
+{
+    ebpo_head head = EBPO_HEAD_INIT;
+    ebpo_range index = { file->info.chunk_index_offset, file->info.chunk_index_bytes };
+    if (index.size && index.offset + index.size > file->in.source.prefetched)
+        ebpo_input_expect(&file->in, &index, 1);
+    ebpo_status status = ebpo_head_open(&head, &file->in, error);
+    if (status == EBPO_OK)
+        ebpo_head_expect_index(&head, index);
+    for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
+        status = locate_array(file, &head, ebpo_array_number(file, i), error);
+    status = ebpo_head_close(&head, status, error);
+    return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
+}
+
+/* --- by the list of all chunks (format-spec/README.md, section 9) --- */
+
+/* Chunks seen so far of each array. */
+typedef struct listing {
+    ebpo_file *file;
+    uint64_t seen[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS], seen_root[EBPO_ARRAYS];
+    uint64_t seen_attribute[1 + 2 * EBPO_ATTRIBUTE_ARRAYS];
+} listing;
+
+static uint64_t *seen_of(listing *l, ebpo_array_id id, int level)
+{
+    return id < EBPO_LEVEL_ARRAYS   ? &l->seen[level][id]
+           : id == EBPO_A_ATTRIBUTE ? &l->seen_attribute[level]
+                                    : &l->seen_root[id];
+}
+
+static ebpo_status list_fails(const ebpo_file *file, const char *what, const char *path,
+                              ebpo_error *error)
+{
+    return long_chunk_fail(file, EBPO_A_PLACES, what, path, error);
+}
+
+static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_place chunk,
+                              ebpo_error *error)
+{
+    int level;
+    ebpo_array_id id = place_array(number, &level);
+    if (id == EBPO_ARRAYS || (id == EBPO_A_ATTRIBUTE && level >= l->file->attributes.arrays))
+        return EBPO_OK; /* a gap, or of a part that is not known, or not listed */
+    ebpo_array_in *a = id < EBPO_LEVEL_ARRAYS   ? &l->file->level_array[level][id]
+                       : id == EBPO_A_ATTRIBUTE ? &l->file->attributes.array[level]
+                                                : &l->file->root_array[id];
+    uint64_t *seen = seen_of(l, id, level);
+    if (!a->present || *seen == ebpo_shape_chunks(&a->shape))
+        return list_fails(l->file, "the list has more chunks than", a->path, error);
+    if (chunk.bytes == 0 || chunk.bytes > ebpo_reader_chunk_bound(a))
+        return list_fails(l->file, "the list has a chunk of a size that it cannot have of", a->path,
+                          error);
+    if (ebpo_shape_chunks(&a->shape) == 1 &&
+        (a->chunks[0].address != chunk.address || a->chunks[0].bytes != chunk.bytes))
+        return list_fails(l->file, "the list contradicts the header of", a->path, error);
+    if (ebpo_shape_chunks(&a->shape) > 1) {
+        a->chunks[*seen] = chunk;
+        a->stored_bytes += chunk.bytes;
+    }
+    ++*seen;
+    return EBPO_OK;
+}
+
+/* Tables for chunks; before that, whether the file can hold them. */
+static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chunks,
+                               ebpo_error *error)
+{
+    if (!a->present || a->chunks)
+        return EBPO_OK;
+    *chunks += ebpo_shape_chunks(&a->shape);
+    if (*chunks > file->root_array[EBPO_A_PLACES].shape.rows)
+        return list_fails(file, "the list has fewer chunks than", a->path, error);
+    a->stored_bytes = 0;
+    a->chunks = ebpo_alloc_zero(ebpo_shape_chunks(&a->shape), sizeof *a->chunks);
+    return a->chunks ? EBPO_OK : ebpo_fail_memory(error, *chunks * sizeof *a->chunks);
+}
+
+static ebpo_status end_array(listing *l, const ebpo_array_in *a, ebpo_error *error)
+{
+    uint64_t seen = *seen_of(l, a->id, a->level);
+    return !a->present || ebpo_schema_is_list(a->id) || seen == ebpo_shape_chunks(&a->shape)
+               ? EBPO_OK
+               : list_fails(l->file, "the list has fewer chunks than", a->path, error);
+}
+
+static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t count,
+                               ebpo_error *error)
+{
+    listing *l = ebpo_alloc_zero(1, sizeof *l);
+    uint64_t at = file->info.head_bytes, chunks = 0;
+    ebpo_status status = l ? EBPO_OK : ebpo_fail_memory(error, sizeof *l);
+    for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
+        status = begin_array(file, ebpo_array_number(file, i), &chunks, error);
+    if (l)
+        l->file = file;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        if (ebpo_place_bytes_of(places[i]) > file->info.file_bytes - at)
+            status =
+                list_fails(file, "a chunk lies beyond the end of the file in", "the list", error);
+        else
+            status = list_chunk(l, ebpo_place_number_of(places[i]),
+                                (ebpo_chunk_place){ at, ebpo_place_bytes_of(places[i]) }, error);
+        at += ebpo_place_bytes_of(places[i]);
+    }
+    for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
+        status = end_array(l, ebpo_array_number(file, i), error);
+    free(l);
+    return status;
+}
+
+/* A list half read is none. */
+static void forget_places(ebpo_file *file)
+{
+    for (int i = 0; i < ebpo_all_arrays(file); i++) {
+        ebpo_array_in *a = ebpo_array_number(file, i);
+        if (a->present && ebpo_shape_chunks(&a->shape) > 1) {
+            free(a->chunks);
+            a->chunks = NULL;
+        }
+    }
+}
+
+static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
+{
+    const ebpo_array_in *a = &file->root_array[EBPO_A_PLACES];
+    uint64_t *places;
+    ebpo_status status = ebpo_long_chunk_read(file, a, &places, error);
+    if (status == EBPO_OK)
+        status = list_chunks(file, places, a->shape.rows, error);
+    free(places);
+    if (status != EBPO_OK)
+        forget_places(file);
+    return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
+}
+
+/* --- either way --- */
+
+static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    pthread_mutex_lock(&file->lock);
+    if (!atomic_load(&file->located)) {
+        status = file->has_places ? locate_by_list(file, error) : locate_by_index(file, error);
+        if (status == EBPO_OK)
+            atomic_store(&file->located, true);
+    }
+    pthread_mutex_unlock(&file->lock);
+    return status;
+}
+
+ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out, ebpo_error *error)
+{
+    ebpo_stored_sizes sizes = EBPO_STORED_SIZES_INIT;
+    ebpo_status status = out ? EBPO_CHECK_SIZED(ebpo_stored_sizes, out, error) : EBPO_OK;
+    if (status == EBPO_OK && !atomic_load(&file->located))
+        status = locate_all(ebpo_reader_own(file), error);
+    if (status == EBPO_OK && out)
+        sizes = reader_sizes(file);
+    if (out)
+        EBPO_GIVE(ebpo_stored_sizes, out, &sizes);
+    return status;
+}
+
+ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array, ebpo_error *error)
+{
+    /* A single chunk's place stands in the array's header: known since the opening. */
+    return ebpo_shape_chunks(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, NULL, error);
+}
+
+/* --- what the head states of each array --- */
+
+static const ebpo_array_in *find_present_array(const ebpo_file *file, unsigned n)
+{
+    for (int level = 0; level < file->info.level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            if (file->level_array[level][id].present && n-- == 0)
+                return &file->level_array[level][id];
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        if (file->root_array[id].present && n-- == 0)
+            return &file->root_array[id];
+    for (int i = 0; i < file->attributes.arrays; i++)
+        if (file->attributes.array[i].present && n-- == 0)
+            return &file->attributes.array[i];
+    return NULL;
+}
+
+/* Where the chunks of an array of several lie may be found by another thread just now. */
+uint64_t ebpo_reader_stored_bytes(const ebpo_file *file, const ebpo_array_in *array)
+{
+    bool known =
+        !array->present || ebpo_shape_chunks(&array->shape) == 1 || atomic_load(&file->located);
+    return known ? array->stored_bytes : 0;
+}
+
+bool ebpo_file_array(const ebpo_file *file, unsigned n, ebpo_array_facts *out)
+{
+    const ebpo_array_in *array = find_present_array(file, n);
+    if (!array)
+        return false;
+    ebpo_array_facts facts = { .rows = array->shape.rows,
+                               .columns = array->shape.cols ? array->shape.cols : 1,
+                               .element_bytes = array->shape.element_size,
+                               .is_signed = array->shape.is_signed,
+                               .stored_bytes = ebpo_reader_stored_bytes(file, array),
+                               .coding =
+                                   array->coding ? array->coding : ebpo_schema[array->id].coding,
+                               .about = ebpo_schema[array->id].about };
+    snprintf(facts.path, sizeof facts.path, "%s", array->path);
+    return EBPO_GIVE(ebpo_array_facts, out, &facts) == EBPO_OK;
+}

@@ -1,0 +1,608 @@
+/* The layout of a file's chunks, for the writer: how many rows the chunks of each array have, in
+ * which order chunks are stored, and which chunks each subtree needs. Levels near the root are
+ * stored whole; deep levels are stored subtree by subtree, so that one subtree is one range of
+ * bytes, except for the chunks of faces and vertices that it shares with subtrees before it.
+ * These shared chunks are listed in /subtrees/outer, and the sums before each subtree in
+ * /subtrees/counts. All of it is computed in integers, because the bytes of a file depend on it.
+ * Source: format-spec/README.md, section 9. */
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/file.h>
+
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/wide.h"
+#include "format/chunk_layout.h"
+#include "format/schema.h"
+#include "geometry/node_types.h"
+#include "hdf5_read/shape.h"
+
+/* --- the chunks that a subtree shares with those before it, one subtree after the other --- */
+
+/* A subtree's own: faces [face, face_end), vertices from `vertex` on. */
+typedef struct outer_range {
+    uint64_t face, face_end, vertex;
+} outer_range;
+
+typedef struct outer_blocks {
+    /* [blocks of the mesh] the round in which a block was last listed */
+    uint32_t *face_round, *vertex_round;
+    uint32_t round;
+    uint32_t *face_block, *vertex_block; /* [blocks of the mesh] those listed */
+    uint64_t face_blocks, vertex_blocks;
+} outer_blocks;
+
+enum {
+    FIRST_LEVELS = 5,    /* these lie together, whatever the subtrees */
+    LEAVES_OF_DEEP = 64, /* a deep level has a leaf for each so many faces */
+    CHUNK_FACES = 16384, /* that a chunk of a lower level goes with */
+    CHUNK_LEAST = 256,   /* bytes */
+    CHUNK_MOST = 32768,
+    MAP_ROWS = 2048,
+    FACES_INDEX_ROWS = 512,
+    OUTER_ROWS = 4096,
+    ATTRIBUTE_ROWS = 2048
+};
+
+/* With subtrees: levels up to the first one lie as they are, from the second one on they are deep.
+ */
+static int last_whole_level(const ebpo_info *info)
+{
+    return info->subtree_level > FIRST_LEVELS ? info->subtree_level : FIRST_LEVELS;
+}
+
+static int first_deep_level(const ebpo_info *info)
+{
+    int level = last_whole_level(info) + 1;
+    while (level < info->level_count &&
+           info->level[level].leaf_count < info->face_count / LEAVES_OF_DEEP)
+        level++;
+    return level;
+}
+
+/* The power of two that is nearest, by its ratio, to the rows that go with CHUNK_FACES faces: the
+ * first one that is not less than these over the root of 2. In integers, as bytes depend on it: of
+ * rows there are at most 2^40, and both sides of the comparison below 2^64 before they are squared.
+ */
+static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
+{
+    uint64_t wanted = rows * CHUNK_FACES, found = 1;
+    for (;; found *= 2) {
+        uint64_t has = found * info->face_count;
+        if (!ebpo_wide_less(ebpo_wide_left(ebpo_wide_product(has, has), 1),
+                            ebpo_wide_product(wanted, wanted)))
+            return found;
+    }
+}
+
+static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
+                            uint32_t row_bytes)
+{
+    switch (id) {
+    case EBPO_A_FACE_SOURCE:
+    case EBPO_A_FACES: return EBPO_FACE_BLOCK;
+    case EBPO_A_VERTICES: return EBPO_VERTEX_BLOCK;
+    case EBPO_A_VERTEX_SOURCE: return MAP_ROWS;
+    case EBPO_A_FACES_INDEX: return FACES_INDEX_ROWS;
+    case EBPO_A_SUBTREE_COUNTS: return ebpo_subtree_rows(info);
+    case EBPO_A_SUBTREE_OUTER: return OUTER_ROWS;
+    case EBPO_A_ATTRIBUTE: return ATTRIBUTE_ROWS;
+    default: break;
+    }
+    if (id >= EBPO_LEVEL_ARRAYS || level <= last_whole_level(info) || ebpo_schema_is_index(id))
+        return UINT64_MAX;
+    uint64_t found = rows_for_faces(info, rows);
+    while (found * row_bytes < CHUNK_LEAST)
+        found *= 2;
+    while (found * row_bytes > CHUNK_MOST)
+        found /= 2;
+    return found;
+}
+
+uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
+                            uint32_t cols, uint32_t element_size)
+{
+    uint32_t most = ebpo_full_chunk_rows(rows, cols, element_size);
+    if (!info->subtree_level)
+        return most;
+    uint64_t wanted = wanted_rows(info, id, level, rows, element_size * (cols ? cols : 1));
+    return wanted < most ? (uint32_t)wanted : most;
+}
+
+uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, bool subtrees,
+                                    bool kept)
+{
+    static const struct {
+        const char *path;
+        uint32_t rows;
+        bool fixed;
+    } known[] = {
+        { "/mesh/faces", EBPO_FACE_BLOCK, true },
+        { "/mesh/vertices", EBPO_VERTEX_BLOCK, true },
+        { "/subtrees/counts", EBPO_SUBTREE_ROWS, true },
+        { "/maps/vertex_source", MAP_ROWS, false },
+        { "/maps/face_source", EBPO_FACE_BLOCK, false },
+        { "/attributes/", ATTRIBUTE_ROWS, false },
+    };
+    uint32_t full = ebpo_full_chunk_rows(stored->rows, stored->cols, stored->element_size),
+             rows = stored->chunk_rows;
+    if (!subtrees)
+        return full;
+    if (rows == 0 || rows & (rows - 1) || rows > full)
+        rows = full;
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        if ((known[i].fixed || !kept) && strncmp(path, known[i].path, strlen(known[i].path)) == 0 &&
+            (path[strlen(known[i].path)] == 0 || path[strlen(known[i].path) - 1] == '/'))
+            rows = known[i].rows < full ? known[i].rows : full;
+    return rows;
+}
+
+static ebpo_status outer_blocks_make(outer_blocks *out, const ebpo_info *info, ebpo_error *error)
+{
+    uint64_t faces = info->face_count / EBPO_FACE_BLOCK + 1,
+             vertices = info->vertex_count / EBPO_VERTEX_BLOCK + 1;
+    *out = (outer_blocks){ .round = 1 };
+    out->face_round = ebpo_alloc_zero(faces, sizeof *out->face_round);
+    out->vertex_round = ebpo_alloc_zero(vertices, sizeof *out->vertex_round);
+    out->face_block = ebpo_alloc(faces, sizeof *out->face_block);
+    out->vertex_block = ebpo_alloc(vertices, sizeof *out->vertex_block);
+    if (!out->face_round || !out->vertex_round || !out->face_block || !out->vertex_block)
+        return ebpo_fail_memory(error, (faces + vertices) * 8);
+    return EBPO_OK;
+}
+
+static void outer_blocks_free(outer_blocks *blocks)
+{
+    free(blocks->face_round);
+    free(blocks->vertex_round);
+    free(blocks->face_block);
+    free(blocks->vertex_block);
+}
+
+static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_t *blocks,
+                       uint64_t *count)
+{
+    if (rounds[block] == round)
+        return;
+    rounds[block] = round;
+    blocks[(*count)++] = (uint32_t)block;
+}
+
+static void use_face(outer_blocks *b, const ebpo_mesh *mesh, const outer_range *own, uint64_t face)
+{
+    for (int k = 0; k < 3; k++) {
+        uint32_t vertex = mesh->faces[3 * face + (uint64_t)k];
+        if (vertex < own->vertex)
+            list_block(b->vertex_round, b->round, vertex / EBPO_VERTEX_BLOCK, b->vertex_block,
+                       &b->vertex_blocks);
+    }
+}
+
+/* Faces that its leaves refer to, own ones among them; and all its own faces. */
+static void outer_blocks_refer(outer_blocks *b, const ebpo_mesh *mesh, const outer_range *own,
+                               const uint32_t *refs, uint64_t count)
+{
+    for (uint64_t i = 0; i < count; i++)
+        if (refs[i] < own->face) {
+            list_block(b->face_round, b->round, refs[i] / EBPO_FACE_BLOCK, b->face_block,
+                       &b->face_blocks);
+            use_face(b, mesh, own, refs[i]);
+        }
+}
+
+static void outer_blocks_use(outer_blocks *b, const ebpo_mesh *mesh, const outer_range *own)
+{
+    for (uint64_t face = own->face; face < own->face_end; face++)
+        use_face(b, mesh, own, face);
+}
+
+static int compare_descending(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x < y) - (x > y);
+}
+
+static uint64_t take_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uint32_t *out)
+{
+    uint64_t taken = 0;
+    if (count)
+        qsort(blocks, count, sizeof *blocks, compare_descending);
+    for (uint64_t i = 0; i < count; i++)
+        if (blocks[i] <= from)
+            out[taken++] = (uint32_t)(from - blocks[i]);
+    return taken;
+}
+
+/* Distances into `out`, faces first; adds how many there are to the sums before the subtree. Then
+ * the lists are empty. */
+static void outer_blocks_take(outer_blocks *b, const outer_range *own, uint32_t *out,
+                              const uint64_t *before, uint64_t *after)
+{
+    uint64_t faces = take_blocks(b->face_block, b->face_blocks, own->face / EBPO_FACE_BLOCK, out);
+    uint64_t vertices = take_blocks(b->vertex_block, b->vertex_blocks,
+                                    own->vertex / EBPO_VERTEX_BLOCK, out + faces);
+    after[EBPO_S_OUTER_FACES] = before[EBPO_S_OUTER_FACES] + faces;
+    after[EBPO_S_OUTER_VERTICES] = before[EBPO_S_OUTER_VERTICES] + vertices;
+    b->face_blocks = b->vertex_blocks = 0;
+    b->round++;
+}
+
+enum { USUAL_FACES = 1024, LEAST_FACES = 131072 };
+/* A subtree's rows in all arrays are some tens of kilobytes. */
+enum { SUBTREES_A_TIME = 128 };
+
+int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces)
+{
+    uint64_t faces = subtree_faces ? subtree_faces : USUAL_FACES;
+    if (subtree_faces == EBPO_NO_SUBTREES || (!subtree_faces && info->face_count < LEAST_FACES))
+        return 0;
+    /* at least these, where it was asked for */
+    int found = subtree_faces && info->level_count > 2;
+    for (int level = 1; level <= info->level_count - 2; level++) {
+        uint64_t grays = info->level[level].gray_count;
+        if (grays && info->face_count / grays >= faces)
+            found = level;
+    }
+    return found;
+}
+
+void ebpo_subtree_sums_free(ebpo_subtree_sums *sums)
+{
+    free(sums->before);
+    free(sums->counts);
+    free(sums->index);
+    free(sums->outer);
+    memset(sums, 0, sizeof *sums);
+}
+
+typedef struct counting {
+    ebpo_subtree_sums *sums;
+    const ebpo_tree *tree;
+    const ebpo_info *info;
+} counting;
+
+static uint64_t *row_of(const counting *c, uint64_t subtree)
+{
+    return c->sums->before + subtree * c->sums->cols;
+}
+
+static uint64_t level_sum(const counting *c, uint64_t subtree, int level, unsigned what)
+{
+    return row_of(c, subtree)[ebpo_subtree_column(c->info, level, what)];
+}
+
+static uint64_t first_group(const counting *c, uint64_t subtree, int level)
+{
+    return level == c->info->subtree_level + 1 ? subtree
+                                               : level_sum(c, subtree, level - 1, EBPO_S_GRAY);
+}
+
+/* What the subtree's leaves of one level have, from rank `leaf` to `end`. */
+static void count_leaves(const counting *c, const ebpo_level *level, uint64_t leaf, uint64_t end,
+                         uint64_t *sum)
+{
+    if (c->info->parts & EBPO_PART_LEAF_PLANES)
+        for (uint64_t i = leaf; i < end; i++)
+            sum[EBPO_S_LEAF_PLANES] += level->leaf_plane_counts[i];
+    if (!(c->info->parts & EBPO_PART_MESH) || leaf == end)
+        return;
+    for (uint64_t i = leaf; i < end; i++)
+        sum[EBPO_S_REFS] += level->leaf_ref_count[i];
+    sum[EBPO_S_ENDS] = level->leaf_first[end - 1] + level->leaf_new[end - 1];
+}
+
+/* The columns of one level, from those of the level before. */
+static void count_level(const counting *c, int number)
+{
+    const ebpo_level *level = &c->tree->level[number];
+    unsigned column = ebpo_subtree_column(c->info, number, 0);
+    EBPO_FOR_ITEMS_EVERY(level->workspace, SUBTREES_A_TIME, i, 0, c->sums->subtrees) {
+        const uint64_t *from = row_of(c, i) + column;
+        uint64_t *sum = row_of(c, i + 1) + column, group = first_group(c, i, number), types[4];
+        memcpy(sum, from, EBPO_SUBTREE_LEVEL_COLS * sizeof *sum);
+        ebpo_groups_count(level->types + group, first_group(c, i + 1, number) - group, types);
+        sum[EBPO_S_GRAY] += types[EBPO_GRAY];
+        sum[EBPO_S_LEAF] += types[EBPO_LEAF];
+        sum[EBPO_S_BLACK] += types[EBPO_BLACK];
+        if (c->info->parts & EBPO_PART_PLANES)
+            for (uint64_t k = from[EBPO_S_GRAY]; k < sum[EBPO_S_GRAY]; k++)
+                sum[EBPO_S_PLANES] += level->plane_counts[k];
+        count_leaves(c, level, from[EBPO_S_LEAF], sum[EBPO_S_LEAF], sum);
+    }
+}
+
+/* New faces of the subtree, in [*first, *end): the leaves' are without gaps. */
+static void own_faces(const counting *c, uint64_t subtree, uint64_t *first, uint64_t *end)
+{
+    *first = UINT64_MAX;
+    *end = 0;
+    for (int l = c->info->subtree_level + 1; l < c->info->level_count; l++) {
+        uint64_t from = level_sum(c, subtree, l, EBPO_S_LEAF),
+                 to = level_sum(c, subtree + 1, l, EBPO_S_LEAF);
+        const ebpo_level *level = &c->tree->level[l];
+        if (from == to)
+            continue;
+        uint64_t last = level->leaf_first[to - 1] + level->leaf_new[to - 1];
+        *first = level->leaf_first[from] < *first ? level->leaf_first[from] : *first;
+        *end = last > *end ? last : *end;
+    }
+}
+
+static void count_faces(const counting *c)
+{
+    uint64_t at = 0, first, end;
+    for (uint64_t i = 0; i < c->sums->subtrees; i++) {
+        uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
+        own_faces(c, i, &first, &end);
+        first = end < at || first == UINT64_MAX ? at : first; /* without leaves */
+        end = end < first ? first : end;
+        to[EBPO_S_FACES_BEFORE] = from[EBPO_S_FACES_BEFORE] + first - at;
+        to[EBPO_S_FACES] = from[EBPO_S_FACES] + end - first;
+        at = end;
+    }
+}
+
+/* First uses of vertices by faces [*face, end): *seen have been used before. */
+static void see_vertices(const ebpo_mesh *mesh, uint64_t *face, uint64_t end, uint64_t *seen)
+{
+    EBPO_FOR_ITEMS(mesh->workspace, i, *face * 3, end * 3)
+        *seen += mesh->faces[i] == *seen;
+    *face = end;
+}
+
+static void count_vertices(const counting *c)
+{
+    uint64_t face = 0, seen = 0;
+    for (uint64_t i = 0; i < c->sums->subtrees; i++) {
+        uint64_t *from = row_of(c, i), *to = row_of(c, i + 1), begin = seen;
+        see_vertices(&c->tree->mesh, &face, to[EBPO_S_FACES_BEFORE] + from[EBPO_S_FACES], &seen);
+        to[EBPO_S_VERTICES_BEFORE] = from[EBPO_S_VERTICES_BEFORE] + seen - begin;
+        begin = seen;
+        see_vertices(&c->tree->mesh, &face, to[EBPO_S_FACES_BEFORE] + to[EBPO_S_FACES], &seen);
+        to[EBPO_S_VERTICES] = from[EBPO_S_VERTICES] + seen - begin;
+    }
+}
+
+static ebpo_status list_outer(const counting *c, ebpo_error *error)
+{
+    outer_blocks blocks;
+    ebpo_status status = outer_blocks_make(&blocks, c->info, error);
+    EBPO_FOR_ITEMS_EVERY(c->tree->mesh.workspace, SUBTREES_A_TIME, i, 0, c->sums->subtrees) {
+        uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
+        outer_range own = {
+            .face = to[EBPO_S_FACES_BEFORE] + from[EBPO_S_FACES],
+            .face_end = to[EBPO_S_FACES_BEFORE] + to[EBPO_S_FACES],
+            .vertex = to[EBPO_S_VERTICES_BEFORE] + from[EBPO_S_VERTICES],
+        };
+        if (status != EBPO_OK)
+            break;
+        for (int l = c->info->subtree_level + 1; l < c->info->level_count; l++) {
+            uint64_t first = level_sum(c, i, l, EBPO_S_REFS),
+                     end = level_sum(c, i + 1, l, EBPO_S_REFS);
+            if (end > first) /* a level without any has no array */
+                outer_blocks_refer(&blocks, &c->tree->mesh, &own,
+                                   c->tree->level[l].leaf_refs + first, end - first);
+        }
+        outer_blocks_use(&blocks, &c->tree->mesh, &own);
+        if (!ebpo_grow(&c->sums->outer, &c->sums->outer_capacity,
+                       c->sums->outer_count + blocks.face_blocks + blocks.vertex_blocks +
+                           1, /* never NULL */
+                       sizeof *c->sums->outer))
+            status = ebpo_fail_memory(error, c->sums->outer_count * sizeof *c->sums->outer);
+        else
+            outer_blocks_take(&blocks, &own, c->sums->outer + c->sums->outer_count, from, to);
+        c->sums->outer_count = to[EBPO_S_OUTER_FACES] + to[EBPO_S_OUTER_VERTICES];
+    }
+    outer_blocks_free(&blocks);
+    return status;
+}
+
+/* Differences, and every so many-th sum. False: a subtree has more than a count holds. */
+static bool split_sums(const counting *c)
+{
+    ebpo_subtree_sums *s = c->sums;
+    uint32_t rows = ebpo_subtree_rows(c->info);
+    bool fits = true;
+    for (uint64_t i = 0; i < s->subtrees; i++) {
+        const uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
+        if (i % rows == 0)
+            memcpy(s->index + i / rows * s->cols, from, s->cols * sizeof *from);
+        for (uint32_t k = 0; k < s->cols; k++) {
+            fits &= to[k] - from[k] <= UINT32_MAX;
+            s->counts[i * s->cols + k] = (uint32_t)(to[k] - from[k]);
+        }
+    }
+    return fits;
+}
+
+ebpo_status ebpo_subtree_sums_make(ebpo_subtree_sums *out, const ebpo_tree *tree,
+                                   const ebpo_info *info, ebpo_error *error)
+{
+    counting c = { out, tree, info };
+    ebpo_status status = EBPO_OK;
+    *out = (ebpo_subtree_sums){ .subtrees = info->level[info->subtree_level].gray_count,
+                                .cols = ebpo_schema_cols(info, EBPO_A_SUBTREE_COUNTS) };
+    out->before = ebpo_alloc_zero((out->subtrees + 1) * out->cols, sizeof *out->before);
+    out->counts = ebpo_alloc(out->subtrees * out->cols, sizeof *out->counts);
+    out->index =
+        ebpo_alloc(ebpo_schema_rows(info, EBPO_A_SUBTREE_INDEX, 0) * out->cols, sizeof *out->index);
+    if (!out->before || !out->counts || !out->index)
+        return ebpo_fail_memory(error, out->subtrees * out->cols * 12);
+    for (int level = info->subtree_level + 1; level < info->level_count; level++)
+        count_level(&c, level);
+    if (info->parts & EBPO_PART_MESH) {
+        count_faces(&c);
+        count_vertices(&c);
+        status = list_outer(&c, error);
+    }
+    if (status == EBPO_OK && !split_sums(&c))
+        status = ebpo_fail(error, EBPO_E_LIMIT,
+                           "a subtree has more than 4,294,967,295 items of a kind; write the file "
+                           "without subtrees");
+    return status;
+}
+
+/* --- which subtree --- */
+
+/* Rows of the array before subtree i. */
+static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint64_t i)
+{
+    const uint64_t *row = row_of(c, i), *next = i < c->sums->subtrees ? row_of(c, i + 1) : row;
+    switch (ebpo_schema[id].per) {
+    case EBPO_PER_GROUP: return first_group(c, i, level);
+    case EBPO_PER_GRAY: return level_sum(c, i, level, EBPO_S_GRAY);
+    case EBPO_PER_LEAF: return level_sum(c, i, level, EBPO_S_LEAF);
+    case EBPO_PER_BLACK: return level_sum(c, i, level, EBPO_S_BLACK);
+    case EBPO_PER_WHITE:
+        return 8 * first_group(c, i, level) - level_sum(c, i, level, EBPO_S_GRAY) -
+               level_sum(c, i, level, EBPO_S_LEAF) - level_sum(c, i, level, EBPO_S_BLACK);
+    case EBPO_PER_PLANE: return level_sum(c, i, level, EBPO_S_PLANES);
+    case EBPO_PER_LEAF_PLANE: return level_sum(c, i, level, EBPO_S_LEAF_PLANES);
+    case EBPO_PER_REF: return level_sum(c, i, level, EBPO_S_REFS);
+    case EBPO_PER_FACE: return next[EBPO_S_FACES_BEFORE] + row[EBPO_S_FACES];
+    default: return next[EBPO_S_VERTICES_BEFORE] + row[EBPO_S_VERTICES];
+    }
+}
+
+/* The subtree that a row of an array belongs to: arrays of levels below the roots, the mesh, the
+ * maps. Rows before the first subtree belong to it. */
+static uint64_t subtree_of_row(const ebpo_subtree_sums *sums, const ebpo_info *info,
+                               ebpo_array_id id, int level, uint64_t row)
+{
+    counting c = { (ebpo_subtree_sums *)sums, NULL, info };
+    uint64_t low = 0, high = sums->subtrees - 1;
+    while (low < high) {
+        uint64_t middle = low + (high - low + 1) / 2;
+        if (rows_before(&c, id, level, middle) <= row)
+            low = middle;
+        else
+            high = middle - 1;
+    }
+    return low;
+}
+
+typedef struct ordering {
+    const ebpo_plan *plan;
+    ebpo_chunk_order *out;
+} ordering;
+
+static void add_array(ordering *o, unsigned array)
+{
+    const ebpo_array_out *a = &o->plan->array[array];
+    uint64_t chunks = ebpo_shape_chunks(&a->shape);
+    for (uint64_t k = 0; k < chunks; k++)
+        o->out->chunk[o->out->count++] = (ebpo_ordered_chunk){ array, (uint32_t)k, 0 };
+}
+
+static int by_subtree(const void *a, const void *b)
+{
+    const ebpo_ordered_chunk *x = a, *y = b;
+    if (x->subtree != y->subtree)
+        return x->subtree < y->subtree ? -1 : 1;
+    return x->array != y->array ? (x->array > y->array) - (x->array < y->array)
+                                : (x->chunk > y->chunk) - (x->chunk < y->chunk);
+}
+
+/* Which arrays come next. */
+typedef struct choice {
+    int first_level, last_level; /* of the arrays of levels */
+    enum { WHOLE, TOP_INDEXES, NODES, LISTS, MESH, MAPS, TABLE, OF_MESH, REST } kind;
+} choice;
+
+/* Else what nodes are. */
+static bool is_of_faces(ebpo_array_id id)
+{
+    return id == EBPO_A_LEAF_SKIP || id == EBPO_A_LEAF_NEW || id == EBPO_A_LEAF_REF_COUNT ||
+           id == EBPO_A_LEAF_REFS;
+}
+
+static bool is_chosen(const choice *c, const ebpo_array_out *a)
+{
+    bool of_level = a->id < EBPO_LEVEL_ARRAYS,
+         here = of_level && a->level >= c->first_level && a->level <= c->last_level,
+         index = of_level && ebpo_schema_is_index(a->id);
+    switch (c->kind) {
+    case WHOLE: return here;
+    case TOP_INDEXES:
+        return (here && index) || a->id == EBPO_A_SUBTREE_INDEX || a->id == EBPO_A_FACES_INDEX;
+    case NODES: return here && !index && !is_of_faces(a->id);
+    case LISTS: return here && is_of_faces(a->id);
+    /* questions tell the source's faces, and read these numbers with the faces */
+    case MESH:
+        return a->id == EBPO_A_VERTICES || a->id == EBPO_A_FACES || a->id == EBPO_A_FACE_SOURCE;
+    case MAPS: return a->id == EBPO_A_VERTEX_SOURCE;
+    case OF_MESH: return a->id == EBPO_A_ATTRIBUTE && a->rows_of != EBPO_A_ATTRIBUTE;
+    case REST: return a->id == EBPO_A_ATTRIBUTE && a->rows_of == EBPO_A_ATTRIBUTE;
+    case TABLE: return a->id == EBPO_A_SUBTREE_COUNTS || a->id == EBPO_A_SUBTREE_OUTER;
+    }
+    return false;
+}
+
+static void add_chosen_chunks(ordering *o, const choice *c)
+{
+    for (unsigned i = 0; i < o->plan->count; i++)
+        if (is_chosen(c, &o->plan->array[i]))
+            add_array(o, i);
+}
+
+static void add_by_subtree(ordering *o, const choice *c)
+{
+    uint64_t begin = o->out->count;
+    add_chosen_chunks(o, c);
+    for (uint64_t i = begin; i < o->out->count; i++) {
+        ebpo_ordered_chunk *chunk = &o->out->chunk[i];
+        const ebpo_array_out *a = &o->plan->array[chunk->array];
+        uint64_t row = (uint64_t)chunk->chunk * a->shape.chunk_rows;
+        chunk->subtree =
+            a->id == EBPO_A_ATTRIBUTE
+                ? subtree_of_row(&o->plan->subtrees, &o->plan->info, a->rows_of, 0, row)
+                : subtree_of_row(&o->plan->subtrees, &o->plan->info, a->id, a->level, row);
+    }
+    if (o->out->count > begin)
+        qsort(o->out->chunk + begin, o->out->count - begin, sizeof *o->out->chunk, by_subtree);
+}
+
+static void order_subtrees(ordering *o)
+{
+    const ebpo_info *info = &o->plan->info;
+    int whole = last_whole_level(info), deep = first_deep_level(info), last = info->level_count - 1;
+    add_chosen_chunks(o, &(choice){ 0, whole, WHOLE });
+    add_chosen_chunks(o, &(choice){ whole + 1, last, TOP_INDEXES });
+    o->out->top = o->out->count;
+    add_chosen_chunks(o, &(choice){ 0, 0, TABLE });
+    for (int level = whole + 1; level < deep; level++)
+        add_by_subtree(o, &(choice){ level, level, NODES });
+    add_by_subtree(o, &(choice){ whole + 1, deep - 1, LISTS });
+    add_by_subtree(o, &(choice){ deep, last, NODES });
+    add_by_subtree(o, &(choice){ deep, last, LISTS });
+    add_by_subtree(o, &(choice){ 0, 0, MESH });
+    add_by_subtree(o, &(choice){ 0, 0, MAPS });
+    add_by_subtree(o, &(choice){ 0, 0, OF_MESH });
+    add_chosen_chunks(o, &(choice){ 0, 0, REST });
+}
+
+ebpo_status ebpo_chunk_order_make(ebpo_chunk_order *out, const ebpo_plan *plan, ebpo_error *error)
+{
+    ordering o = { plan, out };
+    uint64_t chunks = 0;
+    *out = (ebpo_chunk_order){ NULL, 0, 0 };
+    for (unsigned i = 0; i < plan->count; i++)
+        chunks += ebpo_shape_chunks(&plan->array[i].shape);
+    out->chunk = ebpo_alloc(chunks, sizeof *out->chunk);
+    if (!out->chunk)
+        return ebpo_fail_memory(error, chunks * sizeof *out->chunk);
+    if (plan->info.subtree_level)
+        order_subtrees(&o);
+    else
+        for (unsigned i = 0; i < plan->count; i++)
+            add_array(&o, i);
+    return EBPO_OK;
+}
+
+void ebpo_chunk_order_free(ebpo_chunk_order *order)
+{
+    free(order->chunk);
+    *order = (ebpo_chunk_order){ NULL, 0, 0 };
+}

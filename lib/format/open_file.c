@@ -1,0 +1,614 @@
+/* Opening a file: read the head, and check that every array is present in the shape that the
+ * counts in the head require. Nothing is sized by a count before head_facts.c has checked it,
+ * and the decoded size is limited relative to the size of the file. The second part opens files
+ * that other programs have rewritten with another HDF5 layout: libhdf5 copies these, in a
+ * separate process with limits of memory, time and bytes written, and the copy is opened like
+ * any other file. Source: format-spec/README.md, sections 2 and 3; docs/develop/threats.md. */
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sized.h"
+#include "format/chunk_directory.h"
+#include "format/chunk_layout.h"
+#include "format/head_facts.h"
+#include "format/read_attributes.h"
+#include "format/reader.h"
+#include "hdf5_read/head.h"
+#include "hdf5_write/compat.h"
+#include "io/byte_source.h"
+#include "io/foreign_bytes.h"
+#include "io/http_source.h"
+#include "mesh/import.h"
+#include "mesh/ply.h"
+#include "mesh/stl_binary.h"
+
+/* The word says how the numbers are to be read: with another one they would be read wrong. In files
+ * of 1.0, and in the first ones of 1.1, `delta` stands at leaf_skip, too. */
+static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gates)
+{
+    if (gates)
+        return strcmp(word, EBPO_GATES_CODING) == 0;
+    return strcmp(word, spec->coding) == 0 ||
+           (spec == &ebpo_schema[EBPO_A_LEAF_SKIP] && strcmp(word, "delta") == 0);
+}
+
+/* Also whether it is stored as it is. */
+static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
+{
+    const ebpo_array_spec *spec = &ebpo_schema[a->id];
+    ebpo_shape values = a->shape;
+    values.cols = ebpo_schema_cols(info, a->id);
+    if (gates)
+        values.element_size = spec->sizes;
+    ebpo_shape stored = ebpo_stored_shape(&values, gates);
+    bool fits = a->shape.cols == stored.cols && a->shape.element_size == stored.element_size &&
+                spec->sizes & values.element_size && a->shape.is_signed == spec->is_signed;
+    a->shape = values;
+    a->gates = gates;
+    return fits;
+}
+
+static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id, int level,
+                              ebpo_error *error)
+{
+    const ebpo_array_spec *spec = &ebpo_schema[id];
+    ebpo_array_in *a =
+        id < EBPO_LEVEL_ARRAYS ? &file->level_array[level][id] : &file->root_array[id];
+    uint64_t rows = ebpo_schema_rows(&file->info, id, level);
+    bool gates = id == EBPO_A_FACES && file->info.gates;
+    *a = (ebpo_array_in){ .id = id, .level = level };
+    ebpo_schema_path(id, level, a->path);
+    if (rows == 0 || (spec->if_needed && ebpo_head_look(head, a->path) == EBPO_HEAD_ABSENT))
+        return EBPO_OK;
+    /* places of more are in the index, or in a list */
+    uint64_t most = ebpo_input_is_far(&file->in) || file->has_places ? 1 : UINT64_MAX;
+    char coding[EBPO_HEAD_CODING_BYTES];
+    ebpo_status status =
+        ebpo_head_read_array(head, a->path, most, ebpo_reader_rows_of_chunk(file, id), &a->shape,
+                             coding, &a->chunks, &a->stored_bytes, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_check check = ebpo_reader_check(file, NULL);
+    if (!coding_known(spec, coding, gates))
+        return ebpo_check_fail(&check, -1, a->path,
+                               "the array's coding is none that the format has for it", error);
+    if (a->shape.rows != rows && rows != EBPO_ROWS_STATED)
+        return ebpo_check_fail(&check, -1, a->path,
+                               "the array's length contradicts the counts in the head", error);
+    if (!type_fits(&file->info, a, gates))
+        return ebpo_check_fail(&check, -1, a->path,
+                               "the array has the wrong type or the wrong number of columns",
+                               error);
+    if (file->info.subtree_level && a->shape.chunk_rows != a->shape.rows &&
+        ((id == EBPO_A_FACES && a->shape.chunk_rows != EBPO_FACE_BLOCK) ||
+         (id == EBPO_A_VERTICES && a->shape.chunk_rows != EBPO_VERTEX_BLOCK) ||
+         (id == EBPO_A_SUBTREE_COUNTS && a->shape.chunk_rows != ebpo_subtree_rows(&file->info))))
+        return ebpo_check_fail(&check, -1, a->path,
+                               "the array's chunks do not have the size that the format fixes",
+                               error);
+    bool wide = file->info.double_coordinates;
+    if (id == EBPO_A_VERTICES && a->shape.element_size != (wide ? 8 : 4))
+        return ebpo_check_fail(&check, -1, a->path, "the array's type contradicts coordinate_type",
+                               error);
+    a->present = true;
+    if (!a->chunks)
+        atomic_store(&file->located, false);
+    if (id < EBPO_LEVEL_ARRAYS && level < file->info.index_level &&
+        ebpo_shape_chunks(&a->shape) > 1)
+        file->info.index_level = level;
+    return EBPO_OK;
+}
+
+static ebpo_status open_levels(ebpo_file *file, ebpo_head *head, ebpo_error *error)
+{
+    ebpo_head_object id;
+    char path[EBPO_PATH_BYTES];
+    ebpo_status status = ebpo_head_open_group(head, "/levels", &id, error);
+    for (int level = 0; level < file->info.level_count && status == EBPO_OK; level++) {
+        snprintf(path, sizeof path, "/levels/%02d", level);
+        status = ebpo_head_open_group(head, path, &id, error);
+        if (status == EBPO_OK)
+            status = ebpo_facts_get_level(head, id, path, &file->info.level[level], error);
+    }
+    return status;
+}
+
+static ebpo_status open_group(ebpo_head *head, const char *path, bool wanted, ebpo_error *error)
+{
+    ebpo_head_object id;
+    return wanted ? ebpo_head_open_group(head, path, &id, error) : EBPO_OK;
+}
+
+static ebpo_status check_pipeline(const ebpo_file *file, const ebpo_array_in *a, ebpo_error *error)
+{
+    return !a->present || a->shape.pipeline == file->level_array[0][EBPO_A_TYPES].shape.pipeline
+               ? EBPO_OK
+               : ebpo_fail_at(error, EBPO_E_UNSUPPORTED, file->in.shown, a->path, -1,
+                              "the array's filters are other ones than the file's first array "
+                              "has, " EBPO_HEAD_FOREIGN);
+}
+
+static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (int level = 0; level < file->info.level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++)
+            status = check_pipeline(file, &file->level_array[level][id], error);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS && status == EBPO_OK; id++)
+        status = check_pipeline(file, &file->root_array[id], error);
+    for (int i = 0; i < file->attributes.arrays && status == EBPO_OK; i++)
+        status = check_pipeline(file, &file->attributes.array[i], error);
+    return status;
+}
+
+/* A list about all chunks, which holds unless another program has rewritten the file. */
+static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id list, bool *holds,
+                             ebpo_error *error)
+{
+    const ebpo_array_in *a = &file->root_array[list];
+    ebpo_head_object id;
+    uint64_t bytes = 0, offset = 0;
+    *holds = false;
+    ebpo_status status = open_array(file, head, list, 0, error);
+    if (status != EBPO_OK || !a->present)
+        return status;
+    status = ebpo_head_open_array(head, a->path, &id, error);
+    if (status != EBPO_OK)
+        return status;
+    bool stated = ebpo_head_get_count(head, id, a->path, "file_bytes", &bytes, NULL) == EBPO_OK &&
+                  ebpo_head_get_count(head, id, a->path, "offset", &offset, NULL) == EBPO_OK;
+    *holds =
+        stated && bytes == file->info.file_bytes && a->chunks && offset == a->chunks[0].address;
+    return EBPO_OK;
+}
+
+static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *error)
+{
+    ebpo_info *info = &file->info;
+    info->index_level = info->level_count;
+    info->file_bytes = file->in.source.size;
+    ebpo_status status = open_group(head, "/subtrees", info->subtree_level != 0, error);
+    if (status == EBPO_OK && info->subtree_level)
+        status = open_list(file, head, EBPO_A_PLACES, &file->has_places, error);
+    if (status == EBPO_OK)
+        status = open_list(file, head, EBPO_A_CHUNK_SUMS, &file->has_sums, error);
+    if (status == EBPO_OK)
+        status = open_group(head, "/mesh", info->parts & EBPO_PART_MESH, error);
+    if (status == EBPO_OK)
+        status = open_group(head, "/maps", info->parts & EBPO_PART_MAPS, error);
+    for (int level = 0; level < info->level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
+            const ebpo_array_in *a = &file->level_array[level][id];
+            status = open_array(file, head, (ebpo_array_id)id, level, error);
+            if (level == 0 && id == EBPO_A_TYPES && a->chunks)
+                info->head_bytes = a->chunks[0].address; /* the first array in the file */
+        }
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES && status == EBPO_OK; id++)
+        status = open_array(file, head, (ebpo_array_id)id, 0, error);
+    if (status == EBPO_OK)
+        status = ebpo_attributes_open(file, head, error);
+    ebpo_pipeline pipeline = file->level_array[0][EBPO_A_TYPES].shape.pipeline;
+    info->codec = pipeline == EBPO_PIPELINE_ZSTD      ? EBPO_CODEC_ZSTD
+                  : pipeline == EBPO_PIPELINE_DEFLATE ? EBPO_CODEC_DEFLATE
+                                                      : EBPO_CODEC_NONE;
+    if (status == EBPO_OK)
+        status = check_pipelines(file, error);
+    return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
+}
+
+/* Files that other programs have rewritten may state what is no longer true. */
+static void judge_index(ebpo_info *info, uint64_t size)
+{
+    enum { INDEX_BYTES_MOST = 64 << 20 };
+    if (info->chunk_index_offset > size ||
+        info->chunk_index_bytes > size - info->chunk_index_offset ||
+        info->chunk_index_bytes > INDEX_BYTES_MOST)
+        info->chunk_index_offset = info->chunk_index_bytes = 0;
+}
+
+static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error)
+{
+    ebpo_head_object root;
+    ebpo_status status = ebpo_head_open_group(head, "/", &root, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_get(head, root, &file->info, error);
+    judge_index(&file->info, file->in.source.size);
+    ebpo_head_expect_index(head, (ebpo_range){ file->info.chunk_index_offset,
+                                               file->info.chunk_index_bytes });
+    if (status == EBPO_OK &&
+        (file->info.level_count < 1 || file->info.level_count > EBPO_LEVELS_MAX))
+        status = ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, "/", -1,
+                              "level_count is not 1 to %d; get a fresh copy of the file",
+                              EBPO_LEVELS_MAX);
+    if (status == EBPO_OK)
+        status = open_levels(file, head, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_check(&file->info, file->in.shown, EBPO_E_FORMAT, error);
+    return status == EBPO_OK ? open_arrays(file, head, error) : status;
+}
+
+/* Chunks without checksums, as `h5repack -f NONE` leaves them: only the sum of the content tells
+ * whether one was changed, so it is compared before anything is answered. */
+static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
+{
+    return file->level_array[0][EBPO_A_TYPES].shape.pipeline == EBPO_PIPELINE_BARE
+               ? ebpo_file_check_content(file, NULL, error)
+               : EBPO_OK;
+}
+
+/* Returns what a file is by its first bytes that is no model but often given for one, and what to
+ * do with it; NULL: it is not known, or the head's error says it. */
+static const char *other_kind(const uint8_t *begin, uint64_t size, uint64_t whole_size)
+{
+    static const char *const meshes[] = {
+        [EBPO_IMPORT_OBJ] = "an OBJ; make one of it with 'ebpo convert'",
+        [EBPO_IMPORT_STL] = "an STL; make one of it with 'ebpo convert'",
+        [EBPO_IMPORT_OFF] = "an OFF; make one of it with 'ebpo convert'"
+    };
+    ebpo_import_format format;
+    if (ebpo_ply_recognise(begin, size))
+        return "a PLY; make one of it with 'ebpo convert'";
+    if (ebpo_stl_states_size(begin, size, whole_size)) /* which begins with any bytes */
+        return meshes[EBPO_IMPORT_STL];
+    if ((size && begin[0] == 0x89) || ebpo_foreign_bytes(begin, size)) /* HDF5; the head says it */
+        return NULL;
+    if (ebpo_import_recognise(&format, begin, size, ""))
+        return meshes[format];
+    return size == 0 ? "an empty file; get a fresh copy of it"
+           : begin[0] == '{'
+               ? "JSON; a scene is for 'ebpo scene', and some commands take a catalogue"
+               : NULL;
+}
+
+static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *error)
+{
+    enum { BEGIN = 4096 };
+    uint64_t size = file->in.source.size < BEGIN ? file->in.source.size : BEGIN;
+    uint8_t begin[BEGIN];
+    if (ebpo_input_read(&file->in, 0, size, begin, NULL) != EBPO_OK)
+        return status;
+    const char *kind = other_kind(begin, size, file->in.source.size);
+    return kind ? ebpo_fail_file(error, status, file->in.shown, "is not an .ebpo.h5 file, but %s",
+                                 kind)
+                : status;
+}
+
+/* Takes the source over, whatever happens. */
+static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const char *name,
+                               uint64_t most_expansion, ebpo_error *error)
+{
+    ebpo_file *file = ebpo_alloc_zero(1, sizeof *file);
+    if (!file) {
+        if (source->close)
+            source->close(source->user);
+        return ebpo_fail_memory(error, sizeof *file);
+    }
+    ebpo_head head = EBPO_HEAD_INIT;
+    pthread_mutex_init(&file->lock, NULL);
+    ebpo_idle_readers_make(&file->idle);
+    atomic_init(&file->located, true);
+    atomic_init(&file->summed, false);
+    ebpo_status status = ebpo_input_open(&file->in, source, name, error);
+    if (status == EBPO_OK) {
+        status = ebpo_head_open(&head, &file->in, error);
+        if (status == EBPO_OK)
+            status = read_head(file, &head, error);
+        status = ebpo_head_close(&head, status, error);
+        if (status == EBPO_E_FORMAT)
+            status = name_kind(file, status, error);
+    }
+    if (status == EBPO_OK)
+        status = ebpo_stored_check_expansion(file, most_expansion, error);
+    if (status == EBPO_OK)
+        status = check_bare(file, error);
+    if (status == EBPO_OK)
+        *out = file;
+    else
+        ebpo_close(file);
+    return status;
+}
+
+static ebpo_status open_bytes(const ebpo_source *source, const char *name, uint64_t most_expansion,
+                              ebpo_file **out, ebpo_error *error)
+{
+    ebpo_source own = EBPO_SOURCE_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_source, &own, source, error);
+    if (status == EBPO_E_UNSUPPORTED && source->close) /* a newer caller's: what we know of it is */
+        source->close(source->user);
+    if (status != EBPO_OK)
+        return status;
+    if (own.read)
+        return open_source(out, &own, name ? name : "source", most_expansion, error);
+    if (own.close)
+        own.close(own.user);
+    return ebpo_fail_file(error, EBPO_E_ARGUMENT, name ? name : "source",
+                          "a source without a read function; set one");
+}
+
+ebpo_status ebpo_open_with(const char *path, const ebpo_open_options *options, ebpo_file **out,
+                           ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_open_options own = EBPO_OPEN_OPTIONS_INIT;
+    ebpo_source source = EBPO_SOURCE_INIT;
+    char shown[EBPO_SHOWN_BYTES];
+    *out = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_open_options, &own, options, error);
+    if (status == EBPO_OK && own.source)
+        return open_bytes(own.source, path, own.most_expansion, out, error);
+    if (status == EBPO_OK)
+        status = ebpo_is_url(path) ? ebpo_source_of_url(path, own.http, &source, error)
+                                   : ebpo_source_of_path(&source, path, error);
+    const char *name =
+        status == EBPO_OK && ebpo_is_url(path) ? ebpo_url_redact(path, shown, sizeof shown) : path;
+    return status == EBPO_OK ? open_source(out, &source, name, own.most_expansion, error) : status;
+}
+
+ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error)
+{
+    return ebpo_open_with(path, NULL, out, error);
+}
+
+ebpo_status ebpo_open_own(const char *path, ebpo_file **out, ebpo_error *error)
+{
+    ebpo_open_options any = EBPO_OPEN_OPTIONS_INIT;
+    any.most_expansion = UINT64_MAX;
+    return ebpo_open_with(path, &any, out, error);
+}
+
+ebpo_status ebpo_open_url(const char *url, const ebpo_http_options *http, ebpo_file **out,
+                          ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_source source = EBPO_SOURCE_INIT;
+    char shown[EBPO_SHOWN_BYTES];
+    *out = NULL;
+    ebpo_status status = ebpo_source_of_url(url, http, &source, error);
+    return status == EBPO_OK
+               ? open_source(out, &source, ebpo_url_redact(url, shown, sizeof shown), 0, error)
+               : status;
+}
+
+ebpo_status ebpo_open_memory(const void *data, uint64_t size, const char *name, ebpo_file **out,
+                             ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    *out = NULL;
+    if (!data && size)
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, name ? name : "memory",
+                              "no bytes; give the file's bytes with their count");
+    ebpo_source source = ebpo_source_of_memory(data, size);
+    return open_source(out, &source, name ? name : "memory", 0, error);
+}
+
+ebpo_status ebpo_open_source(const ebpo_source *source, const char *name, ebpo_file **out,
+                             ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    *out = NULL;
+    return open_bytes(source, name, 0, out, error);
+}
+
+void ebpo_close(ebpo_file *file)
+{
+    if (!file)
+        return;
+    for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS; i++)
+        free(file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS].chunks);
+    for (int i = 0; i < EBPO_ARRAYS; i++)
+        free(file->root_array[i].chunks);
+    free(file->sums);
+    ebpo_attributes_close(file);
+    ebpo_input_close(&file->in);
+    ebpo_idle_readers_free(&file->idle);
+    pthread_mutex_destroy(&file->lock);
+    free(file);
+}
+
+ebpo_status ebpo_file_get_stats(const ebpo_file *file, ebpo_file_stats *out)
+{
+    ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
+    stats.bytes_read = atomic_load(&file->in.bytes);
+    stats.reads = atomic_load(&file->in.reads);
+    return EBPO_GIVE(ebpo_file_stats, out, &stats);
+}
+
+ebpo_status ebpo_file_get_http_stats(const ebpo_file *file, ebpo_http_stats *out)
+{
+    ebpo_http_stats stats = EBPO_HTTP_STATS_INIT;
+    bool told = ebpo_source_http_stats(&file->in.source, &stats);
+    ebpo_status status = EBPO_GIVE(ebpo_http_stats, out, &stats);
+    return status == EBPO_OK && !told ? EBPO_E_ABSENT : status;
+}
+
+const ebpo_info *ebpo_file_info(const ebpo_file *file) { return &file->info; }
+
+ebpo_status ebpo_register_filters(ebpo_error *error) { return ebpo_h5_register(error); }
+
+/* --- files that other programs have rewritten --- */
+
+enum { PIECE = 4 << 20, BYTES_A_SECOND = 4 << 20 };
+
+/* A file with a name for libhdf5, until that has opened it. */
+typedef struct temporary {
+    int fd;
+    char name[PATH_MAX];
+} temporary;
+
+static ebpo_status make_temporary(temporary *t, const char *shown, ebpo_error *error)
+{
+    const char *folder = getenv("TMPDIR");
+    snprintf(t->name, sizeof t->name, "%s/.ebpo-compat-XXXXXX",
+             folder && *folder ? folder : "/tmp");
+    t->fd = mkostemp(t->name, O_CLOEXEC);
+    return t->fd >= 0 ? EBPO_OK
+                      : ebpo_fail_errno(error, shown, "its copy could not be made in TMPDIR");
+}
+
+static void remove_temporary(temporary *t)
+{
+    if (t->fd < 0)
+        return;
+    unlink(t->name); /* unless that has happened */
+    close(t->fd);
+}
+
+static ebpo_status write_piece(int fd, const char *shown, uint64_t at, const uint8_t *data,
+                               uint64_t bytes, ebpo_error *error)
+{
+    while (bytes > 0) {
+        ssize_t done = pwrite(fd, data, (size_t)bytes, (off_t)at);
+        if (done < 0 && errno == EINTR)
+            continue;
+        if (done <= 0)
+            return ebpo_fail_errno(error, shown, "its copy in TMPDIR could not be written");
+        data += done;
+        at += (uint64_t)done;
+        bytes -= (uint64_t)done;
+    }
+    return EBPO_OK;
+}
+
+/* Everything of a URL, into a file without a name. */
+static ebpo_status fetch_url(const char *url, const ebpo_http_options *http, const char *shown,
+                             int to, ebpo_error *error)
+{
+    ebpo_source source = EBPO_SOURCE_INIT;
+    ebpo_input input;
+    ebpo_status status = ebpo_source_of_url(url, http, &source, error);
+    if (status == EBPO_OK)
+        status = ebpo_input_open(&input, &source, shown, error);
+    if (status != EBPO_OK)
+        return status;
+    uint8_t *piece = ebpo_alloc(PIECE, 1);
+    if (!piece)
+        status = ebpo_fail_memory(error, PIECE);
+    for (uint64_t at = 0; at < source.size && status == EBPO_OK; at += PIECE) {
+        uint64_t bytes = source.size - at < PIECE ? source.size - at : PIECE;
+        status = ebpo_input_read(&input, at, bytes, piece, error);
+        if (status == EBPO_OK)
+            status = write_piece(to, shown, at, piece, bytes, error);
+    }
+    free(piece);
+    ebpo_input_close(&input);
+    return status;
+}
+
+/* The name under which libhdf5 finds the file, and its bytes. */
+static ebpo_status find_from(const char *path, const ebpo_http_options *http, const char *shown,
+                             temporary *fetched, const char **from, uint64_t *bytes,
+                             ebpo_error *error)
+{
+    struct stat facts;
+    ebpo_status status = EBPO_OK;
+    if (ebpo_is_url(path))
+        status = make_temporary(fetched, shown, error);
+    if (status == EBPO_OK && ebpo_is_url(path))
+        status = fetch_url(path, http, shown, fetched->fd, error);
+    *from = ebpo_is_url(path) ? fetched->name : path;
+    if (status == EBPO_OK && (stat(*from, &facts) != 0 || !S_ISREG(facts.st_mode)))
+        return ebpo_fail_errno(error, shown, "cannot be opened");
+    if (status == EBPO_OK)
+        *bytes = (uint64_t)facts.st_size;
+    return status;
+}
+
+/* The copy by its descriptor, which stays the caller's; and whether it is what the head says. */
+static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_options *o,
+                             ebpo_file **out, ebpo_error *error)
+{
+    char name[32];
+    ebpo_source source = EBPO_SOURCE_INIT;
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_open_options open = EBPO_OPEN_OPTIONS_INIT;
+    read.threads = o->threads;
+    open.source = &source;
+    open.most_expansion = o->most_expansion;
+    snprintf(name, sizeof name, "/dev/fd/%d", to);
+    ebpo_status status = ebpo_source_of_path(&source, name, error);
+    if (status == EBPO_OK)
+        status = ebpo_open_with(shown, &open, out, error);
+    if (status == EBPO_OK)
+        status = ebpo_file_check_content(*out, &read, error);
+    if (status != EBPO_OK) {
+        ebpo_close(*out);
+        *out = NULL;
+    }
+    return status;
+}
+
+/* Returns whether the copy lacks what an error is about. */
+static bool copy_lacks(int copy, const char *shown, const char *object)
+{
+    char name[32];
+    ebpo_source source = EBPO_SOURCE_INIT;
+    ebpo_input input;
+    ebpo_head head = EBPO_HEAD_INIT;
+    snprintf(name, sizeof name, "/dev/fd/%d", copy);
+    if (!*object || ebpo_source_of_path(&source, name, NULL) != EBPO_OK ||
+        ebpo_input_open(&input, &source, shown, NULL) != EBPO_OK)
+        return false;
+    ebpo_status status = ebpo_head_open(&head, &input, NULL);
+    bool absent = status == EBPO_OK && ebpo_head_look(&head, object) == EBPO_HEAD_ABSENT;
+    (void)!ebpo_head_close(&head, status, NULL);
+    ebpo_input_close(&input);
+    return absent;
+}
+
+static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, ebpo_file **out,
+                                ebpo_error *error)
+{
+    enum { HEAD_MORE = 64 << 20 };
+    char redacted[EBPO_SHOWN_BYTES];
+    const char *shown = ebpo_is_url(path) ? ebpo_url_redact(path, redacted, sizeof redacted) : path;
+    ebpo_apart_limits limits = { o->memory_bytes, HEAD_MORE, o->seconds };
+    temporary fetched = { .fd = -1 }, copy = { .fd = -1 };
+    const char *from = NULL;
+    uint64_t bytes = 0;
+    ebpo_status status = find_from(path, o->http, shown, &fetched, &from, &bytes, error);
+    if (status == EBPO_OK)
+        status = make_temporary(&copy, shown, error);
+    limits.file_bytes += 2 * bytes;
+    if (!limits.seconds) /* decoding and encoding take about a twentieth of a second for a MiB */
+        limits.seconds = 60 + (unsigned)(bytes / BYTES_A_SECOND);
+    ebpo_error left_out = EBPO_ERROR_INIT, why = EBPO_ERROR_INIT;
+    if (status == EBPO_OK)
+        status = ebpo_h5_clean_copy(from, fetched.fd >= 0, copy.name, shown,
+                                    ebpo_rows_of_foreign_chunk, &limits, &left_out, error);
+    if (status == EBPO_OK && open_copy(copy.fd, shown, o, out, &why) != EBPO_OK)
+        status = ebpo_fail_with(error, *left_out.message && copy_lacks(copy.fd, shown, why.object)
+                                           ? &left_out /* it was there, and here is what it is */
+                                           : &why);
+    remove_temporary(&copy);
+    remove_temporary(&fetched);
+    return status;
+}
+
+ebpo_status ebpo_open_compat(const char *path, const ebpo_compat_options *options, ebpo_file **out,
+                             ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_compat_options own = EBPO_COMPAT_OPTIONS_INIT;
+    ebpo_error first = EBPO_ERROR_INIT;
+    *out = NULL;
+    ebpo_status status = options ? EBPO_TAKE(ebpo_compat_options, &own, options, error) : EBPO_OK;
+    if (status != EBPO_OK)
+        return status;
+    own.memory_bytes = own.memory_bytes ? own.memory_bytes : UINT64_C(1) << 30;
+    ebpo_open_options open = EBPO_OPEN_OPTIONS_INIT;
+    open.most_expansion = own.most_expansion;
+    open.http = own.http;
+    status = ebpo_open_with(path, &open, out, &first);
+    if (status == EBPO_E_UNSUPPORTED)
+        return open_foreign(path, &own, out, error);
+    return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &first);
+}

@@ -1,0 +1,735 @@
+/* Slices: whole subtrees as one piece, or the whole tree. A subtree is a contiguous range of the
+ * nodes of every level. A slice contains these ranges, the faces that its leaves list, and their
+ * vertices, with local numbers: first faces that are new in leaves before the subtree, in
+ * ascending order, then its own. Numbers that are scattered over a large range become dense by a
+ * hash table (ebpo_compact). A caller may limit the memory (ebpo_room), which is taken before
+ * each array is made. Source: format-spec/README.md, sections 4 and 5. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "format/chunks.h"
+#include "format/file_nodes.h"
+#include "format/pick_rows.h"
+#include "format/reader.h"
+#include "format/slice.h"
+#include "format/subtree_index.h"
+#include "geometry/node_types.h"
+
+static const uint32_t FREE = UINT32_MAX;
+
+uint64_t ebpo_compact_bytes(uint64_t capacity)
+{
+    const ebpo_compact *c = NULL;
+    return ebpo_hash_slots(2 * capacity) * sizeof *c->slot + capacity * 2 * sizeof *c->sorted;
+}
+
+static void compact_free(ebpo_compact *compact)
+{
+    free(compact->slot);
+    free(compact->sorted);
+    *compact = (ebpo_compact){ .slot = NULL };
+}
+
+ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity, ebpo_error *error)
+{
+    *out = (ebpo_compact){ .mask = 0 };
+    if (capacity > UINT64_C(1) << 31)
+        return ebpo_fail(
+            error, EBPO_E_LIMIT,
+            "%llu references in one subtree are more than can be numbered; choose a deeper level",
+            (unsigned long long)capacity);
+    uint64_t slots = ebpo_hash_slots(2 * capacity);
+    out->mask = slots - 1;
+    out->slot = ebpo_alloc(slots, sizeof *out->slot);
+    out->sorted = ebpo_alloc(capacity, sizeof *out->sorted);
+    if (!out->slot || !out->sorted) {
+        compact_free(out);
+        return ebpo_fail_memory(error, slots * sizeof *out->slot + capacity * sizeof *out->sorted);
+    }
+    memset(out->slot, 0xff, slots * sizeof *out->slot);
+    return EBPO_OK;
+}
+
+/* Where a number is, or would be. */
+static uint64_t slot_of(const ebpo_compact *c, uint32_t number)
+{
+    uint64_t at;
+    EBPO_HASH_FIND(at, ebpo_hash_number(number), c->mask,
+                   c->slot[at].number == number || c->slot[at].number == FREE);
+    return at;
+}
+
+static void compact_add(ebpo_compact *compact, uint32_t number)
+{
+    uint64_t at = slot_of(compact, number);
+    if (compact->slot[at].number == number)
+        return;
+    compact->slot[at].number = number;
+    compact->sorted[compact->count++] = number;
+}
+
+/* Radix sort, byte by byte from the lowest; bytes in which all numbers agree are passed over. */
+static void sort_numbers(uint32_t *numbers, uint32_t *other, uint64_t count)
+{
+    uint64_t begin[4][256] = { { 0 } };
+    uint32_t *from = numbers, *to = other;
+    for (uint64_t i = 0; i < count; i++)
+        for (int byte = 0; byte < 4; byte++)
+            begin[byte][numbers[i] >> 8 * byte & 255]++;
+    for (int byte = 0; byte < 4; byte++) {
+        if (begin[byte][from[0] >> 8 * byte & 255] == count)
+            continue;
+        uint64_t sum = 0;
+        for (int k = 0; k < 256; k++) {
+            uint64_t here = begin[byte][k];
+            begin[byte][k] = sum;
+            sum += here;
+        }
+        for (uint64_t i = 0; i < count; i++)
+            to[begin[byte][from[i] >> 8 * byte & 255]++] = from[i];
+        uint32_t *swap = from;
+        from = to;
+        to = swap;
+    }
+    if (from != numbers)
+        memcpy(numbers, from, count * sizeof *numbers);
+}
+
+/* After the last add: sorts. */
+static ebpo_status compact_sort(ebpo_compact *compact, ebpo_error *error)
+{
+    if (compact->count == 0)
+        return EBPO_OK;
+    uint32_t *other = ebpo_alloc(compact->count, sizeof *other);
+    if (!other)
+        return ebpo_fail_memory(error, compact->count * sizeof *other);
+    sort_numbers(compact->sorted, other, compact->count);
+    free(other);
+    for (uint64_t i = 0; i < compact->count; i++)
+        compact->slot[slot_of(compact, compact->sorted[i])].place = (uint32_t)i;
+    return EBPO_OK;
+}
+
+/* Place of a number that was added. */
+static uint32_t compact_find(const ebpo_compact *compact, uint32_t number)
+{
+    return compact->slot[slot_of(compact, number)].place;
+}
+
+/* --- faces --- */
+
+static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *single,
+                        uint64_t singles, uint64_t first, uint64_t rows)
+{
+    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    /* rows before `next` are in */
+    uint64_t chunk_rows = ebpo_reader_array(chunks->file, id, 0)->shape.chunk_rows, next = 0;
+    if (!ebpo_input_expects(&chunks->file->in))
+        return;
+    for (uint64_t i = 0; i < singles; i++)
+        if (single[i] >= next) {
+            ebpo_chunks_expect(chunks, &e, id, 0, single[i], 1);
+            next = (single[i] / chunk_rows + 1) * chunk_rows;
+        }
+    if (rows && first + rows > next)
+        ebpo_chunks_expect(chunks, &e, id, 0, first > next ? first : next,
+                           first + rows - (first > next ? first : next));
+    ebpo_expect_all(&e);
+}
+
+/* Rows of a decoded array: those of `single` (ascending), then [first, first + rows). Chunks stay
+ * pinned while rows are in them. */
+static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row_bytes,
+                               const uint32_t *single, uint64_t singles, uint64_t first,
+                               uint64_t rows, void *out, ebpo_error *error)
+{
+    ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, id, 0) };
+    ebpo_status status = EBPO_OK;
+    uint8_t *to = out;
+    expect_rows(chunks, id, single, singles, first, rows);
+    for (uint64_t i = 0;
+         i < singles && (status = ebpo_held_chunk_move(chunks, &view, single[i], error)) == EBPO_OK;
+         i++, to += row_bytes)
+        memcpy(to, view.rows + (single[i] - view.begin) * row_bytes, row_bytes);
+    while (rows && status == EBPO_OK &&
+           (status = ebpo_held_chunk_move(chunks, &view, first, error)) == EBPO_OK) {
+        uint64_t here = view.end - first < rows ? view.end - first : rows;
+        memcpy(to, view.rows + (first - view.begin) * row_bytes, here * row_bytes);
+        to += here * row_bytes;
+        first += here;
+        rows -= here;
+    }
+    ebpo_held_chunk_release(chunks, &view);
+    return status;
+}
+
+/* --- references --- */
+
+static ebpo_status collect_outer(ebpo_slice *slice, ebpo_compact *outer, ebpo_room *room,
+                                 ebpo_error *error)
+{
+    uint64_t capacity = 0;
+    for (int i = 0; i < slice->level_count; i++)
+        for (uint64_t k = 0; k < slice->level[i].ref_count; k++)
+            capacity += slice->level[i].leaf_refs[k] < slice->first_face;
+    ebpo_status status = ebpo_room_check(room, ebpo_compact_bytes(capacity), error);
+    if (status == EBPO_OK)
+        status = ebpo_compact_make(outer, capacity, error);
+    if (status != EBPO_OK)
+        return status;
+    for (int i = 0; i < slice->level_count; i++)
+        for (uint64_t k = 0; k < slice->level[i].ref_count; k++)
+            if (slice->level[i].leaf_refs[k] < slice->first_face)
+                compact_add(outer, slice->level[i].leaf_refs[k]);
+    return compact_sort(outer, error);
+}
+
+static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
+{
+    /* the outer faces are some of those before the first */
+    uint64_t less = slice->first_face - outer->count;
+    for (int i = 0; i < slice->level_count; i++) {
+        ebpo_level *level = &slice->level[i];
+        for (uint64_t k = 0; k < level->leaf_count; k++)
+            level->leaf_first[k] -= less;
+        for (uint64_t k = 0; k < level->ref_count; k++) {
+            uint32_t ref = level->leaf_refs[k];
+            level->leaf_refs[k] =
+                ref < slice->first_face ? compact_find(outer, ref) : (uint32_t)(ref - less);
+        }
+    }
+}
+
+/* The list of outer faces stays with the slice. */
+static ebpo_status number_faces(ebpo_slice *slice, ebpo_room *room, ebpo_error *error)
+{
+    ebpo_compact outer = { .slot = NULL };
+    ebpo_status status = collect_outer(slice, &outer, room, error);
+    if (status == EBPO_OK)
+        localise_faces(slice, &outer);
+    if (status == EBPO_OK && outer.count) {
+        uint32_t *fit = ebpo_realloc(outer.sorted, outer.count, sizeof *fit);
+        slice->outer = fit ? fit : outer.sorted;
+        slice->outer_count = (uint32_t)outer.count;
+        outer.sorted = NULL;
+    }
+    compact_free(&outer);
+    return status;
+}
+
+/* --- vertices --- */
+
+/* Vertices are numbered by first use, so those that are new in the slice's own faces are a range,
+ * [*begin, *end), and all others that it uses lie before. */
+static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t *begin,
+                                uint64_t *end, ebpo_error *error)
+{
+    ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0) };
+    *begin = *end = UINT32_MAX; /* no own faces: all vertices are older */
+    if (slice->face_count == 0)
+        return EBPO_OK;
+    ebpo_status status = ebpo_held_chunk_move(chunks, &view, slice->first_face, error);
+    if (status != EBPO_OK)
+        return status;
+    const uint32_t *corners = (const uint32_t *)(const void *)view.rows,
+                   *own = slice->mesh.faces + 3 * (uint64_t)slice->outer_count;
+    uint64_t seen = chunks->seen ? chunks->seen[view.begin / view.array->shape.chunk_rows] : 0;
+    uint32_t before = 0, within = 0; /* one past the largest; vertex numbers are below 2^32 - 2 */
+    for (uint64_t i = 0; i < 3 * (slice->first_face - view.begin); i++)
+        before = corners[i] + 1 > before ? corners[i] + 1 : before;
+    for (uint64_t i = 0; i < 3 * slice->face_count; i++)
+        within = own[i] + 1 > within ? own[i] + 1 : within;
+    ebpo_held_chunk_release(chunks, &view);
+    *begin = before > seen ? before : seen;
+    *end = within > *begin ? within : *begin;
+    return EBPO_OK;
+}
+
+static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_room *room,
+                                 ebpo_compact *older, uint64_t *bytes, ebpo_error *error)
+{
+    uint64_t capacity = 0, corners = 3 * mesh->face_count;
+    for (uint64_t i = 0; i < corners; i++)
+        capacity += mesh->faces[i] < begin;
+    *bytes = ebpo_compact_bytes(capacity);
+    ebpo_status status = ebpo_room_check(room, *bytes, error);
+    if (status == EBPO_OK)
+        status = ebpo_compact_make(older, capacity, error);
+    for (uint64_t i = 0; i < corners && status == EBPO_OK; i++)
+        if (mesh->faces[i] < begin)
+            compact_add(older, mesh->faces[i]);
+    return status == EBPO_OK ? compact_sort(older, error) : status;
+}
+
+/* Older vertices first, then the new ones: the order of the file. */
+static void renumber_vertices(ebpo_mesh *mesh, uint64_t begin, const ebpo_compact *older)
+{
+    uint32_t less = (uint32_t)(begin - older->count);
+    for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
+        mesh->faces[i] =
+            mesh->faces[i] < begin ? compact_find(older, mesh->faces[i]) : mesh->faces[i] - less;
+}
+
+static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_room *room,
+                                 ebpo_error *error)
+{
+    ebpo_mesh *mesh = &slice->mesh;
+    ebpo_compact older = { .slot = NULL };
+    uint64_t begin, end, table = 0;
+    bool wide = chunks->file->info.double_coordinates;
+    size_t row_bytes = 3 * (wide ? sizeof(double) : sizeof(float));
+    ebpo_status status = new_vertices(slice, chunks, &begin, &end, error);
+    if (status == EBPO_OK)
+        status = collect_older(mesh, begin, room, &older, &table, error);
+    if (status == EBPO_OK) {
+        mesh->vertex_count = older.count + (end - begin);
+        status = ebpo_room_check(room, table + mesh->vertex_count * row_bytes, error);
+    }
+    if (status == EBPO_OK)
+        status = ebpo_room_take(room, mesh->vertex_count * row_bytes, error);
+    if (status == EBPO_OK) {
+        renumber_vertices(mesh, begin, &older);
+        void *xyz = ebpo_alloc(mesh->vertex_count, row_bytes);
+        mesh->xyz32 = wide ? NULL : xyz;
+        mesh->xyz64 = wide ? xyz : NULL;
+        status = xyz ? gather_rows(chunks, EBPO_A_VERTICES, row_bytes, older.sorted, older.count,
+                                   begin, end - begin, xyz, error)
+                     : ebpo_fail_memory(error, mesh->vertex_count * row_bytes);
+    }
+    compact_free(&older);
+    return status;
+}
+
+static ebpo_status take_source(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_error *error)
+{
+    if (!(chunks->file->info.parts & EBPO_PART_MAPS))
+        return EBPO_OK;
+    slice->face_source = ebpo_alloc(slice->mesh.face_count, sizeof *slice->face_source);
+    if (!slice->face_source)
+        return ebpo_fail_memory(error, slice->mesh.face_count * sizeof *slice->face_source);
+    return gather_rows(chunks, EBPO_A_FACE_SOURCE, sizeof *slice->face_source, slice->outer,
+                       slice->outer_count, slice->first_face, slice->face_count, slice->face_source,
+                       error);
+}
+
+/* From levels with numbers of the file, and first_face and face_count: everything else, with `maps`
+ * numbers in the source, too, and local numbers in the levels. `room`: ebpo_slice_read_within. */
+static ebpo_status slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool maps,
+                                    ebpo_room *room, ebpo_error *error)
+{
+    enum { ROW = 3 * sizeof(uint32_t), NUMBER = sizeof(uint32_t) };
+    ebpo_status status = number_faces(slice, room, error);
+    slice->mesh.face_count = slice->outer_count + slice->face_count;
+    if (status == EBPO_OK)
+        status = ebpo_room_take(room,
+                                slice->outer_count * (uint64_t)NUMBER +
+                                    slice->mesh.face_count * (maps ? ROW + NUMBER : ROW),
+                                error);
+    if (status != EBPO_OK)
+        return status;
+    slice->mesh.faces = ebpo_alloc(slice->mesh.face_count, ROW);
+    if (!slice->mesh.faces)
+        return ebpo_fail_memory(error, slice->mesh.face_count * ROW);
+    status = gather_rows(chunks, EBPO_A_FACES, ROW, slice->outer, slice->outer_count,
+                         slice->first_face, slice->face_count, slice->mesh.faces, error);
+    if (status == EBPO_OK)
+        status = take_vertices(slice, chunks, room, error);
+    return status == EBPO_OK && maps ? take_source(slice, chunks, error) : status;
+}
+
+/* --- subtrees --- */
+
+void ebpo_slice_free(ebpo_slice *slice)
+{
+    if (!slice)
+        return;
+    for (int i = 0; i < EBPO_LEVELS_MAX; i++)
+        ebpo_level_free(&slice->level[i]);
+    free(slice->outer);
+    ebpo_mesh_free(&slice->mesh);
+    ebpo_array_free(NULL, slice->face_source);
+    memset(slice, 0, sizeof *slice);
+}
+
+/* A subtree's nodes in one level of the file. */
+typedef struct range {
+    int level;
+    ebpo_run run;
+} range;
+
+static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_node *root, range *out,
+                              ebpo_error *error)
+{
+    if (root->type != EBPO_GRAY && root->type != EBPO_LEAF)
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, chunks->file->in.shown,
+                              "the subtree of a white or black node is asked for; it has none");
+    *out = (range){ .level = root->cell.level };
+    out->run.rank[root->type] = root->rank;
+    out->run.count[root->type] = 1;
+    return ebpo_chunks_check_node(chunks, root, error);
+}
+
+/* Which of a subtree's nodes, and what of them (EBPO_NEEDS_...). */
+typedef struct extent {
+    uint32_t needs;
+    int end;         /* one past the deepest level */
+    bool faces;      /* that the leaves list will be read as well */
+    ebpo_room *room; /* NULL: no limit */
+} extent;
+
+/* `levels` below the root's, or all. */
+static extent extent_of(const ebpo_chunks *chunks, const ebpo_node *root, uint32_t needs,
+                        int levels)
+{
+    int count = chunks->file->info.level_count, below = count - 1 - root->cell.level;
+    return (extent){ needs & ebpo_schema_has(&chunks->file->info),
+                     levels >= 0 && levels < below ? root->cell.level + levels + 1 : count, false,
+                     NULL };
+}
+
+/* Whether the range has a next level: the gray nodes of the file's last one are pruned. */
+static bool goes_on(const extent *e, const range *r)
+{
+    return r->run.count[EBPO_GRAY] && r->level + 1 < e->end;
+}
+
+/* The next level's range. */
+static ebpo_status next_range(ebpo_chunks *chunks, range *r, uint16_t **types, ebpo_error *error)
+{
+    uint64_t group = r->run.rank[EBPO_GRAY], groups = r->run.count[EBPO_GRAY];
+    r->level++;
+    ebpo_status status = ebpo_ranks_before(chunks, r->level, group, r->run.rank, error);
+    if (status == EBPO_OK && types)
+        status = ebpo_chunks_take(chunks, EBPO_A_TYPES, r->level, group, groups, sizeof **types,
+                                  types, error);
+    if (status == EBPO_OK && types)
+        ebpo_groups_count(*types, groups, r->run.count);
+    else if (status == EBPO_OK)
+        status = ebpo_ranks_count_file(chunks, r->level, group, groups, r->run.count, error);
+    return status == EBPO_OK ? ebpo_ranks_check(chunks, r->level, r->run.rank, r->run.count, error)
+                             : status;
+}
+
+/* What reading a level's nodes begins with, and the next level's types; only files far away care.
+ */
+static void expect_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
+{
+    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    uint64_t gray = r->run.rank[EBPO_GRAY], index = gray / EBPO_INDEX_ROWS,
+             counted = index * EBPO_INDEX_ROWS;
+    ebpo_runs_expect(chunks, &e, r->level, &r->run, 1, x->needs);
+    if (goes_on(x, r) && ebpo_subtree_table_has(chunks->file, r->level + 1)) {
+        ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES, r->level + 1, gray, r->run.count[EBPO_GRAY]);
+    } else if (goes_on(x, r)) {
+        ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES_INDEX, r->level + 1, index, 1);
+        ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES, r->level + 1, counted,
+                           gray + r->run.count[EBPO_GRAY] - counted);
+    }
+    ebpo_expect_all(&e);
+}
+
+/* From the level of subtrees' roots on, all that is below is known. */
+static void expect_below(ebpo_chunks *chunks, const extent *x, const range *r)
+{
+    uint64_t first = r->run.rank[EBPO_GRAY], count = r->run.count[EBPO_GRAY];
+    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    e.near = true;
+    if (!ebpo_subtree_table_has(chunks->file, r->level + 1) || !goes_on(x, r) ||
+        r->level != chunks->file->info.subtree_level || !ebpo_expected_wanted(&e))
+        return;
+    ebpo_subtree_table_expect_run(chunks, first, count);
+    ebpo_subtrees_expect(chunks, &e, first, count, x->needs, x->end - 1, x->faces);
+    ebpo_expect_all(&e);
+}
+
+/* Everything of one level but its types. */
+static ebpo_status read_nodes(ebpo_chunks *chunks, const extent *x, const range *r, ebpo_level *out,
+                              ebpo_error *error)
+{
+    expect_below(chunks, x, r);
+    expect_nodes(chunks, x, r);
+    return ebpo_runs_read(chunks, r->level, &r->run, 1, x->needs, x->room, out, error);
+}
+
+static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const extent *x,
+                               ebpo_error *error)
+{
+    const ebpo_node *root = &slice->root;
+    range r;
+    ebpo_status status = root_range(chunks, root, &r, error);
+    if (status != EBPO_OK)
+        return status;
+    slice->level[0].group_count = 1;
+    slice->level[0].types = ebpo_alloc(1, sizeof(uint16_t));
+    if (!slice->level[0].types)
+        return ebpo_fail_memory(error, sizeof(uint16_t));
+    slice->level[0].types[0] = (uint16_t)root->type;
+    status = read_nodes(chunks, x, &r, &slice->level[0], error);
+    for (slice->level_count = 1; status == EBPO_OK && goes_on(x, &r); slice->level_count++) {
+        ebpo_level *out = &slice->level[slice->level_count];
+        out->group_count = r.run.count[EBPO_GRAY];
+        status = ebpo_room_take(x->room, out->group_count * sizeof *out->types, error);
+        if (status == EBPO_OK)
+            status = next_range(chunks, &r, &out->types, error);
+        if (status == EBPO_OK)
+            status = read_nodes(chunks, x, &r, out, error);
+    }
+    return status;
+}
+
+typedef struct walk {
+    ebpo_chunks *chunks;
+    ebpo_slice *slice;
+    uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX]; /* next of each level */
+    bool begun;
+} walk;
+
+/* Leaves in depth-first order have the subtree's own faces as their new ones, without gaps: the
+ * first leaf tells where they begin. */
+static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
+{
+    const ebpo_level *arrays = &w->slice->level[level];
+    uint16_t types = arrays->types[w->group[level]++];
+    for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++) {
+        ebpo_node_type type = ebpo_group_type(types, octant);
+        if (type == EBPO_GRAY && level + 1 < w->slice->level_count) {
+            ebpo_status status = walk_group(w, level + 1, error);
+            if (status != EBPO_OK)
+                return status;
+        } else if (type == EBPO_LEAF) {
+            uint64_t i = w->leaf[level]++;
+            if (!w->begun)
+                w->slice->first_face = arrays->leaf_first[i];
+            w->begun = true;
+            if (arrays->leaf_first[i] != w->slice->first_face + w->slice->face_count)
+                return ebpo_chunks_fail(w->chunks, w->slice->root.cell.level + level,
+                                        EBPO_A_LEAF_SKIP,
+                                        "the leaves' new faces are not in depth-first order",
+                                        error);
+            w->slice->face_count += arrays->leaf_new[i];
+        }
+    }
+    return EBPO_OK;
+}
+
+static bool is_subtree(const ebpo_chunks *chunks, const extent *x, const ebpo_node *root)
+{
+    const ebpo_info *info = &chunks->file->info;
+    /* of fewer levels the table does not tell the faces */
+    return info->subtree_level && root->cell.level == info->subtree_level &&
+           root->type == EBPO_GRAY && x->end == info->level_count;
+}
+
+/* The leaves' faces are those that the table gives the subtree. */
+static ebpo_status check_own_faces(const ebpo_slice *slice, ebpo_chunks *chunks, const extent *x,
+                                   ebpo_error *error)
+{
+    ebpo_subtree_row row;
+    if (!is_subtree(chunks, x, &slice->root))
+        return EBPO_OK;
+    ebpo_status status = ebpo_subtree_table_row(chunks, slice->root.rank, &row, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t has = row.after[EBPO_S_FACES] - row.before[EBPO_S_FACES];
+    return has == slice->face_count && (has == 0 || row.face == slice->first_face)
+               ? EBPO_OK
+               : ebpo_chunks_fail(chunks, -1, EBPO_A_SUBTREE_COUNTS,
+                                  "a row contradicts the faces of its subtree", error);
+}
+
+static ebpo_status read_extent(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                               const extent *x, ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    out->root = *root;
+    out->pruned = chunks->file->info.pruned;
+    ebpo_status status = read_levels(out, chunks, x, error);
+    if (status != EBPO_OK)
+        ebpo_slice_free(out);
+    return status;
+}
+
+ebpo_status ebpo_slice_read_nodes(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                                  uint32_t needs, int levels, ebpo_error *error)
+{
+    extent x = extent_of(chunks, root, needs, levels);
+    return read_extent(out, chunks, root, &x, error);
+}
+
+ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                                  uint32_t needs, ebpo_error *error)
+{
+    return ebpo_slice_read_within(out, chunks, root, needs, NULL, error);
+}
+
+ebpo_status ebpo_slice_read_within(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                                   uint32_t needs, ebpo_room *room, ebpo_error *error)
+{
+    enum { ALWAYS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH };
+    extent x = extent_of(chunks, root, needs | ALWAYS, EBPO_SLICE_ALL);
+    memset(out, 0, sizeof *out);
+    if (!(chunks->file->info.parts & EBPO_PART_MESH))
+        return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,
+                              "the file was written without its mesh; build it again with it");
+    walk w = { .chunks = chunks, .slice = out };
+    x.faces = true;
+    x.room = room;
+    ebpo_status status = read_extent(out, chunks, root, &x, error);
+    if (status == EBPO_OK)
+        status = walk_group(&w, 0, error);
+    if (status == EBPO_OK)
+        status = check_own_faces(out, chunks, &x, error);
+    if (status == EBPO_OK)
+        status = slice_take_faces(out, chunks, needs & EBPO_NEEDS_MAPS, room, error);
+    if (status != EBPO_OK)
+        ebpo_slice_free(out);
+    return status;
+}
+
+ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                            ebpo_error *error)
+{
+    return ebpo_slice_read_parts(out, chunks, root, ~(uint32_t)EBPO_NEEDS_LEAF_PLANES, error);
+}
+
+static ebpo_status measure_faces(ebpo_chunks *chunks, const range *r, ebpo_slice_size *out,
+                                 ebpo_error *error)
+{
+    uint64_t refs = 0, fresh = 0, first = r->run.rank[EBPO_LEAF], count = r->run.count[EBPO_LEAF];
+    const ebpo_level_summary *s = &chunks->file->info.level[r->level];
+    ebpo_status status =
+        ebpo_chunks_sum(chunks, EBPO_A_LEAF_REF_COUNT, r->level, first, count, &refs, error);
+    if (status == EBPO_OK)
+        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_NEW, r->level, first, count, &fresh, error);
+    if (status == EBPO_OK && (refs > s->ref_count || fresh > s->new_count))
+        status = ebpo_chunks_fail(chunks, r->level, EBPO_A_LEAF_NEW,
+                                  "the leaves' counts do not add up to those in the head", error);
+    out->refs += refs;
+    out->new_faces += fresh;
+    return status;
+}
+
+static ebpo_status measure_planes(ebpo_chunks *chunks, const range *r, ebpo_node_type type,
+                                  ebpo_slice_size *out, ebpo_error *error)
+{
+    ebpo_array_id id = type == EBPO_LEAF ? EBPO_A_LEAF_PLANE_COUNTS : EBPO_A_PLANE_COUNTS;
+    uint64_t sum = 0, count = r->run.count[type];
+    ebpo_status status =
+        count ? ebpo_chunks_sum(chunks, id, r->level, r->run.rank[type], count, &sum, error)
+              : EBPO_OK;
+    out->planes += sum;
+    return status;
+}
+
+static ebpo_status measure_nodes(ebpo_chunks *chunks, const extent *x, const range *r,
+                                 ebpo_slice_size *out, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    out->leaves += r->run.count[EBPO_LEAF];
+    if (x->needs & EBPO_NEEDS_MESH && r->run.count[EBPO_LEAF])
+        status = measure_faces(chunks, r, out, error);
+    if (status == EBPO_OK && x->needs & EBPO_NEEDS_PLANES)
+        status = measure_planes(chunks, r, EBPO_GRAY, out, error);
+    if (status == EBPO_OK && x->needs & EBPO_NEEDS_LEAF_PLANES)
+        status = measure_planes(chunks, r, EBPO_LEAF, out, error);
+    return status;
+}
+
+/* What the table says of a subtree, but for its root. */
+static ebpo_status measure_subtree(ebpo_chunks *chunks, const extent *x, uint64_t subtree,
+                                   ebpo_slice_size *out, ebpo_error *error)
+{
+    const ebpo_info *info = &chunks->file->info;
+    ebpo_subtree_row row;
+    /* what reading it will want to know of the table comes with the same request */
+    ebpo_subtree_table_expect_run(chunks, subtree, 1);
+    ebpo_status status = ebpo_subtree_table_row(chunks, subtree, &row, error);
+    for (int level = info->subtree_level + 1; level < x->end && status == EBPO_OK; level++) {
+        uint64_t has[EBPO_SUBTREE_LEVEL_COLS];
+        for (unsigned k = 0; k < EBPO_SUBTREE_LEVEL_COLS; k++)
+            has[k] = row.after[ebpo_subtree_column(info, level, k)] -
+                     row.before[ebpo_subtree_column(info, level, k)];
+        out->groups += ebpo_subtree_groups(info, &row, level, true) -
+                       ebpo_subtree_groups(info, &row, level, false);
+        out->leaves += has[EBPO_S_LEAF];
+        out->refs += x->needs & EBPO_NEEDS_MESH ? has[EBPO_S_REFS] : 0;
+        out->planes += (x->needs & EBPO_NEEDS_PLANES ? has[EBPO_S_PLANES] : 0) +
+                       (x->needs & EBPO_NEEDS_LEAF_PLANES ? has[EBPO_S_LEAF_PLANES] : 0);
+    }
+    if (status == EBPO_OK && x->needs & EBPO_NEEDS_MESH)
+        out->new_faces += row.after[EBPO_S_FACES] - row.before[EBPO_S_FACES];
+    return status;
+}
+
+ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const ebpo_node *root, uint32_t needs,
+                                     int levels, ebpo_slice_size *out, ebpo_error *error)
+{
+    range r;
+    extent x = extent_of(chunks, root, needs, levels);
+    *out = (ebpo_slice_size){ .groups = 1 };
+    ebpo_status status = root_range(chunks, root, &r, error);
+    if (status == EBPO_OK)
+        status = measure_nodes(chunks, &x, &r, out, error);
+    if (status == EBPO_OK && is_subtree(chunks, &x, root)) {
+        status = measure_subtree(chunks, &x, root->rank, out, error);
+        out->outer = out->refs;
+        return status;
+    }
+    while (status == EBPO_OK && goes_on(&x, &r)) {
+        out->groups += r.run.count[EBPO_GRAY];
+        status = next_range(chunks, &r, NULL, error);
+        if (status == EBPO_OK)
+            status = measure_nodes(chunks, &x, &r, out, error);
+    }
+    out->outer = root->cell.level == 0 ? 0 : out->refs;
+    return status;
+}
+
+ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root, ebpo_slice_size *out,
+                               ebpo_error *error)
+{
+    return ebpo_slice_measure_nodes(chunks, root, EBPO_NEEDS_MESH, EBPO_SLICE_ALL, out, error);
+}
+
+/* --- the whole tree --- */
+
+/* What a slice does not have. */
+static void drop_arrays(ebpo_level *level)
+{
+    ebpo_level_drop(level, EBPO_NEEDS_LEAF_PLANES);
+    level->leaf_plane_count = 0;
+    level->gray_volume = level->leaf_volume = 0;
+}
+
+ebpo_status ebpo_slice_read_all(ebpo_slice *out, const ebpo_file *file, unsigned threads,
+                                ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    if (!(file->info.parts & EBPO_PART_MESH))
+        return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
+                              "the file was written without its mesh; build it again with it");
+    ebpo_tree tree;
+    ebpo_read_options read = ebpo_read_threads(threads);
+    ebpo_status status = ebpo_file_read_tree(file, &read, &tree, error);
+    if (status != EBPO_OK)
+        return status;
+    out->level_count = file->info.level_count;
+    out->pruned = file->info.pruned;
+    for (int i = 0; i < out->level_count; i++) {
+        drop_arrays(&tree.level[i]);
+        out->level[i] = tree.level[i];
+        memset(&tree.level[i], 0, sizeof tree.level[i]);
+    }
+    out->root.type = (ebpo_node_type)out->level[0].types[0];
+    out->face_count = tree.mesh.face_count;
+    out->mesh = tree.mesh;
+    memset(&tree.mesh, 0, sizeof tree.mesh);
+    out->face_source = tree.face_source;
+    tree.face_source = NULL;
+    ebpo_tree_free(&tree);
+    return EBPO_OK;
+}

@@ -1,0 +1,694 @@
+/* Writing a file: ebpo_tree_write. The headers come first (groups, arrays' headers, attributes,
+ * and HDF5's indexes of chunks); their size is learned from a trial in memory. Then the chunks
+ * are encoded and compressed in windows of some chunks, on several threads, and appended in the
+ * order of chunk_layout.c: first those of the top levels, which looking up a subtree takes, then
+ * all others. The lists of chunk offsets and chunk checksums are the last chunks. Checksums of
+ * the content are computed on the way. ebpo_repack reads a file and writes it again with other
+ * options. Source: format-spec/README.md, sections 2, 9 and 20. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/file.h>
+
+#include "core/alloc.h"
+#include "core/arrays.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/sha256.h"
+#include "core/sized.h"
+#include "format/chunk_layout.h"
+#include "format/chunk_directory.h"
+#include "format/content_checksum.h"
+#include "format/head_facts.h"
+#include "format/reader.h"
+#include "format/write_file.h"
+#include "format/write_plan.h"
+#include "hdf5_read/face_gates.h"
+#include "io/publish.h"
+
+/* --- headers --- */
+
+/* In the order of the file. */
+typedef enum header_list { LIST_SUMS, LIST_PLACES, LISTS } header_list;
+
+typedef struct file_headers {
+    ebpo_plan *plan; /* whose arrays get handles */
+    ebpo_h5_out out;
+    ebpo_h5_id root;
+    /* lists about all chunks, the last chunks of the file; without rows they are not written */
+    ebpo_array_out list[LISTS];
+    uint64_t chunks; /* of the plan's arrays */
+    int codec_level;
+    uint64_t head_bytes;  /* headers */
+    uint64_t index_bytes; /* of arrays of several chunks; 0: there are none */
+} file_headers;
+
+/* The file's first chunk (of the root's type): it is written with the headers. */
+typedef struct first_chunk {
+    const void *data;
+    size_t bytes;
+} first_chunk;
+
+/* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that
+ * where no other header follows. */
+enum { ALONE_BYTES = 4096 };
+
+static bool has_index(const ebpo_plan *plan)
+{
+    for (unsigned i = 0; i < plan->count; i++)
+        if (ebpo_shape_chunks(&plan->array[i].shape) > 1)
+            return true;
+    return false;
+}
+
+static void plan_list(file_headers *h, header_list list, ebpo_array_id id, uint64_t rows)
+{
+    ebpo_array_out *a = &h->list[list];
+    *a = (ebpo_array_out){ .id = id, .handle = -1 };
+    ebpo_schema_path(id, 0, a->path);
+    if (rows)
+        a->shape = (ebpo_shape){ .rows = rows,
+                                 .chunk_rows = (uint32_t)rows,
+                                 .element_size = ebpo_schema[id].sizes,
+                                 .pipeline = h->plan->array[0].shape.pipeline };
+}
+
+/* The plan stays the caller's. End with headers_close, and ebpo_h5_finish or ebpo_h5_discard.
+ */
+static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
+                         const ebpo_write_options *options)
+{
+    bool summed = options->chunk_sums == EBPO_SUMS_USUAL;
+    *h = (file_headers){
+        .plan = plan, .root = -1, .chunks = chunks, .codec_level = options->codec_level
+    };
+    h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
+    plan_list(h, LIST_SUMS, EBPO_A_CHUNK_SUMS, summed ? chunks : 0);
+    plan_list(h, LIST_PLACES, EBPO_A_PLACES,
+              plan->info.subtree_level ? chunks + has_index(plan) + summed : 0);
+}
+
+static ebpo_status make_level_groups(file_headers *h, ebpo_error *error)
+{
+    const ebpo_info *info = &h->plan->info;
+    ebpo_h5_id id;
+    ebpo_status status =
+        ebpo_h5_make_group(&h->out, "/levels", (unsigned)info->level_count, &id, error);
+    ebpo_h5_close_id(&h->out, status == EBPO_OK ? id : -1);
+    for (int level = 0; level < info->level_count && status == EBPO_OK; level++) {
+        char path[EBPO_PATH_BYTES];
+        unsigned links = 0;
+        for (unsigned i = 0; i < h->plan->count; i++)
+            links += h->plan->array[i].id < EBPO_LEVEL_ARRAYS && h->plan->array[i].level == level;
+        snprintf(path, sizeof path, "/levels/%02d", level);
+        status = ebpo_h5_make_group(&h->out, path, links, &id, error);
+        if (status == EBPO_OK)
+            status = ebpo_facts_put_level(&h->out, id, &info->level[level], error);
+        ebpo_h5_close_id(&h->out, id);
+    }
+    return status;
+}
+
+/* A group of the root, if what it is there for is, with room for all arrays that it may have. */
+static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t need,
+                                   ebpo_error *error)
+{
+    unsigned links = 0;
+    ebpo_h5_id id = -1;
+    if (!(ebpo_schema_has(&h->plan->info) & need))
+        return EBPO_OK;
+    for (int k = EBPO_LEVEL_ARRAYS; k < EBPO_ARRAYS; k++)
+        links += (ebpo_schema[k].needs & need) != 0;
+    ebpo_status status = ebpo_h5_make_group(&h->out, path, links, &id, error);
+    ebpo_h5_close_id(&h->out, id);
+    return status;
+}
+
+/* Of a list: its own place and the file's size, which tell readers whether it still holds. */
+static ebpo_status headers_put_holds(file_headers *h, header_list list, uint64_t file_bytes,
+                                     uint64_t offset, ebpo_error *error)
+{
+    ebpo_h5_id id = h->list[list].handle;
+    ebpo_status status = ebpo_h5_put_count(&h->out, id, "file_bytes", file_bytes, error);
+    return status == EBPO_OK ? ebpo_h5_put_count(&h->out, id, "offset", offset, error) : status;
+}
+
+static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_chunk *first,
+                              ebpo_error *error)
+{
+    ebpo_shape shape = ebpo_stored_shape(&a->shape, a->gates);
+    ebpo_status status = ebpo_h5_make_array(&h->out, a->path, &shape, &a->handle, error);
+    if (status == EBPO_OK && first)
+        status = ebpo_h5_put_chunk(&h->out, a->path, a->handle, &a->shape, 0, first->data,
+                                   first->bytes, error);
+    if (status == EBPO_OK && a->id == EBPO_A_ATTRIBUTE)
+        return ebpo_attributes_put_array(&h->out, h->plan, a, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_put_text(&h->out, a->handle, "coding",
+                                  a->gates ? EBPO_GATES_CODING : ebpo_schema[a->id].coding, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_put_text(&h->out, a->handle, "about", ebpo_schema[a->id].about, error);
+    return status;
+}
+
+/* Everything but the chunks, and the first of these: before the first header grows by attributes:
+ * HDF5 then cannot grow the metadata block at the end of the file, but only fill it. */
+static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
+                           uint64_t head_bytes, first_chunk first, ebpo_error *error)
+{
+    ebpo_plan *plan = h->plan;
+    h->out.codec_level = h->codec_level;
+    ebpo_status status =
+        ebpo_h5_create(&h->out, path, shown, head_bytes,
+                       3 + (h->list[LIST_SUMS].shape.rows != 0) + (plan->info.subtree_level != 0) +
+                           (plan->attributes != NULL),
+                       error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_root(&h->out, &h->root, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_put(&h->out, h->root, &plan->info, error);
+    if (status == EBPO_OK)
+        status = make_level_groups(h, error);
+    if (status == EBPO_OK)
+        status = make_root_group(h, "/mesh", EBPO_NEEDS_MESH, error);
+    if (status == EBPO_OK)
+        status = make_root_group(h, "/maps", EBPO_NEEDS_MAPS, error);
+    if (status == EBPO_OK)
+        status = make_root_group(h, "/subtrees", EBPO_NEEDS_SUBTREES, error);
+    if (status == EBPO_OK)
+        status = ebpo_attributes_put_group(&h->out, plan, error);
+    for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)
+        status = make_array(h, &plan->array[i], i == 0 ? &first : NULL, error);
+    for (header_list l = 0; l < LISTS && status == EBPO_OK; l++) {
+        if (h->list[l].shape.rows == 0)
+            continue;
+        status = make_array(h, &h->list[l], NULL, error);
+        if (status == EBPO_OK)
+            status = headers_put_holds(h, l, 0, 0, error);
+    }
+    return status;
+}
+
+/* Closes root and arrays, not the file. */
+static void headers_close(file_headers *h)
+{
+    for (unsigned i = 0; i < h->plan->count; i++) {
+        ebpo_h5_close_id(&h->out, h->plan->array[i].handle);
+        h->plan->array[i].handle = -1;
+    }
+    for (header_list l = 0; l < LISTS; l++) {
+        ebpo_h5_close_id(&h->out, h->list[l].handle);
+        h->list[l].handle = -1;
+    }
+    ebpo_h5_close_id(&h->out, h->root);
+    h->root = -1;
+}
+
+/* Then the file, which is left open. `shown`: for messages. */
+static ebpo_status headers_lay_out(file_headers *h, const char *path, const char *shown,
+                                   first_chunk first, ebpo_error *error)
+{
+    return lay_out(h, path, shown, h->head_bytes, first, error);
+}
+
+/* Sizes of headers and indexes: the same file in memory, with chunks of one byte. */
+static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_error *error)
+{
+    ebpo_plan *plan = h->plan;
+    uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * h->chunks,
+             headers = 0, all = 0;
+    ebpo_status status = lay_out(h, NULL, shown, capacity, (first_chunk){ "", 1 }, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_head_used(&h->out, capacity, &headers, error);
+    for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++) {
+        const ebpo_array_out *a = &plan->array[i];
+        for (uint64_t k = i == 0; k < ebpo_shape_chunks(&a->shape) && status == EBPO_OK; k++)
+            status = ebpo_h5_put_chunk(&h->out, a->path, a->handle, &a->shape, k, "", 1, error);
+    }
+    headers_close(h);
+    if (status == EBPO_OK)
+        status = ebpo_h5_head_used(&h->out, capacity, &all, error);
+    ebpo_h5_discard(&h->out);
+    h->head_bytes = (headers + 8 + 7) / 8 * 8; /* the last checksum may end in zero bytes */
+    if (plan->count == 1)
+        h->head_bytes += ALONE_BYTES;
+    /* not by the sizes, which are too small where a checksum ends in zero bytes */
+    h->index_bytes = has_index(plan) ? (all - headers + 8 + 7) / 8 * 8 : 0;
+    return status;
+}
+
+/* With index_bytes: what comes now is in a piece of its own, once the first array of several chunks
+ * calls for it. */
+static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
+{
+    headers_close(h);
+    ebpo_status status = ebpo_h5_reopen(&h->out, h->index_bytes, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_root(&h->out, &h->root, error);
+    for (unsigned i = 0; i < h->plan->count && status == EBPO_OK; i++)
+        status =
+            ebpo_h5_open_array(&h->out, h->plan->array[i].path, &h->plan->array[i].handle, error);
+    for (header_list l = 0; l < LISTS && status == EBPO_OK; l++)
+        if (h->list[l].shape.rows)
+            status = ebpo_h5_open_array(&h->out, h->list[l].path, &h->list[l].handle, error);
+    return status;
+}
+
+/* --- chunks --- */
+
+/* Chunks that are in memory at a time: 8 MiB raw and as much encoded. */
+enum { WINDOW = 128 };
+
+typedef struct slot {
+    const ebpo_array_out *array;
+    uint64_t chunk;
+    uint8_t *raw, *stored;
+    size_t raw_bytes, stored_bytes;
+    ebpo_status status;
+} slot;
+
+typedef struct writer {
+    ebpo_plan plan;
+    const ebpo_write_options *options;
+    unsigned threads;
+    file_headers head;
+    slot slots[WINDOW];
+    unsigned used;            /* slots */
+    ebpo_chunk_coder *coders; /* one for each thread */
+    ebpo_chunk_order order;
+    ebpo_array_digest *digest; /* [arrays of the plan] */
+    ebpo_content content[EBPO_DIGESTS];
+    uint64_t chunk_bytes, chunks_done;
+    uint64_t *sum; /* [chunks], if sums are written: of the plan's arrays one after the other */
+    uint64_t *first_sum; /* [arrays of the plan] */
+    uint64_t *place;     /* [rows of places] */
+    uint64_t place_count, top_bytes;
+    uint64_t index_at; /* where the index begins; 0: there is none, or not yet */
+} writer;
+
+static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    writer *w = context;
+    (void)worker;
+    (void)error;
+    for (uint64_t i = begin; i < end; i++) {
+        slot *s = &w->slots[i];
+        const ebpo_shape *shape = &s->array->shape;
+        uint64_t row = s->chunk * shape->chunk_rows, rows = shape->rows - row < shape->chunk_rows
+                                                                ? shape->rows - row
+                                                                : shape->chunk_rows;
+        size_t bytes = rows * ebpo_shape_row_bytes(shape);
+        s->raw_bytes = shape->chunk_rows * ebpo_shape_row_bytes(shape);
+        ebpo_plan_encode(&w->plan, s->array, row, rows, s->raw);
+        memset(s->raw + bytes, 0, s->raw_bytes - bytes);
+    }
+    return EBPO_OK;
+}
+
+static void digest_slots(writer *w)
+{
+    for (unsigned i = 0; i < w->used; i++) {
+        const slot *s = &w->slots[i];
+        const ebpo_shape *shape = &s->array->shape;
+        uint64_t row = s->chunk * shape->chunk_rows, left = shape->rows - row;
+        ebpo_array_digest *state = &w->digest[s->array - w->plan.array];
+        uint8_t digest[32];
+        if (!ebpo_content_has(&w->plan.info, s->array->id))
+            continue;
+        if (row == 0)
+            ebpo_array_digest_begin(state);
+        ebpo_array_digest_add(state, &w->plan.info, s->array->id, shape, row,
+                              left < shape->chunk_rows ? left : shape->chunk_rows, s->raw);
+        if (left > shape->chunk_rows)
+            continue;
+        ebpo_array_digest_end(state, digest);
+        ebpo_content_put(&w->content[ebpo_content_of(s->array->id)], s->array->path, digest);
+    }
+}
+
+/* The filling of the last chunk is no face. */
+static ebpo_status compress_gates(slot *s, ebpo_chunk_coder *coder, int level)
+{
+    ebpo_shape stored = ebpo_stored_shape(&s->array->shape, true);
+    uint64_t left = stored.rows - s->chunk * stored.chunk_rows,
+             rows = left < stored.chunk_rows ? left : stored.chunk_rows;
+    size_t ends[EBPO_GATES_ENDS], bytes = stored.chunk_rows * ebpo_shape_row_bytes(&stored);
+    ebpo_gates_encode(s->raw, (uint32_t)rows, coder->scratch, ends);
+    memset(coder->scratch + rows * EBPO_GATES_COLS, 0, bytes - rows * EBPO_GATES_COLS);
+    return ebpo_chunk_encode_streams(coder, stored.pipeline, level, coder->scratch, bytes, ends,
+                                     EBPO_GATES_ENDS, s->stored, &s->stored_bytes);
+}
+
+static ebpo_status compress_chunk(slot *s, ebpo_chunk_coder *coder, int level)
+{
+    const ebpo_shape *shape = &s->array->shape;
+    return s->array->gates ? compress_gates(s, coder, level)
+                           : ebpo_chunk_encode(coder, shape->pipeline, level, shape->element_size,
+                                               s->raw, s->raw_bytes, s->stored, &s->stored_bytes);
+}
+
+/* Item 0 digests the whole window, the others compress one slot each. */
+static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
+{
+    writer *w = context;
+    for (uint64_t i = begin; i < end; i++) {
+        if (i == 0) {
+            digest_slots(w);
+            continue;
+        }
+        slot *s = &w->slots[i - 1];
+        ebpo_status status = compress_chunk(s, &w->coders[worker], w->options->codec_level);
+        if (status != EBPO_OK)
+            return ebpo_fail_at(error, status, w->head.out.shown, s->array->path, -1,
+                                "a chunk could not be compressed");
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status encode_window(writer *w, ebpo_error *error)
+{
+    unsigned threads = w->used > 4 ? w->threads : 1;
+    ebpo_status status = ebpo_parallel_for(threads, w->plan.tree->mesh.workspace, w->used, 1,
+                                           fill_slot, w, NULL, "write", error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(threads, w->plan.tree->mesh.workspace, w->used + 1u, 1,
+                                   compress_slot, w, NULL, "write", error);
+    return status;
+}
+
+static void note_place(writer *w, uint32_t number, uint64_t bytes)
+{
+    if (!w->head.list[LIST_PLACES].shape.rows)
+        return;
+    w->place[w->place_count++] = ebpo_place(number, bytes);
+}
+
+/* Called for each chunk, in the order of the file, before it is written. */
+static void place_chunk(writer *w, const slot *s)
+{
+    if (w->index_at == 0 && ebpo_shape_chunks(&s->array->shape) > 1) {
+        w->index_at = w->head.head_bytes + w->chunk_bytes;
+        note_place(w, EBPO_PLACE_GAP, w->head.index_bytes);
+    }
+    uint32_t number = ebpo_place_number(s->array->id, s->array->level);
+    note_place(w, number, s->stored_bytes);
+    if (w->head.list[LIST_SUMS].shape.rows)
+        w->sum[w->first_sum[s->array - w->plan.array] + s->chunk] =
+            ebpo_place(number, ebpo_chunk_sum(s->stored, s->stored_bytes));
+    w->chunk_bytes += s->stored_bytes;
+    if (w->chunks_done + 1 == w->order.top)
+        w->top_bytes =
+            w->head.head_bytes + w->chunk_bytes + (w->index_at ? w->head.index_bytes : 0);
+}
+
+static ebpo_status flush_window(writer *w, ebpo_error *error)
+{
+    ebpo_status status = encode_window(w, error);
+    for (unsigned i = 0; i < w->used && status == EBPO_OK; i++) {
+        const slot *s = &w->slots[i];
+        place_chunk(w, s);
+        if (w->chunks_done++ == 0)
+            continue; /* written with the headers */
+        status = ebpo_h5_put_chunk(&w->head.out, s->array->path, s->array->handle, &s->array->shape,
+                                   s->chunk, s->stored, s->stored_bytes, error);
+    }
+    w->used = 0;
+    const ebpo_progress *progress = &w->options->progress;
+    if (status == EBPO_OK &&
+        !ebpo_progress_step(progress, "writing", w->chunks_done, w->order.count, error))
+        status = EBPO_E_CANCELLED;
+    return status;
+}
+
+static ebpo_status write_chunks(writer *w, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < w->order.count && status == EBPO_OK; i++) {
+        w->slots[w->used].array = &w->plan.array[w->order.chunk[i].array];
+        w->slots[w->used++].chunk = w->order.chunk[i].chunk;
+        if (w->used == WINDOW)
+            status = flush_window(w, error);
+    }
+    return status == EBPO_OK && w->used ? flush_window(w, error) : status;
+}
+
+static ebpo_status write_list(writer *w, header_list list, const uint64_t *values, size_t *bytes,
+                              ebpo_error *error)
+{
+    const ebpo_array_out *a = &w->head.list[list];
+    uint8_t *stored = NULL;
+    *bytes = 0;
+    if (!a->shape.rows)
+        return EBPO_OK;
+    ebpo_status status = ebpo_long_chunk_encode(values, a->shape.rows, a->shape.pipeline,
+                                                w->options->codec_level, &stored, bytes, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_put_chunk(&w->head.out, a->path, a->handle, &a->shape, 0, stored, *bytes,
+                                   error);
+    free(stored);
+    return status;
+}
+
+/* The last chunks of the file. Where libhdf5 has put something else in between, the lists say that
+ * they do not hold. */
+static ebpo_status write_lists(writer *w, ebpo_error *error)
+{
+    size_t bytes[LISTS];
+    uint64_t offset = w->head.head_bytes + w->chunk_bytes + w->head.index_bytes, size = 0;
+    const uint64_t *values[LISTS] = { w->sum, w->place };
+    ebpo_status status = write_list(w, LIST_SUMS, values[LIST_SUMS], &bytes[LIST_SUMS], error);
+    if (status == EBPO_OK && bytes[LIST_SUMS])
+        note_place(w, ebpo_place_number(EBPO_A_CHUNK_SUMS, 0), bytes[LIST_SUMS]);
+    if (status == EBPO_OK)
+        status = write_list(w, LIST_PLACES, values[LIST_PLACES], &bytes[LIST_PLACES], error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_size(&w->head.out, &size, error);
+    bool holds = status == EBPO_OK && size == offset + bytes[LIST_SUMS] + bytes[LIST_PLACES];
+    for (header_list l = 0; l < LISTS && status == EBPO_OK; l++) {
+        if (w->head.list[l].shape.rows)
+            status = headers_put_holds(&w->head, l, holds ? size : 0, holds ? offset : 0, error);
+        offset += bytes[l];
+    }
+    return status;
+}
+
+static ebpo_status make_window(writer *w, ebpo_error *error)
+{
+    size_t bound = ebpo_chunk_bound(EBPO_CHUNK_BYTES_MAX),
+           slot_bytes = EBPO_CHUNK_BYTES_MAX + bound;
+    uint64_t wanted = w->order.count < WINDOW ? w->order.count : WINDOW;
+    w->threads = ebpo_thread_count(w->options->threads);
+    w->coders = ebpo_alloc_zero(w->threads, sizeof *w->coders);
+    uint8_t *block = ebpo_alloc(wanted, slot_bytes);
+    w->slots[0].raw = block;
+    w->digest = ebpo_alloc(w->plan.count, sizeof *w->digest);
+    w->place = ebpo_alloc(w->head.list[LIST_PLACES].shape.rows, sizeof *w->place);
+    w->sum = ebpo_alloc(w->head.list[LIST_SUMS].shape.rows, sizeof *w->sum);
+    w->first_sum = ebpo_alloc(w->plan.count, sizeof *w->first_sum);
+    if (!w->coders || !block || !w->digest || !w->place || !w->sum || !w->first_sum)
+        return ebpo_fail_memory(error, wanted * slot_bytes);
+    for (unsigned i = 0; i < wanted; i++) {
+        w->slots[i].raw = block + i * slot_bytes;
+        w->slots[i].stored = w->slots[i].raw + EBPO_CHUNK_BYTES_MAX;
+    }
+    uint64_t sums = 0;
+    for (unsigned i = 0; i < w->plan.count; i++) {
+        w->first_sum[i] = sums;
+        sums += ebpo_shape_chunks(&w->plan.array[i].shape);
+    }
+    return EBPO_OK;
+}
+
+/* The root's types, encoded ahead of its turn. */
+static ebpo_status encode_first(writer *w, uint8_t *stored, size_t *bytes, ebpo_error *error)
+{
+    slot *s = &w->slots[0];
+    s->array = &w->plan.array[0];
+    s->chunk = 0;
+    (void)fill_slot(w, 0, 1, 0, NULL);
+    ebpo_status status = compress_slot(w, 1, 2, 0, error);
+    *bytes = s->stored_bytes;
+    memcpy(stored, s->stored, s->stored_bytes);
+    return status;
+}
+
+static ebpo_status put_digests(writer *w, ebpo_error *error)
+{
+    uint8_t digest[32];
+    ebpo_status status = ebpo_content_end(&w->content[EBPO_DIGEST_CONTENT], digest, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_put_digest(&w->head.out, w->head.root, digest, error);
+    if (status != EBPO_OK || !(w->plan.info.parts & EBPO_PART_COLOURS))
+        return status;
+    status = ebpo_content_end(&w->content[EBPO_DIGEST_COLOURS], digest, error);
+    return status == EBPO_OK
+               ? ebpo_facts_put_colours_digest(&w->head.out, w->head.root, digest, error)
+               : status;
+}
+
+static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
+{
+    uint8_t first[256]; /* the chunk is of two bytes */
+    size_t first_bytes = 0;
+    ebpo_status status = encode_first(w, first, &first_bytes, error);
+    if (status == EBPO_OK)
+        status = headers_measure(&w->head, shown, error);
+    if (status == EBPO_OK)
+        status = headers_lay_out(&w->head, path, shown, (first_chunk){ first, first_bytes }, error);
+    if (status == EBPO_OK && w->head.index_bytes)
+        status = headers_begin_index(&w->head, error);
+    if (status == EBPO_OK)
+        status = write_chunks(w, error);
+    if (status == EBPO_OK)
+        status = write_lists(w, error);
+    if (status == EBPO_OK)
+        status = put_digests(w, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_put_index(&w->head.out, w->head.root, w->index_at, w->head.index_bytes,
+                                      error);
+    if (status == EBPO_OK && w->plan.info.subtree_level)
+        status = ebpo_facts_put_top(&w->head.out, w->head.root, w->top_bytes, error);
+    headers_close(&w->head);
+    if (status == EBPO_OK)
+        /* another libhdf5 may have placed metadata otherwise: no reader relies on it, tests do */
+        status = ebpo_h5_finish(&w->head.out, error);
+    return status;
+}
+
+static ebpo_status check_options(const ebpo_write_options *options, const char *path,
+                                 ebpo_error *error)
+{
+    int most = options->codec == EBPO_CODEC_ZSTD      ? 22
+               : options->codec == EBPO_CODEC_DEFLATE ? 9
+                                                      : 0;
+    if ((unsigned)options->codec > EBPO_CODEC_NONE || options->codec_level < 0 ||
+        options->codec_level > most)
+        return ebpo_fail_file(
+            error, EBPO_E_ARGUMENT, path,
+            "no such codec or codec level; zstd takes 1 to 22, deflate 1 to 9, none takes 0");
+    if ((unsigned)options->chunk_sums > EBPO_SUMS_NONE)
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, path, "chunk_sums: there is no choice %u",
+                              (unsigned)options->chunk_sums);
+    return EBPO_OK;
+}
+
+/* Publishes the file under its name; without `publish` writes right into `path`. */
+static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const char *shown,
+                              ebpo_publish *publish, const ebpo_write_options *options,
+                              ebpo_error *error)
+{
+    ebpo_write_options wanted = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_write_options, &wanted, options, error);
+    if (status != EBPO_OK)
+        return status;
+    writer *w = ebpo_alloc_zero(1, sizeof *w);
+    if (!w)
+        return ebpo_fail_memory(error, sizeof *w);
+    w->options = &wanted;
+    status = check_options(w->options, shown, error);
+    if (status == EBPO_OK && !ebpo_progress_stage(&w->options->progress, "writing", error))
+        status = EBPO_E_CANCELLED;
+    if (status == EBPO_OK)
+        status = ebpo_plan_make(&w->plan, tree, w->options, shown, error);
+    if (status == EBPO_OK)
+        status = ebpo_chunk_order_make(&w->order, &w->plan, error);
+    headers_plan(&w->head, &w->plan, w->order.count, w->options);
+    if (status == EBPO_OK)
+        status = make_window(w, error);
+    if (status == EBPO_OK && publish)
+        status = ebpo_publish_begin(publish, path, error);
+    if (status == EBPO_OK)
+        status = write_file(w, publish ? ebpo_publish_path(publish) : path, shown, error);
+    headers_close(&w->head);
+    ebpo_h5_discard(&w->head.out);
+    if (status == EBPO_OK && publish)
+        status = ebpo_publish_commit(publish, error);
+    for (unsigned i = 0; w->coders && i < w->threads; i++)
+        ebpo_chunk_coder_clear(&w->coders[i]);
+    free(w->coders);
+    free(w->slots[0].raw);
+    free(w->digest);
+    free(w->place);
+    free(w->sum);
+    free(w->first_sum);
+    ebpo_chunk_order_free(&w->order);
+    ebpo_plan_free(&w->plan);
+    for (int i = 0; i < EBPO_DIGESTS; i++)
+        ebpo_content_free(&w->content[i]);
+    free(w);
+    return status;
+}
+
+ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path,
+                            const ebpo_write_options *options, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_publish publish = EBPO_PUBLISH_INIT;
+    ebpo_status status = write_tree(tree, path, path, &publish, options, error);
+    ebpo_publish_abort(&publish);
+    return status;
+}
+
+ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const char *shown,
+                                 const ebpo_write_options *options, ebpo_error *error)
+{
+    return write_tree(tree, path, shown, NULL, options, error);
+}
+
+/* --- repacking --- */
+
+/* What is on the disk, against the content of the file that was read. */
+static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
+                                 const ebpo_read_options *read, ebpo_error *error)
+{
+    ebpo_file *file;
+    ebpo_status status = ebpo_open_own(ebpo_publish_path(out), &file, error);
+    if (status != EBPO_OK)
+        return status;
+    bool same = memcmp(file->info.content_sha256, from->info.content_sha256,
+                       sizeof file->info.content_sha256) == 0 &&
+                memcmp(file->attributes.sha256, from->attributes.sha256,
+                       sizeof file->attributes.sha256) == 0;
+    if (same)
+        status = ebpo_file_check_content(file, read, error);
+    ebpo_close(file);
+    if (status != EBPO_OK || same)
+        return status;
+    status = ebpo_file_check_content(from, read, error);
+    return status != EBPO_OK
+               ? status
+               : ebpo_fail_file(error, EBPO_E_UNSUPPORTED, from->in.shown,
+                                "written anew it would have another content checksum, although "
+                                "its own is right; another program has stored its arrays in ways "
+                                "that this one does not write. Nothing was written");
+}
+
+ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo_read_options *read,
+                             const ebpo_write_options *write, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_write_options wanted = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_publish out = EBPO_PUBLISH_INIT;
+    ebpo_tree tree = { 0 };
+    ebpo_status status = EBPO_TAKE(ebpo_write_options, &wanted, write, error);
+    wanted.parts = ~0u;
+    if (status == EBPO_OK)
+        status = ebpo_publish_begin(&out, path, error); /* before what may take long */
+    if (status == EBPO_OK) {
+        ebpo_publish_expect_input(&out, &file->in);
+        status = ebpo_file_read_tree(file, read, &tree, error);
+    }
+    if (status == EBPO_OK)
+        status = ebpo_tree_write_into(&tree, ebpo_publish_path(&out), path, &wanted, error);
+    ebpo_tree_free(&tree);
+    if (status == EBPO_OK)
+        status = check_written(file, &out, read, error);
+    if (status == EBPO_OK)
+        status = ebpo_publish_commit(&out, error);
+    ebpo_publish_abort(&out);
+    return status;
+}
