@@ -11,7 +11,6 @@
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "derive/export_job.h"
 #include "io/file_source.h"
 

@@ -12,9 +12,9 @@
 
 #include "core/alloc.h"
 #include "core/endian.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
-#include "core/text_stream.h"
+#include "core/text.h"
 #include "derive/export_job.h"
 #include "io/file_source.h"
 #include "io/publish.h"

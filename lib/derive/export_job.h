@@ -6,7 +6,7 @@
 #include <ebpo/colours.h>
 #include <ebpo/export.h>
 
-#include "hdf5_write/tables.h"
+#include "hdf5_write/h5.h"
 
 typedef struct ebpo_block {
     int level; /* -1: the mesh */

@@ -17,7 +17,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "levels/lod_model.h"
 #include "geometry/cells.h"
 #include "geometry/node_types.h"

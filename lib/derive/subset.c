@@ -17,7 +17,6 @@
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "derive/subset_parts.h"
 #include "format/file_nodes.h"
 #include "format/reader.h"

@@ -11,7 +11,6 @@
 #include "core/alloc.h"
 #include "core/endian.h"
 #include "core/error.h"
-#include "core/sized.h"
 #include "format/chunk_directory.h"
 #include "format/file_in.h"
 #include "mesh/attributes.h"

@@ -11,13 +11,13 @@
 #include <ebpo/file.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/wide.h"
 #include "format/chunk_layout.h"
 #include "format/schema.h"
 #include "geometry/node_types.h"
-#include "hdf5_read/shape.h"
+#include "hdf5_read/chunk.h"
 
 /* --- the chunks that a subtree shares with those before it, one subtree after the other --- */
 

@@ -6,7 +6,7 @@
 #include <ebpo/file.h>
 
 #include "format/schema.h"
-#include "hdf5_read/shape.h"
+#include "hdf5_read/chunk.h"
 #include "hdf5_write/h5.h"
 #include "mesh/attributes.h"
 

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/array_loops.h"
+#include "core/workspace.h"
 #include "core/endian.h"
 #include "core/error.h"
 #include "format/content_checksum.h"

@@ -6,9 +6,9 @@
 
 #include <ebpo/base.h>
 
-#include "core/sha256.h"
+#include "core/checksum.h"
 #include "format/schema.h"
-#include "hdf5_read/shape.h"
+#include "hdf5_read/chunk.h"
 #include "mesh/attributes.h"
 
 typedef struct ebpo_content_entry {

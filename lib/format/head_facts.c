@@ -13,7 +13,7 @@
 #include <ebpo/build.h>
 
 #include "core/error.h"
-#include "core/sha256.h"
+#include "core/checksum.h"
 #include "format/head_facts.h"
 #include "format/schema.h"
 #include "geometry/cell.h"

@@ -4,7 +4,7 @@
 #ifndef EBPO_FORMAT_PICK_ROWS_H
 #define EBPO_FORMAT_PICK_ROWS_H
 
-#include "core/room.h"
+#include "core/alloc.h"
 #include "format/chunks.h"
 #include "mesh/attributes.h"
 

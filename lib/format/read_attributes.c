@@ -7,10 +7,9 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
-#include "core/sized.h"
-#include "core/sums.h"
+#include "core/checksum.h"
 #include "format/content_checksum.h"
 #include "format/head_facts.h"
 #include "format/read_attributes.h"

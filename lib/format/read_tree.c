@@ -8,12 +8,11 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
-#include "core/sums.h"
+#include "core/checksum.h"
 #include "format/content_checksum.h"
 #include "format/read_attributes.h"
 #include "format/reader.h"

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "format/chunk_directory.h"

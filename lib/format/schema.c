@@ -14,7 +14,7 @@
 #include <ebpo/file.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "format/schema.h"
 #include "geometry/node_types.h"

@@ -7,7 +7,7 @@
 
 #include <ebpo/file.h>
 
-#include "hdf5_read/shape.h"
+#include "hdf5_read/chunk.h"
 
 /* In the order in which they lie in the file. Up to EBPO_LEVEL_ARRAYS once for each level. */
 typedef enum ebpo_array_id {

@@ -6,7 +6,7 @@
 #include <ebpo/base.h>
 #include <ebpo/file.h>
 
-#include "core/room.h"
+#include "core/alloc.h"
 #include "format/chunks.h"
 #include "format/file_nodes.h"
 

@@ -12,12 +12,11 @@
 #include <ebpo/file.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sha256.h"
-#include "core/sized.h"
+#include "core/checksum.h"
 #include "format/chunk_layout.h"
 #include "format/chunk_directory.h"
 #include "format/content_checksum.h"

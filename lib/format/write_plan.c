@@ -10,10 +10,10 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/endian.h"
 #include "core/error.h"
-#include "core/sha256.h"
+#include "core/checksum.h"
 #include "core/text.h"
 #include "ebpo_config.h"
 #include "format/content_checksum.h"

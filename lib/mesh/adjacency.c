@@ -3,10 +3,10 @@
 #include <stdlib.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/sort_with.h"
+#include "core/sort.h"
 #include "geometry/predicates.h"
 #include "mesh/adjacency.h"
 

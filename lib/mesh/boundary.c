@@ -6,7 +6,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/sort.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 
 #define NONE UINT64_MAX
 

@@ -1,6 +1,6 @@
 #include "core/strict_fp.h"
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "mesh/box_tree.h"
 
 mesh_point *ebpo_point_tree_add(point_tree *tree)

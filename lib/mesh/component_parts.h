@@ -4,7 +4,7 @@
 
 #include <ebpo/groups.h>
 
-#include "core/named_run.h"
+#include "core/text.h"
 #include "mesh/mesh_parts.h"
 
 /* Faces that share vertices. */

@@ -5,12 +5,11 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
-#include "core/sort_with.h"
+#include "core/sort.h"
 #include "mesh/attributes.h"
 #include "mesh/component_parts.h"
 #include "mesh/mesh_parts.h"

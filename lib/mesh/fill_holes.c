@@ -7,7 +7,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "mesh/boundary.h"
 #include "mesh/mesh_parts.h"
 #include "mesh/adjacency.h"

@@ -8,12 +8,11 @@
 #include <ebpo/places.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/endian.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "core/sort.h"
 #include "io/publish.h"
 #include "mesh/component_parts.h"

@@ -7,7 +7,7 @@
 #include <strings.h>
 
 #include "mesh/attributes.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "mesh/import_build.h"
 #include "mesh/obj.h"
@@ -15,7 +15,6 @@
 #include "mesh/off.h"
 #include "mesh/stl.h"
 #include "io/file_source.h"
-#include "io/foreign_bytes.h"
 
 void ebpo_import_clear(ebpo_mesh *mesh)
 {

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "mesh/attributes.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "geometry/decimal.h"
 #include "mesh/obj_faces.h"

@@ -8,9 +8,9 @@
 
 #include "mesh/attributes.h"
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
-#include "core/text_stream.h"
+#include "core/text.h"
 #include "core/hash.h"
 
 enum { RUNS_MOST = 100000000, MATERIALS_MOST = 10000000 };

@@ -4,7 +4,7 @@
 
 #include <ebpo/mesh.h>
 
-#include "core/named_run.h"
+#include "core/text.h"
 #include "mesh/obj_text.h"
 
 /* Faces that stand under one `g` or `o` line. */

@@ -4,7 +4,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 
 enum { RELEASE = 1 << 22 };

@@ -8,7 +8,7 @@
 
 #include <ebpo/base.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "geometry/decimal.h"

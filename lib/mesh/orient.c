@@ -7,7 +7,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "mesh/adjacency.h"
 #include "mesh/mesh_frame.h"
 #include "mesh/mesh_parts.h"

@@ -5,7 +5,7 @@
 
 #include <ebpo/mesh.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "mesh/ply_parts.h"

@@ -8,10 +8,10 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/text.h"
-#include "io/foreign_bytes.h"
+#include "io/file_source.h"
 #include "mesh/ply_parts.h"
 
 enum { MAX_WORDS = 6 }; /* no statement has more than five; a sixth shows that there are too many */

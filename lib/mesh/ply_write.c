@@ -9,10 +9,10 @@
 #include <ebpo/mesh.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/endian.h"
 #include "core/error.h"
-#include "core/text_stream.h"
+#include "core/text.h"
 #include "io/publish.h"
 #include "mesh/attributes.h"
 #include "mesh/ply_parts.h"

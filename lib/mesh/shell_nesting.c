@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "mesh/shell_probes.h"

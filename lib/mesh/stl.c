@@ -7,7 +7,7 @@
 #include <strings.h>
 
 #include "mesh/attributes.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "geometry/decimal.h"

@@ -8,10 +8,10 @@
 #include <string.h>
 
 #include "mesh/attributes.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/endian.h"
 #include "core/error.h"
-#include "io/foreign_bytes.h"
+#include "io/file_source.h"
 
 enum { COUNT = 80, HEAD = 84, RECORD = 50, WORD = 48 };
 

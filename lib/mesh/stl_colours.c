@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "mesh/attributes.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/endian.h"
 #include "core/error.h"
 

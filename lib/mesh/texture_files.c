@@ -8,9 +8,8 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/sha256.h"
+#include "core/checksum.h"
 #include "io/file_source.h"
-#include "io/open_below.h"
 
 /* Of material libraries: bytes of all, and names that are tried. */
 enum { LIBRARY_BYTES = 1 << 25, LIBRARIES = 100, DIGEST = 32, STEP = 1 << 20 };

@@ -5,10 +5,9 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
-#include "core/sha256.h"
-#include "core/sums.h"
+#include "core/checksum.h"
 #include "mesh/textures.h"
 
 enum { DIGEST = 32, STEP = 1 << 20 };

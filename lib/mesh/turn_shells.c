@@ -3,7 +3,7 @@
 
 #include <ebpo/repair.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "mesh/shell_nesting.h"
 

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/parallel.h"

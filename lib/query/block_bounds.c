@@ -16,7 +16,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/huge_pages.h"
+#include "core/os.h"
 #include "core/parallel.h"
 #include "query/accel_parts.h"
 

@@ -13,7 +13,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/huge_pages.h"
+#include "core/os.h"
 #include "core/parallel.h"
 #include "geometry/node_types.h"
 #include "query/accel_parts.h"

@@ -16,7 +16,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "format/reader.h"
 #include "query/accel.h"
 #include "query/model_parts.h"

@@ -12,10 +12,9 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "geometry/plane_clip.h"
 #include "geometry/polytope.h"
 #include "levels/lod_model.h"

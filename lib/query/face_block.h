@@ -5,7 +5,7 @@
 #define EBPO_QUERY_FACE_BLOCK_H
 
 #include "query/accel.h"
-#include "core/eight.h"
+#include "core/simd.h"
 
 typedef struct ebpo_face_block {
     const ebpo_meshlet *m;

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 
 #include "core/alloc.h"
-#include "core/eight.h"
+#include "core/simd.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "geometry/ray_triangle.h"

@@ -16,10 +16,9 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "format/reader.h"
 #include "geometry/cursor.h"
 #include "geometry/node_types.h"

@@ -12,7 +12,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/eight.h"
+#include "core/simd.h"
 #include "geometry/cells.h"
 #include "geometry/min_max.h"
 #include "query/face_block.h"

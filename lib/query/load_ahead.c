@@ -15,8 +15,7 @@
 
 #include "core/alloc.h"
 #include "format/reader.h"
-#include "format/subtree_expect.h"
-#include "format/subtree_table.h"
+#include "format/subtree_index.h"
 #include "geometry/octcode.h"
 #include "query/load_ahead.h"
 #include "query/nearest.h"

@@ -19,7 +19,6 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "core/sized.h"
 #include "format/reader.h"
 #include "geometry/double_double.h"
 #include "geometry/rule.h"

@@ -15,7 +15,7 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "query/nearest.h"
 #include "query/query_kernels.h"

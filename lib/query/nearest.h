@@ -3,7 +3,7 @@
 #ifndef EBPO_QUERY_NEAREST_H
 #define EBPO_QUERY_NEAREST_H
 
-#include "core/clock.h"
+#include "core/os.h"
 #include "geometry/distance.h"
 #include "query/query_node.h"
 

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 
 #include "core/alloc.h"
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "format/reader.h"
 #include "geometry/cell.h"

@@ -12,11 +12,10 @@
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/clock.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/hash.h"
-#include "core/sized.h"
 #include "query/model_parts.h"
 #include "query/query_model.h"
 

@@ -10,7 +10,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "core/arrays.h"
+#include "core/workspace.h"
 #include "format/reader.h"
 #include "geometry/node_types.h"
 

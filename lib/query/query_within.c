@@ -15,7 +15,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "query/accel.h"
 #include "query/load_ahead.h"
 #include "query/nearest.h"

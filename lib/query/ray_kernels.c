@@ -11,7 +11,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "core/three.h"
+#include "core/simd.h"
 #include "query/face_block.h"
 #include "query/query_kernels.h"
 

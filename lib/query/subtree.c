@@ -16,7 +16,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/sized.h"
 #include "format/file_nodes.h"
 #include "format/slice.h"
 #include "geometry/cell.h"
