@@ -1,4 +1,4 @@
-/* See sweep.h. Included by one source for each kind of processor. */
+/* Sweeps over planes and points (sweep.h). */
 #include "core/strict_fp.h"
 
 #include "construct/sweep.h"

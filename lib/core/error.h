@@ -1,5 +1,5 @@
-/* What public functions tell and are told: filling in the caller's ebpo_error, and structs that
- * begin with their size. */
+/* Where public functions meet their callers: they fill in the caller's ebpo_error, and read and
+ * write structs that begin with their size. */
 #ifndef EBPO_CORE_ERROR_H
 #define EBPO_CORE_ERROR_H
 

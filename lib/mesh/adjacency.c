@@ -1,3 +1,5 @@
+/* Adjacency of faces: the faces at each vertex (stars), faces with the same corners, and the faces
+ * at an edge, sorted around it by exact predicates. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

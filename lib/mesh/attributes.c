@@ -1,4 +1,6 @@
-/* Arrays of attributes: making, naming and freeing them. */
+/* Attributes of a mesh: arrays of numbers of vertices, faces and other elements. They are made,
+ * named, copied and freed here; rows are picked, reordered and compared; ranges and names are read.
+ */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -11,6 +13,8 @@
 #include "core/workspace.h"
 #include "core/error.h"
 #include "mesh/attributes.h"
+
+/* --- making and freeing --- */
 
 static const char *const type_names[] = { "int8",  "uint8",  "int16",   "uint16",
                                           "int32", "uint32", "float32", "float64" };

@@ -1,3 +1,4 @@
+/* Trees of boxes: of points, and of faces, whose tree is built on that of their middles. */
 #include "core/strict_fp.h"
 
 #include "core/workspace.h"

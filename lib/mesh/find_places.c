@@ -1,4 +1,5 @@
-/* What kinds of findings are called, and their colours. */
+/* The places of a mesh's findings: they are noted while the mesh is checked, sorted, and handed to
+ * the caller with the faces around each; or written as a PLY in which each kind has its colour. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -17,6 +18,8 @@
 #include "io/publish.h"
 #include "mesh/component_parts.h"
 #include "mesh/mesh_check_parts.h"
+
+/* --- names and colours of findings --- */
 
 /* A mesh with the places of findings in colours. */
 

@@ -1,3 +1,5 @@
+/* The mesh that a reader of OBJ, OFF or STL builds: positions, polygons that are triangulated,
+ * corners that become vertices, and columns of values that become attributes. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

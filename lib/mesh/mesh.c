@@ -1,3 +1,5 @@
+/* A mesh as a whole: what it is called in messages, the check of its shape, copying and freeing it,
+ * and the frame in which its coordinates can be multiplied without overflow. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

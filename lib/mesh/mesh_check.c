@@ -1,3 +1,5 @@
+/* Checks a mesh: faces, edges, vertices and positions are examined in parallel, and the report says
+ * whether the mesh is a closed 2-manifold, and what is wrong with it and where. */
 #include "core/strict_fp.h"
 
 #include <math.h>

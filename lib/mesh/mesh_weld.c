@@ -1,3 +1,5 @@
+/* Welds vertices: those at one position, or within a distance of each other (weld_within.c), become
+ * the one that the source has first. Attributes follow. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

@@ -1,4 +1,5 @@
-/* The header of a PLY file to be written, and what its rows hold. */
+/* Writes a mesh and its attributes as PLY. The header is the source's where it fits, else one of
+ * our own; properties keep the source's types where these hold every value. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -16,6 +17,8 @@
 #include "io/publish.h"
 #include "mesh/attributes.h"
 #include "mesh/ply_parts.h"
+
+/* --- the layout --- */
 
 /* What a PLY file to be written is made of: the properties of a mesh and of its attributes, in the
  * order of the header that they were read with, or in their own. */

@@ -1,4 +1,5 @@
-/* Faces that repeat another one are removed, or counted by position. */
+/* Repairs of a mesh: faces that repeat another one are removed, or counted by the positions of
+ * their corners; then the repairs that the caller asked for are made, always in one order. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -14,6 +15,8 @@
 #include "mesh/mesh_check_parts.h"
 #include "mesh/mesh_parts.h"
 #include "mesh/positions.h"
+
+/* --- repeated faces --- */
 
 enum { DROP_GRAIN = 1 << 13, WORD = 64 };
 
@@ -208,7 +211,7 @@ ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mesh, unsigned threads, eb
     return status;
 }
 
-/* Mending in the one order that there is. */
+/* --- all repairs, in their order --- */
 
 enum { TURN_GRAIN = 1 << 14 };
 

@@ -99,7 +99,7 @@ def python_in(folder):
 
 def main():
     tool, inputs, features, tests = sys.argv[1:]
-    bad = lines = 0
+    bad = lines = without = 0
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as commands:
         python_in(commands)
         path = [commands, os.path.dirname(os.path.abspath(tool)), os.environ["PATH"]]
@@ -108,11 +108,12 @@ def main():
         subprocess.run([inputs, folder], check=True)
         for number, line in lines_of(tests):
             lines += 1
+            without += wanted(line.split(" | ", 1)[0].strip(), line, features.split(",")) is None
             wrong = run_line(line, folder, environment, features.split(","))
             if wrong:
                 bad += 1
                 print(f"{tests}:{number}: {line}\n{wrong}")
-    print(f"{tests}: {lines} lines, {bad} failed")
+    print(f"{tests}: {lines} lines, {bad} failed, {without} of other builds")
     return 1 if bad or not lines else 0
 
 

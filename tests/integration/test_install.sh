@@ -95,6 +95,14 @@ if command -v pkg-config >/dev/null &&
     there=$(cd "$(sed 's/\\//g' "$work/out")" && pwd -P) && [ "$there" = "$own" ] || fail "ebpo.pc moves along"
 fi
 
+# Both say whether the library has the extras, whose headers are there or not.
+extras=no
+[ -z "$(find "$own" -name collide.h)" ] || extras=yes
+if command -v pkg-config >/dev/null; then
+    PKG_CONFIG_PATH=$(dirname "$pc") pkg-config --variable=extras ebpo >"$work/out" 2>&1
+    grep -qx $extras "$work/out" || fail "the variable extras of ebpo.pc"
+fi
+
 # And by CMake.
 if command -v cmake >/dev/null; then
     mkdir "$work/user"
@@ -120,6 +128,11 @@ C
     sed 's/ebpo 0.1 /ebpo 0.9 /' "$work/user/CMakeLists.txt" >"$work/new" && mv "$work/new" "$work/user/CMakeLists.txt"
     (cd "$work/user" && cmake -S . -B later -DCMAKE_PREFIX_PATH="$own") >"$work/out" 2>&1 &&
         fail "find_package takes an older version"
+    sed 's/ebpo 0.9 REQUIRED/ebpo REQUIRED COMPONENTS extras/' "$work/user/CMakeLists.txt" >"$work/new" &&
+        mv "$work/new" "$work/user/CMakeLists.txt"
+    found=no
+    (cd "$work/user" && cmake -S . -B extras -DCMAKE_PREFIX_PATH="$own") >"$work/out" 2>&1 && found=yes
+    [ $found = $extras ] || fail "find_package(ebpo COMPONENTS extras)"
 fi
 
 # Configured for a machine whose programs do not run here, none is run.

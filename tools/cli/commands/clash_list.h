@@ -29,7 +29,4 @@ void clash_free(clash_list *list);
 /* Of an ebpo_meeting_kind. */
 const char *clash_kind_word(int32_t kind);
 
-/* How deep one is in the other at least; 0: not known. */
-double clash_depth(const ebpo_scene_meeting *m);
-
 #endif

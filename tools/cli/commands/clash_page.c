@@ -1,3 +1,4 @@
+/* The page of `ebpo scene report`: meetings in a table with filters and pictures, in HTML. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -6,7 +7,7 @@
 #include "cli/commands/clash_list.h"
 #include "cli/commands/clash_page.h"
 
-/* Names as text of a page. */
+/* --- names as text of a page --- */
 
 /* Rows of a page of clashes by the groups of their parts: chosen without scripts. */
 
@@ -37,7 +38,8 @@ static int rank_of(const ebpo_scene_meeting *m)
     return ranks[m->kind];
 }
 
-double clash_depth(const ebpo_scene_meeting *m)
+/* How deep one is in the other at least; 0: not known. */
+static double clash_depth(const ebpo_scene_meeting *m)
 {
     double a = m->depth[0].hi < INFINITY ? m->depth[0].lo : 0;
     double b = m->depth[1].hi < INFINITY ? m->depth[1].lo : 0;

@@ -1,3 +1,4 @@
+/* ebpo check: what a mesh is before anything is built from it, and where its findings are. */
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -16,13 +17,11 @@
 #include "cli/standard_files.h"
 #include "ebpo_config.h"
 
-/* ebpo check --places. */
+#if EBPO_HAVE_EXTRAS
+#include "cli/commands/check_crossings.h"
+#endif
 
-/* Prints all places, or writes the picture and prints its legend. `j`: into its open object
- * instead; NULL: words, unless `quiet`. */
-EBPO_MUST_USE ebpo_status check_places(const ebpo_mesh *mesh, const char *to, unsigned threads,
-                                       ebpo_progress progress, json *j, bool quiet,
-                                       progress_line *line, ebpo_error *error);
+/* --- places of findings --- */
 
 typedef struct telling {
     json *j; /* NULL: words, if `words` */
@@ -111,9 +110,11 @@ static void print_legend(const char *path, const uint64_t count[EBPO_FINDING_KIN
     }
 }
 
-ebpo_status check_places(const ebpo_mesh *mesh, const char *to, unsigned threads,
-                         ebpo_progress progress, json *j, bool quiet, progress_line *line,
-                         ebpo_error *error)
+/* Prints all places, or writes the picture and prints its legend. `j`: into its open object
+ * instead; NULL: words, unless `quiet`. */
+static ebpo_status check_places(const ebpo_mesh *mesh, const char *to, unsigned threads,
+                                ebpo_progress progress, json *j, bool quiet, progress_line *line,
+                                ebpo_error *error)
 {
     ebpo_places_options how = EBPO_PLACES_OPTIONS_INIT;
     telling t = { .j = j, .line = line };
@@ -132,11 +133,7 @@ ebpo_status check_places(const ebpo_mesh *mesh, const char *to, unsigned threads
     return status;
 }
 
-/* ebpo check: what a mesh is, before anything is built from it. */
-
-#if EBPO_HAVE_EXTRAS
-#include "cli/commands/check_crossings.h"
-#endif
+/* --- the command --- */
 
 typedef struct values {
     mending mend;
@@ -192,8 +189,6 @@ static ebpo_status search_crossings(const values *v, mesh_input *p, ebpo_progres
     return check_crossings(&p->mesh, &p->prepared.report, &how, v->json ? j : NULL, v->quiet, line,
                            error);
 }
-#else
-#define search_crossings(...) EBPO_OK /* --crossings is refused */
 #endif
 
 static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo_progress progress,
@@ -213,10 +208,12 @@ static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo
                               v->json ? &j : NULL, v->quiet, line, error);
     else if (v->json)
         json_null(&j, "places"); /* not asked for */
-    if (status == EBPO_OK && v->crossings)
-        status = search_crossings(v, p, progress, &j, line, error);
-    else if (v->json)
+    if (v->json && !(status == EBPO_OK && v->crossings))
         json_null(&j, "crossings"); /* not looked for */
+#if EBPO_HAVE_EXTRAS
+    else if (status == EBPO_OK && v->crossings)
+        status = search_crossings(v, p, progress, &j, line, error);
+#endif
     if (v->json)
         json_finish(&j);
     command_flush("check");

@@ -1,3 +1,4 @@
+/* ebpo collide: which faces of two models meet, and how far apart the models are. */
 #include <float.h>
 #include <inttypes.h>
 #include <stddef.h>
@@ -18,8 +19,7 @@
 #include "cli/query_args.h"
 #include "cli/words.h"
 
-/* ebpo collide --distance, --depth and --way-out: asking and printing; and relations of models
- * whose faces do not meet. */
+/* --- distance, depth and relation --- */
 
 /* As the options say; not given: a tolerance of 0, an at_least below 0. */
 typedef struct collide_far {
@@ -34,13 +34,12 @@ typedef struct collide_far {
         false, false, 0.0, -1.0, NULL, { 0, 0, 0 } \
     }
 
-/* By ebpo_relation. */
-extern const char *const collide_relations[];
-
 /* --- how models lie to each other --- */
 
-const char *const collide_relations[] = { "DISJOINT",   "TOUCHING", "INTERSECTING", "A_INSIDE_B",
-                                          "B_INSIDE_A", "EQUAL",    "not known" };
+/* By ebpo_relation. */
+static const char *const collide_relations[] = { "DISJOINT",   "TOUCHING",   "INTERSECTING",
+                                                 "A_INSIDE_B", "B_INSIDE_A", "EQUAL",
+                                                 "not known" };
 
 /* How models whose faces do not meet lie to each other: *relation is an ebpo_relation as its name;
  * NULL: they are DISJOINT, or faces meet after all. */
@@ -225,7 +224,7 @@ static ebpo_status ask_depth(const collide_far *f, bool as_json, ebpo_collider *
     return EBPO_OK;
 }
 
-/* --- the way out --- */
+/* --- how far along a direction the models are apart --- */
 
 static ebpo_status ask_way_out(const collide_far *f, bool as_json, ebpo_collider *c,
                                const ebpo_collide_options *how, ebpo_error *error)
@@ -256,7 +255,7 @@ static ebpo_status collide_far_ask(const collide_far *f, bool as_json, ebpo_coll
                          : ask_depth(f, as_json, c, how, error);
 }
 
-/* ebpo collide: which faces of two models meet, and how far apart they are. */
+/* --- the command --- */
 
 typedef struct collide_values {
     query_values query;

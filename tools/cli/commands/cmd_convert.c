@@ -1,3 +1,4 @@
+/* ebpo convert: makes an .ebpo.h5 file from a mesh, and describes both. */
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -25,7 +26,7 @@
 #include "cli/tables.h"
 #include "cli/words.h"
 
-/* What `ebpo convert` says of the mesh that it read and of the file that it wrote. */
+/* --- the mesh and the file, described --- */
 
 /* What is told, and how. */
 typedef struct convert_told {
@@ -194,7 +195,7 @@ static ebpo_status convert_tell_file(const convert_told *t, const mesh_input *p,
     return status;
 }
 
-/* ebpo convert: from a mesh to an .ebpo.h5 file. */
+/* --- the command --- */
 
 typedef struct values {
     int64_t max_level, leaf_faces, zstd_level, threads;

@@ -1,4 +1,4 @@
-/* Where the points of a plane or grid are. */
+/* ebpo map: distances on a plane, on a grid, or at another model's vertices. */
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
@@ -18,6 +18,8 @@
 #include "cli/render/raster.h"
 #include "cli/words.h"
 #include "ebpo_config.h"
+
+/* --- the points of a plane or grid --- */
 
 enum { LONGER_EDGE = 1000, GRID_MOST = 1 << 20 };
 
@@ -189,7 +191,8 @@ static int lattice_of_grid(map_job *j)
     return EXIT_FINE;
 }
 
-int map_find_lattice(map_job *j)
+/* From --plane, --grid, --box, --margin and --size. An exit code; what is wrong was said. */
+static int map_find_lattice(map_job *j)
 {
     j->plane = j->v->plane != NULL;
     return j->plane ? lattice_of_plane(j) : lattice_of_grid(j);
@@ -257,8 +260,9 @@ static bool has_signs(const map_job *j)
     return j->v->palette == EBPO_MAP_DIVERGING && j->stats.min < 0;
 }
 
-ebpo_status map_draw_plane(const map_job *j, const double *values, const char *path,
-                           ebpo_error *error)
+/* Draws values[height][width], row 0 at the bottom, or a painted mesh, with a legend. */
+static ebpo_status map_draw_plane(const map_job *j, const double *values, const char *path,
+                                  ebpo_error *error)
 {
     int width = (int)j->lattice.count[0], height = (int)j->lattice.count[1];
     picture p = { 0 };
@@ -278,8 +282,8 @@ ebpo_status map_draw_plane(const map_job *j, const double *values, const char *p
     return status;
 }
 
-ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *path,
-                          ebpo_error *error)
+static ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *path,
+                                 ebpo_error *error)
 {
     picture p = { 0 };
     camera view;
@@ -332,7 +336,7 @@ ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *p
 
 #endif
 
-/* Asking for the distances, and writing them. */
+/* --- distances --- */
 
 static ebpo_status no_memory(ebpo_error *error)
 {
@@ -376,7 +380,7 @@ static ebpo_status map_plane(map_job *j, ebpo_error *error)
     return status;
 }
 
-ebpo_status map_plane_or_grid(map_job *j, ebpo_error *error)
+static ebpo_status map_plane_or_grid(map_job *j, ebpo_error *error)
 {
     const char *out = j->v->out;
     ebpo_status status = EBPO_OK;
@@ -445,7 +449,7 @@ static ebpo_status bound(map_job *j, const ebpo_mesh *m, const double *distances
     return ebpo_map_find_reach(j->model, m, distances, &o, &j->reach, error);
 }
 
-ebpo_status map_vertices(map_job *j, ebpo_progress progress, ebpo_error *error)
+static ebpo_status map_vertices(map_job *j, ebpo_progress progress, ebpo_error *error)
 {
     ebpo_mesh m = { 0 };
     ebpo_mesh_report report;
@@ -471,7 +475,7 @@ ebpo_status map_vertices(map_job *j, ebpo_progress progress, ebpo_error *error)
     return status;
 }
 
-/* ebpo map: distances on a plane, on a grid, or of another model's vertices. */
+/* --- the command --- */
 
 typedef map_values values;
 

@@ -1,4 +1,4 @@
-/* What `ebpo paint` reads: colours, places, and the way of a hand. */
+/* ebpo paint: paint and notes on a model, in a file beside it. */
 #include <errno.h>
 #include <float.h>
 #include <math.h>
@@ -16,7 +16,10 @@
 #include "cli/progress.h"
 #include "cli/words.h"
 
-bool paint_read_colour(const char *text, uint32_t *out)
+/* --- colours, places and paths are read --- */
+
+/* "RRGGBB" or "RRGGBBAA" as 0xRRGGBBAA. False: it is not that. */
+static bool paint_read_colour(const char *text, uint32_t *out)
 {
     size_t length = strlen(text), digits = strspn(text, "0123456789abcdefABCDEF");
     if (length != digits || (length != 6 && length != 8))
@@ -46,7 +49,11 @@ static int read_numbers(const char *text, double *out, int most)
     }
 }
 
-bool paint_read_place(const char *text, double out[3]) { return read_numbers(text, out, 3) == 3; }
+/* Three numbers with commas. False: it is not that. */
+static bool paint_read_place(const char *text, double out[3])
+{
+    return read_numbers(text, out, 3) == 3;
+}
 
 static bool fail_line(const paint_values *v, uint64_t line, const char *what)
 {
@@ -103,7 +110,8 @@ static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_hand **hand, 
     return *count > 0;
 }
 
-bool paint_read_path(const paint_values *v, ebpo_paint_hand **hand, uint64_t *count)
+/* The hand's way; the caller frees it. False: what is wrong was said. */
+static bool paint_read_path(const paint_values *v, ebpo_paint_hand **hand, uint64_t *count)
 {
     bool standard = strcmp(v->path, "-") == 0;
     FILE *in = standard ? stdin : fopen(v->path, "r");
@@ -119,7 +127,7 @@ bool paint_read_path(const paint_values *v, ebpo_paint_hand **hand, uint64_t *co
     return fine;
 }
 
-/* What `ebpo paint` changes, and what it bakes. */
+/* --- changes and baking --- */
 
 static ebpo_status fail(ebpo_error *error, ebpo_status status, const char *what)
 {
@@ -135,7 +143,8 @@ static ebpo_paint_info info_of(const paint_job *j)
     return info;
 }
 
-ebpo_status paint_layer(const paint_job *j, uint64_t *layer, ebpo_error *error)
+/* The number of --layer, or of the topmost. EBPO_E_ARGUMENT: there is none. */
+static ebpo_status paint_layer(const paint_job *j, uint64_t *layer, ebpo_error *error)
 {
     ebpo_paint_info info = info_of(j);
     *layer = j->v->layer >= 0 ? (uint64_t)j->v->layer : info.layer_count - 1;
@@ -271,8 +280,9 @@ static ebpo_status undo(paint_job *j, ebpo_error *error)
     return status;
 }
 
-ebpo_status paint_change(paint_job *j, const ebpo_paint_hand *hand, uint64_t count,
-                         ebpo_error *error)
+/* The change that was asked for; a paint that is not there is made before. Exit code, said. */
+static ebpo_status paint_change(paint_job *j, const ebpo_paint_hand *hand, uint64_t count,
+                                ebpo_error *error)
 {
     const paint_values *v = j->v;
     ebpo_status status = EBPO_OK;
@@ -343,7 +353,7 @@ static ebpo_status write_baked(paint_job *j, ebpo_mesh *mesh, const uint8_t *rgb
                        &o, NULL, error);
 }
 
-ebpo_status paint_bake(paint_job *j, ebpo_error *error)
+static ebpo_status paint_bake(paint_job *j, ebpo_error *error)
 {
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     ebpo_paint_options options = EBPO_PAINT_OPTIONS_INIT;
@@ -367,7 +377,7 @@ ebpo_status paint_bake(paint_job *j, ebpo_error *error)
     return status;
 }
 
-/* ebpo paint: paint and notes on a model, in a file beside it. */
+/* --- the command --- */
 
 #include "cli/options/paint.inc"
 

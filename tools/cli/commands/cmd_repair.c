@@ -1,3 +1,5 @@
+/* ebpo repair: a new file of what is left of a damaged one. Whatever the tree holds is made anew of
+ * the mesh; the mesh is the file's own, or that of its source. */
 #include <inttypes.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -18,7 +20,7 @@
 #include "cli/textures.h"
 #include "cli/words.h"
 
-/* What is left of a damaged file: each of its parts is read. */
+/* --- which parts of the file can be read --- */
 
 typedef enum fate { NONE, KEPT, REBUILT, LOST } fate; /* NONE: the file has no such part */
 
@@ -192,8 +194,7 @@ static ebpo_status patient_look(patient *p, ebpo_error *error)
     return status;
 }
 
-/* ebpo repair: a new file of what is left of a damaged one. Whatever the tree holds is made anew of
- * the mesh; the mesh is the file's own, or that of its source. */
+/* --- the command --- */
 
 typedef struct values {
     const char *out, *source;

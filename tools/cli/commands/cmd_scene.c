@@ -1,4 +1,4 @@
-/* What a scene holds, where that is, and which of its instances may meet. */
+/* ebpo scene: models at many places, that move. */
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -12,6 +12,8 @@
 #include "cli/json.h"
 #include "cli/progress.h"
 #include "cli/words.h"
+
+/* --- contents, boxes and pairs --- */
 
 /* Bytes of the files of models, each counted once. */
 typedef struct sums {
@@ -104,8 +106,8 @@ static void info_words(const char *path, const ebpo_scene *scene, const ebpo_sce
     }
 }
 
-ebpo_status scene_info(const scene_values *v, const char *path, ebpo_scene *scene,
-                       ebpo_error *error)
+static ebpo_status scene_info(const scene_values *v, const char *path, ebpo_scene *scene,
+                              ebpo_error *error)
 {
     double box[2][3];
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
@@ -117,8 +119,8 @@ ebpo_status scene_info(const scene_values *v, const char *path, ebpo_scene *scen
 }
 
 /* All was checked while it was opened. */
-ebpo_status scene_check(const scene_values *v, const char *path, ebpo_scene *scene,
-                        ebpo_error *error)
+static ebpo_status scene_check(const scene_values *v, const char *path, ebpo_scene *scene,
+                               ebpo_error *error)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
     (void)ebpo_scene_get_counts(scene, &c);
@@ -138,8 +140,8 @@ ebpo_status scene_check(const scene_values *v, const char *path, ebpo_scene *sce
     return status;
 }
 
-ebpo_status scene_boxes(const scene_values *v, const char *path, ebpo_scene *scene,
-                        ebpo_error *error)
+static ebpo_status scene_boxes(const scene_values *v, const char *path, ebpo_scene *scene,
+                               ebpo_error *error)
 {
     json j;
     ebpo_status status = EBPO_OK;
@@ -198,8 +200,8 @@ static bool print_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count
     return true;
 }
 
-ebpo_status scene_pairs(const scene_values *v, const char *path, ebpo_scene *scene,
-                        ebpo_error *error)
+static ebpo_status scene_pairs(const scene_values *v, const char *path, ebpo_scene *scene,
+                               ebpo_error *error)
 {
     pair_print p = { .v = v, .scene = scene };
     (void)path;
@@ -324,8 +326,8 @@ static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t coun
     return true;
 }
 
-ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_scene *scene,
-                           ebpo_error *error)
+static ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_scene *scene,
+                                  ebpo_error *error)
 {
     listing l = { .v = v, .scene = scene };
     ebpo_scene_way_options how = EBPO_SCENE_WAY_OPTIONS_INIT;
@@ -356,7 +358,7 @@ ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_scene *
     return status;
 }
 
-/* ebpo scene: models at many places, that move. */
+/* --- the command --- */
 
 static const char *const purpose_words[] = { "collide", "view", "inside", "solids", NULL };
 

@@ -1,3 +1,4 @@
+/* ebpo touch: a hand is played at a steady rate, and the times of its ticks are measured. */
 #include <float.h>
 #include <math.h>
 #include <sched.h>
@@ -22,7 +23,7 @@
 #include "cli/tool_clock.h"
 #include "cli/words.h"
 
-/* A hand played at a steady rate, and how long its ticks took. */
+/* --- ticks at a steady rate --- */
 
 /* Of a microsecond: bin 0 is less than 1, bin n from 2^(n - 1) to 2^n, the last all beyond. */
 enum { TOUCH_BINS = 16 };
@@ -244,7 +245,7 @@ static bool touch_play_run(const touch_play *p, touch_times *out)
     return true;
 }
 
-/* ebpo touch: a hand played at a steady rate, and whether any of its ticks was late. */
+/* --- the command --- */
 
 typedef struct values {
     const char *path, *device, *record, *tool, *memory;

@@ -1,3 +1,5 @@
+/* ebpo convert --split-components and --split-groups: a folder with one model for each part, and a
+ * scene of them. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,7 +19,7 @@
 #include "cli/signals.h"
 #include "cli/words.h"
 
-/* Names of parts: as files, and in a scene. */
+/* --- names of parts --- */
 
 enum { PART_NAME_SIZE = 96, PART_SHOWN_SIZE = 256 };
 

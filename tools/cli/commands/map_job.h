@@ -34,18 +34,7 @@ typedef struct map_job {
     ebpo_map_reach reach;
 } map_job;
 
-/* From --plane, --grid, --box, --margin and --size. An exit code; what is wrong was said. */
-int map_find_lattice(map_job *job);
 /* "800x600" into two numbers of 2 to 8192 each. False, said. */
 bool map_read_size(const char *text, int *width, int *height);
-
-EBPO_MUST_USE ebpo_status map_plane_or_grid(map_job *job, ebpo_error *error);
-EBPO_MUST_USE ebpo_status map_vertices(map_job *job, ebpo_progress progress, ebpo_error *error);
-
-/* Draws values[height][width], row 0 at the bottom, or a painted mesh, with a legend. */
-EBPO_MUST_USE ebpo_status map_draw_plane(const map_job *job, const double *values, const char *path,
-                                         ebpo_error *error);
-EBPO_MUST_USE ebpo_status map_draw_mesh(const map_job *job, const ebpo_mesh *mesh, const char *path,
-                                        ebpo_error *error);
 
 #endif

@@ -31,20 +31,6 @@ typedef struct paint_job {
     uint64_t colours_of_own; /* by --bake: the model has colours of vertices */
 } paint_job;
 
-/* "RRGGBB" or "RRGGBBAA" as 0xRRGGBBAA. False: it is not that. */
-bool paint_read_colour(const char *text, uint32_t *out);
-/* Three numbers with commas. False: it is not that. */
-bool paint_read_place(const char *text, double out[3]);
-/* The hand's way; the caller frees it. False: what is wrong was said. */
-bool paint_read_path(const paint_values *v, ebpo_paint_hand **hand, uint64_t *count);
-
-/* The number of --layer, or of the topmost. EBPO_E_ARGUMENT: there is none. */
-EBPO_MUST_USE ebpo_status paint_layer(const paint_job *job, uint64_t *layer, ebpo_error *error);
-/* The change that was asked for; a paint that is not there is made before. Exit code, said. */
-EBPO_MUST_USE ebpo_status paint_change(paint_job *job, const ebpo_paint_hand *hand, uint64_t count,
-                                       ebpo_error *error);
-EBPO_MUST_USE ebpo_status paint_bake(paint_job *job, ebpo_error *error);
-
 /* Prints the list, and what was done. */
 void paint_tell(const paint_job *job);
 

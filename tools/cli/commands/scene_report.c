@@ -1,3 +1,4 @@
+/* ebpo scene report: the meetings of a scene's instances, as JSON, CSV or words. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +13,7 @@
 #include "cli/progress.h"
 #include "cli/words.h"
 
-/* What a report of a scene prints of a meeting: JSON, CSV or words. */
+/* --- a meeting --- */
 
 /* Until the scene is freed. */
 static const char *scene_instance_name(const ebpo_scene *scene, uint64_t instance)

@@ -15,7 +15,4 @@ typedef struct scene_frame {
 ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *scene,
                          ebpo_error *error);
 
-ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_scene *scene,
-                           ebpo_error *error);
-
 #endif

@@ -19,13 +19,4 @@ typedef struct scene_values {
         .time = __builtin_nan(""), .from = __builtin_nan(""), .to = __builtin_nan("") \
     }
 
-ebpo_status scene_info(const scene_values *v, const char *path, ebpo_scene *scene,
-                       ebpo_error *error);
-ebpo_status scene_check(const scene_values *v, const char *path, ebpo_scene *scene,
-                        ebpo_error *error);
-ebpo_status scene_boxes(const scene_values *v, const char *path, ebpo_scene *scene,
-                        ebpo_error *error);
-ebpo_status scene_pairs(const scene_values *v, const char *path, ebpo_scene *scene,
-                        ebpo_error *error);
-
 #endif
