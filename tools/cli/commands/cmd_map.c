@@ -316,7 +316,7 @@ static ebpo_status without(ebpo_error *error)
     return error->status = EBPO_E_UNSUPPORTED;
 }
 
-ebpo_status map_draw_plane(const map_job *j, const double *values, const char *path,
+static ebpo_status map_draw_plane(const map_job *j, const double *values, const char *path,
                            ebpo_error *error)
 {
     (void)j;
@@ -325,7 +325,7 @@ ebpo_status map_draw_plane(const map_job *j, const double *values, const char *p
     return without(error);
 }
 
-ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *path,
+static ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *path,
                           ebpo_error *error)
 {
     (void)j;
