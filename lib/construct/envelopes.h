@@ -14,4 +14,15 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, cons
                      uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_STORED]);
 
+/* What the top's gray nodes keep until the levels are joined. */
+
+typedef struct ebpo_top_envelope {
+    uint32_t codes[EBPO_PLANES_STORED];
+    int count;
+    double volume;
+} ebpo_top_envelope;
+
+/* The nodes above the subtrees. */
+ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error);
+
 #endif

@@ -15,4 +15,8 @@ ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_
 bool ebpo_build_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *list, uint64_t count, ebpo_build_detail *detail);
 
+/* The top of the tree, and the lists of faces of the pieces below it. */
+
+ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error);
+
 #endif

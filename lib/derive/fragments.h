@@ -8,7 +8,7 @@
 #include "geometry/cell.h"
 #include "geometry/cursor.h"
 #include "geometry/polytope.h"
-#include "levels/lod_model.h"
+#include "levels/lod.h"
 
 typedef struct ebpo_cell_frame {
     ebpo_cell cell;

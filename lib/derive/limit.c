@@ -17,7 +17,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "levels/lod_model.h"
+#include "levels/lod.h"
 #include "geometry/cells.h"
 #include "geometry/node_types.h"
 #include "geometry/rule.h"

@@ -19,7 +19,7 @@
 #include "geometry/cells.h"
 #include "geometry/node_types.h"
 #include "geometry/plane_clip.h"
-#include "levels/lod_model.h"
+#include "levels/lod.h"
 
 /* --- copying the arrays of remaining nodes --- */
 

@@ -17,7 +17,7 @@
 #include "core/fp_env.h"
 #include "geometry/plane_clip.h"
 #include "geometry/polytope.h"
-#include "levels/lod_model.h"
+#include "levels/lod.h"
 #include "query/load_ahead.h"
 #include "query/nearest.h"
 #include "query/query_model.h"

@@ -25,9 +25,8 @@
 #include "geometry/node_types.h"
 #include "geometry/octcode.h"
 #include "geometry/plane_code.h"
-#include "levels/cell_to_model.h"
-#include "levels/lod_model.h"
-#include "levels/stream_node.h"
+#include "levels/stream.h"
+#include "levels/lod.h"
 
 typedef struct subtree_scratch subtree_scratch; /* what describing a node takes */
 

@@ -3,7 +3,7 @@
 #define EBPO_VERIFY_VERIFY_SUBTREES_H
 
 #include "verify/tally.h"
-#include "verify/twin_tree.h"
+#include "verify/verify_tree.h"
 
 /* Every column of the table, by visiting the tree depth first; and the blocks from elsewhere, each
  * listed that is needed, and no other. Nothing to do in files without subtrees. */

@@ -12,10 +12,8 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/workspace.h"
-#include "verify/containment.h"
+#include "verify/verify_geometry.h"
 #include "verify/verify_labels.h"
-#include "verify/lists.h"
-#include "verify/winding.h"
 
 enum {
     FACE_GRAIN = 4096,

@@ -3,7 +3,7 @@
 #define EBPO_VERIFY_VERIFY_WALK_H
 
 #include "verify/tally.h"
-#include "verify/twin_tree.h"
+#include "verify/verify_tree.h"
 
 /* Adds to the tally. The result does not depend on the number of threads. */
 EBPO_MUST_USE ebpo_status ebpo_verify_walk(ebpo_tally *tally, const ebpo_twin_tree *view,

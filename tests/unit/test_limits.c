@@ -8,21 +8,20 @@
 
 #include "check_main.h"
 #include "hdf5_read/coding.h"
-#include "construct/branch.h"
+#include "construct/pieces.h"
 #include "construct/partition.h"
 #include "format/head_facts.h"
 #include "format/write_plan.h"
 #include "format/slice.h"
 #include "derive/export_job.h"
 #include "core/strict_fp.h"
-#include "levels/polyhedra.h"
+#include "levels/lod.h"
 #include "mesh/mesh_parts.h"
 #include "geometry/octcode.h"
 #include "random_tree.h"
 #include "read_by.h"
 #include "scratch.h"
 #include "levels/frontier.h"
-#include "levels/partial_tree.h"
 #include "query/accel_parts.h"
 
 static const uint64_t TWO32 = UINT64_C(1) << 32;

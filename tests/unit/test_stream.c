@@ -17,7 +17,7 @@
 #include "geometry/octcode.h"
 #include "scratch.h"
 #include "solids.h"
-#include "levels/cell_to_model.h"
+#include "levels/stream.h"
 
 static const char *path;
 

@@ -13,7 +13,7 @@
 #include "geometry/node_types.h"
 #include "random_tree.h"
 #include "scratch.h"
-#include "verify/structure.h"
+#include "verify/verify_tree.h"
 
 static const char *path, *other;
 static ebpo_tree tree;
