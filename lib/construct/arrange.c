@@ -12,7 +12,7 @@
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "core/sort.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 #include "mesh/mesh_parts.h"
 
 enum { GRAIN = 1 << 15 };

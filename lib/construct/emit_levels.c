@@ -12,8 +12,8 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "geometry/node_types.h"
-#include "geometry/plane_clip.h"
+#include "geometry/level_nodes.h"
+#include "geometry/polytope.h"
 
 struct ebpo_emit_scratch {
     ebpo_envelope_scratch *envelope;

@@ -16,8 +16,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/parallel.h"
-#include "geometry/plane_clip.h"
-#include "geometry/plane_code.h"
+#include "geometry/polytope.h"
 
 /* Candidate normals of a gray node, from the faces below it. */
 

@@ -12,7 +12,7 @@
 #include "construct/planes.h"
 #include "construct/sweep.h"
 #include "core/hash.h"
-#include "geometry/plane_code.h"
+#include "geometry/polytope.h"
 
 static const double flat = 1e-9; /* what is nearer to a plane lies in it */
 

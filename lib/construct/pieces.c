@@ -8,7 +8,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/workspace.h"
-#include "geometry/plane_code.h"
+#include "geometry/polytope.h"
 
 void ebpo_piece_levels_free(ebpo_piece_level *out)
 {

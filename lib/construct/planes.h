@@ -4,7 +4,7 @@
 
 #include <ebpo/build.h>
 
-#include "geometry/cell.h"
+#include "geometry/cells.h"
 #include "geometry/polytope.h"
 
 enum {

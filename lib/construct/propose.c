@@ -13,8 +13,8 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "geometry/octcode.h"
-#include "geometry/plane_code.h"
+#include "geometry/cells.h"
+#include "geometry/polytope.h"
 
 /* Planes from the leaves up, of the nodes of a piece. */
 

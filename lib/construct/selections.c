@@ -10,8 +10,7 @@
 #include "construct/planes.h"
 #include "core/alloc.h"
 #include "core/hash.h"
-#include "geometry/plane_clip.h"
-#include "geometry/plane_code.h"
+#include "geometry/polytope.h"
 
 typedef struct ranked {
     double gain; /* an upper bound; exact for the envelope of `round` */

@@ -17,7 +17,7 @@
 #include "core/parallel.h"
 #include "mesh/mesh_frame.h"
 #include "mesh/shell_nesting.h"
-#include "geometry/rule.h"
+#include "geometry/level_nodes.h"
 #include "geometry/triangle_pair.h"
 
 enum { RULES = 3, GRAIN = 1 << 13, STEPS_PER_FACE = 64, STEPS_AT_LEAST = 1 << 22 };

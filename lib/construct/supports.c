@@ -11,8 +11,8 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hash.h"
-#include "geometry/octcode.h"
-#include "geometry/plane_code.h"
+#include "geometry/cells.h"
+#include "geometry/polytope.h"
 
 static void vertex_bounds_join(double (*box)[3], const double low[3], const double high[3])
 {

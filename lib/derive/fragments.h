@@ -5,7 +5,7 @@
 
 #include <ebpo/query.h>
 
-#include "geometry/cell.h"
+#include "geometry/cells.h"
 #include "geometry/cursor.h"
 #include "geometry/polytope.h"
 #include "levels/lod.h"

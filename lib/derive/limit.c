@@ -19,8 +19,7 @@
 #include "core/parallel.h"
 #include "levels/lod.h"
 #include "geometry/cells.h"
-#include "geometry/node_types.h"
-#include "geometry/rule.h"
+#include "geometry/level_nodes.h"
 
 #if EBPO_HAVE_QHULL
 #include <limits.h>

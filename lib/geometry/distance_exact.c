@@ -1,19 +1,673 @@
+#include "core/strict_fp.h"
+
+#include <gmp.h>
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "geometry/distance.h"
+#include "geometry/distance_pairs.h"
+#include "geometry/distance_exact.h"
+#include "geometry/integer_vectors.h"
+
+/* Points that are far from a triangle for its size: what products of a coordinate of the point and
+ * a side of the triangle tell, each with an error that is relative to itself. Signs only; certain.
+ */
+
+/* A number, and a bound of its error; 0 without error is exact. */
+typedef struct near {
+    double x, error;
+} near;
+
+/* Roundings of the errors themselves, and of what is below the normal doubles. */
+static const double more = 1 + 0x1p-40, rounding = 0x1p-52, lost = 0x1p-1060;
+
+static near distance_far_multiply(near a, near b)
+{
+    near out = { a.x * b.x, 0 };
+    if ((a.x == 0 && a.error == 0) || (b.x == 0 && b.error == 0))
+        return (near){ 0, 0 };
+    out.error =
+        (fabs(a.x) * b.error + fabs(b.x) * a.error + a.error * b.error + fabs(out.x) * rounding) *
+            more +
+        lost;
+    return out;
+}
+static near distance_far_add(near a, near b)
+{
+    near out = { a.x + b.x, (a.error + b.error) * more };
+    out.error += fabs(out.x) * rounding;
+    return out;
+}
+static near distance_far_minus(near a) { return (near){ -a.x, a.error }; }
+
+static near distance_far_dot(const near a[3], const near b[3])
+{
+    return distance_far_add(distance_far_add(distance_far_multiply(a[0], b[0]),
+                                             distance_far_multiply(a[1], b[1])),
+                            distance_far_multiply(a[2], b[2]));
+}
+static void distance_far_cross(const near a[3], const near b[3], near out[3])
+{
+    for (int k = 0; k < 3; k++) {
+        int u = (k + 1) % 3, v = (k + 2) % 3;
+        out[k] = distance_far_add(distance_far_multiply(a[u], b[v]),
+                                  distance_far_minus(distance_far_multiply(a[v], b[u])));
+    }
+}
+static int sign_of(near a) { return a.x > a.error ? 1 : a.x < -a.error ? -1 : 0; }
+static bool is_nothing(near a) { return a.x == 0 && a.error == 0; }
+
+/* to - from, times 2^-exponent. */
+static near distance_far_difference(double to, double from, int exponent)
+{
+    double d = to - from;
+    near out = { isfinite(d) ? ldexp(d, -exponent) : ldexp(to, -exponent) - ldexp(from, -exponent),
+                 0 };
+    if (d != 0)
+        out.error = fabs(out.x) * rounding + lost;
+    return out;
+}
+
+/* So that no coordinate's difference is above 2. */
+static int exponent_of(const double (*a)[3], int count, const double b[3])
+{
+    double most = 0;
+    int exponent;
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            double d = fabs(a[i][k] - b[k]);
+            most = fmax(most, isfinite(d) ? d : 0x1p1023);
+        }
+    frexp(most, &exponent);
+    return exponent;
+}
+
+typedef struct far_triangle {
+    near corner[3][3], edge[3][3]; /* in units of their own: corners seen from p */
+    near along[3], back[3];        /* corner k . edge k; corner k + 1 . edge k */
+    int exponent, edge_exponent;
+} far_triangle;
+
+/* False: two corners are equal, and which of them is nearest is not told here. */
+static bool distance_far_relate(const double p[3], const double triangle[3][3], far_triangle *t)
+{
+    bool apart = true;
+    t->exponent = exponent_of(triangle, 3, p);
+    t->edge_exponent = exponent_of(triangle, 3, triangle[0]);
+    for (int i = 0; i < 3; i++) {
+        bool any = false;
+        for (int k = 0; k < 3; k++) {
+            t->corner[i][k] = distance_far_difference(triangle[i][k], p[k], t->exponent);
+            t->edge[i][k] =
+                distance_far_difference(triangle[(i + 1) % 3][k], triangle[i][k], t->edge_exponent);
+            any = any || !is_nothing(t->edge[i][k]);
+        }
+        apart = apart && any;
+    }
+    for (int i = 0; i < 3; i++) {
+        t->along[i] = distance_far_dot(t->corner[i], t->edge[i]);
+        t->back[i] = distance_far_dot(t->corner[(i + 1) % 3], t->edge[i]);
+    }
+    return apart;
+}
+
+static ebpo_feature feature_of(const far_triangle *t)
+{
+    near normal[3], outward[3];
+    bool inside = true;
+    distance_far_cross(t->edge[0], t->edge[1], normal);
+    for (int i = 0; i < 3; i++) {
+        const near *along = &t->along[i], *before = &t->back[(i + 2) % 3];
+        /* behind the corner along both of its edges, or right beside it */
+        if ((sign_of(*along) > 0 || is_nothing(*along)) &&
+            (sign_of(*before) < 0 || is_nothing(*before)))
+            return (ebpo_feature)(EBPO_NEAR_CORNER0 + i);
+        distance_far_cross(t->edge[i], normal, outward);
+        int side = sign_of(distance_far_dot(outward, t->corner[i]));
+        if (side < 0 && sign_of(*along) < 0 && sign_of(t->back[i]) > 0)
+            return (ebpo_feature)(EBPO_NEAR_EDGE0 + i);
+        inside = inside && side > 0;
+    }
+    return inside ? EBPO_NEAR_INTERIOR : EBPO_NEAR_UNKNOWN;
+}
+
+static double distance_far_length(const near a[3])
+{
+    return sqrt(a[0].x * a[0].x + a[1].x * a[1].x + a[2].x * a[2].x);
+}
+
+/* The nearest corner is at most the triangle's size farther than the nearest point. */
+static void distance_far_bound(const far_triangle *t, ebpo_feature feature,
+                               ebpo_distance_bounds *out)
+{
+    double least = INFINITY, size = 0;
+    for (int i = 0; i < 3; i++) {
+        least = fmin(least, distance_far_length(t->corner[i]));
+        size = fmax(size, distance_far_length(t->edge[i]));
+    }
+    if (feature <= EBPO_NEAR_CORNER2) {
+        least = distance_far_length(t->corner[feature]);
+        size = 0;
+    }
+    double low = least * (1 - 0x1p-48) -
+                 ldexp(size, t->edge_exponent - t->exponent) * (1 + 0x1p-40) - 0x1p-1000,
+           high = least * (1 + 0x1p-48) + 0x1p-1000;
+    out->feature = feature;
+    out->lo = low > 0 ? fmax(nextafter(ldexp(low, t->exponent), -INFINITY), 0) : 0;
+    out->hi = nextafter(ldexp(high, t->exponent), INFINITY);
+    /* what overflows may not have before it was rounded */
+    out->lo = fmin(out->lo, 0x1.fffffffffffffp1023);
+}
+
+/* The nearest feature, or EBPO_NEAR_UNKNOWN. `out`, unless NULL: bounds of the distance that are as
+ * near as the triangle is small. */
+static ebpo_feature ebpo_far_feature(const double p[3], const double triangle[3][3],
+                                     ebpo_distance_bounds *out)
+{
+    far_triangle t;
+    ebpo_feature feature = EBPO_NEAR_UNKNOWN;
+    if (distance_far_relate(p, triangle, &t))
+        feature = feature_of(&t);
+    if (out && t.exponent - t.edge_exponent > 20)
+        distance_far_bound(&t, feature, out);
+    return feature;
+}
+
+/* |p - a|^2 - |p - b|^2 = (a - b) . ((a - p) + (b - p)) */
+static bool ebpo_far_corners_compare(const double p[3], const double a[3], const double b[3],
+                                     int *sign)
+{
+    const double both[2][3] = { { a[0], a[1], a[2] }, { b[0], b[1], b[2] } };
+    int apart = exponent_of((const double(*)[3])both, 1, b),
+        away = exponent_of((const double(*)[3])both, 2, p);
+    near step[3], middle[3];
+    for (int k = 0; k < 3; k++) {
+        step[k] = distance_far_difference(a[k], b[k], apart);
+        middle[k] = distance_far_add(distance_far_difference(a[k], p[k], away),
+                                     distance_far_difference(b[k], p[k], away));
+    }
+    near d = distance_far_dot(step, middle);
+    *sign = sign_of(d);
+    return *sign || is_nothing(d);
+}
+
+/* The corners that a feature has; the others become copies of them. */
+static void keep_feature(double t[3][3], ebpo_feature feature)
+{
+    double from[3], to[3];
+    if (feature > EBPO_NEAR_EDGE2)
+        return;
+    int first = feature <= EBPO_NEAR_CORNER2 ? (int)feature : (int)(feature - EBPO_NEAR_EDGE0),
+        last = feature <= EBPO_NEAR_CORNER2 ? first : (first + 1) % 3;
+    memcpy(from, t[first], sizeof from);
+    memcpy(to, t[last], sizeof to);
+    memcpy(t[0], from, sizeof from);
+    memcpy(t[1], to, sizeof to);
+    memcpy(t[2], to, sizeof to);
+}
+
+/* What lies in one plane across an axis is as near as it is to the foot of the point in that plane.
+ * True: p has been moved there, and a and b have become no more than their features. */
+static bool ebpo_far_flatten(double p[3], double a[3][3], ebpo_feature of_a, double b[3][3],
+                             ebpo_feature of_b)
+{
+    bool moved = false;
+    keep_feature(a, of_a);
+    keep_feature(b, of_b);
+    for (int k = 0; k < 3; k++) {
+        bool flat = a[0][k] != p[k];
+        for (int i = 0; i < 3; i++)
+            flat = flat && a[i][k] == a[0][k] && b[i][k] == a[0][k];
+        if (flat) {
+            p[k] = a[0][k];
+            moved = true;
+        }
+    }
+    return moved;
+}
+
+/* Bounds of the distance to a triangle, in doubles.
+ *
+ * With corners a, b, c relative to p, the nearest feature is certain when the signs of a few
+ * products are: a corner when p lies behind it along both of its edges; an edge when p projects
+ * between its ends and lies outside of it in the plane; the interior when p projects inside all
+ * edges (the features' Voronoi regions).
+ *
+ * Rounding (u = 2^-53; r: 1-norms of the relative corners at most; l: of the edges; s = l^2, at
+ * least the normal's length): relative corners are off by u of themselves, edges likewise. So
+ * products of a corner and an edge are off by 8 u r l, the normal by 8 u l^2 on each axis, products
+ * of a corner with edge x normal by 64 u r l^3. Distances to points of corners and edges are off by
+ * 16 u r. The distance to the plane is off by what tilting the normal by 16 u l^2 / |n| moves the
+ * plane within the triangle, and by 16 u r. Everything below doubles these at least. Numbers whose
+ * fourth powers leave the doubles are scaled first. */
+
+static const double huge_reach = 0x1p200, tiny_reach = 0x1p-200;
+/* From so many times the triangle's size on, errors that are relative to the greatest product tell
+ * little: distance_far.h. */
+static const double far_ratio = 0x1p20;
+
+static inline double distance_bounds_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline void distance_bounds_cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static inline double distance_bounds_size1(const double a[3])
+{
+    return fabs(a[0]) + fabs(a[1]) + fabs(a[2]);
+}
+
+static inline double distance_bounds_greater(double a, double b) { return a > b ? a : b; }
+
+typedef struct relation {
+    double corner[3][3]; /* relative to p */
+    double edge[3][3];   /* corner k to k + 1 */
+    double reach, size;  /* r and l */
+    /* corner k . edge k: how far p is behind corner k along its edge, times the edge's length */
+    double along[3];
+    double back[3]; /* corner k + 1 . edge k */
+    double normal[3];
+    double side[3]; /* positive where p is within edge k */
+} relation;
+
+static void distance_bounds_relate(const double p[3], const double triangle[3][3], relation *r)
+{
+    r->reach = r->size = 0;
+    for (int i = 0; i < 3; i++) {
+        int j = i == 2 ? 0 : i + 1;
+        for (int k = 0; k < 3; k++) {
+            r->corner[i][k] = triangle[i][k] - p[k];
+            r->edge[i][k] = triangle[j][k] - triangle[i][k];
+        }
+        r->reach = distance_bounds_greater(r->reach, distance_bounds_size1(r->corner[i]));
+        r->size = distance_bounds_greater(r->size, distance_bounds_size1(r->edge[i]));
+    }
+}
+
+static void distance_bounds_multiply(relation *r)
+{
+    distance_bounds_cross(r->edge[0], r->edge[1], r->normal);
+    for (int i = 0; i < 3; i++) {
+        double outward[3];
+        r->along[i] = distance_bounds_dot(r->corner[i], r->edge[i]);
+        r->back[i] = distance_bounds_dot(r->corner[i == 2 ? 0 : i + 1], r->edge[i]);
+        distance_bounds_cross(r->edge[i], r->normal, outward);
+        r->side[i] = distance_bounds_dot(outward, r->corner[i]);
+    }
+}
+
+/* Distance to the line through edge i, p projecting between its ends: to corner plus a share of the
+ * edge. */
+static double edge_distance(const relation *r, int i)
+{
+    double length2 = distance_bounds_dot(r->edge[i], r->edge[i]),
+           t = length2 > 0 ? -r->along[i] / length2 : 0, q[3];
+    t = t < 0 ? 0 : t > 1 ? 1 : t;
+    for (int k = 0; k < 3; k++)
+        q[k] = r->corner[i][k] + t * r->edge[i][k];
+    return sqrt(distance_bounds_dot(q, q));
+}
+
+static ebpo_feature certain_feature(const relation *r)
+{
+    double flat = 0x1p-48 * r->reach * r->size,
+           solid = 0x1p-44 * r->reach * r->size * r->size * r->size;
+    bool inside = true;
+    for (int i = 0; i < 3; i++) {
+        int before = i == 0 ? 2 : i - 1;
+        /* Behind corner i along edge i, and beyond it along the edge before. */
+        if (r->along[i] > flat && r->back[before] < -flat)
+            return (ebpo_feature)(EBPO_NEAR_CORNER0 + i);
+        if (r->along[i] < -flat && r->back[i] > flat && r->side[i] < -solid)
+            return (ebpo_feature)(EBPO_NEAR_EDGE0 + i);
+        inside = inside && r->side[i] > solid;
+    }
+    return inside ? EBPO_NEAR_INTERIOR : EBPO_NEAR_UNKNOWN;
+}
+
+static double plane_distance(const relation *r, double *error)
+{
+    double length = sqrt(distance_bounds_dot(r->normal, r->normal));
+    *error = 0x1p-47 * r->reach + 0x1p-46 * r->size * r->size * r->size / length;
+    return fabs(distance_bounds_dot(r->normal, r->corner[0])) / length;
+}
+
+/* The plane is never farther than the triangle; a plane of unknown tilt says nothing, but no point
+ * of the triangle is farther from its edges than its height. */
+static void bound_by_edges(const relation *r, double plane, double error, ebpo_distance_bounds *out)
+{
+    double edges = edge_distance(r, 0), length = sqrt(distance_bounds_dot(r->normal, r->normal));
+    for (int i = 1; i < 3; i++) {
+        double other = edge_distance(r, i);
+        edges = other < edges ? other : edges;
+    }
+    double height = length > 0 ? 2 * length / r->size + 0x1p-44 * r->size : 0x1p-44 * r->size;
+    double low = edges - error - 4 * height,
+           tilted = 0x1p-47 * r->reach + 0x1p-46 * r->size * r->size / length * r->reach;
+    if (tilted < 0x1p-20 * r->reach)
+        low = distance_bounds_greater(low, plane < edges ? plane - tilted : edges - tilted);
+    out->lo = low > 0 ? low : 0;
+    out->hi = edges + error;
+}
+
+static void distance_bounds_bound(const relation *r, ebpo_distance_bounds *out)
+{
+    double error = 0x1p-47 * r->reach, d;
+    out->feature = certain_feature(r);
+    if (out->feature <= EBPO_NEAR_CORNER2) {
+        const double *q = r->corner[out->feature];
+        d = sqrt(distance_bounds_dot(q, q));
+        error = 0x1p-49 * d;
+    } else if (out->feature <= EBPO_NEAR_EDGE2) {
+        d = edge_distance(r, (int)(out->feature - EBPO_NEAR_EDGE0));
+    } else {
+        double plane_error;
+        d = plane_distance(r, &plane_error);
+        if (out->feature != EBPO_NEAR_INTERIOR || !(plane_error < 0x1p-20 * r->reach)) {
+            bound_by_edges(r, d, error, out);
+            return;
+        }
+        error = plane_error;
+    }
+    out->lo = d > error ? d - error : 0;
+    out->hi = d + error;
+}
+
+static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_distance_bounds *out)
+{
+    double q[3], t[3][3];
+    int exponent = ebpo_distance_scale(p, triangle, q, t);
+    relation r;
+    distance_bounds_relate(q, (const double(*)[3])t, &r);
+    if (!(r.reach > tiny_reach * 0x1p-100) || !(r.size > tiny_reach || r.size == 0)) {
+        /* Next to a point: only that much is known. */
+        *out = (ebpo_distance_bounds){
+            0, ldexp(r.reach + 0x1p-1000, exponent) * (1 + 0x1p-50) + 0x1p-1074, EBPO_NEAR_UNKNOWN
+        };
+        out->feature = ebpo_far_feature(p, triangle, out);
+        return;
+    }
+    distance_bounds_multiply(&r);
+    distance_bounds_bound(&r, out);
+    /* Scaling up is exact, scaling down may have lost what lies below 2^-1074. */
+    out->feature = ebpo_far_feature(p, triangle, NULL);
+    out->lo = nextafter(ldexp(out->lo - 0x1p-1000, exponent), -INFINITY);
+    out->lo = out->lo > 0 ? out->lo : 0;
+    out->hi = nextafter(ldexp(out->hi + 0x1p-1000, exponent), INFINITY);
+}
+
+void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3],
+                                   ebpo_distance_bounds *out)
+{
+    relation r;
+    distance_bounds_relate(p, triangle, &r);
+    if (!(r.reach < huge_reach) || !(r.reach > tiny_reach) || !(r.size > tiny_reach)) {
+        bound_scaled(p, triangle, out);
+        return;
+    }
+    distance_bounds_multiply(&r);
+    distance_bounds_bound(&r, out);
+    if (out->feature == EBPO_NEAR_UNKNOWN && r.reach > far_ratio * r.size)
+        out->feature = ebpo_far_feature(p, triangle, NULL);
+}
+
+int ebpo_distance_scale(const double p[3], const double triangle[3][3], double q[3], double t[3][3])
+{
+    double most = 0;
+    int exponent;
+    for (int k = 0; k < 3; k++) {
+        most = distance_bounds_greater(most, fabs(p[k]));
+        for (int i = 0; i < 3; i++)
+            most = distance_bounds_greater(most, fabs(triangle[i][k]));
+    }
+    frexp(most, &exponent);
+    for (int k = 0; k < 3; k++) {
+        q[k] = ldexp(p[k], -exponent);
+        for (int i = 0; i < 3; i++)
+            t[i][k] = ldexp(triangle[i][k], -exponent);
+    }
+    return exponent;
+}
+
+/* Distance to a triangle without rounding: coordinates as integers in a common power of two, the
+ * squared distance as a fraction of integers. */
+
+/* The nearest point is p + numerator / denominator, the squared distance square / denominator2. */
+typedef struct nearest {
+    int unit;
+    ebpo_vectorz p, corner[3], edge[3], normal; /* corners relative to p */
+    mpz_t square, denominator;                  /* squared distance in squared units */
+    ebpo_vectorz offset;                        /* nearest point less p, times offset_denominator */
+    mpz_t offset_denominator;
+    ebpo_feature feature;
+    mpz_t t, u;
+    ebpo_vectorz w;
+} nearest;
+
+static void nearest_init(nearest *n)
+{
+    ebpo_vectorz *all[] = { &n->p,       &n->corner[0], &n->corner[1], &n->corner[2], &n->edge[0],
+                            &n->edge[1], &n->edge[2],   &n->normal,    &n->offset,    &n->w };
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
+        ebpo_vectorz_init(all[i]);
+    mpz_inits(n->square, n->denominator, n->offset_denominator, n->t, n->u, NULL);
+}
+
+static void nearest_clear(nearest *n)
+{
+    ebpo_vectorz *all[] = { &n->p,       &n->corner[0], &n->corner[1], &n->corner[2], &n->edge[0],
+                            &n->edge[1], &n->edge[2],   &n->normal,    &n->offset,    &n->w };
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
+        ebpo_vectorz_clear(all[i]);
+    mpz_clears(n->square, n->denominator, n->offset_denominator, n->t, n->u, NULL);
+}
+
+static void set_points(nearest *n, const double p[3], const double triangle[3][3], int unit)
+{
+    n->unit = unit;
+    for (int k = 0; k < 3; k++) {
+        ebpo_set_integer(n->p.x[k], p[k], unit);
+        for (int i = 0; i < 3; i++) {
+            ebpo_set_integer(n->corner[i].x[k], triangle[i][k], unit);
+            mpz_sub(n->corner[i].x[k], n->corner[i].x[k], n->p.x[k]);
+        }
+    }
+    for (int i = 0; i < 3; i++)
+        ebpo_vectorz_subtract(&n->edge[i], &n->corner[(i + 1) % 3], &n->corner[i]);
+    ebpo_vectorz_cross(&n->normal, &n->edge[0], &n->edge[1]);
+}
+
+static bool try_interior(nearest *n)
+{
+    ebpo_vectorz_dot(n->denominator, &n->normal, &n->normal);
+    if (mpz_sgn(n->denominator) == 0)
+        return false;
+    for (int i = 0; i < 3; i++) {
+        ebpo_vectorz_cross(&n->w, &n->edge[i], &n->normal);
+        ebpo_vectorz_dot(n->t, &n->w, &n->corner[i]);
+        if (mpz_sgn(n->t) <= 0)
+            return false;
+    }
+    ebpo_vectorz_dot(n->t, &n->normal, &n->corner[0]);
+    mpz_mul(n->square, n->t, n->t);
+    for (int k = 0; k < 3; k++)
+        mpz_mul(n->offset.x[k], n->normal.x[k], n->t);
+    mpz_set(n->offset_denominator, n->denominator);
+    n->feature = EBPO_NEAR_INTERIOR;
+    return true;
+}
+
+/* Takes corner or edge when it is nearer than what was found (of equal ones: the corner). */
+static void distance_gmp_offer(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
+                               ebpo_feature feature, bool *taken)
+{
+    int sign = -1;
+    *taken = false;
+    if (!first) {
+        mpz_t left, right;
+        mpz_inits(left, right, NULL);
+        mpz_mul(left, square, n->denominator);
+        mpz_mul(right, n->square, denominator);
+        sign = mpz_cmp(left, right);
+        mpz_clears(left, right, NULL);
+    }
+    if (sign > 0 || (sign == 0 && feature >= n->feature))
+        return;
+    mpz_set(n->square, square);
+    mpz_set(n->denominator, denominator);
+    n->feature = feature;
+    *taken = true;
+}
+
+static void offer_edge(nearest *n, int i)
+{
+    mpz_t along, length2, square;
+    bool taken;
+    mpz_inits(along, length2, square, NULL);
+    ebpo_vectorz_dot(along, &n->corner[i], &n->edge[i]);
+    mpz_neg(along, along); /* projection of p on the edge, times its length */
+    ebpo_vectorz_dot(length2, &n->edge[i], &n->edge[i]);
+    if (mpz_sgn(along) > 0 && mpz_cmp(along, length2) < 0) {
+        ebpo_vectorz_dot(square, &n->corner[i], &n->corner[i]);
+        mpz_mul(square, square, length2);
+        mpz_submul(square, along, along);
+        distance_gmp_offer(n, false, square, length2, (ebpo_feature)(EBPO_NEAR_EDGE0 + i), &taken);
+        if (taken) {
+            for (int k = 0; k < 3; k++) {
+                mpz_mul(n->offset.x[k], n->corner[i].x[k], length2);
+                mpz_addmul(n->offset.x[k], n->edge[i].x[k], along);
+            }
+            mpz_set(n->offset_denominator, length2);
+        }
+    }
+    mpz_clears(along, length2, square, NULL);
+}
+
+static void offer_corner(nearest *n, int i)
+{
+    mpz_t one, square;
+    bool taken;
+    mpz_inits(one, square, NULL);
+    mpz_set_ui(one, 1);
+    ebpo_vectorz_dot(square, &n->corner[i], &n->corner[i]);
+    distance_gmp_offer(n, i == 0, square, one, (ebpo_feature)(EBPO_NEAR_CORNER0 + i), &taken);
+    if (taken) {
+        for (int k = 0; k < 3; k++)
+            mpz_set(n->offset.x[k], n->corner[i].x[k]);
+        mpz_set_ui(n->offset_denominator, 1);
+    }
+    mpz_clears(one, square, NULL);
+}
+
+static void distance_gmp_find(nearest *n)
+{
+    if (try_interior(n))
+        return;
+    for (int i = 0; i < 3; i++)
+        offer_corner(n, i);
+    for (int i = 0; i < 3; i++)
+        offer_edge(n, i);
+}
+
+void ebpo_triangle_nearest_gmp(const double p[3], const double triangle[3][3],
+                               ebpo_triangle_nearest *out)
+{
+    nearest n;
+    nearest_init(&n);
+    set_points(&n, p, triangle,
+               ebpo_common_unit(&triangle[0][0], 9, ebpo_common_unit(p, 3, EBPO_UNIT_OF_ZEROS)));
+    distance_gmp_find(&n);
+    out->feature = n.feature;
+    out->distance = ebpo_round_root(n.square, n.denominator, n.unit);
+    for (int k = 0; k < 3; k++) {
+        mpz_addmul(n.offset.x[k], n.p.x[k], n.offset_denominator);
+        out->point[k] = ebpo_round_quotient(n.offset.x[k], n.offset_denominator, n.unit);
+    }
+    if (n.feature <= EBPO_NEAR_CORNER2)
+        memcpy(out->point, triangle[n.feature], sizeof out->point);
+    nearest_clear(&n);
+}
+
+void ebpo_triangle_square_gmp(const double p[3], const double triangle[3][3], int unit,
+                              mpz_t square, mpz_t denominator)
+{
+    nearest n;
+    nearest_init(&n);
+    set_points(&n, p, triangle, unit);
+    distance_gmp_find(&n);
+    mpz_set(square, n.square);
+    mpz_set(denominator, n.denominator);
+    nearest_clear(&n);
+}
+
+int ebpo_triangle_distance_compare_gmp(const double p[3], const double a[3][3],
+                                       const double b[3][3])
+{
+    nearest n, m;
+    nearest_init(&n);
+    nearest_init(&m);
+    int unit =
+        ebpo_common_unit(&b[0][0], 9,
+                         ebpo_common_unit(&a[0][0], 9, ebpo_common_unit(p, 3, EBPO_UNIT_OF_ZEROS)));
+    set_points(&n, p, a, unit);
+    set_points(&m, p, b, unit);
+    distance_gmp_find(&n);
+    distance_gmp_find(&m);
+    mpz_mul(n.t, n.square, m.denominator);
+    mpz_mul(m.t, m.square, n.denominator);
+    int sign = mpz_cmp(n.t, m.t);
+    nearest_clear(&n);
+    nearest_clear(&m);
+    return (sign > 0) - (sign < 0);
+}
+
+int ebpo_triangle_distance_compare_to_gmp(const double p[3], const double triangle[3][3], double d)
+{
+    nearest n;
+    nearest_init(&n);
+    set_points(&n, p, triangle,
+               ebpo_common_unit(&triangle[0][0], 9,
+                                ebpo_common_unit(p, 3,
+                                                 ebpo_common_unit(&d, 1, EBPO_UNIT_OF_ZEROS))));
+    distance_gmp_find(&n);
+    ebpo_set_integer(n.t, d, n.unit);
+    mpz_mul(n.t, n.t, n.t);
+    mpz_mul(n.t, n.t, n.denominator);
+    int sign = mpz_cmp(n.square, n.t);
+    nearest_clear(&n);
+    return (sign > 0) - (sign < 0);
+}
+
+void ebpo_triangle_unit_normal_gmp(const double triangle[3][3], double normal[3])
+{
+    static const double origin[3];
+    nearest n;
+    nearest_init(&n);
+    set_points(&n, origin, triangle, ebpo_common_unit(&triangle[0][0], 9, EBPO_UNIT_OF_ZEROS));
+    ebpo_vectorz_dot(n.t, &n.normal, &n.normal);
+    for (int k = 0; k < 3; k++) {
+        mpz_mul(n.u, n.normal.x[k], n.normal.x[k]);
+        double size = mpz_sgn(n.t) ? ebpo_round_root(n.u, n.t, 0) : 0;
+        normal[k] = mpz_sgn(n.normal.x[k]) < 0 ? -size : size;
+    }
+    nearest_clear(&n);
+}
+
 /* Distance to a triangle, correctly rounded: double-double arithmetic while its error bound decides
  * the rounding, integers of any size otherwise. Source of the test: Ziv, "Fast evaluation of
  * elementary mathematical functions with correctly rounded last bit", 1991. */
-#include "core/strict_fp.h"
-
-#include <math.h>
-#include <string.h>
-
-#include "geometry/distance_far.h"
-#include "geometry/distance_pairs.h"
-#include "geometry/distance_parts.h"
 
 /* Beyond these, products of four coordinates or their rounding errors would leave the doubles. */
 static const double most_reach = 0x1p120, least_size = 0x1p-120;
 
-static bool ordinary(const double p[3], const double triangle[3][3])
+static bool distance_exact_ordinary(const double p[3], const double triangle[3][3])
 {
     double reach = 0, size = 0;
     for (int i = 0; i < 3; i++)
@@ -27,7 +681,7 @@ static bool ordinary(const double p[3], const double triangle[3][3])
 }
 
 /* Ziv's test. */
-static bool rounds(const ebpo_measured *m, double *distance)
+static bool distance_exact_rounds(const ebpo_measured *m, double *distance)
 {
     double error = m->error * m->distance.head;
     double least = m->distance.head + (m->distance.tail - error),
@@ -49,7 +703,7 @@ static bool corner_by_pairs(const double p[3], const double triangle[3][3],
     if (ldexp(bounds->lo, -exponent) < 0x1p-10)
         return false;
     ebpo_distance_pairs_best()->measure(q, (const double(*)[3])t, bounds->feature, NULL, &m);
-    if (!rounds(&m, &out->distance))
+    if (!distance_exact_rounds(&m, &out->distance))
         return false;
     out->distance = ldexp(out->distance, exponent);
     out->feature = bounds->feature;
@@ -66,10 +720,10 @@ static bool nearest_by_pairs(const double p[3], const double triangle[3][3],
     *known = false;
     if (bounds->feature == EBPO_NEAR_UNKNOWN || !(bounds->lo > least_size))
         return false;
-    if (!ordinary(p, triangle))
+    if (!distance_exact_ordinary(p, triangle))
         return corner_by_pairs(p, triangle, bounds, out);
     *known = ebpo_distance_pairs_best()->measure(p, triangle, bounds->feature, normal, &m);
-    if (!rounds(&m, &out->distance))
+    if (!distance_exact_rounds(&m, &out->distance))
         return false;
     out->feature = bounds->feature;
     memcpy(out->point, m.point, sizeof out->point);

@@ -7,7 +7,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hash.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 #include "levels/frontier.h"
 
 /* of a sum of three products, generously: what is hardly seen counts as seen */

@@ -6,9 +6,8 @@
 #include <ebpo/view.h>
 
 #include "format/file_nodes.h"
-#include "geometry/cell.h"
-#include "geometry/node_types.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
+#include "geometry/level_nodes.h"
 #include "levels/stream.h"
 
 /* Made ready. Lengths are in units of about the root cell's longest side (a power of two of the

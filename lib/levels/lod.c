@@ -11,10 +11,8 @@
 #include "core/parallel.h"
 #include "format/schema.h"
 #include "geometry/cells.h"
-#include "geometry/node_types.h"
-#include "geometry/octcode.h"
-#include "geometry/plane_clip.h"
-#include "geometry/rule.h"
+#include "geometry/level_nodes.h"
+#include "geometry/polytope.h"
 #include "levels/lod.h"
 
 /* Colours of a level's nodes. */

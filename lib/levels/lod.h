@@ -6,7 +6,7 @@
 #include <ebpo/lod.h>
 
 #include "construct/planes.h"
-#include "geometry/cell.h"
+#include "geometry/cells.h"
 #include "geometry/level_nodes.h"
 #include "geometry/polytope.h"
 

@@ -17,7 +17,6 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "geometry/cells.h"
-#include "geometry/octcode.h"
 
 enum { SIDES = 6, ON_PLANE = SIDES, DEEPEST = EBPO_LEVELS_MAX - 1 };
 

@@ -14,8 +14,7 @@
 #include "format/reader.h"
 #include "format/schema.h"
 #include "geometry/cells.h"
-#include "geometry/node_types.h"
-#include "geometry/octcode.h"
+#include "geometry/level_nodes.h"
 #include "levels/stream.h"
 
 /* With t the cell's shortest side and N = t n / size, the half-space is N . (p - corner) <= t d /

@@ -7,8 +7,7 @@
 #include <ebpo/file.h>
 #include <ebpo/stream.h>
 
-#include "geometry/cell.h"
-#include "geometry/envelope_stack.h"
+#include "geometry/cells.h"
 #include "geometry/polytope.h"
 
 /* The code's half-space 4096 (n . xi) <= d as out[0..2] . p <= out[3] with a unit normal (to 4

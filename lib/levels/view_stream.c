@@ -12,7 +12,7 @@
 #include "format/file_nodes.h"
 #include "format/slice.h"
 #include "format/subtree_index.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 #include "levels/frontier.h"
 
 /* The faces of leaves in a view stream. */

@@ -5,8 +5,8 @@
 
 #include <ebpo/mesh.h>
 
-#include "geometry/cell.h"
-#include "geometry/chain.h"
+#include "geometry/cells.h"
+#include "geometry/polygon.h"
 
 #define EBPO_NO_INDEX UINT32_MAX
 

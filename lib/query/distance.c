@@ -15,7 +15,6 @@
 #include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "geometry/plane_clip.h"
 #include "geometry/polytope.h"
 #include "levels/lod.h"
 #include "query/load_ahead.h"

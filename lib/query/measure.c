@@ -21,7 +21,7 @@
 #include "core/parallel.h"
 #include "format/reader.h"
 #include "geometry/double_double.h"
-#include "geometry/rule.h"
+#include "geometry/level_nodes.h"
 #include "mesh/mesh_parts.h"
 
 enum { BLOCK_FACES = 16384 };

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 
 static int compare_u64(uint64_t a, uint64_t b) { return (a > b) - (a < b); }
 

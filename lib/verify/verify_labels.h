@@ -4,7 +4,7 @@
 
 #include <ebpo/mesh.h>
 
-#include "geometry/cell.h"
+#include "geometry/cells.h"
 #include "verify/tally.h"
 #include "verify/verify_geometry.h"
 #include "verify/verify_tree.h"

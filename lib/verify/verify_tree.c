@@ -8,7 +8,7 @@
 #include "core/wide.h"
 #include "core/workspace.h"
 #include "format/schema.h"
-#include "geometry/plane_code.h"
+#include "geometry/polytope.h"
 #include "mesh/mesh_parts.h"
 #include "verify/verify_tree.h"
 

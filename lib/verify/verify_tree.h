@@ -5,8 +5,7 @@
 
 #include <ebpo/file.h>
 
-#include "geometry/cell.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 #include "verify/tally.h"
 
 /* How many of each thing come before a group of siblings in its level. */

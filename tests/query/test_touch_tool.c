@@ -6,7 +6,7 @@
 
 #include "check_main.h"
 #include "query_kit.h"
-#include "extras/haptic/tool_hold.h"
+#include "extras/haptic/tool.h"
 #include "touch_watch.h"
 
 enum { POINTS = 40 };

@@ -17,7 +17,7 @@
 #include "core/strict_fp.h"
 #include "levels/lod.h"
 #include "mesh/mesh_parts.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 #include "random_tree.h"
 #include "read_by.h"
 #include "scratch.h"

@@ -4,8 +4,7 @@
 #include <stdlib.h>
 
 #include "check_main.h"
-#include "geometry/plane_clip.h"
-#include "geometry/plane_code.h"
+#include "geometry/polytope.h"
 #include "construct/octants.h"
 #include "construct/planes.h"
 #include "solids.h"

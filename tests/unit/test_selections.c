@@ -13,7 +13,7 @@
 
 #include "core/workspace.h"
 #include "check_main.h"
-#include "geometry/plane_code.h"
+#include "geometry/polytope.h"
 #include "construct/leaf_planes.h"
 #include "construct/planes.h"
 #include "scratch.h"

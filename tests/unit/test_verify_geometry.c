@@ -5,7 +5,7 @@
 
 #include "core/workspace.h"
 #include "check_main.h"
-#include "geometry/plane_code.h"
+#include "geometry/polytope.h"
 #include "geometry/predicates.h"
 #include "solids.h"
 #include "verify/verify_geometry.h"

@@ -1,8 +1,7 @@
 #include "core/strict_fp.h"
 
-#include "extras/boolean/boolean.h"
-
 #include <inttypes.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -10,9 +9,248 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
+#include "extras/boolean/boolean.h"
+#include "geometry/level_nodes.h"
 #include "geometry/predicates.h"
-#include "geometry/rule.h"
 #include "query/query_model.h"
+#include "query/query_node.h"
+
+static ebpo_status check_node(const ebpo_boolean_node *node, uint32_t number, uint32_t operands,
+                              ebpo_error *error)
+{
+    bool operand = node->operation == EBPO_BOOLEAN_OPERAND;
+    if (node->operation < 0 || node->operation > EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "node %" PRIu32 " of the expression: there is no operation %" PRId32,
+                         number, node->operation);
+    if (operand && node->left >= operands)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "node %" PRIu32 " of the expression: left is %" PRIu32
+                         ", but operands are numbered from 0 and there are %" PRIu32,
+                         number, node->left, operands);
+    if (!operand && (node->left >= number || node->right >= number))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "node %" PRIu32 " of the expression names node %" PRIu32
+                         ", which does not stand before it",
+                         number, node->left >= number ? node->left : node->right);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_expression_make(ebpo_expression *out, const ebpo_boolean_node *nodes,
+                                 uint32_t count, uint32_t operands, ebpo_error *error)
+{
+    if (count == 0 || count > EBPO_BOOLEAN_NODES_MAX)
+        return ebpo_fail(error, EBPO_E_LIMIT, "an expression of %" PRIu32 " nodes; give 1 to %d",
+                         count, EBPO_BOOLEAN_NODES_MAX);
+    ebpo_status status = EBPO_OK;
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
+        status = check_node(&nodes[i], i, operands, error);
+    if (status != EBPO_OK)
+        return status;
+    memcpy(out->node, nodes, count * sizeof *nodes);
+    out->count = count;
+    return EBPO_OK;
+}
+
+static unsigned expression_opposite(unsigned may)
+{
+    return (may & EBPO_MAY_IN ? EBPO_MAY_OUT : 0u) | (may & EBPO_MAY_OUT ? EBPO_MAY_IN : 0u);
+}
+
+/* In both: possible if it is in both; not in both: possible if it is not in either. */
+static unsigned expression_both(unsigned a, unsigned b)
+{
+    return (a & b & EBPO_MAY_IN) | ((a | b) & EBPO_MAY_OUT);
+}
+
+static unsigned expression_combine(int32_t operation, unsigned a, unsigned b)
+{
+    switch (operation) {
+    case EBPO_BOOLEAN_UNION:
+        return expression_opposite(expression_both(expression_opposite(a), expression_opposite(b)));
+    case EBPO_BOOLEAN_INTERSECTION: return expression_both(a, b);
+    case EBPO_BOOLEAN_DIFFERENCE: return expression_both(a, expression_opposite(b));
+    default: break;
+    }
+    if (a == EBPO_MAY_BOTH || b == EBPO_MAY_BOTH)
+        return EBPO_MAY_BOTH;
+    return a != b ? EBPO_MAY_IN : EBPO_MAY_OUT;
+}
+
+unsigned ebpo_expression_value(const ebpo_expression *e, uint64_t known, uint64_t in)
+{
+    uint8_t may[EBPO_BOOLEAN_NODES_MAX];
+    for (uint32_t i = 0; i < e->count; i++) {
+        const ebpo_boolean_node *n = &e->node[i];
+        if (n->operation != EBPO_BOOLEAN_OPERAND)
+            may[i] = (uint8_t)expression_combine(n->operation, may[n->left], may[n->right]);
+        else
+            may[i] = !(known >> n->left & 1) ? EBPO_MAY_BOTH
+                     : in >> n->left & 1     ? EBPO_MAY_IN
+                                             : EBPO_MAY_OUT;
+    }
+    return may[e->count - 1];
+}
+
+uint64_t ebpo_expression_operands(const ebpo_expression *e)
+{
+    bool used[EBPO_BOOLEAN_NODES_MAX] = { false };
+    uint64_t operands = 0;
+    used[e->count - 1] = true;
+    for (uint32_t i = e->count; i-- > 0;) {
+        const ebpo_boolean_node *n = &e->node[i];
+        if (used[i] && n->operation == EBPO_BOOLEAN_OPERAND)
+            operands |= UINT64_C(1) << n->left;
+        else if (used[i])
+            used[n->left] = used[n->right] = true;
+    }
+    return operands;
+}
+
+static void combine_boxes(int32_t operation, const double a[6], const double b[6], double out[6])
+{
+    bool smaller = operation == EBPO_BOOLEAN_INTERSECTION;
+    if (operation == EBPO_BOOLEAN_DIFFERENCE)
+        memcpy(out, a, 6 * sizeof *out);
+    for (int k = 0; k < 3 && operation != EBPO_BOOLEAN_DIFFERENCE; k++) {
+        out[k] = smaller ? fmax(a[k], b[k]) : fmin(a[k], b[k]);
+        out[3 + k] = smaller ? fmin(a[3 + k], b[3 + k]) : fmax(a[3 + k], b[3 + k]);
+    }
+    if (out[0] > out[3] || out[1] > out[4] || out[2] > out[5])
+        for (int k = 0; k < 3; k++) { /* so that a union takes no part of what is empty */
+            out[k] = INFINITY;
+            out[3 + k] = -INFINITY;
+        }
+}
+
+void ebpo_expression_box(const ebpo_expression *e, const double (*box)[6], double out[6])
+{
+    double of[EBPO_BOOLEAN_NODES_MAX][6];
+    for (uint32_t i = 0; i < e->count; i++) {
+        const ebpo_boolean_node *n = &e->node[i];
+        if (n->operation == EBPO_BOOLEAN_OPERAND)
+            memcpy(of[i], box[n->left], sizeof of[i]);
+        else
+            combine_boxes(n->operation, (const double *)of[n->left], (const double *)of[n->right],
+                          of[i]);
+    }
+    memcpy(out, of[e->count - 1], sizeof of[0]);
+}
+
+/* The cube's ball is brought into the model. If its tree's white and black nodes do not decide, the
+ * nearest face does. */
+
+enum {
+    SEEN_FACES = 4, /* beside EBPO_MAY_IN and EBPO_MAY_OUT: perhaps faces */
+    NODES_MOST = 64 /* looked at for a black and a white one once faces are seen */
+};
+
+typedef struct ball {
+    const ebpo_model *model;
+    ebpo_box box;
+    const double *p;
+    double square; /* of its radius */
+    unsigned seen; /* perhaps in the ball */
+    unsigned sure; /* of EBPO_MAY_IN and EBPO_MAY_OUT: certainly in it */
+    unsigned nodes;
+} ball;
+
+/* Squared distance of the cell, right to 2^-50 of itself while it is not almost 0. */
+static double square_to(const ball *b, ebpo_cell cell)
+{
+    double low[3], high[3], sum = 0;
+    ebpo_cell_bounds(&b->box, cell, low, high);
+    for (int k = 0; k < 3; k++) {
+        double d = fmax(fmax(low[k] - b->p[k], b->p[k] - high[k]), 0);
+        sum += d * d;
+    }
+    return sum;
+}
+
+static void solid_in_cube_look(ball *b, const ebpo_node *node)
+{
+    bool enough = b->sure == EBPO_MAY_BOTH || (b->seen & SEEN_FACES && ++b->nodes > NODES_MOST);
+    double square = enough ? 0 : square_to(b, node->cell);
+    if (enough || square * (1 - 0x1p-48) > b->square + 0x1p-1000)
+        return;
+    if (ebpo_node_is_uniform(node)) {
+        unsigned kind = node->type == EBPO_BLACK ? EBPO_MAY_IN : EBPO_MAY_OUT;
+        b->seen |= kind;
+        if (square < b->square * (1 - 0x1p-48) && b->square > 0x1p-900)
+            b->sure |= kind;
+    } else if (node->type != EBPO_GRAY || node->pruned || ebpo_node_is_below(node)) {
+        b->seen |= SEEN_FACES;
+    } else {
+        for (unsigned octant = 0; octant < 8; octant++) {
+            ebpo_node child = ebpo_model_child(b->model, node, octant);
+            solid_in_cube_look(b, &child);
+        }
+    }
+}
+
+/* EBPO_MAY_IN or EBPO_MAY_OUT: no face is in the ball. EBPO_MAY_BOTH: one is. 0: not known. What is
+ * said is what the faces would say, so that nothing depends on what is in memory. */
+static unsigned decide_by_nodes(const ebpo_model *model, const double p[3], double radius)
+{
+    ball b = { .model = model,
+               .box = ebpo_model_box(model),
+               .p = p,
+
+               .square = radius * radius };
+    double low[3], high[3];
+    ebpo_node root = ebpo_model_root(model);
+    ebpo_cell_bounds(&b.box, root.cell, low, high);
+    for (int k = 0; k < 3; k++) { /* beyond the root cell all is out */
+        double beyond = radius - fmin(p[k] - low[k], high[k] - p[k]);
+        if (!(beyond < -0x1p-48 * radius))
+            b.seen |= EBPO_MAY_OUT;
+        if (beyond > 0x1p-48 * radius)
+            b.sure |= EBPO_MAY_OUT;
+    }
+    solid_in_cube_look(&b, &root);
+    if (b.sure == EBPO_MAY_BOTH) /* between a black and a white point there is a face */
+        return EBPO_MAY_BOTH;
+    return b.seen == EBPO_MAY_IN || b.seen == EBPO_MAY_OUT ? b.seen : 0;
+}
+
+/* What the faces say of the ball. */
+static ebpo_status look_at_faces(ebpo_context *context, const double p[3], double radius,
+                                 unsigned *may, ebpo_error *error)
+{
+    ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
+    ebpo_distance_result nearest;
+    ebpo_inside_result inside;
+    o.max_distance = radius;
+    o.unsigned_distance = true;
+    *may = EBPO_MAY_BOTH;
+    ebpo_status status = ebpo_distance(context, p, &o, &nearest, error);
+    if (status != EBPO_OK || nearest.distance < INFINITY)
+        return status;
+    status = ebpo_inside(context, p, NULL, &inside, error);
+    if (status == EBPO_OK && inside.where != EBPO_ON)
+        *may = inside.where == EBPO_IN ? EBPO_MAY_IN : EBPO_MAY_OUT;
+    return status;
+}
+
+ebpo_status ebpo_solid_in_cube(const ebpo_posed_solid *s, ebpo_context *context,
+                               const double centre[3], double half, unsigned *may, unsigned *way,
+                               ebpo_error *error)
+{
+    double p[3], doubt;
+    *way = EBPO_CUBE_BY_BOX;
+    *may = EBPO_MAY_OUT;
+    if (!ebpo_posed_solid_near(s, centre, half))
+        return EBPO_OK;
+    ebpo_unpose(s, centre, p, &doubt);
+    /* 1.7321 is more than the root of 3 */
+    double radius = 1.7321 * half / s->posing.scale * (1 + 0x1p-40) + doubt;
+    *may = decide_by_nodes(s->model, p, radius);
+    *way = EBPO_CUBE_BY_NODES;
+    if (*may)
+        return EBPO_OK;
+    *way = EBPO_CUBE_BY_FACES;
+    return look_at_faces(context, p, radius, may, error);
+}
 
 /* --- making --- */
 
@@ -48,7 +286,8 @@ static ebpo_status make_contexts(ebpo_boolean *b, ebpo_error *error)
     return status;
 }
 
-static ebpo_status fill(ebpo_boolean *b, const ebpo_boolean_operand *operands, ebpo_error *error)
+static ebpo_status boolean_fill(ebpo_boolean *b, const ebpo_boolean_operand *operands,
+                                ebpo_error *error)
 {
     b->solid = ebpo_alloc_zero(b->count, sizeof *b->solid);
     b->pose = ebpo_alloc_zero(b->count, sizeof *b->pose);
@@ -80,7 +319,7 @@ ebpo_status ebpo_boolean_new(const ebpo_boolean_operand *operands, uint32_t oper
     b->threads = ebpo_thread_count(wanted.threads);
     status = ebpo_expression_make(&b->expression, nodes, node_count, operand_count, error);
     if (status == EBPO_OK)
-        status = fill(b, operands, error);
+        status = boolean_fill(b, operands, error);
     if (status == EBPO_OK)
         *out = b;
     else
@@ -139,8 +378,8 @@ static void add_opinion(opinion *o, uint32_t i, ebpo_rule rule, const ebpo_posed
     o->on = true;
 }
 
-static void conclude(const ebpo_boolean *b, const opinion *o, unsigned may,
-                     ebpo_boolean_result *out)
+static void boolean_conclude(const ebpo_boolean *b, const opinion *o, unsigned may,
+                             ebpo_boolean_result *out)
 {
     if (may == EBPO_MAY_BOTH && o->flat) {
         uint64_t all = ~UINT64_C(0);
@@ -165,7 +404,7 @@ ebpo_status ebpo_boolean_ask(const ebpo_boolean *b, unsigned worker, const doubl
         add_opinion(&o, i, b->solid[i].model->info->rule, &sides);
         may = ebpo_expression_value(&b->expression, o.known, o.above);
     }
-    conclude(b, &o, may, out);
+    boolean_conclude(b, &o, may, out);
     return EBPO_OK;
 }
 

@@ -1,23 +1,44 @@
-/* In-cells and mixed cells of a result. */
+/* Cells of an octree of the world, with what is known of them. */
 #ifndef EBPO_BOOLEAN_BOOLEAN_CELLS_H
 #define EBPO_BOOLEAN_BOOLEAN_CELLS_H
 
-#include "extras/boolean/world_cell.h"
-#include "geometry/octcode.h"
+#include "extras/boolean/boolean.h"
+#include "geometry/cells.h"
 
-/* An in-cell, as octcodes of the finest level. */
-typedef struct ebpo_in_run {
-    ebpo_octcode first;
-    uint64_t count;
-} ebpo_in_run;
+/* The root: corners and centres of cells down to `level` are exact. */
+typedef struct ebpo_world {
+    double origin[3], edge; /* a power of two; 0: nothing is there */
+    int level;
+} ebpo_world;
 
-struct ebpo_boolean_cells {
-    ebpo_world world;
-    ebpo_in_run *in; /* ascending */
-    uint64_t in_count, in_capacity;
-    ebpo_octcode *mixed; /* of the finest level, ascending */
-    uint64_t mixed_count, mixed_capacity;
-    uint64_t ways[EBPO_CUBE_WAYS];
-};
+/* Around the result. EBPO_E_LIMIT: corners would be no doubles. */
+EBPO_MUST_USE ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level,
+                                          ebpo_error *error);
+
+typedef struct ebpo_world_cell {
+    ebpo_cell cell;
+    uint64_t known, in; /* operands, as ebpo_expression_value takes them */
+} ebpo_world_cell;
+
+static inline double ebpo_world_edge(const ebpo_world *w, int level)
+{
+    return w->edge * ebpo_half_power(level);
+}
+
+static inline double ebpo_world_wall(const ebpo_world *w, int axis, int level, uint32_t k)
+{
+    return w->origin[axis] + (double)k * ebpo_world_edge(w, level);
+}
+
+static inline ebpo_world_cell ebpo_world_child(const ebpo_world_cell *c, unsigned octant)
+{
+    return (ebpo_world_cell){ ebpo_cell_child(c->cell, octant), c->known, c->in };
+}
+
+/* Asks the operands that the cell does not know of yet, until the expression is decided: *may. Adds
+ * to ways[EBPO_CUBE_WAYS]. */
+EBPO_MUST_USE ebpo_status ebpo_world_cell_ask(const ebpo_boolean *b, unsigned worker,
+                                              const ebpo_world *w, ebpo_world_cell *c,
+                                              unsigned *may, uint8_t *ways, ebpo_error *error);
 
 #endif

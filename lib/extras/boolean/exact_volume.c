@@ -1,8 +1,6 @@
-/* Where no face of an operand meets one of another, each patch of faces is in or out of every other
- * operand as a whole. So it bounds the result, from within or from without, or it does not; signed
- * volumes below those that do add up. Proof: docs/develop/booleans.md, "Exact volumes". */
 #include "core/strict_fp.h"
 
+#include <gmp.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,14 +10,139 @@
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "extras/boolean/boolean.h"
-#include "extras/boolean/volume_sum.h"
 #include "extras/collide/collider.h"
-#include "extras/collide/edge_patches.h"
-#include "extras/collide/exact_winding.h"
-#include "extras/collide/face_slots.h"
-#include "extras/collide/posed_model.h"
+#include "extras/collide/contacts.h"
+#include "extras/collide/posed_solid.h"
+#include "extras/collide/unmet_patches.h"
+#include "geometry/expansion.h"
+#include "geometry/integer_vectors.h"
+#include "geometry/level_nodes.h"
 #include "geometry/predicates.h"
-#include "geometry/rule.h"
+#include "mesh/sum.h"
+
+/* Signed volumes below faces, summed without rounding: of a closed surface that looks outward they
+ * are the volume within. One thread each; sums of several threads are merged. */
+
+/* Six times the volumes of tetrahedra from the origin. */
+typedef struct ebpo_volume_sum {
+    ebpo_sum usual; /* of faces whose products doubles can hold */
+    mpz_t other;    /* of all others, in units of 2^EBPO_VOLUME_UNIT */
+} ebpo_volume_sum;
+
+/* Of products of three doubles; of each all 53 bits count, also of the least one, 2^-1074. */
+enum { EBPO_VOLUME_UNIT = -3 * (1074 + 52) };
+
+static void ebpo_volume_sum_begin(ebpo_volume_sum *s)
+{
+    s->usual = (ebpo_sum){ 0 };
+    mpz_init(s->other);
+}
+
+static void ebpo_volume_sum_end(ebpo_volume_sum *s) { mpz_clear(s->other); }
+
+/* Products of three such numbers, and what rounding leaves of them, are doubles: their lowest bit
+ * is 3 (250 + 52) below 1 at most. */
+static bool is_usual(const double t[3][3])
+{
+    bool usual = true;
+    for (int i = 0; i < 9; i++) {
+        double x = fabs(t[i / 3][i % 3]);
+        usual &= x == 0 || (x >= 0x1p-250 && x <= 0x1p250);
+    }
+    return usual;
+}
+
+/* x y z, exactly. */
+static void add_product(ebpo_sum *s, double x, double y, double z)
+{
+    double product[2], all[4];
+    int n = ebpo_expansion_of_pair(product, ebpo_two_product(x, y));
+    n = ebpo_expansion_scale(all, product, n, z);
+    for (int i = 0; i < n; i++)
+        ebpo_sum_add(s, all[i]);
+}
+
+static void add_usual(ebpo_sum *s, const double t[3][3], int times)
+{
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        add_product(s, times * t[0][k], t[1][u], t[2][v]);
+        add_product(s, -times * t[0][k], t[1][v], t[2][u]);
+    }
+}
+
+static void add_other(mpz_t sum, const double t[3][3], int times)
+{
+    ebpo_vectorz corner[3], cross;
+    mpz_t volume;
+    mpz_init(volume);
+    ebpo_vectorz_init(&cross);
+    for (int i = 0; i < 3; i++) {
+        ebpo_vectorz_init(&corner[i]);
+        for (int k = 0; k < 3; k++)
+            ebpo_set_integer(corner[i].x[k], t[i][k], EBPO_VOLUME_UNIT / 3);
+    }
+    ebpo_vectorz_cross(&cross, &corner[1], &corner[2]);
+    ebpo_vectorz_dot(volume, &corner[0], &cross);
+    mpz_mul_si(volume, volume, times);
+    mpz_add(sum, sum, volume);
+    for (int i = 0; i < 3; i++)
+        ebpo_vectorz_clear(&corner[i]);
+    ebpo_vectorz_clear(&cross);
+    mpz_clear(volume);
+}
+
+/* Of the face t, counter-clockwise seen from outside; times: 1 or -1. Corners are finite. */
+static void ebpo_volume_sum_add(ebpo_volume_sum *s, const double t[3][3], int times)
+{
+    if (is_usual(t))
+        add_usual(&s->usual, t, times);
+    else
+        add_other(s->other, t, times);
+}
+
+static void ebpo_volume_sum_merge(ebpo_volume_sum *s, const ebpo_volume_sum *more)
+{
+    ebpo_sum_merge(&s->usual, &more->usual);
+    mpz_add(s->other, s->other, more->other);
+}
+
+/* In units of 2^-1074, as limbs have it. */
+static void to_integer(mpz_t out, const ebpo_sum *sum)
+{
+    ebpo_sum s = *sum;
+    ebpo_sum_carry(&s);
+    mpz_set_si(out, 0);
+    for (int i = EBPO_SUM_LIMBS - 1; i >= 0; i--) {
+        mpz_mul_2exp(out, out, 32);
+        if (s.limb[i] < 0)
+            mpz_sub_ui(out, out, (unsigned long)-s.limb[i]);
+        else
+            mpz_add_ui(out, out, (unsigned long)s.limb[i]);
+    }
+}
+
+/* Returns the double nearest to the volume, ties to even; infinite beyond doubles. In *scaled and
+ * *exponent the volume in units of 2^exponent, in which it is about 1, rounded likewise. */
+static double ebpo_volume_sum_value(const ebpo_volume_sum *s, double *scaled, int64_t *exponent)
+{
+    mpz_t all, six;
+    mpz_init(all);
+    mpz_init_set_ui(six, 6);
+    to_integer(all, &s->usual);
+    mpz_mul_2exp(all, all, -1074 - EBPO_VOLUME_UNIT);
+    mpz_add(all, all, s->other);
+    double value = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
+    int bits = mpz_sgn(all) ? (int)mpz_sizeinbase(all, 2) : -EBPO_VOLUME_UNIT;
+    *scaled = ebpo_round_quotient(all, six, -bits);
+    *exponent = EBPO_VOLUME_UNIT + bits;
+    mpz_clears(all, six, NULL);
+    return value;
+}
+
+/* Where no face of an operand meets one of another, each patch of faces is in or out of every other
+ * operand as a whole. So it bounds the result, from within or from without, or it does not; signed
+ * volumes below those that do add up. Proof: docs/develop/booleans.md, "Exact volumes". */
 
 static const char stage[] = "exact volume";
 
@@ -74,7 +197,7 @@ static void bound_by_box(measuring *m)
     m->out->volume = ebpo_certain_of(0, most);
 }
 
-static void doubt(measuring *m, ebpo_volume_doubt why, uint32_t i, uint32_t k)
+static void exact_volume_doubt(measuring *m, ebpo_volume_doubt why, uint32_t i, uint32_t k)
 {
     m->out->doubt = why;
     m->out->operand[0] = i;
@@ -86,9 +209,9 @@ static void check_models(measuring *m)
     for (uint32_t i = 0; i < m->b->count && !m->out->doubt; i++) {
         const ebpo_model *model = m->b->solid[i].model;
         if (is_asked(m, i) && model->info->pruned)
-            doubt(m, EBPO_VOLUME_SUBSET, i, i);
+            exact_volume_doubt(m, EBPO_VOLUME_SUBSET, i, i);
         else if (is_asked(m, i) && !model->whole)
-            doubt(m, EBPO_VOLUME_IN_PARTS, i, i);
+            exact_volume_doubt(m, EBPO_VOLUME_IN_PARTS, i, i);
     }
 }
 
@@ -136,7 +259,7 @@ static ebpo_status check_pair(measuring *m, uint32_t i, uint32_t k, ebpo_error *
         return status;
     status = ebpo_collide_first(collider, &options, &pair, &found, error);
     if (status == EBPO_OK && found) {
-        doubt(m, EBPO_VOLUME_OPERANDS_MEET, i, k);
+        exact_volume_doubt(m, EBPO_VOLUME_OPERANDS_MEET, i, k);
         name_faces(m->out, &pair);
     }
     ebpo_collider_free(collider);
@@ -183,7 +306,7 @@ static bool take_self(void *user, const ebpo_face_pair *pairs, uint64_t count)
     for (uint64_t i = 0; i < count && !o->m->out->doubt; i++) {
         if (!has_area(o, pairs[i].file_face_a) || !has_area(o, pairs[i].file_face_b))
             continue; /* bounds nothing */
-        doubt(o->m, EBPO_VOLUME_FACES_MEET, o->number, o->number);
+        exact_volume_doubt(o->m, EBPO_VOLUME_FACES_MEET, o->number, o->number);
         name_faces(o->m->out, &pairs[i]);
     }
     return !o->m->out->doubt;

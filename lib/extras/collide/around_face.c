@@ -8,10 +8,10 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "extras/collide/exact_winding.h"
+#include "extras/collide/posed_solid.h"
 #include "geometry/min_max.h"
 #include "geometry/predicates.h"
-#include "geometry/rule.h"
+#include "geometry/level_nodes.h"
 
 ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places, ebpo_error *error)
 {

@@ -4,7 +4,7 @@
 
 #include "extras/collide/contacts.h"
 #include "extras/collide/face_pieces.h"
-#include "extras/collide/posed_sides.h"
+#include "extras/collide/posed_solid.h"
 
 /* Both models of a question, in its order. */
 typedef struct ebpo_two_models {

@@ -1,10 +1,72 @@
-/* All pairs, in one order. */
+/* The first contact. */
 #include "core/strict_fp.h"
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "extras/collide/gather_parts.h"
+#include "core/parallel.h"
 #include "extras/collide/gathering.h"
+#include "extras/collide/subtree_pairs.h"
+
+/* -1: late. */
+static ebpo_status first_search(const ebpo_collision *q, ebpo_pair_walk *w, const char *stage,
+                                int32_t *found, ebpo_error *error)
+{
+    if (!w->kernels->start(w))
+        return ebpo_fail_memory(error, w->capacity * sizeof *w->stack);
+    while (w->top > 0) {
+        if (!w->kernels->run(w, EBPO_WALK_PAIRS))
+            return ebpo_fail_memory(error, w->capacity * sizeof *w->stack);
+        if (w->top > 0 && ebpo_collision_is_late(q)) {
+            *found = -1;
+            return EBPO_OK;
+        }
+        if (!ebpo_progress_step(&q->options.progress, stage, 0, 0, error))
+            return EBPO_E_CANCELLED;
+    }
+    *found = w->met_count > 0;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_collision_first(const ebpo_collision *q, const ebpo_accel *const accel[2],
+                                 const char *stage, int32_t *found, ebpo_error *error)
+{
+    ebpo_pair_walk *w = &q->collider->walk;
+    ebpo_accel_pair pair;
+    const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
+    *found = 0;
+    if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
+        return EBPO_OK;
+    ebpo_accel_pair_make(&pair, accel, posing, q->reach);
+    if (pair.apart)
+        return EBPO_OK;
+    ebpo_pair_walk_begin(w, &pair);
+    w->first = true;
+    w->self = false;
+    ebpo_status status = first_search(q, w, stage, found, error);
+    ebpo_collider_count(q->collider, w);
+    return status;
+}
+
+ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *options,
+                               ebpo_face_pair *out, int32_t *found, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_collision q;
+    *out = (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE, 0, 0 };
+    *found = 0;
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    if (status == EBPO_OK && ebpo_collision_is_in_parts(&q))
+        return ebpo_first_of_parts(&q, out, found, error);
+    if (status != EBPO_OK)
+        return status;
+    const ebpo_accel *accel[2] = { q.model[0]->whole, q.model[1]->whole };
+    status = ebpo_collision_first(&q, accel, "first contact", found, error);
+    if (status == EBPO_OK && *found == 1)
+        *out = ebpo_collision_pair(&q, q.model[0]->whole, q.model[1]->whole, &c->walk.met[0]);
+    return status;
+}
+
+/* All pairs, in one order. */
 
 /* Pairs as they are handed out. */
 typedef struct giving {
@@ -17,7 +79,7 @@ typedef struct giving {
 
 enum { GIVEN_AT_ONCE = 1024 };
 
-static void give(giving *v, const ebpo_met_pair *met, uint64_t count)
+static void all_give(giving *v, const ebpo_met_pair *met, uint64_t count)
 {
     ebpo_face_pair out[GIVEN_AT_ONCE];
     for (uint64_t at = 0; at < count && !v->enough; at += GIVEN_AT_ONCE) {
@@ -46,7 +108,7 @@ static ebpo_status in_runs(giving *v, ebpo_gathering *g, ebpo_error *error)
             run = run / 2;
             continue;
         }
-        give(v, g->met, g->met_count);
+        all_give(v, g->met, g->met_count);
         begin = end;
         run = run < faces / 2 ? 2 * run : faces;
     }

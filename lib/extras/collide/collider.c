@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "extras/collide/gap_search.h"
-#include "extras/collide/posed_model.h"
+#include "extras/collide/posed_solid.h"
 #include "query/query_model.h"
 
 /* What was left out of a subset might meet as well. */

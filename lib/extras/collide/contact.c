@@ -9,7 +9,6 @@
 
 #include "geometry/double_double.h"
 #include "geometry/integer_vectors.h"
-#include "geometry/corner_order.h"
 #include "geometry/triangle_pair.h"
 
 /* An edge from below to above a plane, both in the order of coordinates. */

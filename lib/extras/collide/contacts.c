@@ -1,14 +1,91 @@
-/* Contact segments of all crossing pairs, in the order of pairs. */
 #include "core/strict_fp.h"
-
-#include "extras/collide/contacts.h"
 
 #include <string.h>
 
+#include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "extras/collide/face_slots.h"
 #include "extras/collide/contact.h"
+#include "extras/collide/contacts.h"
+
+uint32_t *ebpo_face_slots(const ebpo_accel *subtree)
+{
+    uint32_t *slot = ebpo_alloc(subtree->face_count, sizeof *slot);
+    if (!slot)
+        return NULL;
+    for (uint32_t n = 0; n < subtree->bound_count; n++)
+        for (unsigned i = 0; i < subtree->bound[n].count; i++) {
+            uint32_t block = subtree->bound[n].child[i];
+            if (block == EBPO_NO_CHILD || !(block & EBPO_IS_BLOCK))
+                continue;
+            block &= ~EBPO_IS_BLOCK;
+            const ebpo_meshlet *m = ebpo_accel_meshlet(subtree, block);
+            for (uint32_t lane = 0; lane < m->faces; lane++)
+                slot[m->face + lane] = block * EBPO_BLOCK + lane;
+        }
+    return slot;
+}
+
+void ebpo_faces_by_number_begin(ebpo_faces_by_number *f, const ebpo_model *model,
+                                const uint32_t *slots)
+{
+    *f = (ebpo_faces_by_number){ .model = model, .slots = slots };
+    if (model->whole)
+        return;
+    f->faces.array = ebpo_reader_array(model->file, EBPO_A_FACES, 0);
+    f->vertices.array = ebpo_reader_array(model->file, EBPO_A_VERTICES, 0);
+}
+
+void ebpo_faces_by_number_end(ebpo_faces_by_number *f)
+{
+    if (!f->model || f->model->whole)
+        return;
+    ebpo_held_chunk_release(f->model->chunks, &f->faces);
+    ebpo_held_chunk_release(f->model->chunks, &f->vertices);
+}
+
+ebpo_status ebpo_faces_by_number_vertex(ebpo_faces_by_number *f, uint64_t vertex, double out[3],
+                                        ebpo_error *error)
+{
+    ebpo_status status = ebpo_held_chunk_move(f->model->chunks, &f->vertices, vertex, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t row = vertex - f->vertices.begin;
+    if (f->model->info->double_coordinates) {
+        memcpy(out, f->vertices.rows + row * 3 * sizeof(double), 3 * sizeof(double));
+        return EBPO_OK;
+    }
+    float x[3];
+    memcpy(x, f->vertices.rows + row * sizeof x, sizeof x);
+    for (int k = 0; k < 3; k++)
+        out[k] = (double)x[k];
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_faces_by_number_corners(ebpo_faces_by_number *f, uint64_t face, uint32_t out[3],
+                                         ebpo_error *error)
+{
+    ebpo_status status = ebpo_held_chunk_move(f->model->chunks, &f->faces, face, error);
+    if (status == EBPO_OK)
+        memcpy(out, f->faces.rows + (face - f->faces.begin) * 3 * sizeof *out, 3 * sizeof *out);
+    return status;
+}
+
+ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face, double out[3][3],
+                                     ebpo_error *error)
+{
+    uint32_t corner[3];
+    if (f->model->whole) {
+        ebpo_accel_triangle(f->model->whole, f->slots[face], out);
+        return EBPO_OK;
+    }
+    ebpo_status status = ebpo_faces_by_number_corners(f, face, corner, error);
+    for (int i = 0; i < 3 && status == EBPO_OK; i++)
+        status = ebpo_faces_by_number_vertex(f, corner[i], out[i], error);
+    return status;
+}
+
+/* Contact segments of all crossing pairs, in the order of pairs. */
 
 ebpo_status ebpo_collider_slots(ebpo_collider *c, ebpo_error *error)
 {
@@ -78,7 +155,7 @@ typedef struct telling {
     ebpo_status status;
 } telling;
 
-static bool tell(void *user, const ebpo_face_pair *pairs, uint64_t count)
+static bool contacts_tell(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     telling *t = user;
     ebpo_contact_segment out[SEGMENTS_AT_ONCE];
@@ -110,7 +187,7 @@ ebpo_status ebpo_collide_contacts(ebpo_collider *c, const ebpo_collide_options *
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&t.faces, &q, error);
     if (status == EBPO_OK)
-        status = ebpo_collide_all(c, options, tell, &t, error);
+        status = ebpo_collide_all(c, options, contacts_tell, &t, error);
     ebpo_pair_faces_end(&t.faces);
     return status == EBPO_OK ? t.status : status;
 }

@@ -1,9 +1,38 @@
-/* Where crossing faces meet, as callers are told. */
+/* Where the faces of a subtree, or of a whole model, are in its blocks. Any thread. */
 #ifndef EBPO_COLLIDE_CONTACTS_H
 #define EBPO_COLLIDE_CONTACTS_H
 
 #include "extras/collide/collider.h"
-#include "extras/collide/faces_by_number.h"
+#include "query/accel.h"
+#include "query/query_model.h"
+
+/* Slots by local numbers, which in a whole model are those in the file. NULL: no memory. The caller
+ * frees it. */
+uint32_t *ebpo_face_slots(const ebpo_accel *subtree);
+
+/* Corners of single faces by their numbers in the file: of a whole model from its blocks, of one in
+ * parts through its cache of chunks. One thread. */
+
+typedef struct ebpo_faces_by_number {
+    const ebpo_model *model;
+    const uint32_t *slots;           /* of a whole model: face_slots.h; else NULL */
+    ebpo_held_chunk faces, vertices; /* where the last ones were */
+} ebpo_faces_by_number;
+
+void ebpo_faces_by_number_begin(ebpo_faces_by_number *f, const ebpo_model *model,
+                                const uint32_t *slots);
+/* As in the file, exactly. The errors of reading. */
+EBPO_MUST_USE ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face,
+                                                   double out[3][3], ebpo_error *error);
+/* Of a model in parts: a face's vertices, and a vertex, as in the file. */
+EBPO_MUST_USE ebpo_status ebpo_faces_by_number_corners(ebpo_faces_by_number *f, uint64_t face,
+                                                       uint32_t out[3], ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_faces_by_number_vertex(ebpo_faces_by_number *f, uint64_t vertex,
+                                                      double out[3], ebpo_error *error);
+/* Lets go of what it holds; zero is fine. */
+void ebpo_faces_by_number_end(ebpo_faces_by_number *f);
+
+/* Where crossing faces meet, as callers are told. */
 
 /* A pair with its faces, of the caller's A and B: as in the files, and at their poses. */
 typedef struct ebpo_posed_pair {

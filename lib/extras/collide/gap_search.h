@@ -7,7 +7,7 @@
 
 #include "core/cpu.h"
 #include "extras/collide/posed_faces.h"
-#include "extras/collide/two_frames.h"
+#include "extras/collide/posed_block.h"
 
 /* A pair of children: node * 8 + lane of each. */
 typedef struct ebpo_gap_visit {

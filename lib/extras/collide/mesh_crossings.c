@@ -14,7 +14,7 @@
 #include "core/fp_env.h"
 #include "core/workspace.h"
 #include "extras/collide/collider.h"
-#include "extras/collide/red_mesh.h"
+#include "extras/collide/collide_write.h"
 #include "format/write_file.h"
 #include "extras/collide/contact.h"
 #include "extras/collide/pair_distance.h"

@@ -6,6 +6,7 @@
 #include <stdbool.h>
 
 #include "geometry/pose.h"
+#include "query/accel.h"
 
 /* A pose made ready for blocks. */
 typedef struct ebpo_block_posing {
@@ -57,5 +58,27 @@ void ebpo_posed_block_make_wide(ebpo_posed_block *out, const ebpo_block_posing *
  * ebpo_pair_kernels take; returns their error. */
 float ebpo_posed_block_place(const ebpo_posed_block *b, double unit, const double origin[3],
                              float out[3][EBPO_POSED_VERTICES]);
+
+/* How two models' frames lie to each other at their poses: what boxes and slabs of one are seen as
+ * from the other, in floats. Pure functions, any thread. */
+
+/* y = x * unit, x in the accel's frame; the other model's y is turn y + shift. */
+typedef struct ebpo_turned_frame {
+    float unit, turn[3][3], turn_size[3][3], shift[3];
+    float in_world[3][3]; /* a direction of the world is in_world^T of it in the frame */
+} ebpo_turned_frame;
+
+/* Lengths are those of the world times ebpo_block_posing's unit, the same for both. */
+typedef struct ebpo_two_frames {
+    ebpo_turned_frame frame[2];
+    /* On each axis of either frame, gaps of boxes may be so much less than they are computed: what
+     * floats lose (docs/develop/collision.md, "Bounds of pairs of nodes"), what poses are off from
+     * motions, and posed coordinates from exact ones. */
+    float slack;
+} ebpo_two_frames;
+
+/* The posings have been made with one reach. */
+void ebpo_two_frames_make(ebpo_two_frames *out, const ebpo_accel *const accel[2],
+                          const ebpo_block_posing posing[2]);
 
 #endif

@@ -1,11 +1,24 @@
-/* A solid at a pose: where a point of the world lies in its model's coordinates, and whether it is
- * inside, exact on posed coordinates. Proofs: docs/develop/booleans.md. Solids are not changed:
- * any thread, each with a context of its own. */
+/* A model at a pose. Pure functions, any thread. */
 #ifndef EBPO_COLLIDE_POSED_SOLID_H
 #define EBPO_COLLIDE_POSED_SOLID_H
 
+#include <gmp.h>
+
 #include "geometry/pose.h"
 #include "query/query_model.h"
+
+/* No vertex of the model is beyond these coordinates, in size. */
+void ebpo_model_reach(const ebpo_model *model, double reach[3]);
+
+/* No posed coordinate of its vertices is greater in size. */
+double ebpo_posed_reach(const ebpo_posing *posing, const double reach[3]);
+
+/* One file, or two of the same content: the same faces, and the same is meant by them. */
+bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b);
+
+/* A solid at a pose: where a point of the world lies in its model's coordinates, and whether it is
+ * inside, exact on posed coordinates. Proofs: docs/develop/booleans.md. Solids are not changed:
+ * any thread, each with a context of its own. */
 
 typedef struct ebpo_posed_solid {
     ebpo_model *model;
@@ -36,5 +49,31 @@ void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double 
 /* No face of the model is within `doubt` of p, for certain. */
 EBPO_MUST_USE ebpo_status ebpo_posed_solid_clear(ebpo_context *context, const double p[3],
                                                  double doubt, bool *clear, ebpo_error *error);
+
+/* Which side of a solid at a pose a point of the world is on: exact on posed coordinates. Proofs:
+ * docs/develop/booleans.md. Any thread, each with a context of its own. */
+
+/* Around a point of the world. */
+typedef struct ebpo_posed_sides {
+    bool on;            /* a posed face with an area goes through it */
+    bool flat;          /* and all such faces have one plane */
+    double plane[3][3]; /* on: corners of one of them */
+    /* Winding numbers close to the point: on the side that is greater in x, or if the plane is
+     * parallel to the x axis in y, or else in z, and on the other one. Equal unless `on`. If on and
+     * not flat, `above` alone is right, somewhere near the point. */
+    int32_t above, below;
+} ebpo_posed_sides;
+
+EBPO_MUST_USE ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo_context *context,
+                                                 const double w[3], ebpo_posed_sides *out,
+                                                 ebpo_error *error);
+
+/* The winding number of a posed model at a point whose coordinates are fractions. Proofs:
+ * docs/develop/collision.md, "Relation of two models". One thread with its context. */
+
+/* At x shifted by (d0, d1, d2) as in ebpo_axis_crossing: never on a face. Coordinates are canonical
+ * and no farther than doubles reach. */
+EBPO_MUST_USE ebpo_status ebpo_exact_winding(const ebpo_posed_solid *s, ebpo_context *context,
+                                             const mpq_t x[3], int32_t *winding, ebpo_error *error);
 
 #endif

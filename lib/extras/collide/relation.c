@@ -12,7 +12,7 @@
 #include "core/parallel.h"
 #include "extras/collide/around_face.h"
 #include "extras/collide/contacts.h"
-#include "extras/collide/posed_model.h"
+#include "extras/collide/posed_solid.h"
 #include "extras/collide/unmet_patches.h"
 #include "geometry/predicates.h"
 

@@ -1,13 +1,51 @@
 #include "core/strict_fp.h"
 
-#include "extras/collide/subtree_pairs.h"
-
 #include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/parallel.h"
+#include "extras/collide/collider.h"
+#include "extras/collide/subtree_pairs.h"
+#include "extras/collide/posed_subtrees.h"
 #include "geometry/length.h"
+
+/* Which subtrees of two models may have faces that meet, before any of them is loaded. */
+
+typedef struct ebpo_subtree_pair {
+    uint32_t a, b;
+    uint32_t rank_a, rank_b; /* in the order of the files' faces */
+    double apart;            /* distance of their middles over the sum of their sizes */
+} ebpo_subtree_pair;
+
+typedef struct ebpo_subtree_pairs {
+    ebpo_subtree_pair *pair;
+    uint64_t count, capacity;
+    uint64_t subtrees[2]; /* different ones of each model */
+} ebpo_subtree_pairs;
+
+/* Faces that meet in two subtrees, which are loaded for it. One thread each. */
+
+/* Faces that meet, with their numbers: [0] of the question's first model. */
+typedef struct ebpo_told_pair {
+    uint32_t file[2], source[2];
+    int32_t kind;
+} ebpo_told_pair;
+
+/* Zero at first. Its contexts hold the two subtrees that it has come to last. */
+typedef struct ebpo_subtree_walk {
+    const ebpo_collision *question;
+    bool self;
+    ebpo_context *context[2]; /* of models that are in parts */
+    ebpo_pair_walk walk;
+    ebpo_told_pair *told; /* of the last pair, in no order; no face with itself */
+    uint64_t count, capacity;
+    uint64_t first_end; /* faces that the first's subtree lists have lesser numbers */
+    bool late;          /* the deadline has passed before all was found */
+} ebpo_subtree_walk;
 
 typedef struct finding {
     ebpo_subtree_pairs *out;
@@ -52,7 +90,7 @@ static bool is_pruned(const ebpo_posed_subtrees *s, uint32_t number)
     return !s->model->whole && s->model->top->below[number].pruned;
 }
 
-static ebpo_status add(const finding *f, const ebpo_posed_node node[2])
+static ebpo_status pairs_add(const finding *f, const ebpo_posed_node node[2])
 {
     uint32_t a = ebpo_entry_value(node[0].entry), b = ebpo_entry_value(node[1].entry);
     ebpo_convex convex[2];
@@ -76,7 +114,7 @@ static ebpo_status add(const finding *f, const ebpo_posed_node node[2])
 
 /* --- the descent --- */
 
-static ebpo_status descend(const finding *f, const ebpo_posed_node node[2])
+static ebpo_status pairs_descend(const finding *f, const ebpo_posed_node node[2])
 {
     bool below[2];
     for (int i = 0; i < 2; i++) {
@@ -87,7 +125,7 @@ static ebpo_status descend(const finding *f, const ebpo_posed_node node[2])
     if (cells_apart(f, node))
         return EBPO_OK;
     if (below[0] && below[1])
-        return add(f, node);
+        return pairs_add(f, node);
     bool larger = ebpo_posed_diagonal(f->side[0], node[0].cell) >=
                   ebpo_posed_diagonal(f->side[1], node[1].cell);
     int down = below[0] ? 1 : below[1] ? 0 : larger ? 0 : 1;
@@ -95,7 +133,7 @@ static ebpo_status descend(const finding *f, const ebpo_posed_node node[2])
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         part[down] = ebpo_posed_child(f->side[down], &node[down], octant);
-        status = descend(f, part);
+        status = pairs_descend(f, part);
     }
     return status;
 }
@@ -144,14 +182,19 @@ static ebpo_status count_seconds(ebpo_subtree_pairs *p, uint64_t most, ebpo_erro
     return EBPO_OK;
 }
 
-ebpo_status ebpo_subtree_pairs_find(ebpo_subtree_pairs *out, ebpo_posed_subtrees *a,
-                                    ebpo_posed_subtrees *b, double reach, bool self,
-                                    ebpo_error *error)
+/* Two faces that meet have a common point, and that is in a cell of each model that lists its face:
+ * so they are listed by the subtrees of one of these pairs. They come sorted by the first's place,
+ * back and forth in the second's, so that what was loaded is used again soon. `self`: both are one
+ * model at one pose; each pair once, the first's place not behind the second's. Freed by the
+ * caller (`pair`), also after a failure. */
+static ebpo_status ebpo_subtree_pairs_find(ebpo_subtree_pairs *out, ebpo_posed_subtrees *a,
+                                           ebpo_posed_subtrees *b, double reach, bool self,
+                                           ebpo_error *error)
 {
     finding f = { out, { a, b }, reach, self, error };
     ebpo_posed_node root[2] = { ebpo_posed_subtree_root(a), ebpo_posed_subtree_root(b) };
     *out = (ebpo_subtree_pairs){ .count = 0 };
-    ebpo_status status = descend(&f, root);
+    ebpo_status status = pairs_descend(&f, root);
     if (status != EBPO_OK)
         return status;
     sort_back_and_forth(out);
@@ -166,8 +209,418 @@ static int by_nearness(const void *x, const void *y)
     return by_places(x, y);
 }
 
-void ebpo_subtree_pairs_nearest_first(ebpo_subtree_pairs *p)
+/* By `apart`, the least first. */
+static void ebpo_subtree_pairs_nearest_first(ebpo_subtree_pairs *p)
 {
     if (p->count)
         qsort(p->pair, p->count, sizeof *p->pair, by_nearness);
+}
+
+static ebpo_status ebpo_subtree_walk_begin(ebpo_subtree_walk *w, const ebpo_collision *question,
+                                           bool self, ebpo_error *error)
+{
+    w->question = question;
+    w->self = self;
+    for (int i = 0; i < 2; i++)
+        if (!question->model[i]->whole && !w->context[i]) {
+            ebpo_status status = ebpo_context_new(question->model[i], &w->context[i], error);
+            if (status != EBPO_OK)
+                return status;
+        }
+    return EBPO_OK;
+}
+
+/* Subtrees that it had to load. */
+static uint64_t ebpo_subtree_walk_loads(const ebpo_subtree_walk *w)
+{
+    uint64_t loads = 0;
+    for (int i = 0; i < 2; i++)
+        loads += w->context[i] ? w->context[i]->loaded : 0;
+    return loads;
+}
+
+/* Others may have the room of its subtrees. */
+static void ebpo_subtree_walk_let_go(ebpo_subtree_walk *w)
+{
+    for (int i = 0; i < 2; i++)
+        ebpo_context_let_go(w->context[i]);
+}
+
+static void ebpo_subtree_walk_free(ebpo_subtree_walk *w)
+{
+    for (int i = 0; i < 2; i++)
+        ebpo_context_free(w->context[i]);
+    ebpo_pair_walk_free(&w->walk);
+    free(w->told);
+}
+
+static int ebpo_told_pair_compare(const void *x, const void *y)
+{
+    const ebpo_told_pair *p = x, *q = y;
+    if (p->file[0] != q->file[0])
+        return p->file[0] < q->file[0] ? -1 : 1;
+    return (p->file[1] > q->file[1]) - (p->file[1] < q->file[1]);
+}
+
+static ebpo_face_pair ebpo_told_pair_tell(const ebpo_collision *q, const ebpo_told_pair *t)
+{
+    int a = q->turned, b = !q->turned;
+    return (ebpo_face_pair){ t->source[a], t->source[b], t->file[a], t->file[b], t->kind, 0 };
+}
+
+/* --- one pair --- */
+
+static ebpo_status walk_load(ebpo_subtree_walk *w, int side, uint32_t number,
+                             const ebpo_accel **out, ebpo_error *error)
+{
+    ebpo_accel *loaded = w->question->model[side]->whole;
+    ebpo_status status =
+        loaded ? EBPO_OK : ebpo_context_subtree(w->context[side], number, &loaded, error);
+    *out = loaded;
+    return status;
+}
+
+static ebpo_status walk_tell(ebpo_subtree_walk *w, const ebpo_accel *const accel[2],
+                             ebpo_error *error)
+{
+    const ebpo_pair_walk *found = &w->walk;
+    if (!ebpo_grow(&w->told, &w->capacity, found->met_count, sizeof *w->told))
+        return ebpo_fail_memory(error, found->met_count * sizeof *w->told);
+    for (uint64_t i = 0; i < found->met_count; i++) {
+        uint32_t local[2] = { found->met[i].a, found->met[i].b };
+        ebpo_told_pair t = { .kind = found->met[i].kind };
+        for (int side = 0; side < 2; side++) {
+            t.file[side] = (uint32_t)ebpo_accel_file_face(accel[side], local[side]);
+            t.source[side] = (uint32_t)ebpo_accel_source_face(accel[side], local[side]);
+        }
+        if (w->self && t.file[0] == t.file[1])
+            continue;
+        if (w->self && t.file[0] > t.file[1])
+            t = (ebpo_told_pair){ { t.file[1], t.file[0] }, { t.source[1], t.source[0] }, t.kind };
+        w->told[w->count++] = t;
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
+{
+    return ebpo_fail_memory(error, (w->capacity + 64) * sizeof *w->stack);
+}
+
+static ebpo_status walk_down(ebpo_subtree_walk *w, const ebpo_accel *const accel[2],
+                             ebpo_error *error)
+{
+    const ebpo_collision *q = w->question;
+    const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
+    ebpo_accel_pair pair;
+    ebpo_pair_walk *down = &w->walk;
+    ebpo_accel_pair_make(&pair, accel, posing, q->reach);
+    if (pair.apart)
+        return EBPO_OK;
+    ebpo_pair_walk_begin(down, &pair);
+    down->first = false;
+    down->neighbours = w->self;
+    down->self = w->self && accel[0] == accel[1];
+    if (!down->kernels->start(down))
+        return no_memory(down, error);
+    while (down->top > 0) {
+        if (!down->kernels->run(down, EBPO_WALK_PAIRS))
+            return no_memory(down, error);
+        if ((w->late = ebpo_collision_is_late(q)))
+            return EBPO_OK;
+    }
+    return walk_tell(w, accel, error);
+}
+
+/* Fills in what has been found. */
+static ebpo_status ebpo_subtree_walk_pair(ebpo_subtree_walk *w, const ebpo_subtree_pair *pair,
+                                          ebpo_error *error)
+{
+    const ebpo_accel *accel[2];
+    w->count = 0;
+    ebpo_status status = walk_load(w, 0, pair->a, &accel[0], error);
+    if (status == EBPO_OK && w->self && pair->a == pair->b)
+        accel[1] = accel[0];
+    else if (status == EBPO_OK)
+        status = walk_load(w, 1, pair->b, &accel[1], error);
+    if (status != EBPO_OK)
+        return status;
+    w->first_end = accel[0]->first_face + (accel[0]->face_count - accel[0]->outer_count);
+    if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
+        return EBPO_OK;
+    return walk_down(w, accel, error);
+}
+
+/* Pairs of subtrees are gone through once, each finds its pairs of faces. A face that several
+ * subtrees list is met more than once, and pairs come in any order, so they wait, sorted now and
+ * then. When they are too many for the collider's memory, those of the first model's later faces
+ * are dropped, and found again when the others have been given. */
+
+static const char stage[] = "pairs of subtrees";
+
+/* So many in a row for one thread: they have the first's subtree in common. */
+enum { PAIRS_IN_A_ROW = 4 };
+
+typedef struct gathering_parts {
+    const ebpo_collision *question;
+    bool self;
+    ebpo_posed_subtrees subtrees[2];
+    ebpo_subtree_pairs pairs;
+    uint64_t *end; /* of each of the first's subtrees: its faces are before; 0: not known yet */
+    ebpo_subtree_walk *walk; /* one for each thread */
+    unsigned threads;
+    uint64_t read_before;
+    pthread_mutex_t lock; /* for what follows */
+    uint64_t from, to;    /* faces of the first model that matter now */
+    ebpo_told_pair *told;
+    uint64_t count, capacity;
+    uint64_t most; /* that wait */
+} gathering_parts;
+
+static void gather_parts_count(const gathering_parts *g, ebpo_subtree_walk *w)
+{
+    g->question->collider->loads += ebpo_subtree_walk_loads(w);
+    ebpo_collider_count(g->question->collider, &w->walk);
+}
+
+/* --- what waits --- */
+
+static void sort_once(gathering_parts *g)
+{
+    uint64_t kept = 0;
+    if (g->count)
+        qsort(g->told, g->count, sizeof *g->told, ebpo_told_pair_compare);
+    for (uint64_t i = 0; i < g->count; i++)
+        if (kept == 0 || ebpo_told_pair_compare(&g->told[kept - 1], &g->told[i]) != 0)
+            g->told[kept++] = g->told[i];
+    g->count = kept;
+}
+
+/* Half of what may wait stays; those of one face alone stay in any case. */
+static void make_room(gathering_parts *g)
+{
+    sort_once(g);
+    uint64_t half = g->most / 2;
+    if (g->count <= half)
+        return;
+    uint64_t cut = g->told[half].file[0];
+    if (cut == g->told[0].file[0])
+        cut++;
+    g->to = cut;
+    while (g->count > 0 && g->told[g->count - 1].file[0] >= cut)
+        g->count--;
+    if (g->most < 2 * g->count)
+        g->most = 2 * g->count;
+}
+
+static ebpo_status gather_parts_hold(gathering_parts *g, const ebpo_subtree_walk *w,
+                                     ebpo_error *error)
+{
+    for (uint64_t i = 0; i < w->count; i++) {
+        if (w->told[i].file[0] < g->from || w->told[i].file[0] >= g->to)
+            continue;
+        if (g->count >= g->most)
+            make_room(g);
+        if (w->told[i].file[0] >= g->to)
+            continue;
+        if (!ebpo_grow(&g->told, &g->capacity, g->count + 1, sizeof *g->told))
+            return ebpo_fail_memory(error, (g->count + 1) * sizeof *g->told);
+        g->told[g->count++] = w->told[i];
+    }
+    return EBPO_OK;
+}
+
+/* --- going through --- */
+
+/* All faces that its first subtree lists have been given. */
+static bool is_done(gathering_parts *g, const ebpo_subtree_pair *pair)
+{
+    (void)pthread_mutex_lock(&g->lock);
+    uint64_t end = g->end[pair->a];
+    (void)pthread_mutex_unlock(&g->lock);
+    return end && end <= g->from;
+}
+
+static ebpo_status gather_parts_keep(gathering_parts *g, const ebpo_subtree_pair *pair,
+                                     const ebpo_subtree_walk *w, ebpo_error *error)
+{
+    (void)pthread_mutex_lock(&g->lock);
+    g->end[pair->a] = w->first_end;
+    ebpo_status status = gather_parts_hold(g, w, error);
+    (void)pthread_mutex_unlock(&g->lock);
+    return status;
+}
+
+static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    gathering_parts *g = user;
+    ebpo_subtree_walk *w = &g->walk[worker];
+    for (uint64_t i = begin; i < end; i++) {
+        const ebpo_subtree_pair *pair = &g->pairs.pair[i];
+        if (is_done(g, pair))
+            continue;
+        ebpo_status status = ebpo_subtree_walk_pair(w, pair, error);
+        if (status == EBPO_OK)
+            status = gather_parts_keep(g, pair, w, error);
+        if (status != EBPO_OK)
+            return status;
+        if (w->late || ebpo_collision_is_late(g->question))
+            return ebpo_fail(error, EBPO_E_CANCELLED, "%s: the deadline has passed", stage);
+    }
+    return EBPO_OK;
+}
+
+/* Several threads hold several subtrees; where the budget has no room for these, one goes on. */
+static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
+{
+    const ebpo_progress *progress = &g->question->options.progress;
+    ebpo_error many = EBPO_ERROR_INIT;
+    ebpo_status status = EBPO_E_LIMIT;
+    if (g->threads > 1)
+        status = ebpo_parallel_for(g->threads, NULL, g->pairs.count, PAIRS_IN_A_ROW, run_pairs, g,
+                                   progress, stage, &many);
+    if (status != EBPO_E_LIMIT) {
+        if (status != EBPO_OK && error)
+            *error = many;
+        return status;
+    }
+    for (unsigned i = 1; i < g->threads; i++) {
+        gather_parts_count(g, &g->walk[i]);
+        ebpo_subtree_walk_free(&g->walk[i]);
+    }
+    g->threads = 1;
+    g->count = 0;
+    g->to = UINT64_MAX;
+    return ebpo_parallel_for(1, NULL, g->pairs.count, PAIRS_IN_A_ROW, run_pairs, g, progress, stage,
+                             error);
+}
+
+enum { GIVEN_AT_ONCE = 1024 };
+
+/* False: enough. */
+static bool gather_parts_give(const gathering_parts *g, ebpo_pairs_fn take, void *user)
+{
+    ebpo_face_pair out[GIVEN_AT_ONCE];
+    for (unsigned i = 0; i < g->threads; i++) /* who takes them may want the room */
+        ebpo_subtree_walk_let_go(&g->walk[i]);
+    for (uint64_t at = 0; at < g->count; at += GIVEN_AT_ONCE) {
+        uint64_t n = g->count - at < GIVEN_AT_ONCE ? g->count - at : GIVEN_AT_ONCE;
+        for (uint64_t i = 0; i < n; i++)
+            out[i] = ebpo_told_pair_tell(g->question, &g->told[at + i]);
+        if (!take(user, out, n))
+            return false;
+    }
+    return true;
+}
+
+static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user, ebpo_error *error)
+{
+    uint64_t most = g->question->collider->options.memory / (2 * sizeof *g->told) + 2;
+    for (g->from = 0; g->from < UINT64_MAX; g->from = g->to) {
+        g->to = UINT64_MAX;
+        g->count = 0;
+        g->most = most;
+        ebpo_status status = run_all(g, error);
+        if (status != EBPO_OK)
+            return status;
+        sort_once(g);
+        if (!gather_parts_give(g, take, user))
+            return EBPO_OK;
+    }
+    return EBPO_OK;
+}
+
+/* --- both questions --- */
+
+static ebpo_status gather_parts_begin(gathering_parts *g, unsigned threads, ebpo_error *error)
+{
+    const ebpo_collision *q = g->question;
+    ebpo_status status = EBPO_OK;
+    g->walk = ebpo_alloc_zero(threads, sizeof *g->walk);
+    if (!g->walk)
+        return ebpo_fail_memory(error, threads * sizeof *g->walk);
+    g->threads = threads;
+    g->read_before = ebpo_collision_bytes_read(q);
+    for (int i = 0; i < 2 && status == EBPO_OK; i++)
+        status =
+            ebpo_posed_subtrees_make(&g->subtrees[i], q->model[i], &q->posing[i].posing, error);
+    for (unsigned i = 0; i < threads && status == EBPO_OK; i++)
+        status = ebpo_subtree_walk_begin(&g->walk[i], q, g->self, error);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_pairs_find(&g->pairs, &g->subtrees[0], &g->subtrees[1], q->reach,
+                                         g->self, error);
+    if (status != EBPO_OK)
+        return status;
+    q->collider->subtree_pairs += g->pairs.count;
+    q->collider->subtrees += g->pairs.subtrees[0] + g->pairs.subtrees[1];
+    g->end = ebpo_alloc_zero(g->subtrees[0].count, sizeof *g->end);
+    return g->end ? EBPO_OK : ebpo_fail_memory(error, g->subtrees[0].count * sizeof *g->end);
+}
+
+static void gather_parts_end(gathering_parts *g)
+{
+    g->question->collider->bytes_read += ebpo_collision_bytes_read(g->question) - g->read_before;
+    for (unsigned i = 0; i < g->threads; i++) {
+        gather_parts_count(g, &g->walk[i]);
+        ebpo_subtree_walk_free(&g->walk[i]);
+    }
+    for (int i = 0; i < 2; i++)
+        ebpo_posed_subtrees_free(&g->subtrees[i]);
+    free(g->walk);
+    free(g->pairs.pair);
+    free(g->end);
+    free(g->told);
+    (void)pthread_mutex_destroy(&g->lock);
+}
+
+ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn take, void *user,
+                              ebpo_error *error)
+{
+    gathering_parts g = { .question = q, .self = self };
+    (void)pthread_mutex_init(&g.lock, NULL);
+    ebpo_status status =
+        gather_parts_begin(&g, ebpo_thread_count(q->collider->options.threads), error);
+    if (status == EBPO_OK)
+        status = in_passes(&g, take, user, error);
+    gather_parts_end(&g);
+    return status;
+}
+
+/* The least of the pairs of faces that the first two subtrees have which have any. */
+static ebpo_status gather_parts_search(gathering_parts *g, ebpo_face_pair *out, int32_t *found,
+                                       ebpo_error *error)
+{
+    const ebpo_collision *q = g->question;
+    ebpo_subtree_walk *w = &g->walk[0];
+    for (uint64_t i = 0; i < g->pairs.count; i++) {
+        ebpo_status status = ebpo_subtree_walk_pair(w, &g->pairs.pair[i], error);
+        if (status != EBPO_OK)
+            return status;
+        *found = w->late || ebpo_collision_is_late(q) ? -1 : w->count > 0;
+        if (*found < 0)
+            return EBPO_OK;
+        if (*found) {
+            qsort(w->told, w->count, sizeof *w->told, ebpo_told_pair_compare);
+            *out = ebpo_told_pair_tell(q, &w->told[0]);
+            return EBPO_OK;
+        }
+        if (!ebpo_progress_step(&q->options.progress, stage, i, g->pairs.count, error))
+            return EBPO_E_CANCELLED;
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_first_of_parts(const ebpo_collision *q, ebpo_face_pair *out, int32_t *found,
+                                ebpo_error *error)
+{
+    gathering_parts g = { .question = q };
+    (void)pthread_mutex_init(&g.lock, NULL);
+    ebpo_status status = gather_parts_begin(&g, 1, error);
+    if (status == EBPO_OK) {
+        ebpo_subtree_pairs_nearest_first(&g.pairs);
+        status = gather_parts_search(&g, out, found, error);
+    }
+    gather_parts_end(&g);
+    return status;
 }

@@ -1,3 +1,87 @@
+/* The nearest point of a cone lies in its inside, on a plane, or on a line of two: all are tried,
+ * there are few. Else it is the apex. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "extras/haptic/ball_walk.h"
+#include "extras/haptic/face_box.h"
+#include "extras/haptic/vectors.h"
+
+typedef struct trial {
+    const ebpo_held_planes *planes;
+    const double *want;
+    double length, best, slack;
+    double *out;
+} trial;
+
+static void try_way(trial *t, const double way[3], double slack)
+{
+    double lost[3];
+    for (int i = 0; i < t->planes->count; i++)
+        if (dot(way, t->planes->normal[i]) < -slack)
+            return;
+    difference(t->want, way, lost);
+    double square = dot(lost, lost);
+    if (square < t->best) {
+        t->best = square;
+        t->slack = slack;
+        copy(way, t->out);
+    }
+}
+
+static void try_plane(trial *t, const double n[3], double slack)
+{
+    double way[3], into = dot(t->want, n);
+    for (int i = 0; i < 3; i++)
+        way[i] = t->want[i] - into * n[i];
+    try_way(t, way, slack);
+}
+
+static void try_line(trial *t, const double m[3], const double n[3], double slack)
+{
+    double line[3], way[3];
+    cross(m, n, line);
+    double square = dot(line, line);
+    if (!(square > 0x1p-40))
+        return;
+    double part = dot(t->want, line) / square;
+    for (int i = 0; i < 3; i++)
+        way[i] = part * line[i];
+    try_way(t, way, slack / sqrt(square));
+}
+
+double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], double out[3])
+{
+    double length = sqrt(dot(want, want)), slack = 0x1p-44 * length;
+    trial t = { planes, want, length, INFINITY, slack, out };
+    for (int i = 0; i < 3; i++)
+        out[i] = 0;
+    try_way(&t, want, slack);
+    if (t.best == 0)
+        return slack;
+    for (int i = 0; i < planes->count; i++)
+        try_plane(&t, planes->normal[i], slack);
+    for (int i = 0; i < planes->count; i++)
+        for (int j = 0; j < i; j++)
+            try_line(&t, planes->normal[i], planes->normal[j], slack);
+    return t.slack;
+}
+
+void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3])
+{
+    for (int k = 0; k < planes->count; k++)
+        if (memcmp(planes->normal[k], normal, sizeof planes->normal[k]) == 0)
+            return;
+    if (planes->count < EBPO_PLANES_MOST)
+        copy(normal, planes->normal[planes->count++]);
+}
+
 /* The tree's nodes are taken in the order in which the ball may come to touch them, and no more
  * when the next one is touched after a face that is known. The distance from a box is convex along
  * a line, as that from a face is: Newton's steps towards the ball's radius never go too far. Of
@@ -5,18 +89,6 @@
  *
  * Where a tick's work ends before, the ball goes as far as the next node allows, if that is worth
  * it; it is held by what is known if it is held where it is; else the next tick goes on. */
-#include "core/strict_fp.h"
-
-#include "extras/haptic/ball_walk.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include "core/alloc.h"
-#include "core/error.h"
-#include "extras/haptic/face_near.h"
-#include "extras/haptic/vectors.h"
 
 enum {
     STEPS = 6,
@@ -62,7 +134,7 @@ static bool goes_away(const ebpo_ball_walk *w, const ebpo_extent *e)
 /* The part of the way, at least, at which the ball may come to touch what is in `e`; where it may
  * touch it now, by how much that is too near, as a number below 0. INFINITY: not before the part
  * that is known, or not at all. */
-static double soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
+static double ball_walk_soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double part = 0;
     for (int step = 0; step < STEPS; step++) {
@@ -86,7 +158,7 @@ static double soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
 
 static void wait_for(ebpo_ball_walk *w, uint64_t node)
 {
-    double key = soonest(w, &w->box->node[node]);
+    double key = ball_walk_soonest(w, &w->box->node[node]);
     if (key < w->part)
         ebpo_near_push(&w->queue, key, node);
 }
@@ -132,7 +204,7 @@ static bool end_before_that(ebpo_ball_walk *w)
     return true;
 }
 
-static bool look(ebpo_ball_walk *w, ebpo_ball_work *work)
+static bool ball_walk_look(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     uint32_t held = work->faces; /* when it was not yet */
     while (w->queue.count > 0 && w->queue.item[0].key < w->part) {
@@ -197,7 +269,7 @@ static bool crosses_leaf(const ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work 
     return false;
 }
 
-static ebpo_ball_end check(ebpo_ball_walk *w, ebpo_ball_work *work)
+static ebpo_ball_end ball_walk_check(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     while (w->depth > 0) {
         if (work->faces + EBPO_FACE_BOX_LEAF > EBPO_BALL_FACES || work->nodes >= EBPO_BALL_NODES)
@@ -219,11 +291,11 @@ static ebpo_ball_end check(ebpo_ball_walk *w, ebpo_ball_work *work)
 ebpo_ball_end ebpo_ball_go_on(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     if (w->stage == EBPO_BALL_LOOKS) {
-        if (!look(w, work))
+        if (!ball_walk_look(w, work))
             return EBPO_BALL_LATER;
         begin_check(w);
     }
-    ebpo_ball_end end = check(w, work);
+    ebpo_ball_end end = ball_walk_check(w, work);
     if (end != EBPO_BALL_LATER)
         w->stage = EBPO_BALL_STANDS;
     return end;

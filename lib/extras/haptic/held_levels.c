@@ -9,7 +9,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "geometry/cells.h"
-#include "geometry/octcode.h"
 
 enum { DEEPEST = 6, MOST = 1 << 17 };
 

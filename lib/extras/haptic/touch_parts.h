@@ -8,10 +8,8 @@
 
 #include "extras/haptic/ball_walk.h"
 #include "extras/haptic/face_box.h"
-#include "extras/haptic/held_back.h"
 #include "extras/haptic/held_levels.h"
-#include "extras/haptic/passive.h"
-#include "extras/haptic/side_walk.h"
+#include "extras/haptic/tool.h"
 
 enum {
     /* The tick's box, the one it looked at last, the one between, the one being loaded. */

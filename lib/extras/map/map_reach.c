@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "extras/map/map_ask.h"
+#include "extras/map/map_lattice.h"
 
 /* Faces that are looked at together; and triangles of a round, beyond which their bounds are taken
  * as they are. */

@@ -15,9 +15,9 @@
 #include "core/parallel.h"
 #include "core/hash.h"
 #include "extras/paint/paint_parts.h"
-#include "extras/paint/reach.h"
+#include "extras/paint/paint_reach.h"
 #include "query/query_model.h"
-#include "extras/haptic/face_near.h"
+#include "extras/haptic/face_box.h"
 #include "extras/haptic/vectors.h"
 
 enum { DENSITY_MOST = 10000 };

@@ -16,7 +16,7 @@
 #include "hdf5_write/h5.h"
 #include "io/file_source.h"
 #include "io/publish.h"
-#include "extras/paint/paint_columns.h"
+#include "extras/paint/paint_open.h"
 
 static ebpo_status put_root(ebpo_h5_out *out, const ebpo_paint *p, ebpo_error *error)
 {

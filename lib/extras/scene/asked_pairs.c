@@ -1,14 +1,244 @@
-/* Pairs of instances that are asked about one after the other, by any thread. */
 #include "core/strict_fp.h"
 
-#include "extras/scene/asked_pairs.h"
-
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "extras/collide/of_parts.h"
+#include "extras/scene/asked_pairs.h"
+#include "geometry/pose.h"
+
+/* of sums of a few products: far above their rounding */
+static const double slack = 0x1p-44;
+
+static const scene_model *left_out_model_of(const ebpo_scene *scene, uint64_t instance)
+{
+    return &scene->models[scene->instances[instance].as.model];
+}
+
+static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double time,
+                             ebpo_posing *out, ebpo_error *error)
+{
+    const scene_model *m = left_out_model_of(scene, instance);
+    double reach[3];
+    ebpo_pose pose;
+    for (int k = 0; k < 3; k++)
+        reach[k] = fmax(fabs(m->min[k]), fabs(m->max[k]));
+    ebpo_status status = ebpo_scene_pose(scene, instance, time, &pose, error);
+    return status == EBPO_OK ? ebpo_posing_make(out, &pose, reach, error) : status;
+}
+
+/* Of the box of a model in the world: its middle, and half of it along each of its axes. */
+typedef struct posed_box {
+    double middle[3], half[3][3], size;
+} posed_box;
+
+static void pose_box(const ebpo_posing *p, const scene_model *m, posed_box *out)
+{
+    double middle[3];
+    for (int k = 0; k < 3; k++)
+        middle[k] = m->min[k] / 2 + m->max[k] / 2;
+    ebpo_posing_apply(p, middle, out->middle);
+    out->size = 0;
+    for (int i = 0; i < 3; i++) {
+        out->size += fabs(p->translation[i]);
+        for (int k = 0; k < 3; k++) {
+            double reach = fmax(fabs(m->min[k]), fabs(m->max[k]));
+            out->half[k][i] = p->matrix[i][k] * (m->max[k] / 2 - m->min[k] / 2);
+            out->size += fabs(p->matrix[i][k]) * reach;
+        }
+    }
+}
+
+ebpo_status scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
+                            scene_seen *out, ebpo_error *error)
+{
+    const scene_model *m = left_out_model_of(scene, of);
+    ebpo_posing from, at;
+    posed_box b;
+    ebpo_status status = posing_of(scene, of, time, &from, error);
+    if (status == EBPO_OK)
+        status = posing_of(scene, other, time, &at, error);
+    if (status != EBPO_OK)
+        return status;
+    pose_box(&at, left_out_model_of(scene, other), &b);
+    double scale = from.scale, sizes = b.size, reach = 0;
+    for (int i = 0; i < 3; i++) {
+        sizes += fabs(from.translation[i]);
+        reach += fmax(fabs(m->min[i]), fabs(m->max[i]));
+    }
+    /* the transposed matrix is the inverse but for the deviation, of points of the model's box */
+    double off = (sizes + reach * scale) * slack / scale + 3 * from.deviation * reach;
+    out->rounding = off;
+    for (int k = 0; k < 3; k++) {
+        double middle = 0, half = off;
+        for (int i = 0; i < 3; i++)
+            middle += from.matrix[i][k] / scale * ((b.middle[i] - from.translation[i]) / scale);
+        for (int j = 0; j < 3; j++) {
+            double sum = 0;
+            for (int i = 0; i < 3; i++)
+                sum += from.matrix[i][k] / scale * (b.half[j][i] / scale);
+            half += fabs(sum);
+        }
+        out->box.min[k] = middle - half;
+        out->box.max[k] = middle + half;
+    }
+    out->unit = scale * (1 - 2 * from.deviation);
+    return EBPO_OK;
+}
+
+double scene_space_gap(const scene_space *a, const scene_space *b)
+{
+    double apart[3];
+    for (int k = 0; k < 3; k++)
+        apart[k] = fmax(fmax(a->min[k] - b->max[k], b->min[k] - a->max[k]), 0);
+    return scene_length_above(apart) * (1 - 8 * slack);
+}
+
+/* The part of a model's box whose faces its file has; false: all. */
+static bool held_box(const ebpo_scene *scene, uint64_t instance, scene_space *out)
+{
+    const ebpo_info *info =
+        ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].as.model));
+    bool mesh = info->parts & EBPO_PART_MESH;
+    if (mesh && !info->pruned)
+        return false;
+    for (int k = 0; k < 3; k++) {
+        bool box = mesh && info->boxed && !info->cut_levels && !(info->kept_error > 0);
+        out->min[k] = box ? info->kept_box[k] : INFINITY;
+        out->max[k] = box ? info->kept_box[3 + k] : -INFINITY;
+    }
+    return true;
+}
+
+/* Of `other` to what is in the box `all` and not in `held`: up to six boxes on its sides. */
+static double gap_around(const scene_space *all, const scene_space *held, const scene_space *other)
+{
+    double gap = INFINITY;
+    for (int k = 0; k < 3; k++) {
+        scene_space side = *all;
+        side.max[k] = fmin(held->min[k], all->max[k]);
+        if (all->min[k] < held->min[k])
+            gap = fmin(gap, scene_space_gap(&side, other));
+        side = *all;
+        side.min[k] = fmax(held->max[k], all->min[k]);
+        if (all->max[k] > held->max[k])
+            gap = fmin(gap, scene_space_gap(&side, other));
+    }
+    return gap;
+}
+
+static ebpo_status left_out_of(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
+                               double *gap, ebpo_error *error)
+{
+    const scene_model *m = left_out_model_of(scene, of);
+    scene_space held, all;
+    scene_seen seen;
+    *gap = INFINITY;
+    if (!held_box(scene, of, &held))
+        return EBPO_OK;
+    memcpy(all.min, m->min, sizeof all.min);
+    memcpy(all.max, m->max, sizeof all.max);
+    ebpo_status status = scene_seen_from(scene, of, other, time, &seen, error);
+    if (status == EBPO_OK)
+        *gap = gap_around(&all, &held, &seen.box) * seen.unit;
+    return status;
+}
+
+ebpo_status scene_left_out(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
+                           double *gap, uint64_t *lacking, ebpo_error *error)
+{
+    double of_a, of_b;
+    ebpo_status status = left_out_of(scene, pair->a, pair->b, time, &of_a, error);
+    if (status == EBPO_OK)
+        status = left_out_of(scene, pair->b, pair->a, time, &of_b, error);
+    if (status != EBPO_OK)
+        return status;
+    *gap = fmin(of_a, of_b);
+    *lacking = of_a <= of_b ? pair->a : pair->b;
+    return EBPO_OK;
+}
+
+ebpo_status scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
+                        double time, bool solids, ebpo_error *error)
+{
+    const scene_model *m = left_out_model_of(scene, lacking);
+    return ebpo_fail(
+        error, EBPO_E_ABSENT,
+        "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a "
+        "part of another or has no mesh, and what is not in it may matter; ask a scene "
+        "with more of it%s",
+        scene->instances[pair->a].as.name, scene->instances[pair->b].as.name, time, m->name,
+        solids ? ", such as ebpo scene pack --solids makes" : "");
+}
+
+static const scene_route *route_of(const ebpo_scene *scene, uint64_t instance)
+{
+    uint64_t route = scene->instances[instance].as.route;
+    return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
+}
+
+bool scene_pair_rides(const ebpo_scene *scene, const ebpo_scene_pair *pair)
+{
+    const scene_route *a = route_of(scene, pair->a), *b = route_of(scene, pair->b);
+    if (!a || !b)
+        return false;
+    return a == b || (a->count == b->count && a->jumps == b->jumps &&
+                      memcmp(a->keys, b->keys, a->count * sizeof *a->keys) == 0);
+}
+
+double scene_pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair)
+{
+    double sum = 0;
+    for (int i = 0; i < 2; i++) {
+        uint64_t instance = i ? pair->b : pair->a;
+        const scene_route *route = route_of(scene, instance);
+        if (route)
+            sum += scene_route_rounding(route, scene_reach_of(scene, &scene->instances[instance]));
+    }
+    return sum;
+}
+
+/* The pose of the route is the same for both, to the last bit: points of theirs that are `reach`
+ * apart at most where the route begins are scale times that apart. */
+static double pair_motion_ride(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
+                               double to)
+{
+    scene_reach a = scene_reach_of(scene, &scene->instances[pair->a]);
+    scene_reach b = scene_reach_of(scene, &scene->instances[pair->b]);
+    return scene_route_growth(route_of(scene, pair->a), from, to,
+                              (scene_reach){ a.length + b.length, a.size + b.size });
+}
+
+ebpo_status scene_pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair, bool rides,
+                              double from, double to, double *out, ebpo_error *error)
+{
+    double a, b;
+    ebpo_status status = ebpo_scene_motion(scene, pair->a, from, to, &a, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_motion(scene, pair->b, from, to, &b, error);
+    if (status != EBPO_OK)
+        return status;
+    *out = (a + b) * (1 + 0x1p-50);
+    if (rides && from < to)
+        *out = fmin(*out, pair_motion_ride(scene, pair, from, to));
+    return EBPO_OK;
+}
+
+double scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from, double to)
+{
+    double next = to;
+    for (int i = 0; i < 2; i++) {
+        const scene_route *route = route_of(scene, i ? pair->b : pair->a);
+        if (route)
+            next = fmin(next, scene_route_next(route, from, to));
+    }
+    return next;
+}
+
+/* Pairs of instances that are asked about one after the other, by any thread. */
 
 static bool keep_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count)
 {
@@ -55,7 +285,7 @@ ebpo_status scene_list_pairs(ebpo_scene *scene, double from, double to, scene_pa
     return status;
 }
 
-static ebpo_model *model_of(const ebpo_scene *scene, uint64_t instance)
+static ebpo_model *asked_pairs_model_of(const ebpo_scene *scene, uint64_t instance)
 {
     return scene->files[scene->models[scene->instances[instance].as.model].file].model;
 }
@@ -74,8 +304,8 @@ ebpo_status scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
     *out = NULL;
     if (!has_mesh(scene, pair->a) || !has_mesh(scene, pair->b))
         return EBPO_OK;
-    return ebpo_collider_of_parts(model_of(scene, pair->a), model_of(scene, pair->b), &how, out,
-                                  error);
+    return ebpo_collider_of_parts(asked_pairs_model_of(scene, pair->a),
+                                  asked_pairs_model_of(scene, pair->b), &how, out, error);
 }
 
 ebpo_status scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
@@ -83,4 +313,63 @@ ebpo_status scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair *pair
 {
     ebpo_status status = ebpo_scene_pose(scene, pair->a, time, &out->pose_a, error);
     return status == EBPO_OK ? ebpo_scene_pose(scene, pair->b, time, &out->pose_b, error) : status;
+}
+
+/* Of a collider that is not there: nothing is left to be near. */
+static ebpo_status ask_distance(scene_looks *l, double time, double *lo, double *hi,
+                                ebpo_error *error)
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
+    ebpo_clearance found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
+    how.tolerance = l->tolerance;
+    how.warm = true; /* lo and hi may differ by it: each pair has a collider of its own */
+    ebpo_status status = scene_pose_pair(l->scene, l->pair, time, &options, error);
+    if (status == EBPO_OK && l->collider)
+        status = ebpo_collide_distance(l->collider, &options, &how, &found, error);
+    *lo = found.distance.lo;
+    *hi = found.distance.hi;
+    return status;
+}
+
+ebpo_status scene_look(scene_looks *l, double time, double *lo, double *hi, ebpo_error *error)
+{
+    l->gap = INFINITY;
+    ebpo_status status = ask_distance(l, time, lo, hi, error);
+    if (status == EBPO_OK)
+        status = scene_left_out(l->scene, l->pair, time, &l->gap, &l->lacking, error);
+    *lo = fmin(*lo, l->gap);
+    return status;
+}
+
+ebpo_status scene_looks_begin(scene_looks *l, const ebpo_scene *scene, const ebpo_scene_pair *pair,
+                              double tolerance, ebpo_error *error)
+{
+    *l = (scene_looks){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
+    /* finer ones would take long, for digits that the next pose has otherwise */
+    l->tolerance = fmax(l->tolerance, scene_pair_rounding(scene, pair) / 16);
+    l->rides = scene_pair_rides(scene, pair);
+    return scene_collider(scene, pair, 1, &l->collider, error);
+}
+
+ebpo_status scene_looks_motion(const scene_looks *l, double from, double to, double *out,
+                               ebpo_error *error)
+{
+    return scene_pair_motion(l->scene, l->pair, l->rides, from, to, out, error);
+}
+
+bool scene_is_within(double hi, double lo, double tolerance)
+{
+    return hi <= lo || (hi - lo) * (1 + 0x1p-52) <= tolerance;
+}
+
+ebpo_status scene_take_way_options(ebpo_scene_way_options *own,
+                                   const ebpo_scene_way_options *options, ebpo_error *error)
+{
+    ebpo_status status = EBPO_TAKE(ebpo_scene_way_options, own, options, error);
+    if (status == EBPO_OK && !(own->tolerance > 0 && own->tolerance < INFINITY))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the tolerance %g is not above 0", own->tolerance);
+    if (!own->most_looks)
+        own->most_looks = 10000;
+    return status;
 }

@@ -8,7 +8,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "geometry/pose.h"
-#include "geometry/quaternion.h"
 #include "extras/scene/scene_parts.h"
 
 /* What rounding adds to lengths: of a few dozen operations, each 2^-53. */

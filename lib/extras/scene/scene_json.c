@@ -1,14 +1,360 @@
-/* A scene from its file (format-spec/scene.md). */
+/* Poses from a file of lines: time, x, y, z, qx, qy, qz, qw, scale in any order, named by the first
+ * line. */
 #include "core/strict_fp.h"
 
+#include <locale.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/error.h"
-#include "io/file_source.h"
 #include "extras/scene/json_reader.h"
-#include "extras/scene/json_routes.h"
+#include "extras/scene/scene_parts.h"
+#include "geometry/decimal.h"
+#include "geometry/pose.h"
+#include "io/file_source.h"
+
+/* Poses and routes in a scene file. */
+
+enum { COLUMNS = 9, NEEDED = 8, FIELDS_MOST = 64 };
+static const char *const columns[COLUMNS] = {
+    "time", "x", "y", "z", "qx", "qy", "qz", "qw", "scale"
+};
+
+typedef struct lines {
+    const char *at, *end, *name;
+    uint64_t line;
+    int field[COLUMNS]; /* where each column stands; -1: not there */
+    int fields;
+    locale_t c_locale;
+} lines;
+
+typedef struct csv_text {
+    const char *at;
+    size_t size;
+} csv_text;
+
+static csv_text csv_trimmed(const char *from, const char *to)
+{
+    while (from < to && strchr(" \t\r", *from))
+        from++;
+    while (to > from && strchr(" \t\r", to[-1]))
+        to--;
+    return (csv_text){ from, (size_t)(to - from) };
+}
+
+/* The next line that is not empty. */
+static bool next_line(lines *l, csv_text *out)
+{
+    while (l->at < l->end) {
+        const char *end = memchr(l->at, '\n', (size_t)(l->end - l->at));
+        end = end ? end : l->end;
+        *out = csv_trimmed(l->at, end);
+        l->at = end < l->end ? end + 1 : end;
+        l->line++;
+        if (out->size)
+            return true;
+    }
+    return false;
+}
+
+/* Commas or semicolons part fields; -1: too many. */
+static int csv_split(csv_text line, csv_text field[FIELDS_MOST])
+{
+    int count = 0;
+    const char *at = line.at, *end = line.at + line.size;
+    for (;;) {
+        const char *stop = at;
+        while (stop < end && *stop != ',' && *stop != ';')
+            stop++;
+        if (count == FIELDS_MOST)
+            return -1;
+        field[count++] = csv_trimmed(at, stop);
+        if (stop == end)
+            return count;
+        at = stop + 1;
+    }
+}
+
+static ebpo_status csv_bad(const lines *l, const char *what, ebpo_error *error)
+{
+    return ebpo_fail_file(error, EBPO_E_FORMAT, l->name, "line %llu: %s",
+                          (unsigned long long)l->line, what);
+}
+
+static ebpo_status read_header(lines *l, ebpo_error *error)
+{
+    csv_text line, field[FIELDS_MOST];
+    for (int k = 0; k < COLUMNS; k++)
+        l->field[k] = -1;
+    if (!next_line(l, &line))
+        return csv_bad(l, "there are no poses", error);
+    l->fields = csv_split(line, field);
+    for (int i = 0; i < l->fields; i++) {
+        int k = 0;
+        while (k < COLUMNS && (strlen(columns[k]) != field[i].size ||
+                               memcmp(columns[k], field[i].at, field[i].size) != 0))
+            k++;
+        if (k == COLUMNS || l->field[k] >= 0)
+            return csv_bad(l, "each column is one of time, x, y, z, qx, qy, qz, qw, scale", error);
+        l->field[k] = i;
+    }
+    for (int k = 0; k < NEEDED; k++)
+        if (l->field[k] < 0)
+            return csv_bad(l, "the first line names columns time, x, y, z, qx, qy, qz, qw", error);
+    return EBPO_OK;
+}
+
+static ebpo_status read_row(lines *l, csv_text line, scene_route *route, ebpo_error *error)
+{
+    csv_text field[FIELDS_MOST];
+    double v[COLUMNS] = { [8] = 1 };
+    if (csv_split(line, field) != l->fields)
+        return csv_bad(l, "there are not as many numbers as columns", error);
+    for (int k = 0; k < COLUMNS; k++)
+        if (l->field[k] >= 0 &&
+            !ebpo_number_double(&v[k], field[l->field[k]].at, field[l->field[k]].size, l->c_locale))
+            return csv_bad(l, "this is not a number in each column", error);
+    scene_key key = {
+        v[0],
+        { v[4], v[5], v[6], v[7] },
+        { v[1], v[2], v[3] },
+        v[8],
+    };
+    ebpo_error why = EBPO_ERROR_INIT;
+    ebpo_status status = scene_add_key(route, &key, &why);
+    return status == EBPO_E_ARGUMENT ? csv_bad(l, why.message, error)
+           : status != EBPO_OK       ? ebpo_fail_with(error, &why)
+                                     : EBPO_OK;
+}
+
+static ebpo_status read_rows(lines *l, scene_route *route, ebpo_error *error)
+{
+    csv_text line;
+    ebpo_status status = read_header(l, error);
+    while (status == EBPO_OK && next_line(l, &line))
+        status = read_row(l, line, route, error);
+    if (status == EBPO_OK && !route->count)
+        status = csv_bad(l, "there are no poses", error);
+    return status;
+}
+
+static ebpo_status read_text(const ebpo_whole_file *file, scene_route *route, const char *path,
+                             ebpo_error *error)
+{
+    lines l = { (const char *)file->data,
+                (const char *)file->data + file->size,
+                path,
+                0,
+                { 0 },
+                0,
+                newlocale(LC_ALL_MASK, "C", (locale_t)0) };
+    ebpo_status status;
+    const char *foreign = ebpo_foreign_bytes(file->data, file->size);
+    l.at += scene_text_mark(l.at, file->size);
+    if (foreign)
+        status = ebpo_fail_file(error, EBPO_E_FORMAT, path, "%s", foreign);
+    else if (!l.c_locale)
+        status = ebpo_fail_memory(error, 1);
+    else
+        status = read_rows(&l, route, error);
+    if (l.c_locale)
+        freelocale(l.c_locale);
+    return status;
+}
+
+ebpo_status scene_read_csv(scene_route *route, const char *path, uint64_t *left, ebpo_error *error)
+{
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
+    ebpo_status status = ebpo_whole_file_open(&file, path, error);
+    if (status == EBPO_OK && file.size > *left)
+        status = ebpo_fail_file(error, EBPO_E_LIMIT, path,
+                                "files of poses have more bytes than the limit that was given");
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
+    if (status == EBPO_OK)
+        status = read_text(&file, route, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_unchanged(&file, path, error);
+    if (status == EBPO_OK)
+        *left -= file.size;
+    ebpo_whole_file_close(&file);
+    return status;
+}
+
+/* Poses and routes in a scene file. */
+
+/* A pose whose rotation may be given as a matrix, or as a quaternion x, y, z, w of any length. */
+typedef struct read_pose {
+    ebpo_pose pose;
+    double turn[4];
+    bool has_turn;
+} read_pose;
+
+static ebpo_status pose_members(json_reader *r, const json_t *value, read_pose *out)
+{
+    static const char *const known[] = { "translation", "rotation", "quaternion", "scale", NULL };
+    ebpo_pose *p = &out->pose;
+    ebpo_status status = json_members(r, value, known);
+    if (status == EBPO_OK)
+        status = json_get_reals(r, value, "translation", false, p->translation, 3);
+    if (status == EBPO_OK)
+        status = json_get_reals(r, value, "rotation", false, &p->rotation[0][0], 9);
+    if (status == EBPO_OK)
+        status = json_get_reals(r, value, "quaternion", false, out->turn, 4);
+    if (status == EBPO_OK)
+        status = json_get_real(r, value, "scale", false, &p->scale);
+    out->has_turn = json_object_get(value, "quaternion") != NULL;
+    if (status == EBPO_OK && out->has_turn && json_object_get(value, "rotation"))
+        return json_bad(r, "has both rotation and quaternion");
+    return status;
+}
+
+/* As a key, whose quaternion has a length of 1. */
+static ebpo_status key_of(json_reader *r, const read_pose *p, double time, scene_route *route)
+{
+    static const double nowhere[3] = { 0, 0, 0 };
+    ebpo_error why = EBPO_ERROR_INIT;
+    ebpo_posing posing;
+    scene_key key = { .time = time, .scale = p->pose.scale };
+    memcpy(key.translation, p->pose.translation, sizeof key.translation);
+    memcpy(key.turn, p->turn, sizeof key.turn);
+    if (!p->has_turn) {
+        ebpo_status status = ebpo_posing_make(&posing, &p->pose, nowhere, &why);
+        if (status != EBPO_OK)
+            return json_judge(r, status, &why);
+        scene_turn_of_matrix(p->pose.rotation, key.turn);
+    }
+    return json_judge(r, scene_add_key(route, &key, &why), &why);
+}
+
+/* *out stays where the member is missing. */
+static ebpo_status json_read_pose(json_reader *r, const json_t *object, const char *key,
+                                  ebpo_pose *out)
+{
+    const json_t *value = json_object_get(object, key);
+    if (!value)
+        return EBPO_OK;
+    read_pose p = { .pose = EBPO_POSE_INIT };
+    scene_route alone = { 0 };
+    json_enter(r, key, 0);
+    ebpo_status status = pose_members(r, value, &p);
+    if (status == EBPO_OK && p.has_turn) {
+        status = key_of(r, &p, 0, &alone);
+        if (status == EBPO_OK)
+            scene_route_at(&alone, 0, &p.pose);
+        free(alone.keys);
+    }
+    json_leave(r);
+    *out = p.pose; /* of a matrix: judged with the instance */
+    return status;
+}
+
+static scene_route *last_route(json_reader *r)
+{
+    return &r->scene->routes[r->scene->routes_count - 1];
+}
+
+static ebpo_status read_key(json_reader *r, const char *name, const json_t *value)
+{
+    static const char *const known[] = { "time", "pose", NULL };
+    (void)name;
+    double time = 0;
+    read_pose p = { .pose = EBPO_POSE_INIT };
+    ebpo_status status = json_members(r, value, known);
+    if (status == EBPO_OK)
+        status = json_get_real(r, value, "time", true, &time);
+    if (status != EBPO_OK)
+        return status;
+    json_enter(r, "pose", 0);
+    status = pose_members(r, json_object_get(value, "pose"), &p);
+    json_leave(r);
+    return status == EBPO_OK ? key_of(r, &p, time, last_route(r)) : status;
+}
+
+static ebpo_status read_poses(json_reader *r, const json_t *value)
+{
+    double begin = 0, step = 0;
+    const json_t *poses = json_object_get(value, "poses");
+    ebpo_status status = json_get_real(r, value, "begin", false, &begin);
+    if (status == EBPO_OK)
+        status = json_get_real(r, value, "step", true, &step);
+    if (status != EBPO_OK)
+        return status;
+    if (!json_is_array(poses))
+        return json_bad_at(r, "poses", "is not an array");
+    json_enter(r, "poses", 0);
+    for (size_t i = 0; i < json_array_size(poses) && status == EBPO_OK; i++) {
+        read_pose p = { .pose = EBPO_POSE_INIT };
+        json_enter(r, NULL, i);
+        status = pose_members(r, json_array_get(poses, i), &p);
+        if (status == EBPO_OK)
+            status = key_of(r, &p, begin + step * (double)i, last_route(r));
+        json_leave(r);
+    }
+    json_leave(r);
+    return status;
+}
+
+static ebpo_status read_csv(json_reader *r, const json_t *value)
+{
+    const char *path = NULL;
+    ebpo_status status = json_get_text(r, value, "csv", true, &path);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_scene_options here = *r->options;
+    here.remote = false;
+    const char *refused = scene_path_refused(path, &here, false);
+    if (refused)
+        return json_bad_at(r, "csv", refused);
+    char *joined = scene_join_path(r->scene->folder, path);
+    status = joined ? EBPO_OK : ebpo_fail_memory(r->error, strlen(path));
+    if (status == EBPO_OK && !here.outside)
+        status = scene_stays_within(r->scene->folder, joined, r->error);
+    if (status == EBPO_OK)
+        status = scene_read_csv(last_route(r), joined, &r->pose_bytes, r->error);
+    free(joined);
+    return status;
+}
+
+static ebpo_status read_between(json_reader *r, const json_t *value)
+{
+    const char *between = "even";
+    ebpo_status status = json_get_text(r, value, "between", false, &between);
+    if (status != EBPO_OK)
+        return status;
+    last_route(r)->jumps = strcmp(between, "jump") == 0;
+    return last_route(r)->jumps || strcmp(between, "even") == 0
+               ? EBPO_OK
+               : json_bad_at(r, "between", "is neither even nor jump");
+}
+
+/* For json_each_member. */
+static ebpo_status json_read_route(json_reader *r, const char *name, const json_t *value)
+{
+    static const char *const known[] = { "keys", "poses", "begin", "step", "csv", "between", NULL };
+    uint64_t number;
+    ebpo_error why = EBPO_ERROR_INIT;
+    ebpo_status status = json_members(r, value, known);
+    if (status == EBPO_OK)
+        status = json_judge(r, scene_add_route(r->scene, name, &number, &why), &why);
+    if (status == EBPO_OK)
+        status = read_between(r, value);
+    if (status != EBPO_OK)
+        return status;
+    bool keys = json_object_get(value, "keys"), poses = json_object_get(value, "poses"),
+         csv = json_object_get(value, "csv");
+    if (keys + poses + csv != 1)
+        return json_bad(r, "has not one of keys, poses and csv");
+    if (!poses && (json_object_get(value, "begin") || json_object_get(value, "step")))
+        return json_bad(r, "begin and step are for poses");
+    status = keys    ? json_each_item(r, value, "keys", read_key)
+             : poses ? read_poses(r, value)
+                     : read_csv(r, value);
+    return status == EBPO_OK && last_route(r)->count == 0 ? json_bad(r, "has no poses") : status;
+}
+
+/* A scene from its file (format-spec/scene.md). */
 
 /* ---- names ---- */
 
@@ -40,7 +386,7 @@ static ebpo_status read_group(json_reader *r, const char *key, const json_t *val
 
 /* ---- models ---- */
 
-static int digit(char c)
+static int json_digit(char c)
 {
     const char *digits = "0123456789abcdef", *at = c ? strchr(digits, c) : NULL;
     return at ? (int)(at - digits) : -1;
@@ -50,7 +396,7 @@ static bool read_digest(const char *hex, uint8_t out[32])
 {
     bool fits = strlen(hex) == 64;
     for (int i = 0; i < 32 && fits; i++) {
-        int high = digit(hex[2 * i]), low = digit(hex[2 * i + 1]);
+        int high = json_digit(hex[2 * i]), low = json_digit(hex[2 * i + 1]);
         fits = high >= 0 && low >= 0;
         out[i] = fits ? (uint8_t)(high << 4 | low) : 0;
     }
@@ -86,8 +432,8 @@ static ebpo_status read_model(json_reader *r, const char *name, const json_t *va
 /* ---- instances ---- */
 
 /* The number of what `key` names; *number stays where it is missing. */
-static ebpo_status find(json_reader *r, const json_t *object, const char *key, const char *kind,
-                        bool needed, uint64_t *number)
+static ebpo_status json_find(json_reader *r, const json_t *object, const char *key,
+                             const char *kind, bool needed, uint64_t *number)
 {
     const char *name = NULL;
     ebpo_status status = json_get_text(r, object, key, needed, &name);
@@ -121,11 +467,11 @@ static ebpo_status read_instance(json_reader *r, const char *key, const json_t *
     if (status == EBPO_OK)
         status = json_get_text(r, value, "name", true, &i.name);
     if (status == EBPO_OK)
-        status = find(r, value, "model", SCENE_MODEL, true, &i.model);
+        status = json_find(r, value, "model", SCENE_MODEL, true, &i.model);
     if (status == EBPO_OK)
-        status = find(r, value, "route", SCENE_ROUTE, false, &i.route);
+        status = json_find(r, value, "route", SCENE_ROUTE, false, &i.route);
     if (status == EBPO_OK)
-        status = find(r, value, "layer", SCENE_LAYER, false, &i.layer);
+        status = json_find(r, value, "layer", SCENE_LAYER, false, &i.layer);
     if (status == EBPO_OK)
         status = json_get_flag(r, value, "fixed", &i.fixed);
     if (status == EBPO_OK)
@@ -181,7 +527,7 @@ static ebpo_status read_camera(json_reader *r, const char *key, const json_t *va
     if (status == EBPO_OK)
         status = json_get_reals(r, value, "pixels", false, pixels, 2);
     if (status == EBPO_OK)
-        status = find(r, value, "route", SCENE_ROUTE, false, &c.route);
+        status = json_find(r, value, "route", SCENE_ROUTE, false, &c.route);
     if (status == EBPO_OK)
         status = check_camera(r, &c, pixels);
     if (status != EBPO_OK)

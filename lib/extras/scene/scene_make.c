@@ -1,15 +1,173 @@
-/* Scenes as they are made: what is added. */
+/* Names of a scene: each kind has its own, and selectors share one space. */
 #include "core/strict_fp.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <ebpo/http.h>
+
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "geometry/pose.h"
 #include "extras/scene/scene_parts.h"
+#include "geometry/pose.h"
+
+enum { NAME_MOST = 255, KIND_MOST = 8 };
+
+static bool is_plain(const char *name)
+{
+    for (const unsigned char *c = (const unsigned char *)name; *c; c++)
+        if (*c < 0x20 || *c == 0x7f)
+            return false;
+    json_t *text = json_string(name); /* NULL where it is not UTF-8 */
+    json_decref(text);
+    return text != NULL;
+}
+
+ebpo_status scene_check_name(const char *name, const char *what, ebpo_error *error)
+{
+    size_t size = name ? strnlen(name, NAME_MOST + 1) : 0;
+    if (size == 0 || size > NAME_MOST || !is_plain(name))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "a name of %s is 1 to %d bytes of UTF-8 without control characters", what,
+                         NAME_MOST);
+    if (strcmp(name, "*") == 0 || strncmp(name, "layer:", 6) == 0 ||
+        strncmp(name, "group:", 6) == 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "'%.80s' cannot be a name of %s: '*', 'layer:' and 'group:' stand for "
+                         "many",
+                         name, what);
+    return EBPO_OK;
+}
+
+static void names_join(char *out, size_t room, const char *kind, const char *name)
+{
+    size_t begin = strlen(kind), size = strnlen(name, room - begin - 1);
+    memcpy(out, kind, begin);
+    memcpy(out + begin, name, size);
+    out[begin + size] = 0;
+}
+
+uint64_t scene_find_name(const ebpo_scene *scene, const char *kind, const char *name)
+{
+    char key[KIND_MOST + NAME_MOST + 2];
+    names_join(key, sizeof key, kind, name);
+    const json_t *number = json_object_get(scene->names, key);
+    return number ? (uint64_t)json_integer_value(number) : EBPO_SCENE_NONE;
+}
+
+ebpo_status scene_put_name(ebpo_scene *scene, const char *kind, const char *name, uint64_t number,
+                           ebpo_error *error)
+{
+    char key[KIND_MOST + NAME_MOST + 2];
+    names_join(key, sizeof key, kind, name);
+    if (json_object_get(scene->names, key))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is another '%.80s'", name);
+    if (json_object_set_new(scene->names, key, json_integer((json_int_t)number)) != 0)
+        return ebpo_fail_memory(error, sizeof key);
+    return EBPO_OK;
+}
+
+ebpo_status scene_add_set(ebpo_scene *scene, const char *kind, const char *name, uint64_t *set,
+                          ebpo_error *error)
+{
+    uint64_t number = scene->sets_count;
+    if (!ebpo_grow(&scene->sets, &scene->sets_capacity, number + 1, sizeof *scene->sets))
+        return ebpo_fail_memory(error, (number + 1) * sizeof *scene->sets);
+    ebpo_status status = scene_put_name(scene, kind, name, number, error);
+    if (status != EBPO_OK)
+        return status;
+    scene->sets[number] = strdup(name);
+    if (!scene->sets[number])
+        return ebpo_fail_memory(error, strlen(name));
+    scene->sets_count++;
+    if (set)
+        *set = number;
+    return EBPO_OK;
+}
+
+/* Files that a scene names, and which of them a stranger's scene may name. */
+
+static bool goes_up(const char *path)
+{
+    for (const char *part = path; part; part = strchr(part, '/')) {
+        part += *part == '/';
+        if (strncmp(part, "..", 2) == 0 && (part[2] == '/' || part[2] == 0))
+            return true;
+    }
+    return false;
+}
+
+const char *scene_path_refused(const char *path, const ebpo_scene_options *options, bool has_digest)
+{
+    if (!*path)
+        return "is no path";
+    if (ebpo_is_url(path) && !options->remote)
+        return "is on a server, which has to be allowed (ebpo scene --remote)";
+    if (ebpo_is_url(path) && !has_digest)
+        return "is on a server, and needs its content_sha256 here";
+    if (!ebpo_is_url(path) && !options->outside && (*path == '/' || goes_up(path)))
+        return "is outside the scene's folder, which has to be allowed (ebpo scene --outside)";
+    return NULL;
+}
+
+char *scene_join_path(const char *folder, const char *path)
+{
+    bool alone = *path == '/' || ebpo_is_url(path);
+    size_t begin = alone ? 0 : strlen(folder), size = strlen(path);
+    char *joined = malloc(begin + size + 1);
+    if (joined) {
+        memcpy(joined, folder, begin);
+        memcpy(joined + begin, path, size + 1);
+    }
+    return joined;
+}
+
+static bool is_below(const char *folder, const char *path)
+{
+    size_t size = strlen(folder);
+    size -= size && folder[size - 1] == '/'; /* the root only */
+    return strncmp(folder, path, size) == 0 && path[size] == '/';
+}
+
+/* Names of files without links. */
+static ebpo_status check_real(const char *folder, const char *real, const char *path,
+                              ebpo_error *error)
+{
+    if (is_below(folder, real))
+        return EBPO_OK;
+    return ebpo_fail_file(error, EBPO_E_FORMAT, path,
+                          "is by a link the file %.160s, outside the scene's folder %.160s, which "
+                          "has to be allowed (ebpo scene --outside)",
+                          real, folder);
+}
+
+ebpo_status scene_stays_within(const char *folder, const char *path, ebpo_error *error)
+{
+    if (ebpo_is_url(path))
+        return EBPO_OK;
+    char *top = realpath(*folder ? folder : ".", NULL), *real = realpath(path, NULL);
+    ebpo_status status = EBPO_OK;
+    if (top && real)
+        status = check_real(top, real, path, error);
+    else if (errno == ENOMEM)
+        status = ebpo_fail_memory(error, strlen(path));
+    else
+        status = ebpo_fail_errno(error, path, "cannot be opened");
+    free(top);
+    free(real);
+    return status;
+}
+
+char *scene_folder_of(const char *path)
+{
+    const char *last = strrchr(path, '/');
+    return strndup(path, last ? (size_t)(last - path) + 1 : 0);
+}
+
+/* Scenes as they are made: what is added. */
 
 ebpo_status ebpo_scene_new(ebpo_scene **out, ebpo_error *error)
 {
@@ -254,4 +412,133 @@ ebpo_status scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b, double cle
     scene->ignored += clearance < 0;
     scene->clearances += clearance >= 0;
     return EBPO_OK;
+}
+
+/* What a scene tells of itself. */
+
+static void add_times(const ebpo_scene *scene, ebpo_scene_counts *c)
+{
+    double begin = INFINITY, end = -INFINITY;
+    for (uint64_t i = 0; i < scene->routes_count; i++) {
+        const scene_route *r = &scene->routes[i];
+        c->poses += r->count;
+        if (r->count) {
+            begin = fmin(begin, r->keys[0].time);
+            end = fmax(end, r->keys[r->count - 1].time);
+        }
+    }
+    if (begin <= end) {
+        c->begin = begin;
+        c->end = end;
+    }
+}
+
+ebpo_status ebpo_scene_get_counts(const ebpo_scene *scene, ebpo_scene_counts *out)
+{
+    ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
+    c.models = scene->models_count;
+    c.instances = scene->instances_count;
+    c.layers = scene->layers_count;
+    c.groups = scene->groups_count;
+    c.routes = scene->routes_count;
+    c.cameras = scene->cameras_count;
+    c.ignored = scene->ignored;
+    c.clearances = scene->clearances;
+    for (uint64_t i = 0; i < scene->instances_count; i++)
+        c.fixed += scene->instances[i].as.fixed;
+    add_times(scene, &c);
+    return EBPO_GIVE(ebpo_scene_counts, out, &c);
+}
+
+ebpo_status ebpo_scene_get_model(const ebpo_scene *scene, uint64_t model,
+                                 ebpo_scene_model_facts *out)
+{
+    if (model >= scene->models_count)
+        return EBPO_E_ARGUMENT;
+    const scene_model *m = &scene->models[model];
+    ebpo_scene_model_facts f = EBPO_SCENE_MODEL_FACTS_INIT;
+    f.name = m->name;
+    f.path = m->path;
+    f.instances = m->instances;
+    f.loaded = m->file != EBPO_SCENE_NONE;
+    memcpy(f.digest, m->digest, sizeof f.digest);
+    memcpy(f.min, m->min, sizeof f.min);
+    memcpy(f.max, m->max, sizeof f.max);
+    return EBPO_GIVE(ebpo_scene_model_facts, out, &f);
+}
+
+ebpo_status ebpo_scene_get_instance(const ebpo_scene *scene, uint64_t instance,
+                                    ebpo_scene_instance *out)
+{
+    if (instance >= scene->instances_count)
+        return EBPO_E_ARGUMENT;
+    return EBPO_GIVE(ebpo_scene_instance, out, &scene->instances[instance].as);
+}
+
+const char *ebpo_scene_get_layer(const ebpo_scene *scene, uint64_t layer)
+{
+    return layer < scene->layers_count ? scene->sets[scene->layers[layer]] : NULL;
+}
+
+const char *ebpo_scene_get_group(const ebpo_scene *scene, uint64_t group)
+{
+    return group < scene->groups_count ? scene->sets[scene->groups[group]] : NULL;
+}
+
+/* EBPO_SCENE_NONE: the set is no group's. */
+static uint64_t group_with(const ebpo_scene *scene, uint64_t set)
+{
+    uint64_t low = 0, high = scene->groups_count;
+    while (low < high) {
+        uint64_t middle = low + (high - low) / 2;
+        if (scene->groups[middle] < set)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < scene->groups_count && scene->groups[low] == set ? low : EBPO_SCENE_NONE;
+}
+
+uint64_t ebpo_scene_group_of(const ebpo_scene *scene, uint64_t instance, uint64_t nth)
+{
+    uint64_t group = EBPO_SCENE_NONE;
+    if (instance >= scene->instances_count)
+        return group;
+    const scene_instance *i = &scene->instances[instance];
+    for (uint32_t n = 0; n < i->set_count; n++) {
+        group = group_with(scene, i->sets[n]);
+        if (group != EBPO_SCENE_NONE && nth-- == 0)
+            return group;
+    }
+    return EBPO_SCENE_NONE;
+}
+
+ebpo_status ebpo_scene_get_camera(const ebpo_scene *scene, uint64_t camera, ebpo_scene_camera *out)
+{
+    if (camera >= scene->cameras_count)
+        return EBPO_E_ARGUMENT;
+    return EBPO_GIVE(ebpo_scene_camera, out, &scene->cameras[camera]);
+}
+
+ebpo_status ebpo_scene_get_stats(const ebpo_scene *scene, ebpo_scene_stats *out)
+{
+    ebpo_scene_stats s = EBPO_SCENE_STATS_INIT;
+    for (uint64_t i = 0; i < scene->files_count; i++) {
+        const scene_file *f = &scene->files[i];
+        ebpo_file_stats read = EBPO_FILE_STATS_INIT;
+        ebpo_model_stats model = EBPO_MODEL_STATS_INIT;
+        if (!f->file)
+            continue;
+        (void)ebpo_file_get_stats(f->file, &read);
+        s.files++;
+        s.bytes_read += read.bytes_read;
+        s.reads += read.reads;
+        if (!f->model)
+            continue;
+        (void)ebpo_model_get_stats(f->model, &model);
+        s.models++;
+        s.memory += model.memory;
+        s.loads += model.loads;
+    }
+    return EBPO_GIVE(ebpo_scene_stats, out, &s);
 }

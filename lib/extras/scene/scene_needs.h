@@ -2,7 +2,7 @@
 #ifndef EBPO_SCENE_SCENE_NEEDS_H
 #define EBPO_SCENE_SCENE_NEEDS_H
 
-#include "extras/scene/left_out.h"
+#include "extras/scene/asked_pairs.h"
 
 typedef struct scene_file_need {
     uint64_t askers;   /* pairs, or cameras that may see it */
@@ -36,5 +36,9 @@ ebpo_subset_options scene_need_options(const scene_needs *needs, uint64_t file);
 /* Of one model, as the caller gets it. */
 EBPO_MUST_USE ebpo_status scene_tell_need(const scene_needs *needs, uint64_t model,
                                           ebpo_scene_need *out);
+
+/* What of each file the scene's cameras can see. */
+
+EBPO_MUST_USE ebpo_status scene_add_views(scene_needs *needs);
 
 #endif

@@ -7,9 +7,8 @@
 #include <stdio.h>
 
 #include "exact_twin.h"
-#include "geometry/cell.h"
+#include "geometry/cells.h"
 #include "geometry/predicates.h"
-#include "geometry/predicates_expansion.h"
 #include "geometry/distance.h"
 #include "geometry/ray_triangle.h"
 
