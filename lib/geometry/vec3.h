@@ -48,11 +48,9 @@ static inline double ebpo_max3(double a, double b, double c)
     return high > c ? high : c;
 }
 
-/* Lengths of vectors of any size. Pure functions, any thread. */
-
-/* Within 2^-50 of itself, or 2^-1073, also where squares are beyond what doubles hold; INFINITY
- * when it overflows. */
-static inline double ebpo_length(const double v[3])
+/* The length, scaled where squares would overflow or underflow: within 2^-50 of itself, or 2^-1073;
+ * INFINITY when the length itself overflows. */
+static inline double ebpo_vec3_scaled_length(const double v[3])
 {
     double square = (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2];
     if (square > 0x1p-900 && square < 0x1p900)
@@ -67,10 +65,10 @@ static inline double ebpo_length(const double v[3])
     return scalbn(sqrt((w[0] * w[0] + w[1] * w[1]) + w[2] * w[2]), power);
 }
 
-static inline double ebpo_length_between(const double a[3], const double b[3])
+static inline double ebpo_vec3_scaled_distance(const double a[3], const double b[3])
 {
     const double way[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
-    return ebpo_length(way);
+    return ebpo_vec3_scaled_length(way);
 }
 
 #endif

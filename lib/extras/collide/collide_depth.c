@@ -193,7 +193,7 @@ static ebpo_status offer_triangle(ebpo_depth_search *s, const double a[3], const
         centre[k] = a[k] + ((b[k] - a[k]) + (c[k] - a[k])) / 3;
     for (int i = 0; i < 3; i++) {
         memcpy(part.corner[i], corner[i], sizeof part.corner[i]);
-        radius = fmax(radius, ebpo_length_between(corner[i], centre));
+        radius = fmax(radius, ebpo_vec3_scaled_distance(corner[i], centre));
     }
     return depth_parts_offer(s, &part, centre, radius * (1 + 0x1p-50) + s->lost, error);
 }
@@ -232,7 +232,7 @@ static ebpo_status divide_triangle(ebpo_depth_search *s, const ebpo_depth_part *
     double middle[3][3], length[3];
     int longest = 0, shortest = 0;
     for (int k = 0; k < 3; k++) {
-        length[k] = ebpo_length_between(p->corner[k], p->corner[(k + 1) % 3]);
+        length[k] = ebpo_vec3_scaled_distance(p->corner[k], p->corner[(k + 1) % 3]);
         longest = length[k] > length[longest] ? k : longest;
         shortest = length[k] < length[shortest] ? k : shortest;
     }

@@ -81,7 +81,7 @@ double ebpo_convex_span(const ebpo_convex *a, const ebpo_convex *b)
     double most = 0;
     for (int i = 0; i < a->count; i++)
         for (int j = 0; j < b->count; j++)
-            most = fmax(most, ebpo_length_between(a->point[i], b->point[j]));
+            most = fmax(most, ebpo_vec3_scaled_distance(a->point[i], b->point[j]));
     return most * (1 + 0x1p-40);
 }
 
@@ -201,7 +201,8 @@ double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double rea
 
 double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell)
 {
-    return ebpo_length(s->model->info->box_size) * s->posing.scale / (double)(1u << cell.level);
+    return ebpo_vec3_scaled_length(s->model->info->box_size) * s->posing.scale /
+           (double)(1u << cell.level);
 }
 
 /* --- envelopes --- */

@@ -81,8 +81,8 @@ static double apart_of(const finding *f, const ebpo_posed_node node[2])
         ebpo_posed_cell(f->side[i], node[i].cell, corner[i]);
     for (int k = 0; k < 3; k++)
         d[k] = (corner[0][0][k] + corner[0][7][k]) - (corner[1][0][k] + corner[1][7][k]);
-    return ebpo_length(d) / (ebpo_posed_diagonal(f->side[0], node[0].cell) +
-                             ebpo_posed_diagonal(f->side[1], node[1].cell));
+    return ebpo_vec3_scaled_length(d) / (ebpo_posed_diagonal(f->side[0], node[0].cell) +
+                                         ebpo_posed_diagonal(f->side[1], node[1].cell));
 }
 
 static bool is_pruned(const ebpo_posed_subtrees *s, uint32_t number)

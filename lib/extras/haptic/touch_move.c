@@ -210,7 +210,7 @@ static ebpo_status new_measure(ebpo_touch *t, ebpo_error *error)
         t->root.max[i] = high + wider;
         most = fmax(most, fmax(fabs(t->root.min[i]), fabs(t->root.max[i])));
     }
-    t->diagonal = ebpo_length_between(t->root.min, t->root.max);
+    t->diagonal = ebpo_vec3_scaled_distance(t->root.min, t->root.max);
     if (!(most <= 0x1p200 && t->diagonal >= 0x1p-200))
         return ebpo_fail(error, EBPO_E_UNSUPPORTED,
                          "coordinates are too large or too small to be touched");
