@@ -1,5 +1,9 @@
-/* A finite double is an integer times a power of two. Coordinates of one axis are brought to a
- * common power, which scales the determinant by a positive factor and leaves integers. */
+/* Orientation predicates and signs of sums of products, exact for every finite double.
+ *
+ * Each predicate goes through stages, cheapest first: signs of factors, a floating-point filter,
+ * exact arithmetic on doubles (expansions) where exponents leave room for it, integers of any size.
+ * Sources: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
+ * Predicates", 1997; docs/develop/design.md. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -11,6 +15,11 @@
 
 #include "geometry/expansion.h"
 #include "geometry/predicates.h"
+
+/* --- integers of any size --- */
+
+/* A finite double is an integer times a power of two. Coordinates of one axis are brought to a
+ * common power, which scales the determinant by a positive factor and leaves integers. */
 
 /* Largest e such that x is an integer multiple of 2^e with a 53-bit factor; INT_MAX for 0, which is
  * a multiple of all. */
@@ -61,8 +70,7 @@ static void set_differences(mpz_t *out, const double *x, int n)
 }
 
 /* out = p * q - r * s */
-static void predicates_exact_minor2(mpz_t out, const mpz_t p, const mpz_t q, const mpz_t r,
-                                    const mpz_t s)
+static void minor_2x2(mpz_t out, const mpz_t p, const mpz_t q, const mpz_t r, const mpz_t s)
 {
     mpz_mul(out, p, q);
     mpz_submul(out, r, s);
@@ -88,7 +96,7 @@ int ebpo_orient2d_exact(const double a[2], const double b[2], const double c[2])
         set_differences(m[k], (double[]){ a[k], b[k], c[k] }, 3);
     }
     mpz_init(det);
-    predicates_exact_minor2(det, m[0][0], m[1][1], m[0][1], m[1][0]);
+    minor_2x2(det, m[0][0], m[1][1], m[0][1], m[1][0]);
     int sign = mpz_sgn(det);
     mpz_clear(det);
     for (int k = 0; k < 2; k++)
@@ -107,7 +115,7 @@ int ebpo_orient3d_exact(const double a[3], const double b[3], const double c[3],
     mpz_init(det);
     for (int k = 0; k < 3; k++) {
         int u = (k + 1) % 3, v = (k + 2) % 3;
-        predicates_exact_minor2(minor, m[u][0], m[v][1], m[v][0], m[u][1]);
+        minor_2x2(minor, m[u][0], m[v][1], m[v][0], m[u][1]);
         mpz_addmul(det, minor, m[k][2]);
     }
     int sign = mpz_sgn(det);
@@ -136,6 +144,8 @@ int ebpo_sign_of_products_exact(const double *factor, int n)
     mpz_clear(p);
     return sign;
 }
+
+/* --- expansions --- */
 
 /* Ranges. A double x with 2^-247 <= |x| <= 2^300 is an integer multiple of 2^-300. So are
  * differences of such numbers and their rounding errors; products of three are multiples of 2^-900
@@ -328,20 +338,18 @@ int ebpo_sign_of_products_expansion(const double *factor, int n)
     return ebpo_expansion_sign(sum[now], length);
 }
 
-/* Each predicate goes through stages, cheapest first: signs of factors, a floating-point filter,
- * exact arithmetic on doubles (expansions) where exponents leave room for it, integers of any size.
- *
- * Error bounds: eps = 2^-53. Each bound holds for the computed permanent (the sum of absolute
+/* --- filters, and the stages in turn --- */
+
+/* Error bounds: eps = 2^-53. Each bound holds for the computed permanent (the sum of absolute
  * values); the slack term covers underflow in the products, and an overflow makes the bound
  * infinite or not a number, so that no comparison succeeds. */
-
 static const double eps = 0x1p-53;
 /* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;
 
 static inline int sign_of(double x) { return (x > 0) - (x < 0); }
 
-static inline int predicates_filtered(double value, double bound)
+static inline int filter_sign(double value, double bound)
 {
     if (value > bound)
         return 1;
@@ -361,7 +369,7 @@ int ebpo_orient2d(const double a[2], const double b[2], const double c[2])
     if (left_sign == 0)
         return 0;
     double left = ux * vy, right = uy * vx;
-    int sign = predicates_filtered(left - right, 4 * eps * (fabs(left) + fabs(right)) + slack);
+    int sign = filter_sign(left - right, 4 * eps * (fabs(left) + fabs(right)) + slack);
     if (sign == EBPO_SIGN_UNKNOWN)
         sign = ebpo_orient2d_expansion(a, b, c);
     return sign != EBPO_SIGN_UNKNOWN ? sign : ebpo_orient2d_exact(a, b, c);
@@ -378,7 +386,7 @@ static int orient3d_filter(double m[3][3])
         permanent += (fabs(p) + fabs(q)) * fabs(m[k][2]);
         third += fabs(m[k][2]);
     }
-    return predicates_filtered(det, 8 * eps * permanent + slack * (1 + third));
+    return filter_sign(det, 8 * eps * permanent + slack * (1 + third));
 }
 
 static inline bool same_point(const double p[3], const double q[3])
@@ -417,7 +425,7 @@ int ebpo_sign_of_products(const double *factor, int n)
         sum += product;
         permanent += fabs(product);
     }
-    int sign = predicates_filtered(sum, (n + 2) * eps * permanent + slack);
+    int sign = filter_sign(sum, (n + 2) * eps * permanent + slack);
     if (sign == EBPO_SIGN_UNKNOWN)
         sign = ebpo_sign_of_products_expansion(factor, n);
     return sign != EBPO_SIGN_UNKNOWN ? sign : ebpo_sign_of_products_exact(factor, n);

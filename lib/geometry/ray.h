@@ -38,6 +38,12 @@ void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int
 int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3], const ebpo_ray_meeting *at_a,
                      const double b[3][3], const ebpo_ray_meeting *at_b);
 
+/* The same in rational numbers, for every finite double. Each call allocates through GMP, which
+ * ends the program when memory is out (a few kilobytes suffice). */
+void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3],
+                             ebpo_ray_meeting *out);
+int ebpo_ray_compare_exact(const ebpo_segment *ray, const double a[3][3], const double b[3][3]);
+
 /* True when the closed triangle and the closed box [min, max] have a common point (min <= max on
  * each axis; a box may be flat or a point). */
 bool ebpo_triangle_meets_box(const double triangle[3][3], const double min[3], const double max[3]);

@@ -1,6 +1,15 @@
-/* Ranges. A double x with 2^-172 <= |x| <= 2^225 is a multiple of 2^-225; products of four such
- * numbers, their differences and rounding errors are multiples of 2^-900 and below 2^910. Comparing
- * two hits takes products of six, so numbers from 2^-97 to 2^150, which are multiples of 2^-150. */
+/* Where a ray meets a triangle.
+ *
+ * A ray goes through stages, cheapest first: on which side of each edge the line passes, in
+ * floating point with error bounds; then numerator and denominator of t in double-double
+ * arithmetic (double_double_kernels.c), which gives t to its last bits; expansions where these are
+ * not certain; rational numbers where exponents leave the range of expansions (ray_exact.c).
+ *
+ * With e_i = corner i - origin the line passes the edge (i, j) on the side given by the sign of d .
+ * (e_i x e_j). Two edges with different signs: the line misses the triangle, also one without area
+ * or seen edge-on, because all three signs are those of one planar figure, the triangle as seen
+ * along d. Three equal signs: it goes through the interior. Anything else touches an edge or a
+ * corner or is not certain. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -12,36 +21,35 @@
 #include "geometry/expansion.h"
 #include "geometry/predicates.h"
 #include "geometry/ray.h"
-#include "geometry/ray_pairs.h"
-
-/* Where a ray meets a triangle, as fractions of expansions: exact without allocation, for rays that
- * the filters of ray_close.c leave open. What returns false or
- * EBPO_SIGN_UNKNOWN cannot tell: numbers are too large or too small. */
-
-/* numerator / denominator; the denominator is not 0. */
-typedef struct ebpo_fraction {
-    int n, m;
-    double numerator[192], denominator[96];
-} ebpo_fraction;
-
-/* Zero, or of a size that no product of four such numbers leaves the doubles. */
-static bool ebpo_ray_in_range(const ebpo_segment *ray, const double triangle[3][3]);
-
-/* Rays that come close to an edge, a corner, a plane or their own end: where the first filter does
- * not suffice. */
+#include "geometry/double_double_kernels.h"
 
 /* Sign of the determinant of direction, corner i and corner i + 1 (relative to the origin), where
  * it is certain; else: */
-enum { EBPO_SIDE_OPEN = 2 };
+enum { SIDE_OPEN = 2 };
 
 /* What is further apart than this is certainly in this order, when a and b are rounded. */
-static inline bool ebpo_certainly_less(double a, double b)
+static inline bool certainly_less(double a, double b)
 {
     return b - a > 0x1p-50 * (__builtin_fabs(a) + __builtin_fabs(b));
 }
 
-/* Rays against triangles in rational numbers: slow, right for every finite double, and used when
- * the filters of ray_triangle.c give up. */
+static inline void set_miss(ebpo_ray_meeting *out)
+{
+    *out = (ebpo_ray_meeting){ false, 0, 0, INFINITY };
+}
+
+/* --- expansions: t as a fraction, exact without allocation --- */
+
+/* Ranges. A double x with 2^-172 <= |x| <= 2^225 is a multiple of 2^-225; products of four such
+ * numbers, their differences and rounding errors are multiples of 2^-900 and below 2^910. Comparing
+ * two hits takes products of six, so numbers from 2^-97 to 2^150, which are multiples of 2^-150.
+ * Functions that return false or EBPO_SIGN_UNKNOWN got numbers outside of these ranges. */
+
+/* numerator / denominator; the denominator is not 0. */
+typedef struct fraction_of_expansions {
+    int n, m;
+    double numerator[192], denominator[96];
+} fraction_of_expansions;
 
 static bool in_range(const double *x, int n, double least, double largest)
 {
@@ -58,20 +66,21 @@ static bool all_in_range(const ebpo_segment *ray, const double triangle[3][3], d
            in_range(ray->direction, 3, least, largest) && in_range(triangle[0], 9, least, largest);
 }
 
-static bool ebpo_ray_in_range(const ebpo_segment *ray, const double triangle[3][3])
+/* Zero, or of a size that no product of four such numbers leaves the doubles. */
+static bool ray_in_range(const ebpo_segment *ray, const double triangle[3][3])
 {
     return all_in_range(ray, triangle, 0x1p-172, 0x1p225);
 }
 
 /* --- fractions --- */
 
-static int ebpo_fraction_sign(const ebpo_fraction *f)
+static int fraction_sign(const fraction_of_expansions *f)
 {
     return ebpo_expansion_sign(f->numerator, f->n) * ebpo_expansion_sign(f->denominator, f->m);
 }
 
 /* Sign of f - t for t >= 0. */
-static int ebpo_fraction_beyond(const ebpo_fraction *f, double t)
+static int fraction_beyond(const fraction_of_expansions *f, double t)
 {
     double end[192], rest[384];
     if (t == INFINITY)
@@ -85,19 +94,19 @@ static int ebpo_fraction_beyond(const ebpo_fraction *f, double t)
 }
 
 /* The two leading components of what is compressed. */
-static ebpo_pair ray_expansion_leading(const double *e, int n)
+static ebpo_pair leading_pair(const double *e, int n)
 {
     return (ebpo_pair){ e[n - 1], n > 1 ? e[n - 2] : 0 };
 }
 
-static void ray_expansion_compress(ebpo_fraction *f)
+static void compress_fraction(fraction_of_expansions *f)
 {
     f->n = ebpo_expansion_compress(f->numerator, f->n);
     f->m = ebpo_expansion_compress(f->denominator, f->m);
 }
 
 /* Of two neighbours the one that the fraction is closer to, or the even one. */
-static double ray_expansion_nearest(const ebpo_fraction *f, const double neighbour[2])
+static double nearest_neighbour(const fraction_of_expansions *f, const double neighbour[2])
 {
     double low[192], high[192], middle[384], rest[576], half = (neighbour[1] - neighbour[0]) / 2;
     int n = ebpo_expansion_scale(low, f->denominator, f->m, neighbour[0]),
@@ -112,22 +121,22 @@ static double ray_expansion_nearest(const ebpo_fraction *f, const double neighbo
 }
 
 /* *t: the fraction, positive, correctly rounded. It keeps its value, in fewer components. */
-static bool ebpo_fraction_value(ebpo_fraction *f, double *t)
+static bool fraction_value(fraction_of_expansions *f, double *t)
 {
     double out[2];
-    ray_expansion_compress(f);
-    if (!ebpo_pair_quotient(ray_expansion_leading(f->numerator, f->n),
-                            ray_expansion_leading(f->denominator, f->m), 0x1p-102, out) ||
+    compress_fraction(f);
+    if (!ebpo_pair_quotient(leading_pair(f->numerator, f->n), leading_pair(f->denominator, f->m),
+                            0x1p-102, out) ||
         !in_range(out, 2, 0x1p-172, 0x1p225))
         return false;
-    *t = out[0] < out[1] ? ray_expansion_nearest(f, out) : out[0];
+    *t = out[0] < out[1] ? nearest_neighbour(f, out) : out[0];
     return true;
 }
 
 /* The t at which the line meets the triangle's plane: normal . (corner - origin) over normal .
- * direction, for what ebpo_ray_in_range accepts. False: it is parallel. */
-static bool ebpo_plane_fraction(const ebpo_segment *ray, const double triangle[3][3],
-                                ebpo_fraction *out)
+ * direction, for what ray_in_range accepts. False: it is parallel. */
+static bool plane_fraction(const ebpo_segment *ray, const double triangle[3][3],
+                           fraction_of_expansions *out)
 {
     ebpo_difference f[3], g[3], e[3];
     double normal[16], up[3][64], down[3][32], two[128];
@@ -157,16 +166,16 @@ static bool ebpo_plane_fraction(const ebpo_segment *ray, const double triangle[3
  * where it crosses edges. */
 typedef struct crossings {
     int count;
-    ebpo_fraction at[3];
+    fraction_of_expansions at[3];
 } crossings;
 
-typedef struct ray_expansion_scene {
+typedef struct scene {
     ebpo_difference corner[3][3]; /* relative to the origin */
     const double *direction;
     int axis; /* of the direction's largest component */
-} ray_expansion_scene;
+} scene;
 
-static void make_scene(ray_expansion_scene *s, const ebpo_segment *ray, const double triangle[3][3])
+static void make_scene(scene *s, const ebpo_segment *ray, const double triangle[3][3])
 {
     s->direction = ray->direction;
     s->axis = 0;
@@ -180,25 +189,25 @@ static void make_scene(ray_expansion_scene *s, const ebpo_segment *ray, const do
 }
 
 /* A double as an expansion. */
-static ebpo_difference ray_expansion_alone(double x)
+static ebpo_difference difference_of_double(double x)
 {
     return ebpo_difference_of((ebpo_pair){ x, 0 });
 }
 
 /* out[i] = component k of corner i x direction, n[i] components; false when all are 0. */
-static bool offsets_along(const ray_expansion_scene *s, int k, double out[3][16], int n[3])
+static bool offsets_along(const scene *s, int k, double out[3][16], int n[3])
 {
     int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-    ebpo_difference du = ray_expansion_alone(s->direction[u]),
-                    dv = ray_expansion_alone(s->direction[v]);
+    ebpo_difference du = difference_of_double(s->direction[u]),
+                    dv = difference_of_double(s->direction[v]);
     for (int i = 0; i < 3; i++)
         n[i] = ebpo_expansion_minor(out[i], s->corner[i][u], dv, s->corner[i][v], du);
     return n[0] || n[1] || n[2];
 }
 
-static void add_corner(crossings *c, const ray_expansion_scene *s, int i)
+static void add_corner(crossings *c, const scene *s, int i)
 {
-    ebpo_fraction *f = &c->at[c->count++];
+    fraction_of_expansions *f = &c->at[c->count++];
     const ebpo_difference *e = &s->corner[i][s->axis];
     f->n = e->n;
     memcpy(f->numerator, e->x, sizeof e->x);
@@ -208,10 +217,9 @@ static void add_corner(crossings *c, const ray_expansion_scene *s, int i)
 
 /* The edge from corner i to j crosses the line at (e_i w_j - e_j w_i) / (w_j - w_i) = t d, w being
  * the offsets. */
-static void ray_expansion_add_crossing(crossings *c, const ray_expansion_scene *s, double w[3][16],
-                                       const int *n, int i, int j)
+static void add_crossing(crossings *c, const scene *s, double w[3][16], const int *n, int i, int j)
 {
-    ebpo_fraction *f = &c->at[c->count++];
+    fraction_of_expansions *f = &c->at[c->count++];
     const ebpo_difference *p = &s->corner[i][s->axis], *q = &s->corner[j][s->axis];
     double left[64], right[64], negative[16];
     int left_n = ebpo_expansion_times(left, w[j], n[j], p->x, p->n),
@@ -226,7 +234,7 @@ static void ray_expansion_add_crossing(crossings *c, const ray_expansion_scene *
 
 static void find_crossings(crossings *c, const ebpo_segment *ray, const double triangle[3][3])
 {
-    ray_expansion_scene s;
+    scene s;
     double w[3][16];
     int n[3], sign[3];
     c->count = 0;
@@ -240,22 +248,22 @@ static void find_crossings(crossings *c, const ebpo_segment *ray, const double t
         if (sign[i] == 0)
             add_corner(c, &s, i);
         else if (sign[i] * sign[j] < 0)
-            ray_expansion_add_crossing(c, &s, w, n, i, j);
+            add_crossing(c, &s, w, n, i, j);
     }
 }
 
 /* The meeting, for a line that lies in the triangle's plane or in one with a triangle without area,
- * for what ebpo_ray_in_range accepts. */
-static bool ebpo_ray_within_plane(const ebpo_segment *ray, const double triangle[3][3],
-                                  ebpo_ray_meeting *out)
+ * for what ray_in_range accepts. */
+static bool meet_within_plane(const ebpo_segment *ray, const double triangle[3][3],
+                              ebpo_ray_meeting *out)
 {
     crossings c;
     bool before_end = false, after_begin = false, before_begin = false;
     double least = INFINITY, t = 0;
     find_crossings(&c, ray, triangle);
     for (int i = 0; i < c.count; i++) {
-        int sign = ebpo_fraction_sign(&c.at[i]), end = ebpo_fraction_beyond(&c.at[i], ray->t_max);
-        if (end == EBPO_SIGN_UNKNOWN || (sign > 0 && !ebpo_fraction_value(&c.at[i], &t)))
+        int sign = fraction_sign(&c.at[i]), end = fraction_beyond(&c.at[i], ray->t_max);
+        if (end == EBPO_SIGN_UNKNOWN || (sign > 0 && !fraction_value(&c.at[i], &t)))
             return false;
         after_begin |= sign >= 0;
         before_begin |= sign <= 0;
@@ -271,8 +279,8 @@ static bool ebpo_ray_within_plane(const ebpo_segment *ray, const double triangle
 /* --- comparing --- */
 
 /* out = e * f; false when there is no room for it. */
-static bool ray_expansion_multiply(double *out, int *length, const double *e, int n,
-                                   const double *f, int m, int room)
+static bool multiply_expansions(double *out, int *length, const double *e, int n, const double *f,
+                                int m, int room)
 {
     double sum[2][512], term[256];
     int count = 0, now = 0;
@@ -288,14 +296,14 @@ static bool ray_expansion_multiply(double *out, int *length, const double *e, in
     return true;
 }
 
-static int compare_fractions(ebpo_fraction *a, ebpo_fraction *b)
+static int compare_fractions(fraction_of_expansions *a, fraction_of_expansions *b)
 {
     double left[512], right[512], rest[1024];
     int left_n, right_n;
-    ray_expansion_compress(a);
-    ray_expansion_compress(b);
-    if (!ray_expansion_multiply(left, &left_n, a->numerator, a->n, b->denominator, b->m, 512) ||
-        !ray_expansion_multiply(right, &right_n, b->numerator, b->n, a->denominator, a->m, 512))
+    compress_fraction(a);
+    compress_fraction(b);
+    if (!multiply_expansions(left, &left_n, a->numerator, a->n, b->denominator, b->m, 512) ||
+        !multiply_expansions(right, &right_n, b->numerator, b->n, a->denominator, a->m, 512))
         return EBPO_SIGN_UNKNOWN;
     ebpo_expansion_negate(right, right_n);
     int n = ebpo_expansion_sum(rest, left, left_n, right, right_n);
@@ -304,9 +312,10 @@ static int compare_fractions(ebpo_fraction *a, ebpo_fraction *b)
 }
 
 /* The t of the first common point; false: not known. */
-static bool first_fraction(const ebpo_segment *ray, const double triangle[3][3], ebpo_fraction *out)
+static bool first_fraction(const ebpo_segment *ray, const double triangle[3][3],
+                           fraction_of_expansions *out)
 {
-    if (ebpo_plane_fraction(ray, triangle, out))
+    if (plane_fraction(ray, triangle, out))
         return true;
     crossings c;
     find_crossings(&c, ray, triangle);
@@ -318,31 +327,27 @@ static bool first_fraction(const ebpo_segment *ray, const double triangle[3][3],
         if (sign < 0)
             *out = c.at[i];
     }
-    if (ebpo_fraction_sign(out) < 0) /* the ray begins within */
+    if (fraction_sign(out) < 0) /* the ray begins within */
         out->n = 0;
     return c.count > 0;
 }
 
 /* Sign of t(a) - t(b), as ebpo_ray_compare. */
-static int ebpo_ray_compare_expansion(const ebpo_segment *ray, const double a[3][3],
-                                      const double b[3][3])
+static int compare_by_expansions(const ebpo_segment *ray, const double a[3][3],
+                                 const double b[3][3])
 {
-    ebpo_fraction first, second;
+    fraction_of_expansions first, second;
     if (!all_in_range(ray, a, 0x1p-97, 0x1p150) || !in_range(b[0], 9, 0x1p-97, 0x1p150) ||
         !first_fraction(ray, a, &first) || !first_fraction(ray, b, &second))
         return EBPO_SIGN_UNKNOWN;
     return compare_fractions(&first, &second);
 }
 
-/* What happens often is recognised: a corner at the origin (t = 0), a corner on the line, an edge
- * through the origin, a shared corner or edge. The rest goes through double-double arithmetic
- * (ray_pairs.h), then expansions. */
+/* --- the parameter t: double-double arithmetic, then expansions --- */
 
-/* --- the parameter --- */
-
-static inline int sign_of(const ebpo_bounded *b)
+static inline int bounded_sign(const ebpo_bounded *b)
 {
-    return b->x.head > b->error ? 1 : b->x.head < -b->error ? -1 : EBPO_SIDE_OPEN;
+    return b->x.head > b->error ? 1 : b->x.head < -b->error ? -1 : SIDE_OPEN;
 }
 
 /* t as a fraction, at first in double-double arithmetic, and as expansions when these are needed.
@@ -352,10 +357,10 @@ typedef struct parameter {
     const double (*triangle)[3];
     ebpo_plane_pairs at;
     bool made; /* the fraction is there */
-    ebpo_fraction fraction;
+    fraction_of_expansions fraction;
 } parameter;
 
-static inline void ray_close_begin(parameter *p, const ebpo_segment *ray,
+static inline void parameter_begin(parameter *p, const ebpo_segment *ray,
                                    const double triangle[3][3])
 {
     p->ray = ray;
@@ -367,16 +372,16 @@ static inline void ray_close_begin(parameter *p, const ebpo_segment *ray,
 static bool make_fraction(parameter *p)
 {
     if (!p->made)
-        p->made = ebpo_ray_in_range(p->ray, p->triangle) &&
-                  ebpo_plane_fraction(p->ray, p->triangle, &p->fraction);
+        p->made =
+            ray_in_range(p->ray, p->triangle) && plane_fraction(p->ray, p->triangle, &p->fraction);
     return p->made;
 }
 
 /* Sign of t; that of the denominator is known. */
 static int sign_of_t(parameter *p, int denominator)
 {
-    int sign = sign_of(&p->at.numerator);
-    if (sign == EBPO_SIDE_OPEN)
+    int sign = bounded_sign(&p->at.numerator);
+    if (sign == SIDE_OPEN)
         sign = -ebpo_orient3d(p->triangle[0], p->triangle[1], p->triangle[2], p->ray->origin);
     return sign * denominator;
 }
@@ -390,7 +395,7 @@ static bool value_of_t(parameter *p, double *t)
         *t = out[0];
         return true;
     }
-    return make_fraction(p) && ebpo_fraction_value(&p->fraction, t);
+    return make_fraction(p) && fraction_value(&p->fraction, t);
 }
 
 /* Sign of t - t_max, which are close; that of the denominator is known. */
@@ -402,34 +407,29 @@ static int beyond_end(parameter *p, int denominator)
     ebpo_bounded rest = { ebpo_pair_subtract(a->x, at_end), 0 };
     rest.error = a->error + end * b->error + 0x1p-97 * (fabs(a->x.head) + fabs(at_end.head)) +
                  EBPO_RAY_SLACK;
-    int sign = sign_of(&rest);
-    if (sign != EBPO_SIDE_OPEN)
+    int sign = bounded_sign(&rest);
+    if (sign != SIDE_OPEN)
         return sign * denominator;
-    return make_fraction(p) ? ebpo_fraction_beyond(&p->fraction, end) : EBPO_SIGN_UNKNOWN;
-}
-
-static inline void ray_close_set_miss(ebpo_ray_meeting *out)
-{
-    *out = (ebpo_ray_meeting){ false, 0, 0, INFINITY };
+    return make_fraction(p) ? fraction_beyond(&p->fraction, end) : EBPO_SIGN_UNKNOWN;
 }
 
 /* The same where the line meets the triangle: `side` as in the answer, `sign` that of normal .
  * direction. */
-static bool ebpo_ray_meet_plane(const ebpo_segment *ray, const double triangle[3][3], int sign,
-                                int side, ebpo_ray_meeting *out)
+static bool meet_plane(const ebpo_segment *ray, const double triangle[3][3], int sign, int side,
+                       ebpo_ray_meeting *out)
 {
     parameter p;
     double t = 0;
-    ray_close_begin(&p, ray, triangle);
+    parameter_begin(&p, ray, triangle);
     int from_begin = sign_of_t(&p, sign);
-    ray_close_set_miss(out);
+    set_miss(out);
     if (from_begin < 0)
         return true;
     if (from_begin > 0 && !value_of_t(&p, &t))
         return false;
-    if (ebpo_certainly_less(ray->t_max, t))
+    if (certainly_less(ray->t_max, t))
         return true;
-    if (t > 0 && ray->t_max < INFINITY && !ebpo_certainly_less(t, ray->t_max)) {
+    if (t > 0 && ray->t_max < INFINITY && !certainly_less(t, ray->t_max)) {
         int from_end = beyond_end(&p, sign);
         if (from_end == EBPO_SIGN_UNKNOWN || from_end > 0)
             return from_end != EBPO_SIGN_UNKNOWN;
@@ -438,10 +438,13 @@ static bool ebpo_ray_meet_plane(const ebpo_segment *ray, const double triangle[3
     return true;
 }
 
-/* --- the sides of edges --- */
+/* --- rays close to an edge or a corner --- */
+
+/* Frequent cases are recognised first: a corner at the origin (t = 0), a corner on the line, an
+ * edge through the origin. */
 
 /* a x b = 0, exact, for numbers in range. */
-static bool ray_close_parallel(const double a[3], const double b[3])
+static bool are_parallel(const double a[3], const double b[3])
 {
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
@@ -478,15 +481,15 @@ static inline bool is_origin(const corner *c)
 
 /* Sign of d . (a x b), exact. The same with b - a in place of b, which loses less where the edge is
  * short beside its distance from the origin. */
-static int ray_close_edge_side(const double d[3], const corner *a, const corner *b)
+static int close_edge_side(const double d[3], const corner *a, const corner *b)
 {
     ebpo_pair m[3][3];
-    if (a->exact && b->exact && ray_close_parallel(a->head, b->head))
+    if (a->exact && b->exact && are_parallel(a->head, b->head))
         return 0;
     ebpo_bounded value;
     ebpo_ray_pairs_best()->edge(d, a->x, a->at, b->at, &value);
-    int sign = sign_of(&value);
-    if (sign != EBPO_SIDE_OPEN)
+    int sign = bounded_sign(&value);
+    if (sign != SIDE_OPEN)
         return sign;
     for (int k = 0; k < 3; k++) {
         m[k][0] = a->x[k];
@@ -499,29 +502,29 @@ static int ray_close_edge_side(const double d[3], const corner *a, const corner 
 /* The line goes through the corner, exact. */
 static inline bool on_line(const double d[3], const corner *c)
 {
-    return c->exact && ray_close_parallel(d, c->head);
+    return c->exact && are_parallel(d, c->head);
 }
 
 static void close_sides(const double d[3], const corner e[3], int sign[3])
 {
     for (int i = 0; i < 3; i++) {
         int before = i == 0 ? 2 : i - 1;
-        if (sign[i] == EBPO_SIDE_OPEN && sign[before] == EBPO_SIDE_OPEN && on_line(d, &e[i]))
+        if (sign[i] == SIDE_OPEN && sign[before] == SIDE_OPEN && on_line(d, &e[i]))
             sign[i] = sign[before] = 0;
     }
     for (int i = 0; i < 3; i++)
-        if (sign[i] == EBPO_SIDE_OPEN)
-            sign[i] = ray_close_edge_side(d, &e[i], &e[i == 2 ? 0 : i + 1]);
+        if (sign[i] == SIDE_OPEN)
+            sign[i] = close_edge_side(d, &e[i], &e[i == 2 ? 0 : i + 1]);
 }
 
 /* The meeting, no two of the given signs being different unless open. False: not certain; numbers
  * are too large or too small. */
-static bool ebpo_ray_close(const ebpo_segment *ray, const double triangle[3][3], int sign[3],
-                           ebpo_ray_meeting *out)
+static bool meet_closely(const ebpo_segment *ray, const double triangle[3][3], int sign[3],
+                         ebpo_ray_meeting *out)
 {
     corner e[3];
     bool begins = false;
-    if (!ebpo_ray_in_range(ray, triangle))
+    if (!ray_in_range(ray, triangle))
         return false;
     for (int i = 0; i < 3; i++) {
         e[i] = corner_at(ray, triangle[i]);
@@ -532,13 +535,13 @@ static bool ebpo_ray_close(const ebpo_segment *ray, const double triangle[3][3],
          right = sign[0] < 0 || sign[1] < 0 || sign[2] < 0, inner = sign[0] && sign[1] && sign[2];
     int normal = left ? 1 : right ? -1 : 0;
     if (left && right)
-        ray_close_set_miss(out);
+        set_miss(out);
     else if (begins)
         *out = (ebpo_ray_meeting){ true, 0, -normal, 0 };
     else if (normal == 0)
-        return ebpo_ray_within_plane(ray, triangle, out);
+        return meet_within_plane(ray, triangle, out);
     else
-        return ebpo_ray_meet_plane(ray, triangle, normal, inner ? -normal : 0, out);
+        return meet_plane(ray, triangle, normal, inner ? -normal : 0, out);
     return true;
 }
 
@@ -554,333 +557,36 @@ static bool has_corner(const double triangle[3][3], const double p[3])
 
 /* True when the ray, which meets both triangles, certainly does so in a corner or an edge that they
  * share, and therefore at the same t. `across`: it lies in the plane of neither. */
-static bool ebpo_ray_meets_shared(const ebpo_segment *ray, const double a[3][3],
-                                  const double b[3][3], bool across)
+static bool meets_shared(const ebpo_segment *ray, const double a[3][3], const double b[3][3],
+                         bool across)
 {
     corner shared[3];
     int count = 0;
     for (int i = 0; i < 3; i++)
         if (has_corner(b, a[i]))
             shared[count++] = corner_at(ray, a[i]);
-    if (count == 0 || !ebpo_ray_in_range(ray, a))
+    if (count == 0 || !ray_in_range(ray, a))
         return false;
     if (count == 3 && has_corner(a, b[0]) && has_corner(a, b[1]) && has_corner(a, b[2]))
         return true;
     for (int i = 0; i < count; i++)
         if (is_origin(&shared[i]) || (across && on_line(ray->direction, &shared[i])))
             return true;
-    return across && count == 2 && ray_close_edge_side(ray->direction, &shared[0], &shared[1]) == 0;
+    return across && count == 2 && close_edge_side(ray->direction, &shared[0], &shared[1]) == 0;
 }
 
-/* Corners relative to the origin become integers e_i in one unit, the direction integers d in
- * another. With s_i = d . (e_j x e_k) for the edge opposite corner i, the line meets the plane at t
- * = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2), and it meets the triangle when no two of the s_i have
- * different signs. When the denominator is 0 the line is parallel to the triangle or the triangle
- * has no area: then there is a common point only where all s_i are 0, and line and triangle lie in
- * one plane. */
+/* --- the filter --- */
 
-typedef struct ray_exact_scene {
-    mpz_t corner[3][3]; /* e_i */
-    mpz_t direction[3];
-    int shift; /* a parameter in these units times 2^shift is t */
-} ray_exact_scene;
-
-/* What the line and the triangle have in common, in units of the scene. */
-typedef struct stretch {
-    bool any;
-    int side, facing;
-    mpq_t low, high;
-} stretch;
-
-/* --- integers --- */
-
-/* Lowers *unit to an exponent e for which x is an integer times 2^e. */
-static void lower_unit(int *unit, const double *x, int n)
-{
-    for (int i = 0; i < n; i++) {
-        int e;
-        frexp(x[i], &e);
-        if (x[i] != 0 && e - DBL_MANT_DIG < *unit)
-            *unit = e - DBL_MANT_DIG;
-    }
-}
-
-/* out = x / 2^unit */
-static void set_integer(mpz_t out, double x, int unit)
-{
-    int e;
-    mpz_set_d(out, ldexp(frexp(x, &e), DBL_MANT_DIG));
-    if (x != 0)
-        mpz_mul_2exp(out, out, (mp_bitcnt_t)(e - DBL_MANT_DIG - unit));
-}
-
-static void scene_init(ray_exact_scene *s, const ebpo_segment *ray, const double triangle[3][3])
-{
-    int length_unit = INT_MAX, direction_unit = INT_MAX;
-    mpz_t origin;
-    mpz_init(origin);
-    lower_unit(&length_unit, ray->origin, 3);
-    lower_unit(&direction_unit, ray->direction, 3);
-    for (int i = 0; i < 3; i++)
-        lower_unit(&length_unit, triangle[i], 3);
-    if (length_unit == INT_MAX)
-        length_unit = 0;
-    for (int k = 0; k < 3; k++) {
-        mpz_init(s->direction[k]);
-        set_integer(s->direction[k], ray->direction[k], direction_unit);
-        set_integer(origin, ray->origin[k], length_unit);
-        for (int i = 0; i < 3; i++) {
-            mpz_init(s->corner[i][k]);
-            set_integer(s->corner[i][k], triangle[i][k], length_unit);
-            mpz_sub(s->corner[i][k], s->corner[i][k], origin);
-        }
-    }
-    s->shift = length_unit - direction_unit;
-    mpz_clear(origin);
-}
-
-static void scene_clear(ray_exact_scene *s)
-{
-    for (int k = 0; k < 3; k++) {
-        mpz_clear(s->direction[k]);
-        for (int i = 0; i < 3; i++)
-            mpz_clear(s->corner[i][k]);
-    }
-}
-
-/* out = component k of a x b */
-static void cross_component(mpz_t out, const mpz_t a[3], const mpz_t b[3], int k)
-{
-    int u = (k + 1) % 3, v = (k + 2) % 3;
-    mpz_mul(out, a[u], b[v]);
-    mpz_submul(out, a[v], b[u]);
-}
-
-/* out = a . (b x c) */
-static void ray_exact_determinant(mpz_t out, const mpz_t a[3], const mpz_t b[3], const mpz_t c[3])
-{
-    mpz_t component;
-    mpz_init(component);
-    mpz_set_ui(out, 0);
-    for (int k = 0; k < 3; k++) {
-        cross_component(component, b, c, k);
-        mpz_addmul(out, a[k], component);
-    }
-    mpz_clear(component);
-}
-
-static void set_fraction(mpq_t out, const mpz_t numerator, const mpz_t denominator)
-{
-    mpz_set(mpq_numref(out), numerator);
-    mpz_set(mpq_denref(out), denominator);
-    mpq_canonicalize(out);
-}
-
-/* --- the line and the triangle --- */
-
-/* Axis with the direction's largest component: there, a multiple of the direction tells the factor.
- */
-static int main_axis(const ray_exact_scene *s)
-{
-    int axis = 0;
-    for (int k = 1; k < 3; k++)
-        if (mpz_cmpabs(s->direction[k], s->direction[axis]) > 0)
-            axis = k;
-    return axis;
-}
-
-static void stretch_add(stretch *st, const mpz_t numerator, const mpz_t denominator)
-{
-    mpq_t t;
-    mpq_init(t);
-    set_fraction(t, numerator, denominator);
-    if (!st->any || mpq_cmp(t, st->low) < 0)
-        mpq_set(st->low, t);
-    if (!st->any || mpq_cmp(t, st->high) > 0)
-        mpq_set(st->high, t);
-    st->any = true;
-    mpq_clear(t);
-}
-
-/* out[i]: signed distance of corner i from the line, up to a common factor, for corners in one
- * plane with the line. */
-static void offsets_from_line(const ray_exact_scene *s, mpz_t out[3])
-{
-    for (int k = 0; k < 3; k++) {
-        for (int i = 0; i < 3; i++)
-            cross_component(out[i], s->corner[i], s->direction, k);
-        if (mpz_sgn(out[0]) || mpz_sgn(out[1]) || mpz_sgn(out[2]))
-            return;
-    }
-}
-
-/* The edge from corner i to corner j crosses the line at (e_i w_j - e_j w_i) / (w_j - w_i) = t d, w
- * being the offsets. */
-static void ray_exact_add_crossing(stretch *st, const ray_exact_scene *s, int axis, mpz_t w[3],
-                                   int i, int j)
-{
-    mpz_t numerator, denominator;
-    mpz_inits(numerator, denominator, NULL);
-    mpz_mul(numerator, s->corner[i][axis], w[j]);
-    mpz_submul(numerator, s->corner[j][axis], w[i]);
-    mpz_sub(denominator, w[j], w[i]);
-    mpz_mul(denominator, denominator, s->direction[axis]);
-    stretch_add(st, numerator, denominator);
-    mpz_clears(numerator, denominator, NULL);
-}
-
-/* Line and triangle lie in one plane. */
-static void meet_in_plane(stretch *st, const ray_exact_scene *s)
-{
-    int axis = main_axis(s);
-    mpz_t w[3];
-    mpz_inits(w[0], w[1], w[2], NULL);
-    offsets_from_line(s, w);
-    for (int i = 0; i < 3; i++) {
-        int j = (i + 1) % 3;
-        if (mpz_sgn(w[i]) == 0)
-            stretch_add(st, s->corner[i][axis], s->direction[axis]);
-        else if (mpz_sgn(w[i]) * mpz_sgn(w[j]) < 0)
-            ray_exact_add_crossing(st, s, axis, w, i, j);
-    }
-    mpz_clears(w[0], w[1], w[2], NULL);
-}
-
-static void meet_line(stretch *st, const ray_exact_scene *s)
-{
-    mpz_t edge[3], denominator, numerator;
-    int sign[3], negative = 0, positive = 0;
-    mpz_inits(denominator, numerator, NULL);
-    for (int i = 0; i < 3; i++) {
-        mpz_init(edge[i]);
-        ray_exact_determinant(edge[i], s->direction, s->corner[(i + 1) % 3],
-                              s->corner[(i + 2) % 3]);
-        mpz_add(denominator, denominator, edge[i]);
-        sign[i] = mpz_sgn(edge[i]);
-        negative += sign[i] < 0;
-        positive += sign[i] > 0;
-    }
-    if (negative + positive == 0)
-        meet_in_plane(st, s);
-    else if (negative == 0 || positive == 0) {
-        ray_exact_determinant(numerator, s->corner[0], s->corner[1], s->corner[2]);
-        stretch_add(st, numerator, denominator);
-        st->facing = negative ? 1 : -1;
-        st->side = negative == 3 || positive == 3 ? st->facing : 0;
-    }
-    mpz_clears(edge[0], edge[1], edge[2], denominator, numerator, NULL);
-}
-
-/* --- the parameter --- */
-
-static void ray_exact_scale(mpq_t t, int shift)
-{
-    if (shift >= 0)
-        mpq_mul_2exp(t, t, (mp_bitcnt_t)shift);
-    else
-        mpq_div_2exp(t, t, (mp_bitcnt_t)-shift);
-}
-
-/* Narrows the stretch to 0 <= t <= t_max, in t's own unit. */
-static void ray_exact_clip(stretch *st, int shift, double t_max)
-{
-    if (!st->any)
-        return;
-    ray_exact_scale(st->low, shift);
-    ray_exact_scale(st->high, shift);
-    st->any = mpq_sgn(st->high) >= 0;
-    if (mpq_sgn(st->low) < 0)
-        mpq_set_ui(st->low, 0, 1);
-    if (st->any && t_max < INFINITY) {
-        mpq_t end;
-        mpq_init(end);
-        mpq_set_d(end, t_max);
-        st->any = mpq_cmp(st->low, end) <= 0;
-        mpq_clear(end);
-    }
-}
-
-static void ray_exact_meet(stretch *st, const ebpo_segment *ray, const double triangle[3][3])
-{
-    ray_exact_scene s;
-    st->any = false;
-    st->side = st->facing = 0;
-    mpq_inits(st->low, st->high, NULL);
-    scene_init(&s, ray, triangle);
-    meet_line(st, &s);
-    ray_exact_clip(st, s.shift, ray->t_max);
-    scene_clear(&s);
-}
-
-static void stretch_clear(stretch *st) { mpq_clears(st->low, st->high, NULL); }
-
-/* To the nearest double, t >= 0; mpq_get_d cuts off. */
-static double ray_exact_rounded(const mpq_t t)
-{
-    double low = mpq_get_d(t), high = nextafter(low, INFINITY);
-    if (low == INFINITY)
-        return low;
-    mpq_t middle, half;
-    mpq_inits(middle, half, NULL);
-    mpq_set_d(middle, low);
-    mpq_set_d(half, high < INFINITY ? high - low : low - nextafter(low, 0));
-    mpq_div_2exp(half, half, 1);
-    mpq_add(middle, middle, half);
-    int sign = mpq_cmp(t, middle);
-    uint64_t bits;
-    memcpy(&bits, &low, sizeof bits);
-    mpq_clears(middle, half, NULL);
-    return sign > 0 || (sign == 0 && bits % 2) ? high : low;
-}
-
-/* The same meaning and ranges as the functions of ray_triangle.h without "_exact". Each call
- * allocates through GMP, which ends the program when memory is out (a few kilobytes suffice). */
-static void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3],
-                                    ebpo_ray_meeting *out)
-{
-    stretch st;
-    ray_exact_meet(&st, ray, triangle);
-    out->meets = st.any;
-    out->side = st.any ? st.side : 0;
-    out->facing = st.any ? st.facing : 0;
-    out->t = st.any ? ray_exact_rounded(st.low) : INFINITY;
-    stretch_clear(&st);
-}
-
-static int ebpo_ray_compare_exact(const ebpo_segment *ray, const double a[3][3],
-                                  const double b[3][3])
-{
-    stretch first, second;
-    ray_exact_meet(&first, ray, a);
-    ray_exact_meet(&second, ray, b);
-    int order = mpq_cmp(first.low, second.low);
-    stretch_clear(&first);
-    stretch_clear(&second);
-    return (order > 0) - (order < 0);
-}
-
-/* A ray goes through stages, cheapest first: on which side of each edge the line passes, in
- * floating point with error bounds; then numerator and denominator of t in double-double
- * arithmetic, which gives t to its last bits (ray_close.c); expansions where these are not certain
- * (ray_expansion.c); rational numbers where exponents leave their range (ray_exact.c).
- *
- * With e_i = corner i - origin the line passes the edge (i, j) on the side given by the sign of d .
- * (e_i x e_j). Two edges with different signs: the line misses the triangle, also one without area
- * or seen edge-on, because all three signs are those of one planar figure, the triangle as seen
- * along d. Three equal signs: it goes through the interior. Anything else touches an edge or a
- * corner or is not certain.
- *
- * Error bounds: as in predicates.c; each holds for the computed permanent (the sum of absolute
+/* Error bounds: as in predicates.c; each holds for the computed permanent (the sum of absolute
  * values), the slack covers underflow, and an overflow makes the bound infinite or not a number, so
  * that no comparison succeeds. */
-
 static const double eps = 0x1p-53;
 /* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;
 
 /* Sign of d . (a x b), a and b being rounded differences; weight: 1 + |d0| + |d1| + |d2|. */
-static inline int ray_triangle_edge_side(const double d[3], double weight, const double a[3],
-                                         const double b[3])
+static inline int filtered_edge_side(const double d[3], double weight, const double a[3],
+                                     const double b[3])
 {
     double p0 = a[1] * b[2], q0 = a[2] * b[1];
     double p1 = a[2] * b[0], q1 = a[0] * b[2];
@@ -889,10 +595,8 @@ static inline int ray_triangle_edge_side(const double d[3], double weight, const
     double permanent = fabs(d[0]) * (fabs(p0) + fabs(q0)) + fabs(d[1]) * (fabs(p1) + fabs(q1)) +
                        fabs(d[2]) * (fabs(p2) + fabs(q2));
     double bound = 8 * eps * permanent + slack * weight;
-    return det > bound ? 1 : det < -bound ? -1 : EBPO_SIDE_OPEN;
+    return det > bound ? 1 : det < -bound ? -1 : SIDE_OPEN;
 }
-
-/* --- rays --- */
 
 /* True when some axis shows that ray and triangle are apart; signs of differences are always right.
  */
@@ -907,11 +611,6 @@ static bool apart_on_an_axis(const ebpo_segment *ray, double e[3][3])
     return false;
 }
 
-static inline void ray_triangle_set_miss(ebpo_ray_meeting *out)
-{
-    *out = (ebpo_ray_meeting){ false, 0, 0, INFINITY };
-}
-
 void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebpo_ray_meeting *out)
 {
     const double *d = ray->direction;
@@ -919,21 +618,21 @@ void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebp
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
             e[i][k] = triangle[i][k] - ray->origin[k];
-    int sign[3] = { ray_triangle_edge_side(d, weight, e[0], e[1]),
-                    ray_triangle_edge_side(d, weight, e[1], e[2]),
-                    ray_triangle_edge_side(d, weight, e[2], e[0]) };
+    int sign[3] = { filtered_edge_side(d, weight, e[0], e[1]),
+                    filtered_edge_side(d, weight, e[1], e[2]),
+                    filtered_edge_side(d, weight, e[2], e[0]) };
     bool done;
     if (sign[0] + sign[1] == 0 || sign[1] + sign[2] == 0 || sign[2] + sign[0] == 0) {
-        ray_triangle_set_miss(out);
+        set_miss(out);
         return;
     }
-    if (sign[0] == sign[1] && sign[1] == sign[2] && sign[0] != EBPO_SIDE_OPEN) {
-        done = ebpo_ray_meet_plane(ray, triangle, sign[0], -sign[0], out);
+    if (sign[0] == sign[1] && sign[1] == sign[2] && sign[0] != SIDE_OPEN) {
+        done = meet_plane(ray, triangle, sign[0], -sign[0], out);
     } else if (apart_on_an_axis(ray, e)) {
-        ray_triangle_set_miss(out);
+        set_miss(out);
         return;
     } else {
-        done = ebpo_ray_close(ray, triangle, sign, out);
+        done = meet_closely(ray, triangle, sign, out);
     }
     if (!done)
         ebpo_ray_triangle_exact(ray, triangle, out);
@@ -942,19 +641,19 @@ void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebp
 void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,
                        ebpo_ray_meeting *out)
 {
-    if (!ebpo_ray_meet_plane(ray, triangle, -facing, facing, out))
+    if (!meet_plane(ray, triangle, -facing, facing, out))
         ebpo_ray_triangle_exact(ray, triangle, out);
 }
 
 int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3], const ebpo_ray_meeting *at_a,
                      const double b[3][3], const ebpo_ray_meeting *at_b)
 {
-    if (ebpo_certainly_less(at_a->t, at_b->t))
+    if (certainly_less(at_a->t, at_b->t))
         return -1;
-    if (ebpo_certainly_less(at_b->t, at_a->t))
+    if (certainly_less(at_b->t, at_a->t))
         return 1;
-    if (ebpo_ray_meets_shared(ray, a, b, at_a->facing && at_b->facing))
+    if (meets_shared(ray, a, b, at_a->facing && at_b->facing))
         return 0;
-    int order = ebpo_ray_compare_expansion(ray, a, b);
+    int order = compare_by_expansions(ray, a, b);
     return order != EBPO_SIGN_UNKNOWN ? order : ebpo_ray_compare_exact(ray, a, b);
 }

@@ -1,3 +1,15 @@
+/* Distance of a point to a triangle: bounds, values that are correctly rounded, and exact
+ * comparisons.
+ *
+ * The stages, cheapest first: bounds in doubles; signs of products whose errors are relative to
+ * themselves, for points that are far from the triangle for its size; double-double arithmetic
+ * (double_double_kernels.c) while its error bound decides the rounding (Ziv, "Fast evaluation of
+ * elementary mathematical functions with correctly rounded last bit", 1991); integers of any size.
+ *
+ * In all stages the nearest feature (corner, edge or interior) follows from the same signs, with
+ * the corners taken relative to the point p. A corner is nearest when p is behind it along both of
+ * its edges. An edge is nearest when p projects between its ends and outside of it in the plane.
+ * The interior is nearest when p projects inside of all edges. Docs: docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -6,13 +18,11 @@
 #include <string.h>
 
 #include "geometry/distance.h"
-#include "geometry/distance_pairs.h"
+#include "geometry/double_double_kernels.h"
 #include "geometry/integer_vectors.h"
 #include "geometry/vec3.h"
 
-/* Points that are far from a triangle for its size: what products of a coordinate of the point and
- * a side of the triangle tell, each with an error that is relative to itself. Signs only; certain.
- */
+/* --- points that are far from the triangle for its size --- */
 
 /* A number, and a bound of its error; 0 without error is exact. */
 typedef struct near {
@@ -22,7 +32,7 @@ typedef struct near {
 /* Roundings of the errors themselves, and of what is below the normal doubles. */
 static const double more = 1 + 0x1p-40, rounding = 0x1p-52, lost = 0x1p-1060;
 
-static near distance_far_multiply(near a, near b)
+static near near_multiply(near a, near b)
 {
     near out = { a.x * b.x, 0 };
     if ((a.x == 0 && a.error == 0) || (b.x == 0 && b.error == 0))
@@ -33,33 +43,31 @@ static near distance_far_multiply(near a, near b)
         lost;
     return out;
 }
-static near distance_far_add(near a, near b)
+static near near_add(near a, near b)
 {
     near out = { a.x + b.x, (a.error + b.error) * more };
     out.error += fabs(out.x) * rounding;
     return out;
 }
-static near distance_far_minus(near a) { return (near){ -a.x, a.error }; }
+static near near_negate(near a) { return (near){ -a.x, a.error }; }
 
-static near distance_far_dot(const near a[3], const near b[3])
+static near near_dot(const near a[3], const near b[3])
 {
-    return distance_far_add(distance_far_add(distance_far_multiply(a[0], b[0]),
-                                             distance_far_multiply(a[1], b[1])),
-                            distance_far_multiply(a[2], b[2]));
+    return near_add(near_add(near_multiply(a[0], b[0]), near_multiply(a[1], b[1])),
+                    near_multiply(a[2], b[2]));
 }
-static void distance_far_cross(const near a[3], const near b[3], near out[3])
+static void near_cross(const near a[3], const near b[3], near out[3])
 {
     for (int k = 0; k < 3; k++) {
         int u = (k + 1) % 3, v = (k + 2) % 3;
-        out[k] = distance_far_add(distance_far_multiply(a[u], b[v]),
-                                  distance_far_minus(distance_far_multiply(a[v], b[u])));
+        out[k] = near_add(near_multiply(a[u], b[v]), near_negate(near_multiply(a[v], b[u])));
     }
 }
-static int sign_of(near a) { return a.x > a.error ? 1 : a.x < -a.error ? -1 : 0; }
-static bool is_nothing(near a) { return a.x == 0 && a.error == 0; }
+static int near_sign(near a) { return a.x > a.error ? 1 : a.x < -a.error ? -1 : 0; }
+static bool near_is_zero(near a) { return a.x == 0 && a.error == 0; }
 
 /* to - from, times 2^-exponent. */
-static near distance_far_difference(double to, double from, int exponent)
+static near near_difference(double to, double from, int exponent)
 {
     double d = to - from;
     near out = { isfinite(d) ? ldexp(d, -exponent) : ldexp(to, -exponent) - ldexp(from, -exponent),
@@ -90,7 +98,7 @@ typedef struct far_triangle {
 } far_triangle;
 
 /* False: two corners are equal, and which of them is nearest is not told here. */
-static bool distance_far_relate(const double p[3], const double triangle[3][3], far_triangle *t)
+static bool relate_far(const double p[3], const double triangle[3][3], far_triangle *t)
 {
     bool apart = true;
     t->exponent = exponent_of(triangle, 3, p);
@@ -98,56 +106,55 @@ static bool distance_far_relate(const double p[3], const double triangle[3][3], 
     for (int i = 0; i < 3; i++) {
         bool any = false;
         for (int k = 0; k < 3; k++) {
-            t->corner[i][k] = distance_far_difference(triangle[i][k], p[k], t->exponent);
+            t->corner[i][k] = near_difference(triangle[i][k], p[k], t->exponent);
             t->edge[i][k] =
-                distance_far_difference(triangle[(i + 1) % 3][k], triangle[i][k], t->edge_exponent);
-            any = any || !is_nothing(t->edge[i][k]);
+                near_difference(triangle[(i + 1) % 3][k], triangle[i][k], t->edge_exponent);
+            any = any || !near_is_zero(t->edge[i][k]);
         }
         apart = apart && any;
     }
     for (int i = 0; i < 3; i++) {
-        t->along[i] = distance_far_dot(t->corner[i], t->edge[i]);
-        t->back[i] = distance_far_dot(t->corner[(i + 1) % 3], t->edge[i]);
+        t->along[i] = near_dot(t->corner[i], t->edge[i]);
+        t->back[i] = near_dot(t->corner[(i + 1) % 3], t->edge[i]);
     }
     return apart;
 }
 
-static ebpo_feature feature_of(const far_triangle *t)
+static ebpo_feature far_feature_of(const far_triangle *t)
 {
     near normal[3], outward[3];
     bool inside = true;
-    distance_far_cross(t->edge[0], t->edge[1], normal);
+    near_cross(t->edge[0], t->edge[1], normal);
     for (int i = 0; i < 3; i++) {
         const near *along = &t->along[i], *before = &t->back[(i + 2) % 3];
         /* behind the corner along both of its edges, or right beside it */
-        if ((sign_of(*along) > 0 || is_nothing(*along)) &&
-            (sign_of(*before) < 0 || is_nothing(*before)))
+        if ((near_sign(*along) > 0 || near_is_zero(*along)) &&
+            (near_sign(*before) < 0 || near_is_zero(*before)))
             return (ebpo_feature)(EBPO_NEAR_CORNER0 + i);
-        distance_far_cross(t->edge[i], normal, outward);
-        int side = sign_of(distance_far_dot(outward, t->corner[i]));
-        if (side < 0 && sign_of(*along) < 0 && sign_of(t->back[i]) > 0)
+        near_cross(t->edge[i], normal, outward);
+        int side = near_sign(near_dot(outward, t->corner[i]));
+        if (side < 0 && near_sign(*along) < 0 && near_sign(t->back[i]) > 0)
             return (ebpo_feature)(EBPO_NEAR_EDGE0 + i);
         inside = inside && side > 0;
     }
     return inside ? EBPO_NEAR_INTERIOR : EBPO_NEAR_UNKNOWN;
 }
 
-static double distance_far_length(const near a[3])
+static double near_length(const near a[3])
 {
     return sqrt(a[0].x * a[0].x + a[1].x * a[1].x + a[2].x * a[2].x);
 }
 
 /* The nearest corner is at most the triangle's size farther than the nearest point. */
-static void distance_far_bound(const far_triangle *t, ebpo_feature feature,
-                               ebpo_distance_bounds *out)
+static void bound_far(const far_triangle *t, ebpo_feature feature, ebpo_distance_bounds *out)
 {
     double least = INFINITY, size = 0;
     for (int i = 0; i < 3; i++) {
-        least = fmin(least, distance_far_length(t->corner[i]));
-        size = fmax(size, distance_far_length(t->edge[i]));
+        least = fmin(least, near_length(t->corner[i]));
+        size = fmax(size, near_length(t->edge[i]));
     }
     if (feature <= EBPO_NEAR_CORNER2) {
-        least = distance_far_length(t->corner[feature]);
+        least = near_length(t->corner[feature]);
         size = 0;
     }
     double low = least * (1 - 0x1p-48) -
@@ -162,34 +169,32 @@ static void distance_far_bound(const far_triangle *t, ebpo_feature feature,
 
 /* The nearest feature, or EBPO_NEAR_UNKNOWN. `out`, unless NULL: bounds of the distance that are as
  * near as the triangle is small. */
-static ebpo_feature ebpo_far_feature(const double p[3], const double triangle[3][3],
+static ebpo_feature find_far_feature(const double p[3], const double triangle[3][3],
                                      ebpo_distance_bounds *out)
 {
     far_triangle t;
     ebpo_feature feature = EBPO_NEAR_UNKNOWN;
-    if (distance_far_relate(p, triangle, &t))
-        feature = feature_of(&t);
+    if (relate_far(p, triangle, &t))
+        feature = far_feature_of(&t);
     if (out && t.exponent - t.edge_exponent > 20)
-        distance_far_bound(&t, feature, out);
+        bound_far(&t, feature, out);
     return feature;
 }
 
 /* |p - a|^2 - |p - b|^2 = (a - b) . ((a - p) + (b - p)) */
-static bool ebpo_far_corners_compare(const double p[3], const double a[3], const double b[3],
-                                     int *sign)
+static bool compare_far_corners(const double p[3], const double a[3], const double b[3], int *sign)
 {
     const double both[2][3] = { { a[0], a[1], a[2] }, { b[0], b[1], b[2] } };
     int apart = exponent_of((const double(*)[3])both, 1, b),
         away = exponent_of((const double(*)[3])both, 2, p);
     near step[3], middle[3];
     for (int k = 0; k < 3; k++) {
-        step[k] = distance_far_difference(a[k], b[k], apart);
-        middle[k] = distance_far_add(distance_far_difference(a[k], p[k], away),
-                                     distance_far_difference(b[k], p[k], away));
+        step[k] = near_difference(a[k], b[k], apart);
+        middle[k] = near_add(near_difference(a[k], p[k], away), near_difference(b[k], p[k], away));
     }
-    near d = distance_far_dot(step, middle);
-    *sign = sign_of(d);
-    return *sign || is_nothing(d);
+    near d = near_dot(step, middle);
+    *sign = near_sign(d);
+    return *sign || near_is_zero(d);
 }
 
 /* The corners that a feature has; the others become copies of them. */
@@ -209,8 +214,8 @@ static void keep_feature(double t[3][3], ebpo_feature feature)
 
 /* What lies in one plane across an axis is as near as it is to the foot of the point in that plane.
  * True: p has been moved there, and a and b have become no more than their features. */
-static bool ebpo_far_flatten(double p[3], double a[3][3], ebpo_feature of_a, double b[3][3],
-                             ebpo_feature of_b)
+static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b[3][3],
+                        ebpo_feature of_b)
 {
     bool moved = false;
     keep_feature(a, of_a);
@@ -227,32 +232,23 @@ static bool ebpo_far_flatten(double p[3], double a[3][3], ebpo_feature of_a, dou
     return moved;
 }
 
-/* Bounds of the distance to a triangle, in doubles.
- *
- * With corners a, b, c relative to p, the nearest feature is certain when the signs of a few
- * products are: a corner when p lies behind it along both of its edges; an edge when p projects
- * between its ends and lies outside of it in the plane; the interior when p projects inside all
- * edges (the features' Voronoi regions).
- *
- * Rounding (u = 2^-53; r: 1-norms of the relative corners at most; l: of the edges; s = l^2, at
+/* --- bounds in doubles --- */
+
+/* Rounding (u = 2^-53; r: 1-norms of the relative corners at most; l: of the edges; s = l^2, at
  * least the normal's length): relative corners are off by u of themselves, edges likewise. So
  * products of a corner and an edge are off by 8 u r l, the normal by 8 u l^2 on each axis, products
  * of a corner with edge x normal by 64 u r l^3. Distances to points of corners and edges are off by
  * 16 u r. The distance to the plane is off by what tilting the normal by 16 u l^2 / |n| moves the
  * plane within the triangle, and by 16 u r. Everything below doubles these at least. Numbers whose
  * fourth powers leave the doubles are scaled first. */
-
 static const double huge_reach = 0x1p200, tiny_reach = 0x1p-200;
 /* From so many times the triangle's size on, errors that are relative to the greatest product tell
- * little: distance_far.h. */
+ * little. */
 static const double far_ratio = 0x1p20;
 
-static inline double distance_bounds_size1(const double a[3])
-{
-    return fabs(a[0]) + fabs(a[1]) + fabs(a[2]);
-}
+static inline double greater_of(double a, double b) { return a > b ? a : b; }
 
-static inline double distance_bounds_greater(double a, double b) { return a > b ? a : b; }
+static inline double norm_1(const double a[3]) { return fabs(a[0]) + fabs(a[1]) + fabs(a[2]); }
 
 typedef struct relation {
     double corner[3][3]; /* relative to p */
@@ -265,7 +261,7 @@ typedef struct relation {
     double side[3]; /* positive where p is within edge k */
 } relation;
 
-static void distance_bounds_relate(const double p[3], const double triangle[3][3], relation *r)
+static void relate_to_point(const double p[3], const double triangle[3][3], relation *r)
 {
     r->reach = r->size = 0;
     for (int i = 0; i < 3; i++) {
@@ -274,12 +270,12 @@ static void distance_bounds_relate(const double p[3], const double triangle[3][3
             r->corner[i][k] = triangle[i][k] - p[k];
             r->edge[i][k] = triangle[j][k] - triangle[i][k];
         }
-        r->reach = distance_bounds_greater(r->reach, distance_bounds_size1(r->corner[i]));
-        r->size = distance_bounds_greater(r->size, distance_bounds_size1(r->edge[i]));
+        r->reach = greater_of(r->reach, norm_1(r->corner[i]));
+        r->size = greater_of(r->size, norm_1(r->edge[i]));
     }
 }
 
-static void distance_bounds_multiply(relation *r)
+static void multiply_relation(relation *r)
 {
     ebpo_vec3_cross(r->edge[0], r->edge[1], r->normal);
     for (int i = 0; i < 3; i++) {
@@ -340,12 +336,12 @@ static void bound_by_edges(const relation *r, double plane, double error, ebpo_d
     double low = edges - error - 4 * height,
            tilted = 0x1p-47 * r->reach + 0x1p-46 * r->size * r->size / length * r->reach;
     if (tilted < 0x1p-20 * r->reach)
-        low = distance_bounds_greater(low, plane < edges ? plane - tilted : edges - tilted);
+        low = greater_of(low, plane < edges ? plane - tilted : edges - tilted);
     out->lo = low > 0 ? low : 0;
     out->hi = edges + error;
 }
 
-static void distance_bounds_bound(const relation *r, ebpo_distance_bounds *out)
+static void bound_relation(const relation *r, ebpo_distance_bounds *out)
 {
     double error = 0x1p-47 * r->reach, d;
     out->feature = certain_feature(r);
@@ -368,52 +364,16 @@ static void distance_bounds_bound(const relation *r, ebpo_distance_bounds *out)
     out->hi = d + error;
 }
 
-static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_distance_bounds *out)
-{
-    double q[3], t[3][3];
-    int exponent = ebpo_distance_scale(p, triangle, q, t);
-    relation r;
-    distance_bounds_relate(q, (const double(*)[3])t, &r);
-    if (!(r.reach > tiny_reach * 0x1p-100) || !(r.size > tiny_reach || r.size == 0)) {
-        /* Next to a point: only that much is known. */
-        *out = (ebpo_distance_bounds){
-            0, ldexp(r.reach + 0x1p-1000, exponent) * (1 + 0x1p-50) + 0x1p-1074, EBPO_NEAR_UNKNOWN
-        };
-        out->feature = ebpo_far_feature(p, triangle, out);
-        return;
-    }
-    distance_bounds_multiply(&r);
-    distance_bounds_bound(&r, out);
-    /* Scaling up is exact, scaling down may have lost what lies below 2^-1074. */
-    out->feature = ebpo_far_feature(p, triangle, NULL);
-    out->lo = nextafter(ldexp(out->lo - 0x1p-1000, exponent), -INFINITY);
-    out->lo = out->lo > 0 ? out->lo : 0;
-    out->hi = nextafter(ldexp(out->hi + 0x1p-1000, exponent), INFINITY);
-}
-
-void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3],
-                                   ebpo_distance_bounds *out)
-{
-    relation r;
-    distance_bounds_relate(p, triangle, &r);
-    if (!(r.reach < huge_reach) || !(r.reach > tiny_reach) || !(r.size > tiny_reach)) {
-        bound_scaled(p, triangle, out);
-        return;
-    }
-    distance_bounds_multiply(&r);
-    distance_bounds_bound(&r, out);
-    if (out->feature == EBPO_NEAR_UNKNOWN && r.reach > far_ratio * r.size)
-        out->feature = ebpo_far_feature(p, triangle, NULL);
-}
-
-int ebpo_distance_scale(const double p[3], const double triangle[3][3], double q[3], double t[3][3])
+/* Scales everything by a power of two so that the largest coordinate is in 1/2 .. 1. Returns the
+ * exponent that undoes it. */
+static int scale_all(const double p[3], const double triangle[3][3], double q[3], double t[3][3])
 {
     double most = 0;
     int exponent;
     for (int k = 0; k < 3; k++) {
-        most = distance_bounds_greater(most, fabs(p[k]));
+        most = greater_of(most, fabs(p[k]));
         for (int i = 0; i < 3; i++)
-            most = distance_bounds_greater(most, fabs(triangle[i][k]));
+            most = greater_of(most, fabs(triangle[i][k]));
     }
     frexp(most, &exponent);
     for (int k = 0; k < 3; k++) {
@@ -424,8 +384,45 @@ int ebpo_distance_scale(const double p[3], const double triangle[3][3], double q
     return exponent;
 }
 
-/* Distance to a triangle without rounding: coordinates as integers in a common power of two, the
- * squared distance as a fraction of integers. */
+static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_distance_bounds *out)
+{
+    double q[3], t[3][3];
+    int exponent = scale_all(p, triangle, q, t);
+    relation r;
+    relate_to_point(q, (const double(*)[3])t, &r);
+    if (!(r.reach > tiny_reach * 0x1p-100) || !(r.size > tiny_reach || r.size == 0)) {
+        /* Next to a point: only that much is known. */
+        *out = (ebpo_distance_bounds){
+            0, ldexp(r.reach + 0x1p-1000, exponent) * (1 + 0x1p-50) + 0x1p-1074, EBPO_NEAR_UNKNOWN
+        };
+        out->feature = find_far_feature(p, triangle, out);
+        return;
+    }
+    multiply_relation(&r);
+    bound_relation(&r, out);
+    /* Scaling up is exact, scaling down may have lost what lies below 2^-1074. */
+    out->feature = find_far_feature(p, triangle, NULL);
+    out->lo = nextafter(ldexp(out->lo - 0x1p-1000, exponent), -INFINITY);
+    out->lo = out->lo > 0 ? out->lo : 0;
+    out->hi = nextafter(ldexp(out->hi + 0x1p-1000, exponent), INFINITY);
+}
+
+void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3],
+                                   ebpo_distance_bounds *out)
+{
+    relation r;
+    relate_to_point(p, triangle, &r);
+    if (!(r.reach < huge_reach) || !(r.reach > tiny_reach) || !(r.size > tiny_reach)) {
+        bound_scaled(p, triangle, out);
+        return;
+    }
+    multiply_relation(&r);
+    bound_relation(&r, out);
+    if (out->feature == EBPO_NEAR_UNKNOWN && r.reach > far_ratio * r.size)
+        out->feature = find_far_feature(p, triangle, NULL);
+}
+
+/* --- integers of any size: the squared distance is a fraction of integers in a common unit --- */
 
 /* The nearest point is p + numerator / denominator, the squared distance square / denominator2. */
 typedef struct nearest {
@@ -493,8 +490,8 @@ static bool try_interior(nearest *n)
 }
 
 /* Takes corner or edge when it is nearer than what was found (of equal ones: the corner). */
-static void distance_gmp_offer(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
-                               ebpo_feature feature, bool *taken)
+static void offer_feature(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
+                          ebpo_feature feature, bool *taken)
 {
     int sign = -1;
     *taken = false;
@@ -526,7 +523,7 @@ static void offer_edge(nearest *n, int i)
         ebpo_vectorz_dot(square, &n->corner[i], &n->corner[i]);
         mpz_mul(square, square, length2);
         mpz_submul(square, along, along);
-        distance_gmp_offer(n, false, square, length2, (ebpo_feature)(EBPO_NEAR_EDGE0 + i), &taken);
+        offer_feature(n, false, square, length2, (ebpo_feature)(EBPO_NEAR_EDGE0 + i), &taken);
         if (taken) {
             for (int k = 0; k < 3; k++) {
                 mpz_mul(n->offset.x[k], n->corner[i].x[k], length2);
@@ -545,7 +542,7 @@ static void offer_corner(nearest *n, int i)
     mpz_inits(one, square, NULL);
     mpz_set_ui(one, 1);
     ebpo_vectorz_dot(square, &n->corner[i], &n->corner[i]);
-    distance_gmp_offer(n, i == 0, square, one, (ebpo_feature)(EBPO_NEAR_CORNER0 + i), &taken);
+    offer_feature(n, i == 0, square, one, (ebpo_feature)(EBPO_NEAR_CORNER0 + i), &taken);
     if (taken) {
         for (int k = 0; k < 3; k++)
             mpz_set(n->offset.x[k], n->corner[i].x[k]);
@@ -554,7 +551,7 @@ static void offer_corner(nearest *n, int i)
     mpz_clears(one, square, NULL);
 }
 
-static void distance_gmp_find(nearest *n)
+static void find_nearest(nearest *n)
 {
     if (try_interior(n))
         return;
@@ -564,14 +561,14 @@ static void distance_gmp_find(nearest *n)
         offer_edge(n, i);
 }
 
-void ebpo_triangle_nearest_gmp(const double p[3], const double triangle[3][3],
-                               ebpo_triangle_nearest *out)
+static void nearest_by_integers(const double p[3], const double triangle[3][3],
+                                ebpo_triangle_nearest *out)
 {
     nearest n;
     nearest_init(&n);
     set_points(&n, p, triangle,
                ebpo_common_unit(&triangle[0][0], 9, ebpo_common_unit(p, 3, EBPO_UNIT_OF_ZEROS)));
-    distance_gmp_find(&n);
+    find_nearest(&n);
     out->feature = n.feature;
     out->distance = ebpo_round_root(n.square, n.denominator, n.unit);
     for (int k = 0; k < 3; k++) {
@@ -589,14 +586,13 @@ void ebpo_triangle_square_gmp(const double p[3], const double triangle[3][3], in
     nearest n;
     nearest_init(&n);
     set_points(&n, p, triangle, unit);
-    distance_gmp_find(&n);
+    find_nearest(&n);
     mpz_set(square, n.square);
     mpz_set(denominator, n.denominator);
     nearest_clear(&n);
 }
 
-int ebpo_triangle_distance_compare_gmp(const double p[3], const double a[3][3],
-                                       const double b[3][3])
+static int compare_by_integers(const double p[3], const double a[3][3], const double b[3][3])
 {
     nearest n, m;
     nearest_init(&n);
@@ -606,8 +602,8 @@ int ebpo_triangle_distance_compare_gmp(const double p[3], const double a[3][3],
                          ebpo_common_unit(&a[0][0], 9, ebpo_common_unit(p, 3, EBPO_UNIT_OF_ZEROS)));
     set_points(&n, p, a, unit);
     set_points(&m, p, b, unit);
-    distance_gmp_find(&n);
-    distance_gmp_find(&m);
+    find_nearest(&n);
+    find_nearest(&m);
     mpz_mul(n.t, n.square, m.denominator);
     mpz_mul(m.t, m.square, n.denominator);
     int sign = mpz_cmp(n.t, m.t);
@@ -616,7 +612,7 @@ int ebpo_triangle_distance_compare_gmp(const double p[3], const double a[3][3],
     return (sign > 0) - (sign < 0);
 }
 
-int ebpo_triangle_distance_compare_to_gmp(const double p[3], const double triangle[3][3], double d)
+static int compare_to_by_integers(const double p[3], const double triangle[3][3], double d)
 {
     nearest n;
     nearest_init(&n);
@@ -624,7 +620,7 @@ int ebpo_triangle_distance_compare_to_gmp(const double p[3], const double triang
                ebpo_common_unit(&triangle[0][0], 9,
                                 ebpo_common_unit(p, 3,
                                                  ebpo_common_unit(&d, 1, EBPO_UNIT_OF_ZEROS))));
-    distance_gmp_find(&n);
+    find_nearest(&n);
     ebpo_set_integer(n.t, d, n.unit);
     mpz_mul(n.t, n.t, n.t);
     mpz_mul(n.t, n.t, n.denominator);
@@ -633,7 +629,7 @@ int ebpo_triangle_distance_compare_to_gmp(const double p[3], const double triang
     return (sign > 0) - (sign < 0);
 }
 
-void ebpo_triangle_unit_normal_gmp(const double triangle[3][3], double normal[3])
+static void unit_normal_by_integers(const double triangle[3][3], double normal[3])
 {
     static const double origin[3];
     nearest n;
@@ -648,14 +644,12 @@ void ebpo_triangle_unit_normal_gmp(const double triangle[3][3], double normal[3]
     nearest_clear(&n);
 }
 
-/* Distance to a triangle, correctly rounded: double-double arithmetic while its error bound decides
- * the rounding, integers of any size otherwise. Source of the test: Ziv, "Fast evaluation of
- * elementary mathematical functions with correctly rounded last bit", 1991. */
+/* --- double-double arithmetic first, then integers --- */
 
 /* Beyond these, products of four coordinates or their rounding errors would leave the doubles. */
 static const double most_reach = 0x1p120, least_size = 0x1p-120;
 
-static bool distance_exact_ordinary(const double p[3], const double triangle[3][3])
+static bool in_pair_range(const double p[3], const double triangle[3][3])
 {
     double reach = 0, size = 0;
     for (int i = 0; i < 3; i++)
@@ -669,7 +663,7 @@ static bool distance_exact_ordinary(const double p[3], const double triangle[3][
 }
 
 /* Ziv's test. */
-static bool distance_exact_rounds(const ebpo_measured *m, double *distance)
+static bool rounds_certainly(const ebpo_measured *m, double *distance)
 {
     double error = m->error * m->distance.head;
     double least = m->distance.head + (m->distance.tail - error),
@@ -687,11 +681,11 @@ static bool corner_by_pairs(const double p[3], const double triangle[3][3],
     ebpo_measured m;
     if (bounds->feature > EBPO_NEAR_CORNER2 || !(bounds->lo > 0x1p-900))
         return false;
-    int exponent = ebpo_distance_scale(p, triangle, q, t);
+    int exponent = scale_all(p, triangle, q, t);
     if (ldexp(bounds->lo, -exponent) < 0x1p-10)
         return false;
     ebpo_distance_pairs_best()->measure(q, (const double(*)[3])t, bounds->feature, NULL, &m);
-    if (!distance_exact_rounds(&m, &out->distance))
+    if (!rounds_certainly(&m, &out->distance))
         return false;
     out->distance = ldexp(out->distance, exponent);
     out->feature = bounds->feature;
@@ -708,10 +702,10 @@ static bool nearest_by_pairs(const double p[3], const double triangle[3][3],
     *known = false;
     if (bounds->feature == EBPO_NEAR_UNKNOWN || !(bounds->lo > least_size))
         return false;
-    if (!distance_exact_ordinary(p, triangle))
+    if (!in_pair_range(p, triangle))
         return corner_by_pairs(p, triangle, bounds, out);
     *known = ebpo_distance_pairs_best()->measure(p, triangle, bounds->feature, normal, &m);
-    if (!distance_exact_rounds(&m, &out->distance))
+    if (!rounds_certainly(&m, &out->distance))
         return false;
     out->feature = bounds->feature;
     memcpy(out->point, m.point, sizeof out->point);
@@ -729,7 +723,7 @@ void ebpo_triangle_nearest_exact(const double p[3], const double triangle[3][3],
     else
         ebpo_triangle_distance_bounds(p, triangle, &b);
     if (!nearest_by_pairs(p, triangle, &b, normal, &known, out))
-        ebpo_triangle_nearest_gmp(p, triangle, out);
+        nearest_by_integers(p, triangle, out);
     if (normal && !known)
         ebpo_triangle_unit_normal(triangle, normal);
 }
@@ -745,15 +739,15 @@ int ebpo_triangle_distance_compare(const double p[3], const double a[3][3], cons
         return 1;
     int sign;
     if (x.feature <= EBPO_NEAR_CORNER2 && y.feature <= EBPO_NEAR_CORNER2 &&
-        ebpo_far_corners_compare(p, a[x.feature], b[y.feature], &sign))
+        compare_far_corners(p, a[x.feature], b[y.feature], &sign))
         return sign;
     double foot[3], c[3][3], d[3][3];
     memcpy(foot, p, sizeof foot);
     memcpy(c, a, sizeof c);
     memcpy(d, b, sizeof d);
-    if (ebpo_far_flatten(foot, c, x.feature, d, y.feature))
+    if (flatten_far(foot, c, x.feature, d, y.feature))
         return ebpo_triangle_distance_compare(foot, (const double(*)[3])c, (const double(*)[3])d);
-    return ebpo_triangle_distance_compare_gmp(p, a, b);
+    return compare_by_integers(p, a, b);
 }
 
 int ebpo_triangle_distance_compare_to(const double p[3], const double triangle[3][3], double d)
@@ -762,11 +756,11 @@ int ebpo_triangle_distance_compare_to(const double p[3], const double triangle[3
     if (isinf(d))
         return -1;
     ebpo_triangle_distance_bounds(p, triangle, &b);
-    return b.hi < d ? -1 : b.lo > d ? 1 : ebpo_triangle_distance_compare_to_gmp(p, triangle, d);
+    return b.hi < d ? -1 : b.lo > d ? 1 : compare_to_by_integers(p, triangle, d);
 }
 
 void ebpo_triangle_unit_normal(const double triangle[3][3], double normal[3])
 {
     if (!ebpo_distance_pairs_best()->unit_normal(triangle, normal))
-        ebpo_triangle_unit_normal_gmp(triangle, normal);
+        unit_normal_by_integers(triangle, normal);
 }

@@ -1,0 +1,295 @@
+/* Rays against triangles in rational numbers: right for every finite double, and slow. The last
+ * stage of ray_triangle.c.
+ *
+ * Corners relative to the origin become integers e_i in one unit, the direction integers d in
+ * another. With s_i = d . (e_j x e_k) for the edge opposite corner i, the line meets the plane at t
+ * = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2), and it meets the triangle when no two of the s_i have
+ * different signs. When the denominator is 0 the line is parallel to the triangle or the triangle
+ * has no area: then there is a common point only where all s_i are 0, and line and triangle lie in
+ * one plane. */
+#include "core/strict_fp.h"
+
+#include <float.h>
+#include <gmp.h>
+#include <limits.h>
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "geometry/ray.h"
+
+typedef struct integer_scene {
+    mpz_t corner[3][3]; /* e_i */
+    mpz_t direction[3];
+    int shift; /* a parameter in these units times 2^shift is t */
+} integer_scene;
+
+/* What the line and the triangle have in common, in units of the scene. */
+typedef struct stretch {
+    bool any;
+    int side, facing;
+    mpq_t low, high;
+} stretch;
+
+/* --- integers --- */
+
+/* Lowers *unit to an exponent e for which x is an integer times 2^e. */
+static void lower_unit(int *unit, const double *x, int n)
+{
+    for (int i = 0; i < n; i++) {
+        int e;
+        frexp(x[i], &e);
+        if (x[i] != 0 && e - DBL_MANT_DIG < *unit)
+            *unit = e - DBL_MANT_DIG;
+    }
+}
+
+/* out = x / 2^unit */
+static void set_integer(mpz_t out, double x, int unit)
+{
+    int e;
+    mpz_set_d(out, ldexp(frexp(x, &e), DBL_MANT_DIG));
+    if (x != 0)
+        mpz_mul_2exp(out, out, (mp_bitcnt_t)(e - DBL_MANT_DIG - unit));
+}
+
+static void scene_init(integer_scene *s, const ebpo_segment *ray, const double triangle[3][3])
+{
+    int length_unit = INT_MAX, direction_unit = INT_MAX;
+    mpz_t origin;
+    mpz_init(origin);
+    lower_unit(&length_unit, ray->origin, 3);
+    lower_unit(&direction_unit, ray->direction, 3);
+    for (int i = 0; i < 3; i++)
+        lower_unit(&length_unit, triangle[i], 3);
+    if (length_unit == INT_MAX)
+        length_unit = 0;
+    for (int k = 0; k < 3; k++) {
+        mpz_init(s->direction[k]);
+        set_integer(s->direction[k], ray->direction[k], direction_unit);
+        set_integer(origin, ray->origin[k], length_unit);
+        for (int i = 0; i < 3; i++) {
+            mpz_init(s->corner[i][k]);
+            set_integer(s->corner[i][k], triangle[i][k], length_unit);
+            mpz_sub(s->corner[i][k], s->corner[i][k], origin);
+        }
+    }
+    s->shift = length_unit - direction_unit;
+    mpz_clear(origin);
+}
+
+static void scene_clear(integer_scene *s)
+{
+    for (int k = 0; k < 3; k++) {
+        mpz_clear(s->direction[k]);
+        for (int i = 0; i < 3; i++)
+            mpz_clear(s->corner[i][k]);
+    }
+}
+
+/* out = component k of a x b */
+static void cross_component(mpz_t out, const mpz_t a[3], const mpz_t b[3], int k)
+{
+    int u = (k + 1) % 3, v = (k + 2) % 3;
+    mpz_mul(out, a[u], b[v]);
+    mpz_submul(out, a[v], b[u]);
+}
+
+/* out = a . (b x c) */
+static void integer_determinant(mpz_t out, const mpz_t a[3], const mpz_t b[3], const mpz_t c[3])
+{
+    mpz_t component;
+    mpz_init(component);
+    mpz_set_ui(out, 0);
+    for (int k = 0; k < 3; k++) {
+        cross_component(component, b, c, k);
+        mpz_addmul(out, a[k], component);
+    }
+    mpz_clear(component);
+}
+
+static void set_fraction(mpq_t out, const mpz_t numerator, const mpz_t denominator)
+{
+    mpz_set(mpq_numref(out), numerator);
+    mpz_set(mpq_denref(out), denominator);
+    mpq_canonicalize(out);
+}
+
+/* --- the line and the triangle --- */
+
+/* Axis with the direction's largest component: there, a multiple of the direction tells the factor.
+ */
+static int main_axis(const integer_scene *s)
+{
+    int axis = 0;
+    for (int k = 1; k < 3; k++)
+        if (mpz_cmpabs(s->direction[k], s->direction[axis]) > 0)
+            axis = k;
+    return axis;
+}
+
+static void stretch_add(stretch *st, const mpz_t numerator, const mpz_t denominator)
+{
+    mpq_t t;
+    mpq_init(t);
+    set_fraction(t, numerator, denominator);
+    if (!st->any || mpq_cmp(t, st->low) < 0)
+        mpq_set(st->low, t);
+    if (!st->any || mpq_cmp(t, st->high) > 0)
+        mpq_set(st->high, t);
+    st->any = true;
+    mpq_clear(t);
+}
+
+/* out[i]: signed distance of corner i from the line, up to a common factor, for corners in one
+ * plane with the line. */
+static void offsets_from_line(const integer_scene *s, mpz_t out[3])
+{
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < 3; i++)
+            cross_component(out[i], s->corner[i], s->direction, k);
+        if (mpz_sgn(out[0]) || mpz_sgn(out[1]) || mpz_sgn(out[2]))
+            return;
+    }
+}
+
+/* The edge from corner i to corner j crosses the line at (e_i w_j - e_j w_i) / (w_j - w_i) = t d, w
+ * being the offsets. */
+static void add_edge_crossing(stretch *st, const integer_scene *s, int axis, mpz_t w[3], int i,
+                              int j)
+{
+    mpz_t numerator, denominator;
+    mpz_inits(numerator, denominator, NULL);
+    mpz_mul(numerator, s->corner[i][axis], w[j]);
+    mpz_submul(numerator, s->corner[j][axis], w[i]);
+    mpz_sub(denominator, w[j], w[i]);
+    mpz_mul(denominator, denominator, s->direction[axis]);
+    stretch_add(st, numerator, denominator);
+    mpz_clears(numerator, denominator, NULL);
+}
+
+/* Line and triangle lie in one plane. */
+static void meet_in_plane(stretch *st, const integer_scene *s)
+{
+    int axis = main_axis(s);
+    mpz_t w[3];
+    mpz_inits(w[0], w[1], w[2], NULL);
+    offsets_from_line(s, w);
+    for (int i = 0; i < 3; i++) {
+        int j = (i + 1) % 3;
+        if (mpz_sgn(w[i]) == 0)
+            stretch_add(st, s->corner[i][axis], s->direction[axis]);
+        else if (mpz_sgn(w[i]) * mpz_sgn(w[j]) < 0)
+            add_edge_crossing(st, s, axis, w, i, j);
+    }
+    mpz_clears(w[0], w[1], w[2], NULL);
+}
+
+static void meet_line(stretch *st, const integer_scene *s)
+{
+    mpz_t edge[3], denominator, numerator;
+    int sign[3], negative = 0, positive = 0;
+    mpz_inits(denominator, numerator, NULL);
+    for (int i = 0; i < 3; i++) {
+        mpz_init(edge[i]);
+        integer_determinant(edge[i], s->direction, s->corner[(i + 1) % 3], s->corner[(i + 2) % 3]);
+        mpz_add(denominator, denominator, edge[i]);
+        sign[i] = mpz_sgn(edge[i]);
+        negative += sign[i] < 0;
+        positive += sign[i] > 0;
+    }
+    if (negative + positive == 0)
+        meet_in_plane(st, s);
+    else if (negative == 0 || positive == 0) {
+        integer_determinant(numerator, s->corner[0], s->corner[1], s->corner[2]);
+        stretch_add(st, numerator, denominator);
+        st->facing = negative ? 1 : -1;
+        st->side = negative == 3 || positive == 3 ? st->facing : 0;
+    }
+    mpz_clears(edge[0], edge[1], edge[2], denominator, numerator, NULL);
+}
+
+/* --- the parameter --- */
+
+static void scale_parameter(mpq_t t, int shift)
+{
+    if (shift >= 0)
+        mpq_mul_2exp(t, t, (mp_bitcnt_t)shift);
+    else
+        mpq_div_2exp(t, t, (mp_bitcnt_t)-shift);
+}
+
+/* Narrows the stretch to 0 <= t <= t_max, in t's own unit. */
+static void clip_stretch(stretch *st, int shift, double t_max)
+{
+    if (!st->any)
+        return;
+    scale_parameter(st->low, shift);
+    scale_parameter(st->high, shift);
+    st->any = mpq_sgn(st->high) >= 0;
+    if (mpq_sgn(st->low) < 0)
+        mpq_set_ui(st->low, 0, 1);
+    if (st->any && t_max < INFINITY) {
+        mpq_t end;
+        mpq_init(end);
+        mpq_set_d(end, t_max);
+        st->any = mpq_cmp(st->low, end) <= 0;
+        mpq_clear(end);
+    }
+}
+
+static void meet_ray(stretch *st, const ebpo_segment *ray, const double triangle[3][3])
+{
+    integer_scene s;
+    st->any = false;
+    st->side = st->facing = 0;
+    mpq_inits(st->low, st->high, NULL);
+    scene_init(&s, ray, triangle);
+    meet_line(st, &s);
+    clip_stretch(st, s.shift, ray->t_max);
+    scene_clear(&s);
+}
+
+static void stretch_clear(stretch *st) { mpq_clears(st->low, st->high, NULL); }
+
+/* To the nearest double, t >= 0; mpq_get_d cuts off. */
+static double round_fraction(const mpq_t t)
+{
+    double low = mpq_get_d(t), high = nextafter(low, INFINITY);
+    if (low == INFINITY)
+        return low;
+    mpq_t middle, half;
+    mpq_inits(middle, half, NULL);
+    mpq_set_d(middle, low);
+    mpq_set_d(half, high < INFINITY ? high - low : low - nextafter(low, 0));
+    mpq_div_2exp(half, half, 1);
+    mpq_add(middle, middle, half);
+    int sign = mpq_cmp(t, middle);
+    uint64_t bits;
+    memcpy(&bits, &low, sizeof bits);
+    mpq_clears(middle, half, NULL);
+    return sign > 0 || (sign == 0 && bits % 2) ? high : low;
+}
+
+void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3],
+                             ebpo_ray_meeting *out)
+{
+    stretch st;
+    meet_ray(&st, ray, triangle);
+    out->meets = st.any;
+    out->side = st.any ? st.side : 0;
+    out->facing = st.any ? st.facing : 0;
+    out->t = st.any ? round_fraction(st.low) : INFINITY;
+    stretch_clear(&st);
+}
+
+int ebpo_ray_compare_exact(const ebpo_segment *ray, const double a[3][3], const double b[3][3])
+{
+    stretch first, second;
+    meet_ray(&first, ray, a);
+    meet_ray(&second, ray, b);
+    int order = mpq_cmp(first.low, second.low);
+    stretch_clear(&first);
+    stretch_clear(&second);
+    return (order > 0) - (order < 0);
+}
