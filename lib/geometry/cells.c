@@ -1,10 +1,18 @@
-/* The root box: for each axis a unit u = 2^e such that the walls of all levels are integers of at
- * most 53 bits times u. */
+/* Cells of an octree: the root box, positions in the grid of a level, octcodes.
+ *
+ * The root box has for each axis a unit u = 2^e such that the faces of the cells of all levels are
+ * integers of at most 53 bits times u. So every cell face is a double without rounding, and
+ * neighbouring cells agree on it.
+ *
+ * An octcode is a leading 1 and three bits for each level (EBP 2017, section 3.3), the interleaved
+ * bits of the cell's position. */
 #include "core/strict_fp.h"
 
 #include <math.h>
 
 #include "geometry/cells.h"
+
+/* --- the root box --- */
 
 enum { MANTISSA_BITS = 53, LEAST_EXPONENT = -1074, LARGEST_EXPONENT = 1000 };
 
@@ -113,6 +121,8 @@ bool ebpo_box_valid(const ebpo_box *box)
     return true;
 }
 
+/* --- cells and positions --- */
+
 bool ebpo_cells_touch(ebpo_cell a, ebpo_cell b)
 {
     int fine = a.level > b.level ? a.level : b.level;
@@ -142,8 +152,10 @@ bool ebpo_locator_decide(const ebpo_locator *l, const double p[3], ebpo_position
     return true;
 }
 
+/* --- octcodes --- */
+
 /* Spreads the low 21 bits of x to every third bit, by halves, quarters and so on. */
-static inline uint64_t octcode_spread(uint64_t x)
+static inline uint64_t spread_bits(uint64_t x)
 {
     x &= 0x1fffff;
     x = (x | x << 32) & 0x001f00000000ffff;
@@ -154,8 +166,8 @@ static inline uint64_t octcode_spread(uint64_t x)
     return x;
 }
 
-/* Gathers every third bit; the inverse of spread. */
-static inline uint32_t octcode_gather(uint64_t x)
+/* Gathers every third bit; the inverse of spread_bits. */
+static inline uint32_t gather_bits(uint64_t x)
 {
     x &= 0x1249249249249249;
     x = (x | x >> 2) & 0x10c30c30c30c30c3;
@@ -168,15 +180,14 @@ static inline uint32_t octcode_gather(uint64_t x)
 
 ebpo_octcode ebpo_octcode_of_cell(ebpo_cell cell)
 {
-    return (uint64_t)1 << 3 * cell.level | octcode_spread(cell.at[0]) |
-           octcode_spread(cell.at[1]) << 1 | octcode_spread(cell.at[2]) << 2;
+    return (uint64_t)1 << 3 * cell.level | spread_bits(cell.at[0]) | spread_bits(cell.at[1]) << 1 |
+           spread_bits(cell.at[2]) << 2;
 }
 
 ebpo_cell ebpo_cell_of_octcode(ebpo_octcode code)
 {
     int level = ebpo_octcode_level(code);
     uint64_t path = code ^ (uint64_t)1 << 3 * level;
-    return (ebpo_cell){
-        level, { octcode_gather(path), octcode_gather(path >> 1), octcode_gather(path >> 2) }
-    };
+    return (ebpo_cell){ level,
+                        { gather_bits(path), gather_bits(path >> 1), gather_bits(path >> 2) } };
 }

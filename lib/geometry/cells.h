@@ -51,8 +51,7 @@ bool ebpo_box_make(ebpo_box *out, const double min[3], const double max[3], int 
 /* True when the box is what ebpo_box_make promises: used on boxes read from files. */
 bool ebpo_box_valid(const ebpo_box *box);
 
-/* Cells as an octree has them: children and parents, what lies beside them, where points are. Walls
- * are geometry/cell.h's. */
+/* Cells as an octree has them: children and parents, what lies beside them, where points are. */
 
 /* A file's root cell. */
 static inline ebpo_box ebpo_root_box(const ebpo_info *info)
@@ -248,7 +247,7 @@ static inline ebpo_octcode ebpo_octcode_first_descendant(ebpo_octcode code, int 
     return code << 3 * (level - ebpo_octcode_level(code));
 }
 
-/* Interleaves the cell's position; the plain twin (tests) goes bit by bit. */
+/* Interleaves the cell's position; the reference implementation in the tests goes bit by bit. */
 ebpo_octcode ebpo_octcode_of_cell(ebpo_cell cell);
 ebpo_cell ebpo_cell_of_octcode(ebpo_octcode code);
 

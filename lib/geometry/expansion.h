@@ -1,6 +1,6 @@
 /* Exact arithmetic on doubles: a value is an unevaluated sum of doubles that do not overlap, the
  * smallest first, without zeros. Exact as long as nothing overflows or underflows: callers keep
- * exponents in range (see predicates_expansion.c). An array of n = 0 components is 0. Include
+ * exponents in range (see predicates.c). An array of n = 0 components is 0. Include
  * strict_fp.h first. Source: Shewchuk 1997, section 2: TWO-SUM, SPLIT, TWO-PRODUCT,
  * FAST-EXPANSION-SUM and SCALE-EXPANSION. */
 #ifndef EBPO_GEOMETRY_EXPANSION_H

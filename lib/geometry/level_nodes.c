@@ -1,9 +1,19 @@
+/* The nodes of an octree in memory: as levels, and as a table of children.
+ *
+ * Levels store node types in groups of eight siblings, 16 bits each. A node is found by its rank:
+ * the number of nodes of its type before it in its level. Ranks are prefix sums of the counts in
+ * the groups, made once for each level; counts that contradict each other are refused.
+ *
+ * The table of children stores four bytes for each node. A grid over its top levels replaces the
+ * first steps from the root, with fewer cells than about twice the groups. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "geometry/level_nodes.h"
+
+/* --- counts of node types --- */
 
 static const uint64_t EVEN = UINT64_C(0x5555555555555555), PAIRS = UINT64_C(0x3333333333333333),
                       NIBBLES = UINT64_C(0x0f0f0f0f0f0f0f0f), BYTES = UINT64_C(0x00ff00ff00ff00ff);
@@ -52,6 +62,8 @@ void ebpo_groups_count(const void *types, uint64_t groups, uint64_t counts[4])
     count_words(rest, 1, counts);
     counts[EBPO_WHITE] = 8 * groups - counts[EBPO_BLACK] - counts[EBPO_LEAF] - counts[EBPO_GRAY];
 }
+
+/* --- ranks --- */
 
 void ebpo_level_ranks_free(ebpo_level_ranks *ranks)
 {
@@ -143,6 +155,8 @@ ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level
     return status;
 }
 
+/* --- nodes of levels --- */
+
 /* Node of a group of the cell's level. */
 static ebpo_node node_of(const ebpo_level_nodes *n, uint64_t group, unsigned octant, ebpo_cell cell)
 {
@@ -195,8 +209,8 @@ int32_t ebpo_level_winding(const ebpo_level_nodes *n, const ebpo_node *node)
 
 /* --- for cursors --- */
 
-static ebpo_status level_nodes_children(void *holder, ebpo_node *gray, ebpo_node child[8],
-                                        ebpo_error *error)
+static ebpo_status source_children(void *holder, ebpo_node *gray, ebpo_node child[8],
+                                   ebpo_error *error)
 {
     (void)error;
     for (unsigned octant = 0; octant < 8 && !gray->pruned; octant++)
@@ -204,9 +218,9 @@ static ebpo_status level_nodes_children(void *holder, ebpo_node *gray, ebpo_node
     return EBPO_OK;
 }
 
-static ebpo_status level_nodes_planes(void *holder, const ebpo_node *node,
-                                      uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
-                                      ebpo_error *error)
+static ebpo_status source_planes(void *holder, const ebpo_node *node,
+                                 uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
+                                 ebpo_error *error)
 {
     (void)error;
     const uint32_t *from = ebpo_level_planes(holder, node, count);
@@ -215,18 +229,17 @@ static ebpo_status level_nodes_planes(void *holder, const ebpo_node *node,
     return EBPO_OK;
 }
 
-static ebpo_status level_nodes_winding(void *holder, const ebpo_node *uniform, int32_t *out,
-                                       ebpo_error *error)
+static ebpo_status source_winding(void *holder, const ebpo_node *uniform, int32_t *out,
+                                  ebpo_error *error)
 {
     (void)error;
     *out = ebpo_level_winding(holder, uniform);
     return EBPO_OK;
 }
 
-const ebpo_node_source ebpo_level_source = { level_nodes_children, level_nodes_planes,
-                                             level_nodes_winding };
+const ebpo_node_source ebpo_level_source = { source_children, source_planes, source_winding };
 
-/* The grid that spares the first steps of the way down. */
+/* --- the table of children, and its grid --- */
 
 typedef struct painter {
     ebpo_node_table *table;
@@ -234,12 +247,11 @@ typedef struct painter {
 } painter;
 
 /* `cell` is counted from the table's root. */
-static void node_table_paint(painter *p, uint32_t entry, ebpo_cell cell)
+static void paint_grid(painter *p, uint32_t entry, ebpo_cell cell)
 {
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY && cell.level < p->bits) {
         for (unsigned octant = 0; octant < 8; octant++)
-            node_table_paint(p, ebpo_table_child(p->table, entry, octant),
-                             ebpo_cell_child(cell, octant));
+            paint_grid(p, ebpo_table_child(p->table, entry, octant), ebpo_cell_child(cell, octant));
         return;
     }
     int shift = p->bits - cell.level;
@@ -278,7 +290,7 @@ void ebpo_node_table_make_grid(ebpo_node_table *table)
         return;
     }
     table->grid_bits = bits;
-    node_table_paint(&(painter){ table, bits }, table->root, (ebpo_cell){ 0, { 0, 0, 0 } });
+    paint_grid(&(painter){ table, bits }, table->root, (ebpo_cell){ 0, { 0, 0, 0 } });
 }
 
 void ebpo_node_table_free(ebpo_node_table *table)

@@ -64,7 +64,7 @@ typedef struct ebpo_node {
     /* How its holder finds it. */
     union {
         uint64_t rank;  /* in levels and files: among the nodes of its type in its level */
-        uint32_t entry; /* in tables: see node_table.h */
+        uint32_t entry; /* in tables: see ebpo_node_table */
     };
     /* in a model whose subtrees are loaded on demand: that in which the node stands; else NULL */
     const struct ebpo_accel *subtree;

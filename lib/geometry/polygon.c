@@ -1,3 +1,12 @@
+/* Cutting polygons in space and closed chains into triangles over their own corners.
+ *
+ * A polygon is projected along the axis on which its normal is largest. A convex one becomes a fan;
+ * any other is cut ear by ear, with exact tests, in any order of coordinates. A corner is tested
+ * again only when its own neighbours have changed, or when the corner that blocked its ear is gone.
+ * Blocking corners are searched for in a tree of boxes. So outlines of 100,000 corners and more are
+ * cut in about n log n steps. Outlines that cross themselves get the triangles of least area in
+ * space, as a chain does. Sources: Meisters, "Polygons have ears", 1975; Barequet and Sharir,
+ * "Filling gaps in the boundary of a polyhedron", 1995. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -11,28 +20,7 @@
 #include "geometry/polygon.h"
 #include "geometry/predicates.h"
 
-/* Cutting the ears off an outline in the plane, by exact tests, in any order of coordinates.
- *
- * A corner is tested again only when its own neighbours have changed, or when the corner that
- * blocked its ear is gone; blocking corners are searched for in a tree of boxes. So outlines of
- * 100,000 corners and more are cut in about n log n steps. */
-
-/* What blocks an ear. */
-typedef enum ebpo_ear_rule {
-    /* Any corner in the closed triangle, unless it is at the place of one of the triangle's. */
-    EBPO_EARS_CLOSED,
-
-    /* For outlines that touch themselves (slits, bridges to holes, pinched corners): a corner
-     * within the triangle or on its new side; and one elsewhere on its border if the outline goes
-     * into the triangle from there. Where no ear is left, spikes without area are cut off. */
-    EBPO_EARS_TOUCHING
-} ebpo_ear_rule;
-
-typedef enum ebpo_ears {
-    EBPO_EARS_CUT,   /* all of it: every triangle turns counter-clockwise, or has no area */
-    EBPO_EARS_STUCK, /* the outline crosses itself */
-    EBPO_EARS_WORK   /* more steps than `limit` were needed */
-} ebpo_ears;
+/* ==== chains ==== */
 
 static double triangle_area(const ebpo_chain *c, uint32_t i, uint32_t j, uint32_t k)
 {
@@ -178,7 +166,7 @@ static void start_cutting(cutting *c)
         push_ear(c, i);
 }
 
-static bool cut_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
+static bool cut_least_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
 {
     uint64_t n = chain->n, written = 0;
     ebpo_workspace *w = chain->workspace;
@@ -213,10 +201,30 @@ static bool cut_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
 
 bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3])
 {
-    return chain->n <= chain->optimal ? least_area(chain, triangles) : cut_ears(chain, triangles);
+    return chain->n <= chain->optimal ? least_area(chain, triangles)
+                                      : cut_least_ears(chain, triangles);
 }
 
+/* ==== outlines in the plane, ear by ear ==== */
+
 #define NONE UINT32_MAX
+
+/* What blocks an ear. */
+typedef enum ear_rule {
+    /* Any corner in the closed triangle, unless it is at the place of one of the triangle's. */
+    EBPO_EARS_CLOSED,
+
+    /* For outlines that touch themselves (slits, bridges to holes, pinched corners): a corner
+     * within the triangle or on its new side; and one elsewhere on its border if the outline goes
+     * into the triangle from there. Where no ear is left, spikes without area are cut off. */
+    EBPO_EARS_TOUCHING
+} ear_rule;
+
+typedef enum ears_result {
+    EBPO_EARS_CUT,   /* all of it: every triangle turns counter-clockwise, or has no area */
+    EBPO_EARS_STUCK, /* the outline crosses itself */
+    EBPO_EARS_WORK   /* more steps than `limit` were needed */
+} ears_result;
 
 enum {
     WORD = 64,
@@ -252,14 +260,14 @@ typedef struct outline {
 } outline;
 
 /* The triangle that is looked at, and what was seen at its corner b. */
-typedef struct polygon_ears_ear {
+typedef struct tested_ear {
     uint32_t corner[3];
     const double *at[3];
     double low[2], high[2];
     bool along_a, along_c; /* other edges run from b's place towards a; towards c */
-} polygon_ears_ear;
+} tested_ear;
 
-static int polygon_ears_turn(const outline *o, uint32_t a, uint32_t b, uint32_t c)
+static int turn_of_corners(const outline *o, uint32_t a, uint32_t b, uint32_t c)
 {
     return ebpo_orient2d(o->at[a], o->at[b], o->at[c]);
 }
@@ -308,7 +316,7 @@ static uint32_t find_bit(const outline *o, uint64_t i)
 
 /* ---- ears that wait for a corner to go ---- */
 
-static void polygon_ears_unblock(outline *o, uint32_t b)
+static void unblock_ear(outline *o, uint32_t b)
 {
     uint32_t x = o->blocker[b];
     if (x == NONE)
@@ -320,7 +328,7 @@ static void polygon_ears_unblock(outline *o, uint32_t b)
     o->blocker[b] = NONE;
 }
 
-static void polygon_ears_block(outline *o, uint32_t b, uint32_t x)
+static void block_ear(outline *o, uint32_t b, uint32_t x)
 {
     uint32_t after = o->first_blocked[x];
     o->blocker[b] = x;
@@ -333,7 +341,7 @@ static void polygon_ears_block(outline *o, uint32_t b, uint32_t x)
 
 static void test_blocked_again(outline *o, uint32_t x)
 {
-    for (uint32_t b; (b = o->first_blocked[x]) != NONE; polygon_ears_unblock(o, b))
+    for (uint32_t b; (b = o->first_blocked[x]) != NONE; unblock_ear(o, b))
         set_bit(o, b);
 }
 
@@ -369,7 +377,7 @@ static void build_tree(outline *o)
 }
 
 /* Returns false where no corner of the box can block the ear. */
-static bool may_block(const outline *o, const polygon_ears_ear *e, const box *b)
+static bool may_block(const outline *o, const tested_ear *e, const box *b)
 {
     for (int k = 0; k < 2; k++)
         if (b->low[k] > e->high[k] || b->high[k] < e->low[k])
@@ -397,30 +405,29 @@ static bool is_along(const double b[2], const double a[2], const double q[2])
     return a[k] > b[k] ? q[k] > b[k] : q[k] < b[k];
 }
 
-static void note_edges_along(const outline *o, polygon_ears_ear *e, uint32_t i)
+static void note_edges_along(const outline *o, tested_ear *e, uint32_t i)
 {
     const uint32_t *c = e->corner;
     const uint32_t beside[2] = { o->next[i], o->previous[i] };
     for (int k = 0; k < 2; k++) {
         const double *q = o->at[beside[k]];
         e->along_a |=
-            polygon_ears_turn(o, c[1], c[0], beside[k]) == 0 && is_along(e->at[1], e->at[0], q);
+            turn_of_corners(o, c[1], c[0], beside[k]) == 0 && is_along(e->at[1], e->at[0], q);
         e->along_c |=
-            polygon_ears_turn(o, c[1], c[2], beside[k]) == 0 && is_along(e->at[1], e->at[2], q);
+            turn_of_corners(o, c[1], c[2], beside[k]) == 0 && is_along(e->at[1], e->at[2], q);
     }
 }
 
 /* Returns whether the edge from a corner on the ear's border, where side[k] is 0, goes into it. */
-static bool polygon_ears_enters(const outline *o, const polygon_ears_ear *e, const int side[3],
-                                uint32_t to)
+static bool edge_enters(const outline *o, const tested_ear *e, const int side[3], uint32_t to)
 {
     for (int k = 0; k < 3; k++)
-        if (side[k] == 0 && polygon_ears_turn(o, e->corner[k], e->corner[(k + 1) % 3], to) <= 0)
+        if (side[k] == 0 && turn_of_corners(o, e->corner[k], e->corner[(k + 1) % 3], to) <= 0)
             return false;
     return true;
 }
 
-static bool polygon_ears_blocks(const outline *o, polygon_ears_ear *e, uint32_t i)
+static bool corner_blocks(const outline *o, tested_ear *e, uint32_t i)
 {
     const double *p = o->at[i];
     int side[3];
@@ -431,27 +438,26 @@ static bool polygon_ears_blocks(const outline *o, polygon_ears_ear *e, uint32_t 
         (same_place(p, e->at[0]) || same_place(p, e->at[1]) || same_place(p, e->at[2])))
         return false;
     for (int k = 0; k < 3; k++)
-        if ((side[k] = polygon_ears_turn(o, e->corner[k], e->corner[(k + 1) % 3], i)) < 0)
+        if ((side[k] = turn_of_corners(o, e->corner[k], e->corner[(k + 1) % 3], i)) < 0)
             return false;
     if (!o->touching || (side[0] > 0 && side[1] > 0))
         return true;
     if (side[0] == 0 && side[1] == 0)
         note_edges_along(o, e, i);
-    return polygon_ears_enters(o, e, side, o->next[i]) ||
-           polygon_ears_enters(o, e, side, o->previous[i]);
+    return edge_enters(o, e, side, o->next[i]) || edge_enters(o, e, side, o->previous[i]);
 }
 
-static uint32_t blocker_in_leaf(outline *o, polygon_ears_ear *e, uint32_t leaf)
+static uint32_t blocker_in_leaf(outline *o, tested_ear *e, uint32_t leaf)
 {
     uint32_t begin = leaf * BLOCK, end = o->n - begin < BLOCK ? o->n : begin + BLOCK;
     o->work += end - begin;
     for (uint32_t i = begin; i < end; i++)
-        if (o->next[i] != NONE && polygon_ears_blocks(o, e, i))
+        if (o->next[i] != NONE && corner_blocks(o, e, i))
             return i;
     return NONE;
 }
 
-static uint32_t blocker_in_tree(outline *o, polygon_ears_ear *e)
+static uint32_t blocker_in_tree(outline *o, tested_ear *e)
 {
     uint32_t stack[64], open = 0;
     stack[open++] = 1;
@@ -469,30 +475,30 @@ static uint32_t blocker_in_tree(outline *o, polygon_ears_ear *e)
     return NONE;
 }
 
-static uint32_t find_blocker(outline *o, polygon_ears_ear *e)
+static uint32_t find_blocker(outline *o, tested_ear *e)
 {
     if (o->leaves)
         return blocker_in_tree(o, e);
     o->work += o->left;
     for (uint32_t i = o->next[e->corner[2]]; i != e->corner[0]; i = o->next[i])
-        if (polygon_ears_blocks(o, e, i))
+        if (corner_blocks(o, e, i))
             return i;
     return NONE;
 }
 
-static double polygon_ears_least(double a, double b, double c)
+static double least_of_3(double a, double b, double c)
 {
     return a < b ? (a < c ? a : c) : (b < c ? b : c);
 }
 
-static polygon_ears_ear ear_at(const outline *o, uint32_t b)
+static tested_ear ear_at(const outline *o, uint32_t b)
 {
-    polygon_ears_ear e = { .corner = { o->previous[b], b, o->next[b] } };
+    tested_ear e = { .corner = { o->previous[b], b, o->next[b] } };
     for (int k = 0; k < 3; k++)
         e.at[k] = o->at[e.corner[k]];
     for (int k = 0; k < 2; k++) {
-        e.low[k] = polygon_ears_least(e.at[0][k], e.at[1][k], e.at[2][k]);
-        e.high[k] = -polygon_ears_least(-e.at[0][k], -e.at[1][k], -e.at[2][k]);
+        e.low[k] = least_of_3(e.at[0][k], e.at[1][k], e.at[2][k]);
+        e.high[k] = -least_of_3(-e.at[0][k], -e.at[1][k], -e.at[2][k]);
     }
     return e;
 }
@@ -500,7 +506,7 @@ static polygon_ears_ear ear_at(const outline *o, uint32_t b)
 /* ---- which side of the outline an ear is on ---- */
 
 /* Finds a point within the ear; false where rounding leaves none. */
-static bool point_within(const polygon_ears_ear *e, double out[2])
+static bool point_within(const tested_ear *e, double out[2])
 {
     for (int k = 0; k < 2; k++)
         out[k] = e->at[1][k] / 2 + (e->at[0][k] / 4 + e->at[2][k] / 4);
@@ -529,7 +535,7 @@ static int64_t winding_around(outline *o, uint32_t start, const double q[2])
 
 /* Returns whether the ear is a bend of a passage without width, whose other side runs beside it:
  * nothing is within such an ear. */
-static bool is_outside(outline *o, const polygon_ears_ear *e)
+static bool is_outside(outline *o, const tested_ear *e)
 {
     double q[2];
     return e->along_a && e->along_c && point_within(e, q) &&
@@ -540,7 +546,7 @@ static bool is_outside(outline *o, const polygon_ears_ear *e)
 static bool is_spike(const outline *o, uint32_t b)
 {
     uint32_t a = o->previous[b], c = o->next[b];
-    if (polygon_ears_turn(o, a, b, c) != 0)
+    if (turn_of_corners(o, a, b, c) != 0)
         return false;
     return same_place(o->at[a], o->at[b]) || same_place(o->at[b], o->at[c]) ||
            is_along(o->at[b], o->at[a], o->at[c]);
@@ -568,7 +574,7 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
     o->previous[c] = a;
     o->next[b] = NONE;
     o->left--;
-    polygon_ears_unblock(o, b);
+    unblock_ear(o, b);
     clear_bit(o, b);
     set_bit(o, a);
     set_bit(o, c);
@@ -584,20 +590,20 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
 /* Returns whether the ear at b may be cut; if not, it is tested again when that may change. */
 static bool is_ear(outline *o, uint32_t b)
 {
-    polygon_ears_ear e = ear_at(o, b);
+    tested_ear e = ear_at(o, b);
     clear_bit(o, b);
-    polygon_ears_unblock(o, b);
+    unblock_ear(o, b);
     if (ebpo_orient2d(e.at[0], e.at[1], e.at[2]) <= 0)
         return false;
     uint32_t x = find_blocker(o, &e);
     if (x != NONE)
-        polygon_ears_block(o, b, x);
+        block_ear(o, b, x);
     return x == NONE && !is_outside(o, &e);
 }
 
 /* Goes around and cuts every ear, skipping one corner after each cut so that fans of slivers stay
  * short. */
-static ebpo_ears cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
+static ears_result cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
 {
     uint32_t done = 0, b = 0;
     while (o->left > 3) {
@@ -616,7 +622,7 @@ static ebpo_ears cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
         cut_off(o, b, triangle[done++]);
         b = o->next[c];
     }
-    if (polygon_ears_turn(o, o->previous[b], b, o->next[b]) < 0)
+    if (turn_of_corners(o, o->previous[b], b, o->next[b]) < 0)
         return EBPO_EARS_STUCK;
     cut_off(o, b, triangle[done]);
     return EBPO_EARS_CUT;
@@ -626,7 +632,7 @@ static ebpo_ears cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
 
 /* Bytes of scratch for n corners, at any alignment that malloc gives; 0 when that does not fit 64
  * bits. */
-static uint64_t ebpo_ears_scratch_bytes(uint64_t n)
+static uint64_t ears_scratch_bytes(uint64_t n)
 {
     /* a corner has six numbers, and at most 4 / BLOCK boxes and counts; bits take less than one
      * byte */
@@ -635,7 +641,7 @@ static uint64_t ebpo_ears_scratch_bytes(uint64_t n)
     return ebpo_mul_ok(n + WORD, each, &bytes) ? bytes : 0;
 }
 
-static void *polygon_ears_take(char **at, uint64_t bytes)
+static void *take_array(char **at, uint64_t bytes)
 {
     void *taken = *at;
     *at += bytes;
@@ -649,24 +655,24 @@ static void place_arrays(outline *o, void *scratch)
     if (o->n > SCANNED)
         for (o->leaves = 1; (uint64_t)o->leaves * BLOCK < o->n;)
             o->leaves *= 2;
-    o->boxes = polygon_ears_take(&at, 2 * (uint64_t)o->leaves * sizeof *o->boxes);
+    o->boxes = take_array(&at, 2 * (uint64_t)o->leaves * sizeof *o->boxes);
     do {
         words = (words + WORD - 1) / WORD;
         o->words[o->levels] = words;
-        o->bits[o->levels++] = polygon_ears_take(&at, words * sizeof **o->bits);
+        o->bits[o->levels++] = take_array(&at, words * sizeof **o->bits);
     } while (words > 1);
     uint32_t **arrays[] = { &o->next,          &o->previous,     &o->blocker,
                             &o->first_blocked, &o->next_blocked, &o->previous_blocked };
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        *arrays[i] = polygon_ears_take(&at, o->n * sizeof **arrays[i]);
-    o->corners = polygon_ears_take(&at, 2 * (uint64_t)o->leaves * sizeof *o->corners);
+        *arrays[i] = take_array(&at, o->n * sizeof **arrays[i]);
+    o->corners = take_array(&at, 2 * (uint64_t)o->leaves * sizeof *o->corners);
 }
 
 /* Writes n - 2 triangles of corner numbers for the outline at[n], n >= 4, that runs
  * counter-clockwise; what is written is of use with EBPO_EARS_CUT only. The result depends on the
  * corners alone. Pure, any thread. */
-static ebpo_ears ebpo_ears_cut(uint32_t (*triangle)[3], const double (*at)[2], uint32_t n,
-                               ebpo_ear_rule rule, uint64_t limit, void *scratch)
+static ears_result cut_outline(uint32_t (*triangle)[3], const double (*at)[2], uint32_t n,
+                               ear_rule rule, uint64_t limit, void *scratch)
 {
     outline o = { .at = at, .touching = rule == EBPO_EARS_TOUCHING, .n = n, .left = n };
     place_arrays(&o, scratch);
@@ -682,6 +688,8 @@ static ebpo_ears ebpo_ears_cut(uint32_t (*triangle)[3], const double (*at)[2], u
         build_tree(&o);
     return cut_all(&o, triangle, limit);
 }
+
+/* ==== polygons in space ==== */
 
 /* Steps of cutting an outline that touches itself, after which it is given up as one that crosses
  * itself: thousands of corners at one place are compared with each other. */
@@ -699,14 +707,14 @@ typedef struct polygon {
 
 uint64_t ebpo_polygon_scratch_bytes(uint64_t n)
 {
-    uint64_t bytes, ears = ebpo_ears_scratch_bytes(n);
+    uint64_t bytes, ears = ears_scratch_bytes(n);
     if (!ears || !ebpo_mul_ok(n, 2 * sizeof(double), &bytes) ||
         __builtin_add_overflow(bytes, ears, &bytes))
         return 0;
     return bytes;
 }
 
-static void polygon_fan(uint32_t (*triangle)[3], uint32_t n)
+static void make_fan(uint32_t (*triangle)[3], uint32_t n)
 {
     for (uint32_t i = 0; i + 2 < n; i++) {
         triangle[i][0] = 0;
@@ -757,7 +765,7 @@ static void newell_normal(const polygon *p, double normal[3])
 }
 
 /* False where it has no normal. */
-static bool polygon_project(polygon *p)
+static bool project_polygon(polygon *p)
 {
     double normal[3];
     newell_normal(p, normal);
@@ -780,7 +788,7 @@ static bool polygon_project(polygon *p)
     return true;
 }
 
-static int polygon_turn(const polygon *p, uint32_t a, uint32_t b, uint32_t c)
+static int turn_of_projected(const polygon *p, uint32_t a, uint32_t b, uint32_t c)
 {
     return ebpo_orient2d(p->flat[a], p->flat[b], p->flat[c]);
 }
@@ -792,13 +800,13 @@ static bool goes_up(const double a[2], const double b[2])
 
 /* Left turns alone do not make a convex polygon (a pentagram has them too): it must also change its
  * direction only twice. */
-static ebpo_polygon_kind polygon_classify(const polygon *p)
+static ebpo_polygon_kind classify_polygon(const polygon *p)
 {
     bool straight = false;
     uint32_t changes = 0;
     for (uint32_t i = 0; i < p->n; i++) {
         uint32_t j = i + 1 < p->n ? i + 1 : 0, k = j + 1 < p->n ? j + 1 : 0;
-        int t = polygon_turn(p, i, j, k);
+        int t = turn_of_projected(p, i, j, k);
         if (t < 0)
             return EBPO_POLYGON_CONCAVE;
         straight = straight || t == 0;
@@ -822,15 +830,15 @@ static ebpo_polygon_kind kind_of_guess(const polygon *p, uint32_t (*triangle)[3]
 {
     bool turned = !p->projected, empty = true;
     for (uint32_t i = 0; i + 2 < p->n; i++) {
-        turned = turned || polygon_turn(p, triangle[i][0], triangle[i][1], triangle[i][2]) < 0;
+        turned = turned || turn_of_projected(p, triangle[i][0], triangle[i][1], triangle[i][2]) < 0;
         empty = empty && !has_area(p, triangle[i]);
     }
     if (empty)
-        polygon_fan(triangle, p->n);
+        make_fan(triangle, p->n);
     return empty ? EBPO_POLYGON_DEGENERATE : turned ? EBPO_POLYGON_GUESSED : EBPO_POLYGON_CONCAVE;
 }
 
-static ebpo_polygon_kind polygon_guess(const polygon *p, uint32_t (*triangle)[3])
+static ebpo_polygon_kind guess_triangles(const polygon *p, uint32_t (*triangle)[3])
 {
     double(*point)[3] = ebpo_alloc(p->n, sizeof *point);
     for (uint32_t i = 0; point && i < p->n; i++)
@@ -846,30 +854,30 @@ static ebpo_polygon_kind polygon_guess(const polygon *p, uint32_t (*triangle)[3]
 
 /* ---- all of it ---- */
 
-static ebpo_polygon_kind polygon_cut(const polygon *p, uint32_t (*triangle)[3], void *scratch)
+static ebpo_polygon_kind cut_polygon(const polygon *p, uint32_t (*triangle)[3], void *scratch)
 {
     const double(*flat)[2] = (const double(*)[2])p->flat;
-    ebpo_polygon_kind kind = polygon_classify(p);
-    ebpo_ears ears = EBPO_EARS_STUCK;
+    ebpo_polygon_kind kind = classify_polygon(p);
+    ears_result ears = EBPO_EARS_STUCK;
     if (kind == EBPO_POLYGON_CONVEX)
         return kind;
     if (kind != EBPO_POLYGON_GUESSED)
-        ears = ebpo_ears_cut(triangle, flat, p->n, EBPO_EARS_CLOSED, EBPO_POLYGON_WORK, scratch);
+        ears = cut_outline(triangle, flat, p->n, EBPO_EARS_CLOSED, EBPO_POLYGON_WORK, scratch);
     if (ears != EBPO_EARS_STUCK)
         return ears == EBPO_EARS_CUT ? kind : EBPO_POLYGON_TOO_LARGE;
-    ears = ebpo_ears_cut(triangle, flat, p->n, EBPO_EARS_TOUCHING, TOUCHING_WORK, scratch);
-    return ears == EBPO_EARS_CUT ? EBPO_POLYGON_CONCAVE : polygon_guess(p, triangle);
+    ears = cut_outline(triangle, flat, p->n, EBPO_EARS_TOUCHING, TOUCHING_WORK, scratch);
+    return ears == EBPO_EARS_CUT ? EBPO_POLYGON_CONCAVE : guess_triangles(p, triangle);
 }
 
 ebpo_polygon_kind ebpo_polygon_triangulate(uint32_t (*triangle)[3], const double (*corner)[3],
                                            uint32_t n, void *scratch)
 {
     polygon p = { .corner = corner, .flat = scratch, .n = n };
-    polygon_fan(triangle, n);
+    make_fan(triangle, n);
     if (n == 3)
         return EBPO_POLYGON_CONVEX;
     if (!find_scale(&p))
         return EBPO_POLYGON_DEGENERATE;
-    p.projected = polygon_project(&p);
-    return p.projected ? polygon_cut(&p, triangle, p.flat + n) : polygon_guess(&p, triangle);
+    p.projected = project_polygon(&p);
+    return p.projected ? cut_polygon(&p, triangle, p.flat + n) : guess_triangles(&p, triangle);
 }

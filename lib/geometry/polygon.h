@@ -43,7 +43,7 @@ bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3]);
  * The polygon is projected along the axis on which its normal (Newell's sum) is largest. There a
  * convex polygon becomes a fan from its first corner; any other is cut ear by ear, every turn and
  * every point-in-ear test by the exact ebpo_orient2d: first as if the outline did not touch itself,
- * then, where that fails, with the rule for outlines that do (polygon_ears.h). All triangles then
+ * then, where that fails, with the rule for outlines that do. All triangles then
  * turn the polygon's way or have no area, so each point is covered as often as the outline winds
  * around it: once in a polygon with slits, with bridges to holes, or pinched at corners.
  *

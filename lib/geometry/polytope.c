@@ -1,3 +1,11 @@
+/* Convex polytopes in the coordinates of a cell, cut from the unit cube by half-spaces.
+ *
+ * Half-spaces are stored as plane codes of 32 bits, which decode to integers, so that no reader
+ * rounds. Polytopes have rounded vertices: they serve volumes, drawing and the choice of planes.
+ * Containment never depends on them. Clipping works on the vertex loops of the faces (BP 2008,
+ * section 3.4.3) and refuses a cut that rounding would spoil, so that a polytope may be too large
+ * and is never too small. An envelope is the cell of a node, cut by the planes of its ancestors and
+ * its own. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -6,6 +14,8 @@
 
 #include "geometry/polytope.h"
 #include "geometry/vec3.h"
+
+/* --- plane codes --- */
 
 bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d)
 {
@@ -58,6 +68,8 @@ int ebpo_plane_code_offset(const int32_t n[3], double support)
     return q < 0 ? 0 : (int)q;
 }
 
+/* --- polytopes and volumes --- */
+
 static const double tolerance = 1e-10;
 
 void ebpo_polytope_cube(ebpo_polytope *p)
@@ -98,8 +110,8 @@ double ebpo_polytope_volume(const ebpo_polytope *p)
     return sum / 6;
 }
 
-static void polytope_between(const double a[3], double da, const double b[3], double db,
-                             double out[3])
+static void interpolate_crossing(const double a[3], double da, const double b[3], double db,
+                                 double out[3])
 {
     double t = da / (da - db);
     for (int k = 0; k < 3; k++)
@@ -128,7 +140,7 @@ typedef struct beyond {
 static void point_between(const beyond *c, int out, int in, double x[3])
 {
     /* always from the outer end, so that neighbours get the same point */
-    polytope_between(c->p->vertex[out], c->dist[out], c->p->vertex[in], c->dist[in], x);
+    interpolate_crossing(c->p->vertex[out], c->dist[out], c->p->vertex[in], c->dist[in], x);
 }
 
 /* An edge of the cut. */
@@ -248,7 +260,7 @@ static uint16_t add_vertex(cut *c, const double x[3], bool on)
     return (uint16_t)i;
 }
 
-static uint16_t polytope_crossing(cut *c, uint16_t in, uint16_t out)
+static uint16_t crossing_vertex(cut *c, uint16_t in, uint16_t out)
 {
     if (c->dist[in] >= -tolerance)
         return c->number[in]; /* the inner end itself lies on the plane */
@@ -260,7 +272,7 @@ static uint16_t polytope_crossing(cut *c, uint16_t in, uint16_t out)
         return 0;
     }
     double x[3];
-    polytope_between(c->in->vertex[in], c->dist[in], c->in->vertex[out], c->dist[out], x);
+    interpolate_crossing(c->in->vertex[in], c->dist[in], c->in->vertex[out], c->dist[out], x);
     uint16_t number = add_vertex(c, x, true);
     c->edge[c->edges].in = in;
     c->edge[c->edges].out = out;
@@ -313,7 +325,7 @@ static void clip_face(cut *c, int f)
         if (!a_out)
             add_corner(c, start, c->number[a]);
         if (a_out != b_out)
-            add_corner(c, start, a_out ? polytope_crossing(c, b, a) : polytope_crossing(c, a, b));
+            add_corner(c, start, a_out ? crossing_vertex(c, b, a) : crossing_vertex(c, a, b));
     }
     close_face(c, start, p->tag[f]);
     for (int i = start; i < c->out->corner_count && !c->full; i++) {
@@ -411,8 +423,10 @@ void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from)
     memcpy(to->corner, from->corner, (size_t)from->corner_count * sizeof from->corner[0]);
 }
 
+/* --- halves and children --- */
+
 /* Keeps one half, as ebpo_polytope_half does. */
-static bool polytope_halve(ebpo_polytope *p, int axis, int side)
+static bool halve_in_place(ebpo_polytope *p, int axis, int side)
 {
     double n[3] = { 0, 0, 0 };
     n[axis] = side ? -1 : 1;
@@ -427,15 +441,15 @@ static bool polytope_halve(ebpo_polytope *p, int axis, int side)
 bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out)
 {
     ebpo_polytope_copy(out, p);
-    return polytope_halve(out, axis, side);
+    return halve_in_place(out, axis, side);
 }
 
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out)
 {
     ebpo_polytope_copy(out, p);
-    bool some = polytope_halve(out, 2, octant >> 2 & 1);
-    some = polytope_halve(out, 1, octant >> 1 & 1) && some;
-    return polytope_halve(out, 0, octant & 1) && some;
+    bool some = halve_in_place(out, 2, octant >> 2 & 1);
+    some = halve_in_place(out, 1, octant >> 1 & 1) && some;
+    return halve_in_place(out, 0, octant & 1) && some;
 }
 
 void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES])
@@ -445,6 +459,8 @@ void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VER
         for (int i = p->first[f]; p->tag[f] < 0 && i < p->first[f + 1]; i++)
             sides[p->corner[i]] |= (uint8_t)(1u << (-1 - p->tag[f]));
 }
+
+/* --- envelopes: cut by plane codes, as half-spaces, and by level --- */
 
 void ebpo_planes_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count)
 {

@@ -1,3 +1,8 @@
+/* Poses: rotations as quaternions and matrices, and the coordinates of posed vertices.
+ *
+ * A pose is checked once. Its matrix may differ from a rotation by rounding only. Posed coordinates
+ * are doubles, each operation rounded once, and all decisions about two models are exact on these
+ * doubles. Bounds: docs/develop/collision.md, "Posed coordinates". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -8,6 +13,8 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "geometry/pose.h"
+
+/* --- quaternions --- */
 
 double ebpo_quaternion_length(const double q[4])
 {
@@ -59,7 +66,7 @@ ebpo_status ebpo_pose_turn(ebpo_pose *pose, const double quaternion[4], ebpo_err
     return EBPO_OK;
 }
 
-/* Checks poses; bounds: docs/develop/collision.md, "Posed coordinates". */
+/* --- poses --- */
 
 static const double most_deviation = 0x1p-20, least_scale = 0x1p-300, most_scale = 0x1p300,
                     most_coordinate = 0x1p1000;
@@ -85,7 +92,7 @@ static double deviation_of(const double r[3][3])
     return most + 0x1p-50;
 }
 
-static double pose_determinant(const double r[3][3])
+static double determinant_3x3(const double r[3][3])
 {
     double sum = 0;
     for (int k = 0; k < 3; k++) {
@@ -104,7 +111,7 @@ static ebpo_status check_rotation(const ebpo_pose *pose, double deviation, ebpo_
                          "pose: the matrix is not a rotation: its transpose times itself is off by "
                          "%.3g from the unit matrix, at most %.3g is allowed",
                          deviation, most_deviation);
-    if (pose_determinant(pose->rotation) < 0)
+    if (determinant_3x3(pose->rotation) < 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "pose: the matrix is a mirror, not a rotation: its determinant is -1");
     if (!(pose->scale >= least_scale && pose->scale <= most_scale))

@@ -1,4 +1,10 @@
-/* Proofs: docs/develop/collision.md, "Kinds of pairs", 3 and 4. */
+/* How two faces are related: apart, touching, crossing or coplanar; exact for every finite double.
+ *
+ * Faces whose planes intersect in a line are turned so that one corner of each is alone on its side
+ * of the other plane; two orientations then compare the ends of both faces on that line (Devillers
+ * and Guigue, "Faster Triangle-Triangle Intersection Tests", 2002). Faces in one plane are compared
+ * as figures in that plane, seen along an axis. A face without area is the segment between its
+ * least and greatest corners. Proofs: docs/develop/collision.md, "Kinds of pairs". */
 #include "core/strict_fp.h"
 
 #include <stdbool.h>
@@ -9,8 +15,6 @@
 #include "geometry/triangle_pair.h"
 #include "geometry/vec3.h"
 #include "geometry/predicates.h"
-
-/* Pairs of faces in one plane, and those of which one has no area: a part of ebpo_triangle_pair. */
 
 /* --- figures in a plane, seen along an axis --- */
 
@@ -71,7 +75,7 @@ static int parted_by_edges(const figure *f, const figure *other)
 }
 
 /* 2: no common point, 1: no common inner point, 0: neither. */
-static int flat_pair_parted(const figure *f, const figure *g)
+static int figures_parted(const figure *f, const figure *g)
 {
     int by_f = parted_by_edges(f, g), by_g = parted_by_edges(g, f);
     return by_f > by_g ? by_f : by_g;
@@ -142,7 +146,7 @@ static bool segment_meets_triangle(const ends *s, const double t[3][3], int axis
         return false;
     if (side[0] == 0 && side[1] == 0 && !s->point) {
         figure f = seen_along(axis, t, 3), g = seen_along(axis, (const double(*)[3])s->at, 2);
-        return flat_pair_parted(&f, &g) != 2;
+        return figures_parted(&f, &g) != 2;
     }
     for (int i = 0; i < 2; i++)
         if (side[i] == 0)
@@ -154,14 +158,14 @@ static bool segment_meets_triangle(const ends *s, const double t[3][3], int axis
 }
 
 /* One face has no area, or both are in one plane. */
-static ebpo_pair_kind ebpo_flat_pair(const double a[3][3], const double b[3][3])
+static ebpo_pair_kind classify_flat(const double a[3][3], const double b[3][3])
 {
     int axis_a = axis_of(a), axis_b = axis_of(b);
     if (axis_a >= 0 && axis_b >= 0) {
         static const ebpo_pair_kind kinds[] = { EBPO_PAIR_COPLANAR, EBPO_PAIR_TOUCHING,
                                                 EBPO_PAIR_APART };
         figure f = seen_along(axis_a, a, 3), g = seen_along(axis_a, b, 3);
-        return kinds[flat_pair_parted(&f, &g)];
+        return kinds[figures_parted(&f, &g)];
     }
     ends s = ends_of(axis_a < 0 ? a : b);
     bool meet;
@@ -174,8 +178,7 @@ static ebpo_pair_kind ebpo_flat_pair(const double a[3][3], const double b[3][3])
     return meet ? EBPO_PAIR_TOUCHING : EBPO_PAIR_APART;
 }
 
-/* Proofs: docs/develop/collision.md, "Kinds of pairs". Source of the test on the common line:
- * Devillers and Guigue, "Faster Triangle-Triangle Intersection Tests", 2002. */
+/* --- pairs of faces in general --- */
 
 static bool boxes_apart(const double a[3][3], const double b[3][3])
 {
@@ -208,7 +211,7 @@ static bool has_both(const int side[3])
 
 /* The corner that is alone on a strict side, the others being on the other one or in the plane; or
  * in the plane, while both others are on one side. Prefers the positive side. */
-static int triangle_pair_alone(const int side[3])
+static int corner_alone(const int side[3])
 {
     static const int order[] = { 1, -1, 0 };
     for (int s = 0; s < 3; s++)
@@ -221,15 +224,15 @@ static int triangle_pair_alone(const int side[3])
 }
 
 /* Turns the corners so that the one that is alone comes first. True: it is not above the others. */
-static bool triangle_pair_turn(const int side[3], int corner[3])
+static bool turn_corners(const int side[3], int corner[3])
 {
-    corner[0] = triangle_pair_alone(side);
+    corner[0] = corner_alone(side);
     corner[1] = corner[0] == 2 ? 0 : corner[0] + 1;
     corner[2] = corner[0] == 0 ? 2 : corner[0] - 1;
     return side[corner[0]] < side[corner[1]] || side[corner[0]] < side[corner[2]];
 }
 
-static void triangle_pair_swap(int *x, int *y)
+static void swap_corners(int *x, int *y)
 {
     int z = *x;
     *x = *y;
@@ -247,15 +250,15 @@ bool ebpo_turn_pair(const double a[3][3], const double b[3][3], ebpo_turned_pair
     if (one_side(out->side_a))
         return false;
     if (within_plane(out->side_a) || within_plane(out->side_b)) {
-        *kind = ebpo_flat_pair(a, b);
+        *kind = classify_flat(a, b);
         return false;
     }
-    out->flipped_b = triangle_pair_turn(out->side_a, out->a);
-    out->flipped_a = triangle_pair_turn(out->side_b, out->b);
+    out->flipped_b = turn_corners(out->side_a, out->a);
+    out->flipped_a = turn_corners(out->side_b, out->b);
     if (out->flipped_b)
-        triangle_pair_swap(&out->b[1], &out->b[2]);
+        swap_corners(&out->b[1], &out->b[2]);
     if (out->flipped_a)
-        triangle_pair_swap(&out->a[1], &out->a[2]);
+        swap_corners(&out->a[1], &out->a[2]);
     return true;
 }
 
