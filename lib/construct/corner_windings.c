@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#include "construct/corner_windings.h"
+#include "construct/construct_stages.h"
 #include "construct/planes.h"
 #include "core/error.h"
 #include "geometry/predicates.h"

@@ -5,9 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "construct/envelopes.h"
-#include "construct/corner_windings.h"
-#include "construct/emit_levels.h"
+#include "construct/planes.h"
+#include "construct/construct_stages.h"
 #include "construct/pieces.h"
 #include "core/alloc.h"
 #include "core/error.h"

@@ -7,9 +7,8 @@
 #include <string.h>
 
 #include "construct/builder.h"
-#include "construct/envelopes.h"
-#include "construct/corner_windings.h"
-#include "construct/leaf_planes.h"
+#include "construct/construct_stages.h"
+#include "construct/planes.h"
 #include "construct/pieces.h"
 #include "construct/supports.h"
 #include "core/alloc.h"

@@ -3,7 +3,7 @@
  * than there are. */
 #include "core/strict_fp.h"
 
-#include "construct/gray_colours.h"
+#include "construct/construct_stages.h"
 
 #include <math.h>
 #include <stdlib.h>

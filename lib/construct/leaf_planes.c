@@ -7,9 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "construct/leaf_planes.h"
-#include "construct/octants.h"
 #include "construct/planes.h"
+#include "construct/construct_stages.h"
 #include "construct/sweep.h"
 #include "core/hash.h"
 #include "geometry/polytope.h"

@@ -6,16 +6,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "construct/corner_windings.h"
-#include "construct/octants.h"
-#include "construct/partition.h"
+#include "construct/planes.h"
+#include "construct/construct_stages.h"
 #include "construct/pieces.h"
 #include "construct/supports.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/parallel.h"
-#include "geometry/ray_triangle.h"
+#include "geometry/ray.h"
 
 enum { RELEASE_FACES = 1 << 13 };
 

@@ -5,10 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "construct/corner_windings.h"
-#include "construct/partition.h"
+#include "construct/planes.h"
+#include "construct/construct_stages.h"
 #include "construct/pieces.h"
-#include "construct/propose.h"
 #include "construct/supports.h"
 #include "core/alloc.h"
 #include "core/error.h"

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "construct/corner_windings.h"
+#include "construct/construct_stages.h"
 #include "construct/supports.h"
 #include "core/alloc.h"
 #include "core/error.h"

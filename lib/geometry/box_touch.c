@@ -6,7 +6,7 @@
  * filters. */
 #include "core/strict_fp.h"
 
-#include "geometry/ray_triangle.h"
+#include "geometry/ray.h"
 
 #include "geometry/predicates.h"
 

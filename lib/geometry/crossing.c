@@ -2,10 +2,10 @@
  * Source of the shift: Edelsbrunner and Muecke, "Simulation of Simplicity", 1990. */
 #include "core/strict_fp.h"
 
-#include "geometry/min_max.h"
+#include "geometry/vec3.h"
 #include "geometry/predicates.h"
 
-static inline int compare(double a, double b) { return (a > b) - (a < b); }
+static inline int crossing_compare(double a, double b) { return (a > b) - (a < b); }
 
 int ebpo_normal_sign(int k, const double a[3], const double b[3], const double c[3])
 {
@@ -29,7 +29,7 @@ static int shifted_side2d(int axis, const double a[3], const double b[3], const 
     if (sign != 0)
         return sign;
     int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
-    int by_u = compare(a[v], b[v]), by_v = compare(b[u], a[u]);
+    int by_u = crossing_compare(a[v], b[v]), by_v = crossing_compare(b[u], a[u]);
     if (u < v)
         return by_u != 0 ? by_u : by_v;
     return by_v != 0 ? by_v : by_u;

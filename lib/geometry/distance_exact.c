@@ -7,8 +7,8 @@
 
 #include "geometry/distance.h"
 #include "geometry/distance_pairs.h"
-#include "geometry/distance_exact.h"
 #include "geometry/integer_vectors.h"
+#include "geometry/vec3.h"
 
 /* Points that are far from a triangle for its size: what products of a coordinate of the point and
  * a side of the triangle tell, each with an error that is relative to itself. Signs only; certain.
@@ -247,18 +247,6 @@ static const double huge_reach = 0x1p200, tiny_reach = 0x1p-200;
  * little: distance_far.h. */
 static const double far_ratio = 0x1p20;
 
-static inline double distance_bounds_dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static inline void distance_bounds_cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
 static inline double distance_bounds_size1(const double a[3])
 {
     return fabs(a[0]) + fabs(a[1]) + fabs(a[2]);
@@ -293,13 +281,13 @@ static void distance_bounds_relate(const double p[3], const double triangle[3][3
 
 static void distance_bounds_multiply(relation *r)
 {
-    distance_bounds_cross(r->edge[0], r->edge[1], r->normal);
+    ebpo_vec3_cross(r->edge[0], r->edge[1], r->normal);
     for (int i = 0; i < 3; i++) {
         double outward[3];
-        r->along[i] = distance_bounds_dot(r->corner[i], r->edge[i]);
-        r->back[i] = distance_bounds_dot(r->corner[i == 2 ? 0 : i + 1], r->edge[i]);
-        distance_bounds_cross(r->edge[i], r->normal, outward);
-        r->side[i] = distance_bounds_dot(outward, r->corner[i]);
+        r->along[i] = ebpo_vec3_dot(r->corner[i], r->edge[i]);
+        r->back[i] = ebpo_vec3_dot(r->corner[i == 2 ? 0 : i + 1], r->edge[i]);
+        ebpo_vec3_cross(r->edge[i], r->normal, outward);
+        r->side[i] = ebpo_vec3_dot(outward, r->corner[i]);
     }
 }
 
@@ -307,12 +295,12 @@ static void distance_bounds_multiply(relation *r)
  * edge. */
 static double edge_distance(const relation *r, int i)
 {
-    double length2 = distance_bounds_dot(r->edge[i], r->edge[i]),
+    double length2 = ebpo_vec3_dot(r->edge[i], r->edge[i]),
            t = length2 > 0 ? -r->along[i] / length2 : 0, q[3];
     t = t < 0 ? 0 : t > 1 ? 1 : t;
     for (int k = 0; k < 3; k++)
         q[k] = r->corner[i][k] + t * r->edge[i][k];
-    return sqrt(distance_bounds_dot(q, q));
+    return sqrt(ebpo_vec3_dot(q, q));
 }
 
 static ebpo_feature certain_feature(const relation *r)
@@ -334,16 +322,16 @@ static ebpo_feature certain_feature(const relation *r)
 
 static double plane_distance(const relation *r, double *error)
 {
-    double length = sqrt(distance_bounds_dot(r->normal, r->normal));
+    double length = sqrt(ebpo_vec3_dot(r->normal, r->normal));
     *error = 0x1p-47 * r->reach + 0x1p-46 * r->size * r->size * r->size / length;
-    return fabs(distance_bounds_dot(r->normal, r->corner[0])) / length;
+    return fabs(ebpo_vec3_dot(r->normal, r->corner[0])) / length;
 }
 
 /* The plane is never farther than the triangle; a plane of unknown tilt says nothing, but no point
  * of the triangle is farther from its edges than its height. */
 static void bound_by_edges(const relation *r, double plane, double error, ebpo_distance_bounds *out)
 {
-    double edges = edge_distance(r, 0), length = sqrt(distance_bounds_dot(r->normal, r->normal));
+    double edges = edge_distance(r, 0), length = sqrt(ebpo_vec3_dot(r->normal, r->normal));
     for (int i = 1; i < 3; i++) {
         double other = edge_distance(r, i);
         edges = other < edges ? other : edges;
@@ -363,7 +351,7 @@ static void distance_bounds_bound(const relation *r, ebpo_distance_bounds *out)
     out->feature = certain_feature(r);
     if (out->feature <= EBPO_NEAR_CORNER2) {
         const double *q = r->corner[out->feature];
-        d = sqrt(distance_bounds_dot(q, q));
+        d = sqrt(ebpo_vec3_dot(q, q));
         error = 0x1p-49 * d;
     } else if (out->feature <= EBPO_NEAR_EDGE2) {
         d = edge_distance(r, (int)(out->feature - EBPO_NEAR_EDGE0));

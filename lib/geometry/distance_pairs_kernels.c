@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "geometry/distance_pairs.h"
-#include "geometry/double_double.h"
+#include "geometry/expansion.h"
 
 /* To about 2^-100 of itself; x > 0. */
 static inline ebpo_pair pair_root(ebpo_pair x)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "geometry/polytope.h"
+#include "geometry/vec3.h"
 
 bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d)
 {
@@ -59,18 +60,6 @@ int ebpo_plane_code_offset(const int32_t n[3], double support)
 
 static const double tolerance = 1e-10;
 
-static void polytope_cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static double polytope_dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 void ebpo_polytope_cube(ebpo_polytope *p)
 {
     /* Vertex i has bit 0 x, bit 1 y, bit 2 z. */
@@ -102,8 +91,8 @@ double ebpo_polytope_volume(const ebpo_polytope *p)
             double ob[3] = { b[0] - o[0], b[1] - o[1], b[2] - o[2] };
             double oc[3] = { c[0] - o[0], c[1] - o[1], c[2] - o[2] };
             double n[3];
-            polytope_cross(ob, oc, n);
-            sum += polytope_dot(oa, n);
+            ebpo_vec3_cross(ob, oc, n);
+            sum += ebpo_vec3_dot(oa, n);
         }
     }
     return sum / 6;
@@ -123,12 +112,6 @@ double ebpo_polytope_cap_bound(double volume, double width, double height)
         return 0;
     double left = height < width ? 1 - height / width : 0;
     return volume * (1 - left * left * left);
-}
-
-static void polytope_minus(const double a[3], const double b[3], double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = a[k] - b[k];
 }
 
 /* What lies beyond a plane, seen from its farthest vertex: faces that have this vertex add nothing,
@@ -157,9 +140,9 @@ static void add_edge(beyond *c, const double from[3], const double to[3])
         return; /* seen from its own end it spans nothing */
     }
     double u[3], v[3], n[3];
-    polytope_minus(from, c->origin, u);
-    polytope_minus(to, c->origin, v);
-    polytope_cross(u, v, n);
+    ebpo_vec3_subtract(from, c->origin, u);
+    ebpo_vec3_subtract(to, c->origin, v);
+    ebpo_vec3_cross(u, v, n);
     for (int k = 0; k < 3; k++)
         c->area[k] += n[k];
 }
@@ -167,12 +150,12 @@ static void add_edge(beyond *c, const double from[3], const double to[3])
 static void add_to_fan(beyond *c, const double x[3], int *kept, double first[3], double last[3])
 {
     double v[3], n[3];
-    polytope_minus(x, c->p->vertex[c->farthest], v);
+    ebpo_vec3_subtract(x, c->p->vertex[c->farthest], v);
     if (*kept == 0)
         memcpy(first, v, sizeof v);
     else if (*kept > 1) {
-        polytope_cross(last, v, n);
-        c->fans += polytope_dot(first, n);
+        ebpo_vec3_cross(last, v, n);
+        c->fans += ebpo_vec3_dot(first, n);
     }
     memcpy(last, v, sizeof v);
     ++*kept;
@@ -215,7 +198,7 @@ double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d
     if (!p->vertex_count)
         return 0;
     for (int i = 0; i < p->vertex_count; i++) {
-        double e = polytope_dot(n, p->vertex[i]) - d;
+        double e = ebpo_vec3_dot(n, p->vertex[i]) - d;
         c.dist[i] = e;
         low = e < low ? e : low;
         if (e > high)
@@ -228,7 +211,7 @@ double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d
     c.started = false;
     for (int f = 0; f < p->face_count; f++)
         face_beyond(&c, f);
-    return (c.fans + high * fabs(polytope_dot(n, c.area)) / polytope_dot(n, n)) / 6;
+    return (c.fans + high * fabs(ebpo_vec3_dot(n, c.area)) / ebpo_vec3_dot(n, n)) / 6;
 }
 
 /* --- clipping --- */
@@ -386,7 +369,7 @@ ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int3
     c.full = c.touched = false;
     double most = -1e300, least = 1e300;
     for (int i = 0; i < p->vertex_count; i++) {
-        double e = polytope_dot(n, p->vertex[i]) - d;
+        double e = ebpo_vec3_dot(n, p->vertex[i]) - d;
         c.dist[i] = e;
         most = e > most ? e : most;
         least = e < least ? e : least;

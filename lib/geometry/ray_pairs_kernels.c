@@ -9,7 +9,7 @@
 #define EBPO_PRODUCTS_BY_FMA
 #endif
 
-#include "geometry/double_double.h"
+#include "geometry/expansion.h"
 #include "geometry/ray_pairs.h"
 
 /* A normal and the sum of absolute values behind each component. */
@@ -18,7 +18,7 @@ typedef struct plane_normal {
     double permanent[3];
 } plane_normal;
 
-static inline plane_normal cross(const ebpo_pair f[3], const ebpo_pair g[3])
+static inline plane_normal ray_pairs_cross(const ebpo_pair f[3], const ebpo_pair g[3])
 {
     plane_normal n;
     for (int k = 0; k < 3; k++) {
@@ -32,7 +32,7 @@ static inline plane_normal cross(const ebpo_pair f[3], const ebpo_pair g[3])
 
 /* n . y. Errors: some 12 * 2^-106 of the permanent in n, 12 more in products and sums; 2^-97 leaves
  * a margin. */
-static inline ebpo_bounded dot(const plane_normal *n, const ebpo_pair y[3])
+static inline ebpo_bounded ray_pairs_dot(const plane_normal *n, const ebpo_pair y[3])
 {
     ebpo_pair first = ebpo_pair_multiply(n->x[0], y[0]), second = ebpo_pair_multiply(n->x[1], y[1]);
     ebpo_bounded out = {
@@ -44,7 +44,7 @@ static inline ebpo_bounded dot(const plane_normal *n, const ebpo_pair y[3])
     return out;
 }
 
-static void plane(const ebpo_segment *ray, const double triangle[3][3], ebpo_plane_pairs *out)
+static void ray_pairs_plane(const ebpo_segment *ray, const double triangle[3][3], ebpo_plane_pairs *out)
 {
     ebpo_pair f[3], g[3], to_plane[3], d[3];
     for (int k = 0; k < 3; k++) {
@@ -53,15 +53,15 @@ static void plane(const ebpo_segment *ray, const double triangle[3][3], ebpo_pla
         to_plane[k] = ebpo_two_difference(triangle[0][k], ray->origin[k]);
         d[k] = ebpo_pair_of(ray->direction[k]);
     }
-    plane_normal n = cross(f, g);
-    ebpo_bounded a = dot(&n, to_plane), b = dot(&n, d);
+    plane_normal n = ray_pairs_cross(f, g);
+    ebpo_bounded a = ray_pairs_dot(&n, to_plane), b = ray_pairs_dot(&n, d);
     double error = a.error / fabs(a.x.head) + b.error / fabs(b.x.head);
     out->numerator = a;
     out->denominator = b;
     out->has_quotient = ebpo_pair_quotient(a.x, b.x, error, out->quotient);
 }
 
-static void edge(const double d[3], const ebpo_pair a[3], const double from[3], const double to[3],
+static void ray_pairs_edge(const double d[3], const ebpo_pair a[3], const double from[3], const double to[3],
                  ebpo_bounded *out)
 {
     ebpo_pair direction[3], e[3];
@@ -69,8 +69,8 @@ static void edge(const double d[3], const ebpo_pair a[3], const double from[3], 
         direction[k] = ebpo_pair_of(d[k]);
         e[k] = ebpo_two_difference(to[k], from[k]);
     }
-    plane_normal n = cross(a, e);
-    *out = dot(&n, direction);
+    plane_normal n = ray_pairs_cross(a, e);
+    *out = ray_pairs_dot(&n, direction);
 }
 
-const ebpo_ray_pairs EBPO_KERNEL(ebpo_ray_pairs) = { plane, edge };
+const ebpo_ray_pairs EBPO_KERNEL(ebpo_ray_pairs) = { ray_pairs_plane, ray_pairs_edge };

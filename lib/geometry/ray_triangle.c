@@ -9,12 +9,10 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "geometry/double_double.h"
 #include "geometry/expansion.h"
 #include "geometry/predicates.h"
 #include "geometry/ray.h"
 #include "geometry/ray_pairs.h"
-#include "geometry/ray_triangle.h"
 
 /* Where a ray meets a triangle, as fractions of expansions: exact without allocation, for rays that
  * the filters of ray_close.c leave open. What returns false or

@@ -7,7 +7,7 @@
 #include <ebpo/pair.h>
 
 #include "geometry/triangle_pair.h"
-#include "geometry/min_max.h"
+#include "geometry/vec3.h"
 #include "geometry/predicates.h"
 
 /* Pairs of faces in one plane, and those of which one has no area: a part of ebpo_triangle_pair. */

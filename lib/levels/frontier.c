@@ -9,14 +9,10 @@
 #include "core/hash.h"
 #include "geometry/cells.h"
 #include "levels/frontier.h"
+#include "geometry/vec3.h"
 
 /* of a sum of three products, generously: what is hardly seen counts as seen */
 static const double SLACK = 1e-12;
-
-static double observer_dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static void observer_cross(const double a[3], const double b[3], double out[3])
 {
@@ -32,7 +28,7 @@ static bool observer_normalise(const double v[3], double out[3])
         return false;
     for (int k = 0; k < 3; k++)
         out[k] = v[k] / largest;
-    double length = sqrt(observer_dot(out, out));
+    double length = sqrt(ebpo_vec3_dot(out, out));
     for (int k = 0; k < 3; k++)
         out[k] /= length;
     return true;
@@ -68,7 +64,7 @@ static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, doubl
     if (!observer_normalise(o->up, up))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the observer's upward direction is (0, 0, 0)");
     observer_cross(forward, up, side[0]);
-    if (observer_dot(side[0], side[0]) < 1e-12 || !observer_normalise(side[0], side[0]))
+    if (ebpo_vec3_dot(side[0], side[0]) < 1e-12 || !observer_normalise(side[0], side[0]))
         return ebpo_fail(
             error, EBPO_E_ARGUMENT,
             "the observer's upward direction lies along the viewing direction; give another one");

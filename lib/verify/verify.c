@@ -15,10 +15,7 @@
 #include "mesh/mesh_parts.h"
 #include "verify/tally.h"
 #include "verify/verify_parts.h"
-#include "verify/verify_source.h"
-#include "verify/verify_subtrees.h"
 #include "verify/verify_tree.h"
-#include "verify/verify_walk.h"
 
 /* Colours of gray nodes against those of the faces below. */
 

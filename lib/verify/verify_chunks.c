@@ -10,8 +10,7 @@
 #include "format/reader.h"
 #include "hdf5_read/chunk.h"
 #include "hdf5_read/head.h"
-#include "verify/verify_chunks.h"
-#include "verify/verify_subtrees.h"
+#include "verify/verify_parts.h"
 
 enum { OPEN_MOST = 64, NEAR = 32 };
 

@@ -9,7 +9,7 @@
 #include "check_main.h"
 #include "hdf5_read/coding.h"
 #include "construct/pieces.h"
-#include "construct/partition.h"
+#include "construct/construct_stages.h"
 #include "format/head_facts.h"
 #include "format/write_plan.h"
 #include "format/slice.h"

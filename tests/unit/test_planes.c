@@ -5,7 +5,7 @@
 
 #include "check_main.h"
 #include "geometry/polytope.h"
-#include "construct/octants.h"
+#include "construct/construct_stages.h"
 #include "construct/planes.h"
 #include "solids.h"
 

@@ -14,7 +14,6 @@
 #include "core/workspace.h"
 #include "check_main.h"
 #include "geometry/polytope.h"
-#include "construct/leaf_planes.h"
 #include "construct/planes.h"
 #include "scratch.h"
 #include "solids.h"

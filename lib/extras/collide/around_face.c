@@ -9,7 +9,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "extras/collide/posed_solid.h"
-#include "geometry/min_max.h"
+#include "geometry/vec3.h"
 #include "geometry/predicates.h"
 #include "geometry/level_nodes.h"
 
@@ -151,7 +151,7 @@ static ebpo_status sides_of_solid(const looking *l, const ebpo_piece *piece, int
     return status;
 }
 
-static ebpo_status look(void *user, const ebpo_piece *piece, ebpo_error *error)
+static ebpo_status around_face_look(void *user, const ebpo_piece *piece, ebpo_error *error)
 {
     const looking *l = user;
     ebpo_around around;
@@ -172,7 +172,7 @@ static ebpo_status look(void *user, const ebpo_piece *piece, ebpo_error *error)
 /* EBPO_E_CANCELLED comes from `look` alone, and means enough. */
 static ebpo_status visit_pieces(looking *l, ebpo_face_cuts *pieces, ebpo_error *error)
 {
-    ebpo_status status = ebpo_face_pieces_visit(pieces, look, l, error);
+    ebpo_status status = ebpo_face_pieces_visit(pieces, around_face_look, l, error);
     return status == EBPO_E_CANCELLED ? EBPO_OK : status;
 }
 

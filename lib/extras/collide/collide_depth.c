@@ -15,7 +15,7 @@
 #include "extras/collide/posed_subtrees.h"
 #include "geometry/cells.h"
 #include "geometry/distance.h"
-#include "geometry/length.h"
+#include "geometry/vec3.h"
 #include "query/query_model.h"
 #include "query/query_node.h"
 

@@ -11,6 +11,7 @@
 #include "extras/collide/collider.h"
 #include "extras/collide/pair_sweep.h"
 #include "extras/collide/posed_subtrees.h"
+#include "geometry/vec3.h"
 
 /* Until when two models have common points, one of which moves along a direction: pairs of nodes of
  * both hierarchies, those first that may part last, then pairs of faces. Bounds:
@@ -123,11 +124,6 @@ static void make_axes(const double d[3], double axis[3][3])
     }
 }
 
-static double way_search_dot(const double x[3], const double y[3])
-{
-    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
-}
-
 static void make_side(ebpo_way_search *s, int which, const ebpo_accel *accel)
 {
     ebpo_way_side *side = &s->side[which];
@@ -139,9 +135,9 @@ static void make_side(ebpo_way_search *s, int which, const ebpo_accel *accel)
         for (int k = 0; k < 3; k++) {
             double column[3] = { side->posing->matrix[0][k], side->posing->matrix[1][k],
                                  side->posing->matrix[2][k] };
-            side->row[i][k] = way_search_dot(s->axis[i], column) / side->accel->scale;
+            side->row[i][k] = ebpo_vec3_dot(s->axis[i], column) / side->accel->scale;
         }
-        side->base[i] = way_search_dot(s->axis[i], centre);
+        side->base[i] = ebpo_vec3_dot(s->axis[i], centre);
     }
 }
 
@@ -251,7 +247,7 @@ static void ebpo_way_search_begin(ebpo_way_search *s)
 {
     ebpo_sweep_time_init(&s->last);
     make_axes(s->direction, s->axis);
-    s->step = way_search_dot(s->axis[0], s->direction);
+    s->step = ebpo_vec3_dot(s->axis[0], s->direction);
     s->lost = 0x1p-40 * s->question->reach;
     s->hi = -1;
     s->pair = (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE,    EBPO_NO_FACE,

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/double_double.h"
+#include "geometry/expansion.h"
 #include "geometry/integer_vectors.h"
 #include "geometry/triangle_pair.h"
 
@@ -69,7 +69,7 @@ static bool share_of_edge(const piercing *p, ebpo_pair *share)
 }
 
 /* False: numbers so large or small that bounds do not hold. */
-static bool ordinary(const piercing *p)
+static bool contact_ordinary(const piercing *p)
 {
     const double *const all[] = { p->end[0], p->end[1], p->plane[0], p->plane[1], p->plane[2] };
     for (int k = 0; k < 3; k++) {
@@ -86,7 +86,7 @@ static bool ordinary(const piercing *p)
 static bool point_by_pairs(const piercing *p, double out[3])
 {
     ebpo_pair share, d[3];
-    if (!ordinary(p) || !share_of_edge(p, &share))
+    if (!contact_ordinary(p) || !share_of_edge(p, &share))
         return false;
     ebpo_pair_differences(p->end[0], p->end[1], d);
     for (int k = 0; k < 3; k++)
@@ -153,7 +153,7 @@ static void point_by_integers(const piercing *p, double out[3])
         ebpo_vectorz_clear(all[i]);
 }
 
-static void pierce(const piercing *p, double out[3])
+static void contact_pierce(const piercing *p, double out[3])
 {
     if (!point_by_pairs(p, out))
         point_by_integers(p, out);
@@ -183,11 +183,11 @@ static void end_of(const edge *e, double out[3])
         return;
     }
     piercing p = piercing_of(e->face, e->from, e->to, e->plane);
-    pierce(&p, out);
+    contact_pierce(&p, out);
 }
 
 /* Of two edges that meet: one that ends there, else the lesser one. */
-static const edge *chosen(const edge *a, const edge *b)
+static const edge *contact_chosen(const edge *a, const edge *b)
 {
     if (a->ends_there || b->ends_there)
         return a->ends_there ? a : b;
@@ -200,7 +200,7 @@ static const edge *chosen(const edge *a, const edge *b)
 /* `order`: negative: the end is that of A's edge, positive: of B's, 0: of both. */
 static void set_end(const edge *a, const edge *b, int order, ebpo_contact_end *out)
 {
-    end_of(order < 0 ? a : order > 0 ? b : chosen(a, b), out->point);
+    end_of(order < 0 ? a : order > 0 ? b : contact_chosen(a, b), out->point);
     out->on_a = order <= 0 ? feature_of(a) : EBPO_NEAR_INTERIOR;
     out->on_b = order >= 0 ? feature_of(b) : EBPO_NEAR_INTERIOR;
 }

@@ -63,7 +63,7 @@ void ebpo_gap_set_best(ebpo_gap_search *g, float best, uint32_t slot_a, uint32_t
     ebpo_gap_set_limit(g, best - g->tolerance);
 }
 
-static float dot(const float a[3], const float b[3])
+static float gap_search_dot(const float a[3], const float b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -71,7 +71,7 @@ static float dot(const float a[3], const float b[3])
 /* Shorter than 1: gaps along it are not too great. */
 void ebpo_gap_set_way(ebpo_gap_search *g, const float way[3])
 {
-    float length = sqrtf(dot(way, way));
+    float length = sqrtf(gap_search_dot(way, way));
     if (!(length > 0x1p-50f && length < 0x1p60f))
         return;
     for (int k = 0; k < 3; k++)
@@ -84,7 +84,7 @@ void ebpo_gap_set_way(ebpo_gap_search *g, const float way[3])
                 sum += g->frames.frame[s].in_world[i][k] * g->way[i];
             g->along[s][k] = s ? -sum : sum;
         }
-    g->along_shift = dot(g->frames.frame[1].shift, g->along[0]);
+    g->along_shift = gap_search_dot(g->frames.frame[1].shift, g->along[0]);
 }
 
 bool ebpo_gap_room(ebpo_gap_search *g)

@@ -413,7 +413,7 @@ static float child_size(ebpo_gap_search *g, int side, uint32_t child)
 }
 
 /* Pushes what is below; false: enough. */
-static bool visit(ebpo_gap_search *g, const ebpo_gap_visit *v)
+static bool gap_walk_visit(ebpo_gap_search *g, const ebpo_gap_visit *v)
 {
     uint32_t child[2];
     bool block[2];
@@ -438,7 +438,7 @@ static bool visit(ebpo_gap_search *g, const ebpo_gap_visit *v)
     return true;
 }
 
-static void walk(ebpo_gap_search *g)
+static void gap_walk_walk(ebpo_gap_search *g)
 {
     if (!ebpo_gap_room(g))
         return;
@@ -450,7 +450,7 @@ static void walk(ebpo_gap_search *g)
             return;
         ebpo_gap_visit v = pop_visit(g);
         fetch_next(g);
-        if (far_along(g, &v) || visit(g, &v))
+        if (far_along(g, &v) || gap_walk_visit(g, &v))
             continue;
         g->stack[g->count++] = v; /* it has been looked at in part, or not at all */
         g->ended = true;
@@ -458,4 +458,4 @@ static void walk(ebpo_gap_search *g)
     }
 }
 
-const ebpo_gap_kernels EBPO_KERNEL(ebpo_gap_kernels) = { walk };
+const ebpo_gap_kernels EBPO_KERNEL(ebpo_gap_kernels) = { gap_walk_walk };

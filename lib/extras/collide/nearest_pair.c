@@ -14,14 +14,14 @@ typedef const double (*corners)[3];
 
 /* --- one pair --- */
 
-static void pose(const ebpo_posing *const posing[2], ebpo_face_two *out)
+static void nearest_pair_pose(const ebpo_posing *const posing[2], ebpo_face_two *out)
 {
     for (int i = 0; i < 6; i++)
         ebpo_posing_apply(posing[i / 3], out->own[i / 3][i % 3], out->corner[i / 3][i % 3]);
     ebpo_triangles_distance_bounds(CORNERS(out, 0), CORNERS(out, 1), &out->bounds);
 }
 
-static void look(const ebpo_gap_search *g, const uint32_t slot[2], ebpo_face_two *out)
+static void nearest_pair_look(const ebpo_gap_search *g, const uint32_t slot[2], ebpo_face_two *out)
 {
     const ebpo_posing *posing[2] = { &g->posing[0].posing, &g->posing[1].posing };
     for (int s = 0; s < 2; s++) {
@@ -30,16 +30,16 @@ static void look(const ebpo_gap_search *g, const uint32_t slot[2], ebpo_face_two
         out->source[s] = ebpo_accel_source_face(g->accel[s], local);
         ebpo_accel_triangle(g->accel[s], slot[s], out->own[s]);
     }
-    pose(posing, out);
+    nearest_pair_pose(posing, out);
 }
 
 /* Of equal distances the first in the order of the files. */
-static bool earlier(const ebpo_face_two *f, const ebpo_face_two *than)
+static bool nearest_pair_earlier(const ebpo_face_two *f, const ebpo_face_two *than)
 {
     return f->file[0] != than->file[0] ? f->file[0] < than->file[0] : f->file[1] < than->file[1];
 }
 
-static bool nearer(const ebpo_face_two *f, const ebpo_face_two *than)
+static bool nearest_pair_nearer(const ebpo_face_two *f, const ebpo_face_two *than)
 {
     if (f->bounds.hi < than->bounds.lo)
         return true;
@@ -50,7 +50,7 @@ static bool nearer(const ebpo_face_two *f, const ebpo_face_two *than)
                             CORNERS(than, 1), &than->bounds))
         order = ebpo_triangles_distance_compare(CORNERS(f, 0), CORNERS(f, 1), CORNERS(than, 0),
                                                 CORNERS(than, 1));
-    return order < 0 || (order == 0 && earlier(f, than));
+    return order < 0 || (order == 0 && nearest_pair_earlier(f, than));
 }
 
 /* --- all that wait --- */
@@ -92,7 +92,7 @@ static void take_within_tolerance(ebpo_nearest_pair *n, const ebpo_face_two *giv
 }
 
 /* False: enough. */
-static bool consider(ebpo_nearest_pair *n, const ebpo_face_two *f)
+static bool nearest_pair_consider(ebpo_nearest_pair *n, const ebpo_face_two *f)
 {
     if (!(f->bounds.lo > 0) &&
         ebpo_triangle_pair(CORNERS(f, 0), CORNERS(f, 1)) != EBPO_PAIR_APART) {
@@ -104,19 +104,19 @@ static bool consider(ebpo_nearest_pair *n, const ebpo_face_two *f)
         return compare_to_asked(n, f);
     if (n->tolerance > 0)
         take_within_tolerance(n, f);
-    else if (!n->found || nearer(f, &n->best)) {
+    else if (!n->found || nearest_pair_nearer(f, &n->best)) {
         n->best = *f;
         n->found = true;
     }
     return true;
 }
 
-static bool take(ebpo_gap_search *g, ebpo_nearest_pair *n, const uint32_t slot[2])
+static bool nearest_pair_take(ebpo_gap_search *g, ebpo_nearest_pair *n, const uint32_t slot[2])
 {
     ebpo_face_two f;
-    look(g, slot, &f);
+    nearest_pair_look(g, slot, &f);
     ebpo_gap_set_best(g, to_unit(g, f.bounds.hi), slot[0], slot[1]);
-    return consider(n, &f);
+    return nearest_pair_consider(n, &f);
 }
 
 static bool go_on(ebpo_gap_search *g)
@@ -139,14 +139,14 @@ static double least_waiting(const ebpo_gap_search *g, unsigned first)
 }
 
 /* Many may be at nearly the same distance, where models have flat parts. */
-static bool judge(ebpo_gap_search *g)
+static bool nearest_pair_judge(ebpo_gap_search *g)
 {
     ebpo_nearest_pair *n = g->user;
     bool more = true;
     unsigned judged = 0, i = 0;
     for (; i < g->waits && more; i++)
         if (!(g->waiting[i].low > g->limit))
-            more = take(g, n, g->waiting[i].slot) && (++judged % 16 || go_on(g));
+            more = nearest_pair_take(g, n, g->waiting[i].slot) && (++judged % 16 || go_on(g));
     if (!more)
         n->lo = fmin(n->lo, least_waiting(g, i));
     g->waits = 0;
@@ -222,13 +222,13 @@ void ebpo_nearest_pair_start(ebpo_nearest_pair *n, const ebpo_posing posing[2],
 {
     const ebpo_posing *const two[2] = { &posing[0], &posing[1] };
     ebpo_face_two f = *pair;
-    pose(two, &f);
-    (void)consider(n, &f);
+    nearest_pair_pose(two, &f);
+    (void)nearest_pair_consider(n, &f);
 }
 
 void ebpo_nearest_pair_met(ebpo_nearest_pair *n, const ebpo_gap_search *g, const uint32_t slot[2])
 {
-    look(g, slot, &n->best);
+    nearest_pair_look(g, slot, &n->best);
     n->found = n->meets = true;
 }
 
@@ -259,16 +259,16 @@ static void begin_search(const ebpo_nearest_pair *n, ebpo_gap_search *g)
 /* What waits, and the pair that is less than `before` and that nobody has judged yet. */
 static void judge_rest(ebpo_gap_search *g, ebpo_nearest_pair *n, float before)
 {
-    if (ebpo_nearest_pair_is_done(n) || !judge(g) || n->meets || !isnan(n->at_least))
+    if (ebpo_nearest_pair_is_done(n) || !nearest_pair_judge(g) || n->meets || !isnan(n->at_least))
         return;
     if (n->tolerance > 0 && g->best < before)
-        take(g, n, g->best_slot);
+        nearest_pair_take(g, n, g->best_slot);
 }
 
 ebpo_status ebpo_nearest_pair_search(ebpo_nearest_pair *n, ebpo_gap_search *g, ebpo_error *error)
 {
     g->user = n;
-    g->judge = judge;
+    g->judge = nearest_pair_judge;
     g->go_on = go_on;
     n->error = error;
     begin_search(n, g);

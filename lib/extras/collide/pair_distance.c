@@ -9,29 +9,11 @@
 
 #include "extras/collide/pair_distance.h"
 #include "geometry/distance.h"
-#include "geometry/distance_exact.h"
 #include "geometry/integer_vectors.h"
 #include "geometry/triangle_pair.h"
+#include "geometry/vec3.h"
 
 static const double most_reach = 0x1p200, least_reach = 0x1p-200;
-
-static double pair_distance_dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void pair_distance_subtract(const double a[3], const double b[3], double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = a[k] - b[k];
-}
-
-static void pair_distance_cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
 
 static double within_unit(double t) { return t > 0 ? (t < 1 ? t : 1) : 0; }
 
@@ -48,8 +30,8 @@ static void pair_distance_offer(search *s, int first, const double p[3], const d
                                 int on_p, int on_q, double room)
 {
     double d[3];
-    pair_distance_subtract(p, q, d);
-    double square = pair_distance_dot(d, d);
+    ebpo_vec3_subtract(p, q, d);
+    double square = ebpo_vec3_dot(d, d);
     if (!(square < s->square))
         return;
     s->square = square;
@@ -80,11 +62,11 @@ static void offer_edges(search *s, int i, int j)
 {
     const double *p = s->face[0][i], *q = s->face[1][j];
     double e[3], f[3], w[3], x[3], y[3];
-    pair_distance_subtract(s->face[0][i == 2 ? 0 : i + 1], p, e);
-    pair_distance_subtract(s->face[1][j == 2 ? 0 : j + 1], q, f);
-    pair_distance_subtract(p, q, w);
-    double ee = pair_distance_dot(e, e), ff = pair_distance_dot(f, f), ef = pair_distance_dot(e, f),
-           ew = pair_distance_dot(e, w), fw = pair_distance_dot(f, w);
+    ebpo_vec3_subtract(s->face[0][i == 2 ? 0 : i + 1], p, e);
+    ebpo_vec3_subtract(s->face[1][j == 2 ? 0 : j + 1], q, f);
+    ebpo_vec3_subtract(p, q, w);
+    double ee = ebpo_vec3_dot(e, e), ff = ebpo_vec3_dot(f, f), ef = ebpo_vec3_dot(e, f),
+           ew = ebpo_vec3_dot(e, w), fw = ebpo_vec3_dot(f, w);
     double area = ee * ff - ef * ef;
     double on_e = area > 0 ? within_unit((ef * fw - ff * ew) / area) : 0;
     double on_f = ff > 0 ? within_unit((on_e * ef + fw) / ff) : 0;
@@ -105,21 +87,21 @@ static void offer_corner(search *s, int of, int i)
     double(*plane)[3] = s->face[!of];
     const double *corner = s->face[of][i];
     double e[3], f[3], n[3], d[3], c[3], foot[3];
-    pair_distance_subtract(plane[1], plane[0], e);
-    pair_distance_subtract(plane[2], plane[0], f);
-    pair_distance_subtract(corner, plane[0], d);
-    pair_distance_cross(e, f, n);
-    double nn = pair_distance_dot(n, n);
-    pair_distance_cross(d, f, c);
-    double on_e = pair_distance_dot(c, n) / nn;
-    pair_distance_cross(e, d, c);
-    double on_f = pair_distance_dot(c, n) / nn;
+    ebpo_vec3_subtract(plane[1], plane[0], e);
+    ebpo_vec3_subtract(plane[2], plane[0], f);
+    ebpo_vec3_subtract(corner, plane[0], d);
+    ebpo_vec3_cross(e, f, n);
+    double nn = ebpo_vec3_dot(n, n);
+    ebpo_vec3_cross(d, f, c);
+    double on_e = ebpo_vec3_dot(c, n) / nn;
+    ebpo_vec3_cross(e, d, c);
+    double on_f = ebpo_vec3_dot(c, n) / nn;
     if (!(on_e >= 0 && on_f >= 0 && on_e + on_f <= 1))
         return;
     for (int k = 0; k < 3; k++)
         foot[k] = plane[0][k] + (on_e * e[k] + on_f * f[k]);
-    double least = fmin(fmin(on_e, on_f), 1 - on_e - on_f), ee = pair_distance_dot(e, e),
-           ff = pair_distance_dot(f, f);
+    double least = fmin(fmin(on_e, on_f), 1 - on_e - on_f), ee = ebpo_vec3_dot(e, e),
+           ff = ebpo_vec3_dot(f, f);
     pair_distance_offer(s, of, corner, foot, i, 6,
                         nn > 0x1p-20 * ee * ff ? least * sqrt(nn / fmax(ee, ff)) : 0);
 }
@@ -134,8 +116,8 @@ static bool see_from_corner(const double a[3][3], const double b[3][3], search *
     memset(s->point, 0, sizeof s->point);
     memset(s->feature, 0, sizeof s->feature);
     for (int i = 0; i < 3; i++) {
-        pair_distance_subtract(a[i], a[0], s->face[0][i]);
-        pair_distance_subtract(b[i], a[0], s->face[1][i]);
+        ebpo_vec3_subtract(a[i], a[0], s->face[0][i]);
+        ebpo_vec3_subtract(b[i], a[0], s->face[1][i]);
         for (int of = 0; of < 2; of++) {
             const double *x = s->face[of][i];
             s->reach = fmax(s->reach, fabs(x[0]) + fabs(x[1]) + fabs(x[2]));
@@ -149,13 +131,13 @@ static double gap_along(const search *s, const double n[3])
 {
     double least = INFINITY, most = -INFINITY, d[3];
     for (int i = 0; i < 3; i++) {
-        pair_distance_subtract(s->face[1][i], s->point[0], d);
-        least = fmin(least, pair_distance_dot(n, d));
-        pair_distance_subtract(s->face[0][i], s->point[0], d);
-        most = fmax(most, pair_distance_dot(n, d));
+        ebpo_vec3_subtract(s->face[1][i], s->point[0], d);
+        least = fmin(least, ebpo_vec3_dot(n, d));
+        ebpo_vec3_subtract(s->face[0][i], s->point[0], d);
+        most = fmax(most, ebpo_vec3_dot(n, d));
     }
     double size = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
-    return (least - most - 0x1p-48 * size * s->reach) / sqrt(pair_distance_dot(n, n));
+    return (least - most - 0x1p-48 * size * s->reach) / sqrt(ebpo_vec3_dot(n, n));
 }
 
 /* --- features --- */
@@ -177,8 +159,8 @@ static bool features_certain(const search *s, const double n[3])
     for (int of = 0; of < 2; of++)
         for (int i = 0; i < 3; i++) {
             double d[3];
-            pair_distance_subtract(s->face[of][i], s->point[of], d);
-            double ahead = of ? pair_distance_dot(n, d) : -pair_distance_dot(n, d);
+            ebpo_vec3_subtract(s->face[of][i], s->point[of], d);
+            double ahead = of ? ebpo_vec3_dot(n, d) : -ebpo_vec3_dot(n, d);
             if (!is_on(i, s->feature[of]) && !(ahead > enough * s->reach * s->reach))
                 return false;
         }
@@ -253,7 +235,7 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
     for (int i = 0; i < 6; i++)
         offer_corner(&s, i / 3, i % 3);
     double n[3], margin = 0x1p-47 * s.reach;
-    pair_distance_subtract(s.point[1], s.point[0], n);
+    ebpo_vec3_subtract(s.point[1], s.point[0], n);
     double distance = sqrt(s.square);
     out->hi = distance + margin;
     if (distance > margin) {

@@ -294,7 +294,7 @@ EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b
     return size_a > LONGER * size_b ? 0 : size_b > LONGER * size_a ? 1 : 2;
 }
 
-EBPO_EIGHT bool divide(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uint32_t b, bool first)
+EBPO_EIGHT bool pair_walk_divide(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uint32_t b, bool first)
 {
     w->node_pairs++;
     if (!ebpo_pair_walk_room(w, 65))
@@ -361,7 +361,7 @@ EBPO_EIGHT bool run_any(ebpo_pair_walk *w, uint64_t pairs, bool first)
             break;
         uint32_t a = below_child(sa, r.a), b = below_child(sb, r.b);
         bool fine = a & b & EBPO_IS_BLOCK ? blocks_meet(w, a & ~EBPO_IS_BLOCK, b & ~EBPO_IS_BLOCK)
-                                          : divide(w, r, a, b, first);
+                                          : pair_walk_divide(w, r, a, b, first);
         if (!fine)
             return false;
         if (first && w->met_count)
@@ -388,7 +388,7 @@ static bool walk_expand(ebpo_pair_walk *w, ebpo_node_pair r)
 {
     uint32_t a = below_child(w->pair->accel[0], r.a), b = below_child(w->pair->accel[1], r.b);
     if (!(a & b & EBPO_IS_BLOCK))
-        return divide(w, r, a, b, false);
+        return pair_walk_divide(w, r, a, b, false);
     if (!ebpo_pair_walk_room(w, 1))
         return false;
     push_pair(w, r.a, r.b, r.key);

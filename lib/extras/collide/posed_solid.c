@@ -9,7 +9,7 @@
 #include "core/fp_env.h"
 #include "extras/collide/posed_solid.h"
 #include "geometry/integer_vectors.h"
-#include "geometry/min_max.h"
+#include "geometry/vec3.h"
 #include "geometry/predicates.h"
 #include "query/query_model.h"
 

@@ -10,14 +10,9 @@
 #include "core/sort.h"
 #include "extras/collide/posed_subtrees.h"
 #include "geometry/cells.h"
-#include "geometry/length.h"
+#include "geometry/vec3.h"
 #include "geometry/polytope.h"
 #include "query/query_node.h"
-
-static double convex_gap_dot(const double x[3], const double y[3])
-{
-    return (x[0] * y[0] + x[1] * y[1]) + x[2] * y[2];
-}
 
 static void middle_of(const ebpo_convex *c, double out[3])
 {
@@ -35,7 +30,7 @@ static const double *convex_gap_farthest(const ebpo_convex *c, const double n[3]
     int best = 0;
     double most = -INFINITY;
     for (int i = 0; i < c->count; i++) {
-        double at = sign * convex_gap_dot(c->point[i], n);
+        double at = sign * ebpo_vec3_dot(c->point[i], n);
         if (at > most) {
             most = at;
             best = i;
@@ -58,13 +53,13 @@ double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough
     for (int k = 0; k < 3; k++)
         v[k] -= from[k];
     for (int turn = 0; turn < DIRECTIONS; turn++) {
-        double length2 = convex_gap_dot(v, v), along, step2 = 0, back = 0;
+        double length2 = ebpo_vec3_dot(v, v), along, step2 = 0, back = 0;
         if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* squares are not what they should be */
             break;
         const double *p = convex_gap_farthest(a, v, 1), *q = convex_gap_farthest(b, v, -1);
         for (int k = 0; k < 3; k++)
             w[k] = q[k] - p[k];
-        along = convex_gap_dot(v, w) / sqrt(length2);
+        along = ebpo_vec3_dot(v, w) / sqrt(length2);
         best = along > best ? along : best;
         if (best > enough)
             break;

@@ -35,16 +35,16 @@ typedef struct relating {
     ebpo_status status;
 } relating;
 
-static bool mixed(const relating *r) { return r->two.solid[0] != r->two.solid[1]; }
+static bool relation_mixed(const relating *r) { return r->two.solid[0] != r->two.solid[1]; }
 
-static bool surfaces(const relating *r) { return !r->two.solid[0] && !r->two.solid[1]; }
+static bool relation_surfaces(const relating *r) { return !r->two.solid[0] && !r->two.solid[1]; }
 
 /* Nothing that is still to be looked at can change the relation. */
 static bool is_decided(const relating *r)
 {
-    if (mixed(r))
+    if (relation_mixed(r))
         return r->both && r->only[r->two.solid[0]];
-    return r->both && (surfaces(r) ? r->only[0] || r->only[1] : r->only[0] && r->only[1]);
+    return r->both && (relation_surfaces(r) ? r->only[0] || r->only[1] : r->only[0] && r->only[1]);
 }
 
 static uint64_t face_count(const relating *r, int m)
@@ -52,7 +52,7 @@ static uint64_t face_count(const relating *r, int m)
     return r->question->model[m]->info->face_count;
 }
 
-static bool bit(const uint64_t *bits, uint64_t i) { return bits[i / 64] >> i % 64 & 1; }
+static bool relation_bit(const uint64_t *bits, uint64_t i) { return bits[i / 64] >> i % 64 & 1; }
 
 static void set_bit(uint64_t *bits, uint64_t i) { bits[i / 64] |= UINT64_C(1) << i % 64; }
 
@@ -71,7 +71,7 @@ static void note_solids(relating *r, const ebpo_around *a)
     r->only[1] |= (a->in[1] & ~a->in[0]) != 0;
 }
 
-static bool note(void *user, const ebpo_around *a)
+static bool relation_note(void *user, const ebpo_around *a)
 {
     const facing *f = user;
     relating *r = f->r;
@@ -81,7 +81,7 @@ static bool note(void *user, const ebpo_around *a)
     if (r->two.solid[0] && r->two.solid[1])
         note_solids(r, a);
     else {
-        r->both |= mixed(r) && other == EBPO_SIDE_BOTH;
+        r->both |= relation_mixed(r) && other == EBPO_SIDE_BOTH;
         r->only[f->m] |= other == 0;
     }
     return !is_decided(r);
@@ -91,10 +91,10 @@ static bool note(void *user, const ebpo_around *a)
 static bool look_at(relating *r, int m, uint64_t face)
 {
     facing f = { r, m };
-    if ((mixed(r) && r->two.solid[m]) || bit(r->seen[m], face))
+    if ((relation_mixed(r) && r->two.solid[m]) || relation_bit(r->seen[m], face))
         return true;
     set_bit(r->seen[m], face);
-    r->status = ebpo_look_around_face(&r->two, m, face, note, &f, r->error);
+    r->status = ebpo_look_around_face(&r->two, m, face, relation_note, &f, r->error);
     if (r->status == EBPO_OK && ++r->looked_at % 64 == 0 &&
         !ebpo_progress_step(&r->question->options.progress, stage, 0, 0, r->error))
         r->status = EBPO_E_CANCELLED;
@@ -138,7 +138,7 @@ static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t coun
     for (uint64_t i = 0; i < count && more; i++) {
         set_bit(r->met[turned], pairs[i].file_face_a);
         set_bit(r->met[!turned], pairs[i].file_face_b);
-        if (surfaces(r))
+        if (relation_surfaces(r))
             more = note_pair(r, &pairs[i]);
         else if (pairs[i].kind == EBPO_PAIR_CROSSING)
             more = look_at_pair(r, &pairs[i]);
@@ -179,7 +179,7 @@ static void look_at_met(relating *r)
     for (int m = 0; m < 2; m++) {
         uint64_t count = face_count(r, m);
         for (uint64_t f = 0; f < count && goes_on(r); f++)
-            if (bit(r->met[m], f))
+            if (relation_bit(r->met[m], f))
                 (void)look_at(r, m, f);
     }
 }
@@ -190,7 +190,7 @@ static void look_at_met(relating *r)
  * tell nothing more? */
 static bool side_is_told(const relating *r, int m, bool in)
 {
-    if (mixed(r))
+    if (relation_mixed(r))
         return in ? r->both : r->only[m];
     return in ? r->both && r->only[!m] : r->only[m];
 }
@@ -200,7 +200,7 @@ static bool side_is_told(const relating *r, int m, bool in)
 static void look_through(relating *r, const ebpo_unmet_patches *u, uint64_t *done)
 {
     for (uint64_t i = 0; i < u->count && goes_on(r); i++) {
-        if (bit(r->met[u->m], u->first + i) || bit(done, u->patch[i]))
+        if (relation_bit(r->met[u->m], u->first + i) || relation_bit(done, u->patch[i]))
             continue;
         r->told = false;
         (void)look_at(r, u->m, u->first + i);
@@ -241,7 +241,7 @@ static bool is_settled(relating *r, const ebpo_unmet_patches *u, uint64_t number
 static void look_at_patches(relating *r, int m)
 {
     ebpo_unmet_patches u;
-    if (mixed(r) && r->two.solid[m])
+    if (relation_mixed(r) && r->two.solid[m])
         return;
     ebpo_unmet_patches_begin(&u, r->question, &r->two, m);
     for (uint64_t i = 0; i < u.subtrees && goes_on(r); i++) {
@@ -289,7 +289,7 @@ static ebpo_status find_touch(relating *r, ebpo_error *error)
     ebpo_status status = take_pairs(r, take_sound, error);
     uint64_t count = face_count(r, 0);
     for (uint64_t f = 0; f < count && status == EBPO_OK && !r->touch && !r->open; f++) {
-        if (bit(r->met[0], f))
+        if (relation_bit(r->met[0], f))
             status = ebpo_face_has_common_point(&r->two, 0, f, &r->touch, error);
         r->open |= ebpo_collision_is_late(r->question);
     }
@@ -303,7 +303,7 @@ static bool has_unmet_area(relating *r, int m)
     bool has = false;
     for (uint64_t f = 0; f < face_count(r, m) && r->status == EBPO_OK && !has; f++) {
         double t[3][3];
-        if (!bit(r->met[m], f))
+        if (!relation_bit(r->met[m], f))
             r->status = ebpo_two_models_face(&r->two, m, f, t, &has, r->error);
     }
     return has;
@@ -321,7 +321,7 @@ static void look_for_any(relating *r)
 {
     uint64_t count = face_count(r, 0);
     r->out->contact = count > 0;
-    if (surfaces(r))
+    if (relation_surfaces(r))
         r->both = r->touch = has_unmet_area(r, 0);
     for (uint64_t f = 0; f < count && goes_on(r) && !r->both; f++)
         (void)look_at(r, 0, f);
@@ -335,7 +335,7 @@ static ebpo_status look_at_first(relating *r, ebpo_error *error)
     ebpo_face_pair pair;
     ebpo_status status = ebpo_collide_first(q->collider, &options, &pair, &r->out->contact, error);
     r->open |= r->out->contact < 0;
-    if (status != EBPO_OK || r->out->contact != 1 || surfaces(r))
+    if (status != EBPO_OK || r->out->contact != 1 || relation_surfaces(r))
         return status;
     (void)look_at_pair(r, &pair);
     return r->status;
@@ -344,9 +344,9 @@ static ebpo_status look_at_first(relating *r, ebpo_error *error)
 static ebpo_status look_at_contacts(relating *r, ebpo_error *error)
 {
     ebpo_status status = take_pairs(r, take_contacts, error);
-    for (int m = 0; m < 2 && r->both && surfaces(r) && goes_on(r); m++)
+    for (int m = 0; m < 2 && r->both && relation_surfaces(r) && goes_on(r); m++)
         r->only[m] = has_unmet_area(r, m);
-    if (status == EBPO_OK && (r->both || !surfaces(r)))
+    if (status == EBPO_OK && (r->both || !relation_surfaces(r)))
         look_at_met(r);
     return status == EBPO_OK ? r->status : status;
 }
@@ -356,11 +356,11 @@ static ebpo_status gather_facts(relating *r, ebpo_error *error)
     ebpo_status status = look_at_first(r, error);
     if (status == EBPO_OK && r->out->contact == 1 && goes_on(r))
         status = look_at_contacts(r, error);
-    for (int m = 0; m < 2 && status == EBPO_OK && !surfaces(r); m++) {
+    for (int m = 0; m < 2 && status == EBPO_OK && !relation_surfaces(r); m++) {
         look_at_patches(r, m);
         status = r->status;
     }
-    if (status == EBPO_OK && !r->open && !r->both && !surfaces(r) && r->out->contact == 1)
+    if (status == EBPO_OK && !r->open && !r->both && !relation_surfaces(r) && r->out->contact == 1)
         status = find_touch(r, error);
     return status;
 }
@@ -370,22 +370,22 @@ static ebpo_relation relation_of(const relating *r)
 {
     if (r->open)
         return EBPO_RELATION_OPEN;
-    if (surfaces(r))
+    if (relation_surfaces(r))
         return !r->touch                    ? EBPO_DISJOINT
                : !r->both                   ? EBPO_TOUCHING
                : !r->only[0] && !r->only[1] ? EBPO_EQUAL
                                             : EBPO_INTERSECTING;
     for (int m = 0; m < 2; m++)
-        if (mixed(r) && !r->two.solid[m] && !r->only[m] && (r->both || r->touch))
+        if (relation_mixed(r) && !r->two.solid[m] && !r->only[m] && (r->both || r->touch))
             return m ? EBPO_B_INSIDE_A : EBPO_A_INSIDE_B;
     if (!r->both)
         return r->touch ? EBPO_TOUCHING : EBPO_DISJOINT;
-    if (mixed(r) || (r->only[0] && r->only[1]))
+    if (relation_mixed(r) || (r->only[0] && r->only[1]))
         return EBPO_INTERSECTING;
     return r->only[0] ? EBPO_B_INSIDE_A : r->only[1] ? EBPO_A_INSIDE_B : EBPO_EQUAL;
 }
 
-static ebpo_relation turned(ebpo_relation r)
+static ebpo_relation relation_turned(ebpo_relation r)
 {
     return r == EBPO_A_INSIDE_B ? EBPO_B_INSIDE_A : r == EBPO_B_INSIDE_A ? EBPO_A_INSIDE_B : r;
 }
@@ -399,7 +399,7 @@ static bool boxes_apart(const ebpo_two_models *two)
     return false;
 }
 
-static ebpo_status relate(relating *r, ebpo_error *error)
+static ebpo_status relation_relate(relating *r, ebpo_error *error)
 {
     const ebpo_collision *q = r->question;
     ebpo_status status = ebpo_two_models_begin(&r->two, &r->places, error);
@@ -429,7 +429,7 @@ static void count_loads(const relating *r, uint64_t bytes_told, uint64_t read_be
     c->bytes_read = bytes_told + ebpo_collision_bytes_read(r->question) - read_before;
 }
 
-static void end(relating *r)
+static void relation_end(relating *r)
 {
     ebpo_two_models_end(&r->two);
     ebpo_pair_faces_end(&r->places);
@@ -452,10 +452,10 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
     if (status != EBPO_OK)
         return status;
     uint64_t told = c->bytes_read, before = ebpo_collision_bytes_read(&q);
-    status = relate(&r, error);
+    status = relation_relate(&r, error);
     ebpo_relation relation = relation_of(&r);
-    out->relation = (int32_t)(q.turned ? turned(relation) : relation);
+    out->relation = (int32_t)(q.turned ? relation_turned(relation) : relation);
     count_loads(&r, told, before);
-    end(&r);
+    relation_end(&r);
     return status;
 }

@@ -11,7 +11,7 @@
 #include "extras/collide/collider.h"
 #include "extras/collide/subtree_pairs.h"
 #include "extras/collide/posed_subtrees.h"
-#include "geometry/length.h"
+#include "geometry/vec3.h"
 
 /* Which subtrees of two models may have faces that meet, before any of them is loaded. */
 

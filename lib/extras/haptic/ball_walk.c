@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "extras/haptic/ball_walk.h"
 #include "extras/haptic/face_box.h"
-#include "extras/haptic/vectors.h"
+#include "geometry/vec3.h"
 
 typedef struct trial {
     const ebpo_held_planes *planes;
@@ -24,20 +24,20 @@ static void try_way(trial *t, const double way[3], double slack)
 {
     double lost[3];
     for (int i = 0; i < t->planes->count; i++)
-        if (dot(way, t->planes->normal[i]) < -slack)
+        if (ebpo_vec3_dot(way, t->planes->normal[i]) < -slack)
             return;
-    difference(t->want, way, lost);
-    double square = dot(lost, lost);
+    ebpo_vec3_subtract(t->want, way, lost);
+    double square = ebpo_vec3_dot(lost, lost);
     if (square < t->best) {
         t->best = square;
         t->slack = slack;
-        copy(way, t->out);
+        ebpo_vec3_copy(way, t->out);
     }
 }
 
 static void try_plane(trial *t, const double n[3], double slack)
 {
-    double way[3], into = dot(t->want, n);
+    double way[3], into = ebpo_vec3_dot(t->want, n);
     for (int i = 0; i < 3; i++)
         way[i] = t->want[i] - into * n[i];
     try_way(t, way, slack);
@@ -46,11 +46,11 @@ static void try_plane(trial *t, const double n[3], double slack)
 static void try_line(trial *t, const double m[3], const double n[3], double slack)
 {
     double line[3], way[3];
-    cross(m, n, line);
-    double square = dot(line, line);
+    ebpo_vec3_cross(m, n, line);
+    double square = ebpo_vec3_dot(line, line);
     if (!(square > 0x1p-40))
         return;
-    double part = dot(t->want, line) / square;
+    double part = ebpo_vec3_dot(t->want, line) / square;
     for (int i = 0; i < 3; i++)
         way[i] = part * line[i];
     try_way(t, way, slack / sqrt(square));
@@ -58,7 +58,7 @@ static void try_line(trial *t, const double m[3], const double n[3], double slac
 
 double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], double out[3])
 {
-    double length = sqrt(dot(want, want)), slack = 0x1p-44 * length;
+    double length = sqrt(ebpo_vec3_dot(want, want)), slack = 0x1p-44 * length;
     trial t = { planes, want, length, INFINITY, slack, out };
     for (int i = 0; i < 3; i++)
         out[i] = 0;
@@ -79,7 +79,7 @@ void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3])
         if (memcmp(planes->normal[k], normal, sizeof planes->normal[k]) == 0)
             return;
     if (planes->count < EBPO_PLANES_MOST)
-        copy(normal, planes->normal[planes->count++]);
+        ebpo_vec3_copy(normal, planes->normal[planes->count++]);
 }
 
 /* The tree's nodes are taken in the order in which the ball may come to touch them, and no more
@@ -143,10 +143,10 @@ static double ball_walk_soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
             double x = w->from[i] + part * w->way[i];
             off[i] = x > e->max[i] ? x - e->max[i] : x < e->min[i] ? x - e->min[i] : 0;
         }
-        double distance = sqrt(dot(off, off)), gap = distance - (w->reach + 2 * w->band);
+        double distance = sqrt(ebpo_vec3_dot(off, off)), gap = distance - (w->reach + 2 * w->band);
         if (gap <= 0)
             return part > 0 ? part : goes_away(w, e) ? INFINITY : gap;
-        double slope = dot(off, w->way) / distance;
+        double slope = ebpo_vec3_dot(off, w->way) / distance;
         if (!(slope < 0))
             return INFINITY;
         part -= gap / slope;

@@ -7,7 +7,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "extras/haptic/face_box.h"
-#include "extras/haptic/vectors.h"
+#include "geometry/vec3.h"
 #include "geometry/predicates.h"
 
 uint64_t ebpo_face_box_leaves(uint64_t count)
@@ -109,8 +109,8 @@ ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
         min[i] = centres->min[i] - margin;
         max[i] = centres->max[i] + margin;
     }
-    copy(min, box->loaded.min);
-    copy(max, box->loaded.max);
+    ebpo_vec3_copy(min, box->loaded.min);
+    ebpo_vec3_copy(max, box->loaded.max);
     ebpo_status status = ebpo_triangles_in_box(context, min, max, face_box_take, &l, error);
     *fits = l.fits;
     if (status == EBPO_OK && l.fits)
@@ -129,8 +129,8 @@ static bool face_box_meet(const ebpo_extent *a, const ebpo_extent *b)
 static bool face_meets(const double face[3][3], const ebpo_extent *around)
 {
     ebpo_extent e;
-    copy(face[0], e.min);
-    copy(face[0], e.max);
+    ebpo_vec3_copy(face[0], e.min);
+    ebpo_vec3_copy(face[0], e.max);
     face_box_widen(&e, face[1], face[1]);
     face_box_widen(&e, face[2], face[2]);
     return face_box_meet(&e, around);
@@ -183,8 +183,8 @@ static double closest_of_leaf(const ebpo_face_box *box, uint64_t leaf, const ebp
     uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
     for (; f < end && f < box->count; f++) {
         ebpo_extent e;
-        copy(box->corner[f][0], e.min);
-        copy(box->corner[f][0], e.max);
+        ebpo_vec3_copy(box->corner[f][0], e.min);
+        ebpo_vec3_copy(box->corner[f][0], e.max);
         face_box_widen(&e, box->corner[f][1], box->corner[f][1]);
         face_box_widen(&e, box->corner[f][2], box->corner[f][2]);
         least = fmin(least, face_box_between(&e, around));
@@ -248,14 +248,14 @@ static void try_edge(const double p[3], const double face[3][3], int k, nearest 
 {
     const double *a = face[k], *b = face[(k + 1) % 3];
     double e[3], d[3], part = 0;
-    difference(b, a, e);
-    difference(p, a, d);
-    double length = dot(e, e);
+    ebpo_vec3_subtract(b, a, e);
+    ebpo_vec3_subtract(p, a, d);
+    double length = ebpo_vec3_dot(e, e);
     if (length > 0)
-        part = fmin(fmax(dot(d, e) / length, 0), 1);
+        part = fmin(fmax(ebpo_vec3_dot(d, e) / length, 0), 1);
     for (int i = 0; i < 3; i++)
         d[i] -= part * e[i];
-    double square = dot(d, d);
+    double square = ebpo_vec3_dot(d, d);
     if (square < best->square) {
         *best = (nearest){ .square = square, .edge = k, .part = part };
         for (int i = 0; i < 3; i++)
@@ -267,20 +267,20 @@ static void try_edge(const double p[3], const double face[3][3], int k, nearest 
 static bool near_inside(const double p[3], const double face[3][3], ebpo_face_near *out)
 {
     double e[3], f[3], n[3], d[3], c[3];
-    difference(face[1], face[0], e);
-    difference(face[2], face[0], f);
-    difference(p, face[0], d);
-    cross(e, f, n);
-    double area = dot(n, n);
+    ebpo_vec3_subtract(face[1], face[0], e);
+    ebpo_vec3_subtract(face[2], face[0], f);
+    ebpo_vec3_subtract(p, face[0], d);
+    ebpo_vec3_cross(e, f, n);
+    double area = ebpo_vec3_dot(n, n);
     if (!(area > 0))
         return false;
-    cross(d, f, c);
-    double u = dot(c, n) / area;
-    cross(e, d, c);
-    double v = dot(c, n) / area;
+    ebpo_vec3_cross(d, f, c);
+    double u = ebpo_vec3_dot(c, n) / area;
+    ebpo_vec3_cross(e, d, c);
+    double v = ebpo_vec3_dot(c, n) / area;
     if (!(u >= 0 && v >= 0 && u + v <= 1))
         return false;
-    double length = sqrt(area), height = dot(d, n) / length;
+    double length = sqrt(area), height = ebpo_vec3_dot(d, n) / length;
     out->distance = fabs(height);
     for (int i = 0; i < 3; i++)
         out->away[i] = height > 0 ? n[i] / length : height < 0 ? -n[i] / length : 0;
@@ -317,7 +317,7 @@ double ebpo_ball_meets(const ebpo_ball_way *w, const double face[3][3], double a
         for (int i = 0; i < 3; i++)
             x[i] = w->from[i] + part * w->way[i];
         ebpo_face_nearest(x, face, &near);
-        double gap = near.distance - w->reach, slope = dot(near.away, w->way);
+        double gap = near.distance - w->reach, slope = ebpo_vec3_dot(near.away, w->way);
         for (int i = 0; i < 3; i++)
             away[i] = near.away[i];
         if (slope >= -(gap > 0 ? w->slack : w->least_slack))
@@ -334,9 +334,9 @@ double ebpo_ball_meets(const ebpo_ball_way *w, const double face[3][3], double a
 static int volume_sign(const double a[3], const double b[3], const double c[3], const double d[3])
 {
     double u[3], v[3], w[3], value = 0, sum = 0, last = 0;
-    difference(b, a, u);
-    difference(c, a, v);
-    difference(d, a, w);
+    ebpo_vec3_subtract(b, a, u);
+    ebpo_vec3_subtract(c, a, v);
+    ebpo_vec3_subtract(d, a, w);
     for (int i = 0; i < 3; i++) {
         int j = (i + 1) % 3, k = (i + 2) % 3;
         double l = u[j] * v[k], r = u[k] * v[j];
@@ -487,7 +487,7 @@ static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const dou
         change += sign;
     }
     side->winding += change;
-    copy(to, side->at);
+    ebpo_vec3_copy(to, side->at);
     return CROSSED;
 }
 
@@ -509,7 +509,7 @@ bool ebpo_side_go(ebpo_side *side, const ebpo_face_box *box, const double place[
                   uint32_t most, uint32_t visits, uint64_t *work)
 {
     double to[3];
-    copy(place, to);
+    ebpo_vec3_copy(place, to);
     side->known = side->known && ebpo_extent_holds(&box->centres, side->at);
     if (!side->known || !ebpo_extent_holds(&box->centres, place))
         return false;
@@ -518,7 +518,7 @@ bool ebpo_side_go(ebpo_side *side, const ebpo_face_box *box, const double place[
         case CROSSED:
             if (to[0] == place[0] && to[1] == place[1] && to[2] == place[2])
                 return true;
-            copy(place, to);
+            ebpo_vec3_copy(place, to);
             break;
         case TOO_MANY:
             for (int i = 0; i < 3; i++)

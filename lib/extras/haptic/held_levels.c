@@ -12,7 +12,7 @@
 
 enum { DEEPEST = 6, MOST = 1 << 17 };
 
-static ebpo_status keep(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
+static ebpo_status held_levels_keep(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
                         ebpo_held_levels *out, ebpo_error *error)
 {
     ebpo_box box = ebpo_root_box(ebpo_file_info(file));
@@ -46,7 +46,7 @@ ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out, 
             status = ebpo_subtree_get_nodes(tree, &nodes);
         bool few = status == EBPO_OK && (nodes.node_count <= MOST || levels == 0);
         if (few)
-            status = keep(file, &nodes, out, error);
+            status = held_levels_keep(file, &nodes, out, error);
         ebpo_subtree_close(tree);
         if (few || status != EBPO_OK)
             return status;

@@ -66,7 +66,7 @@ bool ebpo_rigid_read(const double place[3], const double turn[4], ebpo_rigid *ou
         unit[i] = turn[i] / most;
         square += unit[i] * unit[i];
     }
-    copy(place, out->place);
+    ebpo_vec3_copy(place, out->place);
     for (int i = 0; i < 4; i++)
         out->turn[i] = unit[i] / sqrt(square);
     return true;
@@ -75,10 +75,10 @@ bool ebpo_rigid_read(const double place[3], const double turn[4], ebpo_rigid *ou
 static void rigid_multiply(const double a[4], const double b[4], double out[4])
 {
     double c[3];
-    cross(a, b, c);
+    ebpo_vec3_cross(a, b, c);
     for (int i = 0; i < 3; i++)
         out[i] = a[3] * b[i] + b[3] * a[i] + c[i];
-    out[3] = a[3] * b[3] - dot(a, b);
+    out[3] = a[3] * b[3] - ebpo_vec3_dot(a, b);
 }
 
 void ebpo_rigid_between(const ebpo_rigid *a, const ebpo_rigid *b, double arm,
@@ -86,9 +86,9 @@ void ebpo_rigid_between(const ebpo_rigid *a, const ebpo_rigid *b, double arm,
 {
     const double back[4] = { -a->turn[0], -a->turn[1], -a->turn[2], a->turn[3] };
     double q[4];
-    difference(b->place, a->place, out);
+    ebpo_vec3_subtract(b->place, a->place, out);
     rigid_multiply(b->turn, back, q);
-    double sine = sqrt(dot(q, q)), side = q[3] < 0 ? -1 : 1;
+    double sine = sqrt(ebpo_vec3_dot(q, q)), side = q[3] < 0 ? -1 : 1;
     double angle = 2 * atan2(sine, side * q[3]);
     for (int i = 0; i < 3; i++)
         out[3 + i] = sine > 0 ? arm * (side * angle / sine) * q[i] : 0;
@@ -98,7 +98,7 @@ void ebpo_rigid_go(const ebpo_rigid *from, const double way[EBPO_SCREW], double 
                    ebpo_rigid *out)
 {
     double by[4], q[4], place[3];
-    double angle = part * sqrt(dot(way + 3, way + 3)) / arm;
+    double angle = part * sqrt(ebpo_vec3_dot(way + 3, way + 3)) / arm;
     for (int i = 0; i < 3; i++) {
         place[i] = from->place[i] + part * way[i];
         by[i] = angle > 0 ? sin(angle / 2) / angle * (part * way[3 + i] / arm) : 0;
@@ -270,8 +270,8 @@ static int longest_axis(const placed *p, uint64_t count)
 static double far_from(const double p[3], const double q[3])
 {
     double d[3];
-    difference(p, q, d);
-    return sqrt(dot(d, d));
+    ebpo_vec3_subtract(p, q, d);
+    return sqrt(ebpo_vec3_dot(d, d));
 }
 
 static void add_cluster(ebpo_tool *t, const placed *p, uint64_t first, uint64_t count)
@@ -302,7 +302,7 @@ static void tool_new_fill(ebpo_tool *t, const double (*points)[3], placed *p)
     const double zero[3] = { 0, 0, 0 };
     double square = 0;
     for (uint64_t i = 0; i < t->count; i++) {
-        copy(points[i], p[i].p);
+        ebpo_vec3_copy(points[i], p[i].p);
         p[i].number = (uint32_t)i;
         double far = far_from(points[i], zero);
         t->radius = fmax(t->radius, far);
@@ -310,7 +310,7 @@ static void tool_new_fill(ebpo_tool *t, const double (*points)[3], placed *p)
     }
     tool_new_part(t, p, 0, t->count);
     for (uint64_t i = 0; i < t->count; i++) {
-        copy(p[i].p, t->point[i]);
+        ebpo_vec3_copy(p[i].p, t->point[i]);
         t->number[i] = p[i].number;
         t->close[i] = (ebpo_tool_close){ 0 };
     }

@@ -8,7 +8,7 @@
 #include <stdint.h>
 
 #include "extras/haptic/face_box.h"
-#include "extras/haptic/vectors.h"
+#include "geometry/vec3.h"
 
 typedef struct ebpo_passive {
     double stiffness, given, step_most;
@@ -47,12 +47,12 @@ void ebpo_rigid_matrix(const ebpo_rigid *r, double out[3][3]);
 static inline void ebpo_rigid_lever(const double matrix[3][3], const double p[3], double out[3])
 {
     for (int i = 0; i < 3; i++)
-        out[i] = dot(matrix[i], p);
+        out[i] = ebpo_vec3_dot(matrix[i], p);
 }
 
 static inline double screw_dot(const double a[EBPO_SCREW], const double b[EBPO_SCREW])
 {
-    return dot(a, b) + dot(a + 3, b + 3);
+    return ebpo_vec3_dot(a, b) + ebpo_vec3_dot(a + 3, b + 3);
 }
 
 static inline double screw_length(const double a[EBPO_SCREW]) { return sqrt(screw_dot(a, a)); }

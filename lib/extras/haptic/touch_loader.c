@@ -11,7 +11,7 @@
 #include "core/os.h"
 #include "core/parallel.h"
 #include "extras/haptic/touch_parts.h"
-#include "extras/haptic/vectors.h"
+#include "geometry/vec3.h"
 
 static ebpo_status known_ask(ebpo_touch *t, ebpo_known_place *out, ebpo_error *error)
 {
@@ -23,8 +23,8 @@ static ebpo_status known_ask(ebpo_touch *t, ebpo_known_place *out, ebpo_error *e
     if (status != EBPO_OK)
         return status;
     out->distance = fabs(near.distance);
-    copy(near.point, out->point);
-    copy(near.normal, out->normal);
+    ebpo_vec3_copy(near.point, out->point);
+    ebpo_vec3_copy(near.normal, out->normal);
     out->winding = inside.winding;
     out->on = inside.where == EBPO_ON;
     out->there = true;
@@ -43,7 +43,7 @@ ebpo_status ebpo_touch_learn(ebpo_touch *t, bool *moved, ebpo_error *error)
     ebpo_status status = known_ask(t, known, error);
     if (status != EBPO_OK)
         return status;
-    copy(known->place, t->asked);
+    ebpo_vec3_copy(known->place, t->asked);
     unsigned got = atomic_exchange_explicit(&t->known_between, t->own_known | EBPO_TOUCH_FRESH,
                                             memory_order_acq_rel);
     t->own_known = got & ~(unsigned)EBPO_TOUCH_FRESH;

@@ -11,8 +11,7 @@
 #include "core/fp_env.h"
 #include "extras/haptic/tool.h"
 #include "extras/haptic/touch_parts.h"
-#include "extras/haptic/vectors.h"
-#include "geometry/length.h"
+#include "geometry/vec3.h"
 #include "query/query_model.h"
 
 void ebpo_touch_tell(ebpo_touch *t, const double hand[3])
@@ -36,14 +35,14 @@ static uint32_t move_rub(ebpo_touch *t, const double from[3], const double hand[
                          ebpo_ball_work *work)
 {
     double slid[3], depth[3], goal[3];
-    difference(t->proxy, from, slid);
-    difference(hand, t->proxy, depth);
-    double length = sqrt(dot(slid, slid));
-    double holds = t->options.friction * sqrt(dot(depth, depth));
+    ebpo_vec3_subtract(t->proxy, from, slid);
+    ebpo_vec3_subtract(hand, t->proxy, depth);
+    double length = sqrt(ebpo_vec3_dot(slid, slid));
+    double holds = t->options.friction * sqrt(ebpo_vec3_dot(depth, depth));
     double part = length > holds ? 1 - holds / length : 0;
     for (int i = 0; i < 3; i++)
         goal[i] = from[i] + part * slid[i] + (part > 0 ? depth[i] : 0);
-    copy(from, t->proxy);
+    ebpo_vec3_copy(from, t->proxy);
     t->way_count = 1;
     if (part > 0)
         return ebpo_touch_go(t, goal, work);
@@ -56,12 +55,12 @@ static uint32_t move_rub(ebpo_touch *t, const double from[3], const double hand[
 static void find_depth(const ebpo_touch *t, const double hand[3], uint32_t flags, double out[3])
 {
     double want[3], way[3];
-    difference(t->proxy, hand, out);
+    ebpo_vec3_subtract(t->proxy, hand, out);
     if (!(flags & (EBPO_TOUCH_WAITS | EBPO_TOUCH_SHORT)))
         return;
-    difference(hand, t->proxy, want);
+    ebpo_vec3_subtract(hand, t->proxy, want);
     (void)ebpo_hold_back(&t->planes, want, way);
-    difference(way, want, out);
+    ebpo_vec3_subtract(way, want, out);
 }
 
 /* The way from hand to proxy is not quite along the faces' normals: by what the proxy has still to
@@ -74,12 +73,12 @@ static void keep_from_faces(const ebpo_touch *t, bool near, const double depth[3
 {
     ebpo_held_planes off = { .count = 0 };
     double wanted[3];
-    if (near && dot(t->away, depth) >= 0)
+    if (near && ebpo_vec3_dot(t->away, depth) >= 0)
         ebpo_held_planes_add(&off, t->away);
     for (int i = 0; i < t->planes.count; i++)
-        if (dot(t->planes.normal[i], depth) >= 0)
+        if (ebpo_vec3_dot(t->planes.normal[i], depth) >= 0)
             ebpo_held_planes_add(&off, t->planes.normal[i]);
-    copy(force, wanted);
+    ebpo_vec3_copy(force, wanted);
     (void)ebpo_hold_back(&off, wanted, force);
 }
 
@@ -108,17 +107,17 @@ void ebpo_touch_move(ebpo_touch *t, const double hand[3], ebpo_touch_result *out
     }
     for (int i = 0; i < 3; i++)
         astray |= !(fabs(hand[i]) <= 0x1p200);
-    copy(astray ? t->hand : hand, at);
+    ebpo_vec3_copy(astray ? t->hand : hand, at);
     *out = (ebpo_touch_result){ .flags = astray ? EBPO_TOUCH_ASTRAY : 0 };
-    difference(at, t->hand, moved);
+    ebpo_vec3_subtract(at, t->hand, moved);
     ebpo_passive_moved(&t->passive, t->force, moved, 3);
-    copy(t->proxy, from);
-    copy(t->along_at, along_at);
+    ebpo_vec3_copy(t->proxy, from);
+    ebpo_vec3_copy(t->along_at, along_at);
     ebpo_held_planes along = t->along;
     uint32_t flags = ebpo_touch_go(t, at, &work);
     if (t->touching && (flags & EBPO_TOUCH_CONTACT) && t->options.friction > 0 && move_stands(t)) {
         t->along = along;
-        copy(along_at, t->along_at);
+        ebpo_vec3_copy(along_at, t->along_at);
         flags |= move_rub(t, from, at, &work);
     }
     out->work = work.faces;
@@ -131,11 +130,11 @@ void ebpo_touch_move(ebpo_touch *t, const double hand[3], ebpo_touch_result *out
         ebpo_passive_push(&t->passive, t->options.damping / t->options.tick, depth, moved, 3,
                           out->force);
         keep_from_faces(t, out->face != EBPO_NO_FACE, depth, out->force);
-        out->depth = sqrt(dot(depth, depth));
+        out->depth = sqrt(ebpo_vec3_dot(depth, depth));
     }
-    copy(t->proxy, out->proxy);
-    copy(out->force, t->force);
-    copy(at, t->hand);
+    ebpo_vec3_copy(t->proxy, out->proxy);
+    ebpo_vec3_copy(out->force, t->force);
+    ebpo_vec3_copy(at, t->hand);
     if ((flags & EBPO_TOUCH_WAITS) && move_stands(t))
         ebpo_touch_try_other(t);
     ebpo_touch_count(t, out->flags, out->work);
@@ -163,7 +162,7 @@ ebpo_status ebpo_touch_get_stats(const ebpo_touch *t, ebpo_touch_stats *out)
 uint32_t ebpo_touch_way(const ebpo_touch *t, double way[EBPO_TOUCH_WAY_MOST][3])
 {
     for (uint32_t i = 0; i < t->way_count; i++)
-        copy(t->way[i], way[i]);
+        ebpo_vec3_copy(t->way[i], way[i]);
     return t->way_count;
 }
 
@@ -319,29 +318,29 @@ ebpo_status ebpo_touch_place(ebpo_touch *t, const double place[3], ebpo_error *e
 {
     EBPO_DEFAULT_FP;
     double proxy[3], hand[3];
-    copy(t->proxy, proxy);
-    copy(t->hand, hand);
+    ebpo_vec3_copy(t->proxy, proxy);
+    ebpo_vec3_copy(t->hand, hand);
     ebpo_status status = check_place(t, place, error);
     if (status != EBPO_OK)
         return status;
     t->walk.stage = EBPO_BALL_STANDS; /* also where this fails: it goes on from where it is */
-    copy(place, t->proxy);
-    copy(place, t->hand);
+    ebpo_vec3_copy(place, t->proxy);
+    ebpo_vec3_copy(place, t->hand);
     ebpo_touch_tell(t, place);
     if (!t->has_thread)
         status = ebpo_touch_loader_start(t, error);
     if (status == EBPO_OK)
         status = await_box(t, error);
     if (status != EBPO_OK) {
-        copy(proxy, t->proxy);
-        copy(hand, t->hand);
+        ebpo_vec3_copy(proxy, t->proxy);
+        ebpo_vec3_copy(hand, t->hand);
         ebpo_touch_tell(t, hand);
         return status;
     }
     t->side.known = false;
     if (t->tool) {
         ebpo_rigid there = { .turn = { 0, 0, 0, 1 } };
-        copy(place, there.place);
+        ebpo_vec3_copy(place, there.place);
         ebpo_tool_put(t->tool, &there);
     }
     t->touching = false;

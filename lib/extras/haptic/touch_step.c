@@ -6,7 +6,7 @@
 
 #include "extras/haptic/face_box.h"
 #include "extras/haptic/touch_parts.h"
-#include "extras/haptic/vectors.h"
+#include "geometry/vec3.h"
 
 static void swap_boxes(ebpo_touch *t)
 {
@@ -53,11 +53,11 @@ static void add_normal(const around *a, const double face[3][3], double gap, dou
 {
     double e[3], f[3], n[3], d[3];
     double far = fmax(gap, 0) / a->look, weight = (1 - far) * (1 - far);
-    difference(face[1], face[0], e);
-    difference(face[2], face[0], f);
-    difference(a->t->proxy, face[0], d);
-    cross(e, f, n);
-    if (!a->t->solid && dot(n, d) < 0)
+    ebpo_vec3_subtract(face[1], face[0], e);
+    ebpo_vec3_subtract(face[2], face[0], f);
+    ebpo_vec3_subtract(a->t->proxy, face[0], d);
+    ebpo_vec3_cross(e, f, n);
+    if (!a->t->solid && ebpo_vec3_dot(n, d) < 0)
         weight = -weight;
     for (int i = 0; i < 3; i++)
         sum[i] += weight * n[i];
@@ -77,7 +77,7 @@ static void add_face(around *a, uint64_t f)
     if (near.distance >= a->nearest)
         return;
     a->nearest = near.distance;
-    copy(near.away, a->t->away);
+    ebpo_vec3_copy(near.away, a->t->away);
     a->out->face = a->box->face[f];
     for (int i = 0; i < 3; i++) {
         a->out->weight[i] = near.weight[i];
@@ -91,7 +91,7 @@ static void wait_for(around *a, uint64_t node)
     double off[3];
     for (int i = 0; i < 3; i++)
         off[i] = fmax(0, fmax(e->min[i] - a->t->proxy[i], a->t->proxy[i] - e->max[i]));
-    double least = sqrt(dot(off, off)) * (1 - 0x1p-48);
+    double least = sqrt(ebpo_vec3_dot(off, off)) * (1 - 0x1p-48);
     if (least < a->t->options.radius + a->t->options.look)
         ebpo_near_push(&a->queue, least, node);
 }
@@ -135,10 +135,10 @@ static void tell_normal(const around *a, double out[3])
     for (uint32_t i = 0; i < a->count; i++)
         if (a->t->gap[i] < a->look)
             add_normal(a, (const double(*)[3])a->box->corner[a->t->found[i]], a->t->gap[i], sum);
-    double length = sqrt(dot(sum, sum));
+    double length = sqrt(ebpo_vec3_dot(sum, sum));
     if (!(length > 0) && a->count > 0 && a->t->options.kind == EBPO_TOUCH_BALL) {
-        difference(a->t->proxy, a->out->point, sum);
-        length = sqrt(dot(sum, sum));
+        ebpo_vec3_subtract(a->t->proxy, a->out->point, sum);
+        length = sqrt(ebpo_vec3_dot(sum, sum));
     }
     for (int i = 0; i < 3; i++)
         out[i] = length > 0 ? sum[i] / length : 0;
@@ -255,22 +255,22 @@ static bool set_out(step *s)
     (void)ebpo_touch_take_box(t);
     if (memcmp(t->along_at, t->proxy, sizeof t->along_at) != 0)
         t->along.count = 0;
-    difference(s->goal, t->proxy, want);
+    ebpo_vec3_subtract(s->goal, t->proxy, want);
     s->slack = ebpo_hold_back(&t->along, want, s->way);
     if (step_differ(s->way, want))
         s->flags |= EBPO_TOUCH_CONTACT;
-    s->least_slack = 0x1p-44 * sqrt(dot(want, want));
-    double whole = sqrt(dot(s->way, s->way));
+    s->least_slack = 0x1p-44 * sqrt(ebpo_vec3_dot(want, want));
+    double whole = sqrt(ebpo_vec3_dot(s->way, s->way));
     if (whole <= 0x1p-12 * t->options.skin)
         return false;
     t->cut = 0;
     if (!keep_known(s))
         return false;
     /* Slacks are those of the whole way: of a hand far away they would be those of long strides. */
-    double share = sqrt(dot(s->way, s->way)) / whole;
+    double share = sqrt(ebpo_vec3_dot(s->way, s->way)) / whole;
     const ebpo_face_box *box = &t->box[t->at];
-    copy(t->proxy, w->from);
-    copy(s->way, w->way);
+    ebpo_vec3_copy(t->proxy, w->from);
+    ebpo_vec3_copy(s->way, w->way);
     w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* see keep_known */
     w->reach = t->reach;
     w->band = t->band;
@@ -283,11 +283,11 @@ static bool set_out(step *s)
 /* Of planes that hold back, three do: those along which the last way did not go make room. */
 static void make_room(ebpo_held_planes *along, const double way[3])
 {
-    double length = sqrt(dot(way, way));
+    double length = sqrt(ebpo_vec3_dot(way, way));
     int kept = 0;
     for (int i = 0; i < along->count; i++)
-        if (dot(along->normal[i], way) <= 0x1p-30 * length)
-            copy(along->normal[i], along->normal[kept++]);
+        if (ebpo_vec3_dot(along->normal[i], way) <= 0x1p-30 * length)
+            ebpo_vec3_copy(along->normal[i], along->normal[kept++]);
     along->count = kept < EBPO_PLANES_MOST ? kept : kept - 1;
 }
 
@@ -300,7 +300,7 @@ static void add_planes(ebpo_touch *t)
         make_room(&t->along, w->way);
     for (int i = 0; i < w->met.count; i++)
         ebpo_held_planes_add(&t->along, w->met.normal[i]);
-    copy(t->proxy, t->along_at);
+    ebpo_vec3_copy(t->proxy, t->along_at);
 }
 
 /* The proxy is at the piece's end. What the ball touches there is what it slides along; after a
@@ -311,8 +311,8 @@ static bool step_settle(step *s)
     const ebpo_ball_walk *w = &t->walk;
     bool touches = !w->cut && w->part < 1;
     if (w->part > 0) {
-        copy(w->to, t->proxy);
-        copy(w->to, t->way[t->way_count++]);
+        ebpo_vec3_copy(w->to, t->proxy);
+        ebpo_vec3_copy(w->to, t->way[t->way_count++]);
     }
     if (touches)
         add_planes(t);
@@ -329,7 +329,7 @@ static uint32_t still_held(const step *s)
     double want[3], way[3];
     if (t->felt)
         return 0;
-    difference(s->goal, t->proxy, want);
+    ebpo_vec3_subtract(s->goal, t->proxy, want);
     (void)ebpo_hold_back(&t->planes, want, way);
     return step_differ(way, want) ? EBPO_TOUCH_CONTACT : 0;
 }
@@ -363,9 +363,9 @@ uint32_t ebpo_touch_go(ebpo_touch *t, const double goal[3], ebpo_ball_work *work
     double left[3];
     t->felt = false;
     t->way_count = 0;
-    copy(t->proxy, t->way[t->way_count++]);
+    ebpo_vec3_copy(t->proxy, t->way[t->way_count++]);
     uint32_t flags = go_by_pieces(&s);
-    difference(goal, t->proxy, left);
-    bool there = sqrt(dot(left, left)) <= 0x1p-12 * t->options.skin;
+    ebpo_vec3_subtract(goal, t->proxy, left);
+    bool there = sqrt(ebpo_vec3_dot(left, left)) <= 0x1p-12 * t->options.skin;
     return there ? flags & ~(uint32_t)EBPO_TOUCH_CONTACT : flags;
 }

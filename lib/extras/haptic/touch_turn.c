@@ -32,7 +32,7 @@ static tool_piece piece_of(ebpo_touch *t, uint64_t *work)
                          tool,
                          known ? box : NULL,
                          t->options.skin,
-                         sqrt(dot(tool->way + 3, tool->way + 3)) / tool->arm,
+                         sqrt(ebpo_vec3_dot(tool->way + 3, tool->way + 3)) / tool->arm,
                          work };
 }
 
@@ -62,10 +62,10 @@ static double tool_step_clearance(const tool_piece *p, const ebpo_extent *e, uin
 /* As far as a point goes at most whose way from the middle of the turn is so long. */
 static double tool_step_far(const tool_piece *p, double lever)
 {
-    return sqrt(dot(p->tool->way, p->tool->way)) + lever * p->turned;
+    return sqrt(ebpo_vec3_dot(p->tool->way, p->tool->way)) + lever * p->turned;
 }
 
-static double lever_of(const double p[3]) { return sqrt(dot(p, p)); }
+static double lever_of(const double p[3]) { return sqrt(ebpo_vec3_dot(p, p)); }
 
 static double most_way(const tool_piece *p, const ebpo_tool_cluster *c)
 {
@@ -83,7 +83,7 @@ static bool add_close(const tool_piece *p, uint32_t point)
     ebpo_rigid_lever((const double(*)[3])tool->to_matrix, tool->point[point], way);
     for (int i = 0; i < 3; i++)
         to[i] = tool->proxy.place[i] + tool->way[i] + way[i];
-    difference(to, from, way);
+    ebpo_vec3_subtract(to, from, way);
     tool_step_around(from, to, looks * p->skin, &e);
     if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL)
         return false;
@@ -163,9 +163,9 @@ static void add_contact(const tool_piece *p, const ebpo_tool_close *close, uint3
                             .face = p->box->face[face] };
     double lever[3];
     ebpo_rigid_lever((const double(*)[3])tool->end_matrix, tool->point[close->point], lever);
-    copy(near->away, c.normal);
-    copy(near->away, c.grip);
-    cross(lever, near->away, c.grip + 3);
+    ebpo_vec3_copy(near->away, c.normal);
+    ebpo_vec3_copy(near->away, c.grip);
+    ebpo_vec3_cross(lever, near->away, c.grip + 3);
     for (int i = 0; i < 3; i++)
         c.grip[3 + i] /= tool->arm;
     ebpo_tool_contact_add(&tool->next, &c);
@@ -237,7 +237,7 @@ static void tool_step_limit(ebpo_touch *t, double way[EBPO_SCREW], uint32_t *fla
 {
     ebpo_tool *tool = t->tool;
     double most = fmin(0.25, sqrt(8 * bend * t->options.skin / tool->radius));
-    double angle = sqrt(dot(way + 3, way + 3)) / tool->arm, part = 1;
+    double angle = sqrt(ebpo_vec3_dot(way + 3, way + 3)) / tool->arm, part = 1;
     if (angle > most)
         part = most / angle;
     double length = screw_length(way);
@@ -359,7 +359,7 @@ static uint32_t turn_go(ebpo_touch *t, const ebpo_rigid *hand, uint64_t *work)
                 return flags;
         }
         flags |= ebpo_tool_go_on(t, work, &arrived);
-        copy(tool->proxy.place, t->proxy);
+        ebpo_vec3_copy(tool->proxy.place, t->proxy);
         if (arrived)
             tool->way_of[tool->way_count++] = tool->proxy;
         if (!arrived || (flags & EBPO_TOUCH_WAITS))
@@ -395,7 +395,7 @@ static void tell_contact(const ebpo_touch *t, ebpo_touch_turned *out)
         return;
     out->point = nearest->point;
     out->face = nearest->face;
-    copy(nearest->normal, out->normal);
+    ebpo_vec3_copy(nearest->normal, out->normal);
 }
 
 static void turn_push(ebpo_touch *t, const double depth[EBPO_SCREW], const double moved[EBPO_SCREW],
@@ -440,8 +440,8 @@ void ebpo_touch_turn(ebpo_touch *t, const double place[3], const double turn[4],
     }
     tell_contact(t, out);
     tool->hand = hand;
-    copy(hand.place, t->hand);
-    copy(tool->proxy.place, out->proxy);
+    ebpo_vec3_copy(hand.place, t->hand);
+    ebpo_vec3_copy(tool->proxy.place, out->proxy);
     for (int k = 0; k < 4; k++)
         out->turn[k] = tool->proxy.turn[k];
     out->flags = flags | (astray ? EBPO_TOUCH_ASTRAY : 0) | ebpo_touch_stopped(t);
@@ -455,7 +455,7 @@ uint32_t ebpo_touch_poses(const ebpo_touch *t, double way[EBPO_TOUCH_WAY_MOST][7
 {
     uint32_t count = t->tool ? t->tool->way_count : 0;
     for (uint32_t i = 0; i < count; i++) {
-        copy(t->tool->way_of[i].place, way[i]);
+        ebpo_vec3_copy(t->tool->way_of[i].place, way[i]);
         for (int k = 0; k < 4; k++)
             way[i][3 + k] = t->tool->way_of[i].turn[k];
     }

@@ -172,7 +172,7 @@ static void take_version(ebpo_paint_file *f, char *path, int fd)
     f->version = ebpo_file_version_of(fd);
 }
 
-static ebpo_status save(const ebpo_paint *p, const char *path, ebpo_error *error)
+static ebpo_status paint_save_save(const ebpo_paint *p, const char *path, ebpo_error *error)
 {
     enum { LINKS = 4 };
     ebpo_paint_file *f = p->file;
@@ -214,7 +214,7 @@ static ebpo_status save(const ebpo_paint *p, const char *path, ebpo_error *error
 ebpo_status ebpo_paint_save(const ebpo_paint *p, const char *path, ebpo_error *error)
 {
     pthread_mutex_lock(&p->file->mutex);
-    ebpo_status status = save(p, path, error);
+    ebpo_status status = paint_save_save(p, path, error);
     pthread_mutex_unlock(&p->file->mutex);
     return status;
 }

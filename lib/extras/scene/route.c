@@ -34,7 +34,7 @@ void scene_turn_of_matrix(const double m[3][3], double turn[4])
     turn[3] = m[k][j] - m[j][k];
 }
 
-static bool fits(const scene_key *key)
+static bool route_fits(const scene_key *key)
 {
     static const double nowhere[3] = { 0, 0, 0 };
     ebpo_pose pose = EBPO_POSE_INIT;
@@ -48,7 +48,7 @@ static bool fits(const scene_key *key)
 ebpo_status scene_add_key(scene_route *route, const scene_key *key, ebpo_error *error)
 {
     scene_key k = *key;
-    if (!fits(&k))
+    if (!route_fits(&k))
         return ebpo_fail(
             error, EBPO_E_ARGUMENT,
             "a number is not finite, the time is beyond 2^1000, or the scale is not from "

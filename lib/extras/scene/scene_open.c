@@ -43,7 +43,7 @@ static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, e
 }
 
 /* `folder` is taken over; NULL: there was no memory. */
-static ebpo_status parse(const char *text, size_t size, const char *name, char *folder,
+static ebpo_status open_parse(const char *text, size_t size, const char *name, char *folder,
                          const ebpo_scene_options *options, ebpo_scene **out, ebpo_error *error)
 {
     ebpo_scene *scene = NULL;
@@ -92,7 +92,7 @@ ebpo_status ebpo_scene_parse(const char *text, size_t size, const char *name, co
     ebpo_status status = take_options(&own, options, error);
     if (status != EBPO_OK)
         return status;
-    return parse(text, size, name, folder_with_slash(folder), &own, out, error);
+    return open_parse(text, size, name, folder_with_slash(folder), &own, out, error);
 }
 
 ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options, ebpo_scene **out,
@@ -110,7 +110,7 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
     if (status == EBPO_OK)
         status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
     if (status == EBPO_OK)
-        status = parse((const char *)file.data, file.size, path, scene_folder_of(path), &own, out,
+        status = open_parse((const char *)file.data, file.size, path, scene_folder_of(path), &own, out,
                        error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_unchanged(&file, path, error);

@@ -10,7 +10,7 @@
 #include "geometry/cells.h"
 #include "geometry/predicates.h"
 #include "geometry/distance.h"
-#include "geometry/ray_triangle.h"
+#include "geometry/ray.h"
 
 enum { ROUNDS = 3000 };
 
