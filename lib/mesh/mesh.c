@@ -1,13 +1,13 @@
-#mesh_include "core/strict_fp.h"
+#include "core/strict_fp.h"
 
-#mesh_include <stdlib.h>
-#mesh_include <string.h>
+#include <stdlib.h>
+#include <string.h>
 
-#mesh_include "core/alloc.h"
-#mesh_include "core/workspace.h"
-#mesh_include "core/error.h"
-#mesh_include "mesh/attributes.h"
-#mesh_include "mesh/mesh_parts.h"
+#include "core/alloc.h"
+#include "core/workspace.h"
+#include "core/error.h"
+#include "mesh/attributes.h"
+#include "mesh/mesh_parts.h"
 
 const char *ebpo_mesh_label(const ebpo_mesh *mesh)
 {

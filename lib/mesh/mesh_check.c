@@ -169,7 +169,7 @@ ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error)
         return ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
     for (int k = 0; k < 3; k++)
         pass.centre[k] = ldexp(0.5 * r->min[k] + 0.5 * r->max[k], -check->units.exponent[k]);
-    ebpo_status status = ebpo_parallel_for(check->threads, NULL, count, FACE_GRAIN, faces, &pass,
+    ebpo_status status = ebpo_parallel_for(check->threads, NULL, count, FACE_GRAIN, check_faces, &pass,
                                            &check->progress, "measuring faces", error);
     ebpo_sum area2 = { .adds = 0 }, volume6 = { .adds = 0 };
     for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {

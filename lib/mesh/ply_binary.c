@@ -374,7 +374,7 @@ ebpo_status ebpo_ply_plain_vertices(ply_parser *p, const ply_element *element, b
     if (element->has_list || !element->row_bytes ||
         element->count > (p->size - p->at) / element->row_bytes)
         return EBPO_OK;
-    ebpo_status status = ply_binary_run(&t, vertices);
+    ebpo_status status = ply_binary_run(&t, ply_binary_vertices);
     if (status == EBPO_OK) {
         *done = element->count;
         p->at += element->count * t.row_bytes;
