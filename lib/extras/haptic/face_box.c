@@ -412,7 +412,7 @@ bool ebpo_segment_may_meet(const double p[3], const double q[3], const double fa
     return !(left && right);
 }
 
-int ebpo_segment_crosses(const double p[3], const double q[3], const double face[3][3])
+static int segment_crosses(const double p[3], const double q[3], const double face[3][3])
 {
     if (!ebpo_segment_may_meet(p, q, face))
         return 0;
@@ -481,7 +481,7 @@ static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const dou
     if (!all)
         return TOO_MANY;
     for (uint32_t i = 0; i < count; i++) {
-        int sign = ebpo_segment_crosses(side->at, to, (const double(*)[3])box->corner[found[i]]);
+        int sign = segment_crosses(side->at, to, (const double(*)[3])box->corner[found[i]]);
         if (sign == EBPO_CROSSES_BADLY)
             return BADLY;
         change += sign;

@@ -86,7 +86,6 @@ bool ebpo_segment_may_meet(const double p[3], const double q[3], const double fa
  * 0: they have no common point. EBPO_CROSSES_BADLY: through an edge, a corner, from or to the
  * face's plane, or perhaps not at all. No memory is taken. */
 enum { EBPO_CROSSES_BADLY = 2 };
-int ebpo_segment_crosses(const double p[3], const double q[3], const double face[3][3]);
 
 /* Nodes of the tree over a box's faces, the one with the least key first. A heap in an array that
  * its owner gives. */

@@ -169,7 +169,7 @@ static double tool_hold_lacks(const held *h, const ebpo_tool_contact *c,
                               const double way[EBPO_SCREW])
 {
     double room = h->release ? c->room : fmax(c->room, 0);
-    return -room - screw_dot(c->grip, way);
+    return -room - ebpo_screw_dot(c->grip, way);
 }
 
 static void tool_hold_sweep(held *h, double close, double way[EBPO_SCREW])
@@ -219,7 +219,7 @@ int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW],
             break;
         h.active[h.count] = next;
         h.force[h.count] = 0;
-        h.square[h.count++] = screw_dot(all->at[next].grip, all->at[next].grip);
+        h.square[h.count++] = ebpo_screw_dot(all->at[next].grip, all->at[next].grip);
         tool_hold_sweep(&h, close, out);
     }
     for (int i = 0; i < h.count; i++)

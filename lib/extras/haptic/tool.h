@@ -50,12 +50,12 @@ static inline void ebpo_rigid_lever(const double matrix[3][3], const double p[3]
         out[i] = ebpo_vec3_dot(matrix[i], p);
 }
 
-static inline double screw_dot(const double a[EBPO_SCREW], const double b[EBPO_SCREW])
+static inline double ebpo_screw_dot(const double a[EBPO_SCREW], const double b[EBPO_SCREW])
 {
     return ebpo_vec3_dot(a, b) + ebpo_vec3_dot(a + 3, b + 3);
 }
 
-static inline double screw_length(const double a[EBPO_SCREW]) { return sqrt(screw_dot(a, a)); }
+static inline double ebpo_screw_length(const double a[EBPO_SCREW]) { return sqrt(ebpo_screw_dot(a, a)); }
 
 /* A tool's way, held back by what its points touch: the nearest one to the way it wants, that takes
  * no point closer to a face than it may. */

@@ -31,7 +31,8 @@ static ebpo_status known_ask(ebpo_touch *t, ebpo_known_place *out, ebpo_error *e
     return EBPO_OK;
 }
 
-ebpo_status ebpo_touch_learn(ebpo_touch *t, bool *moved, ebpo_error *error)
+/* touch_known.c: the loading thread asks about the place where a probe is. True: it has moved. */
+static ebpo_status learn_place(ebpo_touch *t, bool *moved, ebpo_error *error)
 {
     ebpo_known_place *known = &t->known[t->own_known];
     for (int i = 0; i < 3; i++)
@@ -165,7 +166,7 @@ static void *loader_run(void *user)
         if (far_from_last(t, &centres))
             status = loader_load(t, goal, &error);
         else if (t->options.kind == EBPO_TOUCH_PROBE)
-            status = ebpo_touch_learn(t, &moved, &error);
+            status = learn_place(t, &moved, &error);
         if (status == EBPO_OK && !moved)
             wait_a_little();
     }

@@ -70,7 +70,8 @@ static void take_value(const uint8_t *from, unsigned bytes, uint8_t *to)
 
 static unsigned values_of(const ebpo_paint_column *c) { return c->cols ? c->cols : 1; }
 
-void ebpo_paint_column_take(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t *bytes)
+/* Between members and the bytes of a file: rows one behind the other. */
+static void take_column(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t *bytes)
 {
     for (uint64_t row = 0; row < ebpo_paint_column_rows(p, c); row++)
         for (unsigned k = 0; k < values_of(c); k++, bytes += c->element)
@@ -349,7 +350,7 @@ static ebpo_status read_column(reader *r, const ebpo_paint_column *c, ebpo_error
         ebpo_sum_differs(ebpo_load32(bytes + count), ebpo_fletcher32(bytes, count)))
         status = open_wrong(r, c->path, "the chunk is damaged: its checksum differs", error);
     if (status == EBPO_OK)
-        ebpo_paint_column_take(r->p, c, bytes);
+        take_column(r->p, c, bytes);
     free(bytes);
     return status;
 }

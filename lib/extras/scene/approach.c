@@ -16,16 +16,16 @@ typedef struct travel {
     const ebpo_scene *scene;
     ebpo_scene_way_options how;
     double from, to;
-    scene_pairs_list list;
+    ebpo_scene_pairs_list list;
     ebpo_scene_way *ways;
 } travel;
 
 /* The next time to look: until then the way is shorter than `gap`; w->time where there is none. */
-static ebpo_status next_look(const travel *t, const scene_looks *looks, const ebpo_scene_way *w,
+static ebpo_status next_look(const travel *t, const ebpo_scene_looks *looks, const ebpo_scene_way *w,
                              double gap, double *next, ebpo_error *error)
 {
     double low = w->time, high = t->to, at = high, length = 0;
-    ebpo_status status = scene_looks_motion(looks, low, at, &length, error);
+    ebpo_status status = ebpo_scene_looks_motion(looks, low, at, &length, error);
     if (status != EBPO_OK || length < gap) {
         *next = at;
         return status;
@@ -33,7 +33,7 @@ static ebpo_status next_look(const travel *t, const scene_looks *looks, const eb
     /* halved until it fits, then a little longer again */
     for (int n = 0; n < 70 && status == EBPO_OK && (low == w->time || n < 8); n++) {
         at = low + (high - low) / 2;
-        status = scene_looks_motion(looks, w->time, at, &length, error);
+        status = ebpo_scene_looks_motion(looks, w->time, at, &length, error);
         if (length < gap)
             low = at;
         else
@@ -45,11 +45,11 @@ static ebpo_status next_look(const travel *t, const scene_looks *looks, const eb
 
 /* Past a jump. *next stays where nothing jumps: there rounding alone may be longer than the gap,
  * however short the time. */
-static ebpo_status approach_jump(const scene_looks *looks, const ebpo_scene_way *w, double *next,
+static ebpo_status approach_jump(const ebpo_scene_looks *looks, const ebpo_scene_way *w, double *next,
                                  ebpo_error *error)
 {
     double length, at = nextafter(w->time, INFINITY);
-    ebpo_status status = scene_looks_motion(looks, w->time, at, &length, error);
+    ebpo_status status = ebpo_scene_looks_motion(looks, w->time, at, &length, error);
     if (status == EBPO_OK && length == INFINITY)
         *next = at;
     return status;
@@ -57,20 +57,20 @@ static ebpo_status approach_jump(const scene_looks *looks, const ebpo_scene_way 
 
 static bool is_reached(const travel *t, const ebpo_scene_way *w)
 {
-    return scene_is_within(w->hi, w->clearance, t->how.tolerance);
+    return ebpo_scene_is_within(w->hi, w->clearance, t->how.tolerance);
 }
 
-static ebpo_status approach_look(const travel *t, scene_looks *looks, ebpo_scene_way *w,
+static ebpo_status approach_look(const travel *t, ebpo_scene_looks *looks, ebpo_scene_way *w,
                                  ebpo_error *error)
 {
-    ebpo_status status = scene_look(looks, w->time, &w->lo, &w->hi, error);
+    ebpo_status status = ebpo_scene_look(looks, w->time, &w->lo, &w->hi, error);
     w->looks++;
     if (status != EBPO_OK || is_reached(t, w) || looks->gap > w->clearance)
         return status;
-    return scene_lacks(t->scene, looks->pair, looks->lacking, w->time, false, error);
+    return ebpo_scene_lacks(t->scene, looks->pair, looks->lacking, w->time, false, error);
 }
 
-static ebpo_status approach_go(const travel *t, scene_looks *looks, ebpo_scene_way *w,
+static ebpo_status approach_go(const travel *t, ebpo_scene_looks *looks, ebpo_scene_way *w,
                                ebpo_error *error)
 {
     for (;;) {
@@ -102,11 +102,11 @@ static ebpo_status go_pairs(void *context, uint64_t begin, uint64_t end, unsigne
     (void)worker;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         const ebpo_scene_pair *pair = &t->list.pairs[i];
-        scene_looks looks;
+        ebpo_scene_looks looks;
         t->ways[i] = (ebpo_scene_way){
             .a = pair->a, .b = pair->b, .time = t->from, .clearance = pair->clearance
         };
-        status = scene_looks_begin(&looks, t->scene, pair, t->how.tolerance, error);
+        status = ebpo_scene_looks_begin(&looks, t->scene, pair, t->how.tolerance, error);
         if (status == EBPO_OK)
             status = approach_go(t, &looks, &t->ways[i], error);
         ebpo_collider_free(looks.collider);
@@ -120,9 +120,9 @@ ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
 {
     EBPO_DEFAULT_FP;
     travel t = { .scene = scene, .how = EBPO_SCENE_WAY_OPTIONS_INIT, .from = from, .to = to };
-    ebpo_status status = scene_take_way_options(&t.how, options, error);
+    ebpo_status status = ebpo_scene_take_way_options(&t.how, options, error);
     if (status == EBPO_OK)
-        status = scene_list_pairs(scene, from, to, &t.list, error);
+        status = ebpo_scene_list_pairs(scene, from, to, &t.list, error);
     t.ways = ebpo_alloc(t.list.count, sizeof *t.ways);
     if (status == EBPO_OK && !t.ways)
         status = ebpo_fail_memory(error, t.list.count * sizeof *t.ways);
@@ -143,7 +143,7 @@ typedef struct least_search {
     const ebpo_scene *scene;
     double from, to, tolerance;
     uint64_t most_looks;
-    scene_pairs_list list;
+    ebpo_scene_pairs_list list;
     ebpo_scene_least *found;
 } least_search;
 
@@ -156,10 +156,10 @@ typedef struct part {
 } part;
 
 typedef struct search {
-    scene_looks looks;
+    ebpo_scene_looks looks;
     ebpo_scene_least *out;
     double limit; /* the least that was seen of what files lack: no better bound can be had */
-    SCENE_LIST(part, parts); /* a heap: the one with the least `least` first */
+    EBPO_SCENE_LIST(part, parts); /* a heap: the one with the least `least` first */
 } search;
 
 /* ---- parts ---- */
@@ -182,7 +182,7 @@ static ebpo_status put_part(search *s, const part *p, ebpo_error *error)
 static ebpo_status least_distance_look(search *s, double time, double *lo, ebpo_error *error)
 {
     double hi;
-    ebpo_status status = scene_look(&s->looks, time, lo, &hi, error);
+    ebpo_status status = ebpo_scene_look(&s->looks, time, lo, &hi, error);
     s->out->looks++;
     if (status == EBPO_OK && s->looks.gap < hi)
         s->limit = fmin(s->limit, *lo);
@@ -196,7 +196,7 @@ static ebpo_status least_distance_look(search *s, double time, double *lo, ebpo_
 /* Between its ends it can be nearer by half of what is left of the way. */
 static ebpo_status add_part(search *s, part p, ebpo_error *error)
 {
-    ebpo_status status = scene_looks_motion(&s->looks, p.from, p.to, &p.motion, error);
+    ebpo_status status = ebpo_scene_looks_motion(&s->looks, p.from, p.to, &p.motion, error);
     if (status != EBPO_OK)
         return status;
     p.least = fmin(fmin(p.at_from, p.at_to), (p.at_from + p.at_to - p.motion) / 2);
@@ -218,7 +218,7 @@ static ebpo_status least_distance_halve(search *s, const part *p, double middle,
 /* Routes may jump at keys; what rides together does not. */
 static double next_jump(const search *s, double from, double to)
 {
-    return s->looks.rides ? to : scene_pair_next(s->looks.scene, s->looks.pair, from, to);
+    return s->looks.rides ? to : ebpo_scene_pair_next(s->looks.scene, s->looks.pair, from, to);
 }
 
 /* From key to key, so that routes jump between parts only. */
@@ -245,7 +245,7 @@ static ebpo_status begin_parts(search *s, double from, double to, ebpo_error *er
 static bool is_done(const search *s, const part *p, double middle, const least_search *how)
 {
     double hi = s->out->hi, open = hi - s->limit; /* below 0: nothing that is lacking matters */
-    return scene_is_within(hi, p->least, how->tolerance) || s->limit - p->least <= open / 8 ||
+    return ebpo_scene_is_within(hi, p->least, how->tolerance) || s->limit - p->least <= open / 8 ||
            s->out->looks >= how->most_looks || p->motion <= how->tolerance / 8 ||
            !(middle > p->from && middle < p->to);
 }
@@ -255,7 +255,7 @@ static ebpo_status is_rounding(const search *s, const part *p, bool *out, ebpo_e
 {
     double least = 0;
     ebpo_status status =
-        scene_looks_motion(&s->looks, p->from, nextafter(p->from, INFINITY), &least, error);
+        ebpo_scene_looks_motion(&s->looks, p->from, nextafter(p->from, INFINITY), &least, error);
     *out = p->motion <= 2 * least;
     return status;
 }
@@ -285,7 +285,7 @@ static ebpo_status find_least(const least_search *how, const ebpo_scene_pair *pa
     *out = (ebpo_scene_least){
         .a = pair->a, .b = pair->b, .time = how->from, .hi = INFINITY, .clearance = pair->clearance
     };
-    ebpo_status status = scene_looks_begin(&s.looks, how->scene, pair, how->tolerance, error);
+    ebpo_status status = ebpo_scene_looks_begin(&s.looks, how->scene, pair, how->tolerance, error);
     if (status == EBPO_OK)
         status = begin_parts(&s, how->from, how->to, error);
     if (status == EBPO_OK)
@@ -315,11 +315,11 @@ ebpo_status ebpo_scene_least_distances(ebpo_scene *scene, double from, double to
     EBPO_DEFAULT_FP;
     least_search s = { .scene = scene, .from = from, .to = to };
     ebpo_scene_way_options how = EBPO_SCENE_WAY_OPTIONS_INIT;
-    ebpo_status status = scene_take_way_options(&how, options, error);
+    ebpo_status status = ebpo_scene_take_way_options(&how, options, error);
     s.tolerance = how.tolerance;
     s.most_looks = how.most_looks;
     if (status == EBPO_OK)
-        status = scene_list_pairs(scene, from, to, &s.list, error);
+        status = ebpo_scene_list_pairs(scene, from, to, &s.list, error);
     s.found = ebpo_alloc(s.list.count, sizeof *s.found);
     if (status == EBPO_OK && !s.found)
         status = ebpo_fail_memory(error, s.list.count * sizeof *s.found);

@@ -255,7 +255,7 @@ typedef struct asking {
     const ebpo_scene *scene;
     ebpo_scene_ask_options how;
     double time;
-    scene_pairs_list list;
+    ebpo_scene_pairs_list list;
     ebpo_scene_meeting *meetings;
 } asking;
 
@@ -335,9 +335,9 @@ static ebpo_status check_left_out(const asking *a, const ebpo_scene_pair *pair, 
 {
     double gap = INFINITY;
     uint64_t lacking = 0;
-    ebpo_status status = scene_left_out(a->scene, pair, a->time, &gap, &lacking, error);
+    ebpo_status status = ebpo_scene_left_out(a->scene, pair, a->time, &gap, &lacking, error);
     if (status == EBPO_OK && (!(gap > pair->clearance) || (a->how.relate && gap < INFINITY)))
-        status = scene_lacks(a->scene, pair, lacking, a->time, a->how.relate, error);
+        status = ebpo_scene_lacks(a->scene, pair, lacking, a->time, a->how.relate, error);
     return status;
 }
 
@@ -354,11 +354,11 @@ static ebpo_status ask_pair(const asking *a, uint64_t n, ebpo_error *error)
     ebpo_collider *collider = NULL;
     *m = (ebpo_scene_meeting){ .a = pair->a, .b = pair->b, .clearance = pair->clearance };
     scene_forget_facts(m);
-    ebpo_status status = scene_pose_pair(a->scene, pair, a->time, &options, error);
+    ebpo_status status = ebpo_scene_pose_pair(a->scene, pair, a->time, &options, error);
     if (status == EBPO_OK)
         status = check_left_out(a, pair, error);
     if (status == EBPO_OK)
-        status = scene_collider(a->scene, pair, 1, &collider, error);
+        status = ebpo_scene_collider(a->scene, pair, 1, &collider, error);
     scene_two two = {
         &a->how, collider, &options, { is_solid(a->scene, pair->a), is_solid(a->scene, pair->b) }
     };
@@ -399,7 +399,7 @@ ebpo_status ebpo_scene_meet(ebpo_scene *scene, double time, const ebpo_scene_ask
         return ebpo_fail(error, EBPO_E_ARGUMENT, "depths within %g: is no length", a.how.depth);
     a.how.relate |= a.how.depth > 0;
     if (status == EBPO_OK)
-        status = scene_list_pairs(scene, time, time, &a.list, error);
+        status = ebpo_scene_list_pairs(scene, time, time, &a.list, error);
     a.meetings = ebpo_alloc(a.list.count, sizeof *a.meetings);
     if (status == EBPO_OK && !a.meetings)
         status = ebpo_fail_memory(error, a.list.count * sizeof *a.meetings);
@@ -423,13 +423,13 @@ ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_t a, uint64_t b, double
     ebpo_scene_pair pair = { a, b, 0 };
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
-    ebpo_status status = scene_pose_pair(scene, &pair, time, &options, error);
+    ebpo_status status = ebpo_scene_pose_pair(scene, &pair, time, &options, error);
     if (status == EBPO_OK)
-        status = scene_make_models(scene, &pair, 1, error);
+        status = ebpo_scene_make_models(scene, &pair, 1, error);
     if (status == EBPO_OK)
         status = check_left_out(&one, &pair, error);
     if (status == EBPO_OK)
-        status = scene_collider(scene, &pair, threads, &collider, error);
+        status = ebpo_scene_collider(scene, &pair, threads, &collider, error);
     if (status == EBPO_OK && collider)
         status = ebpo_collide_all(collider, &options, take, user, error);
     ebpo_collider_free(collider);

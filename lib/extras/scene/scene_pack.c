@@ -27,7 +27,7 @@
 #define SCENE_PACKED "packed.scene.json"
 
 /* Takes the options; the scene and its times are right. */
-static ebpo_status scene_plan_check(scene_needs *needs, const ebpo_plan_options *options)
+static ebpo_status scene_plan_check(ebpo_scene_needs *needs, const ebpo_plan_options *options)
 {
     const ebpo_scene *scene = needs->scene;
     ebpo_error *error = needs->error;
@@ -51,25 +51,25 @@ static ebpo_status scene_plan_check(scene_needs *needs, const ebpo_plan_options 
 }
 
 /* Finds what is needed of each file. Free needs->files, also on failure. */
-static ebpo_status scene_plan_needs(scene_needs *needs)
+static ebpo_status scene_plan_needs(ebpo_scene_needs *needs)
 {
-    ebpo_status status = scene_begin_needs(needs);
+    ebpo_status status = ebpo_scene_begin_needs(needs);
     if (status == EBPO_OK)
-        status = needs->how.purpose == EBPO_SCENE_FOR_VIEW ? scene_add_views(needs)
-                                                           : scene_add_near(needs);
+        status = needs->how.purpose == EBPO_SCENE_FOR_VIEW ? ebpo_scene_add_views(needs)
+                                                           : ebpo_scene_add_near(needs);
     if (status == EBPO_OK)
-        scene_end_needs(needs);
+        ebpo_scene_end_needs(needs);
     return status;
 }
 
 /* A need of each model; free it, also on failure. */
-static ebpo_status scene_plan_list(const scene_needs *needs, ebpo_scene_need **out)
+static ebpo_status scene_plan_list(const ebpo_scene_needs *needs, ebpo_scene_need **out)
 {
     uint64_t count = needs->scene->models_count;
     ebpo_scene_need *list = ebpo_alloc(count, sizeof *list);
     ebpo_status status = list ? EBPO_OK : ebpo_fail_memory(needs->error, count * sizeof *list);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        status = scene_tell_need(needs, i, &list[i]);
+        status = ebpo_scene_tell_need(needs, i, &list[i]);
     *out = list;
     return status;
 }
@@ -79,7 +79,7 @@ ebpo_status ebpo_scene_plan(ebpo_scene *scene, double from, double to,
                             ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    scene_needs needs = { .scene = scene, .from = from, .to = to, .error = error };
+    ebpo_scene_needs needs = { .scene = scene, .from = from, .to = to, .error = error };
     ebpo_scene_need *list = NULL;
     ebpo_status status = scene_plan_check(&needs, options);
     if (status == EBPO_OK)
@@ -115,7 +115,7 @@ static ebpo_status name_files(json_t *root, const ebpo_scene *scene, const ebpo_
     json_t *models = json_object_get(root, "models");
     bool set = true;
     for (uint64_t i = 0; i < scene->models_count; i++) {
-        const scene_model *m = &scene->models[i];
+        const ebpo_scene_model_entry *m = &scene->models[i];
         json_t *model = json_object_get(models, m->name);
         char name[40], digest[65], source[65];
         scene_packed_name(m->file, name);
@@ -144,10 +144,10 @@ static ebpo_status copy_poses(const ebpo_scene *scene, const char *csv, const ch
                               const char *name, ebpo_error *error)
 {
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
-    char *path = scene_join_path(scene->folder, csv);
+    char *path = ebpo_scene_join_path(scene->folder, csv);
     ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(csv));
     if (status == EBPO_OK && !scene->outside)
-        status = scene_stays_within(scene->folder, path, error);
+        status = ebpo_scene_stays_within(scene->folder, path, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_open(&file, path, error);
     if (status == EBPO_OK)
@@ -204,7 +204,7 @@ static ebpo_status scene_write_packed(const ebpo_scene *scene, const ebpo_scene_
 /* A folder with what a scene needs: written beside its place, and put there whole. */
 
 typedef struct packing {
-    scene_needs needs;
+    ebpo_scene_needs needs;
     ebpo_pack_options how;
     const char *folder;
     char *making; /* the folder until it is whole */
@@ -284,7 +284,7 @@ static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
 {
     ebpo_scene_packed *out = &p->files[number];
     const ebpo_file *file = p->needs.scene->files[number].file;
-    ebpo_subset_options o = scene_need_options(&p->needs, number);
+    ebpo_subset_options o = ebpo_scene_need_options(&p->needs, number);
     char name[40];
     scene_packed_name(number, name);
     char *path = path_in(p->making, name);
