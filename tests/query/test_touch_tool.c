@@ -283,7 +283,7 @@ static void random_contact(uint64_t *state, ebpo_tool_contact *c)
     }
     for (int k = 0; k < 3; k++)
         c->grip[k] = c->normal[k] / length(c->normal);
-    cross(lever, c->grip, c->grip + 3);
+    ebpo_vec3_cross(lever, c->grip, c->grip + 3);
 }
 
 /* One that pulled, so that its point would stick to the face, would hold back more than is needed.

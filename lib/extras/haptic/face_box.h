@@ -1,5 +1,6 @@
-/* The faces in a box, with a tree of boxes over them: what a tick works on. Made by the loading
- * thread, never changed while a tick has it. */
+/* The faces in a box with a tree of boxes over them, on which a haptic step works; distances from
+ * faces and the side of a point. The loading thread makes a box; it never changes while a step
+ * uses it. */
 #ifndef EBPO_HAPTIC_FACE_BOX_H
 #define EBPO_HAPTIC_FACE_BOX_H
 

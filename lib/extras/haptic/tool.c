@@ -1,3 +1,14 @@
+/* A tool: a rigid set of points that move together, the contacts that hold it, and the forces that
+ * it returns.
+ *
+ * Points are split at the middle of their longest side into clusters of few points. A rotation is
+ * measured as a length: its angle times the tool's arm.
+ *
+ * The way of a tool is held back by its contacts: the nearest way to the wanted one that takes no
+ * point closer to a face than it may be. Hildreth's method solves that for the contacts that
+ * matter, which are added one at a time, the most violated first.
+ *
+ * Forces are passive: they are reduced where the hand would receive more energy than it gave. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -120,8 +131,7 @@ void ebpo_rigid_matrix(const ebpo_rigid *r, double out[3][3])
     }
 }
 
-/* Hildreth's method for the few contacts that matter, which are found one after the other: of all,
- * the one that the way so far offends most. */
+/* --- contacts --- */
 
 enum { ACTIVE = 12, SWEEPS = 20 };
 
@@ -227,7 +237,7 @@ int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW],
     return holding;
 }
 
-/* Points are parted at the middle of their longest side until few are left. */
+/* --- the tool --- */
 
 typedef struct placed {
     double p[3];

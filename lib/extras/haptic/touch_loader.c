@@ -1,5 +1,9 @@
-/* Exact answers for where a probe was a moment ago: asked by the thread that loads, handed over as
- * boxes are. */
+/* The thread that loads boxes of faces ahead of the hand, and exact results for probes.
+ *
+ * A haptic step never waits for it. Boxes and results are handed over through buffers that are
+ * exchanged atomically: the loader writes its own one and swaps it with the one between, which the
+ * step swaps with one of its own. Where the hand goes is predicted from its speed. When a box has
+ * more faces than there is room for, a smaller one is loaded. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -60,7 +64,7 @@ const ebpo_known_place *ebpo_touch_known(ebpo_touch *t)
     return &t->known[t->answer];
 }
 
-/* The thread that loads boxes ahead of the hand. */
+/* --- boxes --- */
 
 /* Seconds that a box should be ahead of the hand, and over which its speed is measured; of half a
  * box's side, how far the proxy may be from the middle when it is made, and how far the middle

@@ -1,4 +1,4 @@
-/* Inside lib/extras/haptic: the object, and who may use which part of it. */
+/* The object of a haptic session, and which thread may use which part of it. */
 #ifndef EBPO_HAPTIC_TOUCH_PARTS_H
 #define EBPO_HAPTIC_TOUCH_PARTS_H
 
@@ -100,7 +100,7 @@ uint32_t ebpo_touch_go(ebpo_touch *t, const double goal[3], ebpo_ball_work *work
  * `reach` are known: to the wall of the box at hand, or all of it where no face can be. */
 double ebpo_touch_known_part(const ebpo_touch *t, const double way[3], double reach);
 
-/* touch_around.c: nearest face, weights, depth and the smooth normal; t->away. */
+/* touch_step.c: nearest face, weights, depth and the smooth normal; t->away. */
 void ebpo_touch_look(ebpo_touch *t, ebpo_touch_result *out);
 
 /* The last that is known. */
@@ -110,7 +110,7 @@ const ebpo_known_place *ebpo_touch_known(ebpo_touch *t);
 EBPO_MUST_USE ebpo_status ebpo_touch_loader_start(ebpo_touch *t, ebpo_error *error);
 void ebpo_touch_loader_stop(ebpo_touch *t);
 
-/* touch_boxes.c: a box that is fresh and holds the proxy becomes the one at hand. True: one did. */
+/* touch_step.c: a box that is fresh and holds the proxy becomes the one at hand. True: one did. */
 bool ebpo_touch_take_box(ebpo_touch *t);
 /* The box before, if it holds the proxy: perhaps that one reaches further. */
 void ebpo_touch_try_other(ebpo_touch *t);

@@ -1,7 +1,11 @@
-/* A piece of a tool's way. First each point that may meet a face is followed along it, to where the
- * first one comes too close. Then all these points are looked at where they will be: exact
- * arithmetic says that they went through nothing, and distances, that they are not too close. Only
- * then the tool is there. Both may take several ticks, if many points are close. */
+/* A haptic step of a tool. Gauss' principle for a body without mass: of all ways that its contacts
+ * allow, the nearest to the hand (Ortega, Redon, Coquillart 2007).
+ *
+ * A piece of the way is decided in two passes. First each point that may meet a face is followed
+ * along it, up to where the first one comes too close. Then all these points are examined at their
+ * new positions: exact arithmetic finds that they went through no face, and distances find that
+ * they are not too close. Only then the tool is there. Both passes may take several steps, if many
+ * points are close. */
 #include "core/strict_fp.h"
 
 #include "core/fp_env.h"
@@ -314,8 +318,7 @@ static uint32_t continue_tool_way(ebpo_touch *t, uint64_t *work, bool *arrived)
     return tool->part < 1 ? 0 : tool->flags;
 }
 
-/* A tick of a tool. Gauss' principle for a body without mass: of all ways that its contacts allow,
- * the one nearest to where the hand is (Ortega, Redon, Coquillart 2007). */
+/* --- the step --- */
 
 static double turn_closeness(const ebpo_touch *t) { return 0x1p-6 * t->options.skin; }
 

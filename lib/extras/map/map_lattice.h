@@ -1,4 +1,4 @@
-/* Inside lib/extras/map: exact distances of many points, on many threads. */
+/* Exact distances of many points, on many threads. */
 #ifndef EBPO_MAP_MAP_LATTICE_H
 #define EBPO_MAP_MAP_LATTICE_H
 

@@ -1,4 +1,11 @@
-/* Strokes and their points. */
+/* A paint as an object: its strokes, layers and notes, and the model that it belongs to.
+ *
+ * Strokes are kept in the order in which they were made, and their points one behind the other.
+ * Removing a layer removes its strokes and its notes. Texts are UTF-8 of limited size without
+ * control characters. A paint belongs to the model whose SHA-256 digest it has: for another one,
+ * queries fail.
+ *
+ * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -125,7 +132,7 @@ ebpo_status ebpo_paint_remove_stroke(ebpo_paint *p, uint64_t number, ebpo_error 
     return EBPO_OK;
 }
 
-/* Layers and notes. */
+/* --- layers and notes --- */
 
 const ebpo_paint_text_kind ebpo_paint_layer_texts[EBPO_PAINT_TEXTS] = {
     { "title", 255 }, { "author", 255 }, { "date", 31 }, { "description", 4095 }
@@ -364,7 +371,7 @@ ebpo_status ebpo_paint_remove_note(ebpo_paint *p, uint64_t number, ebpo_error *e
     return EBPO_OK;
 }
 
-/* Paints as objects, and whose they are. */
+/* --- the object --- */
 
 static void write_hex(const uint8_t digest[32], char out[65])
 {

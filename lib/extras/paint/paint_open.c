@@ -1,3 +1,13 @@
+/* Reads paint files, and has the table of their arrays.
+ *
+ * A paint file is untrusted input, read by the strict reader of HDF5 headers (lib/hdf5_read)
+ * without libhdf5. Every count is compared with its limit and with the file's size before memory
+ * is taken; every number is checked for its range, and texts for UTF-8 without control characters.
+ *
+ * The table of arrays says for each column its path, its element type, and the member of a stroke
+ * or a point that it holds; paint_save.c writes by the same table.
+ *
+ * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -86,7 +96,7 @@ void ebpo_paint_column_give(const ebpo_paint *p, const ebpo_paint_column *c, uin
             take_value(member_of(p, c, row) + k * c->element, c->element, bytes);
 }
 
-/* Reading paint files, which are anybody's: format-spec/paint.md. */
+/* --- reading --- */
 
 typedef struct reader {
     ebpo_head head;

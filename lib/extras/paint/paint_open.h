@@ -1,5 +1,5 @@
-/* Inside lib/extras/paint: the arrays of a paint file, and which members of strokes and points they
- * hold. format-spec/paint.md, section 3. */
+/* The arrays of a paint file, and which members of strokes and points they hold:
+ * format-spec/paint.md, section 3. */
 #ifndef EBPO_PAINT_PAINT_OPEN_H
 #define EBPO_PAINT_PAINT_OPEN_H
 

@@ -1,4 +1,4 @@
-/* Inside lib/extras/paint: what a paint holds. */
+/* What a paint holds. */
 #ifndef EBPO_PAINT_PAINT_PARTS_H
 #define EBPO_PAINT_PAINT_PARTS_H
 

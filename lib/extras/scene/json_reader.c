@@ -1,4 +1,14 @@
-/* The text of a scene file: whether it may be parsed, and on which line its members are. */
+/* Reads members of a scene file, of which every error names the line, the path of the value and
+ * what was expected.
+ *
+ * A scene file is untrusted input. Before jansson parses the text, one pass counts its values and
+ * its depth against the limits, so that parsing takes bounded memory. jansson keeps no positions:
+ * a line is found by a second pass over the text, which follows the path of the member.
+ *
+ * A reader keeps that path: ebpo_json_enter and ebpo_json_leave bracket the evaluation of a value.
+ * Unknown members are errors, except private ones, whose names begin with "x-".
+ *
+ * Source: format-spec/scene.md. */
 #include "core/strict_fp.h"
 
 #include <stdarg.h>
@@ -10,7 +20,10 @@
 #include "extras/scene/json_reader.h"
 #include "extras/scene/scene_parts.h"
 
-size_t ebpo_scene_text_mark(const char *text, size_t size) { return (size_t)ebpo_text_mark(text, size); }
+size_t ebpo_scene_text_mark(const char *text, size_t size)
+{
+    return (size_t)ebpo_text_mark(text, size);
+}
 
 /* Behind the string that begins at text[i], or `size`. */
 static size_t skip_string(const char *text, size_t size, size_t i)
@@ -20,7 +33,8 @@ static size_t skip_string(const char *text, size_t size, size_t i)
     return i + 1 < size ? i + 1 : size;
 }
 
-ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t most_values, ebpo_error *error)
+ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t most_values,
+                                 ebpo_error *error)
 {
     uint64_t values = 1, depth = 0;
     for (size_t i = 0; i < size;) {
@@ -127,7 +141,7 @@ static uint64_t find_line(const char *text, const ebpo_scene_at *path, int count
     return line;
 }
 
-/* Members of a scene file, by jansson. */
+/* --- members --- */
 
 void ebpo_json_enter(ebpo_json_reader *r, const char *key, uint64_t item)
 {
@@ -194,8 +208,8 @@ ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value, const ch
             k++;
         if (!*k && strncmp(key, "x-", 2) != 0)
             return ebpo_json_bad_at(r, key,
-                               "is not a member that this version knows; private ones begin "
-                               "with x-");
+                                    "is not a member that this version knows; private ones begin "
+                                    "with x-");
     }
     return EBPO_OK;
 }
@@ -205,8 +219,8 @@ static ebpo_status json_reader_missing(ebpo_json_reader *r, const char *key, boo
     return needed ? ebpo_json_bad(r, "has no member %s", key) : EBPO_OK;
 }
 
-ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object, const char *key, bool needed,
-                          const char **out)
+ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object, const char *key,
+                               bool needed, const char **out)
 {
     const json_t *value = json_object_get(object, key);
     if (!value)
@@ -217,7 +231,8 @@ ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object, const 
     return EBPO_OK;
 }
 
-ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object, const char *key, bool *out)
+ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object, const char *key,
+                               bool *out)
 {
     const json_t *value = json_object_get(object, key);
     if (!value)
@@ -228,8 +243,8 @@ ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object, const 
     return EBPO_OK;
 }
 
-ebpo_status ebpo_json_get_real(ebpo_json_reader *r, const json_t *object, const char *key, bool needed,
-                          double *out)
+ebpo_status ebpo_json_get_real(ebpo_json_reader *r, const json_t *object, const char *key,
+                               bool needed, double *out)
 {
     const json_t *value = json_object_get(object, key);
     if (!value)
@@ -240,8 +255,8 @@ ebpo_status ebpo_json_get_real(ebpo_json_reader *r, const json_t *object, const 
     return EBPO_OK;
 }
 
-ebpo_status ebpo_json_get_reals(ebpo_json_reader *r, const json_t *object, const char *key, bool needed,
-                           double *out, size_t count)
+ebpo_status ebpo_json_get_reals(ebpo_json_reader *r, const json_t *object, const char *key,
+                                bool needed, double *out, size_t count)
 {
     char what[64];
     const json_t *value = json_object_get(object, key);
@@ -257,7 +272,7 @@ ebpo_status ebpo_json_get_reals(ebpo_json_reader *r, const json_t *object, const
 }
 
 ebpo_status ebpo_json_each_member(ebpo_json_reader *r, const json_t *object, const char *key,
-                             ebpo_json_each_fn each)
+                                  ebpo_json_each_fn each)
 {
     json_t *members = json_object_get(object, key), *value;
     const char *name;
@@ -279,7 +294,8 @@ ebpo_status ebpo_json_each_member(ebpo_json_reader *r, const json_t *object, con
     return status;
 }
 
-ebpo_status ebpo_json_each_item(ebpo_json_reader *r, const json_t *object, const char *key, ebpo_json_each_fn each)
+ebpo_status ebpo_json_each_item(ebpo_json_reader *r, const json_t *object, const char *key,
+                                ebpo_json_each_fn each)
 {
     const json_t *items = json_object_get(object, key);
     ebpo_status status = EBPO_OK;

@@ -27,24 +27,26 @@ ebpo_status ebpo_json_judge(ebpo_json_reader *r, ebpo_status status, const ebpo_
 
 /* An object of these members (NULL ends them) and private ones, "x-...". */
 EBPO_MUST_USE ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value,
-                                       const char *const *known);
+                                            const char *const *known);
 
 /* *out stays where the member is missing; then EBPO_E_FORMAT if it is needed. */
-EBPO_MUST_USE ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object, const char *key,
-                                        bool needed, const char **out);
-EBPO_MUST_USE ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object, const char *key,
-                                        bool *out);
-EBPO_MUST_USE ebpo_status ebpo_json_get_real(ebpo_json_reader *r, const json_t *object, const char *key,
-                                        bool needed, double *out);
-EBPO_MUST_USE ebpo_status ebpo_json_get_reals(ebpo_json_reader *r, const json_t *object, const char *key,
-                                         bool needed, double *out, size_t count);
+EBPO_MUST_USE ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object,
+                                             const char *key, bool needed, const char **out);
+EBPO_MUST_USE ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object,
+                                             const char *key, bool *out);
+EBPO_MUST_USE ebpo_status ebpo_json_get_real(ebpo_json_reader *r, const json_t *object,
+                                             const char *key, bool needed, double *out);
+EBPO_MUST_USE ebpo_status ebpo_json_get_reals(ebpo_json_reader *r, const json_t *object,
+                                              const char *key, bool needed, double *out,
+                                              size_t count);
 
 /* Each member (or item) of the member `key`, which may be missing, entered. `name` is NULL in
  * arrays. */
-typedef ebpo_status (*ebpo_json_each_fn)(ebpo_json_reader *r, const char *name, const json_t *value);
-EBPO_MUST_USE ebpo_status ebpo_json_each_member(ebpo_json_reader *r, const json_t *object, const char *key,
-                                           ebpo_json_each_fn each);
-EBPO_MUST_USE ebpo_status ebpo_json_each_item(ebpo_json_reader *r, const json_t *object, const char *key,
-                                         ebpo_json_each_fn each);
+typedef ebpo_status (*ebpo_json_each_fn)(ebpo_json_reader *r, const char *name,
+                                         const json_t *value);
+EBPO_MUST_USE ebpo_status ebpo_json_each_member(ebpo_json_reader *r, const json_t *object,
+                                                const char *key, ebpo_json_each_fn each);
+EBPO_MUST_USE ebpo_status ebpo_json_each_item(ebpo_json_reader *r, const json_t *object,
+                                              const char *key, ebpo_json_each_fn each);
 
 #endif

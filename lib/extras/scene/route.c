@@ -1,5 +1,12 @@
-/* Routes: where they are at a time, and how far what follows them can move. Sums, products,
- * quotients and square roots only: the same bits on every machine. */
+/* Routes: the pose at a time between keys, and bounds of how far points that follow a route move.
+ *
+ * A rotation is interpolated along the arc between two unit quaternions by halving it repeatedly.
+ * Only sums, products, quotients and square roots are used, so that a pose has the same bits on
+ * every machine.
+ *
+ * Bounds hold between two times without a key between them: the length of the motion, the
+ * deviation from a straight line, and the part of it that rounding alone makes. They are rounded
+ * upwards. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -45,7 +52,8 @@ static bool route_fits(const ebpo_route_key *key)
            ebpo_posing_make(&posing, &pose, nowhere, NULL) == EBPO_OK;
 }
 
-ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *key, ebpo_error *error)
+ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *key,
+                               ebpo_error *error)
 {
     ebpo_route_key k = *key;
     if (!route_fits(&k))
@@ -174,7 +182,8 @@ double ebpo_scene_length_above(const double way[3])
     return sqrt(sum) * (1 + slack) * most;
 }
 
-ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from, double to, ebpo_scene_reach reach)
+ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from, double to,
+                                      ebpo_scene_reach reach)
 {
     uint64_t n = key_at(route, from);
     const ebpo_route_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
@@ -192,7 +201,8 @@ ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from
     double turned = angle * part, grown = grows * part;
     double rounding = slack * (size + (reach.length + reach.size) * scale);
     return (ebpo_scene_step){
-        (ebpo_scene_length_above(way) * part + reach.length * (scale * turned + grown)) * (1 + slack) +
+        (ebpo_scene_length_above(way) * part + reach.length * (scale * turned + grown)) *
+                (1 + slack) +
             rounding,
         reach.length / 8 * (scale * turned * turned + 2 * grown * turned) * (1 + slack) + rounding,
     };
@@ -214,7 +224,8 @@ static void grow_to(growing *g, double scale, const double translation[3])
     g->size = fmax(g->size, size);
 }
 
-double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, double to, ebpo_scene_reach reach)
+double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, double to,
+                               ebpo_scene_reach reach)
 {
     ebpo_pose at;
     ebpo_scene_route_at(route, from, &at);

@@ -1,5 +1,12 @@
-/* Poses from a file of lines: time, x, y, z, qx, qy, qz, qw, scale in any order, named by the first
- * line. */
+/* Reads a scene from its file: models, instances, layers, groups, cameras, rules and routes, and
+ * the CSV files of poses that routes name.
+ *
+ * A scene file is untrusted input: each member is checked for its type and range, names must be
+ * unique, and other files may be named only as the options allow (scene_make.c). A file of poses
+ * has a first line that names its columns time, x, y, z, qx, qy, qz, qw and scale in any order;
+ * the bytes of all such files are limited. Numbers are read in the C locale.
+ *
+ * Source: format-spec/scene.md. */
 #include "core/strict_fp.h"
 
 #include <locale.h>
@@ -13,8 +20,6 @@
 #include "geometry/decimal.h"
 #include "geometry/pose.h"
 #include "io/file_source.h"
-
-/* Poses and routes in a scene file. */
 
 enum { COLUMNS = 9, NEEDED = 8, FIELDS_MOST = 64 };
 static const char *const columns[COLUMNS] = {
@@ -164,7 +169,8 @@ static ebpo_status read_text(const ebpo_whole_file *file, ebpo_scene_route *rout
 }
 
 /* Adds a file of poses to a route. *left: bytes that may still be read. */
-static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint64_t *left, ebpo_error *error)
+static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint64_t *left,
+                                 ebpo_error *error)
 {
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     ebpo_status status = ebpo_whole_file_open(&file, path, error);
@@ -183,7 +189,7 @@ static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint
     return status;
 }
 
-/* Poses and routes in a scene file. */
+/* --- poses and routes --- */
 
 /* A pose whose rotation may be given as a matrix, or as a quaternion x, y, z, w of any length. */
 typedef struct read_pose {
@@ -212,7 +218,8 @@ static ebpo_status pose_members(ebpo_json_reader *r, const json_t *value, read_p
 }
 
 /* As a key, whose quaternion has a length of 1. */
-static ebpo_status key_of(ebpo_json_reader *r, const read_pose *p, double time, ebpo_scene_route *route)
+static ebpo_status key_of(ebpo_json_reader *r, const read_pose *p, double time,
+                          ebpo_scene_route *route)
 {
     static const double nowhere[3] = { 0, 0, 0 };
     ebpo_error why = EBPO_ERROR_INIT;
@@ -352,12 +359,11 @@ static ebpo_status json_read_route(ebpo_json_reader *r, const char *name, const 
     status = keys    ? ebpo_json_each_item(r, value, "keys", read_key)
              : poses ? read_poses(r, value)
                      : read_csv(r, value);
-    return status == EBPO_OK && last_route(r)->count == 0 ? ebpo_json_bad(r, "has no poses") : status;
+    return status == EBPO_OK && last_route(r)->count == 0 ? ebpo_json_bad(r, "has no poses")
+                                                          : status;
 }
 
-/* A scene from its file (format-spec/scene.md). */
-
-/* ---- names ---- */
+/* --- names --- */
 
 static ebpo_status read_name(ebpo_json_reader *r, const json_t *value, const char **name)
 {
@@ -373,7 +379,8 @@ static ebpo_status read_layer(ebpo_json_reader *r, const char *key, const json_t
     ebpo_error why = EBPO_ERROR_INIT;
     const char *name = NULL;
     ebpo_status status = read_name(r, value, &name);
-    return status == EBPO_OK ? ebpo_json_judge(r, ebpo_scene_add_layer(r->scene, name, &why), &why) : status;
+    return status == EBPO_OK ? ebpo_json_judge(r, ebpo_scene_add_layer(r->scene, name, &why), &why)
+                             : status;
 }
 
 static ebpo_status read_group(ebpo_json_reader *r, const char *key, const json_t *value)
@@ -382,10 +389,11 @@ static ebpo_status read_group(ebpo_json_reader *r, const char *key, const json_t
     ebpo_error why = EBPO_ERROR_INIT;
     const char *name = NULL;
     ebpo_status status = read_name(r, value, &name);
-    return status == EBPO_OK ? ebpo_json_judge(r, ebpo_scene_add_group(r->scene, name, &why), &why) : status;
+    return status == EBPO_OK ? ebpo_json_judge(r, ebpo_scene_add_group(r->scene, name, &why), &why)
+                             : status;
 }
 
-/* ---- models ---- */
+/* --- models --- */
 
 static int json_digit(char c)
 {
@@ -430,7 +438,7 @@ static ebpo_status read_model(ebpo_json_reader *r, const char *name, const json_
     return ebpo_json_judge(r, status, &why);
 }
 
-/* ---- instances ---- */
+/* --- instances --- */
 
 /* The number of what `key` names; *number stays where it is missing. */
 static ebpo_status json_find(ebpo_json_reader *r, const json_t *object, const char *key,
@@ -441,7 +449,8 @@ static ebpo_status json_find(ebpo_json_reader *r, const json_t *object, const ch
     if (status != EBPO_OK || !name)
         return status;
     *number = ebpo_scene_find_name(r->scene, kind, name);
-    return *number != EBPO_SCENE_NONE ? EBPO_OK : ebpo_json_bad_at(r, key, "is not one of this scene");
+    return *number != EBPO_SCENE_NONE ? EBPO_OK
+                                      : ebpo_json_bad_at(r, key, "is not one of this scene");
 }
 
 static ebpo_status join_group(ebpo_json_reader *r, const char *key, const json_t *value)
@@ -453,8 +462,9 @@ static ebpo_status join_group(ebpo_json_reader *r, const char *key, const json_t
     if (status != EBPO_OK)
         return status;
     uint64_t set = ebpo_scene_find_name(r->scene, "group:", name);
-    return set == EBPO_SCENE_NONE ? ebpo_json_bad(r, "is not a group of this scene")
-                                  : ebpo_json_judge(r, ebpo_scene_join_set(r->scene, set, &why), &why);
+    return set == EBPO_SCENE_NONE
+               ? ebpo_json_bad(r, "is not a group of this scene")
+               : ebpo_json_judge(r, ebpo_scene_join_set(r->scene, set, &why), &why);
 }
 
 static ebpo_status read_instance(ebpo_json_reader *r, const char *key, const json_t *value)
@@ -482,9 +492,10 @@ static ebpo_status read_instance(ebpo_json_reader *r, const char *key, const jso
     return status == EBPO_OK ? ebpo_json_each_item(r, value, "groups", join_group) : status;
 }
 
-/* ---- cameras ---- */
+/* --- cameras --- */
 
-static ebpo_status check_camera(ebpo_json_reader *r, const ebpo_scene_camera *c, const double pixels[2])
+static ebpo_status check_camera(ebpo_json_reader *r, const ebpo_scene_camera *c,
+                                const double pixels[2])
 {
     double see[3], cross = 0;
     for (int k = 0; k < 3; k++)
@@ -538,7 +549,7 @@ static ebpo_status read_camera(ebpo_json_reader *r, const char *key, const json_
     return ebpo_json_judge(r, ebpo_scene_add_camera(r->scene, &c, &why), &why);
 }
 
-/* ---- rules ---- */
+/* --- rules --- */
 
 /* An array of two selectors. */
 static ebpo_status read_two(ebpo_json_reader *r, const json_t *two, uint64_t set[2])
@@ -587,7 +598,7 @@ static ebpo_status read_clearance(ebpo_json_reader *r, const char *key, const js
                              : status;
 }
 
-/* ---- all of it ---- */
+/* --- all of it --- */
 
 static ebpo_status check_version(ebpo_json_reader *r, const json_t *root)
 {
@@ -646,14 +657,15 @@ static ebpo_status parse_failed(const char *name, const json_error_t *e, ebpo_er
     return ebpo_fail_file(error, EBPO_E_FORMAT, name, "line %d: is not JSON: %s", e->line, what);
 }
 
-ebpo_status ebpo_scene_too_long(const char *name, const ebpo_scene_options *options, ebpo_error *error)
+ebpo_status ebpo_scene_too_long(const char *name, const ebpo_scene_options *options,
+                                ebpo_error *error)
 {
     return ebpo_fail_file(error, EBPO_E_LIMIT, name, "has more than %llu bytes",
                           (unsigned long long)options->most_bytes);
 }
 
 ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *text, size_t size, const char *name,
-                            const ebpo_scene_options *options, ebpo_error *error)
+                                 const ebpo_scene_options *options, ebpo_error *error)
 {
     json_error_t parsed;
     ebpo_error why = EBPO_ERROR_INIT;
@@ -669,11 +681,11 @@ ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *text, size_t siz
     if (!root)
         return parse_failed(name, &parsed, error);
     ebpo_json_reader r = { .scene = scene,
-                      .text = text,
-                      .name = name,
-                      .options = options,
-                      .pose_bytes = options->most_pose_bytes,
-                      .error = error };
+                           .text = text,
+                           .name = name,
+                           .options = options,
+                           .pose_bytes = options->most_pose_bytes,
+                           .error = error };
     ebpo_status status = read_root(&r, root);
     if (status == EBPO_OK)
         ebpo_scene_sort_rules(scene);

@@ -1,4 +1,12 @@
-/* Names of a scene: each kind has its own, and selectors share one space. */
+/* A scene as an object: its names, the files that it may name, adding its members, and returning
+ * them.
+ *
+ * Each kind of member has its own names; layers, groups and instances share one space of
+ * selectors, which rules use. A selector is a set: every instance belongs to the set of all, to
+ * its own, to that of its layer and to those of its groups.
+ *
+ * A scene that is untrusted input may name files only below its own folder, unless the options
+ * allow others; symbolic links that lead out of the folder are refused. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -61,7 +69,7 @@ uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const c
 
 /* Gives `kind` and `name` a number. EBPO_E_ARGUMENT: there is one already. */
 static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *name, uint64_t number,
-                           ebpo_error *error)
+                            ebpo_error *error)
 {
     char key[KIND_MOST + NAME_MOST + 2];
     names_join(key, sizeof key, kind, name);
@@ -74,7 +82,7 @@ static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *nam
 
 /* A new set; *set may be NULL. */
 static ebpo_status add_set(ebpo_scene *scene, const char *kind, const char *name, uint64_t *set,
-                          ebpo_error *error)
+                           ebpo_error *error)
 {
     uint64_t number = scene->sets_count;
     if (!ebpo_grow(&scene->sets, &scene->sets_capacity, number + 1, sizeof *scene->sets))
@@ -91,7 +99,7 @@ static ebpo_status add_set(ebpo_scene *scene, const char *kind, const char *name
     return EBPO_OK;
 }
 
-/* Files that a scene names, and which of them a stranger's scene may name. */
+/* --- files that a scene names --- */
 
 static bool goes_up(const char *path)
 {
@@ -103,7 +111,8 @@ static bool goes_up(const char *path)
     return false;
 }
 
-const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *options, bool has_digest)
+const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *options,
+                                    bool has_digest)
 {
     if (!*path)
         return "is no path";
@@ -170,7 +179,7 @@ char *ebpo_scene_folder_of(const char *path)
     return strndup(path, last ? (size_t)(last - path) + 1 : 0);
 }
 
-/* Scenes as they are made: what is added. */
+/* --- adding --- */
 
 ebpo_status ebpo_scene_new(ebpo_scene **out, ebpo_error *error)
 {
@@ -264,7 +273,9 @@ ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const char *name, const char
     if (status != EBPO_OK)
         return status;
     ebpo_scene_model_entry *m = &scene->models[n];
-    *m = (ebpo_scene_model_entry){ .name = strdup(name), .path = strdup(path), .file = EBPO_SCENE_NONE };
+    *m = (ebpo_scene_model_entry){ .name = strdup(name),
+                                   .path = strdup(path),
+                                   .file = EBPO_SCENE_NONE };
     if (digest)
         memcpy(m->digest, digest, sizeof m->digest);
     scene->models_count++; /* freed with the scene, whole or not */
@@ -374,7 +385,7 @@ ebpo_status ebpo_scene_add_group(ebpo_scene *scene, const char *name, ebpo_error
 }
 
 ebpo_status ebpo_scene_add_route(ebpo_scene *scene, const char *name, uint64_t *number,
-                            ebpo_error *error)
+                                 ebpo_error *error)
 {
     ebpo_status status = check_name(name, "a route", error);
     if (status == EBPO_OK)
@@ -387,7 +398,8 @@ ebpo_status ebpo_scene_add_route(ebpo_scene *scene, const char *name, uint64_t *
     return scene->routes[*number].name ? EBPO_OK : ebpo_fail_memory(error, strlen(name));
 }
 
-ebpo_status ebpo_scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera, ebpo_error *error)
+ebpo_status ebpo_scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera,
+                                  ebpo_error *error)
 {
     uint64_t n;
     ebpo_status status = check_name(camera->name, "a camera", error);
@@ -405,19 +417,20 @@ ebpo_status ebpo_scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *ca
 }
 
 ebpo_status ebpo_scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b, double clearance,
-                           ebpo_error *error)
+                                ebpo_error *error)
 {
     uint64_t n;
     ebpo_status status = ROOM(scene, rules, &n, error);
     if (status != EBPO_OK)
         return status;
-    scene->rules[scene->rules_count++] = (ebpo_scene_rule_entry){ a < b ? a : b, a < b ? b : a, clearance };
+    scene->rules[scene->rules_count++] =
+        (ebpo_scene_rule_entry){ a < b ? a : b, a < b ? b : a, clearance };
     scene->ignored += clearance < 0;
     scene->clearances += clearance >= 0;
     return EBPO_OK;
 }
 
-/* What a scene tells of itself. */
+/* --- returning members --- */
 
 static void add_times(const ebpo_scene *scene, ebpo_scene_counts *c)
 {

@@ -1,5 +1,12 @@
-/* Boxes, in each model's own coordinates, that hold all that another instance comes near: over
- * steps of time so short that nothing moves far. */
+/* Finds which part of each model's file a scene can call for in an interval of time: a box for
+ * collisions and for inside tests, and the last level for views.
+ *
+ * Boxes are in the model's own coordinates, and hold all that another instance comes near, over
+ * steps of time so short that no instance moves far. They are rounded outwards, so that a subset
+ * by them answers the same queries as the whole file.
+ *
+ * A view needs the levels whose cells are larger than a pixel: a node's envelope and what it
+ * stands for are both in its cell, so that finer levels cannot be told apart by a camera. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -10,7 +17,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "derive/subset_parts.h"
-#include "extras/scene/asked_pairs.h"
+#include "extras/scene/instance_pair.h"
 #include "extras/scene/scene_needs.h"
 
 enum { HALVINGS = 12 };
@@ -75,7 +82,8 @@ static ebpo_status near_box(const nearing *n, double from, double to, double mot
                             ebpo_scene_space *out, bool *any)
 {
     ebpo_scene_seen at, later;
-    ebpo_status status = ebpo_scene_seen_from(n->scene, n->of, n->other, from, &at, n->needs->error);
+    ebpo_status status =
+        ebpo_scene_seen_from(n->scene, n->of, n->other, from, &at, n->needs->error);
     if (status == EBPO_OK)
         status = ebpo_scene_seen_from(n->scene, n->of, n->other, to, &later, n->needs->error);
     if (status != EBPO_OK)
@@ -268,7 +276,8 @@ ebpo_subset_options ebpo_scene_need_options(const ebpo_scene_needs *needs, uint6
     return o;
 }
 
-ebpo_status ebpo_scene_tell_need(const ebpo_scene_needs *needs, uint64_t model, ebpo_scene_need *out)
+ebpo_status ebpo_scene_tell_need(const ebpo_scene_needs *needs, uint64_t model,
+                                 ebpo_scene_need *out)
 {
     uint64_t number = needs->scene->models[model].file;
     const ebpo_scene_file_need *need = &needs->files[number];
@@ -293,8 +302,7 @@ ebpo_status ebpo_scene_tell_need(const ebpo_scene_needs *needs, uint64_t model, 
     return status;
 }
 
-/* Levels that cameras can tell apart: a node's envelope and what it stands for are both in its
- * cell, so cells that are no larger than a pixel are enough. */
+/* --- views --- */
 
 enum { STEPS = 16 }; /* of a camera's way from key to key */
 
@@ -313,7 +321,8 @@ static void eye_box(const seeing *s, double from, double to, ebpo_scene_space *o
     memcpy(out->min, c->eye, sizeof out->min);
     if (c->route != EBPO_SCENE_NONE) {
         const ebpo_scene_route *route = &s->needs->scene->routes[c->route];
-        ebpo_scene_reach reach = { ebpo_scene_length_above(c->eye), ebpo_scene_length_above(c->eye) };
+        ebpo_scene_reach reach = { ebpo_scene_length_above(c->eye),
+                                   ebpo_scene_length_above(c->eye) };
         ebpo_scene_route_at(route, from, &at);
         length = ebpo_scene_route_step(route, from, to, reach).length;
         for (int i = 0; i < 3; i++)

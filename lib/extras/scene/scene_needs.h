@@ -1,15 +1,15 @@
-/* What of each file a scene can ever call for. */
+/* Which part of each model's file a scene can call for. */
 #ifndef EBPO_SCENE_SCENE_NEEDS_H
 #define EBPO_SCENE_SCENE_NEEDS_H
 
-#include "extras/scene/asked_pairs.h"
+#include "extras/scene/instance_pair.h"
 
 typedef struct ebpo_scene_file_need {
-    uint64_t askers;   /* pairs, or cameras that may see it */
-    bool any;          /* something is asked for; else nothing but the root */
+    uint64_t askers;        /* pairs, or cameras that may see it */
+    bool any;               /* something is asked for; else nothing but the root */
     ebpo_scene_space box;   /* collide, inside */
     ebpo_scene_space whole; /* of all faces */
-    int last_level;    /* view; else -1 */
+    int last_level;         /* view; else -1 */
     uint32_t parts;
 } ebpo_scene_file_need;
 
@@ -35,7 +35,7 @@ ebpo_subset_options ebpo_scene_need_options(const ebpo_scene_needs *needs, uint6
 
 /* Of one model, as the caller gets it. */
 EBPO_MUST_USE ebpo_status ebpo_scene_tell_need(const ebpo_scene_needs *needs, uint64_t model,
-                                          ebpo_scene_need *out);
+                                               ebpo_scene_need *out);
 
 /* What of each file the scene's cameras can see. */
 

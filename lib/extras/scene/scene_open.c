@@ -1,4 +1,9 @@
-/* Scene files and the models that they name. */
+/* Opens scene files, and loads the models that they name.
+ *
+ * Models of the same path share one open file. Where a scene file states a digest, the
+ * content_sha256 of the model's file must be equal. Loading sets the box of each model, on which
+ * bounds of motion rest; until then a scene has no boxes. A model for queries is made when it is
+ * first asked for. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -44,7 +49,8 @@ static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, e
 
 /* `folder` is taken over; NULL: there was no memory. */
 static ebpo_status open_parse(const char *text, size_t size, const char *name, char *folder,
-                         const ebpo_scene_options *options, ebpo_scene **out, ebpo_error *error)
+                              const ebpo_scene_options *options, ebpo_scene **out,
+                              ebpo_error *error)
 {
     ebpo_scene *scene = NULL;
     size_t mark = ebpo_scene_text_mark(text, size);
@@ -110,8 +116,8 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
     if (status == EBPO_OK)
         status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
     if (status == EBPO_OK)
-        status = open_parse((const char *)file.data, file.size, path, ebpo_scene_folder_of(path), &own, out,
-                       error);
+        status = open_parse((const char *)file.data, file.size, path, ebpo_scene_folder_of(path),
+                            &own, out, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_unchanged(&file, path, error);
     if (status != EBPO_OK) {
@@ -122,7 +128,7 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
     return status;
 }
 
-/* ---- models ---- */
+/* --- models --- */
 
 static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t most_expansion,
                              uint64_t *number, ebpo_error *error)
@@ -160,7 +166,8 @@ static void box_of(ebpo_scene_model_entry *m, const ebpo_info *info)
     }
 }
 
-static ebpo_status check_digest(const ebpo_scene_model_entry *m, const ebpo_info *info, ebpo_error *error)
+static ebpo_status check_digest(const ebpo_scene_model_entry *m, const ebpo_info *info,
+                                ebpo_error *error)
 {
     static const uint8_t none[32];
     if (memcmp(m->digest, none, 32) == 0 || memcmp(m->digest, info->content_sha256, 32) == 0)
@@ -195,7 +202,8 @@ static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint
     return status;
 }
 
-static ebpo_status check_reach(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, ebpo_error *error)
+static ebpo_status check_reach(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
+                               ebpo_error *error)
 {
     const ebpo_scene_model_entry *m = &scene->models[i->as.model];
     double reach[3];

@@ -1,4 +1,11 @@
-/* What a scene needs of its models. */
+/* Plans and packs a scene: which bytes of its models are needed, and a folder that has only those.
+ *
+ * Packing writes a subset of each file (scene_needs.c), copies the files of poses, and writes a
+ * scene file like the source's with other paths and digests. The folder is written beside its
+ * place and renamed when it is complete, so that it appears whole or not at all; on failure it is
+ * removed.
+ *
+ * A plan finds the same needs without writing anything. */
 #include "core/strict_fp.h"
 
 #include <fcntl.h>
@@ -18,10 +25,6 @@
 #include "extras/scene/scene_parts.h"
 #include "format/file_in.h"
 #include "io/file_source.h"
-
-/* Planning, as packing does it too. */
-
-/* The scene file of a packed scene: its source's, with other files and their digests. */
 
 /* Names in the folder: of the scene, of a file of scene->files, of a route's poses. */
 #define SCENE_PACKED "packed.scene.json"
@@ -201,8 +204,6 @@ static ebpo_status scene_write_packed(const ebpo_scene *scene, const ebpo_scene_
     return status;
 }
 
-/* A folder with what a scene needs: written beside its place, and put there whole. */
-
 typedef struct packing {
     ebpo_scene_needs needs;
     ebpo_pack_options how;
@@ -212,7 +213,7 @@ typedef struct packing {
     ebpo_error *error;
 } packing;
 
-/* ---- folders ---- */
+/* --- folders --- */
 
 static char *path_in(const char *folder, const char *name)
 {
@@ -256,7 +257,7 @@ static ebpo_status publish_folder(packing *p)
     return status;
 }
 
-/* ---- models ---- */
+/* --- models --- */
 
 /* What is on the disk. */
 static ebpo_status look_at(packing *p, const char *path, ebpo_scene_packed *out)
@@ -340,7 +341,7 @@ static ebpo_status write_files(packing *p)
     return status == EBPO_OK ? pack_shrink(p) : status;
 }
 
-/* ---- all of it ---- */
+/* --- all of it --- */
 
 static ebpo_status pack_check(packing *p, const ebpo_pack_options *options)
 {

@@ -1,4 +1,14 @@
-/* Which pairs of instances are asked about, and how far apart they shall be. */
+/* The broad phase of a scene: which pairs of instances may come near each other in an interval of
+ * time.
+ *
+ * Rules say which pairs are evaluated and which clearance they keep: of several rules for a pair
+ * the greatest clearance counts, and one that ignores the pair counts more than all others.
+ *
+ * The box of an instance holds it at all times of the interval. Between keys it is made in steps
+ * of little rotation, each widened by what the motion deviates from a straight line.
+ *
+ * Sweep and prune sorts boxes along the axis on which they overlap least by chance. Pairs are
+ * returned in the order of their instances. All tests err towards a pair that is not needed. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -74,8 +84,8 @@ static bool take_rule(double rule, double *clearance)
     return rule >= 0;
 }
 
-static bool by_sets(const ebpo_scene *scene, const ebpo_scene_instance_entry *x, const ebpo_scene_instance_entry *y,
-                    double *clearance)
+static bool by_sets(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
+                    const ebpo_scene_instance_entry *y, double *clearance)
 {
     for (uint32_t i = 0; i < x->set_count; i++)
         for (uint32_t k = 0; k < y->set_count; k++)
@@ -89,8 +99,8 @@ static bool is_in(const ebpo_scene_instance_entry *i, uint64_t set)
     return bsearch(&set, i->sets, i->set_count, sizeof set, compare_sets) != NULL;
 }
 
-static bool by_rules(const ebpo_scene *scene, const ebpo_scene_instance_entry *x, const ebpo_scene_instance_entry *y,
-                     double *clearance)
+static bool by_rules(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
+                     const ebpo_scene_instance_entry *y, double *clearance)
 {
     for (uint64_t i = 0; i < scene->rules_count; i++) {
         const ebpo_scene_rule_entry *r = &scene->rules[i];
@@ -114,7 +124,7 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
     return (few ? by_rules : by_sets)(scene, x, y, clearance);
 }
 
-/* Where instances are, in time: poses, boxes, and how far they move. */
+/* --- poses, boxes and motion --- */
 
 static const double slack = 0x1p-44;
 /* Of a turn, in radians, that is taken as one step of a box. */
@@ -125,7 +135,8 @@ static const ebpo_scene_route *route_of(const ebpo_scene *scene, const ebpo_scen
     return i->as.route == EBPO_SCENE_NONE ? NULL : &scene->routes[i->as.route];
 }
 
-static void pose_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double time, ebpo_pose *out)
+static void pose_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double time,
+                    ebpo_pose *out)
 {
     const ebpo_scene_route *route = route_of(scene, i);
     ebpo_pose moved;
@@ -170,7 +181,8 @@ ebpo_status ebpo_scene_pose(const ebpo_scene *scene, uint64_t instance, double t
 }
 
 /* Of the posed vertices; rounding is within. */
-static void posed_box(const ebpo_pose *pose, const ebpo_scene_model_entry *m, double min[3], double max[3])
+static void posed_box(const ebpo_pose *pose, const ebpo_scene_model_entry *m, double min[3],
+                      double max[3])
 {
     for (int i = 0; i < 3; i++) {
         double low = 0, high = 0, size = fabs(pose->translation[i]);
@@ -221,8 +233,8 @@ ebpo_scene_reach ebpo_scene_reach_of(const ebpo_scene *scene, const ebpo_scene_i
     return reach;
 }
 
-static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double time, double by,
-                   double min[3], double max[3])
+static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double time,
+                   double by, double min[3], double max[3])
 {
     double low[3], high[3];
     ebpo_pose pose;
@@ -232,8 +244,9 @@ static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, 
 }
 
 /* Between two times that no key is between, in steps of little turning. */
-static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, ebpo_scene_reach reach,
-                        double from, double to, double min[3], double max[3])
+static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
+                        ebpo_scene_reach reach, double from, double to, double min[3],
+                        double max[3])
 {
     const ebpo_scene_route *route = route_of(scene, i);
     ebpo_scene_step all = ebpo_scene_route_step(route, from, to, reach);
@@ -248,8 +261,8 @@ static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry
     }
 }
 
-static void swept_box(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double from, double to,
-                      double min[3], double max[3])
+static void swept_box(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double from,
+                      double to, double min[3], double max[3])
 {
     const ebpo_scene_route *route = route_of(scene, i);
     ebpo_scene_reach reach = ebpo_scene_reach_of(scene, i);
@@ -278,8 +291,8 @@ ebpo_status ebpo_scene_motion(const ebpo_scene *scene, uint64_t instance, double
     for (double at = from; route && at < to;) {
         double next = ebpo_scene_route_next(route, at, to);
         sum += ebpo_scene_route_step(route, at, next, reach).length;
-        bool key = next > route->keys[0].time &&
-                   ebpo_scene_route_next(route, next, INFINITY) > ebpo_scene_route_next(route, at, INFINITY);
+        bool key = next > route->keys[0].time && ebpo_scene_route_next(route, next, INFINITY) >
+                                                     ebpo_scene_route_next(route, at, INFINITY);
         if (route->jumps && key)
             sum = INFINITY;
         at = next;
@@ -313,7 +326,7 @@ ebpo_status ebpo_scene_box(const ebpo_scene *scene, double from, double to, doub
     return status;
 }
 
-/* The broad phase: sweep and prune along the axis on which boxes are spread most. */
+/* --- sweep and prune --- */
 
 /* 400 MB while they are sorted. */
 static const uint64_t most_pairs = UINT64_C(1) << 23;

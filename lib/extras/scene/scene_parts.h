@@ -1,4 +1,4 @@
-/* What a scene is made of, within the module. */
+/* What a scene is made of, and what the files of lib/extras/scene share. */
 #ifndef EBPO_SCENE_SCENE_PARTS_H
 #define EBPO_SCENE_SCENE_PARTS_H
 
@@ -48,7 +48,7 @@ typedef struct ebpo_scene_rule_entry {
 
 /* A growing list: items, how many, room. */
 #define EBPO_SCENE_LIST(type, name) \
-    type *name;                \
+    type *name;                     \
     uint64_t name##_count, name##_capacity
 
 struct ebpo_scene {
@@ -57,9 +57,9 @@ struct ebpo_scene {
     EBPO_SCENE_LIST(ebpo_scene_route, routes);
     EBPO_SCENE_LIST(ebpo_scene_camera, cameras);
     EBPO_SCENE_LIST(ebpo_scene_rule_entry, rules); /* sorted, once a file is read */
-    EBPO_SCENE_LIST(char *, sets);      /* names: "*", those of layers, groups and instances */
-    EBPO_SCENE_LIST(uint64_t, layers);  /* their sets */
-    EBPO_SCENE_LIST(uint64_t, groups);  /* the same, ascending */
+    EBPO_SCENE_LIST(char *, sets);     /* names: "*", those of layers, groups and instances */
+    EBPO_SCENE_LIST(uint64_t, layers); /* their sets */
+    EBPO_SCENE_LIST(uint64_t, groups); /* the same, ascending */
     EBPO_SCENE_LIST(ebpo_scene_file_entry, files);
     json_t *names; /* of each kind and of sets, with their numbers */
     uint64_t ignored, clearances;
@@ -73,7 +73,7 @@ struct ebpo_scene {
 
 #define EBPO_SCENE_ALL_SET 0
 
-/* ---- scene_names.c ---- */
+/* --- names --- */
 
 /* Kinds of names; sets are "", "layer:" and "group:". No name begins with a control character. */
 #define EBPO_SCENE_MODEL  "\001m"
@@ -84,41 +84,44 @@ struct ebpo_scene {
 /* EBPO_SCENE_NONE: there is none. */
 uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const char *name);
 
-/* ---- scene_make.c ---- */
+/* --- adding members --- */
 
 /* What only files can say. Texts are copied; numbers are valid. */
-EBPO_MUST_USE ebpo_status ebpo_scene_add_layer(ebpo_scene *scene, const char *name, ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_scene_add_group(ebpo_scene *scene, const char *name, ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_scene_add_route(ebpo_scene *scene, const char *name, uint64_t *number,
-                                          ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_scene_add_layer(ebpo_scene *scene, const char *name,
+                                               ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_scene_add_group(ebpo_scene *scene, const char *name,
+                                               ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_scene_add_route(ebpo_scene *scene, const char *name,
+                                               uint64_t *number, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera,
-                                           ebpo_error *error);
+                                                ebpo_error *error);
 /* Of the instance that was added last. */
 EBPO_MUST_USE ebpo_status ebpo_scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error);
 /* clearance below 0: ignored. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b,
-                                         double clearance, ebpo_error *error);
+                                              double clearance, ebpo_error *error);
 
-/* ---- scene_rules.c ---- */
+/* --- rules --- */
 
 /* Before the scene is handed out. */
 void ebpo_scene_sort_rules(ebpo_scene *scene);
 
-/* ---- scene_json.c ---- */
+/* --- scene files --- */
 
 /* EBPO_E_LIMIT, of a text of more than `most_bytes`. */
-ebpo_status ebpo_scene_too_long(const char *name, const ebpo_scene_options *options, ebpo_error *error);
+ebpo_status ebpo_scene_too_long(const char *name, const ebpo_scene_options *options,
+                                ebpo_error *error);
 /* Adds what `text` says to an empty scene with a folder. */
 EBPO_MUST_USE ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *text, size_t size,
-                                          const char *name, const ebpo_scene_options *options,
-                                          ebpo_error *error);
+                                               const char *name, const ebpo_scene_options *options,
+                                               ebpo_error *error);
 
-/* ---- route.c ---- */
+/* --- routes --- */
 
 /* Appends; a key's rotation is made a unit quaternion's. EBPO_E_ARGUMENT: not finite, time not
  * above the last or beyond 2^1000, no rotation, scale out of range. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *key,
-                                        ebpo_error *error);
+                                             ebpo_error *error);
 /* The quaternion nearest to a matrix, of any length but 0. */
 void ebpo_scene_turn_of_matrix(const double m[3][3], double turn[4]);
 void ebpo_scene_route_at(const ebpo_scene_route *route, double time, ebpo_pose *out);
@@ -143,7 +146,8 @@ typedef struct ebpo_scene_reach {
 typedef struct ebpo_scene_step {
     double length, sag;
 } ebpo_scene_step;
-ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from, double to, ebpo_scene_reach reach);
+ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from, double to,
+                                      ebpo_scene_reach reach);
 
 /* Of points that follow the route, anywhere on it: the part of their steps that does not become
  * shorter with them. */
@@ -151,37 +155,37 @@ double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_reach
 
 /* How far the distance of two things that ride on what moves along the route changes on its way
  * from .. to, at most, by rounding too. reach: the sum of both. from < to. */
-double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, double to, ebpo_scene_reach reach);
+double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, double to,
+                               ebpo_scene_reach reach);
 
-/* ---- scene_boxes.c ---- */
+/* --- boxes --- */
 
 /* Of the instance's points, from the origin of what moves along its route. */
-ebpo_scene_reach ebpo_scene_reach_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *instance);
+ebpo_scene_reach ebpo_scene_reach_of(const ebpo_scene *scene,
+                                     const ebpo_scene_instance_entry *instance);
 
-/* ---- scene_csv.c ---- */
-
-/* ---- scene_paths.c ---- */
+/* --- files that a scene names --- */
 
 /* NULL, or why the scene may not name this file. */
 const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *options,
-                               bool has_digest);
+                                    bool has_digest);
 /* `path` as it is opened: malloc's, NULL without memory. */
 char *ebpo_scene_join_path(const char *folder, const char *path);
 /* Of a path as it is opened, of a scene with this folder that may not name others: EBPO_E_FORMAT
  * where links lead it out of the folder. EBPO_E_IO, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_scene_stays_within(const char *folder, const char *path,
-                                             ebpo_error *error);
+                                                  ebpo_error *error);
 /* The part of a path up to its last "/", or "": malloc's. */
 char *ebpo_scene_folder_of(const char *path);
 
-/* ---- json_text.c ---- */
+/* --- the text of a scene file --- */
 
 /* Bytes of a byte order mark of UTF-8 that a text begins with: 0 or 3. */
 size_t ebpo_scene_text_mark(const char *text, size_t size);
 
 /* EBPO_E_LIMIT: more than so many values or 32 levels of them, seen without parsing. */
 EBPO_MUST_USE ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t most_values,
-                                          ebpo_error *error);
+                                               ebpo_error *error);
 
 /* A member's place: keys, and numbers of items where the key is NULL. */
 typedef struct ebpo_scene_at {

@@ -1,3 +1,13 @@
+/* Two instances of a scene at a time: where one is in the other's coordinates, how far they move
+ * relative to each other, how far they are apart, and what their files omit that may matter.
+ *
+ * Boxes and lengths are rounded outwards, so that every bound is certain in spite of rounding. A
+ * file that is a subset has only the faces of its kept box: what it omits is bounded by up to six
+ * boxes around that one. Two instances that follow one route have a relative motion of rounding
+ * and scale alone.
+ *
+ * A list of pairs is evaluated on all cores by ebpo_scene_find_in_pairs, each pair by itself with
+ * its own collider, so that results do not depend on the number of threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -6,8 +16,9 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "extras/collide/of_parts.h"
-#include "extras/scene/asked_pairs.h"
+#include "extras/scene/instance_pair.h"
 #include "geometry/pose.h"
 
 /* of sums of a few products: far above their rounding */
@@ -53,7 +64,7 @@ static void pose_box(const ebpo_posing *p, const ebpo_scene_model_entry *m, pose
 }
 
 ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
-                            ebpo_scene_seen *out, ebpo_error *error)
+                                 ebpo_scene_seen *out, ebpo_error *error)
 {
     const ebpo_scene_model_entry *m = left_out_model_of(scene, of);
     ebpo_posing from, at;
@@ -114,7 +125,8 @@ static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_spac
 }
 
 /* Of `other` to what is in the box `all` and not in `held`: up to six boxes on its sides. */
-static double gap_around(const ebpo_scene_space *all, const ebpo_scene_space *held, const ebpo_scene_space *other)
+static double gap_around(const ebpo_scene_space *all, const ebpo_scene_space *held,
+                         const ebpo_scene_space *other)
 {
     double gap = INFINITY;
     for (int k = 0; k < 3; k++) {
@@ -148,7 +160,7 @@ static ebpo_status left_out_of(const ebpo_scene *scene, uint64_t of, uint64_t ot
 }
 
 ebpo_status ebpo_scene_left_out(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
-                           double *gap, uint64_t *lacking, ebpo_error *error)
+                                double *gap, uint64_t *lacking, ebpo_error *error)
 {
     double of_a, of_b;
     ebpo_status status = left_out_of(scene, pair->a, pair->b, time, &of_a, error);
@@ -162,7 +174,7 @@ ebpo_status ebpo_scene_left_out(const ebpo_scene *scene, const ebpo_scene_pair *
 }
 
 ebpo_status ebpo_scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
-                        double time, bool solids, ebpo_error *error)
+                             double time, bool solids, ebpo_error *error)
 {
     const ebpo_scene_model_entry *m = left_out_model_of(scene, lacking);
     return ebpo_fail(
@@ -200,7 +212,9 @@ static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair
         uint64_t instance = i ? pair->b : pair->a;
         const ebpo_scene_route *route = route_of(scene, instance);
         if (route)
-            sum += ebpo_scene_route_rounding(route, ebpo_scene_reach_of(scene, &scene->instances[instance]));
+            sum +=
+                ebpo_scene_route_rounding(route,
+                                          ebpo_scene_reach_of(scene, &scene->instances[instance]));
     }
     return sum;
 }
@@ -213,13 +227,13 @@ static double pair_motion_ride(const ebpo_scene *scene, const ebpo_scene_pair *p
     ebpo_scene_reach a = ebpo_scene_reach_of(scene, &scene->instances[pair->a]);
     ebpo_scene_reach b = ebpo_scene_reach_of(scene, &scene->instances[pair->b]);
     return ebpo_scene_route_growth(route_of(scene, pair->a), from, to,
-                              (ebpo_scene_reach){ a.length + b.length, a.size + b.size });
+                                   (ebpo_scene_reach){ a.length + b.length, a.size + b.size });
 }
 
 /* Their distance changes by no more than *out on its way between two times, INFINITY over a jump.
  * rides: as pair_rides says. */
 static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair, bool rides,
-                              double from, double to, double *out, ebpo_error *error)
+                               double from, double to, double *out, ebpo_error *error)
 {
     double a, b;
     ebpo_status status = ebpo_scene_motion(scene, pair->a, from, to, &a, error);
@@ -233,7 +247,8 @@ static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *p
     return EBPO_OK;
 }
 
-double ebpo_scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from, double to)
+double ebpo_scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
+                            double to)
 {
     double next = to;
     for (int i = 0; i < 2; i++) {
@@ -244,7 +259,7 @@ double ebpo_scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair
     return next;
 }
 
-/* Pairs of instances that are asked about one after the other, by any thread. */
+/* --- lists of pairs --- */
 
 static bool keep_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count)
 {
@@ -257,7 +272,7 @@ static bool keep_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count)
 }
 
 ebpo_status ebpo_scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pairs, uint64_t count,
-                              ebpo_error *error)
+                                   ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_model *model;
@@ -268,8 +283,8 @@ ebpo_status ebpo_scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pai
     return status;
 }
 
-ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double to, ebpo_scene_pairs_list *out,
-                             ebpo_error *error)
+ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double to,
+                                  ebpo_scene_pairs_list *out, ebpo_error *error)
 {
     *out = (ebpo_scene_pairs_list){ 0 };
     ebpo_status status = ebpo_scene_pairs(scene, from, to, keep_pairs, out, error);
@@ -278,8 +293,9 @@ ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double t
     return status;
 }
 
-ebpo_status ebpo_scene_list_pairs(ebpo_scene *scene, double from, double to, ebpo_scene_pairs_list *out,
-                             ebpo_error *error)
+/* The same; their models are made. On failure there is nothing to free. */
+static ebpo_status list_pairs(ebpo_scene *scene, double from, double to, ebpo_scene_pairs_list *out,
+                              ebpo_error *error)
 {
     ebpo_status status = ebpo_scene_keep_pairs(scene, from, to, out, error);
     if (status == EBPO_OK)
@@ -291,7 +307,44 @@ ebpo_status ebpo_scene_list_pairs(ebpo_scene *scene, double from, double to, ebp
     return status;
 }
 
-static ebpo_model *asked_pairs_model_of(const ebpo_scene *scene, uint64_t instance)
+typedef struct pair_finds {
+    const ebpo_scene_search *search;
+    const ebpo_scene_pair *pairs;
+    char *results;
+} pair_finds;
+
+static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    const pair_finds *f = context;
+    const ebpo_scene_search *s = f->search;
+    ebpo_status status = EBPO_OK;
+    (void)worker;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
+        status = s->find(s->how, &f->pairs[i], f->results + i * s->result_size, error);
+    return status;
+}
+
+ebpo_status ebpo_scene_find_in_pairs(ebpo_scene *scene, double from, double to,
+                                     const ebpo_scene_search *search, void **results,
+                                     uint64_t *count, ebpo_error *error)
+{
+    ebpo_scene_pairs_list list;
+    ebpo_status status = list_pairs(scene, from, to, &list, error);
+    *count = list.count;
+    *results = ebpo_alloc(list.count, search->result_size);
+    if (status == EBPO_OK && !*results)
+        status = ebpo_fail_memory(error, list.count * search->result_size);
+    pair_finds finds = { search, list.pairs, *results };
+    if (status == EBPO_OK)
+        status =
+            ebpo_parallel_for(ebpo_thread_count(search->threads), NULL, list.count, search->grain,
+                              find_some, &finds, search->progress, search->stage, error);
+    free(list.pairs);
+    return status;
+}
+
+static ebpo_model *opened_model(const ebpo_scene *scene, uint64_t instance)
 {
     return scene->files[scene->models[scene->instances[instance].as.model].file].model;
 }
@@ -302,20 +355,20 @@ static bool has_mesh(const ebpo_scene *scene, uint64_t instance)
     return ebpo_file_info(ebpo_scene_file(scene, model))->parts & EBPO_PART_MESH;
 }
 
-ebpo_status ebpo_scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair, unsigned threads,
-                           ebpo_collider **out, ebpo_error *error)
+ebpo_status ebpo_scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
+                                unsigned threads, ebpo_collider **out, ebpo_error *error)
 {
     ebpo_collider_options how = EBPO_COLLIDER_OPTIONS_INIT;
     how.threads = threads;
     *out = NULL;
     if (!has_mesh(scene, pair->a) || !has_mesh(scene, pair->b))
         return EBPO_OK;
-    return ebpo_collider_of_parts(asked_pairs_model_of(scene, pair->a),
-                                  asked_pairs_model_of(scene, pair->b), &how, out, error);
+    return ebpo_collider_of_parts(opened_model(scene, pair->a), opened_model(scene, pair->b), &how,
+                                  out, error);
 }
 
 ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
-                            ebpo_collide_options *out, ebpo_error *error)
+                                 ebpo_collide_options *out, ebpo_error *error)
 {
     ebpo_status status = ebpo_scene_pose(scene, pair->a, time, &out->pose_a, error);
     return status == EBPO_OK ? ebpo_scene_pose(scene, pair->b, time, &out->pose_b, error) : status;
@@ -338,7 +391,8 @@ static ebpo_status ask_distance(ebpo_scene_looks *l, double time, double *lo, do
     return status;
 }
 
-ebpo_status ebpo_scene_look(ebpo_scene_looks *l, double time, double *lo, double *hi, ebpo_error *error)
+ebpo_status ebpo_scene_look(ebpo_scene_looks *l, double time, double *lo, double *hi,
+                            ebpo_error *error)
 {
     l->gap = INFINITY;
     ebpo_status status = ask_distance(l, time, lo, hi, error);
@@ -348,8 +402,8 @@ ebpo_status ebpo_scene_look(ebpo_scene_looks *l, double time, double *lo, double
     return status;
 }
 
-ebpo_status ebpo_scene_looks_begin(ebpo_scene_looks *l, const ebpo_scene *scene, const ebpo_scene_pair *pair,
-                              double tolerance, ebpo_error *error)
+ebpo_status ebpo_scene_looks_begin(ebpo_scene_looks *l, const ebpo_scene *scene,
+                                   const ebpo_scene_pair *pair, double tolerance, ebpo_error *error)
 {
     *l = (ebpo_scene_looks){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
     /* finer ones would take long, for digits that the next pose has otherwise */
@@ -359,7 +413,7 @@ ebpo_status ebpo_scene_looks_begin(ebpo_scene_looks *l, const ebpo_scene *scene,
 }
 
 ebpo_status ebpo_scene_looks_motion(const ebpo_scene_looks *l, double from, double to, double *out,
-                               ebpo_error *error)
+                                    ebpo_error *error)
 {
     return pair_motion(l->scene, l->pair, l->rides, from, to, out, error);
 }
@@ -370,7 +424,7 @@ bool ebpo_scene_is_within(double hi, double lo, double tolerance)
 }
 
 ebpo_status ebpo_scene_take_way_options(ebpo_scene_way_options *own,
-                                   const ebpo_scene_way_options *options, ebpo_error *error)
+                                        const ebpo_scene_way_options *options, ebpo_error *error)
 {
     ebpo_status status = EBPO_TAKE(ebpo_scene_way_options, own, options, error);
     if (status == EBPO_OK && !(own->tolerance > 0 && own->tolerance < INFINITY))
