@@ -170,8 +170,9 @@ static ebpo_status construct_arrange(ebpo_builder *b, ebpo_mesh *mesh, ebpo_erro
     return ebpo_bounds_make(b, error);
 }
 
-static ebpo_status construct_prepare(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                           const ebpo_build_options *options, ebpo_error *error)
+static ebpo_status construct_prepare(ebpo_builder *b, ebpo_mesh *mesh,
+                                     const ebpo_mesh_report *report,
+                                     const ebpo_build_options *options, ebpo_error *error)
 {
     b->options = options;
     b->threads = ebpo_thread_count(options->threads);

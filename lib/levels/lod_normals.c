@@ -219,7 +219,8 @@ static ebpo_status lod_normals_prepare(lighting *l, ebpo_error *error)
                                                 nodes * (sizeof *l->at + 8 * sizeof *l->sum));
 }
 
-static ebpo_status lod_normals_check(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes, ebpo_error *error)
+static ebpo_status lod_normals_check(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes,
+                                     ebpo_error *error)
 {
     uint64_t triangles = 0;
     if (!mesh->xyz64 && mesh->face_count)

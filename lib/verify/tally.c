@@ -43,7 +43,7 @@ static int print_place(char *out, size_t size, const ebpo_verify_place *place)
 /* Equal places (two findings about one node) are told apart by their text, so that merging does not
  * depend on order. */
 static void tally_record(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
-                   const char *text)
+                         const char *text)
 {
     int order = tally->violations[kind] ? compare_places(place, &tally->place[kind]) : -1;
     tally->violations[kind]++;

@@ -133,7 +133,7 @@ static bool same_head(const ebpo_attribute *a, const ebpo_attribute *b)
 
 /* The digest and the bytes of an image that was not there are no claim. */
 static bool source_unknown(const ebpo_attribute *source, uint64_t at, const ebpo_attribute *stored,
-                    uint64_t i)
+                           uint64_t i)
 {
     return !ebpo_texture_list(source, at).count || !ebpo_texture_list(stored, i).count;
 }
@@ -204,7 +204,7 @@ static int compare_faces(const void *a, const void *b, void *mesh)
 
 /* 0 .. count - 1, sorted; NULL when memory is short. */
 static uint32_t *source_sorted(const ebpo_mesh *mesh, uint64_t count,
-                        int (*source_compare)(const void *, const void *, void *))
+                               int (*source_compare)(const void *, const void *, void *))
 {
     uint32_t *order = ebpo_array_alloc(mesh->workspace, count, sizeof *order);
     if (!order)
@@ -323,8 +323,8 @@ static bool was_rounded(const ebpo_info *info, const ebpo_mesh *source)
            strncmp(source->source_format, "ply", 3) != 0;
 }
 
-static ebpo_status source_compare(ebpo_tally *tally, const ebpo_mesh *mended, const ebpo_mesh *stored,
-                           bool ordered, ebpo_error *error)
+static ebpo_status source_compare(ebpo_tally *tally, const ebpo_mesh *mended,
+                                  const ebpo_mesh *stored, bool ordered, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     bool comparable =

@@ -1,5 +1,17 @@
-/* The nearest point of a cone lies in its inside, on a plane, or on a line of two: all are tried,
- * there are few. Else it is the apex. */
+/* Follows a ball along a straight piece of its way, to the first face that it touches, and checks
+ * that its centre goes through none.
+ *
+ * Nodes of the tree over the faces are visited in the order in which the ball may touch them,
+ * until the next one would be touched after a face that is known. The distance from a box is
+ * convex along a line, as that from a face is: Newton's steps towards the ball's radius never go
+ * too far. Of the nodes that the ball touches already the closest come first.
+ *
+ * The work is bounded for each haptic step. Where it ends early, the ball goes as far as the next
+ * node allows; it is held by what is known if that holds it where it is; otherwise the next step
+ * goes on.
+ *
+ * The nearest point of the cone that planes leave free is in its inside, on a plane or on the line
+ * of two planes: all are tried, since there are few; otherwise it is the apex. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -82,13 +94,7 @@ void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3])
         ebpo_vec3_copy(normal, planes->normal[planes->count++]);
 }
 
-/* The tree's nodes are taken in the order in which the ball may come to touch them, and no more
- * when the next one is touched after a face that is known. The distance from a box is convex along
- * a line, as that from a face is: Newton's steps towards the ball's radius never go too far. Of
- * those that it may touch already the closest are first: if it is held there, that is known soon.
- *
- * Where a tick's work ends before, the ball goes as far as the next node allows, if that is worth
- * it; it is held by what is known if it is held where it is; else the next tick goes on. */
+/* --- the walk --- */
 
 enum {
     STEPS = 6,

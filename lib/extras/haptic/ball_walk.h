@@ -1,5 +1,5 @@
-/* A way that planes through its beginning hold back: the nearest that is allowed to where it wanted
- * to end. */
+/* A straight piece of a ball's way: where it first touches a face, and that its centre goes
+ * through none. The work is done in shares, and goes on where it ended. */
 #ifndef EBPO_HAPTIC_BALL_WALK_H
 #define EBPO_HAPTIC_BALL_WALK_H
 

@@ -1,3 +1,14 @@
+/* The faces in a box around the proxy, with a tree of boxes over them: all that a haptic step
+ * reads.
+ *
+ * The loading thread makes a box; a box never changes while a step uses it. Faces keep the order
+ * of the file, which follows a curve, so that the tree needs no sorting. What steps call takes no
+ * memory, and its work is bounded by limits that callers give.
+ *
+ * Distances are in doubles, and are right within a few ulps. The side of a point is exact: its
+ * winding number changes at each face that a straight way crosses through its inside. Where the
+ * way meets an edge, or begins in a face's plane, it goes by way of another point, as almost every
+ * one will do. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -234,6 +245,8 @@ double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *arou
     return sqrt(find_square(box, around, most_visits, visits)) * (1 - 0x1p-48);
 }
 
+/* --- the nearest point of a face --- */
+
 /* The distance from a face, a convex set, is a convex function along a line: where it falls,
  * tangents lie below it, so that Newton's steps towards a distance never go too far. That finds
  * when a ball touches a face, whichever of its features it is. */
@@ -412,7 +425,7 @@ bool ebpo_segment_may_meet(const double p[3], const double q[3], const double fa
     return !(left && right);
 }
 
-int ebpo_segment_crosses(const double p[3], const double q[3], const double face[3][3])
+static int segment_crosses(const double p[3], const double q[3], const double face[3][3])
 {
     if (!ebpo_segment_may_meet(p, q, face))
         return 0;
@@ -453,9 +466,7 @@ ebpo_near_node ebpo_near_pop(ebpo_near_queue *queue)
     return first;
 }
 
-/* A straight way counts the faces that it crosses well: through the inside, from one side of the
- * plane to the other. Where it meets an edge or begins in a face's plane, it goes by way of another
- * place: almost every one will do. */
+/* --- the side of a point --- */
 
 enum { PIECES = 12 };
 
@@ -481,7 +492,7 @@ static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const dou
     if (!all)
         return TOO_MANY;
     for (uint32_t i = 0; i < count; i++) {
-        int sign = ebpo_segment_crosses(side->at, to, (const double(*)[3])box->corner[found[i]]);
+        int sign = segment_crosses(side->at, to, (const double(*)[3])box->corner[found[i]]);
         if (sign == EBPO_CROSSES_BADLY)
             return BADLY;
         change += sign;

@@ -1,5 +1,6 @@
-/* The faces in a box, with a tree of boxes over them: what a tick works on. Made by the loading
- * thread, never changed while a tick has it. */
+/* The faces in a box with a tree of boxes over them, on which a haptic step works; distances from
+ * faces and the side of a point. The loading thread makes a box; it never changes while a step
+ * uses it. */
 #ifndef EBPO_HAPTIC_FACE_BOX_H
 #define EBPO_HAPTIC_FACE_BOX_H
 
@@ -86,7 +87,6 @@ bool ebpo_segment_may_meet(const double p[3], const double q[3], const double fa
  * 0: they have no common point. EBPO_CROSSES_BADLY: through an edge, a corner, from or to the
  * face's plane, or perhaps not at all. No memory is taken. */
 enum { EBPO_CROSSES_BADLY = 2 };
-int ebpo_segment_crosses(const double p[3], const double q[3], const double face[3][3]);
 
 /* Nodes of the tree over a box's faces, the one with the least key first. A heap in an array that
  * its owner gives. */

@@ -1,3 +1,10 @@
+/* The first levels of an octree, kept in memory for probes: bounds of the distance to the surface,
+ * and the winding number of cells without faces, without reading a file.
+ *
+ * There are at most 2^17 nodes, of 6 levels or fewer below the root. A node has its box, its
+ * children, whether any face comes near its cell, and otherwise its winding number. Bounds are
+ * certain: they allow for the rounding of the model's coordinates. A query visits at most as many
+ * nodes as its caller allows, and returns wider bounds when that is too few. */
 #include "core/strict_fp.h"
 
 #include "extras/haptic/held_levels.h"
@@ -13,7 +20,7 @@
 enum { DEEPEST = 6, MOST = 1 << 17 };
 
 static ebpo_status held_levels_keep(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
-                        ebpo_held_levels *out, ebpo_error *error)
+                                    ebpo_held_levels *out, ebpo_error *error)
 {
     ebpo_box box = ebpo_root_box(ebpo_file_info(file));
     out->node = ebpo_alloc_zero(nodes->node_count, sizeof *out->node);

@@ -1,3 +1,14 @@
+/* A tool: a rigid set of points that move together, the contacts that hold it, and the forces that
+ * it returns.
+ *
+ * Points are split at the middle of their longest side into clusters of few points. A rotation is
+ * measured as a length: its angle times the tool's arm.
+ *
+ * The way of a tool is held back by its contacts: the nearest way to the wanted one that takes no
+ * point closer to a face than it may be. Hildreth's method solves that for the contacts that
+ * matter, which are added one at a time, the most violated first.
+ *
+ * Forces are passive: they are reduced where the hand would receive more energy than it gave. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -120,8 +131,7 @@ void ebpo_rigid_matrix(const ebpo_rigid *r, double out[3][3])
     }
 }
 
-/* Hildreth's method for the few contacts that matter, which are found one after the other: of all,
- * the one that the way so far offends most. */
+/* --- contacts --- */
 
 enum { ACTIVE = 12, SWEEPS = 20 };
 
@@ -169,7 +179,7 @@ static double tool_hold_lacks(const held *h, const ebpo_tool_contact *c,
                               const double way[EBPO_SCREW])
 {
     double room = h->release ? c->room : fmax(c->room, 0);
-    return -room - screw_dot(c->grip, way);
+    return -room - ebpo_screw_dot(c->grip, way);
 }
 
 static void tool_hold_sweep(held *h, double close, double way[EBPO_SCREW])
@@ -219,7 +229,7 @@ int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW],
             break;
         h.active[h.count] = next;
         h.force[h.count] = 0;
-        h.square[h.count++] = screw_dot(all->at[next].grip, all->at[next].grip);
+        h.square[h.count++] = ebpo_screw_dot(all->at[next].grip, all->at[next].grip);
         tool_hold_sweep(&h, close, out);
     }
     for (int i = 0; i < h.count; i++)
@@ -227,7 +237,7 @@ int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW],
     return holding;
 }
 
-/* Points are parted at the middle of their longest side until few are left. */
+/* --- the tool --- */
 
 typedef struct placed {
     double p[3];

@@ -1,5 +1,5 @@
-/* Energy that a hand is given and that was taken from it: forces are made weaker where it would get
- * more than it gave. In three coordinates or six. */
+/* A tool: points that move together, its contacts, rigid motions, and passive forces. For each
+ * point a distance is known for which it meets no face; only points beyond it are examined. */
 #ifndef EBPO_HAPTIC_TOOL_H
 #define EBPO_HAPTIC_TOOL_H
 
@@ -22,7 +22,7 @@ void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *move
 void ebpo_passive_push(const ebpo_passive *p, double damping, const double *depth,
                        const double *moved, int n, double *force);
 
-/* Inside lib/extras/haptic: rigid motions, of which a tool's turning is measured in lengths: angles
+/* Rigid motions, of which a tool's turning is measured in lengths: angles
  * times the tool's arm. */
 
 typedef struct ebpo_rigid {
@@ -50,12 +50,15 @@ static inline void ebpo_rigid_lever(const double matrix[3][3], const double p[3]
         out[i] = ebpo_vec3_dot(matrix[i], p);
 }
 
-static inline double screw_dot(const double a[EBPO_SCREW], const double b[EBPO_SCREW])
+static inline double ebpo_screw_dot(const double a[EBPO_SCREW], const double b[EBPO_SCREW])
 {
     return ebpo_vec3_dot(a, b) + ebpo_vec3_dot(a + 3, b + 3);
 }
 
-static inline double screw_length(const double a[EBPO_SCREW]) { return sqrt(screw_dot(a, a)); }
+static inline double ebpo_screw_length(const double a[EBPO_SCREW])
+{
+    return sqrt(ebpo_screw_dot(a, a));
+}
 
 /* A tool's way, held back by what its points touch: the nearest one to the way it wants, that takes
  * no point closer to a face than it may. */
@@ -83,7 +86,7 @@ void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *con
 int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW], double close,
                    bool release, double out[EBPO_SCREW]);
 
-/* Inside lib/extras/haptic: a tool, which is points that are moved together. Of each it is known
+/* A tool, which is points that are moved together. Of each it is known
  * how far it may go before it could meet a face; only of those that may is more found out. */
 
 enum {

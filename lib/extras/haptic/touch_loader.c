@@ -1,5 +1,9 @@
-/* Exact answers for where a probe was a moment ago: asked by the thread that loads, handed over as
- * boxes are. */
+/* The thread that loads boxes of faces ahead of the hand, and exact results for probes.
+ *
+ * A haptic step never waits for it. Boxes and results are handed over through buffers that are
+ * exchanged atomically: the loader writes its own one and swaps it with the one between, which the
+ * step swaps with one of its own. Where the hand goes is predicted from its speed. When a box has
+ * more faces than there is room for, a smaller one is loaded. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -31,7 +35,8 @@ static ebpo_status known_ask(ebpo_touch *t, ebpo_known_place *out, ebpo_error *e
     return EBPO_OK;
 }
 
-ebpo_status ebpo_touch_learn(ebpo_touch *t, bool *moved, ebpo_error *error)
+/* touch_known.c: the loading thread asks about the place where a probe is. True: it has moved. */
+static ebpo_status learn_place(ebpo_touch *t, bool *moved, ebpo_error *error)
 {
     ebpo_known_place *known = &t->known[t->own_known];
     for (int i = 0; i < 3; i++)
@@ -59,7 +64,7 @@ const ebpo_known_place *ebpo_touch_known(ebpo_touch *t)
     return &t->known[t->answer];
 }
 
-/* The thread that loads boxes ahead of the hand. */
+/* --- boxes --- */
 
 /* Seconds that a box should be ahead of the hand, and over which its speed is measured; of half a
  * box's side, how far the proxy may be from the middle when it is made, and how far the middle
@@ -165,7 +170,7 @@ static void *loader_run(void *user)
         if (far_from_last(t, &centres))
             status = loader_load(t, goal, &error);
         else if (t->options.kind == EBPO_TOUCH_PROBE)
-            status = ebpo_touch_learn(t, &moved, &error);
+            status = learn_place(t, &moved, &error);
         if (status == EBPO_OK && !moved)
             wait_a_little();
     }

@@ -1,4 +1,12 @@
-/* A tick. */
+/* The object of a haptic session: its options and memory, the step of a ball, and where the hand
+ * is put.
+ *
+ * A step moves the proxy towards the hand (touch_step.c), and returns the force of a spring
+ * between them, with friction along the surface, held back by the planes that the proxy touches. A
+ * step takes no memory, no lock and no file access: all that it uses is made before or is handed
+ * over by the loading thread. A hand at infinity or NaN stays where it was.
+ *
+ * Source: docs/guide/touch.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -166,7 +174,7 @@ uint32_t ebpo_touch_way(const ebpo_touch *t, double way[EBPO_TOUCH_WAY_MOST][3])
     return t->way_count;
 }
 
-/* Making the object, and putting the hand somewhere. */
+/* --- making the object --- */
 
 static bool is_amount(double x) { return x >= 0 && x <= 0x1p200; }
 

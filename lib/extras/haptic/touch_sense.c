@@ -1,4 +1,10 @@
-/* A tick of a probe: bounds from three sources, of which each is certain. */
+/* A haptic step of a probe: bounds of its distance to the surface, and on which side it is.
+ *
+ * Bounds come from three sources, of which each is certain: the faces of the box at hand, the
+ * exact result for a point where the probe was a moment ago, and the first levels of the octree.
+ * Their intersection is returned. The side is the winding number, which exact arithmetic changes
+ * at each face that the probe crosses; where that cannot be found in a step's time it is
+ * EBPO_MAYBE. */
 #include "core/strict_fp.h"
 
 #include <math.h>

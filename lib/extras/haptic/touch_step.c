@@ -1,4 +1,12 @@
-/* The tick's side of handing boxes over. */
+/* The way of the proxy in a haptic step: straight on until the ball touches, then along what it
+ * touches, a few times.
+ *
+ * Each straight piece is decided twice: by distances, which find where the ball stops, and by
+ * exact arithmetic, which finds that the centre went through no face. A piece takes several steps
+ * if very many faces are around.
+ *
+ * Also here: taking over a box that the loading thread has made, and the nearest face with a
+ * normal that changes continuously. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -34,7 +42,7 @@ void ebpo_touch_try_other(ebpo_touch *t)
         swap_boxes(t);
 }
 
-/* What is around the proxy: the nearest face, and a normal that turns steadily. */
+/* --- the nearest face --- */
 
 typedef struct around {
     ebpo_touch *t;
@@ -165,10 +173,7 @@ void ebpo_touch_look(ebpo_touch *t, ebpo_touch_result *out)
     out->depth = -fmin(t->options.look, a.nearest - t->options.radius);
 }
 
-/* The proxy's way of a tick: straight on until a ball touches, then along what it touches, a few
- * times. Each straight piece is decided twice: by distances, which say where the ball stops, and by
- * exact arithmetic, which says that the centre went through nothing. A piece may take several
- * ticks, if very many faces are around. */
+/* --- the way --- */
 
 typedef struct step {
     ebpo_touch *t;

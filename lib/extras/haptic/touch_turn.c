@@ -1,7 +1,11 @@
-/* A piece of a tool's way. First each point that may meet a face is followed along it, to where the
- * first one comes too close. Then all these points are looked at where they will be: exact
- * arithmetic says that they went through nothing, and distances, that they are not too close. Only
- * then the tool is there. Both may take several ticks, if many points are close. */
+/* A haptic step of a tool. Gauss' principle for a body without mass: of all ways that its contacts
+ * allow, the nearest to the hand (Ortega, Redon, Coquillart 2007).
+ *
+ * A piece of the way is decided in two passes. First each point that may meet a face is followed
+ * along it, up to where the first one comes too close. Then all these points are examined at their
+ * new positions: exact arithmetic finds that they went through no face, and distances find that
+ * they are not too close. Only then the tool is there. Both passes may take several steps, if many
+ * points are close. */
 #include "core/strict_fp.h"
 
 #include "core/fp_env.h"
@@ -240,7 +244,7 @@ static void tool_step_limit(ebpo_touch *t, double way[EBPO_SCREW], uint32_t *fla
     double angle = sqrt(ebpo_vec3_dot(way + 3, way + 3)) / tool->arm, part = 1;
     if (angle > most)
         part = most / angle;
-    double length = screw_length(way);
+    double length = ebpo_screw_length(way);
     if (part * length > t->stride)
         part = t->stride / length;
     if (part >= 1)
@@ -250,7 +254,9 @@ static void tool_step_limit(ebpo_touch *t, double way[EBPO_SCREW], uint32_t *fla
         way[k] *= part;
 }
 
-bool ebpo_tool_set_out(ebpo_touch *t, const double wanted[EBPO_SCREW], uint32_t *flags)
+/* tool_step.c: a tool's next piece of way; flags are given when it is there. False: it cannot
+ * begin. */
+static bool begin_tool_way(ebpo_touch *t, const double wanted[EBPO_SCREW], uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
     for (int k = 0; k < EBPO_SCREW; k++)
@@ -280,12 +286,13 @@ bool ebpo_tool_set_out(ebpo_touch *t, const double wanted[EBPO_SCREW], uint32_t 
 /* A way along which too much is close: a shorter one the next time. */
 static uint32_t give_up(tool_piece *p)
 {
-    p->t->stride = fmax(0.25 * screw_length(p->tool->way), 0x1p-8 * p->skin);
+    p->t->stride = fmax(0.25 * ebpo_screw_length(p->tool->way), 0x1p-8 * p->skin);
     p->tool->stage = EBPO_TOOL_STANDS;
     return EBPO_TOUCH_SHORT;
 }
 
-uint32_t ebpo_tool_go_on(ebpo_touch *t, uint64_t *work, bool *arrived)
+/* Goes on with it; bits of ebpo_touch_flag. */
+static uint32_t continue_tool_way(ebpo_touch *t, uint64_t *work, bool *arrived)
 {
     tool_piece p = piece_of(t, work);
     ebpo_tool *tool = t->tool;
@@ -311,8 +318,7 @@ uint32_t ebpo_tool_go_on(ebpo_touch *t, uint64_t *work, bool *arrived)
     return tool->part < 1 ? 0 : tool->flags;
 }
 
-/* A tick of a tool. Gauss' principle for a body without mass: of all ways that its contacts allow,
- * the one nearest to where the hand is (Ortega, Redon, Coquillart 2007). */
+/* --- the step --- */
 
 static double turn_closeness(const ebpo_touch *t) { return 0x1p-6 * t->options.skin; }
 
@@ -322,7 +328,7 @@ static void turn_rub(const ebpo_touch *t, const double want[EBPO_SCREW], double 
     double held[EBPO_SCREW];
     for (int k = 0; k < EBPO_SCREW; k++)
         held[k] = want[k] - way[k];
-    double length = screw_length(way), holds = t->options.friction * screw_length(held);
+    double length = ebpo_screw_length(way), holds = t->options.friction * ebpo_screw_length(held);
     double part = length > holds ? 1 - holds / length : 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         way[k] *= part;
@@ -337,9 +343,9 @@ static bool set_out(ebpo_touch *t, const ebpo_rigid *hand, uint32_t *flags)
     int holding = ebpo_tool_hold(&tool->contacts, want, turn_closeness(t), true, way);
     if (holding > 0 && t->touching && t->options.friction > 0)
         turn_rub(t, want, way);
-    if (screw_length(way) <= turn_closeness(t) / 2)
+    if (ebpo_screw_length(way) <= turn_closeness(t) / 2)
         return false;
-    return ebpo_tool_set_out(t, way, flags);
+    return begin_tool_way(t, way, flags);
 }
 
 static uint32_t turn_go(ebpo_touch *t, const ebpo_rigid *hand, uint64_t *work)
@@ -358,7 +364,7 @@ static uint32_t turn_go(ebpo_touch *t, const ebpo_rigid *hand, uint64_t *work)
             if (!set_out(t, hand, &flags))
                 return flags;
         }
-        flags |= ebpo_tool_go_on(t, work, &arrived);
+        flags |= continue_tool_way(t, work, &arrived);
         ebpo_vec3_copy(tool->proxy.place, t->proxy);
         if (arrived)
             tool->way_of[tool->way_count++] = tool->proxy;
@@ -436,7 +442,7 @@ void ebpo_touch_turn(ebpo_touch *t, const double place[3], const double turn[4],
     if (t->touching) {
         flags |= EBPO_TOUCH_CONTACT;
         turn_push(t, depth, moved, out);
-        out->depth = screw_length(depth);
+        out->depth = ebpo_screw_length(depth);
     }
     tell_contact(t, out);
     tool->hand = hand;

@@ -1,3 +1,10 @@
+/* Distances of many points: of given ones, and of the points of a lattice.
+ *
+ * A lattice is evaluated in slabs of layers, and a slab in bricks, whose points are close to each
+ * other, so that subtrees are loaded few times and caches are warm. Each thread has a query
+ * context of its own, made when it is first used. Results do not depend on the number of threads.
+ *
+ * Source: docs/guide/maps.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -12,8 +19,9 @@
 #include "query/load_ahead.h"
 #include "query/query_model.h"
 
-ebpo_status ebpo_map_take_options(ebpo_map_options *out, const ebpo_map_options *given,
-                                  ebpo_error *error)
+/* Takes the options, or the usual ones for NULL. */
+static ebpo_status take_map_options(ebpo_map_options *out, const ebpo_map_options *given,
+                                    ebpo_error *error)
 {
     *out = (ebpo_map_options)EBPO_MAP_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_map_options, out, given, error);
@@ -53,7 +61,7 @@ ebpo_status ebpo_map_ask(ebpo_map_askers *askers, unsigned worker, const double 
                : status;
 }
 
-/* Distances of points that somebody else has placed. */
+/* --- given points --- */
 
 typedef struct points_job {
     ebpo_map_askers askers;
@@ -90,7 +98,7 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
     EBPO_DEFAULT_FP;
     ebpo_map_options o;
     points_job job = { .points = points, .distances = distances };
-    ebpo_status status = ebpo_map_take_options(&o, options, error);
+    ebpo_status status = take_map_options(&o, options, error);
     if (status == EBPO_OK)
         status = ebpo_check_points(points, count, error);
     if (status != EBPO_OK)
@@ -107,8 +115,7 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
     return status;
 }
 
-/* Distances at the points of a lattice, in slabs of layers. A slab is asked about in bricks, whose
- * points are close to each other, so that subtrees are loaded few times and caches are warm. */
+/* --- lattices --- */
 
 enum { BRICK = 16, SLAB_VALUES = 8 << 20 };
 #define POINTS_MOST (UINT64_C(1) << 40)
@@ -234,7 +241,7 @@ ebpo_status ebpo_map_lattice(ebpo_model *model, const ebpo_lattice *lattice,
     EBPO_DEFAULT_FP;
     ebpo_map_options o;
     slab_job job = { .lattice = lattice };
-    ebpo_status status = ebpo_map_take_options(&o, options, error);
+    ebpo_status status = take_map_options(&o, options, error);
     if (status == EBPO_OK)
         status = check_lattice(lattice, error);
     if (status != EBPO_OK)

@@ -1,4 +1,4 @@
-/* Inside lib/extras/map: exact distances of many points, on many threads. */
+/* Exact distances of many points, on many threads. */
 #ifndef EBPO_MAP_MAP_LATTICE_H
 #define EBPO_MAP_MAP_LATTICE_H
 
@@ -18,10 +18,6 @@ typedef struct ebpo_map_askers {
 EBPO_MUST_USE ebpo_status ebpo_map_askers_make(ebpo_map_askers *out, ebpo_model *model,
                                                const ebpo_map_options *options, ebpo_error *error);
 void ebpo_map_askers_free(ebpo_map_askers *askers);
-
-/* Takes the options, or the usual ones for NULL. */
-EBPO_MUST_USE ebpo_status ebpo_map_take_options(ebpo_map_options *out,
-                                                const ebpo_map_options *given, ebpo_error *error);
 
 /* points[count][3], at most EBPO_MAP_PIECE, into results[count]. */
 EBPO_MUST_USE ebpo_status ebpo_map_ask(ebpo_map_askers *askers, unsigned worker,

@@ -1,5 +1,9 @@
-/* Colours of distances. The diverging palette is made in OKLab (B. Ottosson, 2020: the matrices
- * below are its definition), whose lightness is what eyes take for it. */
+/* Colours of distances, and distances with their colours as attributes of a mesh's vertices.
+ *
+ * The diverging palette is made in OKLab (B. Ottosson, 2020: the matrices below are its
+ * definition), whose lightness agrees with perception. The other palette is that of the thesis.
+ *
+ * Attributes of vertices named distance, red, green or blue are replaced. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -86,7 +90,7 @@ void ebpo_map_colour(ebpo_map_palette palette, double distance, double range, ui
         palette_diverging(share, rgb);
 }
 
-/* Distances and their colours as attributes of a mesh's vertices. */
+/* --- attributes --- */
 
 static bool has_name(const char *names, const char *name)
 {

@@ -1,7 +1,10 @@
-/* How far faces reach from a model, their insides included. Branch and bound over triangles, which
- * are cut into four: the distance changes by no more than its argument moves, so that all of a
- * triangle is at most as far as a corner and the longest way from there. Rounds, in which those of
- * the greatest bounds are cut at once, make the result independent of threads. */
+/* The greatest distance of a mesh's faces from a model, their insides included (a one-sided
+ * Hausdorff distance), as certain bounds.
+ *
+ * Branch and bound over triangles, which are cut into four: the distance changes by no more than
+ * its argument moves, so that all of a triangle is at most as far as a corner plus the longest way
+ * from there. In each round those of the greatest bounds are cut at once, which makes the result
+ * independent of threads. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

@@ -1,4 +1,11 @@
-/* Statistics of distances. Sums are exact, so that they depend neither on order nor on threads. */
+/* Statistics of distances, and files of the distances at a lattice's points.
+ *
+ * Sums are exact (mesh/sum.h), in three ranges of size so that neither values nor squares
+ * overflow: statistics depend neither on the order of values nor on threads.
+ *
+ * A lattice is written layer by layer as NRRD (teem, "Definition of NRRD File Format") or as a
+ * VTKHDF 1.0 image (VTK's documentation, "VTKHDF file format"). The file appears whole or not at
+ * all. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -17,27 +24,27 @@
 #include "io/publish.h"
 #include "mesh/sum.h"
 
-/* Inside lib/extras/map: statistics as values come, without percentiles. */
+/* Statistics while values are added, without percentiles. */
 
-enum { EBPO_MAP_BINS = 3, EBPO_MAP_BIN_UNIT = 600 };
+enum { MAP_BINS = 3, MAP_BIN_UNIT = 600 };
 
-typedef struct ebpo_map_sums {
+typedef struct map_sums {
     ebpo_map_stats stats; /* counts, min and max */
-    /* of small, ordinary and large values: bin i counts 2^(EBPO_MAP_BIN_UNIT (i - 1)), squares its
+    /* of small, ordinary and large values: bin i counts 2^(MAP_BIN_UNIT (i - 1)), squares its
      * square */
-    ebpo_sum sum[EBPO_MAP_BINS], sum_unsigned[EBPO_MAP_BINS], squares[EBPO_MAP_BINS];
-} ebpo_map_sums;
+    ebpo_sum sum[MAP_BINS], sum_unsigned[MAP_BINS], squares[MAP_BINS];
+} map_sums;
 
-/* Inside lib/extras/map: what writes a lattice's values into a file, layer by layer. */
+/* A file that is written layer by layer. */
 
-typedef struct ebpo_map_file {
+typedef struct map_file {
     const ebpo_lattice *lattice;
     const char *shown;
     const char *path; /* of the file by name: HDF5 */
     FILE *stream;     /* NRRD */
     ebpo_h5_out out;
     ebpo_h5_id values;
-} ebpo_map_file;
+} map_file;
 
 static const double percents[EBPO_MAP_PERCENTILES] = { 1, 5, 25, 50, 75, 95, 99 };
 
@@ -49,9 +56,9 @@ double ebpo_map_percent(int index)
 /* --- sums --- */
 
 /* Freed by free(); NULL when memory is short. */
-static ebpo_map_sums *ebpo_map_sums_new(void)
+static map_sums *map_sums_new(void)
 {
-    ebpo_map_sums *s = ebpo_alloc_zero(1, sizeof *s);
+    map_sums *s = ebpo_alloc_zero(1, sizeof *s);
     if (s)
         s->stats = (ebpo_map_stats){ .min = INFINITY, .max = -INFINITY };
     return s;
@@ -59,25 +66,25 @@ static ebpo_map_sums *ebpo_map_sums_new(void)
 
 /* In multiples of a power of two that suits its size, so that neither sums nor squares overflow or
  * vanish, and so that nothing depends on the order. */
-static void add_to(ebpo_sum bins[EBPO_MAP_BINS], double value, bool square)
+static void add_to(ebpo_sum bins[MAP_BINS], double value, bool square)
 {
     double size = fabs(value);
     int bin = size < 0x1p-400 ? 0 : size < 0x1p400 ? 1 : 2;
-    double scaled = ldexp(value, -EBPO_MAP_BIN_UNIT * (bin - 1));
+    double scaled = ldexp(value, -MAP_BIN_UNIT * (bin - 1));
     ebpo_sum_add(&bins[bin], square ? scaled * scaled : scaled);
 }
 
 /* Of the sum divided by count, as multiples of 2^unit. */
-static double mean_of(const ebpo_sum bins[EBPO_MAP_BINS], bool square, uint64_t count, int unit)
+static double mean_of(const ebpo_sum bins[MAP_BINS], bool square, uint64_t count, int unit)
 {
     double sum = 0;
-    for (int bin = 0; bin < EBPO_MAP_BINS; bin++)
+    for (int bin = 0; bin < MAP_BINS; bin++)
         sum += ldexp(ebpo_sum_value(&bins[bin]) / (double)count,
-                     EBPO_MAP_BIN_UNIT * (bin - 1) * (square ? 2 : 1) - unit);
+                     MAP_BIN_UNIT * (bin - 1) * (square ? 2 : 1) - unit);
     return sum;
 }
 
-static void ebpo_map_sums_add(ebpo_map_sums *s, const double *values, uint64_t count)
+static void map_sums_add(map_sums *s, const double *values, uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++) {
         double d = values[i];
@@ -103,7 +110,7 @@ static ebpo_map_stats describe_nothing(const ebpo_map_stats *s)
     return out;
 }
 
-static ebpo_map_stats ebpo_map_sums_stats(const ebpo_map_sums *s)
+static ebpo_map_stats map_sums_stats(const map_sums *s)
 {
     ebpo_map_stats out = s->stats.count ? s->stats : describe_nothing(&s->stats);
     for (int i = 0; i < EBPO_MAP_PERCENTILES; i++)
@@ -164,11 +171,11 @@ ebpo_status ebpo_map_describe(const double *values, uint64_t count, ebpo_map_sta
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_map_stats, out, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_map_sums *sums = ebpo_map_sums_new();
+    map_sums *sums = map_sums_new();
     if (!sums)
         return ebpo_fail_memory(error, sizeof *sums);
-    ebpo_map_sums_add(sums, values, count);
-    ebpo_map_stats filled = ebpo_map_sums_stats(sums);
+    map_sums_add(sums, values, count);
+    ebpo_map_stats filled = map_sums_stats(sums);
     free(sums);
     if (filled.count)
         status = add_percentiles(values, count, &filled, error);
@@ -177,7 +184,7 @@ ebpo_status ebpo_map_describe(const double *values, uint64_t count, ebpo_map_sta
     return status;
 }
 
-/* NRRD: a header of text and raw numbers. Source: teem, "Definition of NRRD File Format". */
+/* --- NRRD: a header of text and raw numbers --- */
 
 static void put_vector(FILE *to, const double v[3])
 {
@@ -186,7 +193,7 @@ static void put_vector(FILE *to, const double v[3])
 
 /* Headers; then layers in order; then the end, which tells what failed late. `discard` after a
  * failure. */
-static ebpo_status ebpo_map_nrrd_begin(ebpo_map_file *f, ebpo_error *error)
+static ebpo_status map_nrrd_begin(map_file *f, ebpo_error *error)
 {
     const ebpo_lattice *l = f->lattice;
     FILE *to = f->stream;
@@ -204,8 +211,8 @@ static ebpo_status ebpo_map_nrrd_begin(ebpo_map_file *f, ebpo_error *error)
     return ferror(to) ? ebpo_fail_errno(error, f->shown, "writing the header") : EBPO_OK;
 }
 
-static ebpo_status ebpo_map_nrrd_layers(ebpo_map_file *f, const double *values, uint64_t first,
-                                        uint64_t layers, ebpo_error *error)
+static ebpo_status map_nrrd_layers(map_file *f, const double *values, uint64_t first,
+                                   uint64_t layers, ebpo_error *error)
 {
     uint64_t count = layers * f->lattice->count[0] * f->lattice->count[1];
     (void)first; /* they come in order */
@@ -223,7 +230,7 @@ static ebpo_status ebpo_map_nrrd_layers(ebpo_map_file *f, const double *values, 
     return EBPO_OK;
 }
 
-/* VTKHDF 1.0: an image. Source: VTK's documentation, "VTKHDF file format". */
+/* --- VTKHDF: an image --- */
 
 static const char values_path[] = "/VTKHDF/PointData/distance";
 
@@ -260,7 +267,7 @@ static ebpo_status find_axes(const ebpo_lattice *l, double spacing[3], double di
     return EBPO_OK;
 }
 
-static ebpo_status put_facts(ebpo_map_file *f, ebpo_h5_id id, ebpo_error *error)
+static ebpo_status put_facts(map_file *f, ebpo_h5_id id, ebpo_error *error)
 {
     static const int64_t version[2] = { 1, 0 };
     const ebpo_lattice *l = f->lattice;
@@ -283,7 +290,7 @@ static ebpo_status put_facts(ebpo_map_file *f, ebpo_h5_id id, ebpo_error *error)
     return status;
 }
 
-static ebpo_status put_group(ebpo_map_file *f, const char *path, bool facts, ebpo_error *error)
+static ebpo_status put_group(map_file *f, const char *path, bool facts, ebpo_error *error)
 {
     ebpo_h5_id id = -1;
     ebpo_status status = ebpo_h5_make_plain_group(&f->out, path, &id, error);
@@ -299,7 +306,7 @@ static void dims_of(const ebpo_lattice *l, uint64_t dims[3])
         dims[i] = l->count[2 - i];
 }
 
-static ebpo_status ebpo_map_vtkhdf_begin(ebpo_map_file *f, ebpo_error *error)
+static ebpo_status map_vtkhdf_begin(map_file *f, ebpo_error *error)
 {
     uint64_t dims[3];
     dims_of(f->lattice, dims);
@@ -313,27 +320,27 @@ static ebpo_status ebpo_map_vtkhdf_begin(ebpo_map_file *f, ebpo_error *error)
     return status;
 }
 
-static ebpo_status ebpo_map_vtkhdf_layers(ebpo_map_file *f, const double *values, uint64_t first,
-                                          uint64_t layers, ebpo_error *error)
+static ebpo_status map_vtkhdf_layers(map_file *f, const double *values, uint64_t first,
+                                     uint64_t layers, ebpo_error *error)
 {
     uint64_t dims[3];
     dims_of(f->lattice, dims);
     return ebpo_h5_put_layers(&f->out, values_path, f->values, dims, first, layers, values, error);
 }
 
-static ebpo_status ebpo_map_vtkhdf_end(ebpo_map_file *f, ebpo_error *error)
+static ebpo_status map_vtkhdf_end(map_file *f, ebpo_error *error)
 {
     ebpo_h5_close_id(&f->out, f->values);
     f->values = -1;
     return ebpo_h5_finish(&f->out, error);
 }
 
-/* A lattice's distances as a file, which appears whole or not at all. */
+/* --- files of lattices --- */
 
 typedef struct writing {
-    ebpo_map_file file;
+    map_file file;
     ebpo_map_format format;
-    ebpo_map_sums *sums;
+    map_sums *sums;
 } writing;
 
 static ebpo_status take_layers(void *user, const double *values, uint64_t first, uint64_t layers,
@@ -341,10 +348,9 @@ static ebpo_status take_layers(void *user, const double *values, uint64_t first,
 {
     writing *w = user;
     const ebpo_lattice *l = w->file.lattice;
-    ebpo_map_sums_add(w->sums, values, layers * l->count[0] * l->count[1]);
-    return w->format == EBPO_MAP_NRRD
-               ? ebpo_map_nrrd_layers(&w->file, values, first, layers, error)
-               : ebpo_map_vtkhdf_layers(&w->file, values, first, layers, error);
+    map_sums_add(w->sums, values, layers * l->count[0] * l->count[1]);
+    return w->format == EBPO_MAP_NRRD ? map_nrrd_layers(&w->file, values, first, layers, error)
+                                      : map_vtkhdf_layers(&w->file, values, first, layers, error);
 }
 
 static ebpo_status write_begin(writing *w, ebpo_publish *publish, ebpo_error *error)
@@ -352,9 +358,9 @@ static ebpo_status write_begin(writing *w, ebpo_publish *publish, ebpo_error *er
     w->file.shown = publish->shown;
     w->file.path = ebpo_publish_path(publish);
     if (w->format != EBPO_MAP_NRRD)
-        return ebpo_map_vtkhdf_begin(&w->file, error);
+        return map_vtkhdf_begin(&w->file, error);
     w->file.stream = ebpo_publish_stream(publish);
-    return w->file.stream ? ebpo_map_nrrd_begin(&w->file, error) : ebpo_fail_memory(error, 4096);
+    return w->file.stream ? map_nrrd_begin(&w->file, error) : ebpo_fail_memory(error, 4096);
 }
 
 ebpo_status ebpo_map_write(ebpo_model *model, const ebpo_lattice *lattice, const char *path,
@@ -364,7 +370,7 @@ ebpo_status ebpo_map_write(ebpo_model *model, const ebpo_lattice *lattice, const
     EBPO_DEFAULT_FP;
     writing w = { .file = { .lattice = lattice, .out = EBPO_H5_OUT_INIT, .values = -1 },
                   .format = format,
-                  .sums = ebpo_map_sums_new() };
+                  .sums = map_sums_new() };
     ebpo_publish publish = EBPO_PUBLISH_INIT;
     ebpo_status status = w.sums ? EBPO_OK : ebpo_fail_memory(error, sizeof *w.sums);
     if (status == EBPO_OK && stats)
@@ -378,14 +384,14 @@ ebpo_status ebpo_map_write(ebpo_model *model, const ebpo_lattice *lattice, const
     if (status == EBPO_OK)
         status = ebpo_map_lattice(model, lattice, options, take_layers, &w, error);
     if (status == EBPO_OK && format != EBPO_MAP_NRRD)
-        status = ebpo_map_vtkhdf_end(&w.file, error);
+        status = map_vtkhdf_end(&w.file, error);
     ebpo_h5_close_id(&w.file.out, w.file.values);
     ebpo_h5_discard(&w.file.out);
     if (status == EBPO_OK)
         status = ebpo_publish_commit(&publish, error);
     ebpo_publish_abort(&publish);
     if (status == EBPO_OK && stats) {
-        ebpo_map_stats filled = ebpo_map_sums_stats(w.sums);
+        ebpo_map_stats filled = map_sums_stats(w.sums);
         status = EBPO_GIVE(ebpo_map_stats, stats, &filled);
     }
     free(w.sums);

@@ -1,4 +1,11 @@
-/* Colours as a mesh's own: where they are already, in their types. */
+/* Turns paint into colours of a mesh's vertices, and finds which faces a stroke covers.
+ *
+ * The strokes of a layer are applied in their order to the vertices that their points reach; then
+ * the layers are put over the colours of vertices in their order. Colours are stored where the
+ * mesh already has them, in the types of its columns; other meshes get columns for them. A stroke
+ * covers the faces of its points' reaches.
+ *
+ * Source: format-spec/paint.md, section 5. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -77,8 +84,7 @@ ebpo_status ebpo_paint_dye_mesh(ebpo_mesh *mesh, const uint8_t *rgba, ebpo_error
     return EBPO_OK;
 }
 
-/* Which faces a stroke reaches, and which of their corners it covers; whether points fit a model.
- */
+/* --- which faces a stroke covers --- */
 
 static int by_file_face(const void *a, const void *b)
 {
@@ -187,7 +193,7 @@ ebpo_status ebpo_paint_check_points(const ebpo_paint *p, ebpo_context *context,
     return status;
 }
 
-/* Layers over the colours of vertices: format-spec/paint.md, section 5. */
+/* --- layers over colours --- */
 
 /* A vertex that something covers. */
 typedef struct dyed {

@@ -1,5 +1,9 @@
-/* From where a hand was to strokes: steps along its way, and at each the more points the more it
- * presses. */
+/* Makes strokes from the way of a hand: points at even steps along it, and the more of them at
+ * each step the harder it presses.
+ *
+ * Every point is on a face of the model, and is stored by the face and three integer weights of
+ * its corners. The scatter of points is pseudorandom with a seed, so that a way makes the same
+ * stroke on every machine. */
 #include "core/strict_fp.h"
 
 #include <ebpo/paint.h>
@@ -69,7 +73,7 @@ static const char *hand_wrong(const ebpo_paint_hand *h)
 }
 
 static ebpo_status lay_check(const lay *l, const ebpo_paint *p, const ebpo_paint_hand *hand,
-                         uint64_t count, ebpo_error *error)
+                             uint64_t count, ebpo_error *error)
 {
     const char *wrong = pen_wrong(&l->pen);
     if (count == 0)
@@ -113,7 +117,7 @@ static void set_point(ebpo_paint_point *q, const ebpo_distance_result *at,
 }
 
 static ebpo_status lay_nearest(ebpo_context *context, const double place[3], double within,
-                           ebpo_distance_result *out, ebpo_error *error)
+                               ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.unsigned_distance = true;
@@ -217,8 +221,8 @@ static const ebpo_reach_face *face_of(const ebpo_reach *reach, uint64_t face)
     return NULL;
 }
 
-static ebpo_status lay_scatter(lay *l, const ebpo_distance_result *middle, const ebpo_paint_hand *hand,
-                           ebpo_error *error)
+static ebpo_status lay_scatter(lay *l, const ebpo_distance_result *middle,
+                               const ebpo_paint_hand *hand, ebpo_error *error)
 {
     double u[3], v[3], place[3], disc[2], spread = l->pen.spread;
     unsigned wanted = (unsigned)fmax(1, floor(hand->pressure * l->pen.density + 0.5));
@@ -281,7 +285,7 @@ static ebpo_status make_step(lay *l, const ebpo_paint_hand *hand, ebpo_error *er
 /* --- the way --- */
 
 static void lay_between(const ebpo_paint_hand *a, const ebpo_paint_hand *b, double t,
-                    ebpo_paint_hand *out)
+                        ebpo_paint_hand *out)
 {
     for (int k = 0; k < 3; k++)
         out->place[k] = a->place[k] + t * (b->place[k] - a->place[k]);

@@ -1,4 +1,11 @@
-/* Strokes and their points. */
+/* A paint as an object: its strokes, layers and notes, and the model that it belongs to.
+ *
+ * Strokes are kept in the order in which they were made, and their points one behind the other.
+ * Removing a layer removes its strokes and its notes. Texts are UTF-8 of limited size without
+ * control characters. A paint belongs to the model whose SHA-256 digest it has: for another one,
+ * queries fail.
+ *
+ * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -125,7 +132,7 @@ ebpo_status ebpo_paint_remove_stroke(ebpo_paint *p, uint64_t number, ebpo_error 
     return EBPO_OK;
 }
 
-/* Layers and notes. */
+/* --- layers and notes --- */
 
 const ebpo_paint_text_kind ebpo_paint_layer_texts[EBPO_PAINT_TEXTS] = {
     { "title", 255 }, { "author", 255 }, { "date", 31 }, { "description", 4095 }
@@ -136,7 +143,7 @@ const ebpo_paint_text_kind ebpo_paint_note_texts[EBPO_PAINT_TEXTS] = {
 
 /* --- texts --- */
 
-void ebpo_paint_texts_free(char *text[EBPO_PAINT_TEXTS])
+static void free_texts(char *text[EBPO_PAINT_TEXTS])
 {
     for (int i = 0; i < EBPO_PAINT_TEXTS; i++)
         free(text[i]);
@@ -150,7 +157,7 @@ static bool copy_texts(const char *const from[EBPO_PAINT_TEXTS], char *to[EBPO_P
         fine = fine && to[i];
     }
     if (!fine)
-        ebpo_paint_texts_free(to);
+        free_texts(to);
     return fine;
 }
 
@@ -257,7 +264,7 @@ ebpo_status ebpo_paint_set_layer(ebpo_paint *p, uint64_t number, const ebpo_pain
     ebpo_status status = take_layer(layer, p->layer[number].text[EBPO_PAINT_DATE], &held, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_paint_texts_free(p->layer[number].text);
+    free_texts(p->layer[number].text);
     p->layer[number] = held;
     return EBPO_OK;
 }
@@ -285,7 +292,7 @@ static void drop_notes(ebpo_paint *p, uint64_t layer)
     uint64_t notes = 0;
     for (uint64_t i = 0; i < p->note_count; i++) {
         if (p->note[i].layer == layer) {
-            ebpo_paint_texts_free(p->note[i].text);
+            free_texts(p->note[i].text);
             continue;
         }
         p->note[notes] = p->note[i];
@@ -301,7 +308,7 @@ ebpo_status ebpo_paint_remove_layer(ebpo_paint *p, uint64_t number, ebpo_error *
         return no_layer(p, number, error);
     drop_strokes(p, number);
     drop_notes(p, number);
-    ebpo_paint_texts_free(p->layer[number].text);
+    free_texts(p->layer[number].text);
     p->layer_count--;
     memmove(p->layer + number, p->layer + number + 1, (p->layer_count - number) * sizeof *p->layer);
     return EBPO_OK;
@@ -358,13 +365,13 @@ ebpo_status ebpo_paint_remove_note(ebpo_paint *p, uint64_t number, ebpo_error *e
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "there is no note %llu: notes are counted from 0, and the paint has %llu",
                          (unsigned long long)number, (unsigned long long)p->note_count);
-    ebpo_paint_texts_free(p->note[number].text);
+    free_texts(p->note[number].text);
     p->note_count--;
     memmove(p->note + number, p->note + number + 1, (p->note_count - number) * sizeof *p->note);
     return EBPO_OK;
 }
 
-/* Paints as objects, and whose they are. */
+/* --- the object --- */
 
 static void write_hex(const uint8_t digest[32], char out[65])
 {
@@ -439,9 +446,9 @@ void ebpo_paint_free(ebpo_paint *p)
     if (!p)
         return;
     for (uint64_t i = 0; i < p->layer_count; i++)
-        ebpo_paint_texts_free(p->layer[i].text);
+        free_texts(p->layer[i].text);
     for (uint64_t i = 0; i < p->note_count; i++)
-        ebpo_paint_texts_free(p->note[i].text);
+        free_texts(p->note[i].text);
     free_file(p->file);
     free(p->layer);
     free(p->note);

@@ -1,6 +1,14 @@
-/* Faces are halved across their longest edge until it is clear to which stroke a part belongs, or
- * the part is small. In each layer the last stroke decides: where a ball of it holds the part, it
- * does; where one only meets it, those before may have what it does not cover. */
+/* Measures the painted area, by stroke, by colour, by layer and in all.
+ *
+ * Faces are halved across their longest edge until it is clear to which stroke a part belongs, or
+ * the part is small. In each layer the last stroke decides: where a ball of it holds the part, the
+ * part is its own; where a ball only meets it, earlier strokes may have what is not covered. So
+ * lower and upper bounds are summed.
+ *
+ * Faces are distributed to a fixed number of pieces of work, whose sums are added in order:
+ * results do not depend on the number of threads.
+ *
+ * Source: format-spec/paint.md, section 6. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,37 +25,34 @@
 #include "extras/paint/paint_parts.h"
 #include "extras/paint/paint_reach.h"
 
-/* Inside lib/extras/paint: to which strokes the parts of a face belong, and how large these are.
- * format-spec/paint.md, section 6. */
-
 /* A ball in whose reach a face is. */
-typedef struct ebpo_area_ball {
+typedef struct area_ball {
     double centre[3], radius;
     uint32_t layer, stroke;
-} ebpo_area_ball;
+} area_ball;
 
-/* Areas by stroke, by colour, by layer and of all, one behind the other: area_keys of them. */
-typedef struct ebpo_area_keys {
+/* Areas by stroke, by colour, by layer and of all, one behind the other: area_key_count of them. */
+typedef struct area_keys {
     const ebpo_paint *p;
     uint32_t *colour; /* [strokes] the number of a stroke's colour */
     uint64_t colours;
-} ebpo_area_keys;
+} area_keys;
 
-static inline uint64_t ebpo_area_key_count(const ebpo_area_keys *k)
+static inline uint64_t area_key_count(const area_keys *k)
 {
     return k->p->stroke_count + k->colours + k->p->layer_count + 1;
 }
 
 /* One thread's. */
-typedef struct ebpo_area_cut {
-    const ebpo_area_keys *keys;
+typedef struct area_cut {
+    const area_keys *keys;
     double fineness;
     ebpo_paint_area *area; /* [keys] to which is added */
-    ebpo_area_ball *ball;  /* a stack: of each part those balls that it meets */
+    area_ball *ball;       /* a stack: of each part those balls that it meets */
     uint64_t ball_capacity;
     uint64_t *seen; /* [colours] the last part that a colour was noted for */
     uint64_t part;
-} ebpo_area_cut;
+} area_cut;
 
 enum { DEEPEST = 900 };
 
@@ -56,14 +61,14 @@ typedef struct triangle {
 } triangle;
 
 /* Room for the sums of a thread: `area` stays the caller's. False: no memory. */
-static bool ebpo_area_cut_begin(ebpo_area_cut *c, const ebpo_area_keys *keys, double fineness)
+static bool area_cut_begin(area_cut *c, const area_keys *keys, double fineness)
 {
-    *c = (ebpo_area_cut){ .keys = keys, .fineness = fineness };
+    *c = (area_cut){ .keys = keys, .fineness = fineness };
     c->seen = ebpo_alloc_zero(keys->colours, sizeof *c->seen);
     return c->seen != NULL;
 }
 
-static void ebpo_area_cut_end(ebpo_area_cut *c)
+static void area_cut_end(area_cut *c)
 {
     free(c->seen);
     free(c->ball);
@@ -87,7 +92,7 @@ static double area_of(const double p[3][3])
     return sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]) / 2;
 }
 
-static bool area_cut_holds(const ebpo_area_ball *ball, const triangle *t)
+static bool area_cut_holds(const area_ball *ball, const triangle *t)
 {
     double square = ball->radius * ball->radius;
     return ebpo_ball_holds(ball->centre, square, t->p[0]) &&
@@ -95,7 +100,7 @@ static bool area_cut_holds(const ebpo_area_ball *ball, const triangle *t)
            ebpo_ball_holds(ball->centre, square, t->p[2]);
 }
 
-static bool area_cut_meets(const ebpo_area_ball *ball, const triangle *t)
+static bool area_cut_meets(const area_ball *ball, const triangle *t)
 {
     ebpo_face_near near;
     ebpo_face_nearest(ball->centre, t->p, &near);
@@ -107,13 +112,13 @@ static bool area_cut_meets(const ebpo_area_ball *ball, const triangle *t)
 /* From a layer's balls at [from, end) those that may have a part of it go to `to`: up to the first
  * stroke of which one holds it, of which that one says it all. Their number; *sure: nothing is left
  * to be decided. */
-static uint64_t sift_layer(ebpo_area_cut *c, const triangle *t, uint64_t from, uint64_t end,
-                           uint64_t to, bool *sure)
+static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64_t end, uint64_t to,
+                           bool *sure)
 {
     uint64_t kept = 0, first = 0; /* first: of the stroke at hand */
     *sure = false;
     for (uint64_t i = from; i < end; i++) {
-        const ebpo_area_ball *b = &c->ball[i];
+        const area_ball *b = &c->ball[i];
         if (i > from && b->stroke != c->ball[i - 1].stroke)
             first = kept;
         if (area_cut_holds(b, t)) {
@@ -129,7 +134,7 @@ static uint64_t sift_layer(ebpo_area_cut *c, const triangle *t, uint64_t from, u
 }
 
 /* The same of all layers at [from, from + count), to behind them. */
-static uint64_t area_cut_sift(ebpo_area_cut *c, const triangle *t, uint64_t from, uint64_t count,
+static uint64_t area_cut_sift(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
                               bool *sure)
 {
     uint64_t kept = 0;
@@ -144,7 +149,7 @@ static uint64_t area_cut_sift(ebpo_area_cut *c, const triangle *t, uint64_t from
     return kept;
 }
 
-static double least_radius(const ebpo_area_cut *c, uint64_t from, uint64_t count)
+static double least_radius(const area_cut *c, uint64_t from, uint64_t count)
 {
     double least = INFINITY;
     for (uint64_t i = from; i < from + count; i++)
@@ -169,19 +174,19 @@ typedef struct verdict {
     bool one_colour;         /* and the only one */
 } verdict;
 
-static bool area_cut_paints(const ebpo_area_cut *c, uint32_t stroke)
+static bool area_cut_paints(const area_cut *c, uint32_t stroke)
 {
     return c->keys->p->stroke[stroke].kind == EBPO_PAINT_PAINTS;
 }
 
 /* Looks at a layer's balls [from, end), each stroke in turn. */
-static verdict judge_layer(const ebpo_area_cut *c, const triangle *t, const double centre[3],
+static verdict judge_layer(const area_cut *c, const triangle *t, const double centre[3],
                            uint64_t from, uint64_t end)
 {
     verdict v = { .at_centre = UINT32_MAX, .one_colour = true, .unpainted = true };
     bool first = true;
     for (uint64_t i = from; i < end; i++) {
-        const ebpo_area_ball *b = &c->ball[i];
+        const area_ball *b = &c->ball[i];
         uint32_t colour = c->keys->colour[b->stroke];
         if (v.at_centre == UINT32_MAX && ebpo_ball_holds(b->centre, b->radius * b->radius, centre))
             v.at_centre = b->stroke;
@@ -200,8 +205,7 @@ static verdict judge_layer(const ebpo_area_cut *c, const triangle *t, const doub
     return v;
 }
 
-static void add_layer(ebpo_area_cut *c, const triangle *t, const verdict *v, uint64_t from,
-                      uint64_t end)
+static void add_layer(area_cut *c, const triangle *t, const verdict *v, uint64_t from, uint64_t end)
 {
     ebpo_paint_area *strokes = c->area, *colours = strokes + c->keys->p->stroke_count,
                     *layers = colours + c->keys->colours;
@@ -227,7 +231,7 @@ static void add_layer(ebpo_area_cut *c, const triangle *t, const verdict *v, uin
     }
 }
 
-static void area_cut_account(ebpo_area_cut *c, const triangle *t, uint64_t from, uint64_t count)
+static void area_cut_account(area_cut *c, const triangle *t, uint64_t from, uint64_t count)
 {
     double centre[3];
     bool may = false, certain = false, valued = false;
@@ -243,7 +247,7 @@ static void area_cut_account(ebpo_area_cut *c, const triangle *t, uint64_t from,
         add_layer(c, t, &v, i, end);
     }
     if (may)
-        area_cut_add(&c->area[ebpo_area_key_count(c->keys) - 1], t->area, certain, valued);
+        area_cut_add(&c->area[area_key_count(c->keys) - 1], t->area, certain, valued);
 }
 
 /* --- cutting --- */
@@ -270,8 +274,7 @@ static bool find_middle(const double a[3], const double b[3], double middle[3])
 }
 
 /* Balls are at [from, from + count); deeper parts use what is behind. */
-static bool area_cut_cut(ebpo_area_cut *c, const triangle *t, uint64_t from, uint64_t count,
-                         int depth)
+static bool area_cut_cut(area_cut *c, const triangle *t, uint64_t from, uint64_t count, int depth)
 {
     bool sure;
     int edge = 0;
@@ -299,7 +302,7 @@ static bool area_cut_cut(ebpo_area_cut *c, const triangle *t, uint64_t from, uin
 
 /* Adds a face whose `count` balls stand at cut->ball, by layer, within a layer the last stroke
  * first. False: no memory. */
-static bool ebpo_area_cut_face(ebpo_area_cut *c, const double corner[3][3], uint64_t count)
+static bool area_cut_face(area_cut *c, const double corner[3][3], uint64_t count)
 {
     triangle t;
     memcpy(t.p, corner, sizeof t.p);
@@ -307,8 +310,7 @@ static bool ebpo_area_cut_face(ebpo_area_cut *c, const double corner[3][3], uint
     return t.area > 0 ? area_cut_cut(c, &t, 0, count, 0) : true;
 }
 
-/* How much of the surface is painted. Faces are shared out to a fixed number of pieces of work,
- * whose sums are added in order: the result does not depend on threads. */
+/* --- the model --- */
 
 enum { PIECES_MOST = 64, SUMS_MOST = 1 << 22, FINENESS_MOST = 1 << 16 };
 
@@ -324,7 +326,7 @@ typedef struct measure {
     hit *hit;
     uint64_t hit_count, hit_capacity, elsewhere;
     uint64_t *first; /* [met.count + 1] of a face's hits */
-    ebpo_area_keys keys;
+    area_keys keys;
     ebpo_paint_colour_area *colour; /* [keys.colours] */
     uint64_t pieces;
     ebpo_paint_area *sum; /* [pieces][keys] */
@@ -440,7 +442,7 @@ static ebpo_status find_colours(measure *m, ebpo_error *error)
 
 /* --- areas --- */
 
-static bool measure_face(measure *m, ebpo_area_cut *cut, uint64_t face)
+static bool measure_face(measure *m, area_cut *cut, uint64_t face)
 {
     const ebpo_paint *p = m->p;
     uint64_t begin = m->first[face], count = m->first[face + 1] - begin;
@@ -449,35 +451,35 @@ static bool measure_face(measure *m, ebpo_area_cut *cut, uint64_t face)
     for (uint64_t i = 0; i < count; i++) {
         const hit *h = &m->hit[begin + i];
         const ebpo_paint_point *q = &p->point[h->point];
-        cut->ball[i] = (ebpo_area_ball){ { q->place[0], q->place[1], q->place[2] },
-                                         ebpo_paint_radius(&p->stroke[h->stroke], q),
-                                         h->layer,
-                                         h->stroke };
+        cut->ball[i] = (area_ball){ { q->place[0], q->place[1], q->place[2] },
+                                    ebpo_paint_radius(&p->stroke[h->stroke], q),
+                                    h->layer,
+                                    h->stroke };
     }
-    return ebpo_area_cut_face(cut, (const double(*)[3])m->met.face[face].corner, count);
+    return area_cut_face(cut, (const double(*)[3])m->met.face[face].corner, count);
 }
 
 static ebpo_status measure_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
     measure *m = context;
-    ebpo_area_cut cut;
-    uint64_t faces = m->met.count, keys = ebpo_area_key_count(&m->keys);
+    area_cut cut;
+    uint64_t faces = m->met.count, keys = area_key_count(&m->keys);
     (void)worker;
-    bool fine = ebpo_area_cut_begin(&cut, &m->keys, m->options->fineness);
+    bool fine = area_cut_begin(&cut, &m->keys, m->options->fineness);
     for (uint64_t piece = begin; piece < end && fine; piece++) {
         cut.area = m->sum + piece * keys;
         for (uint64_t f = faces * piece / m->pieces; f < faces * (piece + 1) / m->pieces && fine;
              f++)
             fine = measure_face(m, &cut, f);
     }
-    ebpo_area_cut_end(&cut);
+    area_cut_end(&cut);
     return fine ? EBPO_OK : ebpo_fail_memory(error, cut.ball_capacity * sizeof *cut.ball);
 }
 
 static ebpo_status measure_all(measure *m, ebpo_error *error)
 {
-    uint64_t keys = ebpo_area_key_count(&m->keys);
+    uint64_t keys = area_key_count(&m->keys);
     m->pieces = SUMS_MOST / keys;
     m->pieces = m->pieces < 1 ? 1 : m->pieces > PIECES_MOST ? PIECES_MOST : m->pieces;
     m->sum = ebpo_alloc_zero(m->pieces * keys, sizeof *m->sum);

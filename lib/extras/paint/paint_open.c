@@ -1,3 +1,13 @@
+/* Reads paint files, and has the table of their arrays.
+ *
+ * A paint file is untrusted input, read by the strict reader of HDF5 headers (lib/hdf5_read)
+ * without libhdf5. Every count is compared with its limit and with the file's size before memory
+ * is taken; every number is checked for its range, and texts for UTF-8 without control characters.
+ *
+ * The table of arrays says for each column its path, its element type, and the member of a stroke
+ * or a point that it holds; paint_save.c writes by the same table.
+ *
+ * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -70,7 +80,8 @@ static void take_value(const uint8_t *from, unsigned bytes, uint8_t *to)
 
 static unsigned values_of(const ebpo_paint_column *c) { return c->cols ? c->cols : 1; }
 
-void ebpo_paint_column_take(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t *bytes)
+/* Between members and the bytes of a file: rows one behind the other. */
+static void take_column(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t *bytes)
 {
     for (uint64_t row = 0; row < ebpo_paint_column_rows(p, c); row++)
         for (unsigned k = 0; k < values_of(c); k++, bytes += c->element)
@@ -85,7 +96,7 @@ void ebpo_paint_column_give(const ebpo_paint *p, const ebpo_paint_column *c, uin
             take_value(member_of(p, c, row) + k * c->element, c->element, bytes);
 }
 
-/* Reading paint files, which are anybody's: format-spec/paint.md. */
+/* --- reading --- */
 
 typedef struct reader {
     ebpo_head head;
@@ -349,7 +360,7 @@ static ebpo_status read_column(reader *r, const ebpo_paint_column *c, ebpo_error
         ebpo_sum_differs(ebpo_load32(bytes + count), ebpo_fletcher32(bytes, count)))
         status = open_wrong(r, c->path, "the chunk is damaged: its checksum differs", error);
     if (status == EBPO_OK)
-        ebpo_paint_column_take(r->p, c, bytes);
+        take_column(r->p, c, bytes);
     free(bytes);
     return status;
 }

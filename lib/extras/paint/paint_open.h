@@ -1,5 +1,5 @@
-/* Inside lib/extras/paint: the arrays of a paint file, and which members of strokes and points they
- * hold. format-spec/paint.md, section 3. */
+/* The arrays of a paint file, and which members of strokes and points they hold:
+ * format-spec/paint.md, section 3. */
 #ifndef EBPO_PAINT_PAINT_OPEN_H
 #define EBPO_PAINT_PAINT_OPEN_H
 
@@ -25,9 +25,6 @@ static inline uint64_t ebpo_paint_column_rows(const ebpo_paint *p, const ebpo_pa
 /* One chunk, of all rows; rows > 0. */
 ebpo_shape ebpo_paint_column_shape(const ebpo_paint_column *column, uint64_t rows);
 
-/* Between members and the bytes of a file: rows one behind the other. */
-void ebpo_paint_column_take(ebpo_paint *paint, const ebpo_paint_column *column,
-                            const uint8_t *bytes);
 void ebpo_paint_column_give(const ebpo_paint *paint, const ebpo_paint_column *column,
                             uint8_t *bytes);
 

@@ -1,3 +1,13 @@
+/* The reach of a point: the faces that are connected with the point's own face within its ball.
+ *
+ * Faces in the ball's box are joined at common corners and edges, by position, where the ball
+ * holds or crosses these; the set that contains the point's face is the reach. So paint does not
+ * go through a wall thinner than the ball.
+ *
+ * Points of a stroke are evaluated in batches on all cores; a reach is kept until it is asked for.
+ * Results do not depend on the number of threads.
+ *
+ * Source: format-spec/paint.md, section 4. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -351,8 +361,7 @@ void ebpo_met_faces_free(ebpo_met_faces *met)
     *met = (ebpo_met_faces){ 0 };
 }
 
-/* Points of a stroke are looked at in batches, on all cores; what each reaches is kept until it is
- * asked for. */
+/* --- many points --- */
 
 /* Points that are looked at together: so many, or fewer when they reach so many faces already. */
 enum { TOGETHER = 1024, FACES_TOGETHER = 1 << 20, GRAIN = 8 };

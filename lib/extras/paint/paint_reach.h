@@ -1,5 +1,5 @@
-/* Inside lib/extras/paint: the reach of a point, the faces that hang together with it within its
- * ball. format-spec/paint.md, section 4. */
+/* The reach of a point: the faces that are connected with it within its ball.
+ * format-spec/paint.md, section 4. */
 #ifndef EBPO_PAINT_PAINT_REACH_H
 #define EBPO_PAINT_PAINT_REACH_H
 
@@ -66,7 +66,7 @@ static inline bool ebpo_ball_holds(const double centre[3], double square, const 
     return (x * x + y * y) + z * z <= square;
 }
 
-/* Inside lib/extras/paint: faces that several points reach, each once. */
+/* Faces that several points reach, each once. */
 
 typedef struct ebpo_met_face {
     double corner[3][3];
@@ -86,7 +86,7 @@ EBPO_MUST_USE ebpo_status ebpo_met_faces_add(ebpo_met_faces *met, const ebpo_rea
                                              uint32_t *number, ebpo_error *error);
 void ebpo_met_faces_free(ebpo_met_faces *met);
 
-/* Inside lib/extras/paint: the reach of a stroke's point. */
+/* The reach of a stroke's point. */
 
 /* Point `i` of a stroke as a ball. */
 static inline ebpo_reach_ball ebpo_paint_ball(const ebpo_paint *p, uint64_t stroke, uint32_t i)
@@ -107,7 +107,7 @@ EBPO_MUST_USE static inline ebpo_status ebpo_paint_reach(ebpo_reach *reach, cons
     return ebpo_reach_find(reach, &ball, here, error);
 }
 
-/* Inside lib/extras/paint: the reaches of many points, found on all cores, given one after the
+/* The reaches of many points, found on all cores, given one after the
  * other. */
 
 typedef struct ebpo_reached_face {

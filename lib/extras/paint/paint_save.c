@@ -1,4 +1,10 @@
-/* Writing paint files: format-spec/paint.md. */
+/* Writes paint files by the table of paint_open.c.
+ *
+ * A file is written to a temporary one and published when it is complete. The file that a paint
+ * belongs to is replaced only while it is the version that the paint was read from or last saved
+ * as, so that a change by another program is not lost.
+ *
+ * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
 
 #include <ebpo/paint.h>

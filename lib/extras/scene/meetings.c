@@ -1,3 +1,13 @@
+/* The narrow phase of a scene: decides exactly which pairs of instances intersect at a time, and
+ * describes each contact.
+ *
+ * Pairs come from the broad phase (scene_pairs.c), and are evaluated on all cores. For each pair
+ * whose faces intersect it is reported which faces, where, how often and how deep; for the others,
+ * as far as the options ask, the relation of the solids and whether the clearance is kept. What a
+ * subset omits must not matter: where it may, the query fails with EBPO_E_ABSENT instead of
+ * guessing.
+ *
+ * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -10,14 +20,9 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/parallel.h"
-#include "extras/collide/contact.h"
-#include "extras/collide/contacts.h"
-#include "extras/collide/pair_distance.h"
-#include "extras/scene/asked_pairs.h"
-
-/* What is told of two instances whose faces meet: which pairs of faces, where, how often, how deep.
- */
+#include "extras/collide/face_pairs.h"
+#include "extras/collide/pair_faces.h"
+#include "extras/scene/instance_pair.h"
 
 /* Two instances at their poses. */
 typedef struct scene_two {
@@ -249,14 +254,12 @@ static ebpo_status scene_tell_depths(const scene_two *two, ebpo_scene_meeting *m
     return EBPO_OK;
 }
 
-/* The narrow phase: which of the pairs that may meet do, exactly, on all cores. */
+/* --- pairs of instances --- */
 
 typedef struct asking {
     const ebpo_scene *scene;
     ebpo_scene_ask_options how;
     double time;
-    scene_pairs_list list;
-    ebpo_scene_meeting *meetings;
 } asking;
 
 static ebpo_meeting_kind kind_of(const ebpo_scene_meeting *m)
@@ -335,9 +338,9 @@ static ebpo_status check_left_out(const asking *a, const ebpo_scene_pair *pair, 
 {
     double gap = INFINITY;
     uint64_t lacking = 0;
-    ebpo_status status = scene_left_out(a->scene, pair, a->time, &gap, &lacking, error);
+    ebpo_status status = ebpo_scene_left_out(a->scene, pair, a->time, &gap, &lacking, error);
     if (status == EBPO_OK && (!(gap > pair->clearance) || (a->how.relate && gap < INFINITY)))
-        status = scene_lacks(a->scene, pair, lacking, a->time, a->how.relate, error);
+        status = ebpo_scene_lacks(a->scene, pair, lacking, a->time, a->how.relate, error);
     return status;
 }
 
@@ -346,19 +349,20 @@ static bool is_solid(const ebpo_scene *scene, uint64_t instance)
     return ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].as.model))->solid;
 }
 
-static ebpo_status ask_pair(const asking *a, uint64_t n, ebpo_error *error)
+static ebpo_status ask_pair(const void *how, const ebpo_scene_pair *pair, void *result,
+                            ebpo_error *error)
 {
-    const ebpo_scene_pair *pair = &a->list.pairs[n];
-    ebpo_scene_meeting *m = &a->meetings[n];
+    const asking *a = how;
+    ebpo_scene_meeting *m = result;
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
     *m = (ebpo_scene_meeting){ .a = pair->a, .b = pair->b, .clearance = pair->clearance };
     scene_forget_facts(m);
-    ebpo_status status = scene_pose_pair(a->scene, pair, a->time, &options, error);
+    ebpo_status status = ebpo_scene_pose_pair(a->scene, pair, a->time, &options, error);
     if (status == EBPO_OK)
         status = check_left_out(a, pair, error);
     if (status == EBPO_OK)
-        status = scene_collider(a->scene, pair, 1, &collider, error);
+        status = ebpo_scene_collider(a->scene, pair, 1, &collider, error);
     scene_two two = {
         &a->how, collider, &options, { is_solid(a->scene, pair->a), is_solid(a->scene, pair->b) }
     };
@@ -368,24 +372,15 @@ static ebpo_status ask_pair(const asking *a, uint64_t n, ebpo_error *error)
     return status;
 }
 
-static ebpo_status ask_pairs(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                             ebpo_error *error)
-{
-    ebpo_status status = EBPO_OK;
-    (void)worker;
-    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
-        status = ask_pair(context, i, error);
-    return status;
-}
-
-static void meetings_give(asking *a, ebpo_scene_meetings_fn take, void *user)
+static void meetings_give(ebpo_scene_meeting *meetings, uint64_t count, ebpo_scene_meetings_fn take,
+                          void *user)
 {
     uint64_t kept = 0;
-    for (uint64_t i = 0; i < a->list.count; i++)
-        if (a->meetings[i].kind != EBPO_MEETING_NONE)
-            a->meetings[kept++] = a->meetings[i];
+    for (uint64_t i = 0; i < count; i++)
+        if (meetings[i].kind != EBPO_MEETING_NONE)
+            meetings[kept++] = meetings[i];
     if (kept)
-        (void)take(user, a->meetings, kept);
+        (void)take(user, meetings, kept);
 }
 
 ebpo_status ebpo_scene_meet(ebpo_scene *scene, double time, const ebpo_scene_ask_options *options,
@@ -394,24 +389,22 @@ ebpo_status ebpo_scene_meet(ebpo_scene *scene, double time, const ebpo_scene_ask
 {
     EBPO_DEFAULT_FP;
     asking a = { .scene = scene, .how = EBPO_SCENE_ASK_OPTIONS_INIT, .time = time };
+    void *meetings = NULL;
+    uint64_t count = 0;
     ebpo_status status = EBPO_TAKE(ebpo_scene_ask_options, &a.how, options, error);
     if (status == EBPO_OK && !(a.how.depth >= 0 && a.how.depth < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "depths within %g: is no length", a.how.depth);
     a.how.relate |= a.how.depth > 0;
+    ebpo_scene_search search = {
+        ask_pair, &a, sizeof(ebpo_scene_meeting), 4, a.how.threads, &a.how.progress, "asking pairs"
+    };
     if (status == EBPO_OK)
-        status = scene_list_pairs(scene, time, time, &a.list, error);
-    a.meetings = ebpo_alloc(a.list.count, sizeof *a.meetings);
-    if (status == EBPO_OK && !a.meetings)
-        status = ebpo_fail_memory(error, a.list.count * sizeof *a.meetings);
+        status = ebpo_scene_find_in_pairs(scene, time, time, &search, &meetings, &count, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(ebpo_thread_count(a.how.threads), NULL, a.list.count, 4,
-                                   ask_pairs, &a, &a.how.progress, "asking pairs", error);
-    if (status == EBPO_OK)
-        meetings_give(&a, take, user);
+        meetings_give(meetings, count, take, user);
     if (asked)
-        *asked = a.list.count;
-    free(a.list.pairs);
-    free(a.meetings);
+        *asked = count;
+    free(meetings);
     return status;
 }
 
@@ -423,13 +416,13 @@ ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_t a, uint64_t b, double
     ebpo_scene_pair pair = { a, b, 0 };
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
-    ebpo_status status = scene_pose_pair(scene, &pair, time, &options, error);
+    ebpo_status status = ebpo_scene_pose_pair(scene, &pair, time, &options, error);
     if (status == EBPO_OK)
-        status = scene_make_models(scene, &pair, 1, error);
+        status = ebpo_scene_make_models(scene, &pair, 1, error);
     if (status == EBPO_OK)
         status = check_left_out(&one, &pair, error);
     if (status == EBPO_OK)
-        status = scene_collider(scene, &pair, threads, &collider, error);
+        status = ebpo_scene_collider(scene, &pair, threads, &collider, error);
     if (status == EBPO_OK && collider)
         status = ebpo_collide_all(collider, &options, take, user, error);
     ebpo_collider_free(collider);

@@ -1,4 +1,12 @@
-/* Names of a scene: each kind has its own, and selectors share one space. */
+/* A scene as an object: its names, the files that it may name, adding its members, and returning
+ * them.
+ *
+ * Each kind of member has its own names; layers, groups and instances share one space of
+ * selectors, which rules use. A selector is a set: every instance belongs to the set of all, to
+ * its own, to that of its layer and to those of its groups.
+ *
+ * A scene that is untrusted input may name files only below its own folder, unless the options
+ * allow others; symbolic links that lead out of the folder are refused. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -26,7 +34,8 @@ static bool is_plain(const char *name)
     return text != NULL;
 }
 
-ebpo_status scene_check_name(const char *name, const char *what, ebpo_error *error)
+/* 1 to 255 bytes of UTF-8 without control characters, not beginning as selectors do. */
+static ebpo_status check_name(const char *name, const char *what, ebpo_error *error)
 {
     size_t size = name ? strnlen(name, NAME_MOST + 1) : 0;
     if (size == 0 || size > NAME_MOST || !is_plain(name))
@@ -50,7 +59,7 @@ static void names_join(char *out, size_t room, const char *kind, const char *nam
     out[begin + size] = 0;
 }
 
-uint64_t scene_find_name(const ebpo_scene *scene, const char *kind, const char *name)
+uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const char *name)
 {
     char key[KIND_MOST + NAME_MOST + 2];
     names_join(key, sizeof key, kind, name);
@@ -58,8 +67,9 @@ uint64_t scene_find_name(const ebpo_scene *scene, const char *kind, const char *
     return number ? (uint64_t)json_integer_value(number) : EBPO_SCENE_NONE;
 }
 
-ebpo_status scene_put_name(ebpo_scene *scene, const char *kind, const char *name, uint64_t number,
-                           ebpo_error *error)
+/* Gives `kind` and `name` a number. EBPO_E_ARGUMENT: there is one already. */
+static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *name, uint64_t number,
+                            ebpo_error *error)
 {
     char key[KIND_MOST + NAME_MOST + 2];
     names_join(key, sizeof key, kind, name);
@@ -70,13 +80,14 @@ ebpo_status scene_put_name(ebpo_scene *scene, const char *kind, const char *name
     return EBPO_OK;
 }
 
-ebpo_status scene_add_set(ebpo_scene *scene, const char *kind, const char *name, uint64_t *set,
-                          ebpo_error *error)
+/* A new set; *set may be NULL. */
+static ebpo_status add_set(ebpo_scene *scene, const char *kind, const char *name, uint64_t *set,
+                           ebpo_error *error)
 {
     uint64_t number = scene->sets_count;
     if (!ebpo_grow(&scene->sets, &scene->sets_capacity, number + 1, sizeof *scene->sets))
         return ebpo_fail_memory(error, (number + 1) * sizeof *scene->sets);
-    ebpo_status status = scene_put_name(scene, kind, name, number, error);
+    ebpo_status status = put_name(scene, kind, name, number, error);
     if (status != EBPO_OK)
         return status;
     scene->sets[number] = strdup(name);
@@ -88,7 +99,7 @@ ebpo_status scene_add_set(ebpo_scene *scene, const char *kind, const char *name,
     return EBPO_OK;
 }
 
-/* Files that a scene names, and which of them a stranger's scene may name. */
+/* --- files that a scene names --- */
 
 static bool goes_up(const char *path)
 {
@@ -100,7 +111,8 @@ static bool goes_up(const char *path)
     return false;
 }
 
-const char *scene_path_refused(const char *path, const ebpo_scene_options *options, bool has_digest)
+const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *options,
+                                    bool has_digest)
 {
     if (!*path)
         return "is no path";
@@ -113,7 +125,7 @@ const char *scene_path_refused(const char *path, const ebpo_scene_options *optio
     return NULL;
 }
 
-char *scene_join_path(const char *folder, const char *path)
+char *ebpo_scene_join_path(const char *folder, const char *path)
 {
     bool alone = *path == '/' || ebpo_is_url(path);
     size_t begin = alone ? 0 : strlen(folder), size = strlen(path);
@@ -144,7 +156,7 @@ static ebpo_status check_real(const char *folder, const char *real, const char *
                           real, folder);
 }
 
-ebpo_status scene_stays_within(const char *folder, const char *path, ebpo_error *error)
+ebpo_status ebpo_scene_stays_within(const char *folder, const char *path, ebpo_error *error)
 {
     if (ebpo_is_url(path))
         return EBPO_OK;
@@ -161,13 +173,13 @@ ebpo_status scene_stays_within(const char *folder, const char *path, ebpo_error 
     return status;
 }
 
-char *scene_folder_of(const char *path)
+char *ebpo_scene_folder_of(const char *path)
 {
     const char *last = strrchr(path, '/');
     return strndup(path, last ? (size_t)(last - path) + 1 : 0);
 }
 
-/* Scenes as they are made: what is added. */
+/* --- adding --- */
 
 ebpo_status ebpo_scene_new(ebpo_scene **out, ebpo_error *error)
 {
@@ -182,7 +194,7 @@ ebpo_status ebpo_scene_new(ebpo_scene **out, ebpo_error *error)
     if (!scene->names || !scene->folder)
         status = ebpo_fail_memory(error, 64);
     if (status == EBPO_OK)
-        status = scene_add_set(scene, "", "*", NULL, error);
+        status = add_set(scene, "", "*", NULL, error);
     if (status == EBPO_OK)
         *out = scene;
     else
@@ -253,15 +265,17 @@ ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const char *name, const char
                                  const uint8_t digest[32], uint64_t *number, ebpo_error *error)
 {
     uint64_t n;
-    ebpo_status status = scene_check_name(name, "a model", error);
+    ebpo_status status = check_name(name, "a model", error);
     if (status == EBPO_OK)
         status = ROOM(scene, models, &n, error);
     if (status == EBPO_OK)
-        status = scene_put_name(scene, SCENE_MODEL, name, n, error);
+        status = put_name(scene, EBPO_SCENE_MODEL, name, n, error);
     if (status != EBPO_OK)
         return status;
-    scene_model *m = &scene->models[n];
-    *m = (scene_model){ .name = strdup(name), .path = strdup(path), .file = EBPO_SCENE_NONE };
+    ebpo_scene_model_entry *m = &scene->models[n];
+    *m = (ebpo_scene_model_entry){ .name = strdup(name),
+                                   .path = strdup(path),
+                                   .file = EBPO_SCENE_NONE };
     if (digest)
         memcpy(m->digest, digest, sizeof m->digest);
     scene->models_count++; /* freed with the scene, whole or not */
@@ -277,7 +291,7 @@ static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_inst
 {
     static const double nowhere[3] = { 0, 0, 0 };
     ebpo_posing posing;
-    ebpo_status status = scene_check_name(i->name, "an instance", error);
+    ebpo_status status = check_name(i->name, "an instance", error);
     if (status != EBPO_OK)
         return status;
     if (i->model >= scene->models_count)
@@ -296,11 +310,11 @@ static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_inst
 
 static ebpo_status own_sets(ebpo_scene *scene, uint64_t set, ebpo_error *error)
 {
-    const scene_instance *i = &scene->instances[scene->instances_count - 1];
-    ebpo_status status = scene_join_set(scene, SCENE_ALL_SET, error);
+    const ebpo_scene_instance_entry *i = &scene->instances[scene->instances_count - 1];
+    ebpo_status status = ebpo_scene_join_set(scene, EBPO_SCENE_ALL_SET, error);
     if (status == EBPO_OK && i->as.layer != EBPO_SCENE_NONE)
-        status = scene_join_set(scene, scene->layers[i->as.layer], error);
-    return status == EBPO_OK ? scene_join_set(scene, set, error) : status;
+        status = ebpo_scene_join_set(scene, scene->layers[i->as.layer], error);
+    return status == EBPO_OK ? ebpo_scene_join_set(scene, set, error) : status;
 }
 
 ebpo_status ebpo_scene_add_instance(ebpo_scene *scene, const ebpo_scene_instance *instance,
@@ -315,11 +329,11 @@ ebpo_status ebpo_scene_add_instance(ebpo_scene *scene, const ebpo_scene_instance
     if (status == EBPO_OK)
         status = ROOM(scene, instances, &n, error);
     if (status == EBPO_OK)
-        status = scene_add_set(scene, "", as.name, &set, error);
+        status = add_set(scene, "", as.name, &set, error);
     if (status != EBPO_OK)
         return status;
     as.name = strdup(as.name);
-    scene->instances[n] = (scene_instance){ .as = as };
+    scene->instances[n] = (ebpo_scene_instance_entry){ .as = as };
     scene->instances_count++;
     if (!as.name)
         return ebpo_fail_memory(error, 1);
@@ -329,9 +343,9 @@ ebpo_status ebpo_scene_add_instance(ebpo_scene *scene, const ebpo_scene_instance
     return own_sets(scene, set, error);
 }
 
-ebpo_status scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error)
+ebpo_status ebpo_scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error)
 {
-    scene_instance *i = &scene->instances[scene->instances_count - 1];
+    ebpo_scene_instance_entry *i = &scene->instances[scene->instances_count - 1];
     uint64_t *sets = ebpo_realloc(i->sets, i->set_count + 1, sizeof *sets);
     if (!sets)
         return ebpo_fail_memory(error, (i->set_count + 1) * sizeof *sets);
@@ -340,29 +354,29 @@ ebpo_status scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error)
     return EBPO_OK;
 }
 
-ebpo_status scene_add_layer(ebpo_scene *scene, const char *name, ebpo_error *error)
+ebpo_status ebpo_scene_add_layer(ebpo_scene *scene, const char *name, ebpo_error *error)
 {
     uint64_t n, set;
-    ebpo_status status = scene_check_name(name, "a layer", error);
+    ebpo_status status = check_name(name, "a layer", error);
     if (status == EBPO_OK)
         status = ROOM(scene, layers, &n, error);
     if (status == EBPO_OK)
-        status = scene_add_set(scene, "layer:", name, &set, error);
+        status = add_set(scene, "layer:", name, &set, error);
     if (status != EBPO_OK)
         return status;
     scene->layers[n] = set;
     scene->layers_count++;
-    return scene_put_name(scene, SCENE_LAYER, name, n, error);
+    return put_name(scene, EBPO_SCENE_LAYER, name, n, error);
 }
 
-ebpo_status scene_add_group(ebpo_scene *scene, const char *name, ebpo_error *error)
+ebpo_status ebpo_scene_add_group(ebpo_scene *scene, const char *name, ebpo_error *error)
 {
     uint64_t n, set;
-    ebpo_status status = scene_check_name(name, "a group", error);
+    ebpo_status status = check_name(name, "a group", error);
     if (status == EBPO_OK)
         status = ROOM(scene, groups, &n, error);
     if (status == EBPO_OK)
-        status = scene_add_set(scene, "group:", name, &set, error);
+        status = add_set(scene, "group:", name, &set, error);
     if (status != EBPO_OK)
         return status;
     scene->groups[n] = set;
@@ -370,28 +384,29 @@ ebpo_status scene_add_group(ebpo_scene *scene, const char *name, ebpo_error *err
     return EBPO_OK;
 }
 
-ebpo_status scene_add_route(ebpo_scene *scene, const char *name, uint64_t *number,
-                            ebpo_error *error)
+ebpo_status ebpo_scene_add_route(ebpo_scene *scene, const char *name, uint64_t *number,
+                                 ebpo_error *error)
 {
-    ebpo_status status = scene_check_name(name, "a route", error);
+    ebpo_status status = check_name(name, "a route", error);
     if (status == EBPO_OK)
         status = ROOM(scene, routes, number, error);
     if (status == EBPO_OK)
-        status = scene_put_name(scene, SCENE_ROUTE, name, *number, error);
+        status = put_name(scene, EBPO_SCENE_ROUTE, name, *number, error);
     if (status != EBPO_OK)
         return status;
-    scene->routes[scene->routes_count++] = (scene_route){ .name = strdup(name) };
+    scene->routes[scene->routes_count++] = (ebpo_scene_route){ .name = strdup(name) };
     return scene->routes[*number].name ? EBPO_OK : ebpo_fail_memory(error, strlen(name));
 }
 
-ebpo_status scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera, ebpo_error *error)
+ebpo_status ebpo_scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera,
+                                  ebpo_error *error)
 {
     uint64_t n;
-    ebpo_status status = scene_check_name(camera->name, "a camera", error);
+    ebpo_status status = check_name(camera->name, "a camera", error);
     if (status == EBPO_OK)
         status = ROOM(scene, cameras, &n, error);
     if (status == EBPO_OK)
-        status = scene_put_name(scene, SCENE_CAMERA, camera->name, n, error);
+        status = put_name(scene, EBPO_SCENE_CAMERA, camera->name, n, error);
     if (status != EBPO_OK)
         return status;
     ebpo_scene_camera *c = &scene->cameras[n];
@@ -401,26 +416,27 @@ ebpo_status scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera,
     return c->name ? EBPO_OK : ebpo_fail_memory(error, strlen(camera->name));
 }
 
-ebpo_status scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b, double clearance,
-                           ebpo_error *error)
+ebpo_status ebpo_scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b, double clearance,
+                                ebpo_error *error)
 {
     uint64_t n;
     ebpo_status status = ROOM(scene, rules, &n, error);
     if (status != EBPO_OK)
         return status;
-    scene->rules[scene->rules_count++] = (scene_rule){ a < b ? a : b, a < b ? b : a, clearance };
+    scene->rules[scene->rules_count++] =
+        (ebpo_scene_rule_entry){ a < b ? a : b, a < b ? b : a, clearance };
     scene->ignored += clearance < 0;
     scene->clearances += clearance >= 0;
     return EBPO_OK;
 }
 
-/* What a scene tells of itself. */
+/* --- returning members --- */
 
 static void add_times(const ebpo_scene *scene, ebpo_scene_counts *c)
 {
     double begin = INFINITY, end = -INFINITY;
     for (uint64_t i = 0; i < scene->routes_count; i++) {
-        const scene_route *r = &scene->routes[i];
+        const ebpo_scene_route *r = &scene->routes[i];
         c->poses += r->count;
         if (r->count) {
             begin = fmin(begin, r->keys[0].time);
@@ -455,7 +471,7 @@ ebpo_status ebpo_scene_get_model(const ebpo_scene *scene, uint64_t model,
 {
     if (model >= scene->models_count)
         return EBPO_E_ARGUMENT;
-    const scene_model *m = &scene->models[model];
+    const ebpo_scene_model_entry *m = &scene->models[model];
     ebpo_scene_model_facts f = EBPO_SCENE_MODEL_FACTS_INIT;
     f.name = m->name;
     f.path = m->path;
@@ -504,7 +520,7 @@ uint64_t ebpo_scene_group_of(const ebpo_scene *scene, uint64_t instance, uint64_
     uint64_t group = EBPO_SCENE_NONE;
     if (instance >= scene->instances_count)
         return group;
-    const scene_instance *i = &scene->instances[instance];
+    const ebpo_scene_instance_entry *i = &scene->instances[instance];
     for (uint32_t n = 0; n < i->set_count; n++) {
         group = group_with(scene, i->sets[n]);
         if (group != EBPO_SCENE_NONE && nth-- == 0)
@@ -524,7 +540,7 @@ ebpo_status ebpo_scene_get_stats(const ebpo_scene *scene, ebpo_scene_stats *out)
 {
     ebpo_scene_stats s = EBPO_SCENE_STATS_INIT;
     for (uint64_t i = 0; i < scene->files_count; i++) {
-        const scene_file *f = &scene->files[i];
+        const ebpo_scene_file_entry *f = &scene->files[i];
         ebpo_file_stats read = EBPO_FILE_STATS_INIT;
         ebpo_model_stats model = EBPO_MODEL_STATS_INIT;
         if (!f->file)

@@ -1,4 +1,11 @@
-/* What a scene needs of its models. */
+/* Plans and packs a scene: which bytes of its models are needed, and a folder that has only those.
+ *
+ * Packing writes a subset of each file (scene_needs.c), copies the files of poses, and writes a
+ * scene file like the source's with other paths and digests. The folder is written beside its
+ * place and renamed when it is complete, so that it appears whole or not at all; on failure it is
+ * removed.
+ *
+ * A plan finds the same needs without writing anything. */
 #include "core/strict_fp.h"
 
 #include <fcntl.h>
@@ -19,15 +26,11 @@
 #include "format/file_in.h"
 #include "io/file_source.h"
 
-/* Planning, as packing does it too. */
-
-/* The scene file of a packed scene: its source's, with other files and their digests. */
-
 /* Names in the folder: of the scene, of a file of scene->files, of a route's poses. */
 #define SCENE_PACKED "packed.scene.json"
 
 /* Takes the options; the scene and its times are right. */
-static ebpo_status scene_plan_check(scene_needs *needs, const ebpo_plan_options *options)
+static ebpo_status scene_plan_check(ebpo_scene_needs *needs, const ebpo_plan_options *options)
 {
     const ebpo_scene *scene = needs->scene;
     ebpo_error *error = needs->error;
@@ -51,25 +54,25 @@ static ebpo_status scene_plan_check(scene_needs *needs, const ebpo_plan_options 
 }
 
 /* Finds what is needed of each file. Free needs->files, also on failure. */
-static ebpo_status scene_plan_needs(scene_needs *needs)
+static ebpo_status scene_plan_needs(ebpo_scene_needs *needs)
 {
-    ebpo_status status = scene_begin_needs(needs);
+    ebpo_status status = ebpo_scene_begin_needs(needs);
     if (status == EBPO_OK)
-        status = needs->how.purpose == EBPO_SCENE_FOR_VIEW ? scene_add_views(needs)
-                                                           : scene_add_near(needs);
+        status = needs->how.purpose == EBPO_SCENE_FOR_VIEW ? ebpo_scene_add_views(needs)
+                                                           : ebpo_scene_add_near(needs);
     if (status == EBPO_OK)
-        scene_end_needs(needs);
+        ebpo_scene_end_needs(needs);
     return status;
 }
 
 /* A need of each model; free it, also on failure. */
-static ebpo_status scene_plan_list(const scene_needs *needs, ebpo_scene_need **out)
+static ebpo_status scene_plan_list(const ebpo_scene_needs *needs, ebpo_scene_need **out)
 {
     uint64_t count = needs->scene->models_count;
     ebpo_scene_need *list = ebpo_alloc(count, sizeof *list);
     ebpo_status status = list ? EBPO_OK : ebpo_fail_memory(needs->error, count * sizeof *list);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        status = scene_tell_need(needs, i, &list[i]);
+        status = ebpo_scene_tell_need(needs, i, &list[i]);
     *out = list;
     return status;
 }
@@ -79,7 +82,7 @@ ebpo_status ebpo_scene_plan(ebpo_scene *scene, double from, double to,
                             ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    scene_needs needs = { .scene = scene, .from = from, .to = to, .error = error };
+    ebpo_scene_needs needs = { .scene = scene, .from = from, .to = to, .error = error };
     ebpo_scene_need *list = NULL;
     ebpo_status status = scene_plan_check(&needs, options);
     if (status == EBPO_OK)
@@ -115,7 +118,7 @@ static ebpo_status name_files(json_t *root, const ebpo_scene *scene, const ebpo_
     json_t *models = json_object_get(root, "models");
     bool set = true;
     for (uint64_t i = 0; i < scene->models_count; i++) {
-        const scene_model *m = &scene->models[i];
+        const ebpo_scene_model_entry *m = &scene->models[i];
         json_t *model = json_object_get(models, m->name);
         char name[40], digest[65], source[65];
         scene_packed_name(m->file, name);
@@ -144,10 +147,10 @@ static ebpo_status copy_poses(const ebpo_scene *scene, const char *csv, const ch
                               const char *name, ebpo_error *error)
 {
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
-    char *path = scene_join_path(scene->folder, csv);
+    char *path = ebpo_scene_join_path(scene->folder, csv);
     ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(csv));
     if (status == EBPO_OK && !scene->outside)
-        status = scene_stays_within(scene->folder, path, error);
+        status = ebpo_scene_stays_within(scene->folder, path, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_open(&file, path, error);
     if (status == EBPO_OK)
@@ -201,10 +204,8 @@ static ebpo_status scene_write_packed(const ebpo_scene *scene, const ebpo_scene_
     return status;
 }
 
-/* A folder with what a scene needs: written beside its place, and put there whole. */
-
 typedef struct packing {
-    scene_needs needs;
+    ebpo_scene_needs needs;
     ebpo_pack_options how;
     const char *folder;
     char *making; /* the folder until it is whole */
@@ -212,7 +213,7 @@ typedef struct packing {
     ebpo_error *error;
 } packing;
 
-/* ---- folders ---- */
+/* --- folders --- */
 
 static char *path_in(const char *folder, const char *name)
 {
@@ -256,7 +257,7 @@ static ebpo_status publish_folder(packing *p)
     return status;
 }
 
-/* ---- models ---- */
+/* --- models --- */
 
 /* What is on the disk. */
 static ebpo_status look_at(packing *p, const char *path, ebpo_scene_packed *out)
@@ -284,7 +285,7 @@ static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
 {
     ebpo_scene_packed *out = &p->files[number];
     const ebpo_file *file = p->needs.scene->files[number].file;
-    ebpo_subset_options o = scene_need_options(&p->needs, number);
+    ebpo_subset_options o = ebpo_scene_need_options(&p->needs, number);
     char name[40];
     scene_packed_name(number, name);
     char *path = path_in(p->making, name);
@@ -340,7 +341,7 @@ static ebpo_status write_files(packing *p)
     return status == EBPO_OK ? pack_shrink(p) : status;
 }
 
-/* ---- all of it ---- */
+/* --- all of it --- */
 
 static ebpo_status pack_check(packing *p, const ebpo_pack_options *options)
 {

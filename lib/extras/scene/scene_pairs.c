@@ -1,4 +1,14 @@
-/* Which pairs of instances are asked about, and how far apart they shall be. */
+/* The broad phase of a scene: which pairs of instances may come near each other in an interval of
+ * time.
+ *
+ * Rules say which pairs are evaluated and which clearance they keep: of several rules for a pair
+ * the greatest clearance counts, and one that ignores the pair counts more than all others.
+ *
+ * The box of an instance holds it at all times of the interval. Between keys it is made in steps
+ * of little rotation, each widened by what the motion deviates from a straight line.
+ *
+ * Sweep and prune sorts boxes along the axis on which they overlap least by chance. Pairs are
+ * returned in the order of their instances. All tests err towards a pair that is not needed. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -13,7 +23,7 @@
 
 static int compare_rules(const void *a, const void *b)
 {
-    const scene_rule *x = a, *y = b;
+    const ebpo_scene_rule_entry *x = a, *y = b;
     if (x->a != y->a)
         return x->a < y->a ? -1 : 1;
     return (x->b > y->b) - (x->b < y->b);
@@ -26,7 +36,7 @@ static int compare_sets(const void *a, const void *b)
 }
 
 /* Ascending, each once. */
-static void sort_sets(scene_instance *i)
+static void sort_sets(ebpo_scene_instance_entry *i)
 {
     uint32_t kept = 0;
     if (i->set_count)
@@ -38,14 +48,14 @@ static void sort_sets(scene_instance *i)
 }
 
 /* One rule for a pair of sets: ignored if any line says so, else the greatest clearance. */
-void scene_sort_rules(ebpo_scene *scene)
+void ebpo_scene_sort_rules(ebpo_scene *scene)
 {
     uint64_t kept = 0;
     if (scene->rules_count)
         qsort(scene->rules, scene->rules_count, sizeof *scene->rules, compare_rules);
     for (uint64_t i = 0; i < scene->rules_count; i++) {
-        scene_rule rule = scene->rules[i];
-        scene_rule *last = kept ? &scene->rules[kept - 1] : NULL;
+        ebpo_scene_rule_entry rule = scene->rules[i];
+        ebpo_scene_rule_entry *last = kept ? &scene->rules[kept - 1] : NULL;
         if (last && last->a == rule.a && last->b == rule.b)
             last->clearance = last->clearance < 0 || rule.clearance < 0
                                   ? -1
@@ -61,8 +71,8 @@ void scene_sort_rules(ebpo_scene *scene)
 /* Of two sets: below 0 ignored, 0 also where there is no rule. */
 static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
 {
-    scene_rule wanted = { a < b ? a : b, a < b ? b : a, 0 };
-    const scene_rule *rule =
+    ebpo_scene_rule_entry wanted = { a < b ? a : b, a < b ? b : a, 0 };
+    const ebpo_scene_rule_entry *rule =
         bsearch(&wanted, scene->rules, scene->rules_count, sizeof *scene->rules, compare_rules);
     return rule ? rule->clearance : 0;
 }
@@ -74,8 +84,8 @@ static bool take_rule(double rule, double *clearance)
     return rule >= 0;
 }
 
-static bool by_sets(const ebpo_scene *scene, const scene_instance *x, const scene_instance *y,
-                    double *clearance)
+static bool by_sets(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
+                    const ebpo_scene_instance_entry *y, double *clearance)
 {
     for (uint32_t i = 0; i < x->set_count; i++)
         for (uint32_t k = 0; k < y->set_count; k++)
@@ -84,16 +94,16 @@ static bool by_sets(const ebpo_scene *scene, const scene_instance *x, const scen
     return true;
 }
 
-static bool is_in(const scene_instance *i, uint64_t set)
+static bool is_in(const ebpo_scene_instance_entry *i, uint64_t set)
 {
     return bsearch(&set, i->sets, i->set_count, sizeof set, compare_sets) != NULL;
 }
 
-static bool by_rules(const ebpo_scene *scene, const scene_instance *x, const scene_instance *y,
-                     double *clearance)
+static bool by_rules(const ebpo_scene *scene, const ebpo_scene_instance_entry *x,
+                     const ebpo_scene_instance_entry *y, double *clearance)
 {
     for (uint64_t i = 0; i < scene->rules_count; i++) {
-        const scene_rule *r = &scene->rules[i];
+        const ebpo_scene_rule_entry *r = &scene->rules[i];
         if (((is_in(x, r->a) && is_in(y, r->b)) || (is_in(x, r->b) && is_in(y, r->a))) &&
             !take_rule(r->clearance, clearance))
             return false;
@@ -106,7 +116,7 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
     *clearance = 0;
     if (a == b || a >= scene->instances_count || b >= scene->instances_count)
         return false;
-    const scene_instance *x = &scene->instances[a], *y = &scene->instances[b];
+    const ebpo_scene_instance_entry *x = &scene->instances[a], *y = &scene->instances[b];
     if (x->as.fixed && y->as.fixed)
         return false;
     /* each group with each of the other would take hours where both have 100,000 */
@@ -114,26 +124,27 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
     return (few ? by_rules : by_sets)(scene, x, y, clearance);
 }
 
-/* Where instances are, in time: poses, boxes, and how far they move. */
+/* --- poses, boxes and motion --- */
 
 static const double slack = 0x1p-44;
 /* Of a turn, in radians, that is taken as one step of a box. */
 static const double step_turn = 0.125;
 
-static const scene_route *route_of(const ebpo_scene *scene, const scene_instance *i)
+static const ebpo_scene_route *route_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *i)
 {
     return i->as.route == EBPO_SCENE_NONE ? NULL : &scene->routes[i->as.route];
 }
 
-static void pose_at(const ebpo_scene *scene, const scene_instance *i, double time, ebpo_pose *out)
+static void pose_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double time,
+                    ebpo_pose *out)
 {
-    const scene_route *route = route_of(scene, i);
+    const ebpo_scene_route *route = route_of(scene, i);
     ebpo_pose moved;
     *out = i->as.pose;
     if (!route)
         return;
-    scene_route_at(route, time, &moved);
-    scene_compose(&moved, &i->as.pose, out);
+    ebpo_scene_route_at(route, time, &moved);
+    ebpo_scene_compose(&moved, &i->as.pose, out);
 }
 
 static ebpo_status check_time(const ebpo_scene *scene, uint64_t instance, double from, double to,
@@ -153,7 +164,7 @@ static ebpo_status check_loaded(const ebpo_scene *scene, uint64_t instance, doub
     ebpo_status status = check_time(scene, instance, from, to, error);
     if (status != EBPO_OK)
         return status;
-    const scene_model *m = &scene->models[scene->instances[instance].as.model];
+    const ebpo_scene_model_entry *m = &scene->models[scene->instances[instance].as.model];
     return m->file != EBPO_SCENE_NONE
                ? EBPO_OK
                : ebpo_fail(error, EBPO_E_ARGUMENT, "model '%.80s' has not been loaded", m->name);
@@ -170,7 +181,8 @@ ebpo_status ebpo_scene_pose(const ebpo_scene *scene, uint64_t instance, double t
 }
 
 /* Of the posed vertices; rounding is within. */
-static void posed_box(const ebpo_pose *pose, const scene_model *m, double min[3], double max[3])
+static void posed_box(const ebpo_pose *pose, const ebpo_scene_model_entry *m, double min[3],
+                      double max[3])
 {
     for (int i = 0; i < 3; i++) {
         double low = 0, high = 0, size = fabs(pose->translation[i]);
@@ -206,23 +218,23 @@ static void empty_box(double min[3], double max[3])
     }
 }
 
-scene_reach scene_reach_of(const ebpo_scene *scene, const scene_instance *i)
+ebpo_scene_reach ebpo_scene_reach_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *i)
 {
-    const scene_model *m = &scene->models[i->as.model];
+    const ebpo_scene_model_entry *m = &scene->models[i->as.model];
     double min[3], max[3], far[3];
-    scene_reach reach = { 0, 0 };
+    ebpo_scene_reach reach = { 0, 0 };
     posed_box(&i->as.pose, m, min, max);
     for (int k = 0; k < 3; k++) {
         far[k] = fmax(fabs(min[k]), fabs(max[k]));
         reach.size += fabs(i->as.pose.translation[k]) +
                       i->as.pose.scale * fmax(fabs(m->min[k]), fabs(m->max[k]));
     }
-    reach.length = scene_length_above(far);
+    reach.length = ebpo_scene_length_above(far);
     return reach;
 }
 
-static void box_at(const ebpo_scene *scene, const scene_instance *i, double time, double by,
-                   double min[3], double max[3])
+static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double time,
+                   double by, double min[3], double max[3])
 {
     double low[3], high[3];
     ebpo_pose pose;
@@ -232,33 +244,34 @@ static void box_at(const ebpo_scene *scene, const scene_instance *i, double time
 }
 
 /* Between two times that no key is between, in steps of little turning. */
-static void box_between(const ebpo_scene *scene, const scene_instance *i, scene_reach reach,
-                        double from, double to, double min[3], double max[3])
+static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
+                        ebpo_scene_reach reach, double from, double to, double min[3],
+                        double max[3])
 {
-    const scene_route *route = route_of(scene, i);
-    scene_step all = scene_route_step(route, from, to, reach);
+    const ebpo_scene_route *route = route_of(scene, i);
+    ebpo_scene_step all = ebpo_scene_route_step(route, from, to, reach);
     double turned = reach.length > 0 ? sqrt(8 * all.sag / reach.length) : 0;
     int steps = turned < 32 * step_turn ? 1 + (int)(turned / step_turn) : 32;
     for (int n = 0; n < steps; n++) {
         double begin = n == 0 ? from : from + (to - from) * n / steps;
         double end = n + 1 == steps ? to : from + (to - from) * (n + 1) / steps;
-        double sag = scene_route_step(route, begin, end, reach).sag;
+        double sag = ebpo_scene_route_step(route, begin, end, reach).sag;
         box_at(scene, i, begin, sag, min, max);
         box_at(scene, i, end, sag, min, max);
     }
 }
 
-static void swept_box(const ebpo_scene *scene, const scene_instance *i, double from, double to,
-                      double min[3], double max[3])
+static void swept_box(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, double from,
+                      double to, double min[3], double max[3])
 {
-    const scene_route *route = route_of(scene, i);
-    scene_reach reach = scene_reach_of(scene, i);
+    const ebpo_scene_route *route = route_of(scene, i);
+    ebpo_scene_reach reach = ebpo_scene_reach_of(scene, i);
     if (!route || from == to) {
         box_at(scene, i, from, 0, min, max);
         return;
     }
     for (double at = from; at < to;) {
-        double next = scene_route_next(route, at, to);
+        double next = ebpo_scene_route_next(route, at, to);
         box_between(scene, i, reach, at, next, min, max);
         at = next;
     }
@@ -271,15 +284,15 @@ ebpo_status ebpo_scene_motion(const ebpo_scene *scene, uint64_t instance, double
     ebpo_status status = check_loaded(scene, instance, from, to, error);
     if (status != EBPO_OK)
         return status;
-    const scene_instance *i = &scene->instances[instance];
-    const scene_route *route = route_of(scene, i);
-    scene_reach reach = scene_reach_of(scene, i);
+    const ebpo_scene_instance_entry *i = &scene->instances[instance];
+    const ebpo_scene_route *route = route_of(scene, i);
+    ebpo_scene_reach reach = ebpo_scene_reach_of(scene, i);
     double sum = 0;
     for (double at = from; route && at < to;) {
-        double next = scene_route_next(route, at, to);
-        sum += scene_route_step(route, at, next, reach).length;
-        bool key = next > route->keys[0].time &&
-                   scene_route_next(route, next, INFINITY) > scene_route_next(route, at, INFINITY);
+        double next = ebpo_scene_route_next(route, at, to);
+        sum += ebpo_scene_route_step(route, at, next, reach).length;
+        bool key = next > route->keys[0].time && ebpo_scene_route_next(route, next, INFINITY) >
+                                                     ebpo_scene_route_next(route, at, INFINITY);
         if (route->jumps && key)
             sum = INFINITY;
         at = next;
@@ -313,7 +326,7 @@ ebpo_status ebpo_scene_box(const ebpo_scene *scene, double from, double to, doub
     return status;
 }
 
-/* The broad phase: sweep and prune along the axis on which boxes are spread most. */
+/* --- sweep and prune --- */
 
 /* 400 MB while they are sorted. */
 static const uint64_t most_pairs = UINT64_C(1) << 23;
@@ -328,7 +341,7 @@ typedef struct sweep {
     box *boxes;
     uint64_t count;
     double clearance; /* the greatest of any rule */
-    SCENE_LIST(ebpo_scene_pair, pairs);
+    EBPO_SCENE_LIST(ebpo_scene_pair, pairs);
 } sweep;
 
 static ebpo_status make_boxes(sweep *s, double from, double to, ebpo_error *error)

@@ -1,4 +1,8 @@
-/* What was asked of a scene at several times, in an HDF5 file for other programs. */
+/* Records results of a scene at several times in an HDF5 file, for other programs.
+ *
+ * The file has the names of instances and models, a row for each time, and for each pair that was
+ * found a row with its kind, place and depth. Tables grow by rows while times are added. The file
+ * is published when it is finished, and is absent after a failure. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -289,9 +293,12 @@ static ebpo_status put_rows(ebpo_scene_record *r, const rows *d, uint64_t count,
 static ebpo_status put_frame(ebpo_scene_record *r, const ebpo_scene_frame *f, uint64_t meetings,
                              ebpo_error *error)
 {
-    const int64_t n[] = { r->meetings,           record_number(meetings),
-                          record_number(f->asked),      record_number(f->nanoseconds),
-                          record_number(f->bytes_read), record_number(f->models),
+    const int64_t n[] = { r->meetings,
+                          record_number(meetings),
+                          record_number(f->asked),
+                          record_number(f->nanoseconds),
+                          record_number(f->bytes_read),
+                          record_number(f->models),
                           record_number(f->loads) };
     ebpo_status status = ebpo_h5_append(&r->out, &r->table[TIME], &f->time, 1, error);
     for (int i = FIRST_MEETING; i < FRAME && status == EBPO_OK; i++)

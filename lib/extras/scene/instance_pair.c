@@ -1,3 +1,13 @@
+/* Two instances of a scene at a time: where one is in the other's coordinates, how far they move
+ * relative to each other, how far they are apart, and what their files omit that may matter.
+ *
+ * Boxes and lengths are rounded outwards, so that every bound is certain in spite of rounding. A
+ * file that is a subset has only the faces of its kept box: what it omits is bounded by up to six
+ * boxes around that one. Two instances that follow one route have a relative motion of rounding
+ * and scale alone.
+ *
+ * A list of pairs is evaluated on all cores by ebpo_scene_find_in_pairs, each pair by itself with
+ * its own collider, so that results do not depend on the number of threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -6,14 +16,15 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "extras/collide/of_parts.h"
-#include "extras/scene/asked_pairs.h"
+#include "core/parallel.h"
+#include "extras/collide/collider.h"
+#include "extras/scene/instance_pair.h"
 #include "geometry/pose.h"
 
 /* of sums of a few products: far above their rounding */
 static const double slack = 0x1p-44;
 
-static const scene_model *left_out_model_of(const ebpo_scene *scene, uint64_t instance)
+static const ebpo_scene_model_entry *left_out_model_of(const ebpo_scene *scene, uint64_t instance)
 {
     return &scene->models[scene->instances[instance].as.model];
 }
@@ -21,7 +32,7 @@ static const scene_model *left_out_model_of(const ebpo_scene *scene, uint64_t in
 static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double time,
                              ebpo_posing *out, ebpo_error *error)
 {
-    const scene_model *m = left_out_model_of(scene, instance);
+    const ebpo_scene_model_entry *m = left_out_model_of(scene, instance);
     double reach[3];
     ebpo_pose pose;
     for (int k = 0; k < 3; k++)
@@ -35,7 +46,7 @@ typedef struct posed_box {
     double middle[3], half[3][3], size;
 } posed_box;
 
-static void pose_box(const ebpo_posing *p, const scene_model *m, posed_box *out)
+static void pose_box(const ebpo_posing *p, const ebpo_scene_model_entry *m, posed_box *out)
 {
     double middle[3];
     for (int k = 0; k < 3; k++)
@@ -52,10 +63,10 @@ static void pose_box(const ebpo_posing *p, const scene_model *m, posed_box *out)
     }
 }
 
-ebpo_status scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
-                            scene_seen *out, ebpo_error *error)
+ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
+                                 ebpo_scene_seen *out, ebpo_error *error)
 {
-    const scene_model *m = left_out_model_of(scene, of);
+    const ebpo_scene_model_entry *m = left_out_model_of(scene, of);
     ebpo_posing from, at;
     posed_box b;
     ebpo_status status = posing_of(scene, of, time, &from, error);
@@ -89,16 +100,16 @@ ebpo_status scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other
     return EBPO_OK;
 }
 
-double scene_space_gap(const scene_space *a, const scene_space *b)
+double ebpo_scene_space_gap(const ebpo_scene_space *a, const ebpo_scene_space *b)
 {
     double apart[3];
     for (int k = 0; k < 3; k++)
         apart[k] = fmax(fmax(a->min[k] - b->max[k], b->min[k] - a->max[k]), 0);
-    return scene_length_above(apart) * (1 - 8 * slack);
+    return ebpo_scene_length_above(apart) * (1 - 8 * slack);
 }
 
 /* The part of a model's box whose faces its file has; false: all. */
-static bool held_box(const ebpo_scene *scene, uint64_t instance, scene_space *out)
+static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_space *out)
 {
     const ebpo_info *info =
         ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].as.model));
@@ -114,18 +125,19 @@ static bool held_box(const ebpo_scene *scene, uint64_t instance, scene_space *ou
 }
 
 /* Of `other` to what is in the box `all` and not in `held`: up to six boxes on its sides. */
-static double gap_around(const scene_space *all, const scene_space *held, const scene_space *other)
+static double gap_around(const ebpo_scene_space *all, const ebpo_scene_space *held,
+                         const ebpo_scene_space *other)
 {
     double gap = INFINITY;
     for (int k = 0; k < 3; k++) {
-        scene_space side = *all;
+        ebpo_scene_space side = *all;
         side.max[k] = fmin(held->min[k], all->max[k]);
         if (all->min[k] < held->min[k])
-            gap = fmin(gap, scene_space_gap(&side, other));
+            gap = fmin(gap, ebpo_scene_space_gap(&side, other));
         side = *all;
         side.min[k] = fmax(held->max[k], all->min[k]);
         if (all->max[k] > held->max[k])
-            gap = fmin(gap, scene_space_gap(&side, other));
+            gap = fmin(gap, ebpo_scene_space_gap(&side, other));
     }
     return gap;
 }
@@ -133,22 +145,22 @@ static double gap_around(const scene_space *all, const scene_space *held, const 
 static ebpo_status left_out_of(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
                                double *gap, ebpo_error *error)
 {
-    const scene_model *m = left_out_model_of(scene, of);
-    scene_space held, all;
-    scene_seen seen;
+    const ebpo_scene_model_entry *m = left_out_model_of(scene, of);
+    ebpo_scene_space held, all;
+    ebpo_scene_seen seen;
     *gap = INFINITY;
     if (!held_box(scene, of, &held))
         return EBPO_OK;
     memcpy(all.min, m->min, sizeof all.min);
     memcpy(all.max, m->max, sizeof all.max);
-    ebpo_status status = scene_seen_from(scene, of, other, time, &seen, error);
+    ebpo_status status = ebpo_scene_seen_from(scene, of, other, time, &seen, error);
     if (status == EBPO_OK)
         *gap = gap_around(&all, &held, &seen.box) * seen.unit;
     return status;
 }
 
-ebpo_status scene_left_out(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
-                           double *gap, uint64_t *lacking, ebpo_error *error)
+ebpo_status ebpo_scene_left_out(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
+                                double *gap, uint64_t *lacking, ebpo_error *error)
 {
     double of_a, of_b;
     ebpo_status status = left_out_of(scene, pair->a, pair->b, time, &of_a, error);
@@ -161,10 +173,10 @@ ebpo_status scene_left_out(const ebpo_scene *scene, const ebpo_scene_pair *pair,
     return EBPO_OK;
 }
 
-ebpo_status scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
-                        double time, bool solids, ebpo_error *error)
+ebpo_status ebpo_scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
+                             double time, bool solids, ebpo_error *error)
 {
-    const scene_model *m = left_out_model_of(scene, lacking);
+    const ebpo_scene_model_entry *m = left_out_model_of(scene, lacking);
     return ebpo_fail(
         error, EBPO_E_ABSENT,
         "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a "
@@ -174,29 +186,35 @@ ebpo_status scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, ui
         solids ? ", such as ebpo scene pack --solids makes" : "");
 }
 
-static const scene_route *route_of(const ebpo_scene *scene, uint64_t instance)
+static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instance)
 {
     uint64_t route = scene->instances[instance].as.route;
     return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
 }
 
-bool scene_pair_rides(const ebpo_scene *scene, const ebpo_scene_pair *pair)
+/* Both ride on what moves along one route, or along two of the same keys: all that changes between
+ * them is what rounding does, and their size where the route's scale does. */
+static bool pair_rides(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
-    const scene_route *a = route_of(scene, pair->a), *b = route_of(scene, pair->b);
+    const ebpo_scene_route *a = route_of(scene, pair->a), *b = route_of(scene, pair->b);
     if (!a || !b)
         return false;
     return a == b || (a->count == b->count && a->jumps == b->jumps &&
                       memcmp(a->keys, b->keys, a->count * sizeof *a->keys) == 0);
 }
 
-double scene_pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair)
+/* What rounding may do to their distance on all their ways, of the order of it; 0: neither moves.
+ */
+static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     double sum = 0;
     for (int i = 0; i < 2; i++) {
         uint64_t instance = i ? pair->b : pair->a;
-        const scene_route *route = route_of(scene, instance);
+        const ebpo_scene_route *route = route_of(scene, instance);
         if (route)
-            sum += scene_route_rounding(route, scene_reach_of(scene, &scene->instances[instance]));
+            sum +=
+                ebpo_scene_route_rounding(route,
+                                          ebpo_scene_reach_of(scene, &scene->instances[instance]));
     }
     return sum;
 }
@@ -206,14 +224,16 @@ double scene_pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 static double pair_motion_ride(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
                                double to)
 {
-    scene_reach a = scene_reach_of(scene, &scene->instances[pair->a]);
-    scene_reach b = scene_reach_of(scene, &scene->instances[pair->b]);
-    return scene_route_growth(route_of(scene, pair->a), from, to,
-                              (scene_reach){ a.length + b.length, a.size + b.size });
+    ebpo_scene_reach a = ebpo_scene_reach_of(scene, &scene->instances[pair->a]);
+    ebpo_scene_reach b = ebpo_scene_reach_of(scene, &scene->instances[pair->b]);
+    return ebpo_scene_route_growth(route_of(scene, pair->a), from, to,
+                                   (ebpo_scene_reach){ a.length + b.length, a.size + b.size });
 }
 
-ebpo_status scene_pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair, bool rides,
-                              double from, double to, double *out, ebpo_error *error)
+/* Their distance changes by no more than *out on its way between two times, INFINITY over a jump.
+ * rides: as pair_rides says. */
+static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair, bool rides,
+                               double from, double to, double *out, ebpo_error *error)
 {
     double a, b;
     ebpo_status status = ebpo_scene_motion(scene, pair->a, from, to, &a, error);
@@ -227,22 +247,23 @@ ebpo_status scene_pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pa
     return EBPO_OK;
 }
 
-double scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from, double to)
+double ebpo_scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
+                            double to)
 {
     double next = to;
     for (int i = 0; i < 2; i++) {
-        const scene_route *route = route_of(scene, i ? pair->b : pair->a);
+        const ebpo_scene_route *route = route_of(scene, i ? pair->b : pair->a);
         if (route)
-            next = fmin(next, scene_route_next(route, from, to));
+            next = fmin(next, ebpo_scene_route_next(route, from, to));
     }
     return next;
 }
 
-/* Pairs of instances that are asked about one after the other, by any thread. */
+/* --- lists of pairs --- */
 
 static bool keep_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count)
 {
-    scene_pairs_list *list = user;
+    ebpo_scene_pairs_list *list = user;
     list->pairs = ebpo_alloc(count, sizeof *pairs);
     list->count = count;
     if (list->pairs)
@@ -250,8 +271,8 @@ static bool keep_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count)
     return true;
 }
 
-ebpo_status scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pairs, uint64_t count,
-                              ebpo_error *error)
+ebpo_status ebpo_scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pairs, uint64_t count,
+                                   ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_model *model;
@@ -262,30 +283,68 @@ ebpo_status scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pairs, u
     return status;
 }
 
-ebpo_status scene_keep_pairs(const ebpo_scene *scene, double from, double to, scene_pairs_list *out,
-                             ebpo_error *error)
+ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double to,
+                                  ebpo_scene_pairs_list *out, ebpo_error *error)
 {
-    *out = (scene_pairs_list){ 0 };
+    *out = (ebpo_scene_pairs_list){ 0 };
     ebpo_status status = ebpo_scene_pairs(scene, from, to, keep_pairs, out, error);
     if (status == EBPO_OK && out->count && !out->pairs)
         status = ebpo_fail_memory(error, out->count * sizeof *out->pairs);
     return status;
 }
 
-ebpo_status scene_list_pairs(ebpo_scene *scene, double from, double to, scene_pairs_list *out,
-                             ebpo_error *error)
+/* The same; their models are made. On failure there is nothing to free. */
+static ebpo_status list_pairs(ebpo_scene *scene, double from, double to, ebpo_scene_pairs_list *out,
+                              ebpo_error *error)
 {
-    ebpo_status status = scene_keep_pairs(scene, from, to, out, error);
+    ebpo_status status = ebpo_scene_keep_pairs(scene, from, to, out, error);
     if (status == EBPO_OK)
-        status = scene_make_models(scene, out->pairs, out->count, error);
+        status = ebpo_scene_make_models(scene, out->pairs, out->count, error);
     if (status != EBPO_OK) {
         free(out->pairs);
-        *out = (scene_pairs_list){ 0 };
+        *out = (ebpo_scene_pairs_list){ 0 };
     }
     return status;
 }
 
-static ebpo_model *asked_pairs_model_of(const ebpo_scene *scene, uint64_t instance)
+typedef struct pair_finds {
+    const ebpo_scene_search *search;
+    const ebpo_scene_pair *pairs;
+    char *results;
+} pair_finds;
+
+static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    const pair_finds *f = context;
+    const ebpo_scene_search *s = f->search;
+    ebpo_status status = EBPO_OK;
+    (void)worker;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
+        status = s->find(s->how, &f->pairs[i], f->results + i * s->result_size, error);
+    return status;
+}
+
+ebpo_status ebpo_scene_find_in_pairs(ebpo_scene *scene, double from, double to,
+                                     const ebpo_scene_search *search, void **results,
+                                     uint64_t *count, ebpo_error *error)
+{
+    ebpo_scene_pairs_list list;
+    ebpo_status status = list_pairs(scene, from, to, &list, error);
+    *count = list.count;
+    *results = ebpo_alloc(list.count, search->result_size);
+    if (status == EBPO_OK && !*results)
+        status = ebpo_fail_memory(error, list.count * search->result_size);
+    pair_finds finds = { search, list.pairs, *results };
+    if (status == EBPO_OK)
+        status =
+            ebpo_parallel_for(ebpo_thread_count(search->threads), NULL, list.count, search->grain,
+                              find_some, &finds, search->progress, search->stage, error);
+    free(list.pairs);
+    return status;
+}
+
+static ebpo_model *opened_model(const ebpo_scene *scene, uint64_t instance)
 {
     return scene->files[scene->models[scene->instances[instance].as.model].file].model;
 }
@@ -296,27 +355,27 @@ static bool has_mesh(const ebpo_scene *scene, uint64_t instance)
     return ebpo_file_info(ebpo_scene_file(scene, model))->parts & EBPO_PART_MESH;
 }
 
-ebpo_status scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair, unsigned threads,
-                           ebpo_collider **out, ebpo_error *error)
+ebpo_status ebpo_scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
+                                unsigned threads, ebpo_collider **out, ebpo_error *error)
 {
     ebpo_collider_options how = EBPO_COLLIDER_OPTIONS_INIT;
     how.threads = threads;
     *out = NULL;
     if (!has_mesh(scene, pair->a) || !has_mesh(scene, pair->b))
         return EBPO_OK;
-    return ebpo_collider_of_parts(asked_pairs_model_of(scene, pair->a),
-                                  asked_pairs_model_of(scene, pair->b), &how, out, error);
+    return ebpo_collider_of_parts(opened_model(scene, pair->a), opened_model(scene, pair->b), &how,
+                                  out, error);
 }
 
-ebpo_status scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
-                            ebpo_collide_options *out, ebpo_error *error)
+ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
+                                 ebpo_collide_options *out, ebpo_error *error)
 {
     ebpo_status status = ebpo_scene_pose(scene, pair->a, time, &out->pose_a, error);
     return status == EBPO_OK ? ebpo_scene_pose(scene, pair->b, time, &out->pose_b, error) : status;
 }
 
 /* Of a collider that is not there: nothing is left to be near. */
-static ebpo_status ask_distance(scene_looks *l, double time, double *lo, double *hi,
+static ebpo_status ask_distance(ebpo_scene_looks *l, double time, double *lo, double *hi,
                                 ebpo_error *error)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
@@ -324,7 +383,7 @@ static ebpo_status ask_distance(scene_looks *l, double time, double *lo, double 
     ebpo_clearance found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
     how.tolerance = l->tolerance;
     how.warm = true; /* lo and hi may differ by it: each pair has a collider of its own */
-    ebpo_status status = scene_pose_pair(l->scene, l->pair, time, &options, error);
+    ebpo_status status = ebpo_scene_pose_pair(l->scene, l->pair, time, &options, error);
     if (status == EBPO_OK && l->collider)
         status = ebpo_collide_distance(l->collider, &options, &how, &found, error);
     *lo = found.distance.lo;
@@ -332,39 +391,40 @@ static ebpo_status ask_distance(scene_looks *l, double time, double *lo, double 
     return status;
 }
 
-ebpo_status scene_look(scene_looks *l, double time, double *lo, double *hi, ebpo_error *error)
+ebpo_status ebpo_scene_look(ebpo_scene_looks *l, double time, double *lo, double *hi,
+                            ebpo_error *error)
 {
     l->gap = INFINITY;
     ebpo_status status = ask_distance(l, time, lo, hi, error);
     if (status == EBPO_OK)
-        status = scene_left_out(l->scene, l->pair, time, &l->gap, &l->lacking, error);
+        status = ebpo_scene_left_out(l->scene, l->pair, time, &l->gap, &l->lacking, error);
     *lo = fmin(*lo, l->gap);
     return status;
 }
 
-ebpo_status scene_looks_begin(scene_looks *l, const ebpo_scene *scene, const ebpo_scene_pair *pair,
-                              double tolerance, ebpo_error *error)
+ebpo_status ebpo_scene_looks_begin(ebpo_scene_looks *l, const ebpo_scene *scene,
+                                   const ebpo_scene_pair *pair, double tolerance, ebpo_error *error)
 {
-    *l = (scene_looks){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
+    *l = (ebpo_scene_looks){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
     /* finer ones would take long, for digits that the next pose has otherwise */
-    l->tolerance = fmax(l->tolerance, scene_pair_rounding(scene, pair) / 16);
-    l->rides = scene_pair_rides(scene, pair);
-    return scene_collider(scene, pair, 1, &l->collider, error);
+    l->tolerance = fmax(l->tolerance, pair_rounding(scene, pair) / 16);
+    l->rides = pair_rides(scene, pair);
+    return ebpo_scene_collider(scene, pair, 1, &l->collider, error);
 }
 
-ebpo_status scene_looks_motion(const scene_looks *l, double from, double to, double *out,
-                               ebpo_error *error)
+ebpo_status ebpo_scene_looks_motion(const ebpo_scene_looks *l, double from, double to, double *out,
+                                    ebpo_error *error)
 {
-    return scene_pair_motion(l->scene, l->pair, l->rides, from, to, out, error);
+    return pair_motion(l->scene, l->pair, l->rides, from, to, out, error);
 }
 
-bool scene_is_within(double hi, double lo, double tolerance)
+bool ebpo_scene_is_within(double hi, double lo, double tolerance)
 {
     return hi <= lo || (hi - lo) * (1 + 0x1p-52) <= tolerance;
 }
 
-ebpo_status scene_take_way_options(ebpo_scene_way_options *own,
-                                   const ebpo_scene_way_options *options, ebpo_error *error)
+ebpo_status ebpo_scene_take_way_options(ebpo_scene_way_options *own,
+                                        const ebpo_scene_way_options *options, ebpo_error *error)
 {
     ebpo_status status = EBPO_TAKE(ebpo_scene_way_options, own, options, error);
     if (status == EBPO_OK && !(own->tolerance > 0 && own->tolerance < INFINITY))
