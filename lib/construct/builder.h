@@ -16,10 +16,9 @@
 #include <ebpo/build.h>
 
 #include "core/workspace.h"
-#include "geometry/cell.h"
-#include "mesh/mesh_parts.h"
 #include "geometry/cells.h"
-#include "geometry/rule.h"
+#include "mesh/mesh_parts.h"
+#include "geometry/level_nodes.h"
 #include "construct/planes.h"
 
 #define EBPO_NO_NUMBER UINT32_MAX

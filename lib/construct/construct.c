@@ -12,18 +12,10 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "construct/branch.h"
-#include "construct/construct_top.h"
-#include "construct/corner_windings.h"
-#include "construct/emit.h"
-#include "construct/face_numbers.h"
-#include "construct/gray_colours.h"
-#include "construct/join_levels.h"
-#include "construct/pack.h"
-#include "construct/partition.h"
-#include "construct/propose.h"
-#include "construct/split.h"
-#include "construct/vertex_bounds.h"
+#include "construct/pieces.h"
+#include "construct/planes.h"
+#include "construct/construct_stages.h"
+#include "construct/supports.h"
 #include "ebpo_config.h"
 
 /* EBP 2017, equation 3: the least i >= 1 with L / 2^i below the mean edge. */
@@ -157,7 +149,7 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
 }
 
 /* A tree that is deeper than the order is good for needs another one. */
-static ebpo_status arrange(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
+static ebpo_status construct_arrange(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
 {
     const ebpo_progress *progress = &b->options->progress;
     ebpo_status status = mesh->arrangement && mesh->arrangement->key
@@ -178,8 +170,9 @@ static ebpo_status arrange(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
     return ebpo_bounds_make(b, error);
 }
 
-static ebpo_status prepare(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                           const ebpo_build_options *options, ebpo_error *error)
+static ebpo_status construct_prepare(ebpo_builder *b, ebpo_mesh *mesh,
+                                     const ebpo_mesh_report *report,
+                                     const ebpo_build_options *options, ebpo_error *error)
 {
     b->options = options;
     b->threads = ebpo_thread_count(options->threads);
@@ -194,7 +187,7 @@ static ebpo_status prepare(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_rep
             mesh->source_name[0] ? mesh->source_name : "the mesh",
             (unsigned long long)report->unbalanced_edges.count);
     b->max_level = options->max_level >= 0 ? options->max_level : level_limit(report);
-    return arrange(b, mesh, error);
+    return construct_arrange(b, mesh, error);
 }
 
 static void builder_free(ebpo_builder *b)
@@ -318,7 +311,7 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
         status = check_options(&wanted, &out->info, error);
     }
     if (status == EBPO_OK)
-        status = prepare(&b, mesh, report, &wanted, error);
+        status = construct_prepare(&b, mesh, report, &wanted, error);
     if (status == EBPO_OK)
         fill_info(&out->info, &b, mesh, report, mend);
     if (status == EBPO_OK)

@@ -1,23 +1,126 @@
-/* The planes of a gray node, from the root down: candidates are the directions of the solid's hull
- * in the cell. Few points: their hull. Many, or none that span a volume: the hull of the extreme
- * ones, found by asking in its own directions, and normals of faces. */
+/* Candidate normals of a gray node: those of the faces below it; where there are many, the mean of
+ * each occupied bin of the octahedral map, with bins no finer than needed. */
 #include "core/strict_fp.h"
-
-#include "construct/envelopes.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "construct/builder.h"
+#include "construct/construct_stages.h"
+#include "construct/planes.h"
+#include "construct/pieces.h"
+#include "construct/supports.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hash.h"
-#include "construct/candidates.h"
-#include "construct/proposals.h"
-#include "construct/supports.h"
-#include "geometry/plane_clip.h"
-#include "geometry/plane_code.h"
-#include "construct/hull_directions.h"
+#include "core/parallel.h"
+#include "geometry/polytope.h"
+
+/* Candidate normals of a gray node, from the faces below it. */
+
+enum { EBPO_CANDIDATES_SAMPLE = 4096, EBPO_CANDIDATES_BINS = 16384 };
+
+/* A bin of the octahedral map, and the normals in it. */
+typedef struct ebpo_normal_bin {
+    uint32_t key; /* 0: free */
+    uint32_t count;
+    uint64_t sum_u, sum_v;
+} ebpo_normal_bin;
+
+/* Memory of one thread, which is too large for its stack; begins as zeros. */
+typedef struct ebpo_candidates_scratch {
+    ebpo_normal_bin table[EBPO_CANDIDATES_BINS]; /* by hash; all are free between calls */
+    uint32_t sample[EBPO_CANDIDATES_SAMPLE];
+    int slots[EBPO_PLANES_CANDIDATES]; /* the bins that are not free */
+} ebpo_candidates_scratch;
+
+/* Every `step`-th of the entries, or of the branch's whole list. */
+static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint32_t *entries,
+                         uint64_t begin, uint64_t end, uint64_t *skip, uint64_t step,
+                         uint32_t *sample, int *count)
+{
+    uint64_t i = begin + *skip;
+    for (; i < end; i += step) {
+        ebpo_triangle face;
+        uint32_t normal;
+        if (step > 64 &&
+            *count % 16 == 0) /* each is in a different part of the workspace's files */
+            ebpo_release_pages(b->workspace);
+        ebpo_branch_triangle(b, s, entries ? entries[i] : (uint32_t)i, &face);
+        if (*count < EBPO_CANDIDATES_SAMPLE && ebpo_face_normal_code(&b->box, &face, &normal))
+            sample[(*count)++] = normal;
+    }
+    *skip = i - end;
+}
+
+static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_build_detail *d,
+                       uint32_t *sample)
+{
+    int count = 0;
+    uint64_t skip = 0, total = 0;
+    if (s->list) {
+        uint64_t step = (d->entry_end - d->entry_begin) / EBPO_CANDIDATES_SAMPLE + 1;
+        sample_faces(b, s, s->entries, d->entry_begin, d->entry_end, &skip, step, sample, &count);
+        return count;
+    }
+    for (uint64_t i = d->entry_begin; i < d->entry_end; i++)
+        total += b->sub[i].list_count;
+    for (uint64_t i = d->entry_begin; i < d->entry_end; i++)
+        sample_faces(b, &b->sub[i], NULL, 0, b->sub[i].list_count, &skip,
+                     total / EBPO_CANDIDATES_SAMPLE + 1, sample, &count);
+    return count;
+}
+
+/* Fills the table with bins of `width` codes; false when more than `most` are occupied. */
+static bool fill_bins(ebpo_normal_bin *table, int *used, int *slots, const uint32_t *sample,
+                      int count, uint32_t width, int most)
+{
+    for (int i = 0; i < *used; i++)
+        table[slots[i]].key = 0;
+    *used = 0;
+    for (int i = 0; i < count; i++) {
+        uint32_t u = sample[i] & 1023, v = sample[i] >> 10 & 1023,
+                 key = 1 + u / width + (v / width << 10);
+        uint64_t at;
+        EBPO_HASH_FIND(at, ebpo_hash_number(key), EBPO_CANDIDATES_BINS - 1,
+                       !table[at].key || table[at].key == key);
+        if (!table[at].key) {
+            if (*used == most)
+                return false;
+            table[at] = (ebpo_normal_bin){ key, 0, 0, 0 };
+            slots[(*used)++] = (int)at;
+        }
+        table[at].count++;
+        table[at].sum_u += u;
+        table[at].sum_v += v;
+    }
+    return true;
+}
+
+/* At most `most` of them; returns how many. */
+static int ebpo_build_candidates(const ebpo_builder *b, ebpo_candidates_scratch *scratch,
+                                 const ebpo_branch *s, const ebpo_build_detail *detail, int most,
+                                 ebpo_candidate *out)
+{
+    ebpo_normal_bin *table = scratch->table;
+    int used = 0, count = take_sample(b, s, detail, scratch->sample);
+    uint32_t width = 1;
+    while (!fill_bins(table, &used, scratch->slots, scratch->sample, count, width, most))
+        width = width < 4 ? 4 : width + width / 2;
+    for (int i = 0; i < used; i++) {
+        ebpo_normal_bin *t = &table[scratch->slots[i]];
+        uint32_t u = (uint32_t)((t->sum_u + t->count / 2) / t->count),
+                 v = (uint32_t)((t->sum_v + t->count / 2) / t->count);
+        out[i] = (ebpo_candidate){ .normal = u | v << 10, .support = -1e300 };
+        t->key = 0;
+    }
+    return used;
+}
+
+/* The planes of a gray node, from the root down: candidates are the directions of the solid's hull
+ * in the cell. Few points: their hull. Many, or none that span a volume: the hull of the extreme
+ * ones, found by asking in its own directions, and normals of faces. */
 
 enum {
     TOP_LEVELS = 4,   /* nearly free of bytes */
@@ -58,8 +161,8 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
 
 /* A support from which on a plane cannot remove epsilon, nor a needle: a cap of height h of a body
  * of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
-static double hopeless(const ebpo_polytope *envelope, double volume, const int32_t n[3],
-                       double epsilon)
+static double envelopes_hopeless(const ebpo_polytope *envelope, double volume, const int32_t n[3],
+                                 double epsilon)
 {
     double most = -1e300, least = 1e300;
     for (int i = 0; i < envelope->vertex_count; i++) {
@@ -79,7 +182,7 @@ static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_pol
 {
     int32_t n[3], d;
     ebpo_plane_code_decode(normal, n, &d);
-    double enough = hopeless(envelope, volume, n, epsilon);
+    double enough = envelopes_hopeless(envelope, volume, n, epsilon);
     double support = ebpo_supports_find_from(&s->supports, n, enough, (const double(*)[3])s->core,
                                              s->core_count, where);
     if (support < enough && s->count < EBPO_PLANES_CANDIDATES)
@@ -280,4 +383,130 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo
     memcpy(codes, proposed, (size_t)count * sizeof *codes);
     ebpo_planes_cut(envelope, codes, (uint64_t)count);
     return count;
+}
+
+/* The nodes above the subtrees: their envelopes level by level, so that every subtree knows its
+ * parent's. */
+
+typedef struct pending {
+    uint32_t node; /* gray, in the top */
+    ebpo_cell cell;
+    int32_t winding;
+    ebpo_polytope *envelope; /* the parent's cut to the cell, then its own */
+} pending;
+
+typedef struct wave {
+    ebpo_builder *b;
+    pending *nodes;
+    uint64_t count, capacity;
+} wave;
+
+static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
+{
+    return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
+}
+
+static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
+{
+    wave *w = context;
+    ebpo_builder *b = w->b;
+    (void)worker;
+    ebpo_envelope_scratch *scratch = NULL;
+    ebpo_status status = ebpo_scratch_make(&scratch, error);
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
+        pending *p = &w->nodes[i];
+        uint32_t detail = b->top.nodes[p->node].detail;
+        ebpo_top_envelope *t = &b->top_envelope[detail];
+        if (b->options->parts & EBPO_PART_PLANES)
+            t->count = ebpo_gray_planes(b, scratch, &b->top, detail, p->cell, p->winding,
+                                        p->envelope, t->codes);
+        t->volume = ebpo_polytope_volume(p->envelope) * ebpo_cell_volume(&b->box, p->cell.level);
+        if (t->count < 0)
+            status = no_memory(b, error);
+    }
+    ebpo_scratch_free(scratch);
+    return status;
+}
+
+/* The children of a finished node: gray ones wait for the next wave, subtrees get what they need.
+ */
+static bool hand_down(ebpo_builder *b, const pending *p, wave *next)
+{
+    const ebpo_build_node *node = &b->top.nodes[p->node];
+    int32_t offset[8];
+    ebpo_child_windings(b, &b->top, node->child, offset);
+    for (uint32_t o = 0; o < 8; o++) {
+        const ebpo_build_node *child = &b->top.nodes[node->child + o];
+        if (child->type == EBPO_WHITE)
+            continue;
+        ebpo_polytope *envelope = ebpo_array_alloc(b->workspace, 1, sizeof *envelope);
+        if (!envelope)
+            return false;
+        ebpo_polytope_child(p->envelope, o, envelope);
+        if (child->type == EBPO_LEAF) {
+            b->sub[child->detail].above = envelope;
+            b->sub[child->detail].winding = p->winding + offset[o];
+            continue;
+        }
+        if (!ebpo_grow(&next->nodes, &next->capacity, next->count + 1, sizeof *next->nodes)) {
+            ebpo_array_free(b->workspace, envelope);
+            return false;
+        }
+        next->nodes[next->count++] = (pending){ node->child + o, ebpo_cell_child(p->cell, o),
+                                                p->winding + offset[o], envelope };
+    }
+    return true;
+}
+
+static void wave_free(wave *w)
+{
+    for (uint64_t i = 0; i < w->count; i++)
+        ebpo_array_free(w->b->workspace, w->nodes[i].envelope);
+    free(w->nodes);
+    *w = (wave){ .b = w->b };
+}
+
+static ebpo_status construct_top_start(ebpo_builder *b, wave *w, ebpo_error *error)
+{
+    ebpo_polytope *cube = ebpo_array_alloc(b->workspace, 1, sizeof *cube);
+    if (!cube)
+        return no_memory(b, error);
+    ebpo_polytope_cube(cube);
+    if (b->top.nodes[0].type == EBPO_LEAF) { /* a small model is one subtree */
+        b->sub[0].above = cube;
+        return EBPO_OK;
+    }
+    if (!ebpo_grow(&w->nodes, &w->capacity, 1, sizeof *w->nodes)) {
+        ebpo_array_free(b->workspace, cube);
+        return no_memory(b, error);
+    }
+    w->nodes[w->count++] = (pending){ 0, b->top.cell, 0, cube };
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error)
+{
+    b->top_envelope = ebpo_alloc_zero(b->top.detail_count + 1, sizeof *b->top_envelope);
+    if (!b->top_envelope)
+        return no_memory(b, error);
+    wave now = { .b = b }, next = { .b = b };
+    ebpo_status status = construct_top_start(b, &now, error);
+    ebpo_pass pass = { &b->options->progress, 0, 0, b->top.detail_count };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
+    while (status == EBPO_OK && now.count) {
+        pass.begin = pass.end;
+        pass.end += now.count;
+        status = ebpo_parallel_for(b->threads, NULL, now.count, 1, wave_envelopes, &now, &progress,
+                                   "top envelopes", error);
+        for (uint64_t i = 0; i < now.count && status == EBPO_OK; i++)
+            if (!hand_down(b, &now.nodes[i], &next))
+                status = no_memory(b, error);
+        wave_free(&now);
+        now = next;
+        next = (wave){ .b = b };
+    }
+    wave_free(&now);
+    wave_free(&next);
+    return status;
 }

@@ -1,7 +1,7 @@
 /* Final numbers: faces by the first leaf, depth first, that they touch; vertices by first use. */
 #include "core/strict_fp.h"
 
-#include "construct/face_numbers.h"
+#include "construct/construct_stages.h"
 
 #include <stdlib.h>
 #include <string.h>

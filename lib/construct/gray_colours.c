@@ -3,7 +3,7 @@
  * than there are. */
 #include "core/strict_fp.h"
 
-#include "construct/gray_colours.h"
+#include "construct/construct_stages.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/wide.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 
 enum { GROUP_GRAIN = 1 << 12, GROUPS_A_TIME = 16 };
 

@@ -1,17 +1,337 @@
-/* Planes from the leaves up, of the nodes above the pieces, and the order in which all are chosen.
- */
-#include "construct/propose.h"
+/* Planes from the leaves up, of the nodes of a piece. */
+#include "core/strict_fp.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "construct/planes.h"
+#include "construct/construct_stages.h"
+#include "construct/pieces.h"
+#include "construct/supports.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "construct/corner_windings.h"
-#include "construct/propose_nodes.h"
+#include "geometry/cells.h"
+#include "geometry/polytope.h"
 
-static ebpo_status no_memory(ebpo_error *error)
+/* Planes from the leaves up, of the nodes of a piece. */
+
+/* Corners of a child's envelope are rounded: what that may be in a support, in cells, many times
+ * over. */
+static const double rounded = 1e-9;
+
+typedef struct proposer {
+    const ebpo_builder *b;
+    ebpo_branch *s;
+    ebpo_select_fn select;
+    ebpo_supports supports;
+    ebpo_candidate *candidates;
+    uint64_t candidate_capacity;
+} proposer;
+
+/* --- choosing, for leaves and gray nodes alike --- */
+
+static int by_normal(const void *a, const void *b)
+{
+    const ebpo_offer *x = a, *y = b;
+    if (x->normal != y->normal)
+        return x->normal < y->normal ? -1 : 1;
+    /* of equal normals the one that has to move least */
+    return x->origin > y->origin ? -1 : x->origin < y->origin;
+}
+
+static int by_normal_alone(const void *a, const void *b)
+{
+    const ebpo_offer *x = a, *y = b;
+    return (x->normal > y->normal) - (x->normal < y->normal);
+}
+
+/* More candidates than this are thinned out evenly: only leaves without a limit on faces have that
+ * many, and k-medoids compares all pairs. */
+enum { CANDIDATES_MOST = 4096 };
+
+/* Of equal normals one is left. Their supports are still to be found. */
+static bool make_candidates(proposer *p, ebpo_handover *given)
+{
+    uint64_t kept = 0;
+    if (given->offer_count == 0)
+        return true;
+    qsort(given->offers, given->offer_count, sizeof *given->offers, by_normal);
+    for (uint64_t i = 0; i < given->offer_count; i++)
+        if (i == 0 || given->offers[i].normal != given->offers[i - 1].normal)
+            given->offers[kept++] = given->offers[i];
+    uint64_t step = kept / CANDIDATES_MOST + 1;
+    given->offer_count = 0;
+    for (uint64_t i = 0; i < kept; i += step)
+        given->offers[given->offer_count++] = given->offers[i];
+    kept = given->offer_count;
+    if (!ebpo_grow(&p->candidates, &p->candidate_capacity, kept, sizeof *p->candidates))
+        return false;
+    for (uint64_t i = 0; i < kept; i++)
+        p->candidates[i] = (ebpo_candidate){ .normal = given->offers[i].normal, .support = -1e300 };
+    return true;
+}
+
+static void raise_support(ebpo_candidate *c, const double point[3], double slack)
+{
+    int32_t n[3], d;
+    ebpo_plane_code_decode(c->normal, n, &d);
+    double s = n[0] * point[0] + n[1] * point[1] + n[2] * point[2] + EBPO_NORMAL_NORM * slack;
+    c->support = s > c->support ? s : c->support;
+}
+
+static double moved_by(const ebpo_offer *offer, double support, const double size[3])
+{
+    int32_t n[3], d;
+    double square = 0, least = fmin(size[0], fmin(size[1], size[2]));
+    ebpo_plane_code_decode(offer->normal, n, &d);
+    for (int k = 0; k < 3; k++)
+        square += (n[k] * (least / size[k])) * (n[k] * (least / size[k]));
+    return (support - offer->origin) * least / sqrt(square);
+}
+
+/* Chooses among p->candidates, notes the planes and makes what the parent will get. */
+static bool propose_nodes_choose(proposer *p, uint32_t detail, ebpo_cell cell,
+                                 const ebpo_handover *given, ebpo_handover *out)
+{
+    const ebpo_build_options *o = p->b->options;
+    ebpo_proposals *all = p->s->proposals;
+    uint32_t codes[EBPO_PLANES_STORED];
+    double size[3];
+    ebpo_polytope own;
+    ebpo_polytope_cube(&own);
+    for (int k = 0; k < 3; k++)
+        size[k] = p->b->box.size[k] / (double)(1u << cell.level);
+    for (uint64_t i = 0; i < given->offer_count; i++)
+        p->candidates[i].moved = moved_by(&given->offers[i], p->candidates[i].support, size);
+    ebpo_choice choice = { .candidates = p->candidates,
+                           .count = (int)given->offer_count,
+                           .most = EBPO_PLANES_STORED,
+                           .cell_size = size,
+                           .normals = o->normals,
+                           .wanted = ebpo_selection_wanted((int)given->offer_count, cell.level,
+                                                           o->percent, o->k_root),
+                           .seed = o->seed ^ ebpo_octcode_of_cell(cell) * 0x9e3779b97f4a7c15u };
+    int count = p->select(&own, &choice, codes);
+    if (count < 0 || !ebpo_grow(&all->codes, &all->code_capacity, all->code_count + (uint64_t)count,
+                                sizeof *all->codes))
+        return false;
+    all->first[detail] = all->code_count;
+    all->count[detail] = (uint8_t)count;
+    for (int i = 0; i < count; i++) {
+        ebpo_offer *offer = bsearch(&(ebpo_offer){ .normal = codes[i] & 0xfffff }, given->offers,
+                                    given->offer_count, sizeof *offer, by_normal_alone);
+        all->codes[all->code_count++] = codes[i];
+        if (offer && !ebpo_handover_add(out, offer->normal, offer->origin))
+            return false;
+    }
+    if (!ebpo_grow(&out->corner, &out->corner_capacity, (uint64_t)own.vertex_count,
+                   sizeof *out->corner))
+        return false;
+    bool used[EBPO_POLYTOPE_VERTICES] = { false };
+    for (int f = 0; f < own.face_count; f++)
+        for (int i = own.first[f]; i < own.first[f + 1] && own.tag[f] >= 0; i++)
+            if (!used[own.corner[i]]) {
+                used[own.corner[i]] = true;
+                memcpy(out->corner[out->corner_count++], own.vertex[own.corner[i]],
+                       sizeof *out->corner);
+            }
+    return true;
+}
+
+/* --- leaves: planes of faces, around the solid --- */
+
+static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell,
+                        ebpo_handover *given)
+{
+    const ebpo_builder *b = p->b;
+    for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
+        ebpo_triangle t;
+        uint32_t normal;
+        int32_t n[3], e;
+        double origin = 0;
+        ebpo_branch_triangle(b, p->s, p->s->entries[i], &t);
+        if (!ebpo_face_normal_code(&b->box, &t, &normal))
+            continue;
+        ebpo_plane_code_decode(normal, n, &e);
+        for (int k = 0; k < 3; k++) {
+            double corner = ebpo_wall(&b->box, k, cell.level, cell.at[k]),
+                   size = b->box.size[k] / (double)(1u << cell.level);
+            for (int c = 0; c < 3; c++)
+                origin += n[k] * ((t.corner[c][k] - corner) / size) / 3;
+        }
+        if (!ebpo_handover_add(given, normal, origin))
+            return false;
+    }
+    return true;
+}
+
+static void leaf_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding,
+                          uint64_t count)
+{
+    const ebpo_builder *b = p->b;
+    unsigned inside = ebpo_inside_corners(b, winding, d->delta);
+    for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
+        ebpo_triangle t;
+        double points[9][3], slack;
+        ebpo_branch_triangle(b, p->s, p->s->entries[i], &t);
+        int corners = ebpo_clip_triangle(&b->box, cell, &t, points, &slack);
+        for (int c = 0; c < corners; c++)
+            for (uint64_t j = 0; j < count; j++)
+                raise_support(&p->candidates[j], points[c], slack);
+    }
+    for (int i = 0; i < 8; i++)
+        for (uint64_t j = 0; j < count && inside >> i & 1; j++)
+            raise_support(&p->candidates[j], (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0);
+}
+
+static bool propose_leaf(proposer *p, uint32_t detail, ebpo_cell cell, int32_t winding,
+                         ebpo_handover *out)
+{
+    const ebpo_build_detail *d = &p->s->details[detail];
+    ebpo_handover given = { 0 };
+    bool good = offer_faces(p, d, cell, &given) && make_candidates(p, &given);
+    if (good) {
+        leaf_supports(p, d, cell, winding, given.offer_count);
+        good = propose_nodes_choose(p, detail, cell, &given, out);
+    }
+    ebpo_handover_free(&given);
+    return good;
+}
+
+/* --- gray nodes: the children's planes, around the children's envelopes --- */
+
+/* Besides the children's envelopes the solid itself counts, so that the guarantee never rests on
+ * rounded corners. */
+static bool gray_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding,
+                          const ebpo_handover *given)
+{
+    if (!ebpo_supports_gather(&p->supports, p->b, p->s, d, cell, winding))
+        return false;
+    for (uint64_t i = 0; i < given->offer_count; i++) {
+        ebpo_candidate *c = &p->candidates[i];
+        int32_t n[3], e;
+        double where[3];
+        ebpo_plane_code_decode(c->normal, n, &e);
+        c->support = ebpo_supports_find(&p->supports, n, 1e300, where);
+        for (uint64_t j = 0; j < given->corner_count; j++)
+            raise_support(c, given->corner[j], rounded);
+    }
+    return true;
+}
+
+static bool propose_gray(proposer *p, uint32_t detail, ebpo_cell cell, int32_t winding,
+                         ebpo_handover *given, ebpo_handover *out)
+{
+    return make_candidates(p, given) &&
+           gray_supports(p, &p->s->details[detail], cell, winding, given) &&
+           propose_nodes_choose(p, detail, cell, given, out);
+}
+
+static bool propose_nodes_propose(proposer *p, uint32_t index, ebpo_cell cell, int32_t winding,
+                                  ebpo_handover *out)
+{
+    ebpo_build_node node = p->s->nodes[index];
+    if (node.type == EBPO_LEAF)
+        return propose_leaf(p, node.detail, cell, winding, out);
+    if (node.type != EBPO_GRAY)
+        return true;
+    int32_t offset[8];
+    ebpo_handover given = { 0 };
+    bool good = true;
+    ebpo_child_windings(p->b, p->s, node.child, offset);
+    for (unsigned o = 0; o < 8 && good; o++) {
+        ebpo_handover child = { 0 };
+        good = propose_nodes_propose(p, node.child + o, ebpo_cell_child(cell, o),
+                                     winding + offset[o], &child) &&
+               ebpo_handover_gather(&given, &child, o);
+        ebpo_handover_free(&child);
+    }
+    good = good && propose_gray(p, node.detail, cell, winding, &given, out);
+    ebpo_handover_free(&given);
+    return good;
+}
+
+static void proposer_free(proposer *p)
+{
+    ebpo_supports_free(&p->supports);
+    free(p->candidates);
+}
+
+/* One gray node, from what its children gave. False: out of memory. */
+static bool ebpo_propose_alone(const ebpo_builder *b, ebpo_branch *s, uint32_t detail,
+                               ebpo_cell cell, int32_t winding, ebpo_handover *given,
+                               ebpo_handover *out)
+{
+    proposer p = { .b = b, .s = s, .select = ebpo_selection_function(b->options->select) };
+    bool good = propose_gray(&p, detail, cell, winding, given, out);
+    proposer_free(&p);
+    return good;
+}
+
+/* --- whole pieces --- */
+
+static ebpo_status propose_nodes_no_memory(ebpo_error *error)
+{
+    return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while choosing planes");
+}
+
+/* Moves them to the builder's store until the walk down needs them. */
+static ebpo_status propose_nodes_pack(ebpo_builder *b, ebpo_branch *s, ebpo_error *error)
+{
+    ebpo_proposals *p = s->proposals;
+    uint64_t n = s->detail_count,
+             bytes = n * (sizeof *p->first + 1) + p->code_count * sizeof *p->codes;
+    if (!b->workspace)
+        return EBPO_OK;
+    uint64_t *first = ebpo_store_reserve(b, bytes);
+    if (!first)
+        return ebpo_workspace_fail(b->workspace, bytes, error);
+    uint32_t *codes = (uint32_t *)(first + n);
+    uint8_t *count = (uint8_t *)(codes + p->code_count);
+    memcpy(first, p->first, (size_t)n * sizeof *first);
+    memcpy(count, p->count, (size_t)n);
+    if (p->code_count)
+        memcpy(codes, p->codes, (size_t)p->code_count * sizeof *codes);
+    free(p->first);
+    free(p->count);
+    free(p->codes);
+    p->first = first;
+    p->codes = codes;
+    p->count = count;
+    p->packed = true;
+    return EBPO_OK;
+}
+
+/* A task over the builder's pieces: partitions each, chooses for its nodes and forgets the nodes.
+ */
+static ebpo_status ebpo_propose_pieces(void *context, uint64_t first, uint64_t last,
+                                       unsigned worker, ebpo_error *error)
+{
+    ebpo_builder *b = context;
+    proposer p = { .b = b, .select = ebpo_selection_function(b->options->select) };
+    ebpo_status status = EBPO_OK;
+    (void)worker;
+    for (uint64_t i = first; i < last && status == EBPO_OK; i++) {
+        p.s = &b->sub[i];
+        status = ebpo_build_partition(b, p.s, error);
+        if (status == EBPO_OK &&
+            (!ebpo_proposals_make(p.s) ||
+             !propose_nodes_propose(&p, 0, p.s->cell, p.s->winding, &p.s->proposals->root)))
+            status = propose_nodes_no_memory(error);
+        if (status == EBPO_OK)
+            status = propose_nodes_pack(b, p.s, error);
+        ebpo_branch_forget(p.s);
+    }
+    proposer_free(&p);
+    return status;
+}
+
+/* Planes from the leaves up, of the nodes above the pieces, and the order in which all are chosen.
+ */
+
+static ebpo_status propose_no_memory(ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while choosing planes");
 }
@@ -94,7 +414,7 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
             const uint32_t *codes = ebpo_proposed(&alone, detail, &n->count);
             memcpy(n->codes, codes, (size_t)n->count * sizeof *codes);
         } else
-            status = no_memory(error);
+            status = propose_no_memory(error);
         ebpo_handover_free(&n->given);
         ebpo_proposals_free(alone.proposals);
     }
@@ -140,7 +460,7 @@ static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
             top_node *n = &t->nodes[i];
             if (n->parent != UINT64_MAX &&
                 !ebpo_handover_gather(&t->nodes[n->parent].given, &n->out, n->octant))
-                status = no_memory(error);
+                status = propose_no_memory(error);
             ebpo_handover_free(&n->out);
         }
         end_of_level = t->base;
@@ -154,7 +474,7 @@ ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
         !(b->options->parts & (EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES)))
         return EBPO_OK;
     top_list t = { .b = b };
-    ebpo_status status = list_top(&t) ? EBPO_OK : no_memory(error);
+    ebpo_status status = list_top(&t) ? EBPO_OK : propose_no_memory(error);
     ebpo_pass pass = { &b->options->progress, 0, b->sub_count, b->sub_count + t.count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     if (status == EBPO_OK)
@@ -165,7 +485,7 @@ ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
     if (status == EBPO_OK)
         status = propose_top(&t, &pass, error);
     if (status == EBPO_OK && !note_top(&t))
-        status = no_memory(error);
+        status = propose_no_memory(error);
     for (uint64_t i = 0; i < t.count; i++) {
         ebpo_handover_free(&t.nodes[i].given);
         ebpo_handover_free(&t.nodes[i].out);

@@ -1,9 +1,476 @@
-/* The function of each selection; its name and settings: format/head_facts.c. */
+/* Greedy selection: the plane that removes most volume first. Gains only shrink while the envelope
+ * does, so a gain computed earlier bounds the present one, and most candidates are never evaluated
+ * again (lazy evaluation). */
 #include "core/strict_fp.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "construct/planes.h"
+#include "core/alloc.h"
+#include "core/hash.h"
+#include "geometry/polytope.h"
+
+typedef struct ranked {
+    double gain; /* an upper bound; exact for the envelope of `round` */
+    double n[3], d;
+    uint32_t code;
+    int round; /* -1: never evaluated */
+} ranked;
+
+/* Candidates that may still be worth a plane: by the volume that they remove (a heap), and by how
+ * far the envelope reaches beyond them. */
+typedef struct contest {
+    ranked by_gain[EBPO_PLANES_CANDIDATES], by_reach[EBPO_PLANES_CANDIDATES];
+    int gains, reaches;
+} contest;
+
+bool ebpo_candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3],
+                          double *offset)
+{
+    int32_t v[3], d;
+    if (!ebpo_plane_code_decode(ebpo_plane_code_make(candidate->normal, 0), v, &d))
+        return false;
+    int q = ebpo_plane_code_offset(v, candidate->support);
+    if (q < 0)
+        return false;
+    *code = ebpo_plane_code_make(candidate->normal, q);
+    ebpo_plane_code_decode(*code, v, &d);
+    *offset = ebpo_plane_as_double(v, d, n);
+    return true;
+}
+
+/* How far the envelope reaches along n. */
+static void select_extent(const ebpo_polytope *p, const double n[3], double *least, double *most)
+{
+    double low = 1e300, high = -1e300;
+    for (int i = 0; i < p->vertex_count; i++) {
+        double e = n[0] * p->vertex[i][0] + n[1] * p->vertex[i][1] + n[2] * p->vertex[i][2];
+        high = e > high ? e : high;
+        low = e < low ? e : low;
+    }
+    *least = low;
+    *most = high;
+}
+
+static double length_of(const double n[3]) { return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]); }
+
+static void rank_candidates(const ebpo_polytope *envelope, double volume,
+                            const ebpo_candidate *candidates, int count, double epsilon,
+                            double reach, contest *c)
+{
+    c->gains = c->reaches = 0;
+    for (int i = 0; i < count && i < EBPO_PLANES_CANDIDATES; i++) {
+        ranked r = { .round = -1 };
+        double least, most;
+        if (!ebpo_candidate_plane(&candidates[i], &r.code, r.n, &r.d))
+            continue;
+        select_extent(envelope, r.n, &least, &most);
+        r.gain = ebpo_polytope_cap_bound(volume, most - least, most - r.d);
+        if (r.gain >= epsilon && r.gain > 0)
+            c->by_gain[c->gains++] = r;
+        if (reach > 0 && most - r.d > reach * length_of(r.n)) /* cutting only shortens it */
+            c->by_reach[c->reaches++] = r;
+    }
+}
+
+static bool select_before(const ranked *a, const ranked *b)
+{
+    return a->gain > b->gain || (a->gain == b->gain && a->code < b->code);
+}
+
+/* Restores the heap (greatest gain first) below item i. */
+static void sift_down(ranked *heap, int count, int i)
+{
+    ranked item = heap[i];
+    for (int child = 2 * i + 1; child < count; child = 2 * i + 1) {
+        if (child + 1 < count && select_before(&heap[child + 1], &heap[child]))
+            child++;
+        if (!select_before(&heap[child], &item))
+            break;
+        heap[i] = heap[child];
+        i = child;
+    }
+    heap[i] = item;
+}
+
+static void make_heap(ranked *heap, int count)
+{
+    for (int i = count / 2 - 1; i >= 0; i--)
+        sift_down(heap, count, i);
+}
+
+static void drop_first(ranked *heap, int *count)
+{
+    heap[0] = heap[--*count];
+    if (*count)
+        sift_down(heap, *count, 0);
+}
+
+/* Volume alone leaves needles, which have next to none: cuts off what reaches far, farthest first.
+ * A plane that clipping refuses is left out, and the next one tried. */
+static int cut_needles(ebpo_polytope *envelope, contest *c, double reach, int most, int taken,
+                       uint32_t *codes)
+{
+    while (taken < most && c->reaches > 0) {
+        double deepest = reach;
+        int which = -1, left = 0;
+        for (int i = 0; i < c->reaches; i++) {
+            double low, high;
+            select_extent(envelope, c->by_reach[i].n, &low, &high);
+            double depth = (high - c->by_reach[i].d) / length_of(c->by_reach[i].n);
+            if (!(depth > reach))
+                continue;
+            c->by_reach[left] = c->by_reach[i];
+            if (depth > deepest)
+                deepest = depth, which = left;
+            left++;
+        }
+        c->reaches = left;
+        if (which < 0)
+            break;
+        ranked r = c->by_reach[which];
+        memmove(&c->by_reach[which], &c->by_reach[which + 1],
+                (size_t)(--c->reaches - which) * sizeof r);
+        if (ebpo_polytope_clip(envelope, r.n, r.d, taken) == EBPO_CLIP_CUT)
+            codes[taken++] = r.code;
+    }
+    return taken;
+}
+
+int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+{
+    contest c;
+    double epsilon = choice->epsilon, volume = ebpo_polytope_volume(envelope);
+    int taken = 0, most = choice->most;
+    rank_candidates(envelope, volume, choice->candidates, choice->count, epsilon, choice->reach,
+                    &c);
+    make_heap(c.by_gain, c.gains);
+    while (c.gains > 0 && taken < most && volume - choice->core >= epsilon) {
+        ranked *r = &c.by_gain[0];
+        if (r->round != taken) {
+            r->gain = ebpo_polytope_removed(envelope, r->n, r->d, volume, epsilon);
+            r->round = taken;
+            if (r->gain >= epsilon && r->gain > 0)
+                sift_down(c.by_gain, c.gains, 0);
+            else
+                drop_first(c.by_gain, &c.gains);
+            continue;
+        }
+        if (ebpo_polytope_clip(envelope, r->n, r->d, taken) == EBPO_CLIP_CUT) {
+            codes[taken++] = r->code;
+            volume -= r->gain;
+        }
+        drop_first(c.by_gain, &c.gains);
+    }
+    return cut_needles(envelope, &c, choice->reach, most, taken, codes);
+}
+
+/* Share of the cell below which a derived plane is not worth the time of a clip. */
+static const double hardly_anything = 3e-4;
+
+int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most,
+                    uint32_t *codes)
+{
+    contest c;
+    int taken = 0;
+    rank_candidates(envelope, ebpo_polytope_volume(envelope), candidates, count, hardly_anything,
+                    ebpo_needle, &c);
+    make_heap(c.by_gain, c.gains);
+    for (; c.gains > 0 && taken < most; drop_first(c.by_gain, &c.gains))
+        if (ebpo_polytope_clip(envelope, c.by_gain[0].n, c.by_gain[0].d, taken) == EBPO_CLIP_CUT)
+            codes[taken++] = c.by_gain[0].code;
+    return cut_needles(envelope, &c, ebpo_needle, most, taken, codes);
+}
+
+/* The theses' selections (EBP 2017, 3.3.4.3; BP 2008, 3.4.2): which of the candidates, whatever
+ * they cut. */
+
+/* Clips by the chosen candidates in ascending order of their numbers. Those that cut nothing when
+ * their turn comes are not kept. Not more than `most` are chosen (ebpo_selection_wanted):
+ * candidates are sorted by direction, and what was left out here would all face one way. */
+static int theses_take(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
+                       uint32_t *codes)
+{
+    int taken = 0;
+    for (int i = 0; i < choice->count && taken < choice->most; i++) {
+        double n[3], offset;
+        uint32_t code;
+        if (!chosen[i] || !ebpo_candidate_plane(&choice->candidates[i], &code, n, &offset))
+            continue;
+        if (ebpo_polytope_clip(envelope, n, offset, taken) == EBPO_CLIP_CUT)
+            codes[taken++] = code;
+    }
+    return taken;
+}
+
+/* --- at random --- */
+
+int ebpo_select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+{
+    if (!choice->count)
+        return 0;
+    bool *chosen = ebpo_alloc_zero((uint64_t)choice->count, sizeof *chosen);
+    if (!chosen)
+        return -1;
+    uint64_t state = choice->seed, first = ebpo_random_next(&state) % (uint64_t)choice->count;
+    for (int i = 0; i < choice->wanted && i < choice->count; i++)
+        chosen[(first + (uint64_t)i) % (uint64_t)choice->count] = true;
+    int taken = theses_take(envelope, choice, chosen, codes);
+    free(chosen);
+    return taken;
+}
+
+/* --- least offset --- */
+
+typedef struct moved {
+    double by;
+    int which;
+} moved;
+
+static int by_offset(const void *a, const void *b)
+{
+    const moved *x = a, *y = b;
+    if (x->by != y->by)
+        return x->by < y->by ? -1 : 1;
+    return x->which - y->which;
+}
+
+int ebpo_select_offset(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+{
+    if (!choice->count)
+        return 0;
+    moved *order = ebpo_alloc((uint64_t)choice->count, sizeof *order);
+    bool *chosen = ebpo_alloc_zero((uint64_t)choice->count, sizeof *chosen);
+    int taken = -1;
+    if (order && chosen) {
+        for (int i = 0; i < choice->count; i++)
+            order[i] = (moved){ choice->candidates[i].moved, i };
+        qsort(order, (size_t)choice->count, sizeof *order, by_offset);
+        for (int i = 0; i < choice->wanted && i < choice->count; i++)
+            chosen[order[i].which] = true;
+        taken = theses_take(envelope, choice, chosen, codes);
+    }
+    free(order);
+    free(chosen);
+    return taken;
+}
+
+/* --- k-medoids: PAM, as the theses cite it after Ng and Han 1994. The swap of least cost is found
+ * for all medoids in one pass over the points (Schubert and Rousseeuw 2019), which gives PAM's
+ * result in a k-th of the time. --- */
+
+typedef struct clustering {
+    int count, wanted;
+    float *distance;       /* [count][count] */
+    int *medoid;           /* [wanted] */
+    bool *chosen;          /* [count] */
+    int *nearest;          /* [count] place in `medoid` */
+    float *first, *second; /* [count] distance of the nearest medoid and of the next */
+    double *lost, *gain;   /* [wanted] */
+} clustering;
+
+/* The angle of (x, y) from the x axis, -pi .. pi, to about 1e-15, by operations that round alike
+ * everywhere: implementations of libm differ, and choices must not. */
+static double angle_of(double y, double x)
+{
+    double least = fmin(fabs(x), fabs(y)), most = fmax(fabs(x), fabs(y));
+    if (!(most > 0))
+        return 0;
+    double t = least / most; /* halved twice: atan t = 2 atan (t / (1 + sqrt (1 + t^2))) */
+    for (int i = 0; i < 2; i++)
+        t /= 1 + sqrt(1 + t * t);
+    double square = t * t, sum = 0;
+    for (int power = 21; power > 0; power -= 2)
+        sum = 1.0 / power - square * sum;
+    double angle = 4 * t * sum;
+    if (fabs(y) > fabs(x))
+        angle = 0x1.921fb54442d18p0 - angle;
+    if (x < 0)
+        angle = 0x1.921fb54442d18p1 - angle;
+    return y < 0 ? -angle : angle;
+}
+
+/* The normal in the model's coordinates, as a unit vector or as the theses' two angles. */
+static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[3])
+{
+    int32_t n[3], d;
+    double length = 0, most = 0;
+    ebpo_plane_code_decode(ebpo_plane_code_make(normal, 0), n, &d);
+    for (int k = 0; k < 3; k++) {
+        out[k] = n[k] / choice->cell_size[k];
+        most = fmax(most, fabs(out[k]));
+    }
+    for (int k = 0; k < 3; k++) {
+        out[k] /= most;
+        length += out[k] * out[k];
+    }
+    for (int k = 0; k < 3; k++)
+        out[k] /= sqrt(length);
+    if (choice->normals == EBPO_NORMALS_ANGLE)
+        return;
+    double around = angle_of(out[1], out[0]),
+           down = angle_of(sqrt(out[0] * out[0] + out[1] * out[1]), out[2]);
+    out[0] = around, out[1] = down, out[2] = 0;
+}
+
+static bool clustering_make(clustering *c, const ebpo_choice *choice)
+{
+    uint64_t n = (uint64_t)choice->count, k = (uint64_t)choice->wanted;
+    double(*at)[3] = ebpo_alloc(n, sizeof *at);
+    *c = (clustering){ .count = choice->count,
+                       .wanted = choice->wanted,
+                       .distance = ebpo_alloc(n * n, sizeof *c->distance),
+                       .medoid = ebpo_alloc(k, sizeof *c->medoid),
+                       .chosen = ebpo_alloc_zero(n, sizeof *c->chosen),
+                       .nearest = ebpo_alloc(n, sizeof *c->nearest),
+                       .first = ebpo_alloc(n, sizeof *c->first),
+                       .second = ebpo_alloc(n, sizeof *c->second),
+                       .lost = ebpo_alloc(k, sizeof *c->lost),
+                       .gain = ebpo_alloc(k, sizeof *c->gain) };
+    bool good = at && c->distance && c->medoid && c->chosen && c->nearest && c->first &&
+                c->second && c->lost && c->gain;
+    for (uint64_t i = 0; i < n && good; i++)
+        place_normal(choice, choice->candidates[i].normal, at[i]);
+    for (uint64_t i = 0; i < n && good; i++)
+        for (uint64_t j = 0; j < n; j++) {
+            double x = at[i][0] - at[j][0], y = at[i][1] - at[j][1], z = at[i][2] - at[j][2];
+            c->distance[i * n + j] = (float)(x * x + y * y + z * z);
+        }
+    free(at);
+    return good;
+}
+
+static void clustering_free(clustering *c)
+{
+    free(c->distance);
+    free(c->medoid);
+    free(c->chosen);
+    free(c->nearest);
+    free(c->first);
+    free(c->second);
+    free(c->lost);
+    free(c->gain);
+}
+
+static void choose_at_random(clustering *c, uint64_t seed)
+{
+    for (int i = 0; i < c->wanted; i++) {
+        int at = (int)(ebpo_random_next(&seed) % (uint64_t)c->count);
+        while (c->chosen[at])
+            at = at + 1 < c->count ? at + 1 : 0;
+        c->chosen[at] = true;
+        c->medoid[i] = at;
+    }
+}
+
+static void theses_assign(clustering *c)
+{
+    for (int i = 0; i < c->count; i++) {
+        const float *row = c->distance + (size_t)i * (size_t)c->count;
+        c->first[i] = c->second[i] = INFINITY;
+        c->nearest[i] = 0;
+        for (int m = 0; m < c->wanted; m++) {
+            float d = row[c->medoid[m]];
+            if (d < c->first[i]) {
+                c->second[i] = c->first[i];
+                c->first[i] = d;
+                c->nearest[i] = m;
+            } else if (d < c->second[i])
+                c->second[i] = d;
+        }
+    }
+}
+
+/* The change of the total cost when candidate `h` takes the place of each medoid; the best of them.
+ */
+static double best_swap_for(clustering *c, int h, int *which)
+{
+    const float *row = c->distance + (size_t)h * (size_t)c->count;
+    double shared = 0;
+    memcpy(c->gain, c->lost, (size_t)c->wanted * sizeof *c->gain);
+    for (int i = 0; i < c->count; i++) {
+        float d = row[i];
+        if (d < c->first[i]) {
+            shared += (double)d - (double)c->first[i];
+            c->gain[c->nearest[i]] += (double)c->first[i] - (double)c->second[i];
+        } else if (d < c->second[i])
+            c->gain[c->nearest[i]] += (double)d - (double)c->second[i];
+    }
+    *which = 0;
+    for (int m = 1; m < c->wanted; m++)
+        if (c->gain[m] < c->gain[*which])
+            *which = m;
+    return c->gain[*which] + shared;
+}
+
+static bool swap_once(clustering *c)
+{
+    int leave = -1, enter = -1;
+    double best = -1e-9; /* less is rounding */
+    memset(c->lost, 0, (size_t)c->wanted * sizeof *c->lost);
+    for (int i = 0; i < c->count; i++)
+        c->lost[c->nearest[i]] += (double)c->second[i] - (double)c->first[i];
+    for (int h = 0; h < c->count; h++) {
+        int which;
+        if (c->chosen[h])
+            continue;
+        double change = best_swap_for(c, h, &which);
+        if (change < best)
+            best = change, leave = which, enter = h;
+    }
+    if (enter < 0)
+        return false;
+    c->chosen[c->medoid[leave]] = false;
+    c->chosen[enter] = true;
+    c->medoid[leave] = enter;
+    return true;
+}
+
+/* With one medoid there is no second nearest. */
+static void single_medoid(clustering *c)
+{
+    double best = INFINITY;
+    memset(c->chosen, 0, (size_t)c->count * sizeof *c->chosen);
+    int at = 0;
+    for (int h = 0; h < c->count; h++) {
+        double sum = 0;
+        for (int i = 0; i < c->count; i++)
+            sum += (double)c->distance[(size_t)h * (size_t)c->count + (size_t)i];
+        if (sum < best)
+            best = sum, at = h;
+    }
+    c->chosen[at] = true;
+}
+
+int ebpo_select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+{
+    /* each lowers the cost; this only guards against rounding in circles */
+    enum { SWAPS_MOST = 100000 };
+    ebpo_choice all = *choice;
+    if (!choice->count || choice->wanted < 1)
+        return 0;
+    all.wanted = choice->wanted < choice->count ? choice->wanted : choice->count;
+    clustering c;
+    int taken = -1;
+    if (clustering_make(&c, &all)) {
+        choose_at_random(&c, choice->seed);
+        if (all.wanted == 1)
+            single_medoid(&c);
+        else if (all.wanted < all.count) {
+            int swaps = 0;
+            do
+                theses_assign(&c);
+            while (swap_once(&c) && ++swaps < SWAPS_MOST);
+        }
+        taken = theses_take(envelope, choice, c.chosen, codes);
+    }
+    clustering_free(&c);
+    return taken;
+}
+
+/* The function of each selection; its name and settings: format/head_facts.c. */
 
 static const ebpo_select_fn selection_functions[] = {
     [EBPO_SELECT_INHERIT] = ebpo_select_greedy,

@@ -6,7 +6,7 @@
 #include <ebpo/file.h>
 #include <ebpo/repair.h>
 
-#include "mesh/shells.h"
+#include "mesh/shell_nesting.h"
 
 typedef struct ebpo_solid_shells {
     const ebpo_mesh *mesh; /* borrowed */

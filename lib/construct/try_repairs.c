@@ -142,7 +142,7 @@ static ebpo_status begin_with(trying *t, start from, unsigned step, start *then,
     return try_steps(t, then->steps, error);
 }
 
-static ebpo_status drop(trying *t, start from, start *then, ebpo_error *error)
+static ebpo_status try_repairs_drop(trying *t, start from, start *then, ebpo_error *error)
 {
     return from.report->repeated_faces.count ? begin_with(t, from, DROP, then, error) : EBPO_OK;
 }
@@ -155,7 +155,7 @@ static ebpo_status weld_first(trying *t, start *from, ebpo_error *error)
         return EBPO_OK;
     ebpo_status status = try_more(t, bare, ORIENT, error);
     if (status == EBPO_OK)
-        status = drop(t, bare, &dropped, error);
+        status = try_repairs_drop(t, bare, &dropped, error);
     if (status == EBPO_OK)
         status = begin_with(t, bare, WELD, from, error);
     return status == EBPO_OK ? try_more(t, dropped, ORIENT, error) : status;
@@ -171,7 +171,7 @@ static ebpo_status try_all(trying *t, ebpo_error *error)
     if (status == EBPO_OK)
         status = try_more(t, plain, FILL, error);
     if (status == EBPO_OK)
-        status = drop(t, plain, &dropped, error);
+        status = try_repairs_drop(t, plain, &dropped, error);
     if (status == EBPO_OK)
         status = try_more(t, dropped, ORIENT, error);
     if (status == EBPO_OK)

@@ -21,7 +21,7 @@
 #include "core/hash.h"
 #include "derive/error_bound.h"
 #include "derive/fragments.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 #include "query/query_model.h"
 
 typedef struct sampling {

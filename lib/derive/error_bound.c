@@ -15,7 +15,7 @@
 #include "core/parallel.h"
 #include "derive/error_bound.h"
 #include "derive/fragments.h"
-#include "geometry/plane_clip.h"
+#include "geometry/polytope.h"
 #include "query/query_model.h"
 
 ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_model *whole, ebpo_model *model,

@@ -5,7 +5,7 @@
 #include <ebpo/query.h>
 
 #include "derive/fragments.h"
-#include "geometry/cell.h"
+#include "geometry/cells.h"
 
 /* What is wanted; lengths in the model's unit. */
 typedef struct ebpo_bound_goal {

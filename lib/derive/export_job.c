@@ -14,7 +14,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "derive/export_job.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 #include "mesh/attributes.h"
 
 const ebpo_column ebpo_columns[EBPO_COLUMNS] = {

@@ -5,10 +5,10 @@
 
 #include <ebpo/query.h>
 
-#include "geometry/cell.h"
+#include "geometry/cells.h"
 #include "geometry/cursor.h"
 #include "geometry/polytope.h"
-#include "levels/lod_model.h"
+#include "levels/lod.h"
 
 typedef struct ebpo_cell_frame {
     ebpo_cell cell;

@@ -17,10 +17,9 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "levels/lod_model.h"
+#include "levels/lod.h"
 #include "geometry/cells.h"
-#include "geometry/node_types.h"
-#include "geometry/rule.h"
+#include "geometry/level_nodes.h"
 
 #if EBPO_HAVE_QHULL
 #include <limits.h>

@@ -12,7 +12,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "format/read_attributes.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 #include "derive/subset_parts.h"
 
 typedef struct numbering {

@@ -17,9 +17,9 @@
 #include "format/schema.h"
 #include "format/subtree_index.h"
 #include "geometry/cells.h"
-#include "geometry/node_types.h"
-#include "geometry/plane_clip.h"
-#include "levels/lod_model.h"
+#include "geometry/level_nodes.h"
+#include "geometry/polytope.h"
+#include "levels/lod.h"
 
 /* --- copying the arrays of remaining nodes --- */
 

@@ -6,7 +6,7 @@
 
 #include "derive/error_bound.h"
 #include "format/pick_rows.h"
-#include "geometry/cell.h"
+#include "geometry/cells.h"
 
 typedef struct ebpo_cutting {
     const ebpo_file *file;

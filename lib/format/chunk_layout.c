@@ -16,7 +16,7 @@
 #include "core/wide.h"
 #include "format/chunk_layout.h"
 #include "format/schema.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 #include "hdf5_read/chunk.h"
 
 /* --- the chunks that a subtree shares with those before it, one subtree after the other --- */

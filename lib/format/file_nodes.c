@@ -11,9 +11,8 @@
 #include "format/chunks.h"
 #include "format/file_nodes.h"
 #include "format/subtree_index.h"
-#include "geometry/node_types.h"
-#include "geometry/plane_code.h"
-#include "geometry/rule.h"
+#include "geometry/level_nodes.h"
+#include "geometry/polytope.h"
 
 ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *node,
                                    ebpo_error *error)

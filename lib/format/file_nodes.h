@@ -3,7 +3,7 @@
 #define EBPO_FORMAT_FILE_NODES_H
 
 #include "format/chunks.h"
-#include "geometry/node_source.h"
+#include "geometry/level_nodes.h"
 
 /* A node that the file has, as far as the head tells; else EBPO_E_ARGUMENT. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *node,

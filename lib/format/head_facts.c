@@ -16,7 +16,7 @@
 #include "core/checksum.h"
 #include "format/head_facts.h"
 #include "format/schema.h"
-#include "geometry/cell.h"
+#include "geometry/cells.h"
 
 #define FORMAT_NAME "EBP-Octree in HDF5"
 

@@ -27,7 +27,7 @@
 #include "io/file_source.h"
 #include "mesh/import.h"
 #include "mesh/ply.h"
-#include "mesh/stl_binary.h"
+#include "mesh/import_build.h"
 
 /* The word says how the numbers are to be read: with another one they would be read wrong. In files
  * of 1.0, and in the first ones of 1.1, `delta` stands at leaf_skip, too. */

@@ -13,9 +13,8 @@
 #include "format/pick_rows.h"
 #include "format/schema.h"
 #include "format/subtree_index.h"
-#include "geometry/node_types.h"
-#include "geometry/plane_code.h"
-#include "geometry/rule.h"
+#include "geometry/level_nodes.h"
+#include "geometry/polytope.h"
 
 /* A run's part of a list behind counts: rows [first, first + count) of the file. */
 typedef struct span {

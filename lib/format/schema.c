@@ -17,9 +17,8 @@
 #include "core/workspace.h"
 #include "core/error.h"
 #include "format/schema.h"
-#include "geometry/node_types.h"
-#include "geometry/plane_code.h"
-#include "geometry/rule.h"
+#include "geometry/level_nodes.h"
+#include "geometry/polytope.h"
 #include "hdf5_read/face_gates.h"
 
 #define REQUIRED       .if_needed = false

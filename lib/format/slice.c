@@ -17,7 +17,7 @@
 #include "format/reader.h"
 #include "format/slice.h"
 #include "format/subtree_index.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 
 static const uint32_t FREE = UINT32_MAX;
 

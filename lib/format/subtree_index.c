@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "format/chunks.h"
 #include "format/subtree_index.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 
 static ebpo_status table_fails(const ebpo_chunks *chunks, ebpo_array_id id, const char *what,
                                ebpo_error *error)

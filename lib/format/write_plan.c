@@ -21,7 +21,7 @@
 #include "format/head_facts.h"
 #include "format/schema.h"
 #include "format/write_plan.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 #include "hdf5_read/coding.h"
 
 static uint64_t *make_index(uint64_t count, unsigned cols)

@@ -1,11 +1,57 @@
-/* Cells as an octree has them: children and parents, what lies beside them, where points are. Walls
- * are geometry/cell.h's. */
+/* Node cells: the root box on a dyadic grid, and the cells below it, all of whose corners are exact
+ * doubles. */
 #ifndef EBPO_GEOMETRY_CELLS_H
 #define EBPO_GEOMETRY_CELLS_H
 
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
 #include <ebpo/file.h>
 
-#include "geometry/cell.h"
+enum { EBPO_MAX_LEVEL = 20 };
+
+/* The root cell: [origin, origin + size] on each axis. origin is an integer multiple of a power of
+ * two u (its own for each axis), and size an integer multiple of u * 2^grid_level, with every
+ * corner at levels 0 .. grid_level exactly representable. size > 0 on every axis. */
+typedef struct ebpo_box {
+    double origin[3];
+    double size[3];
+    int grid_level; /* deepest level for which corners are exact */
+} ebpo_box;
+
+/* A cell by level and integer position, 0 .. 2^level - 1 on each axis. */
+typedef struct ebpo_cell {
+    int level;
+    uint32_t at[3];
+} ebpo_cell;
+
+/* 2^-n, 0 <= n <= 1000. Multiplying by it rounds as dividing by 2^n does, in a fraction of the
+ * time. */
+static inline double ebpo_half_power(int n)
+{
+    uint64_t bits = (uint64_t)(1023 - n) << 52;
+    double out;
+    memcpy(&out, &bits, sizeof out);
+    return out;
+}
+
+/* Coordinate of the wall with number `k` (0 .. 2^level) at `level` on `axis`; exact for level <=
+ * grid_level: origin + k * (size / 2^level). */
+static inline double ebpo_wall(const ebpo_box *box, int axis, int level, uint32_t k)
+{
+    return box->origin[axis] + (double)k * (box->size[axis] * ebpo_half_power(level));
+}
+
+/* Builds the root box around [min, max] (finite, min <= max), strictly larger on every side, exact
+ * down to `grid_level` (0 .. 20). False when the coordinates are too large (beyond 2^1000) for
+ * that. */
+bool ebpo_box_make(ebpo_box *out, const double min[3], const double max[3], int grid_level);
+
+/* True when the box is what ebpo_box_make promises: used on boxes read from files. */
+bool ebpo_box_valid(const ebpo_box *box);
+
+/* Cells as an octree has them: children and parents, what lies beside them, where points are. */
 
 /* A file's root cell. */
 static inline ebpo_box ebpo_root_box(const ebpo_info *info)
@@ -170,5 +216,39 @@ static inline double ebpo_wall_point(const ebpo_box *box, ebpo_cell cell, int ax
         return ebpo_wall(box, axis, cell.level, cell.at[axis] + 1);
     return low + xi * (box->size[axis] / (double)(1u << cell.level));
 }
+
+/* Octcodes: locational codes of octree nodes. 64 bits: a leading 1, then three bits for each level,
+ * the most significant first; the root is 1. Numeric order is breadth-first order. Bit 0 of each
+ * triple is x, bit 1 y, bit 2 z. Source: EBP 2017, section 3.3 (there with separate level bits and
+ * at most 20 levels). */
+
+typedef uint64_t ebpo_octcode;
+
+static inline bool ebpo_octcode_valid(ebpo_octcode code)
+{
+    if (code == 0)
+        return false;
+    int top = 63 - __builtin_clzll(code);
+    return top % 3 == 0 && top / 3 <= EBPO_MAX_LEVEL;
+}
+
+static inline int ebpo_octcode_level(ebpo_octcode code) { return (63 - __builtin_clzll(code)) / 3; }
+
+static inline ebpo_octcode ebpo_octcode_parent(ebpo_octcode code) { return code >> 3; }
+
+static inline ebpo_octcode ebpo_octcode_child(ebpo_octcode code, unsigned octant)
+{
+    return code << 3 | octant;
+}
+
+/* The octcodes of a node's descendants at `level` are [first, first + 8^(level - its level)). */
+static inline ebpo_octcode ebpo_octcode_first_descendant(ebpo_octcode code, int level)
+{
+    return code << 3 * (level - ebpo_octcode_level(code));
+}
+
+/* Interleaves the cell's position; the reference implementation in the tests goes bit by bit. */
+ebpo_octcode ebpo_octcode_of_cell(ebpo_cell cell);
+ebpo_cell ebpo_cell_of_octcode(ebpo_octcode code);
 
 #endif

@@ -1,10 +1,16 @@
+/* A position in an octree that moves from node to node, whatever holds the nodes.
+ *
+ * The cursor keeps the nodes from the root down to the current one, each with its children once
+ * they have been read. Moving up therefore reads nothing, and a step to a cell nearby reads only
+ * what is below the common ancestor. Nodes come from an ebpo_node_source: levels in memory, a file,
+ * or the tables of a decoded tree. */
 #include "core/strict_fp.h"
 
 #include "geometry/cursor.h"
 
 #include <string.h>
 
-static void arrive(ebpo_cursor *c, int depth, const ebpo_node *node)
+static void arrive_at(ebpo_cursor *c, int depth, const ebpo_node *node)
 {
     c->depth = depth;
     c->at[depth].node = *node;
@@ -15,7 +21,7 @@ void ebpo_cursor_begin(ebpo_cursor *c, const ebpo_node_source *source, void *hol
 {
     c->source = source;
     c->holder = holder;
-    arrive(c, 0, &root);
+    arrive_at(c, 0, &root);
 }
 
 ebpo_status ebpo_cursor_children(ebpo_cursor *c, const ebpo_node **child, ebpo_error *error)
@@ -36,7 +42,7 @@ ebpo_status ebpo_cursor_children(ebpo_cursor *c, const ebpo_node **child, ebpo_e
 
 void ebpo_cursor_down(ebpo_cursor *c, unsigned octant)
 {
-    arrive(c, c->depth + 1, &c->at[c->depth].child[octant]);
+    arrive_at(c, c->depth + 1, &c->at[c->depth].child[octant]);
 }
 
 bool ebpo_cursor_up(ebpo_cursor *c)
@@ -68,7 +74,7 @@ ebpo_status ebpo_cursor_next(ebpo_cursor *c, bool over, bool *more, ebpo_error *
     return status;
 }
 
-static bool holds(const ebpo_node *node, ebpo_cell cell)
+static bool node_holds(const ebpo_node *node, ebpo_cell cell)
 {
     return node->cell.level <= cell.level &&
            ebpo_cell_equal(ebpo_cell_ancestor(cell, node->cell.level), node->cell);
@@ -78,7 +84,7 @@ ebpo_status ebpo_cursor_to_cell(ebpo_cursor *c, ebpo_cell cell, ebpo_error *erro
 {
     const ebpo_node *child = NULL;
     ebpo_status status = EBPO_OK;
-    while (!holds(ebpo_cursor_node(c), cell) && ebpo_cursor_up(c))
+    while (!node_holds(ebpo_cursor_node(c), cell) && ebpo_cursor_up(c))
         ;
     while (ebpo_cursor_node(c)->cell.level < cell.level) {
         status = ebpo_cursor_children(c, &child, error);
@@ -93,7 +99,7 @@ ebpo_status ebpo_cursor_to_point(ebpo_cursor *c, const ebpo_box *box, const doub
                                  bool *within, ebpo_error *error)
 {
     ebpo_cell cell = { level, { 0, 0, 0 } };
-    *within = ebpo_locate(box, level, p, cell.at) && holds(&c->at[0].node, cell);
+    *within = ebpo_locate(box, level, p, cell.at) && node_holds(&c->at[0].node, cell);
     return *within ? ebpo_cursor_to_cell(c, cell, error) : EBPO_OK;
 }
 

@@ -14,10 +14,9 @@
 #ifndef EBPO_GEOMETRY_CURSOR_H
 #define EBPO_GEOMETRY_CURSOR_H
 
-#include "geometry/envelope_stack.h"
-#include "geometry/half_spaces.h"
-#include "geometry/node_source.h"
-#include "geometry/octcode.h"
+#include "geometry/polytope.h"
+#include "geometry/level_nodes.h"
+#include "geometry/cells.h"
 
 /* About 8 KB; not to be copied about. */
 typedef struct ebpo_cursor {

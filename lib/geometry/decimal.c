@@ -45,7 +45,7 @@ static bool scan_exponent(decimal *d, const char *s, const char *end)
     return s < end && scan_exponent_of(d, negative, s, end);
 }
 
-static bool scan(decimal *d, const char *s, const char *end)
+static bool scan_number(decimal *d, const char *s, const char *end)
 {
     *d = (decimal){ .short_form = true };
     d->negative = s < end && *s == '-';
@@ -285,7 +285,7 @@ bool ebpo_number_float_kept(float *out, bool *kept, const char *s, size_t n, loc
     *kept = true;
     if (n > EBPO_NUMBER_LONGEST)
         return false;
-    if (!scan(&d, s, s + n)) {
+    if (!scan_number(&d, s, s + n)) {
         bool word = scan_word(&value, s, n);
         *out = word ? (float)value : 0;
         return word;
@@ -309,7 +309,7 @@ bool ebpo_number_double(double *out, const char *s, size_t n, locale_t c_locale)
     double value;
     if (n > EBPO_NUMBER_LONGEST)
         return false;
-    if (!scan(&d, s, s + n))
+    if (!scan_number(&d, s, s + n))
         return scan_word(out, s, n);
     if (one_operation(&value, &d) || long_quotient(&value, &d, 53)) {
         *out = d.negative ? -value : value;

@@ -4,6 +4,7 @@
 #ifndef EBPO_GEOMETRY_DISTANCE_H
 #define EBPO_GEOMETRY_DISTANCE_H
 
+#include <gmp.h>
 #include <stdbool.h>
 
 /* Which feature of the triangle (corners 0, 1, 2) is nearest. */
@@ -53,5 +54,10 @@ int ebpo_triangle_distance_compare_to(const double p[3], const double triangle[3
 /* Unit normal (b - a) x (c - a) / |...|, each component within 2 ulp; (0, 0, 0) for a triangle
  * without area. */
 void ebpo_triangle_unit_normal(const double triangle[3][3], double normal[3]);
+
+/* The squared distance as a fraction of integers, in squares of 2^unit; all coordinates are
+ * multiples of 2^unit. Allocates through GMP. */
+void ebpo_triangle_square_gmp(const double p[3], const double triangle[3][3], int unit,
+                              mpz_t square, mpz_t denominator);
 
 #endif

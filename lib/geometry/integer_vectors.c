@@ -1,4 +1,6 @@
-/* Doubles as integers in a common power of two, and the way back with one rounding. */
+/* Doubles as integers in a common power of two, and the way back with one rounding. Used where the
+ * filters and expansions do not decide. Quotients and roots are computed with some 70 bits, and the
+ * lowest bit is set when anything is below it, so that rounding to a double errs never. */
 #include "core/strict_fp.h"
 
 #include "geometry/integer_vectors.h"

@@ -1,6 +1,161 @@
+/* The nodes of an octree in memory: as levels, and as a table of children.
+ *
+ * Levels store node types in groups of eight siblings, 16 bits each. A node is found by its rank:
+ * the number of nodes of its type before it in its level. Ranks are prefix sums of the counts in
+ * the groups, made once for each level; counts that contradict each other are refused.
+ *
+ * The table of children stores four bytes for each node. A grid over its top levels replaces the
+ * first steps from the root, with fewer cells than about twice the groups. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
 #include "geometry/level_nodes.h"
 
-#include <string.h>
+/* --- counts of node types --- */
+
+static const uint64_t EVEN = UINT64_C(0x5555555555555555), PAIRS = UINT64_C(0x3333333333333333),
+                      NIBBLES = UINT64_C(0x0f0f0f0f0f0f0f0f), BYTES = UINT64_C(0x00ff00ff00ff00ff);
+
+/* Set bits of each byte; only even bits are set. */
+static inline uint64_t bits_of_bytes(uint64_t x)
+{
+    x = (x & PAIRS) + (x >> 2 & PAIRS);
+    return (x + (x >> 4)) & NIBBLES;
+}
+
+static inline uint64_t sum_of_bytes(uint64_t x)
+{
+    return ((x & BYTES) + (x >> 8 & BYTES)) * UINT64_C(0x0001000100010001) >> 48;
+}
+
+/* Types of up to 128 groups, four in a word. Bytes of the sums stay below 256. */
+static void count_words(const uint8_t *types, unsigned words, uint64_t counts[4])
+{
+    uint64_t low = 0, high = 0, both = 0;
+    for (unsigned i = 0; i < words; i++) {
+        uint64_t word;
+        memcpy(&word, types + 8 * (size_t)i, sizeof word);
+        low += bits_of_bytes(word & EVEN);
+        high += bits_of_bytes(word >> 1 & EVEN);
+        both += bits_of_bytes(word & word >> 1 & EVEN);
+    }
+    uint64_t gray = sum_of_bytes(both);
+    counts[EBPO_GRAY] += gray;
+    counts[EBPO_BLACK] += sum_of_bytes(low) - gray;
+    counts[EBPO_LEAF] += sum_of_bytes(high) - gray;
+}
+
+void ebpo_groups_count(const void *types, uint64_t groups, uint64_t counts[4])
+{
+    const uint8_t *at = types;
+    uint64_t words = groups / 4;
+    memset(counts, 0, 4 * sizeof *counts);
+    for (; words; at += 8 * 32, words -= 32) {
+        count_words(at, words < 32 ? (unsigned)words : 32, counts);
+        if (words < 32)
+            break;
+    }
+    uint8_t rest[8] = { 0 };
+    memcpy(rest, (const uint8_t *)types + groups / 4 * 8, groups % 4 * 2);
+    count_words(rest, 1, counts);
+    counts[EBPO_WHITE] = 8 * groups - counts[EBPO_BLACK] - counts[EBPO_LEAF] - counts[EBPO_GRAY];
+}
+
+/* --- ranks --- */
+
+void ebpo_level_ranks_free(ebpo_level_ranks *ranks)
+{
+    for (int type = 0; type < 4; type++)
+        free(ranks->before[type]);
+    free(ranks->plane_first);
+    free(ranks->leaf_plane_first);
+    free(ranks->ref_first);
+    memset(ranks, 0, sizeof *ranks);
+}
+
+/* Nodes of a type in the groups before each, and in all of them. */
+static ebpo_status count_before(uint64_t **out, const ebpo_level *level, ebpo_node_type type,
+                                uint64_t *count, ebpo_error *error)
+{
+    *count = 0;
+    if (!(*out = ebpo_alloc(level->group_count, sizeof **out)))
+        return ebpo_fail_memory(error, level->group_count * sizeof **out);
+    for (uint64_t i = 0; i < level->group_count; i++) {
+        (*out)[i] = *count;
+        *count += ebpo_group_count(level->types[i], type, 8);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status make_ranks(ebpo_level_ranks *out, const ebpo_level *level, int number,
+                              ebpo_error *error)
+{
+    const bool wanted[4] = { [EBPO_WHITE] = level->white_winding,
+                             [EBPO_BLACK] = level->black_winding,
+                             [EBPO_LEAF] = true,
+                             [EBPO_GRAY] = true };
+    uint64_t count[4] = { level->white_count, level->black_count, 0, 0 };
+    ebpo_status status = EBPO_OK;
+    for (int type = 0; type < 4 && status == EBPO_OK; type++)
+        if (wanted[type])
+            status =
+                count_before(&out->before[type], level, (ebpo_node_type)type, &count[type], error);
+    if (status != EBPO_OK)
+        return status;
+    if (number == 0 && wanted[EBPO_WHITE])
+        count[EBPO_WHITE] -= 7; /* octants that the root's group does not have */
+    if (count[EBPO_GRAY] != level->gray_count || count[EBPO_LEAF] != level->leaf_count ||
+        count[EBPO_BLACK] != level->black_count || count[EBPO_WHITE] != level->white_count)
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "level %d: its types and its node counts disagree; run ebpo verify",
+                         number);
+    return EBPO_OK;
+}
+
+static ebpo_status sums_disagree(int number, const char *what, ebpo_error *error)
+{
+    return ebpo_fail(error, EBPO_E_FORMAT,
+                     "level %d: the counts of its %s do not add up; run ebpo verify", number, what);
+}
+
+/* The sums of the counts before each; `bytes`: of a count, 1 or 4. */
+static ebpo_status sum_before(uint64_t **out, const void *counts, size_t bytes, uint64_t count,
+                              uint64_t total, int number, const char *what, ebpo_error *error)
+{
+    const uint8_t *narrow = counts;
+    const uint32_t *wide = counts;
+    if (!(*out = ebpo_alloc(count, sizeof **out)))
+        return ebpo_fail_memory(error, count * sizeof **out);
+    uint64_t sum = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        (*out)[i] = sum;
+        sum += bytes == 1 ? narrow[i] : wide[i];
+    }
+    return sum == total ? EBPO_OK : sums_disagree(number, what, error);
+}
+
+ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level, int number,
+                                  ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    ebpo_status status = make_ranks(out, level, number, error);
+    if (status == EBPO_OK && level->plane_counts)
+        status = sum_before(&out->plane_first, level->plane_counts, 1, level->gray_count,
+                            level->plane_count, number, "planes", error);
+    if (status == EBPO_OK && level->leaf_plane_counts)
+        status = sum_before(&out->leaf_plane_first, level->leaf_plane_counts, 1, level->leaf_count,
+                            level->leaf_plane_count, number, "leaf planes", error);
+    if (status == EBPO_OK && level->leaf_ref_count)
+        status = sum_before(&out->ref_first, level->leaf_ref_count, 4, level->leaf_count,
+                            level->ref_count, number, "face lists", error);
+    if (status != EBPO_OK)
+        ebpo_level_ranks_free(out);
+    return status;
+}
+
+/* --- nodes of levels --- */
 
 /* Node of a group of the cell's level. */
 static ebpo_node node_of(const ebpo_level_nodes *n, uint64_t group, unsigned octant, ebpo_cell cell)
@@ -54,7 +209,8 @@ int32_t ebpo_level_winding(const ebpo_level_nodes *n, const ebpo_node *node)
 
 /* --- for cursors --- */
 
-static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error)
+static ebpo_status source_children(void *holder, ebpo_node *gray, ebpo_node child[8],
+                                   ebpo_error *error)
 {
     (void)error;
     for (unsigned octant = 0; octant < 8 && !gray->pruned; octant++)
@@ -62,8 +218,9 @@ static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], e
     return EBPO_OK;
 }
 
-static ebpo_status planes(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
-                          unsigned *count, ebpo_error *error)
+static ebpo_status source_planes(void *holder, const ebpo_node *node,
+                                 uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
+                                 ebpo_error *error)
 {
     (void)error;
     const uint32_t *from = ebpo_level_planes(holder, node, count);
@@ -72,11 +229,74 @@ static ebpo_status planes(void *holder, const ebpo_node *node, uint32_t codes[EB
     return EBPO_OK;
 }
 
-static ebpo_status winding(void *holder, const ebpo_node *uniform, int32_t *out, ebpo_error *error)
+static ebpo_status source_winding(void *holder, const ebpo_node *uniform, int32_t *out,
+                                  ebpo_error *error)
 {
     (void)error;
     *out = ebpo_level_winding(holder, uniform);
     return EBPO_OK;
 }
 
-const ebpo_node_source ebpo_level_source = { children, planes, winding };
+const ebpo_node_source ebpo_level_source = { source_children, source_planes, source_winding };
+
+/* --- the table of children, and its grid --- */
+
+typedef struct painter {
+    ebpo_node_table *table;
+    int bits;
+} painter;
+
+/* `cell` is counted from the table's root. */
+static void paint_grid(painter *p, uint32_t entry, ebpo_cell cell)
+{
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY && cell.level < p->bits) {
+        for (unsigned octant = 0; octant < 8; octant++)
+            paint_grid(p, ebpo_table_child(p->table, entry, octant), ebpo_cell_child(cell, octant));
+        return;
+    }
+    int shift = p->bits - cell.level;
+    uint32_t span = 1u << shift, x = cell.at[0] << shift, y = cell.at[1] << shift,
+             z = cell.at[2] << shift;
+    for (uint32_t k = z; k < z + span; k++)
+        for (uint32_t j = y; j < y + span; j++)
+            for (uint32_t i = x; i < x + span; i++) {
+                uint64_t at = ((uint64_t)k << p->bits | j) << p->bits | i;
+                p->table->grid[at] = entry;
+                p->table->grid_depth[at] = (uint8_t)cell.level;
+            }
+}
+
+int ebpo_node_grid_bits(uint64_t groups)
+{
+    int bits = 0;
+    while (bits < 8 && UINT64_C(1) << 3 * (bits + 1) <= 8 * groups)
+        bits++;
+    return bits < 2 ? 0 : bits;
+}
+
+void ebpo_node_table_make_grid(ebpo_node_table *table)
+{
+    int bits = ebpo_node_grid_bits(table->group_count);
+    if (!bits)
+        return;
+    uint64_t cells = UINT64_C(1) << 3 * bits;
+    table->grid = ebpo_alloc(cells, sizeof *table->grid);
+    table->grid_depth = ebpo_alloc(cells, 1);
+    if (!table->grid || !table->grid_depth) {
+        free(table->grid);
+        free(table->grid_depth);
+        table->grid = NULL;
+        table->grid_depth = NULL;
+        return;
+    }
+    table->grid_bits = bits;
+    paint_grid(&(painter){ table, bits }, table->root, (ebpo_cell){ 0, { 0, 0, 0 } });
+}
+
+void ebpo_node_table_free(ebpo_node_table *table)
+{
+    free(table->group);
+    free(table->grid);
+    free(table->grid_depth);
+    memset(table, 0, sizeof *table);
+}

@@ -1,10 +1,143 @@
-/* The nodes of levels in memory, from the root down to some level. */
+/* Node types in groups of eight siblings: a 16-bit word each, two bits for each octant, octant 0
+ * lowest. Level 0 has one group, of which only octant 0 exists. */
 #ifndef EBPO_GEOMETRY_LEVEL_NODES_H
 #define EBPO_GEOMETRY_LEVEL_NODES_H
 
-#include "geometry/level_ranks.h"
-#include "geometry/node.h"
-#include "geometry/node_source.h"
+#include <ebpo/file.h>
+
+#include "geometry/cells.h"
+
+/* Octants that a group of this level has. */
+static inline unsigned ebpo_group_octants(int level) { return level ? 8 : 1; }
+
+static inline ebpo_node_type ebpo_group_type(uint16_t types, unsigned octant)
+{
+    return (ebpo_node_type)(types >> 2 * octant & 3);
+}
+
+/* The word of a group in which only this octant is not white. */
+static inline uint16_t ebpo_group_of(ebpo_node_type type, unsigned octant)
+{
+    return (uint16_t)((unsigned)type << 2 * octant);
+}
+
+static inline uint16_t ebpo_group_set(uint16_t types, unsigned octant, ebpo_node_type type)
+{
+    return (uint16_t)((types & ~(3u << 2 * octant)) | ebpo_group_of(type, octant));
+}
+
+/* Bit 2i is set when octant i is a leaf or gray: when faces touch it. */
+static inline unsigned ebpo_group_filled(uint16_t types) { return types >> 1 & 0x5555u; }
+
+/* Octants below `octants` (at most 8) that are of this type: with an octant's own number, its rank
+ * among its siblings of the type. */
+static inline unsigned ebpo_group_count(uint16_t types, ebpo_node_type type, unsigned octants)
+{
+    unsigned differs = types ^ 0x5555u * (unsigned)type;
+    unsigned bits = ~(differs | differs >> 1) & 0x5555u & ((1u << 2 * octants) - 1);
+    bits = (bits & 0x3333) + (bits >> 2 & 0x3333);
+    bits = (bits + (bits >> 4)) & 0x0f0f;
+    return (bits + (bits >> 8)) & 0xf;
+}
+
+/* Nodes of each type in groups of eight, 16 bits each, little-endian, in any place of memory. */
+void ebpo_groups_count(const void *types, uint64_t groups, uint64_t counts[4]);
+
+/* The same for groups of one level; level 0 has only its root. */
+static inline void ebpo_groups_count_at(int level, const uint16_t *types, uint64_t groups,
+                                        uint64_t counts[4])
+{
+    if (level)
+        ebpo_groups_count(types, groups, counts);
+    else
+        for (int type = 0; type < 4; type++)
+            counts[type] = ebpo_group_count(types[0], (ebpo_node_type)type, 1);
+}
+
+/* A node of an octree, by where it stands: what every holder of nodes (levels in memory, a file,
+ * the tables of a decoded tree) gives and takes. A value: copy it, keep it, put it in a queue. */
+
+typedef struct ebpo_node {
+    ebpo_cell cell;
+    ebpo_node_type type;
+    bool pruned; /* gray, and known to have no children in what holds it */
+    /* How its holder finds it. */
+    union {
+        uint64_t rank;  /* in levels and files: among the nodes of its type in its level */
+        uint32_t entry; /* in tables: see ebpo_node_table */
+    };
+    /* in a model whose subtrees are loaded on demand: that in which the node stands; else NULL */
+    const struct ebpo_accel *subtree;
+} ebpo_node;
+
+/* White or black: no face touches it, and all of it is on one side. */
+static inline bool ebpo_node_is_uniform(const ebpo_node *node)
+{
+    return node->type == EBPO_WHITE || node->type == EBPO_BLACK;
+}
+
+/* A gray node's child: its types as the group of its children gives them, and the rank of the
+ * group's first node of each type in the next level. */
+static inline ebpo_node ebpo_node_child(const ebpo_node *gray, unsigned octant, uint16_t types,
+                                        const uint64_t ranks[4])
+{
+    ebpo_node_type type = ebpo_group_type(types, octant);
+    return (ebpo_node){ .cell = ebpo_cell_child(gray->cell, octant),
+                        .type = type,
+                        .rank = ranks[type] + ebpo_group_count(types, type, octant) };
+}
+
+/* What a winding number means. */
+
+/* True where points of this winding number belong to the solid. */
+static inline bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
+{
+    switch (rule) {
+    case EBPO_RULE_EVENODD: return winding & 1;
+    case EBPO_RULE_POSITIVE: return winding > 0;
+    case EBPO_RULE_NONZERO: break;
+    }
+    return winding != 0;
+}
+
+/* What a cursor asks of that which holds nodes: levels in memory, a file, the tables of a decoded
+ * tree, a model that loads subtrees as they are needed. */
+
+enum { EBPO_NODE_PLANES = 255 }; /* counts of planes are bytes */
+
+typedef struct ebpo_node_source {
+    /* The eight children of a gray node. Where there are none in this holder, the node is marked as
+     * pruned instead. What the holder learns about the node is noted in it as well, so that it need
+     * not be found a second time. */
+    ebpo_status (*children)(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error);
+    /* Codes of the planes that a gray node adds to its parent's envelope; other nodes have none,
+     * but leaves where levels store theirs. */
+    ebpo_status (*planes)(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
+                          unsigned *count, ebpo_error *error);
+    /* Winding number in a white or black node of a solid. */
+    ebpo_status (*winding)(void *holder, const ebpo_node *uniform, int32_t *winding,
+                           ebpo_error *error);
+} ebpo_node_source;
+
+/* Ranks in one level of a tree in memory: where a group's nodes, a node's planes and a leaf's
+ * references begin. Prefix sums, so that nodes can be gone to in any order. */
+
+typedef struct ebpo_level_ranks {
+    /* [group_count] by type: such nodes in the groups before; of white and of black nodes only
+     * where the level has their winding numbers, else NULL */
+    uint64_t *before[4];
+    uint64_t *plane_first;      /* [gray_count] */
+    uint64_t *leaf_plane_first; /* [leaf_count], NULL without stored leaf planes */
+    uint64_t *ref_first;        /* [leaf_count], NULL without face lists */
+} ebpo_level_ranks;
+
+/* EBPO_E_FORMAT when the level's counts contradict each other. On failure nothing is left to free.
+ * `number` is for messages. */
+EBPO_MUST_USE ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level,
+                                                int number, ebpo_error *error);
+void ebpo_level_ranks_free(ebpo_level_ranks *ranks);
+
+/* The nodes of levels in memory, from the root down to some level. */
 
 /* Lent; gray nodes without children in these levels are pruned ones, those of the last level all
  * are. */
@@ -29,5 +162,151 @@ int32_t ebpo_level_winding(const ebpo_level_nodes *nodes, const ebpo_node *node)
 
 /* For cursors; the holder is an ebpo_level_nodes. */
 extern const ebpo_node_source ebpo_level_source;
+
+/* A decoded tree as a table of children: four bytes a node, found by following numbers. What is
+ * asked of many times in a row stands in this form; a point's way down it is a loop of one line. */
+
+/* An entry: two bits of kind, 30 of value. */
+typedef enum ebpo_entry_kind {
+    EBPO_ENTRY_UNIFORM = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
+    EBPO_ENTRY_LEAF = 1,    /* value: number of the leaf */
+    EBPO_ENTRY_GRAY = 2,    /* value: number of the group of its eight children */
+    /* in the top of a tree: value: number of a subtree that is loaded on demand; in a subtree: a
+       pruned node, of which value is the number among gray nodes */
+    EBPO_ENTRY_BELOW = 3
+} ebpo_entry_kind;
+enum { EBPO_ENTRY_ZERO = 1 << 29 };
+
+static inline uint32_t ebpo_entry(ebpo_entry_kind kind, uint32_t value)
+{
+    return (uint32_t)kind << 30 | value;
+}
+static inline ebpo_entry_kind ebpo_entry_kind_of(uint32_t entry)
+{
+    return (ebpo_entry_kind)(entry >> 30);
+}
+static inline uint32_t ebpo_entry_value(uint32_t entry) { return entry & 0x3fffffff; }
+static inline int32_t ebpo_entry_winding(uint32_t entry)
+{
+    return (int32_t)ebpo_entry_value(entry) - EBPO_ENTRY_ZERO;
+}
+
+/* The entry of a white or black node; false for a winding number that it cannot hold. */
+static inline bool ebpo_entry_uniform(int32_t winding, uint32_t *entry)
+{
+    if (winding <= -EBPO_ENTRY_ZERO || winding >= EBPO_ENTRY_ZERO)
+        return false;
+    *entry = ebpo_entry(EBPO_ENTRY_UNIFORM, (uint32_t)(winding + EBPO_ENTRY_ZERO));
+    return true;
+}
+
+/* The node that an entry describes. */
+static inline ebpo_node ebpo_entry_node(uint32_t entry, ebpo_cell cell, ebpo_rule rule)
+{
+    ebpo_node node = { .cell = cell, .entry = entry, .type = EBPO_GRAY };
+    switch (ebpo_entry_kind_of(entry)) {
+    case EBPO_ENTRY_UNIFORM:
+        node.type = ebpo_rule_inside(rule, ebpo_entry_winding(entry)) ? EBPO_BLACK : EBPO_WHITE;
+        break;
+    case EBPO_ENTRY_LEAF: node.type = EBPO_LEAF; break;
+    case EBPO_ENTRY_BELOW: node.pruned = true; break;
+    case EBPO_ENTRY_GRAY: break;
+    }
+    return node;
+}
+
+typedef struct ebpo_node_table {
+    int root_level;       /* level of the node that `root` describes */
+    uint32_t root;        /* its entry */
+    uint32_t (*group)[8]; /* entries of the children, octant by octant */
+    uint32_t group_count;
+    /* 0: no grid. The entry of the node that contains the cell at level root_level + grid_bits, or
+     * of this cell, */
+    int grid_bits;
+    uint32_t *grid;      /* at [z][y][x]; */
+    uint8_t *grid_depth; /* and the depth of that node below the root */
+} ebpo_node_table;
+
+/* Bits of the grid of a table of so many groups; 0: none. */
+int ebpo_node_grid_bits(uint64_t groups);
+/* Makes the grid: fewer cells than about twice the groups. Optional; without memory there is none.
+ */
+void ebpo_node_table_make_grid(ebpo_node_table *table);
+void ebpo_node_table_free(ebpo_node_table *table);
+
+static inline uint32_t ebpo_table_child(const ebpo_node_table *table, uint32_t gray,
+                                        unsigned octant)
+{
+    return table->group[ebpo_entry_value(gray)][octant];
+}
+
+/* --- the way down to cell `at` of `fine_level`, which the root holds --- */
+
+/* Where a descent has come to. */
+typedef struct ebpo_descent {
+    uint32_t entry;
+    int level; /* of the entry's node */
+} ebpo_descent;
+
+static inline uint64_t ebpo_grid_cell(const ebpo_node_table *table, int fine_level,
+                                      const uint32_t at[3])
+{
+    int shift = fine_level - table->root_level - table->grid_bits;
+    uint32_t mask = (1u << table->grid_bits) - 1;
+    uint64_t x = at[0] >> shift & mask, y = at[1] >> shift & mask, z = at[2] >> shift & mask;
+    return (z << table->grid_bits | y) << table->grid_bits | x;
+}
+
+/* At the root, or at once at the node that the grid names. */
+static inline ebpo_descent ebpo_descent_begin(const ebpo_node_table *table, int fine_level,
+                                              const uint32_t at[3])
+{
+    if (!table->grid)
+        return (ebpo_descent){ table->root, table->root_level };
+    uint64_t cell = ebpo_grid_cell(table, fine_level, at);
+    uint32_t entry = table->grid[cell];
+    /* most gray ones are of the grid's own level: a cache line less */
+    bool deep = ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY;
+    int depth = deep ? table->grid_bits : table->grid_depth[cell];
+    return (ebpo_descent){ entry, table->root_level + depth };
+}
+
+/* One level down; false where there is none. */
+static inline bool ebpo_descent_step(ebpo_descent *d, const ebpo_node_table *table, int fine_level,
+                                     const uint32_t at[3])
+{
+    if (ebpo_entry_kind_of(d->entry) != EBPO_ENTRY_GRAY)
+        return false;
+    d->level++;
+    d->entry = ebpo_table_child(table, d->entry, ebpo_octant_at(at, fine_level - d->level));
+    return true;
+}
+
+/* Brings the children's entries nearer to the processor, for a step to come; false at the deepest
+ * node. */
+static inline bool ebpo_descent_prefetch(const ebpo_descent *d, const ebpo_node_table *table)
+{
+    if (ebpo_entry_kind_of(d->entry) != EBPO_ENTRY_GRAY)
+        return false;
+    __builtin_prefetch(table->group[ebpo_entry_value(d->entry)]);
+    return true;
+}
+
+/* The node's cell. */
+static inline ebpo_cell ebpo_descent_cell(const ebpo_descent *d, int fine_level,
+                                          const uint32_t at[3])
+{
+    return ebpo_cell_ancestor((ebpo_cell){ fine_level, { at[0], at[1], at[2] } }, d->level);
+}
+
+/* To the deepest node. */
+static inline ebpo_descent ebpo_descend(const ebpo_node_table *table, int fine_level,
+                                        const uint32_t at[3])
+{
+    ebpo_descent d = ebpo_descent_begin(table, fine_level, at);
+    while (ebpo_descent_step(&d, table, fine_level, at))
+        ;
+    return d;
+}
 
 #endif

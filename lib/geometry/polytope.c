@@ -1,23 +1,76 @@
+/* Convex polytopes in the coordinates of a cell, cut from the unit cube by half-spaces.
+ *
+ * Half-spaces are stored as plane codes of 32 bits, which decode to integers, so that no reader
+ * rounds. Polytopes have rounded vertices: they serve volumes, drawing and the choice of planes.
+ * Containment never depends on them. Clipping works on the vertex loops of the faces (BP 2008,
+ * section 3.4.3) and refuses a cut that rounding would spoil, so that a polytope may be too large
+ * and is never too small. An envelope is the cell of a node, cut by the planes of its ancestors and
+ * its own. */
 #include "core/strict_fp.h"
 
-#include "geometry/polytope.h"
-
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "geometry/polytope.h"
+#include "geometry/vec3.h"
+
+/* --- plane codes --- */
+
+bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d)
+{
+    int32_t u = (int32_t)(code & 1023) - EBPO_NORMAL_NORM,
+            v = (int32_t)(code >> 10 & 1023) - EBPO_NORMAL_NORM;
+    int32_t q = (int32_t)(code >> 20);
+    if (u > EBPO_NORMAL_NORM || v > EBPO_NORMAL_NORM || q >= EBPO_OFFSET_STEPS - 1)
+        return false;
+    int32_t w = EBPO_NORMAL_NORM - abs(u) - abs(v);
+    n[0] = w >= 0 ? u : (u < 0 ? -1 : 1) * (EBPO_NORMAL_NORM - abs(v));
+    n[1] = w >= 0 ? v : (v < 0 ? -1 : 1) * (EBPO_NORMAL_NORM - abs(u));
+    n[2] = w;
+    int32_t least = 0;
+    for (int i = 0; i < 3; i++)
+        least += n[i] < 0 ? n[i] : 0;
+    *d = EBPO_OFFSET_STEPS * least + EBPO_NORMAL_NORM * (q + 1);
+    return true;
+}
+
+bool ebpo_plane_code_normal(const double direction[3], uint32_t *normal)
+{
+    double x = direction[0], y = direction[1], z = direction[2];
+    double most = fmax(fabs(x), fmax(fabs(y), fabs(z)));
+    if (!(most > 0) || !isfinite(most) || !isfinite(x + y + z))
+        return false;
+    x /= most, y /= most, z /= most; /* keeps the sum below from overflow and underflow */
+    double scale = EBPO_NORMAL_NORM / (fabs(x) + fabs(y) + fabs(z));
+    double u = x * scale, v = y * scale;
+    if (z < 0) {
+        double fu = (EBPO_NORMAL_NORM - fabs(v)) * (u < 0 ? -1 : 1);
+        double fv = (EBPO_NORMAL_NORM - fabs(u)) * (v < 0 ? -1 : 1);
+        u = fu, v = fv;
+    }
+    int32_t iu = (int32_t)floor(u + 0.5), iv = (int32_t)floor(v + 0.5);
+    iu = iu < -EBPO_NORMAL_NORM ? -EBPO_NORMAL_NORM : iu > EBPO_NORMAL_NORM ? EBPO_NORMAL_NORM : iu;
+    iv = iv < -EBPO_NORMAL_NORM ? -EBPO_NORMAL_NORM : iv > EBPO_NORMAL_NORM ? EBPO_NORMAL_NORM : iv;
+    *normal = (uint32_t)(iu + EBPO_NORMAL_NORM) | (uint32_t)(iv + EBPO_NORMAL_NORM) << 10;
+    return true;
+}
+
+int ebpo_plane_code_offset(const int32_t n[3], double support)
+{
+    double least = 0;
+    for (int i = 0; i < 3; i++)
+        least += n[i] < 0 ? n[i] : 0;
+    /* A relative rounding of a few 2^-53 of values below 2^21: 1e-8 steps is far above it. */
+    double q = ceil((support - least) * ((double)EBPO_OFFSET_STEPS / EBPO_NORMAL_NORM) + 1e-8) - 1;
+    if (!(q < EBPO_OFFSET_STEPS - 1))
+        return -1;
+    return q < 0 ? 0 : (int)q;
+}
+
+/* --- polytopes and volumes --- */
+
 static const double tolerance = 1e-10;
-
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 void ebpo_polytope_cube(ebpo_polytope *p)
 {
@@ -50,14 +103,15 @@ double ebpo_polytope_volume(const ebpo_polytope *p)
             double ob[3] = { b[0] - o[0], b[1] - o[1], b[2] - o[2] };
             double oc[3] = { c[0] - o[0], c[1] - o[1], c[2] - o[2] };
             double n[3];
-            cross(ob, oc, n);
-            sum += dot(oa, n);
+            ebpo_vec3_cross(ob, oc, n);
+            sum += ebpo_vec3_dot(oa, n);
         }
     }
     return sum / 6;
 }
 
-static void between(const double a[3], double da, const double b[3], double db, double out[3])
+static void interpolate_crossing(const double a[3], double da, const double b[3], double db,
+                                 double out[3])
 {
     double t = da / (da - db);
     for (int k = 0; k < 3; k++)
@@ -70,12 +124,6 @@ double ebpo_polytope_cap_bound(double volume, double width, double height)
         return 0;
     double left = height < width ? 1 - height / width : 0;
     return volume * (1 - left * left * left);
-}
-
-static void minus(const double a[3], const double b[3], double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = a[k] - b[k];
 }
 
 /* What lies beyond a plane, seen from its farthest vertex: faces that have this vertex add nothing,
@@ -92,7 +140,7 @@ typedef struct beyond {
 static void point_between(const beyond *c, int out, int in, double x[3])
 {
     /* always from the outer end, so that neighbours get the same point */
-    between(c->p->vertex[out], c->dist[out], c->p->vertex[in], c->dist[in], x);
+    interpolate_crossing(c->p->vertex[out], c->dist[out], c->p->vertex[in], c->dist[in], x);
 }
 
 /* An edge of the cut. */
@@ -104,9 +152,9 @@ static void add_edge(beyond *c, const double from[3], const double to[3])
         return; /* seen from its own end it spans nothing */
     }
     double u[3], v[3], n[3];
-    minus(from, c->origin, u);
-    minus(to, c->origin, v);
-    cross(u, v, n);
+    ebpo_vec3_subtract(from, c->origin, u);
+    ebpo_vec3_subtract(to, c->origin, v);
+    ebpo_vec3_cross(u, v, n);
     for (int k = 0; k < 3; k++)
         c->area[k] += n[k];
 }
@@ -114,12 +162,12 @@ static void add_edge(beyond *c, const double from[3], const double to[3])
 static void add_to_fan(beyond *c, const double x[3], int *kept, double first[3], double last[3])
 {
     double v[3], n[3];
-    minus(x, c->p->vertex[c->farthest], v);
+    ebpo_vec3_subtract(x, c->p->vertex[c->farthest], v);
     if (*kept == 0)
         memcpy(first, v, sizeof v);
     else if (*kept > 1) {
-        cross(last, v, n);
-        c->fans += dot(first, n);
+        ebpo_vec3_cross(last, v, n);
+        c->fans += ebpo_vec3_dot(first, n);
     }
     memcpy(last, v, sizeof v);
     ++*kept;
@@ -162,7 +210,7 @@ double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d
     if (!p->vertex_count)
         return 0;
     for (int i = 0; i < p->vertex_count; i++) {
-        double e = dot(n, p->vertex[i]) - d;
+        double e = ebpo_vec3_dot(n, p->vertex[i]) - d;
         c.dist[i] = e;
         low = e < low ? e : low;
         if (e > high)
@@ -175,7 +223,7 @@ double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d
     c.started = false;
     for (int f = 0; f < p->face_count; f++)
         face_beyond(&c, f);
-    return (c.fans + high * fabs(dot(n, c.area)) / dot(n, n)) / 6;
+    return (c.fans + high * fabs(ebpo_vec3_dot(n, c.area)) / ebpo_vec3_dot(n, n)) / 6;
 }
 
 /* --- clipping --- */
@@ -212,7 +260,7 @@ static uint16_t add_vertex(cut *c, const double x[3], bool on)
     return (uint16_t)i;
 }
 
-static uint16_t crossing(cut *c, uint16_t in, uint16_t out)
+static uint16_t crossing_vertex(cut *c, uint16_t in, uint16_t out)
 {
     if (c->dist[in] >= -tolerance)
         return c->number[in]; /* the inner end itself lies on the plane */
@@ -224,7 +272,7 @@ static uint16_t crossing(cut *c, uint16_t in, uint16_t out)
         return 0;
     }
     double x[3];
-    between(c->in->vertex[in], c->dist[in], c->in->vertex[out], c->dist[out], x);
+    interpolate_crossing(c->in->vertex[in], c->dist[in], c->in->vertex[out], c->dist[out], x);
     uint16_t number = add_vertex(c, x, true);
     c->edge[c->edges].in = in;
     c->edge[c->edges].out = out;
@@ -277,7 +325,7 @@ static void clip_face(cut *c, int f)
         if (!a_out)
             add_corner(c, start, c->number[a]);
         if (a_out != b_out)
-            add_corner(c, start, a_out ? crossing(c, b, a) : crossing(c, a, b));
+            add_corner(c, start, a_out ? crossing_vertex(c, b, a) : crossing_vertex(c, a, b));
     }
     close_face(c, start, p->tag[f]);
     for (int i = start; i < c->out->corner_count && !c->full; i++) {
@@ -333,7 +381,7 @@ ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int3
     c.full = c.touched = false;
     double most = -1e300, least = 1e300;
     for (int i = 0; i < p->vertex_count; i++) {
-        double e = dot(n, p->vertex[i]) - d;
+        double e = ebpo_vec3_dot(n, p->vertex[i]) - d;
         c.dist[i] = e;
         most = e > most ? e : most;
         least = e < least ? e : least;
@@ -375,8 +423,10 @@ void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from)
     memcpy(to->corner, from->corner, (size_t)from->corner_count * sizeof from->corner[0]);
 }
 
+/* --- halves and children --- */
+
 /* Keeps one half, as ebpo_polytope_half does. */
-static bool halve(ebpo_polytope *p, int axis, int side)
+static bool halve_in_place(ebpo_polytope *p, int axis, int side)
 {
     double n[3] = { 0, 0, 0 };
     n[axis] = side ? -1 : 1;
@@ -391,15 +441,15 @@ static bool halve(ebpo_polytope *p, int axis, int side)
 bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out)
 {
     ebpo_polytope_copy(out, p);
-    return halve(out, axis, side);
+    return halve_in_place(out, axis, side);
 }
 
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out)
 {
     ebpo_polytope_copy(out, p);
-    bool some = halve(out, 2, octant >> 2 & 1);
-    some = halve(out, 1, octant >> 1 & 1) && some;
-    return halve(out, 0, octant & 1) && some;
+    bool some = halve_in_place(out, 2, octant >> 2 & 1);
+    some = halve_in_place(out, 1, octant >> 1 & 1) && some;
+    return halve_in_place(out, 0, octant & 1) && some;
 }
 
 void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES])
@@ -408,4 +458,81 @@ void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VER
     for (int f = 0; f < p->face_count; f++)
         for (int i = p->first[f]; p->tag[f] < 0 && i < p->first[f + 1]; i++)
             sides[p->corner[i]] |= (uint8_t)(1u << (-1 - p->tag[f]));
+}
+
+/* --- envelopes: cut by plane codes, as half-spaces, and by level --- */
+
+void ebpo_planes_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        int32_t v[3], d;
+        double n[3];
+        if (!ebpo_plane_code_decode(codes[i], v, &d))
+            continue;
+        double offset = ebpo_plane_as_double(v, d, n);
+        (void)ebpo_polytope_clip(envelope, n, offset, (int32_t)i);
+    }
+}
+
+void ebpo_half_spaces_add(ebpo_half_spaces *s, const uint32_t *codes, uint64_t count)
+{
+    for (uint64_t i = 0; i < count && s->count < EBPO_HALF_SPACES_MAX; i++) {
+        int32_t d;
+        ebpo_half_space *next = &s->at[s->count];
+        if (!ebpo_plane_code_decode(codes[i], next->n, &d))
+            continue;
+        next->d = d;
+        s->count++;
+    }
+}
+
+static bool keeps_cell(const ebpo_half_space *h)
+{
+    int64_t most = 0;
+    for (int k = 0; k < 3; k++)
+        most += h->n[k] > 0 ? h->n[k] : 0;
+    return EBPO_OFFSET_STEPS * most <= h->d;
+}
+
+void ebpo_half_spaces_to_child(ebpo_half_spaces *s, unsigned octant)
+{
+    int kept = 0;
+    for (int i = 0; i < s->count; i++) {
+        ebpo_half_space h = s->at[i];
+        h.d = ebpo_plane_to_child(h.n, h.d, octant);
+        if (!keeps_cell(&h))
+            s->at[kept++] = h;
+    }
+    s->count = kept;
+}
+
+void ebpo_half_spaces_cut(const ebpo_half_spaces *s, double slack, ebpo_polytope *out)
+{
+    ebpo_polytope_cube(out);
+    for (int i = 0; i < s->count; i++) {
+        double n[3], d = ebpo_plane_as_double(s->at[i].n, s->at[i].d, n);
+        (void)ebpo_polytope_clip(out, n, d + slack, i);
+    }
+}
+
+const ebpo_polytope *ebpo_envelope_put(ebpo_envelope_stack *stack, ebpo_octcode octcode,
+                                       const uint32_t *codes, uint64_t count)
+{
+    int level = ebpo_octcode_level(octcode);
+    ebpo_polytope *envelope = &stack->at[level];
+    if (level)
+        (void)ebpo_polytope_child(&stack->at[level - 1], octcode & 7, envelope);
+    else
+        ebpo_polytope_cube(envelope);
+    ebpo_planes_cut(envelope, codes, count);
+    stack->octcode[level] = octcode;
+    return envelope;
+}
+
+const ebpo_polytope *ebpo_envelope_put_cube(ebpo_envelope_stack *stack, ebpo_octcode octcode)
+{
+    int level = ebpo_octcode_level(octcode);
+    ebpo_polytope_cube(&stack->at[level]);
+    stack->octcode[level] = octcode;
+    return &stack->at[level];
 }

@@ -1,12 +1,58 @@
-/* Convex polytopes in cell coordinates, cut from the unit cube by half-spaces: for volumes, drawing
- * and choosing planes. Their vertices are rounded. Containment never depends on them; the decoded
- * half-spaces carry the guarantee. Source: BP 2008, section 3.4.3 (clipping of the box), done here
- * on vertex loops. */
+/* Plane codes: a half-space in the coordinates of its node's cell, in 32 bits, decoded to integers
+ * so that nobody rounds.
+ *
+ * bits 0-9 u, bits 10-19 v, bits 20-31 q. With U = u - 511, V = v - 511 in [-511, 511]: the normal
+ * is the point (U, V) of the octahedral map (Cigolle et al., "A Survey of Efficient Representations
+ * for Independent Unit Vectors", 2014) kept as integers of 1-norm 511. With m the sum of the
+ * normal's negative components (the least value of n . xi over the cell), the half-space is 4096 *
+ * (n . xi) <= 4096 * m + 511 * (q + 1),   0 <= q <= 4094, so q counts 4096ths of the cell's width
+ * in direction n. q = 4095 would keep the whole cell and stands for no plane.
+ */
 #ifndef EBPO_GEOMETRY_POLYTOPE_H
 #define EBPO_GEOMETRY_POLYTOPE_H
 
 #include <stdbool.h>
 #include <stdint.h>
+
+#include <ebpo/file.h>
+
+#include "geometry/cells.h"
+
+enum { EBPO_NORMAL_NORM = 511, EBPO_OFFSET_STEPS = 4096 };
+
+/* The same as the public ebpo_plane_decode (file.h), for the lower layers. */
+bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d);
+
+/* Normal part (bits 0-19) of the code nearest to a direction in cell coordinates, of any length;
+ * false for (0, 0, 0) or not finite. Cell coordinates scale each axis, so a face's world normal is
+ * multiplied by the cell's size, axis by axis, to get this direction. */
+bool ebpo_plane_code_normal(const double direction[3], uint32_t *normal);
+
+/* Least q whose half-space keeps every point with n . xi <= support, or -1 when only the whole cell
+ * would do. `support` is in units of n . xi; the rounding of this function itself is on the safe
+ * side. */
+int ebpo_plane_code_offset(const int32_t n[3], double support);
+
+static inline uint32_t ebpo_plane_code_make(uint32_t normal, int q)
+{
+    return normal | (uint32_t)q << 20;
+}
+
+/* The same half-space, 4096 * (n . xi) <= d, in the coordinates of child `octant`: xi_parent =
+ * (xi_child + octant) / 2. Exact; d grows by less than one bit for each level. */
+static inline int64_t ebpo_plane_to_child(const int32_t n[3], int64_t d, unsigned octant)
+{
+    int64_t shift = 0;
+    for (int i = 0; i < 3; i++)
+        if (octant >> i & 1)
+            shift += n[i];
+    return 2 * d - (int64_t)EBPO_OFFSET_STEPS * shift;
+}
+
+/* Convex polytopes in cell coordinates, cut from the unit cube by half-spaces: for volumes, drawing
+ * and choosing planes. Their vertices are rounded. Containment never depends on them; the decoded
+ * half-spaces carry the guarantee. Source: BP 2008, section 3.4.3 (clipping of the box), done here
+ * on vertex loops. */
 
 /* Room for the 255 planes that a node may have, on a cube, where no more than three meet in a
  * point. */
@@ -64,5 +110,70 @@ double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d
  * plane's normal and reaches so far beyond it: among convex bodies of volume V and width H the cap
  * of height h is largest for the cone with its base on the far side, V (1 - (1 - h/H)^3). */
 double ebpo_polytope_cap_bound(double volume, double width, double height);
+
+/* Polytopes cut by plane codes. */
+
+/* n as a direction of length about 1 and the matching offset, for ebpo_polytope_clip. */
+static inline double ebpo_plane_as_double(const int32_t n[3], int64_t d, double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = (double)n[k] * (1.0 / 511);
+    return (double)d * (1.0 / (511.0 * 4096));
+}
+
+/* Cuts the envelope by plane codes of its own cell; a face's tag is the place of its code. */
+void ebpo_planes_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count);
+
+/* What bounds a node's envelope beside its cell: the half-spaces of its ancestors and its own, as
+ * exact integers in the coordinates of its cell. */
+
+/* 4096 (n . xi) <= d */
+typedef struct ebpo_half_space {
+    int32_t n[3];
+    int64_t d;
+} ebpo_half_space;
+
+enum { EBPO_HALF_SPACES_MAX = EBPO_LEVELS_MAX * 256 }; /* plane counts are bytes */
+
+/* Half-spaces that keep the whole cell are left out. */
+typedef struct ebpo_half_spaces {
+    int count;
+    ebpo_half_space at[EBPO_HALF_SPACES_MAX];
+} ebpo_half_spaces;
+
+/* Adds planes of the cell at hand. */
+void ebpo_half_spaces_add(ebpo_half_spaces *spaces, const uint32_t *codes, uint64_t count);
+
+/* From the cell to its child. */
+void ebpo_half_spaces_to_child(ebpo_half_spaces *spaces, unsigned octant);
+
+/* The cell cut by the half-spaces, each moved outwards by `slack` (in the units of n / 511, about
+ * cells). */
+void ebpo_half_spaces_cut(const ebpo_half_spaces *spaces, double slack, ebpo_polytope *out);
+
+/* Envelopes along a way down the tree, as polytopes, so that neighbours share their ancestors'. */
+
+/* About 170 KB; zeroed before first use. */
+typedef struct ebpo_envelope_stack {
+    ebpo_octcode octcode[EBPO_LEVELS_MAX]; /* whose envelope it is; 0: nobody's */
+    ebpo_polytope at[EBPO_LEVELS_MAX];
+} ebpo_envelope_stack;
+
+/* The node's envelope, or NULL when it is not in the stack. */
+static inline const ebpo_polytope *ebpo_envelope_held(const ebpo_envelope_stack *stack,
+                                                      ebpo_octcode octcode)
+{
+    int level = ebpo_octcode_level(octcode);
+    return stack->octcode[level] == octcode ? &stack->at[level] : NULL;
+}
+
+/* Puts the envelope of a node whose parent's is held (the root's: the cube), in coordinates of its
+ * cell: its parent's part in the cell, cut by its own planes. Lent until another node of its level
+ * is put. */
+const ebpo_polytope *ebpo_envelope_put(ebpo_envelope_stack *stack, ebpo_octcode octcode,
+                                       const uint32_t *codes, uint64_t count);
+
+/* A black node's: its cell. */
+const ebpo_polytope *ebpo_envelope_put_cube(ebpo_envelope_stack *stack, ebpo_octcode octcode);
 
 #endif

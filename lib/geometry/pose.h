@@ -1,10 +1,22 @@
-/* Where a model is in the world, and the posed coordinates of its vertices: doubles, each operation
- * rounded once, on which all decisions about two models are exact (docs/develop/collision.md).
- * Functions are pure; any thread. */
+/* Rotations as quaternions: x, y, z, w (the real part). Any thread. */
 #ifndef EBPO_GEOMETRY_POSE_H
 #define EBPO_GEOMETRY_POSE_H
 
+#include <stdbool.h>
+
 #include <ebpo/pose.h>
+
+double ebpo_quaternion_length(const double q[4]);
+
+/* To length 1 but for rounding. False: its greatest part is not within 2^-500 .. 2^500. */
+bool ebpo_quaternion_normalise(double q[4]);
+
+/* Of length 1 but for rounding; m: [3][3]. */
+void ebpo_quaternion_matrix(const double q[4], double (*m)[3]);
+
+/* Where a model is in the world, and the posed coordinates of its vertices: doubles, each operation
+ * rounded once, on which all decisions about two models are exact (docs/develop/collision.md).
+ * Functions are pure; any thread. */
 
 /* A pose that has been checked. */
 typedef struct ebpo_posing {

@@ -1,25 +1,355 @@
-/* Each predicate goes through stages, cheapest first: signs of factors, a floating-point filter,
- * exact arithmetic on doubles (expansions) where exponents leave room for it, integers of any size.
+/* Orientation predicates and signs of sums of products, exact for every finite double.
  *
- * Error bounds: eps = 2^-53. Each bound holds for the computed permanent (the sum of absolute
- * values); the slack term covers underflow in the products, and an overflow makes the bound
- * infinite or not a number, so that no comparison succeeds. */
+ * Each predicate goes through stages, cheapest first: signs of factors, a floating-point filter,
+ * exact arithmetic on doubles (expansions) where exponents leave room for it, integers of any size.
+ * Sources: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
+ * Predicates", 1997; docs/develop/design.md. */
 #include "core/strict_fp.h"
 
+#include <gmp.h>
+#include <limits.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "geometry/expansion.h"
 #include "geometry/predicates.h"
 
-#include <math.h>
+/* --- integers of any size --- */
 
-#include "geometry/predicates_exact.h"
-#include "geometry/predicates_expansion.h"
+/* A finite double is an integer times a power of two. Coordinates of one axis are brought to a
+ * common power, which scales the determinant by a positive factor and leaves integers. */
 
+/* Largest e such that x is an integer multiple of 2^e with a 53-bit factor; INT_MAX for 0, which is
+ * a multiple of all. */
+static int unit_exponent(double x)
+{
+    int e;
+    if (x == 0)
+        return INT_MAX;
+    frexp(x, &e);
+    return e - 53;
+}
+
+static int common_exponent(const double *x, int n)
+{
+    int least = INT_MAX;
+    for (int i = 0; i < n; i++) {
+        int e = unit_exponent(x[i]);
+        if (e < least)
+            least = e;
+    }
+    return least;
+}
+
+/* out = x / 2^unit, an integer by choice of unit. */
+static void set_integer(mpz_t out, double x, int unit)
+{
+    if (x == 0) {
+        mpz_set_ui(out, 0);
+        return;
+    }
+    int e;
+    mpz_set_d(out, ldexp(frexp(x, &e), 53));
+    mpz_mul_2exp(out, out, (mp_bitcnt_t)(e - 53 - unit));
+}
+
+/* out[i] = (x[i + 1] - x[0]) / a common positive power of two, i = 0 .. n-2. */
+static void set_differences(mpz_t *out, const double *x, int n)
+{
+    mpz_t base;
+    int unit = common_exponent(x, n);
+    mpz_init(base);
+    set_integer(base, x[0], unit);
+    for (int i = 1; i < n; i++) {
+        set_integer(out[i - 1], x[i], unit);
+        mpz_sub(out[i - 1], out[i - 1], base);
+    }
+    mpz_clear(base);
+}
+
+/* out = p * q - r * s */
+static void minor_2x2(mpz_t out, const mpz_t p, const mpz_t q, const mpz_t r, const mpz_t s)
+{
+    mpz_mul(out, p, q);
+    mpz_submul(out, r, s);
+}
+
+static void init_all(mpz_t *z, int n)
+{
+    for (int i = 0; i < n; i++)
+        mpz_init(z[i]);
+}
+
+static void clear_all(mpz_t *z, int n)
+{
+    for (int i = 0; i < n; i++)
+        mpz_clear(z[i]);
+}
+
+int ebpo_orient2d_exact(const double a[2], const double b[2], const double c[2])
+{
+    mpz_t m[2][2], det;
+    for (int k = 0; k < 2; k++) {
+        init_all(m[k], 2);
+        set_differences(m[k], (double[]){ a[k], b[k], c[k] }, 3);
+    }
+    mpz_init(det);
+    minor_2x2(det, m[0][0], m[1][1], m[0][1], m[1][0]);
+    int sign = mpz_sgn(det);
+    mpz_clear(det);
+    for (int k = 0; k < 2; k++)
+        clear_all(m[k], 2);
+    return sign;
+}
+
+int ebpo_orient3d_exact(const double a[3], const double b[3], const double c[3], const double d[3])
+{
+    mpz_t m[3][3], minor, det;
+    for (int k = 0; k < 3; k++) {
+        init_all(m[k], 3);
+        set_differences(m[k], (double[]){ a[k], b[k], c[k], d[k] }, 4);
+    }
+    mpz_init(minor);
+    mpz_init(det);
+    for (int k = 0; k < 3; k++) {
+        int u = (k + 1) % 3, v = (k + 2) % 3;
+        minor_2x2(minor, m[u][0], m[v][1], m[v][0], m[u][1]);
+        mpz_addmul(det, minor, m[k][2]);
+    }
+    int sign = mpz_sgn(det);
+    mpz_clear(det);
+    mpz_clear(minor);
+    for (int k = 0; k < 3; k++)
+        clear_all(m[k], 3);
+    return sign;
+}
+
+int ebpo_sign_of_products_exact(const double *factor, int n)
+{
+    int unit = common_exponent(factor, 2 * n);
+    mpz_t p, q, sum;
+    mpz_init(p);
+    mpz_init(q);
+    mpz_init(sum);
+    for (int i = 0; i < n; i++) {
+        set_integer(p, factor[2 * i], unit);
+        set_integer(q, factor[2 * i + 1], unit);
+        mpz_addmul(sum, p, q);
+    }
+    int sign = mpz_sgn(sum);
+    mpz_clear(sum);
+    mpz_clear(q);
+    mpz_clear(p);
+    return sign;
+}
+
+/* --- expansions --- */
+
+/* Ranges. A double x with 2^-247 <= |x| <= 2^300 is an integer multiple of 2^-300. So are
+ * differences of such numbers and their rounding errors; products of three are multiples of 2^-900
+ * and below 2^910: no operation here overflows or underflows. */
+
+/* Sum of absolute products is within this factor of the error of taking rounded differences for
+ * exact ones: 3 eps and a margin. */
+static const double heads_error = 4 * 0x1p-53;
+
+static bool in_range(const double *x, int n, double least, double largest)
+{
+    bool ok = true;
+    for (int i = 0; i < n; i++)
+        ok &= (x[i] == 0) | ((fabs(x[i]) >= least) & (fabs(x[i]) <= largest));
+    return ok;
+}
+
+static bool coordinates_in_range(const double *x, int n)
+{
+    return in_range(x, n, 0x1p-247, 0x1p300);
+}
+
+int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c[2])
+{
+    const double all[6] = { a[0], a[1], b[0], b[1], c[0], c[1] };
+    if (!coordinates_in_range(all, 6))
+        return EBPO_SIGN_UNKNOWN;
+    ebpo_difference m[2][2];
+    for (int k = 0; k < 2; k++) {
+        m[k][0] = ebpo_difference_of(ebpo_two_difference(b[k], a[k]));
+        m[k][1] = ebpo_difference_of(ebpo_two_difference(c[k], a[k]));
+    }
+    double det[16];
+    int n = ebpo_expansion_minor(det, m[0][0], m[1][1], m[1][0], m[0][1]);
+    return ebpo_expansion_sign(det, n);
+}
+
+/* --- orient3d: integers of 128 bits, then expansions --- */
+
+#ifdef EBPO_HAVE_INT128
+__extension__ typedef __int128 wide;
+
+/* 2^(exponent of x), x normal and positive. */
+static double power_below(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits &= 0x7ff0000000000000;
+    memcpy(&x, &bits, sizeof bits);
+    return x;
+}
+
+/* Scales a row to integers below 2^41 by a power of two; false when it has more bits. */
+static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
+{
+    double largest = fmax(fabs(row[0].head), fmax(fabs(row[1].head), fabs(row[2].head)));
+    double scale = largest == 0 ? 1 : 0x1p40 / power_below(largest);
+    bool exact = true;
+    for (int i = 0; i < 3; i++) {
+        double x = row[i].head * scale;
+        /* Adding 1.5 * 2^52 rounds to an integer. A cast forth and back is less safe: GCC 12 drops
+         * such pairs when it vectorises. */
+        exact &= (x + 0x1.8p52) - 0x1.8p52 == x;
+        out[i] = (int64_t)x;
+    }
+    return exact;
+}
+
+/* The determinant of differences that are exact and have few bits, as those of single-precision or
+ * integer input. Each is below 2^41, so that minors are below 2^83 and the determinant below 2^126.
+ * False when the differences are not like that. */
+static bool integer_determinant(int *sign, ebpo_pair m[3][3])
+{
+    int64_t z[3][3];
+    for (int k = 0; k < 3; k++)
+        if (!row_to_integers(z[k], m[k]))
+            return false;
+    wide det = 0;
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        det += ((wide)z[u][0] * z[v][1] - (wide)z[v][0] * z[u][1]) * z[k][2];
+    }
+    *sign = (det > 0) - (det < 0);
+    return true;
+}
+
+#else
+/* Expansions decide alone. */
+static bool integer_determinant(int *sign, ebpo_pair m[3][3])
+{
+    (void)sign, (void)m;
+    return false;
+}
+#endif
+
+/* out = the determinant; room for 192. */
+static int expand_determinant(double *out, ebpo_difference m[3][3])
+{
+    double minor[16], term[3][64], two[128];
+    int term_n[3];
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        int n = ebpo_expansion_minor(minor, m[u][0], m[v][1], m[v][0], m[u][1]);
+        term_n[k] = ebpo_expansion_times(term[k], minor, n, m[k][2].x, m[k][2].n);
+    }
+    int two_n = ebpo_expansion_sum(two, term[0], term_n[0], term[1], term_n[1]);
+    return ebpo_expansion_sum(out, two, two_n, term[2], term_n[2]);
+}
+
+/* The determinant of the heads alone is off by at most this. */
+static double error_of_heads(ebpo_pair m[3][3])
+{
+    double permanent = 0;
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        permanent += (fabs(m[u][0].head * m[v][1].head) + fabs(m[v][0].head * m[u][1].head)) *
+                     fabs(m[k][2].head);
+    }
+    return heads_error * permanent;
+}
+
+/* A lower bound of |e| for n <= 24. Components do not overlap, so the sum of their sizes is below
+ * twice the last one, and adding them up errs by less than n eps of that. */
+static double expansion_size(const double *e, int n)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++)
+        sum += e[i];
+    return n == 0 ? 0 : fabs(sum) - 64 * 0x1p-53 * fabs(e[n - 1]);
+}
+
+static int expansion_determinant_sign(ebpo_pair m[3][3], bool heads_exact)
+{
+    ebpo_difference d[3][3];
+    double det[192];
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++)
+            d[k][i] = ebpo_difference_of((ebpo_pair){ m[k][i].head, 0 });
+    int n = expand_determinant(det, d);
+    if (heads_exact || expansion_size(det, n) > error_of_heads(m))
+        return ebpo_expansion_sign(det, n);
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++)
+            d[k][i] = ebpo_difference_of(m[k][i]);
+    n = expand_determinant(det, d);
+    return ebpo_expansion_sign(det, n);
+}
+
+int ebpo_determinant_expansion(ebpo_pair m[3][3])
+{
+    bool heads_exact = true;
+    for (int k = 0; k < 3; k++)
+        heads_exact &= (m[k][0].tail == 0) & (m[k][1].tail == 0) & (m[k][2].tail == 0);
+    int sign;
+    if (heads_exact && integer_determinant(&sign, m))
+        return sign;
+    return expansion_determinant_sign(m, heads_exact);
+}
+
+int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c[3],
+                            const double d[3])
+{
+    if (!coordinates_in_range(a, 3) || !coordinates_in_range(b, 3) || !coordinates_in_range(c, 3) ||
+        !coordinates_in_range(d, 3))
+        return EBPO_SIGN_UNKNOWN;
+    ebpo_pair m[3][3];
+    for (int k = 0; k < 3; k++) {
+        m[k][0] = ebpo_two_difference(b[k], a[k]);
+        m[k][1] = ebpo_two_difference(c[k], a[k]);
+        m[k][2] = ebpo_two_difference(d[k], a[k]);
+    }
+    return ebpo_determinant_expansion(m);
+}
+
+/* --- sums of products --- */
+
+int ebpo_sign_of_products_expansion(const double *factor, int n)
+{
+    /* Factors are multiples of 2^-500, products and their errors multiples of 2^-1000. */
+    if (n > 8 || !in_range(factor, 2 * n, 0x1p-447, 0x1p480))
+        return EBPO_SIGN_UNKNOWN;
+    double sum[2][16], product[2];
+    int length = 0, now = 0;
+    for (int i = 0; i < n; i++) {
+        int product_n =
+            ebpo_expansion_of_pair(product, ebpo_two_product(factor[2 * i], factor[2 * i + 1]));
+        length = ebpo_expansion_sum(sum[!now], sum[now], length, product, product_n);
+        now = !now;
+    }
+    return ebpo_expansion_sign(sum[now], length);
+}
+
+/* --- filters, and the stages in turn --- */
+
+/* Error bounds: eps = 2^-53. Each bound holds for the computed permanent (the sum of absolute
+ * values); the slack term covers underflow in the products, and an overflow makes the bound
+ * infinite or not a number, so that no comparison succeeds. */
 static const double eps = 0x1p-53;
 /* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;
 
 static inline int sign_of(double x) { return (x > 0) - (x < 0); }
 
-static inline int filtered(double value, double bound)
+static inline int filter_sign(double value, double bound)
 {
     if (value > bound)
         return 1;
@@ -39,7 +369,7 @@ int ebpo_orient2d(const double a[2], const double b[2], const double c[2])
     if (left_sign == 0)
         return 0;
     double left = ux * vy, right = uy * vx;
-    int sign = filtered(left - right, 4 * eps * (fabs(left) + fabs(right)) + slack);
+    int sign = filter_sign(left - right, 4 * eps * (fabs(left) + fabs(right)) + slack);
     if (sign == EBPO_SIGN_UNKNOWN)
         sign = ebpo_orient2d_expansion(a, b, c);
     return sign != EBPO_SIGN_UNKNOWN ? sign : ebpo_orient2d_exact(a, b, c);
@@ -56,7 +386,7 @@ static int orient3d_filter(double m[3][3])
         permanent += (fabs(p) + fabs(q)) * fabs(m[k][2]);
         third += fabs(m[k][2]);
     }
-    return filtered(det, 8 * eps * permanent + slack * (1 + third));
+    return filter_sign(det, 8 * eps * permanent + slack * (1 + third));
 }
 
 static inline bool same_point(const double p[3], const double q[3])
@@ -95,7 +425,7 @@ int ebpo_sign_of_products(const double *factor, int n)
         sum += product;
         permanent += fabs(product);
     }
-    int sign = filtered(sum, (n + 2) * eps * permanent + slack);
+    int sign = filter_sign(sum, (n + 2) * eps * permanent + slack);
     if (sign == EBPO_SIGN_UNKNOWN)
         sign = ebpo_sign_of_products_expansion(factor, n);
     return sign != EBPO_SIGN_UNKNOWN ? sign : ebpo_sign_of_products_exact(factor, n);

@@ -1,14 +1,17 @@
 /* Exact predicates over doubles: the sign is right for every finite input, whatever the compiler
- * and its flags. A floating-point filter answers nearly always; the rest goes to integers of any
- * size (GMP). Overflow and underflow in the filter are detected and fall back too. All functions
- * are pure and may be called from any thread. Source: Shewchuk, "Adaptive Precision Floating-Point
- * Arithmetic and Fast Robust Geometric Predicates", 1997, for the idea of filters.
+ * and its flags. A floating-point filter decides nearly always; the rest goes to exact arithmetic
+ * on doubles (expansions), then to integers of any size (GMP). Overflow and underflow in the filter
+ * are detected and fall back too. All functions are pure and may be called from any thread. Source:
+ * Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates",
+ * 1997, for the idea of filters.
  */
 #ifndef EBPO_GEOMETRY_PREDICATES_H
 #define EBPO_GEOMETRY_PREDICATES_H
 
 #include <stdbool.h>
 #include <stdint.h>
+
+#include "geometry/expansion.h"
 
 /* Sign (-1, 0, 1) of the determinant | b - a, c - a |: 1 when a, b, c turn counter-clockwise. */
 int ebpo_orient2d(const double a[2], const double b[2], const double c[2]);
@@ -45,5 +48,28 @@ int ebpo_axis_crossing(const double from[3], double to, int axis, const double a
  * also one without area. Exact. */
 bool ebpo_point_on_triangle(const double p[3], const double a[3], const double b[3],
                             const double c[3]);
+
+/* --- the exact stages, each alone --- */
+
+/* Returned instead of a sign when coordinates are too large or too small for this stage. */
+enum { EBPO_SIGN_UNKNOWN = 2 };
+
+/* In exact arithmetic on doubles: tens to hundreds of nanoseconds, without allocation. The same
+ * meaning as the functions above without "_expansion"; -1, 0, 1 are exact. */
+int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c[2]);
+int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c[3],
+                            const double d[3]);
+int ebpo_sign_of_products_expansion(const double *factor, int n);
+
+/* Sign of the determinant of three columns of differences, m[axis][column]; coordinates as large
+ * and small as those that ebpo_orient3d_expansion takes, or closer to 1. Exact. */
+int ebpo_determinant_expansion(ebpo_pair m[3][3]);
+
+/* In integers of any size. The same meaning and ranges as the functions above without "_exact".
+ * Each call allocates through GMP, which ends the program when memory is out (a few kilobytes
+ * suffice). */
+int ebpo_orient2d_exact(const double a[2], const double b[2], const double c[2]);
+int ebpo_orient3d_exact(const double a[3], const double b[3], const double c[3], const double d[3]);
+int ebpo_sign_of_products_exact(const double *factor, int n);
 
 #endif

@@ -21,4 +21,31 @@ typedef struct ebpo_ray_meeting {
     double t; /* of the first common point, correctly rounded */
 } ebpo_ray_meeting;
 
+/* Rays and boxes against triangles, exact: the decisions are those of arithmetic without rounding,
+ * for every finite double. Filters in floating point first, then exact arithmetic on doubles
+ * (expansions), integers of any size (GMP) where numbers are too large or too small for these. Pure
+ * functions, any thread; the same results with every compiler and its flags. */
+
+void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebpo_ray_meeting *out);
+
+/* The same where the line certainly goes through the triangle's interior, `facing` as in the answer
+ * (not 0). */
+void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,
+                       ebpo_ray_meeting *out);
+
+/* Sign of t(a) - t(b), exact, for two triangles that the ray meets (first common points) as
+ * ebpo_ray_triangle has said. */
+int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3], const ebpo_ray_meeting *at_a,
+                     const double b[3][3], const ebpo_ray_meeting *at_b);
+
+/* The same in rational numbers, for every finite double. Each call allocates through GMP, which
+ * ends the program when memory is out (a few kilobytes suffice). */
+void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3],
+                             ebpo_ray_meeting *out);
+int ebpo_ray_compare_exact(const ebpo_segment *ray, const double a[3][3], const double b[3][3]);
+
+/* True when the closed triangle and the closed box [min, max] have a common point (min <= max on
+ * each axis; a box may be flat or a point). */
+bool ebpo_triangle_meets_box(const double triangle[3][3], const double min[3], const double max[3]);
+
 #endif

@@ -1,4 +1,7 @@
-/* Corners relative to the origin become integers e_i in one unit, the direction integers d in
+/* Rays against triangles in rational numbers: right for every finite double, and slow. The last
+ * stage of ray_triangle.c.
+ *
+ * Corners relative to the origin become integers e_i in one unit, the direction integers d in
  * another. With s_i = d . (e_j x e_k) for the edge opposite corner i, the line meets the plane at t
  * = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2), and it meets the triangle when no two of the s_i have
  * different signs. When the denominator is 0 the line is parallel to the triangle or the triangle
@@ -6,20 +9,20 @@
  * one plane. */
 #include "core/strict_fp.h"
 
-#include "geometry/ray_exact.h"
-
+#include <float.h>
+#include <gmp.h>
 #include <limits.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
-#include <gmp.h>
+#include "geometry/ray.h"
 
-typedef struct scene {
+typedef struct integer_scene {
     mpz_t corner[3][3]; /* e_i */
     mpz_t direction[3];
     int shift; /* a parameter in these units times 2^shift is t */
-} scene;
+} integer_scene;
 
 /* What the line and the triangle have in common, in units of the scene. */
 typedef struct stretch {
@@ -50,7 +53,7 @@ static void set_integer(mpz_t out, double x, int unit)
         mpz_mul_2exp(out, out, (mp_bitcnt_t)(e - DBL_MANT_DIG - unit));
 }
 
-static void scene_init(scene *s, const ebpo_segment *ray, const double triangle[3][3])
+static void scene_init(integer_scene *s, const ebpo_segment *ray, const double triangle[3][3])
 {
     int length_unit = INT_MAX, direction_unit = INT_MAX;
     mpz_t origin;
@@ -75,7 +78,7 @@ static void scene_init(scene *s, const ebpo_segment *ray, const double triangle[
     mpz_clear(origin);
 }
 
-static void scene_clear(scene *s)
+static void scene_clear(integer_scene *s)
 {
     for (int k = 0; k < 3; k++) {
         mpz_clear(s->direction[k]);
@@ -93,7 +96,7 @@ static void cross_component(mpz_t out, const mpz_t a[3], const mpz_t b[3], int k
 }
 
 /* out = a . (b x c) */
-static void determinant(mpz_t out, const mpz_t a[3], const mpz_t b[3], const mpz_t c[3])
+static void integer_determinant(mpz_t out, const mpz_t a[3], const mpz_t b[3], const mpz_t c[3])
 {
     mpz_t component;
     mpz_init(component);
@@ -116,7 +119,7 @@ static void set_fraction(mpq_t out, const mpz_t numerator, const mpz_t denominat
 
 /* Axis with the direction's largest component: there, a multiple of the direction tells the factor.
  */
-static int main_axis(const scene *s)
+static int main_axis(const integer_scene *s)
 {
     int axis = 0;
     for (int k = 1; k < 3; k++)
@@ -140,7 +143,7 @@ static void stretch_add(stretch *st, const mpz_t numerator, const mpz_t denomina
 
 /* out[i]: signed distance of corner i from the line, up to a common factor, for corners in one
  * plane with the line. */
-static void offsets_from_line(const scene *s, mpz_t out[3])
+static void offsets_from_line(const integer_scene *s, mpz_t out[3])
 {
     for (int k = 0; k < 3; k++) {
         for (int i = 0; i < 3; i++)
@@ -152,7 +155,8 @@ static void offsets_from_line(const scene *s, mpz_t out[3])
 
 /* The edge from corner i to corner j crosses the line at (e_i w_j - e_j w_i) / (w_j - w_i) = t d, w
  * being the offsets. */
-static void add_crossing(stretch *st, const scene *s, int axis, mpz_t w[3], int i, int j)
+static void add_edge_crossing(stretch *st, const integer_scene *s, int axis, mpz_t w[3], int i,
+                              int j)
 {
     mpz_t numerator, denominator;
     mpz_inits(numerator, denominator, NULL);
@@ -165,7 +169,7 @@ static void add_crossing(stretch *st, const scene *s, int axis, mpz_t w[3], int 
 }
 
 /* Line and triangle lie in one plane. */
-static void meet_in_plane(stretch *st, const scene *s)
+static void meet_in_plane(stretch *st, const integer_scene *s)
 {
     int axis = main_axis(s);
     mpz_t w[3];
@@ -176,19 +180,19 @@ static void meet_in_plane(stretch *st, const scene *s)
         if (mpz_sgn(w[i]) == 0)
             stretch_add(st, s->corner[i][axis], s->direction[axis]);
         else if (mpz_sgn(w[i]) * mpz_sgn(w[j]) < 0)
-            add_crossing(st, s, axis, w, i, j);
+            add_edge_crossing(st, s, axis, w, i, j);
     }
     mpz_clears(w[0], w[1], w[2], NULL);
 }
 
-static void meet_line(stretch *st, const scene *s)
+static void meet_line(stretch *st, const integer_scene *s)
 {
     mpz_t edge[3], denominator, numerator;
     int sign[3], negative = 0, positive = 0;
     mpz_inits(denominator, numerator, NULL);
     for (int i = 0; i < 3; i++) {
         mpz_init(edge[i]);
-        determinant(edge[i], s->direction, s->corner[(i + 1) % 3], s->corner[(i + 2) % 3]);
+        integer_determinant(edge[i], s->direction, s->corner[(i + 1) % 3], s->corner[(i + 2) % 3]);
         mpz_add(denominator, denominator, edge[i]);
         sign[i] = mpz_sgn(edge[i]);
         negative += sign[i] < 0;
@@ -197,7 +201,7 @@ static void meet_line(stretch *st, const scene *s)
     if (negative + positive == 0)
         meet_in_plane(st, s);
     else if (negative == 0 || positive == 0) {
-        determinant(numerator, s->corner[0], s->corner[1], s->corner[2]);
+        integer_determinant(numerator, s->corner[0], s->corner[1], s->corner[2]);
         stretch_add(st, numerator, denominator);
         st->facing = negative ? 1 : -1;
         st->side = negative == 3 || positive == 3 ? st->facing : 0;
@@ -207,7 +211,7 @@ static void meet_line(stretch *st, const scene *s)
 
 /* --- the parameter --- */
 
-static void scale(mpq_t t, int shift)
+static void scale_parameter(mpq_t t, int shift)
 {
     if (shift >= 0)
         mpq_mul_2exp(t, t, (mp_bitcnt_t)shift);
@@ -216,12 +220,12 @@ static void scale(mpq_t t, int shift)
 }
 
 /* Narrows the stretch to 0 <= t <= t_max, in t's own unit. */
-static void clip(stretch *st, int shift, double t_max)
+static void clip_stretch(stretch *st, int shift, double t_max)
 {
     if (!st->any)
         return;
-    scale(st->low, shift);
-    scale(st->high, shift);
+    scale_parameter(st->low, shift);
+    scale_parameter(st->high, shift);
     st->any = mpq_sgn(st->high) >= 0;
     if (mpq_sgn(st->low) < 0)
         mpq_set_ui(st->low, 0, 1);
@@ -234,22 +238,22 @@ static void clip(stretch *st, int shift, double t_max)
     }
 }
 
-static void meet(stretch *st, const ebpo_segment *ray, const double triangle[3][3])
+static void meet_ray(stretch *st, const ebpo_segment *ray, const double triangle[3][3])
 {
-    scene s;
+    integer_scene s;
     st->any = false;
     st->side = st->facing = 0;
     mpq_inits(st->low, st->high, NULL);
     scene_init(&s, ray, triangle);
     meet_line(st, &s);
-    clip(st, s.shift, ray->t_max);
+    clip_stretch(st, s.shift, ray->t_max);
     scene_clear(&s);
 }
 
 static void stretch_clear(stretch *st) { mpq_clears(st->low, st->high, NULL); }
 
 /* To the nearest double, t >= 0; mpq_get_d cuts off. */
-static double rounded(const mpq_t t)
+static double round_fraction(const mpq_t t)
 {
     double low = mpq_get_d(t), high = nextafter(low, INFINITY);
     if (low == INFINITY)
@@ -271,19 +275,19 @@ void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3
                              ebpo_ray_meeting *out)
 {
     stretch st;
-    meet(&st, ray, triangle);
+    meet_ray(&st, ray, triangle);
     out->meets = st.any;
     out->side = st.any ? st.side : 0;
     out->facing = st.any ? st.facing : 0;
-    out->t = st.any ? rounded(st.low) : INFINITY;
+    out->t = st.any ? round_fraction(st.low) : INFINITY;
     stretch_clear(&st);
 }
 
 int ebpo_ray_compare_exact(const ebpo_segment *ray, const double a[3][3], const double b[3][3])
 {
     stretch first, second;
-    meet(&first, ray, a);
-    meet(&second, ray, b);
+    meet_ray(&first, ray, a);
+    meet_ray(&second, ray, b);
     int order = mpq_cmp(first.low, second.low);
     stretch_clear(&first);
     stretch_clear(&second);

@@ -1,34 +1,592 @@
-/* A ray goes through stages, cheapest first: on which side of each edge the line passes, in
+/* Where a ray meets a triangle.
+ *
+ * A ray goes through stages, cheapest first: on which side of each edge the line passes, in
  * floating point with error bounds; then numerator and denominator of t in double-double
- * arithmetic, which gives t to its last bits (ray_close.c); expansions where these are not certain
- * (ray_expansion.c); rational numbers where exponents leave their range (ray_exact.c).
+ * arithmetic (double_double_kernels.c), which gives t to its last bits; expansions where these are
+ * not certain; rational numbers where exponents leave the range of expansions (ray_exact.c).
  *
  * With e_i = corner i - origin the line passes the edge (i, j) on the side given by the sign of d .
  * (e_i x e_j). Two edges with different signs: the line misses the triangle, also one without area
  * or seen edge-on, because all three signs are those of one planar figure, the triangle as seen
  * along d. Three equal signs: it goes through the interior. Anything else touches an edge or a
- * corner or is not certain.
- *
- * Error bounds: as in predicates.c; each holds for the computed permanent (the sum of absolute
- * values), the slack covers underflow, and an overflow makes the bound infinite or not a number, so
- * that no comparison succeeds. */
+ * corner or is not certain. */
 #include "core/strict_fp.h"
 
-#include "geometry/ray_triangle.h"
-
+#include <gmp.h>
+#include <limits.h>
 #include <math.h>
+#include <stdint.h>
+#include <string.h>
 
-#include "geometry/predicates_expansion.h"
-#include "geometry/ray_close.h"
-#include "geometry/ray_exact.h"
-#include "geometry/ray_expansion.h"
+#include "geometry/expansion.h"
+#include "geometry/predicates.h"
+#include "geometry/ray.h"
+#include "geometry/double_double_kernels.h"
 
+/* Sign of the determinant of direction, corner i and corner i + 1 (relative to the origin), where
+ * it is certain; else: */
+enum { SIDE_OPEN = 2 };
+
+/* What is further apart than this is certainly in this order, when a and b are rounded. */
+static inline bool certainly_less(double a, double b)
+{
+    return b - a > 0x1p-50 * (__builtin_fabs(a) + __builtin_fabs(b));
+}
+
+static inline void set_miss(ebpo_ray_meeting *out)
+{
+    *out = (ebpo_ray_meeting){ false, 0, 0, INFINITY };
+}
+
+/* --- expansions: t as a fraction, exact without allocation --- */
+
+/* Ranges. A double x with 2^-172 <= |x| <= 2^225 is a multiple of 2^-225; products of four such
+ * numbers, their differences and rounding errors are multiples of 2^-900 and below 2^910. Comparing
+ * two hits takes products of six, so numbers from 2^-97 to 2^150, which are multiples of 2^-150.
+ * Functions that return false or EBPO_SIGN_UNKNOWN got numbers outside of these ranges. */
+
+/* numerator / denominator; the denominator is not 0. */
+typedef struct fraction_of_expansions {
+    int n, m;
+    double numerator[192], denominator[96];
+} fraction_of_expansions;
+
+static bool in_range(const double *x, int n, double least, double largest)
+{
+    bool ok = true;
+    for (int i = 0; i < n; i++)
+        ok &= (x[i] == 0) | ((fabs(x[i]) >= least) & (fabs(x[i]) <= largest));
+    return ok;
+}
+
+static bool all_in_range(const ebpo_segment *ray, const double triangle[3][3], double least,
+                         double largest)
+{
+    return in_range(ray->origin, 3, least, largest) &&
+           in_range(ray->direction, 3, least, largest) && in_range(triangle[0], 9, least, largest);
+}
+
+/* Zero, or of a size that no product of four such numbers leaves the doubles. */
+static bool ray_in_range(const ebpo_segment *ray, const double triangle[3][3])
+{
+    return all_in_range(ray, triangle, 0x1p-172, 0x1p225);
+}
+
+/* --- fractions --- */
+
+static int fraction_sign(const fraction_of_expansions *f)
+{
+    return ebpo_expansion_sign(f->numerator, f->n) * ebpo_expansion_sign(f->denominator, f->m);
+}
+
+/* Sign of f - t for t >= 0. */
+static int fraction_beyond(const fraction_of_expansions *f, double t)
+{
+    double end[192], rest[384];
+    if (t == INFINITY)
+        return -1;
+    if (!in_range(&t, 1, 0x1p-172, 0x1p225))
+        return EBPO_SIGN_UNKNOWN;
+    int n = t == 0 ? 0 : ebpo_expansion_scale(end, f->denominator, f->m, t);
+    ebpo_expansion_negate(end, n);
+    n = ebpo_expansion_sum(rest, f->numerator, f->n, end, n);
+    return ebpo_expansion_sign(rest, n) * ebpo_expansion_sign(f->denominator, f->m);
+}
+
+/* The two leading components of what is compressed. */
+static ebpo_pair leading_pair(const double *e, int n)
+{
+    return (ebpo_pair){ e[n - 1], n > 1 ? e[n - 2] : 0 };
+}
+
+static void compress_fraction(fraction_of_expansions *f)
+{
+    f->n = ebpo_expansion_compress(f->numerator, f->n);
+    f->m = ebpo_expansion_compress(f->denominator, f->m);
+}
+
+/* Of two neighbours the one that the fraction is closer to, or the even one. */
+static double nearest_neighbour(const fraction_of_expansions *f, const double neighbour[2])
+{
+    double low[192], high[192], middle[384], rest[576], half = (neighbour[1] - neighbour[0]) / 2;
+    int n = ebpo_expansion_scale(low, f->denominator, f->m, neighbour[0]),
+        m = ebpo_expansion_scale(high, f->denominator, f->m, half);
+    n = ebpo_expansion_sum(middle, low, n, high, m);
+    ebpo_expansion_negate(middle, n);
+    n = ebpo_expansion_sum(rest, f->numerator, f->n, middle, n);
+    int sign = ebpo_expansion_sign(rest, n) * ebpo_expansion_sign(f->denominator, f->m);
+    uint64_t bits;
+    memcpy(&bits, neighbour, sizeof bits);
+    return sign > 0 || (sign == 0 && bits % 2) ? neighbour[1] : neighbour[0];
+}
+
+/* *t: the fraction, positive, correctly rounded. It keeps its value, in fewer components. */
+static bool fraction_value(fraction_of_expansions *f, double *t)
+{
+    double out[2];
+    compress_fraction(f);
+    if (!ebpo_pair_quotient(leading_pair(f->numerator, f->n), leading_pair(f->denominator, f->m),
+                            0x1p-102, out) ||
+        !in_range(out, 2, 0x1p-172, 0x1p225))
+        return false;
+    *t = out[0] < out[1] ? nearest_neighbour(f, out) : out[0];
+    return true;
+}
+
+/* The t at which the line meets the triangle's plane: normal . (corner - origin) over normal .
+ * direction, for what ray_in_range accepts. False: it is parallel. */
+static bool plane_fraction(const ebpo_segment *ray, const double triangle[3][3],
+                           fraction_of_expansions *out)
+{
+    ebpo_difference f[3], g[3], e[3];
+    double normal[16], up[3][64], down[3][32], two[128];
+    int up_n[3], down_n[3];
+    for (int k = 0; k < 3; k++) {
+        f[k] = ebpo_difference_of(ebpo_two_difference(triangle[1][k], triangle[0][k]));
+        g[k] = ebpo_difference_of(ebpo_two_difference(triangle[2][k], triangle[0][k]));
+        e[k] = ebpo_difference_of(ebpo_two_difference(triangle[0][k], ray->origin[k]));
+    }
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        int n = ebpo_expansion_minor(normal, f[u], g[v], f[v], g[u]);
+        double d = ray->direction[k];
+        up_n[k] = ebpo_expansion_times(up[k], normal, n, e[k].x, e[k].n);
+        down_n[k] = d == 0 ? 0 : ebpo_expansion_scale(down[k], normal, n, d);
+    }
+    int n = ebpo_expansion_sum(two, up[0], up_n[0], up[1], up_n[1]);
+    out->n = ebpo_expansion_sum(out->numerator, two, n, up[2], up_n[2]);
+    n = ebpo_expansion_sum(two, down[0], down_n[0], down[1], down_n[1]);
+    out->m = ebpo_expansion_sum(out->denominator, two, n, down[2], down_n[2]);
+    return out->m > 0;
+}
+
+/* --- line and triangle in one plane --- */
+
+/* Places at which the line leaves or enters the triangle: at corners that it passes through, and
+ * where it crosses edges. */
+typedef struct crossings {
+    int count;
+    fraction_of_expansions at[3];
+} crossings;
+
+typedef struct scene {
+    ebpo_difference corner[3][3]; /* relative to the origin */
+    const double *direction;
+    int axis; /* of the direction's largest component */
+} scene;
+
+static void make_scene(scene *s, const ebpo_segment *ray, const double triangle[3][3])
+{
+    s->direction = ray->direction;
+    s->axis = 0;
+    for (int k = 0; k < 3; k++) {
+        if (fabs(ray->direction[k]) > fabs(ray->direction[s->axis]))
+            s->axis = k;
+        for (int i = 0; i < 3; i++)
+            s->corner[i][k] =
+                ebpo_difference_of(ebpo_two_difference(triangle[i][k], ray->origin[k]));
+    }
+}
+
+/* A double as an expansion. */
+static ebpo_difference difference_of_double(double x)
+{
+    return ebpo_difference_of((ebpo_pair){ x, 0 });
+}
+
+/* out[i] = component k of corner i x direction, n[i] components; false when all are 0. */
+static bool offsets_along(const scene *s, int k, double out[3][16], int n[3])
+{
+    int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+    ebpo_difference du = difference_of_double(s->direction[u]),
+                    dv = difference_of_double(s->direction[v]);
+    for (int i = 0; i < 3; i++)
+        n[i] = ebpo_expansion_minor(out[i], s->corner[i][u], dv, s->corner[i][v], du);
+    return n[0] || n[1] || n[2];
+}
+
+static void add_corner(crossings *c, const scene *s, int i)
+{
+    fraction_of_expansions *f = &c->at[c->count++];
+    const ebpo_difference *e = &s->corner[i][s->axis];
+    f->n = e->n;
+    memcpy(f->numerator, e->x, sizeof e->x);
+    f->m = 1;
+    f->denominator[0] = s->direction[s->axis];
+}
+
+/* The edge from corner i to j crosses the line at (e_i w_j - e_j w_i) / (w_j - w_i) = t d, w being
+ * the offsets. */
+static void add_crossing(crossings *c, const scene *s, double w[3][16], const int *n, int i, int j)
+{
+    fraction_of_expansions *f = &c->at[c->count++];
+    const ebpo_difference *p = &s->corner[i][s->axis], *q = &s->corner[j][s->axis];
+    double left[64], right[64], negative[16];
+    int left_n = ebpo_expansion_times(left, w[j], n[j], p->x, p->n),
+        right_n = ebpo_expansion_times(right, w[i], n[i], q->x, q->n);
+    ebpo_expansion_negate(right, right_n);
+    f->n = ebpo_expansion_sum(f->numerator, left, left_n, right, right_n);
+    memcpy(negative, w[i], sizeof negative);
+    ebpo_expansion_negate(negative, n[i]);
+    int m = ebpo_expansion_sum(left, w[j], n[j], negative, n[i]);
+    f->m = ebpo_expansion_scale(f->denominator, left, m, s->direction[s->axis]);
+}
+
+static void find_crossings(crossings *c, const ebpo_segment *ray, const double triangle[3][3])
+{
+    scene s;
+    double w[3][16];
+    int n[3], sign[3];
+    c->count = 0;
+    make_scene(&s, ray, triangle);
+    for (int k = 0; k < 3 && !offsets_along(&s, k, w, n); k++)
+        ;
+    for (int i = 0; i < 3; i++)
+        sign[i] = ebpo_expansion_sign(w[i], n[i]);
+    for (int i = 0; i < 3; i++) {
+        int j = i == 2 ? 0 : i + 1;
+        if (sign[i] == 0)
+            add_corner(c, &s, i);
+        else if (sign[i] * sign[j] < 0)
+            add_crossing(c, &s, w, n, i, j);
+    }
+}
+
+/* The meeting, for a line that lies in the triangle's plane or in one with a triangle without area,
+ * for what ray_in_range accepts. */
+static bool meet_within_plane(const ebpo_segment *ray, const double triangle[3][3],
+                              ebpo_ray_meeting *out)
+{
+    crossings c;
+    bool before_end = false, after_begin = false, before_begin = false;
+    double least = INFINITY, t = 0;
+    find_crossings(&c, ray, triangle);
+    for (int i = 0; i < c.count; i++) {
+        int sign = fraction_sign(&c.at[i]), end = fraction_beyond(&c.at[i], ray->t_max);
+        if (end == EBPO_SIGN_UNKNOWN || (sign > 0 && !fraction_value(&c.at[i], &t)))
+            return false;
+        after_begin |= sign >= 0;
+        before_begin |= sign <= 0;
+        before_end |= end <= 0;
+        least = sign > 0 ? fmin(least, t) : least;
+    }
+    *out = (ebpo_ray_meeting){ after_begin && before_end, 0, 0, INFINITY };
+    if (out->meets)
+        out->t = before_begin ? 0 : least;
+    return true;
+}
+
+/* --- comparing --- */
+
+/* out = e * f; false when there is no room for it. */
+static bool multiply_expansions(double *out, int *length, const double *e, int n, const double *f,
+                                int m, int room)
+{
+    double sum[2][512], term[256];
+    int count = 0, now = 0;
+    if (2 * n * m > room || room > 512 || 2 * n > 256)
+        return false;
+    for (int i = 0; i < m; i++) {
+        int term_n = ebpo_expansion_scale(term, e, n, f[i]);
+        count = ebpo_expansion_sum(sum[!now], sum[now], count, term, term_n);
+        now = !now;
+    }
+    memcpy(out, sum[now], (size_t)count * sizeof *out);
+    *length = count;
+    return true;
+}
+
+static int compare_fractions(fraction_of_expansions *a, fraction_of_expansions *b)
+{
+    double left[512], right[512], rest[1024];
+    int left_n, right_n;
+    compress_fraction(a);
+    compress_fraction(b);
+    if (!multiply_expansions(left, &left_n, a->numerator, a->n, b->denominator, b->m, 512) ||
+        !multiply_expansions(right, &right_n, b->numerator, b->n, a->denominator, a->m, 512))
+        return EBPO_SIGN_UNKNOWN;
+    ebpo_expansion_negate(right, right_n);
+    int n = ebpo_expansion_sum(rest, left, left_n, right, right_n);
+    return ebpo_expansion_sign(rest, n) * ebpo_expansion_sign(a->denominator, a->m) *
+           ebpo_expansion_sign(b->denominator, b->m);
+}
+
+/* The t of the first common point; false: not known. */
+static bool first_fraction(const ebpo_segment *ray, const double triangle[3][3],
+                           fraction_of_expansions *out)
+{
+    if (plane_fraction(ray, triangle, out))
+        return true;
+    crossings c;
+    find_crossings(&c, ray, triangle);
+    *out = c.at[0];
+    for (int i = 1; i < c.count; i++) {
+        int sign = compare_fractions(&c.at[i], out);
+        if (sign == EBPO_SIGN_UNKNOWN)
+            return false;
+        if (sign < 0)
+            *out = c.at[i];
+    }
+    if (fraction_sign(out) < 0) /* the ray begins within */
+        out->n = 0;
+    return c.count > 0;
+}
+
+/* Sign of t(a) - t(b), as ebpo_ray_compare. */
+static int compare_by_expansions(const ebpo_segment *ray, const double a[3][3],
+                                 const double b[3][3])
+{
+    fraction_of_expansions first, second;
+    if (!all_in_range(ray, a, 0x1p-97, 0x1p150) || !in_range(b[0], 9, 0x1p-97, 0x1p150) ||
+        !first_fraction(ray, a, &first) || !first_fraction(ray, b, &second))
+        return EBPO_SIGN_UNKNOWN;
+    return compare_fractions(&first, &second);
+}
+
+/* --- the parameter t: double-double arithmetic, then expansions --- */
+
+static inline int bounded_sign(const ebpo_bounded *b)
+{
+    return b->x.head > b->error ? 1 : b->x.head < -b->error ? -1 : SIDE_OPEN;
+}
+
+/* t as a fraction, at first in double-double arithmetic, and as expansions when these are needed.
+ */
+typedef struct parameter {
+    const ebpo_segment *ray;
+    const double (*triangle)[3];
+    ebpo_plane_pairs at;
+    bool made; /* the fraction is there */
+    fraction_of_expansions fraction;
+} parameter;
+
+static inline void parameter_begin(parameter *p, const ebpo_segment *ray,
+                                   const double triangle[3][3])
+{
+    p->ray = ray;
+    p->triangle = triangle;
+    ebpo_ray_pairs_best()->plane(ray, triangle, &p->at);
+    p->made = false;
+}
+
+static bool make_fraction(parameter *p)
+{
+    if (!p->made)
+        p->made =
+            ray_in_range(p->ray, p->triangle) && plane_fraction(p->ray, p->triangle, &p->fraction);
+    return p->made;
+}
+
+/* Sign of t; that of the denominator is known. */
+static int sign_of_t(parameter *p, int denominator)
+{
+    int sign = bounded_sign(&p->at.numerator);
+    if (sign == SIDE_OPEN)
+        sign = -ebpo_orient3d(p->triangle[0], p->triangle[1], p->triangle[2], p->ray->origin);
+    return sign * denominator;
+}
+
+/* t > 0, correctly rounded. */
+static bool value_of_t(parameter *p, double *t)
+{
+    const double *out = p->at.quotient;
+    *t = 0;
+    if (p->at.has_quotient && !(out[0] < out[1])) {
+        *t = out[0];
+        return true;
+    }
+    return make_fraction(p) && fraction_value(&p->fraction, t);
+}
+
+/* Sign of t - t_max, which are close; that of the denominator is known. */
+static int beyond_end(parameter *p, int denominator)
+{
+    double end = p->ray->t_max;
+    const ebpo_bounded *a = &p->at.numerator, *b = &p->at.denominator;
+    ebpo_pair at_end = ebpo_pair_multiply(b->x, ebpo_pair_of(end));
+    ebpo_bounded rest = { ebpo_pair_subtract(a->x, at_end), 0 };
+    rest.error = a->error + end * b->error + 0x1p-97 * (fabs(a->x.head) + fabs(at_end.head)) +
+                 EBPO_RAY_SLACK;
+    int sign = bounded_sign(&rest);
+    if (sign != SIDE_OPEN)
+        return sign * denominator;
+    return make_fraction(p) ? fraction_beyond(&p->fraction, end) : EBPO_SIGN_UNKNOWN;
+}
+
+/* The same where the line meets the triangle: `side` as in the answer, `sign` that of normal .
+ * direction. */
+static bool meet_plane(const ebpo_segment *ray, const double triangle[3][3], int sign, int side,
+                       ebpo_ray_meeting *out)
+{
+    parameter p;
+    double t = 0;
+    parameter_begin(&p, ray, triangle);
+    int from_begin = sign_of_t(&p, sign);
+    set_miss(out);
+    if (from_begin < 0)
+        return true;
+    if (from_begin > 0 && !value_of_t(&p, &t))
+        return false;
+    if (certainly_less(ray->t_max, t))
+        return true;
+    if (t > 0 && ray->t_max < INFINITY && !certainly_less(t, ray->t_max)) {
+        int from_end = beyond_end(&p, sign);
+        if (from_end == EBPO_SIGN_UNKNOWN || from_end > 0)
+            return from_end != EBPO_SIGN_UNKNOWN;
+    }
+    *out = (ebpo_ray_meeting){ true, side, -sign, t };
+    return true;
+}
+
+/* --- rays close to an edge or a corner --- */
+
+/* Frequent cases are recognised first: a corner at the origin (t = 0), a corner on the line, an
+ * edge through the origin. */
+
+/* a x b = 0, exact, for numbers in range. */
+static bool are_parallel(const double a[3], const double b[3])
+{
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        ebpo_pair p = ebpo_two_product(a[u], b[v]), q = ebpo_two_product(a[v], b[u]);
+        if (p.head != q.head || p.tail != q.tail)
+            return false;
+    }
+    return true;
+}
+
+/* A corner relative to the ray's origin. */
+typedef struct corner {
+    const double *at; /* in the model */
+    ebpo_pair x[3];
+    double head[3];
+    bool exact; /* no tails */
+} corner;
+
+static corner corner_at(const ebpo_segment *ray, const double p[3])
+{
+    corner c = { .at = p, .exact = true };
+    for (int k = 0; k < 3; k++) {
+        c.x[k] = ebpo_two_difference(p[k], ray->origin[k]);
+        c.head[k] = c.x[k].head;
+        c.exact &= c.x[k].tail == 0;
+    }
+    return c;
+}
+
+static inline bool is_origin(const corner *c)
+{
+    return c->head[0] == 0 && c->head[1] == 0 && c->head[2] == 0;
+}
+
+/* Sign of d . (a x b), exact. The same with b - a in place of b, which loses less where the edge is
+ * short beside its distance from the origin. */
+static int close_edge_side(const double d[3], const corner *a, const corner *b)
+{
+    ebpo_pair m[3][3];
+    if (a->exact && b->exact && are_parallel(a->head, b->head))
+        return 0;
+    ebpo_bounded value;
+    ebpo_ray_pairs_best()->edge(d, a->x, a->at, b->at, &value);
+    int sign = bounded_sign(&value);
+    if (sign != SIDE_OPEN)
+        return sign;
+    for (int k = 0; k < 3; k++) {
+        m[k][0] = a->x[k];
+        m[k][1] = b->x[k];
+        m[k][2] = ebpo_pair_of(d[k]);
+    }
+    return ebpo_determinant_expansion(m);
+}
+
+/* The line goes through the corner, exact. */
+static inline bool on_line(const double d[3], const corner *c)
+{
+    return c->exact && are_parallel(d, c->head);
+}
+
+static void close_sides(const double d[3], const corner e[3], int sign[3])
+{
+    for (int i = 0; i < 3; i++) {
+        int before = i == 0 ? 2 : i - 1;
+        if (sign[i] == SIDE_OPEN && sign[before] == SIDE_OPEN && on_line(d, &e[i]))
+            sign[i] = sign[before] = 0;
+    }
+    for (int i = 0; i < 3; i++)
+        if (sign[i] == SIDE_OPEN)
+            sign[i] = close_edge_side(d, &e[i], &e[i == 2 ? 0 : i + 1]);
+}
+
+/* The meeting, no two of the given signs being different unless open. False: not certain; numbers
+ * are too large or too small. */
+static bool meet_closely(const ebpo_segment *ray, const double triangle[3][3], int sign[3],
+                         ebpo_ray_meeting *out)
+{
+    corner e[3];
+    bool begins = false;
+    if (!ray_in_range(ray, triangle))
+        return false;
+    for (int i = 0; i < 3; i++) {
+        e[i] = corner_at(ray, triangle[i]);
+        begins |= is_origin(&e[i]);
+    }
+    close_sides(ray->direction, e, sign);
+    bool left = sign[0] > 0 || sign[1] > 0 || sign[2] > 0,
+         right = sign[0] < 0 || sign[1] < 0 || sign[2] < 0, inner = sign[0] && sign[1] && sign[2];
+    int normal = left ? 1 : right ? -1 : 0;
+    if (left && right)
+        set_miss(out);
+    else if (begins)
+        *out = (ebpo_ray_meeting){ true, 0, -normal, 0 };
+    else if (normal == 0)
+        return meet_within_plane(ray, triangle, out);
+    else
+        return meet_plane(ray, triangle, normal, inner ? -normal : 0, out);
+    return true;
+}
+
+/* --- what two triangles share --- */
+
+static bool has_corner(const double triangle[3][3], const double p[3])
+{
+    bool has = false;
+    for (int i = 0; i < 3; i++)
+        has |= triangle[i][0] == p[0] && triangle[i][1] == p[1] && triangle[i][2] == p[2];
+    return has;
+}
+
+/* True when the ray, which meets both triangles, certainly does so in a corner or an edge that they
+ * share, and therefore at the same t. `across`: it lies in the plane of neither. */
+static bool meets_shared(const ebpo_segment *ray, const double a[3][3], const double b[3][3],
+                         bool across)
+{
+    corner shared[3];
+    int count = 0;
+    for (int i = 0; i < 3; i++)
+        if (has_corner(b, a[i]))
+            shared[count++] = corner_at(ray, a[i]);
+    if (count == 0 || !ray_in_range(ray, a))
+        return false;
+    if (count == 3 && has_corner(a, b[0]) && has_corner(a, b[1]) && has_corner(a, b[2]))
+        return true;
+    for (int i = 0; i < count; i++)
+        if (is_origin(&shared[i]) || (across && on_line(ray->direction, &shared[i])))
+            return true;
+    return across && count == 2 && close_edge_side(ray->direction, &shared[0], &shared[1]) == 0;
+}
+
+/* --- the filter --- */
+
+/* Error bounds: as in predicates.c; each holds for the computed permanent (the sum of absolute
+ * values), the slack covers underflow, and an overflow makes the bound infinite or not a number, so
+ * that no comparison succeeds. */
 static const double eps = 0x1p-53;
 /* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;
 
 /* Sign of d . (a x b), a and b being rounded differences; weight: 1 + |d0| + |d1| + |d2|. */
-static inline int edge_side(const double d[3], double weight, const double a[3], const double b[3])
+static inline int filtered_edge_side(const double d[3], double weight, const double a[3],
+                                     const double b[3])
 {
     double p0 = a[1] * b[2], q0 = a[2] * b[1];
     double p1 = a[2] * b[0], q1 = a[0] * b[2];
@@ -37,10 +595,8 @@ static inline int edge_side(const double d[3], double weight, const double a[3],
     double permanent = fabs(d[0]) * (fabs(p0) + fabs(q0)) + fabs(d[1]) * (fabs(p1) + fabs(q1)) +
                        fabs(d[2]) * (fabs(p2) + fabs(q2));
     double bound = 8 * eps * permanent + slack * weight;
-    return det > bound ? 1 : det < -bound ? -1 : EBPO_SIDE_OPEN;
+    return det > bound ? 1 : det < -bound ? -1 : SIDE_OPEN;
 }
-
-/* --- rays --- */
 
 /* True when some axis shows that ray and triangle are apart; signs of differences are always right.
  */
@@ -55,11 +611,6 @@ static bool apart_on_an_axis(const ebpo_segment *ray, double e[3][3])
     return false;
 }
 
-static inline void set_miss(ebpo_ray_meeting *out)
-{
-    *out = (ebpo_ray_meeting){ false, 0, 0, INFINITY };
-}
-
 void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebpo_ray_meeting *out)
 {
     const double *d = ray->direction;
@@ -67,20 +618,21 @@ void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebp
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
             e[i][k] = triangle[i][k] - ray->origin[k];
-    int sign[3] = { edge_side(d, weight, e[0], e[1]), edge_side(d, weight, e[1], e[2]),
-                    edge_side(d, weight, e[2], e[0]) };
+    int sign[3] = { filtered_edge_side(d, weight, e[0], e[1]),
+                    filtered_edge_side(d, weight, e[1], e[2]),
+                    filtered_edge_side(d, weight, e[2], e[0]) };
     bool done;
     if (sign[0] + sign[1] == 0 || sign[1] + sign[2] == 0 || sign[2] + sign[0] == 0) {
         set_miss(out);
         return;
     }
-    if (sign[0] == sign[1] && sign[1] == sign[2] && sign[0] != EBPO_SIDE_OPEN) {
-        done = ebpo_ray_meet_plane(ray, triangle, sign[0], -sign[0], out);
+    if (sign[0] == sign[1] && sign[1] == sign[2] && sign[0] != SIDE_OPEN) {
+        done = meet_plane(ray, triangle, sign[0], -sign[0], out);
     } else if (apart_on_an_axis(ray, e)) {
         set_miss(out);
         return;
     } else {
-        done = ebpo_ray_close(ray, triangle, sign, out);
+        done = meet_closely(ray, triangle, sign, out);
     }
     if (!done)
         ebpo_ray_triangle_exact(ray, triangle, out);
@@ -89,19 +641,19 @@ void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebp
 void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,
                        ebpo_ray_meeting *out)
 {
-    if (!ebpo_ray_meet_plane(ray, triangle, -facing, facing, out))
+    if (!meet_plane(ray, triangle, -facing, facing, out))
         ebpo_ray_triangle_exact(ray, triangle, out);
 }
 
 int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3], const ebpo_ray_meeting *at_a,
                      const double b[3][3], const ebpo_ray_meeting *at_b)
 {
-    if (ebpo_certainly_less(at_a->t, at_b->t))
+    if (certainly_less(at_a->t, at_b->t))
         return -1;
-    if (ebpo_certainly_less(at_b->t, at_a->t))
+    if (certainly_less(at_b->t, at_a->t))
         return 1;
-    if (ebpo_ray_meets_shared(ray, a, b, at_a->facing && at_b->facing))
+    if (meets_shared(ray, a, b, at_a->facing && at_b->facing))
         return 0;
-    int order = ebpo_ray_compare_expansion(ray, a, b);
+    int order = compare_by_expansions(ray, a, b);
     return order != EBPO_SIGN_UNKNOWN ? order : ebpo_ray_compare_exact(ray, a, b);
 }

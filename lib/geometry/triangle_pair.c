@@ -1,12 +1,184 @@
-/* Proofs: docs/develop/collision.md, "Kinds of pairs". Source of the test on the common line:
- * Devillers and Guigue, "Faster Triangle-Triangle Intersection Tests", 2002. */
+/* How two faces are related: apart, touching, crossing or coplanar; exact for every finite double.
+ *
+ * Faces whose planes intersect in a line are turned so that one corner of each is alone on its side
+ * of the other plane; two orientations then compare the ends of both faces on that line (Devillers
+ * and Guigue, "Faster Triangle-Triangle Intersection Tests", 2002). Faces in one plane are compared
+ * as figures in that plane, seen along an axis. A face without area is the segment between its
+ * least and greatest corners. Proofs: docs/develop/collision.md, "Kinds of pairs". */
 #include "core/strict_fp.h"
 
-#include "geometry/triangle_pair.h"
+#include <stdbool.h>
+#include <string.h>
 
-#include "geometry/min_max.h"
+#include <ebpo/pair.h>
+
+#include "geometry/triangle_pair.h"
+#include "geometry/vec3.h"
 #include "geometry/predicates.h"
-#include "geometry/flat_pair.h"
+
+/* --- figures in a plane, seen along an axis --- */
+
+/* Points of one plane, corners in turn; two are a segment, whose both sides are outer ones. */
+typedef struct figure {
+    double corner[3][2];
+    int corners;
+} figure;
+
+static figure seen_along(int axis, const double (*corner)[3], int corners)
+{
+    const int to[2] = { axis == 2 ? 0 : axis + 1, axis == 0 ? 2 : axis - 1 };
+    figure f = { .corners = corners };
+    for (int i = 0; i < corners; i++)
+        for (int k = 0; k < 2; k++)
+            f.corner[i][k] = corner[i][to[k]];
+    return f;
+}
+
+static int turn_of(const figure *f)
+{
+    return ebpo_orient2d(f->corner[0], f->corner[1], f->corner[2]);
+}
+
+/* An axis along which the corners are seen as a triangle; -1: they have no area. */
+static int axis_of(const double corner[3][3])
+{
+    for (int k = 0; k < 3; k++) {
+        figure f = seen_along(k, corner, 3);
+        if (turn_of(&f) != 0)
+            return k;
+    }
+    return -1;
+}
+
+/* How an edge parts two figures: 2: the other one is strictly beyond it, 1: not strictly, 0: not.
+ */
+static int parted_by(const double from[2], const double to[2], int outer, const figure *other)
+{
+    int parted = 2;
+    for (int i = 0; i < other->corners; i++) {
+        int side = ebpo_orient2d(from, to, other->corner[i]) * outer;
+        if (side < 0)
+            return 0;
+        parted = side == 0 ? 1 : parted;
+    }
+    return parted;
+}
+
+static int parted_by_edges(const figure *f, const figure *other)
+{
+    int most = 0, edges = f->corners == 3 ? 3 : 2, inner = f->corners == 3 ? turn_of(f) : 1;
+    for (int i = 0; i < edges; i++) {
+        int parted = parted_by(f->corner[i], f->corner[i + 1 == edges ? 0 : i + 1], -inner, other);
+        most = parted > most ? parted : most;
+    }
+    return most;
+}
+
+/* 2: no common point, 1: no common inner point, 0: neither. */
+static int figures_parted(const figure *f, const figure *g)
+{
+    int by_f = parted_by_edges(f, g), by_g = parted_by_edges(g, f);
+    return by_f > by_g ? by_f : by_g;
+}
+
+/* --- faces without area: the segment between their least and greatest corners --- */
+
+typedef struct ends {
+    double at[2][3];
+    bool point;
+} ends;
+
+static ends ends_of(const double corner[3][3])
+{
+    int least = 0, greatest = 0;
+    for (int i = 1; i < 3; i++) {
+        least = ebpo_corner_order(corner[i], corner[least]) < 0 ? i : least;
+        greatest = ebpo_corner_order(corner[i], corner[greatest]) > 0 ? i : greatest;
+    }
+    ends e;
+    memcpy(e.at[0], corner[least], sizeof e.at[0]);
+    memcpy(e.at[1], corner[greatest], sizeof e.at[1]);
+    e.point = ebpo_corner_order(e.at[0], e.at[1]) == 0;
+    return e;
+}
+
+static bool point_on_segment(const double p[3], const ends *s)
+{
+    return ebpo_point_on_triangle(p, s->at[0], s->at[1], s->at[1]);
+}
+
+/* Inner points of two segments meet in one point. */
+static bool segments_cross(const ends *s, const ends *t)
+{
+    double corner[3][3];
+    if (ebpo_orient3d(s->at[0], s->at[1], t->at[0], t->at[1]) != 0)
+        return false;
+    memcpy(corner, s->at, sizeof s->at);
+    memcpy(corner[2], t->at[0], sizeof corner[2]);
+    int axis = axis_of((const double(*)[3])corner);
+    if (axis < 0)
+        return false;
+    figure f = seen_along(axis, (const double(*)[3])s->at, 2),
+           g = seen_along(axis, (const double(*)[3])t->at, 2);
+    int side[2][2];
+    for (int i = 0; i < 2; i++) {
+        side[0][i] = ebpo_orient2d(f.corner[0], f.corner[1], g.corner[i]);
+        side[1][i] = ebpo_orient2d(g.corner[0], g.corner[1], f.corner[i]);
+    }
+    return side[0][0] * side[0][1] < 0 && side[1][0] * side[1][1] < 0;
+}
+
+static bool segments_meet(const ends *s, const ends *t)
+{
+    for (int i = 0; i < 2; i++)
+        if (point_on_segment(s->at[i], t) || point_on_segment(t->at[i], s))
+            return true;
+    return segments_cross(s, t);
+}
+
+/* The triangle has an area. */
+static bool segment_meets_triangle(const ends *s, const double t[3][3], int axis)
+{
+    int side[2], around[3];
+    for (int i = 0; i < 2; i++)
+        side[i] = ebpo_orient3d(t[0], t[1], t[2], s->at[i]);
+    if (side[0] * side[1] > 0)
+        return false;
+    if (side[0] == 0 && side[1] == 0 && !s->point) {
+        figure f = seen_along(axis, t, 3), g = seen_along(axis, (const double(*)[3])s->at, 2);
+        return figures_parted(&f, &g) != 2;
+    }
+    for (int i = 0; i < 2; i++)
+        if (side[i] == 0)
+            return ebpo_point_on_triangle(s->at[i], t[0], t[1], t[2]);
+    for (int i = 0; i < 3; i++)
+        around[i] = ebpo_orient3d(s->at[0], s->at[1], t[i], t[i == 2 ? 0 : i + 1]);
+    bool left = around[0] >= 0 && around[1] >= 0 && around[2] >= 0;
+    return left || (around[0] <= 0 && around[1] <= 0 && around[2] <= 0);
+}
+
+/* One face has no area, or both are in one plane. */
+static ebpo_pair_kind classify_flat(const double a[3][3], const double b[3][3])
+{
+    int axis_a = axis_of(a), axis_b = axis_of(b);
+    if (axis_a >= 0 && axis_b >= 0) {
+        static const ebpo_pair_kind kinds[] = { EBPO_PAIR_COPLANAR, EBPO_PAIR_TOUCHING,
+                                                EBPO_PAIR_APART };
+        figure f = seen_along(axis_a, a, 3), g = seen_along(axis_a, b, 3);
+        return kinds[figures_parted(&f, &g)];
+    }
+    ends s = ends_of(axis_a < 0 ? a : b);
+    bool meet;
+    if (axis_a < 0 && axis_b < 0) {
+        ends t = ends_of(b);
+        meet = segments_meet(&s, &t);
+    } else {
+        meet = segment_meets_triangle(&s, axis_a < 0 ? b : a, axis_a < 0 ? axis_b : axis_a);
+    }
+    return meet ? EBPO_PAIR_TOUCHING : EBPO_PAIR_APART;
+}
+
+/* --- pairs of faces in general --- */
 
 static bool boxes_apart(const double a[3][3], const double b[3][3])
 {
@@ -39,7 +211,7 @@ static bool has_both(const int side[3])
 
 /* The corner that is alone on a strict side, the others being on the other one or in the plane; or
  * in the plane, while both others are on one side. Prefers the positive side. */
-static int alone(const int side[3])
+static int corner_alone(const int side[3])
 {
     static const int order[] = { 1, -1, 0 };
     for (int s = 0; s < 3; s++)
@@ -52,15 +224,15 @@ static int alone(const int side[3])
 }
 
 /* Turns the corners so that the one that is alone comes first. True: it is not above the others. */
-static bool turn(const int side[3], int corner[3])
+static bool turn_corners(const int side[3], int corner[3])
 {
-    corner[0] = alone(side);
+    corner[0] = corner_alone(side);
     corner[1] = corner[0] == 2 ? 0 : corner[0] + 1;
     corner[2] = corner[0] == 0 ? 2 : corner[0] - 1;
     return side[corner[0]] < side[corner[1]] || side[corner[0]] < side[corner[2]];
 }
 
-static void swap(int *x, int *y)
+static void swap_corners(int *x, int *y)
 {
     int z = *x;
     *x = *y;
@@ -78,15 +250,15 @@ bool ebpo_turn_pair(const double a[3][3], const double b[3][3], ebpo_turned_pair
     if (one_side(out->side_a))
         return false;
     if (within_plane(out->side_a) || within_plane(out->side_b)) {
-        *kind = ebpo_flat_pair(a, b);
+        *kind = classify_flat(a, b);
         return false;
     }
-    out->flipped_b = turn(out->side_a, out->a);
-    out->flipped_a = turn(out->side_b, out->b);
+    out->flipped_b = turn_corners(out->side_a, out->a);
+    out->flipped_a = turn_corners(out->side_b, out->b);
     if (out->flipped_b)
-        swap(&out->b[1], &out->b[2]);
+        swap_corners(&out->b[1], &out->b[2]);
     if (out->flipped_a)
-        swap(&out->a[1], &out->a[2]);
+        swap_corners(&out->a[1], &out->a[2]);
     return true;
 }
 

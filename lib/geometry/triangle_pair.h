@@ -1,12 +1,22 @@
-/* How two faces lie to each other, exact for every finite double; what the kinds mean is defined in
- * docs/develop/collision.md. Swapping the faces or renumbering corners changes nothing. Pure
- * functions, any thread. */
+/* Corners in the order of their coordinates: x, then y, then z. */
 #ifndef EBPO_GEOMETRY_TRIANGLE_PAIR_H
 #define EBPO_GEOMETRY_TRIANGLE_PAIR_H
 
 #include <stdbool.h>
 
 #include <ebpo/pair.h>
+
+static inline int ebpo_corner_order(const double p[3], const double q[3])
+{
+    for (int k = 0; k < 3; k++)
+        if (p[k] != q[k])
+            return p[k] < q[k] ? -1 : 1;
+    return 0;
+}
+
+/* How two faces lie to each other, exact for every finite double; what the kinds mean is defined in
+ * docs/develop/collision.md. Swapping the faces or renumbering corners changes nothing. Pure
+ * functions, any thread. */
 
 ebpo_pair_kind ebpo_triangle_pair(const double a[3][3], const double b[3][3]);
 

@@ -1,13 +1,280 @@
-#include "levels/frontier.h"
+#include "core/strict_fp.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "geometry/cells.h"
+#include "levels/frontier.h"
+#include "geometry/vec3.h"
 
-static bool before(const ebpo_waiting *a, const ebpo_waiting *b)
+/* of a sum of three products, generously: what is hardly seen counts as seen */
+static const double SLACK = 1e-12;
+
+static void observer_cross(const double a[3], const double b[3], double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+}
+
+/* To length 1, whatever its length; false for (0, 0, 0). */
+static bool observer_normalise(const double v[3], double out[3])
+{
+    double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    if (!(largest > 0))
+        return false;
+    for (int k = 0; k < 3; k++)
+        out[k] = v[k] / largest;
+    double length = sqrt(ebpo_vec3_dot(out, out));
+    for (int k = 0; k < 3; k++)
+        out[k] /= length;
+    return true;
+}
+
+static bool all_finite(const double v[3])
+{
+    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
+}
+
+static ebpo_status observer_check(const ebpo_observer *o, ebpo_error *error)
+{
+    if (!all_finite(o->eye) || !all_finite(o->direction) || !all_finite(o->up))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the observer's eye, direction and up must be finite numbers");
+    if (!(o->fov > 0 && o->fov < 180))
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "the observer's angle of view must be above 0 and below 180 degrees; it is %g", o->fov);
+    if (o->width == 0 || o->height == 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the observer's picture has no pixels");
+    return EBPO_OK;
+}
+
+/* Side walls: inward normals t * forward +- right, where t is the tangent of half the angle. */
+static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, double tangent,
+                                ebpo_error *error)
+{
+    double forward[3], side[2][3], up[3];
+    s->everywhere = !observer_normalise(o->direction, forward);
+    if (s->everywhere)
+        return EBPO_OK;
+    if (!observer_normalise(o->up, up))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the observer's upward direction is (0, 0, 0)");
+    observer_cross(forward, up, side[0]);
+    if (ebpo_vec3_dot(side[0], side[0]) < 1e-12 || !observer_normalise(side[0], side[0]))
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "the observer's upward direction lies along the viewing direction; give another one");
+    observer_cross(side[0], forward, side[1]);
+    double tangents[2] = { tangent * ((double)o->width / o->height), tangent };
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 3; k++) {
+            s->inward[2 * i][k] = tangents[i] * forward[k] + side[i][k];
+            s->inward[2 * i + 1][k] = tangents[i] * forward[k] - side[i][k];
+        }
+    memcpy(s->inward[4], forward, sizeof forward);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
+                                const ebpo_observer *observer, ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    if (!observer)
+        return EBPO_OK;
+    ebpo_status status = observer_check(observer, error);
+    if (status != EBPO_OK)
+        return status;
+    int exponent;
+    (void)frexp(fmax(box->size[0], fmax(box->size[1], box->size[2])), &exponent);
+    out->given = true;
+    out->unit = ldexp(1, exponent);
+    double root2 = 0, tangent = tan(observer->fov * (3.14159265358979323846 / 360));
+    for (int k = 0; k < 3; k++) {
+        double side = box->size[k] / out->unit;
+        root2 += side * side;
+        out->eye[k] = observer->eye[k];
+    }
+    for (int i = 0; i < EBPO_LEVELS_MAX; i++)
+        out->diagonal2[i] = root2 * ebpo_half_power(2 * i);
+    out->focal = (double)observer->height / (2 * tangent);
+    return make_frustum(out, observer, tangent, error);
+}
+
+ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_cell cell)
+{
+    ebpo_seen out = { 0, true };
+    double low[3], high[3]; /* from the eye */
+    if (!s->given)
+        return out;
+    for (int k = 0; k < 3; k++) {
+        low[k] = (ebpo_wall(box, k, cell.level, cell.at[k]) - s->eye[k]) / s->unit;
+        high[k] = (ebpo_wall(box, k, cell.level, cell.at[k] + 1) - s->eye[k]) / s->unit;
+        double away = low[k] > 0 ? low[k] : high[k] < 0 ? -high[k] : 0;
+        out.distance2 += away * away;
+    }
+    for (int i = 0; i < 5 && !s->everywhere && out.seen; i++) {
+        double most = 0, reach = 0;
+        for (int k = 0; k < 3; k++) {
+            double a = s->inward[i][k] * low[k], b = s->inward[i][k] * high[k];
+            most += a > b ? a : b;
+            reach += fabs(a) + fabs(b);
+        }
+        out.seen = !(most < -SLACK * reach);
+    }
+    return out;
+}
+
+double ebpo_viewpoint_distance(const ebpo_viewpoint *s, double distance2)
+{
+    return s->given ? sqrt(distance2) * s->unit : NAN;
+}
+
+double ebpo_viewpoint_pixels(const ebpo_viewpoint *s, int level, double distance2)
+{
+    return s->given ? s->focal * sqrt(s->diagonal2[level] / distance2) : NAN;
+}
+
+unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_cell cell)
+{
+    unsigned octant = 0;
+    for (int k = 0; k < 3 && s->given; k++)
+        octant |= (unsigned)(s->eye[k] >= ebpo_wall(box, k, cell.level + 1, 2 * cell.at[k] + 1))
+                  << k;
+    return octant;
+}
+
+/* Octants from the root down, each as seen from the eye: reading them as one number gives the
+ * enumeration's order. */
+static uint64_t observer_enumerate(const ebpo_viewpoint *s, const ebpo_box *box,
+                                   ebpo_octcode octcode)
+{
+    int level = ebpo_octcode_level(octcode);
+    ebpo_cell cell = ebpo_cell_of_octcode(octcode);
+    uint64_t key = 0;
+    for (int i = 0; i < level; i++) {
+        int below = level - i;
+        ebpo_cell above = { i, { cell.at[0] >> below, cell.at[1] >> below, cell.at[2] >> below } };
+        unsigned octant = octcode >> 3 * (below - 1) & 7;
+        key |= (uint64_t)(octant ^ ebpo_viewpoint_octant(s, box, above))
+               << 3 * (EBPO_MAX_LEVEL - 1 - i);
+    }
+    return key;
+}
+
+/* Doubles that are not negative sort as their bits do. */
+static uint64_t observer_bits(double v)
+{
+    uint64_t out;
+    memcpy(&out, &v, sizeof out);
+    return out;
+}
+
+uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_priority priority,
+                            ebpo_octcode octcode, double distance2)
+{
+    switch (priority) {
+    case EBPO_PRIORITY_DISTANCE: return observer_bits(distance2);
+    case EBPO_PRIORITY_PIXELS:
+        return ~observer_bits(s->diagonal2[ebpo_octcode_level(octcode)] / distance2);
+    case EBPO_PRIORITY_FRONT_TO_BACK: return observer_enumerate(s, box, octcode);
+    case EBPO_PRIORITY_LEVEL:
+    default: return octcode;
+    }
+}
+
+void ebpo_partial_free(ebpo_partial *partial)
+{
+    free(partial->group);
+    free(partial->codes);
+    free(partial->winding);
+    memset(partial, 0, sizeof *partial);
+}
+
+static ebpo_status make_room(ebpo_partial *g, unsigned codes, ebpo_error *error)
+{
+    if (g->group_count >= UINT32_MAX)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "more nodes than a view can hold; give a deepest level or a budget");
+    if (!ebpo_grow(&g->group, &g->group_capacity, g->group_count + 1, sizeof *g->group) ||
+        !ebpo_grow(&g->codes, &g->code_capacity, g->code_count + codes, sizeof *g->codes) ||
+        (g->windings &&
+         !ebpo_grow(&g->winding, &g->winding_capacity, g->group_count + 1, sizeof *g->winding)))
+        return ebpo_fail_memory(error, (g->group_count + 1) * sizeof *g->group +
+                                           (g->code_count + codes) * sizeof *g->codes);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_partial_add(ebpo_partial *g, const ebpo_info *info, uint64_t parent,
+                             const ebpo_group *read, ebpo_error *error)
+{
+    int level = parent ? ebpo_octcode_level(parent) + 1 : 0;
+    uint64_t grays = ebpo_group_count(read->types, EBPO_GRAY, 8);
+    if (grays >
+        info->level[level].gray_count - g->grays[level]) /* else a damaged index could give one node
+                                                            to many parents, without end */
+        return ebpo_fail(
+            error, EBPO_E_FORMAT,
+            "level %d: its index gives more gray nodes than the head states; run ebpo verify",
+            level);
+    ebpo_status status = make_room(g, read->code_count, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_partial_group *out = &g->group[g->group_count];
+    *out = (ebpo_partial_group){ .parent = parent,
+                                 .first_gray = read->rank[EBPO_GRAY],
+                                 .first_code = g->code_count,
+                                 .types = read->types };
+    memcpy(out->plane_count, read->plane_count, sizeof out->plane_count);
+    if (read->code_count)
+        memcpy(g->codes + g->code_count, read->codes, read->code_count * sizeof *g->codes);
+    if (g->windings)
+        memcpy(g->winding[g->group_count], read->winding, sizeof *g->winding);
+    g->grays[level] += grays;
+    g->code_count += read->code_count;
+    g->group_count++;
+    return EBPO_OK;
+}
+
+const uint32_t *ebpo_partial_codes(const ebpo_partial *g, ebpo_partial_node node, unsigned *count)
+{
+    const ebpo_partial_group *group = &g->group[node.group];
+    uint64_t first = group->first_code;
+    for (unsigned i = 0; i < node.octant; i++)
+        first += group->plane_count[i];
+    *count = group->plane_count[node.octant];
+    return *count ? g->codes + first : NULL;
+}
+
+const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *g, ebpo_partial_node node,
+                                           ebpo_envelope_stack *e)
+{
+    ebpo_octcode octcode = ebpo_partial_octcode(g, node);
+    int level = ebpo_octcode_level(octcode);
+    const ebpo_polytope *envelope = NULL;
+    ebpo_partial_node at = { 0, 0 };
+    if (ebpo_partial_type(g, node) == EBPO_BLACK)
+        return ebpo_envelope_put_cube(e, octcode);
+    for (int depth = 0; depth <= level; depth++) {
+        ebpo_octcode own = octcode >> 3 * (level - depth);
+        if (depth == level)
+            at = node; /* its group may not be linked yet */
+        else if (depth)
+            at = (ebpo_partial_node){ g->group[at.group].child[at.octant], (uint8_t)(own & 7) };
+        envelope = ebpo_envelope_held(e, own);
+        if (!envelope) {
+            unsigned count;
+            const uint32_t *codes = ebpo_partial_codes(g, at, &count);
+            envelope = ebpo_envelope_put(e, own, codes, count);
+        }
+    }
+    return envelope;
+}
+
+static bool frontier_before(const ebpo_waiting *a, const ebpo_waiting *b)
 {
     if (a->turn != b->turn)
         return a->turn < b->turn;
@@ -27,13 +294,13 @@ ebpo_status ebpo_frontier_reserve(ebpo_frontier *f, uint64_t more, ebpo_error *e
                : ebpo_fail_memory(error, (f->count + more) * sizeof *f->at);
 }
 
-static void sink(ebpo_frontier *f, uint64_t i)
+static void frontier_sink(ebpo_frontier *f, uint64_t i)
 {
     ebpo_waiting node = f->at[i];
     for (uint64_t below = 2 * i + 1; below < f->count; below = 2 * i + 1) {
-        if (below + 1 < f->count && before(&f->at[below + 1], &f->at[below]))
+        if (below + 1 < f->count && frontier_before(&f->at[below + 1], &f->at[below]))
             below++;
-        if (!before(&f->at[below], &node))
+        if (!frontier_before(&f->at[below], &node))
             break;
         f->at[i] = f->at[below];
         i = below;
@@ -44,7 +311,7 @@ static void sink(ebpo_frontier *f, uint64_t i)
 void ebpo_frontier_push(ebpo_frontier *f, ebpo_waiting node)
 {
     uint64_t i = f->count++;
-    for (; i > 0 && before(&node, &f->at[(i - 1) / 2]); i = (i - 1) / 2)
+    for (; i > 0 && frontier_before(&node, &f->at[(i - 1) / 2]); i = (i - 1) / 2)
         f->at[i] = f->at[(i - 1) / 2];
     f->at[i] = node;
 }
@@ -54,14 +321,14 @@ ebpo_waiting ebpo_frontier_pop(ebpo_frontier *f)
     ebpo_waiting top = f->at[0];
     f->at[0] = f->at[--f->count];
     if (f->count)
-        sink(f, 0);
+        frontier_sink(f, 0);
     return top;
 }
 
 void ebpo_frontier_sort(ebpo_frontier *f)
 {
     for (uint64_t i = f->count / 2; i-- > 0;)
-        sink(f, i);
+        frontier_sink(f, i);
 }
 
 /* A table of blocks by hash; those for which there is no room are left out. */
@@ -86,7 +353,7 @@ unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
         if (!slot[at].block && count == EBPO_FRONTIER_BLOCKS)
             continue;
         count += !slot[at].block;
-        if (!slot[at].block || before(w, &f->at[slot[at].place]))
+        if (!slot[at].block || frontier_before(w, &f->at[slot[at].place]))
             slot[at].place = i;
         slot[at].block = block;
     }
@@ -94,7 +361,7 @@ unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
     for (unsigned at = 0; at < SLOTS; at++)
         if (slot[at].block) {
             unsigned i = count++;
-            for (; i > 0 && before(&f->at[slot[at].place], &f->at[places[i - 1]]); i--)
+            for (; i > 0 && frontier_before(&f->at[slot[at].place], &f->at[places[i - 1]]); i--)
                 places[i] = places[i - 1];
             places[i] = slot[at].place;
         }

@@ -1,24 +1,394 @@
-/* A level's envelopes: from the root down, each cut from its parent's. The top of the tree is
- * walked first; the subtrees that hang from it are independent of each other. Where it is cut
- * depends on the tree alone, so the result does not depend on the number of threads. */
 #include "core/strict_fp.h"
-
-#include <ebpo/lod.h>
 
 #include <stdlib.h>
 #include <string.h>
+
+#include <ebpo/lod.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "geometry/plane_clip.h"
-#include "levels/lod_colours.h"
-#include "levels/lod_model.h"
-#include "levels/polyhedra.h"
+#include "format/schema.h"
 #include "geometry/cells.h"
-#include "geometry/node_types.h"
-#include "geometry/octcode.h"
+#include "geometry/level_nodes.h"
+#include "geometry/polytope.h"
+#include "levels/lod.h"
+
+/* Colours of a level's nodes. */
+
+static const uint64_t count_limit = UINT32_MAX - 1;
+
+void ebpo_polyhedra_free(ebpo_polyhedra *piece)
+{
+    free(piece->xyz);
+    free(piece->faces);
+    piece->xyz = NULL;
+    piece->faces = NULL;
+    piece->vertex_count = piece->vertex_capacity = piece->face_count = piece->face_capacity = 0;
+    free(piece->nodes);
+    free(piece->corners);
+    piece->nodes = NULL;
+    piece->corners = NULL;
+    piece->node_count = piece->node_capacity = piece->polygon_count = piece->polygon_capacity = 0;
+}
+
+static void add_fan(ebpo_polyhedra *piece, const uint32_t *number, const uint16_t *loop,
+                    int corners)
+{
+    for (int i = 1; i + 1 < corners; i++) {
+        uint32_t *face = piece->faces + 3 * piece->face_count++;
+        face[0] = number[loop[0]];
+        face[1] = number[loop[i]];
+        face[2] = number[loop[i + 1]];
+    }
+}
+
+/* Room for the node of a polytope, which is begun. */
+static bool begin_node(ebpo_polyhedra *piece, const ebpo_polytope *p, const ebpo_box *box,
+                       ebpo_cell cell, ebpo_node_type type)
+{
+    if (!ebpo_grow(&piece->nodes, &piece->node_capacity, piece->node_count + 1,
+                   sizeof *piece->nodes) ||
+        !ebpo_grow(&piece->corners, &piece->polygon_capacity,
+                   piece->polygon_count + (uint64_t)p->face_count, 1))
+        return false;
+    piece->nodes[piece->node_count++] =
+        (ebpo_lod_node){ .octcode = ebpo_octcode_of_cell(cell),
+                         .volume = ebpo_polytope_volume(p) * ebpo_cell_volume(box, cell.level),
+                         .type = type };
+    return true;
+}
+
+static void end_polygon(ebpo_polyhedra *piece, unsigned corners)
+{
+    piece->corners[piece->polygon_count++] = (uint8_t)corners;
+    piece->nodes[piece->node_count - 1].polygon_count++;
+}
+
+ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p, const ebpo_box *box,
+                               ebpo_cell cell, ebpo_node_type type, bool walls, ebpo_error *error)
+{
+    if (piece->vertex_count + EBPO_POLYTOPE_VERTICES > count_limit)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "the level has more than 4294967294 vertices; choose a coarser level");
+    if (!ebpo_grow(&piece->xyz, &piece->vertex_capacity,
+                   piece->vertex_count + (uint64_t)p->vertex_count, 3 * sizeof(double)) ||
+        !ebpo_grow(&piece->faces, &piece->face_capacity,
+                   piece->face_count + (uint64_t)p->corner_count, 3 * sizeof(uint32_t)) ||
+        (piece->wants_nodes && !begin_node(piece, p, box, cell, type)))
+        return ebpo_fail_memory(error,
+                                (piece->vertex_count + piece->face_count) * 3 * sizeof(double));
+    uint32_t number[EBPO_POLYTOPE_VERTICES];
+    uint8_t sides[EBPO_POLYTOPE_VERTICES];
+    ebpo_polytope_sides(p, sides);
+    memset(number, 0xff, sizeof number);
+    uint64_t first_vertex = piece->vertex_count;
+    for (int f = 0; f < p->face_count; f++) {
+        if (p->tag[f] < 0 && !walls)
+            continue;
+        for (int i = p->first[f]; i < p->first[f + 1]; i++) {
+            uint16_t v = p->corner[i];
+            if (number[v] != UINT32_MAX)
+                continue;
+            for (int k = 0; k < 3; k++)
+                piece->xyz[3 * piece->vertex_count + (uint64_t)k] =
+                    ebpo_wall_point(box, cell, k, p->vertex[v][k], sides[v]);
+            number[v] = (uint32_t)piece->vertex_count++;
+        }
+        add_fan(piece, number, p->corner + p->first[f], p->first[f + 1] - p->first[f]);
+        if (piece->wants_nodes)
+            end_polygon(piece, p->first[f + 1] - p->first[f]);
+    }
+    if (piece->wants_nodes)
+        piece->nodes[piece->node_count - 1].vertex_count =
+            (uint32_t)(piece->vertex_count - first_vertex);
+    return EBPO_OK;
+}
+
+static void polyhedra_append(ebpo_mesh *out, const ebpo_polyhedra *piece)
+{
+    if (piece->vertex_count)
+        memcpy(out->xyz64 + 3 * out->vertex_count, piece->xyz,
+               piece->vertex_count * 3 * sizeof(double));
+    uint32_t *faces = out->faces + 3 * out->face_count, base = (uint32_t)out->vertex_count;
+    for (uint64_t i = 0; i < 3 * piece->face_count; i++)
+        faces[i] = piece->faces[i] + base;
+    out->vertex_count += piece->vertex_count;
+    out->face_count += piece->face_count;
+}
+
+static void append_nodes(ebpo_lod_nodes *out, const ebpo_polyhedra *piece)
+{
+    if (piece->node_count)
+        memcpy(out->nodes + out->node_count, piece->nodes, piece->node_count * sizeof *out->nodes);
+    if (piece->polygon_count)
+        memcpy(out->corners + out->polygon_count, piece->corners, piece->polygon_count);
+    out->node_count += piece->node_count;
+    out->polygon_count += piece->polygon_count;
+}
+
+static ebpo_status make_nodes(ebpo_lod_nodes *out, ebpo_polyhedra *const *pieces, uint64_t count,
+                              ebpo_error *error)
+{
+    uint64_t nodes = 0, polygons = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        nodes += pieces[i]->node_count;
+        polygons += pieces[i]->polygon_count;
+    }
+    out->nodes = ebpo_alloc(nodes, sizeof *out->nodes);
+    out->corners = ebpo_alloc(polygons, 1);
+    return out->nodes && out->corners
+               ? EBPO_OK
+               : ebpo_fail_memory(error, nodes * sizeof *out->nodes + polygons);
+}
+
+ebpo_status ebpo_polyhedra_join(ebpo_mesh *out, ebpo_lod_nodes *out_nodes,
+                                ebpo_polyhedra *const *pieces, uint64_t count, ebpo_error *error)
+{
+    uint64_t vertices = 0, faces = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        vertices += pieces[i]->vertex_count;
+        faces += pieces[i]->face_count;
+    }
+    if (vertices > count_limit || faces > count_limit)
+        return ebpo_fail(
+            error, EBPO_E_LIMIT,
+            "the level has more than 4294967294 vertices or faces; choose a coarser level");
+    memset(out, 0, sizeof *out);
+    out->xyz64 = ebpo_alloc(vertices, 3 * sizeof(double));
+    out->faces = ebpo_alloc(faces, 3 * sizeof(uint32_t));
+    if (!out->xyz64 || !out->faces ||
+        (out_nodes && make_nodes(out_nodes, pieces, count, error) != EBPO_OK)) {
+        ebpo_mesh_free(out);
+        return ebpo_fail_memory(error,
+                                vertices * 3 * sizeof(double) + faces * 3 * sizeof(uint32_t));
+    }
+    for (uint64_t i = 0; i < count; i++) {
+        polyhedra_append(out, pieces[i]);
+        if (out_nodes)
+            append_nodes(out_nodes, pieces[i]);
+        ebpo_polyhedra_free(pieces[i]);
+    }
+    return EBPO_OK;
+}
+
+void ebpo_lod_model_free(ebpo_lod_model *model)
+{
+    for (int i = 0; i < EBPO_LEVELS_MAX; i++) {
+        ebpo_level_free(&model->level[i]);
+        ebpo_level_ranks_free(&model->ranks[i]);
+    }
+    ebpo_mesh_free(&model->mesh);
+}
+
+static ebpo_status read_levels(ebpo_lod_model *out, const ebpo_file *file,
+                               const ebpo_read_options *read, ebpo_error *error)
+{
+    ebpo_file_prefetch_levels(file, 0, out->target);
+    for (int i = 0; i <= out->target; i++) {
+        ebpo_status status = ebpo_file_read_level(file, i, read, &out->level[i], error);
+        if (status == EBPO_OK)
+            status = ebpo_level_ranks_make(&out->ranks[i], &out->level[i], i, error);
+        if (status != EBPO_OK)
+            return status;
+        uint64_t expected = i == 0 ? 1 : out->level[i - 1].gray_count;
+        if (out->level[i].group_count != expected)
+            return ebpo_fail(error, EBPO_E_FORMAT,
+                             "level %d: %llu groups of siblings, but %llu parents; run ebpo verify",
+                             i, (unsigned long long)out->level[i].group_count,
+                             (unsigned long long)expected);
+    }
+    return EBPO_OK;
+}
+
+static bool has_leaves(const ebpo_lod_model *model)
+{
+    for (int i = 0; i <= model->target; i++)
+        if (model->level[i].leaf_count)
+            return true;
+    return false;
+}
+
+ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int target,
+                                const ebpo_read_options *read, ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    out->info = ebpo_file_info(file);
+    out->target = target;
+    out->box = ebpo_root_box(out->info);
+    uint32_t parts = out->info->parts;
+    out->leaf_source = parts & EBPO_PART_LEAF_PLANES ? EBPO_LEAF_STORED
+                       : parts & EBPO_PART_MESH      ? EBPO_LEAF_DERIVED
+                                                     : EBPO_LEAF_INHERITED;
+    ebpo_status status = read_levels(out, file, read, error);
+    if (status == EBPO_OK && out->leaf_source == EBPO_LEAF_DERIVED && has_leaves(out))
+        status = ebpo_file_read_mesh(file, read, &out->mesh, error);
+    if (status != EBPO_OK)
+        ebpo_lod_model_free(out);
+    return status;
+}
+
+/* Envelopes of leaves. */
+
+static bool take_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
+{
+    if (face >= mesh->face_count)
+        return false;
+    for (int i = 0; i < 3; i++) {
+        uint64_t v = mesh->faces[3 * face + (uint64_t)i];
+        if (v >= mesh->vertex_count)
+            return false;
+        for (uint64_t k = 0; k < 3; k++)
+            out->corner[i][k] =
+                mesh->xyz32 ? (double)mesh->xyz32[3 * v + k] : mesh->xyz64[3 * v + k];
+    }
+    return true;
+}
+
+/* The leaf's faces in the order in which the builder saw them: ascending numbers, so references
+ * before new ones. */
+ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
+                                ebpo_leaf_scratch *scratch, uint64_t *count, ebpo_error *error)
+{
+    const ebpo_level *level = &model->level[cell.level];
+    if (!level->leaf_first || !level->leaf_new || !model->ranks[cell.level].ref_first)
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "level %d: its leaves have no face lists; run ebpo verify", cell.level);
+    uint64_t refs = level->leaf_ref_count[leaf], fresh = level->leaf_new[leaf];
+    if (!ebpo_grow(&scratch->faces, &scratch->capacity, refs + fresh, sizeof *scratch->faces))
+        return ebpo_fail_memory(error, (refs + fresh) * sizeof *scratch->faces);
+    const uint32_t *ref =
+        level->leaf_refs ? level->leaf_refs + model->ranks[cell.level].ref_first[leaf] : NULL;
+    bool fine = true;
+    for (uint64_t i = 0; i < refs && fine; i++)
+        fine = take_face(&model->mesh, ref[i], &scratch->faces[i]);
+    for (uint64_t i = 0; i < fresh && fine; i++)
+        fine = take_face(&model->mesh, level->leaf_first[leaf] + i, &scratch->faces[refs + i]);
+    if (!fine)
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "level %d: leaf %llu names a face or vertex that the mesh does not have; "
+                         "run ebpo verify",
+                         cell.level, (unsigned long long)leaf);
+    *count = refs + fresh;
+    return EBPO_OK;
+}
+
+unsigned ebpo_lod_inside_corners(const ebpo_box *box, ebpo_cell cell, ebpo_rule rule,
+                                 int32_t winding, const ebpo_triangle *faces, uint64_t count)
+{
+    int32_t delta[8];
+    ebpo_corner_windings(box, cell, faces, count, delta);
+    unsigned inside = 0;
+    for (unsigned i = 0; i < 8; i++)
+        inside |= (unsigned)ebpo_rule_inside(rule, winding + delta[i]) << i;
+    return inside;
+}
+
+ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
+                                 ebpo_leaf_scratch *scratch, ebpo_polytope *envelope,
+                                 uint32_t codes[EBPO_PLANES_MAX], int *plane_count,
+                                 ebpo_error *error)
+{
+    uint64_t count = 0;
+    ebpo_status status = ebpo_lod_leaf_faces(model, cell, leaf, scratch, &count, error);
+    if (status != EBPO_OK)
+        return status;
+    const int32_t *winding = model->level[cell.level].leaf_winding;
+    unsigned inside = model->info->solid && winding
+                          ? ebpo_lod_inside_corners(&model->box, cell, model->info->rule,
+                                                    winding[leaf], scratch->faces, count)
+                          : 0;
+    /* Derived planes cost no bytes: each that removes anything is taken, as in the volumes that the
+     * file states. */
+    *plane_count =
+        ebpo_leaf_planes(&model->box, cell, scratch->faces, count, inside, 0, envelope, codes);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
+                          ebpo_leaf_scratch *scratch, ebpo_polytope *envelope, ebpo_error *error)
+{
+    const ebpo_level *level = &model->level[cell.level];
+    const ebpo_level_ranks *ranks = &model->ranks[cell.level];
+    if (model->leaf_source == EBPO_LEAF_STORED && ranks->leaf_plane_first &&
+        level->leaf_plane_counts[leaf])
+        ebpo_planes_cut(envelope, level->leaf_planes + ranks->leaf_plane_first[leaf],
+                        level->leaf_plane_counts[leaf]);
+    uint32_t codes[EBPO_PLANES_MAX];
+    int count;
+    if (model->leaf_source != EBPO_LEAF_DERIVED)
+        return EBPO_OK;
+    return ebpo_lod_leaf_planes(model, cell, leaf, scratch, envelope, codes, &count, error);
+}
+
+/* Down from the root: of the last gray node on the way, which is the node or its parent. */
+static bool find_colour(const ebpo_lod_model *model, uint64_t octcode, uint32_t *colour)
+{
+    int depth = ebpo_cell_of_octcode(octcode).level;
+    uint64_t group = 0;
+    bool found = false;
+    for (int level = 0; level <= depth; level++) {
+        const ebpo_level *l = &model->level[level];
+        unsigned octant = level ? octcode >> 3 * (depth - level) & 7 : 0;
+        uint16_t types = l->types[group];
+        if (ebpo_group_type(types, octant) != EBPO_GRAY || !l->gray_colours)
+            break;
+        group = model->ranks[level].before[EBPO_GRAY][group] +
+                ebpo_group_count(types, EBPO_GRAY, octant);
+        *colour = l->gray_colours[group];
+        found = true;
+    }
+    return found;
+}
+
+static void ebpo_lod_add_colours(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
+{
+    for (uint64_t i = 0; i < nodes->node_count; i++) {
+        ebpo_lod_node *node = &nodes->nodes[i];
+        node->colour = EBPO_COLOUR_OF_NOTHING;
+        node->coloured = find_colour(model, node->octcode, &node->colour);
+    }
+}
+
+static bool are_coloured(const ebpo_lod_nodes *nodes)
+{
+    for (uint64_t i = 0; i < nodes->node_count; i++)
+        if (nodes->nodes[i].coloured)
+            return true;
+    return false;
+}
+
+ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes, uint64_t vertex_count, ebpo_colours *out,
+                             ebpo_error *error)
+{
+    uint64_t sum = 0;
+    memset(out, 0, sizeof *out);
+    for (uint64_t i = 0; i < nodes->node_count; i++)
+        sum += nodes->nodes[i].vertex_count;
+    if (sum != vertex_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the nodes have %llu vertices, the mesh %llu; give both of one level",
+                         (unsigned long long)sum, (unsigned long long)vertex_count);
+    if (!are_coloured(nodes))
+        return EBPO_OK;
+    uint8_t *rgba = out->vertex = ebpo_alloc(vertex_count, 4);
+    if (!rgba)
+        return ebpo_fail_memory(error, vertex_count * 4);
+    for (uint64_t i = 0; i < nodes->node_count; i++)
+        for (uint32_t v = 0; v < nodes->nodes[i].vertex_count; v++, rgba += 4) {
+            uint32_t colour = nodes->nodes[i].colour;
+            rgba[0] = (uint8_t)colour;
+            rgba[1] = (uint8_t)(colour >> 8);
+            rgba[2] = (uint8_t)(colour >> 16);
+            rgba[3] = 255;
+        }
+    return EBPO_OK;
+}
+
+/* A level's envelopes: from the root down, each cut from its parent's. The top of the tree is
+ * walked first; the subtrees that hang from it are independent of each other. Where it is cut
+ * depends on the tree alone, so the result does not depend on the number of threads. */
 
 enum { SEEDS_WANTED = 128 };
 
@@ -52,7 +422,7 @@ typedef struct walker {
     ebpo_error *error;
 } walker;
 
-static ebpo_status emit(walker *w, const ebpo_polytope *p, ebpo_cell cell, ebpo_node_type type)
+static ebpo_status lod_emit(walker *w, const ebpo_polytope *p, ebpo_cell cell, ebpo_node_type type)
 {
     ebpo_polyhedra *piece = &w->out[cell.level];
     piece->volume += ebpo_polytope_volume(p) * ebpo_cell_volume(&w->j->model->box, cell.level);
@@ -79,7 +449,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
         ebpo_planes_cut(envelope, level->planes + w->j->model->ranks[cell.level].plane_first[gray],
                         level->plane_counts[gray]);
     if (cell.level == w->j->model->target)
-        return emit(w, envelope, cell, EBPO_GRAY);
+        return lod_emit(w, envelope, cell, EBPO_GRAY);
     if (cell.level == w->stop) {
         seed *s = &w->j->seeds[w->j->seed_count++];
         s->cell = cell;
@@ -87,7 +457,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
         return EBPO_OK;
     }
     if (is_pruned(w->j->model, cell.level, gray))
-        return emit(w, envelope, cell, EBPO_GRAY);
+        return lod_emit(w, envelope, cell, EBPO_GRAY);
     return visit_group(w, gray, cell, envelope);
 }
 
@@ -103,7 +473,7 @@ static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_c
     if (type == EBPO_GRAY)
         return visit_gray(w, rank, cell, envelope);
     ebpo_status status = ebpo_lod_leaf(model, cell, rank, w->scratch, envelope, w->error);
-    return status == EBPO_OK ? emit(w, envelope, cell, EBPO_LEAF) : status;
+    return status == EBPO_OK ? lod_emit(w, envelope, cell, EBPO_LEAF) : status;
 }
 
 /* Black nodes are their whole cell. */
@@ -111,7 +481,7 @@ static ebpo_status visit_black(walker *w, ebpo_cell cell)
 {
     ebpo_polytope cube;
     ebpo_polytope_cube(&cube);
-    return emit(w, &cube, cell, EBPO_BLACK);
+    return lod_emit(w, &cube, cell, EBPO_BLACK);
 }
 
 static ebpo_status visit_root(walker *w)
@@ -161,7 +531,7 @@ static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsig
         /* Seeds are in octcode order, and all gray nodes of their level: the i-th has the i-th
          * group below it. */
         ebpo_status status = is_pruned(j->model, s->cell.level, i)
-                                 ? emit(&w, &s->envelope, s->cell, EBPO_GRAY)
+                                 ? lod_emit(&w, &s->envelope, s->cell, EBPO_GRAY)
                                  : visit_group(&w, i, s->cell, &s->envelope);
         if (status != EBPO_OK)
             return status;
@@ -178,7 +548,7 @@ static int choose_split(const ebpo_lod_model *model)
     return level;
 }
 
-static ebpo_status prepare(job *j, unsigned threads, ebpo_error *error)
+static ebpo_status lod_prepare(job *j, unsigned threads, ebpo_error *error)
 {
     j->split = choose_split(j->model);
     uint64_t seeds = j->split < j->model->target ? j->model->level[j->split].gray_count : 0;
@@ -192,7 +562,8 @@ static ebpo_status prepare(job *j, unsigned threads, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status walk(job *j, unsigned threads, const ebpo_progress *progress, ebpo_error *error)
+static ebpo_status lod_walk(job *j, unsigned threads, const ebpo_progress *progress,
+                            ebpo_error *error)
 {
     walker top = { j, j->pieces[0], &j->scratch[0], j->halves[0], j->split, error };
     ebpo_status status = visit_root(&top);
@@ -203,8 +574,8 @@ static ebpo_status walk(job *j, unsigned threads, const ebpo_progress *progress,
 }
 
 /* Level after level, and within one level first the top's nodes or the seeds' in their order. */
-static ebpo_status join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
-                        ebpo_error *error)
+static ebpo_status lod_join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
+                            ebpo_error *error)
 {
     uint64_t count = j->seed_count + 1, listed = 0;
     ebpo_polyhedra **list = ebpo_alloc(count * EBPO_LEVELS_MAX, sizeof *list);
@@ -303,11 +674,11 @@ ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, int level, const ebpo_lo
     job j = {
         .model = &model, .walls = wanted.walls, .polygons = out != NULL, .nodes = nodes != NULL
     };
-    status = prepare(&j, threads, error);
+    status = lod_prepare(&j, threads, error);
     if (status == EBPO_OK)
-        status = walk(&j, threads, &wanted.progress, error);
+        status = lod_walk(&j, threads, &wanted.progress, error);
     if (status == EBPO_OK)
-        status = join(&j, out, nodes, volume, error);
+        status = lod_join(&j, out, nodes, volume, error);
     if (status == EBPO_OK && nodes) {
         add_windings(nodes, &model);
         ebpo_lod_add_colours(nodes, &model);

@@ -17,7 +17,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "geometry/cells.h"
-#include "geometry/octcode.h"
+#include "geometry/vec3.h"
 
 enum { SIDES = 6, ON_PLANE = SIDES, DEEPEST = EBPO_LEVELS_MAX - 1 };
 
@@ -39,11 +39,6 @@ typedef struct lighting {
     uint64_t *keys;    /* [corner_count] where they are */
     uint64_t corner_count, key_capacity;
 } lighting;
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 /* --- polygons --- */
 
@@ -84,7 +79,7 @@ static int side_of(const ebpo_box *box, ebpo_cell cell, const ebpo_mesh *mesh, c
     return ON_PLANE;
 }
 
-static void describe(lighting *l, const ebpo_mesh *mesh)
+static void lod_normals_describe(lighting *l, const ebpo_mesh *mesh)
 {
     const uint32_t *face = mesh->faces;
     polygon *p = l->polygons;
@@ -148,7 +143,7 @@ static void node_sum(const polygon *p, uint32_t count, int side, double out[4])
     double sign = side % 2 ? 1 : -1;
     memset(out, 0, 4 * sizeof *out);
     for (uint32_t k = 0; k < count; k++, p++) {
-        double length = sqrt(dot(p->area, p->area));
+        double length = sqrt(ebpo_vec3_dot(p->area, p->area));
         if (p->side != ON_PLANE || !(sign * p->area[side / 2] > least_turned * length))
             continue;
         for (int axis = 0; axis < 3; axis++)
@@ -190,9 +185,9 @@ static void direction_at(const lighting *l, ebpo_cell cell, const uint32_t at[8]
     }
 }
 
-static void put(const double direction[3], float out[3])
+static void lod_normals_put(const double direction[3], float out[3])
 {
-    double length = sqrt(dot(direction, direction));
+    double length = sqrt(ebpo_vec3_dot(direction, direction));
     for (int k = 0; k < 3 && length > 0; k++)
         out[k] = (float)(direction[k] / length);
 }
@@ -207,12 +202,12 @@ static void light_side(const lighting *l, int side, float *out)
             if (p->side != side)
                 continue;
             direction_at(l, ebpo_cell_of_octcode(node->octcode), l->at[i], p->middle, direction);
-            put(direction, out);
+            lod_normals_put(direction, out);
         }
     }
 }
 
-static ebpo_status prepare(lighting *l, ebpo_error *error)
+static ebpo_status lod_normals_prepare(lighting *l, ebpo_error *error)
 {
     uint64_t nodes = l->nodes->node_count, polygons = l->nodes->polygon_count;
     l->polygons = ebpo_alloc(polygons, sizeof *l->polygons);
@@ -224,7 +219,8 @@ static ebpo_status prepare(lighting *l, ebpo_error *error)
                                                 nodes * (sizeof *l->at + 8 * sizeof *l->sum));
 }
 
-static ebpo_status check(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes, ebpo_error *error)
+static ebpo_status lod_normals_check(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes,
+                                     ebpo_error *error)
 {
     uint64_t triangles = 0;
     if (!mesh->xyz64 && mesh->face_count)
@@ -243,14 +239,14 @@ ebpo_status ebpo_lod_normals(const ebpo_info *info, const ebpo_mesh *mesh,
                              const ebpo_lod_nodes *nodes, float *out, ebpo_error *error)
 {
     lighting l = { .box = ebpo_root_box(info), .nodes = nodes };
-    ebpo_status status = check(mesh, nodes, error);
+    ebpo_status status = lod_normals_check(mesh, nodes, error);
     if (status == EBPO_OK)
-        status = prepare(&l, error);
+        status = lod_normals_prepare(&l, error);
     if (status == EBPO_OK) {
-        describe(&l, mesh);
+        lod_normals_describe(&l, mesh);
         memset(out, 0, nodes->polygon_count * 3 * sizeof *out);
         for (uint64_t i = 0; i < nodes->polygon_count; i++)
-            put(l.polygons[i].area, out + 3 * i);
+            lod_normals_put(l.polygons[i].area, out + 3 * i);
     }
     for (int side = 0; side < SIDES && status == EBPO_OK; side++) {
         sum_side(&l, side);

@@ -1,23 +1,183 @@
-/* Levels one after the other. Of a level that has been passed only its types stay, and with
- * polygons its planes: enough to walk down to the nodes of the next one. */
 #include "core/strict_fp.h"
-
-#include <ebpo/stream.h>
 
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <ebpo/stream.h>
+
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "format/reader.h"
+#include "format/schema.h"
 #include "geometry/cells.h"
-#include "geometry/node_types.h"
-#include "levels/stream_node.h"
-#include "levels/level_walk.h"
+#include "geometry/level_nodes.h"
+#include "levels/stream.h"
+
+/* With t the cell's shortest side and N = t n / size, the half-space is N . (p - corner) <= t d /
+ * 4096. For any normal a, any factor f > 0, and p in the cell: a . p = a . corner + f N . (p -
+ * corner) + (a - f N) . (p - corner) <= a . corner + f t d / 4096 + sum |a - f N| size. Here f is 1
+ * / |N| as computed and a is f N as computed, so that |a - f N| <= 4 u |a| with u = DBL_EPSILON /
+ * 2, the other roundings of this function sum to less than 8 u times sum |a| (|corner| + size), and
+ * evaluating a . p to another 4 u of that. 32 u covers them all; what underflows is covered by the
+ * rest. */
+void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3], int32_t d,
+                         double out[4])
+{
+    double corner[3], size[3], reach = 0, bulk = 0, at = 0, square = 0;
+    for (int k = 0; k < 3; k++) {
+        corner[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
+        size[k] = box->size[k] / (double)(1u << cell.level);
+    }
+    double shortest = fmin(size[0], fmin(size[1], size[2]));
+    for (int k = 0; k < 3; k++) {
+        out[k] = (double)n[k] * (shortest / size[k]);
+        square += out[k] * out[k];
+    }
+    double factor = 1 / sqrt(square);
+    for (int k = 0; k < 3; k++) {
+        out[k] *= factor;
+        at += out[k] * corner[k];
+        reach += fabs(out[k]) * (fabs(corner[k]) + size[k]);
+        bulk += fabs(corner[k]) + size[k];
+    }
+    out[3] = at + factor * shortest * ((double)d / 4096) +
+             (16 * DBL_EPSILON * reach + 4 * DBL_MIN * bulk + 64 * DBL_TRUE_MIN);
+}
+
+void ebpo_polytope_to_world(const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell,
+                            double (*out)[3])
+{
+    uint8_t sides[EBPO_POLYTOPE_VERTICES];
+    ebpo_polytope_sides(p, sides);
+    for (int v = 0; v < p->vertex_count; v++)
+        for (int k = 0; k < 3; k++)
+            out[v][k] = ebpo_wall_point(box, cell, k, p->vertex[v][k], sides[v]);
+}
+
+void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
+                     ebpo_node_type type)
+{
+    ebpo_cell cell = ebpo_cell_of_octcode(octcode);
+    *out = (ebpo_stream_node){ .octcode = octcode, .type = type, .colour = EBPO_COLOUR_OF_NOTHING };
+    ebpo_cell_bounds(box, cell, out->min, out->max);
+    if (type == EBPO_BLACK)
+        out->volume = ebpo_cell_volume(box, cell.level);
+}
+
+void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
+                          unsigned count, ebpo_node_buffers *capacity)
+{
+    ebpo_cell cell = ebpo_cell_of_octcode(out->octcode);
+    for (unsigned i = 0; i < count; i++) {
+        int32_t n[3], d;
+        if (ebpo_plane_decode(codes[i], n, &d))
+            ebpo_plane_to_world(box, cell, n, d, capacity->planes[out->plane_count++]);
+    }
+    out->planes = (const double(*)[4])capacity->planes;
+}
+
+void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const ebpo_polytope *p,
+                            ebpo_node_buffers *capacity)
+{
+    ebpo_cell cell = ebpo_cell_of_octcode(out->octcode);
+    ebpo_polytope_to_world(p, box, cell, capacity->vertices);
+    for (int f = 0; f <= p->face_count; f++)
+        capacity->polygon_first[f] = p->first[f];
+    for (int i = 0; i < p->corner_count; i++)
+        capacity->corners[i] = p->corner[i];
+    out->volume = ebpo_polytope_volume(p) * ebpo_cell_volume(box, cell.level);
+    out->vertex_count = (uint32_t)p->vertex_count;
+    out->polygon_count = (uint32_t)p->face_count;
+    out->vertices = (const double(*)[3])capacity->vertices;
+    out->polygon_first = capacity->polygon_first;
+    out->corners = capacity->corners;
+}
+
+void ebpo_level_walk_begin(ebpo_level_walk *walk, const ebpo_level *level, int target, bool pruned)
+{
+    memset(walk, 0, sizeof *walk);
+    walk->level = level;
+    walk->target = target;
+    walk->pruned = pruned;
+}
+
+/* The next node of the level at `depth`, of which there is one. */
+static ebpo_level_walk_node *level_walk_pass(ebpo_level_walk *w, int depth)
+{
+    const ebpo_level *level = &w->level[depth];
+    unsigned octant = w->at[depth].octant++;
+    ebpo_level_walk_node *node = &w->at[depth].node;
+    node->octcode = depth ? ebpo_octcode_child(w->at[depth - 1].node.octcode, octant) : 1;
+    node->type = ebpo_group_type(level->types[w->at[depth].group], octant);
+    node->rank = w->at[depth].rank[node->type]++;
+    node->codes = NULL;
+    node->code_count = 0;
+    if (node->type == EBPO_GRAY && level->plane_counts) {
+        node->code_count = level->plane_counts[node->rank];
+        node->codes = node->code_count ? level->planes + w->at[depth].plane : NULL;
+        w->at[depth].plane += node->code_count;
+    } else if (node->type == EBPO_LEAF && level->leaf_plane_counts) {
+        node->code_count = level->leaf_plane_counts[node->rank];
+        node->codes = node->code_count ? level->leaf_planes + w->at[depth].leaf_plane : NULL;
+        w->at[depth].leaf_plane += node->code_count;
+    }
+    return node;
+}
+
+bool ebpo_level_walk_next(ebpo_level_walk *w, ebpo_level_walk_node *out)
+{
+    for (;;) {
+        int depth = w->depth;
+        if (w->at[depth].octant == ebpo_group_octants(depth)) { /* level 0 has one node */
+            if (depth == 0)
+                return false;
+            w->at[depth].group++;
+            w->at[depth].octant = 0;
+            w->depth--;
+            continue;
+        }
+        if (w->pruned && depth && w->level[depth].types[w->at[depth].group] == 0) {
+            w->at[depth].rank[EBPO_WHITE] += 8;
+            w->at[depth].octant = 8;
+            continue;
+        }
+        const ebpo_level_walk_node *node = level_walk_pass(w, depth);
+        if (depth == w->target) {
+            *out = *node;
+            return true;
+        }
+        if (node->type == EBPO_GRAY)
+            w->depth++;
+    }
+}
+
+/* Of the ancestor at `depth`, and those above it. */
+static const ebpo_polytope *level_walk_ancestor(const ebpo_level_walk *w, int depth,
+                                                ebpo_envelope_stack *e)
+{
+    const ebpo_level_walk_node *node = &w->at[depth].node;
+    const ebpo_polytope *held = ebpo_envelope_held(e, node->octcode);
+    if (held)
+        return held;
+    if (depth)
+        (void)level_walk_ancestor(w, depth - 1, e);
+    return ebpo_envelope_put(e, node->octcode, node->codes, node->code_count);
+}
+
+const ebpo_polytope *ebpo_level_walk_envelope(const ebpo_level_walk *w,
+                                              const ebpo_level_walk_node *node,
+                                              ebpo_envelope_stack *e)
+{
+    return node->type == EBPO_BLACK ? ebpo_envelope_put_cube(e, node->octcode)
+                                    : level_walk_ancestor(w, w->target, e);
+}
+
+/* Levels one after the other. Of a level that has been passed only its types stay, and with
+ * polygons its planes: enough to walk down to the nodes of the next one. */
 
 enum { PIECE = 4096 };
 

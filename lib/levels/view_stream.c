@@ -1,14 +1,418 @@
-/* One group of siblings after the other, chosen from the gray nodes of the cut. */
-#include "levels/view_stream.h"
+#include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <ebpo/view.h>
+
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "levels/view_fetch.h"
+#include "format/file_nodes.h"
+#include "format/slice.h"
+#include "format/subtree_index.h"
+#include "geometry/cells.h"
+#include "levels/frontier.h"
+
+/* The faces of leaves in a view stream. */
+
+/* Of the siblings that are being delivered, and which faces have been. */
+typedef struct ebpo_view_leaves {
+    const ebpo_info *info;
+    ebpo_slice slice[8]; /* of the leaves among them */
+    uint8_t *given;      /* a bit for each face of the file */
+    /* What is lent of the leaf given last. */
+    double (*corners)[3][3];
+    uint32_t *numbers;
+    uint8_t *repeated;
+    uint64_t capacity[3];
+    ebpo_view_faces now;
+} ebpo_view_leaves;
+
+/* A group of siblings; `parent` is an octcode, 0 of the root's group. */
+typedef struct ebpo_view_group {
+    ebpo_group_number number;
+    uint64_t parent;
+} ebpo_view_group;
+
+/* What a view stream needs of a file far away: asked for together, and ahead. */
+
+/* To which level the view goes below a node, at most. */
+typedef struct ebpo_view_depth {
+    int (*level)(const void *user, uint64_t octcode);
+    const void *user;
+} ebpo_view_depth;
+
+/* Inside an ebpo_view_stream. */
+
+struct ebpo_view_stream {
+    const ebpo_file *file;
+    const ebpo_info *info;
+    ebpo_box box;
+    ebpo_view_options options; /* observer: NULL, or `observer` below */
+    ebpo_observer observer;
+    ebpo_viewpoint viewpoint;
+    ebpo_chunks *chunks;
+    ebpo_partial partial;
+    ebpo_frontier frontier; /* gray nodes of the cut, but for `parent` */
+    /* Siblings that are being delivered: the last group of `grown`. */
+    bool delivering;
+    ebpo_waiting parent; /* not of the root's group */
+    unsigned step, flip; /* the next one is octant step ^ flip */
+    uint64_t delivered, cut[4];
+    ebpo_group read;
+    ebpo_envelope_stack *envelopes; /* with polygons */
+    ebpo_node_buffers capacity;
+    ebpo_view_leaves *leaves; /* with faces */
+    /* what is deeper, or smaller, is not announced yet */
+    int soon_level;
+    double soon_pixels;
+};
+
+static ebpo_status ebpo_view_leaves_new(ebpo_view_leaves **out, const ebpo_file *file,
+                                        ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    *out = NULL;
+    if (!(info->parts & EBPO_PART_MESH))
+        return ebpo_fail(error, EBPO_E_ABSENT,
+                         "view options: faces are asked for, and the file was written without its "
+                         "mesh; build it again with it");
+    ebpo_view_leaves *l = ebpo_alloc_zero(1, sizeof *l);
+    if (l)
+        l->given = ebpo_alloc_zero(info->face_count / 8 + 1, 1);
+    if (!l || !l->given) {
+        free(l);
+        return ebpo_fail_memory(error, sizeof *l + info->face_count / 8 + 1);
+    }
+    l->info = info;
+    *out = l;
+    return EBPO_OK;
+}
+
+static void drop_slices(ebpo_view_leaves *l)
+{
+    for (unsigned octant = 0; octant < 8; octant++)
+        ebpo_slice_free(&l->slice[octant]);
+}
+
+static void ebpo_view_leaves_free(ebpo_view_leaves *l)
+{
+    if (!l)
+        return;
+    drop_slices(l);
+    free(l->given);
+    free(l->corners);
+    free(l->numbers);
+    free(l->repeated);
+    free(l);
+}
+
+/* The node of an octant of a group that has been read, if it is a leaf. */
+static bool ebpo_view_leaf_of(const ebpo_view_group *group, const ebpo_group *read, unsigned octant,
+                              ebpo_node *out)
+{
+    if (ebpo_group_type(read->types, octant) != EBPO_LEAF ||
+        octant >= ebpo_group_octants(group->number.level))
+        return false;
+    uint64_t octcode = group->parent ? ebpo_octcode_child(group->parent, octant) : 1;
+    *out = (ebpo_node){ .cell = ebpo_cell_of_octcode(octcode),
+                        .type = EBPO_LEAF,
+                        .rank = read->rank[EBPO_LEAF] +
+                                ebpo_group_count(read->types, EBPO_LEAF, octant) };
+    return true;
+}
+
+/* --- reading --- */
+
+static ebpo_status make_room(ebpo_view_leaves *l, uint64_t faces, ebpo_error *error)
+{
+    bool fine = ebpo_grow(&l->corners, &l->capacity[0], faces, sizeof *l->corners) &&
+                ebpo_grow(&l->numbers, &l->capacity[1], faces, sizeof *l->numbers) &&
+                ebpo_grow(&l->repeated, &l->capacity[2], faces, sizeof *l->repeated);
+    return fine ? EBPO_OK
+                : ebpo_fail_memory(error, faces * (sizeof *l->corners + sizeof *l->numbers + 1));
+}
+
+/* The faces of all leaves of a group that has been read. On failure there are none. */
+static ebpo_status ebpo_view_leaves_read(ebpo_view_leaves *l, ebpo_chunks *chunks,
+                                         const ebpo_view_group *group, const ebpo_group *read,
+                                         ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    ebpo_node leaf;
+    drop_slices(l);
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
+        if (ebpo_view_leaf_of(group, read, octant, &leaf)) {
+            status = ebpo_slice_read_parts(&l->slice[octant], chunks, &leaf, 0, error);
+            if (status == EBPO_OK)
+                status = make_room(l, l->slice[octant].mesh.face_count, error);
+        }
+    if (status != EBPO_OK)
+        drop_slices(l);
+    return status;
+}
+
+/* --- giving --- */
+
+/* About no node. */
+static void ebpo_view_leaves_give_none(ebpo_view_leaves *l)
+{
+    l->now = (ebpo_view_faces)EBPO_VIEW_FACES_INIT;
+}
+
+static void take_face(ebpo_view_leaves *l, const ebpo_slice *slice, uint32_t face)
+{
+    const ebpo_mesh *mesh = &slice->mesh;
+    uint64_t number = ebpo_slice_file_face(slice, face);
+    for (uint64_t i = 0; i < 9; i++) {
+        uint64_t at = 3 * (uint64_t)mesh->faces[3 * (uint64_t)face + i / 3] + i % 3;
+        l->corners[face][i / 3][i % 3] = mesh->xyz32 ? (double)mesh->xyz32[at] : mesh->xyz64[at];
+    }
+    l->numbers[face] = (uint32_t)number;
+    l->repeated[face] = l->given[number / 8] >> number % 8 & 1;
+    l->given[number / 8] |= (uint8_t)(1u << number % 8);
+    l->now.new_count += !l->repeated[face];
+}
+
+/* From now on `now` is about the node of this octant, which has been given with that. */
+static void ebpo_view_leaves_give(ebpo_view_leaves *l, unsigned octant)
+{
+    const ebpo_slice *slice = &l->slice[octant];
+    ebpo_view_leaves_give_none(l);
+    l->now.face_count = slice->mesh.face_count;
+    l->now.corners = (const double(*)[3][3])l->corners;
+    l->now.numbers = l->numbers;
+    l->now.repeated = l->repeated;
+    for (uint32_t face = 0; face < slice->mesh.face_count; face++)
+        take_face(l, slice, face);
+}
+
+typedef struct fetching {
+    ebpo_chunks *chunks;
+    const ebpo_partial *partial;
+    const ebpo_frontier *frontier;
+    unsigned wanted;
+    bool faces;
+    const ebpo_view_depth *depth;
+} fetching;
+
+/* The children of a node that waits to be refined. */
+static ebpo_view_group ebpo_view_children(const ebpo_waiting *w)
+{
+    return (ebpo_view_group){ { ebpo_octcode_level(w->octcode) + 1, w->below }, w->octcode };
+}
+
+/* What comes next, and after it what comes soon; returns how many groups. Of those that stand
+ * together in blocks of so many, one. */
+static unsigned view_fetch_coming(const fetching *f, const ebpo_view_group *first, unsigned block,
+                                  ebpo_view_group groups[EBPO_FRONTIER_BLOCKS])
+{
+    uint64_t best[EBPO_FRONTIER_BLOCKS];
+    unsigned count = ebpo_frontier_blocks(f->frontier, block, best);
+    groups[0] = *first;
+    for (unsigned i = 0; i < count; i++) /* the first is the one at hand */
+        groups[i] = ebpo_view_children(&f->frontier->at[best[i]]);
+    return count ? count : 1;
+}
+
+/* Reads all that a group takes, for nothing but to find out what is missing. */
+static void try_group(const fetching *f, const ebpo_view_group *group)
+{
+    ebpo_group read;
+    ebpo_node leaf;
+    ebpo_status status = ebpo_group_read(f->chunks, group->number.level, group->number.group,
+                                         f->wanted, &read, NULL);
+    for (unsigned octant = 0; octant < 8 && f->faces && status == EBPO_OK; octant++) {
+        ebpo_slice slice;
+        if (ebpo_view_leaf_of(group, &read, octant, &leaf) &&
+            ebpo_slice_read_parts(&slice, f->chunks, &leaf, 0, NULL) == EBPO_OK)
+            ebpo_slice_free(&slice);
+    }
+}
+
+/* --- subtrees --- */
+
+static bool below_subtrees(const fetching *f, const ebpo_view_group *group)
+{
+    return group->parent && ebpo_subtree_table_has(f->chunks->file, group->number.level);
+}
+
+/* The number of the subtree that a group stands in: its root's rank among gray nodes. */
+static uint64_t subtree_of(const fetching *f, const ebpo_view_group *group)
+{
+    int last = ebpo_octcode_level(group->parent), level = f->chunks->file->info.subtree_level;
+    ebpo_partial_node node = { 0, 0 };
+    for (int depth = 1; depth <= level; depth++)
+        node = (ebpo_partial_node){ f->partial->group[node.group].child[node.octant],
+                                    (uint8_t)(group->parent >> 3 * (last - depth) & 7) };
+    return ebpo_partial_children(f->partial, node);
+}
+
+enum { SUBTREES_MOST = 4096, WITH_FACES = 64 };
+
+/* A subtree that the view goes into, by its number and its root. */
+typedef struct entered {
+    uint64_t number, octcode;
+} entered;
+
+typedef struct entering {
+    unsigned count;
+    entered list[SUBTREES_MOST];
+} entering;
+
+/* In which subtrees these groups stand, each once; not what waits at a root. */
+static void enter_groups(const fetching *f, const ebpo_view_group *groups, unsigned count,
+                         entering *e)
+{
+    int level = f->chunks->file->info.subtree_level;
+    for (unsigned i = 0; i < count; i++) {
+        if (!below_subtrees(f, &groups[i]) || (!f->faces && groups[i].number.level == level + 1))
+            continue;
+        uint64_t root = groups[i].parent >> 3 * (ebpo_octcode_level(groups[i].parent) - level);
+        unsigned k = 0;
+        while (k < e->count && e->list[k].octcode != root)
+            k++;
+        if (k == e->count)
+            e->list[e->count++] = (entered){ subtree_of(f, &groups[i]), root };
+    }
+}
+
+/* The subtrees that the view will come to from a node above them: the types of the levels in
+ * between are in memory, or else are noted as missing. */
+static void enter_below(const fetching *f, const ebpo_view_group *children, entering *e)
+{
+    int level = children->number.level;
+    ebpo_group read;
+    if (ebpo_group_read(f->chunks, level, children->number.group, 0, &read, NULL) != EBPO_OK)
+        return;
+    for (unsigned octant = 0; octant < 8 && e->count < SUBTREES_MOST; octant++) {
+        uint64_t octcode = ebpo_octcode_child(children->parent, octant),
+                 rank = read.rank[EBPO_GRAY] + ebpo_group_count(read.types, EBPO_GRAY, octant);
+        if (ebpo_group_type(read.types, octant) != EBPO_GRAY ||
+            f->depth->level(f->depth->user, octcode) <= level)
+            continue;
+        if (level == f->chunks->file->info.subtree_level)
+            e->list[e->count++] = (entered){ rank, octcode };
+        else
+            enter_below(f, &(ebpo_view_group){ { level + 1, rank }, octcode }, e);
+    }
+}
+
+/* What waits at the subtrees' roots and above. */
+static void enter_frontier(const fetching *f, entering *e)
+{
+    int level = f->chunks->file->info.subtree_level;
+    for (uint64_t i = 0; i < f->frontier->count && e->count < SUBTREES_MOST; i++) {
+        const ebpo_waiting *w = &f->frontier->at[i];
+        ebpo_view_group children = ebpo_view_children(w);
+        if (w->turn == EBPO_TURN_SEEN && children.number.level <= level)
+            enter_below(f, &children, e);
+        else if (w->turn == EBPO_TURN_SEEN && children.number.level == level + 1)
+            e->list[e->count++] = (entered){ w->below, w->octcode };
+    }
+}
+
+/* Of the subtrees of these groups, all that the view will come to, as far as `most` bytes go.
+ * Faces: not where it goes through so many that it comes to the end of none soon; then what the
+ * next groups take is enough. */
+static bool try_subtrees(const fetching *f, const ebpo_view_group *groups, unsigned count,
+                         const ebpo_chunk_keys *keys, uint64_t most)
+{
+    entering e;
+    bool planes = f->wanted & EBPO_GROUP_PLANES, windings = f->wanted & EBPO_GROUP_WINDINGS;
+    uint32_t needs = EBPO_NEEDS_ALWAYS | (f->faces ? EBPO_NEEDS_MESH : 0) |
+                     (windings ? EBPO_NEEDS_SOLID : 0) |
+                     (planes ? EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES : 0);
+    e.count = 0;
+    enter_groups(f, groups, count, &e);
+    if (!f->faces)
+        enter_frontier(f, &e);
+    if (f->faces && e.count > WITH_FACES)
+        return false;
+    for (unsigned i = 0; i < e.count && keys->bytes < most; i++) {
+        ebpo_expected none = EBPO_EXPECTED_INIT(f->chunks->file);
+        ebpo_subtrees_expect(f->chunks, &none, e.list[i].number, 1, needs,
+                             f->depth->level(f->depth->user, e.list[i].octcode), f->faces);
+    }
+    return e.count > 0;
+}
+
+/* --- fetching --- */
+
+/* The chunks that the group waits for next, and, unless they have been announced before, behind
+ * these what the next groups take: so one batch is used up before the next one is told. How many
+ * are its own. */
+static unsigned view_fetch_collect(const fetching *f, const ebpo_view_group *group,
+                                   ebpo_chunk_keys *keys)
+{
+    enum { FACES_BLOCK = 64, TRIED = 64 }; /* trying is work */
+    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS];
+    ebpo_chunk_keys_begin(keys);
+    ebpo_chunks_collect(f->chunks, keys);
+    try_group(f, group);
+    unsigned own = keys->count;
+    uint64_t most = keys->bytes + ebpo_chunks_room(f->chunks);
+    if (own && !ebpo_chunks_announced(f->chunks, keys)) {
+        unsigned count = view_fetch_coming(f, group, f->faces ? FACES_BLOCK : 1, groups);
+        bool told = try_subtrees(f, groups, count, keys, most);
+        for (unsigned i = 1; i < count && i < TRIED && !told && keys->bytes < most; i++)
+            try_group(f, &groups[i]);
+    }
+    ebpo_chunks_collect(f->chunks, NULL);
+    return own;
+}
+
+/* Pass by pass: lists, references, faces, vertices, with what ranks take in between. Beyond that,
+ * reading goes on without having been announced. */
+static ebpo_status fetch_tried(const fetching *f, const ebpo_view_group *group, ebpo_error *error)
+{
+    enum { PASSES = 12 };
+    ebpo_chunk_keys keys;
+    ebpo_status status = EBPO_OK;
+    unsigned own = 1;
+    for (int pass = 0; pass < PASSES && own && status == EBPO_OK; pass++) {
+        own = view_fetch_collect(f, group, &keys);
+        if (own)
+            status = ebpo_chunks_fetch(f->chunks, &keys, own, error);
+    }
+    return status;
+}
+
+/* Nodes alone, of levels above the subtrees or of files without. */
+static ebpo_status fetch_nodes(const fetching *f, const ebpo_view_group *group, ebpo_error *error)
+{
+    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS];
+    ebpo_group_number numbers[EBPO_FRONTIER_BLOCKS];
+    if (!ebpo_group_is_far(f->chunks, &group->number, f->wanted))
+        return EBPO_OK;
+    if (f->chunks->limit == UINT64_MAX)
+        ebpo_expect_top(f->chunks->file); /* with it what the subtrees ask for first */
+    unsigned count = view_fetch_coming(f, group, EBPO_GROUP_BLOCK, groups);
+    for (unsigned i = 0; i < count; i++)
+        numbers[i] = groups[i].number;
+    return ebpo_group_fetch(f->chunks, numbers, count, f->wanted, error);
+}
+
+/* For files far away, when not all is in memory: fetches what the group (EBPO_GROUP_...) and with
+ * `faces` those of its leaves take and is not in memory, and announces with it what the next groups
+ * of the frontier take: where the file has a table of subtrees, all of the subtrees in which they
+ * are. Counted chunks: EBPO_E_LIMIT as ebpo_group_read. */
+static ebpo_status ebpo_view_fetch(ebpo_chunks *chunks, const ebpo_partial *partial,
+                                   const ebpo_frontier *frontier, const ebpo_view_group *group,
+                                   unsigned wanted, bool faces, const ebpo_view_depth *depth,
+                                   ebpo_error *error)
+{
+    fetching f = { chunks, partial, frontier, wanted, faces, depth };
+    ebpo_status status = EBPO_OK;
+    if (!below_subtrees(&f, group))
+        status = fetch_nodes(&f, group, error);
+    return status == EBPO_OK && (faces || below_subtrees(&f, group)) ? fetch_tried(&f, group, error)
+                                                                     : status;
+}
+
+/* One group of siblings after the other, chosen from the gray nodes of the cut. */
 
 enum { MEMORY_LEAST = 1 << 20 };
 
@@ -119,7 +523,7 @@ static ebpo_turn turn_of(const ebpo_view_stream *s, int level, ebpo_seen look)
     return o->unseen == EBPO_UNSEEN_NEVER ? EBPO_TURN_NEVER : EBPO_TURN_UNSEEN;
 }
 
-static void rank(const ebpo_view_stream *s, ebpo_waiting *w)
+static void view_stream_rank(const ebpo_view_stream *s, ebpo_waiting *w)
 {
     ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(w->octcode));
     w->key =
@@ -146,7 +550,7 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
     if (status != EBPO_OK)
         return status;
     for (uint64_t i = 0; i < s->frontier.count; i++)
-        rank(s, &s->frontier.at[i]);
+        view_stream_rank(s, &s->frontier.at[i]);
     ebpo_frontier_sort(&s->frontier);
     return EBPO_OK;
 }
@@ -295,7 +699,7 @@ static void end_group(ebpo_view_stream *s)
                                .below = ebpo_partial_children(&s->partial, node),
                                .group = group,
                                .octant = (uint8_t)octant };
-            rank(s, &w);
+            view_stream_rank(s, &w);
             ebpo_frontier_push(&s->frontier, w);
         }
     }
@@ -304,7 +708,8 @@ static void end_group(ebpo_view_stream *s)
 
 /* --- nodes --- */
 
-void ebpo_view_fill(ebpo_view_stream *s, ebpo_partial_node node, ebpo_view_node *out)
+/* All about a node of `grown`; `complete` is left to the caller. */
+static void ebpo_view_fill(ebpo_view_stream *s, ebpo_partial_node node, ebpo_view_node *out)
 {
     ebpo_node_type type = ebpo_partial_type(&s->partial, node);
     memset(out, 0, sizeof *out);
@@ -350,4 +755,73 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
     if (out->complete)
         end_group(s);
     return EBPO_OK;
+}
+
+/* What of a view has been delivered: faces of a leaf, the cut, and figures. */
+
+typedef struct visitor {
+    ebpo_view_stream *stream;
+    ebpo_view_visit_fn visit;
+    void *user;
+    ebpo_view_node node;
+} visitor;
+
+/* False: enough. */
+static bool visit_node(visitor *v, ebpo_partial_node node)
+{
+    const ebpo_partial *partial = &v->stream->partial;
+    uint32_t below = partial->group[node.group].child[node.octant];
+    if (below == 0) {
+        ebpo_view_fill(v->stream, node, &v->node);
+        v->node.complete = true;
+        return v->visit(v->user, &v->node);
+    }
+    unsigned flip =
+        ebpo_viewpoint_octant(&v->stream->viewpoint, &v->stream->box,
+                              ebpo_cell_of_octcode(ebpo_partial_octcode(partial, node)));
+    for (unsigned step = 0; step < 8; step++)
+        if (!visit_node(v, (ebpo_partial_node){ below, (uint8_t)(step ^ flip) }))
+            return false;
+    return true;
+}
+
+void ebpo_view_stream_cut(ebpo_view_stream *s, ebpo_view_visit_fn visit, void *user)
+{
+    EBPO_DEFAULT_FP;
+    visitor v = { .stream = s, .visit = visit, .user = user };
+    if (s->delivered)
+        (void)visit_node(&v, (ebpo_partial_node){ 0, 0 });
+}
+
+static void count_node(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_stats *out)
+{
+    ebpo_cell cell = ebpo_cell_of_octcode(w->octcode);
+    ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, cell);
+    if (look.seen)
+        out->pixels =
+            fmax(out->pixels, ebpo_viewpoint_pixels(&s->viewpoint, cell.level, look.distance2));
+    out->waiting += w->turn != EBPO_TURN_NEVER;
+}
+
+ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *s, ebpo_view_stats *out)
+{
+    ebpo_file_stats file = EBPO_FILE_STATS_INIT;
+    ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
+    stats.nodes = s->delivered;
+    stats.pixels = s->viewpoint.given ? 0 : NAN;
+    ebpo_file_get_stats(s->file, &file);
+    stats.bytes_read = file.bytes_read;
+    for (int i = 0; i < 4; i++)
+        stats.cut[i] = s->cut[i];
+    for (uint64_t i = 0; i < s->frontier.count; i++)
+        count_node(s, &s->frontier.at[i], &stats);
+    if (s->delivering && s->partial.group_count > 1)
+        count_node(s, &s->parent, &stats);
+    return EBPO_GIVE(ebpo_view_stats, out, &stats);
+}
+
+ebpo_status ebpo_view_stream_get_faces(const ebpo_view_stream *stream, ebpo_view_faces *out)
+{
+    static const ebpo_view_faces none = EBPO_VIEW_FACES_INIT;
+    return EBPO_GIVE(ebpo_view_faces, out, stream->leaves ? &stream->leaves->now : &none);
 }

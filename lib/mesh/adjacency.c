@@ -49,7 +49,7 @@ static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsi
 }
 
 /* first[v] holds the row's end before, and counts down to its begin. */
-static inline void put(ebpo_stars *stars, uint32_t v, uint64_t f)
+static inline void adjacency_put(ebpo_stars *stars, uint32_t v, uint64_t f)
 {
     stars->face[__atomic_fetch_sub(&stars->first[v], 1, __ATOMIC_RELAXED) - 1] = (uint32_t)f;
 }
@@ -61,11 +61,11 @@ static ebpo_status place_faces(void *context, uint64_t begin, uint64_t end, unsi
     build *b = context;
     EBPO_FOR_ITEMS_SCATTERED(b->mesh->workspace, f, begin, end) {
         const uint32_t *v = b->mesh->faces + 3 * f;
-        put(b->stars, v[0], f);
+        adjacency_put(b->stars, v[0], f);
         if (v[1] != v[0])
-            put(b->stars, v[1], f);
+            adjacency_put(b->stars, v[1], f);
         if (v[2] != v[0] && v[2] != v[1])
-            put(b->stars, v[2], f);
+            adjacency_put(b->stars, v[2], f);
     }
     return EBPO_OK;
 }

@@ -59,7 +59,7 @@ ebpo_attributes *ebpo_attributes_make(ebpo_workspace *workspace)
     return made;
 }
 
-static void clear(ebpo_workspace *workspace, ebpo_attribute *a)
+static void attributes_clear(ebpo_workspace *workspace, ebpo_attribute *a)
 {
     if (!a->borrowed) {
         ebpo_array_free(workspace, a->values);
@@ -74,7 +74,7 @@ void ebpo_attributes_free(ebpo_attributes *attributes)
     if (!attributes)
         return;
     for (uint64_t i = 0; i < attributes->count; i++)
-        clear(attributes->workspace, &attributes->array[i]);
+        attributes_clear(attributes->workspace, &attributes->array[i]);
     free(attributes->array);
     free(attributes->header);
     free(attributes);
@@ -96,7 +96,7 @@ ebpo_attribute *ebpo_attributes_add(ebpo_attributes *to, const ebpo_attribute *l
 
 void ebpo_attributes_remove(ebpo_attributes *from, uint64_t index)
 {
-    clear(from->workspace, &from->array[index]);
+    attributes_clear(from->workspace, &from->array[index]);
     from->count--;
     memmove(from->array + index, from->array + index + 1,
             (from->count - index) * sizeof *from->array);
@@ -121,9 +121,10 @@ bool ebpo_attribute_reserve(ebpo_workspace *workspace, ebpo_attribute *a, uint64
 }
 
 /* Into a text of `size` bytes, which says "and more" when it is full. */
-static void append(char *to, size_t size, const char *format, va_list args) EBPO_PRINTF(3, 0);
+static void attributes_append(char *to, size_t size, const char *format, va_list args)
+    EBPO_PRINTF(3, 0);
 
-static void append(char *to, size_t size, const char *format, va_list args)
+static void attributes_append(char *to, size_t size, const char *format, va_list args)
 {
     static const char more[] = "; and more";
     char text[200];
@@ -139,7 +140,7 @@ void ebpo_attributes_lose(ebpo_attributes *attributes, const char *format, ...)
 {
     va_list args;
     va_start(args, format);
-    append(attributes->lost, sizeof attributes->lost, format, args);
+    attributes_append(attributes->lost, sizeof attributes->lost, format, args);
     va_end(args);
 }
 
@@ -147,7 +148,7 @@ void ebpo_attributes_note_unread(ebpo_attributes *attributes, const char *format
 {
     va_list args;
     va_start(args, format);
-    append(attributes->unread, sizeof attributes->unread, format, args);
+    attributes_append(attributes->unread, sizeof attributes->unread, format, args);
     va_end(args);
 }
 
@@ -274,7 +275,7 @@ static void pick_items(picking *p)
 }
 
 /* Into p->made, which the caller frees. */
-static bool pick(picking *p)
+static bool attributes_pick(picking *p)
 {
     const ebpo_attribute *from = p->from;
     p->made = *from;
@@ -308,7 +309,7 @@ ebpo_status ebpo_attributes_pick(ebpo_attributes *attributes, const char *elemen
         if (!ebpo_attribute_is_of(a, element))
             continue;
         picking p = { attributes->workspace, a, rows, count, { .rows = 0 } };
-        if (!pick(&p)) {
+        if (!attributes_pick(&p)) {
             ebpo_array_free(attributes->workspace, p.made.ends);
             return ebpo_workspace_fail(attributes->workspace,
                                        count * (ebpo_attribute_row_bytes(a) + sizeof *a->ends),
@@ -460,18 +461,19 @@ static const char *const together[][4] = {
 };
 
 /* What stands before the end; -1: it is not its end. */
-static int beginning(const ebpo_attribute_name *name, const char *end)
+static int attributes_beginning(const ebpo_attribute_name *name, const char *end)
 {
     size_t n = strlen(end);
     return name->n >= n && memcmp(name->s + name->n - n, end, n) == 0 ? (int)(name->n - n) : -1;
 }
 
-static unsigned match(const char *const ends[4], const ebpo_attribute_name *names, unsigned count)
+static unsigned attributes_match(const char *const ends[4], const ebpo_attribute_name *names,
+                                 unsigned count)
 {
     unsigned n = 0;
-    int before = beginning(&names[0], ends[0]);
+    int before = attributes_beginning(&names[0], ends[0]);
     for (; n < 4 && ends[n]; n++)
-        if (before < 0 || n == count || beginning(&names[n], ends[n]) != before ||
+        if (before < 0 || n == count || attributes_beginning(&names[n], ends[n]) != before ||
             memcmp(names[n].s, names[0].s, (size_t)before) != 0)
             return 1;
     return n;
@@ -480,7 +482,7 @@ static unsigned match(const char *const ends[4], const ebpo_attribute_name *name
 unsigned ebpo_attribute_names_together(const ebpo_attribute_name *names, unsigned count)
 {
     for (size_t i = 0; i < sizeof together / sizeof together[0]; i++) {
-        unsigned n = match(together[i], names, count);
+        unsigned n = attributes_match(together[i], names, count);
         if (n > 1)
             return n;
     }

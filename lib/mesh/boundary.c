@@ -132,7 +132,7 @@ static void take_arrivals(void *context, uint64_t place, const void *records, ui
 static const ebpo_progress silent = { NULL, NULL };
 
 /* Where the leading bits of a vertex << 32 are. */
-static unsigned leading(const ebpo_mesh *mesh)
+static unsigned boundary_leading(const ebpo_mesh *mesh)
 {
     unsigned shift = 32;
     while (mesh->vertex_count >> (shift - 32) >= EBPO_SORT_BINS)
@@ -148,7 +148,7 @@ static ebpo_status sort_all(chaining *c, ebpo_error *error)
                        .stage = "",
                        .count = c->count,
                        .record = sizeof *c->edges,
-                       .shift = leading(c->mesh),
+                       .shift = boundary_leading(c->mesh),
                        .context = c,
                        .make = make_edges,
                        .compare = compare_edges,
@@ -171,7 +171,7 @@ static void let_go(const chaining *c, uint64_t steps)
         ebpo_release_pages(c->mesh->workspace);
 }
 
-static void connect(chaining *c, uint64_t edge, uint64_t next)
+static void boundary_connect(chaining *c, uint64_t edge, uint64_t next)
 {
     c->next[edge] = next;
     c->continued[next] = 1;
@@ -206,7 +206,8 @@ static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
 
 /* The edge that leaves for `neighbour` (the source's number) among the sorted [begin, end); NONE
  * when there is none. */
-static uint64_t departure(const chaining *c, uint64_t begin, uint64_t end, uint64_t neighbour)
+static uint64_t boundary_departure(const chaining *c, uint64_t begin, uint64_t end,
+                                   uint64_t neighbour)
 {
     while (begin < end) {
         uint64_t middle = begin + (end - begin) / 2;
@@ -232,11 +233,12 @@ static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b,
         for (uint64_t i = a; i < b; i++) {
             uint64_t edge = c->arrivals[i].edge;
             uint32_t neighbour = fan_end(c, vertex, c->edges[edge].face);
-            uint64_t next = neighbour == EBPO_NO_INDEX
-                                ? NONE
-                                : departure(c, d, e, ebpo_mesh_source_vertex(c->mesh, neighbour));
+            uint64_t next =
+                neighbour == EBPO_NO_INDEX
+                    ? NONE
+                    : boundary_departure(c, d, e, ebpo_mesh_source_vertex(c->mesh, neighbour));
             if (next != NONE && !c->continued[next])
-                connect(c, edge, next);
+                boundary_connect(c, edge, next);
         }
     }
     for (uint64_t i = a; i < b; i++) {
@@ -246,7 +248,7 @@ static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b,
             d++;
         if (d == e)
             break;
-        connect(c, c->arrivals[i].edge, d);
+        boundary_connect(c, c->arrivals[i].edge, d);
     }
     return true;
 }
@@ -289,7 +291,7 @@ static void emit_loop(chaining *c, uint64_t place)
     c->path_length = place;
 }
 
-static void visit(chaining *c, uint32_t vertex)
+static void boundary_visit(chaining *c, uint32_t vertex)
 {
     if (c->place[vertex] != EBPO_NO_INDEX)
         emit_loop(c, c->place[vertex]);
@@ -318,14 +320,14 @@ static uint64_t first_of_cycle(chaining *c, uint64_t edge)
     return first;
 }
 
-static void walk(chaining *c, uint64_t edge)
+static void boundary_walk(chaining *c, uint64_t edge)
 {
     c->path_length = 0;
     c->start = source_key(c, edge);
-    visit(c, c->edges[edge].from);
+    boundary_visit(c, c->edges[edge].from);
     while (edge != NONE && !c->walked[edge]) {
         c->walked[edge] = 1;
-        visit(c, c->edges[edge].to);
+        boundary_visit(c, c->edges[edge].to);
         edge = c->next[edge];
         let_go(c, ++c->steps);
     }
@@ -335,7 +337,7 @@ static void walk(chaining *c, uint64_t edge)
         c->place[c->path[i]] = EBPO_NO_INDEX;
 }
 
-static bool allocate(chaining *c)
+static bool boundary_allocate(chaining *c)
 {
     ebpo_workspace *w = c->mesh->workspace;
     uint64_t n = c->count, vertices = c->mesh->vertex_count;
@@ -356,10 +358,10 @@ static bool allocate(chaining *c)
     return true;
 }
 
-static ebpo_status chain(chaining *c, ebpo_error *error)
+static ebpo_status boundary_chain(chaining *c, ebpo_error *error)
 {
     ebpo_workspace *w = c->mesh->workspace;
-    if (!allocate(c))
+    if (!boundary_allocate(c))
         return ebpo_workspace_fail(w, c->count * 56 + c->mesh->vertex_count * sizeof *c->place,
                                    error);
     ebpo_status status = sort_all(c, error);
@@ -369,12 +371,12 @@ static ebpo_status chain(chaining *c, ebpo_error *error)
         return ebpo_fail_memory(error, c->star.capacity * 2 * sizeof *c->star.links);
     EBPO_FOR_ITEMS(w, e, 0, c->count) {
         if (!c->continued[e])
-            walk(c, e);
+            boundary_walk(c, e);
     }
     c->out->on_paths = c->out->count;
     EBPO_FOR_ITEMS(w, e, 0, c->count) {
         if (!c->walked[e])
-            walk(c, first_of_cycle(c, e));
+            boundary_walk(c, first_of_cycle(c, e));
     }
     return EBPO_OK;
 }
@@ -389,7 +391,7 @@ ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary, const 
                    .mesh = mesh,
                    .threads = threads,
                    .out = out };
-    ebpo_status status = chain(&c, error);
+    ebpo_status status = boundary_chain(&c, error);
     ebpo_star_free(&c.star);
     ebpo_array_free(mesh->workspace, c.arrivals);
     ebpo_array_free(mesh->workspace, c.next);
@@ -460,7 +462,7 @@ ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops, const
                            .stage = "",
                            .count = count,
                            .record = sizeof *r.sorted,
-                           .shift = leading(mesh),
+                           .shift = boundary_leading(mesh),
                            .context = &r,
                            .make = make_ranks,
                            .compare = compare_ranks,

@@ -12,7 +12,7 @@
 #include "geometry/predicates.h"
 #include "mesh/component_parts.h"
 #include "mesh/adjacency.h"
-#include "mesh/mesh_frame.h"
+#include "mesh/mesh_parts.h"
 #include "mesh/sum.h"
 
 enum { VERTEX_GRAIN = 1 << 13, COMPONENT_GRAIN = 64 };
@@ -27,7 +27,7 @@ typedef struct measuring {
 
 /* ---- edges ---- */
 
-static bool balances(const ebpo_link *links, uint64_t uses)
+static bool component_volume_balances(const ebpo_link *links, uint64_t uses)
 {
     uint64_t out = 0;
     for (uint64_t i = 0; i < uses; i++)
@@ -79,7 +79,7 @@ static ebpo_status visit_vertices(void *context, uint64_t begin, uint64_t end, u
             if (c->of_face && next - i > 2) {
                 if (!visit_edge(c, links, next - i, &m->around[worker]))
                     return ebpo_fail_memory(error, (next - i) * sizeof(ebpo_edge_face));
-            } else if (!balances(links, next - i))
+            } else if (!component_volume_balances(links, next - i))
                 set_open(c, c->of_face ? c->of_face[ebpo_link_face(links)] : c->number[v]);
         }
     }

@@ -24,7 +24,7 @@ static uint32_t root_of(uint32_t *above, uint32_t v)
     return v;
 }
 
-static void join(uint32_t *above, uint32_t a, uint32_t b)
+static void components_join(uint32_t *above, uint32_t a, uint32_t b)
 {
     a = root_of(above, a);
     b = root_of(above, b);
@@ -60,8 +60,8 @@ static void join_vertices(const ebpo_mesh *mesh, const uint32_t *closed, uint32_
         const uint32_t *corner = mesh->faces + 3 * f;
         if (closed && closed[f] != EBPO_NO_INDEX)
             continue;
-        join(above, corner[0], corner[1]);
-        join(above, corner[0], corner[2]);
+        components_join(above, corner[0], corner[1]);
+        components_join(above, corner[0], corner[2]);
     }
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count)
         above[v] = above[above[v]]; /* what is lower is done already */
@@ -213,7 +213,7 @@ static ebpo_status join_cavities(ebpo_components *c, ebpo_error *error)
 
 /* ---- all of it ---- */
 
-static ebpo_status find(ebpo_components *c, ebpo_error *error)
+static ebpo_status components_find(ebpo_components *c, ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->mesh;
     uint64_t n = mesh->vertex_count;
@@ -273,7 +273,7 @@ ebpo_status ebpo_components_find(const ebpo_mesh *mesh, uint32_t *closed, unsign
     c->of_face = closed;
     if (progress && !ebpo_progress_stage(progress, "components", error))
         return EBPO_E_CANCELLED;
-    status = find(c, error);
+    status = components_find(c, error);
     return status == EBPO_OK ? ebpo_components_measure(c, threads, progress, error) : status;
 }
 
@@ -287,7 +287,7 @@ ebpo_status ebpo_components_number(const ebpo_mesh *mesh, uint32_t **number, ebp
     if (!c)
         return ebpo_fail_memory(error, sizeof *c);
     c->mesh = mesh;
-    status = find(c, error);
+    status = components_find(c, error);
     if (status == EBPO_OK) {
         *number = c->number;
         c->number = NULL;
@@ -471,14 +471,14 @@ typedef struct naming {
     uint64_t name_bytes;
 } naming;
 
-static ebpo_named_run shown(const ebpo_named_run *run)
+static ebpo_named_run components_shown(const ebpo_named_run *run)
 {
     return run->size ? *run : (ebpo_named_run){ unnamed, sizeof unnamed - 1, run->faces };
 }
 
 static int compare_names(const ebpo_named_run *x, const ebpo_named_run *y)
 {
-    ebpo_named_run a = shown(x), b = shown(y);
+    ebpo_named_run a = components_shown(x), b = components_shown(y);
     if (a.size != b.size)
         return a.size < b.size ? -1 : 1;
     return memcmp(a.name, b.name, a.size);
@@ -512,7 +512,7 @@ static void name_group(naming *n, uint64_t run, uint64_t first_face)
     uint32_t *number = &n->number[n->alike[run]];
     if (*number != EBPO_NO_INDEX)
         return;
-    ebpo_named_run name = shown(&n->runs[run]);
+    ebpo_named_run name = components_shown(&n->runs[run]);
     char *to = n->out->names + n->name_bytes;
     memcpy(to, name.name, name.size);
     to[name.size] = 0;
@@ -543,7 +543,7 @@ static void name_groups(naming *n)
         name_group(n, i, 0);
 }
 
-static ebpo_status make(naming *n, ebpo_error *error)
+static ebpo_status components_make(naming *n, ebpo_error *error)
 {
     uint64_t bytes = n->count * sizeof unnamed;
     for (uint64_t i = 0; i < n->count; i++)
@@ -571,7 +571,8 @@ ebpo_status ebpo_mesh_groups_new(const ebpo_named_run *runs, uint64_t count, ebp
     if (count >= EBPO_NO_INDEX)
         return ebpo_fail(error, EBPO_E_LIMIT, "there are too many names of groups");
     n.out = ebpo_alloc_zero(1, sizeof *n.out);
-    ebpo_status status = n.out ? make(&n, error) : ebpo_fail_memory(error, sizeof *n.out);
+    ebpo_status status =
+        n.out ? components_make(&n, error) : ebpo_fail_memory(error, sizeof *n.out);
     free(n.order);
     free(n.alike);
     free(n.number);
@@ -650,7 +651,7 @@ static void list_vertices(ebpo_components *c, uint32_t *seen)
     c->vertices.begin[c->count] = count;
 }
 
-static int ascending(const void *x, const void *y)
+static int components_ascending(const void *x, const void *y)
 {
     uint32_t a = *(const uint32_t *)x, b = *(const uint32_t *)y;
     return a < b ? -1 : a > b;
@@ -672,7 +673,8 @@ static ebpo_status gather_vertices(ebpo_components *c, ebpo_error *error)
     if (!v->of)
         return ebpo_workspace_fail(workspace, c->mesh->vertex_count * sizeof *v->of, error);
     for (uint64_t n = 0; n < c->count; n++)
-        qsort(v->of + v->begin[n], v->begin[n + 1] - v->begin[n], sizeof *v->of, ascending);
+        qsort(v->of + v->begin[n], v->begin[n + 1] - v->begin[n], sizeof *v->of,
+              components_ascending);
     return EBPO_OK;
 }
 
@@ -690,7 +692,8 @@ static ebpo_status list_groups(ebpo_components *c, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status check(const ebpo_mesh *mesh, const ebpo_mesh_groups *groups, ebpo_error *error)
+static ebpo_status components_check(const ebpo_mesh *mesh, const ebpo_mesh_groups *groups,
+                                    ebpo_error *error)
 {
     ebpo_status status = ebpo_components_check(mesh, error);
     if (status != EBPO_OK)
@@ -708,7 +711,7 @@ ebpo_status ebpo_components_of_groups(const ebpo_mesh *mesh, const ebpo_mesh_gro
                                       ebpo_components **out, ebpo_error *error)
 {
     *out = NULL;
-    ebpo_status status = check(mesh, groups, error);
+    ebpo_status status = components_check(mesh, groups, error);
     if (status != EBPO_OK)
         return status;
     ebpo_components *c = ebpo_alloc_zero(1, sizeof *c);

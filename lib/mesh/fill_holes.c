@@ -43,8 +43,8 @@ typedef struct filling {
     uint64_t added;
 } filling;
 
-static ebpo_status collect(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                           ebpo_error *error)
+static ebpo_status fill_holes_collect(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                      ebpo_error *error)
 {
     filling *f = context;
     scratch *s = &f->scratch[worker];
@@ -68,7 +68,7 @@ static ebpo_status collect(void *context, uint64_t begin, uint64_t end, unsigned
 static ebpo_status collect_boundary(filling *f, ebpo_error *error)
 {
     ebpo_status status = ebpo_parallel_for(f->threads, NULL, f->mesh->vertex_count, VERTEX_GRAIN,
-                                           collect, f, NULL, "", error);
+                                           fill_holes_collect, f, NULL, "", error);
     ebpo_boundary *lists = ebpo_alloc(f->threads, sizeof *lists);
     if (!lists)
         return ebpo_fail_memory(error, f->threads * sizeof *lists);
@@ -176,7 +176,7 @@ static ebpo_status make_room(filling *f, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status run(filling *f, ebpo_error *error)
+static ebpo_status fill_holes_run(filling *f, ebpo_error *error)
 {
     ebpo_mesh *mesh = f->mesh;
     f->scratch = ebpo_alloc_zero(f->threads, sizeof *f->scratch);
@@ -225,7 +225,7 @@ ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)
         return status;
-    status = run(&f, error);
+    status = fill_holes_run(&f, error);
     if (status == EBPO_OK && record) {
         record->fill_holes = true;
         record->filled_holes += f.loops.count;

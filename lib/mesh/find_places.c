@@ -162,8 +162,8 @@ static ebpo_status join_lists(const places *p, const ebpo_found_list *lists, uns
 }
 
 /* In one list, which does not depend on who noted what. */
-static ebpo_status gather(places *p, const ebpo_found_list *lists, unsigned count,
-                          ebpo_error *error)
+static ebpo_status find_places_gather(places *p, const ebpo_found_list *lists, unsigned count,
+                                      ebpo_error *error)
 {
     ebpo_workspace *workspace = p->mesh->workspace;
     ebpo_found_list joined = { NULL, 0, 0, false };
@@ -313,14 +313,14 @@ static ebpo_status note_all(places *p, ebpo_mesh_report *report, ebpo_error *err
                          .found = lists };
     ebpo_status status = ebpo_check_run(&check, error);
     if (status == EBPO_OK)
-        status = gather(p, lists, threads, error);
+        status = find_places_gather(p, lists, threads, error);
     for (unsigned t = 0; t < threads; t++)
         ebpo_array_free(p->mesh->workspace, lists[t].item);
     free(lists);
     return status;
 }
 
-static ebpo_status find(places *p, ebpo_mesh_report *report, ebpo_error *error)
+static ebpo_status find_places_find(places *p, ebpo_mesh_report *report, ebpo_error *error)
 {
     ebpo_status status = note_all(p, report, error);
     if (status == EBPO_OK)
@@ -350,7 +350,7 @@ ebpo_status ebpo_mesh_places(const ebpo_mesh *mesh, const ebpo_places_options *o
     ebpo_mesh_report found = { .edges = 0 };
     ebpo_status status = EBPO_TAKE(ebpo_places_options, &p.options, options, error);
     if (status == EBPO_OK)
-        status = find(&p, &found, error);
+        status = find_places_find(&p, &found, error);
     ebpo_array_free(mesh->workspace, p.all.item);
     ebpo_array_free(mesh->workspace, p.component);
     ebpo_array_free(mesh->workspace, p.faces);

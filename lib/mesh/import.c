@@ -11,9 +11,6 @@
 #include "core/error.h"
 #include "mesh/import_build.h"
 #include "mesh/obj.h"
-#include "mesh/obj_text.h"
-#include "mesh/off.h"
-#include "mesh/stl.h"
 #include "io/file_source.h"
 
 void ebpo_import_clear(ebpo_mesh *mesh)
@@ -69,9 +66,9 @@ static ebpo_status read_once(ebpo_mesh *mesh, ebpo_import_format format, const u
     return status;
 }
 
-static ebpo_status import(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
-                          uint64_t size, const char *name, ebpo_workspace *workspace,
-                          bool attributes, ebpo_obj_runs *runs, ebpo_error *error)
+static ebpo_status import_import(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
+                                 uint64_t size, const char *name, ebpo_workspace *workspace,
+                                 bool attributes, ebpo_obj_runs *runs, ebpo_error *error)
 {
     static const char *const formats[] = { "obj", "stl", "off" };
     ebpo_mesh mesh = { .workspace = workspace };
@@ -98,7 +95,8 @@ ebpo_status ebpo_import_groups(ebpo_mesh *out, const uint8_t *data, uint64_t siz
                                ebpo_error *error)
 {
     *runs = (ebpo_obj_runs){ 0 };
-    return import(out, EBPO_IMPORT_OBJ, data, size, name, workspace, attributes, runs, error);
+    return import_import(out, EBPO_IMPORT_OBJ, data, size, name, workspace, attributes, runs,
+                         error);
 }
 
 /* --- which format it is --- */
@@ -158,5 +156,5 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
         *out = (ebpo_mesh){ 0 };
         return status;
     }
-    return import(out, format, data, size, name, workspace, attributes, NULL, error);
+    return import_import(out, format, data, size, name, workspace, attributes, NULL, error);
 }

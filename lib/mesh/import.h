@@ -4,7 +4,7 @@
 
 #include <ebpo/mesh.h>
 
-#include "mesh/obj_names.h"
+#include "mesh/obj.h"
 
 typedef enum ebpo_import_format {
     EBPO_IMPORT_OBJ,

@@ -220,7 +220,7 @@ static void load_position(const import_build *b, uint64_t vertex, double xyz[3])
         xyz[k] = b->doubles ? wide[3 * vertex + k] : (double)narrow[3 * vertex + k];
 }
 
-static ebpo_status cut(import_build *b, uint32_t n)
+static ebpo_status build_cut(import_build *b, uint32_t n)
 {
     ebpo_status status = reserve_scratch(b, n);
     if (status != EBPO_OK)
@@ -261,7 +261,7 @@ ebpo_status ebpo_import_polygon(import_build *b)
         if (status == EBPO_OK && n == 3)
             put_triangle(b, 0, 1, 2);
         else if (status == EBPO_OK)
-            status = cut(b, (uint32_t)n);
+            status = build_cut(b, (uint32_t)n);
     }
     b->corners = 0;
     return status;
@@ -270,7 +270,7 @@ ebpo_status ebpo_import_polygon(import_build *b)
 /* --- the end --- */
 
 /* Arrays grew by halves, and vertices may be fewer. */
-static void trim(ebpo_mesh *mesh, size_t position_size)
+static void build_trim(ebpo_mesh *mesh, size_t position_size)
 {
     if (mesh->workspace)
         return;
@@ -306,7 +306,7 @@ ebpo_status ebpo_import_end(import_build *b)
             mesh->faces[i] = map[mesh->faces[i]];
     ebpo_array_free(workspace, map);
     if (status == EBPO_OK)
-        trim(mesh, b->position_size);
+        build_trim(mesh, b->position_size);
     return status;
 }
 
@@ -366,7 +366,7 @@ static ebpo_attribute head_of(const placing *p, const char *element)
     return head;
 }
 
-static ebpo_status add(const placing *p, ebpo_attribute *head, ebpo_attribute **out)
+static ebpo_status build_add(const placing *p, ebpo_attribute *head, ebpo_attribute **out)
 {
     const ebpo_mesh *mesh = p->b->mesh;
     size_t bytes = head->columns * (size_t)ebpo_attribute_bytes(head->type);
@@ -380,7 +380,7 @@ static ebpo_status add(const placing *p, ebpo_attribute *head, ebpo_attribute **
 }
 
 /* Takes away the last one again. */
-static void drop(const placing *p)
+static void build_drop(const placing *p)
 {
     ebpo_attributes_remove(p->b->mesh->attributes, p->b->mesh->attributes->count - 1);
 }
@@ -399,7 +399,7 @@ static ebpo_status place_on_vertices(const placing *p, bool *fits)
 {
     const ebpo_mesh *mesh = p->b->mesh;
     ebpo_attribute head = head_of(p, "vertex"), *a;
-    ebpo_status status = add(p, &head, &a);
+    ebpo_status status = build_add(p, &head, &a);
     *fits = status == EBPO_OK;
     if (!*fits)
         return status;
@@ -411,7 +411,7 @@ static ebpo_status place_on_vertices(const placing *p, bool *fits)
             break;
     }
     if (!*fits)
-        drop(p);
+        build_drop(p);
     return EBPO_OK;
 }
 
@@ -420,7 +420,7 @@ static ebpo_status place_on_faces(const placing *p, bool *fits)
 {
     const ebpo_mesh *mesh = p->b->mesh;
     ebpo_attribute head = head_of(p, "face"), *a;
-    ebpo_status status = add(p, &head, &a);
+    ebpo_status status = build_add(p, &head, &a);
     *fits = status == EBPO_OK;
     for (uint64_t f = 0; f < mesh->face_count && *fits; f++) {
         const void *first = value_at(p, 3 * f);
@@ -429,7 +429,7 @@ static ebpo_status place_on_faces(const placing *p, bool *fits)
         memcpy(a->values + f * p->bytes, first, p->bytes);
     }
     if (status == EBPO_OK && !*fits)
-        drop(p);
+        build_drop(p);
     return status;
 }
 
@@ -439,7 +439,7 @@ static ebpo_status place_in_lists(const placing *p)
     head.columns *= 3;
     head.list = EBPO_ATTRIBUTE_UINT8;
     snprintf(head.names, sizeof head.names, "%s", sorts[p->sort].list_name);
-    ebpo_status status = add(p, &head, &a);
+    ebpo_status status = build_add(p, &head, &a);
     for (uint64_t i = 0; status == EBPO_OK && i < 3 * p->b->mesh->face_count; i++)
         memcpy(a->values + i * p->bytes, value_at(p, i), p->bytes);
     return status;
@@ -502,8 +502,8 @@ static inline bool has_key(const char *xyz, size_t size, const uint64_t key[3])
 }
 
 /* The size is a constant where this is called, and compiled as such. */
-static inline uint64_t weld(char *xyz, size_t size, uint64_t count, uint32_t *map, uint32_t *table,
-                            uint64_t slots)
+static inline uint64_t build_weld(char *xyz, size_t size, uint64_t count, uint32_t *map,
+                                  uint32_t *table, uint64_t slots)
 {
     uint32_t kept = 0;
     for (uint64_t i = 0; i < count; i++) {
@@ -530,8 +530,8 @@ ebpo_status ebpo_import_weld(void *xyz, bool doubles, uint64_t count, uint32_t *
     if (!table)
         return ebpo_fail_memory(error, slots * sizeof *table);
     memset(table, 0xff, (size_t)slots * sizeof *table);
-    *welded = doubles ? weld(xyz, sizeof(double), count, map, table, slots)
-                      : weld(xyz, sizeof(float), count, map, table, slots);
+    *welded = doubles ? build_weld(xyz, sizeof(double), count, map, table, slots)
+                      : build_weld(xyz, sizeof(float), count, map, table, slots);
     free(table);
     return EBPO_OK;
 }

@@ -124,4 +124,40 @@ void ebpo_import_free(import_build *b);
 EBPO_MUST_USE ebpo_status ebpo_import_weld(void *xyz, bool doubles, uint64_t count, uint32_t *map,
                                            uint64_t *welded, ebpo_error *error);
 
+/* Reading OFF files, by words: rows may go over lines, and lines hold several rows. Sources: the
+ * manual of Geomview 1.9.4, "OFF Files"; CGAL and MeshLab, whose colours are of three or four
+ * values.
+ */
+
+/* Whether a file begins with the word OFF, with letters before it that say what vertices have. */
+bool ebpo_off_recognise(const uint8_t *data, uint64_t size);
+
+/* Makes the mesh, and its attributes if they are kept. Errors are those of ebpo_import_memory. */
+EBPO_MUST_USE ebpo_status ebpo_off_read(import_build *b, const uint8_t *data, uint64_t size);
+
+/* Binary STL files. */
+
+/* True where all bytes are those of binary models: of one, also with the bytes that its facets'
+ * attribute byte counts state, or of several, one behind the other. */
+bool ebpo_stl_fits_binary(const uint8_t *data, uint64_t size);
+
+/* True if the first `known` bytes of a file state that a binary model takes `size` bytes. */
+bool ebpo_stl_states_size(const uint8_t *data, uint64_t known, uint64_t size);
+
+/* Reads the facets as vertices, three each, and notes bytes that are not read. *plain: the size of
+ * the one model whose facets have their two bytes of attributes; 0: it is another file. */
+EBPO_MUST_USE ebpo_status ebpo_stl_read_binary(import_build *b, const uint8_t *data, uint64_t size,
+                                               uint64_t *plain);
+
+/* Reading STL files, in text and binary. Source: "StereoLithography Interface Specification", 3D
+ * Systems, 1989. */
+
+/* True for the bytes of an STL file: binary if all of them are those of the faces that it states,
+ * whatever it begins with; else text that begins with the word solid. */
+bool ebpo_stl_recognise(const uint8_t *data, uint64_t size);
+
+/* Makes the mesh. A file that is called STL is text if it says so and has the word facet. Normals
+ * are not read: they follow from corners. Errors are those of ebpo_import_memory. */
+EBPO_MUST_USE ebpo_status ebpo_stl_read(import_build *b, const uint8_t *data, uint64_t size);
+
 #endif

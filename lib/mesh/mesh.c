@@ -9,7 +9,6 @@
 #include "core/workspace.h"
 #include "core/error.h"
 #include "mesh/attributes.h"
-#include "mesh/mesh_frame.h"
 #include "mesh/mesh_parts.h"
 
 const char *ebpo_mesh_label(const ebpo_mesh *mesh)
@@ -126,7 +125,7 @@ int ebpo_mesh_has_attributes(const ebpo_mesh *mesh)
     return ebpo_attributes_hold(mesh->attributes);
 }
 
-static void include(double most[3], const ebpo_mesh *mesh, uint64_t vertex)
+static void mesh_include(double most[3], const ebpo_mesh *mesh, uint64_t vertex)
 {
     double p[3];
     ebpo_mesh_position(mesh, vertex, p);
@@ -152,11 +151,11 @@ ebpo_mesh_frame ebpo_mesh_frame_of(const ebpo_mesh *mesh)
     if (mesh->xyz32) /* whose exponents are from -148 to 128 */
         return (ebpo_mesh_frame){ .scaled = false };
     EBPO_FOR_ITEMS(mesh->workspace, v, 0, mesh->vertex_count)
-        include(most, mesh, v);
+        mesh_include(most, mesh, v);
     if (!frame_of(most).scaled)
         return (ebpo_mesh_frame){ .scaled = false };
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count)
         for (uint64_t k = 0; k < 3; k++)
-            include(used, mesh, mesh->faces[3 * f + k]);
+            mesh_include(used, mesh, mesh->faces[3 * f + k]);
     return frame_of(used);
 }

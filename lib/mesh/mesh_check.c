@@ -13,8 +13,7 @@
 #include "core/parallel.h"
 #include "geometry/predicates.h"
 #include "mesh/mesh_check_parts.h"
-#include "mesh/mesh_frame.h"
-#include "mesh/positions.h"
+#include "mesh/mesh_parts.h"
 #include "mesh/adjacency.h"
 
 /* Places while checking, a list for each worker. */
@@ -67,7 +66,7 @@ static uint32_t find_root(uint32_t *parents, uint32_t v)
 
 /* The higher root goes below the lower one, so there are no cycles; the number of roots is the same
  * in any order. */
-static void join(uint32_t *parents, uint32_t a, uint32_t b)
+static void check_join(uint32_t *parents, uint32_t a, uint32_t b)
 {
     for (;;) {
         a = find_root(parents, a);
@@ -113,23 +112,23 @@ static double cross_length(const ebpo_units *u, const double cross[3])
     return ebpo_scaled_length(cross, exponent, u->area);
 }
 
-static void measure(face_block *block, const ebpo_units *units, const double centre[3],
-                    const double a[3], const double cross[3])
+static void check_measure(face_block *block, const ebpo_units *units, const double centre[3],
+                          const double a[3], const double cross[3])
 {
     ebpo_sum_add(&block->area2, cross_length(units, cross));
     ebpo_sum_add(&block->volume6, (a[0] - centre[0]) * cross[0] + (a[1] - centre[1]) * cross[1] +
                                       (a[2] - centre[2]) * cross[2]);
 }
 
-static void note(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
-                 ebpo_finding_kind kind, uint64_t face)
+static void check_note(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
+                       ebpo_finding_kind kind, uint64_t face)
 {
     ebpo_check_note(check, worker, finding, kind, ebpo_mesh_source_face(check->mesh, face),
                     (uint32_t)face, (uint32_t)face);
 }
 
-static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                         ebpo_error *error)
+static ebpo_status check_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     (void)error;
     const face_pass *pass = context;
@@ -138,11 +137,12 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
     face_block block = { .area2 = { .adds = 0 } };
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, begin, end) {
         const uint32_t *v = mesh->faces + 3 * f;
-        join(parents, v[0], v[1]);
-        join(parents, v[1], v[2]);
+        check_join(parents, v[0], v[1]);
+        check_join(parents, v[1], v[2]);
         if (ebpo_face_repeats_index(v)) {
-            note(pass->check, worker, &block.index_repeated, EBPO_FOUND_INDEX_REPEATED_FACE, f);
-            note(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
+            check_note(pass->check, worker, &block.index_repeated, EBPO_FOUND_INDEX_REPEATED_FACE,
+                       f);
+            check_note(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
             continue;
         }
         double a[3], b[3], c[3], cross[3];
@@ -150,14 +150,14 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
         ebpo_check_position(pass->check, v[1], b);
         ebpo_check_position(pass->check, v[2], c);
         ebpo_face_cross(a, b, c, cross);
-        measure(&block, &pass->check->units, pass->centre, a, cross);
+        check_measure(&block, &pass->check->units, pass->centre, a, cross);
         if (pass->check->units.scaled) { /* the test is exact: on the coordinates themselves */
             ebpo_mesh_position(mesh, v[0], a);
             ebpo_mesh_position(mesh, v[1], b);
             ebpo_mesh_position(mesh, v[2], c);
         }
         if (zero_area(a, b, c))
-            note(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
+            check_note(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
     }
     pass->blocks[begin / FACE_GRAIN] = block;
     return EBPO_OK;
@@ -172,8 +172,8 @@ ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error)
         return ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
     for (int k = 0; k < 3; k++)
         pass.centre[k] = ldexp(0.5 * r->min[k] + 0.5 * r->max[k], -check->units.exponent[k]);
-    ebpo_status status = ebpo_parallel_for(check->threads, NULL, count, FACE_GRAIN, faces, &pass,
-                                           &check->progress, "measuring faces", error);
+    ebpo_status status = ebpo_parallel_for(check->threads, NULL, count, FACE_GRAIN, check_faces,
+                                           &pass, &check->progress, "measuring faces", error);
     ebpo_sum area2 = { .adds = 0 }, volume6 = { .adds = 0 };
     for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {
         ebpo_sum_merge(&area2, &pass.blocks[i].area2);
@@ -308,8 +308,8 @@ static bool check_repeated(const ebpo_check *check, star_block *block, scratch *
     return true;
 }
 
-static ebpo_status stars(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                         ebpo_error *error)
+static ebpo_status check_stars(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     star_pass *pass = context;
     const ebpo_check *check = pass->check;
@@ -371,7 +371,7 @@ ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
     }
     for (unsigned t = 0; t < check->threads; t++)
         pass.scratch[t].boundary = &boundaries[t], pass.scratch[t].worker = t;
-    status = ebpo_parallel_for(check->threads, NULL, count, STAR_GRAIN, stars, &pass,
+    status = ebpo_parallel_for(check->threads, NULL, count, STAR_GRAIN, check_stars, &pass,
                                &check->progress, "checking edges", error);
     if (status != EBPO_OK)
         goto done;
@@ -390,8 +390,8 @@ done:
 
 enum { VERTEX_GRAIN = 1 << 15 };
 
-static ebpo_status coordinates(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
+static ebpo_status check_coordinates(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                     ebpo_error *error)
 {
     (void)worker;
     const ebpo_check *c = context;
@@ -415,7 +415,7 @@ static ebpo_status coordinates(void *context, uint64_t begin, uint64_t end, unsi
 ebpo_status ebpo_check_coordinates(ebpo_check *check, ebpo_error *error)
 {
     return ebpo_parallel_for(check->threads, check->mesh->workspace, check->mesh->vertex_count,
-                             VERTEX_GRAIN, coordinates, check, &check->progress,
+                             VERTEX_GRAIN, check_coordinates, check, &check->progress,
                              "checking coordinates", error);
 }
 
@@ -430,8 +430,8 @@ typedef struct vertex_pass {
     vertex_block *blocks;
 } vertex_pass;
 
-static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                            ebpo_error *error)
+static ebpo_status check_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
 {
     (void)error;
     const vertex_pass *pass = context;
@@ -481,8 +481,8 @@ ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error)
     if (!pass.blocks)
         return ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
     ebpo_status status =
-        ebpo_parallel_for(check->threads, check->mesh->workspace, count, VERTEX_GRAIN, vertices,
-                          &pass, &check->progress, "checking vertices", error);
+        ebpo_parallel_for(check->threads, check->mesh->workspace, count, VERTEX_GRAIN,
+                          check_vertices, &pass, &check->progress, "checking vertices", error);
     for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {
         const vertex_block *b = &pass.blocks[i];
         for (int k = 0; k < 3; k++) {
@@ -607,7 +607,7 @@ ebpo_status ebpo_check_positions(ebpo_check *check, ebpo_error *error)
 }
 
 /* Source: EBP 2017, section 3.1, for what a closed 2-manifold is; Euler's formula for the genus. */
-static void conclude(ebpo_check *c)
+static void check_conclude(ebpo_check *c)
 {
     ebpo_mesh_report *r = c->report;
     r->balanced = r->unbalanced_edges.count == 0;
@@ -637,7 +637,7 @@ static ebpo_status boundary_loops(ebpo_check *c, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status run(ebpo_check *c, ebpo_error *error)
+static ebpo_status check_run(ebpo_check *c, ebpo_error *error)
 {
     uint64_t count = c->mesh->vertex_count;
     ebpo_status status = ebpo_check_coordinates(c, error);
@@ -663,7 +663,7 @@ static ebpo_status run(ebpo_check *c, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_check_positions(c, error);
     if (status == EBPO_OK)
-        conclude(c);
+        check_conclude(c);
     return status;
 }
 
@@ -678,7 +678,7 @@ ebpo_status ebpo_check_run(ebpo_check *check, ebpo_error *error)
         return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
                               "%llu vertices but no faces; give a triangle mesh, not a point cloud",
                               (unsigned long long)mesh->vertex_count);
-    status = run(check, error);
+    status = check_run(check, error);
     ebpo_stars_free(&check->stars);
     ebpo_boundary_free(&check->boundary);
     if (status != EBPO_OK)

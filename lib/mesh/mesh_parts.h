@@ -3,10 +3,12 @@
 #ifndef EBPO_MESH_MESH_PARTS_H
 #define EBPO_MESH_MESH_PARTS_H
 
+#include <math.h>
+
 #include <ebpo/mesh.h>
 
-#include "geometry/cell.h"
-#include "geometry/chain.h"
+#include "geometry/cells.h"
+#include "geometry/polygon.h"
 
 #define EBPO_NO_INDEX UINT32_MAX
 
@@ -141,5 +143,55 @@ const char *ebpo_mesh_label(const ebpo_mesh *mesh);
 /* EBPO_E_ARGUMENT unless the arrays that the counts promise are there, EBPO_E_LIMIT when a count is
  * beyond 2^32 - 2. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_check_shape(const ebpo_mesh *mesh, ebpo_error *error);
+
+/* Coordinates in units of powers of two, one for each axis, in which volumes of meshes far from 1
+ * neither overflow nor vanish: their signs and order are the same. */
+
+/* Squares and cubes of what lies between 2^-256 and 2^256 are far from overflow and underflow. */
+enum { EBPO_EXPONENT_MAX = 256 };
+
+static inline bool ebpo_exponent_is_far(int exponent)
+{
+    return exponent > EBPO_EXPONENT_MAX || exponent < -EBPO_EXPONENT_MAX;
+}
+
+typedef struct ebpo_mesh_frame {
+    bool scaled; /* else coordinates are as they are */
+    int exponent[3];
+} ebpo_mesh_frame;
+
+/* By the corners of all faces. */
+ebpo_mesh_frame ebpo_mesh_frame_of(const ebpo_mesh *mesh);
+
+static inline void ebpo_frame_position(const ebpo_mesh_frame *frame, const ebpo_mesh *mesh,
+                                       uint64_t vertex, double out[3])
+{
+    ebpo_mesh_position(mesh, vertex, out);
+    if (frame->scaled)
+        for (int k = 0; k < 3; k++)
+            out[k] = ldexp(out[k], -frame->exponent[k]);
+}
+
+/* Vertices with one and the same position. */
+
+/* A hash table of all positions; each keeps the lowest vertex number that has it. 5.3 to 10.7 bytes
+ * a vertex. */
+typedef struct ebpo_positions {
+    const ebpo_mesh *mesh; /* borrowed */
+    uint32_t *slots;
+    uint64_t mask;
+    ebpo_workspace *workspace; /* the mesh's */
+    uint64_t repeated;         /* vertices whose position an earlier vertex has */
+} ebpo_positions;
+
+/* -0 equals 0; NaNs are compared by their bits. `out` is cleared on failure. The result is the same
+ * for any thread count. */
+EBPO_MUST_USE ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh,
+                                               unsigned threads, const ebpo_progress *progress,
+                                               ebpo_error *error);
+void ebpo_positions_free(ebpo_positions *positions);
+
+/* The lowest vertex number with the position of v. */
+uint32_t ebpo_positions_first(const ebpo_positions *positions, uint32_t v);
 
 #endif

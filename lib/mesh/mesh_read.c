@@ -9,7 +9,7 @@
 #include "core/checksum.h"
 #include "core/workspace.h"
 #include "mesh/import.h"
-#include "mesh/stl.h"
+#include "mesh/import_build.h"
 #include "mesh/textures.h"
 #include "io/file_source.h"
 #include "mesh/mesh_parts.h"
@@ -75,9 +75,9 @@ static ebpo_status import_groups(ebpo_mesh *out, const ebpo_whole_file *file, co
     return status;
 }
 
-static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
-                         const ebpo_mesh_read_options *wanted, ebpo_mesh_groups **groups,
-                         ebpo_error *error)
+static ebpo_status read_parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
+                              const ebpo_mesh_read_options *wanted, ebpo_mesh_groups **groups,
+                              ebpo_error *error)
 {
     const char *dot = strrchr(ebpo_path_name(path), '.');
     const char *foreign;
@@ -132,7 +132,7 @@ static ebpo_status read_mesh(const char *path, const ebpo_mesh_read_options *opt
         return status;
     }
     hash_begin(&hash);
-    status = parse(out, &file, path, &wanted, groups, error);
+    status = read_parse(out, &file, path, &wanted, groups, error);
     hash_end(&hash);
     out->workspace = workspace;
     if (status == EBPO_OK && wanted.attributes)

@@ -13,7 +13,6 @@
 #include "core/parallel.h"
 #include "mesh/attributes.h"
 #include "mesh/mesh_parts.h"
-#include "mesh/positions.h"
 
 enum { VERTEX_GRAIN = 1 << 14 };
 
@@ -39,7 +38,7 @@ static inline bool same_key(const key *a, const key *b)
 
 /* True when the position was there already. Whoever comes first, the slot ends up with the lowest
  * number. */
-static bool insert(ebpo_positions *t, uint32_t v)
+static bool weld_insert(ebpo_positions *t, uint32_t v)
 {
     key k = key_of(t->mesh, v);
     for (uint64_t h = ebpo_hash_three(k.bits) & t->mask;; h = (h + 1) & t->mask) {
@@ -65,7 +64,7 @@ static ebpo_status insert_range(void *context, uint64_t begin, uint64_t end, uns
     ebpo_positions *t = context;
     uint64_t repeated = 0;
     EBPO_FOR_ITEMS_SCATTERED(t->mesh->workspace, v, begin, end)
-        repeated += insert(t, (uint32_t)v);
+        repeated += weld_insert(t, (uint32_t)v);
     __atomic_fetch_add(&t->repeated, repeated, __ATOMIC_RELAXED);
     return EBPO_OK;
 }
@@ -231,7 +230,7 @@ static ebpo_status group_within(welding *w, ebpo_error *error)
 
 /* Of each group the vertex that the source has first. Groups are numbered by their first vertices,
  * so a new number is met first as the next one. */
-static ebpo_status choose(welding *w, ebpo_error *error)
+static ebpo_status weld_choose(welding *w, ebpo_error *error)
 {
     const ebpo_mesh *mesh = w->mesh;
     uint64_t met = 0;
@@ -371,7 +370,7 @@ static void move_vertices(welding *w)
         mesh->xyz64 = smaller;
 }
 
-static ebpo_status run(welding *w, ebpo_error *error)
+static ebpo_status weld_run(welding *w, ebpo_error *error)
 {
     ebpo_mesh *mesh = w->mesh;
     ebpo_status status = ebpo_parallel_for(0, mesh->workspace, mesh->face_count, GRAIN,
@@ -390,7 +389,7 @@ static ebpo_status run(welding *w, ebpo_error *error)
         return status;
     status = ebpo_mesh_check_whole(mesh, error);
     if (status == EBPO_OK && !w->from)
-        status = choose(w, error);
+        status = weld_choose(w, error);
     if (status != EBPO_OK)
         return status;
     if (mesh->arrangement)
@@ -408,15 +407,15 @@ static ebpo_status run(welding *w, ebpo_error *error)
 }
 
 /* Distance 0: by equal positions. */
-static ebpo_status weld(ebpo_mesh *mesh, double distance, ebpo_mend_record *record,
-                        ebpo_error *error)
+static ebpo_status mesh_weld_weld(ebpo_mesh *mesh, double distance, ebpo_mend_record *record,
+                                  ebpo_error *error)
 {
     welding w = { .mesh = mesh, .distance = distance };
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)
         return status;
     uint64_t count = mesh->vertex_count;
-    status = run(&w, error);
+    status = weld_run(&w, error);
     if (status == EBPO_OK && record) {
         record->weld = true;
         record->welded_vertices += count - mesh->vertex_count;
@@ -438,7 +437,7 @@ static ebpo_status weld(ebpo_mesh *mesh, double distance, ebpo_mend_record *reco
 ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    return weld(mesh, 0, record, error);
+    return mesh_weld_weld(mesh, 0, record, error);
 }
 
 ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double distance, ebpo_mend_record *record,
@@ -448,6 +447,6 @@ ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double distance, ebpo_mend_re
     if (!(distance > 0))
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
                               "the distance to weld within has to be above 0, not %g", distance);
-    ebpo_status status = weld(mesh, 0, record, error);
-    return status == EBPO_OK ? weld(mesh, distance, record, error) : status;
+    ebpo_status status = mesh_weld_weld(mesh, 0, record, error);
+    return status == EBPO_OK ? mesh_weld_weld(mesh, distance, record, error) : status;
 }

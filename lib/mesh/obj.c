@@ -1,19 +1,547 @@
+#include "core/strict_fp.h"
+
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/text.h"
+#include "core/workspace.h"
+#include "geometry/decimal.h"
+#include "mesh/attributes.h"
+#include "mesh/import_build.h"
+#include "mesh/obj.h"
+
+/* What both passes over an OBJ file share. */
+
+/* What the file says and the mesh does not have. */
+typedef struct obj_losses {
+    uint64_t weights, surplus;              /* vertices divided by w; with values beyond */
+    uint64_t curves, unknown, unknown_line; /* statements; where the first unknown one is */
+    uint64_t absent[IMPORT_SORTS];          /* corners that name values that are not there */
+    uint64_t uncoloured, alpha, no_numbers; /* vertices, vertices, normals and coordinates */
+    bool third, smoothing, library, groups;
+} obj_losses;
+
+typedef struct obj_reading {
+    import_build *build;
+    const uint8_t *data;
+    uint64_t size;
+    obj_text text;
+    uint64_t next_release;       /* byte */
+    uint64_t line;               /* where the statement began */
+    uint64_t rows[IMPORT_SORTS]; /* of the file's vertices, normals, texture coordinates; in the
+                                    second pass of those so far */
+    ebpo_obj_runs *runs;         /* NULL: not asked for */
+    obj_losses losses;
+    obj_names names;
+} obj_reading;
+
+/* EBPO_E_FORMAT, with the statement's line. */
+ebpo_status ebpo_obj_fail(const obj_reading *r, const char *format, ...) EBPO_PRINTF(2, 3);
+
+/* The second pass over an OBJ file. */
+
+static bool ends_line(char c) { return c == '\n' || c == '\r'; }
+
+static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
+
+obj_text ebpo_obj_text(const uint8_t *data, uint64_t size)
+{
+    return (obj_text){ (const char *)data + ebpo_text_mark(data, size), (const char *)data + size,
+                       1, false };
+}
+
+/* Characters at which a word may end. */
+static const bool may_end[256] = { [' '] = true,  ['\t'] = true, ['\v'] = true, ['\f'] = true,
+                                   ['\n'] = true, ['\r'] = true, ['\\'] = true };
+
+/* Past the end of a line. */
+static const char *past_end(const char *at, const char *end)
+{
+    if (end - at > 1 && at[0] == '\r' && at[1] == '\n')
+        return at + 2;
+    return at < end ? at + 1 : at;
+}
+
+/* The end of the line where a backslash joins it to the next; NULL: it does not. */
+static const char *joined_end(const char *at, const char *end)
+{
+    if (*at != '\\')
+        return NULL;
+    for (at++; at < end && is_blank(*at);)
+        at++;
+    return at < end && ends_line(*at) ? at : NULL;
+}
+
+static void skip_blanks(obj_text *t)
+{
+    const char *joined;
+    while (t->at < t->end) {
+        if (is_blank(*t->at)) {
+            t->at++;
+        } else if ((joined = joined_end(t->at, t->end))) {
+            t->at = past_end(joined, t->end);
+            t->line++;
+        } else {
+            return;
+        }
+    }
+}
+
+bool ebpo_obj_next_word(obj_text *t, obj_word *word)
+{
+    skip_blanks(t);
+    const char *s = t->at;
+    if (s == t->end || ends_line(*s) || *s == '#')
+        return false;
+    const char *at = s;
+    while (at < t->end && (!may_end[(uint8_t)*at] || (*at == '\\' && !joined_end(at, t->end))))
+        at++;
+    t->at = at;
+    *word = (obj_word){ s, (size_t)(at - s) };
+    return true;
+}
+
+static void skip_line(obj_text *t)
+{
+    while (t->at < t->end && !ends_line(*t->at))
+        t->at++;
+}
+
+obj_word ebpo_obj_name(obj_text *t)
+{
+    while (t->at < t->end && is_blank(*t->at))
+        t->at++;
+    const char *s = t->at, *stop;
+    skip_line(t);
+    for (stop = t->at; stop > s && is_blank(stop[-1]);)
+        stop--;
+    return (obj_word){ s, (size_t)(stop - s) };
+}
+
+bool ebpo_obj_next_statement(obj_text *t, obj_word *word)
+{
+    bool begun = t->begun;
+    t->begun = true;
+    while (ebpo_obj_next_word(t, word))
+        if (!begun)
+            return true;
+    for (;;) {
+        skip_line(t);
+        if (t->at == t->end)
+            return false;
+        t->at = past_end(t->at, t->end);
+        t->line++;
+        if (ebpo_obj_next_word(t, word))
+            return true;
+    }
+}
+
+bool ebpo_obj_word_is(obj_word word, const char *text)
+{
+    return word.n == strlen(text) && memcmp(word.s, text, word.n) == 0;
+}
+
+enum { RUNS_MOST = 100000000, MATERIALS_MOST = 10000000 };
+
+void ebpo_obj_runs_free(ebpo_obj_runs *runs)
+{
+    free(runs->of);
+    *runs = (ebpo_obj_runs){ 0 };
+}
+
+ebpo_status ebpo_obj_runs_add(ebpo_obj_runs *runs, obj_word run, const char *name,
+                              ebpo_error *error)
+{
+    if (runs->count == RUNS_MOST)
+        return ebpo_fail_file(error, EBPO_E_LIMIT, name,
+                              "has more than %d lines that name groups; leave some out", RUNS_MOST);
+    if (!ebpo_grow(&runs->of, &runs->capacity, runs->count + 1, sizeof *runs->of))
+        return ebpo_fail_memory(error, (runs->count + 1) * sizeof *runs->of);
+    runs->of[runs->count++] = (ebpo_named_run){ .name = run.s, .size = run.n };
+    return EBPO_OK;
+}
+
+/* --- materials --- */
+
+static uint64_t hash_of(obj_word word)
+{
+    uint64_t hash = word.n;
+    for (size_t i = 0; i < word.n; i++)
+        hash = hash * 31 + (uint8_t)word.s[i];
+    return ebpo_hash_number(hash);
+}
+
+static bool obj_names_same(obj_word a, obj_word b)
+{
+    return a.n == b.n && memcmp(a.s, b.s, a.n) == 0;
+}
+
+/* Place of the name in the table: where its number is, or would go. 0 is a free slot, as the number
+ * 0 has no name. */
+static uint64_t obj_names_find(const obj_names *names, obj_word word)
+{
+    uint64_t at;
+    EBPO_HASH_FIND(at, hash_of(word), names->slots - 1,
+                   !names->slot[at] || obj_names_same(names->material[names->slot[at]], word));
+    return at;
+}
+
+static bool grow_table(obj_names *names)
+{
+    uint64_t slots = ebpo_hash_slots(4 * (names->count + 1));
+    uint32_t *slot = ebpo_alloc_zero(slots, sizeof *slot);
+    if (!slot)
+        return false;
+    free(names->slot);
+    names->slot = slot;
+    names->slots = slots;
+    for (uint64_t i = 1; i < names->count; i++)
+        slot[obj_names_find(names, names->material[i])] = (uint32_t)i;
+    return true;
+}
+
+ebpo_status ebpo_obj_use_material(obj_names *names, obj_word material, ebpo_error *error)
+{
+    if (names->count >= MATERIALS_MOST)
+        return ebpo_fail(error, EBPO_E_LIMIT, "there are more than %d names of materials",
+                         MATERIALS_MOST);
+    uint64_t need = names->count ? names->count + 1 : 2;
+    if (!ebpo_grow(&names->material, &names->capacity, need, sizeof *names->material) ||
+        (2 * need > names->slots && !grow_table(names)))
+        return ebpo_fail_memory(error, need * sizeof *names->material);
+    if (!names->count)
+        names->material[names->count++] = (obj_word){ "DefaultMaterial", 15 };
+    uint64_t at = obj_names_find(names, material);
+    if (!names->slot[at]) {
+        names->material[names->count] = material;
+        names->slot[at] = (uint32_t)names->count++;
+    }
+    names->current = names->slot[at];
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_obj_give_material(obj_names *names, const ebpo_mesh *mesh, ebpo_error *error)
+{
+    if (!ebpo_array_grow(mesh->workspace, &names->of_face, &names->face_capacity, mesh->face_count,
+                         sizeof *names->of_face))
+        return ebpo_workspace_fail(mesh->workspace, mesh->face_count * sizeof *names->of_face,
+                                   error);
+    while (names->faces < mesh->face_count)
+        names->of_face[names->faces++] = names->current;
+    return EBPO_OK;
+}
+
+static void print_names(FILE *out, const obj_names *names)
+{
+    for (uint64_t i = 0; i < names->count; i++) {
+        fprintf(out, "comment material %llu ", (unsigned long long)i);
+        for (size_t k = 0; k < names->material[i].n; k++) {
+            char c = names->material[i].s[k];
+            fputc((unsigned char)c < ' ' || c == 127 ? '?' : c, out);
+        }
+        fputc('\n', out);
+    }
+}
+
+static void print_properties(FILE *out, const ebpo_attributes *attributes, const char *element)
+{
+    for (uint64_t i = 0; i < attributes->count; i++) {
+        const ebpo_attribute *a = &attributes->array[i];
+        const char *type = a->type == EBPO_ATTRIBUTE_FLOAT32 ? "float" : "uint";
+        const char *name = a->names;
+        if (!ebpo_attribute_is_of(a, element))
+            continue;
+        if (a->list != EBPO_ATTRIBUTE_NO_LIST)
+            fprintf(out, "property list uchar %s %s\n", type, name);
+        else
+            for (size_t n; (n = strcspn(name, " ")) > 0; name += n + (name[n] == ' '))
+                fprintf(out, "property %s %.*s\n", type, (int)n, name);
+    }
+}
+
+/* A header of PLY, as such files are written again. */
+static ebpo_status make_header(const ebpo_mesh *mesh, const obj_names *names, ebpo_error *error)
+{
+    ebpo_attributes *attributes = mesh->attributes;
+    const char *type = mesh->xyz64 ? "double" : "float";
+    ebpo_text_stream text;
+    if (!ebpo_text_stream_begin(&text))
+        return ebpo_fail_memory(error, BUFSIZ);
+    FILE *out = text.file;
+    fputs("ply\nformat binary_little_endian 1.0\n", out);
+    print_names(out, names);
+    fprintf(out, "element vertex 0\nproperty %s x\nproperty %s y\nproperty %s z\n", type, type,
+            type);
+    print_properties(out, attributes, "vertex");
+    fputs("element face 0\nproperty list uchar int vertex_indices\n", out);
+    print_properties(out, attributes, "face");
+    fputs("end_header\n", out);
+    if (!ebpo_text_stream_end(&text))
+        return ebpo_fail_memory(error, text.bytes);
+    if (text.bytes > EBPO_ATTRIBUTE_HEADER) {
+        free(text.text);
+        ebpo_attributes_lose(attributes, "names of materials (more than 1 MiB)");
+        return EBPO_OK;
+    }
+    attributes->header = text.text;
+    attributes->header_bytes = text.bytes;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_obj_keep_materials(obj_names *names, ebpo_mesh *mesh, ebpo_error *error)
+{
+    ebpo_attribute head = { .element = "face", .names = "material", .columns = 1 };
+    if (!names->count)
+        return EBPO_OK;
+    head.type = EBPO_ATTRIBUTE_UINT32;
+    head.list = EBPO_ATTRIBUTE_NO_LIST;
+    head.rows = mesh->face_count;
+    ebpo_attribute *a = ebpo_attributes_add(mesh->attributes, &head);
+    if (!a)
+        return ebpo_fail_memory(error, sizeof *a);
+    a->values = ebpo_array_alloc(mesh->workspace, mesh->face_count, sizeof *names->of_face);
+    if (!a->values)
+        return ebpo_workspace_fail(mesh->workspace, mesh->face_count * sizeof *names->of_face,
+                                   error);
+    ebpo_array_copy(mesh->workspace, a->values, names->of_face,
+                    mesh->face_count * sizeof *names->of_face);
+    return make_header(mesh, names, error);
+}
+
+void ebpo_obj_names_free(obj_names *names, ebpo_workspace *workspace)
+{
+    free(names->material);
+    free(names->slot);
+    ebpo_array_free(workspace, names->of_face);
+}
+
+enum { RELEASE = 1 << 22 };
+
+ebpo_status ebpo_obj_fail(const obj_reading *r, const char *format, ...)
+{
+    char text[320];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    return ebpo_fail_file(r->build->error, EBPO_E_FORMAT, r->build->name, "line %" PRIu64 ": %s",
+                          r->line, text);
+}
+
+/* The next statement's first word; lets pages go now and then. */
+static bool ebpo_obj_step(obj_reading *r, obj_word *word)
+{
+    uint64_t at = (uint64_t)(r->text.at - (const char *)r->data);
+    if (at >= r->next_release) {
+        ebpo_release_pages(r->build->mesh->workspace);
+        r->next_release = at + RELEASE;
+    }
+    bool more = ebpo_obj_next_statement(&r->text, word);
+    r->line = r->text.line;
+    return more;
+}
+
+/* The second pass: faces, and under which names they stand. */
+
+/* What the parts of a corner, v/vt/vn, behind the first are numbers of. */
+static const import_sort sort_of[2] = { IMPORT_TEXTURE, IMPORT_NORMALS };
+
+static ebpo_status fail_corner(const obj_reading *r, obj_word word)
+{
+    char text[IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, word.s, word.n);
+    return ebpo_obj_fail(r,
+                         "a face has the corner '%s', but it takes v, v/vt, v//vn or v/vt/vn; "
+                         "repair the file",
+                         text);
+}
+
+/* [+-] digits, up to `end` or a slash. */
+static bool read_number(const char **at, const char *end, int64_t *number)
+{
+    bool negative = *at < end && **at == '-';
+    if (*at < end && (**at == '-' || **at == '+'))
+        ++*at;
+    const char *first = *at;
+    for (*number = 0; *at < end && **at >= '0' && **at <= '9'; ++*at)
+        if (*number < INT64_C(1) << 40)
+            *number = 10 * *number + (**at - '0');
+    *number = negative ? -*number : *number;
+    return *at > first && (*at == end || **at == '/');
+}
+
+/* Numbers count from 1, or back from what stands before the face. */
+static bool obj_faces_resolve(const obj_reading *r, import_sort sort, uint64_t total,
+                              int64_t number, uint32_t *row)
+{
+    int64_t at = number > 0 ? number - 1 : (int64_t)r->rows[sort] + number;
+    *row = (uint32_t)at;
+    return number != 0 && at >= 0 && (uint64_t)at < total;
+}
+
+static ebpo_status obj_faces_fail_vertex(const obj_reading *r, int64_t number)
+{
+    if (number > 0)
+        return ebpo_obj_fail(r,
+                             "a face names vertex %" PRId64 ", but there are %" PRIu64
+                             " vertices; repair the file or drop the face",
+                             number, r->build->vertices);
+    return number ? ebpo_obj_fail(r,
+                                  "a face names vertex %" PRId64 ", but only %" PRIu64
+                                  " stand before it; repair the file or drop the face",
+                                  number, r->rows[IMPORT_COLOURS])
+                  : ebpo_obj_fail(r, "a face names vertex 0, but they count from 1; repair the "
+                                     "file");
+}
+
+static ebpo_status add_corner(obj_reading *r, const uint64_t total[IMPORT_SORTS], obj_word word)
+{
+    const char *at = word.s, *end = word.s + word.n;
+    import_corner *c = ebpo_import_corner(r->build);
+    int64_t number;
+    if (!c)
+        return ebpo_fail_memory(r->build->error, r->build->corners * sizeof *c);
+    memset(c, 0xff, sizeof *c);
+    if (!read_number(&at, end, &number))
+        return fail_corner(r, word);
+    if (!obj_faces_resolve(r, IMPORT_COLOURS, r->build->vertices, number, &c->vertex))
+        return obj_faces_fail_vertex(r, number);
+    c->row[IMPORT_COLOURS] = c->vertex;
+    for (int i = 0; i < 2 && at < end; i++) {
+        import_sort sort = sort_of[i];
+        at++;
+        if (at == end || *at == '/') /* not given */
+            continue;
+        if (!read_number(&at, end, &number))
+            return fail_corner(r, word);
+        if (!obj_faces_resolve(r, sort, total[sort], number, &c->row[sort])) {
+            c->row[sort] = IMPORT_NONE;
+            r->losses.absent[sort]++;
+        }
+    }
+    return at == end ? EBPO_OK : fail_corner(r, word);
+}
+
+static ebpo_status read_face(obj_reading *r, const uint64_t total[IMPORT_SORTS])
+{
+    import_build *b = r->build;
+    ebpo_mesh *mesh = b->mesh;
+    uint64_t before = mesh->face_count;
+    obj_word word;
+    ebpo_status status = EBPO_OK;
+    while (status == EBPO_OK && ebpo_obj_next_word(&r->text, &word))
+        status = add_corner(r, total, word);
+    if (status == EBPO_OK)
+        status = ebpo_import_polygon(b);
+    if (r->runs && status == EBPO_OK)
+        r->runs->of[r->runs->count - 1].faces += mesh->face_count - before;
+    return status;
+}
+
+/* Faces so far have the material so far. */
+static ebpo_status use_material(obj_reading *r)
+{
+    import_build *b = r->build;
+    obj_word name = ebpo_obj_name(&r->text);
+    if (!b->attributes || !name.n)
+        return EBPO_OK;
+    ebpo_status status = ebpo_obj_give_material(&r->names, b->mesh, b->error);
+    return status == EBPO_OK ? ebpo_obj_use_material(&r->names, name, b->error) : status;
+}
+
+static ebpo_status begin_run(obj_reading *r)
+{
+    obj_word name = ebpo_obj_name(&r->text);
+    r->losses.groups |= name.n > 0;
+    return r->runs ? ebpo_obj_runs_add(r->runs, name, r->build->name, r->build->error) : EBPO_OK;
+}
+
+/* Free-form geometry, points and lines; and what says how these are drawn, which no mesh needs. */
+static bool is_curve(obj_word word)
+{
+    static const char *const words[] = { "p",    "l",    "vp",    "cstype", "deg",  "bmat",
+                                         "step", "curv", "curv2", "surf",   "parm", "trim",
+                                         "hole", "scrv", "sp",    "con",    "end",  "bzp",
+                                         "cdc",  "cdp",  "res",   "bsp" };
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (ebpo_obj_word_is(word, words[i]))
+            return true;
+    return false;
+}
+
+static bool is_display(obj_word word)
+{
+    static const char *const words[] = { "mg",        "bevel",  "c_interp", "d_interp",
+                                         "lod",       "usemap", "maplib",   "shadow_obj",
+                                         "trace_obj", "ctech",  "stech",    "call" };
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (ebpo_obj_word_is(word, words[i]))
+            return true;
+    return false;
+}
+
+static void note_other(obj_reading *r, obj_word word)
+{
+    obj_losses *l = &r->losses;
+    if (ebpo_obj_word_is(word, "mtllib")) {
+        l->library |= ebpo_obj_name(&r->text).n > 0;
+    } else if (ebpo_obj_word_is(word, "s")) {
+        obj_word value = ebpo_obj_name(&r->text);
+        l->smoothing |= value.n && !ebpo_obj_word_is(value, "off") && !ebpo_obj_word_is(value, "0");
+    } else if (is_curve(word)) {
+        l->curves++;
+    } else if (!is_display(word)) {
+        l->unknown_line = l->unknown++ ? l->unknown_line : r->line;
+    }
+}
+
+static ebpo_status read_statement(obj_reading *r, const uint64_t total[IMPORT_SORTS], obj_word word)
+{
+    if (*word.s == 'v' && word.n <= 2) {
+        char second = word.n == 2 ? word.s[1] : 0;
+        if (!second || second == 'n' || second == 't') {
+            r->rows[second == 'n' ? IMPORT_NORMALS : second ? IMPORT_TEXTURE : IMPORT_COLOURS]++;
+            return EBPO_OK;
+        }
+    }
+    if (ebpo_obj_word_is(word, "f") || ebpo_obj_word_is(word, "fo"))
+        return read_face(r, total);
+    if (ebpo_obj_word_is(word, "g") || ebpo_obj_word_is(word, "o"))
+        return begin_run(r);
+    if (ebpo_obj_word_is(word, "usemtl"))
+        return use_material(r);
+    note_other(r, word);
+    return EBPO_OK;
+}
+
+/* The faces, with what is said on the way. Errors are those of ebpo_import_memory. */
+static ebpo_status ebpo_obj_read_faces(obj_reading *r)
+{
+    import_build *b = r->build;
+    uint64_t total[IMPORT_SORTS];
+    obj_word word;
+    ebpo_status status =
+        r->runs ? ebpo_obj_runs_add(r->runs, (obj_word){ "", 0 }, b->name, b->error) : EBPO_OK;
+    memcpy(total, r->rows, sizeof total);
+    memset(r->rows, 0, sizeof r->rows);
+    r->text = ebpo_obj_text(r->data, r->size);
+    r->next_release = 0;
+    while (status == EBPO_OK && ebpo_obj_step(r, &word))
+        status = read_statement(r, total, word);
+    return status == EBPO_OK && r->names.count
+               ? ebpo_obj_give_material(&r->names, b->mesh, b->error)
+               : status;
+}
+
 /* The first pass: what faces name. Faces may name what comes later, so they are a pass of their
  * own.
  */
-#include "core/strict_fp.h"
-
-#include "mesh/obj.h"
-
-#include <inttypes.h>
-#include <string.h>
-
-#include "mesh/attributes.h"
-#include "core/workspace.h"
-#include "core/error.h"
-#include "geometry/decimal.h"
-#include "mesh/obj_faces.h"
-#include "mesh/obj_state.h"
 
 enum { MOST_WORDS = 8 };
 
@@ -44,7 +572,7 @@ static bool read_position(const obj_reading *r, const obj_word *word, double xyz
     return true;
 }
 
-static ebpo_status fail_vertex(const obj_reading *r, obj_word word)
+static ebpo_status obj_fail_vertex(const obj_reading *r, obj_word word)
 {
     char text[IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
@@ -53,11 +581,11 @@ static ebpo_status fail_vertex(const obj_reading *r, obj_word word)
 }
 
 /* Homogeneous coordinates, as w is where it is no 1. */
-static ebpo_status divide(obj_reading *r, const obj_word word[4], double xyz[3])
+static ebpo_status obj_divide(obj_reading *r, const obj_word word[4], double xyz[3])
 {
     double w;
     if (!ebpo_number_double(&w, word[3].s, word[3].n, r->build->c_locale) || w == 0)
-        return fail_vertex(r, word[3]);
+        return obj_fail_vertex(r, word[3]);
     for (int k = 0; k < 3 && w != 1; k++)
         ebpo_import_quotient(r->build, &xyz[k], word[k].s, word[k].n, w);
     r->losses.weights += w != 1;
@@ -100,8 +628,8 @@ static ebpo_status read_vertex(obj_reading *r)
                              "(0 in a plane), or repair the file",
                              r->build->vertices + 1, n);
     if (!read_position(r, word, xyz, &bad))
-        return fail_vertex(r, word[bad]);
-    ebpo_status status = n == 4 ? divide(r, word, xyz) : EBPO_OK;
+        return obj_fail_vertex(r, word[bad]);
+    ebpo_status status = n == 4 ? obj_divide(r, word, xyz) : EBPO_OK;
     if (status == EBPO_OK)
         status = ebpo_import_position(r->build, xyz);
     r->losses.surplus += n == 5 || n == 8;

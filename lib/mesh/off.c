@@ -13,7 +13,7 @@
 #include "core/text.h"
 #include "geometry/decimal.h"
 #include "mesh/attributes.h"
-#include "mesh/off.h"
+#include "mesh/import_build.h"
 
 /* The words of an OFF file. */
 
@@ -118,9 +118,9 @@ typedef struct off_reading {
     bool alpha, both, more;
 } off_reading;
 
-static ebpo_status fail(const off_reading *r, const char *format, ...) EBPO_PRINTF(2, 3);
+static ebpo_status off_fail(const off_reading *r, const char *format, ...) EBPO_PRINTF(2, 3);
 
-static ebpo_status fail(const off_reading *r, const char *format, ...)
+static ebpo_status off_fail(const off_reading *r, const char *format, ...)
 {
     char text[320];
     va_list args;
@@ -182,7 +182,8 @@ static bool read_count(off_word word, uint64_t *value)
 
 static ebpo_status fail_counts(const off_reading *r)
 {
-    return fail(r, "no counts of vertices, faces and edges follow the word OFF; repair the file");
+    return off_fail(r,
+                    "no counts of vertices, faces and edges follow the word OFF; repair the file");
 }
 
 /* Edges: on the line of the faces, or alone on the next one; some programs leave their count out.
@@ -217,7 +218,7 @@ static ebpo_status read_head(off_reading *r)
     off_word word;
     bool dimension = false;
     if (!ebpo_off_next(&r->text, &word))
-        return fail(r, "the file is empty; there is no mesh in it");
+        return off_fail(r, "the file is empty; there is no mesh in it");
     off_text behind = r->text;
     size_t named = read_kind(word, r, &dimension);
     if (named) {
@@ -237,9 +238,10 @@ static ebpo_status read_head(off_reading *r)
             return fail_counts(r);
     }
     if (!read_count(word, &r->vertices))
-        return named ? fail_counts(r)
-                     : fail(r, "neither the word OFF nor counts stand there; this is not an OFF "
-                               "file that can be read");
+        return named
+                   ? fail_counts(r)
+                   : off_fail(r, "neither the word OFF nor counts stand there; this is not an OFF "
+                                 "file that can be read");
     if (!ebpo_off_next(&r->text, &word) || !read_count(word, &r->faces))
         return fail_counts(r);
     read_edges(r);
@@ -280,7 +282,7 @@ static void take_rest(off_reading *r)
 }
 
 /* Numbers of the rest from `first` on, into a row of a table. */
-static ebpo_status keep(off_reading *r, import_sort sort, int first, bool *good)
+static ebpo_status off_keep(off_reading *r, import_sort sort, int first, bool *good)
 {
     float value[3] = { 0, 0, 0 };
     int columns = (int)ebpo_import_columns(sort);
@@ -305,18 +307,18 @@ static ebpo_status keep_rest(off_reading *r)
     bool fine = left >= 0, good;
     ebpo_status status = EBPO_OK;
     if (r->normals) {
-        status = keep(r, IMPORT_NORMALS, 0, &good);
+        status = off_keep(r, IMPORT_NORMALS, 0, &good);
         fine &= good;
     }
     if (r->colours && status == EBPO_OK) {
-        status = keep(r, IMPORT_COLOURS, at, &good);
+        status = off_keep(r, IMPORT_COLOURS, at, &good);
         fine &= good && (left == 3 || left == 4);
         r->alpha |= left == 4;
     } else {
         fine &= left == 0;
     }
     if (r->texture && status == EBPO_OK) {
-        status = keep(r, IMPORT_TEXTURE, r->rest_count - 2 > 0 ? r->rest_count - 2 : 0, &good);
+        status = off_keep(r, IMPORT_TEXTURE, r->rest_count - 2 > 0 ? r->rest_count - 2 : 0, &good);
         fine &= good;
     }
     r->surplus_vertices += !fine;
@@ -348,7 +350,7 @@ static ebpo_status fail_number(const off_reading *r, off_word word, uint64_t row
 {
     char text[IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
-    return fail(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text, row);
+    return off_fail(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text, row);
 }
 
 static ebpo_status read_vertex(off_reading *r, uint64_t row)
@@ -359,7 +361,7 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
         if (!next_needed(r, k == 0, &word[k])) {
             if (k == 0 || r->text.at == r->text.end)
                 return fail_end(r, "vertex", row + (k > 0));
-            return fail(r, "vertex %" PRIu64 " has no three coordinates; repair the file", row);
+            return off_fail(r, "vertex %" PRIu64 " has no three coordinates; repair the file", row);
         }
         const char *s = word[k].s;
         size_t n = word[k].n;
@@ -393,7 +395,7 @@ static ebpo_status keep_face(off_reading *r, uint32_t *row)
     }
     r->alpha |= r->rest_count == 4;
     t->of_face = true;
-    ebpo_status status = keep(r, IMPORT_COLOURS, 0, &good);
+    ebpo_status status = off_keep(r, IMPORT_COLOURS, 0, &good);
     r->surplus_faces += !good;
     if (t->rows)
         *row = (uint32_t)(t->rows - 1);
@@ -408,14 +410,15 @@ static ebpo_status read_corner(off_reading *r, uint64_t row, uint64_t corners)
     if (!c)
         return ebpo_fail_memory(r->build->error, r->build->corners * sizeof *c);
     if (!next_needed(r, false, &word) || !read_count(word, &index))
-        return fail(r,
-                    "face %" PRIu64 " names fewer than its %" PRIu64 " vertices; repair the file",
-                    row, corners);
+        return off_fail(r,
+                        "face %" PRIu64 " names fewer than its %" PRIu64
+                        " vertices; repair the file",
+                        row, corners);
     if (index >= r->vertices)
-        return fail(r,
-                    "face %" PRIu64 " names vertex %" PRIu64 ", but there are %" PRIu64
-                    " vertices; repair the file or drop the face",
-                    row, index, r->vertices);
+        return off_fail(r,
+                        "face %" PRIu64 " names vertex %" PRIu64 ", but there are %" PRIu64
+                        " vertices; repair the file or drop the face",
+                        row, index, r->vertices);
     c->vertex = (uint32_t)index;
     c->row[IMPORT_COLOURS] = r->colours ? c->vertex : IMPORT_NONE;
     c->row[IMPORT_NORMALS] = r->normals ? c->vertex : IMPORT_NONE;
@@ -432,12 +435,12 @@ static ebpo_status read_face(off_reading *r, uint64_t row)
     if (!next_needed(r, true, &word))
         return fail_end(r, "face", row);
     if (!read_count(word, &corners) || !corners)
-        return fail(r, "face %" PRIu64 " has no number of corners; repair the file", row);
+        return off_fail(r, "face %" PRIu64 " has no number of corners; repair the file", row);
     if (corners > r->size / 2)
-        return fail(r,
-                    "face %" PRIu64 " has %" PRIu64 " corners, more than fit into the file; "
-                    "repair it",
-                    row, corners);
+        return off_fail(r,
+                        "face %" PRIu64 " has %" PRIu64 " corners, more than fit into the file; "
+                        "repair it",
+                        row, corners);
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < corners && status == EBPO_OK; i++)
         status = read_corner(r, row, corners);
@@ -495,8 +498,8 @@ static ebpo_status read_rows(off_reading *r)
     if (status == EBPO_OK)
         r->more = ebpo_off_next(&r->text, &word);
     if (status == EBPO_OK && r->more && r->rows == ROWS_ANYHOW)
-        status = fail(r, "there is more behind the last face, though lines have several rows; "
-                         "repair the counts");
+        status = off_fail(r, "there is more behind the last face, though lines have several rows; "
+                             "repair the counts");
     return status;
 }
 

@@ -9,7 +9,6 @@
 #include "core/parallel.h"
 #include "core/workspace.h"
 #include "mesh/adjacency.h"
-#include "mesh/mesh_frame.h"
 #include "mesh/mesh_parts.h"
 #include "mesh/sum.h"
 
@@ -87,7 +86,7 @@ static uint64_t find_root(uint64_t *above, uint32_t f)
 
 /* The higher root goes below the lower one, so that the roots are the same in any order. False when
  * the faces are in one patch already, the other way round. */
-static bool join(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
+static bool orient_join(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
 {
     for (;;) {
         uint64_t ra = find_root(above, a), rb = find_root(above, b);
@@ -101,7 +100,7 @@ static bool join(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
     }
 }
 
-static void flag(orienting *o, uint32_t face, uint8_t flags)
+static void orient_flag(orienting *o, uint32_t face, uint8_t flags)
 {
     __atomic_fetch_or(&o->flags[face], flags, __ATOMIC_RELAXED);
 }
@@ -115,14 +114,14 @@ static void visit_edge(orienting *o, const ebpo_link *links, uint64_t uses)
         return;
     }
     if (uses != 2 || a == b) {
-        flag(o, a, BOUNDARY);
+        orient_flag(o, a, BOUNDARY);
         return;
     }
     uint64_t turned = links[0].out == links[1].out;
     if (turned)
-        flag(o, a, INCONSISTENT);
-    if (!join(o->above, a, b, turned))
-        flag(o, a, TWISTED);
+        orient_flag(o, a, INCONSISTENT);
+    if (!orient_join(o->above, a, b, turned))
+        orient_flag(o, a, TWISTED);
 }
 
 static ebpo_status begin_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -238,7 +237,7 @@ static void flag_unbalanced(orienting *o, ebpo_edge_faces *e, uint8_t flags)
         for (next = i; next < e->count && e->face[next].patch >> 1 == e->face[i].patch >> 1; next++)
             sum += (e->face[next].out ^ (e->face[next].patch & 1)) ? 1 : -1;
         if (sum)
-            flag(o, (uint32_t)(e->face[i].patch >> 1), flags);
+            orient_flag(o, (uint32_t)(e->face[i].patch >> 1), flags);
     }
 }
 
@@ -282,13 +281,13 @@ static ebpo_status join_around(orienting *o, const ebpo_link *links, uint64_t us
     bool turns = kept % 2 == 0 && ebpo_edge_faces_turn(e, o->mesh, v, ebpo_link_neighbour(links));
     if (!turns || !ebpo_edge_faces_alternate(e))
         for (uint64_t i = 0; i < kept; i++)
-            flag(o, (uint32_t)(e->face[i].patch >> 1), INCONSISTENT);
+            orient_flag(o, (uint32_t)(e->face[i].patch >> 1), INCONSISTENT);
     for (uint64_t i = 0; turns && i + 1 < kept; i++) {
         const ebpo_edge_face *a = &e->face[i], *b = a + 1;
         uint64_t turned = a->out == b->out;
-        if (!join(o->above, (uint32_t)(a->patch >> 1), (uint32_t)(b->patch >> 1),
-                  (turned ^ a->patch ^ b->patch) & 1))
-            flag(o, (uint32_t)(a->patch >> 1), CONTRADICTED);
+        if (!orient_join(o->above, (uint32_t)(a->patch >> 1), (uint32_t)(b->patch >> 1),
+                         (turned ^ a->patch ^ b->patch) & 1))
+            orient_flag(o, (uint32_t)(a->patch >> 1), CONTRADICTED);
     }
     return EBPO_OK;
 }
@@ -411,8 +410,8 @@ static void add_volume(orienting *o, patch *p, const ebpo_sum *sum, double most)
 }
 
 /* The sum is exact, so it does not matter which thread adds what. */
-static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                           ebpo_error *error)
+static ebpo_status orient_measure(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
 {
     orienting *o = context;
     const ebpo_mesh *mesh = o->mesh;
@@ -448,7 +447,7 @@ static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned
     return EBPO_OK;
 }
 
-static void decide(patch *p)
+static void orient_decide(patch *p)
 {
     double volume = p->closed ? ebpo_sum_value(&p->volume) : 0;
     volume = ebpo_volume_is_noise(volume, p->count, p->most) ? 0 : volume;
@@ -457,8 +456,8 @@ static void decide(patch *p)
     p->turn_others = volume < 0 || (!(volume > 0) && against_seed > p->count - against_seed);
 }
 
-static ebpo_status flip(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                        ebpo_error *error)
+static ebpo_status orient_flip(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     orienting *o = context;
     (void)worker, (void)error;
@@ -503,11 +502,12 @@ static ebpo_status turn_patches(orienting *o, ebpo_error *error)
         return EBPO_OK;
     count_faces(o);
     o->frame = ebpo_mesh_frame_of(o->mesh);
-    ebpo_status status = ebpo_parallel_for(0, NULL, count, FACE_GRAIN, measure, o, NULL, "", error);
+    ebpo_status status =
+        ebpo_parallel_for(0, NULL, count, FACE_GRAIN, orient_measure, o, NULL, "", error);
     for (uint64_t i = 0; i < o->patch_count; i++)
-        decide(&o->patches[i]);
+        orient_decide(&o->patches[i]);
     return status == EBPO_OK
-               ? ebpo_parallel_for(0, NULL, count, FACE_GRAIN, flip, o, NULL, "", error)
+               ? ebpo_parallel_for(0, NULL, count, FACE_GRAIN, orient_flip, o, NULL, "", error)
                : status;
 }
 

@@ -61,8 +61,8 @@ static unsigned find_together(const ply_property *property, uint64_t left)
     return count ? ebpo_attribute_names_together(names, count) : 1;
 }
 
-static void lose(const ply_parser *p, const ply_element *element, const ply_property *property,
-                 const char *why)
+static void ply_attributes_lose(const ply_parser *p, const ply_element *element,
+                                const ply_property *property, const char *why)
 {
     char of[PLY_WORD_TEXT], name[PLY_WORD_TEXT];
     ebpo_ply_word_text(of, element->name);
@@ -90,13 +90,15 @@ static ebpo_status plan_array(ply_parser *p, const ply_element *element, ply_pro
     if (!take_word(a.element, sizeof a.element, element->name) ||
         !take_names(a.names, sizeof a.names, property, columns) ||
         to->count == EBPO_ATTRIBUTE_ARRAYS) {
-        lose(p, element, property, "its name is too long or no text, or there are too many");
+        ply_attributes_lose(p, element, property,
+                            "its name is too long or no text, or there are too many");
         return EBPO_OK;
     }
     bool face = element->kind == PLY_KIND_FACE;
     a.rows = face ? 0 : element->count;
     if (is_second(to, &a, a.rows)) {
-        lose(p, element, property, "a second element of this name, of another length");
+        ply_attributes_lose(p, element, property,
+                            "a second element of this name, of another length");
         return EBPO_OK;
     }
     ebpo_attribute *made = ebpo_attributes_add(to, &a);
@@ -118,7 +120,7 @@ static ebpo_status plan_element(ply_parser *p, const ply_element *element)
     for (uint64_t i = 0; i < element->properties && status == EBPO_OK;) {
         unsigned columns = 1;
         if (property[i].role == PLY_ROLE_NONE && element->kind == PLY_KIND_STRIPS) {
-            lose(p, element, &property[i], "of strips");
+            ply_attributes_lose(p, element, &property[i], "of strips");
         } else if (property[i].role == PLY_ROLE_NONE && element->count) {
             columns = find_together(property + i, element->properties - i);
             status = plan_array(p, element, property + i, columns);
@@ -192,7 +194,7 @@ ebpo_status ebpo_ply_put_list(ply_parser *p, const ply_property *property, uint6
     return EBPO_OK;
 }
 
-static bool fits(int64_t value, ply_type type)
+static bool ply_attributes_fits(int64_t value, ply_type type)
 {
     static const int64_t least[] = { INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0 },
                          most[] = { INT8_MAX,   UINT8_MAX, INT16_MAX,
@@ -221,7 +223,7 @@ static bool text_bits(ply_parser *p, ply_type type, ply_word token, uint64_t *bi
         memcpy(bits, &wide, sizeof wide);
         return true;
     default:
-        if (!ebpo_number_integer(&whole, token.s, token.n) || !fits(whole, type))
+        if (!ebpo_number_integer(&whole, token.s, token.n) || !ply_attributes_fits(whole, type))
             return false;
         *bits = (uint64_t)whole;
         return true;

@@ -252,7 +252,7 @@ typedef struct plain {
 } plain;
 
 /* Reports rows as bytes of the file, as the row-by-row reader does. */
-static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
+static bool ply_binary_report(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     const plain *t = user;
     (void)total;
@@ -260,15 +260,16 @@ static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
                                   t->p->size);
 }
 
-static void put(const plain *t, const ply_property *property, uint64_t row, const uint8_t *at)
+static void ply_binary_put(const plain *t, const ply_property *property, uint64_t row,
+                           const uint8_t *at)
 {
     if (ebpo_ply_is_attribute(property))
         ebpo_ply_put_value(t->p, property, row,
                            ebpo_ply_load(at, ebpo_ply_type_bytes(property->type), t->swap));
 }
 
-static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                            ebpo_error *error)
+static ebpo_status ply_binary_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                       ebpo_error *error)
 {
     const plain *t = context;
     const ply_property *property = t->p->header.property + t->element->first;
@@ -279,13 +280,13 @@ static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigne
             if (property[i].role != PLY_ROLE_NONE)
                 ebpo_ply_store_coordinate(t->p->mesh, row, &property[i], at, t->swap);
             else
-                put(t, &property[i], row, at);
+                ply_binary_put(t, &property[i], row, at);
             at += ebpo_ply_type_bytes(property[i].type);
         }
     return EBPO_OK;
 }
 
-static ebpo_status deviate(plain *t, uint64_t row)
+static ebpo_status ply_binary_deviate(plain *t, uint64_t row)
 {
     uint64_t known = __atomic_load_n(&t->deviates, __ATOMIC_RELAXED);
     while (row < known && !__atomic_compare_exchange_n(&t->deviates, &known, row, true,
@@ -299,7 +300,7 @@ static void put_face(const plain *t, uint64_t row, const uint8_t *at)
 {
     const ply_property *property = t->p->header.property + t->element->first;
     for (uint64_t i = 0; i < t->element->properties; i++) {
-        put(t, &property[i], t->first + row, at);
+        ply_binary_put(t, &property[i], t->first + row, at);
         at += property[i].list ? ebpo_ply_type_bytes(property[i].count_type) +
                                      3 * ebpo_ply_type_bytes(property[i].type)
                                : ebpo_ply_type_bytes(property[i].type);
@@ -307,8 +308,8 @@ static void put_face(const plain *t, uint64_t row, const uint8_t *at)
 }
 
 /* After a row that deviates nothing is where it was expected; those rows are read again. */
-static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                         ebpo_error *error)
+static ebpo_status ply_binary_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                    ebpo_error *error)
 {
     plain *t = context;
     uint64_t count = t->p->header.element[t->p->header.vertex].count;
@@ -323,7 +324,7 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
                                                       t->corners->type, t->swap)
                               : ebpo_ply_load_integer(at, t->corners->count_type, t->swap);
             if (k ? (uint64_t)value >= count : value != 3)
-                return deviate(t, row);
+                return ply_binary_deviate(t, row);
             if (k)
                 *face++ = (uint32_t)value;
         }
@@ -356,11 +357,11 @@ static bool describe_triangles(plain *t)
            t->element->count <= t->p->face_capacity - t->first;
 }
 
-static ebpo_status run(plain *t, ebpo_task_fn task)
+static ebpo_status ply_binary_run(plain *t, ebpo_task_fn task)
 {
     ply_parser *p = t->p;
     bool watched = p->progress && p->progress->report;
-    t->progress = (ebpo_progress){ watched ? report : NULL, t };
+    t->progress = (ebpo_progress){ watched ? ply_binary_report : NULL, t };
     ebpo_status status = ebpo_parallel_for(p->threads, p->mesh->workspace, t->element->count, GRAIN,
                                            task, t, &t->progress, "reading", NULL);
     return status == EBPO_E_CANCELLED ? ebpo_ply_fail_stopped(p) : status;
@@ -374,7 +375,7 @@ ebpo_status ebpo_ply_plain_vertices(ply_parser *p, const ply_element *element, b
     if (element->has_list || !element->row_bytes ||
         element->count > (p->size - p->at) / element->row_bytes)
         return EBPO_OK;
-    ebpo_status status = run(&t, vertices);
+    ebpo_status status = ply_binary_run(&t, ply_binary_vertices);
     if (status == EBPO_OK) {
         *done = element->count;
         p->at += element->count * t.row_bytes;
@@ -389,7 +390,7 @@ ebpo_status ebpo_ply_plain_faces(ply_parser *p, const ply_element *element, bool
     *done = 0;
     if (!describe_triangles(&t))
         return EBPO_OK;
-    ebpo_status status = run(&t, faces);
+    ebpo_status status = ply_binary_run(&t, ply_binary_faces);
     if (status != EBPO_OK && status != EBPO_E_FORMAT)
         return status;
     *done = t.deviates;

@@ -74,7 +74,7 @@ static void corner_position(const ebpo_mesh *mesh, uint32_t vertex, double out[3
                              : (double)mesh->xyz32[3 * (uint64_t)vertex + k];
 }
 
-static ebpo_status triangulate(ply_parser *p, uint32_t n, uint64_t row)
+static ebpo_status ply_faces_triangulate(ply_parser *p, uint32_t n, uint64_t row)
 {
     ebpo_status status = scratch_capacity(p, n);
     if (status == EBPO_OK)
@@ -117,7 +117,7 @@ ebpo_status ebpo_ply_add_polygon(ply_parser *p, uint64_t row)
         return p->corner_count > MOST_FACES
                    ? ebpo_fail_file(p->error, EBPO_E_LIMIT, p->name,
                                     "face %" PRIu64 " has more than 2^32 - 2 corners", row)
-                   : triangulate(p, (uint32_t)p->corner_count, row);
+                   : ply_faces_triangulate(p, (uint32_t)p->corner_count, row);
     ebpo_status status = face_capacity(p, 1);
     if (status == EBPO_OK)
         add_triangle(p->mesh, p->corners[0], p->corners[1], p->corners[2]);
@@ -126,7 +126,7 @@ ebpo_status ebpo_ply_add_polygon(ply_parser *p, uint64_t row)
 
 /* Every second triangle of a strip runs the other way. Triangles that repeat a vertex are the glue
  * between parts of a strip, not faces. */
-static void unroll(ebpo_mesh *mesh, const uint32_t *v, uint64_t n)
+static void ply_faces_unroll(ebpo_mesh *mesh, const uint32_t *v, uint64_t n)
 {
     mesh->strips++;
     for (uint64_t i = 0; i + 2 < n; i++) {
@@ -151,7 +151,7 @@ ebpo_status ebpo_ply_add_strip(ply_parser *p, uint64_t row)
         while (end < n && p->corners[end] != PLY_RESTART)
             end++;
         if (end - begin >= 3)
-            unroll(p->mesh, p->corners + begin, end - begin);
+            ply_faces_unroll(p->mesh, p->corners + begin, end - begin);
         begin = end + 1;
     }
     if (status == EBPO_OK)
@@ -182,8 +182,8 @@ static bool is_finite(const ebpo_mesh *mesh, uint64_t v)
     return finite;
 }
 
-static ebpo_status find(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                        ebpo_error *error)
+static ebpo_status ply_faces_find(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
 {
     leaving *l = context;
     (void)worker, (void)error;
@@ -195,7 +195,7 @@ static ebpo_status find(void *context, uint64_t begin, uint64_t end, unsigned wo
     return EBPO_OK;
 }
 
-static ebpo_status choose(leaving *l)
+static ebpo_status ply_faces_choose(leaving *l)
 {
     ebpo_mesh *mesh = l->p->mesh;
     ebpo_workspace *workspace = mesh->workspace;
@@ -220,7 +220,7 @@ static ebpo_status choose(leaving *l)
     return EBPO_OK;
 }
 
-static void move(const leaving *l)
+static void ply_faces_move(const leaving *l)
 {
     ebpo_mesh *mesh = l->p->mesh;
     size_t size = 3 * (mesh->xyz32 ? sizeof *mesh->xyz32 : sizeof *mesh->xyz64);
@@ -251,7 +251,7 @@ static void move_attributes(const leaving *l)
                                          "by numbers that have changed");
 }
 
-static ebpo_status note(const leaving *l, uint64_t left)
+static ebpo_status ply_faces_note(const leaving *l, uint64_t left)
 {
     ebpo_status status = ebpo_ply_notes(l->p);
     if (status == EBPO_OK)
@@ -266,15 +266,15 @@ ebpo_status ebpo_ply_leave_unused(ply_parser *p)
     leaving l = { .p = p };
     ebpo_mesh *mesh = p->mesh;
     uint64_t count = mesh->vertex_count;
-    ebpo_status status =
-        ebpo_parallel_for(p->threads, mesh->workspace, count, GRAIN, find, &l, NULL, "", p->error);
+    ebpo_status status = ebpo_parallel_for(p->threads, mesh->workspace, count, GRAIN,
+                                           ply_faces_find, &l, NULL, "", p->error);
     if (status == EBPO_OK && l.found)
-        status = choose(&l);
+        status = ply_faces_choose(&l);
     if (status == EBPO_OK && l.found && !l.refused && l.kept < count) {
-        move(&l);
+        ply_faces_move(&l);
         move_attributes(&l);
         mesh->vertex_count = l.kept;
-        status = note(&l, count - l.kept);
+        status = ply_faces_note(&l, count - l.kept);
     }
     ebpo_array_free(mesh->workspace, l.used);
     ebpo_array_free(mesh->workspace, l.from);

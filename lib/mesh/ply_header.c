@@ -43,7 +43,7 @@ unsigned ebpo_ply_type_bytes(ply_type type)
     return bytes[type];
 }
 
-static bool is(ply_word word, const char *text)
+static bool ply_header_is(ply_word word, const char *text)
 {
     return strlen(text) == word.n && memcmp(word.s, text, word.n) == 0;
 }
@@ -56,7 +56,7 @@ void ebpo_ply_word_text(char text[PLY_WORD_TEXT], ply_word word)
     text[n] = 0;
 }
 
-static ebpo_status fail(const reader *r, const char *what, ply_word word)
+static ebpo_status ply_header_fail(const reader *r, const char *what, ply_word word)
 {
     char text[PLY_WORD_TEXT];
     ebpo_ply_word_text(text, word);
@@ -83,7 +83,7 @@ static bool next_line(reader *r, ply_word *line)
     return true;
 }
 
-static int split(ply_word line, ply_word words[MAX_WORDS])
+static int ply_header_split(ply_word line, ply_word words[MAX_WORDS])
 {
     int n = 0;
     const char *s = line.s, *end = line.s + line.n;
@@ -104,7 +104,7 @@ static int split(ply_word line, ply_word words[MAX_WORDS])
 static bool parse_type(ply_word word, ply_type *type)
 {
     for (size_t i = 0; i < sizeof type_names / sizeof *type_names; i++)
-        if (is(word, type_names[i].word)) {
+        if (ply_header_is(word, type_names[i].word)) {
             *type = type_names[i].type;
             return true;
         }
@@ -127,17 +127,17 @@ static bool parse_count(ply_word word, uint64_t *count)
 static ebpo_status format_statement(reader *r, const ply_word *words, int n)
 {
     if (n != 3 || r->format_seen)
-        return fail(r, "unexpected statement", words[0]);
-    if (is(words[1], "ascii"))
+        return ply_header_fail(r, "unexpected statement", words[0]);
+    if (ply_header_is(words[1], "ascii"))
         r->header->encoding = PLY_ASCII;
-    else if (is(words[1], "binary_little_endian"))
+    else if (ply_header_is(words[1], "binary_little_endian"))
         r->header->encoding = PLY_LITTLE;
-    else if (is(words[1], "binary_big_endian"))
+    else if (ply_header_is(words[1], "binary_big_endian"))
         r->header->encoding = PLY_BIG;
     else
-        return fail(r, "unknown format", words[1]);
-    if (!is(words[2], "1.0"))
-        return fail(r, "unknown format version", words[2]);
+        return ply_header_fail(r, "unknown format", words[1]);
+    if (!ply_header_is(words[2], "1.0"))
+        return ply_header_fail(r, "unknown format version", words[2]);
     r->format_seen = true;
     return EBPO_OK;
 }
@@ -146,20 +146,20 @@ static ebpo_status note_kind(reader *r, ply_element *element)
 {
     ply_header *h = r->header;
     int64_t *place;
-    if (is(element->name, "vertex")) {
+    if (ply_header_is(element->name, "vertex")) {
         element->kind = PLY_KIND_VERTEX;
         place = &h->vertex;
-    } else if (is(element->name, "face")) {
+    } else if (ply_header_is(element->name, "face")) {
         element->kind = PLY_KIND_FACE;
         place = &h->face;
-    } else if (is(element->name, "tristrips")) {
+    } else if (ply_header_is(element->name, "tristrips")) {
         element->kind = PLY_KIND_STRIPS;
         place = &h->strips;
     } else {
         return EBPO_OK;
     }
     if (*place >= 0)
-        return fail(r, "a second element", element->name);
+        return ply_header_fail(r, "a second element", element->name);
     *place = (int64_t)h->elements;
     return EBPO_OK;
 }
@@ -170,9 +170,9 @@ static ebpo_status element_statement(reader *r, const ply_word *words, int n)
     ply_header *h = r->header;
     ply_element element = { .line = r->line, .first = h->properties };
     if (n != 3)
-        return fail(r, "a name and a count should follow", words[0]);
+        return ply_header_fail(r, "a name and a count should follow", words[0]);
     if (!parse_count(words[2], &element.count))
-        return fail(r, "not a count:", words[2]);
+        return ply_header_fail(r, "not a count:", words[2]);
     element.name = words[1];
     ebpo_status status = note_kind(r, &element);
     if (status != EBPO_OK)
@@ -192,7 +192,8 @@ static ply_role role_of(const ply_element *element, const ply_property *property
                : c == 'z' ? PLY_ROLE_Z
                           : PLY_ROLE_NONE;
     }
-    bool corners = is(property->name, "vertex_indices") || is(property->name, "vertex_index");
+    bool corners = ply_header_is(property->name, "vertex_indices") ||
+                   ply_header_is(property->name, "vertex_index");
     if ((element->kind == PLY_KIND_FACE || element->kind == PLY_KIND_STRIPS) && property->list &&
         corners)
         return PLY_ROLE_CORNERS;
@@ -212,22 +213,22 @@ static ebpo_status property_statement(reader *r, const ply_word *words, int n)
 {
     ply_header *h = r->header;
     if (!h->elements)
-        return fail(r, "no element stands before", words[0]);
-    ply_property property = { .list = n > 1 && is(words[1], "list"), .attribute = -1 };
+        return ply_header_fail(r, "no element stands before", words[0]);
+    ply_property property = { .list = n > 1 && ply_header_is(words[1], "list"), .attribute = -1 };
     if (n != (property.list ? 5 : 3))
-        return fail(r, "too few or too many words in", words[0]);
+        return ply_header_fail(r, "too few or too many words in", words[0]);
     if (!parse_type(words[n - 2], &property.type))
-        return fail(r, "unknown type", words[n - 2]);
+        return ply_header_fail(r, "unknown type", words[n - 2]);
     if (property.list &&
         (!parse_type(words[2], &property.count_type) || property.count_type >= PLY_FLOAT32))
-        return fail(r, "no type for a list's length:", words[2]);
+        return ply_header_fail(r, "no type for a list's length:", words[2]);
     property.name = words[n - 1];
     ply_element *element = &h->element[h->elements - 1];
     property.role = role_of(element, &property);
     if (property.role == PLY_ROLE_CORNERS && property.type >= PLY_FLOAT32)
-        return fail(r, "no type for vertex numbers:", words[n - 2]);
+        return ply_header_fail(r, "no type for vertex numbers:", words[n - 2]);
     if (role_taken(h, element, property.role))
-        return fail(r, "a second property", property.name);
+        return ply_header_fail(r, "a second property", property.name);
     if (!ebpo_grow(&h->property, &h->property_capacity, h->properties + 1, sizeof *h->property))
         return ebpo_fail_memory(r->error, sizeof property);
     h->property[h->properties++] = property;
@@ -237,28 +238,28 @@ static ebpo_status property_statement(reader *r, const ply_word *words, int n)
     return EBPO_OK;
 }
 
-static ebpo_status statement(reader *r, ply_word line, bool *ended)
+static ebpo_status ply_header_statement(reader *r, ply_word line, bool *ended)
 {
     ply_word words[MAX_WORDS];
-    int n = split(line, words);
-    if (n == 0 || is(words[0], "comment") || is(words[0], "obj_info")) {
+    int n = ply_header_split(line, words);
+    if (n == 0 || ply_header_is(words[0], "comment") || ply_header_is(words[0], "obj_info")) {
         r->header->notes++;
         return EBPO_OK;
     }
-    if (is(words[0], "format"))
+    if (ply_header_is(words[0], "format"))
         return format_statement(r, words, n);
-    if (is(words[0], "element"))
+    if (ply_header_is(words[0], "element"))
         return element_statement(r, words, n);
-    if (is(words[0], "property"))
+    if (ply_header_is(words[0], "property"))
         return property_statement(r, words, n);
-    if (is(words[0], "end_header")) {
+    if (ply_header_is(words[0], "end_header")) {
         *ended = true;
         return EBPO_OK;
     }
     /* Blender 2.47 left the word "comment" out of its first line. Later on, a line that is not
      * understood could change what the body means. */
     r->header->notes++;
-    return r->header->elements ? fail(r, "unknown statement", words[0]) : EBPO_OK;
+    return r->header->elements ? ply_header_fail(r, "unknown statement", words[0]) : EBPO_OK;
 }
 
 const char *ebpo_ply_first_line(const uint8_t *data, uint64_t size, char *line_end)
@@ -287,7 +288,7 @@ static ebpo_status check_magic(reader *r, uint64_t size)
     return EBPO_OK;
 }
 
-static ebpo_status statements(reader *r, bool whole)
+static ebpo_status ply_header_statements(reader *r, bool whole)
 {
     bool ended = false;
     ply_word line = { "", 0 };
@@ -297,12 +298,12 @@ static ebpo_status statements(reader *r, bool whole)
                                   "line %" PRIu64
                                   ": %s before 'end_header'; the file is cut short or no PLY file",
                                   r->line + 1, whole ? "the file ends" : "a megabyte of header");
-        ebpo_status status = statement(r, line, &ended);
+        ebpo_status status = ply_header_statement(r, line, &ended);
         if (status != EBPO_OK)
             return status;
     }
     if (!r->format_seen)
-        return fail(r, "no format was named before", line);
+        return ply_header_fail(r, "no format was named before", line);
     return EBPO_OK;
 }
 
@@ -350,7 +351,7 @@ ebpo_status ebpo_ply_header_parse(ply_header *out, const uint8_t *data, uint64_t
                  .error = error };
     ebpo_status status = check_magic(&r, size);
     if (status == EBPO_OK)
-        status = statements(&r, visible == size);
+        status = ply_header_statements(&r, visible == size);
     if (status == EBPO_OK)
         status = check_roles(&r);
     out->body = (uint64_t)((const uint8_t *)r.at - data);

@@ -110,7 +110,7 @@ static ebpo_status allocate_vertices(ply_parser *p)
     return EBPO_OK;
 }
 
-static ebpo_status allocate(ply_parser *p)
+static ebpo_status ply_parse_allocate(ply_parser *p)
 {
     const ply_header *h = &p->header;
     p->face_capacity = h->face >= 0 ? h->element[h->face].count : 0;
@@ -162,7 +162,7 @@ static ebpo_status read_body(ply_parser *p)
 }
 
 /* The face array grew by halves; give back what is left over. */
-static void trim(ply_parser *p)
+static void ply_parse_trim(ply_parser *p)
 {
     if (p->face_capacity == p->mesh->face_count || p->mesh->workspace)
         return;
@@ -171,7 +171,7 @@ static void trim(ply_parser *p)
         p->mesh->faces = faces;
 }
 
-static void describe(ply_parser *p)
+static void ply_parse_describe(ply_parser *p)
 {
     static const char *const formats[] = { "ply-ascii", "ply-le", "ply-be" };
     snprintf(p->mesh->source_name, sizeof p->mesh->source_name, "%s", p->name);
@@ -205,7 +205,7 @@ static ebpo_status note_unread(ply_parser *p)
 }
 
 /* All but the mesh. */
-static void release(ply_parser *p)
+static void ply_parse_release(ply_parser *p)
 {
     if (p->c_locale)
         freelocale(p->c_locale);
@@ -233,7 +233,7 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
     if (status == EBPO_OK)
         status = check_parts(&p);
     if (status == EBPO_OK)
-        status = allocate(&p);
+        status = ply_parse_allocate(&p);
     if (status == EBPO_OK && attributes)
         status = ebpo_ply_attributes_plan(&p);
     if (status == EBPO_OK)
@@ -245,8 +245,8 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
     if (status == EBPO_OK)
         status = ebpo_ply_leave_unused(&p);
     if (status == EBPO_OK) {
-        trim(&p);
-        describe(&p);
+        ply_parse_trim(&p);
+        ply_parse_describe(&p);
     } else {
         ebpo_array_free(workspace, mesh.xyz32);
         ebpo_array_free(workspace, mesh.xyz64);
@@ -254,7 +254,7 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
         ebpo_attributes_free(mesh.attributes);
         mesh = (ebpo_mesh){ 0 };
     }
-    release(&p);
+    ply_parse_release(&p);
     *out = mesh;
     return status;
 }
@@ -286,6 +286,6 @@ ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *n
     } else {
         free(mesh.xyz64);
     }
-    release(&p);
+    ply_parse_release(&p);
     return status;
 }

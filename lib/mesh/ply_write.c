@@ -98,7 +98,7 @@ static ply_type position_type(const ebpo_mesh *mesh)
 }
 
 /* Whether a coordinate is a value of the type, bit for bit. */
-static bool holds(ply_type type, double v)
+static bool ply_write_holds(ply_type type, double v)
 {
     static const double least[] = { INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0 }, most[] = {
         INT8_MAX, UINT8_MAX, INT16_MAX, UINT16_MAX, INT32_MAX, UINT32_MAX
@@ -123,7 +123,7 @@ static ply_type axis_type(const making *m, ply_role role, ply_type wanted)
     if (!mesh->xyz64)
         return PLY_FLOAT32;
     EBPO_FOR_ITEMS(mesh->workspace, i, 0, wanted == PLY_FLOAT64 ? 0 : mesh->vertex_count)
-        if (!holds(wanted, mesh->xyz64[3 * i + axis]))
+        if (!ply_write_holds(wanted, mesh->xyz64[3 * i + axis]))
             return PLY_FLOAT64;
     return wanted;
 }
@@ -327,7 +327,7 @@ static void follow_property(following *f, ply_word line)
         put_line(m, line);
 }
 
-static bool begins(ply_word line, const char *word)
+static bool ply_write_begins(ply_word line, const char *word)
 {
     size_t n = strlen(word), at = 0;
     while (at < line.n && (line.s[at] == ' ' || line.s[at] == '\t'))
@@ -338,22 +338,22 @@ static bool begins(ply_word line, const char *word)
 
 static void follow_line(following *f, ply_word line)
 {
-    if (begins(line, "format"))
+    if (ply_write_begins(line, "format"))
         fputs("format binary_little_endian 1.0\n", f->m->text);
-    else if (begins(line, "element"))
+    else if (ply_write_begins(line, "element"))
         follow_element(f);
-    else if (begins(line, "property"))
+    else if (ply_write_begins(line, "property"))
         follow_property(f, line);
     else
         put_line(f->m, line);
 }
 
-static void follow(following *f, const char *at, const char *end)
+static void ply_write_follow(following *f, const char *at, const char *end)
 {
     while (at < end && !f->m->no_memory) {
         const char *stop = memchr(at, '\n', (size_t)(end - at));
         ply_word line = { at, (size_t)((stop ? stop : end) - at) };
-        if (begins(line, "end_header"))
+        if (ply_write_begins(line, "end_header"))
             close_element(f);
         if (line.n && line.s[line.n - 1] == '\r')
             line.n--;
@@ -374,7 +374,7 @@ static bool make_as_source(making *m)
     bool usable =
         (f.header.face >= 0 || f.header.strips >= 0) && f.header.body == all->header_bytes;
     if (usable)
-        follow(&f, all->header, all->header + all->header_bytes);
+        ply_write_follow(&f, all->header, all->header + all->header_bytes);
     ebpo_ply_header_free(&f.header);
     return usable;
 }
@@ -419,7 +419,7 @@ void ebpo_ply_layout_free(ply_layout *layout)
 
 enum { BUFFER = 1 << 16 };
 
-static ebpo_status check(const ebpo_mesh *mesh, ebpo_error *error)
+static ebpo_status ply_write_check(const ebpo_mesh *mesh, ebpo_error *error)
 {
     if (mesh->vertex_count > UINT32_MAX - 1 || mesh->face_count > UINT32_MAX - 1)
         return ebpo_fail(error, EBPO_E_LIMIT,
@@ -448,14 +448,14 @@ typedef struct writing {
     bool failed;
 } writing;
 
-static void flush(writing *w)
+static void ply_write_flush(writing *w)
 {
     w->failed = w->failed || fwrite(w->buffer, 1, w->used, w->f) != w->used;
     w->used = 0;
 }
 
 /* The low bytes of a number, little-endian. */
-static void put(writing *w, unsigned bytes, uint64_t bits)
+static void ply_write_put(writing *w, unsigned bytes, uint64_t bits)
 {
     uint8_t *at = w->buffer + w->used;
     if (bytes == 1)
@@ -468,7 +468,7 @@ static void put(writing *w, unsigned bytes, uint64_t bits)
         ebpo_store64(at, bits);
     w->used += bytes;
     if (w->used > BUFFER - sizeof(uint64_t))
-        flush(w);
+        ply_write_flush(w);
 }
 
 static void put_position(writing *w, const ply_out_property *p, uint64_t row)
@@ -483,14 +483,14 @@ static void put_position(writing *w, const ply_out_property *p, uint64_t row)
     } else {
         bits = (uint64_t)(int64_t)w->mesh->xyz64[at]; /* the layout has seen that it is one */
     }
-    put(w, ebpo_ply_type_bytes(p->type), bits);
+    ply_write_put(w, ebpo_ply_type_bytes(p->type), bits);
 }
 
 static void put_corners(writing *w, const ply_out_property *p, uint64_t row)
 {
-    put(w, ebpo_ply_type_bytes(p->count_type), 3);
+    ply_write_put(w, ebpo_ply_type_bytes(p->count_type), 3);
     for (uint64_t k = 0; k < 3; k++)
-        put(w, ebpo_ply_type_bytes(p->type), w->mesh->faces[3 * row + k]);
+        ply_write_put(w, ebpo_ply_type_bytes(p->type), w->mesh->faces[3 * row + k]);
 }
 
 static uint64_t native_bits(const uint8_t *at, unsigned bytes)
@@ -514,10 +514,10 @@ static void put_attribute(writing *w, const ply_out_property *p, uint64_t row)
     if (a->list != EBPO_ATTRIBUTE_NO_LIST) {
         begin = !a->ends ? row * a->columns : row ? a->ends[row - 1] : 0;
         count = a->ends ? a->ends[row] - begin : a->columns;
-        put(w, ebpo_ply_type_bytes(p->count_type), count);
+        ply_write_put(w, ebpo_ply_type_bytes(p->count_type), count);
     }
     for (uint64_t i = begin; i < begin + count; i++)
-        put(w, bytes, native_bits(a->values + i * bytes, bytes));
+        ply_write_put(w, bytes, native_bits(a->values + i * bytes, bytes));
 }
 
 static void put_row(writing *w, uint64_t row)
@@ -543,7 +543,7 @@ static bool write_rows(writing *w)
                 break;
         }
     }
-    flush(w);
+    ply_write_flush(w);
     return !w->failed;
 }
 
@@ -552,7 +552,7 @@ ebpo_status ebpo_mesh_write_ply(const ebpo_mesh *mesh, const char *path, ebpo_er
     ebpo_publish out = EBPO_PUBLISH_INIT;
     ply_layout layout = { .element = NULL };
     writing w = { .mesh = mesh, .layout = &layout };
-    ebpo_status status = check(mesh, error);
+    ebpo_status status = ply_write_check(mesh, error);
     if (status == EBPO_OK)
         status = ebpo_ply_layout_make(&layout, mesh, error);
     if (status == EBPO_OK)

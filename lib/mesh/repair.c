@@ -14,7 +14,6 @@
 #include "mesh/component_parts.h"
 #include "mesh/mesh_check_parts.h"
 #include "mesh/mesh_parts.h"
-#include "mesh/positions.h"
 
 /* --- repeated faces --- */
 
@@ -29,7 +28,7 @@ typedef struct dropping {
     uint64_t count, opposite;
 } dropping;
 
-static bool goes(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
+static bool repair_goes(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
 
 /* From its lowest vertex the face runs to the lesser of the two others. */
 static bool runs_up(const uint32_t face[3])
@@ -102,7 +101,7 @@ static void close_ranks(const dropping *d)
     ebpo_mesh *mesh = d->mesh;
     uint64_t to = 0;
     EBPO_FOR_ITEMS(mesh->workspace, f, 0, mesh->face_count) {
-        if (goes(d, f))
+        if (repair_goes(d, f))
             continue;
         if (to != f) {
             memcpy(mesh->faces + 3 * to, mesh->faces + 3 * f, 3 * sizeof *mesh->faces);
@@ -131,7 +130,7 @@ static ebpo_status find_all(dropping *d, ebpo_error *error)
                              find_repeated, d, NULL, "", error);
 }
 
-static ebpo_status drop(dropping *d, ebpo_error *error)
+static ebpo_status repair_drop(dropping *d, ebpo_error *error)
 {
     ebpo_mesh *mesh = d->mesh;
     ebpo_status status = find_all(d, error);
@@ -161,7 +160,7 @@ ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh, ebpo_mend_record *record,
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)
         return status;
-    status = drop(&d, error);
+    status = repair_drop(&d, error);
     if (status == EBPO_OK && record) {
         record->drop_duplicates = true;
         record->dropped_faces += d.count;
@@ -203,7 +202,7 @@ ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mesh, unsigned threads, eb
     if (status == EBPO_OK)
         status = find_all(&d, error);
     EBPO_FOR_ITEMS(mesh->workspace, f, 0, status == EBPO_OK ? mesh->face_count : 0)
-        if (goes(&d, f))
+        if (repair_goes(&d, f))
             ebpo_finding_add(out, ebpo_mesh_source_face(mesh, f));
     *opposite = d.opposite;
     free_dropping(&d);

@@ -1,24 +1,398 @@
-/* Closed components, what is known of each, and how many each is within. */
+/* The samples of what may be within a host, in a tree, and each of its faces against it. */
 #include "core/strict_fp.h"
 
-#include "mesh/shell_nesting.h"
-
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
-#include "core/workspace.h"
+#include <ebpo/repair.h>
+
+#include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "mesh/shell_probes.h"
-#include "mesh/shell_rays.h"
+#include "core/workspace.h"
+#include "geometry/predicates.h"
+#include "mesh/shell_nesting.h"
+
+/* What is within hosts that are not crowded. */
+
+/* What is within crowded hosts. */
+
+/* Of one thread: what may be within the host that it looks at. */
+typedef struct seeker {
+    point_tree probes; /* SHELL_SAMPLES of each of these shells; values are winding numbers */
+    struct probing *all;
+    const shell *host;
+    const double (*face)[3];
+} seeker;
+
+typedef struct probing {
+    nesting *n;
+    seeker *seeker; /* one for each worker */
+} probing;
+
+static bool near_host(void *user, const box_node *node)
+{
+    return ebpo_shell_may_hold(((const seeker *)user)->host, node);
+}
+
+static bool add_probes(seeker *w, uint32_t number)
+{
+    const shell *one = &w->all->n->shells[number];
+    for (int d = 0; d < SHELL_SAMPLES; d++) {
+        mesh_point *p = ebpo_point_tree_add(&w->probes);
+        if (!p)
+            return false;
+        *p = (mesh_point){ .number = number };
+        memcpy(p->at, one->sample[d], sizeof p->at);
+    }
+    return true;
+}
+
+static bool list_inner(void *user, mesh_point *points, uint64_t count)
+{
+    seeker *w = user;
+    for (uint64_t i = 0; i < count; i++) {
+        const shell *one = &w->all->n->shells[points[i].number];
+        if (one != w->host && ebpo_shell_box_within(one, w->host) &&
+            !add_probes(w, points[i].number))
+            return false;
+    }
+    return true;
+}
+
+/* Whether a line along the edge from t[0] to t[1], in the plane of y and z, separates the box from
+ * the triangle. Certain: errors of rounding are bounded, and what is not a number separates
+ * nothing. */
+static bool shell_probes_separates(const double *const t[3], const point_box *box)
+{
+    static const double ROUNDING = 0x1p-49, TINY = 0x1p-1000;
+    const double *a = t[0], e[2] = { a[2] - t[1][2], t[1][1] - a[1] };
+    double low = 0, high = 0, size = 0, least = 0, most = 0;
+    for (int k = 0; k < 2; k++) {
+        double x = e[k] * (box->min[k + 1] - a[k + 1]), y = e[k] * (box->max[k + 1] - a[k + 1]);
+        low += x < y ? x : y;
+        high += x < y ? y : x;
+        size += fabs(x) + fabs(y);
+    }
+    for (int i = 1; i < 3; i++) {
+        double x = e[0] * (t[i][1] - a[1]), y = e[1] * (t[i][2] - a[2]);
+        least = x + y < least ? x + y : least;
+        most = x + y > most ? x + y : most;
+        size += fabs(x) + fabs(y);
+    }
+    double error = size * ROUNDING + TINY;
+    return low > most + error || high < least - error;
+}
+
+/* False only if no line along x from somewhere in the box meets the triangle. */
+static bool ebpo_face_may_meet_lines(const double t[3][3], const point_box *box)
+{
+    bool before = false;
+    for (int i = 0; i < 3; i++)
+        before |= t[i][0] >= box->min[0];
+    if (!before)
+        return false;
+    for (int k = 1; k < 3; k++) {
+        double low = fmin(fmin(t[0][k], t[1][k]), t[2][k]),
+               high = fmax(fmax(t[0][k], t[1][k]), t[2][k]);
+        if (low > box->max[k] || high < box->min[k])
+            return false;
+    }
+    for (int i = 0; i < 3; i++) {
+        const double *const turned[3] = { t[i], t[(i + 1) % 3], t[(i + 2) % 3] };
+        if (shell_probes_separates(turned, box))
+            return false;
+    }
+    return true;
+}
+
+static bool near_face(void *user, const point_box *box)
+{
+    return ebpo_face_may_meet_lines(((const seeker *)user)->face, box);
+}
+
+/* What segments from the probes along x to the host's end cross. */
+static bool cross_face(void *user, mesh_point *points, uint64_t count)
+{
+    seeker *w = user;
+    for (uint64_t i = 0; i < count; i++)
+        points[i].value += ebpo_axis_crossing(points[i].at, w->host->max[0], 0, w->face[0],
+                                              w->face[1], w->face[2]);
+    return true;
+}
+
+static void cross_host(seeker *w)
+{
+    const ebpo_components *c = w->all->n->components;
+    EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[w->host->component],
+                             c->faces.begin[w->host->component + (uint64_t)1]) {
+        double t[3][3];
+        ebpo_face_corners(c->mesh, c->faces.of[i], t);
+        w->face = (const double(*)[3])t;
+        (void)ebpo_point_tree_walk(&w->probes, near_face, cross_face, w);
+    }
+}
+
+static int by_number(const void *x, const void *y)
+{
+    const mesh_point *a = x, *b = y;
+    return (a->number > b->number) - (a->number < b->number);
+}
+
+static void count_inner(const seeker *w)
+{
+    const mesh_point *p = w->probes.point;
+    qsort(w->probes.point, w->probes.count, sizeof *p, by_number);
+    for (uint64_t i = 0; i < w->probes.count; i += SHELL_SAMPLES) {
+        bool within = true;
+        for (uint64_t d = 0; d < SHELL_SAMPLES; d++)
+            within &= p[i + d].value != 0;
+        if (!within)
+            continue;
+        shell *inner = &w->all->n->shells[p[i].number];
+        __atomic_fetch_add(&inner->depth, 1, __ATOMIC_RELAXED);
+        __atomic_fetch_sub(&inner->around, p[i].value, __ATOMIC_RELAXED); /* it ends outside */
+    }
+}
+
+static ebpo_status find_inner(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
+{
+    const probing *all = context;
+    seeker *w = &all->seeker[worker];
+    for (uint64_t host = begin; host < end; host++) {
+        w->host = &all->n->shells[host];
+        if (w->host->crowded)
+            continue;
+        w->probes.count = 0;
+        if (!ebpo_box_tree_walk(&all->n->tree, near_host, list_inner, w) ||
+            !ebpo_point_tree_build(&w->probes))
+            return ebpo_workspace_fail(w->probes.workspace,
+                                       (w->probes.count + SHELL_SAMPLES) * sizeof(mesh_point),
+                                       error);
+        if (w->probes.count == 0)
+            continue;
+        cross_host(w);
+        count_inner(w);
+    }
+    return EBPO_OK;
+}
+
+/* Each face is shown to the samples that are near it; adds to the depths. */
+static ebpo_status ebpo_nesting_probe(nesting *n, ebpo_error *error)
+{
+    ebpo_workspace *workspace = n->components->mesh->workspace;
+    probing all = { n, ebpo_alloc_zero(n->threads, sizeof *all.seeker) };
+    if (!all.seeker)
+        return ebpo_fail_memory(error, n->threads * sizeof *all.seeker);
+    for (unsigned t = 0; t < n->threads; t++)
+        all.seeker[t] = (seeker){ .probes = { .workspace = workspace }, .all = &all };
+    ebpo_status status =
+        ebpo_parallel_for(n->threads, workspace, n->count, 1, find_inner, &all, NULL, "", error);
+    for (unsigned t = 0; t < n->threads; t++)
+        ebpo_point_tree_free(&all.seeker[t].probes);
+    free(all.seeker);
+    return status;
+}
+
+/* Rays along x from the samples of all shells through one tree of the crowded hosts' faces: of each
+ * host what a ray crosses of it is its winding number at the sample. */
+
+enum { SHELL_RAYS_GRAIN = 16 };
+
+/* What the rays of the shell that is looked at cross of one host. */
+typedef struct tally {
+    int32_t winding[SHELL_SAMPLES];
+    uint32_t shell; /* whose rays these are, and one more */
+} tally;
+
+typedef struct casting {
+    nesting *n;
+    uint32_t *host; /* the crowded ones, numbers of shells */
+    uint64_t host_count;
+    box_tree faces; /* number: the face; value: its place in `host` */
+    struct caster *caster;
+} casting;
+
+/* Of one thread. */
+typedef struct caster {
+    const casting *all;
+    tally *of;     /* [host_count] */
+    int32_t *seen; /* [host_count] which of these the shell's rays have met */
+    uint64_t seen_count;
+    uint32_t shell;
+    int sample;
+    point_box at; /* that sample: a box without extent */
+} caster;
+
+static bool on_ray(void *user, const box_node *node)
+{
+    const caster *w = user;
+    const double *at = w->at.min;
+    const point_box *box = node->filled;
+    return at[0] <= box->max[0] && at[1] >= box->min[1] && at[1] <= box->max[1] &&
+           at[2] >= box->min[2] && at[2] <= box->max[2];
+}
+
+static tally *tally_of(caster *w, int32_t host)
+{
+    tally *t = &w->of[host];
+    if (t->shell != w->shell + 1) {
+        *t = (tally){ .shell = w->shell + 1 };
+        w->seen[w->seen_count++] = host;
+    }
+    return t;
+}
+
+static bool cross_faces(void *user, mesh_point *points, uint64_t count)
+{
+    caster *w = user;
+    const nesting *n = w->all->n;
+    for (uint64_t i = 0; i < count; i++) {
+        double t[3][3];
+        if (w->all->host[points[i].value] == w->shell)
+            continue;
+        ebpo_face_corners(n->components->mesh, points[i].number, t);
+        if (!ebpo_face_may_meet_lines((const double(*)[3])t, &w->at))
+            continue;
+        int crossing = ebpo_axis_crossing(w->at.min, INFINITY, 0, t[0], t[1], t[2]);
+        if (crossing != 0)
+            tally_of(w, points[i].value)->winding[w->sample] += crossing;
+    }
+    return true;
+}
+
+/* Counts the hosts that all samples up to now are within, and adds up their winding numbers. */
+static uint32_t count_hosts(const caster *w, int32_t *around)
+{
+    uint32_t count = 0;
+    *around = 0;
+    for (uint64_t i = 0; i < w->seen_count; i++) {
+        bool within = true;
+        for (int d = 0; d <= w->sample; d++)
+            within &= w->of[w->seen[i]].winding[d] != 0;
+        count += within;
+        *around += within ? w->of[w->seen[i]].winding[0] : 0;
+    }
+    return count;
+}
+
+/* The samples are the ends of the shell's box: where all are within a host, so is the box within
+ * the host's. */
+static ebpo_status cast_rays(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    const casting *all = context;
+    caster *w = &all->caster[worker];
+    (void)error;
+    for (uint64_t i = begin; i < end; i++) {
+        uint32_t hosts = 1;
+        int32_t around = 0;
+        w->shell = (uint32_t)i;
+        w->seen_count = 0;
+        for (w->sample = 0; hosts && w->sample < SHELL_SAMPLES; w->sample++) {
+            const double *at = all->n->shells[i].sample[w->sample];
+            memcpy(w->at.min, at, sizeof w->at.min);
+            memcpy(w->at.max, at, sizeof w->at.max);
+            (void)ebpo_box_tree_walk(&all->faces, on_ray, cross_faces, w);
+            hosts = count_hosts(w, &around);
+        }
+        all->n->shells[i].depth += hosts;
+        all->n->shells[i].around -= around; /* rays end outside */
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status add_faces(casting *all, uint64_t host, ebpo_error *error)
+{
+    const ebpo_components *c = all->n->components;
+    uint64_t component = all->n->shells[all->host[host]].component;
+    EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[component],
+                             c->faces.begin[component + 1]) {
+        if (!ebpo_face_add(&all->faces, c->mesh, c->faces.of[i], (int32_t)host))
+            return ebpo_workspace_fail(c->mesh->workspace,
+                                       (all->faces.points.count + 1) * sizeof(mesh_point), error);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status shell_rays_plant(casting *all, ebpo_error *error)
+{
+    const ebpo_mesh *mesh = all->n->components->mesh;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t h = 0; h < all->host_count && status == EBPO_OK; h++)
+        status = add_faces(all, h, error);
+    if (status != EBPO_OK || ebpo_box_tree_build(&all->faces, ebpo_face_box, mesh))
+        return status;
+    return ebpo_workspace_fail(mesh->workspace, 2 * all->faces.points.count * sizeof(point_box),
+                               error);
+}
+
+static ebpo_status shell_rays_hire(casting *all, ebpo_error *error)
+{
+    ebpo_workspace *workspace = all->n->components->mesh->workspace;
+    all->caster = ebpo_alloc_zero(all->n->threads, sizeof *all->caster);
+    if (!all->caster)
+        return ebpo_fail_memory(error, all->n->threads * sizeof *all->caster);
+    for (unsigned t = 0; t < all->n->threads; t++) {
+        caster *w = &all->caster[t];
+        w->all = all;
+        w->of = ebpo_array_alloc(workspace, all->host_count, sizeof *w->of);
+        w->seen = ebpo_array_alloc(workspace, all->host_count, sizeof *w->seen);
+        if (!w->of || !w->seen)
+            return ebpo_workspace_fail(workspace, all->host_count * sizeof *w->of, error);
+        memset(w->of, 0, all->host_count * sizeof *w->of);
+    }
+    return EBPO_OK;
+}
+
+static void free_casting(casting *all)
+{
+    ebpo_workspace *workspace = all->n->components->mesh->workspace;
+    for (unsigned t = 0; all->caster && t < all->n->threads; t++) {
+        ebpo_array_free(workspace, all->caster[t].of);
+        ebpo_array_free(workspace, all->caster[t].seen);
+    }
+    free(all->caster);
+    ebpo_box_tree_free(&all->faces);
+    ebpo_array_free(workspace, all->host);
+}
+
+/* A ray from each sample goes through a tree of all of their faces; adds to the depths. */
+static ebpo_status ebpo_nesting_cast(nesting *n, ebpo_error *error)
+{
+    ebpo_workspace *workspace = n->components->mesh->workspace;
+    casting all = { .n = n, .faces = { .points = { .workspace = workspace } } };
+    all.host = ebpo_array_alloc(workspace, n->count, sizeof *all.host);
+    if (!all.host)
+        return ebpo_workspace_fail(workspace, n->count * sizeof *all.host, error);
+    for (uint64_t i = 0; i < n->count; i++)
+        if (n->shells[i].crowded)
+            all.host[all.host_count++] = (uint32_t)i;
+    ebpo_status status = EBPO_OK;
+    if (all.host_count) {
+        status = shell_rays_plant(&all, error);
+        if (status == EBPO_OK)
+            status = shell_rays_hire(&all, error);
+        if (status == EBPO_OK)
+            status = ebpo_parallel_for(n->threads, workspace, n->count, SHELL_RAYS_GRAIN, cast_rays,
+                                       &all, NULL, "", error);
+    }
+    free_casting(&all);
+    return status;
+}
+
+/* Closed components, what is known of each, and how many each is within. */
 
 /* A host is crowded with more than so many samples for each of its faces. */
-enum { CROWD = 8, GRAIN = 64 };
+enum { CROWD = 8, SHELL_NESTING_GRAIN = 64 };
 
 /* ---- what is known of each ---- */
 
 /* Whether a comes before b along direction d: by that coordinate, then by all of them, so that only
  * vertices at one position are equal. */
-static bool before(const double a[3], const double b[3], int d)
+static bool shell_nesting_before(const double a[3], const double b[3], int d)
 {
     int axis = d / 2;
     if (a[axis] != b[axis])
@@ -48,7 +422,7 @@ static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, un
                 double at[3];
                 ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)c->faces.of[i] + k], at);
                 for (int d = 0; d < SHELL_SAMPLES; d++)
-                    if (before(at, one->sample[d], d))
+                    if (shell_nesting_before(at, one->sample[d], d))
                         memcpy(one->sample[d], at, sizeof at);
             }
         }
@@ -139,18 +513,18 @@ static ebpo_status make_tree(nesting *n, ebpo_error *error)
                : ebpo_workspace_fail(workspace, 2 * n->count * sizeof(point_box), error);
 }
 
-static ebpo_status nest(nesting *n, ebpo_error *error)
+static ebpo_status shell_nesting_nest(nesting *n, ebpo_error *error)
 {
     ebpo_status status = list_shells(n, error);
     if (status != EBPO_OK || n->count < 2)
         return status;
-    status =
-        ebpo_parallel_for(n->threads, NULL, n->count, GRAIN, sample_shells, n, NULL, "", error);
+    status = ebpo_parallel_for(n->threads, NULL, n->count, SHELL_NESTING_GRAIN, sample_shells, n,
+                               NULL, "", error);
     if (status == EBPO_OK)
         status = make_tree(n, error);
     if (status == EBPO_OK)
-        status =
-            ebpo_parallel_for(n->threads, NULL, n->count, GRAIN, find_crowded, n, NULL, "", error);
+        status = ebpo_parallel_for(n->threads, NULL, n->count, SHELL_NESTING_GRAIN, find_crowded, n,
+                                   NULL, "", error);
     if (status == EBPO_OK)
         status = ebpo_nesting_probe(n, error);
     return status == EBPO_OK ? ebpo_nesting_cast(n, error) : status;
@@ -162,7 +536,7 @@ ebpo_status ebpo_nesting_find(nesting *n, const ebpo_mesh *mesh, uint32_t *close
     n->threads = ebpo_thread_count(threads);
     ebpo_status status =
         ebpo_components_find(mesh, closed, threads, progress, &n->components, error);
-    return status == EBPO_OK ? nest(n, error) : status;
+    return status == EBPO_OK ? shell_nesting_nest(n, error) : status;
 }
 
 void ebpo_nesting_free(nesting *n, const ebpo_mesh *mesh)
@@ -170,4 +544,31 @@ void ebpo_nesting_free(nesting *n, const ebpo_mesh *mesh)
     ebpo_box_tree_free(&n->tree);
     ebpo_array_free(mesh->workspace, n->shells);
     ebpo_components_free(n->components);
+}
+
+/* Shells look outwards, or inwards where they bound a cavity. */
+
+static uint64_t turn_shell(const ebpo_components *c, uint32_t component)
+{
+    uint64_t begin = c->faces.begin[component], end = c->faces.begin[component + (uint64_t)1];
+    EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, begin, end)
+        ebpo_face_turn(c->mesh->faces + 3 * (uint64_t)c->faces.of[i]);
+    return end - begin;
+}
+
+ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed, ebpo_mend_record *record,
+                                  ebpo_error *error)
+{
+    nesting n = { .components = NULL };
+    uint64_t turned = 0;
+    if (mesh->face_count == 0)
+        return EBPO_OK;
+    ebpo_status status = ebpo_nesting_find(&n, mesh, closed, 0, NULL, error);
+    for (uint64_t i = 0; i < n.count && status == EBPO_OK; i++)
+        if (ebpo_shell_looks_inwards(&n, &n.shells[i]) != ebpo_shell_is_cavity(&n.shells[i]))
+            turned += turn_shell(n.components, n.shells[i].component);
+    ebpo_nesting_free(&n, mesh);
+    if (record)
+        record->flipped_faces += turned;
+    return status;
 }

@@ -1,8 +1,90 @@
-/* How many closed components each is within. */
+/* Which closed components of a mesh are within which, while it is found out. */
 #ifndef EBPO_MESH_SHELL_NESTING_H
 #define EBPO_MESH_SHELL_NESTING_H
 
-#include "mesh/shells.h"
+#include <math.h>
+
+#include "mesh/box_tree.h"
+#include "mesh/component_parts.h"
+
+/* A component is within another one, its host, if these vertices are: the least and the greatest
+ * along each axis. */
+enum { SHELL_SAMPLES = 6 };
+
+typedef struct shell {
+    double sample[SHELL_SAMPLES][3];
+    double min[3], max[3];
+    uint32_t component;
+    uint32_t depth; /* closed components that it is within */
+    int32_t around; /* the sum of their winding numbers there */
+    bool crowded;   /* a host to many for the faces that it has: rays lead to it */
+} shell;
+
+typedef struct nesting {
+    ebpo_components *components;
+    shell *shells; /* closed, with a volume */
+    uint64_t count;
+    box_tree tree; /* of shells' boxes; the points are sample[0] */
+    unsigned threads;
+} nesting;
+
+static inline bool ebpo_shell_looks_inwards(const nesting *n, const shell *one)
+{
+    return n->components->list[one->component].volume < 0;
+}
+
+static inline bool ebpo_shell_is_cavity(const shell *one) { return one->depth % 2 != 0; }
+
+static inline void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, double t[3][3])
+{
+    for (uint64_t k = 0; k < 3; k++)
+        ebpo_mesh_position(mesh, mesh->faces[3 * face + k], t[k]);
+}
+
+/* Gives the box of a face to a box tree over faces of the mesh `user`. */
+static inline void ebpo_face_box(const void *user, const mesh_point *p, point_box *out)
+{
+    double t[3][3];
+    ebpo_face_corners(user, p->number, t);
+    for (int k = 0; k < 3; k++) {
+        out->min[k] = fmin(fmin(t[0][k], t[1][k]), t[2][k]);
+        out->max[k] = fmax(fmax(t[0][k], t[1][k]), t[2][k]);
+    }
+}
+
+/* Adds a face to such a tree. False when memory is short. */
+static inline bool ebpo_face_add(box_tree *tree, const ebpo_mesh *mesh, uint32_t face,
+                                 int32_t value)
+{
+    point_box box;
+    mesh_point *p = ebpo_point_tree_add(&tree->points);
+    if (!p)
+        return false;
+    *p = (mesh_point){ .number = face, .value = value };
+    ebpo_face_box(mesh, p, &box);
+    for (int k = 0; k < 3; k++)
+        p->at[k] = box.min[k] / 2 + box.max[k] / 2;
+    return true;
+}
+
+static inline bool ebpo_shell_box_within(const shell *inner, const shell *outer)
+{
+    for (int k = 0; k < 3; k++)
+        if (inner->min[k] < outer->min[k] || inner->max[k] > outer->max[k])
+            return false;
+    return true;
+}
+
+/* Whether shells of the node may be within the host: their first samples near it. */
+static inline bool ebpo_shell_may_hold(const shell *host, const box_node *node)
+{
+    for (int k = 0; k < 3; k++)
+        if (node->points->min[k] > host->max[k] || node->points->max[k] < host->min[k])
+            return false;
+    return true;
+}
+
+/* How many closed components each is within. */
 
 /* Zeroed to begin with; to be freed on failure as well. `closed`: of ebpo_mesh_find_shells,
  * borrowed until then, and changed. */

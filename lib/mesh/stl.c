@@ -1,20 +1,324 @@
+/* Binary STL files: a head of 80 bytes, a count, facets of 50 bytes. The last two bytes of a facet
+ * are, by the format, the number of bytes that follow it; most programs keep a colour there. */
 #include "core/strict_fp.h"
 
-#include "mesh/stl.h"
-
 #include <inttypes.h>
+#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
-#include "mesh/attributes.h"
-#include "core/workspace.h"
+#include <ebpo/mesh.h>
+
+#include "core/endian.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "core/workspace.h"
 #include "geometry/decimal.h"
-#include "mesh/stl_binary.h"
-#include "mesh/stl_colours.h"
+#include "io/file_source.h"
+#include "mesh/attributes.h"
+#include "mesh/import_build.h"
 
-enum { HEAD = 84, RELEASE = 1 << 22, LOOK_AHEAD = 1 << 16 };
+/* The two bytes behind each face of a binary STL file. assimp takes them for colours where programs
+ * that follow Magics mean that there is none, so they are read here. */
+
+enum { COUNT = 80, STL_BINARY_HEAD = 84, RECORD = 50, STL_BINARY_WORD = 48 };
+
+/* What the bytes of a file are. */
+typedef struct stl_bytes {
+    uint64_t models;  /* one behind the other */
+    uint64_t payload; /* bytes that follow facets, as their last two bytes state */
+    uint64_t behind;  /* bytes behind the last facet */
+} stl_bytes;
+
+static uint64_t stated_faces(const uint8_t *head) { return ebpo_load32(head + COUNT); }
+
+static uint64_t stated_size(const uint8_t *head)
+{
+    return STL_BINARY_HEAD + RECORD * stated_faces(head);
+}
+
+/* Counts the models that take all bytes, one behind the other; 0: there are other bytes. */
+static uint64_t count_models(const uint8_t *data, uint64_t size)
+{
+    uint64_t models = 0, bytes;
+    for (uint64_t at = 0; at < size; at += bytes, models++) {
+        bytes = size - at < STL_BINARY_HEAD ? UINT64_MAX : stated_size(data + at);
+        if (bytes > size - at || (bytes == STL_BINARY_HEAD && size > STL_BINARY_HEAD))
+            return 0;
+    }
+    return models;
+}
+
+/* Returns where the last facet ends if bytes follow each as its last two state; UINT64_MAX: beyond
+ * the file. */
+static uint64_t end_with_payload(ebpo_workspace *workspace, const uint8_t *data, uint64_t size)
+{
+    uint64_t at = STL_BINARY_HEAD;
+    EBPO_FOR_ITEMS(workspace, i, 0, stated_faces(data)) {
+        uint64_t next = size - at < RECORD ? UINT64_MAX
+                                           : at + RECORD + ebpo_load16(data + at + STL_BINARY_WORD);
+        if (next > size)
+            return UINT64_MAX;
+        at = next;
+    }
+    return at;
+}
+
+bool ebpo_stl_states_size(const uint8_t *data, uint64_t known, uint64_t size)
+{
+    return known >= STL_BINARY_HEAD && size > STL_BINARY_HEAD && stated_size(data) == size;
+}
+
+bool ebpo_stl_fits_binary(const uint8_t *data, uint64_t size)
+{
+    return size >= STL_BINARY_HEAD &&
+           (count_models(data, size) ||
+            (stated_size(data) < size && end_with_payload(NULL, data, size) == size &&
+             stated_faces(data)));
+}
+
+static ebpo_status fail_ambiguous(const import_build *b, const uint8_t *data, uint64_t size)
+{
+    return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
+                          "states %" PRIu64 " faces, which take %" PRIu64 " of its %" PRIu64
+                          " bytes, and the others may belong to faces (their attribute byte "
+                          "counts) or follow them; save it as STL without attributes, or as PLY",
+                          stated_faces(data), stated_size(data), size);
+}
+
+/* Finds out what the bytes behind the stated facets are; EBPO_E_FORMAT where that is not certain.
+ */
+static ebpo_status stl_binary_explain(const import_build *b, const uint8_t *data, uint64_t size,
+                                      stl_bytes *is)
+{
+    uint64_t end = stated_size(data), held = (size - STL_BINARY_HEAD) / RECORD;
+    *is = (stl_bytes){ .models = 1 };
+    if (end == size)
+        return EBPO_OK;
+    uint64_t models = count_models(data, size),
+             last = end_with_payload(b->mesh->workspace, data, size);
+    bool payload = last == size && last > end;
+    if (models && payload)
+        return fail_ambiguous(b, data, size);
+    if (models || payload) {
+        is->models = models ? models : 1;
+        is->payload = payload ? size - end : 0;
+        return EBPO_OK;
+    }
+    if (held && (!stated_faces(data) || (size - STL_BINARY_HEAD) % RECORD == 0))
+        return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
+                              "states %" PRIu64 " faces, but its %" PRIu64 " bytes hold %" PRIu64
+                              "; correct the count (bytes 80 to 83), or get the file again",
+                              stated_faces(data), size, held);
+    if (last > end && last < size)
+        return fail_ambiguous(b, data, size);
+    is->behind = size - end;
+    return EBPO_OK;
+}
+
+static ebpo_status read_facets(import_build *b, const uint8_t *model, bool payload)
+{
+    const uint8_t *at = model + STL_BINARY_HEAD;
+    ebpo_status status = EBPO_OK;
+    EBPO_FOR_ITEMS(b->mesh->workspace, i, 0, stated_faces(model)) {
+        for (unsigned k = 0; k < 3 && status == EBPO_OK; k++) {
+            const uint8_t *corner = at + 12 + 12 * k;
+            uint32_t raw[3] = { ebpo_load32(corner), ebpo_load32(corner + 4),
+                                ebpo_load32(corner + 8) };
+            float xyz[3];
+            memcpy(xyz, raw, sizeof xyz);
+            status = ebpo_import_vertex(b, xyz);
+        }
+        if (status != EBPO_OK)
+            return status;
+        at += RECORD + (payload ? ebpo_load16(at + STL_BINARY_WORD) : 0);
+    }
+    return EBPO_OK;
+}
+
+/* Counts the facets of a model whose last two bytes are not zero. */
+static uint64_t count_words(const import_build *b, const uint8_t *model)
+{
+    uint64_t words = 0;
+    EBPO_FOR_ITEMS(b->mesh->workspace, i, 0, stated_faces(model))
+        words += ebpo_load16(model + STL_BINARY_HEAD + RECORD * i + STL_BINARY_WORD) != 0;
+    return words;
+}
+
+static ebpo_status stl_binary_note(import_build *b, const stl_bytes *is, uint64_t words)
+{
+    ebpo_status status = is->payload || is->behind || words ? ebpo_import_notes(b) : EBPO_OK;
+    if (status != EBPO_OK || !b->mesh->attributes)
+        return status;
+    ebpo_attributes *to = b->mesh->attributes;
+    ebpo_attributes_count_unread(to, "bytes that follow facets, by their attribute byte counts",
+                                 is->payload);
+    ebpo_attributes_count_unread(to, "bytes behind the last facet", is->behind);
+    if (words)
+        ebpo_attributes_lose(to,
+                             "the two bytes behind %" PRIu64
+                             " facets (colours, perhaps), as the file holds several models",
+                             words);
+    if (is->models > 1 && b->attributes)
+        ebpo_attributes_lose(to, "where each of %" PRIu64 " models begins", is->models);
+    return EBPO_OK;
+}
+
+static ebpo_status fail_head(const import_build *b, const uint8_t *data, uint64_t size)
+{
+    char word[IMPORT_WORD_TEXT];
+    uint64_t at = 0, end;
+    if (!ebpo_bytes_are_text(data, size))
+        return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
+                              "is no STL file: neither the word solid stands first, nor are there "
+                              "the 84 bytes that binary ones begin with");
+    while (at < size && (data[at] == ' ' || (data[at] >= '\t' && data[at] <= '\r')))
+        at++;
+    for (end = at; end < size && data[end] > ' ';)
+        end++;
+    ebpo_import_word_text(word, (const char *)data + at, end - at);
+    return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
+                          "is no STL file, but text that begins with '%s'; an STL file in text "
+                          "begins with the word solid: remove what is before it, or rename the "
+                          "file",
+                          word);
+}
+
+ebpo_status ebpo_stl_read_binary(import_build *b, const uint8_t *data, uint64_t size,
+                                 uint64_t *plain)
+{
+    *plain = 0;
+    if (size < STL_BINARY_HEAD ||
+        (ebpo_bytes_are_text(data, size) && !ebpo_stl_fits_binary(data, size)))
+        return fail_head(b, data, size);
+    uint64_t faces = stated_faces(data), words = 0;
+    if (stated_size(data) > size)
+        return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
+                              "states %" PRIu64 " faces, but its %" PRIu64 " bytes hold %" PRIu64
+                              "; it is cut short or no STL file",
+                              faces, size, (size - STL_BINARY_HEAD) / RECORD);
+    if (3 * faces > IMPORT_MOST)
+        return ebpo_fail_file(b->error, EBPO_E_LIMIT, b->name,
+                              "states %" PRIu64 " faces of three corners each, more than 2^32 - 2 "
+                              "corners; split the model",
+                              faces);
+    stl_bytes is;
+    ebpo_status status = stl_binary_explain(b, data, size, &is);
+    for (uint64_t m = 0, at = 0; status == EBPO_OK && m < is.models; m++) {
+        status = read_facets(b, data + at, is.payload > 0);
+        words += is.models > 1 ? count_words(b, data + at) : 0;
+        at += stated_size(data + at);
+    }
+    *plain = is.models == 1 && !is.payload ? stated_size(data) : 0;
+    return status == EBPO_OK ? stl_binary_note(b, &is, words) : status;
+}
+
+enum { HEADER = 80, FIRST = 84, FACE = 50, STL_COLOURS_WORD = 48, OWN = 0x8000 };
+
+typedef struct stl_colours {
+    const uint8_t *data;
+    uint64_t faces;
+    bool magics, words, coloured; /* some word is not 0; some face has a colour */
+    uint8_t others[3];            /* of faces without one */
+} stl_colours;
+
+static uint16_t word_of(const stl_colours *s, uint64_t face)
+{
+    return ebpo_load16(s->data + FIRST + FACE * face + STL_COLOURS_WORD);
+}
+
+static bool has_own(const stl_colours *s, uint16_t word)
+{
+    return s->magics ? !(word & OWN) : (word & OWN) != 0;
+}
+
+static void find_default(stl_colours *s)
+{
+    static const char mark[] = "COLOR=";
+    enum { LENGTH = sizeof mark - 1 };
+    memset(s->others, 255, sizeof s->others);
+    for (unsigned i = 0; i + LENGTH + 4 <= HEADER && !s->magics; i++) {
+        s->magics = memcmp(s->data + i, mark, LENGTH) == 0;
+        if (s->magics)
+            memcpy(s->others, s->data + i + LENGTH, sizeof s->others);
+    }
+}
+
+static void stl_colours_look(stl_colours *s)
+{
+    find_default(s);
+    s->coloured = s->magics;
+    for (uint64_t f = 0; f < s->faces; f++) {
+        uint16_t word = word_of(s, f);
+        s->words |= word != 0;
+        s->coloured |= has_own(s, word);
+    }
+}
+
+/* Five bits as eight: 0 to 255 with equal steps, as far as there are. */
+static uint8_t stl_colours_widen(unsigned five) { return (uint8_t)((five * 255 + 15) / 31); }
+
+static void colour_of(const stl_colours *s, uint16_t word, uint8_t rgb[3])
+{
+    memcpy(rgb, s->others, 3);
+    for (unsigned k = 0; k < 3 && has_own(s, word); k++)
+        rgb[s->magics ? k : 2 - k] = stl_colours_widen(word >> 5 * k & 31);
+}
+
+static ebpo_status stl_colours_add(ebpo_mesh *mesh, const char *names, ebpo_attribute_type type,
+                                   uint32_t columns, uint8_t **values, ebpo_error *error)
+{
+    ebpo_attribute head = { .element = "face", .type = type, .columns = columns };
+    head.list = EBPO_ATTRIBUTE_NO_LIST;
+    head.rows = mesh->face_count;
+    snprintf(head.names, sizeof head.names, "%s", names);
+    ebpo_attribute *a = ebpo_attributes_add(mesh->attributes, &head);
+    if (!a)
+        return ebpo_fail_memory(error, sizeof *a);
+    uint64_t bytes = ebpo_attribute_row_bytes(&head);
+    *values = a->values = ebpo_array_alloc(mesh->workspace, head.rows, bytes);
+    return *values ? EBPO_OK : ebpo_workspace_fail(mesh->workspace, head.rows * bytes, error);
+}
+
+static ebpo_status add_colours(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *error)
+{
+    uint8_t *values = NULL;
+    ebpo_status status =
+        stl_colours_add(mesh, "red green blue", EBPO_ATTRIBUTE_UINT8, 3, &values, error);
+    for (uint64_t f = 0; f < s->faces && status == EBPO_OK; f++)
+        colour_of(s, word_of(s, f), values + 3 * f);
+    return status;
+}
+
+static ebpo_status add_words(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *error)
+{
+    uint8_t *values = NULL;
+    ebpo_status status =
+        stl_colours_add(mesh, "attribute", EBPO_ATTRIBUTE_UINT16, 1, &values, error);
+    for (uint64_t f = 0; f < s->faces && status == EBPO_OK; f++) {
+        uint16_t word = word_of(s, f);
+        memcpy(values + f * sizeof word, &word, sizeof word);
+    }
+    return status;
+}
+
+/* Adds to the mesh's attributes, if any of them says something: `attribute`, as they are, and `red
+ * green blue`, five bits each: of files with COLOR= in the first 80 bytes (Magics) red first, where
+ * bit 15 is 0, else the colour that stands there; of others (VisCAM) blue first, where bit 15 is 1,
+ * else white. Nothing of a file in text. The mesh's faces are those of the file. EBPO_E_MEMORY,
+ * EBPO_E_IO. */
+static ebpo_status ebpo_import_stl_colours(ebpo_mesh *mesh, const uint8_t *data, uint64_t size,
+                                           ebpo_error *error)
+{
+    stl_colours s = { .data = data, .faces = mesh->face_count };
+    if (size != FIRST + FACE * s.faces || ebpo_load32(data + HEADER) != s.faces)
+        return EBPO_OK;
+    stl_colours_look(&s);
+    ebpo_status status = s.coloured ? add_colours(mesh, &s, error) : EBPO_OK;
+    return status == EBPO_OK && s.words ? add_words(mesh, &s, error) : status;
+}
+
+enum { STL_HEAD = 84, RELEASE = 1 << 22, LOOK_AHEAD = 1 << 16 };
 
 static bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
@@ -65,7 +369,7 @@ static bool next_word(stl_text *t, stl_word *word)
     return word->n > 0;
 }
 
-static bool is(stl_word word, const char *text)
+static bool stl_is(stl_word word, const char *text)
 {
     return word.n == strlen(text) && strncasecmp(word.s, text, word.n) == 0;
 }
@@ -113,7 +417,7 @@ static void pass_odd(stl_text *t)
     stl_word word;
     while (next_word(&ahead, &word) && ahead.line == t->line) {
         for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-            if (is(word, words[i]))
+            if (stl_is(word, words[i]))
                 return;
         note_odd(t);
         t->at = ahead.at;
@@ -128,23 +432,23 @@ static ebpo_status read_loop(stl_text *t)
     for (int passed = 0;; passed++) {
         if (!next_word(t, &word))
             return fail_end(t);
-        if (is(word, "outer") || is(word, "vertex") || is(word, "endfacet"))
+        if (stl_is(word, "outer") || stl_is(word, "vertex") || stl_is(word, "endfacet"))
             break;
         if (passed > 3)
             note_odd(t);
     }
-    if (is(word, "endfacet"))
+    if (stl_is(word, "endfacet"))
         return fail_word(t, "outer loop", word);
-    if (is(word, "outer") && next_word(t, &word) && !is(word, "loop"))
+    if (stl_is(word, "outer") && next_word(t, &word) && !stl_is(word, "loop"))
         return fail_word(t, "the word loop", word);
-    if (is(word, "vertex"))
+    if (stl_is(word, "vertex"))
         status = read_vertex(t);
-    for (t->corners = is(word, "vertex"); status == EBPO_OK;) {
+    for (t->corners = stl_is(word, "vertex"); status == EBPO_OK;) {
         if (!next_word(t, &word))
             return fail_end(t);
-        if (is(word, "endloop") || is(word, "endfacet"))
+        if (stl_is(word, "endloop") || stl_is(word, "endfacet"))
             break;
-        status = is(word, "vertex") ? read_vertex(t) : fail_word(t, "vertex or endloop", word);
+        status = stl_is(word, "vertex") ? read_vertex(t) : fail_word(t, "vertex or endloop", word);
     }
     if (status == EBPO_OK && t->corners != 3)
         status = ebpo_fail_file(t->build->error, EBPO_E_FORMAT, t->build->name,
@@ -163,10 +467,10 @@ static bool holds_facet(const stl_text *t)
     stl_word word;
     float x;
     bool more = next_word(&ahead, &word);
-    for (int i = 0; more && i < 4 && !is(word, "outer") && (i || is(word, "normal")); i++)
+    for (int i = 0; more && i < 4 && !stl_is(word, "outer") && (i || stl_is(word, "normal")); i++)
         more = next_word(&ahead, &word);
-    return more && is(word, "outer") && next_word(&ahead, &word) && is(word, "loop") &&
-           next_word(&ahead, &word) && is(word, "vertex") && next_word(&ahead, &word) &&
+    return more && stl_is(word, "outer") && next_word(&ahead, &word) && stl_is(word, "loop") &&
+           next_word(&ahead, &word) && stl_is(word, "vertex") && next_word(&ahead, &word) &&
            ebpo_number_float(&x, word.s, word.n, t->build->c_locale);
 }
 
@@ -176,7 +480,7 @@ static void pass_name(stl_text *t)
     stl_text ahead = *t;
     stl_word word;
     while (next_word(&ahead, &word) && ahead.line == t->line &&
-           !(is(word, "facet") && holds_facet(&ahead)))
+           !(stl_is(word, "facet") && holds_facet(&ahead)))
         t->at = ahead.at;
 }
 
@@ -184,8 +488,8 @@ static bool begins_facet(stl_text *t, stl_word word)
 {
     stl_text ahead = *t;
     stl_word next;
-    return is(word, "facet") &&
-           (!next_word(&ahead, &next) || is(next, "normal") || is(next, "outer"));
+    return stl_is(word, "facet") &&
+           (!next_word(&ahead, &next) || stl_is(next, "normal") || stl_is(next, "outer"));
 }
 
 static ebpo_status read_text(stl_text *t)
@@ -202,14 +506,14 @@ static ebpo_status read_text(stl_text *t)
             t->solids += t->begun;
             between = t->begun = false;
             status = read_loop(t);
-        } else if (is(word, "solid") || is(word, "endsolid")) {
+        } else if (stl_is(word, "solid") || stl_is(word, "endsolid")) {
             between = t->begun = true;
             pass_name(t);
         } else if (between) {
             note_odd(t);
-        } else if (is(word, "end")) {
+        } else if (stl_is(word, "end")) {
             continue;
-        } else if (is(word, "endfacet") || is(word, "endloop") || is(word, "color")) {
+        } else if (stl_is(word, "endfacet") || stl_is(word, "endloop") || stl_is(word, "color")) {
             pass_odd(t);
         } else {
             status = fail_word(t, "facet or endsolid", word);
@@ -241,7 +545,7 @@ static bool is_text(const uint8_t *data, uint64_t size)
 {
     uint64_t look = size < LOOK_AHEAD ? size : LOOK_AHEAD;
     const uint8_t *at = data, *end = data + look;
-    if (!begins_solid(data, size) || memchr(data, 0, size < HEAD ? size : HEAD) ||
+    if (!begins_solid(data, size) || memchr(data, 0, size < STL_HEAD ? size : STL_HEAD) ||
         ebpo_stl_fits_binary(data, size))
         return false;
     for (; at + 5 <= end; at++)

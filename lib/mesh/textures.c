@@ -1,16 +1,21 @@
 #include "core/strict_fp.h"
 
+#include <errno.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
-#include "core/workspace.h"
-#include "core/error.h"
 #include "core/checksum.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/text.h"
+#include "core/workspace.h"
+#include "io/file_source.h"
 #include "mesh/textures.h"
 
-enum { DIGEST = 32, STEP = 1 << 20 };
+enum { TEXTURES_DIGEST = 32, TEXTURES_STEP = 1 << 20 };
 
 const char *ebpo_texture_array_name(ebpo_texture_array which)
 {
@@ -18,7 +23,7 @@ const char *ebpo_texture_array_name(ebpo_texture_array which)
     return names[which];
 }
 
-static ebpo_attribute *find(const ebpo_attributes *all, ebpo_texture_array which)
+static ebpo_attribute *textures_find(const ebpo_attributes *all, ebpo_texture_array which)
 {
     for (uint64_t i = 0; all && i < all->count; i++) {
         ebpo_attribute *a = &all->array[i];
@@ -32,7 +37,7 @@ static ebpo_attribute *find(const ebpo_attributes *all, ebpo_texture_array which
 
 const ebpo_attribute *ebpo_textures_array(const ebpo_attributes *all, ebpo_texture_array which)
 {
-    return find(all, which);
+    return textures_find(all, which);
 }
 
 ebpo_texture_bytes ebpo_texture_list(const ebpo_attribute *a, uint64_t row)
@@ -47,7 +52,7 @@ ebpo_texture_bytes ebpo_texture_list(const ebpo_attribute *a, uint64_t row)
     return (ebpo_texture_bytes){ a->values ? a->values + from : NULL, to - from };
 }
 
-static ebpo_attribute *make(ebpo_attributes *to, ebpo_texture_array which)
+static ebpo_attribute *textures_make(ebpo_attributes *to, ebpo_texture_array which)
 {
     ebpo_attribute head = { .element = EBPO_TEXTURE_ELEMENT,
                             .type = EBPO_ATTRIBUTE_UINT8,
@@ -72,8 +77,8 @@ ebpo_status ebpo_textures_add(ebpo_attributes *to, bool keep,
                               const ebpo_texture_bytes list[EBPO_TEXTURE_ARRAYS], ebpo_error *error)
 {
     for (int which = 0; which < (keep ? EBPO_TEXTURE_ARRAYS : EBPO_TEXTURE_BYTES); which++) {
-        ebpo_attribute *a = find(to, (ebpo_texture_array)which);
-        if (!a && !(a = make(to, (ebpo_texture_array)which)))
+        ebpo_attribute *a = textures_find(to, (ebpo_texture_array)which);
+        if (!a && !(a = textures_make(to, (ebpo_texture_array)which)))
             return ebpo_fail_memory(error, sizeof *a);
         if (!add_row(to->workspace, a, list[which]))
             return ebpo_workspace_fail(to->workspace, list[which].count, error);
@@ -84,20 +89,21 @@ ebpo_status ebpo_textures_add(ebpo_attributes *to, bool keep,
 static bool is_digest(ebpo_texture_bytes bytes, ebpo_texture_bytes sha256,
                       ebpo_workspace *workspace)
 {
-    uint8_t digest[DIGEST];
+    uint8_t digest[TEXTURES_DIGEST];
     ebpo_sha256 state;
     ebpo_sha256_begin(&state);
-    EBPO_FOR_PIECES(workspace, at, bytes.count, STEP)
+    EBPO_FOR_PIECES(workspace, at, bytes.count, TEXTURES_STEP)
         ebpo_sha256_add(&state, (const uint8_t *)bytes.at + at,
-                        bytes.count - at < STEP ? (size_t)(bytes.count - at) : STEP);
+                        bytes.count - at < TEXTURES_STEP ? (size_t)(bytes.count - at)
+                                                         : TEXTURES_STEP);
     ebpo_sha256_end(&state, digest);
-    return sha256.count == DIGEST && !ebpo_digest_differs(sha256.at, digest);
+    return sha256.count == TEXTURES_DIGEST && !ebpo_digest_differs(sha256.at, digest);
 }
 
 bool ebpo_textures_good(const ebpo_attributes *all)
 {
-    const ebpo_attribute *bytes = find(all, EBPO_TEXTURE_BYTES),
-                         *sha256 = find(all, EBPO_TEXTURE_SHA256);
+    const ebpo_attribute *bytes = textures_find(all, EBPO_TEXTURE_BYTES),
+                         *sha256 = textures_find(all, EBPO_TEXTURE_SHA256);
     for (uint64_t i = 0; bytes && i < bytes->rows; i++) {
         ebpo_texture_bytes list = ebpo_texture_list(bytes, i);
         if (list.count && !is_digest(list, ebpo_texture_list(sha256, i), all->workspace))
@@ -126,7 +132,7 @@ typedef struct naming {
     bool *kept; /* [rows] */
 } naming;
 
-static words trimmed(words t)
+static words textures_trimmed(words t)
 {
     while (t.n && (*t.s == ' ' || *t.s == '\t' || *t.s == '\r'))
         t = (words){ t.s + 1, t.n - 1 };
@@ -138,10 +144,10 @@ static words trimmed(words t)
 /* Takes the first word off. */
 static words first_word(words *rest)
 {
-    words t = trimmed(*rest), word = { t.s, 0 };
+    words t = textures_trimmed(*rest), word = { t.s, 0 };
     while (word.n < t.n && t.s[word.n] != ' ' && t.s[word.n] != '\t')
         word.n++;
-    *rest = trimmed((words){ t.s + word.n, t.n - word.n });
+    *rest = textures_trimmed((words){ t.s + word.n, t.n - word.n });
     return word;
 }
 
@@ -158,7 +164,7 @@ static bool first_line(words *text, words *line)
     return true;
 }
 
-static bool is(words a, const char *text)
+static bool textures_is(words a, const char *text)
 {
     return a.n == strlen(text) && (!a.n || memcmp(a.s, text, a.n) == 0);
 }
@@ -188,12 +194,12 @@ static bool read_header(naming *n)
     words text = { n->all->header, n->all->header_bytes }, line;
     bool good = true;
     while (good && first_line(&text, &line)) {
-        if (!is(first_word(&line), "comment"))
+        if (!textures_is(first_word(&line), "comment"))
             continue;
         words word = first_word(&line);
-        if (is(word, "TextureFile"))
+        if (textures_is(word, "TextureFile"))
             good = add_name(&n->files, line);
-        else if (is(word, "material") && n->materials.of_faces) {
+        else if (textures_is(word, "material") && n->materials.of_faces) {
             words number = first_word(&line);
             bool next = number.n && strtoull(number.s, NULL, 10) == n->materials.count;
             good = !next || add_name(&n->materials, line);
@@ -202,7 +208,8 @@ static bool read_header(naming *n)
     return good;
 }
 
-static bool mark(numbered *to, const uint32_t *faces, uint64_t count, ebpo_workspace *workspace)
+static bool textures_mark(numbered *to, const uint32_t *faces, uint64_t count,
+                          ebpo_workspace *workspace)
 {
     const ebpo_attribute *a = to->of_faces;
     to->used = ebpo_alloc_zero(to->count + 1, sizeof *to->used);
@@ -236,7 +243,7 @@ static void sort_used(numbered *n)
         qsort(n->name, used, sizeof *n->name, compare_words);
 }
 
-static bool has(const numbered *n, words name)
+static bool textures_has(const numbered *n, words name)
 {
     return n->count && bsearch(&name, n->name, n->count, sizeof *n->name, compare_words);
 }
@@ -245,12 +252,12 @@ static bool has(const numbered *n, words name)
 static bool is_named(const naming *n, words file, words use)
 {
     words word = first_word(&use);
-    if (is(word, "TextureFile"))
-        return !n->files.of_faces || has(&n->files, file);
-    return !n->materials.of_faces || has(&n->materials, use);
+    if (textures_is(word, "TextureFile"))
+        return !n->files.of_faces || textures_has(&n->files, file);
+    return !n->materials.of_faces || textures_has(&n->materials, use);
 }
 
-static bool keeps(const naming *n, uint64_t row)
+static bool textures_keeps(const naming *n, uint64_t row)
 {
     ebpo_texture_bytes name =
                            ebpo_texture_list(ebpo_textures_array(n->all, EBPO_TEXTURE_NAME), row),
@@ -263,7 +270,7 @@ static bool keeps(const naming *n, uint64_t row)
 }
 
 /* The array anew, of the lists that are kept; all others are empty. */
-static ebpo_status cut(naming *n, ebpo_attribute *a, ebpo_error *error)
+static ebpo_status textures_cut(naming *n, ebpo_attribute *a, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->all->workspace;
     ebpo_attribute made = *a;
@@ -296,13 +303,13 @@ static ebpo_status cut(naming *n, ebpo_attribute *a, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status keep(naming *n, ebpo_attribute *bytes, const uint32_t *faces, uint64_t count,
-                        ebpo_error *error)
+static ebpo_status textures_keep(naming *n, ebpo_attribute *bytes, const uint32_t *faces,
+                                 uint64_t count, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->all->workspace;
     uint64_t kept = 0;
-    if (!read_header(n) || !mark(&n->materials, faces, count, workspace) ||
-        !mark(&n->files, faces, count, workspace))
+    if (!read_header(n) || !textures_mark(&n->materials, faces, count, workspace) ||
+        !textures_mark(&n->files, faces, count, workspace))
         return ebpo_fail_memory(error, n->all->header_bytes);
     sort_used(&n->materials);
     sort_used(&n->files);
@@ -310,9 +317,9 @@ static ebpo_status keep(naming *n, ebpo_attribute *bytes, const uint32_t *faces,
     if (!n->kept)
         return ebpo_fail_memory(error, bytes->rows);
     for (uint64_t i = 0; i < bytes->rows; i++)
-        kept += n->kept[i] = keeps(n, i);
+        kept += n->kept[i] = textures_keeps(n, i);
     if (kept < bytes->rows && kept)
-        return cut(n, bytes, error);
+        return textures_cut(n, bytes, error);
     if (!kept)
         ebpo_attributes_remove(n->all, (uint64_t)(bytes - n->all->array));
     return EBPO_OK;
@@ -327,11 +334,473 @@ ebpo_status ebpo_textures_keep_named(ebpo_attributes *of, const uint32_t *faces,
     naming n = { .all = of };
     n.materials.of_faces = of_faces(of, "material");
     n.files.of_faces = of_faces(of, "texnumber");
-    ebpo_status status = keep(&n, &of->array[bytes - of->array], faces, count, error);
+    ebpo_status status = textures_keep(&n, &of->array[bytes - of->array], faces, count, error);
     free(n.materials.name);
     free(n.materials.used);
     free(n.files.name);
     free(n.files.used);
     free(n.kept);
+    return status;
+}
+
+/* Text that does not end with a zero. */
+typedef struct span {
+    const char *s;
+    size_t n;
+} span;
+
+static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+static span texture_names_trimmed(span t)
+{
+    while (t.n && is_blank(*t.s))
+        t = (span){ t.s + 1, t.n - 1 };
+    while (t.n && is_blank(t.s[t.n - 1]))
+        t.n--;
+    return t;
+}
+
+/* Takes the first word off. */
+static span take_word(span *rest)
+{
+    span t = texture_names_trimmed(*rest), word = { t.s, 0 };
+    while (word.n < t.n && !is_blank(t.s[word.n]))
+        word.n++;
+    *rest = texture_names_trimmed((span){ t.s + word.n, t.n - word.n });
+    return word;
+}
+
+static bool texture_names_is(span word, const char *text)
+{
+    return word.n == strlen(text) && memcmp(word.s, text, word.n) == 0;
+}
+
+static bool texture_names_begins(span word, const char *text)
+{
+    return word.n >= strlen(text) && memcmp(word.s, text, strlen(text)) == 0;
+}
+
+/* Text behind its mark of the order of bytes, if it has one. */
+static span whole_text(const uint8_t *text, uint64_t bytes)
+{
+    uint64_t mark = ebpo_text_mark(text, bytes);
+    return (span){ (const char *)text + mark, bytes - mark };
+}
+
+/* The next line; false: there is none. */
+static bool next_line(span *text, span *line)
+{
+    if (!text->n)
+        return false;
+    const char *stop = memchr(text->s, '\n', text->n);
+    size_t n = stop ? (size_t)(stop - text->s) : text->n, step = n + (stop != NULL);
+    *line = (span){ text->s, n };
+    *text = (span){ text->s + step, text->n - step };
+    return true;
+}
+
+/* --- the list --- */
+
+static bool is_name(span name)
+{
+    bool good = name.n > 0 && name.n <= EBPO_TEXTURE_NAME_BYTES;
+    for (size_t i = 0; i < name.n && good; i++)
+        good = (unsigned char)name.s[i] >= ' ' && name.s[i] != 127;
+    return good;
+}
+
+static uint64_t hash_of(span name)
+{
+    uint64_t hash = name.n;
+    for (size_t i = 0; i < name.n; i++)
+        hash = hash * 31 + (uint8_t)name.s[i];
+    return ebpo_hash_number(hash);
+}
+
+static ebpo_texture_name *place_of(ebpo_texture_names *names, span name)
+{
+    uint64_t at;
+    EBPO_HASH_FIND(at, hash_of(name), EBPO_TEXTURE_SLOTS - 1,
+                   !names->slot[at] || texture_names_is(name, names->of[names->slot[at] - 1].name));
+    if (names->slot[at])
+        return &names->of[names->slot[at] - 1];
+    if (!is_name(name) || names->count == EBPO_TEXTURES) {
+        names->left_out++;
+        return NULL;
+    }
+    char *copy = strndup(name.s, name.n);
+    if (!copy || !ebpo_grow(&names->of, &names->capacity, names->count + 1, sizeof *names->of)) {
+        free(copy);
+        names->no_memory = true;
+        return NULL;
+    }
+    names->of[names->count] = (ebpo_texture_name){ .name = copy };
+    names->slot[at] = (uint16_t)(names->count + 1);
+    return &names->of[names->count++];
+}
+
+/* Control characters become question marks: lines end lines. */
+static void texture_names_append(ebpo_texture_name *to, span text)
+{
+    for (size_t i = 0; i < text.n; i++)
+        to->use[to->use_bytes++] =
+            (unsigned char)text.s[i] < ' ' || text.s[i] == 127 ? '?' : text.s[i];
+}
+
+/* What for: a word, and the name of what has it. */
+static void texture_names_add(ebpo_texture_names *names, span name, span word, span owner)
+{
+    ebpo_texture_name *to = place_of(names, name);
+    if (!to)
+        return;
+    if (to->use_bytes + word.n + owner.n + 2 > EBPO_TEXTURE_USE_BYTES) {
+        names->left_out++;
+        return;
+    }
+    if (!ebpo_grow(&to->use, &to->use_capacity, to->use_bytes + word.n + owner.n + 2, 1)) {
+        names->no_memory = true;
+        return;
+    }
+    if (to->use_bytes)
+        to->use[to->use_bytes++] = '\n';
+    texture_names_append(to, word);
+    if (owner.n)
+        to->use[to->use_bytes++] = ' ';
+    texture_names_append(to, owner);
+}
+
+void ebpo_texture_names_free(ebpo_texture_names *names)
+{
+    for (uint64_t i = 0; i < names->count; i++) {
+        free(names->of[i].name);
+        free(names->of[i].use);
+    }
+    free(names->of);
+    *names = (ebpo_texture_names){ .of = NULL };
+}
+
+/* --- PLY --- */
+
+void ebpo_texture_names_of_ply(ebpo_texture_names *names, const char *header, uint64_t bytes)
+{
+    span text = { header, bytes }, line;
+    while (next_line(&text, &line)) {
+        if (!texture_names_is(take_word(&line), "comment"))
+            continue;
+        span word = take_word(&line);
+        if (texture_names_is(word, "TextureFile"))
+            texture_names_add(names, line, word, (span){ "", 0 });
+    }
+}
+
+/* --- OBJ --- */
+
+static bool is_map(span word)
+{
+    static const char *const others[] = { "bump", "disp", "decal", "refl", "norm" };
+    bool found = texture_names_begins(word, "map_");
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++)
+        found = found || texture_names_is(word, others[i]);
+    return found && !texture_names_is(word, "map_aat"); /* a switch */
+}
+
+static bool is_number(span word)
+{
+    bool digits = false;
+    for (size_t i = 0; i < word.n; i++) {
+        if (!strchr("+-.0123456789eE", word.s[i]))
+            return false;
+        digits |= word.s[i] >= '0' && word.s[i] <= '9';
+    }
+    return digits;
+}
+
+/* Behind a map's options stands its file's name, to the end of the line. */
+static span skip_options(span rest)
+{
+    while (rest.n > 1 && rest.s[0] == '-') {
+        span option = take_word(&rest);
+        bool numbers = texture_names_is(option, "-o") || texture_names_is(option, "-s") ||
+                       texture_names_is(option, "-t");
+        int most = numbers ? 3 : texture_names_is(option, "-mm") ? 2 : 1;
+        for (int i = 0; i < most; i++) {
+            span ahead = rest, value = take_word(&ahead);
+            if ((numbers && !is_number(value)) || !ahead.n)
+                break;
+            rest = ahead;
+        }
+    }
+    return rest;
+}
+
+void ebpo_texture_names_of_mtl(ebpo_texture_names *names, const uint8_t *text, uint64_t bytes)
+{
+    span rest = whole_text(text, bytes), line, material = { "", 0 };
+    while (next_line(&rest, &line)) {
+        span word = take_word(&line);
+        if (texture_names_is(word, "newmtl"))
+            material = line;
+        else if (is_map(word))
+            texture_names_add(names, skip_options(line), word, material);
+    }
+}
+
+void ebpo_obj_libraries(const uint8_t *text, uint64_t bytes,
+                        void (*take)(void *context, const char *rest, size_t size), void *context)
+{
+    span rest = whole_text(text, bytes), line;
+    while (next_line(&rest, &line)) {
+        for (; line.n && is_blank(*line.s); line.n--)
+            line.s++;
+        if (line.n > 6 && memcmp(line.s, "mtllib", 6) == 0 && is_blank(line.s[6])) {
+            take_word(&line);
+            take(context, line.s, line.n);
+        }
+    }
+}
+
+/* Of material libraries: bytes of all, and names that are tried. */
+enum {
+    LIBRARY_BYTES = 1 << 25,
+    LIBRARIES = 100,
+    TEXTURE_FILES_DIGEST = 32,
+    TEXTURE_FILES_STEP = 1 << 20
+};
+#define IMAGE_BYTES ((uint64_t)1 << 30)
+
+typedef struct finding {
+    const char *path; /* of the source */
+    ebpo_texture_names names;
+    uint64_t absent, outside, large; /* not found; forbidden; too large */
+    uint64_t tried, libraries;       /* names of libraries; not read */
+    uint64_t library_bytes;          /* read */
+    bool keep, no_memory;
+    ebpo_error *error;
+} finding;
+
+/* --- files beside the source --- */
+
+/* Below the folder, by its words: no root, no drive, nothing upwards. */
+static bool stays_below(const char *name)
+{
+    if (*name == '/' || (*name && name[1] == ':'))
+        return false;
+    for (const char *s = name; *s;) {
+        size_t n = strcspn(s, "/");
+        if (n == 2 && s[0] == '.' && s[1] == '.')
+            return false;
+        s += n + (s[n] == '/');
+    }
+    return true;
+}
+
+typedef enum found { FOUND, ABSENT, OUTSIDE, NO_MEMORY } found;
+
+/* Other systems' names have backslashes. */
+static char *path_of(const char *name)
+{
+    char *path = strdup(name);
+    for (char *s = path; path && *s; s++)
+        if (*s == '\\')
+            *s = '/';
+    return path;
+}
+
+/* Opens a file that the source names. */
+static found open_beside(const char *source, const char *name, ebpo_whole_file *out)
+{
+    size_t length = (size_t)(ebpo_path_name(source) - source);
+    char *path = path_of(name), *folder = strndup(length ? source : ".", length ? length : 1);
+    found how = path && folder ? FOUND : NO_MEMORY;
+    if (how == FOUND && !stays_below(path))
+        how = OUTSIDE;
+    if (how == FOUND) {
+        int fd = ebpo_open_below(folder, path);
+        how = fd >= 0 ? FOUND : errno == EXDEV ? OUTSIDE : ABSENT;
+        if (fd >= 0 && ebpo_whole_file_take(out, fd, path, NULL) != EBPO_OK)
+            how = ABSENT;
+    }
+    free(path);
+    free(folder);
+    return how;
+}
+
+/* --- names --- */
+
+static bool read_library(finding *f, const char *name)
+{
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
+    found how = f->tried++ < LIBRARIES ? open_beside(f->path, name, &file) : ABSENT;
+    f->no_memory |= how == NO_MEMORY;
+    bool good = how == FOUND && file.size <= LIBRARY_BYTES - f->library_bytes;
+    if (good)
+        f->library_bytes += file.size;
+    good = good && ebpo_whole_file_load(&file, NULL, 1, NULL, name, NULL) == EBPO_OK;
+    if (good)
+        ebpo_texture_names_of_mtl(&f->names, file.data, file.size);
+    ebpo_whole_file_close(&file);
+    return good;
+}
+
+/* A library's name with spaces, or several names. */
+static void read_libraries(void *context, const char *rest, size_t size)
+{
+    finding *f = context;
+    char *names = strndup(rest, size);
+    if (!names || read_library(f, names)) {
+        f->no_memory |= !names;
+        free(names);
+        return;
+    }
+    char *left = NULL, *name = strtok_r(names, " \t", &left);
+    for (; name; name = strtok_r(NULL, " \t", &left))
+        f->libraries += !read_library(f, name);
+    free(names);
+}
+
+static void find_names(finding *f, const ebpo_mesh *mesh, const uint8_t *data, uint64_t size)
+{
+    if (strcmp(mesh->source_format, "obj") == 0)
+        ebpo_obj_libraries(data, size, read_libraries, f);
+    else if (mesh->attributes && mesh->attributes->header)
+        ebpo_texture_names_of_ply(&f->names, mesh->attributes->header,
+                                  mesh->attributes->header_bytes);
+    f->no_memory |= f->names.no_memory;
+}
+
+/* --- images --- */
+
+/* Piece by piece: where the bytes are not kept they need not be in memory all at once. */
+static ebpo_status make_digest(const ebpo_whole_file *file, const char *name,
+                               uint8_t digest[TEXTURE_FILES_DIGEST], ebpo_error *error)
+{
+    ebpo_sha256 state;
+    ebpo_status status = EBPO_OK;
+    uint8_t *piece = file->data ? NULL : ebpo_alloc(TEXTURE_FILES_STEP, 1);
+    if (!file->data && !piece)
+        return ebpo_fail_memory(error, TEXTURE_FILES_STEP);
+    ebpo_sha256_begin(&state);
+    for (uint64_t at = 0; at < file->size && status == EBPO_OK; at += TEXTURE_FILES_STEP) {
+        size_t bytes =
+            file->size - at < TEXTURE_FILES_STEP ? (size_t)(file->size - at) : TEXTURE_FILES_STEP;
+        if (piece)
+            status = ebpo_whole_file_read(file, at, piece, bytes, name, error);
+        if (status == EBPO_OK)
+            ebpo_sha256_add(&state, piece ? piece : file->data + at, bytes);
+    }
+    ebpo_sha256_end(&state, digest);
+    free(piece);
+    return status;
+}
+
+/* Bytes that are kept, and the digest. */
+static ebpo_status read_image(const finding *f, ebpo_whole_file *file, const char *name,
+                              uint8_t digest[TEXTURE_FILES_DIGEST])
+{
+    ebpo_status status =
+        f->keep ? ebpo_whole_file_load(file, NULL, 1, NULL, name, f->error) : EBPO_OK;
+    return status == EBPO_OK ? make_digest(file, name, digest, f->error) : status;
+}
+
+static ebpo_status add_image(finding *f, ebpo_attributes *to, const ebpo_texture_name *named)
+{
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
+    uint8_t digest[TEXTURE_FILES_DIGEST];
+    ebpo_texture_bytes list[EBPO_TEXTURE_ARRAYS] = {
+        [EBPO_TEXTURE_NAME] = { named->name, strlen(named->name) },
+        [EBPO_TEXTURE_USE] = { named->use, named->use_bytes },
+    };
+    found how = open_beside(f->path, named->name, &file);
+    f->absent += how == ABSENT;
+    f->outside += how == OUTSIDE;
+    if (how == NO_MEMORY)
+        return ebpo_fail_memory(f->error, strlen(f->path));
+    ebpo_status status = EBPO_OK;
+    if (how == FOUND && file.size > IMAGE_BYTES) {
+        f->large++;
+    } else if (how == FOUND) {
+        status = read_image(f, &file, named->name, digest);
+        list[EBPO_TEXTURE_SHA256] = (ebpo_texture_bytes){ digest, TEXTURE_FILES_DIGEST };
+        if (f->keep)
+            list[EBPO_TEXTURE_BYTES] = (ebpo_texture_bytes){ file.data, file.size };
+    }
+    if (status == EBPO_OK)
+        status = ebpo_textures_add(to, f->keep, list, f->error);
+    if (status == EBPO_OK && how == FOUND)
+        status = ebpo_whole_file_unchanged(&file, named->name, f->error);
+    ebpo_whole_file_close(&file);
+    return status;
+}
+
+/* --- notes --- */
+
+static void texture_files_lose(ebpo_attributes *to, uint64_t count, const char *one,
+                               const char *several)
+{
+    if (count == 1)
+        ebpo_attributes_lose(to, "%s", one);
+    else if (count)
+        ebpo_attributes_lose(to, several, count);
+}
+
+static void note_losses(const finding *f, ebpo_attributes *to)
+{
+    uint64_t known = f->names.count - f->absent - f->outside - f->large;
+    texture_files_lose(to, f->names.left_out,
+                       "a name or a use of an image (there is no room for more)",
+                       "%" PRIu64 " names and uses of images (there is no room for more)");
+    texture_files_lose(to, f->libraries, "names of images (a material library cannot be read)",
+                       "names of images (%" PRIu64 " material libraries cannot be read)");
+    texture_files_lose(to, f->absent,
+                       "the digest of an image (there is no such file beside the source)",
+                       "the digests of %" PRIu64
+                       " images (there are no such files beside the source)");
+    texture_files_lose(to, f->outside,
+                       "the digest of an image (its name leads out of the source's folder)",
+                       "the digests of %" PRIu64
+                       " images (their names lead out of the source's folder)");
+    texture_files_lose(to, f->large, "an image of more than 1 GiB",
+                       "%" PRIu64 " images of more than 1 GiB");
+    texture_files_lose(to, f->keep ? 0 : known,
+                       "the bytes of an image (--embed-textures keeps them)",
+                       "the bytes of %" PRIu64 " images (--embed-textures keeps them)");
+}
+
+/* The element is ours, whatever a PLY says of one of that name. */
+static void drop_own(ebpo_attributes *from)
+{
+    bool any = false;
+    for (uint64_t i = from ? from->count : 0; i-- > 0;)
+        if (ebpo_attribute_is_of_textures(&from->array[i])) {
+            ebpo_attributes_remove(from, i);
+            any = true;
+        }
+    if (any)
+        ebpo_attributes_lose(from, "the element " EBPO_TEXTURE_ELEMENT);
+}
+
+static ebpo_status add_images(finding *f, ebpo_mesh *mesh)
+{
+    ebpo_status status = EBPO_OK;
+    if (f->no_memory)
+        return ebpo_fail_memory(f->error, sizeof *f->names.of);
+    if (!f->names.count && !f->names.left_out && !f->libraries)
+        return EBPO_OK;
+    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
+        return ebpo_fail_memory(f->error, sizeof *mesh->attributes);
+    for (uint64_t i = 0; i < f->names.count && status == EBPO_OK; i++)
+        status = add_image(f, mesh->attributes, &f->names.of[i]);
+    note_losses(f, mesh->attributes);
+    return status;
+}
+
+ebpo_status ebpo_textures_find(ebpo_mesh *mesh, const char *path, const uint8_t *data,
+                               uint64_t size, bool keep, ebpo_error *error)
+{
+    finding f = { .path = path, .keep = keep, .error = error };
+    drop_own(mesh->attributes);
+    find_names(&f, mesh, data, size);
+    ebpo_status status = add_images(&f, mesh);
+    ebpo_texture_names_free(&f.names);
     return status;
 }

@@ -92,7 +92,7 @@ static ebpo_status sort_positions(grouping *g, ebpo_error *error)
 
 /* ---- exact distances ---- */
 
-static double squared(const double p[3], const double q[3])
+static double weld_within_squared(const double p[3], const double q[3])
 {
     double d[3] = { p[0] - q[0], p[1] - q[1], p[2] - q[2] };
     return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
@@ -122,7 +122,7 @@ static int put_distance(double (*factor)[2], double sign, const double p[3], con
 
 static bool is_within(const double p[3], const double q[3], double distance)
 {
-    double square = squared(p, q), limit = distance * distance, factor[13][2];
+    double square = weld_within_squared(p, q), limit = distance * distance, factor[13][2];
     if (is_certain(square, limit))
         return square < limit;
     int n = put_distance(factor, 1, p, q);
@@ -133,7 +133,7 @@ static bool is_within(const double p[3], const double q[3], double distance)
 
 static bool is_nearer(const double p[3], const double a[3], const double b[3])
 {
-    double to_a = squared(p, a), to_b = squared(p, b), factor[24][2];
+    double to_a = weld_within_squared(p, a), to_b = weld_within_squared(p, b), factor[24][2];
     if (is_certain(to_a, to_b))
         return to_a < to_b;
     int n = put_distance(factor, 1, p, a);
@@ -157,7 +157,7 @@ static uint64_t slot_of(const grouping *g, const int64_t cell[3])
     return ebpo_hash_three(key) & g->mask;
 }
 
-static void stay(grouping *g, uint32_t v, const double p[3])
+static void weld_within_stay(grouping *g, uint32_t v, const double p[3])
 {
     int64_t cell[3];
     for (int k = 0; k < 3; k++)
@@ -207,7 +207,7 @@ static ebpo_status choose_nearest(void *context, uint64_t begin, uint64_t end, u
         ebpo_mesh_position(g->mesh, v, p);
         g->map[v] = find_staying(g, p, true);
         ebpo_mesh_position(g->mesh, g->map[v], q);
-        g->moved[worker] = fmax(g->moved[worker], squared(p, q));
+        g->moved[worker] = fmax(g->moved[worker], weld_within_squared(p, q));
     }
     return EBPO_OK;
 }
@@ -264,8 +264,8 @@ static uint64_t number_staying(grouping *g, uint32_t *from)
     return kept;
 }
 
-static ebpo_status group(grouping *g, uint32_t *from, uint64_t *kept, double *moved,
-                         ebpo_error *error)
+static ebpo_status weld_within_group(grouping *g, uint32_t *from, uint64_t *kept, double *moved,
+                                     ebpo_error *error)
 {
     const ebpo_mesh *mesh = g->mesh;
     ebpo_workspace *workspace = mesh->workspace;
@@ -290,7 +290,7 @@ static ebpo_status group(grouping *g, uint32_t *from, uint64_t *kept, double *mo
         double p[3];
         ebpo_mesh_position(mesh, g->order[i], p);
         if (find_staying(g, p, false) == EBPO_NO_INDEX)
-            stay(g, g->order[i], p);
+            weld_within_stay(g, g->order[i], p);
     }
     status = ebpo_parallel_for(threads, NULL, mesh->vertex_count, GRAIN, choose_nearest, g, NULL,
                                "", error);
@@ -306,7 +306,7 @@ ebpo_status ebpo_weld_group_within(const ebpo_mesh *mesh, double distance, uint3
                                    uint32_t *from, uint64_t *kept, double *moved, ebpo_error *error)
 {
     grouping g = { .mesh = mesh, .distance = distance, .map = map };
-    ebpo_status status = group(&g, from, kept, moved, error);
+    ebpo_status status = weld_within_group(&g, from, kept, moved, error);
     ebpo_array_free(mesh->workspace, g.order);
     ebpo_array_free(mesh->workspace, g.chain);
     ebpo_array_free(mesh->workspace, g.slots);

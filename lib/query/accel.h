@@ -10,9 +10,8 @@
 #include <stdatomic.h>
 
 #include "format/slice.h"
-#include "geometry/cell.h"
-#include "geometry/node_source.h"
-#include "geometry/node_table.h"
+#include "geometry/cells.h"
+#include "geometry/level_nodes.h"
 
 /* --- leaves --- */
 

@@ -20,7 +20,7 @@
 #include "core/hash.h"
 #include "core/os.h"
 #include "format/slice.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 #include "query/accel.h"
 #include "query/accel_parts.h"
 

@@ -15,7 +15,7 @@
 #include "core/error.h"
 #include "core/os.h"
 #include "core/parallel.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 #include "query/accel_parts.h"
 
 /* What a walk brings up from a node: either up to eight faces that are no block yet, or up to eight

@@ -14,7 +14,7 @@
 #include "core/simd.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "geometry/ray_triangle.h"
+#include "geometry/ray.h"
 #include "query/load_ahead.h"
 #include "query/query_model.h"
 #include "query/query_node.h"

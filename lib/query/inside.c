@@ -21,7 +21,7 @@
 #include "core/fp_env.h"
 #include "format/reader.h"
 #include "geometry/cursor.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 #include "geometry/predicates.h"
 #include "query/load_ahead.h"
 #include "query/query_model.h"

@@ -14,7 +14,7 @@
 
 #include "core/simd.h"
 #include "geometry/cells.h"
-#include "geometry/min_max.h"
+#include "geometry/vec3.h"
 #include "query/face_block.h"
 #include "query/query_kernels.h"
 

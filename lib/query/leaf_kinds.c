@@ -20,7 +20,7 @@
 
 #include "core/alloc.h"
 #include "geometry/cells.h"
-#include "geometry/min_max.h"
+#include "geometry/vec3.h"
 #include "geometry/predicates.h"
 #include "query/accel_parts.h"
 

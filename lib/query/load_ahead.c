@@ -16,7 +16,7 @@
 #include "core/alloc.h"
 #include "format/reader.h"
 #include "format/subtree_index.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 #include "query/load_ahead.h"
 #include "query/nearest.h"
 #include "query/query_node.h"

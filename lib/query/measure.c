@@ -20,8 +20,8 @@
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "format/reader.h"
-#include "geometry/double_double.h"
-#include "geometry/rule.h"
+#include "geometry/expansion.h"
+#include "geometry/level_nodes.h"
 #include "mesh/mesh_parts.h"
 
 enum { BLOCK_FACES = 16384 };

@@ -15,8 +15,7 @@
 #include "core/os.h"
 #include "core/error.h"
 #include "format/reader.h"
-#include "geometry/cell.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 #include "query/nearest.h"
 
 /* A heap. */

@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/plane_code.h"
+#include "geometry/polytope.h"
 #include "query/point_bounds.h"
 
 /* A node may list a face that only comes near, within 1/256 of the cell's size on each axis

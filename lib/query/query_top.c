@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "core/workspace.h"
 #include "format/reader.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 
 /* Reading, level by level, with what the next level needs to know of the one before. */
 typedef struct reading {

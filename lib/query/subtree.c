@@ -18,16 +18,12 @@
 #include "core/fp_env.h"
 #include "format/file_nodes.h"
 #include "format/slice.h"
-#include "geometry/cell.h"
+#include "geometry/cells.h"
 #include "geometry/cursor.h"
-#include "geometry/envelope_stack.h"
-#include "geometry/half_spaces.h"
-#include "geometry/node_types.h"
-#include "geometry/octcode.h"
-#include "geometry/plane_code.h"
-#include "levels/cell_to_model.h"
-#include "levels/lod_model.h"
-#include "levels/stream_node.h"
+#include "geometry/polytope.h"
+#include "geometry/level_nodes.h"
+#include "levels/stream.h"
+#include "levels/lod.h"
 
 typedef struct subtree_scratch subtree_scratch; /* what describing a node takes */
 

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 
 static int compare_u64(uint64_t a, uint64_t b) { return (a > b) - (a < b); }
 
@@ -42,8 +42,8 @@ static int print_place(char *out, size_t size, const ebpo_verify_place *place)
 
 /* Equal places (two findings about one node) are told apart by their text, so that merging does not
  * depend on order. */
-static void record(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
-                   const char *text)
+static void tally_record(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
+                         const char *text)
 {
     int order = tally->violations[kind] ? compare_places(place, &tally->place[kind]) : -1;
     tally->violations[kind]++;
@@ -59,7 +59,7 @@ static void record_va(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verif
     char text[sizeof tally->first[kind]];
     int length = print_place(text, sizeof text, place);
     vsnprintf(text + length, sizeof text - (size_t)length, format, args);
-    record(tally, kind, place, text);
+    tally_record(tally, kind, place, text);
 }
 
 void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
@@ -93,7 +93,7 @@ void ebpo_tally_merge(ebpo_tally *into, const ebpo_tally *from)
     for (int kind = 0; kind < EBPO_VERIFY_KINDS; kind++) {
         into->checks[kind] += from->checks[kind];
         if (from->violations[kind]) {
-            record(into, (ebpo_verify_kind)kind, &from->place[kind], from->first[kind]);
+            tally_record(into, (ebpo_verify_kind)kind, &from->place[kind], from->first[kind]);
             into->violations[kind] += from->violations[kind] - 1;
         }
     }

@@ -1,7 +1,7 @@
 /* The table of subtrees, counted anew: one visit of the whole tree, leaf by leaf in the order of
  * the faces. Writer and reader go level by level; nothing of theirs is used but how arrays are
  * read. */
-#include "verify/verify_subtrees.h"
+#include "verify/verify_parts.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
@@ -62,7 +62,7 @@ typedef struct recount {
     bool no_memory;
 } recount;
 
-static bool add(ebpo_workspace *workspace, numbers *list, uint32_t number)
+static bool subtrees_add(ebpo_workspace *workspace, numbers *list, uint32_t number)
 {
     if (list->count && list->at[list->count - 1] == number)
         return true;
@@ -73,7 +73,7 @@ static bool add(ebpo_workspace *workspace, numbers *list, uint32_t number)
     return true;
 }
 
-static int ascending(const void *a, const void *b)
+static int subtrees_ascending(const void *a, const void *b)
 {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x > y) - (x < y);
@@ -83,7 +83,7 @@ static void sort_once(numbers *list)
 {
     uint64_t kept = 0;
     if (list->count)
-        qsort(list->at, list->count, sizeof *list->at, ascending);
+        qsort(list->at, list->count, sizeof *list->at, subtrees_ascending);
     for (uint64_t i = 0; i < list->count; i++)
         if (!kept || list->at[kept - 1] != list->at[i])
             list->at[kept++] = list->at[i];
@@ -97,7 +97,7 @@ static bool add_block(numbers *list, uint32_t block)
         sort_once(list);
         list->different = list->count;
     }
-    return add(NULL, list, block);
+    return subtrees_add(NULL, list, block);
 }
 
 static const char *column_name(const recount *c, unsigned column, int *level)
@@ -215,7 +215,7 @@ static void see_leaf(recount *c, const ebpo_twin_node *leaf, uint64_t *row)
         const uint32_t *face = ebpo_twin_refs(c->view, leaf, &references);
         uint64_t end = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
         EBPO_FOR_ITEMS(c->view->workspace, i, 0, references)
-            if (!add(c->view->workspace, &c->outer_faces, face[i]))
+            if (!subtrees_add(c->view->workspace, &c->outer_faces, face[i]))
                 c->no_memory = true;
         row[REFERENCES] += references;
         row[END] += end - c->end[leaf->cell.level];

@@ -3,7 +3,7 @@
  * Every face is tested exactly against every cell that it comes near. */
 #include "core/strict_fp.h"
 
-#include "verify/verify_walk.h"
+#include "verify/verify_parts.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -12,10 +12,8 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/workspace.h"
-#include "verify/containment.h"
+#include "verify/verify_geometry.h"
 #include "verify/verify_labels.h"
-#include "verify/lists.h"
-#include "verify/winding.h"
 
 enum {
     FACE_GRAIN = 4096,
@@ -379,7 +377,7 @@ static void finish_upper(walk *w)
         ebpo_check_root_corners(&w->workers[0].tally, &w->upper[0].corners);
 }
 
-static ebpo_status prepare(walk *w, ebpo_error *error)
+static ebpo_status walk_prepare(walk *w, ebpo_error *error)
 {
     w->workers = ebpo_alloc_zero(w->threads, sizeof *w->workers);
     if (!w->workers)
@@ -418,7 +416,7 @@ static ebpo_status follow_rays(walk *w, ebpo_error *error)
     return status;
 }
 
-static void release(walk *w)
+static void walk_release(walk *w)
 {
     for (unsigned i = 0; w->workers && i < w->threads; i++) {
         free(w->workers[i].stack.faces);
@@ -437,7 +435,7 @@ ebpo_status ebpo_verify_walk(ebpo_tally *tally, const ebpo_twin_tree *view,
                              const ebpo_verify_options *options, ebpo_error *error)
 {
     walk w = { .view = view, .options = options, .threads = ebpo_thread_count(options->threads) };
-    ebpo_status status = prepare(&w, error);
+    ebpo_status status = walk_prepare(&w, error);
     if (status == EBPO_OK)
         status = walk_upper(&w, error);
     if (status == EBPO_OK)
@@ -450,6 +448,6 @@ ebpo_status ebpo_verify_walk(ebpo_tally *tally, const ebpo_twin_tree *view,
         for (unsigned i = 0; i < w.threads; i++)
             ebpo_tally_merge(tally, &w.workers[i].tally);
     }
-    release(&w);
+    walk_release(&w);
     return status;
 }

@@ -4,7 +4,6 @@
 
 #include "exact_twin.h"
 #include "geometry/predicates.h"
-#include "geometry/predicates_exact.h"
 
 enum { SETS = 4096, ROUNDS = 50 };
 

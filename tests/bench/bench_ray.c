@@ -5,7 +5,7 @@
 #include <time.h>
 
 #include "exact_twin.h"
-#include "geometry/ray_triangle.h"
+#include "geometry/ray.h"
 
 enum { COUNT = 4096, ROUNDS = 30 };
 

@@ -9,7 +9,7 @@
 
 #include "hdf5_read/coding.h"
 #include "hdf5_read/face_gates.h"
-#include "verify/plain_gates.h"
+#include "verify/verify_parts.h"
 
 static void points(const uint8_t *data, uint64_t rows, bool doubles)
 {

@@ -4,7 +4,7 @@
 
 #include "hdf5_read/coding.h"
 #include "hdf5_read/face_gates.h"
-#include "verify/plain_gates.h"
+#include "verify/verify_parts.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {

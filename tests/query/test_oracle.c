@@ -9,7 +9,7 @@
 #include "oracle.h"
 #include "oracle_parts.h"
 #include "solids.h"
-#include "verify/exact.h"
+#include "verify/verify_geometry.h"
 
 static double some(uint64_t *state, double low, double high)
 {

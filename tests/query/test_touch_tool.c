@@ -6,7 +6,7 @@
 
 #include "check_main.h"
 #include "query_kit.h"
-#include "extras/haptic/tool_hold.h"
+#include "extras/haptic/tool.h"
 #include "touch_watch.h"
 
 enum { POINTS = 40 };
@@ -255,8 +255,8 @@ static void hold_plainly(const ebpo_tool_contacts *all, const double want[EBPO_S
     memcpy(out, want, EBPO_SCREW * sizeof *out);
     for (int i = 0; i < 1000 * all->count; i++) {
         const ebpo_tool_contact *c = &all->at[i % all->count];
-        double lacks = -c->room - screw_dot(c->grip, out);
-        double by = fmax(lacks / screw_dot(c->grip, c->grip), -force[i % all->count]);
+        double lacks = -c->room - ebpo_screw_dot(c->grip, out);
+        double by = fmax(lacks / ebpo_screw_dot(c->grip, c->grip), -force[i % all->count]);
         force[i % all->count] += by;
         for (int k = 0; k < EBPO_SCREW; k++)
             out[k] += by * c->grip[k];
@@ -268,7 +268,7 @@ static double apart_by(const double a[EBPO_SCREW], const double b[EBPO_SCREW])
     double way[EBPO_SCREW];
     for (int k = 0; k < EBPO_SCREW; k++)
         way[k] = a[k] - b[k];
-    return screw_length(way);
+    return ebpo_screw_length(way);
 }
 
 /* A point with a lever of up to 3 arms on a face of any direction upward. */
@@ -283,7 +283,7 @@ static void random_contact(uint64_t *state, ebpo_tool_contact *c)
     }
     for (int k = 0; k < 3; k++)
         c->grip[k] = c->normal[k] / length(c->normal);
-    cross(lever, c->grip, c->grip + 3);
+    ebpo_vec3_cross(lever, c->grip, c->grip + 3);
 }
 
 /* One that pulled, so that its point would stick to the face, would hold back more than is needed.

@@ -11,8 +11,8 @@
 #include <ebpo/file.h>
 
 #include "core/alloc.h"
-#include "geometry/cell.h"
-#include "geometry/plane_code.h"
+#include "geometry/cells.h"
+#include "geometry/polytope.h"
 
 typedef struct random_tree_options {
     uint64_t seed;

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "model_file.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 #include "read_by.h"
 #include "scratch.h"
 

@@ -10,7 +10,7 @@
 #include "check_main.h"
 #include "core/sort.h"
 #include "mesh/mesh_parts.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 #include "solids.h"
 
 static const ebpo_progress silent = { NULL, NULL };

@@ -6,8 +6,7 @@
 
 #include "check_main.h"
 #include "exact_twin.h"
-#include "geometry/cell.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 
 /* --- boxes --- */
 

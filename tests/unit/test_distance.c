@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "check_main.h"
-#include "geometry/distance_pairs.h"
+#include "geometry/double_double_kernels.h"
 
 typedef struct point {
     mpq_t x[3];

@@ -10,7 +10,7 @@
 #include "check_main.h"
 #include "hdf5_read/face_gates.h"
 #include "solids.h"
-#include "verify/plain_gates.h"
+#include "verify/verify_parts.h"
 
 enum { ROWS = 4096, BYTES = ROWS * EBPO_GATES_COLS };
 

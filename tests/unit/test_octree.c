@@ -5,8 +5,7 @@
 
 #include "check_main.h"
 #include "geometry/cells.h"
-#include "geometry/node_types.h"
-#include "geometry/octcode.h"
+#include "geometry/level_nodes.h"
 
 static uint32_t random_below(uint64_t *state, uint32_t below)
 {

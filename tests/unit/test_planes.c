@@ -4,9 +4,8 @@
 #include <stdlib.h>
 
 #include "check_main.h"
-#include "geometry/plane_clip.h"
-#include "geometry/plane_code.h"
-#include "construct/octants.h"
+#include "geometry/polytope.h"
+#include "construct/construct_stages.h"
 #include "construct/planes.h"
 #include "solids.h"
 

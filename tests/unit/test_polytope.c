@@ -4,7 +4,6 @@
 #include <stdlib.h>
 
 #include "check_main.h"
-#include "geometry/plane_code.h"
 #include "geometry/polytope.h"
 #include "construct/planes.h"
 #include "solids.h"

@@ -6,8 +6,6 @@
 #include "check_main.h"
 #include "exact_twin.h"
 #include "geometry/predicates.h"
-#include "geometry/predicates_exact.h"
-#include "geometry/predicates_expansion.h"
 #include "solids.h"
 
 enum { CASES_2D = 20000, CASES_3D = 15000, CASES_PRODUCTS = 60000 };

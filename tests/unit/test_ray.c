@@ -9,7 +9,7 @@
 
 #include "check_main.h"
 #include "exact_twin.h"
-#include "geometry/ray_triangle.h"
+#include "geometry/ray.h"
 
 enum { ROUNDS = 11000, RAY_KINDS = 12, BOX_KINDS = 7 };
 

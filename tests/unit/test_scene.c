@@ -222,7 +222,7 @@ START_TEST(csv)
             continue;
         }
         fine(status);
-        scene_route_at(&s->routes[0], 1.5, &pose);
+        ebpo_scene_route_at(&s->routes[0], 1.5, &pose);
         ck_assert(pose.translation[2] == 4.5 && pose.rotation[0][0] == 1);
         ebpo_scene_free(s);
     }
@@ -236,15 +236,15 @@ static double some(uint64_t *state, double size)
     return (double)twin_integer(state, -1000000, 1000000) * size / 1000000;
 }
 
-static void some_route(scene_route *route, uint64_t *state, int keys)
+static void some_route(ebpo_scene_route *route, uint64_t *state, int keys)
 {
     for (int i = 0; i < keys; i++) {
-        scene_key key = { .time = i, .scale = 1 + 0.5 * fabs(some(state, 1)) };
+        ebpo_route_key key = { .time = i, .scale = 1 + 0.5 * fabs(some(state, 1)) };
         for (int k = 0; k < 4; k++)
             key.turn[k] = some(state, 1) + (k == 3 ? 1e-3 : 0);
         for (int k = 0; k < 3; k++)
             key.translation[k] = some(state, 3);
-        fine(scene_add_key(route, &key, &error));
+        fine(ebpo_scene_add_key(route, &key, &error));
     }
 }
 
@@ -260,14 +260,14 @@ static void sine_twin(const double a[4], const double b[4], double u, double q[4
 START_TEST(turns_evenly)
 {
     uint64_t state = 7;
-    scene_route route = { 0 };
+    ebpo_scene_route route = { 0 };
     some_route(&route, &state, 300);
     for (int i = 0; i + 1 < 300; i++) {
         double u = fabs(some(&state, 1)), q[4];
         ebpo_pose p;
         if (u >= 1)
             continue;
-        scene_route_at(&route, i + u, &p);
+        ebpo_scene_route_at(&route, i + u, &p);
         sine_twin(route.keys[i].turn, route.keys[i + 1].turn, (i + u) - i, q);
         double twin[3][3] = {
             { 1 - 2 * (q[1] * q[1] + q[2] * q[2]), 2 * (q[0] * q[1] - q[2] * q[3]),
@@ -287,16 +287,16 @@ END_TEST
 START_TEST(matrices_become_turns)
 {
     uint64_t state = 8;
-    scene_route route = { 0 };
+    ebpo_scene_route route = { 0 };
     some_route(&route, &state, 500);
     for (int i = 0; i < 500; i++) {
         ebpo_pose p, again;
-        scene_route one = { 0 };
-        scene_key key = { .scale = 1 };
-        scene_route_at(&route, i, &p);
-        scene_turn_of_matrix((const double(*)[3])p.rotation, key.turn);
-        fine(scene_add_key(&one, &key, &error));
-        scene_route_at(&one, 0, &again);
+        ebpo_scene_route one = { 0 };
+        ebpo_route_key key = { .scale = 1 };
+        ebpo_scene_route_at(&route, i, &p);
+        ebpo_scene_turn_of_matrix((const double(*)[3])p.rotation, key.turn);
+        fine(ebpo_scene_add_key(&one, &key, &error));
+        ebpo_scene_route_at(&one, 0, &again);
         for (int k = 0; k < 9; k++)
             ck_assert_double_eq_tol((&p.rotation[0][0])[k], (&again.rotation[0][0])[k], 1e-14);
         free(one.keys);
@@ -322,7 +322,7 @@ static ebpo_scene *some_scene(uint64_t *state, int routes, int instances)
     }
     for (int i = 0; i < routes; i++) {
         snprintf(name, sizeof name, "r%d", i);
-        fine(scene_add_route(s, name, &number, &error));
+        fine(ebpo_scene_add_route(s, name, &number, &error));
         some_route(&s->routes[i], state, 2 + i % 5);
         s->routes[i].jumps = i % 4 == 3;
     }
@@ -343,7 +343,7 @@ static ebpo_scene *some_scene(uint64_t *state, int routes, int instances)
 static void some_vertex(const ebpo_scene *s, uint64_t *state, double x[3])
 {
     for (int k = 0; k < 3; k++) {
-        const scene_model *m = &s->models[0];
+        const ebpo_scene_model_entry *m = &s->models[0];
         double u = (double)twin_integer(state, 0, 4) / 4;
         x[k] = fmin(fmax(m->min[k] + u * (m->max[k] - m->min[k]), m->min[k]), m->max[k]);
     }
@@ -497,21 +497,21 @@ START_TEST(rules_as_twin)
     int groups = _i % 2 ? 12 : 1, lines = _i / 2 ? MOST : 4;
     ebpo_scene *s = some_scene(&state, 0, 0);
     bool in[INSTANCES][200] = { { false } };
-    scene_rule line[MOST];
+    ebpo_scene_rule_entry line[MOST];
     char name[20];
     for (int g = 0; g < groups; g++) {
         snprintf(name, sizeof name, "g%d", g);
-        fine(scene_add_group(s, name, &error));
+        fine(ebpo_scene_add_group(s, name, &error));
     }
     for (int i = 0; i < INSTANCES; i++) {
         ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
         snprintf(name, sizeof name, "i%d", i);
         at.name = name;
         fine(ebpo_scene_add_instance(s, &at, NULL, &error));
-        in[i][SCENE_ALL_SET] = in[i][s->sets_count - 1] = true;
+        in[i][EBPO_SCENE_ALL_SET] = in[i][s->sets_count - 1] = true;
         for (int g = 0; g < groups; g++) {
             uint64_t set = (uint64_t)twin_integer(&state, 1, groups);
-            fine(scene_join_set(s, set, &error));
+            fine(ebpo_scene_join_set(s, set, &error));
             in[i][set] = true;
         }
     }
@@ -519,9 +519,9 @@ START_TEST(rules_as_twin)
         line[i].a = (uint64_t)twin_integer(&state, 1, (int)s->sets_count - 1);
         line[i].b = (uint64_t)twin_integer(&state, i ? 1 : 0, (int)s->sets_count - 1);
         line[i].clearance = i % 5 == 4 ? -1 : twin_integer(&state, 0, 9);
-        fine(scene_add_rule(s, line[i].a, line[i].b, line[i].clearance, &error));
+        fine(ebpo_scene_add_rule(s, line[i].a, line[i].b, line[i].clearance, &error));
     }
-    scene_sort_rules(s);
+    ebpo_scene_sort_rules(s);
     for (uint64_t a = 0; a < INSTANCES; a++)
         for (uint64_t b = 0; b < INSTANCES; b++) {
             double want = 0, got;
@@ -541,10 +541,10 @@ START_TEST(pairs_as_twin)
     static found fast, slow;
     uint64_t state = 11 + (uint64_t)_i;
     ebpo_scene *s = some_scene(&state, _i % 2 ? 8 : 0, 150);
-    fine(scene_add_rule(s, SCENE_ALL_SET, SCENE_ALL_SET, _i * 0.2, &error));
-    fine(scene_add_rule(s, 3, 7, 4, &error));
-    fine(scene_add_rule(s, 4, SCENE_ALL_SET, -1, &error));
-    scene_sort_rules(s);
+    fine(ebpo_scene_add_rule(s, EBPO_SCENE_ALL_SET, EBPO_SCENE_ALL_SET, _i * 0.2, &error));
+    fine(ebpo_scene_add_rule(s, 3, 7, 4, &error));
+    fine(ebpo_scene_add_rule(s, 4, EBPO_SCENE_ALL_SET, -1, &error));
+    ebpo_scene_sort_rules(s);
     fast.count = slow.count = 0;
     fine(ebpo_scene_pairs(s, 0, _i < 2 ? 0 : 2.5, keep, &fast, &error));
     all_pairs(s, 0, _i < 2 ? 0 : 2.5, &slow);

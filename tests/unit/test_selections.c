@@ -13,8 +13,7 @@
 
 #include "core/workspace.h"
 #include "check_main.h"
-#include "geometry/plane_code.h"
-#include "construct/hull_directions.h"
+#include "geometry/polytope.h"
 #include "construct/planes.h"
 #include "scratch.h"
 #include "solids.h"

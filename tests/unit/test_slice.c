@@ -12,7 +12,7 @@
 #include "format/chunks.h"
 #include "format/file_nodes.h"
 #include "format/slice.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 #include "random_tree.h"
 #include "scratch.h"
 #include "solids.h"

@@ -13,11 +13,11 @@
 #include "check_main.h"
 #include "model_file.h"
 #include "read_by.h"
-#include "geometry/plane_code.h"
-#include "geometry/octcode.h"
+#include "geometry/polytope.h"
+#include "geometry/cells.h"
 #include "scratch.h"
 #include "solids.h"
-#include "levels/cell_to_model.h"
+#include "levels/stream.h"
 
 static const char *path;
 

@@ -13,7 +13,7 @@
 #include "format/subtree_index.h"
 #include "counted_source.h"
 #include "expect.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 #include "random_tree.h"
 #include "read_by.h"
 #include "scratch.h"

@@ -5,13 +5,11 @@
 
 #include "core/workspace.h"
 #include "check_main.h"
-#include "geometry/plane_code.h"
+#include "geometry/polytope.h"
 #include "geometry/predicates.h"
 #include "solids.h"
-#include "verify/containment.h"
-#include "verify/exact.h"
-#include "verify/verify_rays.h"
-#include "verify/winding.h"
+#include "verify/verify_geometry.h"
+#include "verify/verify_labels.h"
 
 enum { ROUNDS = 6000 };
 

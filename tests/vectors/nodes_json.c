@@ -10,7 +10,7 @@
 #include <ebpo/query.h>
 
 #include "change_file.h"
-#include "geometry/octcode.h"
+#include "geometry/cells.h"
 
 enum { NODES_MOST = 600 };
 

@@ -1,3 +1,11 @@
+/* What is on either side of a posed face of two models. The face is cut into pieces along the
+ * faces of both models that intersect it (face_pieces.h). For a point of each piece the winding
+ * numbers of both models give the sides on which each model is.
+ *
+ * All decisions are exact: points are fractions, posed coordinates are the doubles that
+ * geometry/pose.h defines. Only the faces near a point are looked up in the models' hierarchies,
+ * so a model may be loaded in parts. Proofs: docs/develop/collision.md, "Relation of two models".
+ */
 #include "core/strict_fp.h"
 
 #include "extras/collide/around_face.h"
@@ -8,10 +16,10 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "extras/collide/exact_winding.h"
-#include "geometry/min_max.h"
+#include "extras/collide/posed_solid.h"
+#include "geometry/vec3.h"
 #include "geometry/predicates.h"
-#include "geometry/rule.h"
+#include "geometry/level_nodes.h"
 
 ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places, ebpo_error *error)
 {
@@ -151,7 +159,7 @@ static ebpo_status sides_of_solid(const looking *l, const ebpo_piece *piece, int
     return status;
 }
 
-static ebpo_status look(void *user, const ebpo_piece *piece, ebpo_error *error)
+static ebpo_status look_around_piece(void *user, const ebpo_piece *piece, ebpo_error *error)
 {
     const looking *l = user;
     ebpo_around around;
@@ -172,7 +180,7 @@ static ebpo_status look(void *user, const ebpo_piece *piece, ebpo_error *error)
 /* EBPO_E_CANCELLED comes from `look` alone, and means enough. */
 static ebpo_status visit_pieces(looking *l, ebpo_face_cuts *pieces, ebpo_error *error)
 {
-    ebpo_status status = ebpo_face_pieces_visit(pieces, look, l, error);
+    ebpo_status status = ebpo_face_pieces_visit(pieces, look_around_piece, l, error);
     return status == EBPO_E_CANCELLED ? EBPO_OK : status;
 }
 

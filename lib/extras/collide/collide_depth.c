@@ -1,14 +1,457 @@
-/* How deep the surfaces of two models are in each other. */
+/* How deep the surface of one model is in the solid of another: the greatest distance of a point
+ * of the surface inside the solid to the boundary of the solid.
+ *
+ * A branch-and-bound search goes through the cells of the surface's octree, then through faces and
+ * parts of faces. Each is enclosed in a ball; the distance at its centre bounds how deep a point
+ * of it can be. A heap gives the part that may be deepest. The search ends when no part can be
+ * deeper than the best point and the tolerance, or at the deadline; lo and hi then bound the
+ * depth. The steps do not depend on what is in memory. Bounds: docs/develop/collision.md, "Depth".
+ * One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
+#include "core/alloc.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
+#include "core/sort.h"
+#include "core/parallel.h"
 #include "extras/collide/collider.h"
-#include "extras/collide/depth_search.h"
-#include "extras/collide/posed_model.h"
+#include "extras/collide/subtree_search.h"
+#include "extras/collide/posed_solid.h"
+#include "geometry/cells.h"
+#include "geometry/distance.h"
+#include "geometry/vec3.h"
 #include "query/query_model.h"
+#include "query/query_node.h"
+
+/* --- the search: balls, faces and parts of faces --- */
+
+/* A part of a face. */
+typedef struct depth_part {
+    double most;         /* no point of it is deeper */
+    double corner[3][3]; /* in the world */
+} depth_part;
+
+typedef struct depth_search {
+    /* In: */
+    ebpo_context *from; /* of the surface's model */
+    const ebpo_posing *posing;
+    double reach; /* no posed coordinate of it is greater */
+    const ebpo_posed_solid *solid;
+    ebpo_context *context; /* of the solid's model, another one */
+    double tolerance;
+    uint64_t late; /* by ebpo_clock; UINT64_MAX: never */
+    const ebpo_progress *progress;
+    /* Out: lo <= depth <= hi. */
+    double lo, hi;
+    /* Begins as 0: */
+    double left, lost; /* the greatest `most` of what was left out; what rounding moves points by */
+    depth_part *part;  /* a heap, the greatest first */
+    uint64_t count, capacity, asked;
+} depth_search;
+
+/* Something of the surface is within `radius` of a point, all of it; and a point of it certainly
+ * within `far`, INFINITY if that is not known. */
+typedef struct depth_ball {
+    double radius, far;
+    /* Out: whether it matters still, and how deep it is at most. */
+    bool open;
+    double most;
+} depth_ball;
+
+/* --- one point --- */
+
+/* How deep it is in the solid, less than 0 outside: surely within *lo .. *hi. rounding: how far it
+ * may be from where it should be. */
+static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, double *hi,
+                            double *rounding, ebpo_error *error)
+{
+    double p[3], doubt, scale = s->solid->posing.scale;
+    ebpo_distance_result r;
+    ebpo_unpose(s->solid, w, p, &doubt);
+    *rounding = doubt * scale;
+    s->asked++;
+    ebpo_status status = ebpo_distance(s->context, p, NULL, &r, error);
+    if (status != EBPO_OK)
+        return status;
+    double size = fabs(r.distance), off = 2 * doubt + 0x1p-50 * size;
+    *hi = (size + off) * scale;
+    *lo = -*hi;
+    if (!(size > off)) /* a face may be on either side of it */
+        return EBPO_OK;
+    if (r.distance < 0)
+        *lo = (size - off) * scale;
+    else
+        *hi = (off - size) * scale;
+    return EBPO_OK;
+}
+
+/* No point of the triangle in the solid is deeper than it is away from the face that was nearest to
+ * the last point asked about; and that is convex, so its corners tell. */
+static double most_at_corners(const depth_search *s, const double corner[3][3])
+{
+    double most = 0, p[3], doubt;
+    for (int i = 0; i < 3; i++) {
+        ebpo_distance_bounds d;
+        ebpo_unpose(s->solid, corner[i], p, &doubt);
+        ebpo_triangle_distance_bounds(p, (const double(*)[3])s->context->warm_triangle, &d);
+        most = fmax(most, (d.hi + 2 * doubt) * s->solid->posing.scale + s->lost);
+    }
+    return most * (1 + 0x1p-50);
+}
+
+/* --- the heap --- */
+
+static bool is_deeper(const depth_part *a, const depth_part *b) { return a->most > b->most; }
+
+EBPO_HEAP(heap, depth_part, is_deeper)
+
+static bool push_part(depth_search *s, const depth_part *part)
+{
+    if (!ebpo_grow(&s->part, &s->capacity, s->count + 1, sizeof *s->part))
+        return false;
+    heap_add(s->part, s->count++, part);
+    return true;
+}
+
+/* --- parts --- */
+
+static bool is_search_late(const depth_search *s)
+{
+    return s->late != UINT64_MAX && ebpo_clock() >= s->late;
+}
+
+/* What rounding alone leaves in doubt is no reason to divide: parts of faces that lie on others
+ * have no end. */
+static bool is_enough(depth_search *s, double most, double rounding)
+{
+    if (most > s->lo + s->tolerance + 4 * (rounding + s->lost))
+        return false;
+    s->left = fmax(s->left, most);
+    return true;
+}
+
+static double most_within(double hi, double radius)
+{
+    return (hi + radius) * (hi + radius > 0 ? 1 + 0x1p-50 : 1);
+}
+
+static ebpo_status ask_ball(depth_search *s, const double middle[3], depth_ball *ball,
+                            ebpo_error *error)
+{
+    double lo, hi, rounding;
+    ball->open = false;
+    if (!ebpo_posed_solid_near(s->solid, middle, ball->radius))
+        return EBPO_OK;
+    ebpo_status status = depth_at(s, middle, &lo, &hi, &rounding, error);
+    if (status != EBPO_OK)
+        return status;
+    s->lo = fmax(s->lo, (lo - ball->far) * (1 - 0x1p-50) - s->lost);
+    ball->most = most_within(hi, ball->radius);
+    ball->open = !is_enough(s, ball->most, rounding);
+    return EBPO_OK;
+}
+
+/* The part is within `radius` of the centre, a point of it. */
+static ebpo_status offer_part(depth_search *s, depth_part *part, const double centre[3],
+                              double radius, ebpo_error *error)
+{
+    double lo, hi, rounding;
+    if (!ebpo_posed_solid_near(s->solid, centre, radius))
+        return EBPO_OK;
+    ebpo_status status = depth_at(s, centre, &lo, &hi, &rounding, error);
+    if (status != EBPO_OK)
+        return status;
+    s->lo = fmax(s->lo, lo - s->lost);
+    part->most = most_within(hi, radius);
+    if (part->most > s->lo && s->context->warm)
+        part->most = fmin(part->most, most_at_corners(s, (const double(*)[3])part->corner));
+    if (is_enough(s, part->most, rounding))
+        return EBPO_OK;
+    if (!(radius > 4 * s->lost)) {
+        s->left = fmax(s->left, part->most);
+        return EBPO_OK;
+    }
+    return push_part(s, part) ? EBPO_OK : ebpo_fail_memory(error, s->capacity * sizeof *s->part);
+}
+
+static ebpo_status offer_triangle(depth_search *s, const double a[3], const double b[3],
+                                  const double c[3], ebpo_error *error)
+{
+    depth_part part;
+    double centre[3], radius = 0;
+    const double *corner[3] = { a, b, c };
+    for (int k = 0; k < 3; k++)
+        centre[k] = a[k] + ((b[k] - a[k]) + (c[k] - a[k])) / 3;
+    for (int i = 0; i < 3; i++) {
+        memcpy(part.corner[i], corner[i], sizeof part.corner[i]);
+        radius = fmax(radius, ebpo_vec3_scaled_distance(corner[i], centre));
+    }
+    return offer_part(s, &part, centre, radius * (1 + 0x1p-50) + s->lost, error);
+}
+
+/* A face, at its pose. */
+static ebpo_status offer_face(depth_search *s, const double corner[3][3], ebpo_error *error)
+{
+    return offer_triangle(s, corner[0], corner[1], corner[2], error);
+}
+
+/* The middle of corner k and the next one. */
+static void middle_of(const depth_part *p, int k, double out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = p->corner[k][i] + (p->corner[(k + 1) % 3][i] - p->corner[k][i]) / 2;
+}
+
+/* Into two, by the middle of edge k. */
+static ebpo_status halve_triangle(depth_search *s, const depth_part *p, int k, ebpo_error *error)
+{
+    double middle[3];
+    const double *opposite = p->corner[(k + 2) % 3];
+    middle_of(p, k, middle);
+    ebpo_status status = offer_triangle(s, p->corner[k], middle, opposite, error);
+    return status == EBPO_OK ? offer_triangle(s, middle, p->corner[(k + 1) % 3], opposite, error)
+                             : status;
+}
+
+/* Into four, by the middles of the edges; but a long one into two, as quarters of it would lie
+ * beside each other, ever more of them as near to what is near to one. */
+static ebpo_status divide_triangle(depth_search *s, const depth_part *p, ebpo_error *error)
+{
+    double middle[3][3], length[3];
+    int longest = 0, shortest = 0;
+    for (int k = 0; k < 3; k++) {
+        length[k] = ebpo_vec3_scaled_distance(p->corner[k], p->corner[(k + 1) % 3]);
+        longest = length[k] > length[longest] ? k : longest;
+        shortest = length[k] < length[shortest] ? k : shortest;
+    }
+    if (length[longest] > 2 * length[shortest])
+        return halve_triangle(s, p, longest, error);
+    for (int k = 0; k < 3; k++)
+        middle_of(p, k, middle[k]);
+    ebpo_status status = offer_triangle(s, middle[0], middle[1], middle[2], error);
+    for (int k = 0; k < 3 && status == EBPO_OK; k++)
+        status = offer_triangle(s, p->corner[k], middle[k], middle[(k + 2) % 3], error);
+    return status;
+}
+
+/* No part that waits is deeper than what is known and the tolerance. */
+static bool is_search_done(const depth_search *s)
+{
+    return s->count == 0 || !(s->part[0].most > s->lo + s->tolerance);
+}
+
+/* The part that may be deepest: it is not done. */
+static ebpo_status divide_next(depth_search *s, ebpo_error *error)
+{
+    depth_part part = heap_take(s->part, s->count--);
+    return divide_triangle(s, &part, error);
+}
+
+/* --- cells of the octree --- */
+
+/* Cells are visited level by level, and on each level in the order of the file, so that a subtree
+ * is loaded about once for each level that matters. The cells do not depend on what is in memory,
+ * and neither does the interval in which the search ends. */
+
+/* What is in a cell may be so deep. */
+typedef struct open_cell {
+    ebpo_cell cell;
+    double most;
+} open_cell;
+
+typedef struct listed_face {
+    uint64_t number; /* in the file */
+    double corner[3][3];
+} listed_face;
+
+typedef struct going_down {
+    depth_search *s;
+    ebpo_posed_subtrees at; /* the pose of the surface */
+    open_cell *open, *next; /* of a level, and of the one below it */
+    uint64_t open_count, open_capacity, next_count, next_capacity;
+    listed_face *face; /* of leaves, waiting to be offered */
+    uint64_t face_count, face_capacity;
+} going_down;
+
+/* So many wait at least. */
+enum { FACES_AT_ONCE = 16384 };
+
+/* --- faces --- */
+
+static int by_number(const void *x, const void *y)
+{
+    const listed_face *a = x, *b = y;
+    return (a->number > b->number) - (a->number < b->number);
+}
+
+/* Several leaves list one: once of those that wait. */
+static ebpo_status offer_faces(going_down *g, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    if (g->face_count)
+        qsort(g->face, g->face_count, sizeof *g->face, by_number);
+    for (uint64_t i = 0; i < g->face_count && status == EBPO_OK; i++)
+        if (i == 0 || g->face[i].number != g->face[i - 1].number)
+            status = offer_face(g->s, (const double(*)[3])g->face[i].corner, error);
+    g->face_count = 0;
+    return status;
+}
+
+static bool add_face(going_down *g, const ebpo_accel *subtree, uint32_t slot)
+{
+    if (!ebpo_grow(&g->face, &g->face_capacity, g->face_count + 1, sizeof *g->face))
+        return false;
+    listed_face *f = &g->face[g->face_count++];
+    f->number = ebpo_accel_file_face(subtree, ebpo_accel_slot_face(subtree, slot));
+    ebpo_posed_triangle(subtree, &g->at.posing, slot, f->corner);
+    return true;
+}
+
+static ebpo_status add_leaf(going_down *g, const ebpo_node *leaf, ebpo_error *error)
+{
+    const ebpo_accel *subtree = leaf->subtree;
+    const ebpo_listed_block *list =
+        subtree->list + subtree->leaf[ebpo_entry_value(leaf->entry)].list;
+    for (uint64_t listed = 0; !(listed & EBPO_LISTED_LAST);) {
+        listed = ebpo_listed(list++);
+        for (unsigned lanes = ebpo_listed_lanes(listed); lanes; lanes &= lanes - 1) {
+            uint32_t lane = (uint32_t)__builtin_ctz(lanes);
+            if (!add_face(g, subtree, ebpo_listed_number(listed) * EBPO_BLOCK + lane))
+                return ebpo_fail_memory(error, (g->face_count + 1) * sizeof *g->face);
+        }
+    }
+    return g->face_count < FACES_AT_ONCE ? EBPO_OK : offer_faces(g, error);
+}
+
+/* --- cells --- */
+
+static ebpo_status offer_cell(going_down *g, ebpo_cell cell, ebpo_error *error)
+{
+    depth_search *s = g->s;
+    double corner[8][3], middle[3], diagonal = ebpo_posed_diagonal(&g->at, cell);
+    depth_ball ball = { .radius = diagonal / 2 * (1 + 0x1p-17) + 2 * s->lost, .far = INFINITY };
+    ebpo_posed_cell(&g->at, cell, corner);
+    for (int k = 0; k < 3; k++)
+        middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
+    if (!g->at.model->info->pruned) /* a face has a point in the cell, or near it */
+        ball.far = ball.radius + EBPO_NEAR_SHARE * diagonal;
+    open_cell open = { .cell = cell };
+    ebpo_status status = ask_ball(s, middle, &ball, error);
+    if (status != EBPO_OK || !ball.open)
+        return status;
+    open.most = ball.most;
+    if (!ebpo_grow(&g->next, &g->next_capacity, g->next_count + 1, sizeof *g->next))
+        return ebpo_fail_memory(error, (g->next_count + 1) * sizeof *g->next);
+    g->next[g->next_count++] = open;
+    return EBPO_OK;
+}
+
+/* Subtrees on the way are loaded. */
+static ebpo_status find_node(going_down *g, ebpo_cell cell, ebpo_node *out, ebpo_error *error)
+{
+    ebpo_context *context = g->s->from;
+    *out = ebpo_model_root(context->model);
+    for (int level = 0;; level++) {
+        ebpo_status status = EBPO_OK;
+        if (ebpo_node_is_below(out) && !out->pruned)
+            status = ebpo_model_enter(context, out, error);
+        if (status != EBPO_OK || level == cell.level)
+            return status;
+        *out = ebpo_model_child(context->model, out, ebpo_cell_octant(cell, level));
+    }
+}
+
+static ebpo_status divide_cell(going_down *g, ebpo_cell cell, ebpo_error *error)
+{
+    ebpo_node node;
+    ebpo_status status = find_node(g, cell, &node, error);
+    if (status != EBPO_OK || node.pruned) /* what it had is not in this file */
+        return status;
+    if (node.type != EBPO_GRAY)
+        return add_leaf(g, &node, error);
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+        ebpo_node child = ebpo_model_child(g->s->from->model, &node, octant);
+        if (!ebpo_node_is_uniform(&child))
+            status = offer_cell(g, child.cell, error);
+    }
+    return status;
+}
+
+/* --- levels --- */
+
+static ebpo_status divide_level(going_down *g, ebpo_error *error)
+{
+    depth_search *s = g->s;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < g->open_count && status == EBPO_OK; i++) {
+        const open_cell *c = &g->open[i];
+        if (!(c->most > s->lo + s->tolerance) || is_search_late(s))
+            s->left = fmax(s->left, c->most);
+        else if (i % 64 == 0 && !ebpo_progress_step(s->progress, "depth", 0, 0, error))
+            return EBPO_E_CANCELLED;
+        else
+            status = divide_cell(g, c->cell, error);
+    }
+    return status == EBPO_OK ? offer_faces(g, error) : status;
+}
+
+static void swap_levels(going_down *g)
+{
+    open_cell *open = g->open;
+    uint64_t capacity = g->open_capacity;
+    g->open = g->next;
+    g->open_count = g->next_count;
+    g->open_capacity = g->next_capacity;
+    g->next = open;
+    g->next_count = 0;
+    g->next_capacity = capacity;
+}
+
+/* Offers all faces that may matter, which wait then. As run_depth_search. */
+static ebpo_status offer_cells(depth_search *s, ebpo_error *error)
+{
+    going_down g = { .s = s, .at = { .model = s->from->model, .posing = *s->posing } };
+    ebpo_node root = ebpo_model_root(g.at.model);
+    ebpo_status status = ebpo_node_is_uniform(&root) ? EBPO_OK : offer_cell(&g, root.cell, error);
+    for (swap_levels(&g); status == EBPO_OK && g.open_count > 0; swap_levels(&g))
+        status = divide_level(&g, error);
+    free(g.open);
+    free(g.next);
+    free(g.face);
+    return status;
+}
+
+static ebpo_status search_parts(depth_search *s, ebpo_error *error)
+{
+    ebpo_status status = offer_cells(s, error);
+    while (status == EBPO_OK && !is_search_done(s) && !is_search_late(s)) {
+        if (s->asked % 64 == 0 && !ebpo_progress_step(s->progress, "depth", 0, 0, error))
+            return EBPO_E_CANCELLED;
+        status = divide_next(s, error);
+    }
+    return status;
+}
+
+/* EBPO_E_MEMORY, EBPO_E_CANCELLED, and those of ebpo_distance. */
+static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
+{
+    s->lost = 0x1p-46 * s->reach;
+    s->lo = 0;
+    ebpo_status status = search_parts(s, error);
+    s->hi = fmax(s->lo, s->left);
+    if (s->count > 0)
+        s->hi = fmax(s->hi, s->part[0].most);
+    free(s->part);
+    s->part = NULL;
+    return status;
+}
+
+/* --- the query --- */
 
 /* Of the caller's model `solid` (0: A), which holds the other one's surface. */
 static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance, ebpo_certain *out,
@@ -22,15 +465,15 @@ static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance
         status = ebpo_posed_solid_make(&posed, c->model[solid], pose, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_depth_search s = { .from = c->context[!solid],
-                            .posing = &q->posing[solid == q->turned].posing,
-                            .reach = q->reach,
-                            .solid = &posed,
-                            .context = c->context[solid],
-                            .tolerance = tolerance,
-                            .late = q->late,
-                            .progress = &q->options.progress };
-    status = ebpo_depth_search_run(&s, error);
+    depth_search s = { .from = c->context[!solid],
+                       .posing = &q->posing[solid == q->turned].posing,
+                       .reach = q->reach,
+                       .solid = &posed,
+                       .context = c->context[solid],
+                       .tolerance = tolerance,
+                       .late = q->late,
+                       .progress = &q->options.progress };
+    status = run_depth_search(&s, error);
     if (status == EBPO_OK)
         *out = ebpo_certain_of(s.lo, s.hi);
     return status;
@@ -45,7 +488,7 @@ static ebpo_status make_contexts(ebpo_collider *c, ebpo_error *error)
     return status;
 }
 
-static uint64_t loads(const ebpo_collider *c)
+static uint64_t subtree_loads(const ebpo_collider *c)
 {
     uint64_t sum = 0;
     for (int i = 0; i < 2; i++)
@@ -65,7 +508,7 @@ ebpo_status ebpo_collide_depth(ebpo_collider *c, const ebpo_collide_options *opt
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;
-    uint64_t loaded = loads(c), read = ebpo_collision_bytes_read(&q);
+    uint64_t loaded = subtree_loads(c), read = ebpo_collision_bytes_read(&q);
     status = make_contexts(c, error);
     if (status == EBPO_OK && a_in_b)
         status = depth_in(&q, 1, tolerance, a_in_b, error);
@@ -73,7 +516,7 @@ ebpo_status ebpo_collide_depth(ebpo_collider *c, const ebpo_collide_options *opt
         status = depth_in(&q, 0, tolerance, b_in_a, error);
     for (int i = 0; i < 2; i++)
         ebpo_context_let_go(c->context[i]);
-    c->loads += loads(c) - loaded;
+    c->loads += subtree_loads(c) - loaded;
     c->bytes_read += ebpo_collision_bytes_read(&q) - read;
     return status;
 }

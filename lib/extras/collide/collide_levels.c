@@ -1,11 +1,226 @@
-/* What levels tell of two models at poses. */
+/* What the levels of two octrees tell of two models at poses, without their faces: bounds of the
+ * distance, and whether both solids certainly have a point in common.
+ *
+ * Pairs of nodes come by the gaps of their envelopes, the smallest first (subtree_search.h). A gap
+ * is a lower bound of the distance. Two nodes with faces bound it from above. A black cell belongs
+ * to its solid as a whole: if it holds a whole cell with faces of the other model, or a point of a
+ * black one, both solids have a common point. One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
 
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "extras/collide/level_search.h"
+#include "core/parallel.h"
+#include "extras/collide/subtree_search.h"
+
+/* Zero at first. */
+typedef struct level_search {
+    const ebpo_collision *question;
+    ebpo_node_gaps nodes;
+    /* out */
+    double lo, hi;       /* of the distance of faces */
+    uint64_t open_pairs; /* that may have faces that meet */
+    bool meets;          /* a point is of both, of solids or of faces: certain */
+    bool may_meet;       /* a pair is left that may have such a point */
+} level_search;
+
+static const char stage[] = "pairs of nodes";
+
+/* Of a black cell's side, what is near its walls is not asked about. */
+static const double wall_share = 0x1p-14;
+
+/* --- nodes --- */
+
+typedef enum content { NOTHING, FACES, SOLID } content;
+
+static content content_of(const level_search *g, int side, const ebpo_posed_node *node)
+{
+    const ebpo_info *info = g->nodes.side[side].model->info;
+    if (ebpo_entry_kind_of(node->entry) != EBPO_ENTRY_UNIFORM)
+        return FACES;
+    return info->solid && ebpo_rule_inside(info->rule, ebpo_entry_winding(node->entry)) ? SOLID
+                                                                                        : NOTHING;
+}
+
+static bool has_children(const level_search *g, const ebpo_posed_node *node)
+{
+    int level = g->question->options.level;
+    return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY &&
+           (level < 0 || node->cell.level < level);
+}
+
+/* --- a point of both solids --- */
+
+/* A posed point is certainly within a posed cell. */
+static bool is_within(const double corner[8][3], const double p[3], double reach)
+{
+    for (int k = 0; k < 3; k++) {
+        const double *from = corner[0], *to = corner[1 << k];
+        double length2 = 0, along = 0;
+        for (int i = 0; i < 3; i++) {
+            length2 += (to[i] - from[i]) * (to[i] - from[i]);
+            along += (to[i] - from[i]) * (p[i] - from[i]);
+        }
+        if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* squares are not what they should be */
+            return false;
+        double room = wall_share * length2 + 0x1p-44 * reach * sqrt(length2);
+        if (!(along > room && along < length2 - room))
+            return false;
+    }
+    return true;
+}
+
+/* A cell and what is near it: of a node with faces one comes there. */
+static void widen_cell(double corner[8][3], double share)
+{
+    double middle[3];
+    for (int i = 0; i < 3; i++)
+        middle[i] = corner[0][i] / 2 + corner[7][i] / 2;
+    for (int c = 0; c < 8; c++)
+        for (int i = 0; i < 3; i++)
+            corner[c][i] = middle[i] + (corner[c][i] - middle[i]) * (1 + share);
+}
+
+/* `solid` is of a black node: all of where a face of the other one must be is in it, or, if that is
+ * black as well, one of some points. */
+static bool shares_point(const level_search *g, double solid[8][3], double other[8][3], bool black)
+{
+    int within = 0;
+    double middle[3], reach = g->question->reach;
+    if (!black)
+        widen_cell(other, 2 * EBPO_NEAR_SHARE);
+    for (int c = 0; c < 8; c++)
+        within += is_within((const double(*)[3])solid, other[c], reach);
+    for (int i = 0; i < 3; i++)
+        middle[i] = other[0][i] / 2 + other[7][i] / 2;
+    return black ? within > 0 || is_within((const double(*)[3])solid, middle, reach) : within == 8;
+}
+
+static bool certainly_meet(const level_search *g, const ebpo_posed_node node[2],
+                           const content has[2])
+{
+    for (int i = 0; i < 2; i++) {
+        double solid[8][3], other[8][3];
+        if (has[i] != SOLID)
+            continue;
+        ebpo_posed_cell(&g->nodes.side[i], node[i].cell, solid);
+        ebpo_posed_cell(&g->nodes.side[1 - i], node[1 - i].cell, other);
+        if (shares_point(g, solid, other, has[1 - i] == SOLID))
+            return true;
+    }
+    return false;
+}
+
+/* --- pairs --- */
+
+static ebpo_status add_node_pair(level_search *g, const ebpo_posed_node node[2], double gap,
+                                 ebpo_error *error)
+{
+    content has[2] = { content_of(g, 0, &node[0]), content_of(g, 1, &node[1]) };
+    ebpo_node_gap pair = { { node[0], node[1] }, 0 };
+    bool faces = has[0] == FACES && has[1] == FACES;
+    if (has[0] == NOTHING || has[1] == NOTHING || (!faces && g->meets))
+        return EBPO_OK;
+    ebpo_status status = ebpo_node_gap_of(&g->nodes, node, &pair.gap, error);
+    pair.gap = fmax(pair.gap, gap); /* the nodes are in those above them */
+    if (status != EBPO_OK || pair.gap > g->hi || (!faces && pair.gap > 0))
+        return status;
+    if (faces)
+        g->hi = fmin(g->hi, ebpo_node_far_bound(&g->nodes, node));
+    else if (certainly_meet(g, node, has))
+        g->meets = true;
+    return ebpo_node_gaps_push(&g->nodes, &pair, error);
+}
+
+static bool has_faces(const level_search *g, const ebpo_node_gap *pair)
+{
+    return content_of(g, 0, &pair->node[0]) == FACES && content_of(g, 1, &pair->node[1]) == FACES;
+}
+
+/* It is not divided. */
+static void close_pair(level_search *g, const ebpo_node_gap *pair)
+{
+    bool faces = has_faces(g, pair);
+    if (faces)
+        g->lo = fmin(g->lo, pair->gap);
+    if (pair->gap > 0)
+        return;
+    g->may_meet = true;
+    g->open_pairs += faces;
+}
+
+static ebpo_status divide_pair(level_search *g, const ebpo_node_gap *pair, ebpo_error *error)
+{
+    bool down[2] = { has_children(g, &pair->node[0]), has_children(g, &pair->node[1]) };
+    int side = !down[0] ? 1 : !down[1] ? 0 : ebpo_node_larger(&g->nodes, pair->node);
+    ebpo_posed_node part[2] = { pair->node[0], pair->node[1] };
+    ebpo_status status = EBPO_OK;
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+        part[side] = ebpo_posed_child(&g->nodes.side[side], &pair->node[side], octant);
+        status = add_node_pair(g, part, pair->gap, error);
+    }
+    return status;
+}
+
+/* --- the search --- */
+
+/* Nothing is decided of what waits; its least gap is all that is known. */
+static void close_all(level_search *g)
+{
+    for (uint64_t i = 0; i < g->nodes.count; i++)
+        close_pair(g, &g->nodes.heap[i]);
+    g->nodes.count = 0;
+}
+
+static bool is_full(const level_search *g)
+{
+    return g->nodes.count * sizeof *g->nodes.heap + g->nodes.side[0].bytes +
+               g->nodes.side[1].bytes >
+           g->question->collider->options.memory;
+}
+
+/* Pairs come by their gaps: behind the first that is closed, and those that may meet, nothing is to
+ * be found out. */
+static ebpo_status search_levels(level_search *g, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    while (g->nodes.count > 0 && status == EBPO_OK) {
+        ebpo_node_gap pair = ebpo_node_gaps_pop(&g->nodes);
+        bool faces = has_faces(g, &pair);
+        g->question->collider->node_pairs++;
+        if ((!faces && g->meets) || pair.gap > g->lo)
+            continue;
+        if (ebpo_collision_is_late(g->question) || is_full(g)) {
+            close_pair(g, &pair);
+            close_all(g);
+        } else if (has_children(g, &pair.node[0]) || has_children(g, &pair.node[1])) {
+            status = divide_pair(g, &pair, error);
+        } else {
+            close_pair(g, &pair);
+        }
+        if (!ebpo_progress_step(&g->question->options.progress, stage, 0, 0, error))
+            return EBPO_E_CANCELLED;
+    }
+    return status;
+}
+
+static ebpo_status level_search_run(level_search *g, const ebpo_collision *q, ebpo_error *error)
+{
+    g->question = q;
+    g->lo = g->hi = INFINITY;
+    ebpo_status status = ebpo_node_gaps_begin(&g->nodes, q, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_posed_node root[2] = { ebpo_posed_root(&g->nodes.side[0]),
+                                ebpo_posed_root(&g->nodes.side[1]) };
+    status = add_node_pair(g, root, 0, error);
+    return status == EBPO_OK ? search_levels(g, error) : status;
+}
+
+static void level_search_free(level_search *g) { ebpo_node_gaps_free(&g->nodes); }
+
+/* --- the query --- */
 
 static int32_t last_level(const ebpo_model *m, int level)
 {
@@ -13,7 +228,7 @@ static int32_t last_level(const ebpo_model *m, int level)
     return level < 0 || level > last ? last : level;
 }
 
-static void tell(const ebpo_collision *q, const ebpo_level_search *g, ebpo_level_result *out)
+static void fill_result(const ebpo_collision *q, const level_search *g, ebpo_level_result *out)
 {
     double lo = fmin(g->lo, g->hi);
     int32_t figure = isinf(lo)                 ? EBPO_FIGURE_EXACT
@@ -32,13 +247,13 @@ ebpo_status ebpo_collide_levels(ebpo_collider *c, const ebpo_collide_options *op
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    ebpo_level_search g = { .open_pairs = 0 };
+    level_search g = { .open_pairs = 0 };
     *out = (ebpo_level_result){ .common = -1, .contact = -1 };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
-        status = ebpo_level_search_run(&g, &q, error);
+        status = level_search_run(&g, &q, error);
     if (status == EBPO_OK)
-        tell(&q, &g, out);
-    ebpo_level_search_free(&g);
+        fill_result(&q, &g, out);
+    level_search_free(&g);
     return status;
 }

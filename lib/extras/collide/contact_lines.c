@@ -1,4 +1,10 @@
-/* Segments of contact, joined to lines where they end at the same features of the same faces. */
+/* Lines of contact: the segments of all crossing pairs, joined where they end at the same features
+ * of the same faces.
+ *
+ * Each end has a key: the edge or corner of the face that it is on, and the face of the other
+ * model. Ends with equal keys are the same point. Corners have numbers, equal for equal
+ * coordinates (face_patches.h). A line goes on where exactly one segment ends and one begins;
+ * elsewhere it ends. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -8,8 +14,8 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "extras/collide/contacts.h"
-#include "extras/collide/corner_ids.h"
+#include "extras/collide/pair_faces.h"
+#include "extras/collide/face_patches.h"
 
 #define NONE UINT32_MAX
 
@@ -147,7 +153,7 @@ static int by_features(const void *x, const void *y)
     return order ? order : (p->end > q->end) - (p->end < q->end);
 }
 
-static void join(lines *l)
+static void join_segments(lines *l)
 {
     uint64_t n = 2 * l->count;
     if (n > 0)
@@ -213,7 +219,7 @@ static bool make_line(lines *l, uint32_t i)
     return true;
 }
 
-static ebpo_status tell(lines *l, ebpo_polylines_fn take, void *user, ebpo_error *error)
+static ebpo_status give_lines(lines *l, ebpo_polylines_fn take, void *user, ebpo_error *error)
 {
     for (uint64_t i = 0; i < l->count; i++) {
         if (l->segment[i].told)
@@ -226,7 +232,7 @@ static ebpo_status tell(lines *l, ebpo_polylines_fn take, void *user, ebpo_error
     return EBPO_OK;
 }
 
-static ebpo_status failed(const lines *l, ebpo_error *error)
+static ebpo_status fail_lines(const lines *l, ebpo_error *error)
 {
     if (l->no_memory)
         return ebpo_fail_memory(error, l->capacity * sizeof *l->segment);
@@ -270,10 +276,10 @@ ebpo_status ebpo_collide_polylines(ebpo_collider *c, const ebpo_collide_options 
     if (status == EBPO_OK)
         status = l.status;
     if (status == EBPO_OK && (l.full || l.no_memory))
-        status = failed(&l, error);
+        status = fail_lines(&l, error);
     if (status == EBPO_OK) {
-        join(&l);
-        status = tell(&l, take, user, error);
+        join_segments(&l);
+        status = give_lines(&l, take, user, error);
     }
     free_lines(&l);
     return status;

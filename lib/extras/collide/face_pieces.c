@@ -1,15 +1,335 @@
-/* Cuts are segments in the face's plane, seen along an axis. Between neighbouring events (ends and
- * crossings of cuts) strips have the same order of cuts all along: a point in the middle of each
- * part of a strip is one of each piece. Parts of neighbouring strips that have an open interval in
- * common belong to one piece. */
+/* The pieces of a face that other faces cut: a point of each piece, exact.
+ *
+ * Other faces cut the face in segments in its plane, seen along the axis of the largest component
+ * of its normal: p and q are the two other coordinates. Coordinates are GMP fractions. Values of p
+ * at which a cut begins, ends or crosses another one are events. Between neighbouring events (a
+ * strip) the cuts have one order in q, so the strip is divided into parts without a cut inside.
+ * Parts of neighbouring strips that share an open interval belong to one piece. Faces in the same
+ * plane count by their winding. docs/develop/collision.md, "Relation of two models". One thread. */
 #include "core/strict_fp.h"
 
-#include "extras/collide/face_pieces.h"
-
+#include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "extras/collide/face_pieces.h"
+#include "geometry/predicates.h"
+
+/* --- arrays of fractions: made once, used again --- */
+
+static bool room_for_cut(ebpo_face_cuts *f)
+{
+    if (!ebpo_grow(&f->cut, &f->cut_capacity, f->cuts + 1, sizeof *f->cut))
+        return false;
+    for (; f->cuts_made <= f->cuts; f->cuts_made++) {
+        ebpo_face_cut *c = &f->cut[f->cuts_made];
+        mpq_inits(c->p[0], c->p[1], c->q[0], c->q[1], c->slope, NULL);
+    }
+    return true;
+}
+
+/* Adds a value of p, or a point (p, q); without memory the face says so. */
+static void add_event(ebpo_face_cuts *f, const mpq_t p)
+{
+    if (!ebpo_grow(&f->event, &f->event_capacity, f->events + 1, sizeof *f->event)) {
+        f->no_memory = true;
+        return;
+    }
+    for (; f->events_made <= f->events; f->events_made++)
+        mpq_init(f->event[f->events_made]);
+    mpq_set(f->event[f->events++], p);
+}
+
+static void add_vertex(ebpo_face_cuts *f, const mpq_t p, const mpq_t q)
+{
+    if (!f->all_cuts)
+        return;
+    if (!ebpo_grow(&f->vertex, &f->vertex_capacity, f->vertices + 1, sizeof *f->vertex)) {
+        f->no_memory = true;
+        return;
+    }
+    for (; f->vertices_made <= f->vertices; f->vertices_made++)
+        mpq_inits(f->vertex[f->vertices_made][0], f->vertex[f->vertices_made][1], NULL);
+    mpq_set(f->vertex[f->vertices][0], p);
+    mpq_set(f->vertex[f->vertices++][1], q);
+}
+
+/* --- the face --- */
+
+/* Along the axis on which the normal is longest, as far as doubles tell, and not 0. */
+static void choose_view(ebpo_face_cuts *f)
+{
+    double most = -1;
+    f->axis = -1;
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        const double(*t)[3] = (const double(*)[3])f->corner;
+        const double a[2] = { t[0][u], t[0][v] }, b[2] = { t[1][u], t[1][v] },
+                     c[2] = { t[2][u], t[2][v] };
+        double size = fabs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+        int turn = ebpo_orient2d(a, b, c);
+        if (turn == 0 || (f->axis >= 0 && !(size > most)))
+            continue;
+        most = size;
+        f->axis = k;
+        f->u = u;
+        f->v = v;
+        f->turn = turn;
+    }
+}
+
+static void difference_of(mpq_t out, mpq_t scratch, double a, double b)
+{
+    mpq_set_d(out, a);
+    mpq_set_d(scratch, b);
+    mpq_sub(out, out, scratch);
+}
+
+static void set_plane(ebpo_face_cuts *f)
+{
+    mpq_t *s = f->scratch;
+    const double(*t)[3] = (const double(*)[3])f->corner;
+    mpq_set_ui(f->offset, 0, 1);
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        difference_of(s[0], s[4], t[1][u], t[0][u]);
+        difference_of(s[1], s[4], t[2][v], t[0][v]);
+        difference_of(s[2], s[4], t[1][v], t[0][v]);
+        difference_of(s[3], s[4], t[2][u], t[0][u]);
+        mpq_mul(s[0], s[0], s[1]);
+        mpq_mul(s[2], s[2], s[3]);
+        mpq_sub(f->normal[k], s[0], s[2]);
+        mpq_set_d(s[5], t[0][k]);
+        mpq_mul(s[5], s[5], f->normal[k]);
+        mpq_add(f->offset, f->offset, s[5]);
+    }
+}
+
+/* The cut's ends are in cut[cuts]: turns it, and adds it. */
+static void finish_cut(ebpo_face_cuts *f)
+{
+    ebpo_face_cut *c = &f->cut[f->cuts];
+    int order = mpq_cmp(c->p[0], c->p[1]);
+    if (order == 0 && mpq_equal(c->q[0], c->q[1])) {
+        add_event(f, c->p[0]);
+        add_vertex(f, c->p[0], c->q[0]);
+        return;
+    }
+    if (order > 0) {
+        mpq_swap(c->p[0], c->p[1]);
+        mpq_swap(c->q[0], c->q[1]);
+    }
+    if (order != 0) {
+        mpq_sub(c->slope, c->q[1], c->q[0]);
+        mpq_sub(f->scratch[0], c->p[1], c->p[0]);
+        mpq_div(c->slope, c->slope, f->scratch[0]);
+    }
+    for (int i = 0; i < 2; i++) {
+        add_event(f, c->p[i]);
+        add_vertex(f, c->p[i], c->q[i]);
+    }
+    f->cuts++;
+}
+
+static void set_end(ebpo_face_cuts *f, int end, const double x[3])
+{
+    mpq_set_d(f->cut[f->cuts].p[end], x[f->u]);
+    mpq_set_d(f->cut[f->cuts].q[end], x[f->v]);
+}
+
+static void cut_along_edges(ebpo_face_cuts *f, const double t[3][3])
+{
+    for (int i = 0; i < 3; i++) {
+        if (!room_for_cut(f)) {
+            f->no_memory = true;
+            return;
+        }
+        set_end(f, 0, t[i]);
+        set_end(f, 1, t[(i + 1) % 3]);
+        finish_cut(f);
+    }
+}
+
+void ebpo_face_cuts_begin(ebpo_face_cuts *f, const double corner[3][3], bool all_cuts)
+{
+    if (!f->made) {
+        for (int i = 0; i < 8; i++)
+            mpq_init(f->scratch[i]);
+        mpq_inits(f->normal[0], f->normal[1], f->normal[2], f->offset, f->target[0], f->target[1],
+                  NULL);
+        f->made = true;
+    }
+    memcpy(f->corner, corner, sizeof f->corner);
+    f->cuts = f->events = f->vertices = f->flats = 0;
+    f->no_memory = f->has_target = false;
+    f->all_cuts = all_cuts;
+    choose_view(f);
+    set_plane(f);
+    cut_along_edges(f, corner);
+}
+
+/* --- other faces --- */
+
+static int side_in_view(const ebpo_face_cuts *f, int i, const double x[3])
+{
+    const double *a = f->corner[i], *b = f->corner[(i + 1) % 3];
+    return f->turn * ebpo_orient2d((double[]){ a[f->u], a[f->v] }, (double[]){ b[f->u], b[f->v] },
+                                   (double[]){ x[f->u], x[f->v] });
+}
+
+/* All of it lies beyond an edge of the face, or on the edge. */
+static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        if (side_in_view(f, i, t[0]) <= 0 && side_in_view(f, i, t[1]) <= 0 &&
+            side_in_view(f, i, t[2]) <= 0)
+            return true;
+    return false;
+}
+
+/* Where the edge from a to b, on both sides of the plane, goes through it. */
+static void set_piercing(ebpo_face_cuts *f, int end, const double a[3], const double b[3])
+{
+    mpq_t *s = f->scratch;
+    const double *const x[2] = { a, b };
+    for (int i = 0; i < 2; i++) {
+        mpq_neg(s[i], f->offset);
+        for (int k = 0; k < 3; k++) {
+            mpq_set_d(s[2], x[i][k]);
+            mpq_mul(s[2], s[2], f->normal[k]);
+            mpq_add(s[i], s[i], s[2]);
+        }
+    }
+    mpq_sub(s[1], s[0], s[1]);
+    mpq_div(s[0], s[0], s[1]); /* the share of the edge */
+    for (int i = 0; i < 2; i++) {
+        int k = i == 0 ? f->u : f->v;
+        difference_of(s[2], s[4], b[k], a[k]);
+        mpq_mul(s[2], s[2], s[0]);
+        mpq_set_d(s[3], a[k]);
+        mpq_add(i == 0 ? f->cut[f->cuts].p[end] : f->cut[f->cuts].q[end], s[2], s[3]);
+    }
+}
+
+static void cut_across(ebpo_face_cuts *f, const double t[3][3], const int side[3])
+{
+    int ends = 0;
+    for (int i = 0; i < 3 && ends < 2; i++) {
+        int next = (i + 1) % 3;
+        if (side[i] == 0)
+            set_end(f, ends++, t[i]);
+        else if (side[i] == -side[next])
+            set_piercing(f, ends++, t[i], t[next]);
+    }
+    if (ends == 1) {
+        mpq_set(f->cut[f->cuts].p[1], f->cut[f->cuts].p[0]);
+        mpq_set(f->cut[f->cuts].q[1], f->cut[f->cuts].q[0]);
+    }
+    finish_cut(f);
+}
+
+static void add_flat(ebpo_face_cuts *f, const double t[3][3], int model)
+{
+    if (!ebpo_grow(&f->flat, &f->flat_capacity, f->flats + 1, sizeof *f->flat)) {
+        f->no_memory = true;
+        return;
+    }
+    ebpo_flat_face *flat = &f->flat[f->flats++];
+    int turn =
+        ebpo_orient2d((double[]){ t[0][f->u], t[0][f->v] }, (double[]){ t[1][f->u], t[1][f->v] },
+                      (double[]){ t[2][f->u], t[2][f->v] });
+    memcpy(flat->corner, t, sizeof flat->corner);
+    flat->model = model;
+    flat->same_way = turn == f->turn;
+    cut_along_edges(f, t);
+}
+
+void ebpo_face_cuts_add(ebpo_face_cuts *f, const double t[3][3], int model)
+{
+    int side[3];
+    for (int i = 0; i < 3; i++)
+        side[i] = ebpo_orient3d(f->corner[0], f->corner[1], f->corner[2], t[i]);
+    if (side[0] != 0 && side[0] == side[1] && side[1] == side[2])
+        return;
+    if ((!f->all_cuts && beyond_an_edge(f, t)) || ebpo_zero_area(t[0], t[1], t[2]))
+        return;
+    if (!(side[0] | side[1] | side[2])) {
+        add_flat(f, t, model);
+        return;
+    }
+    if (room_for_cut(f))
+        cut_across(f, t, side);
+    else
+        f->no_memory = true;
+}
+
+/* Sign of the turn from a to b to the point. */
+static int side_of_edge(ebpo_face_cuts *f, const double a[3], const double b[3], const mpq_t p,
+                        const mpq_t q)
+{
+    mpq_t *s = f->scratch;
+    difference_of(s[0], s[4], b[f->u], a[f->u]);
+    difference_of(s[1], s[4], b[f->v], a[f->v]);
+    mpq_set_d(s[2], a[f->u]);
+    mpq_sub(s[2], p, s[2]);
+    mpq_set_d(s[3], a[f->v]);
+    mpq_sub(s[3], q, s[3]);
+    mpq_mul(s[0], s[0], s[3]);
+    mpq_mul(s[1], s[1], s[2]);
+    return mpq_cmp(s[0], s[1]);
+}
+
+bool ebpo_face_cuts_target(ebpo_face_cuts *f, const mpq_t x[3])
+{
+    mpq_t *s = f->scratch;
+    mpq_neg(s[0], f->offset);
+    for (int k = 0; k < 3; k++) {
+        mpq_mul(s[1], x[k], f->normal[k]);
+        mpq_add(s[0], s[0], s[1]);
+    }
+    f->has_target = mpq_sgn(s[0]) == 0;
+    for (int i = 0; i < 3 && f->has_target; i++)
+        f->has_target =
+            side_of_edge(f, f->corner[i], f->corner[(i + 1) % 3], x[f->u], x[f->v]) * f->turn >= 0;
+    if (!f->has_target)
+        return false;
+    mpq_set(f->target[0], x[f->u]);
+    mpq_set(f->target[1], x[f->v]);
+    add_event(f, f->target[0]);
+    return true;
+}
+
+void ebpo_face_cuts_free(ebpo_face_cuts *f)
+{
+    for (uint64_t i = 0; i < f->cuts_made; i++)
+        mpq_clears(f->cut[i].p[0], f->cut[i].p[1], f->cut[i].q[0], f->cut[i].q[1], f->cut[i].slope,
+                   NULL);
+    for (uint64_t i = 0; i < f->events_made; i++)
+        mpq_clear(f->event[i]);
+    for (uint64_t i = 0; i < f->vertices_made; i++)
+        mpq_clears(f->vertex[i][0], f->vertex[i][1], NULL);
+    for (uint64_t i = 0; i < f->values_made; i++)
+        mpq_clear(f->value[i]);
+    for (int i = 0; i < 2; i++) {
+        for (uint64_t k = 0; k < f->ends_made[i]; k++)
+            mpq_clears(f->end[i][k].low, f->end[i][k].high, NULL);
+        free(f->end[i]);
+    }
+    for (int i = 0; i < 8 && f->made; i++)
+        mpq_clear(f->scratch[i]);
+    if (f->made)
+        mpq_clears(f->normal[0], f->normal[1], f->normal[2], f->offset, f->target[0], f->target[1],
+                   NULL);
+    free(f->cut);
+    free(f->event);
+    free(f->vertex);
+    free(f->flat);
+    free(f->value);
+    free(f->order);
+    *f = (ebpo_face_cuts){ 0 };
+}
 
 /* --- events --- */
 
@@ -22,7 +342,7 @@ static void at_p(const ebpo_face_cut *c, const mpq_t p, mpq_t out)
 
 static bool is_upright(const ebpo_face_cut *c) { return mpq_equal(c->p[0], c->p[1]) != 0; }
 
-static bool reaches(const ebpo_face_cut *c, const mpq_t p)
+static bool cut_reaches(const ebpo_face_cut *c, const mpq_t p)
 {
     return mpq_cmp(c->p[0], p) <= 0 && mpq_cmp(c->p[1], p) >= 0;
 }
@@ -40,20 +360,20 @@ static void cross_two(ebpo_face_cuts *f, const ebpo_face_cut *a, const ebpo_face
     mpq_sub(s[2], s[2], b->q[0]);
     mpq_sub(s[1], s[1], s[2]);
     mpq_div(s[1], s[1], s[0]);
-    if (!reaches(a, s[1]) || !reaches(b, s[1]))
+    if (!cut_reaches(a, s[1]) || !cut_reaches(b, s[1]))
         return;
-    ebpo_face_add_event(f, s[1]);
+    add_event(f, s[1]);
     at_p(a, s[1], s[2]);
-    ebpo_face_add_vertex(f, s[1], s[2]);
+    add_vertex(f, s[1], s[2]);
 }
 
 /* Its p is an event already. */
 static void cross_upright(ebpo_face_cuts *f, const ebpo_face_cut *upright, const ebpo_face_cut *c)
 {
-    if (!f->all_cuts || is_upright(c) || !reaches(c, upright->p[0]))
+    if (!f->all_cuts || is_upright(c) || !cut_reaches(c, upright->p[0]))
         return;
     at_p(c, upright->p[0], f->scratch[2]);
-    ebpo_face_add_vertex(f, upright->p[0], f->scratch[2]);
+    add_vertex(f, upright->p[0], f->scratch[2]);
 }
 
 static int by_value(const void *x, const void *y) { return mpq_cmp((mpq_srcptr)x, (mpq_srcptr)y); }
@@ -85,7 +405,7 @@ static void find_events(ebpo_face_cuts *f)
 /* --- strips --- */
 
 /* A fraction between both, with few bits where a double is. */
-static void between(const mpq_t low, const mpq_t high, mpq_t out)
+static void fraction_between(const mpq_t low, const mpq_t high, mpq_t out)
 {
     double middle = mpq_get_d(low) / 2 + mpq_get_d(high) / 2;
     mpq_set_d(out, middle);
@@ -97,7 +417,7 @@ static void between(const mpq_t low, const mpq_t high, mpq_t out)
 
 enum { LEFT, MIDDLE, RIGHT };
 
-static mpq_t *value(const ebpo_face_cuts *f, uint32_t cut, int where)
+static mpq_t *value_at(const ebpo_face_cuts *f, uint32_t cut, int where)
 {
     return &f->value[3 * (uint64_t)cut + (unsigned)where];
 }
@@ -128,9 +448,10 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
         const ebpo_face_cut *c = &f->cut[i];
         if (is_upright(c) || mpq_cmp(c->p[0], p[LEFT]) > 0 || mpq_cmp(c->p[1], p[RIGHT]) < 0)
             continue;
-        at_p(c, p[MIDDLE], *value(f, i, MIDDLE));
+        at_p(c, p[MIDDLE], *value_at(f, i, MIDDLE));
         uint64_t at = n++;
-        for (; at > 0 && mpq_cmp(*value(f, f->order[at - 1], MIDDLE), *value(f, i, MIDDLE)) > 0;
+        for (;
+             at > 0 && mpq_cmp(*value_at(f, f->order[at - 1], MIDDLE), *value_at(f, i, MIDDLE)) > 0;
              at--)
             f->order[at] = f->order[at - 1];
         f->order[at] = i;
@@ -143,8 +464,8 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
     /* an edge of the face may stand after an equal cut: nothing is between them */
     for (uint64_t i = (uint64_t)(low < 0 ? 0 : low); low >= 0 && i <= (uint64_t)high; i++) {
         f->order[kept++] = f->order[i];
-        at_p(&f->cut[f->order[kept - 1]], p[LEFT], *value(f, f->order[kept - 1], LEFT));
-        at_p(&f->cut[f->order[kept - 1]], p[RIGHT], *value(f, f->order[kept - 1], RIGHT));
+        at_p(&f->cut[f->order[kept - 1]], p[LEFT], *value_at(f, f->order[kept - 1], LEFT));
+        at_p(&f->cut[f->order[kept - 1]], p[RIGHT], *value_at(f, f->order[kept - 1], RIGHT));
     }
     return kept;
 }
@@ -184,7 +505,7 @@ static bool is_in_flat(ebpo_face_cuts *f, const ebpo_flat_face *t, const mpq_t p
 {
     int turn = t->same_way ? f->turn : -f->turn;
     for (int i = 0; i < 3; i++)
-        if (ebpo_face_side_of_edge(f, t->corner[i], t->corner[(i + 1) % 3], p, q) * turn <= 0)
+        if (side_of_edge(f, t->corner[i], t->corner[(i + 1) % 3], p, q) * turn <= 0)
             return false;
     return true;
 }
@@ -211,8 +532,8 @@ static bool is_at_target(const ebpo_face_cuts *f, const mpq_t p[3], uint32_t low
 {
     for (int where = LEFT; f->has_target && where <= RIGHT; where += RIGHT)
         if (mpq_equal(f->target[0], p[where]) &&
-            mpq_cmp(*value(f, low, where), f->target[1]) <= 0 &&
-            mpq_cmp(f->target[1], *value(f, high, where)) <= 0)
+            mpq_cmp(*value_at(f, low, where), f->target[1]) <= 0 &&
+            mpq_cmp(f->target[1], *value_at(f, high, where)) <= 0)
             return true;
     return false;
 }
@@ -226,14 +547,15 @@ static ebpo_status visit_strip(ebpo_face_cuts *f, strip_scratch *s, int now, ebp
     f->ends[now] = 0;
     for (uint64_t i = 0; i + 1 < n && status == EBPO_OK; i++) {
         uint32_t low = f->order[i], high = f->order[i + 1];
-        if (mpq_equal(*value(f, low, MIDDLE), *value(f, high, MIDDLE)))
+        if (mpq_equal(*value_at(f, low, MIDDLE), *value_at(f, high, MIDDLE)))
             continue;
         ebpo_piece_end *e = &f->end[now][f->ends[now]++];
-        mpq_set(e->low, *value(f, low, RIGHT));
-        mpq_set(e->high, *value(f, high, RIGHT));
-        if (!wall && !f->all_cuts && goes_on(f, !now, *value(f, low, LEFT), *value(f, high, LEFT)))
+        mpq_set(e->low, *value_at(f, low, RIGHT));
+        mpq_set(e->high, *value_at(f, high, RIGHT));
+        if (!wall && !f->all_cuts &&
+            goes_on(f, !now, *value_at(f, low, LEFT), *value_at(f, high, LEFT)))
             continue;
-        between(*value(f, low, MIDDLE), *value(f, high, MIDDLE), s->q);
+        fraction_between(*value_at(f, low, MIDDLE), *value_at(f, high, MIDDLE), s->q);
         status = visit_at(f, s->p[MIDDLE], s->q, s->x,
                           is_at_target(f, (const mpq_t *)s->p, low, high), visit, user, error);
     }
@@ -254,7 +576,7 @@ ebpo_status ebpo_face_pieces_visit(ebpo_face_cuts *f, ebpo_piece_fn visit, void 
     for (uint64_t i = 0; i + 1 < f->events && status == EBPO_OK; i++) {
         mpq_set(s.p[LEFT], f->event[i]);
         mpq_set(s.p[RIGHT], f->event[i + 1]);
-        between(f->event[i], f->event[i + 1], s.p[MIDDLE]);
+        fraction_between(f->event[i], f->event[i + 1], s.p[MIDDLE]);
         status = visit_strip(f, &s, (int)(i % 2), visit, user, error);
     }
     mpq_clears(s.p[0], s.p[1], s.p[2], s.q, s.x[0], s.x[1], s.x[2], NULL);
@@ -274,8 +596,8 @@ ebpo_status ebpo_face_pieces_vertices(ebpo_face_cuts *f, ebpo_vertex_fn visit, v
     for (uint64_t i = 0; i < f->vertices && status == EBPO_OK; i++) {
         bool within = true;
         for (int k = 0; k < 3 && within; k++)
-            within = ebpo_face_side_of_edge(f, f->corner[k], f->corner[(k + 1) % 3],
-                                            f->vertex[i][0], f->vertex[i][1]) *
+            within = side_of_edge(f, f->corner[k], f->corner[(k + 1) % 3], f->vertex[i][0],
+                                  f->vertex[i][1]) *
                          f->turn >=
                      0;
         if (!within)

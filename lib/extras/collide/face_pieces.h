@@ -1,11 +1,67 @@
-/* The pieces of a face that has been cut by others, exact: a point of each, in fractions, on none
- * of the cuts. docs/develop/collision.md, "Relation of two models". One thread. */
+/* The pieces of a face that other faces cut, exact: a point of each, in fractions, on none of the
+ * cuts. docs/develop/collision.md, "Relation of two models". One thread. */
 #ifndef EBPO_COLLIDE_FACE_PIECES_H
 #define EBPO_COLLIDE_FACE_PIECES_H
 
+#include <gmp.h>
+#include <stdbool.h>
+#include <stdint.h>
+
 #include <ebpo/base.h>
 
-#include "extras/collide/face_cuts.h"
+/* A cut, seen along an axis: p[0] <= p[1]. */
+typedef struct ebpo_face_cut {
+    mpq_t p[2], q[2], slope; /* slope: dq / dp, of cuts with p[0] < p[1] */
+} ebpo_face_cut;
+
+/* Another face with an area in the same plane. */
+typedef struct ebpo_flat_face {
+    double corner[3][3];
+    int model;
+    bool same_way; /* its normal has the face's direction */
+} ebpo_flat_face;
+
+/* What bounds a piece in a strip between two neighbouring events, at the strip's right end. */
+typedef struct ebpo_piece_end {
+    mpq_t low, high;
+} ebpo_piece_end;
+
+/* Arrays stay from one face to the next. Zero at first. */
+typedef struct ebpo_face_cuts {
+    double corner[3][3];
+    int axis, u, v;          /* seen along `axis`: p is coordinate u, q coordinate v */
+    int turn;                /* of the corners in this view */
+    mpq_t normal[3], offset; /* normal . x = offset */
+    mpq_t scratch[8];
+    bool made, no_memory;
+    bool all_cuts; /* also those that only touch the face's border */
+    bool has_target;
+    mpq_t target[2]; /* of which pieces are told apart */
+    ebpo_face_cut *cut;
+    uint64_t cuts, cuts_made, cut_capacity;
+    mpq_t *event; /* values of p between which nothing begins, ends or crosses */
+    uint64_t events, events_made, event_capacity;
+    mpq_t (*vertex)[2]; /* with all_cuts: ends of cuts and where they meet */
+    uint64_t vertices, vertices_made, vertex_capacity;
+    ebpo_flat_face *flat;
+    uint64_t flats, flat_capacity;
+    mpq_t *value; /* of q, at three places, for each cut */
+    uint64_t values_made, value_capacity;
+    uint32_t *order;
+    uint64_t order_capacity;
+    ebpo_piece_end *end[2]; /* of this strip and the last one */
+    uint64_t ends[2], ends_made[2], end_capacity[2];
+} ebpo_face_cuts;
+
+/* A face with an area. */
+void ebpo_face_cuts_begin(ebpo_face_cuts *f, const double corner[3][3], bool all_cuts);
+/* Another face, of model 0 or 1. */
+void ebpo_face_cuts_add(ebpo_face_cuts *f, const double other[3][3], int model);
+/* With all cuts. False: x is not on the face. Else pieces will say whether x is theirs. */
+bool ebpo_face_cuts_target(ebpo_face_cuts *f, const mpq_t x[3]);
+void ebpo_face_cuts_free(ebpo_face_cuts *f);
+
+/* --- pieces --- */
 
 /* Around a piece's point. */
 typedef struct ebpo_piece {

@@ -1,35 +1,24 @@
-/* Bounds from a nearest pair of points that need not be the nearest: proof in
- * docs/develop/collision.md. All is seen from A's first corner, so that where the faces lie does
- * not matter. */
+/* The distance of two triangles: bounds in doubles, and exact comparisons.
+ *
+ * Bounds come from a pair of near points, which need not be the nearest: its distance bounds from
+ * above, the planes at right angles to the line between the points from below. All is seen from
+ * A's first corner, so that the position of the faces does not matter. Where bounds do not decide,
+ * the squared distance is a fraction of integers: the least over corners and faces, and over edges
+ * whose inner points are nearest. docs/develop/collision.md, "Distance of two faces". Pure
+ * functions, any thread; the results are the same with every compiler and its flags. */
 #include "core/strict_fp.h"
-
-#include "extras/collide/pair_distance.h"
 
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
+#include "extras/collide/face_pairs.h"
+#include "geometry/distance.h"
+#include "geometry/integer_vectors.h"
 #include "geometry/triangle_pair.h"
+#include "geometry/vec3.h"
 
 static const double most_reach = 0x1p200, least_reach = 0x1p-200;
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void subtract(const double a[3], const double b[3], double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = a[k] - b[k];
-}
-
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
 
 static double within_unit(double t) { return t > 0 ? (t < 1 ? t : 1) : 0; }
 
@@ -42,12 +31,12 @@ typedef struct search {
     double room; /* of the points: from where their features end, as a part of the reach */
 } search;
 
-static void offer(search *s, int first, const double p[3], const double q[3], int on_p, int on_q,
-                  double room)
+static void offer_points(search *s, int first, const double p[3], const double q[3], int on_p,
+                         int on_q, double room)
 {
     double d[3];
-    subtract(p, q, d);
-    double square = dot(d, d);
+    ebpo_vec3_subtract(p, q, d);
+    double square = ebpo_vec3_dot(d, d);
     if (!(square < s->square))
         return;
     s->square = square;
@@ -60,7 +49,7 @@ static void offer(search *s, int first, const double p[3], const double q[3], in
 
 /* --- edges with edges --- */
 
-static void along(const double from[3], const double edge[3], double t, double out[3])
+static void point_along(const double from[3], const double edge[3], double t, double out[3])
 {
     for (int k = 0; k < 3; k++)
         out[k] = from[k] + t * edge[k];
@@ -78,20 +67,21 @@ static void offer_edges(search *s, int i, int j)
 {
     const double *p = s->face[0][i], *q = s->face[1][j];
     double e[3], f[3], w[3], x[3], y[3];
-    subtract(s->face[0][i == 2 ? 0 : i + 1], p, e);
-    subtract(s->face[1][j == 2 ? 0 : j + 1], q, f);
-    subtract(p, q, w);
-    double ee = dot(e, e), ff = dot(f, f), ef = dot(e, f), ew = dot(e, w), fw = dot(f, w);
+    ebpo_vec3_subtract(s->face[0][i == 2 ? 0 : i + 1], p, e);
+    ebpo_vec3_subtract(s->face[1][j == 2 ? 0 : j + 1], q, f);
+    ebpo_vec3_subtract(p, q, w);
+    double ee = ebpo_vec3_dot(e, e), ff = ebpo_vec3_dot(f, f), ef = ebpo_vec3_dot(e, f),
+           ew = ebpo_vec3_dot(e, w), fw = ebpo_vec3_dot(f, w);
     double area = ee * ff - ef * ef;
     double on_e = area > 0 ? within_unit((ef * fw - ff * ew) / area) : 0;
     double on_f = ff > 0 ? within_unit((on_e * ef + fw) / ff) : 0;
     on_e = ee > 0 ? within_unit((on_f * ef - ew) / ee) : 0;
-    along(p, e, on_e, x);
-    along(q, f, on_f, y);
+    point_along(p, e, on_e, x);
+    point_along(q, f, on_f, y);
     bool edges = on_e > 0 && on_e < 1 && on_f > 0 && on_f < 1;
     double room = fmin(room_on_edge(on_e, ee), room_on_edge(on_f, ff));
-    offer(s, 0, x, y, on_edge(i, on_e), on_edge(j, on_f),
-          edges && !(area > 0x1p-20 * ee * ff) ? 0 : room);
+    offer_points(s, 0, x, y, on_edge(i, on_e), on_edge(j, on_f),
+                 edges && !(area > 0x1p-20 * ee * ff) ? 0 : room);
 }
 
 /* --- corners with planes --- */
@@ -102,21 +92,23 @@ static void offer_corner(search *s, int of, int i)
     double(*plane)[3] = s->face[!of];
     const double *corner = s->face[of][i];
     double e[3], f[3], n[3], d[3], c[3], foot[3];
-    subtract(plane[1], plane[0], e);
-    subtract(plane[2], plane[0], f);
-    subtract(corner, plane[0], d);
-    cross(e, f, n);
-    double nn = dot(n, n);
-    cross(d, f, c);
-    double on_e = dot(c, n) / nn;
-    cross(e, d, c);
-    double on_f = dot(c, n) / nn;
+    ebpo_vec3_subtract(plane[1], plane[0], e);
+    ebpo_vec3_subtract(plane[2], plane[0], f);
+    ebpo_vec3_subtract(corner, plane[0], d);
+    ebpo_vec3_cross(e, f, n);
+    double nn = ebpo_vec3_dot(n, n);
+    ebpo_vec3_cross(d, f, c);
+    double on_e = ebpo_vec3_dot(c, n) / nn;
+    ebpo_vec3_cross(e, d, c);
+    double on_f = ebpo_vec3_dot(c, n) / nn;
     if (!(on_e >= 0 && on_f >= 0 && on_e + on_f <= 1))
         return;
     for (int k = 0; k < 3; k++)
         foot[k] = plane[0][k] + (on_e * e[k] + on_f * f[k]);
-    double least = fmin(fmin(on_e, on_f), 1 - on_e - on_f), ee = dot(e, e), ff = dot(f, f);
-    offer(s, of, corner, foot, i, 6, nn > 0x1p-20 * ee * ff ? least * sqrt(nn / fmax(ee, ff)) : 0);
+    double least = fmin(fmin(on_e, on_f), 1 - on_e - on_f), ee = ebpo_vec3_dot(e, e),
+           ff = ebpo_vec3_dot(f, f);
+    offer_points(s, of, corner, foot, i, 6,
+                 nn > 0x1p-20 * ee * ff ? least * sqrt(nn / fmax(ee, ff)) : 0);
 }
 
 /* --- bounds --- */
@@ -129,8 +121,8 @@ static bool see_from_corner(const double a[3][3], const double b[3][3], search *
     memset(s->point, 0, sizeof s->point);
     memset(s->feature, 0, sizeof s->feature);
     for (int i = 0; i < 3; i++) {
-        subtract(a[i], a[0], s->face[0][i]);
-        subtract(b[i], a[0], s->face[1][i]);
+        ebpo_vec3_subtract(a[i], a[0], s->face[0][i]);
+        ebpo_vec3_subtract(b[i], a[0], s->face[1][i]);
         for (int of = 0; of < 2; of++) {
             const double *x = s->face[of][i];
             s->reach = fmax(s->reach, fabs(x[0]) + fabs(x[1]) + fabs(x[2]));
@@ -144,13 +136,13 @@ static double gap_along(const search *s, const double n[3])
 {
     double least = INFINITY, most = -INFINITY, d[3];
     for (int i = 0; i < 3; i++) {
-        subtract(s->face[1][i], s->point[0], d);
-        least = fmin(least, dot(n, d));
-        subtract(s->face[0][i], s->point[0], d);
-        most = fmax(most, dot(n, d));
+        ebpo_vec3_subtract(s->face[1][i], s->point[0], d);
+        least = fmin(least, ebpo_vec3_dot(n, d));
+        ebpo_vec3_subtract(s->face[0][i], s->point[0], d);
+        most = fmax(most, ebpo_vec3_dot(n, d));
     }
     double size = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
-    return (least - most - 0x1p-48 * size * s->reach) / sqrt(dot(n, n));
+    return (least - most - 0x1p-48 * size * s->reach) / sqrt(ebpo_vec3_dot(n, n));
 }
 
 /* --- features --- */
@@ -172,8 +164,8 @@ static bool features_certain(const search *s, const double n[3])
     for (int of = 0; of < 2; of++)
         for (int i = 0; i < 3; i++) {
             double d[3];
-            subtract(s->face[of][i], s->point[of], d);
-            double ahead = of ? dot(n, d) : -dot(n, d);
+            ebpo_vec3_subtract(s->face[of][i], s->point[of], d);
+            double ahead = of ? ebpo_vec3_dot(n, d) : -ebpo_vec3_dot(n, d);
             if (!is_on(i, s->feature[of]) && !(ahead > enough * s->reach * s->reach))
                 return false;
         }
@@ -248,7 +240,7 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
     for (int i = 0; i < 6; i++)
         offer_corner(&s, i / 3, i % 3);
     double n[3], margin = 0x1p-47 * s.reach;
-    subtract(s.point[1], s.point[0], n);
+    ebpo_vec3_subtract(s.point[1], s.point[0], n);
     double distance = sqrt(s.square);
     out->hi = distance + margin;
     if (distance > margin) {
@@ -260,4 +252,224 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
     for (int of = 0; of < 2; of++)
         for (int k = 0; k < 3; k++)
             out->point[of][k] = a[0][k] + s.point[of][k];
+}
+
+/* --- exact distances: fractions of integers --- */
+
+typedef struct fraction {
+    mpz_t square, denominator; /* of units */
+} fraction;
+
+static void fraction_init(fraction *f) { mpz_inits(f->square, f->denominator, NULL); }
+
+static void fraction_clear(fraction *f) { mpz_clears(f->square, f->denominator, NULL); }
+
+static int fraction_compare(const fraction *f, const fraction *g)
+{
+    mpz_t left, right;
+    mpz_inits(left, right, NULL);
+    mpz_mul(left, f->square, g->denominator);
+    mpz_mul(right, g->square, f->denominator);
+    int order = mpz_cmp(left, right);
+    mpz_clears(left, right, NULL);
+    return order;
+}
+
+/* Takes the lesser one; a denominator of 0: none so far. */
+static void take_lesser(fraction *best, const fraction *other)
+{
+    if (mpz_sgn(best->denominator) != 0 && fraction_compare(other, best) >= 0)
+        return;
+    mpz_set(best->square, other->square);
+    mpz_set(best->denominator, other->denominator);
+}
+
+/* --- edges --- */
+
+typedef struct edges {
+    ebpo_vectorz from[2], along[2], between, normal, part;
+    mpz_t length2, share;
+} edges;
+
+static void edges_init(edges *e)
+{
+    ebpo_vectorz *all[] = { &e->from[0], &e->from[1], &e->along[0], &e->along[1],
+                            &e->between, &e->normal,  &e->part };
+    for (int i = 0; i < 7; i++)
+        ebpo_vectorz_init(all[i]);
+    mpz_inits(e->length2, e->share, NULL);
+}
+
+static void edges_clear(edges *e)
+{
+    ebpo_vectorz *all[] = { &e->from[0], &e->from[1], &e->along[0], &e->along[1],
+                            &e->between, &e->normal,  &e->part };
+    for (int i = 0; i < 7; i++)
+        ebpo_vectorz_clear(all[i]);
+    mpz_clears(e->length2, e->share, NULL);
+}
+
+static void set_edge(edges *e, int of, const double from[3], const double to[3], int unit)
+{
+    for (int k = 0; k < 3; k++) {
+        ebpo_set_integer(e->from[of].x[k], from[k], unit);
+        ebpo_set_integer(e->along[of].x[k], to[k], unit);
+    }
+    ebpo_vectorz_subtract(&e->along[of], &e->along[of], &e->from[of]);
+}
+
+/* Where the lines are nearest is between the ends of edge `of`. */
+static bool within_edge(edges *e, int of)
+{
+    ebpo_vectorz_cross(&e->part, &e->between, &e->along[!of]);
+    ebpo_vectorz_dot(e->share, &e->part, &e->normal);
+    return mpz_sgn(e->share) >= 0 && mpz_cmp(e->share, e->length2) <= 0;
+}
+
+/* False: parallel, or an end is nearer. */
+static bool edges_square(edges *e, fraction *out)
+{
+    ebpo_vectorz_subtract(&e->between, &e->from[1], &e->from[0]);
+    ebpo_vectorz_cross(&e->normal, &e->along[0], &e->along[1]);
+    ebpo_vectorz_dot(e->length2, &e->normal, &e->normal);
+    if (mpz_sgn(e->length2) == 0 || !within_edge(e, 0) || !within_edge(e, 1))
+        return false;
+    ebpo_vectorz_dot(e->share, &e->between, &e->normal);
+    mpz_mul(out->square, e->share, e->share);
+    mpz_set(out->denominator, e->length2);
+    return true;
+}
+
+/* Farther than `hi` for certain. */
+static bool edges_far(const double a[3][3], int i, const double b[3][3], int j, double hi)
+{
+    double p[3][3], q[3][3];
+    ebpo_pair_distance_bounds bounds;
+    for (int k = 0; k < 3; k++) {
+        memcpy(p[k], a[(i + (k > 0)) % 3], sizeof p[k]);
+        memcpy(q[k], b[(j + (k > 0)) % 3], sizeof q[k]);
+    }
+    ebpo_triangles_distance_bounds((const double(*)[3])p, (const double(*)[3])q, &bounds);
+    return bounds.lo > hi;
+}
+
+static void take_edges(fraction *best, const double a[3][3], const double b[3][3], double hi,
+                       int unit)
+{
+    edges e;
+    fraction f;
+    edges_init(&e);
+    fraction_init(&f);
+    for (int i = 0; i < 3; i++) {
+        set_edge(&e, 0, a[i], a[i == 2 ? 0 : i + 1], unit);
+        for (int j = 0; j < 3; j++) {
+            if (edges_far(a, i, b, j, hi))
+                continue;
+            set_edge(&e, 1, b[j], b[j == 2 ? 0 : j + 1], unit);
+            if (edges_square(&e, &f))
+                take_lesser(best, &f);
+        }
+    }
+    fraction_clear(&f);
+    edges_clear(&e);
+}
+
+/* --- faces --- */
+
+static void take_corners(fraction *best, const double corner[3][3], const double face[3][3],
+                         double hi, int unit)
+{
+    fraction f;
+    fraction_init(&f);
+    for (int i = 0; i < 3; i++) {
+        ebpo_distance_bounds bounds;
+        ebpo_triangle_distance_bounds(corner[i], face, &bounds);
+        if (bounds.lo > hi)
+            continue;
+        ebpo_triangle_square_gmp(corner[i], face, unit, f.square, f.denominator);
+        take_lesser(best, &f);
+    }
+    fraction_clear(&f);
+}
+
+static int unit_of(const double a[3][3], const double b[3][3], int unit)
+{
+    return ebpo_common_unit(&b[0][0], 9, ebpo_common_unit(&a[0][0], 9, unit));
+}
+
+static void squared_distance(const double a[3][3], const double b[3][3], int unit, fraction *out)
+{
+    if (ebpo_triangle_pair(a, b) != EBPO_PAIR_APART) {
+        mpz_set_ui(out->square, 0);
+        mpz_set_ui(out->denominator, 1);
+        return;
+    }
+    ebpo_pair_distance_bounds bounds; /* what is farther is not the least */
+    ebpo_triangles_distance_bounds(a, b, &bounds);
+    mpz_set_ui(out->denominator, 0);
+    take_corners(out, a, b, bounds.hi, unit);
+    take_corners(out, b, a, bounds.hi, unit);
+    take_edges(out, a, b, bounds.hi, unit);
+}
+
+double ebpo_triangles_distance(const double a[3][3], const double b[3][3])
+{
+    fraction f;
+    fraction_init(&f);
+    int unit = unit_of(a, b, EBPO_UNIT_OF_ZEROS);
+    squared_distance(a, b, unit, &f);
+    double out = ebpo_round_root(f.square, f.denominator, unit);
+    fraction_clear(&f);
+    return out;
+}
+
+/* --- comparisons --- */
+
+static int compare_exact(const double a[3][3], const double b[3][3], const double c[3][3],
+                         const double d[3][3])
+{
+    fraction f, g;
+    fraction_init(&f);
+    fraction_init(&g);
+    int unit = unit_of(c, d, unit_of(a, b, EBPO_UNIT_OF_ZEROS));
+    squared_distance(a, b, unit, &f);
+    squared_distance(c, d, unit, &g);
+    int order = fraction_compare(&f, &g);
+    fraction_clear(&f);
+    fraction_clear(&g);
+    return (order > 0) - (order < 0);
+}
+
+int ebpo_triangles_distance_compare(const double a[3][3], const double b[3][3],
+                                    const double c[3][3], const double d[3][3])
+{
+    ebpo_pair_distance_bounds x, y;
+    ebpo_triangles_distance_bounds(a, b, &x);
+    ebpo_triangles_distance_bounds(c, d, &y);
+    return x.hi < y.lo ? -1 : x.lo > y.hi ? 1 : compare_exact(a, b, c, d);
+}
+
+static int compare_to_exact(const double a[3][3], const double b[3][3], double distance)
+{
+    fraction f, g;
+    fraction_init(&f);
+    fraction_init(&g);
+    int unit = unit_of(a, b, ebpo_common_unit(&distance, 1, EBPO_UNIT_OF_ZEROS));
+    squared_distance(a, b, unit, &f);
+    ebpo_set_integer(g.square, distance, unit);
+    mpz_mul(g.square, g.square, g.square);
+    mpz_set_ui(g.denominator, 1);
+    int order = fraction_compare(&f, &g);
+    fraction_clear(&f);
+    fraction_clear(&g);
+    return (order > 0) - (order < 0);
+}
+
+int ebpo_triangles_distance_compare_to(const double a[3][3], const double b[3][3], double distance)
+{
+    ebpo_pair_distance_bounds x;
+    if (isinf(distance))
+        return -1;
+    ebpo_triangles_distance_bounds(a, b, &x);
+    return x.hi < distance ? -1 : x.lo > distance ? 1 : compare_to_exact(a, b, distance);
 }

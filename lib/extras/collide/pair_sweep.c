@@ -1,12 +1,19 @@
-/* Seen along the direction both faces are convex polygons with heights; the difference of heights
- * is concave where they overlap, so it is greatest over a corner of one, or where edges cross. */
+/* Two triangles of which one moves along a direction: the last time at which they have a common
+ * point.
+ *
+ * Seen along the direction both faces are convex polygons with heights. The difference of heights
+ * is concave where they overlap, so it is greatest over a corner of one polygon or where edges
+ * cross. The exact time is a fraction of integers (GMP). A bound in doubles comes from separating
+ * axes: normals, and products of edges with each other and with the direction.
+ * docs/develop/collision.md, "The way out". Pure functions, any thread. */
 #include "core/strict_fp.h"
 
-#include "extras/collide/pair_sweep.h"
+#include "extras/collide/face_pairs.h"
 
 #include <math.h>
 
 #include "geometry/integer_vectors.h"
+#include "geometry/vec3.h"
 
 void ebpo_sweep_time_init(ebpo_sweep_time *t)
 {
@@ -76,8 +83,8 @@ static void sweep_clear(sweep *s)
 }
 
 /* x . (y cross z); `m` is lost. */
-static void triple(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebpo_vectorz *y,
-                   const ebpo_vectorz *z)
+static void triple_product(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebpo_vectorz *y,
+                           const ebpo_vectorz *z)
 {
     ebpo_vectorz_cross(&s->m, y, z);
     ebpo_vectorz_dot(out, x, &s->m);
@@ -85,7 +92,7 @@ static void triple(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebpo_vector
 
 /* top / bottom is a time of contact. `other`: of the face that does not move, seen from which time
  * goes the other way. */
-static void take(sweep *s, bool other)
+static void take_time(sweep *s, bool other)
 {
     if (mpz_sgn(s->bottom) < 0) {
         mpz_neg(s->top, s->top);
@@ -133,7 +140,7 @@ static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
     for (int k = 0; k < 3; k++) {
         ebpo_vectorz_subtract(&s->u, next_corner(s, of, k), &s->corner[of][k]);
         ebpo_vectorz_subtract(&s->v, corner, &s->corner[of][k]);
-        triple(s, s->share, &s->d, &s->u, &s->v);
+        triple_product(s, s->share, &s->d, &s->u, &s->v);
         signs[mpz_sgn(s->share) + 1]++;
     }
     return signs[0] == 0 || signs[2] == 0;
@@ -149,7 +156,7 @@ static void corners_and_face(sweep *s, int of)
         ebpo_vectorz_subtract(&s->w, &s->corner[!of][0], &s->corner[of][i]);
         ebpo_vectorz_dot(s->top, &s->n, &s->w);
         ebpo_vectorz_dot(s->bottom, &s->n, &s->d);
-        take(s, of == 1);
+        take_time(s, of == 1);
     }
 }
 
@@ -160,17 +167,17 @@ static void two_edges(sweep *s, int i, int j)
     ebpo_vectorz_subtract(&s->u, next_corner(s, 0, i), p);
     ebpo_vectorz_subtract(&s->v, next_corner(s, 1, j), q);
     ebpo_vectorz_subtract(&s->w, q, p);
-    triple(s, s->bottom, &s->d, &s->u, &s->v);
+    triple_product(s, s->bottom, &s->d, &s->u, &s->v);
     if (mpz_sgn(s->bottom) == 0)
         return;
-    triple(s, s->share, &s->d, &s->w, &s->v);
+    triple_product(s, s->share, &s->d, &s->w, &s->v);
     if (!is_share(s))
         return;
-    triple(s, s->share, &s->d, &s->w, &s->u);
+    triple_product(s, s->share, &s->d, &s->w, &s->u);
     if (!is_share(s))
         return;
-    triple(s, s->top, &s->w, &s->u, &s->v);
-    take(s, false);
+    triple_product(s, s->top, &s->w, &s->u, &s->v);
+    take_time(s, false);
 }
 
 /* Of a corner of face `of` that is over an edge of the other: w = t d - x v. */
@@ -184,11 +191,11 @@ static void corner_and_edge(sweep *s, int of, int i, int j)
     ebpo_vectorz_dot(s->share, &s->w, &s->n);
     if (mpz_sgn(s->bottom) == 0 || mpz_sgn(s->share) != 0)
         return;
-    triple(s, s->share, &s->n, &s->w, &s->d);
+    triple_product(s, s->share, &s->n, &s->w, &s->d);
     if (!is_share(s))
         return;
-    triple(s, s->top, &s->n, &s->w, &s->v);
-    take(s, of == 1);
+    triple_product(s, s->top, &s->n, &s->w, &s->v);
+    take_time(s, of == 1);
 }
 
 /* Of two corners one of which is over the other: w = t d. */
@@ -201,10 +208,10 @@ static void two_corners(sweep *s, int i, int j)
             return;
     ebpo_vectorz_dot(s->top, &s->w, &s->d);
     ebpo_vectorz_dot(s->bottom, &s->d, &s->d);
-    take(s, false);
+    take_time(s, false);
 }
 
-static void look(sweep *s)
+static void look_at_faces(sweep *s)
 {
     bool upright[2] = { !find_normal(s, 0), !find_normal(s, 1) };
     for (int of = 0; of < 2; of++)
@@ -239,7 +246,7 @@ void ebpo_sweep_last(const double a[3][3], const double b[3][3], const double di
     }
     out->ever = false;
     out->unit = unit - along;
-    look(&s);
+    look_at_faces(&s);
     sweep_clear(&s);
 }
 
@@ -253,28 +260,15 @@ typedef struct bounding {
     double most; /* less than 0: none */
 } bounding;
 
-static double dot(const double x[3], const double y[3])
-{
-    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
-}
-
-static void cross(const double x[3], const double y[3], double out[3])
-{
-    for (int k = 0; k < 3; k++) {
-        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        out[k] = x[u] * y[v] - x[v] * y[u];
-    }
-}
-
 static void bound_by(bounding *b, const double n[3])
 {
     double size = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
     if (!(size > 0x1p-600 && size < 0x1p600) || b->most < 0)
         return;
-    double c = dot(n, b->d), sign = c < 0 ? -1 : 1, slack = 0x1p-48 * size * b->reach;
+    double c = ebpo_vec3_dot(n, b->d), sign = c < 0 ? -1 : 1, slack = 0x1p-48 * size * b->reach;
     double x_lo = INFINITY, x_hi = -INFINITY, y_lo = INFINITY, y_hi = -INFINITY;
     for (int i = 0; i < 3; i++) {
-        double x = sign * dot(n, b->x[i]), y = sign * dot(n, b->y[i]);
+        double x = sign * ebpo_vec3_dot(n, b->x[i]), y = sign * ebpo_vec3_dot(n, b->y[i]);
         x_lo = fmin(x_lo, x);
         x_hi = fmax(x_hi, x);
         y_lo = fmin(y_lo, y);
@@ -292,7 +286,7 @@ static void bound_by(bounding *b, const double n[3])
 static void bound_by_cross(bounding *b, const double x[3], const double y[3])
 {
     double n[3];
-    cross(x, y, n);
+    ebpo_vec3_cross(x, y, n);
     bound_by(b, n);
 }
 

@@ -1,14 +1,65 @@
-/* Points of the world asked of models; bounds: docs/develop/booleans.md. */
+/* Solids at poses: on which side of a solid a point of the world is, exact on posed coordinates.
+ *
+ * The point is brought into the model's coordinates with a bound of the error. If no face is near,
+ * the winding number there is the answer. Otherwise the faces near the point are posed and decide:
+ * from a point farther away, whose winding number is known, axis-parallel segments lead to the
+ * point in question, and their crossings are counted exactly. Points with fractions as coordinates
+ * are reached from the nearest double in three such segments.
+ *
+ * Solids are not changed: any thread may use them, each with its own context. Proofs:
+ * docs/develop/booleans.md and docs/develop/collision.md, "Relation of two models". */
 #include "core/strict_fp.h"
 
-#include "extras/collide/posed_solid.h"
+#include <ebpo/collide.h>
 
 #include <math.h>
 #include <string.h>
 
 #include "core/error.h"
-#include "extras/collide/posed_model.h"
+#include "core/fp_env.h"
+#include "extras/collide/posed_solid.h"
+#include "geometry/integer_vectors.h"
+#include "geometry/vec3.h"
+#include "geometry/predicates.h"
 #include "query/query_model.h"
+
+void ebpo_model_reach(const ebpo_model *m, double reach[3])
+{
+    for (int k = 0; k < 3; k++) {
+        double low = m->info->box_origin[k], high = low + m->info->box_size[k];
+        reach[k] = fmax(fabs(low), fabs(high)) * (1 + 0x1p-50);
+    }
+}
+
+double ebpo_posed_reach(const ebpo_posing *p, const double reach[3])
+{
+    double most = 0;
+    for (int i = 0; i < 3; i++) {
+        double size = fabs(p->translation[i]);
+        for (int k = 0; k < 3; k++)
+            size += fabs(p->matrix[i][k]) * reach[k];
+        most = fmax(most, size);
+    }
+    return most * (1 + 0x1p-50);
+}
+
+ebpo_status ebpo_pose_check(const ebpo_model *model, const ebpo_pose *pose, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_posing posing;
+    double reach[3];
+    ebpo_model_reach(model, reach);
+    return ebpo_posing_make(&posing, pose, reach, error);
+}
+
+bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b)
+{
+    const ebpo_info *x = a->info, *y = b->info;
+    return memcmp(x->content_sha256, y->content_sha256, sizeof x->content_sha256) == 0 &&
+           x->solid == y->solid && x->rule == y->rule;
+}
+
+/* --- points in the coordinates of the model --- */
 
 /* More than the roundings of a bound's own computation. */
 static const double more = 1 + 0x1p-40;
@@ -96,8 +147,9 @@ void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double 
     }
 }
 
-ebpo_status ebpo_posed_solid_clear(ebpo_context *context, const double p[3], double doubt,
-                                   bool *clear, ebpo_error *error)
+/* No face of the model is within `doubt` of p, for certain. */
+static ebpo_status is_clear_of_faces(ebpo_context *context, const double p[3], double doubt,
+                                     bool *clear, ebpo_error *error)
 {
     double low[3], high[3];
     const uint64_t *faces;
@@ -108,5 +160,311 @@ ebpo_status ebpo_posed_solid_clear(ebpo_context *context, const double p[3], dou
     }
     ebpo_status status = ebpo_faces_in_box(context, low, high, &faces, &count, error);
     *clear = status == EBPO_OK && count == 0;
+    return status;
+}
+
+/* --- sides of a point --- */
+
+/* --- faces --- */
+
+typedef struct looking {
+    const ebpo_posed_solid *solid;
+    const double *w;
+    int axis;              /* the segment runs along it, */
+    double low[3], to;     /* from here to there */
+    int32_t crossed, jump; /* winding numbers: end less beginning; above less below */
+    ebpo_posed_sides *out;
+} looking;
+
+/* Which axis tells the two sides of a face apart: the first one that its plane is not parallel to;
+ * -1: no area. */
+static int side_axis(const double t[3][3])
+{
+    for (int k = 0; k < 3; k++)
+        if (ebpo_normal_sign(k, t[0], t[1], t[2]) != 0)
+            return k;
+    return -1;
+}
+
+static bool in_plane(const double plane[3][3], const double t[3][3])
+{
+    return ebpo_orient3d(plane[0], plane[1], plane[2], t[0]) == 0 &&
+           ebpo_orient3d(plane[0], plane[1], plane[2], t[1]) == 0 &&
+           ebpo_orient3d(plane[0], plane[1], plane[2], t[2]) == 0;
+}
+
+/* A face that w is on. */
+static void take_on(looking *l, const double t[3][3])
+{
+    int axis = side_axis(t);
+    if (axis < 0)
+        return; /* bounds nothing */
+    if (!l->out->on)
+        memcpy(l->out->plane, t, sizeof l->out->plane);
+    else if (!in_plane((const double(*)[3])l->out->plane, t))
+        l->out->flat = false;
+    l->out->on = true;
+    double from[3] = { l->w[0], l->w[1], l->w[2] };
+    from[axis] = nextafter(from[axis], -INFINITY);
+    l->jump += ebpo_axis_crossing(from, nextafter(l->w[axis], INFINITY), axis, t[0], t[1], t[2]);
+}
+
+static bool take_near_triangles(void *user, const ebpo_triangles *triangles)
+{
+    looking *l = user;
+    for (uint64_t i = 0; i < triangles->count; i++) {
+        double t[3][3];
+        for (int c = 0; c < 3; c++)
+            ebpo_posing_apply(&l->solid->posing, triangles->corners[i][c], t[c]);
+        l->crossed += ebpo_axis_crossing(l->low, l->to, l->axis, t[0], t[1], t[2]);
+        if (ebpo_point_on_triangle(l->w, t[0], t[1], t[2]))
+            take_on(l, (const double(*)[3])t);
+    }
+    return true;
+}
+
+/* --- a point that is certainly far enough from faces --- */
+
+typedef struct anchor {
+    double at[3];
+    int axis;        /* on which it is away from w */
+    int32_t winding; /* there */
+} anchor;
+
+static ebpo_status try_anchor(const ebpo_posed_solid *s, ebpo_context *context, anchor *a,
+                              bool *found, ebpo_error *error)
+{
+    double p[3], doubt;
+    ebpo_inside_result inside = { 0 };
+    *found = !ebpo_posed_solid_near(s, a->at, 0);
+    a->winding = 0;
+    if (*found)
+        return EBPO_OK;
+    ebpo_unpose(s, a->at, p, &doubt);
+    ebpo_status status = is_clear_of_faces(context, p, doubt, found, error);
+    if (status == EBPO_OK && *found)
+        status = ebpo_inside(context, p, NULL, &inside, error);
+    a->winding = inside.winding;
+    return status;
+}
+
+/* Farther and farther away; beyond the solid's box at the latest. */
+static ebpo_status find_anchor(const ebpo_posed_solid *s, ebpo_context *context, const double w[3],
+                               double step, anchor *a, ebpo_error *error)
+{
+    for (;; step *= 4)
+        for (int side = 0; side < 6; side++) {
+            bool found;
+            memcpy(a->at, w, sizeof a->at);
+            a->axis = side / 2;
+            a->at[a->axis] += side % 2 ? -step : step;
+            ebpo_status status = try_anchor(s, context, a, &found, error);
+            if (status != EBPO_OK || found)
+                return status;
+        }
+}
+
+static ebpo_status decide_by_faces(const ebpo_posed_solid *s, ebpo_context *context,
+                                   const double w[3], double doubt, ebpo_posed_sides *out,
+                                   ebpo_error *error)
+{
+    anchor a;
+    double low[3], high[3];
+    looking l = { .solid = s, .w = w, .out = out };
+    ebpo_status status = find_anchor(s, context, w, 8 * doubt * s->posing.scale, &a, error);
+    if (status != EBPO_OK)
+        return status;
+    bool upward = a.at[a.axis] > w[a.axis]; /* the segment begins at w */
+    l.axis = a.axis;
+    memcpy(l.low, upward ? w : a.at, sizeof l.low);
+    l.to = upward ? a.at[a.axis] : w[a.axis];
+    ebpo_unpose_box(s, w, a.at, low, high);
+    status = ebpo_triangles_in_box(context, low, high, take_near_triangles, &l, error);
+    if (status != EBPO_OK)
+        return status;
+    out->above = upward ? a.winding - l.crossed : a.winding + l.crossed;
+    out->below = out->above - l.jump;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo_context *context,
+                                   const double w[3], ebpo_posed_sides *out, ebpo_error *error)
+{
+    double p[3], doubt;
+    bool clear = false;
+    ebpo_inside_result inside;
+    *out = (ebpo_posed_sides){ .flat = true };
+    if (!ebpo_posed_solid_near(s, w, 0))
+        return EBPO_OK;
+    ebpo_unpose(s, w, p, &doubt);
+    ebpo_status status = is_clear_of_faces(context, p, doubt, &clear, error);
+    if (status == EBPO_OK && !clear)
+        return decide_by_faces(s, context, w, doubt, out, error);
+    if (status == EBPO_OK)
+        status = ebpo_inside(context, p, NULL, &inside, error);
+    if (status == EBPO_OK)
+        out->above = out->below = inside.winding;
+    return status;
+}
+
+/* --- winding numbers at points with fractions --- */
+
+/* Points in units of 2^unit / denominator. */
+typedef struct path {
+    const ebpo_posed_solid *solid;
+    const mpq_t *x;
+    double w[3];
+    mpz_t denominator, number[4]; /* number: scratch */
+    ebpo_vectorz at[4];           /* w, then one coordinate after the other of x */
+    ebpo_vectorz corner[3];
+    int32_t crossed;
+} path;
+
+static void make_path(path *p)
+{
+    mpz_init_set_ui(p->denominator, 1);
+    for (int i = 0; i < 4; i++)
+        mpz_init(p->number[i]);
+    for (int i = 0; i < 4; i++)
+        ebpo_vectorz_init(&p->at[i]);
+    for (int i = 0; i < 3; i++) {
+        ebpo_vectorz_init(&p->corner[i]);
+        mpz_lcm(p->denominator, p->denominator, mpq_denref(p->x[i]));
+    }
+}
+
+static void clear_path(path *p)
+{
+    mpz_clear(p->denominator);
+    for (int i = 0; i < 4; i++)
+        mpz_clear(p->number[i]);
+    for (int i = 0; i < 4; i++)
+        ebpo_vectorz_clear(&p->at[i]);
+    for (int i = 0; i < 3; i++)
+        ebpo_vectorz_clear(&p->corner[i]);
+}
+
+/* unit: 0 or less, so that x is a whole number. */
+static void set_points(path *p, const double t[3][3], int unit)
+{
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            ebpo_set_integer(p->corner[i].x[k], t[i][k], unit);
+            mpz_mul(p->corner[i].x[k], p->corner[i].x[k], p->denominator);
+        }
+    for (int k = 0; k < 3; k++) {
+        ebpo_set_integer(p->number[0], p->w[k], unit);
+        mpz_mul(p->number[0], p->number[0], p->denominator);
+        mpz_divexact(p->number[1], p->denominator, mpq_denref(p->x[k]));
+        mpz_mul(p->number[1], p->number[1], mpq_numref(p->x[k]));
+        mpz_mul_2exp(p->number[1], p->number[1], (mp_bitcnt_t)-unit);
+        for (int i = 0; i < 4; i++)
+            mpz_set(p->at[i].x[k], p->number[i > k]);
+    }
+}
+
+/* Orientation of a, b, c seen against the axis. */
+static int turn_of(path *p, int axis, const ebpo_vectorz *a, const ebpo_vectorz *b,
+                   const ebpo_vectorz *c)
+{
+    int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
+    mpz_sub(p->number[0], b->x[u], a->x[u]);
+    mpz_sub(p->number[1], c->x[v], a->x[v]);
+    mpz_mul(p->number[0], p->number[0], p->number[1]);
+    mpz_sub(p->number[2], b->x[v], a->x[v]);
+    mpz_sub(p->number[3], c->x[u], a->x[u]);
+    mpz_submul(p->number[0], p->number[2], p->number[3]);
+    return mpz_sgn(p->number[0]);
+}
+
+/* As in geometry/triangle_predicates.c: the side of the shifted point of a line and of the plane. */
+static int side_of_line(path *p, int axis, int i, const ebpo_vectorz *at)
+{
+    const ebpo_vectorz *a = &p->corner[i], *b = &p->corner[i == 2 ? 0 : i + 1];
+    int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
+    int sign = turn_of(p, axis, a, b, at);
+    if (sign != 0)
+        return sign;
+    int by_u = mpz_cmp(a->x[v], b->x[v]), by_v = mpz_cmp(b->x[u], a->x[u]);
+    int first = u < v ? by_u : by_v, second = u < v ? by_v : by_u;
+    sign = first ? first : second;
+    return (sign > 0) - (sign < 0);
+}
+
+static int side_of_plane(path *p, const ebpo_vectorz *at)
+{
+    const ebpo_vectorz *a = &p->corner[0];
+    mpz_t sum;
+    mpz_init(sum);
+    for (int k = 0; k < 3; k++) {
+        (void)turn_of(p, k, a, &p->corner[1], &p->corner[2]);
+        mpz_sub(p->number[1], at->x[k], a->x[k]);
+        mpz_addmul(sum, p->number[0], p->number[1]);
+    }
+    int sign = mpz_sgn(sum);
+    mpz_clear(sum);
+    for (int k = 0; k < 3 && sign == 0; k++)
+        sign = turn_of(p, k, a, &p->corner[1], &p->corner[2]);
+    return sign;
+}
+
+/* Of the corners, along the axis from one point to another above it. */
+static int count_crossing(path *p, int axis, const ebpo_vectorz *from, const ebpo_vectorz *to)
+{
+    int turn = side_of_line(p, axis, 0, from);
+    if (turn == 0 || side_of_line(p, axis, 1, from) != turn ||
+        side_of_line(p, axis, 2, from) != turn || side_of_plane(p, from) == turn ||
+        side_of_plane(p, to) != turn)
+        return 0;
+    return -turn;
+}
+
+static bool take_path_triangles(void *user, const ebpo_triangles *triangles)
+{
+    path *p = user;
+    for (uint64_t i = 0; i < triangles->count; i++) {
+        double t[3][3];
+        int unit = 0;
+        for (int c = 0; c < 3; c++)
+            ebpo_posing_apply(&p->solid->posing, triangles->corners[i][c], t[c]);
+        unit = ebpo_common_unit(&t[0][0], 9, ebpo_common_unit(p->w, 3, unit));
+        set_points(p, (const double(*)[3])t, unit);
+        for (int k = 0; k < 3; k++) {
+            int up = mpz_cmp(p->at[k + 1].x[k], p->at[k].x[k]);
+            if (up > 0)
+                p->crossed += count_crossing(p, k, &p->at[k], &p->at[k + 1]);
+            else if (up < 0)
+                p->crossed -= count_crossing(p, k, &p->at[k + 1], &p->at[k]);
+        }
+    }
+    return true;
+}
+
+ebpo_status ebpo_exact_winding(const ebpo_posed_solid *s, ebpo_context *context, const mpq_t x[3],
+                               int32_t *winding, ebpo_error *error)
+{
+    path p = { .solid = s, .x = x };
+    double low[3], high[3], corner[2][3];
+    ebpo_posed_sides sides;
+    bool there = true;
+    mpq_t w;
+    mpq_init(w);
+    for (int k = 0; k < 3; k++) {
+        p.w[k] = mpq_get_d(x[k]);
+        mpq_set_d(w, p.w[k]);
+        there &= mpq_equal(w, x[k]) != 0;
+        corner[0][k] = nextafter(p.w[k], -INFINITY);
+        corner[1][k] = nextafter(p.w[k], INFINITY);
+    }
+    mpq_clear(w);
+    ebpo_status status = ebpo_posed_solid_sides(s, context, p.w, &sides, error);
+    *winding = sides.above;
+    if (status != EBPO_OK || there)
+        return status;
+    make_path(&p);
+    ebpo_unpose_box(s, corner[0], corner[1], low, high);
+    status = ebpo_triangles_in_box(context, low, high, take_path_triangles, &p, error);
+    *winding += p.crossed;
+    clear_path(&p);
     return status;
 }

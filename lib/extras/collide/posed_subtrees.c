@@ -1,6 +1,12 @@
+/* The subtrees of a model at a pose, and where each can have faces: convex envelopes, and gaps
+ * between them. A model in parts has the subtrees that are loaded on demand; a whole model is a
+ * single one.
+ *
+ * Envelopes are the cell's polytope, cut by the planes that are in memory for it and for its last
+ * ancestors, then posed. They are kept in a hash table by octcode. Gaps are lower bounds of the
+ * distance of two convex sets, found by the iteration of Gilbert (1966): every direction gives a
+ * bound, so it may stop at any time. */
 #include "core/strict_fp.h"
-
-#include "extras/collide/posed_subtrees.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,10 +15,82 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hash.h"
-#include "geometry/length.h"
-#include "geometry/plane_clip.h"
-#include "geometry/octcode.h"
+#include "extras/collide/posed_subtrees.h"
+#include "geometry/vec3.h"
+#include "geometry/cells.h"
+#include "geometry/polytope.h"
 #include "query/query_node.h"
+
+static void middle_of(const ebpo_convex *c, double out[3])
+{
+    for (int k = 0; k < 3; k++) {
+        double sum = 0;
+        for (int i = 0; i < c->count; i++)
+            sum += c->point[i][k];
+        out[k] = sum / c->count;
+    }
+}
+
+/* The point that is farthest along a direction, or (sign -1) against it. */
+static const double *farthest_point(const ebpo_convex *c, const double n[3], double sign)
+{
+    int best = 0;
+    double most = -INFINITY;
+    for (int i = 0; i < c->count; i++) {
+        double at = sign * ebpo_vec3_dot(c->point[i], n);
+        if (at > most) {
+            most = at;
+            best = i;
+        }
+    }
+    return c->point[best];
+}
+
+/* So many directions are tried; those that are nearly in contact would take more. */
+enum { DIRECTIONS = 32 };
+
+/* Of all differences of points of B and of A, `v` is one near the origin: the line from there to
+ * the difference that is farthest back along v comes nearer (Gilbert 1966). Any v bounds the
+ * distance: all differences are at least as far along it as that one. */
+double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough)
+{
+    double v[3], w[3], from[3], best = 0;
+    middle_of(a, from);
+    middle_of(b, v);
+    for (int k = 0; k < 3; k++)
+        v[k] -= from[k];
+    for (int turn = 0; turn < DIRECTIONS; turn++) {
+        double length2 = ebpo_vec3_dot(v, v), along, step2 = 0, back = 0;
+        if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* squares are not what they should be */
+            break;
+        const double *p = farthest_point(a, v, 1), *q = farthest_point(b, v, -1);
+        for (int k = 0; k < 3; k++)
+            w[k] = q[k] - p[k];
+        along = ebpo_vec3_dot(v, w) / sqrt(length2);
+        best = along > best ? along : best;
+        if (best > enough)
+            break;
+        for (int k = 0; k < 3; k++) {
+            back += v[k] * (v[k] - w[k]);
+            step2 += (v[k] - w[k]) * (v[k] - w[k]);
+        }
+        if (!(back > 0x1p-40 * length2))
+            break;
+        double share = back < step2 ? back / step2 : 1;
+        for (int k = 0; k < 3; k++)
+            v[k] += share * (w[k] - v[k]);
+    }
+    return best;
+}
+
+double ebpo_convex_span(const ebpo_convex *a, const ebpo_convex *b)
+{
+    double most = 0;
+    for (int i = 0; i < a->count; i++)
+        for (int j = 0; j < b->count; j++)
+            most = fmax(most, ebpo_vec3_scaled_distance(a->point[i], b->point[j]));
+    return most * (1 + 0x1p-40);
+}
 
 typedef struct posed_hull {
     ebpo_octcode code;
@@ -40,7 +118,7 @@ static int by_code(const void *x, const void *y)
     return (p->code > q->code) - (p->code < q->code);
 }
 
-static ebpo_status order(ebpo_posed_subtrees *s, ebpo_error *error)
+static ebpo_status order_subtrees(ebpo_posed_subtrees *s, ebpo_error *error)
 {
     const ebpo_top *top = s->model->top;
     place *at = ebpo_alloc(s->count, sizeof *at);
@@ -66,7 +144,7 @@ ebpo_status ebpo_posed_subtrees_make(ebpo_posed_subtrees *out, const ebpo_model 
     out->rank = ebpo_alloc_zero(out->count, sizeof *out->rank);
     if (!out->rank)
         return ebpo_fail_memory(error, out->count * sizeof *out->rank);
-    return model->whole ? EBPO_OK : order(out, error);
+    return model->whole ? EBPO_OK : order_subtrees(out, error);
 }
 
 void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s)
@@ -130,12 +208,14 @@ double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double rea
 
 double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell)
 {
-    return ebpo_length(s->model->info->box_size) * s->posing.scale / (double)(1u << cell.level);
+    return ebpo_vec3_scaled_length(s->model->info->box_size) * s->posing.scale /
+           (double)(1u << cell.level);
 }
 
 /* --- envelopes --- */
 
-static void cut(const ebpo_posed_subtrees *s, const ebpo_posed_node *node, ebpo_polytope *envelope)
+static void cut_node(const ebpo_posed_subtrees *s, const ebpo_posed_node *node,
+                     ebpo_polytope *envelope)
 {
     uint32_t count = 0;
     ebpo_node as = ebpo_entry_node(node->entry, node->cell, s->model->info->rule);
@@ -153,7 +233,7 @@ static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_poly
     for (int level = 0;; level++) {
         bool matters = level + LEVELS_OF_PLANES > cell.level;
         if (matters)
-            cut(s, &node, out);
+            cut_node(s, &node, out);
         if (level == cell.level)
             return;
         unsigned octant = ebpo_cell_octant(cell, level);
@@ -185,7 +265,7 @@ static posed_hull *make_hull(const ebpo_posed_subtrees *s, ebpo_cell cell)
     return out;
 }
 
-static posed_hull **find(posed_hull **hull, uint64_t slots, ebpo_octcode code)
+static posed_hull **find_hull(posed_hull **hull, uint64_t slots, ebpo_octcode code)
 {
     uint64_t at;
     EBPO_HASH_FIND(at, ebpo_hash_number(code), slots - 1, !hull[at] || hull[at]->code == code);
@@ -193,7 +273,7 @@ static posed_hull **find(posed_hull **hull, uint64_t slots, ebpo_octcode code)
 }
 
 /* Room for one more. */
-static bool widen(ebpo_posed_subtrees *s)
+static bool widen_table(ebpo_posed_subtrees *s)
 {
     if (4 * (s->hulls + 1) <= 3 * s->slots)
         return true;
@@ -203,7 +283,7 @@ static bool widen(ebpo_posed_subtrees *s)
         return false;
     for (uint64_t i = 0; i < s->slots; i++)
         if (s->hull[i])
-            *find(hull, slots, s->hull[i]->code) = s->hull[i];
+            *find_hull(hull, slots, s->hull[i]->code) = s->hull[i];
     free(s->hull);
     s->hull = hull;
     s->bytes += (slots - s->slots) * sizeof *hull;
@@ -214,9 +294,9 @@ static bool widen(ebpo_posed_subtrees *s)
 ebpo_status ebpo_posed_envelope(ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_convex *out,
                                 ebpo_error *error)
 {
-    if (!widen(s))
+    if (!widen_table(s))
         return ebpo_fail_memory(error, 2 * s->slots * sizeof *s->hull);
-    posed_hull **hull = find(s->hull, s->slots, ebpo_octcode_of_cell(cell));
+    posed_hull **hull = find_hull(s->hull, s->slots, ebpo_octcode_of_cell(cell));
     if (!*hull) {
         *hull = make_hull(s, cell);
         if (!*hull)

@@ -1,11 +1,26 @@
-/* A model's subtrees at a pose, and where each can have faces: those that are loaded on demand, or
- * the whole model as a single one. */
+/* The subtrees of a model at a pose and the convex envelopes of their faces, with gaps between
+ * envelopes. */
 #ifndef EBPO_COLLIDE_POSED_SUBTREES_H
 #define EBPO_COLLIDE_POSED_SUBTREES_H
 
-#include "extras/collide/convex_gap.h"
 #include "geometry/pose.h"
 #include "query/query_model.h"
+
+/* The hull of its points. */
+typedef struct ebpo_convex {
+    int count; /* 1 at least */
+    const double (*point)[3];
+} ebpo_convex;
+
+/* A lower bound of the distance, 0 if none was found: right to 2^-48 of the greatest coordinate. It
+ * is near the distance, but need not be it; one that is beyond `enough` ends the search. The same
+ * on every processor. */
+double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough);
+
+/* No two of their points are farther apart; rounded up. */
+double ebpo_convex_span(const ebpo_convex *a, const ebpo_convex *b);
+
+/* The subtrees that are loaded on demand, or a whole model as a single one. */
 
 typedef struct ebpo_posed_subtrees {
     const ebpo_model *model;

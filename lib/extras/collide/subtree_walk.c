@@ -1,14 +1,231 @@
+/* All pairs of intersecting faces of models that are loaded in parts, with the same result as of
+ * whole models.
+ *
+ * Two faces with a common point are listed by the subtrees whose cells hold that point, so it
+ * suffices to search pairs of subtrees whose envelopes may touch. These pairs are found before a
+ * subtree is loaded, and sorted so that a loaded subtree is soon used again. Several threads
+ * search pairs of subtrees. A face that several subtrees list is found more than once, so pairs
+ * wait, are sorted and made unique, and are given in order as soon as no earlier one can come.
+ *
+ * When too many wait for the collider's memory, pairs of the first model's later faces are dropped
+ * and found again in another round. */
 #include "core/strict_fp.h"
 
-#include "extras/collide/subtree_walk.h"
-
+#include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/parallel.h"
+#include "extras/collide/collider.h"
+#include "extras/collide/subtree_walk.h"
+#include "extras/collide/posed_subtrees.h"
+#include "geometry/vec3.h"
 
-ebpo_status ebpo_subtree_walk_begin(ebpo_subtree_walk *w, const ebpo_collision *question, bool self,
-                                    ebpo_error *error)
+/* Subtrees that may have faces that intersect. */
+typedef struct subtree_pair {
+    uint32_t a, b;
+    uint32_t rank_a, rank_b; /* in the order of the files' faces */
+    double apart;            /* distance of their middles over the sum of their sizes */
+} subtree_pair;
+
+typedef struct subtree_pairs {
+    subtree_pair *pair;
+    uint64_t count, capacity;
+    uint64_t subtrees[2]; /* different ones of each model */
+} subtree_pairs;
+
+/* Faces that meet, with their numbers: [0] of the question's first model. */
+typedef struct told_pair {
+    uint32_t file[2], source[2];
+    int32_t kind;
+} told_pair;
+
+/* Zero at first. Its contexts hold the two subtrees that it has come to last. */
+typedef struct subtree_walk {
+    const ebpo_collision *question;
+    bool self;
+    ebpo_context *context[2]; /* of models that are in parts */
+    ebpo_pair_walk walk;
+    told_pair *told; /* of the last pair, in no order; no face with itself */
+    uint64_t count, capacity;
+    uint64_t first_end; /* faces that the first's subtree lists have lesser numbers */
+    bool late;          /* the deadline has passed before all was found */
+} subtree_walk;
+
+typedef struct finding {
+    subtree_pairs *out;
+    ebpo_posed_subtrees *side[2];
+    double reach;
+    bool self;
+    ebpo_error *error;
+} finding;
+
+/* --- of two nodes --- */
+
+static double slack_of(const finding *f, const ebpo_posed_node node[2])
+{
+    return ebpo_posed_slack(f->side[0], node[0].cell, f->reach) +
+           ebpo_posed_slack(f->side[1], node[1].cell, f->reach);
+}
+
+static bool cells_apart(const finding *f, const ebpo_posed_node node[2])
+{
+    double corner[2][8][3], slack = slack_of(f, node);
+    ebpo_convex convex[2];
+    for (int i = 0; i < 2; i++) {
+        ebpo_posed_cell(f->side[i], node[i].cell, corner[i]);
+        convex[i] = (ebpo_convex){ 8, (const double(*)[3])corner[i] };
+    }
+    return ebpo_convex_gap(&convex[0], &convex[1], slack) > slack;
+}
+
+static double apart_of(const finding *f, const ebpo_posed_node node[2])
+{
+    double corner[2][8][3], d[3];
+    for (int i = 0; i < 2; i++)
+        ebpo_posed_cell(f->side[i], node[i].cell, corner[i]);
+    for (int k = 0; k < 3; k++)
+        d[k] = (corner[0][0][k] + corner[0][7][k]) - (corner[1][0][k] + corner[1][7][k]);
+    return ebpo_vec3_scaled_length(d) / (ebpo_posed_diagonal(f->side[0], node[0].cell) +
+                                         ebpo_posed_diagonal(f->side[1], node[1].cell));
+}
+
+static bool is_pruned(const ebpo_posed_subtrees *s, uint32_t number)
+{
+    return !s->model->whole && s->model->top->below[number].pruned;
+}
+
+static ebpo_status add_subtree_pair(const finding *f, const ebpo_posed_node node[2])
+{
+    uint32_t a = ebpo_entry_value(node[0].entry), b = ebpo_entry_value(node[1].entry);
+    ebpo_convex convex[2];
+    double slack = slack_of(f, node);
+    if (is_pruned(f->side[0], a) || is_pruned(f->side[1], b))
+        return EBPO_OK; /* what it had is not in this file */
+    subtree_pair pair = { a, b, f->side[0]->rank[a], f->side[1]->rank[b], apart_of(f, node) };
+    if (f->self && pair.rank_a > pair.rank_b)
+        return EBPO_OK;
+    ebpo_status status = ebpo_posed_envelope(f->side[0], node[0].cell, &convex[0], f->error);
+    if (status == EBPO_OK)
+        status = ebpo_posed_envelope(f->side[1], node[1].cell, &convex[1], f->error);
+    if (status != EBPO_OK || ebpo_convex_gap(&convex[0], &convex[1], slack) > slack)
+        return status;
+    subtree_pairs *out = f->out;
+    if (!ebpo_grow(&out->pair, &out->capacity, out->count + 1, sizeof *out->pair))
+        return ebpo_fail_memory(f->error, (out->count + 1) * sizeof *out->pair);
+    out->pair[out->count++] = pair;
+    return EBPO_OK;
+}
+
+/* --- the descent --- */
+
+static ebpo_status descend_pair(const finding *f, const ebpo_posed_node node[2])
+{
+    bool below[2];
+    for (int i = 0; i < 2; i++) {
+        if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
+            return EBPO_OK;
+        below[i] = ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_BELOW;
+    }
+    if (cells_apart(f, node))
+        return EBPO_OK;
+    if (below[0] && below[1])
+        return add_subtree_pair(f, node);
+    bool larger = ebpo_posed_diagonal(f->side[0], node[0].cell) >=
+                  ebpo_posed_diagonal(f->side[1], node[1].cell);
+    int down = below[0] ? 1 : below[1] ? 0 : larger ? 0 : 1;
+    ebpo_posed_node part[2] = { node[0], node[1] };
+    ebpo_status status = EBPO_OK;
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+        part[down] = ebpo_posed_child(f->side[down], &node[down], octant);
+        status = descend_pair(f, part);
+    }
+    return status;
+}
+
+/* --- their order --- */
+
+static int by_places(const void *x, const void *y)
+{
+    const subtree_pair *p = x, *q = y;
+    if (p->rank_a != q->rank_a)
+        return p->rank_a < q->rank_a ? -1 : 1;
+    return (p->rank_b > q->rank_b) - (p->rank_b < q->rank_b);
+}
+
+static void turn_round(subtree_pair *pair, uint64_t count)
+{
+    for (uint64_t i = 0; i < count / 2; i++) {
+        subtree_pair other = pair[i];
+        pair[i] = pair[count - 1 - i];
+        pair[count - 1 - i] = other;
+    }
+}
+
+static void sort_back_and_forth(subtree_pairs *p)
+{
+    if (p->count)
+        qsort(p->pair, p->count, sizeof *p->pair, by_places);
+    for (uint64_t begin = 0, end; begin < p->count; begin = end) {
+        for (end = begin + 1; end < p->count && p->pair[end].a == p->pair[begin].a;)
+            end++;
+        if (p->subtrees[0]++ % 2)
+            turn_round(p->pair + begin, end - begin);
+    }
+}
+
+static ebpo_status count_seconds(subtree_pairs *p, uint64_t most, ebpo_error *error)
+{
+    bool *seen = ebpo_alloc_zero(most, sizeof *seen);
+    if (!seen)
+        return ebpo_fail_memory(error, most);
+    for (uint64_t i = 0; i < p->count; i++) {
+        p->subtrees[1] += !seen[p->pair[i].b];
+        seen[p->pair[i].b] = true;
+    }
+    free(seen);
+    return EBPO_OK;
+}
+
+/* Two faces that meet have a common point, and that is in a cell of each model that lists its face:
+ * so they are listed by the subtrees of one of these pairs. They come sorted by the first's place,
+ * back and forth in the second's, so that what was loaded is used again soon. `self`: both are one
+ * model at one pose; each pair once, the first's place not behind the second's. Freed by the
+ * caller (`pair`), also after a failure. */
+static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a,
+                                      ebpo_posed_subtrees *b, double reach, bool self,
+                                      ebpo_error *error)
+{
+    finding f = { out, { a, b }, reach, self, error };
+    ebpo_posed_node root[2] = { ebpo_posed_subtree_root(a), ebpo_posed_subtree_root(b) };
+    *out = (subtree_pairs){ .count = 0 };
+    ebpo_status status = descend_pair(&f, root);
+    if (status != EBPO_OK)
+        return status;
+    sort_back_and_forth(out);
+    return count_seconds(out, b->count, error);
+}
+
+static int by_nearness(const void *x, const void *y)
+{
+    const subtree_pair *p = x, *q = y;
+    if (p->apart != q->apart)
+        return p->apart < q->apart ? -1 : 1;
+    return by_places(x, y);
+}
+
+/* By `apart`, the least first. */
+static void sort_nearest_first(subtree_pairs *p)
+{
+    if (p->count)
+        qsort(p->pair, p->count, sizeof *p->pair, by_nearness);
+}
+
+static ebpo_status subtree_walk_begin(subtree_walk *w, const ebpo_collision *question, bool self,
+                                      ebpo_error *error)
 {
     w->question = question;
     w->self = self;
@@ -21,7 +238,8 @@ ebpo_status ebpo_subtree_walk_begin(ebpo_subtree_walk *w, const ebpo_collision *
     return EBPO_OK;
 }
 
-uint64_t ebpo_subtree_walk_loads(const ebpo_subtree_walk *w)
+/* Subtrees that it had to load. */
+static uint64_t subtree_walk_loads(const subtree_walk *w)
 {
     uint64_t loads = 0;
     for (int i = 0; i < 2; i++)
@@ -29,13 +247,14 @@ uint64_t ebpo_subtree_walk_loads(const ebpo_subtree_walk *w)
     return loads;
 }
 
-void ebpo_subtree_walk_let_go(ebpo_subtree_walk *w)
+/* Others may have the room of its subtrees. */
+static void subtree_walk_let_go(subtree_walk *w)
 {
     for (int i = 0; i < 2; i++)
         ebpo_context_let_go(w->context[i]);
 }
 
-void ebpo_subtree_walk_free(ebpo_subtree_walk *w)
+static void subtree_walk_free(subtree_walk *w)
 {
     for (int i = 0; i < 2; i++)
         ebpo_context_free(w->context[i]);
@@ -43,15 +262,15 @@ void ebpo_subtree_walk_free(ebpo_subtree_walk *w)
     free(w->told);
 }
 
-int ebpo_told_pair_compare(const void *x, const void *y)
+static int compare_told_pairs(const void *x, const void *y)
 {
-    const ebpo_told_pair *p = x, *q = y;
+    const told_pair *p = x, *q = y;
     if (p->file[0] != q->file[0])
         return p->file[0] < q->file[0] ? -1 : 1;
     return (p->file[1] > q->file[1]) - (p->file[1] < q->file[1]);
 }
 
-ebpo_face_pair ebpo_told_pair_tell(const ebpo_collision *q, const ebpo_told_pair *t)
+static ebpo_face_pair tell_told_pair(const ebpo_collision *q, const told_pair *t)
 {
     int a = q->turned, b = !q->turned;
     return (ebpo_face_pair){ t->source[a], t->source[b], t->file[a], t->file[b], t->kind, 0 };
@@ -59,8 +278,8 @@ ebpo_face_pair ebpo_told_pair_tell(const ebpo_collision *q, const ebpo_told_pair
 
 /* --- one pair --- */
 
-static ebpo_status load(ebpo_subtree_walk *w, int side, uint32_t number, const ebpo_accel **out,
-                        ebpo_error *error)
+static ebpo_status load_subtree(subtree_walk *w, int side, uint32_t number, const ebpo_accel **out,
+                                ebpo_error *error)
 {
     ebpo_accel *loaded = w->question->model[side]->whole;
     ebpo_status status =
@@ -69,14 +288,14 @@ static ebpo_status load(ebpo_subtree_walk *w, int side, uint32_t number, const e
     return status;
 }
 
-static ebpo_status tell(ebpo_subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
+static ebpo_status tell_pairs(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
 {
     const ebpo_pair_walk *found = &w->walk;
     if (!ebpo_grow(&w->told, &w->capacity, found->met_count, sizeof *w->told))
         return ebpo_fail_memory(error, found->met_count * sizeof *w->told);
     for (uint64_t i = 0; i < found->met_count; i++) {
         uint32_t local[2] = { found->met[i].a, found->met[i].b };
-        ebpo_told_pair t = { .kind = found->met[i].kind };
+        told_pair t = { .kind = found->met[i].kind };
         for (int side = 0; side < 2; side++) {
             t.file[side] = (uint32_t)ebpo_accel_file_face(accel[side], local[side]);
             t.source[side] = (uint32_t)ebpo_accel_source_face(accel[side], local[side]);
@@ -84,7 +303,7 @@ static ebpo_status tell(ebpo_subtree_walk *w, const ebpo_accel *const accel[2], 
         if (w->self && t.file[0] == t.file[1])
             continue;
         if (w->self && t.file[0] > t.file[1])
-            t = (ebpo_told_pair){ { t.file[1], t.file[0] }, { t.source[1], t.source[0] }, t.kind };
+            t = (told_pair){ { t.file[1], t.file[0] }, { t.source[1], t.source[0] }, t.kind };
         w->told[w->count++] = t;
     }
     return EBPO_OK;
@@ -95,8 +314,7 @@ static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
     return ebpo_fail_memory(error, (w->capacity + 64) * sizeof *w->stack);
 }
 
-static ebpo_status walk_down(ebpo_subtree_walk *w, const ebpo_accel *const accel[2],
-                             ebpo_error *error)
+static ebpo_status walk_down(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
 {
     const ebpo_collision *q = w->question;
     const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
@@ -117,23 +335,293 @@ static ebpo_status walk_down(ebpo_subtree_walk *w, const ebpo_accel *const accel
         if ((w->late = ebpo_collision_is_late(q)))
             return EBPO_OK;
     }
-    return tell(w, accel, error);
+    return tell_pairs(w, accel, error);
 }
 
-ebpo_status ebpo_subtree_walk_pair(ebpo_subtree_walk *w, const ebpo_subtree_pair *pair,
-                                   ebpo_error *error)
+/* Fills in what has been found. */
+static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
     w->count = 0;
-    ebpo_status status = load(w, 0, pair->a, &accel[0], error);
+    ebpo_status status = load_subtree(w, 0, pair->a, &accel[0], error);
     if (status == EBPO_OK && w->self && pair->a == pair->b)
         accel[1] = accel[0];
     else if (status == EBPO_OK)
-        status = load(w, 1, pair->b, &accel[1], error);
+        status = load_subtree(w, 1, pair->b, &accel[1], error);
     if (status != EBPO_OK)
         return status;
     w->first_end = accel[0]->first_face + (accel[0]->face_count - accel[0]->outer_count);
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
         return EBPO_OK;
     return walk_down(w, accel, error);
+}
+
+/* --- waiting pairs --- */
+
+static const char stage[] = "pairs of subtrees";
+
+/* So many in a row for one thread: they have the first's subtree in common. */
+enum { PAIRS_IN_A_ROW = 4 };
+
+typedef struct gathering_parts {
+    const ebpo_collision *question;
+    bool self;
+    ebpo_posed_subtrees subtrees[2];
+    subtree_pairs pairs;
+    uint64_t *end; /* of each of the first's subtrees: its faces are before; 0: not known yet */
+    subtree_walk *walk; /* one for each thread */
+    unsigned threads;
+    uint64_t read_before;
+    pthread_mutex_t lock; /* for what follows */
+    uint64_t from, to;    /* faces of the first model that matter now */
+    told_pair *told;
+    uint64_t count, capacity;
+    uint64_t most; /* that wait */
+} gathering_parts;
+
+static void count_walk(const gathering_parts *g, subtree_walk *w)
+{
+    g->question->collider->loads += subtree_walk_loads(w);
+    ebpo_collider_count(g->question->collider, &w->walk);
+}
+
+/* --- what waits --- */
+
+static void sort_once(gathering_parts *g)
+{
+    uint64_t kept = 0;
+    if (g->count)
+        qsort(g->told, g->count, sizeof *g->told, compare_told_pairs);
+    for (uint64_t i = 0; i < g->count; i++)
+        if (kept == 0 || compare_told_pairs(&g->told[kept - 1], &g->told[i]) != 0)
+            g->told[kept++] = g->told[i];
+    g->count = kept;
+}
+
+/* Half of what may wait stays; those of one face alone stay in any case. */
+static void make_room(gathering_parts *g)
+{
+    sort_once(g);
+    uint64_t half = g->most / 2;
+    if (g->count <= half)
+        return;
+    uint64_t cut = g->told[half].file[0];
+    if (cut == g->told[0].file[0])
+        cut++;
+    g->to = cut;
+    while (g->count > 0 && g->told[g->count - 1].file[0] >= cut)
+        g->count--;
+    if (g->most < 2 * g->count)
+        g->most = 2 * g->count;
+}
+
+static ebpo_status hold_pairs(gathering_parts *g, const subtree_walk *w, ebpo_error *error)
+{
+    for (uint64_t i = 0; i < w->count; i++) {
+        if (w->told[i].file[0] < g->from || w->told[i].file[0] >= g->to)
+            continue;
+        if (g->count >= g->most)
+            make_room(g);
+        if (w->told[i].file[0] >= g->to)
+            continue;
+        if (!ebpo_grow(&g->told, &g->capacity, g->count + 1, sizeof *g->told))
+            return ebpo_fail_memory(error, (g->count + 1) * sizeof *g->told);
+        g->told[g->count++] = w->told[i];
+    }
+    return EBPO_OK;
+}
+
+/* --- going through --- */
+
+/* All faces that its first subtree lists have been given. */
+static bool is_done(gathering_parts *g, const subtree_pair *pair)
+{
+    (void)pthread_mutex_lock(&g->lock);
+    uint64_t end = g->end[pair->a];
+    (void)pthread_mutex_unlock(&g->lock);
+    return end && end <= g->from;
+}
+
+static ebpo_status keep_pairs(gathering_parts *g, const subtree_pair *pair, const subtree_walk *w,
+                              ebpo_error *error)
+{
+    (void)pthread_mutex_lock(&g->lock);
+    g->end[pair->a] = w->first_end;
+    ebpo_status status = hold_pairs(g, w, error);
+    (void)pthread_mutex_unlock(&g->lock);
+    return status;
+}
+
+static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    gathering_parts *g = user;
+    subtree_walk *w = &g->walk[worker];
+    for (uint64_t i = begin; i < end; i++) {
+        const subtree_pair *pair = &g->pairs.pair[i];
+        if (is_done(g, pair))
+            continue;
+        ebpo_status status = subtree_walk_pair(w, pair, error);
+        if (status == EBPO_OK)
+            status = keep_pairs(g, pair, w, error);
+        if (status != EBPO_OK)
+            return status;
+        if (w->late || ebpo_collision_is_late(g->question))
+            return ebpo_fail(error, EBPO_E_CANCELLED, "%s: the deadline has passed", stage);
+    }
+    return EBPO_OK;
+}
+
+/* Several threads hold several subtrees; where the budget has no room for these, one goes on. */
+static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
+{
+    const ebpo_progress *progress = &g->question->options.progress;
+    ebpo_error many = EBPO_ERROR_INIT;
+    ebpo_status status = EBPO_E_LIMIT;
+    if (g->threads > 1)
+        status = ebpo_parallel_for(g->threads, NULL, g->pairs.count, PAIRS_IN_A_ROW, run_pairs, g,
+                                   progress, stage, &many);
+    if (status != EBPO_E_LIMIT) {
+        if (status != EBPO_OK && error)
+            *error = many;
+        return status;
+    }
+    for (unsigned i = 1; i < g->threads; i++) {
+        count_walk(g, &g->walk[i]);
+        subtree_walk_free(&g->walk[i]);
+    }
+    g->threads = 1;
+    g->count = 0;
+    g->to = UINT64_MAX;
+    return ebpo_parallel_for(1, NULL, g->pairs.count, PAIRS_IN_A_ROW, run_pairs, g, progress, stage,
+                             error);
+}
+
+enum { GIVEN_AT_ONCE = 1024 };
+
+/* False: enough. */
+static bool give_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *user)
+{
+    ebpo_face_pair out[GIVEN_AT_ONCE];
+    for (unsigned i = 0; i < g->threads; i++) /* who takes them may want the room */
+        subtree_walk_let_go(&g->walk[i]);
+    for (uint64_t at = 0; at < g->count; at += GIVEN_AT_ONCE) {
+        uint64_t n = g->count - at < GIVEN_AT_ONCE ? g->count - at : GIVEN_AT_ONCE;
+        for (uint64_t i = 0; i < n; i++)
+            out[i] = tell_told_pair(g->question, &g->told[at + i]);
+        if (!take(user, out, n))
+            return false;
+    }
+    return true;
+}
+
+static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user, ebpo_error *error)
+{
+    uint64_t most = g->question->collider->options.memory / (2 * sizeof *g->told) + 2;
+    for (g->from = 0; g->from < UINT64_MAX; g->from = g->to) {
+        g->to = UINT64_MAX;
+        g->count = 0;
+        g->most = most;
+        ebpo_status status = run_all(g, error);
+        if (status != EBPO_OK)
+            return status;
+        sort_once(g);
+        if (!give_waiting(g, take, user))
+            return EBPO_OK;
+    }
+    return EBPO_OK;
+}
+
+/* --- both questions --- */
+
+static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_error *error)
+{
+    const ebpo_collision *q = g->question;
+    ebpo_status status = EBPO_OK;
+    g->walk = ebpo_alloc_zero(threads, sizeof *g->walk);
+    if (!g->walk)
+        return ebpo_fail_memory(error, threads * sizeof *g->walk);
+    g->threads = threads;
+    g->read_before = ebpo_collision_bytes_read(q);
+    for (int i = 0; i < 2 && status == EBPO_OK; i++)
+        status =
+            ebpo_posed_subtrees_make(&g->subtrees[i], q->model[i], &q->posing[i].posing, error);
+    for (unsigned i = 0; i < threads && status == EBPO_OK; i++)
+        status = subtree_walk_begin(&g->walk[i], q, g->self, error);
+    if (status == EBPO_OK)
+        status = find_subtree_pairs(&g->pairs, &g->subtrees[0], &g->subtrees[1], q->reach, g->self,
+                                    error);
+    if (status != EBPO_OK)
+        return status;
+    q->collider->subtree_pairs += g->pairs.count;
+    q->collider->subtrees += g->pairs.subtrees[0] + g->pairs.subtrees[1];
+    g->end = ebpo_alloc_zero(g->subtrees[0].count, sizeof *g->end);
+    return g->end ? EBPO_OK : ebpo_fail_memory(error, g->subtrees[0].count * sizeof *g->end);
+}
+
+static void end_gathering(gathering_parts *g)
+{
+    g->question->collider->bytes_read += ebpo_collision_bytes_read(g->question) - g->read_before;
+    for (unsigned i = 0; i < g->threads; i++) {
+        count_walk(g, &g->walk[i]);
+        subtree_walk_free(&g->walk[i]);
+    }
+    for (int i = 0; i < 2; i++)
+        ebpo_posed_subtrees_free(&g->subtrees[i]);
+    free(g->walk);
+    free(g->pairs.pair);
+    free(g->end);
+    free(g->told);
+    (void)pthread_mutex_destroy(&g->lock);
+}
+
+ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn take, void *user,
+                              ebpo_error *error)
+{
+    gathering_parts g = { .question = q, .self = self };
+    (void)pthread_mutex_init(&g.lock, NULL);
+    ebpo_status status =
+        begin_gathering(&g, ebpo_thread_count(q->collider->options.threads), error);
+    if (status == EBPO_OK)
+        status = in_passes(&g, take, user, error);
+    end_gathering(&g);
+    return status;
+}
+
+/* The least of the pairs of faces that the first two subtrees have which have any. */
+static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, int32_t *found,
+                                      ebpo_error *error)
+{
+    const ebpo_collision *q = g->question;
+    subtree_walk *w = &g->walk[0];
+    for (uint64_t i = 0; i < g->pairs.count; i++) {
+        ebpo_status status = subtree_walk_pair(w, &g->pairs.pair[i], error);
+        if (status != EBPO_OK)
+            return status;
+        *found = w->late || ebpo_collision_is_late(q) ? -1 : w->count > 0;
+        if (*found < 0)
+            return EBPO_OK;
+        if (*found) {
+            qsort(w->told, w->count, sizeof *w->told, compare_told_pairs);
+            *out = tell_told_pair(q, &w->told[0]);
+            return EBPO_OK;
+        }
+        if (!ebpo_progress_step(&q->options.progress, stage, i, g->pairs.count, error))
+            return EBPO_E_CANCELLED;
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_first_of_parts(const ebpo_collision *q, ebpo_face_pair *out, int32_t *found,
+                                ebpo_error *error)
+{
+    gathering_parts g = { .question = q };
+    (void)pthread_mutex_init(&g.lock, NULL);
+    ebpo_status status = begin_gathering(&g, 1, error);
+    if (status == EBPO_OK) {
+        sort_nearest_first(&g.pairs);
+        status = search_first_parts(&g, out, found, error);
+    }
+    end_gathering(&g);
+    return status;
 }

@@ -1,22 +1,100 @@
-/* The tree's nodes are taken in the order in which the ball may come to touch them, and no more
- * when the next one is touched after a face that is known. The distance from a box is convex along
- * a line, as that from a face is: Newton's steps towards the ball's radius never go too far. Of
- * those that it may touch already the closest are first: if it is held there, that is known soon.
+/* Follows a ball along a straight piece of its way, to the first face that it touches, and checks
+ * that its centre goes through none.
  *
- * Where a tick's work ends before, the ball goes as far as the next node allows, if that is worth
- * it; it is held by what is known if it is held where it is; else the next tick goes on. */
+ * Nodes of the tree over the faces are visited in the order in which the ball may touch them,
+ * until the next one would be touched after a face that is known. The distance from a box is
+ * convex along a line, as that from a face is: Newton's steps towards the ball's radius never go
+ * too far. Of the nodes that the ball touches already the closest come first.
+ *
+ * The work is bounded for each haptic step. Where it ends early, the ball goes as far as the next
+ * node allows; it is held by what is known if that holds it where it is; otherwise the next step
+ * goes on.
+ *
+ * The nearest point of the cone that planes leave free is in its inside, on a plane or on the line
+ * of two planes: all are tried, since there are few; otherwise it is the apex. */
 #include "core/strict_fp.h"
 
-#include "extras/haptic/ball_walk.h"
-
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "extras/haptic/face_near.h"
-#include "extras/haptic/vectors.h"
+#include "extras/haptic/ball_walk.h"
+#include "extras/haptic/face_box.h"
+#include "geometry/vec3.h"
+
+typedef struct trial {
+    const ebpo_held_planes *planes;
+    const double *want;
+    double length, best, slack;
+    double *out;
+} trial;
+
+static void try_way(trial *t, const double way[3], double slack)
+{
+    double lost[3];
+    for (int i = 0; i < t->planes->count; i++)
+        if (ebpo_vec3_dot(way, t->planes->normal[i]) < -slack)
+            return;
+    ebpo_vec3_subtract(t->want, way, lost);
+    double square = ebpo_vec3_dot(lost, lost);
+    if (square < t->best) {
+        t->best = square;
+        t->slack = slack;
+        ebpo_vec3_copy(way, t->out);
+    }
+}
+
+static void try_plane(trial *t, const double n[3], double slack)
+{
+    double way[3], into = ebpo_vec3_dot(t->want, n);
+    for (int i = 0; i < 3; i++)
+        way[i] = t->want[i] - into * n[i];
+    try_way(t, way, slack);
+}
+
+static void try_line(trial *t, const double m[3], const double n[3], double slack)
+{
+    double line[3], way[3];
+    ebpo_vec3_cross(m, n, line);
+    double square = ebpo_vec3_dot(line, line);
+    if (!(square > 0x1p-40))
+        return;
+    double part = ebpo_vec3_dot(t->want, line) / square;
+    for (int i = 0; i < 3; i++)
+        way[i] = part * line[i];
+    try_way(t, way, slack / sqrt(square));
+}
+
+double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], double out[3])
+{
+    double length = sqrt(ebpo_vec3_dot(want, want)), slack = 0x1p-44 * length;
+    trial t = { planes, want, length, INFINITY, slack, out };
+    for (int i = 0; i < 3; i++)
+        out[i] = 0;
+    try_way(&t, want, slack);
+    if (t.best == 0)
+        return slack;
+    for (int i = 0; i < planes->count; i++)
+        try_plane(&t, planes->normal[i], slack);
+    for (int i = 0; i < planes->count; i++)
+        for (int j = 0; j < i; j++)
+            try_line(&t, planes->normal[i], planes->normal[j], slack);
+    return t.slack;
+}
+
+void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3])
+{
+    for (int k = 0; k < planes->count; k++)
+        if (memcmp(planes->normal[k], normal, sizeof planes->normal[k]) == 0)
+            return;
+    if (planes->count < EBPO_PLANES_MOST)
+        ebpo_vec3_copy(normal, planes->normal[planes->count++]);
+}
+
+/* --- the walk --- */
 
 enum {
     STEPS = 6,
@@ -62,7 +140,7 @@ static bool goes_away(const ebpo_ball_walk *w, const ebpo_extent *e)
 /* The part of the way, at least, at which the ball may come to touch what is in `e`; where it may
  * touch it now, by how much that is too near, as a number below 0. INFINITY: not before the part
  * that is known, or not at all. */
-static double soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
+static double ball_walk_soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double part = 0;
     for (int step = 0; step < STEPS; step++) {
@@ -71,10 +149,10 @@ static double soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
             double x = w->from[i] + part * w->way[i];
             off[i] = x > e->max[i] ? x - e->max[i] : x < e->min[i] ? x - e->min[i] : 0;
         }
-        double distance = sqrt(dot(off, off)), gap = distance - (w->reach + 2 * w->band);
+        double distance = sqrt(ebpo_vec3_dot(off, off)), gap = distance - (w->reach + 2 * w->band);
         if (gap <= 0)
             return part > 0 ? part : goes_away(w, e) ? INFINITY : gap;
-        double slope = dot(off, w->way) / distance;
+        double slope = ebpo_vec3_dot(off, w->way) / distance;
         if (!(slope < 0))
             return INFINITY;
         part -= gap / slope;
@@ -86,7 +164,7 @@ static double soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
 
 static void wait_for(ebpo_ball_walk *w, uint64_t node)
 {
-    double key = soonest(w, &w->box->node[node]);
+    double key = ball_walk_soonest(w, &w->box->node[node]);
     if (key < w->part)
         ebpo_near_push(&w->queue, key, node);
 }
@@ -132,7 +210,7 @@ static bool end_before_that(ebpo_ball_walk *w)
     return true;
 }
 
-static bool look(ebpo_ball_walk *w, ebpo_ball_work *work)
+static bool ball_walk_look(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     uint32_t held = work->faces; /* when it was not yet */
     while (w->queue.count > 0 && w->queue.item[0].key < w->part) {
@@ -197,7 +275,7 @@ static bool crosses_leaf(const ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work 
     return false;
 }
 
-static ebpo_ball_end check(ebpo_ball_walk *w, ebpo_ball_work *work)
+static ebpo_ball_end ball_walk_check(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     while (w->depth > 0) {
         if (work->faces + EBPO_FACE_BOX_LEAF > EBPO_BALL_FACES || work->nodes >= EBPO_BALL_NODES)
@@ -219,11 +297,11 @@ static ebpo_ball_end check(ebpo_ball_walk *w, ebpo_ball_work *work)
 ebpo_ball_end ebpo_ball_go_on(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     if (w->stage == EBPO_BALL_LOOKS) {
-        if (!look(w, work))
+        if (!ball_walk_look(w, work))
             return EBPO_BALL_LATER;
         begin_check(w);
     }
-    ebpo_ball_end end = check(w, work);
+    ebpo_ball_end end = ball_walk_check(w, work);
     if (end != EBPO_BALL_LATER)
         w->stage = EBPO_BALL_STANDS;
     return end;

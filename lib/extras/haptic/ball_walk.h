@@ -1,12 +1,27 @@
-/* A straight piece of a ball's way: where it first touches a face, and that its centre went through
- * none. The work is done in shares, and goes on where it ended: so a ball may have any number of
- * faces around it. */
+/* A straight piece of a ball's way: where it first touches a face, and that its centre goes
+ * through none. The work is done in shares, and goes on where it ended. */
 #ifndef EBPO_HAPTIC_BALL_WALK_H
 #define EBPO_HAPTIC_BALL_WALK_H
 
 #include "extras/haptic/face_box.h"
-#include "extras/haptic/held_back.h"
-#include "extras/haptic/near_queue.h"
+
+enum { EBPO_PLANES_MOST = 12 };
+
+typedef struct ebpo_held_planes {
+    double normal[EBPO_PLANES_MOST][3]; /* unit vectors to the side that is free */
+    int count;
+} ebpo_held_planes;
+
+/* One more, unless it is there already, or there is no room. */
+void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3]);
+
+/* `out` is the way `want` projected onto the cone n . x >= 0 for all planes; 0 if rounding finds
+ * none. Returns how far below 0 n . out may be. */
+double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], double out[3]);
+
+/* A straight piece of a ball's way: where it first touches a face, and that its centre went through
+ * none. The work is done in shares, and goes on where it ended: so a ball may have any number of
+ * faces around it. */
 
 enum {
     /* Of a tick. */

@@ -1,6 +1,15 @@
+/* The faces in a box around the proxy, with a tree of boxes over them: all that a haptic step
+ * reads.
+ *
+ * The loading thread makes a box; a box never changes while a step uses it. Faces keep the order
+ * of the file, which follows a curve, so that the tree needs no sorting. What steps call takes no
+ * memory, and its work is bounded by limits that callers give.
+ *
+ * Distances are in doubles, and are right within a few ulps. The side of a point is exact: its
+ * winding number changes at each face that a straight way crosses through its inside. Where the
+ * way meets an edge, or begins in a face's plane, it goes by way of another point, as almost every
+ * one will do. */
 #include "core/strict_fp.h"
-
-#include "extras/haptic/face_box.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -8,7 +17,9 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
-#include "extras/haptic/vectors.h"
+#include "extras/haptic/face_box.h"
+#include "geometry/vec3.h"
+#include "geometry/predicates.h"
 
 uint64_t ebpo_face_box_leaves(uint64_t count)
 {
@@ -57,7 +68,7 @@ typedef struct loading {
     bool fits;
 } loading;
 
-static bool take(void *user, const ebpo_triangles *triangles)
+static bool face_box_take(void *user, const ebpo_triangles *triangles)
 {
     loading *l = user;
     ebpo_face_box *box = l->box;
@@ -70,7 +81,7 @@ static bool take(void *user, const ebpo_triangles *triangles)
     return true;
 }
 
-static void widen(ebpo_extent *e, const double min[3], const double max[3])
+static void face_box_widen(ebpo_extent *e, const double min[3], const double max[3])
 {
     for (int i = 0; i < 3; i++) {
         e->min[i] = fmin(e->min[i], min[i]);
@@ -89,11 +100,11 @@ static void make_tree(ebpo_face_box *box)
         for (uint64_t f = leaf * EBPO_FACE_BOX_LEAF;
              f < box->count && f < (leaf + 1) * EBPO_FACE_BOX_LEAF; f++)
             for (int k = 0; k < 3; k++)
-                widen(e, box->corner[f][k], box->corner[f][k]);
+                face_box_widen(e, box->corner[f][k], box->corner[f][k]);
     }
     for (uint64_t n = box->leaves - 1; n > 0; n--) {
         box->node[n] = box->node[2 * n];
-        widen(&box->node[n], box->node[2 * n + 1].min, box->node[2 * n + 1].max);
+        face_box_widen(&box->node[n], box->node[2 * n + 1].min, box->node[2 * n + 1].max);
     }
 }
 
@@ -109,16 +120,16 @@ ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
         min[i] = centres->min[i] - margin;
         max[i] = centres->max[i] + margin;
     }
-    copy(min, box->loaded.min);
-    copy(max, box->loaded.max);
-    ebpo_status status = ebpo_triangles_in_box(context, min, max, take, &l, error);
+    ebpo_vec3_copy(min, box->loaded.min);
+    ebpo_vec3_copy(max, box->loaded.max);
+    ebpo_status status = ebpo_triangles_in_box(context, min, max, face_box_take, &l, error);
     *fits = l.fits;
     if (status == EBPO_OK && l.fits)
         make_tree(box);
     return status;
 }
 
-static bool meet(const ebpo_extent *a, const ebpo_extent *b)
+static bool face_box_meet(const ebpo_extent *a, const ebpo_extent *b)
 {
     for (int i = 0; i < 3; i++)
         if (!(a->min[i] <= b->max[i] && a->max[i] >= b->min[i]))
@@ -129,11 +140,11 @@ static bool meet(const ebpo_extent *a, const ebpo_extent *b)
 static bool face_meets(const double face[3][3], const ebpo_extent *around)
 {
     ebpo_extent e;
-    copy(face[0], e.min);
-    copy(face[0], e.max);
-    widen(&e, face[1], face[1]);
-    widen(&e, face[2], face[2]);
-    return meet(&e, around);
+    ebpo_vec3_copy(face[0], e.min);
+    ebpo_vec3_copy(face[0], e.max);
+    face_box_widen(&e, face[1], face[1]);
+    face_box_widen(&e, face[2], face[2]);
+    return face_box_meet(&e, around);
 }
 
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
@@ -148,7 +159,7 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
         if (*visits == 0)
             return false;
         --*visits;
-        if (!meet(&box->node[n], around))
+        if (!face_box_meet(&box->node[n], around))
             continue;
         if (n < box->leaves) {
             stack[depth++] = 2 * n + 1;
@@ -167,7 +178,7 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
 }
 
 /* Squared. */
-static double between(const ebpo_extent *a, const ebpo_extent *b)
+static double face_box_between(const ebpo_extent *a, const ebpo_extent *b)
 {
     double square = 0;
     for (int i = 0; i < 3; i++) {
@@ -183,11 +194,11 @@ static double closest_of_leaf(const ebpo_face_box *box, uint64_t leaf, const ebp
     uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
     for (; f < end && f < box->count; f++) {
         ebpo_extent e;
-        copy(box->corner[f][0], e.min);
-        copy(box->corner[f][0], e.max);
-        widen(&e, box->corner[f][1], box->corner[f][1]);
-        widen(&e, box->corner[f][2], box->corner[f][2]);
-        least = fmin(least, between(&e, around));
+        ebpo_vec3_copy(box->corner[f][0], e.min);
+        ebpo_vec3_copy(box->corner[f][0], e.max);
+        face_box_widen(&e, box->corner[f][1], box->corner[f][1]);
+        face_box_widen(&e, box->corner[f][2], box->corner[f][2]);
+        least = fmin(least, face_box_between(&e, around));
     }
     return least;
 }
@@ -204,7 +215,7 @@ static double find_square(const ebpo_face_box *box, const ebpo_extent *around, u
     if (box->count == 0)
         return INFINITY;
     stack[depth].node = 1;
-    stack[depth++].lower = between(&box->node[1], around);
+    stack[depth++].lower = face_box_between(&box->node[1], around);
     for (uint32_t n = 0; depth > 0; n++) {
         uint64_t node = stack[--depth].node;
         double lower = stack[depth].lower;
@@ -216,8 +227,8 @@ static double find_square(const ebpo_face_box *box, const ebpo_extent *around, u
         } else if (node >= box->leaves) {
             least = fmin(least, closest_of_leaf(box, node - box->leaves, around));
         } else {
-            double l = between(&box->node[2 * node], around);
-            double r = between(&box->node[2 * node + 1], around);
+            double l = face_box_between(&box->node[2 * node], around);
+            double r = face_box_between(&box->node[2 * node + 1], around);
             bool first = l <= r; /* is looked at first, so goes on last */
             stack[depth].node = 2 * node + first;
             stack[depth++].lower = first ? r : l;
@@ -232,4 +243,313 @@ double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *arou
                                uint32_t most_visits, uint64_t *visits)
 {
     return sqrt(find_square(box, around, most_visits, visits)) * (1 - 0x1p-48);
+}
+
+/* --- the nearest point of a face --- */
+
+/* The distance from a face, a convex set, is a convex function along a line: where it falls,
+ * tangents lie below it, so that Newton's steps towards a distance never go too far. That finds
+ * when a ball touches a face, whichever of its features it is. */
+
+typedef struct nearest {
+    double square, offset[3]; /* from the nearest point to p */
+    int edge;                 /* k to k + 1 */
+    double part;              /* of it */
+} nearest;
+
+static void try_edge(const double p[3], const double face[3][3], int k, nearest *best)
+{
+    const double *a = face[k], *b = face[(k + 1) % 3];
+    double e[3], d[3], part = 0;
+    ebpo_vec3_subtract(b, a, e);
+    ebpo_vec3_subtract(p, a, d);
+    double length = ebpo_vec3_dot(e, e);
+    if (length > 0)
+        part = fmin(fmax(ebpo_vec3_dot(d, e) / length, 0), 1);
+    for (int i = 0; i < 3; i++)
+        d[i] -= part * e[i];
+    double square = ebpo_vec3_dot(d, d);
+    if (square < best->square) {
+        *best = (nearest){ .square = square, .edge = k, .part = part };
+        for (int i = 0; i < 3; i++)
+            best->offset[i] = d[i];
+    }
+}
+
+/* Where p is above the inside of the face. */
+static bool near_inside(const double p[3], const double face[3][3], ebpo_face_near *out)
+{
+    double e[3], f[3], n[3], d[3], c[3];
+    ebpo_vec3_subtract(face[1], face[0], e);
+    ebpo_vec3_subtract(face[2], face[0], f);
+    ebpo_vec3_subtract(p, face[0], d);
+    ebpo_vec3_cross(e, f, n);
+    double area = ebpo_vec3_dot(n, n);
+    if (!(area > 0))
+        return false;
+    ebpo_vec3_cross(d, f, c);
+    double u = ebpo_vec3_dot(c, n) / area;
+    ebpo_vec3_cross(e, d, c);
+    double v = ebpo_vec3_dot(c, n) / area;
+    if (!(u >= 0 && v >= 0 && u + v <= 1))
+        return false;
+    double length = sqrt(area), height = ebpo_vec3_dot(d, n) / length;
+    out->distance = fabs(height);
+    for (int i = 0; i < 3; i++)
+        out->away[i] = height > 0 ? n[i] / length : height < 0 ? -n[i] / length : 0;
+    out->weight[0] = 1 - u - v;
+    out->weight[1] = u;
+    out->weight[2] = v;
+    return true;
+}
+
+void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_near *out)
+{
+    if (near_inside(p, face, out))
+        return;
+    nearest best = { .square = INFINITY };
+    for (int k = 0; k < 3; k++)
+        try_edge(p, face, k, &best);
+    out->distance = sqrt(best.square);
+    for (int i = 0; i < 3; i++) {
+        out->away[i] = out->distance > 0 ? best.offset[i] / out->distance : 0;
+        out->weight[i] = 0;
+    }
+    out->weight[best.edge] = 1 - best.part;
+    out->weight[(best.edge + 1) % 3] = best.part;
+}
+
+enum { STEPS = 24 };
+
+double ebpo_ball_meets(const ebpo_ball_way *w, const double face[3][3], double away[3])
+{
+    double part = 0;
+    for (int step = 0; step < STEPS; step++) {
+        double x[3];
+        ebpo_face_near near;
+        for (int i = 0; i < 3; i++)
+            x[i] = w->from[i] + part * w->way[i];
+        ebpo_face_nearest(x, face, &near);
+        double gap = near.distance - w->reach, slope = ebpo_vec3_dot(near.away, w->way);
+        for (int i = 0; i < 3; i++)
+            away[i] = near.away[i];
+        if (slope >= -(gap > 0 ? w->slack : w->least_slack))
+            return 2;
+        if (gap <= w->band)
+            return part;
+        part -= gap / slope;
+        if (!(part <= 1))
+            return 2;
+    }
+    return part;
+}
+
+static int volume_sign(const double a[3], const double b[3], const double c[3], const double d[3])
+{
+    double u[3], v[3], w[3], value = 0, sum = 0, last = 0;
+    ebpo_vec3_subtract(b, a, u);
+    ebpo_vec3_subtract(c, a, v);
+    ebpo_vec3_subtract(d, a, w);
+    for (int i = 0; i < 3; i++) {
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        double l = u[j] * v[k], r = u[k] * v[j];
+        value += (l - r) * w[i];
+        sum += (fabs(l) + fabs(r)) * fabs(w[i]);
+        last += fabs(w[i]);
+    }
+    /* the bound of ebpo_orient3d; that function may take memory where expansions do not do */
+    double bound = 0x1p-50 * sum + 0x1p-960 * (1 + last);
+    return value > bound ? 1 : value < -bound ? -1 : ebpo_orient3d_expansion(a, b, c, d);
+}
+
+/* In the face's plane, seen along an axis: no line along an edge or along pq parts them. */
+static bool meets_in_plane(const double p[3], const double q[3], const double face[3][3], int axis)
+{
+    int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    double a[2] = { p[u], p[v] }, b[2] = { q[u], q[v] }, corner[3][2];
+    int turn[3];
+    for (int k = 0; k < 3; k++) {
+        corner[k][0] = face[k][u];
+        corner[k][1] = face[k][v];
+        turn[k] = ebpo_orient2d_expansion(a, b, corner[k]);
+    }
+    int way = ebpo_orient2d_expansion(corner[0], corner[1], corner[2]);
+    if (way != 1 && way != -1)
+        return way != 0;
+    if (turn[0] == turn[1] && turn[1] == turn[2] && (turn[0] == 1 || turn[0] == -1))
+        return false;
+    for (int k = 0; k < 3; k++)
+        if (ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], a) == -way &&
+            ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], b) == -way)
+            return false;
+    /* on the line of a flat view: along it, too */
+    for (int i = 0; i < 2; i++)
+        if (fmax(a[i], b[i]) < fmin(corner[0][i], fmin(corner[1][i], corner[2][i])) ||
+            fmin(a[i], b[i]) > fmax(corner[0][i], fmax(corner[1][i], corner[2][i])))
+            return false;
+    return true;
+}
+
+/* Along each axis in which the face is not a line; without area it is one along all. */
+static bool meets_flat(const double p[3], const double q[3], const double face[3][3])
+{
+    for (int axis = 0; axis < 3; axis++) {
+        int u = (axis + 1) % 3, v = (axis + 2) % 3;
+        const double c[3][2] = { { face[0][u], face[0][v] },
+                                 { face[1][u], face[1][v] },
+                                 { face[2][u], face[2][v] } };
+        if (ebpo_orient2d_expansion(c[0], c[1], c[2]) != 0)
+            return meets_in_plane(p, q, face, axis);
+    }
+    return false;
+}
+
+bool ebpo_segment_may_meet(const double p[3], const double q[3], const double face[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        if (fmax(p[i], q[i]) < fmin(face[0][i], fmin(face[1][i], face[2][i])) ||
+            fmin(p[i], q[i]) > fmax(face[0][i], fmax(face[1][i], face[2][i])))
+            return false;
+    int at_p = volume_sign(face[0], face[1], face[2], p);
+    int at_q = volume_sign(face[0], face[1], face[2], q);
+    if (at_p == at_q && (at_p == 1 || at_p == -1))
+        return false;
+    if (at_p == 0 && at_q == 0)
+        return meets_flat(p, q, face);
+    bool left = false, right = false;
+    for (int k = 0; k < 3; k++) {
+        int sign = volume_sign(p, q, face[k], face[(k + 1) % 3]);
+        left |= sign == 1;
+        right |= sign == -1;
+    }
+    return !(left && right);
+}
+
+static int segment_crosses(const double p[3], const double q[3], const double face[3][3])
+{
+    if (!ebpo_segment_may_meet(p, q, face))
+        return 0;
+    int at_p = volume_sign(face[0], face[1], face[2], p);
+    int at_q = volume_sign(face[0], face[1], face[2], q);
+    if (at_p * at_q != -1)
+        return EBPO_CROSSES_BADLY;
+    for (int k = 0; k < 3; k++) {
+        int sign = volume_sign(p, q, face[k], face[(k + 1) % 3]);
+        if (sign != 1 && sign != -1)
+            return EBPO_CROSSES_BADLY;
+    }
+    return at_p; /* from its outer side */
+}
+
+void ebpo_near_push(ebpo_near_queue *queue, double key, uint64_t node)
+{
+    uint64_t at = queue->count++;
+    for (; at > 0 && queue->item[(at - 1) / 2].key > key; at = (at - 1) / 2)
+        queue->item[at] = queue->item[(at - 1) / 2];
+    queue->item[at] = (ebpo_near_node){ key, node };
+}
+
+ebpo_near_node ebpo_near_pop(ebpo_near_queue *queue)
+{
+    ebpo_near_node first = queue->item[0], last = queue->item[--queue->count];
+    uint64_t at = 0;
+    for (uint64_t child = 1; child < queue->count; child = 2 * at + 1) {
+        if (child + 1 < queue->count && queue->item[child + 1].key < queue->item[child].key)
+            child++;
+        if (!(queue->item[child].key < last.key))
+            break;
+        queue->item[at] = queue->item[child];
+        at = child;
+    }
+    if (queue->count > 0)
+        queue->item[at] = last;
+    return first;
+}
+
+/* --- the side of a point --- */
+
+enum { PIECES = 12 };
+
+static void extent_of(const double p[3], const double q[3], ebpo_extent *out)
+{
+    for (int i = 0; i < 3; i++) {
+        out->min[i] = fmin(p[i], q[i]);
+        out->max[i] = fmax(p[i], q[i]);
+    }
+}
+
+typedef enum crossing { CROSSED, TOO_MANY, BADLY } crossing;
+
+static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const double to[3],
+                            uint32_t *found, uint32_t most, uint32_t visits, uint64_t *work)
+{
+    ebpo_extent around;
+    uint32_t count;
+    int32_t change = 0;
+    extent_of(side->at, to, &around);
+    bool all = ebpo_face_box_find(box, &around, found, most, &visits, &count);
+    *work += count;
+    if (!all)
+        return TOO_MANY;
+    for (uint32_t i = 0; i < count; i++) {
+        int sign = segment_crosses(side->at, to, (const double(*)[3])box->corner[found[i]]);
+        if (sign == EBPO_CROSSES_BADLY)
+            return BADLY;
+        change += sign;
+    }
+    side->winding += change;
+    ebpo_vec3_copy(to, side->at);
+    return CROSSED;
+}
+
+/* A place near the middle of the way, another one each time. */
+static void go_round(ebpo_side *side, const double to[3], const ebpo_extent *within, double via[3])
+{
+    double length = 0;
+    for (int i = 0; i < 3; i++)
+        length = fmax(length, fabs(to[i] - side->at[i]));
+    for (int i = 0; i < 3; i++) {
+        side->turns = side->turns * 1664525u + 1013904223u;
+        double off = (double)(side->turns >> 8) * 0x1p-24 - 0.5;
+        via[i] = 0.5 * (side->at[i] + to[i]) + 0.75 * off * length;
+        via[i] = fmin(fmax(via[i], within->min[i]), within->max[i]);
+    }
+}
+
+bool ebpo_side_go(ebpo_side *side, const ebpo_face_box *box, const double place[3], uint32_t *found,
+                  uint32_t most, uint32_t visits, uint64_t *work)
+{
+    double to[3];
+    ebpo_vec3_copy(place, to);
+    side->known = side->known && ebpo_extent_holds(&box->centres, side->at);
+    if (!side->known || !ebpo_extent_holds(&box->centres, place))
+        return false;
+    for (int piece = 0; piece < PIECES; piece++) {
+        switch (cross_faces(side, box, to, found, most, visits, work)) {
+        case CROSSED:
+            if (to[0] == place[0] && to[1] == place[1] && to[2] == place[2])
+                return true;
+            ebpo_vec3_copy(place, to);
+            break;
+        case TOO_MANY:
+            for (int i = 0; i < 3; i++)
+                to[i] = side->at[i] + 0.25 * (to[i] - side->at[i]);
+            break;
+        case BADLY: go_round(side, to, &box->centres, to); break;
+        }
+    }
+    return false;
+}
+
+bool ebpo_side_on(const ebpo_face_box *box, const double place[3], uint32_t *found, uint32_t most,
+                  uint32_t visits)
+{
+    ebpo_extent around;
+    uint32_t count;
+    extent_of(place, place, &around);
+    bool all = ebpo_face_box_find(box, &around, found, most, &visits, &count);
+    for (uint32_t i = 0; i < count; i++)
+        if (ebpo_segment_may_meet(place, place, (const double(*)[3])box->corner[found[i]]))
+            return true;
+    return !all;
 }

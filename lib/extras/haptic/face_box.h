@@ -1,7 +1,11 @@
-/* The faces in a box, with a tree of boxes over them: what a tick works on. Made by the loading
- * thread, never changed while a tick has it. */
+/* The faces in a box with a tree of boxes over them, on which a haptic step works; distances from
+ * faces and the side of a point. The loading thread makes a box; it never changes while a step
+ * uses it. */
 #ifndef EBPO_HAPTIC_FACE_BOX_H
 #define EBPO_HAPTIC_FACE_BOX_H
+
+#include <stdbool.h>
+#include <stdint.h>
 
 #include <ebpo/query.h>
 
@@ -50,5 +54,75 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
  * says less. *visits counts them. */
 double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *around,
                                uint32_t most_visits, uint64_t *visits);
+
+/* How far a place is from a face, fast, and what a moving ball and a face are to each other. */
+
+typedef struct ebpo_face_near {
+    double distance;
+    double away[3];   /* unit vector from the nearest point of the face; 0 at distance 0 */
+    double weight[3]; /* of the corners at the nearest point */
+} ebpo_face_near;
+
+/* In doubles: right within some ulps of the coordinates. */
+void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_near *out);
+
+typedef struct ebpo_ball_way {
+    const double *from, *way; /* [3] */
+    double reach, band;       /* the ball's radius; it touches if it is that much farther away */
+    /* Going towards a face by less than this over the whole way is none; the least where the ball
+     * is closer than its radius already. */
+    double slack, least_slack;
+} ebpo_ball_way;
+
+/* The part 0 to 1 of the way at which the ball comes to touch the face, or a little less; 2 if it
+ * does not. `away` as above there. */
+double ebpo_ball_meets(const ebpo_ball_way *w, const double face[3][3], double away[3]);
+
+/* False: the closed segment and the closed face have certainly no common point. True: they have
+ * one, or numbers are so large or small that only integers of any size could tell. Faces without
+ * area have none. No memory is taken. */
+bool ebpo_segment_may_meet(const double p[3], const double q[3], const double face[3][3]);
+
+/* How the winding number changes from p to q through the face: 1 from outside to inside, -1 back,
+ * 0: they have no common point. EBPO_CROSSES_BADLY: through an edge, a corner, from or to the
+ * face's plane, or perhaps not at all. No memory is taken. */
+enum { EBPO_CROSSES_BADLY = 2 };
+
+/* Nodes of the tree over a box's faces, the one with the least key first. A heap in an array that
+ * its owner gives. */
+
+typedef struct ebpo_near_node {
+    double key; /* not NAN */
+    uint64_t node;
+} ebpo_near_node;
+
+typedef struct ebpo_near_queue {
+    ebpo_near_node *item; /* there is room for all that are pushed */
+    uint64_t count;
+} ebpo_near_queue;
+
+void ebpo_near_push(ebpo_near_queue *queue, double key, uint64_t node);
+/* item[0] is the first; this takes it out. */
+ebpo_near_node ebpo_near_pop(ebpo_near_queue *queue);
+
+/* On which side a probe is: its winding number, which exact arithmetic changes at each face that it
+ * goes through. */
+
+typedef struct ebpo_side {
+    double at[3]; /* of this place, which is on no face, */
+    int32_t winding;
+    bool known;
+    uint32_t turns; /* of ways around what is met badly */
+} ebpo_side;
+
+/* Goes on to `place`, as far as it gets with so little work: at most `most` faces for each of some
+ * pieces, into found[most]. True: it is there. Else it stands where the winding number is known, or
+ * has left the box (known is false then). */
+bool ebpo_side_go(ebpo_side *side, const ebpo_face_box *box, const double place[3], uint32_t *found,
+                  uint32_t most, uint32_t visits, uint64_t *work);
+
+/* Whether a place is on a face: true also where that is not to be told without memory. */
+bool ebpo_side_on(const ebpo_face_box *box, const double place[3], uint32_t *found, uint32_t most,
+                  uint32_t visits);
 
 #endif

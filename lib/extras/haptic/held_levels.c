@@ -1,3 +1,10 @@
+/* The first levels of an octree, kept in memory for probes: bounds of the distance to the surface,
+ * and the winding number of cells without faces, without reading a file.
+ *
+ * There are at most 2^17 nodes, of 6 levels or fewer below the root. A node has its box, its
+ * children, whether any face comes near its cell, and otherwise its winding number. Bounds are
+ * certain: they allow for the rounding of the model's coordinates. A query visits at most as many
+ * nodes as its caller allows, and returns wider bounds when that is too few. */
 #include "core/strict_fp.h"
 
 #include "extras/haptic/held_levels.h"
@@ -9,12 +16,11 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "geometry/cells.h"
-#include "geometry/octcode.h"
 
 enum { DEEPEST = 6, MOST = 1 << 17 };
 
-static ebpo_status keep(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
-                        ebpo_held_levels *out, ebpo_error *error)
+static ebpo_status held_levels_keep(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
+                                    ebpo_held_levels *out, ebpo_error *error)
 {
     ebpo_box box = ebpo_root_box(ebpo_file_info(file));
     out->node = ebpo_alloc_zero(nodes->node_count, sizeof *out->node);
@@ -47,7 +53,7 @@ ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out, 
             status = ebpo_subtree_get_nodes(tree, &nodes);
         bool few = status == EBPO_OK && (nodes.node_count <= MOST || levels == 0);
         if (few)
-            status = keep(file, &nodes, out, error);
+            status = held_levels_keep(file, &nodes, out, error);
         ebpo_subtree_close(tree);
         if (few || status != EBPO_OK)
             return status;

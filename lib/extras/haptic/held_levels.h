@@ -1,5 +1,5 @@
-/* The first levels of a model's octree, kept for ticks: what they tell of a place, certainly and
- * without reading. */
+/* The first levels of a model's octree, kept for haptic steps: certain bounds without reading a
+ * file. */
 #ifndef EBPO_HAPTIC_HELD_LEVELS_H
 #define EBPO_HAPTIC_HELD_LEVELS_H
 

@@ -1,4 +1,9 @@
-/* The thread that loads boxes ahead of the hand. */
+/* The thread that loads boxes of faces ahead of the hand, and exact results for probes.
+ *
+ * A haptic step never waits for it. Boxes and results are handed over through buffers that are
+ * exchanged atomically: the loader writes its own one and swaps it with the one between, which the
+ * step swaps with one of its own. Where the hand goes is predicted from its speed. When a box has
+ * more faces than there is room for, a smaller one is loaded. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -6,11 +11,60 @@
 #include <string.h>
 #include <time.h>
 
-#include "core/os.h"
 #include "core/error.h"
+#include "core/os.h"
 #include "core/parallel.h"
 #include "extras/haptic/touch_parts.h"
-#include "extras/haptic/vectors.h"
+#include "geometry/vec3.h"
+
+static ebpo_status known_ask(ebpo_touch *t, ebpo_known_place *out, ebpo_error *error)
+{
+    ebpo_distance_result near;
+    ebpo_inside_result inside = { .where = EBPO_OUT };
+    ebpo_status status = ebpo_distance(t->loading, out->place, NULL, &near, error);
+    if (status == EBPO_OK && t->solid)
+        status = ebpo_inside(t->loading, out->place, NULL, &inside, error);
+    if (status != EBPO_OK)
+        return status;
+    out->distance = fabs(near.distance);
+    ebpo_vec3_copy(near.point, out->point);
+    ebpo_vec3_copy(near.normal, out->normal);
+    out->winding = inside.winding;
+    out->on = inside.where == EBPO_ON;
+    out->there = true;
+    return EBPO_OK;
+}
+
+/* touch_known.c: the loading thread asks about the place where a probe is. True: it has moved. */
+static ebpo_status learn_place(ebpo_touch *t, bool *moved, ebpo_error *error)
+{
+    ebpo_known_place *known = &t->known[t->own_known];
+    for (int i = 0; i < 3; i++)
+        known->place[i] = atomic_load_explicit(&t->hand_told[i], memory_order_relaxed);
+    *moved = known->place[0] != t->asked[0] || known->place[1] != t->asked[1] ||
+             known->place[2] != t->asked[2];
+    if (!*moved)
+        return EBPO_OK;
+    ebpo_status status = known_ask(t, known, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_vec3_copy(known->place, t->asked);
+    unsigned got = atomic_exchange_explicit(&t->known_between, t->own_known | EBPO_TOUCH_FRESH,
+                                            memory_order_acq_rel);
+    t->own_known = got & ~(unsigned)EBPO_TOUCH_FRESH;
+    return EBPO_OK;
+}
+
+const ebpo_known_place *ebpo_touch_known(ebpo_touch *t)
+{
+    if (atomic_load_explicit(&t->known_between, memory_order_relaxed) & EBPO_TOUCH_FRESH) {
+        unsigned got = atomic_exchange_explicit(&t->known_between, t->answer, memory_order_acq_rel);
+        t->answer = got & ~(unsigned)EBPO_TOUCH_FRESH;
+    }
+    return &t->known[t->answer];
+}
+
+/* --- boxes --- */
 
 /* Seconds that a box should be ahead of the hand, and over which its speed is measured; of half a
  * box's side, how far the proxy may be from the middle when it is made, and how far the middle
@@ -25,7 +79,7 @@ static void wait_a_little(void)
 
 /* Where the hand will be if it goes on like this. Its speed is that of some ticks: from one look to
  * the next the hand has often made one step or none. */
-static void foresee(ebpo_touch *t, double out[3])
+static void loader_foresee(ebpo_touch *t, double out[3])
 {
     uint64_t now = ebpo_clock();
     double seconds = 1e-9 * (double)(now - t->when_before);
@@ -74,7 +128,7 @@ static void hand_over(ebpo_touch *t, uint64_t began)
         atomic_store(&t->load_ns_most, ns);
 }
 
-static ebpo_status load(ebpo_touch *t, const double goal[3], ebpo_error *error)
+static ebpo_status loader_load(ebpo_touch *t, const double goal[3], ebpo_error *error)
 {
     uint64_t began = ebpo_clock();
     ebpo_face_box *box = &t->box[t->own];
@@ -102,7 +156,7 @@ static ebpo_status load(ebpo_touch *t, const double goal[3], ebpo_error *error)
     return EBPO_OK;
 }
 
-static void *run(void *user)
+static void *loader_run(void *user)
 {
     ebpo_touch *t = user;
     ebpo_status status = EBPO_OK;
@@ -110,13 +164,13 @@ static void *run(void *user)
     while (status == EBPO_OK && !atomic_load(&t->stop)) {
         double goal[3];
         ebpo_extent centres;
-        foresee(t, goal);
+        loader_foresee(t, goal);
         place_box(t, goal, &centres);
         bool moved = false;
         if (far_from_last(t, &centres))
-            status = load(t, goal, &error);
+            status = loader_load(t, goal, &error);
         else if (t->options.kind == EBPO_TOUCH_PROBE)
-            status = ebpo_touch_learn(t, &moved, &error);
+            status = learn_place(t, &moved, &error);
         if (status == EBPO_OK && !moved)
             wait_a_little();
     }
@@ -137,7 +191,7 @@ ebpo_status ebpo_touch_loader_start(ebpo_touch *t, ebpo_error *error)
         t->hand_before[i] = atomic_load(&t->hand_told[i]);
     }
     t->when_before = ebpo_clock();
-    int failed = ebpo_thread_start(&t->thread, run, t);
+    int failed = ebpo_thread_start(&t->thread, loader_run, t);
     t->has_thread = failed == 0;
     return failed ? ebpo_fail(error, EBPO_E_MEMORY, "no thread to load in: %s", strerror(failed))
                   : EBPO_OK;

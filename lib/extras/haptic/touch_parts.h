@@ -1,4 +1,4 @@
-/* Inside lib/extras/haptic: the object, and who may use which part of it. */
+/* The object of a haptic session, and which thread may use which part of it. */
 #ifndef EBPO_HAPTIC_TOUCH_PARTS_H
 #define EBPO_HAPTIC_TOUCH_PARTS_H
 
@@ -8,10 +8,8 @@
 
 #include "extras/haptic/ball_walk.h"
 #include "extras/haptic/face_box.h"
-#include "extras/haptic/held_back.h"
 #include "extras/haptic/held_levels.h"
-#include "extras/haptic/passive.h"
-#include "extras/haptic/side_walk.h"
+#include "extras/haptic/tool.h"
 
 enum {
     /* The tick's box, the one it looked at last, the one between, the one being loaded. */
@@ -102,17 +100,9 @@ uint32_t ebpo_touch_go(ebpo_touch *t, const double goal[3], ebpo_ball_work *work
  * `reach` are known: to the wall of the box at hand, or all of it where no face can be. */
 double ebpo_touch_known_part(const ebpo_touch *t, const double way[3], double reach);
 
-/* tool_step.c: a tool's next piece of way; flags are given when it is there. False: it cannot
- * begin. */
-bool ebpo_tool_set_out(ebpo_touch *t, const double way[6], uint32_t *flags);
-/* Goes on with it; bits of ebpo_touch_flag. */
-uint32_t ebpo_tool_go_on(ebpo_touch *t, uint64_t *work, bool *arrived);
-
-/* touch_around.c: nearest face, weights, depth and the smooth normal; t->away. */
+/* touch_step.c: nearest face, weights, depth and the smooth normal; t->away. */
 void ebpo_touch_look(ebpo_touch *t, ebpo_touch_result *out);
 
-/* touch_known.c: the loading thread asks about the place where a probe is. True: it has moved. */
-EBPO_MUST_USE ebpo_status ebpo_touch_learn(ebpo_touch *t, bool *moved, ebpo_error *error);
 /* The last that is known. */
 const ebpo_known_place *ebpo_touch_known(ebpo_touch *t);
 
@@ -120,7 +110,7 @@ const ebpo_known_place *ebpo_touch_known(ebpo_touch *t);
 EBPO_MUST_USE ebpo_status ebpo_touch_loader_start(ebpo_touch *t, ebpo_error *error);
 void ebpo_touch_loader_stop(ebpo_touch *t);
 
-/* touch_boxes.c: a box that is fresh and holds the proxy becomes the one at hand. True: one did. */
+/* touch_step.c: a box that is fresh and holds the proxy becomes the one at hand. True: one did. */
 bool ebpo_touch_take_box(ebpo_touch *t);
 /* The box before, if it holds the proxy: perhaps that one reaches further. */
 void ebpo_touch_try_other(ebpo_touch *t);

@@ -1,4 +1,10 @@
-/* A tick of a probe: bounds from three sources, of which each is certain. */
+/* A haptic step of a probe: bounds of its distance to the surface, and on which side it is.
+ *
+ * Bounds come from three sources, of which each is certain: the faces of the box at hand, the
+ * exact result for a point where the probe was a moment ago, and the first levels of the octree.
+ * Their intersection is returned. The side is the winding number, which exact arithmetic changes
+ * at each face that the probe crosses; where that cannot be found in a step's time it is
+ * EBPO_MAYBE. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -6,7 +12,7 @@
 #include "core/fp_env.h"
 #include "query/query_model.h"
 #include "extras/haptic/touch_parts.h"
-#include "extras/haptic/vectors.h"
+#include "geometry/vec3.h"
 
 enum { VISITS = 512 };
 
@@ -15,7 +21,7 @@ typedef struct bounds {
     double lo, hi;
 } bounds;
 
-static void narrow(bounds *b, double lo, double hi)
+static void sense_narrow(bounds *b, double lo, double hi)
 {
     b->lo = fmax(b->lo, lo);
     b->hi = fmin(b->hi, hi);
@@ -35,18 +41,18 @@ static bool sense_faces(ebpo_touch *t, const double place[3], ebpo_touch_sensed 
     out->work += near.work;
     out->flags |= near.flags;
     out->face = near.face;
-    copy(near.normal, out->normal);
-    copy(near.point, out->point);
-    copy(near.weight, out->weight);
+    ebpo_vec3_copy(near.normal, out->normal);
+    ebpo_vec3_copy(near.point, out->point);
+    ebpo_vec3_copy(near.weight, out->weight);
     bool all = !(near.flags & EBPO_TOUCH_PARTLY);
     double distance = INFINITY, look = t->options.look;
     if (near.face != EBPO_NO_FACE) {
         double way[3];
-        difference(place, near.point, way);
-        distance = sqrt(dot(way, way));
+        ebpo_vec3_subtract(place, near.point, way);
+        distance = sqrt(ebpo_vec3_dot(way, way));
     }
     double nearer = fmin(distance, look);
-    narrow(b, all ? nearer - rounding_of(t, nearer) : 0, distance + rounding_of(t, distance));
+    sense_narrow(b, all ? nearer - rounding_of(t, nearer) : 0, distance + rounding_of(t, distance));
     return all && near.face != EBPO_NO_FACE;
 }
 
@@ -57,11 +63,11 @@ static bool sense_known(ebpo_touch *t, const double place[3], ebpo_touch_sensed 
     double way[3];
     if (!known->there)
         return false;
-    difference(place, known->place, way);
-    double far = sqrt(dot(way, way)), rounding = rounding_of(t, far + known->distance);
-    narrow(b, known->distance - far - rounding, known->distance + far + rounding);
+    ebpo_vec3_subtract(place, known->place, way);
+    double far = sqrt(ebpo_vec3_dot(way, way)), rounding = rounding_of(t, far + known->distance);
+    sense_narrow(b, known->distance - far - rounding, known->distance + far + rounding);
     if (out->normal[0] == 0 && out->normal[1] == 0 && out->normal[2] == 0)
-        copy(known->normal, out->normal);
+        ebpo_vec3_copy(known->normal, out->normal);
     return far == 0;
 }
 
@@ -76,21 +82,21 @@ static bool find_side(ebpo_touch *t, const double place[3], ebpo_touch_sensed *o
             return true;
         if (t->side.known || !known->there || known->on)
             return false;
-        copy(known->place, t->side.at);
+        ebpo_vec3_copy(known->place, t->side.at);
         t->side.winding = known->winding;
         t->side.known = true;
     }
     return false;
 }
 
-static int32_t where(ebpo_touch *t, const double place[3], ebpo_touch_sensed *out)
+static int32_t sense_where(ebpo_touch *t, const double place[3], ebpo_touch_sensed *out)
 {
     int32_t winding;
     const ebpo_face_box *box = &t->box[t->at];
     if (!t->solid)
         return EBPO_OUT;
     if (ebpo_held_levels_winding(&t->levels, place, &winding)) {
-        copy(place, t->side.at);
+        ebpo_vec3_copy(place, t->side.at);
         t->side.winding = winding;
         t->side.known = true;
     } else if (ebpo_extent_holds(&box->centres, place) &&
@@ -102,7 +108,7 @@ static int32_t where(ebpo_touch *t, const double place[3], ebpo_touch_sensed *ou
     return ebpo_rule_inside(t->model->info->rule, t->side.winding) ? EBPO_IN : EBPO_OUT;
 }
 
-static void tell(ebpo_touch_sensed *out, const bounds *b, bool close)
+static void sense_tell(ebpo_touch_sensed *out, const bounds *b, bool close)
 {
     double lo = fmax(0, fmin(b->lo, b->hi)), hi = b->hi;
     bool in = out->where == EBPO_IN, maybe = out->where == EBPO_MAYBE;
@@ -128,18 +134,18 @@ void ebpo_touch_sense(ebpo_touch *t, const double place[3], ebpo_touch_sensed *o
     }
     for (int i = 0; i < 3; i++)
         astray |= !(fabs(place[i]) <= 0x1p200);
-    copy(astray ? t->hand : place, at);
+    ebpo_vec3_copy(astray ? t->hand : place, at);
     out->flags = (astray ? EBPO_TOUCH_ASTRAY : 0) | ebpo_touch_stopped(t);
-    copy(at, t->proxy);
-    copy(at, t->hand);
+    ebpo_vec3_copy(at, t->proxy);
+    ebpo_vec3_copy(at, t->hand);
     (void)ebpo_touch_take_box(t);
     bool close = sense_faces(t, at, out, &b);
     close |= sense_known(t, at, out, &b);
     double lo, hi;
     ebpo_held_levels_bound(&t->levels, at, VISITS, &lo, &hi);
-    narrow(&b, lo, hi);
-    out->where = where(t, at, out);
-    tell(out, &b, close);
+    sense_narrow(&b, lo, hi);
+    out->where = sense_where(t, at, out);
+    sense_tell(out, &b, close);
     ebpo_touch_count(t, out->flags | (out->flags & EBPO_TOUCH_CLOSE ? 0 : EBPO_TOUCH_WAITS),
                      out->work);
     ebpo_touch_tell(t, at);

@@ -1,14 +1,179 @@
-/* The proxy's way of a tick: straight on until a ball touches, then along what it touches, a few
- * times. Each straight piece is decided twice: by distances, which say where the ball stops, and by
- * exact arithmetic, which says that the centre went through nothing. A piece may take several
- * ticks, if very many faces are around. */
+/* The way of the proxy in a haptic step: straight on until the ball touches, then along what it
+ * touches, a few times.
+ *
+ * Each straight piece is decided twice: by distances, which find where the ball stops, and by
+ * exact arithmetic, which finds that the centre went through no face. A piece takes several steps
+ * if very many faces are around.
+ *
+ * Also here: taking over a box that the loading thread has made, and the nearest face with a
+ * normal that changes continuously. */
 #include "core/strict_fp.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "extras/haptic/face_box.h"
 #include "extras/haptic/touch_parts.h"
-#include "extras/haptic/vectors.h"
+#include "geometry/vec3.h"
+
+static void swap_boxes(ebpo_touch *t)
+{
+    unsigned before = t->at;
+    t->at = t->seen;
+    t->seen = before;
+}
+
+bool ebpo_touch_take_box(ebpo_touch *t)
+{
+    if (!(atomic_load_explicit(&t->between, memory_order_relaxed) & EBPO_TOUCH_FRESH))
+        return false;
+    unsigned got = atomic_exchange_explicit(&t->between, t->seen, memory_order_acq_rel);
+    t->seen = got & ~(unsigned)EBPO_TOUCH_FRESH;
+    if (!ebpo_extent_holds(&t->box[t->seen].centres, t->proxy))
+        return false; /* it was made for another place */
+    swap_boxes(t);
+    t->stats.taken++;
+    return true;
+}
+
+void ebpo_touch_try_other(ebpo_touch *t)
+{
+    if (ebpo_extent_holds(&t->box[t->seen].centres, t->proxy))
+        swap_boxes(t);
+}
+
+/* --- the nearest face --- */
+
+typedef struct around {
+    ebpo_touch *t;
+    const ebpo_face_box *box;
+    ebpo_near_queue queue;
+    double look;    /* all faces that are closer to the ball are found */
+    double nearest; /* centre to face */
+    uint32_t looked;
+    uint32_t count; /* of t->found */
+    ebpo_touch_result *out;
+} around;
+
+/* Area times a weight that falls to 0 where faces are no longer looked at; to the side on which the
+ * proxy is, of a solid always the outer one. */
+static void add_normal(const around *a, const double face[3][3], double gap, double sum[3])
+{
+    double e[3], f[3], n[3], d[3];
+    double far = fmax(gap, 0) / a->look, weight = (1 - far) * (1 - far);
+    ebpo_vec3_subtract(face[1], face[0], e);
+    ebpo_vec3_subtract(face[2], face[0], f);
+    ebpo_vec3_subtract(a->t->proxy, face[0], d);
+    ebpo_vec3_cross(e, f, n);
+    if (!a->t->solid && ebpo_vec3_dot(n, d) < 0)
+        weight = -weight;
+    for (int i = 0; i < 3; i++)
+        sum[i] += weight * n[i];
+}
+
+static void add_face(around *a, uint64_t f)
+{
+    const double(*face)[3] = (const double(*)[3])a->box->corner[f];
+    ebpo_face_near near;
+    ebpo_face_nearest(a->t->proxy, face, &near);
+    double gap = near.distance - a->t->options.radius;
+    a->looked++;
+    if (!(gap < a->t->options.look))
+        return;
+    a->t->found[a->count] = (uint32_t)f;
+    a->t->gap[a->count++] = gap;
+    if (near.distance >= a->nearest)
+        return;
+    a->nearest = near.distance;
+    ebpo_vec3_copy(near.away, a->t->away);
+    a->out->face = a->box->face[f];
+    for (int i = 0; i < 3; i++) {
+        a->out->weight[i] = near.weight[i];
+        a->out->point[i] = a->t->proxy[i] - near.distance * near.away[i];
+    }
+}
+
+static void wait_for(around *a, uint64_t node)
+{
+    const ebpo_extent *e = &a->box->node[node];
+    double off[3];
+    for (int i = 0; i < 3; i++)
+        off[i] = fmax(0, fmax(e->min[i] - a->t->proxy[i], a->t->proxy[i] - e->max[i]));
+    double least = sqrt(ebpo_vec3_dot(off, off)) * (1 - 0x1p-48);
+    if (least < a->t->options.radius + a->t->options.look)
+        ebpo_near_push(&a->queue, least, node);
+}
+
+/* The nearest first: where there are too many the farthest are left out, and the normal is that of
+ * those which are surely closer. */
+static void find_faces(around *a)
+{
+    for (uint32_t visits = 0; a->queue.count > 0; visits++) {
+        if (visits >= EBPO_TOUCH_VISITS || a->looked + EBPO_FACE_BOX_LEAF > EBPO_TOUCH_FACES) {
+            a->out->flags |= EBPO_TOUCH_PARTLY;
+            a->look = fmin(a->look, a->queue.item[0].key - a->t->options.radius);
+            return;
+        }
+        uint64_t node = ebpo_near_pop(&a->queue).node;
+        if (node < a->box->leaves) {
+            wait_for(a, 2 * node);
+            wait_for(a, 2 * node + 1);
+            continue;
+        }
+        uint64_t f = (node - a->box->leaves) * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
+        for (; f < end && f < a->box->count; f++)
+            add_face(a, f);
+    }
+}
+
+static bool no_face_close(const ebpo_touch *t)
+{
+    double wide = t->options.radius + t->options.look;
+    for (int i = 0; i < 3; i++)
+        if (t->proxy[i] - wide > t->root.max[i] || t->proxy[i] + wide < t->root.min[i])
+            return true;
+    return false;
+}
+
+/* Of a ball with so many faces around it that hardly any are known to be all, away from the
+ * nearest. */
+static void tell_normal(const around *a, double out[3])
+{
+    double sum[3] = { 0 };
+    for (uint32_t i = 0; i < a->count; i++)
+        if (a->t->gap[i] < a->look)
+            add_normal(a, (const double(*)[3])a->box->corner[a->t->found[i]], a->t->gap[i], sum);
+    double length = sqrt(ebpo_vec3_dot(sum, sum));
+    if (!(length > 0) && a->count > 0 && a->t->options.kind == EBPO_TOUCH_BALL) {
+        ebpo_vec3_subtract(a->t->proxy, a->out->point, sum);
+        length = sqrt(ebpo_vec3_dot(sum, sum));
+    }
+    for (int i = 0; i < 3; i++)
+        out[i] = length > 0 ? sum[i] / length : 0;
+}
+
+void ebpo_touch_look(ebpo_touch *t, ebpo_touch_result *out)
+{
+    around a = { .t = t,
+                 .box = &t->box[t->at],
+                 .queue = { t->looking, 0 },
+                 .look = t->options.look,
+                 .nearest = INFINITY,
+                 .out = out };
+    out->face = EBPO_NO_FACE;
+    if (!ebpo_extent_holds(&a.box->centres, t->proxy)) {
+        if (!no_face_close(t))
+            out->flags |= EBPO_TOUCH_PARTLY;
+    } else if (a.box->count > 0) {
+        wait_for(&a, 1);
+        find_faces(&a);
+    }
+    out->work += a.looked;
+    tell_normal(&a, out->normal);
+    out->depth = -fmin(t->options.look, a.nearest - t->options.radius);
+}
+
+/* --- the way --- */
 
 typedef struct step {
     ebpo_touch *t;
@@ -18,7 +183,7 @@ typedef struct step {
     ebpo_ball_work *work;
 } step;
 
-static void swept(const double p[3], const double way[3], double wider, ebpo_extent *out)
+static void step_swept(const double p[3], const double way[3], double wider, ebpo_extent *out)
 {
     for (int i = 0; i < 3; i++) {
         out->min[i] = fmin(p[i], p[i] + way[i]) - wider;
@@ -26,7 +191,7 @@ static void swept(const double p[3], const double way[3], double wider, ebpo_ext
     }
 }
 
-static bool apart(const ebpo_extent *a, const ebpo_extent *b)
+static bool step_apart(const ebpo_extent *a, const ebpo_extent *b)
 {
     for (int i = 0; i < 3; i++)
         if (a->min[i] > b->max[i] || a->max[i] < b->min[i])
@@ -34,7 +199,7 @@ static bool apart(const ebpo_extent *a, const ebpo_extent *b)
     return false;
 }
 
-static void shorten(double way[3], double part)
+static void step_shorten(double way[3], double part)
 {
     for (int i = 0; i < 3; i++)
         way[i] *= part;
@@ -59,8 +224,8 @@ double ebpo_touch_known_part(const ebpo_touch *t, const double way[3], double re
 {
     const ebpo_extent *centres = &t->box[t->at].centres;
     ebpo_extent all;
-    swept(t->proxy, way, reach, &all);
-    if (apart(&all, &t->root))
+    step_swept(t->proxy, way, reach, &all);
+    if (step_apart(&all, &t->root))
         return 1;
     return ebpo_extent_holds(centres, t->proxy) ? part_inside(t->proxy, way, centres) : 0;
 }
@@ -72,7 +237,7 @@ static bool keep_known(step *s)
     double part = ebpo_touch_known_part(t, s->way, t->reach + t->band);
     if (part < 1) {
         t->cut = EBPO_TOUCH_WAITS;
-        shorten(s->way, part);
+        step_shorten(s->way, part);
     }
     if (part <= 0 && !ebpo_extent_holds(&t->box[t->at].centres, t->proxy)) {
         s->flags |= EBPO_TOUCH_WAITS;
@@ -81,7 +246,7 @@ static bool keep_known(step *s)
     return true;
 }
 
-static bool differ(const double a[3], const double b[3])
+static bool step_differ(const double a[3], const double b[3])
 {
     return a[0] != b[0] || a[1] != b[1] || a[2] != b[2];
 }
@@ -95,22 +260,22 @@ static bool set_out(step *s)
     (void)ebpo_touch_take_box(t);
     if (memcmp(t->along_at, t->proxy, sizeof t->along_at) != 0)
         t->along.count = 0;
-    difference(s->goal, t->proxy, want);
+    ebpo_vec3_subtract(s->goal, t->proxy, want);
     s->slack = ebpo_hold_back(&t->along, want, s->way);
-    if (differ(s->way, want))
+    if (step_differ(s->way, want))
         s->flags |= EBPO_TOUCH_CONTACT;
-    s->least_slack = 0x1p-44 * sqrt(dot(want, want));
-    double whole = sqrt(dot(s->way, s->way));
+    s->least_slack = 0x1p-44 * sqrt(ebpo_vec3_dot(want, want));
+    double whole = sqrt(ebpo_vec3_dot(s->way, s->way));
     if (whole <= 0x1p-12 * t->options.skin)
         return false;
     t->cut = 0;
     if (!keep_known(s))
         return false;
     /* Slacks are those of the whole way: of a hand far away they would be those of long strides. */
-    double share = sqrt(dot(s->way, s->way)) / whole;
+    double share = sqrt(ebpo_vec3_dot(s->way, s->way)) / whole;
     const ebpo_face_box *box = &t->box[t->at];
-    copy(t->proxy, w->from);
-    copy(s->way, w->way);
+    ebpo_vec3_copy(t->proxy, w->from);
+    ebpo_vec3_copy(s->way, w->way);
     w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* see keep_known */
     w->reach = t->reach;
     w->band = t->band;
@@ -123,11 +288,11 @@ static bool set_out(step *s)
 /* Of planes that hold back, three do: those along which the last way did not go make room. */
 static void make_room(ebpo_held_planes *along, const double way[3])
 {
-    double length = sqrt(dot(way, way));
+    double length = sqrt(ebpo_vec3_dot(way, way));
     int kept = 0;
     for (int i = 0; i < along->count; i++)
-        if (dot(along->normal[i], way) <= 0x1p-30 * length)
-            copy(along->normal[i], along->normal[kept++]);
+        if (ebpo_vec3_dot(along->normal[i], way) <= 0x1p-30 * length)
+            ebpo_vec3_copy(along->normal[i], along->normal[kept++]);
     along->count = kept < EBPO_PLANES_MOST ? kept : kept - 1;
 }
 
@@ -140,19 +305,19 @@ static void add_planes(ebpo_touch *t)
         make_room(&t->along, w->way);
     for (int i = 0; i < w->met.count; i++)
         ebpo_held_planes_add(&t->along, w->met.normal[i]);
-    copy(t->proxy, t->along_at);
+    ebpo_vec3_copy(t->proxy, t->along_at);
 }
 
 /* The proxy is at the piece's end. What the ball touches there is what it slides along; after a
  * way, only that. False: it touches nothing, and goes no farther in this tick. */
-static bool settle(step *s)
+static bool step_settle(step *s)
 {
     ebpo_touch *t = s->t;
     const ebpo_ball_walk *w = &t->walk;
     bool touches = !w->cut && w->part < 1;
     if (w->part > 0) {
-        copy(w->to, t->proxy);
-        copy(w->to, t->way[t->way_count++]);
+        ebpo_vec3_copy(w->to, t->proxy);
+        ebpo_vec3_copy(w->to, t->way[t->way_count++]);
     }
     if (touches)
         add_planes(t);
@@ -169,9 +334,9 @@ static uint32_t still_held(const step *s)
     double want[3], way[3];
     if (t->felt)
         return 0;
-    difference(s->goal, t->proxy, want);
+    ebpo_vec3_subtract(s->goal, t->proxy, want);
     (void)ebpo_hold_back(&t->planes, want, way);
-    return differ(way, want) ? EBPO_TOUCH_CONTACT : 0;
+    return step_differ(way, want) ? EBPO_TOUCH_CONTACT : 0;
 }
 
 static uint32_t go_by_pieces(step *s)
@@ -186,7 +351,7 @@ static uint32_t go_by_pieces(step *s)
             return s->flags | EBPO_TOUCH_SHORT | still_held(s);
         if (end == EBPO_BALL_THROUGH)
             return s->flags | EBPO_TOUCH_SHORT;
-        if (!settle(s)) {
+        if (!step_settle(s)) {
             if (!resumed)
                 return s->flags;
             s->flags = 0; /* that was on the way to where the hand was */
@@ -203,9 +368,9 @@ uint32_t ebpo_touch_go(ebpo_touch *t, const double goal[3], ebpo_ball_work *work
     double left[3];
     t->felt = false;
     t->way_count = 0;
-    copy(t->proxy, t->way[t->way_count++]);
+    ebpo_vec3_copy(t->proxy, t->way[t->way_count++]);
     uint32_t flags = go_by_pieces(&s);
-    difference(goal, t->proxy, left);
-    bool there = sqrt(dot(left, left)) <= 0x1p-12 * t->options.skin;
+    ebpo_vec3_subtract(goal, t->proxy, left);
+    bool there = sqrt(ebpo_vec3_dot(left, left)) <= 0x1p-12 * t->options.skin;
     return there ? flags & ~(uint32_t)EBPO_TOUCH_CONTACT : flags;
 }

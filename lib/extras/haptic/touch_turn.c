@@ -1,20 +1,334 @@
-/* A tick of a tool. Gauss' principle for a body without mass: of all ways that its contacts allow,
- * the one nearest to where the hand is (Ortega, Redon, Coquillart 2007). */
+/* A haptic step of a tool. Gauss' principle for a body without mass: of all ways that its contacts
+ * allow, the nearest to the hand (Ortega, Redon, Coquillart 2007).
+ *
+ * A piece of the way is decided in two passes. First each point that may meet a face is followed
+ * along it, up to where the first one comes too close. Then all these points are examined at their
+ * new positions: exact arithmetic finds that they went through no face, and distances find that
+ * they are not too close. Only then the tool is there. Both passes may take several steps, if many
+ * points are close. */
 #include "core/strict_fp.h"
 
 #include "core/fp_env.h"
+#include "extras/haptic/face_box.h"
 #include "extras/haptic/tool.h"
 #include "extras/haptic/touch_parts.h"
 
-static double closeness(const ebpo_touch *t) { return 0x1p-6 * t->options.skin; }
+enum { CLUSTER_VISITS = 64, POINT_VISITS = 48, FACE_VISITS = 256, FACE_COST = 6 };
+
+/* Of the skin: faces this close are looked at; the way ends where a point would come closer; where
+ * it ends none is closer. What turning adds to straight ways is less than a bend (see limit). */
+static const double looks = 2.5, blocks = 0.75, least = 0.5, bend = 0.125;
+
+typedef struct tool_piece {
+    ebpo_touch *t;
+    ebpo_tool *tool;
+    const ebpo_face_box *box; /* NULL: there are no faces where it goes */
+    double skin, turned;      /* the angle of the whole way */
+    uint64_t *work;
+} tool_piece;
+
+static tool_piece piece_of(ebpo_touch *t, uint64_t *work)
+{
+    ebpo_tool *tool = t->tool;
+    const ebpo_face_box *box = &t->box[t->at];
+    bool known = ebpo_extent_holds(&box->centres, tool->proxy.place);
+    return (tool_piece){ t,
+                         tool,
+                         known ? box : NULL,
+                         t->options.skin,
+                         sqrt(ebpo_vec3_dot(tool->way + 3, tool->way + 3)) / tool->arm,
+                         work };
+}
+
+static void tool_step_around(const double p[3], const double q[3], double wide, ebpo_extent *out)
+{
+    for (int i = 0; i < 3; i++) {
+        out->min[i] = fmin(p[i], q[i]) - wide;
+        out->max[i] = fmax(p[i], q[i]) + wide;
+    }
+}
+
+/* No face is closer to anything in `e`: by those of the box, by where what was loaded ends, and by
+ * where the model does. */
+static double tool_step_clearance(const tool_piece *p, const ebpo_extent *e, uint32_t visits)
+{
+    double out = 0, inside = INFINITY;
+    for (int i = 0; i < 3; i++)
+        out = fmax(out, fmax(p->t->root.min[i] - e->max[i], e->min[i] - p->t->root.max[i]));
+    if (!p->box)
+        return out;
+    for (int i = 0; i < 3; i++)
+        inside = fmin(inside,
+                      fmin(e->min[i] - p->box->loaded.min[i], p->box->loaded.max[i] - e->max[i]));
+    return fmax(out, fmin(inside, ebpo_face_box_clearance(p->box, e, visits, p->work)));
+}
+
+/* As far as a point goes at most whose way from the middle of the turn is so long. */
+static double tool_step_far(const tool_piece *p, double lever)
+{
+    return sqrt(ebpo_vec3_dot(p->tool->way, p->tool->way)) + lever * p->turned;
+}
+
+static double lever_of(const double p[3]) { return sqrt(ebpo_vec3_dot(p, p)); }
+
+static double most_way(const tool_piece *p, const ebpo_tool_cluster *c)
+{
+    return tool_step_far(p, lever_of(c->middle) + c->radius) * (1 + 0x1p-40);
+}
+
+/* False: the pool is full, or too many faces are in one place. */
+static bool add_close(const tool_piece *p, uint32_t point)
+{
+    ebpo_tool *tool = p->tool;
+    double from[3], way[3], to[3];
+    ebpo_extent e;
+    uint32_t count, visits = FACE_VISITS;
+    ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[point], from);
+    ebpo_rigid_lever((const double(*)[3])tool->to_matrix, tool->point[point], way);
+    for (int i = 0; i < 3; i++)
+        to[i] = tool->proxy.place[i] + tool->way[i] + way[i];
+    ebpo_vec3_subtract(to, from, way);
+    tool_step_around(from, to, looks * p->skin, &e);
+    if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL)
+        return false;
+    bool all = ebpo_face_box_find(p->box, &e, tool->pool + tool->pool_count, EBPO_TOOL_NEAR,
+                                  &visits, &count);
+    *p->work += FACE_VISITS - visits + FACE_COST * (uint64_t)count;
+    if (!all)
+        return false;
+    const ebpo_ball_way w = { from, way, blocks * p->skin, p->t->band, 0, 0 };
+    for (uint32_t i = 0; i < count; i++) {
+        double away[3];
+        double met =
+            ebpo_ball_meets(&w,
+                            (const double(*)[3])p->box->corner[tool->pool[tool->pool_count + i]],
+                            away);
+        tool->part = fmin(tool->part, met);
+    }
+    tool->close[tool->close_count++] =
+        (ebpo_tool_close){ point, (uint32_t)tool->pool_count, count };
+    tool->pool_count += count;
+    return true;
+}
+
+/* Points of a cluster that as a whole may meet faces. */
+static bool look_at_points(const tool_piece *p, uint32_t number)
+{
+    ebpo_tool *tool = p->tool;
+    ebpo_tool_cluster *c = &tool->cluster[number];
+    double need = looks * p->skin;
+    double all = INFINITY;
+    c->free = 0; /* if it is given up */
+    for (uint32_t i = c->first; i < c->first + c->count; i++) {
+        double way = tool_step_far(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
+        if (tool->free[i] - c->gone - way <= 0) {
+            double at[3];
+            ebpo_extent e;
+            ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[i], at);
+            tool_step_around(at, at, 0, &e);
+            tool->free[i] = c->gone + tool_step_clearance(p, &e, POINT_VISITS) - need;
+        }
+        if (tool->free[i] - c->gone - way <= 0 && !add_close(p, i))
+            return false;
+        all = fmin(all, tool->free[i]);
+    }
+    c->free = all;
+    return true;
+}
+
+static bool look_at_cluster(const tool_piece *p, uint32_t number)
+{
+    ebpo_tool *tool = p->tool;
+    ebpo_tool_cluster *c = &tool->cluster[number];
+    double way = most_way(p, c);
+    ++*p->work;
+    if (!p->box || c->free - c->gone - way > 0)
+        return true;
+    double at[3], from_all;
+    ebpo_extent e;
+    ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, c->middle, at);
+    tool_step_around(at, at, c->radius, &e);
+    from_all = tool_step_clearance(p, &e, CLUSTER_VISITS) - looks * p->skin;
+    if (from_all - way <= 0)
+        return look_at_points(p, number);
+    c->free = c->gone + from_all;
+    for (uint32_t i = c->first; i < c->first + c->count; i++)
+        tool->free[i] = fmax(tool->free[i], c->free);
+    return true;
+}
+
+static void add_contact(const tool_piece *p, const ebpo_tool_close *close, uint32_t face,
+                        const ebpo_face_near *near)
+{
+    ebpo_tool *tool = p->tool;
+    ebpo_tool_contact c = { .room = near->distance - p->skin,
+                            .gap = near->distance,
+                            .point = tool->number[close->point],
+                            .face = p->box->face[face] };
+    double lever[3];
+    ebpo_rigid_lever((const double(*)[3])tool->end_matrix, tool->point[close->point], lever);
+    ebpo_vec3_copy(near->away, c.normal);
+    ebpo_vec3_copy(near->away, c.grip);
+    ebpo_vec3_cross(lever, near->away, c.grip + 3);
+    for (int i = 0; i < 3; i++)
+        c.grip[3 + i] /= tool->arm;
+    ebpo_tool_contact_add(&tool->next, &c);
+}
+
+/* Of faces that meet in an edge, one is below the point and pushes it straight away; the others
+ * would hold it back from going on to them, askew. So a face counts if what is nearest of it lies
+ * in its inside, or if it is the nearest of all. */
+static void add_contacts(const tool_piece *p, const ebpo_tool_close *close,
+                         const ebpo_face_near *near)
+{
+    double nearest = INFINITY;
+    for (uint32_t i = 0; i < close->count; i++)
+        nearest = fmin(nearest, near[i].distance);
+    for (uint32_t i = 0; i < close->count; i++) {
+        const double *w = near[i].weight;
+        bool straight = w[0] > 0 && w[1] > 0 && w[2] > 0;
+        if (near[i].distance < looks * p->skin &&
+            (straight || near[i].distance <= nearest + 0x1p-10 * p->skin))
+            add_contact(p, close, p->tool->pool[close->first + i], &near[i]);
+    }
+}
+
+/* Where the point will be. False: it may not. */
+static bool check_close(const tool_piece *p, const ebpo_tool_close *close)
+{
+    ebpo_tool *tool = p->tool;
+    ebpo_face_near near[EBPO_TOOL_NEAR];
+    double from[3], to[3];
+    ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[close->point],
+                 from);
+    ebpo_tool_at(&tool->end, (const double(*)[3])tool->end_matrix, tool->point[close->point], to);
+    *p->work += FACE_COST * (uint64_t)close->count;
+    for (uint32_t i = 0; i < close->count; i++) {
+        const double(*face)[3] = (const double(*)[3])p->box->corner[tool->pool[close->first + i]];
+        ebpo_face_nearest(to, face, &near[i]);
+        if (tool->part > 0 && (near[i].distance < least * p->skin + p->t->band ||
+                               ebpo_segment_may_meet(from, to, face)))
+            return false;
+    }
+    add_contacts(p, close, near);
+    return true;
+}
+
+static void begin_check(ebpo_tool *tool)
+{
+    tool->stage = EBPO_TOOL_CHECKS;
+    tool->at = 0;
+    tool->next.count = 0;
+    tool->end = tool->proxy;
+    if (tool->part > 0)
+        ebpo_rigid_go(&tool->proxy, tool->way, tool->part, tool->arm, &tool->end);
+    ebpo_rigid_matrix(&tool->end, tool->end_matrix);
+}
+
+/* It is there: what each point may still go is less by that. */
+static void tool_step_arrive(const tool_piece *p)
+{
+    ebpo_tool *tool = p->tool;
+    for (uint64_t i = 0; i < tool->cluster_count; i++)
+        tool->cluster[i].gone += tool->part * most_way(p, &tool->cluster[i]) + 0x1p-8 * p->t->band;
+    tool->contacts = tool->next;
+    tool->proxy = tool->end;
+    tool->stage = EBPO_TOOL_STANDS;
+}
+
+/* Straight ways and turns differ by no more than lever times angle^2 / 8. */
+static void tool_step_limit(ebpo_touch *t, double way[EBPO_SCREW], uint32_t *flags)
+{
+    ebpo_tool *tool = t->tool;
+    double most = fmin(0.25, sqrt(8 * bend * t->options.skin / tool->radius));
+    double angle = sqrt(ebpo_vec3_dot(way + 3, way + 3)) / tool->arm, part = 1;
+    if (angle > most)
+        part = most / angle;
+    double length = ebpo_screw_length(way);
+    if (part * length > t->stride)
+        part = t->stride / length;
+    if (part >= 1)
+        return;
+    *flags |= EBPO_TOUCH_SHORT;
+    for (int k = 0; k < EBPO_SCREW; k++)
+        way[k] *= part;
+}
+
+/* tool_step.c: a tool's next piece of way; flags are given when it is there. False: it cannot
+ * begin. */
+static bool begin_tool_way(ebpo_touch *t, const double wanted[EBPO_SCREW], uint32_t *flags)
+{
+    ebpo_tool *tool = t->tool;
+    for (int k = 0; k < EBPO_SCREW; k++)
+        tool->way[k] = wanted[k];
+    tool->flags = 0;
+    tool_step_limit(t, tool->way, &tool->flags);
+    double part = ebpo_touch_known_part(t, tool->way, tool->radius + looks * t->options.skin);
+    if (part < 1) {
+        tool->flags |= EBPO_TOUCH_WAITS;
+        if (part <= 0) {
+            *flags |= EBPO_TOUCH_WAITS;
+            return false;
+        }
+        for (int k = 0; k < EBPO_SCREW; k++)
+            tool->way[k] *= part;
+    }
+    ebpo_rigid_matrix(&tool->proxy, tool->from_matrix);
+    ebpo_rigid end;
+    ebpo_rigid_go(&tool->proxy, tool->way, 1, tool->arm, &end);
+    ebpo_rigid_matrix(&end, tool->to_matrix);
+    tool->stage = EBPO_TOOL_LOOKS;
+    tool->at = tool->close_count = tool->pool_count = 0;
+    tool->part = 1;
+    return true;
+}
+
+/* A way along which too much is close: a shorter one the next time. */
+static uint32_t give_up(tool_piece *p)
+{
+    p->t->stride = fmax(0.25 * ebpo_screw_length(p->tool->way), 0x1p-8 * p->skin);
+    p->tool->stage = EBPO_TOOL_STANDS;
+    return EBPO_TOUCH_SHORT;
+}
+
+/* Goes on with it; bits of ebpo_touch_flag. */
+static uint32_t continue_tool_way(ebpo_touch *t, uint64_t *work, bool *arrived)
+{
+    tool_piece p = piece_of(t, work);
+    ebpo_tool *tool = t->tool;
+    *arrived = false;
+    for (; tool->stage == EBPO_TOOL_LOOKS && tool->at < tool->cluster_count; tool->at++) {
+        if (*work > EBPO_TOOL_WORK)
+            return EBPO_TOUCH_SHORT;
+        if (!look_at_cluster(&p, (uint32_t)tool->at))
+            return give_up(&p);
+    }
+    if (tool->stage == EBPO_TOOL_LOOKS)
+        begin_check(tool);
+    for (; tool->at < tool->close_count; tool->at++) {
+        if (*work > EBPO_TOOL_WORK)
+            return EBPO_TOUCH_SHORT;
+        if (!check_close(&p, &tool->close[tool->at]))
+            return give_up(&p);
+    }
+    tool_step_arrive(&p);
+    *arrived = true;
+    if (t->stride < t->diagonal && tool->pool_count < EBPO_TOOL_POOL / 4)
+        t->stride *= 2;
+    return tool->part < 1 ? 0 : tool->flags;
+}
+
+/* --- the step --- */
+
+static double turn_closeness(const ebpo_touch *t) { return 0x1p-6 * t->options.skin; }
 
 /* Coulomb: what is left of the way along the contacts is friction times what they hold back. */
-static void rub(const ebpo_touch *t, const double want[EBPO_SCREW], double way[EBPO_SCREW])
+static void turn_rub(const ebpo_touch *t, const double want[EBPO_SCREW], double way[EBPO_SCREW])
 {
     double held[EBPO_SCREW];
     for (int k = 0; k < EBPO_SCREW; k++)
         held[k] = want[k] - way[k];
-    double length = screw_length(way), holds = t->options.friction * screw_length(held);
+    double length = ebpo_screw_length(way), holds = t->options.friction * ebpo_screw_length(held);
     double part = length > holds ? 1 - holds / length : 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         way[k] *= part;
@@ -26,15 +340,15 @@ static bool set_out(ebpo_touch *t, const ebpo_rigid *hand, uint32_t *flags)
     ebpo_tool *tool = t->tool;
     double want[EBPO_SCREW], way[EBPO_SCREW];
     ebpo_rigid_between(&tool->proxy, hand, tool->arm, want);
-    int holding = ebpo_tool_hold(&tool->contacts, want, closeness(t), true, way);
+    int holding = ebpo_tool_hold(&tool->contacts, want, turn_closeness(t), true, way);
     if (holding > 0 && t->touching && t->options.friction > 0)
-        rub(t, want, way);
-    if (screw_length(way) <= closeness(t) / 2)
+        turn_rub(t, want, way);
+    if (ebpo_screw_length(way) <= turn_closeness(t) / 2)
         return false;
-    return ebpo_tool_set_out(t, way, flags);
+    return begin_tool_way(t, way, flags);
 }
 
-static uint32_t go(ebpo_touch *t, const ebpo_rigid *hand, uint64_t *work)
+static uint32_t turn_go(ebpo_touch *t, const ebpo_rigid *hand, uint64_t *work)
 {
     ebpo_tool *tool = t->tool;
     uint32_t flags = 0;
@@ -50,8 +364,8 @@ static uint32_t go(ebpo_touch *t, const ebpo_rigid *hand, uint64_t *work)
             if (!set_out(t, hand, &flags))
                 return flags;
         }
-        flags |= ebpo_tool_go_on(t, work, &arrived);
-        copy(tool->proxy.place, t->proxy);
+        flags |= continue_tool_way(t, work, &arrived);
+        ebpo_vec3_copy(tool->proxy.place, t->proxy);
         if (arrived)
             tool->way_of[tool->way_count++] = tool->proxy;
         if (!arrived || (flags & EBPO_TOUCH_WAITS))
@@ -67,7 +381,7 @@ static int find_depth(const ebpo_touch *t, const ebpo_rigid *hand, uint32_t flag
     const ebpo_tool *tool = t->tool;
     double want[EBPO_SCREW], way[EBPO_SCREW];
     ebpo_rigid_between(&tool->proxy, hand, tool->arm, want);
-    int holding = ebpo_tool_hold(&tool->contacts, want, closeness(t), false, way);
+    int holding = ebpo_tool_hold(&tool->contacts, want, turn_closeness(t), false, way);
     bool part = flags & (EBPO_TOUCH_WAITS | EBPO_TOUCH_SHORT) || t->options.friction == 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         out[k] = (part ? way[k] : 0) - want[k];
@@ -87,11 +401,11 @@ static void tell_contact(const ebpo_touch *t, ebpo_touch_turned *out)
         return;
     out->point = nearest->point;
     out->face = nearest->face;
-    copy(nearest->normal, out->normal);
+    ebpo_vec3_copy(nearest->normal, out->normal);
 }
 
-static void push(ebpo_touch *t, const double depth[EBPO_SCREW], const double moved[EBPO_SCREW],
-                 ebpo_touch_turned *out)
+static void turn_push(ebpo_touch *t, const double depth[EBPO_SCREW], const double moved[EBPO_SCREW],
+                      ebpo_touch_turned *out)
 {
     ebpo_tool *tool = t->tool;
     double *force = tool->force;
@@ -120,20 +434,20 @@ void ebpo_touch_turn(ebpo_touch *t, const double place[3], const double turn[4],
         hand = tool->hand;
     ebpo_rigid_between(&tool->hand, &hand, tool->arm, moved);
     ebpo_passive_moved(&t->passive, tool->force, moved, EBPO_SCREW);
-    uint32_t flags = go(t, &hand, &out->work);
+    uint32_t flags = turn_go(t, &hand, &out->work);
     int holding = find_depth(t, &hand, flags, depth);
     t->touching = holding > 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         tool->force[k] = 0;
     if (t->touching) {
         flags |= EBPO_TOUCH_CONTACT;
-        push(t, depth, moved, out);
-        out->depth = screw_length(depth);
+        turn_push(t, depth, moved, out);
+        out->depth = ebpo_screw_length(depth);
     }
     tell_contact(t, out);
     tool->hand = hand;
-    copy(hand.place, t->hand);
-    copy(tool->proxy.place, out->proxy);
+    ebpo_vec3_copy(hand.place, t->hand);
+    ebpo_vec3_copy(tool->proxy.place, out->proxy);
     for (int k = 0; k < 4; k++)
         out->turn[k] = tool->proxy.turn[k];
     out->flags = flags | (astray ? EBPO_TOUCH_ASTRAY : 0) | ebpo_touch_stopped(t);
@@ -147,7 +461,7 @@ uint32_t ebpo_touch_poses(const ebpo_touch *t, double way[EBPO_TOUCH_WAY_MOST][7
 {
     uint32_t count = t->tool ? t->tool->way_count : 0;
     for (uint32_t i = 0; i < count; i++) {
-        copy(t->tool->way_of[i].place, way[i]);
+        ebpo_vec3_copy(t->tool->way_of[i].place, way[i]);
         for (int k = 0; k < 4; k++)
             way[i][3 + k] = t->tool->way_of[i].turn[k];
     }

@@ -1,15 +1,121 @@
-/* Distances at the points of a lattice, in slabs of layers. A slab is asked about in bricks, whose
- * points are close to each other, so that subtrees are loaded few times and caches are warm. */
+/* Distances of many points: of given ones, and of the points of a lattice.
+ *
+ * A lattice is evaluated in slabs of layers, and a slab in bricks, whose points are close to each
+ * other, so that subtrees are loaded few times and caches are warm. Each thread has a query
+ * context of its own, made when it is first used. Results do not depend on the number of threads.
+ *
+ * Source: docs/guide/maps.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "extras/map/map_ask.h"
+#include "extras/map/map_lattice.h"
+#include "query/load_ahead.h"
+#include "query/query_model.h"
+
+/* Takes the options, or the usual ones for NULL. */
+static ebpo_status take_map_options(ebpo_map_options *out, const ebpo_map_options *given,
+                                    ebpo_error *error)
+{
+    *out = (ebpo_map_options)EBPO_MAP_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_map_options, out, given, error);
+    if (status == EBPO_OK && !(out->max_distance >= 0))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "max_distance must be 0 or more; INFINITY: everything matters");
+    return status;
+}
+
+ebpo_status ebpo_map_askers_make(ebpo_map_askers *out, ebpo_model *model,
+                                 const ebpo_map_options *options, ebpo_error *error)
+{
+    ebpo_distance_options distance = EBPO_DISTANCE_OPTIONS_INIT;
+    distance.max_distance = options->max_distance;
+    distance.unsigned_distance = options->unsigned_distance;
+    *out = (ebpo_map_askers){ .model = model, .distance = distance };
+    out->threads = ebpo_thread_count(options->threads);
+    /* so that what cannot be asked at all is told before anything is made */
+    ebpo_status status = ebpo_context_new(model, &out->context[0], error);
+    return status == EBPO_OK ? ebpo_distance_many(out->context[0], NULL, 0, &distance, NULL, error)
+                             : status;
+}
+
+void ebpo_map_askers_free(ebpo_map_askers *askers)
+{
+    for (int i = 0; i < EBPO_MAP_THREADS; i++)
+        ebpo_context_free(askers->context[i]);
+}
+
+ebpo_status ebpo_map_ask(ebpo_map_askers *askers, unsigned worker, const double *points,
+                         uint64_t count, ebpo_distance_result *results, ebpo_error *error)
+{
+    ebpo_context **own = &askers->context[worker];
+    ebpo_status status = *own ? EBPO_OK : ebpo_context_new(askers->model, own, error);
+    return status == EBPO_OK
+               ? ebpo_distance_many(*own, points, count, &askers->distance, results, error)
+               : status;
+}
+
+/* --- given points --- */
+
+typedef struct points_job {
+    ebpo_map_askers askers;
+    const double *points;
+    const uint64_t *order; /* along the curve; NULL: as they come */
+    double *distances;
+} points_job;
+
+static uint64_t place_of(const points_job *j, uint64_t i) { return j->order ? j->order[i] : i; }
+
+static ebpo_status ask_piece(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    points_job *j = context;
+    uint64_t count = end - begin;
+    double(*points)[3] = ebpo_alloc(count, sizeof *points);
+    ebpo_distance_result *results = ebpo_alloc(count, sizeof *results);
+    ebpo_status status =
+        points && results ? EBPO_OK : ebpo_fail_memory(error, count * sizeof *results);
+    for (uint64_t i = 0; status == EBPO_OK && i < count; i++)
+        memcpy(points[i], j->points + 3 * place_of(j, begin + i), sizeof points[i]);
+    if (status == EBPO_OK)
+        status = ebpo_map_ask(&j->askers, worker, points[0], count, results, error);
+    for (uint64_t i = 0; status == EBPO_OK && i < count; i++)
+        j->distances[place_of(j, begin + i)] = results[i].distance;
+    free(points);
+    free(results);
+    return status;
+}
+
+ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t count,
+                            const ebpo_map_options *options, double *distances, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_map_options o;
+    points_job job = { .points = points, .distances = distances };
+    ebpo_status status = take_map_options(&o, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_points(points, count, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_box box = ebpo_model_box(model);
+    uint64_t *order = model->whole ? NULL : ebpo_curve_order(&box, points, count);
+    job.order = order; /* without memory for it, as they come: slower, and the same */
+    status = ebpo_map_askers_make(&job.askers, model, &o, error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(job.askers.threads, NULL, count, EBPO_MAP_PIECE, ask_piece, &job,
+                                   &o.progress, "asking for distances", error);
+    ebpo_map_askers_free(&job.askers);
+    free(order);
+    return status;
+}
+
+/* --- lattices --- */
 
 enum { BRICK = 16, SLAB_VALUES = 8 << 20 };
 #define POINTS_MOST (UINT64_C(1) << 40)
@@ -45,7 +151,7 @@ static brick brick_of(const slab_job *j, uint64_t number)
     return b;
 }
 
-static uint64_t fill(const slab_job *j, const brick *b, double (*points)[3])
+static uint64_t lattice_fill(const slab_job *j, const brick *b, double (*points)[3])
 {
     uint64_t count = 0;
     for (uint64_t z = b->low[2]; z < b->high[2]; z++)
@@ -55,7 +161,7 @@ static uint64_t fill(const slab_job *j, const brick *b, double (*points)[3])
     return count;
 }
 
-static void keep(const slab_job *j, const brick *b, const ebpo_distance_result *results)
+static void lattice_keep(const slab_job *j, const brick *b, const ebpo_distance_result *results)
 {
     const uint64_t *size = j->lattice->count;
     for (uint64_t z = b->low[2]; z < b->high[2]; z++)
@@ -74,9 +180,10 @@ static ebpo_status ask_bricks(void *context, uint64_t begin, uint64_t end, unsig
         points && results ? EBPO_OK : ebpo_fail_memory(error, EBPO_MAP_PIECE * sizeof *results);
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         brick b = brick_of(j, i);
-        status = ebpo_map_ask(&j->askers, worker, points[0], fill(j, &b, points), results, error);
+        status = ebpo_map_ask(&j->askers, worker, points[0], lattice_fill(j, &b, points), results,
+                              error);
         if (status == EBPO_OK)
-            keep(j, &b, results);
+            lattice_keep(j, &b, results);
     }
     free(points);
     free(results);
@@ -134,7 +241,7 @@ ebpo_status ebpo_map_lattice(ebpo_model *model, const ebpo_lattice *lattice,
     EBPO_DEFAULT_FP;
     ebpo_map_options o;
     slab_job job = { .lattice = lattice };
-    ebpo_status status = ebpo_map_take_options(&o, options, error);
+    ebpo_status status = take_map_options(&o, options, error);
     if (status == EBPO_OK)
         status = check_lattice(lattice, error);
     if (status != EBPO_OK)

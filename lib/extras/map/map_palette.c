@@ -1,17 +1,27 @@
-/* Colours of distances. The diverging palette is made in OKLab (B. Ottosson, 2020: the matrices
- * below are its definition), whose lightness is what eyes take for it. */
+/* Colours of distances, and distances with their colours as attributes of a mesh's vertices.
+ *
+ * The diverging palette is made in OKLab (B. Ottosson, 2020: the matrices below are its
+ * definition), whose lightness agrees with perception. The other palette is that of the thesis.
+ *
+ * Attributes of vertices named distance, red, green or blue are replaced. */
 #include "core/strict_fp.h"
 
-#include <ebpo/map.h>
 #include <math.h>
+#include <stdio.h>
+#include <string.h>
 
+#include <ebpo/map.h>
+
+#include "core/error.h"
 #include "core/fp_env.h"
+#include "core/workspace.h"
+#include "mesh/attributes.h"
 
-static const char *const names[EBPO_MAP_PALETTES] = { "diverging", "thesis" };
+static const char *const palette_names[EBPO_MAP_PALETTES] = { "diverging", "thesis" };
 
 const char *ebpo_map_palette_name(ebpo_map_palette palette)
 {
-    return (unsigned)palette < EBPO_MAP_PALETTES ? names[palette] : NULL;
+    return (unsigned)palette < EBPO_MAP_PALETTES ? palette_names[palette] : NULL;
 }
 
 static uint8_t byte_of(double share)
@@ -43,7 +53,7 @@ static void of_oklab(double light, double a, double b, uint8_t rgb[3])
 }
 
 /* Hues of 255 and 50 degrees, which the colour blind tell apart. */
-static void diverging(double share, uint8_t rgb[3])
+static void palette_diverging(double share, uint8_t rgb[3])
 {
     static const double cosine[2] = { -0.2588190451, 0.6427876097 },
                         sine[2] = { -0.9659258263, 0.7660444431 };
@@ -53,7 +63,7 @@ static void diverging(double share, uint8_t rgb[3])
 }
 
 /* Red over green to blue: a third of the circle of hues each. */
-static void thesis(double share, uint8_t rgb[3])
+static void palette_thesis(double share, uint8_t rgb[3])
 {
     double far = fabs(share), turn = 4 * far; /* red, yellow, green, cyan, blue */
     double red = turn < 1 ? 1 : 2 - turn, blue = turn < 3 ? turn - 2 : 1,
@@ -75,7 +85,74 @@ void ebpo_map_colour(ebpo_map_palette palette, double distance, double range, ui
     if (share == 0 && distance != 0)
         share = copysign(0x1p-1022, distance);
     if (palette == EBPO_MAP_THESIS)
-        thesis(share, rgb);
+        palette_thesis(share, rgb);
     else
-        diverging(share, rgb);
+        palette_diverging(share, rgb);
+}
+
+/* --- attributes --- */
+
+static bool has_name(const char *names, const char *name)
+{
+    size_t length = strlen(name);
+    for (const char *at = names; *at;) {
+        size_t n = strcspn(at, " ");
+        if (n == length && memcmp(at, name, n) == 0)
+            return true;
+        at += n + (at[n] == ' ');
+    }
+    return false;
+}
+
+static bool paint_replaced(const ebpo_attribute *a)
+{
+    static const char *const names[] = { "distance", "red", "green", "blue" };
+    for (int i = 0; i < 4; i++)
+        if (ebpo_attribute_is_of(a, "vertex") && has_name(a->names, names[i]))
+            return true;
+    return false;
+}
+
+static ebpo_attribute *paint_add(ebpo_mesh *mesh, const char *names, ebpo_attribute_type type,
+                                 uint32_t columns)
+{
+    ebpo_attribute like = {
+        .type = type, .list = EBPO_ATTRIBUTE_NO_LIST, .columns = columns, .rows = mesh->vertex_count
+    };
+    snprintf(like.element, sizeof like.element, "vertex");
+    snprintf(like.names, sizeof like.names, "%s", names);
+    ebpo_attribute *a = ebpo_attributes_add(mesh->attributes, &like);
+    if (a && !ebpo_attribute_reserve(mesh->attributes->workspace, a, mesh->vertex_count, 0)) {
+        ebpo_attributes_remove(mesh->attributes, mesh->attributes->count - 1);
+        return NULL;
+    }
+    return a;
+}
+
+ebpo_status ebpo_map_paint(ebpo_mesh *mesh, const double *distances, ebpo_map_palette palette,
+                           double range, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    if ((unsigned)palette >= EBPO_MAP_PALETTES || !(range > 0) || !isfinite(range))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "painting takes one of the palettes, and a finite range above 0");
+    if (!mesh->attributes)
+        mesh->attributes = ebpo_attributes_make(mesh->workspace);
+    for (uint64_t i = mesh->attributes ? mesh->attributes->count : 0; i-- > 0;)
+        if (paint_replaced(&mesh->attributes->array[i]))
+            ebpo_attributes_remove(mesh->attributes, i);
+    if (mesh->attributes && mesh->attributes->count > EBPO_ATTRIBUTE_ARRAYS - 2)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the mesh has so many attributes that no more fit; leave some out");
+    ebpo_attribute *colour =
+        mesh->attributes ? paint_add(mesh, "red green blue", EBPO_ATTRIBUTE_UINT8, 3) : NULL;
+    uint8_t *rgb = colour ? colour->values : NULL; /* adding moves the struct */
+    ebpo_attribute *distance =
+        colour ? paint_add(mesh, "distance", EBPO_ATTRIBUTE_FLOAT64, 1) : NULL;
+    if (!distance)
+        return ebpo_fail_memory(error, mesh->vertex_count * 11);
+    memcpy(distance->values, distances, mesh->vertex_count * sizeof *distances);
+    for (uint64_t i = 0; i < mesh->vertex_count; i++)
+        ebpo_map_colour(palette, distances[i], range, rgb + 3 * i);
+    return EBPO_OK;
 }

@@ -1,7 +1,10 @@
-/* How far faces reach from a model, their insides included. Branch and bound over triangles, which
- * are cut into four: the distance changes by no more than its argument moves, so that all of a
- * triangle is at most as far as a corner and the longest way from there. Rounds, in which those of
- * the greatest bounds are cut at once, make the result independent of threads. */
+/* The greatest distance of a mesh's faces from a model, their insides included (a one-sided
+ * Hausdorff distance), as certain bounds.
+ *
+ * Branch and bound over triangles, which are cut into four: the distance changes by no more than
+ * its argument moves, so that all of a triangle is at most as far as a corner plus the longest way
+ * from there. In each round those of the greatest bounds are cut at once, which makes the result
+ * independent of threads. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -13,7 +16,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "extras/map/map_ask.h"
+#include "extras/map/map_lattice.h"
 
 /* Faces that are looked at together; and triangles of a round, beyond which their bounds are taken
  * as they are. */
@@ -43,7 +46,7 @@ typedef struct search {
     uint64_t middle_capacity, away_capacity;
 } search;
 
-static double apart(const double a[3], const double b[3])
+static double reach_apart(const double a[3], const double b[3])
 {
     double d[3] = { a[0] - b[0], a[1] - b[1], a[2] - b[2] };
     double most = fmax(fabs(d[0]), fmax(fabs(d[1]), fabs(d[2])));
@@ -54,12 +57,12 @@ static double apart(const double a[3], const double b[3])
     return most * sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * (1 + 0x1p-48);
 }
 
-static void bound(const search *s, triangle *t)
+static void reach_bound(const search *s, triangle *t)
 {
     double edge[3];
     t->upper = INFINITY;
     for (int k = 0; k < 3; k++)
-        edge[k] = apart(t->corner[k], t->corner[(k + 1) % 3]);
+        edge[k] = reach_apart(t->corner[k], t->corner[(k + 1) % 3]);
     for (int k = 0; k < 3; k++)
         t->upper = fmin(t->upper, t->away[k] + fmax(edge[k], edge[(k + 2) % 3]));
     t->upper += s->slack;
@@ -71,7 +74,7 @@ static bool in_the_way(const search *s, double upper)
 }
 
 /* Keeps a triangle for the next round, or takes its bound as it is. */
-static ebpo_status keep(search *s, triangles *list, const triangle *t, ebpo_error *error)
+static ebpo_status reach_keep(search *s, triangles *list, const triangle *t, ebpo_error *error)
 {
     if (!in_the_way(s, t->upper))
         return EBPO_OK;
@@ -85,7 +88,7 @@ static ebpo_status keep(search *s, triangles *list, const triangle *t, ebpo_erro
     return EBPO_OK;
 }
 
-static void learn(search *s, double away, const double place[3])
+static void reach_learn(search *s, double away, const double place[3])
 {
     if (away <= s->reach.lo)
         return;
@@ -126,7 +129,7 @@ static void child_of(const search *s, uint64_t i, int which, triangle *out)
 
 /* Puts those first whose bounds are above half of the greatest one: to cut others helps nobody yet.
  */
-static void choose(search *s)
+static void reach_choose(search *s)
 {
     double most = 0;
     uint64_t left = s->allowed > s->reach.questions ? s->allowed - s->reach.questions : 0;
@@ -141,42 +144,42 @@ static void choose(search *s)
         }
 }
 
-static ebpo_status cut(search *s, ebpo_error *error)
+static ebpo_status reach_cut(search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     s->reach.questions += 3 * s->cut;
     for (uint64_t i = 0; i < s->cut; i++)
         for (int k = 0; k < 3; k++)
-            learn(s, s->middle_away[i][k] - s->slack, s->middle[i][k]);
+            reach_learn(s, s->middle_away[i][k] - s->slack, s->middle[i][k]);
     s->next.count = 0;
     for (uint64_t i = 0; i < s->cut && status == EBPO_OK; i++)
         for (int which = 0; which < 4 && status == EBPO_OK; which++) {
             triangle t;
             child_of(s, i, which, &t);
-            bound(s, &t);
-            status = keep(s, &s->next, &t, error);
+            reach_bound(s, &t);
+            status = reach_keep(s, &s->next, &t, error);
         }
     for (uint64_t i = s->cut; i < s->now.count && status == EBPO_OK; i++)
-        status = keep(s, &s->next, &s->now.item[i], error);
+        status = reach_keep(s, &s->next, &s->now.item[i], error);
     triangles old = s->now;
     s->now = s->next;
     s->next = old;
     return status;
 }
 
-static ebpo_status refine(search *s, ebpo_error *error)
+static ebpo_status reach_refine(search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_progress none = { NULL, NULL };
     while (status == EBPO_OK && s->now.count) {
-        choose(s);
+        reach_choose(s);
         if (!ebpo_grow(&s->middle, &s->middle_capacity, s->cut, sizeof *s->middle) ||
             !ebpo_grow(&s->middle_away, &s->away_capacity, s->cut, sizeof *s->middle_away))
             return ebpo_fail_memory(error, s->cut * sizeof *s->middle);
         status = ebpo_parallel_for(s->askers.threads, NULL, s->cut, 256, ask_middles, s, &none, "",
                                    error);
         if (status == EBPO_OK)
-            status = cut(s, error);
+            status = reach_cut(s, error);
     }
     return status;
 }
@@ -204,10 +207,10 @@ static ebpo_status look_at_faces(search *s, uint64_t begin, uint64_t end, ebpo_e
             corner_of(s->mesh, v, t.corner[k]);
             t.away[k] = fabs(s->distances[v]);
         }
-        bound(s, &t);
-        status = keep(s, &s->now, &t, error);
+        reach_bound(s, &t);
+        status = reach_keep(s, &s->now, &t, error);
     }
-    return status == EBPO_OK ? refine(s, error) : status;
+    return status == EBPO_OK ? reach_refine(s, error) : status;
 }
 
 static ebpo_status search_all(search *s, ebpo_error *error)
@@ -228,7 +231,7 @@ static ebpo_status search_all(search *s, ebpo_error *error)
 }
 
 /* What vertices tell; and how much rounding may matter. */
-static ebpo_status begin(search *s, ebpo_error *error)
+static ebpo_status reach_begin(search *s, ebpo_error *error)
 {
     const ebpo_mesh *m = s->mesh;
     double most = 0;
@@ -244,13 +247,13 @@ static ebpo_status begin(search *s, ebpo_error *error)
                                  f);
             corner_of(m, v, p);
             most = fmax(most, fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2]))));
-            learn(s, fabs(s->distances[v]), p);
+            reach_learn(s, fabs(s->distances[v]), p);
         }
     s->slack = most * 0x1p-49 + 0x1p-1060;
     return EBPO_OK;
 }
 
-static ebpo_status take(search *s, const ebpo_map_reach_options *given, ebpo_error *error)
+static ebpo_status reach_take(search *s, const ebpo_map_reach_options *given, ebpo_error *error)
 {
     s->o = (ebpo_map_reach_options)EBPO_MAP_REACH_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_map_reach_options, &s->o, given, error);
@@ -270,9 +273,9 @@ ebpo_status ebpo_map_find_reach(ebpo_model *model, const ebpo_mesh *mesh, const 
     search s = { .mesh = mesh, .distances = distances };
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_map_reach, out, error);
     if (status == EBPO_OK)
-        status = take(&s, options, error);
+        status = reach_take(&s, options, error);
     if (status == EBPO_OK)
-        status = begin(&s, error);
+        status = reach_begin(&s, error);
     if (status != EBPO_OK)
         return status;
     asking.unsigned_distance = true;

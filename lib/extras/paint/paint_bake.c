@@ -1,19 +1,199 @@
-/* Layers over the colours of vertices: format-spec/paint.md, section 5. */
+/* Turns paint into colours of a mesh's vertices, and finds which faces a stroke covers.
+ *
+ * The strokes of a layer are applied in their order to the vertices that their points reach; then
+ * the layers are put over the colours of vertices in their order. Colours are stored where the
+ * mesh already has them, in the types of its columns; other meshes get columns for them. A stroke
+ * covers the faces of its points' reaches.
+ *
+ * Source: format-spec/paint.md, section 5. */
 #include "core/strict_fp.h"
 
-#include <ebpo/paint.h>
-
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include <ebpo/colours.h>
+#include <ebpo/paint.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "extras/paint/paint_parts.h"
-#include "extras/paint/reached.h"
+#include "extras/paint/paint_reach.h"
+#include "mesh/attributes.h"
 #include "query/query_model.h"
+
+/* The inverse of ebpo_colour_byte. */
+static void put_byte(const ebpo_colour_column *c, uint64_t row, uint8_t value)
+{
+    uint8_t *to = c->of->values + row * ebpo_attribute_row_bytes(c->of) +
+                  (uint64_t)c->column * ebpo_attribute_bytes(c->of->type);
+    const uint16_t full = (uint16_t)(257 * value), two = value;
+    const uint32_t four = value;
+    const float share = (float)(value / 255.0);
+    const double exact = value / 255.0;
+    switch (c->of->type) {
+    case EBPO_ATTRIBUTE_INT8: *to = value < 127 ? value : 127; break; /* the most it holds */
+    case EBPO_ATTRIBUTE_UINT8: *to = value; break;
+    case EBPO_ATTRIBUTE_INT16: memcpy(to, &two, sizeof two); break;
+    case EBPO_ATTRIBUTE_UINT16: memcpy(to, &full, sizeof full); break;
+    case EBPO_ATTRIBUTE_INT32:
+    case EBPO_ATTRIBUTE_UINT32: memcpy(to, &four, sizeof four); break;
+    case EBPO_ATTRIBUTE_FLOAT32: memcpy(to, &share, sizeof share); break;
+    case EBPO_ATTRIBUTE_FLOAT64: memcpy(to, &exact, sizeof exact); break;
+    }
+}
+
+/* Three new properties of all vertices. */
+static ebpo_status add_colours(ebpo_mesh *mesh, const uint8_t *rgba, ebpo_error *error)
+{
+    ebpo_attribute like = { .element = "vertex",
+                            .names = "red green blue",
+                            .type = EBPO_ATTRIBUTE_UINT8,
+                            .list = EBPO_ATTRIBUTE_NO_LIST,
+                            .columns = 3,
+                            .rows = mesh->vertex_count };
+    if (!mesh->attributes)
+        mesh->attributes = ebpo_attributes_make(mesh->workspace);
+    if (mesh->attributes && mesh->attributes->count >= EBPO_ATTRIBUTE_ARRAYS)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the mesh has so many attributes that no more fit; leave some out");
+    ebpo_attribute *a = mesh->attributes ? ebpo_attributes_add(mesh->attributes, &like) : NULL;
+    if (a && !ebpo_attribute_reserve(mesh->attributes->workspace, a, mesh->vertex_count, 0)) {
+        ebpo_attributes_remove(mesh->attributes, mesh->attributes->count - 1);
+        a = NULL;
+    }
+    if (!a)
+        return ebpo_fail_memory(error, 3 * mesh->vertex_count);
+    for (uint64_t i = 0; i < mesh->vertex_count; i++)
+        memcpy(a->values + 3 * i, rgba + 4 * i, 3);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_paint_dye_mesh(ebpo_mesh *mesh, const uint8_t *rgba, ebpo_error *error)
+{
+    ebpo_colour_column channels[EBPO_COLOUR_CHANNELS];
+    if (!ebpo_colour_columns(mesh->attributes, "vertex", channels))
+        return add_colours(mesh, rgba, error);
+    for (int k = 0; k < 3; k++)
+        for (uint64_t i = 0; i < mesh->vertex_count && i < channels[k].of->rows; i++)
+            if (ebpo_colour_byte(&channels[k], i) != rgba[4 * i + (unsigned)k])
+                put_byte(&channels[k], i, rgba[4 * i + (unsigned)k]);
+    return EBPO_OK;
+}
+
+/* --- which faces a stroke covers --- */
+
+static int by_file_face(const void *a, const void *b)
+{
+    const ebpo_met_face *x = a, *y = b;
+    return (x->file_face > y->file_face) - (x->file_face < y->file_face);
+}
+
+static ebpo_status add_point(ebpo_met_faces *met, ebpo_reach *reach, ebpo_error *error)
+{
+    for (uint64_t i = 0; i < reach->count; i++) {
+        const ebpo_reach_face *f = &reach->face[i];
+        uint32_t number;
+        ebpo_status status = ebpo_met_faces_add(met, f, &number, error);
+        if (status != EBPO_OK)
+            return status;
+        for (int k = 0; k < 3; k++)
+            met->face[number].covered[k] |= f->within[k];
+    }
+    return EBPO_OK;
+}
+
+static void cover_give(const ebpo_met_faces *met, ebpo_paint_face_fn take, void *user)
+{
+    qsort(met->face, met->count, sizeof *met->face, by_file_face);
+    for (uint64_t i = 0; i < met->count; i++) {
+        const ebpo_met_face *f = &met->face[i];
+        ebpo_paint_face out = { .face = f->face, .file_face = f->file_face };
+        memcpy(out.corner, f->corner, sizeof out.corner);
+        for (int k = 0; k < 3; k++)
+            out.covered[k] = f->covered[k];
+        if (!take(user, &out))
+            return;
+    }
+}
+
+ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_t stroke,
+                             ebpo_paint_face_fn take, void *user, uint64_t *elsewhere,
+                             ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_met_faces met = { 0 };
+    ebpo_reach reach;
+    uint64_t absent = 0;
+    ebpo_status status = ebpo_paint_check_context(p, context, error);
+    if (status == EBPO_OK && stroke >= p->stroke_count)
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "there is no stroke %llu",
+                           (unsigned long long)stroke);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_reach_begin(&reach, context);
+    for (uint32_t i = 0; i < p->stroke[stroke].count && status == EBPO_OK; i++) {
+        bool here;
+        status = ebpo_paint_reach(&reach, p, stroke, i, &here, error);
+        if (status == EBPO_OK && here)
+            status = add_point(&met, &reach, error);
+        absent += status == EBPO_OK && !here;
+    }
+    ebpo_reach_end(&reach);
+    if (status == EBPO_OK && elsewhere)
+        *elsewhere = absent;
+    if (status == EBPO_OK)
+        cover_give(&met, take, user);
+    ebpo_met_faces_free(&met);
+    return status;
+}
+
+/* --- all points --- */
+
+static ebpo_status check_point(ebpo_reach *reach, const ebpo_paint_point *q, const char *what,
+                               uint64_t number, ebpo_error *error)
+{
+    bool fits;
+    ebpo_status status = ebpo_reach_check(reach, q->place, q->face, &fits, error);
+    return status != EBPO_OK || fits
+               ? status
+               : ebpo_fail_file(
+                     error, EBPO_E_FORMAT, reach->context->model->file->in.shown,
+                     "%s %llu of the paint is not on face %lu, where it says to be: the "
+                     "paint does not fit the model; give the one that it was made on, or "
+                     "remove that %s without naming a model",
+                     what, (unsigned long long)number, (unsigned long)q->face, what);
+}
+
+ebpo_status ebpo_paint_check_points(const ebpo_paint *p, ebpo_context *context,
+                                    const ebpo_progress *progress, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    enum { STEP = 1024 };
+    ebpo_reach reach;
+    uint64_t done = 0;
+    ebpo_status status = ebpo_paint_check_context(p, context, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_reach_begin(&reach, context);
+    for (uint64_t i = 0; i < p->stroke_count && status == EBPO_OK; i++)
+        for (uint32_t k = 0; k < p->stroke[i].count && status == EBPO_OK; k++, done++) {
+            if (done % STEP == 0 &&
+                !ebpo_progress_step(progress, "checking", done, p->point_count, error))
+                status = EBPO_E_CANCELLED;
+            else
+                status = check_point(&reach, &p->point[p->stroke[i].first + k], "stroke", i, error);
+        }
+    for (uint64_t i = 0; i < p->note_count && status == EBPO_OK; i++)
+        status = check_point(&reach, &p->note[i].at, "note", i, error);
+    ebpo_reach_end(&reach);
+    return status;
+}
+
+/* --- layers over colours --- */
 
 /* A vertex that something covers. */
 typedef struct dyed {
@@ -96,7 +276,7 @@ static ebpo_status find_dyed(bake *b, uint32_t vertex, dyed **out, ebpo_error *e
 }
 
 /* A stroke covers it once. */
-static void apply(dyed *d, const ebpo_stroke_held *s, uint32_t number)
+static void bake_apply(dyed *d, const ebpo_stroke_held *s, uint32_t number)
 {
     double share = s->rgba[3] / 255.0;
     if (d->layer != s->layer + 1) {
@@ -129,7 +309,7 @@ static ebpo_status dye_face(bake *b, const ebpo_reached_face *f, const ebpo_stro
         ebpo_status status = find_dyed(b, vertex, &d, error);
         if (status != EBPO_OK)
             return status;
-        apply(d, s, number);
+        bake_apply(d, s, number);
         *any = true;
     }
     return EBPO_OK;

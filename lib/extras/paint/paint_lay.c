@@ -1,5 +1,9 @@
-/* From where a hand was to strokes: steps along its way, and at each the more points the more it
- * presses. */
+/* Makes strokes from the way of a hand: points at even steps along it, and the more of them at
+ * each step the harder it presses.
+ *
+ * Every point is on a face of the model, and is stored by the face and three integer weights of
+ * its corners. The scatter of points is pseudorandom with a seed, so that a way makes the same
+ * stroke on every machine. */
 #include "core/strict_fp.h"
 
 #include <ebpo/paint.h>
@@ -15,10 +19,10 @@
 #include "core/parallel.h"
 #include "core/hash.h"
 #include "extras/paint/paint_parts.h"
-#include "extras/paint/reach.h"
+#include "extras/paint/paint_reach.h"
 #include "query/query_model.h"
-#include "extras/haptic/face_near.h"
-#include "extras/haptic/vectors.h"
+#include "extras/haptic/face_box.h"
+#include "geometry/vec3.h"
 
 enum { DENSITY_MOST = 10000 };
 
@@ -68,8 +72,8 @@ static const char *hand_wrong(const ebpo_paint_hand *h)
     return in_range(h->time, 0, UINT32_MAX) ? NULL : "the hand's time is 0 to 2^32 - 1";
 }
 
-static ebpo_status check(const lay *l, const ebpo_paint *p, const ebpo_paint_hand *hand,
-                         uint64_t count, ebpo_error *error)
+static ebpo_status lay_check(const lay *l, const ebpo_paint *p, const ebpo_paint_hand *hand,
+                             uint64_t count, ebpo_error *error)
 {
     const char *wrong = pen_wrong(&l->pen);
     if (count == 0)
@@ -112,8 +116,8 @@ static void set_point(ebpo_paint_point *q, const ebpo_distance_result *at,
     round_weights(near.weight, q->weight);
 }
 
-static ebpo_status nearest(ebpo_context *context, const double place[3], double within,
-                           ebpo_distance_result *out, ebpo_error *error)
+static ebpo_status lay_nearest(ebpo_context *context, const double place[3], double within,
+                               ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.unsigned_distance = true;
@@ -121,7 +125,7 @@ static ebpo_status nearest(ebpo_context *context, const double place[3], double 
     return ebpo_distance(context, place, &options, out, error);
 }
 
-static bool found(const ebpo_distance_result *at)
+static bool lay_found(const ebpo_distance_result *at)
 {
     return at->face != EBPO_NO_FACE && isfinite(at->distance);
 }
@@ -148,7 +152,7 @@ ebpo_status ebpo_paint_place(const ebpo_paint *p, ebpo_context *context, const d
     ebpo_reach reach;
     ebpo_status status = ebpo_paint_check_context(p, context, error);
     if (status == EBPO_OK)
-        status = nearest(context, place, INFINITY, &at, error);
+        status = lay_nearest(context, place, INFINITY, &at, error);
     if (status != EBPO_OK)
         return status;
     ebpo_reach_begin(&reach, context);
@@ -192,11 +196,11 @@ static void make_frame(const double normal[3], double u[3], double v[3])
         if (fabs(n[k]) < fabs(n[least]))
             least = k;
     axis[least] = 1;
-    cross(n, axis, u);
-    double length = sqrt(dot(u, u));
+    ebpo_vec3_cross(n, axis, u);
+    double length = sqrt(ebpo_vec3_dot(u, u));
     for (int k = 0; k < 3; k++)
         u[k] /= length;
-    cross(n, u, v);
+    ebpo_vec3_cross(n, u, v);
 }
 
 /* Evenly within the unit disc. */
@@ -217,8 +221,8 @@ static const ebpo_reach_face *face_of(const ebpo_reach *reach, uint64_t face)
     return NULL;
 }
 
-static ebpo_status scatter(lay *l, const ebpo_distance_result *middle, const ebpo_paint_hand *hand,
-                           ebpo_error *error)
+static ebpo_status lay_scatter(lay *l, const ebpo_distance_result *middle,
+                               const ebpo_paint_hand *hand, ebpo_error *error)
 {
     double u[3], v[3], place[3], disc[2], spread = l->pen.spread;
     unsigned wanted = (unsigned)fmax(1, floor(hand->pressure * l->pen.density + 0.5));
@@ -229,10 +233,10 @@ static ebpo_status scatter(lay *l, const ebpo_distance_result *middle, const ebp
         random_in_disc(&l->random, disc);
         for (int k = 0; k < 3; k++)
             place[k] = middle->point[k] + spread * (disc[0] * u[k] + disc[1] * v[k]);
-        status = nearest(l->context, place, spread, &at, error);
+        status = lay_nearest(l->context, place, spread, &at, error);
         if (status != EBPO_OK)
             return status;
-        const ebpo_reach_face *f = found(&at) ? face_of(&l->reach, at.face) : NULL;
+        const ebpo_reach_face *f = lay_found(&at) ? face_of(&l->reach, at.face) : NULL;
         if (f && ebpo_ball_holds(middle->point, spread * spread, at.point))
             status = add_point(l, &at, f->corner, hand, error);
         else
@@ -258,10 +262,10 @@ static ebpo_status make_step(lay *l, const ebpo_paint_hand *hand, ebpo_error *er
     ebpo_distance_result at = { .face = EBPO_NO_FACE };
     ebpo_status status = EBPO_OK;
     if (hand->pressure > 0)
-        status = nearest(l->context, hand->place, l->pen.within, &at, error);
+        status = lay_nearest(l->context, hand->place, l->pen.within, &at, error);
     if (status != EBPO_OK)
         return status;
-    if (!found(&at)) {
+    if (!lay_found(&at)) {
         l->down = false;
         l->laid.lifted++;
         return EBPO_OK;
@@ -273,15 +277,15 @@ static ebpo_status make_step(lay *l, const ebpo_paint_hand *hand, ebpo_error *er
     if (status != EBPO_OK)
         return status;
     return l->pen.spread > 0
-               ? scatter(l, &at, hand, error)
+               ? lay_scatter(l, &at, hand, error)
                : add_point(l, &at, (const double(*)[3])l->reach.face[l->reach.own].corner, hand,
                            error);
 }
 
 /* --- the way --- */
 
-static void between(const ebpo_paint_hand *a, const ebpo_paint_hand *b, double t,
-                    ebpo_paint_hand *out)
+static void lay_between(const ebpo_paint_hand *a, const ebpo_paint_hand *b, double t,
+                        ebpo_paint_hand *out)
 {
     for (int k = 0; k < 3; k++)
         out->place[k] = a->place[k] + t * (b->place[k] - a->place[k]);
@@ -292,12 +296,12 @@ static void between(const ebpo_paint_hand *a, const ebpo_paint_hand *b, double t
 static double length_between(const ebpo_paint_hand *a, const ebpo_paint_hand *b)
 {
     double d[3];
-    difference(b->place, a->place, d);
-    return sqrt(dot(d, d));
+    ebpo_vec3_subtract(b->place, a->place, d);
+    return sqrt(ebpo_vec3_dot(d, d));
 }
 
 /* Steps are at whole multiples of their length, from the first place on. */
-static ebpo_status go(lay *l, const ebpo_paint_hand *hand, uint64_t count, ebpo_error *error)
+static ebpo_status lay_go(lay *l, const ebpo_paint_hand *hand, uint64_t count, ebpo_error *error)
 {
     double step = l->pen.step != 0 ? l->pen.step : fmax(l->pen.radius, l->pen.spread) / 2,
            ahead = step; /* from the place at hand to the next step */
@@ -313,7 +317,7 @@ static ebpo_status go(lay *l, const ebpo_paint_hand *hand, uint64_t count, ebpo_
                 EBPO_PAINT_POINTS);
         for (uint64_t k = 1; at <= length && status == EBPO_OK; k++) {
             ebpo_paint_hand pen;
-            between(&hand[i - 1], &hand[i], at / length, &pen);
+            lay_between(&hand[i - 1], &hand[i], at / length, &pen);
             pen.time = fmax(pen.time, l->begun);
             status = make_step(l, &pen, error);
             at = ahead + (double)k * step;
@@ -324,7 +328,7 @@ static ebpo_status go(lay *l, const ebpo_paint_hand *hand, uint64_t count, ebpo_
 }
 
 /* All or none. */
-static ebpo_status keep(lay *l, ebpo_paint *p, ebpo_error *error)
+static ebpo_status lay_keep(lay *l, ebpo_paint *p, ebpo_error *error)
 {
     uint64_t before = p->stroke_count;
     ebpo_status status = EBPO_OK;
@@ -360,7 +364,7 @@ ebpo_status ebpo_paint_lay(ebpo_paint *p, ebpo_context *context, const ebpo_pain
     if (status == EBPO_OK && laid)
         status = EBPO_CHECK_SIZED(ebpo_paint_laid, laid, error);
     if (status == EBPO_OK)
-        status = check(&l, p, hand, count, error);
+        status = lay_check(&l, p, hand, count, error);
     if (status == EBPO_OK)
         status = ebpo_paint_check_context(p, context, error);
     if (status != EBPO_OK)
@@ -368,9 +372,9 @@ ebpo_status ebpo_paint_lay(ebpo_paint *p, ebpo_context *context, const ebpo_pain
     l.random = l.pen.seed;
     l.room = EBPO_PAINT_POINTS - p->point_count;
     ebpo_reach_begin(&l.reach, context);
-    status = go(&l, hand, count, error);
+    status = lay_go(&l, hand, count, error);
     if (status == EBPO_OK)
-        status = keep(&l, p, error);
+        status = lay_keep(&l, p, error);
     if (status == EBPO_OK && laid)
         EBPO_GIVE(ebpo_paint_laid, laid, &l.laid);
     ebpo_reach_end(&l.reach);

@@ -1,15 +1,138 @@
-/* Layers and notes. */
+/* A paint as an object: its strokes, layers and notes, and the model that it belongs to.
+ *
+ * Strokes are kept in the order in which they were made, and their points one behind the other.
+ * Removing a layer removes its strokes and its notes. Texts are UTF-8 of limited size without
+ * control characters. A paint belongs to the model whose SHA-256 digest it has: for another one,
+ * queries fail.
+ *
+ * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
 
-#include <ebpo/paint.h>
-
+#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
+
+#include <ebpo/paint.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "extras/paint/paint_parts.h"
+#include "format/file_in.h"
+#include "query/query_model.h"
+
+const char *ebpo_paint_point_wrong(const ebpo_paint_point *q)
+{
+    for (int i = 0; i < 3; i++)
+        if (!(fabs(q->place[i]) <= EBPO_PAINT_MOST))
+            return "a place is not finite, or beyond 2^200";
+    if (q->face == UINT32_MAX)
+        return "a point has no face";
+    if ((uint64_t)q->weight[0] + q->weight[1] > EBPO_PAINT_WEIGHTS)
+        return "the weights of a point are more than 2^30 in sum";
+    if (q->size < 1 || q->size > EBPO_PAINT_FULL)
+        return "the size of a point is not 1 to 2^15";
+    return NULL;
+}
+
+const char *ebpo_paint_stroke_wrong(const ebpo_stroke_held *s, uint64_t layers)
+{
+    static const uint8_t none[4];
+    if (s->layer >= layers)
+        return "a stroke is in a layer that there is not";
+    if (s->kind > EBPO_PAINT_ERASES)
+        return "a stroke is of a kind that is not known";
+    if (s->kind == EBPO_PAINT_ERASES && memcmp(s->rgba, none, sizeof none) != 0)
+        return "an erasing stroke has a colour, which has to be 0";
+    if (!(s->radius >= 1 / EBPO_PAINT_MOST && s->radius <= EBPO_PAINT_MOST))
+        return "the radius of a stroke is not 2^-200 to 2^200";
+    if (s->time > EBPO_PAINT_TIME_MOST)
+        return "the time of a stroke is beyond 2^53";
+    return s->count == 0 ? "a stroke has no point" : NULL;
+}
+
+ebpo_status ebpo_paint_get_stroke(const ebpo_paint *p, uint64_t number, ebpo_paint_stroke *out)
+{
+    ebpo_paint_stroke own = EBPO_PAINT_STROKE_INIT;
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_paint_stroke, out, NULL);
+    if (status != EBPO_OK || number >= p->stroke_count)
+        return EBPO_E_ARGUMENT;
+    const ebpo_stroke_held *s = &p->stroke[number];
+    own.layer = s->layer;
+    own.kind = (ebpo_paint_kind)s->kind;
+    own.colour = ebpo_paint_pack(s->rgba);
+    own.radius = s->radius;
+    own.time = s->time;
+    own.point_count = s->count;
+    own.points = p->point + s->first;
+    return EBPO_GIVE(ebpo_paint_stroke, out, &own);
+}
+
+static ebpo_status strokes_check(const ebpo_paint *p, const ebpo_paint_stroke *stroke,
+                                 ebpo_stroke_held *out, ebpo_error *error)
+{
+    *out = (ebpo_stroke_held){ .radius = stroke->radius,
+                               .time = stroke->time,
+                               .first = p->point_count,
+                               .layer = stroke->layer < UINT32_MAX ? (uint32_t)stroke->layer
+                                                                   : UINT32_MAX,
+                               .kind = (uint32_t)stroke->kind };
+    for (int i = 0; i < 4; i++)
+        out->rgba[i] = (uint8_t)(stroke->colour >> (24 - 8 * i));
+    if (p->stroke_count == EBPO_PAINT_STROKES ||
+        stroke->point_count > EBPO_PAINT_POINTS - p->point_count)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "a paint has at most %d strokes, and %d points in all of them",
+                         EBPO_PAINT_STROKES, EBPO_PAINT_POINTS);
+    out->count = (uint32_t)stroke->point_count;
+    const char *wrong = ebpo_paint_stroke_wrong(out, p->layer_count);
+    for (uint64_t i = 0; i < stroke->point_count && !wrong; i++)
+        wrong = ebpo_paint_point_wrong(&stroke->points[i]);
+    return wrong ? ebpo_fail(error, EBPO_E_ARGUMENT, "%s", wrong) : EBPO_OK;
+}
+
+ebpo_status ebpo_paint_add_stroke(ebpo_paint *p, const ebpo_paint_stroke *given, ebpo_error *error)
+{
+    ebpo_stroke_held held;
+    ebpo_paint_stroke stroke = EBPO_PAINT_STROKE_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_paint_stroke, &stroke, given, error);
+    if (status == EBPO_OK)
+        status = strokes_check(p, &stroke, &held, error);
+    if (status != EBPO_OK)
+        return status;
+    if (!ebpo_grow(&p->stroke, &p->stroke_capacity, p->stroke_count + 1, sizeof *p->stroke) ||
+        !ebpo_grow(&p->point, &p->point_capacity, p->point_count + held.count, sizeof *p->point))
+        return ebpo_fail_memory(error, held.count * sizeof *p->point);
+    memcpy(p->point + p->point_count, stroke.points, held.count * sizeof *p->point);
+    for (uint32_t i = 0; i < held.count; i++)
+        p->point[p->point_count + i].reserved = 0;
+    p->stroke[p->stroke_count++] = held;
+    p->point_count += held.count;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_paint_remove_stroke(ebpo_paint *p, uint64_t number, ebpo_error *error)
+{
+    if (number >= p->stroke_count)
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "there is no stroke %llu: strokes are counted from 0, and the paint has %llu",
+            (unsigned long long)number, (unsigned long long)p->stroke_count);
+    ebpo_stroke_held gone = p->stroke[number];
+    uint64_t end = gone.first + gone.count;
+    memmove(p->point + gone.first, p->point + end, (p->point_count - end) * sizeof *p->point);
+    p->point_count -= gone.count;
+    p->stroke_count--;
+    memmove(p->stroke + number, p->stroke + number + 1,
+            (p->stroke_count - number) * sizeof *p->stroke);
+    for (uint64_t i = number; i < p->stroke_count; i++)
+        p->stroke[i].first -= gone.count;
+    return EBPO_OK;
+}
+
+/* --- layers and notes --- */
 
 const ebpo_paint_text_kind ebpo_paint_layer_texts[EBPO_PAINT_TEXTS] = {
     { "title", 255 }, { "author", 255 }, { "date", 31 }, { "description", 4095 }
@@ -20,7 +143,7 @@ const ebpo_paint_text_kind ebpo_paint_note_texts[EBPO_PAINT_TEXTS] = {
 
 /* --- texts --- */
 
-void ebpo_paint_texts_free(char *text[EBPO_PAINT_TEXTS])
+static void free_texts(char *text[EBPO_PAINT_TEXTS])
 {
     for (int i = 0; i < EBPO_PAINT_TEXTS; i++)
         free(text[i]);
@@ -34,7 +157,7 @@ static bool copy_texts(const char *const from[EBPO_PAINT_TEXTS], char *to[EBPO_P
         fine = fine && to[i];
     }
     if (!fine)
-        ebpo_paint_texts_free(to);
+        free_texts(to);
     return fine;
 }
 
@@ -141,7 +264,7 @@ ebpo_status ebpo_paint_set_layer(ebpo_paint *p, uint64_t number, const ebpo_pain
     ebpo_status status = take_layer(layer, p->layer[number].text[EBPO_PAINT_DATE], &held, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_paint_texts_free(p->layer[number].text);
+    free_texts(p->layer[number].text);
     p->layer[number] = held;
     return EBPO_OK;
 }
@@ -169,7 +292,7 @@ static void drop_notes(ebpo_paint *p, uint64_t layer)
     uint64_t notes = 0;
     for (uint64_t i = 0; i < p->note_count; i++) {
         if (p->note[i].layer == layer) {
-            ebpo_paint_texts_free(p->note[i].text);
+            free_texts(p->note[i].text);
             continue;
         }
         p->note[notes] = p->note[i];
@@ -185,7 +308,7 @@ ebpo_status ebpo_paint_remove_layer(ebpo_paint *p, uint64_t number, ebpo_error *
         return no_layer(p, number, error);
     drop_strokes(p, number);
     drop_notes(p, number);
-    ebpo_paint_texts_free(p->layer[number].text);
+    free_texts(p->layer[number].text);
     p->layer_count--;
     memmove(p->layer + number, p->layer + number + 1, (p->layer_count - number) * sizeof *p->layer);
     return EBPO_OK;
@@ -242,8 +365,151 @@ ebpo_status ebpo_paint_remove_note(ebpo_paint *p, uint64_t number, ebpo_error *e
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "there is no note %llu: notes are counted from 0, and the paint has %llu",
                          (unsigned long long)number, (unsigned long long)p->note_count);
-    ebpo_paint_texts_free(p->note[number].text);
+    free_texts(p->note[number].text);
     p->note_count--;
     memmove(p->note + number, p->note + number + 1, (p->note_count - number) * sizeof *p->note);
     return EBPO_OK;
+}
+
+/* --- the object --- */
+
+static void write_hex(const uint8_t digest[32], char out[65])
+{
+    for (int i = 0; i < 32; i++)
+        snprintf(out + 2 * i, 3, "%02x", digest[i]);
+}
+
+/* Which model a paint made on this file is for: format-spec/paint.md, section 2. */
+static void name_model(const ebpo_info *info, char out[65])
+{
+    bool whole = info->pruned && info->parts & EBPO_PART_MAPS;
+    write_hex(whole ? info->subset_of : info->content_sha256, out);
+}
+
+static ebpo_status check_mesh(const ebpo_file *model, ebpo_error *error)
+{
+    return model->info.parts & EBPO_PART_MESH
+               ? EBPO_OK
+               : ebpo_fail_file(error, EBPO_E_ABSENT, model->in.shown,
+                                "the file was written without its mesh, so there is nothing to "
+                                "paint on; build it again with that part");
+}
+
+ebpo_paint *ebpo_paint_begin(void)
+{
+    ebpo_paint *p = ebpo_alloc_zero(1, sizeof *p);
+    ebpo_paint_file *file = p ? ebpo_alloc_zero(1, sizeof *file) : NULL;
+    if (!file) {
+        free(p);
+        return NULL;
+    }
+    file->fd = -1;
+    file->lock = (ebpo_file_lock)EBPO_FILE_LOCK_INIT;
+    pthread_mutex_init(&file->mutex, NULL);
+    p->file = file;
+    return p;
+}
+
+static void free_file(ebpo_paint_file *file)
+{
+    ebpo_file_lock_release(&file->lock);
+    if (file->fd >= 0)
+        close(file->fd);
+    pthread_mutex_destroy(&file->mutex);
+    free(file->path);
+    free(file);
+}
+
+ebpo_status ebpo_paint_new(const ebpo_file *model, ebpo_paint **out, ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_status status = check_mesh(model, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_paint *p = ebpo_paint_begin();
+    if (!p)
+        return ebpo_fail_memory(error, sizeof *p);
+    const char *name = strrchr(model->in.shown, '/');
+    name_model(&model->info, p->model_sha256);
+    p->source_numbers = model->info.parts & EBPO_PART_MAPS;
+    snprintf(p->generator, sizeof p->generator, "ebpo %s", ebpo_version());
+    snprintf(p->unit, sizeof p->unit, "%s", model->info.unit);
+    name = name ? name + 1 : model->in.shown;
+    if (strlen(name) < sizeof p->model_name)
+        snprintf(p->model_name, sizeof p->model_name, "%s", name);
+    *out = p;
+    return EBPO_OK;
+}
+
+void ebpo_paint_free(ebpo_paint *p)
+{
+    if (!p)
+        return;
+    for (uint64_t i = 0; i < p->layer_count; i++)
+        free_texts(p->layer[i].text);
+    for (uint64_t i = 0; i < p->note_count; i++)
+        free_texts(p->note[i].text);
+    free_file(p->file);
+    free(p->layer);
+    free(p->note);
+    free(p->stroke);
+    free(p->point);
+    free(p);
+}
+
+ebpo_status ebpo_paint_get_info(const ebpo_paint *p, ebpo_paint_info *out)
+{
+    ebpo_paint_info own = EBPO_PAINT_INFO_INIT;
+    own.generator = p->generator;
+    own.model_sha256 = p->model_sha256;
+    own.model_name = p->model_name;
+    own.unit = p->unit;
+    own.source_numbers = p->source_numbers;
+    own.layer_count = p->layer_count;
+    own.note_count = p->note_count;
+    own.stroke_count = p->stroke_count;
+    own.point_count = p->point_count;
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_paint_info, out, NULL);
+    return status == EBPO_OK ? EBPO_GIVE(ebpo_paint_info, out, &own) : status;
+}
+
+ebpo_status ebpo_paint_check_model(const ebpo_paint *p, const ebpo_file *model, ebpo_error *error)
+{
+    char own[65], whole[65];
+    bool maps = model->info.parts & EBPO_PART_MAPS;
+    ebpo_status status = check_mesh(model, error);
+    if (status != EBPO_OK)
+        return status;
+    write_hex(model->info.content_sha256, own);
+    name_model(&model->info, whole);
+    bool named = strcmp(p->model_sha256, own) == 0 || strcmp(p->model_sha256, whole) == 0;
+    if (named && p->source_numbers && !maps)
+        return ebpo_fail_file(error, EBPO_E_ABSENT, model->in.shown,
+                              "the paint names faces by their numbers in the source, which this "
+                              "file was written without; build it again with maps");
+    if (strcmp(p->model_sha256, p->source_numbers ? own : whole) == 0 ||
+        (p->source_numbers && named))
+        return p->source_numbers == maps
+                   ? EBPO_OK
+                   : ebpo_fail_file(error, EBPO_E_ARGUMENT, model->in.shown,
+                                    "the paint names faces by their rows in the file, where this "
+                                    "model has numbers of the source: it was not made for it");
+    return ebpo_fail_file(error, EBPO_E_ARGUMENT, model->in.shown,
+                          "the paint belongs to another model%s%s, with content_sha256 %s; this "
+                          "one has %s: give the model that it was made on",
+                          p->model_name[0] ? ", " : "", p->model_name, p->model_sha256, own);
+}
+
+ebpo_status ebpo_paint_check_context(const ebpo_paint *p, const ebpo_context *context,
+                                     ebpo_error *error)
+{
+    const ebpo_info *info = context->model->info;
+    ebpo_status status = ebpo_paint_check_model(p, context->model->file, error);
+    for (int i = 0; i < 3 && status == EBPO_OK; i++)
+        if (!(fabs(info->box_origin[i]) <= EBPO_PAINT_MOST / 2 &&
+              info->box_size[i] <= EBPO_PAINT_MOST / 2))
+            status = ebpo_fail_file(error, EBPO_E_UNSUPPORTED, context->model->file->in.shown,
+                                    "coordinates beyond 2^199 cannot be painted on; scale the "
+                                    "model");
+    return status;
 }

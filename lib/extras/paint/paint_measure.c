@@ -1,19 +1,316 @@
-/* How much of the surface is painted. Faces are shared out to a fixed number of pieces of work,
- * whose sums are added in order: the result does not depend on threads. */
+/* Measures the painted area, by stroke, by colour, by layer and in all.
+ *
+ * Faces are halved across their longest edge until it is clear to which stroke a part belongs, or
+ * the part is small. In each layer the last stroke decides: where a ball of it holds the part, the
+ * part is its own; where a ball only meets it, earlier strokes may have what is not covered. So
+ * lower and upper bounds are summed.
+ *
+ * Faces are distributed to a fixed number of pieces of work, whose sums are added in order:
+ * results do not depend on the number of threads.
+ *
+ * Source: format-spec/paint.md, section 6. */
 #include "core/strict_fp.h"
 
-#include <ebpo/paint.h>
-
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include <ebpo/paint.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "extras/paint/area_cut.h"
-#include "extras/paint/met_faces.h"
+#include "extras/haptic/face_box.h"
+#include "extras/paint/paint_parts.h"
 #include "extras/paint/paint_reach.h"
+
+/* A ball in whose reach a face is. */
+typedef struct area_ball {
+    double centre[3], radius;
+    uint32_t layer, stroke;
+} area_ball;
+
+/* Areas by stroke, by colour, by layer and of all, one behind the other: area_key_count of them. */
+typedef struct area_keys {
+    const ebpo_paint *p;
+    uint32_t *colour; /* [strokes] the number of a stroke's colour */
+    uint64_t colours;
+} area_keys;
+
+static inline uint64_t area_key_count(const area_keys *k)
+{
+    return k->p->stroke_count + k->colours + k->p->layer_count + 1;
+}
+
+/* One thread's. */
+typedef struct area_cut {
+    const area_keys *keys;
+    double fineness;
+    ebpo_paint_area *area; /* [keys] to which is added */
+    area_ball *ball;       /* a stack: of each part those balls that it meets */
+    uint64_t ball_capacity;
+    uint64_t *seen; /* [colours] the last part that a colour was noted for */
+    uint64_t part;
+} area_cut;
+
+enum { DEEPEST = 900 };
+
+typedef struct triangle {
+    double p[3][3], area;
+} triangle;
+
+/* Room for the sums of a thread: `area` stays the caller's. False: no memory. */
+static bool area_cut_begin(area_cut *c, const area_keys *keys, double fineness)
+{
+    *c = (area_cut){ .keys = keys, .fineness = fineness };
+    c->seen = ebpo_alloc_zero(keys->colours, sizeof *c->seen);
+    return c->seen != NULL;
+}
+
+static void area_cut_end(area_cut *c)
+{
+    free(c->seen);
+    free(c->ball);
+}
+
+static double square_of_edge(const double a[3], const double b[3])
+{
+    double x = b[0] - a[0], y = b[1] - a[1], z = b[2] - a[2];
+    return (x * x + y * y) + z * z;
+}
+
+static double area_of(const double p[3][3])
+{
+    double e[3], f[3], n[3];
+    for (int i = 0; i < 3; i++) {
+        e[i] = p[1][i] - p[0][i];
+        f[i] = p[2][i] - p[0][i];
+    }
+    for (int i = 0; i < 3; i++)
+        n[i] = e[(i + 1) % 3] * f[(i + 2) % 3] - e[(i + 2) % 3] * f[(i + 1) % 3];
+    return sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]) / 2;
+}
+
+static bool area_cut_holds(const area_ball *ball, const triangle *t)
+{
+    double square = ball->radius * ball->radius;
+    return ebpo_ball_holds(ball->centre, square, t->p[0]) &&
+           ebpo_ball_holds(ball->centre, square, t->p[1]) &&
+           ebpo_ball_holds(ball->centre, square, t->p[2]);
+}
+
+static bool area_cut_meets(const area_ball *ball, const triangle *t)
+{
+    ebpo_face_near near;
+    ebpo_face_nearest(ball->centre, t->p, &near);
+    return near.distance <= ball->radius;
+}
+
+/* --- which balls a part meets --- */
+
+/* From a layer's balls at [from, end) those that may have a part of it go to `to`: up to the first
+ * stroke of which one holds it, of which that one says it all. Their number; *sure: nothing is left
+ * to be decided. */
+static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64_t end, uint64_t to,
+                           bool *sure)
+{
+    uint64_t kept = 0, first = 0; /* first: of the stroke at hand */
+    *sure = false;
+    for (uint64_t i = from; i < end; i++) {
+        const area_ball *b = &c->ball[i];
+        if (i > from && b->stroke != c->ball[i - 1].stroke)
+            first = kept;
+        if (area_cut_holds(b, t)) {
+            c->ball[to + first] = *b;
+            *sure = first == 0;
+            return first + 1;
+        }
+        if (area_cut_meets(b, t))
+            c->ball[to + kept++] = *b;
+    }
+    *sure = kept == 0;
+    return kept;
+}
+
+/* The same of all layers at [from, from + count), to behind them. */
+static uint64_t area_cut_sift(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
+                              bool *sure)
+{
+    uint64_t kept = 0;
+    *sure = true;
+    for (uint64_t i = from, end; i < from + count; i = end) {
+        bool layer_sure;
+        for (end = i; end < from + count && c->ball[end].layer == c->ball[i].layer; end++)
+            continue;
+        kept += sift_layer(c, t, i, end, from + count + kept, &layer_sure);
+        *sure = *sure && layer_sure;
+    }
+    return kept;
+}
+
+static double least_radius(const area_cut *c, uint64_t from, uint64_t count)
+{
+    double least = INFINITY;
+    for (uint64_t i = from; i < from + count; i++)
+        least = fmin(least, c->ball[i].radius);
+    return least;
+}
+
+/* --- sums --- */
+
+static void area_cut_add(ebpo_paint_area *to, double area, bool certain, bool valued)
+{
+    to->lo += certain ? area : 0;
+    to->value += valued ? area : 0;
+    to->hi += area;
+}
+
+/* A layer's part of a small or decided triangle. */
+typedef struct verdict {
+    bool painted, unpainted; /* may be so */
+    uint32_t at_centre;      /* the stroke that has the middle; UINT32_MAX: none */
+    uint32_t colour;         /* of what may be painted, the first; */
+    bool one_colour;         /* and the only one */
+} verdict;
+
+static bool area_cut_paints(const area_cut *c, uint32_t stroke)
+{
+    return c->keys->p->stroke[stroke].kind == EBPO_PAINT_PAINTS;
+}
+
+/* Looks at a layer's balls [from, end), each stroke in turn. */
+static verdict judge_layer(const area_cut *c, const triangle *t, const double centre[3],
+                           uint64_t from, uint64_t end)
+{
+    verdict v = { .at_centre = UINT32_MAX, .one_colour = true, .unpainted = true };
+    bool first = true;
+    for (uint64_t i = from; i < end; i++) {
+        const area_ball *b = &c->ball[i];
+        uint32_t colour = c->keys->colour[b->stroke];
+        if (v.at_centre == UINT32_MAX && ebpo_ball_holds(b->centre, b->radius * b->radius, centre))
+            v.at_centre = b->stroke;
+        if (area_cut_paints(c, b->stroke)) {
+            v.one_colour = v.one_colour && (first || v.colour == colour);
+            v.colour = first ? colour : v.colour;
+            v.painted = true;
+            first = false;
+        }
+    }
+    if (end > from && area_cut_holds(&c->ball[end - 1], t)) { /* the last one leaves nothing over */
+        v.unpainted = false;
+        for (uint64_t i = from; i < end; i++)
+            v.unpainted = v.unpainted || !area_cut_paints(c, c->ball[i].stroke);
+    }
+    return v;
+}
+
+static void add_layer(area_cut *c, const triangle *t, const verdict *v, uint64_t from, uint64_t end)
+{
+    ebpo_paint_area *strokes = c->area, *colours = strokes + c->keys->p->stroke_count,
+                    *layers = colours + c->keys->colours;
+    bool certain = v->painted && !v->unpainted,
+         valued = v->at_centre != UINT32_MAX && area_cut_paints(c, v->at_centre);
+    if (!v->painted)
+        return;
+    area_cut_add(&layers[c->ball[from].layer], t->area, certain, valued);
+    c->part++;
+    for (uint64_t i = from; i < end; i++) {
+        uint32_t stroke = c->ball[i].stroke, colour = c->keys->colour[stroke];
+        bool again = i > from && c->ball[i - 1].stroke == stroke;
+        if (again || !area_cut_paints(c, stroke))
+            continue;
+        area_cut_add(&strokes[stroke], t->area,
+                     certain && c->ball[from].stroke == stroke && c->ball[end - 1].stroke == stroke,
+                     v->at_centre == stroke);
+        if (c->seen[colour] == c->part)
+            continue;
+        c->seen[colour] = c->part;
+        area_cut_add(&colours[colour], t->area, certain && v->one_colour,
+                     valued && c->keys->colour[v->at_centre] == colour);
+    }
+}
+
+static void area_cut_account(area_cut *c, const triangle *t, uint64_t from, uint64_t count)
+{
+    double centre[3];
+    bool may = false, certain = false, valued = false;
+    for (int i = 0; i < 3; i++)
+        centre[i] = (t->p[0][i] + t->p[1][i] + t->p[2][i]) / 3;
+    for (uint64_t i = from, end; i < from + count; i = end) {
+        for (end = i; end < from + count && c->ball[end].layer == c->ball[i].layer; end++)
+            continue;
+        verdict v = judge_layer(c, t, (const double *)centre, i, end);
+        may = may || v.painted;
+        certain = certain || (v.painted && !v.unpainted);
+        valued = valued || (v.at_centre != UINT32_MAX && area_cut_paints(c, v.at_centre));
+        add_layer(c, t, &v, i, end);
+    }
+    if (may)
+        area_cut_add(&c->area[area_key_count(c->keys) - 1], t->area, certain, valued);
+}
+
+/* --- cutting --- */
+
+static double longest_edge(const triangle *t, int *which)
+{
+    double longest = -1;
+    for (int k = 0; k < 3; k++) {
+        double square = square_of_edge(t->p[k], t->p[(k + 1) % 3]);
+        if (square > longest) {
+            longest = square;
+            *which = k;
+        }
+    }
+    return sqrt(longest);
+}
+
+/* The middle of an edge; false: it is one of its ends, as doubles are no finer. */
+static bool find_middle(const double a[3], const double b[3], double middle[3])
+{
+    for (int i = 0; i < 3; i++)
+        middle[i] = a[i] + (b[i] - a[i]) / 2;
+    return memcmp(middle, a, 3 * sizeof *a) != 0 && memcmp(middle, b, 3 * sizeof *b) != 0;
+}
+
+/* Balls are at [from, from + count); deeper parts use what is behind. */
+static bool area_cut_cut(area_cut *c, const triangle *t, uint64_t from, uint64_t count, int depth)
+{
+    bool sure;
+    int edge = 0;
+    if (!ebpo_grow(&c->ball, &c->ball_capacity, from + 2 * count, sizeof *c->ball))
+        return false;
+    uint64_t kept = area_cut_sift(c, t, from, count, &sure), at = from + count;
+    if (kept == 0)
+        return true;
+    double longest = longest_edge(t, &edge), middle[3];
+    const double *a = t->p[edge], *b = t->p[(edge + 1) % 3];
+    if (sure || depth == DEEPEST || longest * c->fineness <= least_radius(c, at, kept) ||
+        !find_middle(a, b, middle)) {
+        area_cut_account(c, t, at, kept);
+        return true;
+    }
+    triangle half = *t;
+    half.area = t->area / 2;
+    memcpy(half.p[edge], middle, sizeof middle);
+    if (!area_cut_cut(c, &half, at, kept, depth + 1))
+        return false;
+    memcpy(half.p[edge], a, sizeof middle);
+    memcpy(half.p[(edge + 1) % 3], middle, sizeof middle);
+    return area_cut_cut(c, &half, at, kept, depth + 1);
+}
+
+/* Adds a face whose `count` balls stand at cut->ball, by layer, within a layer the last stroke
+ * first. False: no memory. */
+static bool area_cut_face(area_cut *c, const double corner[3][3], uint64_t count)
+{
+    triangle t;
+    memcpy(t.p, corner, sizeof t.p);
+    t.area = area_of(corner);
+    return t.area > 0 ? area_cut_cut(c, &t, 0, count, 0) : true;
+}
+
+/* --- the model --- */
 
 enum { PIECES_MOST = 64, SUMS_MOST = 1 << 22, FINENESS_MOST = 1 << 16 };
 
@@ -29,7 +326,7 @@ typedef struct measure {
     hit *hit;
     uint64_t hit_count, hit_capacity, elsewhere;
     uint64_t *first; /* [met.count + 1] of a face's hits */
-    ebpo_area_keys keys;
+    area_keys keys;
     ebpo_paint_colour_area *colour; /* [keys.colours] */
     uint64_t pieces;
     ebpo_paint_area *sum; /* [pieces][keys] */
@@ -145,7 +442,7 @@ static ebpo_status find_colours(measure *m, ebpo_error *error)
 
 /* --- areas --- */
 
-static bool measure_face(measure *m, ebpo_area_cut *cut, uint64_t face)
+static bool measure_face(measure *m, area_cut *cut, uint64_t face)
 {
     const ebpo_paint *p = m->p;
     uint64_t begin = m->first[face], count = m->first[face + 1] - begin;
@@ -154,35 +451,35 @@ static bool measure_face(measure *m, ebpo_area_cut *cut, uint64_t face)
     for (uint64_t i = 0; i < count; i++) {
         const hit *h = &m->hit[begin + i];
         const ebpo_paint_point *q = &p->point[h->point];
-        cut->ball[i] = (ebpo_area_ball){ { q->place[0], q->place[1], q->place[2] },
-                                         ebpo_paint_radius(&p->stroke[h->stroke], q),
-                                         h->layer,
-                                         h->stroke };
+        cut->ball[i] = (area_ball){ { q->place[0], q->place[1], q->place[2] },
+                                    ebpo_paint_radius(&p->stroke[h->stroke], q),
+                                    h->layer,
+                                    h->stroke };
     }
-    return ebpo_area_cut_face(cut, (const double(*)[3])m->met.face[face].corner, count);
+    return area_cut_face(cut, (const double(*)[3])m->met.face[face].corner, count);
 }
 
 static ebpo_status measure_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
     measure *m = context;
-    ebpo_area_cut cut;
-    uint64_t faces = m->met.count, keys = ebpo_area_key_count(&m->keys);
+    area_cut cut;
+    uint64_t faces = m->met.count, keys = area_key_count(&m->keys);
     (void)worker;
-    bool fine = ebpo_area_cut_begin(&cut, &m->keys, m->options->fineness);
+    bool fine = area_cut_begin(&cut, &m->keys, m->options->fineness);
     for (uint64_t piece = begin; piece < end && fine; piece++) {
         cut.area = m->sum + piece * keys;
         for (uint64_t f = faces * piece / m->pieces; f < faces * (piece + 1) / m->pieces && fine;
              f++)
             fine = measure_face(m, &cut, f);
     }
-    ebpo_area_cut_end(&cut);
+    area_cut_end(&cut);
     return fine ? EBPO_OK : ebpo_fail_memory(error, cut.ball_capacity * sizeof *cut.ball);
 }
 
 static ebpo_status measure_all(measure *m, ebpo_error *error)
 {
-    uint64_t keys = ebpo_area_key_count(&m->keys);
+    uint64_t keys = area_key_count(&m->keys);
     m->pieces = SUMS_MOST / keys;
     m->pieces = m->pieces < 1 ? 1 : m->pieces > PIECES_MOST ? PIECES_MOST : m->pieces;
     m->sum = ebpo_alloc_zero(m->pieces * keys, sizeof *m->sum);
@@ -211,7 +508,7 @@ static ebpo_paint_area *copy_areas(const ebpo_paint_area *from, uint64_t count)
     return to;
 }
 
-static ebpo_status give(measure *m, ebpo_paint_areas *out, ebpo_error *error)
+static ebpo_status measure_give(measure *m, ebpo_paint_areas *out, ebpo_error *error)
 {
     const ebpo_paint_area *strokes = m->sum, *colours = strokes + m->p->stroke_count,
                           *layers = colours + m->keys.colours;
@@ -270,7 +567,7 @@ ebpo_status ebpo_paint_measure(const ebpo_paint *p, ebpo_context *context,
     if (status == EBPO_OK)
         status = measure_all(&m, error);
     if (status == EBPO_OK)
-        status = give(&m, out, error);
+        status = measure_give(&m, out, error);
     ebpo_met_faces_free(&m.met);
     free(m.hit);
     free(m.first);

@@ -1,25 +1,102 @@
-/* Reading paint files, which are anybody's: format-spec/paint.md. */
+/* Reads paint files, and has the table of their arrays.
+ *
+ * A paint file is untrusted input, read by the strict reader of HDF5 headers (lib/hdf5_read)
+ * without libhdf5. Every count is compared with its limit and with the file's size before memory
+ * is taken; every number is checked for its range, and texts for UTF-8 without control characters.
+ *
+ * The table of arrays says for each column its path, its element type, and the member of a stroke
+ * or a point that it holds; paint_save.c writes by the same table.
+ *
+ * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
-
-#include <ebpo/paint.h>
 
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include <ebpo/paint.h>
+
 #include "core/alloc.h"
+#include "core/checksum.h"
 #include "core/endian.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/checksum.h"
+#include "extras/paint/paint_open.h"
 #include "hdf5_read/head.h"
 #include "io/byte_source.h"
 #include "io/file_source.h"
-#include "extras/paint/paint_columns.h"
+
+#define OF_STROKES(path, element, cols, member)                                    \
+    {                                                                              \
+        "/strokes/" path, element, cols, false, offsetof(ebpo_stroke_held, member) \
+    }
+#define OF_POINTS(path, element, cols, member)                                   \
+    {                                                                            \
+        "/points/" path, element, cols, true, offsetof(ebpo_paint_point, member) \
+    }
+
+const ebpo_paint_column ebpo_paint_columns[EBPO_PAINT_COLUMNS] = {
+    OF_STROKES("layer", 4, 0, layer),      OF_STROKES("kind", 4, 0, kind),
+    OF_STROKES("colour", 1, 4, rgba),      OF_STROKES("radius", 8, 0, radius),
+    OF_STROKES("time", 8, 0, time),        OF_STROKES("points", 4, 0, count),
+    OF_POINTS("face", 4, 0, face),         OF_POINTS("weights", 4, 2, weight),
+    OF_POINTS("place", 8, 3, place),       OF_POINTS("size", 2, 0, size),
+    OF_POINTS("pressure", 2, 0, pressure), OF_POINTS("time", 4, 0, time),
+};
+
+ebpo_shape ebpo_paint_column_shape(const ebpo_paint_column *c, uint64_t rows)
+{
+    return (ebpo_shape){ .rows = rows,
+                         .cols = c->cols,
+                         .chunk_rows = (uint32_t)rows,
+                         .element_size = c->element,
+                         .pipeline = EBPO_PIPELINE_CHECKSUM };
+}
+
+/* The member in a row. */
+static uint8_t *member_of(const ebpo_paint *p, const ebpo_paint_column *c, uint64_t row)
+{
+    uint8_t *rows = c->of_points ? (uint8_t *)p->point : (uint8_t *)p->stroke;
+    return rows + row * (c->of_points ? sizeof *p->point : sizeof *p->stroke) + c->offset;
+}
+
+static void take_value(const uint8_t *from, unsigned bytes, uint8_t *to)
+{
+    const uint16_t two = bytes == 2 ? ebpo_load16(from) : 0;
+    const uint32_t four = bytes == 4 ? ebpo_load32(from) : 0;
+    const uint64_t eight = bytes == 8 ? ebpo_load64(from) : 0;
+    memcpy(to,
+           bytes == 1   ? (const void *)from
+           : bytes == 2 ? (const void *)&two
+           : bytes == 4 ? (const void *)&four
+                        : (const void *)&eight,
+           bytes);
+}
+
+static unsigned values_of(const ebpo_paint_column *c) { return c->cols ? c->cols : 1; }
+
+/* Between members and the bytes of a file: rows one behind the other. */
+static void take_column(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t *bytes)
+{
+    for (uint64_t row = 0; row < ebpo_paint_column_rows(p, c); row++)
+        for (unsigned k = 0; k < values_of(c); k++, bytes += c->element)
+            take_value(bytes, c->element, member_of(p, c, row) + k * c->element);
+}
+
+/* Turning bytes around is its own inverse. */
+void ebpo_paint_column_give(const ebpo_paint *p, const ebpo_paint_column *c, uint8_t *bytes)
+{
+    for (uint64_t row = 0; row < ebpo_paint_column_rows(p, c); row++)
+        for (unsigned k = 0; k < values_of(c); k++, bytes += c->element)
+            take_value(member_of(p, c, row) + k * c->element, c->element, bytes);
+}
+
+/* --- reading --- */
 
 typedef struct reader {
     ebpo_head head;
@@ -29,7 +106,8 @@ typedef struct reader {
     char text[EBPO_PAINT_TEXT_MOST + 1];
 } reader;
 
-static ebpo_status wrong(const reader *r, const char *path, const char *what, ebpo_error *error)
+static ebpo_status open_wrong(const reader *r, const char *path, const char *what,
+                              ebpo_error *error)
 {
     return ebpo_fail_at(error, EBPO_E_FORMAT, r->input.shown, path, -1,
                         "%s; get a fresh copy of the file", what);
@@ -37,11 +115,12 @@ static ebpo_status wrong(const reader *r, const char *path, const char *what, eb
 
 /* --- attributes --- */
 
-static ebpo_status missing(const reader *r, const char *path, const char *name, ebpo_error *error)
+static ebpo_status open_missing(const reader *r, const char *path, const char *name,
+                                ebpo_error *error)
 {
     char what[80];
     snprintf(what, sizeof what, "attribute %s is missing", name);
-    return wrong(r, path, what, error);
+    return open_wrong(r, path, what, error);
 }
 
 /* A text of less than `size` bytes. */
@@ -50,7 +129,7 @@ static ebpo_status get_text(reader *r, ebpo_head_object object, const char *path
 {
     ebpo_status status = ebpo_head_get_text(&r->head, object, path, name, out, size, error);
     if (status == EBPO_E_ABSENT)
-        status = required ? missing(r, path, name, error) : EBPO_OK;
+        status = required ? open_missing(r, path, name, error) : EBPO_OK;
     return status;
 }
 
@@ -60,15 +139,15 @@ static ebpo_status get_count(reader *r, ebpo_head_object object, const char *pat
     char what[96];
     ebpo_status status = ebpo_head_get_count(&r->head, object, path, name, out, error);
     if (status == EBPO_E_ABSENT)
-        return missing(r, path, name, error);
+        return open_missing(r, path, name, error);
     if (status != EBPO_OK || *out <= most)
         return status;
     snprintf(what, sizeof what, "attribute %s is above %" PRIu64, name, most);
-    return wrong(r, path, what, error);
+    return open_wrong(r, path, what, error);
 }
 
 /* What the file is, before all else. */
-static ebpo_status judge(reader *r, ebpo_head_object root, ebpo_error *error)
+static ebpo_status open_judge(reader *r, ebpo_head_object root, ebpo_error *error)
 {
     char format[64];
     int64_t major = 0, minor = 0;
@@ -83,14 +162,14 @@ static ebpo_status judge(reader *r, ebpo_head_object root, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_head_get_int(&r->head, root, "/", "format_version_minor", &minor, error);
     if (status == EBPO_E_ABSENT)
-        return missing(r, "/", "format_version", error);
+        return open_missing(r, "/", "format_version", error);
     if (status == EBPO_OK && major != EBPO_PAINT_FORMAT_MAJOR)
         return ebpo_fail_file(error, EBPO_E_VERSION, r->input.shown,
                               "the paint file has version %" PRId64 " of its format, and this "
                               "program reads version %d; get a later program",
                               major, EBPO_PAINT_FORMAT_MAJOR);
     if (status == EBPO_OK && (minor < 0 || minor > EBPO_PAINT_MINOR_MOST))
-        return wrong(r, "/", "attribute format_version_minor is out of range", error);
+        return open_wrong(r, "/", "attribute format_version_minor is out of range", error);
     return status;
 }
 
@@ -109,7 +188,7 @@ static ebpo_status read_names(reader *r, ebpo_head_object root, ebpo_error *erro
         status = get_text(r, root, "/", "model_sha256", true, p->model_sha256,
                           sizeof p->model_sha256, error);
     if (status == EBPO_OK && !is_digest(p->model_sha256))
-        return wrong(r, "/", "attribute model_sha256 is not 64 digits 0-9 a-f", error);
+        return open_wrong(r, "/", "attribute model_sha256 is not 64 digits 0-9 a-f", error);
     if (status == EBPO_OK)
         status =
             get_text(r, root, "/", "model_name", false, p->model_name, sizeof p->model_name, error);
@@ -122,7 +201,7 @@ static ebpo_status read_names(reader *r, ebpo_head_object root, ebpo_error *erro
     p->source_numbers = strcmp(numbers, "source") == 0;
     return p->source_numbers || strcmp(numbers, "file") == 0
                ? EBPO_OK
-               : wrong(r, "/", "attribute face_numbers is neither 'source' nor 'file'", error);
+               : open_wrong(r, "/", "attribute face_numbers is neither 'source' nor 'file'", error);
 }
 
 static ebpo_status read_texts(reader *r, ebpo_head_object group, const char *path,
@@ -136,8 +215,8 @@ static ebpo_status read_texts(reader *r, ebpo_head_object group, const char *pat
             return status;
         r->text_bytes += strlen(r->text);
         if (r->text_bytes > r->input.source.size)
-            return wrong(r, path, "there is more text than the file has bytes: groups share it",
-                         error);
+            return open_wrong(r, path,
+                              "there is more text than the file has bytes: groups share it", error);
         char *copy = strdup(r->text);
         if (!copy)
             return ebpo_fail_memory(error, strlen(r->text));
@@ -178,7 +257,7 @@ static ebpo_status read_note_place(reader *r, ebpo_head_object group, const char
     if (status == EBPO_OK)
         status = ebpo_head_get_real(&r->head, group, path, "place", n->at.place, 3, error);
     if (status == EBPO_E_ABSENT)
-        return missing(r, path, "weights or place", error);
+        return open_missing(r, path, "weights or place", error);
     if (status != EBPO_OK)
         return status;
     n->at.face = (uint32_t)face;
@@ -186,11 +265,12 @@ static ebpo_status read_note_place(reader *r, ebpo_head_object group, const char
     for (int i = 0; i < 2; i++) {
         if (!(weights[i] >= 0 && weights[i] <= EBPO_PAINT_WEIGHTS) ||
             (double)(uint32_t)weights[i] != weights[i])
-            return wrong(r, path, "attribute weights is not whole numbers of 0 to 2^30", error);
+            return open_wrong(r, path, "attribute weights is not whole numbers of 0 to 2^30",
+                              error);
         n->at.weight[i] = (uint32_t)weights[i];
     }
     const char *what = ebpo_paint_point_wrong(&n->at);
-    return what ? wrong(r, path, what, error) : EBPO_OK;
+    return what ? open_wrong(r, path, what, error) : EBPO_OK;
 }
 
 static ebpo_status read_note(reader *r, uint64_t number, ebpo_error *error)
@@ -205,7 +285,7 @@ static ebpo_status read_note(reader *r, uint64_t number, ebpo_error *error)
     if (status == EBPO_OK)
         status = get_count(r, group, path, "layer", EBPO_PAINT_LAYERS, &n->layer, error);
     if (status == EBPO_OK && n->layer >= r->p->layer_count)
-        return wrong(r, path, "attribute layer names a layer that there is not", error);
+        return open_wrong(r, path, "attribute layer names a layer that there is not", error);
     return status == EBPO_OK ? read_note_place(r, group, path, n, error) : status;
 }
 
@@ -254,11 +334,12 @@ static ebpo_status find_column(reader *r, const ebpo_paint_column *c, uint64_t r
         *place = chunks[0];
     free(chunks);
     if (!same)
-        return wrong(r, c->path,
-                     "the array has not the type, shape and filter that the format fixes", error);
+        return open_wrong(r, c->path,
+                          "the array has not the type, shape and filter that the format fixes",
+                          error);
     return place->bytes == rows * ebpo_shape_row_bytes(&expected) + 4
                ? EBPO_OK
-               : wrong(r, c->path, "the chunk has not as many bytes as its rows", error);
+               : open_wrong(r, c->path, "the chunk has not as many bytes as its rows", error);
 }
 
 static ebpo_status read_column(reader *r, const ebpo_paint_column *c, ebpo_error *error)
@@ -277,9 +358,9 @@ static ebpo_status read_column(reader *r, const ebpo_paint_column *c, ebpo_error
     size_t count = place.bytes - 4;
     if (status == EBPO_OK &&
         ebpo_sum_differs(ebpo_load32(bytes + count), ebpo_fletcher32(bytes, count)))
-        status = wrong(r, c->path, "the chunk is damaged: its checksum differs", error);
+        status = open_wrong(r, c->path, "the chunk is damaged: its checksum differs", error);
     if (status == EBPO_OK)
-        ebpo_paint_column_take(r->p, c, bytes);
+        take_column(r->p, c, bytes);
     free(bytes);
     return status;
 }
@@ -291,17 +372,17 @@ static ebpo_status check_strokes(reader *r, ebpo_error *error)
     for (uint64_t i = 0; i < p->stroke_count; i++) {
         const char *what = ebpo_paint_stroke_wrong(&p->stroke[i], p->layer_count);
         if (what)
-            return wrong(r, "/strokes", what, error);
+            return open_wrong(r, "/strokes", what, error);
         p->stroke[i].first = sum;
         sum += p->stroke[i].count;
     }
     if (sum != p->point_count)
-        return wrong(r, "/strokes/points", "the strokes have not as many points as there are",
-                     error);
+        return open_wrong(r, "/strokes/points", "the strokes have not as many points as there are",
+                          error);
     for (uint64_t i = 0; i < p->point_count; i++) {
         const char *what = ebpo_paint_point_wrong(&p->point[i]);
         if (what)
-            return wrong(r, "/points", what, error);
+            return open_wrong(r, "/points", what, error);
     }
     return EBPO_OK;
 }
@@ -338,7 +419,7 @@ static ebpo_status read_all(reader *r, ebpo_error *error)
     uint64_t layers = 0, notes = 0, strokes = 0, points = 0;
     ebpo_status status = ebpo_head_open_group(&r->head, "/", &root, error);
     if (status == EBPO_OK)
-        status = judge(r, root, error);
+        status = open_judge(r, root, error);
     if (status == EBPO_OK)
         status = read_names(r, root, error);
     if (status == EBPO_OK)

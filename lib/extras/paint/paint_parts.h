@@ -1,4 +1,4 @@
-/* Inside lib/extras/paint: what a paint holds. */
+/* What a paint holds. */
 #ifndef EBPO_PAINT_PAINT_PARTS_H
 #define EBPO_PAINT_PAINT_PARTS_H
 
@@ -91,7 +91,6 @@ const char *ebpo_paint_stroke_wrong(const ebpo_stroke_held *stroke, uint64_t lay
 
 /* Empty texts for a layer or a note. False: no memory. */
 bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS]);
-void ebpo_paint_texts_free(char *text[EBPO_PAINT_TEXTS]);
 
 /* An empty paint, without a file. NULL: no memory. */
 ebpo_paint *ebpo_paint_begin(void);

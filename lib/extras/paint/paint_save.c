@@ -1,4 +1,10 @@
-/* Writing paint files: format-spec/paint.md. */
+/* Writes paint files by the table of paint_open.c.
+ *
+ * A file is written to a temporary one and published when it is complete. The file that a paint
+ * belongs to is replaced only while it is the version that the paint was read from or last saved
+ * as, so that a change by another program is not lost.
+ *
+ * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
 
 #include <ebpo/paint.h>
@@ -16,7 +22,7 @@
 #include "hdf5_write/h5.h"
 #include "io/file_source.h"
 #include "io/publish.h"
-#include "extras/paint/paint_columns.h"
+#include "extras/paint/paint_open.h"
 
 static ebpo_status put_root(ebpo_h5_out *out, const ebpo_paint *p, ebpo_error *error)
 {
@@ -172,7 +178,7 @@ static void take_version(ebpo_paint_file *f, char *path, int fd)
     f->version = ebpo_file_version_of(fd);
 }
 
-static ebpo_status save(const ebpo_paint *p, const char *path, ebpo_error *error)
+static ebpo_status paint_save_save(const ebpo_paint *p, const char *path, ebpo_error *error)
 {
     enum { LINKS = 4 };
     ebpo_paint_file *f = p->file;
@@ -214,7 +220,7 @@ static ebpo_status save(const ebpo_paint *p, const char *path, ebpo_error *error
 ebpo_status ebpo_paint_save(const ebpo_paint *p, const char *path, ebpo_error *error)
 {
     pthread_mutex_lock(&p->file->mutex);
-    ebpo_status status = save(p, path, error);
+    ebpo_status status = paint_save_save(p, path, error);
     pthread_mutex_unlock(&p->file->mutex);
     return status;
 }

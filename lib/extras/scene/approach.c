@@ -1,5 +1,14 @@
-/* When instances first come near each other: between two looks nothing is missed, for the way that
- * both can go in the time between is shorter than what is between them. */
+/* Searches along the routes of pairs of instances: the first time at which a pair comes within its
+ * clearance, and the least distance of a pair over an interval of time.
+ *
+ * Both rest on one bound: the distance of two instances changes by no more than the two move. The
+ * first search goes from look to look, so that in between the motion is shorter than the gap to
+ * the clearance and no contact is missed. The second one keeps parts of the interval in a heap by
+ * the least distance that each allows, and halves the first until the result is within the
+ * tolerance. Jumps of routes are ends of parts. A result is a pair of certain bounds; a search
+ * that needs too many looks returns what it knows.
+ *
+ * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -8,24 +17,21 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/parallel.h"
-#include "extras/scene/left_out.h"
-#include "extras/scene/pair_looks.h"
+#include "core/sort.h"
+#include "extras/scene/instance_pair.h"
 
 typedef struct travel {
     const ebpo_scene *scene;
     ebpo_scene_way_options how;
     double from, to;
-    scene_pairs_list list;
-    ebpo_scene_way *ways;
 } travel;
 
 /* The next time to look: until then the way is shorter than `gap`; w->time where there is none. */
-static ebpo_status next_look(const travel *t, const scene_looks *looks, const ebpo_scene_way *w,
-                             double gap, double *next, ebpo_error *error)
+static ebpo_status next_look(const travel *t, const ebpo_scene_looks *looks,
+                             const ebpo_scene_way *w, double gap, double *next, ebpo_error *error)
 {
     double low = w->time, high = t->to, at = high, length = 0;
-    ebpo_status status = scene_looks_motion(looks, low, at, &length, error);
+    ebpo_status status = ebpo_scene_looks_motion(looks, low, at, &length, error);
     if (status != EBPO_OK || length < gap) {
         *next = at;
         return status;
@@ -33,7 +39,7 @@ static ebpo_status next_look(const travel *t, const scene_looks *looks, const eb
     /* halved until it fits, then a little longer again */
     for (int n = 0; n < 70 && status == EBPO_OK && (low == w->time || n < 8); n++) {
         at = low + (high - low) / 2;
-        status = scene_looks_motion(looks, w->time, at, &length, error);
+        status = ebpo_scene_looks_motion(looks, w->time, at, &length, error);
         if (length < gap)
             low = at;
         else
@@ -45,11 +51,11 @@ static ebpo_status next_look(const travel *t, const scene_looks *looks, const eb
 
 /* Past a jump. *next stays where nothing jumps: there rounding alone may be longer than the gap,
  * however short the time. */
-static ebpo_status jump(const scene_looks *looks, const ebpo_scene_way *w, double *next,
-                        ebpo_error *error)
+static ebpo_status approach_jump(const ebpo_scene_looks *looks, const ebpo_scene_way *w,
+                                 double *next, ebpo_error *error)
 {
     double length, at = nextafter(w->time, INFINITY);
-    ebpo_status status = scene_looks_motion(looks, w->time, at, &length, error);
+    ebpo_status status = ebpo_scene_looks_motion(looks, w->time, at, &length, error);
     if (status == EBPO_OK && length == INFINITY)
         *next = at;
     return status;
@@ -57,23 +63,25 @@ static ebpo_status jump(const scene_looks *looks, const ebpo_scene_way *w, doubl
 
 static bool is_reached(const travel *t, const ebpo_scene_way *w)
 {
-    return scene_is_within(w->hi, w->clearance, t->how.tolerance);
+    return ebpo_scene_is_within(w->hi, w->clearance, t->how.tolerance);
 }
 
-static ebpo_status look(const travel *t, scene_looks *looks, ebpo_scene_way *w, ebpo_error *error)
+static ebpo_status approach_look(const travel *t, ebpo_scene_looks *looks, ebpo_scene_way *w,
+                                 ebpo_error *error)
 {
-    ebpo_status status = scene_look(looks, w->time, &w->lo, &w->hi, error);
+    ebpo_status status = ebpo_scene_look(looks, w->time, &w->lo, &w->hi, error);
     w->looks++;
     if (status != EBPO_OK || is_reached(t, w) || looks->gap > w->clearance)
         return status;
-    return scene_lacks(t->scene, looks->pair, looks->lacking, w->time, false, error);
+    return ebpo_scene_lacks(t->scene, looks->pair, looks->lacking, w->time, false, error);
 }
 
-static ebpo_status go(const travel *t, scene_looks *looks, ebpo_scene_way *w, ebpo_error *error)
+static ebpo_status approach_go(const travel *t, ebpo_scene_looks *looks, ebpo_scene_way *w,
+                               ebpo_error *error)
 {
     for (;;) {
         double next;
-        ebpo_status status = look(t, looks, w, error);
+        ebpo_status status = approach_look(t, looks, w, error);
         if (status != EBPO_OK)
             return status;
         w->reached = is_reached(t, w);
@@ -81,7 +89,7 @@ static ebpo_status go(const travel *t, scene_looks *looks, ebpo_scene_way *w, eb
             return EBPO_OK;
         status = next_look(t, looks, w, w->lo - w->clearance, &next, error);
         if (status == EBPO_OK && !(next > w->time))
-            status = jump(looks, w, &next, error);
+            status = approach_jump(looks, w, &next, error);
         if (status != EBPO_OK)
             return status;
         if (w->looks >= t->how.most_looks || !(next > w->time)) {
@@ -92,23 +100,19 @@ static ebpo_status go(const travel *t, scene_looks *looks, ebpo_scene_way *w, eb
     }
 }
 
-static ebpo_status go_pairs(void *context, uint64_t begin, uint64_t end, unsigned worker,
+static ebpo_status find_way(const void *how, const ebpo_scene_pair *pair, void *result,
                             ebpo_error *error)
 {
-    const travel *t = context;
-    ebpo_status status = EBPO_OK;
-    (void)worker;
-    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        const ebpo_scene_pair *pair = &t->list.pairs[i];
-        scene_looks looks;
-        t->ways[i] = (ebpo_scene_way){
-            .a = pair->a, .b = pair->b, .time = t->from, .clearance = pair->clearance
-        };
-        status = scene_looks_begin(&looks, t->scene, pair, t->how.tolerance, error);
-        if (status == EBPO_OK)
-            status = go(t, &looks, &t->ways[i], error);
-        ebpo_collider_free(looks.collider);
-    }
+    const travel *t = how;
+    ebpo_scene_way *way = result;
+    ebpo_scene_looks looks;
+    *way = (ebpo_scene_way){
+        .a = pair->a, .b = pair->b, .time = t->from, .clearance = pair->clearance
+    };
+    ebpo_status status = ebpo_scene_looks_begin(&looks, t->scene, pair, t->how.tolerance, error);
+    if (status == EBPO_OK)
+        status = approach_go(t, &looks, way, error);
+    ebpo_collider_free(looks.collider);
     return status;
 }
 
@@ -118,18 +122,198 @@ ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
 {
     EBPO_DEFAULT_FP;
     travel t = { .scene = scene, .how = EBPO_SCENE_WAY_OPTIONS_INIT, .from = from, .to = to };
-    ebpo_status status = scene_take_way_options(&t.how, options, error);
+    void *ways = NULL;
+    uint64_t count = 0;
+    ebpo_status status = ebpo_scene_take_way_options(&t.how, options, error);
+    ebpo_scene_search search = {
+        find_way, &t, sizeof(ebpo_scene_way), 1, t.how.threads, &t.how.progress, "following routes"
+    };
     if (status == EBPO_OK)
-        status = scene_list_pairs(scene, from, to, &t.list, error);
-    t.ways = ebpo_alloc(t.list.count, sizeof *t.ways);
-    if (status == EBPO_OK && !t.ways)
-        status = ebpo_fail_memory(error, t.list.count * sizeof *t.ways);
+        status = ebpo_scene_find_in_pairs(scene, from, to, &search, &ways, &count, error);
+    if (status == EBPO_OK && count)
+        (void)take(user, ways, count);
+    free(ways);
+    return status;
+}
+
+/* --- the least distance --- */
+
+typedef struct least_search {
+    const ebpo_scene *scene;
+    double from, to, tolerance;
+    uint64_t most_looks;
+} least_search;
+
+/* A part of the time, without a jump within. */
+typedef struct part {
+    double from, to;
+    double at_from, at_to; /* lower bounds of the distance there */
+    double motion;         /* how far both go at most */
+    double least;          /* a lower bound of the distance in it */
+} part;
+
+typedef struct part_search {
+    ebpo_scene_looks looks;
+    ebpo_scene_least *out;
+    double limit; /* the least that was seen of what files lack: no better bound can be had */
+    EBPO_SCENE_LIST(part, parts); /* a heap: the one with the least `least` first */
+} part_search;
+
+/* --- parts --- */
+
+static bool is_less(const part *a, const part *b) { return a->least < b->least; }
+
+EBPO_HEAP(heap, part, is_less)
+
+static ebpo_status put_part(part_search *s, const part *p, ebpo_error *error)
+{
+    uint64_t count = s->parts_count;
+    if (!ebpo_grow(&s->parts, &s->parts_capacity, count + 1, sizeof *s->parts))
+        return ebpo_fail_memory(error, (count + 1) * sizeof *s->parts);
+    heap_add(s->parts, s->parts_count++, p);
+    return EBPO_OK;
+}
+
+/* --- looking --- */
+
+static ebpo_status least_distance_look(part_search *s, double time, double *lo, ebpo_error *error)
+{
+    double hi;
+    ebpo_status status = ebpo_scene_look(&s->looks, time, lo, &hi, error);
+    s->out->looks++;
+    if (status == EBPO_OK && s->looks.gap < hi)
+        s->limit = fmin(s->limit, *lo);
+    if (status == EBPO_OK && hi < s->out->hi) {
+        s->out->hi = hi;
+        s->out->time = time;
+    }
+    return status;
+}
+
+/* Between its ends it can be nearer by half of what is left of the way. */
+static ebpo_status add_part(part_search *s, part p, ebpo_error *error)
+{
+    ebpo_status status = ebpo_scene_looks_motion(&s->looks, p.from, p.to, &p.motion, error);
+    if (status != EBPO_OK)
+        return status;
+    p.least = fmin(fmin(p.at_from, p.at_to), (p.at_from + p.at_to - p.motion) / 2);
+    p.least = p.least > 0 ? p.least * (1 - 0x1p-50) : 0;
+    return put_part(s, &p, error);
+}
+
+static ebpo_status least_distance_halve(part_search *s, const part *p, double middle,
+                                        ebpo_error *error)
+{
+    double at_middle;
+    ebpo_status status = least_distance_look(s, middle, &at_middle, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(ebpo_thread_count(t.how.threads), NULL, t.list.count, 1,
-                                   go_pairs, &t, &t.how.progress, "following routes", error);
-    if (status == EBPO_OK && t.list.count)
-        (void)take(user, t.ways, t.list.count);
-    free(t.list.pairs);
-    free(t.ways);
+        status = add_part(s, (part){ p->from, middle, p->at_from, at_middle, 0, 0 }, error);
+    return status == EBPO_OK
+               ? add_part(s, (part){ middle, p->to, at_middle, p->at_to, 0, 0 }, error)
+               : status;
+}
+
+/* Routes may jump at keys; what rides together does not. */
+static double next_jump(const part_search *s, double from, double to)
+{
+    return s->looks.rides ? to : ebpo_scene_pair_next(s->looks.scene, s->looks.pair, from, to);
+}
+
+/* From key to key, so that routes jump between parts only. */
+static ebpo_status begin_parts(part_search *s, double from, double to, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (double at = from; status == EBPO_OK;) {
+        double next = next_jump(s, at, to), end = next > at ? nextafter(next, -INFINITY) : at;
+        part p = { .from = at, .to = end };
+        status = least_distance_look(s, at, &p.at_from, error);
+        p.at_to = p.at_from;
+        if (status == EBPO_OK && end > at)
+            status = least_distance_look(s, end, &p.at_to, error);
+        if (status == EBPO_OK)
+            status = add_part(s, p, error);
+        if (!(next > at))
+            break;
+        at = next;
+    }
+    return status;
+}
+
+/* Whether the least part tells enough, or all that can be found out. */
+static bool is_done(const part_search *s, const part *p, double middle, const least_search *how)
+{
+    double hi = s->out->hi, open = hi - s->limit; /* below 0: nothing that is lacking matters */
+    return ebpo_scene_is_within(hi, p->least, how->tolerance) || s->limit - p->least <= open / 8 ||
+           s->out->looks >= how->most_looks || p->motion <= how->tolerance / 8 ||
+           !(middle > p->from && middle < p->to);
+}
+
+/* What rounding may do stays, however short the part is: nearly all of its motion then. */
+static ebpo_status is_rounding(const part_search *s, const part *p, bool *out, ebpo_error *error)
+{
+    double least = 0;
+    ebpo_status status =
+        ebpo_scene_looks_motion(&s->looks, p->from, nextafter(p->from, INFINITY), &least, error);
+    *out = p->motion <= 2 * least;
+    return status;
+}
+
+static ebpo_status least_distance_narrow(part_search *s, const least_search *how, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    while (status == EBPO_OK) {
+        part p = heap_take(s->parts, s->parts_count--);
+        double middle = p.from + (p.to - p.from) / 2;
+        s->out->lo = fmin(p.least, s->out->hi);
+        bool done = is_done(s, &p, middle, how);
+        if (!done)
+            status = is_rounding(s, &p, &done, error);
+        if (done)
+            break;
+        if (status == EBPO_OK)
+            status = least_distance_halve(s, &p, middle, error);
+    }
+    return status;
+}
+
+static ebpo_status find_least(const void *context, const ebpo_scene_pair *pair, void *result,
+                              ebpo_error *error)
+{
+    const least_search *how = context;
+    ebpo_scene_least *out = result;
+    part_search s = { .limit = INFINITY, .out = out };
+    *out = (ebpo_scene_least){
+        .a = pair->a, .b = pair->b, .time = how->from, .hi = INFINITY, .clearance = pair->clearance
+    };
+    ebpo_status status = ebpo_scene_looks_begin(&s.looks, how->scene, pair, how->tolerance, error);
+    if (status == EBPO_OK)
+        status = begin_parts(&s, how->from, how->to, error);
+    if (status == EBPO_OK)
+        status = least_distance_narrow(&s, how, error);
+    ebpo_collider_free(s.looks.collider);
+    free(s.parts);
+    return status;
+}
+
+ebpo_status ebpo_scene_least_distances(ebpo_scene *scene, double from, double to,
+                                       const ebpo_scene_way_options *options,
+                                       ebpo_scene_least_fn take, void *user, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    least_search s = { .scene = scene, .from = from, .to = to };
+    ebpo_scene_way_options how = EBPO_SCENE_WAY_OPTIONS_INIT;
+    void *found = NULL;
+    uint64_t count = 0;
+    ebpo_status status = ebpo_scene_take_way_options(&how, options, error);
+    s.tolerance = how.tolerance;
+    s.most_looks = how.most_looks;
+    ebpo_scene_search search = {
+        find_least, &s, sizeof(ebpo_scene_least), 1, how.threads, &how.progress, "following routes"
+    };
+    if (status == EBPO_OK)
+        status = ebpo_scene_find_in_pairs(scene, from, to, &search, &found, &count, error);
+    if (status == EBPO_OK && count)
+        (void)take(user, found, count);
+    free(found);
     return status;
 }

@@ -1,28 +1,162 @@
-/* Members of a scene file, by jansson. */
+/* Reads members of a scene file, of which every error names the line, the path of the value and
+ * what was expected.
+ *
+ * A scene file is untrusted input. Before jansson parses the text, one pass counts its values and
+ * its depth against the limits, so that parsing takes bounded memory. jansson keeps no positions:
+ * a line is found by a second pass over the text, which follows the path of the member.
+ *
+ * A reader keeps that path: ebpo_json_enter and ebpo_json_leave bracket the evaluation of a value.
+ * Unknown members are errors, except private ones, whose names begin with "x-".
+ *
+ * Source: format-spec/scene.md. */
 #include "core/strict_fp.h"
-
-#include "extras/scene/json_reader.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "core/error.h"
+#include "core/text.h"
+#include "extras/scene/json_reader.h"
+#include "extras/scene/scene_parts.h"
 
-void json_enter(json_reader *r, const char *key, uint64_t item)
+size_t ebpo_scene_text_mark(const char *text, size_t size)
 {
-    r->path[r->depth++] = (scene_at){ key, item };
+    return (size_t)ebpo_text_mark(text, size);
 }
 
-void json_leave(json_reader *r) { r->depth--; }
+/* Behind the string that begins at text[i], or `size`. */
+static size_t skip_string(const char *text, size_t size, size_t i)
+{
+    for (i++; i < size && text[i] != '"'; i++)
+        i += text[i] == '\\';
+    return i + 1 < size ? i + 1 : size;
+}
+
+ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t most_values,
+                                 ebpo_error *error)
+{
+    uint64_t values = 1, depth = 0;
+    for (size_t i = 0; i < size;) {
+        char c = text[i];
+        i = c == '"' ? skip_string(text, size, i) : i + 1;
+        bool opens = c == '{' || c == '[';
+        values += opens || c == ',' || c == ':';
+        if (opens && ++depth > EBPO_SCENE_DEPTH)
+            return ebpo_fail(error, EBPO_E_LIMIT, "byte %zu: more than %d levels of brackets", i,
+                             EBPO_SCENE_DEPTH);
+        depth -= (c == '}' || c == ']') && depth > 0;
+        if (values > most_values)
+            return ebpo_fail(error, EBPO_E_LIMIT,
+                             "byte %zu: more than %llu values, the limit that was given", i,
+                             (unsigned long long)most_values);
+    }
+    return EBPO_OK;
+}
+
+/* A place in valid JSON, and the lines before it. */
+typedef struct cursor {
+    const char *at;
+    uint64_t line;
+} cursor;
+
+static void json_text_blanks(cursor *c)
+{
+    for (; *c->at && strchr(" \t\r\n", *c->at); c->at++)
+        c->line += *c->at == '\n';
+}
+
+static void json_text_string(cursor *c)
+{
+    for (c->at++; *c->at && *c->at != '"'; c->at++)
+        c->at += *c->at == '\\' && c->at[1];
+    c->at += *c->at == '"';
+}
+
+/* Over a value, and blanks before it. */
+static void json_text_value(cursor *c)
+{
+    int depth = 0;
+    do {
+        json_text_blanks(c);
+        char first = *c->at;
+        if (first == '"') {
+            json_text_string(c);
+        } else if (first == '{' || first == '[') {
+            depth++;
+            c->at++;
+        } else if (first == '}' || first == ']') {
+            depth--;
+            c->at++;
+        } else if (first == ',' || first == ':') {
+            c->at++;
+        } else {
+            c->at += strcspn(c->at, " \t\r\n,:]}[{\"");
+        }
+        json_text_blanks(c);
+    } while (*c->at && depth > 0);
+}
+
+static bool key_is(const cursor *c, const char *key)
+{
+    size_t size = strlen(key);
+    return *c->at == '"' && strncmp(c->at + 1, key, size) == 0 && c->at[1 + size] == '"';
+}
+
+/* From the bracket that `c` is at to the value in it that `at` names. */
+static bool json_text_enter(cursor *c, const ebpo_scene_at *at)
+{
+    bool object = *c->at == '{';
+    uint64_t item = 0;
+    for (c->at++; json_text_blanks(c), *c->at && *c->at != '}' && *c->at != ']'; item++) {
+        bool found = object ? at->key && key_is(c, at->key) : !at->key && item == at->item;
+        if (object) {
+            json_text_string(c);
+            json_text_blanks(c);
+            c->at += *c->at == ':';
+        }
+        json_text_blanks(c);
+        if (found)
+            return true;
+        json_text_value(c);
+        json_text_blanks(c);
+        c->at += *c->at == ',';
+    }
+    return false;
+}
+
+/* The line, from 1, on which the value at path[count] begins in text that is valid JSON; where that
+ * is not there, of the deepest one above it that is. */
+static uint64_t find_line(const char *text, const ebpo_scene_at *path, int count)
+{
+    cursor c = { text, 1 };
+    uint64_t line = 1;
+    json_text_blanks(&c);
+    line = c.line;
+    for (int i = 0; i < count && (*c.at == '{' || *c.at == '['); i++) {
+        if (!json_text_enter(&c, &path[i]))
+            break;
+        line = c.line;
+    }
+    return line;
+}
+
+/* --- members --- */
+
+void ebpo_json_enter(ebpo_json_reader *r, const char *key, uint64_t item)
+{
+    r->path[r->depth++] = (ebpo_scene_at){ key, item };
+}
+
+void ebpo_json_leave(ebpo_json_reader *r) { r->depth--; }
 
 /* "instances[3].pose": what fits. */
-static void show_path(const json_reader *r, char *out, size_t room)
+static void show_path(const ebpo_json_reader *r, char *out, size_t room)
 {
     size_t used = 0;
     out[0] = 0;
     for (int i = 0; i < r->depth && used < room; i++) {
-        const scene_at *at = &r->path[i];
+        const ebpo_scene_at *at = &r->path[i];
         int n = at->key ? snprintf(out + used, room - used, "%s%.60s", i ? "." : "", at->key)
                         : snprintf(out + used, room - used, "[%llu]", (unsigned long long)at->item);
         used += n > 0 ? (size_t)n : 0;
@@ -32,7 +166,7 @@ static void show_path(const json_reader *r, char *out, size_t room)
             *c = '?';
 }
 
-ebpo_status json_bad(json_reader *r, const char *format, ...)
+ebpo_status ebpo_json_bad(ebpo_json_reader *r, const char *format, ...)
 {
     char what[256], path[200];
     va_list args;
@@ -41,103 +175,104 @@ ebpo_status json_bad(json_reader *r, const char *format, ...)
     va_end(args);
     show_path(r, path, sizeof path);
     return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name, "line %llu: %s%s%s",
-                          (unsigned long long)scene_line_of(r->text, r->path, r->depth), path,
+                          (unsigned long long)find_line(r->text, r->path, r->depth), path,
                           *path ? ": " : "", what);
 }
 
-ebpo_status json_bad_at(json_reader *r, const char *key, const char *what)
+ebpo_status ebpo_json_bad_at(ebpo_json_reader *r, const char *key, const char *what)
 {
-    json_enter(r, key, 0);
-    ebpo_status status = json_bad(r, "%s", what);
-    json_leave(r);
+    ebpo_json_enter(r, key, 0);
+    ebpo_status status = ebpo_json_bad(r, "%s", what);
+    ebpo_json_leave(r);
     return status;
 }
 
-ebpo_status json_judge(json_reader *r, ebpo_status status, const ebpo_error *why)
+ebpo_status ebpo_json_judge(ebpo_json_reader *r, ebpo_status status, const ebpo_error *why)
 {
     if (status == EBPO_OK)
         return status;
-    return status == EBPO_E_ARGUMENT ? json_bad(r, "%.250s", why->message)
+    return status == EBPO_E_ARGUMENT ? ebpo_json_bad(r, "%.250s", why->message)
                                      : ebpo_fail_with(r->error, why);
 }
 
-ebpo_status json_members(json_reader *r, const json_t *value, const char *const *known)
+ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value, const char *const *known)
 {
     const char *key;
     json_t *member;
     if (!json_is_object(value))
-        return json_bad(r, "is not an object");
+        return ebpo_json_bad(r, "is not an object");
     json_object_foreach((json_t *)value, key, member)
     {
         const char *const *k = known;
         while (*k && strcmp(*k, key) != 0)
             k++;
         if (!*k && strncmp(key, "x-", 2) != 0)
-            return json_bad_at(r, key,
-                               "is not a member that this version knows; private ones begin "
-                               "with x-");
+            return ebpo_json_bad_at(r, key,
+                                    "is not a member that this version knows; private ones begin "
+                                    "with x-");
     }
     return EBPO_OK;
 }
 
-static ebpo_status missing(json_reader *r, const char *key, bool needed)
+static ebpo_status json_reader_missing(ebpo_json_reader *r, const char *key, bool needed)
 {
-    return needed ? json_bad(r, "has no member %s", key) : EBPO_OK;
+    return needed ? ebpo_json_bad(r, "has no member %s", key) : EBPO_OK;
 }
 
-ebpo_status json_get_text(json_reader *r, const json_t *object, const char *key, bool needed,
-                          const char **out)
+ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object, const char *key,
+                               bool needed, const char **out)
 {
     const json_t *value = json_object_get(object, key);
     if (!value)
-        return missing(r, key, needed);
+        return json_reader_missing(r, key, needed);
     if (!json_is_string(value))
-        return json_bad_at(r, key, "is not a text");
+        return ebpo_json_bad_at(r, key, "is not a text");
     *out = json_string_value(value);
     return EBPO_OK;
 }
 
-ebpo_status json_get_flag(json_reader *r, const json_t *object, const char *key, bool *out)
+ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object, const char *key,
+                               bool *out)
 {
     const json_t *value = json_object_get(object, key);
     if (!value)
         return EBPO_OK;
     if (!json_is_boolean(value))
-        return json_bad_at(r, key, "is neither true nor false");
+        return ebpo_json_bad_at(r, key, "is neither true nor false");
     *out = json_is_true(value);
     return EBPO_OK;
 }
 
-ebpo_status json_get_real(json_reader *r, const json_t *object, const char *key, bool needed,
-                          double *out)
+ebpo_status ebpo_json_get_real(ebpo_json_reader *r, const json_t *object, const char *key,
+                               bool needed, double *out)
 {
     const json_t *value = json_object_get(object, key);
     if (!value)
-        return missing(r, key, needed);
+        return json_reader_missing(r, key, needed);
     if (!json_is_number(value))
-        return json_bad_at(r, key, "is not a number");
+        return ebpo_json_bad_at(r, key, "is not a number");
     *out = json_number_value(value);
     return EBPO_OK;
 }
 
-ebpo_status json_get_reals(json_reader *r, const json_t *object, const char *key, bool needed,
-                           double *out, size_t count)
+ebpo_status ebpo_json_get_reals(ebpo_json_reader *r, const json_t *object, const char *key,
+                                bool needed, double *out, size_t count)
 {
     char what[64];
     const json_t *value = json_object_get(object, key);
     if (!value)
-        return missing(r, key, needed);
+        return json_reader_missing(r, key, needed);
     bool fits = json_is_array(value) && json_array_size(value) == count;
     for (size_t i = 0; i < count && fits; i++) {
         fits = json_is_number(json_array_get(value, i));
         out[i] = json_number_value(json_array_get(value, i));
     }
     snprintf(what, sizeof what, "is not an array of %zu numbers", count);
-    return fits ? EBPO_OK : json_bad_at(r, key, what);
+    return fits ? EBPO_OK : ebpo_json_bad_at(r, key, what);
 }
 
-ebpo_status json_each_member(json_reader *r, const json_t *object, const char *key,
-                             json_each_fn each)
+ebpo_status ebpo_json_each_member(ebpo_json_reader *r, const json_t *object, const char *key,
+                                  ebpo_json_each_fn each)
 {
     json_t *members = json_object_get(object, key), *value;
     const char *name;
@@ -145,34 +280,35 @@ ebpo_status json_each_member(json_reader *r, const json_t *object, const char *k
     if (!members)
         return status;
     if (!json_is_object(members))
-        return json_bad_at(r, key, "is not an object");
-    json_enter(r, key, 0);
+        return ebpo_json_bad_at(r, key, "is not an object");
+    ebpo_json_enter(r, key, 0);
     json_object_foreach(members, name, value)
     {
-        json_enter(r, name, 0);
+        ebpo_json_enter(r, name, 0);
         status = each(r, name, value);
-        json_leave(r);
+        ebpo_json_leave(r);
         if (status != EBPO_OK)
             break;
     }
-    json_leave(r);
+    ebpo_json_leave(r);
     return status;
 }
 
-ebpo_status json_each_item(json_reader *r, const json_t *object, const char *key, json_each_fn each)
+ebpo_status ebpo_json_each_item(ebpo_json_reader *r, const json_t *object, const char *key,
+                                ebpo_json_each_fn each)
 {
     const json_t *items = json_object_get(object, key);
     ebpo_status status = EBPO_OK;
     if (!items)
         return status;
     if (!json_is_array(items))
-        return json_bad_at(r, key, "is not an array");
-    json_enter(r, key, 0);
+        return ebpo_json_bad_at(r, key, "is not an array");
+    ebpo_json_enter(r, key, 0);
     for (size_t i = 0; i < json_array_size(items) && status == EBPO_OK; i++) {
-        json_enter(r, NULL, i);
+        ebpo_json_enter(r, NULL, i);
         status = each(r, NULL, json_array_get(items, i));
-        json_leave(r);
+        ebpo_json_leave(r);
     }
-    json_leave(r);
+    ebpo_json_leave(r);
     return status;
 }

@@ -1,23 +1,265 @@
-/* The narrow phase: which of the pairs that may meet do, exactly, on all cores. */
+/* The narrow phase of a scene: decides exactly which pairs of instances intersect at a time, and
+ * describes each contact.
+ *
+ * Pairs come from the broad phase (scene_pairs.c), and are evaluated on all cores. For each pair
+ * whose faces intersect it is reported which faces, where, how often and how deep; for the others,
+ * as far as the options ask, the relation of the solids and whether the clearance is kept. What a
+ * subset omits must not matter: where it may, the query fails with EBPO_E_ABSENT instead of
+ * guessing.
+ *
+ * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/collide.h>
+#include <ebpo/scene.h>
 
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/parallel.h"
-#include "extras/scene/asked_pairs.h"
-#include "extras/scene/left_out.h"
-#include "extras/scene/meeting_facts.h"
+#include "extras/collide/face_pairs.h"
+#include "extras/collide/pair_faces.h"
+#include "extras/scene/instance_pair.h"
+
+/* Two instances at their poses. */
+typedef struct scene_two {
+    const ebpo_scene_ask_options *how;
+    ebpo_collider *collider;
+    const ebpo_collide_options *options;
+    bool solid[2];
+} scene_two;
+
+/* Nothing that was asked for is known yet. */
+static void scene_forget_facts(ebpo_scene_meeting *m)
+{
+    static const ebpo_certain unknown = { 0, INFINITY, EBPO_FIGURE_BOUND, 0 };
+    m->face_a = m->face_b = EBPO_NO_FACE;
+    m->relation = EBPO_RELATION_OPEN;
+    for (int k = 0; k < 3; k++)
+        m->place[k] = m->place_min[k] = m->place_max[k] = NAN;
+    m->depth[0] = m->depth[1] = unknown;
+}
+
+/* Of NAN and a number the number. */
+static void meeting_facts_widen(ebpo_scene_meeting *m, const double p[3])
+{
+    for (int k = 0; k < 3; k++) {
+        m->place_min[k] = fmin(m->place_min[k], p[k]);
+        m->place_max[k] = fmax(m->place_max[k], p[k]);
+    }
+}
+
+static void set_place(ebpo_scene_meeting *m, const double place[3])
+{
+    memcpy(m->place, place, sizeof m->place);
+    meeting_facts_widen(m, place);
+}
+
+/* --- all pairs --- */
+
+/* Counts pairs of faces by kind, and keeps the first by numbers; only whether there is one that
+ * crosses, where that is enough. */
+typedef struct tally {
+    ebpo_scene_meeting *m;
+    ebpo_pair_faces *faces; /* to ask where; NULL: not asked */
+    ebpo_face_pair first;
+    bool enough;
+    ebpo_error *error; /* of `status` */
+    ebpo_status status;
+} tally;
+
+static bool comes_first(const ebpo_face_pair *p, const ebpo_face_pair *q)
+{
+    return p->face_a < q->face_a || (p->face_a == q->face_a && p->face_b < q->face_b);
+}
+
+static bool note_segment(tally *t, const ebpo_face_pair *pair)
+{
+    ebpo_posed_pair faces;
+    ebpo_contact_segment s;
+    t->status = ebpo_pose_pair(t->faces, pair, &faces, t->error);
+    if (t->status != EBPO_OK)
+        return false;
+    ebpo_contact_of(&faces, pair, &s);
+    meeting_facts_widen(t->m, s.point[0]);
+    meeting_facts_widen(t->m, s.point[1]);
+    return true;
+}
+
+static bool count_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    tally *t = user;
+    for (uint64_t i = 0; i < count; i++) {
+        t->m->touching += pairs[i].kind == EBPO_PAIR_TOUCHING;
+        t->m->crossing += pairs[i].kind == EBPO_PAIR_CROSSING;
+        t->m->coplanar += pairs[i].kind == EBPO_PAIR_COPLANAR;
+        if (t->enough && t->m->crossing)
+            return false;
+        if (!t->enough && comes_first(&pairs[i], &t->first))
+            t->first = pairs[i];
+        if (t->faces && pairs[i].kind == EBPO_PAIR_CROSSING && !note_segment(t, &pairs[i]))
+            return false;
+    }
+    return true;
+}
+
+static bool count_lines(void *user, const ebpo_polyline *line)
+{
+    (void)line;
+    ++*(uint64_t *)user;
+    return true;
+}
+
+/* More segments than the collider's memory holds are no failure of a report; what else fails is. */
+static ebpo_status tell_lines(const scene_two *two, ebpo_scene_meeting *m, ebpo_error *error)
+{
+    if (m->crossing > ebpo_contact_lines_most(two->collider)) {
+        m->contacts = UINT64_MAX;
+        return EBPO_OK;
+    }
+    return ebpo_collide_polylines(two->collider, two->options, count_lines, &m->contacts, error);
+}
+
+/* --- where --- */
+
+/* A point of both faces: an end of their common segment, or what their nearest features have. */
+static ebpo_status common_point(ebpo_pair_faces *of, const ebpo_face_pair *pair, double out[3],
+                                ebpo_error *error)
+{
+    ebpo_posed_pair faces;
+    ebpo_status status = ebpo_pose_pair(of, pair, &faces, error);
+    if (status != EBPO_OK)
+        return status;
+    const double(*a)[3] = (const double(*)[3])faces.corner[0];
+    const double(*b)[3] = (const double(*)[3])faces.corner[1];
+    if (pair->kind == EBPO_PAIR_CROSSING) {
+        ebpo_contact_end end[2];
+        ebpo_triangle_contact(a, b, end);
+        memcpy(out, end[0].point, sizeof end[0].point);
+    } else {
+        ebpo_pair_distance_bounds bounds;
+        ebpo_triangles_distance_bounds(a, b, &bounds);
+        memcpy(out, bounds.point[0], sizeof bounds.point[0]);
+    }
+    return EBPO_OK;
+}
+
+/* The distance of models that meet begins with their first contact, and tells a point of it: that
+ * takes no table of all faces. */
+static ebpo_status place_of_first(const scene_two *two, ebpo_scene_meeting *m, ebpo_error *error)
+{
+    ebpo_clearance found;
+    ebpo_status status = ebpo_collide_distance(two->collider, two->options, NULL, &found, error);
+    if (status == EBPO_OK)
+        set_place(m, found.point_a);
+    return status;
+}
+
+/* Faces, distance and place of the nearest pair. */
+static void scene_tell_nearest(const scene_two *two, const ebpo_clearance *nearest,
+                               ebpo_scene_meeting *m)
+{
+    double middle[3];
+    m->distance = nearest->distance.hi;
+    m->face_a = nearest->pair.face_a;
+    m->face_b = nearest->pair.face_b;
+    for (int k = 0; k < 3; k++)
+        middle[k] = nearest->point_a[k] / 2 + nearest->point_b[k] / 2;
+    if (two->how->places)
+        set_place(m, middle);
+}
+
+/* --- of faces that meet --- */
+
+/* `faces`: NULL, or to tell where. */
+static ebpo_status count_all(const scene_two *two, ebpo_pair_faces *faces,
+                             const ebpo_face_pair *first, ebpo_scene_meeting *m, ebpo_error *error)
+{
+    tally t = { m, faces, *first, false, error, EBPO_OK };
+    double place[3];
+    ebpo_status status = ebpo_collide_all(two->collider, two->options, count_faces, &t, error);
+    if (status == EBPO_OK)
+        status = t.status;
+    if (status != EBPO_OK)
+        return status;
+    m->face_a = t.first.face_a;
+    m->face_b = t.first.face_b;
+    if (faces)
+        status = common_point(faces, &t.first, place, error);
+    if (faces && status == EBPO_OK)
+        set_place(m, place);
+    return status == EBPO_OK && m->crossing ? tell_lines(two, m, error) : status;
+}
+
+static ebpo_status count_places(const scene_two *two, const ebpo_face_pair *first,
+                                ebpo_scene_meeting *m, ebpo_error *error)
+{
+    ebpo_collision question;
+    ebpo_pair_faces faces = { .question = &question };
+    ebpo_status status = ebpo_collision_begin(&question, two->collider, two->options, error);
+    if (status == EBPO_OK)
+        status = ebpo_pair_faces_begin(&faces, &question, error);
+    if (status == EBPO_OK)
+        status = count_all(two, &faces, first, m, error);
+    ebpo_pair_faces_end(&faces);
+    return status;
+}
+
+static ebpo_status find_kind(const scene_two *two, const ebpo_face_pair *first,
+                             ebpo_scene_meeting *m, ebpo_error *error)
+{
+    tally t = { m, NULL, *first, true, error, EBPO_OK };
+    m->crossing = first->kind == EBPO_PAIR_CROSSING;
+    return m->crossing ? EBPO_OK
+                       : ebpo_collide_all(two->collider, two->options, count_faces, &t, error);
+}
+
+/* `first`: as ebpo_collide_first gives it. Sets faces, numbers of pairs, contacts and place. */
+static ebpo_status scene_tell_contacts(const scene_two *two, const ebpo_face_pair *first,
+                                       ebpo_scene_meeting *m, ebpo_error *error)
+{
+    m->face_a = first->face_a;
+    m->face_b = first->face_b;
+    if (two->how->count)
+        return two->how->places ? count_places(two, first, m, error)
+                                : count_all(two, NULL, first, m, error);
+    ebpo_status status = find_kind(two, first, m, error);
+    return status == EBPO_OK && two->how->places ? place_of_first(two, m, error) : status;
+}
+
+/* Whether a point of one is inner to the other; else nothing is deep, and a search, at faces that
+ * lie on each other, would take long to find that out. */
+static bool is_any_inner(int32_t relation)
+{
+    return relation == EBPO_INTERSECTING || relation == EBPO_A_INSIDE_B ||
+           relation == EBPO_B_INSIDE_A;
+}
+
+/* What is inside which. */
+static ebpo_status scene_tell_depths(const scene_two *two, ebpo_scene_meeting *m, ebpo_error *error)
+{
+    static const ebpo_certain none = { 0, 0, EBPO_FIGURE_EXACT, 0 };
+    if (!(two->how->depth > 0))
+        return EBPO_OK;
+    if (is_any_inner(m->relation) && (two->solid[0] || two->solid[1]))
+        return ebpo_collide_depth(two->collider, two->options, two->how->depth,
+                                  two->solid[1] ? &m->depth[0] : NULL,
+                                  two->solid[0] ? &m->depth[1] : NULL, error);
+    for (int i = 0; i < 2; i++)
+        if (two->solid[!i])
+            m->depth[i] = none;
+    return EBPO_OK;
+}
+
+/* --- pairs of instances --- */
 
 typedef struct asking {
     const ebpo_scene *scene;
     ebpo_scene_ask_options how;
     double time;
-    scene_pairs_list list;
-    ebpo_scene_meeting *meetings;
 } asking;
 
 static ebpo_meeting_kind kind_of(const ebpo_scene_meeting *m)
@@ -96,9 +338,9 @@ static ebpo_status check_left_out(const asking *a, const ebpo_scene_pair *pair, 
 {
     double gap = INFINITY;
     uint64_t lacking = 0;
-    ebpo_status status = scene_left_out(a->scene, pair, a->time, &gap, &lacking, error);
+    ebpo_status status = ebpo_scene_left_out(a->scene, pair, a->time, &gap, &lacking, error);
     if (status == EBPO_OK && (!(gap > pair->clearance) || (a->how.relate && gap < INFINITY)))
-        status = scene_lacks(a->scene, pair, lacking, a->time, a->how.relate, error);
+        status = ebpo_scene_lacks(a->scene, pair, lacking, a->time, a->how.relate, error);
     return status;
 }
 
@@ -107,19 +349,20 @@ static bool is_solid(const ebpo_scene *scene, uint64_t instance)
     return ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].as.model))->solid;
 }
 
-static ebpo_status ask_pair(const asking *a, uint64_t n, ebpo_error *error)
+static ebpo_status ask_pair(const void *how, const ebpo_scene_pair *pair, void *result,
+                            ebpo_error *error)
 {
-    const ebpo_scene_pair *pair = &a->list.pairs[n];
-    ebpo_scene_meeting *m = &a->meetings[n];
+    const asking *a = how;
+    ebpo_scene_meeting *m = result;
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
     *m = (ebpo_scene_meeting){ .a = pair->a, .b = pair->b, .clearance = pair->clearance };
     scene_forget_facts(m);
-    ebpo_status status = scene_pose_pair(a->scene, pair, a->time, &options, error);
+    ebpo_status status = ebpo_scene_pose_pair(a->scene, pair, a->time, &options, error);
     if (status == EBPO_OK)
         status = check_left_out(a, pair, error);
     if (status == EBPO_OK)
-        status = scene_collider(a->scene, pair, 1, &collider, error);
+        status = ebpo_scene_collider(a->scene, pair, 1, &collider, error);
     scene_two two = {
         &a->how, collider, &options, { is_solid(a->scene, pair->a), is_solid(a->scene, pair->b) }
     };
@@ -129,24 +372,15 @@ static ebpo_status ask_pair(const asking *a, uint64_t n, ebpo_error *error)
     return status;
 }
 
-static ebpo_status ask_pairs(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                             ebpo_error *error)
-{
-    ebpo_status status = EBPO_OK;
-    (void)worker;
-    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
-        status = ask_pair(context, i, error);
-    return status;
-}
-
-static void give(asking *a, ebpo_scene_meetings_fn take, void *user)
+static void meetings_give(ebpo_scene_meeting *meetings, uint64_t count, ebpo_scene_meetings_fn take,
+                          void *user)
 {
     uint64_t kept = 0;
-    for (uint64_t i = 0; i < a->list.count; i++)
-        if (a->meetings[i].kind != EBPO_MEETING_NONE)
-            a->meetings[kept++] = a->meetings[i];
+    for (uint64_t i = 0; i < count; i++)
+        if (meetings[i].kind != EBPO_MEETING_NONE)
+            meetings[kept++] = meetings[i];
     if (kept)
-        (void)take(user, a->meetings, kept);
+        (void)take(user, meetings, kept);
 }
 
 ebpo_status ebpo_scene_meet(ebpo_scene *scene, double time, const ebpo_scene_ask_options *options,
@@ -155,24 +389,22 @@ ebpo_status ebpo_scene_meet(ebpo_scene *scene, double time, const ebpo_scene_ask
 {
     EBPO_DEFAULT_FP;
     asking a = { .scene = scene, .how = EBPO_SCENE_ASK_OPTIONS_INIT, .time = time };
+    void *meetings = NULL;
+    uint64_t count = 0;
     ebpo_status status = EBPO_TAKE(ebpo_scene_ask_options, &a.how, options, error);
     if (status == EBPO_OK && !(a.how.depth >= 0 && a.how.depth < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "depths within %g: is no length", a.how.depth);
     a.how.relate |= a.how.depth > 0;
+    ebpo_scene_search search = {
+        ask_pair, &a, sizeof(ebpo_scene_meeting), 4, a.how.threads, &a.how.progress, "asking pairs"
+    };
     if (status == EBPO_OK)
-        status = scene_list_pairs(scene, time, time, &a.list, error);
-    a.meetings = ebpo_alloc(a.list.count, sizeof *a.meetings);
-    if (status == EBPO_OK && !a.meetings)
-        status = ebpo_fail_memory(error, a.list.count * sizeof *a.meetings);
+        status = ebpo_scene_find_in_pairs(scene, time, time, &search, &meetings, &count, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(ebpo_thread_count(a.how.threads), NULL, a.list.count, 4,
-                                   ask_pairs, &a, &a.how.progress, "asking pairs", error);
-    if (status == EBPO_OK)
-        give(&a, take, user);
+        meetings_give(meetings, count, take, user);
     if (asked)
-        *asked = a.list.count;
-    free(a.list.pairs);
-    free(a.meetings);
+        *asked = count;
+    free(meetings);
     return status;
 }
 
@@ -184,13 +416,13 @@ ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_t a, uint64_t b, double
     ebpo_scene_pair pair = { a, b, 0 };
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
-    ebpo_status status = scene_pose_pair(scene, &pair, time, &options, error);
+    ebpo_status status = ebpo_scene_pose_pair(scene, &pair, time, &options, error);
     if (status == EBPO_OK)
-        status = scene_make_models(scene, &pair, 1, error);
+        status = ebpo_scene_make_models(scene, &pair, 1, error);
     if (status == EBPO_OK)
         status = check_left_out(&one, &pair, error);
     if (status == EBPO_OK)
-        status = scene_collider(scene, &pair, threads, &collider, error);
+        status = ebpo_scene_collider(scene, &pair, threads, &collider, error);
     if (status == EBPO_OK && collider)
         status = ebpo_collide_all(collider, &options, take, user, error);
     ebpo_collider_free(collider);

@@ -1,5 +1,12 @@
-/* Routes: where they are at a time, and how far what follows them can move. Sums, products,
- * quotients and square roots only: the same bits on every machine. */
+/* Routes: the pose at a time between keys, and bounds of how far points that follow a route move.
+ *
+ * A rotation is interpolated along the arc between two unit quaternions by halving it repeatedly.
+ * Only sums, products, quotients and square roots are used, so that a pose has the same bits on
+ * every machine.
+ *
+ * Bounds hold between two times without a key between them: the length of the motion, the
+ * deviation from a straight line, and the part of it that rounding alone makes. They are rounded
+ * upwards. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -8,7 +15,6 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "geometry/pose.h"
-#include "geometry/quaternion.h"
 #include "extras/scene/scene_parts.h"
 
 /* What rounding adds to lengths: of a few dozen operations, each 2^-53. */
@@ -16,7 +22,7 @@ static const double slack = 0x1p-44;
 /* Times beyond would have differences that are no numbers. */
 static const double most_time = 0x1p1000;
 
-void scene_turn_of_matrix(const double m[3][3], double turn[4])
+void ebpo_scene_turn_of_matrix(const double m[3][3], double turn[4])
 {
     double trace = m[0][0] + m[1][1] + m[2][2];
     int i = m[1][1] > m[0][0] ? 1 : 0;
@@ -35,7 +41,7 @@ void scene_turn_of_matrix(const double m[3][3], double turn[4])
     turn[3] = m[k][j] - m[j][k];
 }
 
-static bool fits(const scene_key *key)
+static bool route_fits(const ebpo_route_key *key)
 {
     static const double nowhere[3] = { 0, 0, 0 };
     ebpo_pose pose = EBPO_POSE_INIT;
@@ -46,10 +52,11 @@ static bool fits(const scene_key *key)
            ebpo_posing_make(&posing, &pose, nowhere, NULL) == EBPO_OK;
 }
 
-ebpo_status scene_add_key(scene_route *route, const scene_key *key, ebpo_error *error)
+ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *key,
+                               ebpo_error *error)
 {
-    scene_key k = *key;
-    if (!fits(&k))
+    ebpo_route_key k = *key;
+    if (!route_fits(&k))
         return ebpo_fail(
             error, EBPO_E_ARGUMENT,
             "a number is not finite, the time is beyond 2^1000, or the scale is not from "
@@ -66,7 +73,7 @@ ebpo_status scene_add_key(scene_route *route, const scene_key *key, ebpo_error *
 }
 
 /* The last key whose time is at most `time`; the first, if there is none. */
-static uint64_t key_at(const scene_route *route, double time)
+static uint64_t key_at(const ebpo_scene_route *route, double time)
 {
     uint64_t low = 0, high = route->count;
     while (high - low > 1) {
@@ -102,10 +109,10 @@ static void turn_between(const double from[4], const double to[4], double u, dou
     ebpo_quaternion_normalise(out);
 }
 
-void scene_route_at(const scene_route *route, double time, ebpo_pose *out)
+void ebpo_scene_route_at(const ebpo_scene_route *route, double time, ebpo_pose *out)
 {
     uint64_t n = key_at(route, time);
-    const scene_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
+    const ebpo_route_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
     *out = (ebpo_pose)EBPO_POSE_INIT;
     if (a == b || route->jumps || time <= a->time) {
         ebpo_quaternion_matrix(a->turn, out->rotation);
@@ -121,7 +128,7 @@ void scene_route_at(const scene_route *route, double time, ebpo_pose *out)
     out->scale = a->scale + u * (b->scale - a->scale);
 }
 
-void scene_compose(const ebpo_pose *outer, const ebpo_pose *inner, ebpo_pose *out)
+void ebpo_scene_compose(const ebpo_pose *outer, const ebpo_pose *inner, ebpo_pose *out)
 {
     ebpo_pose p;
     for (int i = 0; i < 3; i++) {
@@ -136,7 +143,7 @@ void scene_compose(const ebpo_pose *outer, const ebpo_pose *inner, ebpo_pose *ou
     *out = p;
 }
 
-double scene_route_next(const scene_route *route, double from, double to)
+double ebpo_scene_route_next(const ebpo_scene_route *route, double from, double to)
 {
     uint64_t n = key_at(route, from);
     if (from < route->keys[0].time)
@@ -165,7 +172,7 @@ static double angle_between(const double a[4], const double b[4])
     return 4 * (sum + term) * (1 + slack); /* what is left is below its first term / (1 - 1/2) */
 }
 
-double scene_length_above(const double way[3])
+double ebpo_scene_length_above(const double way[3])
 {
     double most = fmax(fmax(fabs(way[0]), fabs(way[1])), fabs(way[2])), sum = 0;
     if (!(most > 0 && most < INFINITY))
@@ -175,13 +182,14 @@ double scene_length_above(const double way[3])
     return sqrt(sum) * (1 + slack) * most;
 }
 
-scene_step scene_route_step(const scene_route *route, double from, double to, scene_reach reach)
+ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from, double to,
+                                      ebpo_scene_reach reach)
 {
     uint64_t n = key_at(route, from);
-    const scene_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
+    const ebpo_route_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
     double part = a == b ? 0 : (to - fmax(from, a->time)) / (b->time - a->time);
     if (!(part > 0) || from < a->time || route->jumps)
-        return (scene_step){ 0, 0 };
+        return (ebpo_scene_step){ 0, 0 };
     part = part * (1 + slack) + slack;
     double way[3], size = 0;
     for (int k = 0; k < 3; k++) {
@@ -192,8 +200,9 @@ scene_step scene_route_step(const scene_route *route, double from, double to, sc
     double grows = fabs(b->scale - a->scale);
     double turned = angle * part, grown = grows * part;
     double rounding = slack * (size + (reach.length + reach.size) * scale);
-    return (scene_step){
-        (scene_length_above(way) * part + reach.length * (scale * turned + grown)) * (1 + slack) +
+    return (ebpo_scene_step){
+        (ebpo_scene_length_above(way) * part + reach.length * (scale * turned + grown)) *
+                (1 + slack) +
             rounding,
         reach.length / 8 * (scale * turned * turned + 2 * grown * turned) * (1 + slack) + rounding,
     };
@@ -215,10 +224,11 @@ static void grow_to(growing *g, double scale, const double translation[3])
     g->size = fmax(g->size, size);
 }
 
-double scene_route_growth(const scene_route *route, double from, double to, scene_reach reach)
+double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, double to,
+                               ebpo_scene_reach reach)
 {
     ebpo_pose at;
-    scene_route_at(route, from, &at);
+    ebpo_scene_route_at(route, from, &at);
     growing g = { .scale = at.scale };
     grow_to(&g, at.scale, at.translation);
     for (uint64_t n = key_at(route, from) + 1; n < route->count; n++) {
@@ -226,13 +236,13 @@ double scene_route_growth(const scene_route *route, double from, double to, scen
             break;
         grow_to(&g, route->keys[n].scale, route->keys[n].translation);
     }
-    scene_route_at(route, to, &at);
+    ebpo_scene_route_at(route, to, &at);
     grow_to(&g, at.scale, at.translation);
     return reach.length * g.grown * (1 + slack) +
            slack * (2 * g.size + (reach.length + reach.size) * g.most);
 }
 
-double scene_route_rounding(const scene_route *route, scene_reach reach)
+double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_reach reach)
 {
     growing g = { .scale = 0 };
     for (uint64_t n = 0; n < route->count; n++)

@@ -1,46 +1,401 @@
-/* A scene from its file (format-spec/scene.md). */
+/* Reads a scene from its file: models, instances, layers, groups, cameras, rules and routes, and
+ * the CSV files of poses that routes name.
+ *
+ * A scene file is untrusted input: each member is checked for its type and range, names must be
+ * unique, and other files may be named only as the options allow (scene_make.c). A file of poses
+ * has a first line that names its columns time, x, y, z, qx, qy, qz, qw and scale in any order;
+ * the bytes of all such files are limited. Numbers are read in the C locale.
+ *
+ * Source: format-spec/scene.md. */
 #include "core/strict_fp.h"
 
+#include <locale.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/error.h"
-#include "io/file_source.h"
 #include "extras/scene/json_reader.h"
-#include "extras/scene/json_routes.h"
+#include "extras/scene/scene_parts.h"
+#include "geometry/decimal.h"
+#include "geometry/pose.h"
+#include "io/file_source.h"
 
-/* ---- names ---- */
+enum { COLUMNS = 9, NEEDED = 8, FIELDS_MOST = 64 };
+static const char *const columns[COLUMNS] = {
+    "time", "x", "y", "z", "qx", "qy", "qz", "qw", "scale"
+};
 
-static ebpo_status read_name(json_reader *r, const json_t *value, const char **name)
+typedef struct lines {
+    const char *at, *end, *name;
+    uint64_t line;
+    int field[COLUMNS]; /* where each column stands; -1: not there */
+    int fields;
+    locale_t c_locale;
+} lines;
+
+typedef struct csv_text {
+    const char *at;
+    size_t size;
+} csv_text;
+
+static csv_text csv_trimmed(const char *from, const char *to)
+{
+    while (from < to && strchr(" \t\r", *from))
+        from++;
+    while (to > from && strchr(" \t\r", to[-1]))
+        to--;
+    return (csv_text){ from, (size_t)(to - from) };
+}
+
+/* The next line that is not empty. */
+static bool next_line(lines *l, csv_text *out)
+{
+    while (l->at < l->end) {
+        const char *end = memchr(l->at, '\n', (size_t)(l->end - l->at));
+        end = end ? end : l->end;
+        *out = csv_trimmed(l->at, end);
+        l->at = end < l->end ? end + 1 : end;
+        l->line++;
+        if (out->size)
+            return true;
+    }
+    return false;
+}
+
+/* Commas or semicolons part fields; -1: too many. */
+static int csv_split(csv_text line, csv_text field[FIELDS_MOST])
+{
+    int count = 0;
+    const char *at = line.at, *end = line.at + line.size;
+    for (;;) {
+        const char *stop = at;
+        while (stop < end && *stop != ',' && *stop != ';')
+            stop++;
+        if (count == FIELDS_MOST)
+            return -1;
+        field[count++] = csv_trimmed(at, stop);
+        if (stop == end)
+            return count;
+        at = stop + 1;
+    }
+}
+
+static ebpo_status csv_bad(const lines *l, const char *what, ebpo_error *error)
+{
+    return ebpo_fail_file(error, EBPO_E_FORMAT, l->name, "line %llu: %s",
+                          (unsigned long long)l->line, what);
+}
+
+static ebpo_status read_header(lines *l, ebpo_error *error)
+{
+    csv_text line, field[FIELDS_MOST];
+    for (int k = 0; k < COLUMNS; k++)
+        l->field[k] = -1;
+    if (!next_line(l, &line))
+        return csv_bad(l, "there are no poses", error);
+    l->fields = csv_split(line, field);
+    for (int i = 0; i < l->fields; i++) {
+        int k = 0;
+        while (k < COLUMNS && (strlen(columns[k]) != field[i].size ||
+                               memcmp(columns[k], field[i].at, field[i].size) != 0))
+            k++;
+        if (k == COLUMNS || l->field[k] >= 0)
+            return csv_bad(l, "each column is one of time, x, y, z, qx, qy, qz, qw, scale", error);
+        l->field[k] = i;
+    }
+    for (int k = 0; k < NEEDED; k++)
+        if (l->field[k] < 0)
+            return csv_bad(l, "the first line names columns time, x, y, z, qx, qy, qz, qw", error);
+    return EBPO_OK;
+}
+
+static ebpo_status read_row(lines *l, csv_text line, ebpo_scene_route *route, ebpo_error *error)
+{
+    csv_text field[FIELDS_MOST];
+    double v[COLUMNS] = { [8] = 1 };
+    if (csv_split(line, field) != l->fields)
+        return csv_bad(l, "there are not as many numbers as columns", error);
+    for (int k = 0; k < COLUMNS; k++)
+        if (l->field[k] >= 0 &&
+            !ebpo_number_double(&v[k], field[l->field[k]].at, field[l->field[k]].size, l->c_locale))
+            return csv_bad(l, "this is not a number in each column", error);
+    ebpo_route_key key = {
+        v[0],
+        { v[4], v[5], v[6], v[7] },
+        { v[1], v[2], v[3] },
+        v[8],
+    };
+    ebpo_error why = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_scene_add_key(route, &key, &why);
+    return status == EBPO_E_ARGUMENT ? csv_bad(l, why.message, error)
+           : status != EBPO_OK       ? ebpo_fail_with(error, &why)
+                                     : EBPO_OK;
+}
+
+static ebpo_status read_rows(lines *l, ebpo_scene_route *route, ebpo_error *error)
+{
+    csv_text line;
+    ebpo_status status = read_header(l, error);
+    while (status == EBPO_OK && next_line(l, &line))
+        status = read_row(l, line, route, error);
+    if (status == EBPO_OK && !route->count)
+        status = csv_bad(l, "there are no poses", error);
+    return status;
+}
+
+static ebpo_status read_text(const ebpo_whole_file *file, ebpo_scene_route *route, const char *path,
+                             ebpo_error *error)
+{
+    lines l = { (const char *)file->data,
+                (const char *)file->data + file->size,
+                path,
+                0,
+                { 0 },
+                0,
+                newlocale(LC_ALL_MASK, "C", (locale_t)0) };
+    ebpo_status status;
+    const char *foreign = ebpo_foreign_bytes(file->data, file->size);
+    l.at += ebpo_scene_text_mark(l.at, file->size);
+    if (foreign)
+        status = ebpo_fail_file(error, EBPO_E_FORMAT, path, "%s", foreign);
+    else if (!l.c_locale)
+        status = ebpo_fail_memory(error, 1);
+    else
+        status = read_rows(&l, route, error);
+    if (l.c_locale)
+        freelocale(l.c_locale);
+    return status;
+}
+
+/* Adds a file of poses to a route. *left: bytes that may still be read. */
+static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint64_t *left,
+                                 ebpo_error *error)
+{
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
+    ebpo_status status = ebpo_whole_file_open(&file, path, error);
+    if (status == EBPO_OK && file.size > *left)
+        status = ebpo_fail_file(error, EBPO_E_LIMIT, path,
+                                "files of poses have more bytes than the limit that was given");
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
+    if (status == EBPO_OK)
+        status = read_text(&file, route, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_unchanged(&file, path, error);
+    if (status == EBPO_OK)
+        *left -= file.size;
+    ebpo_whole_file_close(&file);
+    return status;
+}
+
+/* --- poses and routes --- */
+
+/* A pose whose rotation may be given as a matrix, or as a quaternion x, y, z, w of any length. */
+typedef struct read_pose {
+    ebpo_pose pose;
+    double turn[4];
+    bool has_turn;
+} read_pose;
+
+static ebpo_status pose_members(ebpo_json_reader *r, const json_t *value, read_pose *out)
+{
+    static const char *const known[] = { "translation", "rotation", "quaternion", "scale", NULL };
+    ebpo_pose *p = &out->pose;
+    ebpo_status status = ebpo_json_members(r, value, known);
+    if (status == EBPO_OK)
+        status = ebpo_json_get_reals(r, value, "translation", false, p->translation, 3);
+    if (status == EBPO_OK)
+        status = ebpo_json_get_reals(r, value, "rotation", false, &p->rotation[0][0], 9);
+    if (status == EBPO_OK)
+        status = ebpo_json_get_reals(r, value, "quaternion", false, out->turn, 4);
+    if (status == EBPO_OK)
+        status = ebpo_json_get_real(r, value, "scale", false, &p->scale);
+    out->has_turn = json_object_get(value, "quaternion") != NULL;
+    if (status == EBPO_OK && out->has_turn && json_object_get(value, "rotation"))
+        return ebpo_json_bad(r, "has both rotation and quaternion");
+    return status;
+}
+
+/* As a key, whose quaternion has a length of 1. */
+static ebpo_status key_of(ebpo_json_reader *r, const read_pose *p, double time,
+                          ebpo_scene_route *route)
+{
+    static const double nowhere[3] = { 0, 0, 0 };
+    ebpo_error why = EBPO_ERROR_INIT;
+    ebpo_posing posing;
+    ebpo_route_key key = { .time = time, .scale = p->pose.scale };
+    memcpy(key.translation, p->pose.translation, sizeof key.translation);
+    memcpy(key.turn, p->turn, sizeof key.turn);
+    if (!p->has_turn) {
+        ebpo_status status = ebpo_posing_make(&posing, &p->pose, nowhere, &why);
+        if (status != EBPO_OK)
+            return ebpo_json_judge(r, status, &why);
+        ebpo_scene_turn_of_matrix(p->pose.rotation, key.turn);
+    }
+    return ebpo_json_judge(r, ebpo_scene_add_key(route, &key, &why), &why);
+}
+
+/* *out stays where the member is missing. */
+static ebpo_status json_read_pose(ebpo_json_reader *r, const json_t *object, const char *key,
+                                  ebpo_pose *out)
+{
+    const json_t *value = json_object_get(object, key);
+    if (!value)
+        return EBPO_OK;
+    read_pose p = { .pose = EBPO_POSE_INIT };
+    ebpo_scene_route alone = { 0 };
+    ebpo_json_enter(r, key, 0);
+    ebpo_status status = pose_members(r, value, &p);
+    if (status == EBPO_OK && p.has_turn) {
+        status = key_of(r, &p, 0, &alone);
+        if (status == EBPO_OK)
+            ebpo_scene_route_at(&alone, 0, &p.pose);
+        free(alone.keys);
+    }
+    ebpo_json_leave(r);
+    *out = p.pose; /* of a matrix: judged with the instance */
+    return status;
+}
+
+static ebpo_scene_route *last_route(ebpo_json_reader *r)
+{
+    return &r->scene->routes[r->scene->routes_count - 1];
+}
+
+static ebpo_status read_key(ebpo_json_reader *r, const char *name, const json_t *value)
+{
+    static const char *const known[] = { "time", "pose", NULL };
+    (void)name;
+    double time = 0;
+    read_pose p = { .pose = EBPO_POSE_INIT };
+    ebpo_status status = ebpo_json_members(r, value, known);
+    if (status == EBPO_OK)
+        status = ebpo_json_get_real(r, value, "time", true, &time);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_json_enter(r, "pose", 0);
+    status = pose_members(r, json_object_get(value, "pose"), &p);
+    ebpo_json_leave(r);
+    return status == EBPO_OK ? key_of(r, &p, time, last_route(r)) : status;
+}
+
+static ebpo_status read_poses(ebpo_json_reader *r, const json_t *value)
+{
+    double begin = 0, step = 0;
+    const json_t *poses = json_object_get(value, "poses");
+    ebpo_status status = ebpo_json_get_real(r, value, "begin", false, &begin);
+    if (status == EBPO_OK)
+        status = ebpo_json_get_real(r, value, "step", true, &step);
+    if (status != EBPO_OK)
+        return status;
+    if (!json_is_array(poses))
+        return ebpo_json_bad_at(r, "poses", "is not an array");
+    ebpo_json_enter(r, "poses", 0);
+    for (size_t i = 0; i < json_array_size(poses) && status == EBPO_OK; i++) {
+        read_pose p = { .pose = EBPO_POSE_INIT };
+        ebpo_json_enter(r, NULL, i);
+        status = pose_members(r, json_array_get(poses, i), &p);
+        if (status == EBPO_OK)
+            status = key_of(r, &p, begin + step * (double)i, last_route(r));
+        ebpo_json_leave(r);
+    }
+    ebpo_json_leave(r);
+    return status;
+}
+
+static ebpo_status read_csv(ebpo_json_reader *r, const json_t *value)
+{
+    const char *path = NULL;
+    ebpo_status status = ebpo_json_get_text(r, value, "csv", true, &path);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_scene_options here = *r->options;
+    here.remote = false;
+    const char *refused = ebpo_scene_path_refused(path, &here, false);
+    if (refused)
+        return ebpo_json_bad_at(r, "csv", refused);
+    char *joined = ebpo_scene_join_path(r->scene->folder, path);
+    status = joined ? EBPO_OK : ebpo_fail_memory(r->error, strlen(path));
+    if (status == EBPO_OK && !here.outside)
+        status = ebpo_scene_stays_within(r->scene->folder, joined, r->error);
+    if (status == EBPO_OK)
+        status = read_csv_file(last_route(r), joined, &r->pose_bytes, r->error);
+    free(joined);
+    return status;
+}
+
+static ebpo_status read_between(ebpo_json_reader *r, const json_t *value)
+{
+    const char *between = "even";
+    ebpo_status status = ebpo_json_get_text(r, value, "between", false, &between);
+    if (status != EBPO_OK)
+        return status;
+    last_route(r)->jumps = strcmp(between, "jump") == 0;
+    return last_route(r)->jumps || strcmp(between, "even") == 0
+               ? EBPO_OK
+               : ebpo_json_bad_at(r, "between", "is neither even nor jump");
+}
+
+/* For ebpo_json_each_member. */
+static ebpo_status json_read_route(ebpo_json_reader *r, const char *name, const json_t *value)
+{
+    static const char *const known[] = { "keys", "poses", "begin", "step", "csv", "between", NULL };
+    uint64_t number;
+    ebpo_error why = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_json_members(r, value, known);
+    if (status == EBPO_OK)
+        status = ebpo_json_judge(r, ebpo_scene_add_route(r->scene, name, &number, &why), &why);
+    if (status == EBPO_OK)
+        status = read_between(r, value);
+    if (status != EBPO_OK)
+        return status;
+    bool keys = json_object_get(value, "keys"), poses = json_object_get(value, "poses"),
+         csv = json_object_get(value, "csv");
+    if (keys + poses + csv != 1)
+        return ebpo_json_bad(r, "has not one of keys, poses and csv");
+    if (!poses && (json_object_get(value, "begin") || json_object_get(value, "step")))
+        return ebpo_json_bad(r, "begin and step are for poses");
+    status = keys    ? ebpo_json_each_item(r, value, "keys", read_key)
+             : poses ? read_poses(r, value)
+                     : read_csv(r, value);
+    return status == EBPO_OK && last_route(r)->count == 0 ? ebpo_json_bad(r, "has no poses")
+                                                          : status;
+}
+
+/* --- names --- */
+
+static ebpo_status read_name(ebpo_json_reader *r, const json_t *value, const char **name)
 {
     if (!json_is_string(value))
-        return json_bad(r, "is not a name");
+        return ebpo_json_bad(r, "is not a name");
     *name = json_string_value(value);
     return EBPO_OK;
 }
 
-static ebpo_status read_layer(json_reader *r, const char *key, const json_t *value)
+static ebpo_status read_layer(ebpo_json_reader *r, const char *key, const json_t *value)
 {
     (void)key;
     ebpo_error why = EBPO_ERROR_INIT;
     const char *name = NULL;
     ebpo_status status = read_name(r, value, &name);
-    return status == EBPO_OK ? json_judge(r, scene_add_layer(r->scene, name, &why), &why) : status;
+    return status == EBPO_OK ? ebpo_json_judge(r, ebpo_scene_add_layer(r->scene, name, &why), &why)
+                             : status;
 }
 
-static ebpo_status read_group(json_reader *r, const char *key, const json_t *value)
+static ebpo_status read_group(ebpo_json_reader *r, const char *key, const json_t *value)
 {
     (void)key;
     ebpo_error why = EBPO_ERROR_INIT;
     const char *name = NULL;
     ebpo_status status = read_name(r, value, &name);
-    return status == EBPO_OK ? json_judge(r, scene_add_group(r->scene, name, &why), &why) : status;
+    return status == EBPO_OK ? ebpo_json_judge(r, ebpo_scene_add_group(r->scene, name, &why), &why)
+                             : status;
 }
 
-/* ---- models ---- */
+/* --- models --- */
 
-static int digit(char c)
+static int json_digit(char c)
 {
     const char *digits = "0123456789abcdef", *at = c ? strchr(digits, c) : NULL;
     return at ? (int)(at - digits) : -1;
@@ -50,54 +405,55 @@ static bool read_digest(const char *hex, uint8_t out[32])
 {
     bool fits = strlen(hex) == 64;
     for (int i = 0; i < 32 && fits; i++) {
-        int high = digit(hex[2 * i]), low = digit(hex[2 * i + 1]);
+        int high = json_digit(hex[2 * i]), low = json_digit(hex[2 * i + 1]);
         fits = high >= 0 && low >= 0;
         out[i] = fits ? (uint8_t)(high << 4 | low) : 0;
     }
     return fits;
 }
 
-static ebpo_status read_model(json_reader *r, const char *name, const json_t *value)
+static ebpo_status read_model(ebpo_json_reader *r, const char *name, const json_t *value)
 {
     static const char *const known[] = { "file", "content_sha256", "subset_of", NULL };
     const char *path = NULL, *hex = NULL, *from = NULL;
     uint8_t digest[32];
     ebpo_error why = EBPO_ERROR_INIT;
-    ebpo_status status = json_members(r, value, known);
+    ebpo_status status = ebpo_json_members(r, value, known);
     if (status == EBPO_OK)
-        status = json_get_text(r, value, "file", true, &path);
+        status = ebpo_json_get_text(r, value, "file", true, &path);
     if (status == EBPO_OK)
-        status = json_get_text(r, value, "content_sha256", false, &hex);
+        status = ebpo_json_get_text(r, value, "content_sha256", false, &hex);
     if (status == EBPO_OK)
-        status = json_get_text(r, value, "subset_of", false, &from);
+        status = ebpo_json_get_text(r, value, "subset_of", false, &from);
     if (status != EBPO_OK)
         return status;
     if (from && !read_digest(from, digest))
-        return json_bad_at(r, "subset_of", "is not 64 digits 0-9 a-f");
+        return ebpo_json_bad_at(r, "subset_of", "is not 64 digits 0-9 a-f");
     if (hex && !read_digest(hex, digest))
-        return json_bad_at(r, "content_sha256", "is not 64 digits 0-9 a-f");
-    const char *refused = scene_path_refused(path, r->options, hex != NULL);
+        return ebpo_json_bad_at(r, "content_sha256", "is not 64 digits 0-9 a-f");
+    const char *refused = ebpo_scene_path_refused(path, r->options, hex != NULL);
     if (refused)
-        return json_bad_at(r, "file", refused);
+        return ebpo_json_bad_at(r, "file", refused);
     status = ebpo_scene_add_model(r->scene, name, path, hex ? digest : NULL, NULL, &why);
-    return json_judge(r, status, &why);
+    return ebpo_json_judge(r, status, &why);
 }
 
-/* ---- instances ---- */
+/* --- instances --- */
 
 /* The number of what `key` names; *number stays where it is missing. */
-static ebpo_status find(json_reader *r, const json_t *object, const char *key, const char *kind,
-                        bool needed, uint64_t *number)
+static ebpo_status json_find(ebpo_json_reader *r, const json_t *object, const char *key,
+                             const char *kind, bool needed, uint64_t *number)
 {
     const char *name = NULL;
-    ebpo_status status = json_get_text(r, object, key, needed, &name);
+    ebpo_status status = ebpo_json_get_text(r, object, key, needed, &name);
     if (status != EBPO_OK || !name)
         return status;
-    *number = scene_find_name(r->scene, kind, name);
-    return *number != EBPO_SCENE_NONE ? EBPO_OK : json_bad_at(r, key, "is not one of this scene");
+    *number = ebpo_scene_find_name(r->scene, kind, name);
+    return *number != EBPO_SCENE_NONE ? EBPO_OK
+                                      : ebpo_json_bad_at(r, key, "is not one of this scene");
 }
 
-static ebpo_status join_group(json_reader *r, const char *key, const json_t *value)
+static ebpo_status join_group(ebpo_json_reader *r, const char *key, const json_t *value)
 {
     (void)key;
     ebpo_error why = EBPO_ERROR_INIT;
@@ -105,39 +461,41 @@ static ebpo_status join_group(json_reader *r, const char *key, const json_t *val
     ebpo_status status = read_name(r, value, &name);
     if (status != EBPO_OK)
         return status;
-    uint64_t set = scene_find_name(r->scene, "group:", name);
-    return set == EBPO_SCENE_NONE ? json_bad(r, "is not a group of this scene")
-                                  : json_judge(r, scene_join_set(r->scene, set, &why), &why);
+    uint64_t set = ebpo_scene_find_name(r->scene, "group:", name);
+    return set == EBPO_SCENE_NONE
+               ? ebpo_json_bad(r, "is not a group of this scene")
+               : ebpo_json_judge(r, ebpo_scene_join_set(r->scene, set, &why), &why);
 }
 
-static ebpo_status read_instance(json_reader *r, const char *key, const json_t *value)
+static ebpo_status read_instance(ebpo_json_reader *r, const char *key, const json_t *value)
 {
     static const char *const known[] = { "name",  "model",  "pose",  "route",
                                          "layer", "groups", "fixed", NULL };
     (void)key;
     ebpo_scene_instance i = EBPO_SCENE_INSTANCE_INIT;
     ebpo_error why = EBPO_ERROR_INIT;
-    ebpo_status status = json_members(r, value, known);
+    ebpo_status status = ebpo_json_members(r, value, known);
     if (status == EBPO_OK)
-        status = json_get_text(r, value, "name", true, &i.name);
+        status = ebpo_json_get_text(r, value, "name", true, &i.name);
     if (status == EBPO_OK)
-        status = find(r, value, "model", SCENE_MODEL, true, &i.model);
+        status = json_find(r, value, "model", EBPO_SCENE_MODEL, true, &i.model);
     if (status == EBPO_OK)
-        status = find(r, value, "route", SCENE_ROUTE, false, &i.route);
+        status = json_find(r, value, "route", EBPO_SCENE_ROUTE, false, &i.route);
     if (status == EBPO_OK)
-        status = find(r, value, "layer", SCENE_LAYER, false, &i.layer);
+        status = json_find(r, value, "layer", EBPO_SCENE_LAYER, false, &i.layer);
     if (status == EBPO_OK)
-        status = json_get_flag(r, value, "fixed", &i.fixed);
+        status = ebpo_json_get_flag(r, value, "fixed", &i.fixed);
     if (status == EBPO_OK)
         status = json_read_pose(r, value, "pose", &i.pose);
     if (status == EBPO_OK)
-        status = json_judge(r, ebpo_scene_add_instance(r->scene, &i, NULL, &why), &why);
-    return status == EBPO_OK ? json_each_item(r, value, "groups", join_group) : status;
+        status = ebpo_json_judge(r, ebpo_scene_add_instance(r->scene, &i, NULL, &why), &why);
+    return status == EBPO_OK ? ebpo_json_each_item(r, value, "groups", join_group) : status;
 }
 
-/* ---- cameras ---- */
+/* --- cameras --- */
 
-static ebpo_status check_camera(json_reader *r, const ebpo_scene_camera *c, const double pixels[2])
+static ebpo_status check_camera(ebpo_json_reader *r, const ebpo_scene_camera *c,
+                                const double pixels[2])
 {
     double see[3], cross = 0;
     for (int k = 0; k < 3; k++)
@@ -147,16 +505,16 @@ static ebpo_status check_camera(json_reader *r, const ebpo_scene_camera *c, cons
         cross = fmax(cross, fabs(see[u] * c->up[v] - see[v] * c->up[u]));
     }
     if (!(cross > 0 && cross < INFINITY))
-        return json_bad(r, "target is not beside eye, or up points to it");
+        return ebpo_json_bad(r, "target is not beside eye, or up points to it");
     if (!(c->fov > 0 && c->fov < 180))
-        return json_bad_at(r, "fov", "is not between 0 and 180 degrees");
+        return ebpo_json_bad_at(r, "fov", "is not between 0 and 180 degrees");
     for (int k = 0; k < 2; k++)
         if (!(pixels[k] >= 1 && pixels[k] <= 65536 && pixels[k] == floor(pixels[k])))
-            return json_bad_at(r, "pixels", "is not two whole numbers from 1 to 65536");
+            return ebpo_json_bad_at(r, "pixels", "is not two whole numbers from 1 to 65536");
     return EBPO_OK;
 }
 
-static ebpo_status read_camera(json_reader *r, const char *key, const json_t *value)
+static ebpo_status read_camera(ebpo_json_reader *r, const char *key, const json_t *value)
 {
     static const char *const known[] = { "name", "eye",    "target", "up",
                                          "fov",  "pixels", "route",  NULL };
@@ -167,85 +525,85 @@ static ebpo_status read_camera(json_reader *r, const char *key, const json_t *va
     c.up[2] = 1;
     c.fov = 45;
     c.route = EBPO_SCENE_NONE;
-    ebpo_status status = json_members(r, value, known);
+    ebpo_status status = ebpo_json_members(r, value, known);
     if (status == EBPO_OK)
-        status = json_get_text(r, value, "name", true, &c.name);
+        status = ebpo_json_get_text(r, value, "name", true, &c.name);
     if (status == EBPO_OK)
-        status = json_get_reals(r, value, "eye", true, c.eye, 3);
+        status = ebpo_json_get_reals(r, value, "eye", true, c.eye, 3);
     if (status == EBPO_OK)
-        status = json_get_reals(r, value, "target", true, c.target, 3);
+        status = ebpo_json_get_reals(r, value, "target", true, c.target, 3);
     if (status == EBPO_OK)
-        status = json_get_reals(r, value, "up", false, c.up, 3);
+        status = ebpo_json_get_reals(r, value, "up", false, c.up, 3);
     if (status == EBPO_OK)
-        status = json_get_real(r, value, "fov", false, &c.fov);
+        status = ebpo_json_get_real(r, value, "fov", false, &c.fov);
     if (status == EBPO_OK)
-        status = json_get_reals(r, value, "pixels", false, pixels, 2);
+        status = ebpo_json_get_reals(r, value, "pixels", false, pixels, 2);
     if (status == EBPO_OK)
-        status = find(r, value, "route", SCENE_ROUTE, false, &c.route);
+        status = json_find(r, value, "route", EBPO_SCENE_ROUTE, false, &c.route);
     if (status == EBPO_OK)
         status = check_camera(r, &c, pixels);
     if (status != EBPO_OK)
         return status;
     c.width = (uint32_t)pixels[0];
     c.height = (uint32_t)pixels[1];
-    return json_judge(r, scene_add_camera(r->scene, &c, &why), &why);
+    return ebpo_json_judge(r, ebpo_scene_add_camera(r->scene, &c, &why), &why);
 }
 
-/* ---- rules ---- */
+/* --- rules --- */
 
 /* An array of two selectors. */
-static ebpo_status read_two(json_reader *r, const json_t *two, uint64_t set[2])
+static ebpo_status read_two(ebpo_json_reader *r, const json_t *two, uint64_t set[2])
 {
     if (!json_is_array(two) || json_array_size(two) != 2)
-        return json_bad(r, "is not an array of two names");
+        return ebpo_json_bad(r, "is not an array of two names");
     for (size_t i = 0; i < 2; i++) {
         const char *name = json_string_value(json_array_get(two, i));
-        set[i] = name ? scene_find_name(r->scene, "", name) : EBPO_SCENE_NONE;
+        set[i] = name ? ebpo_scene_find_name(r->scene, "", name) : EBPO_SCENE_NONE;
         if (set[i] == EBPO_SCENE_NONE) {
-            json_enter(r, NULL, i);
+            ebpo_json_enter(r, NULL, i);
             ebpo_status status =
-                json_bad(r, "is no instance, layer:NAME, group:NAME or * of this scene");
-            json_leave(r);
+                ebpo_json_bad(r, "is no instance, layer:NAME, group:NAME or * of this scene");
+            ebpo_json_leave(r);
             return status;
         }
     }
     return EBPO_OK;
 }
 
-static ebpo_status read_ignored(json_reader *r, const char *key, const json_t *value)
+static ebpo_status read_ignored(ebpo_json_reader *r, const char *key, const json_t *value)
 {
     (void)key;
     uint64_t set[2];
     ebpo_status status = read_two(r, value, set);
-    return status == EBPO_OK ? scene_add_rule(r->scene, set[0], set[1], -1, r->error) : status;
+    return status == EBPO_OK ? ebpo_scene_add_rule(r->scene, set[0], set[1], -1, r->error) : status;
 }
 
-static ebpo_status read_clearance(json_reader *r, const char *key, const json_t *value)
+static ebpo_status read_clearance(ebpo_json_reader *r, const char *key, const json_t *value)
 {
     static const char *const known[] = { "between", "distance", NULL };
     (void)key;
     uint64_t set[2];
     double distance = 0;
-    ebpo_status status = json_members(r, value, known);
+    ebpo_status status = ebpo_json_members(r, value, known);
     if (status != EBPO_OK)
         return status;
-    json_enter(r, "between", 0);
+    ebpo_json_enter(r, "between", 0);
     status = read_two(r, json_object_get(value, "between"), set);
-    json_leave(r);
+    ebpo_json_leave(r);
     if (status == EBPO_OK)
-        status = json_get_real(r, value, "distance", true, &distance);
+        status = ebpo_json_get_real(r, value, "distance", true, &distance);
     if (status == EBPO_OK && !(distance >= 0 && distance <= 0x1p1000))
-        return json_bad_at(r, "distance", "is below 0 or beyond 2^1000");
-    return status == EBPO_OK ? scene_add_rule(r->scene, set[0], set[1], distance, r->error)
+        return ebpo_json_bad_at(r, "distance", "is below 0 or beyond 2^1000");
+    return status == EBPO_OK ? ebpo_scene_add_rule(r->scene, set[0], set[1], distance, r->error)
                              : status;
 }
 
-/* ---- all of it ---- */
+/* --- all of it --- */
 
-static ebpo_status check_version(json_reader *r, const json_t *root)
+static ebpo_status check_version(ebpo_json_reader *r, const json_t *root)
 {
     const char *version = NULL;
-    ebpo_status status = json_get_text(r, root, "ebpo_scene", true, &version);
+    ebpo_status status = ebpo_json_get_text(r, root, "ebpo_scene", true, &version);
     if (status != EBPO_OK)
         return status;
     if (strncmp(version, "1.", 2) != 0 || strspn(version + 2, "0123456789") == 0 ||
@@ -255,36 +613,36 @@ static ebpo_status check_version(json_reader *r, const json_t *root)
     return EBPO_OK;
 }
 
-static ebpo_status read_root(json_reader *r, const json_t *root)
+static ebpo_status read_root(ebpo_json_reader *r, const json_t *root)
 {
     static const char *const known[] = { "ebpo_scene", "title",  "unit",      "models",
                                          "layers",     "groups", "routes",    "instances",
                                          "cameras",    "ignore", "clearance", NULL };
     const char *text;
     if (!json_is_object(root))
-        return json_bad(r, "a scene is an object");
+        return ebpo_json_bad(r, "a scene is an object");
     ebpo_status status = check_version(r, root);
     if (status == EBPO_OK)
-        status = json_members(r, root, known);
+        status = ebpo_json_members(r, root, known);
     if (status == EBPO_OK)
-        status = json_get_text(r, root, "title", false, &text);
+        status = ebpo_json_get_text(r, root, "title", false, &text);
     if (status == EBPO_OK)
-        status = json_get_text(r, root, "unit", false, &text);
+        status = ebpo_json_get_text(r, root, "unit", false, &text);
     if (status == EBPO_OK)
-        status = json_each_member(r, root, "models", read_model);
+        status = ebpo_json_each_member(r, root, "models", read_model);
     if (status == EBPO_OK)
-        status = json_each_item(r, root, "layers", read_layer);
+        status = ebpo_json_each_item(r, root, "layers", read_layer);
     if (status == EBPO_OK)
-        status = json_each_item(r, root, "groups", read_group);
+        status = ebpo_json_each_item(r, root, "groups", read_group);
     if (status == EBPO_OK)
-        status = json_each_member(r, root, "routes", json_read_route);
+        status = ebpo_json_each_member(r, root, "routes", json_read_route);
     if (status == EBPO_OK)
-        status = json_each_item(r, root, "instances", read_instance);
+        status = ebpo_json_each_item(r, root, "instances", read_instance);
     if (status == EBPO_OK)
-        status = json_each_item(r, root, "cameras", read_camera);
+        status = ebpo_json_each_item(r, root, "cameras", read_camera);
     if (status == EBPO_OK)
-        status = json_each_item(r, root, "ignore", read_ignored);
-    return status == EBPO_OK ? json_each_item(r, root, "clearance", read_clearance) : status;
+        status = ebpo_json_each_item(r, root, "ignore", read_ignored);
+    return status == EBPO_OK ? ebpo_json_each_item(r, root, "clearance", read_clearance) : status;
 }
 
 static ebpo_status parse_failed(const char *name, const json_error_t *e, ebpo_error *error)
@@ -299,37 +657,38 @@ static ebpo_status parse_failed(const char *name, const json_error_t *e, ebpo_er
     return ebpo_fail_file(error, EBPO_E_FORMAT, name, "line %d: is not JSON: %s", e->line, what);
 }
 
-ebpo_status scene_too_long(const char *name, const ebpo_scene_options *options, ebpo_error *error)
+ebpo_status ebpo_scene_too_long(const char *name, const ebpo_scene_options *options,
+                                ebpo_error *error)
 {
     return ebpo_fail_file(error, EBPO_E_LIMIT, name, "has more than %llu bytes",
                           (unsigned long long)options->most_bytes);
 }
 
-ebpo_status scene_read_json(ebpo_scene *scene, const char *text, size_t size, const char *name,
-                            const ebpo_scene_options *options, ebpo_error *error)
+ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *text, size_t size, const char *name,
+                                 const ebpo_scene_options *options, ebpo_error *error)
 {
     json_error_t parsed;
     ebpo_error why = EBPO_ERROR_INIT;
     if (size > options->most_bytes)
-        return scene_too_long(name, options, error);
+        return ebpo_scene_too_long(name, options, error);
     const char *foreign = ebpo_foreign_bytes((const uint8_t *)text, size);
     if (foreign)
         return ebpo_fail_file(error, EBPO_E_FORMAT, name, "%s", foreign);
-    if (scene_text_fits(text, size, options->most_values, &why) != EBPO_OK)
+    if (ebpo_scene_text_fits(text, size, options->most_values, &why) != EBPO_OK)
         return ebpo_fail_file(error, EBPO_E_LIMIT, name, "%s", why.message);
     json_t *root =
         json_loadb(text, size, JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, &parsed);
     if (!root)
         return parse_failed(name, &parsed, error);
-    json_reader r = { .scene = scene,
-                      .text = text,
-                      .name = name,
-                      .options = options,
-                      .pose_bytes = options->most_pose_bytes,
-                      .error = error };
+    ebpo_json_reader r = { .scene = scene,
+                           .text = text,
+                           .name = name,
+                           .options = options,
+                           .pose_bytes = options->most_pose_bytes,
+                           .error = error };
     ebpo_status status = read_root(&r, root);
     if (status == EBPO_OK)
-        scene_sort_rules(scene);
+        ebpo_scene_sort_rules(scene);
     json_decref(root);
     return status;
 }

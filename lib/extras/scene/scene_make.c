@@ -1,15 +1,185 @@
-/* Scenes as they are made: what is added. */
+/* A scene as an object: its names, the files that it may name, adding its members, and returning
+ * them.
+ *
+ * Each kind of member has its own names; layers, groups and instances share one space of
+ * selectors, which rules use. A selector is a set: every instance belongs to the set of all, to
+ * its own, to that of its layer and to those of its groups.
+ *
+ * A scene that is untrusted input may name files only below its own folder, unless the options
+ * allow others; symbolic links that lead out of the folder are refused. */
 #include "core/strict_fp.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <ebpo/http.h>
+
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "geometry/pose.h"
 #include "extras/scene/scene_parts.h"
+#include "geometry/pose.h"
+
+enum { NAME_MOST = 255, KIND_MOST = 8 };
+
+static bool is_plain(const char *name)
+{
+    for (const unsigned char *c = (const unsigned char *)name; *c; c++)
+        if (*c < 0x20 || *c == 0x7f)
+            return false;
+    json_t *text = json_string(name); /* NULL where it is not UTF-8 */
+    json_decref(text);
+    return text != NULL;
+}
+
+/* 1 to 255 bytes of UTF-8 without control characters, not beginning as selectors do. */
+static ebpo_status check_name(const char *name, const char *what, ebpo_error *error)
+{
+    size_t size = name ? strnlen(name, NAME_MOST + 1) : 0;
+    if (size == 0 || size > NAME_MOST || !is_plain(name))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "a name of %s is 1 to %d bytes of UTF-8 without control characters", what,
+                         NAME_MOST);
+    if (strcmp(name, "*") == 0 || strncmp(name, "layer:", 6) == 0 ||
+        strncmp(name, "group:", 6) == 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "'%.80s' cannot be a name of %s: '*', 'layer:' and 'group:' stand for "
+                         "many",
+                         name, what);
+    return EBPO_OK;
+}
+
+static void names_join(char *out, size_t room, const char *kind, const char *name)
+{
+    size_t begin = strlen(kind), size = strnlen(name, room - begin - 1);
+    memcpy(out, kind, begin);
+    memcpy(out + begin, name, size);
+    out[begin + size] = 0;
+}
+
+uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const char *name)
+{
+    char key[KIND_MOST + NAME_MOST + 2];
+    names_join(key, sizeof key, kind, name);
+    const json_t *number = json_object_get(scene->names, key);
+    return number ? (uint64_t)json_integer_value(number) : EBPO_SCENE_NONE;
+}
+
+/* Gives `kind` and `name` a number. EBPO_E_ARGUMENT: there is one already. */
+static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *name, uint64_t number,
+                            ebpo_error *error)
+{
+    char key[KIND_MOST + NAME_MOST + 2];
+    names_join(key, sizeof key, kind, name);
+    if (json_object_get(scene->names, key))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is another '%.80s'", name);
+    if (json_object_set_new(scene->names, key, json_integer((json_int_t)number)) != 0)
+        return ebpo_fail_memory(error, sizeof key);
+    return EBPO_OK;
+}
+
+/* A new set; *set may be NULL. */
+static ebpo_status add_set(ebpo_scene *scene, const char *kind, const char *name, uint64_t *set,
+                           ebpo_error *error)
+{
+    uint64_t number = scene->sets_count;
+    if (!ebpo_grow(&scene->sets, &scene->sets_capacity, number + 1, sizeof *scene->sets))
+        return ebpo_fail_memory(error, (number + 1) * sizeof *scene->sets);
+    ebpo_status status = put_name(scene, kind, name, number, error);
+    if (status != EBPO_OK)
+        return status;
+    scene->sets[number] = strdup(name);
+    if (!scene->sets[number])
+        return ebpo_fail_memory(error, strlen(name));
+    scene->sets_count++;
+    if (set)
+        *set = number;
+    return EBPO_OK;
+}
+
+/* --- files that a scene names --- */
+
+static bool goes_up(const char *path)
+{
+    for (const char *part = path; part; part = strchr(part, '/')) {
+        part += *part == '/';
+        if (strncmp(part, "..", 2) == 0 && (part[2] == '/' || part[2] == 0))
+            return true;
+    }
+    return false;
+}
+
+const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *options,
+                                    bool has_digest)
+{
+    if (!*path)
+        return "is no path";
+    if (ebpo_is_url(path) && !options->remote)
+        return "is on a server, which has to be allowed (ebpo scene --remote)";
+    if (ebpo_is_url(path) && !has_digest)
+        return "is on a server, and needs its content_sha256 here";
+    if (!ebpo_is_url(path) && !options->outside && (*path == '/' || goes_up(path)))
+        return "is outside the scene's folder, which has to be allowed (ebpo scene --outside)";
+    return NULL;
+}
+
+char *ebpo_scene_join_path(const char *folder, const char *path)
+{
+    bool alone = *path == '/' || ebpo_is_url(path);
+    size_t begin = alone ? 0 : strlen(folder), size = strlen(path);
+    char *joined = malloc(begin + size + 1);
+    if (joined) {
+        memcpy(joined, folder, begin);
+        memcpy(joined + begin, path, size + 1);
+    }
+    return joined;
+}
+
+static bool is_below(const char *folder, const char *path)
+{
+    size_t size = strlen(folder);
+    size -= size && folder[size - 1] == '/'; /* the root only */
+    return strncmp(folder, path, size) == 0 && path[size] == '/';
+}
+
+/* Names of files without links. */
+static ebpo_status check_real(const char *folder, const char *real, const char *path,
+                              ebpo_error *error)
+{
+    if (is_below(folder, real))
+        return EBPO_OK;
+    return ebpo_fail_file(error, EBPO_E_FORMAT, path,
+                          "is by a link the file %.160s, outside the scene's folder %.160s, which "
+                          "has to be allowed (ebpo scene --outside)",
+                          real, folder);
+}
+
+ebpo_status ebpo_scene_stays_within(const char *folder, const char *path, ebpo_error *error)
+{
+    if (ebpo_is_url(path))
+        return EBPO_OK;
+    char *top = realpath(*folder ? folder : ".", NULL), *real = realpath(path, NULL);
+    ebpo_status status = EBPO_OK;
+    if (top && real)
+        status = check_real(top, real, path, error);
+    else if (errno == ENOMEM)
+        status = ebpo_fail_memory(error, strlen(path));
+    else
+        status = ebpo_fail_errno(error, path, "cannot be opened");
+    free(top);
+    free(real);
+    return status;
+}
+
+char *ebpo_scene_folder_of(const char *path)
+{
+    const char *last = strrchr(path, '/');
+    return strndup(path, last ? (size_t)(last - path) + 1 : 0);
+}
+
+/* --- adding --- */
 
 ebpo_status ebpo_scene_new(ebpo_scene **out, ebpo_error *error)
 {
@@ -24,7 +194,7 @@ ebpo_status ebpo_scene_new(ebpo_scene **out, ebpo_error *error)
     if (!scene->names || !scene->folder)
         status = ebpo_fail_memory(error, 64);
     if (status == EBPO_OK)
-        status = scene_add_set(scene, "", "*", NULL, error);
+        status = add_set(scene, "", "*", NULL, error);
     if (status == EBPO_OK)
         *out = scene;
     else
@@ -95,15 +265,17 @@ ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const char *name, const char
                                  const uint8_t digest[32], uint64_t *number, ebpo_error *error)
 {
     uint64_t n;
-    ebpo_status status = scene_check_name(name, "a model", error);
+    ebpo_status status = check_name(name, "a model", error);
     if (status == EBPO_OK)
         status = ROOM(scene, models, &n, error);
     if (status == EBPO_OK)
-        status = scene_put_name(scene, SCENE_MODEL, name, n, error);
+        status = put_name(scene, EBPO_SCENE_MODEL, name, n, error);
     if (status != EBPO_OK)
         return status;
-    scene_model *m = &scene->models[n];
-    *m = (scene_model){ .name = strdup(name), .path = strdup(path), .file = EBPO_SCENE_NONE };
+    ebpo_scene_model_entry *m = &scene->models[n];
+    *m = (ebpo_scene_model_entry){ .name = strdup(name),
+                                   .path = strdup(path),
+                                   .file = EBPO_SCENE_NONE };
     if (digest)
         memcpy(m->digest, digest, sizeof m->digest);
     scene->models_count++; /* freed with the scene, whole or not */
@@ -119,7 +291,7 @@ static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_inst
 {
     static const double nowhere[3] = { 0, 0, 0 };
     ebpo_posing posing;
-    ebpo_status status = scene_check_name(i->name, "an instance", error);
+    ebpo_status status = check_name(i->name, "an instance", error);
     if (status != EBPO_OK)
         return status;
     if (i->model >= scene->models_count)
@@ -138,11 +310,11 @@ static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_inst
 
 static ebpo_status own_sets(ebpo_scene *scene, uint64_t set, ebpo_error *error)
 {
-    const scene_instance *i = &scene->instances[scene->instances_count - 1];
-    ebpo_status status = scene_join_set(scene, SCENE_ALL_SET, error);
+    const ebpo_scene_instance_entry *i = &scene->instances[scene->instances_count - 1];
+    ebpo_status status = ebpo_scene_join_set(scene, EBPO_SCENE_ALL_SET, error);
     if (status == EBPO_OK && i->as.layer != EBPO_SCENE_NONE)
-        status = scene_join_set(scene, scene->layers[i->as.layer], error);
-    return status == EBPO_OK ? scene_join_set(scene, set, error) : status;
+        status = ebpo_scene_join_set(scene, scene->layers[i->as.layer], error);
+    return status == EBPO_OK ? ebpo_scene_join_set(scene, set, error) : status;
 }
 
 ebpo_status ebpo_scene_add_instance(ebpo_scene *scene, const ebpo_scene_instance *instance,
@@ -157,11 +329,11 @@ ebpo_status ebpo_scene_add_instance(ebpo_scene *scene, const ebpo_scene_instance
     if (status == EBPO_OK)
         status = ROOM(scene, instances, &n, error);
     if (status == EBPO_OK)
-        status = scene_add_set(scene, "", as.name, &set, error);
+        status = add_set(scene, "", as.name, &set, error);
     if (status != EBPO_OK)
         return status;
     as.name = strdup(as.name);
-    scene->instances[n] = (scene_instance){ .as = as };
+    scene->instances[n] = (ebpo_scene_instance_entry){ .as = as };
     scene->instances_count++;
     if (!as.name)
         return ebpo_fail_memory(error, 1);
@@ -171,9 +343,9 @@ ebpo_status ebpo_scene_add_instance(ebpo_scene *scene, const ebpo_scene_instance
     return own_sets(scene, set, error);
 }
 
-ebpo_status scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error)
+ebpo_status ebpo_scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error)
 {
-    scene_instance *i = &scene->instances[scene->instances_count - 1];
+    ebpo_scene_instance_entry *i = &scene->instances[scene->instances_count - 1];
     uint64_t *sets = ebpo_realloc(i->sets, i->set_count + 1, sizeof *sets);
     if (!sets)
         return ebpo_fail_memory(error, (i->set_count + 1) * sizeof *sets);
@@ -182,29 +354,29 @@ ebpo_status scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error)
     return EBPO_OK;
 }
 
-ebpo_status scene_add_layer(ebpo_scene *scene, const char *name, ebpo_error *error)
+ebpo_status ebpo_scene_add_layer(ebpo_scene *scene, const char *name, ebpo_error *error)
 {
     uint64_t n, set;
-    ebpo_status status = scene_check_name(name, "a layer", error);
+    ebpo_status status = check_name(name, "a layer", error);
     if (status == EBPO_OK)
         status = ROOM(scene, layers, &n, error);
     if (status == EBPO_OK)
-        status = scene_add_set(scene, "layer:", name, &set, error);
+        status = add_set(scene, "layer:", name, &set, error);
     if (status != EBPO_OK)
         return status;
     scene->layers[n] = set;
     scene->layers_count++;
-    return scene_put_name(scene, SCENE_LAYER, name, n, error);
+    return put_name(scene, EBPO_SCENE_LAYER, name, n, error);
 }
 
-ebpo_status scene_add_group(ebpo_scene *scene, const char *name, ebpo_error *error)
+ebpo_status ebpo_scene_add_group(ebpo_scene *scene, const char *name, ebpo_error *error)
 {
     uint64_t n, set;
-    ebpo_status status = scene_check_name(name, "a group", error);
+    ebpo_status status = check_name(name, "a group", error);
     if (status == EBPO_OK)
         status = ROOM(scene, groups, &n, error);
     if (status == EBPO_OK)
-        status = scene_add_set(scene, "group:", name, &set, error);
+        status = add_set(scene, "group:", name, &set, error);
     if (status != EBPO_OK)
         return status;
     scene->groups[n] = set;
@@ -212,28 +384,29 @@ ebpo_status scene_add_group(ebpo_scene *scene, const char *name, ebpo_error *err
     return EBPO_OK;
 }
 
-ebpo_status scene_add_route(ebpo_scene *scene, const char *name, uint64_t *number,
-                            ebpo_error *error)
+ebpo_status ebpo_scene_add_route(ebpo_scene *scene, const char *name, uint64_t *number,
+                                 ebpo_error *error)
 {
-    ebpo_status status = scene_check_name(name, "a route", error);
+    ebpo_status status = check_name(name, "a route", error);
     if (status == EBPO_OK)
         status = ROOM(scene, routes, number, error);
     if (status == EBPO_OK)
-        status = scene_put_name(scene, SCENE_ROUTE, name, *number, error);
+        status = put_name(scene, EBPO_SCENE_ROUTE, name, *number, error);
     if (status != EBPO_OK)
         return status;
-    scene->routes[scene->routes_count++] = (scene_route){ .name = strdup(name) };
+    scene->routes[scene->routes_count++] = (ebpo_scene_route){ .name = strdup(name) };
     return scene->routes[*number].name ? EBPO_OK : ebpo_fail_memory(error, strlen(name));
 }
 
-ebpo_status scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera, ebpo_error *error)
+ebpo_status ebpo_scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera,
+                                  ebpo_error *error)
 {
     uint64_t n;
-    ebpo_status status = scene_check_name(camera->name, "a camera", error);
+    ebpo_status status = check_name(camera->name, "a camera", error);
     if (status == EBPO_OK)
         status = ROOM(scene, cameras, &n, error);
     if (status == EBPO_OK)
-        status = scene_put_name(scene, SCENE_CAMERA, camera->name, n, error);
+        status = put_name(scene, EBPO_SCENE_CAMERA, camera->name, n, error);
     if (status != EBPO_OK)
         return status;
     ebpo_scene_camera *c = &scene->cameras[n];
@@ -243,15 +416,145 @@ ebpo_status scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera,
     return c->name ? EBPO_OK : ebpo_fail_memory(error, strlen(camera->name));
 }
 
-ebpo_status scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b, double clearance,
-                           ebpo_error *error)
+ebpo_status ebpo_scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b, double clearance,
+                                ebpo_error *error)
 {
     uint64_t n;
     ebpo_status status = ROOM(scene, rules, &n, error);
     if (status != EBPO_OK)
         return status;
-    scene->rules[scene->rules_count++] = (scene_rule){ a < b ? a : b, a < b ? b : a, clearance };
+    scene->rules[scene->rules_count++] =
+        (ebpo_scene_rule_entry){ a < b ? a : b, a < b ? b : a, clearance };
     scene->ignored += clearance < 0;
     scene->clearances += clearance >= 0;
     return EBPO_OK;
+}
+
+/* --- returning members --- */
+
+static void add_times(const ebpo_scene *scene, ebpo_scene_counts *c)
+{
+    double begin = INFINITY, end = -INFINITY;
+    for (uint64_t i = 0; i < scene->routes_count; i++) {
+        const ebpo_scene_route *r = &scene->routes[i];
+        c->poses += r->count;
+        if (r->count) {
+            begin = fmin(begin, r->keys[0].time);
+            end = fmax(end, r->keys[r->count - 1].time);
+        }
+    }
+    if (begin <= end) {
+        c->begin = begin;
+        c->end = end;
+    }
+}
+
+ebpo_status ebpo_scene_get_counts(const ebpo_scene *scene, ebpo_scene_counts *out)
+{
+    ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
+    c.models = scene->models_count;
+    c.instances = scene->instances_count;
+    c.layers = scene->layers_count;
+    c.groups = scene->groups_count;
+    c.routes = scene->routes_count;
+    c.cameras = scene->cameras_count;
+    c.ignored = scene->ignored;
+    c.clearances = scene->clearances;
+    for (uint64_t i = 0; i < scene->instances_count; i++)
+        c.fixed += scene->instances[i].as.fixed;
+    add_times(scene, &c);
+    return EBPO_GIVE(ebpo_scene_counts, out, &c);
+}
+
+ebpo_status ebpo_scene_get_model(const ebpo_scene *scene, uint64_t model,
+                                 ebpo_scene_model_facts *out)
+{
+    if (model >= scene->models_count)
+        return EBPO_E_ARGUMENT;
+    const ebpo_scene_model_entry *m = &scene->models[model];
+    ebpo_scene_model_facts f = EBPO_SCENE_MODEL_FACTS_INIT;
+    f.name = m->name;
+    f.path = m->path;
+    f.instances = m->instances;
+    f.loaded = m->file != EBPO_SCENE_NONE;
+    memcpy(f.digest, m->digest, sizeof f.digest);
+    memcpy(f.min, m->min, sizeof f.min);
+    memcpy(f.max, m->max, sizeof f.max);
+    return EBPO_GIVE(ebpo_scene_model_facts, out, &f);
+}
+
+ebpo_status ebpo_scene_get_instance(const ebpo_scene *scene, uint64_t instance,
+                                    ebpo_scene_instance *out)
+{
+    if (instance >= scene->instances_count)
+        return EBPO_E_ARGUMENT;
+    return EBPO_GIVE(ebpo_scene_instance, out, &scene->instances[instance].as);
+}
+
+const char *ebpo_scene_get_layer(const ebpo_scene *scene, uint64_t layer)
+{
+    return layer < scene->layers_count ? scene->sets[scene->layers[layer]] : NULL;
+}
+
+const char *ebpo_scene_get_group(const ebpo_scene *scene, uint64_t group)
+{
+    return group < scene->groups_count ? scene->sets[scene->groups[group]] : NULL;
+}
+
+/* EBPO_SCENE_NONE: the set is no group's. */
+static uint64_t group_with(const ebpo_scene *scene, uint64_t set)
+{
+    uint64_t low = 0, high = scene->groups_count;
+    while (low < high) {
+        uint64_t middle = low + (high - low) / 2;
+        if (scene->groups[middle] < set)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < scene->groups_count && scene->groups[low] == set ? low : EBPO_SCENE_NONE;
+}
+
+uint64_t ebpo_scene_group_of(const ebpo_scene *scene, uint64_t instance, uint64_t nth)
+{
+    uint64_t group = EBPO_SCENE_NONE;
+    if (instance >= scene->instances_count)
+        return group;
+    const ebpo_scene_instance_entry *i = &scene->instances[instance];
+    for (uint32_t n = 0; n < i->set_count; n++) {
+        group = group_with(scene, i->sets[n]);
+        if (group != EBPO_SCENE_NONE && nth-- == 0)
+            return group;
+    }
+    return EBPO_SCENE_NONE;
+}
+
+ebpo_status ebpo_scene_get_camera(const ebpo_scene *scene, uint64_t camera, ebpo_scene_camera *out)
+{
+    if (camera >= scene->cameras_count)
+        return EBPO_E_ARGUMENT;
+    return EBPO_GIVE(ebpo_scene_camera, out, &scene->cameras[camera]);
+}
+
+ebpo_status ebpo_scene_get_stats(const ebpo_scene *scene, ebpo_scene_stats *out)
+{
+    ebpo_scene_stats s = EBPO_SCENE_STATS_INIT;
+    for (uint64_t i = 0; i < scene->files_count; i++) {
+        const ebpo_scene_file_entry *f = &scene->files[i];
+        ebpo_file_stats read = EBPO_FILE_STATS_INIT;
+        ebpo_model_stats model = EBPO_MODEL_STATS_INIT;
+        if (!f->file)
+            continue;
+        (void)ebpo_file_get_stats(f->file, &read);
+        s.files++;
+        s.bytes_read += read.bytes_read;
+        s.reads += read.reads;
+        if (!f->model)
+            continue;
+        (void)ebpo_model_get_stats(f->model, &model);
+        s.models++;
+        s.memory += model.memory;
+        s.loads += model.loads;
+    }
+    return EBPO_GIVE(ebpo_scene_stats, out, &s);
 }

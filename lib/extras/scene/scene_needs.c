@@ -1,5 +1,12 @@
-/* Boxes, in each model's own coordinates, that hold all that another instance comes near: over
- * steps of time so short that nothing moves far. */
+/* Finds which part of each model's file a scene can call for in an interval of time: a box for
+ * collisions and for inside tests, and the last level for views.
+ *
+ * Boxes are in the model's own coordinates, and hold all that another instance comes near, over
+ * steps of time so short that no instance moves far. They are rounded outwards, so that a subset
+ * by them answers the same queries as the whole file.
+ *
+ * A view needs the levels whose cells are larger than a pixel: a node's envelope and what it
+ * stands for are both in its cell, so that finer levels cannot be told apart by a camera. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -9,28 +16,27 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "extras/scene/asked_pairs.h"
-#include "extras/scene/pair_motion.h"
-#include "extras/scene/scene_needs.h"
 #include "derive/subset_parts.h"
+#include "extras/scene/instance_pair.h"
+#include "extras/scene/scene_needs.h"
 
 enum { HALVINGS = 12 };
 
 /* One instance as another one comes near it. */
 typedef struct nearing {
-    scene_needs *needs;
+    ebpo_scene_needs *needs;
     const ebpo_scene *scene;
     uint64_t of, other;
     double clearance, margin; /* in the world's unit */
-    scene_file_need *need;
+    ebpo_scene_file_need *need;
 } nearing;
 
-static scene_file_need *need_of(const scene_needs *n, uint64_t instance)
+static ebpo_scene_file_need *need_of(const ebpo_scene_needs *n, uint64_t instance)
 {
     return &n->files[n->scene->models[n->scene->instances[instance].as.model].file];
 }
 
-static const scene_route *route_of(const ebpo_scene *scene, uint64_t instance)
+static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instance)
 {
     uint64_t route = scene->instances[instance].as.route;
     return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
@@ -38,13 +44,13 @@ static const scene_route *route_of(const ebpo_scene *scene, uint64_t instance)
 
 /* How far points where the other one is are from what moves along the route, at most, in its
  * unit. */
-static ebpo_status reach_of_other(const nearing *n, const scene_route *route, double from,
+static ebpo_status reach_of_other(const nearing *n, const ebpo_scene_route *route, double from,
                                   double to, double *reach)
 {
     double min[3], max[3], far[3];
     ebpo_pose at[2];
-    scene_route_at(route, from, &at[0]);
-    scene_route_at(route, to, &at[1]);
+    ebpo_scene_route_at(route, from, &at[0]);
+    ebpo_scene_route_at(route, to, &at[1]);
     ebpo_status status =
         ebpo_scene_instance_box(n->scene, n->other, from, to, min, max, n->needs->error);
     for (int k = 0; k < 3; k++) {
@@ -52,7 +58,7 @@ static ebpo_status reach_of_other(const nearing *n, const scene_route *route, do
                high = fmax(at[0].translation[k], at[1].translation[k]);
         far[k] = fmax(fabs(max[k] - low), fabs(high - min[k]));
     }
-    *reach = scene_length_above(far) / fmin(at[0].scale, at[1].scale);
+    *reach = ebpo_scene_length_above(far) / fmin(at[0].scale, at[1].scale);
     return status;
 }
 
@@ -60,12 +66,12 @@ static ebpo_status reach_of_other(const nearing *n, const scene_route *route, do
  * the times. */
 static ebpo_status motion_seen(const nearing *n, double from, double to, double *out)
 {
-    const scene_route *route = route_of(n->scene, n->of);
+    const ebpo_scene_route *route = route_of(n->scene, n->of);
     double reach = 0, own = 0;
     ebpo_status status = ebpo_scene_motion(n->scene, n->other, from, to, out, n->needs->error);
     if (status == EBPO_OK && route && from < to) {
         status = reach_of_other(n, route, from, to, &reach);
-        own = scene_route_step(route, from, to, (scene_reach){ reach, reach }).length;
+        own = ebpo_scene_route_step(route, from, to, (ebpo_scene_reach){ reach, reach }).length;
     }
     *out = (*out + own) * (1 + 0x1p-40);
     return status;
@@ -73,12 +79,13 @@ static ebpo_status motion_seen(const nearing *n, double from, double to, double 
 
 /* What the other one may come near between two times, within the model's box; false: nothing. */
 static ebpo_status near_box(const nearing *n, double from, double to, double motion,
-                            scene_space *out, bool *any)
+                            ebpo_scene_space *out, bool *any)
 {
-    scene_seen at, later;
-    ebpo_status status = scene_seen_from(n->scene, n->of, n->other, from, &at, n->needs->error);
+    ebpo_scene_seen at, later;
+    ebpo_status status =
+        ebpo_scene_seen_from(n->scene, n->of, n->other, from, &at, n->needs->error);
     if (status == EBPO_OK)
-        status = scene_seen_from(n->scene, n->of, n->other, to, &later, n->needs->error);
+        status = ebpo_scene_seen_from(n->scene, n->of, n->other, to, &later, n->needs->error);
     if (status != EBPO_OK)
         return status;
     /* beyond what rounding may do between these times: also where nothing else is added */
@@ -95,7 +102,7 @@ static ebpo_status near_box(const nearing *n, double from, double to, double mot
     return EBPO_OK;
 }
 
-static bool is_within(const scene_space *a, const scene_file_need *need)
+static bool is_within(const ebpo_scene_space *a, const ebpo_scene_file_need *need)
 {
     bool within = need->any;
     for (int k = 0; k < 3; k++)
@@ -103,7 +110,7 @@ static bool is_within(const scene_space *a, const scene_file_need *need)
     return within;
 }
 
-static void join(scene_file_need *need, const scene_space *box)
+static void needs_join(ebpo_scene_file_need *need, const ebpo_scene_space *box)
 {
     if (!need->any)
         need->box = *box;
@@ -117,7 +124,7 @@ static void join(scene_file_need *need, const scene_space *box)
 static ebpo_status come_near(const nearing *n, double from, double to, int halvings)
 {
     double motion, middle = from + (to - from) / 2;
-    scene_space box;
+    ebpo_scene_space box;
     bool any = false;
     ebpo_status status = motion_seen(n, from, to, &motion);
     if (status == EBPO_OK)
@@ -125,7 +132,7 @@ static ebpo_status come_near(const nearing *n, double from, double to, int halvi
     if (status != EBPO_OK || !any || is_within(&box, n->need))
         return status;
     if (motion <= n->margin || halvings == 0 || !(middle > from && middle < to)) {
-        join(n->need, &box);
+        needs_join(n->need, &box);
         return EBPO_OK;
     }
     status = come_near(n, from, middle, halvings - 1);
@@ -139,7 +146,7 @@ static ebpo_status come_near_along(const nearing *n)
     double to = n->needs->to;
     ebpo_status status = EBPO_OK;
     for (double at = n->needs->from; at < to && status == EBPO_OK;) {
-        double next = scene_pair_next(n->scene, &pair, at, to);
+        double next = ebpo_scene_pair_next(n->scene, &pair, at, to);
         status = come_near(n, at, nextafter(next, -INFINITY), HALVINGS);
         at = next;
     }
@@ -149,7 +156,7 @@ static ebpo_status come_near_along(const nearing *n)
 /* Longest side of an instance's box in the world. */
 static double size_of(const ebpo_scene *scene, uint64_t instance, double time)
 {
-    const scene_model *m = &scene->models[scene->instances[instance].as.model];
+    const ebpo_scene_model_entry *m = &scene->models[scene->instances[instance].as.model];
     ebpo_pose pose = EBPO_POSE_INIT;
     double size = 0;
     if (ebpo_scene_pose(scene, instance, time, &pose, NULL) != EBPO_OK)
@@ -160,7 +167,7 @@ static double size_of(const ebpo_scene *scene, uint64_t instance, double time)
 }
 
 /* Usual for a pair; a point has no size of its own. */
-static double usual_margin(const scene_needs *needs, const ebpo_scene_pair *pair)
+static double usual_margin(const ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     double a = size_of(needs->scene, pair->a, needs->from);
     double b = size_of(needs->scene, pair->b, needs->from);
@@ -168,17 +175,17 @@ static double usual_margin(const scene_needs *needs, const ebpo_scene_pair *pair
 }
 
 /* A face anywhere may be around the other one. */
-static void add_whole(scene_needs *needs, const ebpo_scene_pair *pair)
+static void add_whole(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     for (int i = 0; i < 2; i++) {
-        scene_file_need *need = need_of(needs, i ? pair->b : pair->a);
+        ebpo_scene_file_need *need = need_of(needs, i ? pair->b : pair->a);
         need->askers++;
         need->any = true;
         need->box = need->whole;
     }
 }
 
-static ebpo_status add_pair(scene_needs *needs, const ebpo_scene_pair *pair)
+static ebpo_status add_pair(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     if (needs->how.purpose == EBPO_SCENE_FOR_SOLIDS) {
         add_whole(needs, pair);
@@ -201,11 +208,11 @@ static ebpo_status add_pair(scene_needs *needs, const ebpo_scene_pair *pair)
     return status;
 }
 
-ebpo_status scene_add_near(scene_needs *needs)
+ebpo_status ebpo_scene_add_near(ebpo_scene_needs *needs)
 {
-    scene_pairs_list list = { 0 };
+    ebpo_scene_pairs_list list = { 0 };
     ebpo_status status =
-        scene_keep_pairs(needs->scene, needs->from, needs->to, &list, needs->error);
+        ebpo_scene_keep_pairs(needs->scene, needs->from, needs->to, &list, needs->error);
     for (uint64_t i = 0; i < list.count && status == EBPO_OK; i++) {
         status = add_pair(needs, &list.pairs[i]);
         if (status == EBPO_OK && !ebpo_progress_step(&needs->how.progress, "finding what is needed",
@@ -217,11 +224,11 @@ ebpo_status scene_add_near(scene_needs *needs)
 }
 
 /* Two models of one file have one box. */
-static void begin_files(scene_needs *needs)
+static void begin_files(ebpo_scene_needs *needs)
 {
     for (uint64_t i = 0; i < needs->scene->models_count; i++) {
-        const scene_model *m = &needs->scene->models[i];
-        scene_file_need *need = &needs->files[m->file];
+        const ebpo_scene_model_entry *m = &needs->scene->models[i];
+        ebpo_scene_file_need *need = &needs->files[m->file];
         memcpy(need->whole.min, m->min, sizeof m->min);
         memcpy(need->whole.max, m->max, sizeof m->max);
         need->box = need->whole;
@@ -235,7 +242,7 @@ static void begin_files(scene_needs *needs)
     }
 }
 
-ebpo_status scene_begin_needs(scene_needs *needs)
+ebpo_status ebpo_scene_begin_needs(ebpo_scene_needs *needs)
 {
     needs->files = ebpo_alloc_zero(needs->scene->files_count, sizeof *needs->files);
     if (!needs->files)
@@ -244,7 +251,7 @@ ebpo_status scene_begin_needs(scene_needs *needs)
     return EBPO_OK;
 }
 
-void scene_end_needs(scene_needs *needs)
+void ebpo_scene_end_needs(ebpo_scene_needs *needs)
 {
     for (uint64_t i = 0; i < needs->scene->files_count; i++)
         if (!needs->files[i].any) {
@@ -253,9 +260,9 @@ void scene_end_needs(scene_needs *needs)
         }
 }
 
-ebpo_subset_options scene_need_options(const scene_needs *needs, uint64_t file)
+ebpo_subset_options ebpo_scene_need_options(const ebpo_scene_needs *needs, uint64_t file)
 {
-    const scene_file_need *need = &needs->files[file];
+    const ebpo_scene_file_need *need = &needs->files[file];
     ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
     o.parts = need->parts;
     o.last_level = need->last_level;
@@ -269,13 +276,14 @@ ebpo_subset_options scene_need_options(const scene_needs *needs, uint64_t file)
     return o;
 }
 
-ebpo_status scene_tell_need(const scene_needs *needs, uint64_t model, ebpo_scene_need *out)
+ebpo_status ebpo_scene_tell_need(const ebpo_scene_needs *needs, uint64_t model,
+                                 ebpo_scene_need *out)
 {
     uint64_t number = needs->scene->models[model].file;
-    const scene_file_need *need = &needs->files[number];
+    const ebpo_scene_file_need *need = &needs->files[number];
     const ebpo_file *file = needs->scene->files[number].file;
     const ebpo_info *info = ebpo_file_info(file);
-    ebpo_subset_options o = scene_need_options(needs, number);
+    ebpo_subset_options o = ebpo_scene_need_options(needs, number);
     ebpo_subset_reads reads;
     *out = (ebpo_scene_need)EBPO_SCENE_NEED_INIT;
     out->model = model;
@@ -291,5 +299,144 @@ ebpo_status scene_tell_need(const scene_needs *needs, uint64_t model, ebpo_scene
     out->bytes = reads.bytes;
     out->subtrees = reads.subtrees;
     out->of_subtrees = reads.of_subtrees;
+    return status;
+}
+
+/* --- views --- */
+
+enum { STEPS = 16 }; /* of a camera's way from key to key */
+
+typedef struct seeing {
+    ebpo_scene_needs *needs;
+    const ebpo_scene_camera *camera;
+    double pixel; /* width of a pixel at a distance of 1 */
+} seeing;
+
+/* Where the eye is between two times that no key of the camera's route is between. */
+static void eye_box(const seeing *s, double from, double to, ebpo_scene_space *out)
+{
+    const ebpo_scene_camera *c = s->camera;
+    ebpo_pose at;
+    double length = 0;
+    memcpy(out->min, c->eye, sizeof out->min);
+    if (c->route != EBPO_SCENE_NONE) {
+        const ebpo_scene_route *route = &s->needs->scene->routes[c->route];
+        ebpo_scene_reach reach = { ebpo_scene_length_above(c->eye),
+                                   ebpo_scene_length_above(c->eye) };
+        ebpo_scene_route_at(route, from, &at);
+        length = ebpo_scene_route_step(route, from, to, reach).length;
+        for (int i = 0; i < 3; i++)
+            out->min[i] =
+                at.scale * ((at.rotation[i][0] * c->eye[0] + at.rotation[i][1] * c->eye[1]) +
+                            at.rotation[i][2] * c->eye[2]) +
+                at.translation[i];
+    }
+    for (int k = 0; k < 3; k++) {
+        out->max[k] = out->min[k] + length;
+        out->min[k] -= length;
+    }
+}
+
+/* Of an instance, over a part of the time; the greatest scale that it has there. */
+static ebpo_status distance_between(const seeing *s, uint64_t instance, double from, double to,
+                                    double *distance, double *scale)
+{
+    ebpo_scene_space eye, box;
+    ebpo_pose at[2];
+    eye_box(s, from, to, &eye);
+    ebpo_status status = ebpo_scene_instance_box(s->needs->scene, instance, from, to, box.min,
+                                                 box.max, s->needs->error);
+    for (int i = 0; i < 2 && status == EBPO_OK; i++)
+        status = ebpo_scene_pose(s->needs->scene, instance, i ? to : from, &at[i], s->needs->error);
+    if (status != EBPO_OK)
+        return status;
+    *distance = ebpo_scene_space_gap(&eye, &box);
+    *scale = fmax(at[0].scale, at[1].scale);
+    return EBPO_OK;
+}
+
+/* A static camera sees nothing that is behind it. */
+static bool is_behind(const seeing *s, const ebpo_scene_space *box)
+{
+    const ebpo_scene_camera *c = s->camera;
+    double most = -INFINITY;
+    for (int corner = 0; corner < 8; corner++) {
+        double sum = 0;
+        for (int k = 0; k < 3; k++)
+            sum += (c->target[k] - c->eye[k]) *
+                   ((corner >> k & 1 ? box->max[k] : box->min[k]) - c->eye[k]);
+        most = fmax(most, sum);
+    }
+    return c->route == EBPO_SCENE_NONE && most < 0;
+}
+
+/* The first level whose cells are at most so large; -1: the last one is needed. */
+static int level_for(const ebpo_info *info, double size)
+{
+    double cell = ebpo_scene_length_above(info->box_size);
+    for (int level = 0; level < info->level_count - 1; level++, cell /= 2)
+        if (cell <= size)
+            return level;
+    return -1;
+}
+
+static ebpo_status see_instance(const seeing *s, uint64_t instance, double from, double to)
+{
+    const ebpo_scene *scene = s->needs->scene;
+    uint64_t file = scene->models[scene->instances[instance].as.model].file;
+    ebpo_scene_file_need *need = &s->needs->files[file];
+    ebpo_scene_space box;
+    double distance, scale;
+    ebpo_status status =
+        ebpo_scene_instance_box(scene, instance, from, to, box.min, box.max, s->needs->error);
+    if (status != EBPO_OK || is_behind(s, &box))
+        return status;
+    status = distance_between(s, instance, from, to, &distance, &scale);
+    if (status != EBPO_OK)
+        return status;
+    int level = level_for(ebpo_file_info(scene->files[file].file), distance * s->pixel / scale);
+    if (!need->any || (need->last_level >= 0 && (level < 0 || level > need->last_level)))
+        need->last_level = level;
+    need->any = true;
+    return EBPO_OK;
+}
+
+static ebpo_status see_from(const seeing *s, double from, double to)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < s->needs->scene->instances_count && status == EBPO_OK; i++)
+        status = see_instance(s, i, from, to);
+    return status;
+}
+
+/* From key to key of the camera's route, in steps. */
+static ebpo_status see_along(const seeing *s)
+{
+    const ebpo_scene_needs *n = s->needs;
+    const ebpo_scene_route *route =
+        s->camera->route == EBPO_SCENE_NONE ? NULL : &n->scene->routes[s->camera->route];
+    ebpo_status status = route ? EBPO_OK : see_from(s, n->from, n->to);
+    for (double at = n->from; route && at < n->to && status == EBPO_OK;) {
+        double next = ebpo_scene_route_next(route, at, n->to);
+        for (int i = 0; i < STEPS && status == EBPO_OK; i++)
+            status = see_from(s, at + (next - at) * i / STEPS,
+                              i + 1 < STEPS ? at + (next - at) * (i + 1) / STEPS
+                                            : nextafter(next, -INFINITY));
+        at = next;
+    }
+    return status == EBPO_OK ? see_from(s, n->to, n->to) : status;
+}
+
+ebpo_status ebpo_scene_add_views(ebpo_scene_needs *needs)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < needs->scene->cameras_count && status == EBPO_OK; i++) {
+        const ebpo_scene_camera *c = &needs->scene->cameras[i];
+        double half = c->fov * (3.14159265358979323846 / 360);
+        seeing s = { needs, c, 2 * tan(half) / c->height };
+        status = see_along(&s);
+        for (uint64_t f = 0; f < needs->scene->files_count; f++)
+            needs->files[f].askers++;
+    }
     return status;
 }

@@ -1,4 +1,9 @@
-/* Scene files and the models that they name. */
+/* Opens scene files, and loads the models that they name.
+ *
+ * Models of the same path share one open file. Where a scene file states a digest, the
+ * content_sha256 of the model's file must be equal. Loading sets the box of each model, on which
+ * bounds of motion rest; until then a scene has no boxes. A model for queries is made when it is
+ * first asked for. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -43,18 +48,19 @@ static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, e
 }
 
 /* `folder` is taken over; NULL: there was no memory. */
-static ebpo_status parse(const char *text, size_t size, const char *name, char *folder,
-                         const ebpo_scene_options *options, ebpo_scene **out, ebpo_error *error)
+static ebpo_status open_parse(const char *text, size_t size, const char *name, char *folder,
+                              const ebpo_scene_options *options, ebpo_scene **out,
+                              ebpo_error *error)
 {
     ebpo_scene *scene = NULL;
-    size_t mark = scene_text_mark(text, size);
+    size_t mark = ebpo_scene_text_mark(text, size);
     text += mark;
     size -= mark;
     ebpo_status status = folder ? ebpo_scene_new(&scene, error) : ebpo_fail_memory(error, 1);
     if (status == EBPO_OK) {
         free(scene->folder);
         scene->folder = folder;
-        status = scene_read_json(scene, text, size, name, options, error);
+        status = ebpo_scene_read_json(scene, text, size, name, options, error);
     } else {
         free(folder);
     }
@@ -92,7 +98,7 @@ ebpo_status ebpo_scene_parse(const char *text, size_t size, const char *name, co
     ebpo_status status = take_options(&own, options, error);
     if (status != EBPO_OK)
         return status;
-    return parse(text, size, name, folder_with_slash(folder), &own, out, error);
+    return open_parse(text, size, name, folder_with_slash(folder), &own, out, error);
 }
 
 ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options, ebpo_scene **out,
@@ -106,12 +112,12 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
     if (status == EBPO_OK)
         status = ebpo_whole_file_open(&file, path, error);
     if (status == EBPO_OK && file.size > own.most_bytes)
-        status = scene_too_long(path, &own, error);
+        status = ebpo_scene_too_long(path, &own, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
     if (status == EBPO_OK)
-        status = parse((const char *)file.data, file.size, path, scene_folder_of(path), &own, out,
-                       error);
+        status = open_parse((const char *)file.data, file.size, path, ebpo_scene_folder_of(path),
+                            &own, out, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_unchanged(&file, path, error);
     if (status != EBPO_OK) {
@@ -122,7 +128,7 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
     return status;
 }
 
-/* ---- models ---- */
+/* --- models --- */
 
 static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t most_expansion,
                              uint64_t *number, ebpo_error *error)
@@ -135,7 +141,7 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t most_
         return EBPO_OK;
     if (!ebpo_grow(&scene->files, &scene->files_capacity, n + 1, sizeof *scene->files))
         return ebpo_fail_memory(error, (n + 1) * sizeof *scene->files);
-    scene_file f = { .path = strdup(path) };
+    ebpo_scene_file_entry f = { .path = strdup(path) };
     ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
     how.most_expansion = most_expansion;
     ebpo_status status =
@@ -149,7 +155,7 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t most_
 }
 
 /* Of the faces, as the file says, where its root cell allows it; else the root cell. */
-static void box_of(scene_model *m, const ebpo_info *info)
+static void box_of(ebpo_scene_model_entry *m, const ebpo_info *info)
 {
     for (int k = 0; k < 3; k++) {
         double low = info->box_origin[k], high = low + info->box_size[k];
@@ -160,7 +166,8 @@ static void box_of(scene_model *m, const ebpo_info *info)
     }
 }
 
-static ebpo_status check_digest(const scene_model *m, const ebpo_info *info, ebpo_error *error)
+static ebpo_status check_digest(const ebpo_scene_model_entry *m, const ebpo_info *info,
+                                ebpo_error *error)
 {
     static const uint8_t none[32];
     if (memcmp(m->digest, none, 32) == 0 || memcmp(m->digest, info->content_sha256, 32) == 0)
@@ -172,15 +179,15 @@ static ebpo_status check_digest(const scene_model *m, const ebpo_info *info, ebp
                           m->name);
 }
 
-static ebpo_status load_model(ebpo_scene *scene, scene_model *m, uint64_t most_expansion,
+static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint64_t most_expansion,
                               ebpo_error *error)
 {
-    char *path = scene_join_path(scene->folder, m->path);
+    char *path = ebpo_scene_join_path(scene->folder, m->path);
     uint64_t number = 0;
     bool of_text = (uint64_t)(m - scene->models) < scene->text_models;
     ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(m->path));
     if (status == EBPO_OK && of_text && !scene->outside)
-        status = scene_stays_within(scene->folder, path, error);
+        status = ebpo_scene_stays_within(scene->folder, path, error);
     if (status == EBPO_OK)
         status = open_file(scene, path, most_expansion, &number, error);
     free(path);
@@ -195,9 +202,10 @@ static ebpo_status load_model(ebpo_scene *scene, scene_model *m, uint64_t most_e
     return status;
 }
 
-static ebpo_status check_reach(const ebpo_scene *scene, const scene_instance *i, ebpo_error *error)
+static ebpo_status check_reach(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
+                               ebpo_error *error)
 {
-    const scene_model *m = &scene->models[i->as.model];
+    const ebpo_scene_model_entry *m = &scene->models[i->as.model];
     double reach[3];
     ebpo_posing posing;
     ebpo_error why = EBPO_ERROR_INIT;
@@ -243,7 +251,7 @@ ebpo_status ebpo_scene_model(ebpo_scene *scene, uint64_t model, ebpo_model **out
     if (!ebpo_scene_file(scene, model))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "model %llu has not been loaded",
                          (unsigned long long)model);
-    scene_file *f = &scene->files[scene->models[model].file];
+    ebpo_scene_file_entry *f = &scene->files[scene->models[model].file];
     ebpo_status status = EBPO_OK;
     if (!f->model)
         status = ebpo_model_new(f->file, &scene->how, &f->model, error);

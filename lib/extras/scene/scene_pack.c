@@ -1,7 +1,15 @@
-/* A folder with what a scene needs: written beside its place, and put there whole. */
+/* Plans and packs a scene: which bytes of its models are needed, and a folder that has only those.
+ *
+ * Packing writes a subset of each file (scene_needs.c), copies the files of poses, and writes a
+ * scene file like the source's with other paths and digests. The folder is written beside its
+ * place and renamed when it is complete, so that it appears whole or not at all; on failure it is
+ * removed.
+ *
+ * A plan finds the same needs without writing anything. */
 #include "core/strict_fp.h"
 
 #include <fcntl.h>
+#include <inttypes.h>
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -10,14 +18,194 @@
 #include <unistd.h>
 
 #include "core/alloc.h"
+#include "core/checksum.h"
 #include "core/error.h"
-#include "format/file_in.h"
 #include "core/fp_env.h"
-#include "extras/scene/packed_text.h"
-#include "extras/scene/planning.h"
+#include "extras/scene/scene_needs.h"
+#include "extras/scene/scene_parts.h"
+#include "format/file_in.h"
+#include "io/file_source.h"
+
+/* Names in the folder: of the scene, of a file of scene->files, of a route's poses. */
+#define SCENE_PACKED "packed.scene.json"
+
+/* Takes the options; the scene and its times are right. */
+static ebpo_status scene_plan_check(ebpo_scene_needs *needs, const ebpo_plan_options *options)
+{
+    const ebpo_scene *scene = needs->scene;
+    ebpo_error *error = needs->error;
+    needs->how = (ebpo_plan_options)EBPO_PLAN_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_plan_options, &needs->how, options, error);
+    if (status != EBPO_OK)
+        return status;
+    if (needs->how.purpose < EBPO_SCENE_FOR_COLLIDE || needs->how.purpose > EBPO_SCENE_FOR_SOLIDS)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no purpose %d", (int)needs->how.purpose);
+    if (!(needs->how.margin >= 0 && needs->how.margin < INFINITY))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the margin %g is below 0 or no length",
+                         needs->how.margin);
+    if (!(isfinite(needs->from) && isfinite(needs->to) && needs->from <= needs->to))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no time from %g to %g", needs->from,
+                         needs->to);
+    for (uint64_t i = 0; i < scene->models_count; i++)
+        if (scene->models[i].file == EBPO_SCENE_NONE)
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "model '%.80s' has not been loaded",
+                             scene->models[i].name);
+    return EBPO_OK;
+}
+
+/* Finds what is needed of each file. Free needs->files, also on failure. */
+static ebpo_status scene_plan_needs(ebpo_scene_needs *needs)
+{
+    ebpo_status status = ebpo_scene_begin_needs(needs);
+    if (status == EBPO_OK)
+        status = needs->how.purpose == EBPO_SCENE_FOR_VIEW ? ebpo_scene_add_views(needs)
+                                                           : ebpo_scene_add_near(needs);
+    if (status == EBPO_OK)
+        ebpo_scene_end_needs(needs);
+    return status;
+}
+
+/* A need of each model; free it, also on failure. */
+static ebpo_status scene_plan_list(const ebpo_scene_needs *needs, ebpo_scene_need **out)
+{
+    uint64_t count = needs->scene->models_count;
+    ebpo_scene_need *list = ebpo_alloc(count, sizeof *list);
+    ebpo_status status = list ? EBPO_OK : ebpo_fail_memory(needs->error, count * sizeof *list);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        status = ebpo_scene_tell_need(needs, i, &list[i]);
+    *out = list;
+    return status;
+}
+
+ebpo_status ebpo_scene_plan(ebpo_scene *scene, double from, double to,
+                            const ebpo_plan_options *options, ebpo_scene_needs_fn take, void *user,
+                            ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_scene_needs needs = { .scene = scene, .from = from, .to = to, .error = error };
+    ebpo_scene_need *list = NULL;
+    ebpo_status status = scene_plan_check(&needs, options);
+    if (status == EBPO_OK)
+        status = scene_plan_needs(&needs);
+    if (status == EBPO_OK)
+        status = scene_plan_list(&needs, &list);
+    if (status == EBPO_OK && scene->models_count)
+        (void)take(user, list, scene->models_count);
+    free(list);
+    free(needs.files);
+    return status;
+}
+
+static void scene_packed_name(uint64_t file, char name[40])
+{
+    snprintf(name, 40, "model-%" PRIu64 ".ebpo.h5", file);
+}
+
+static void scene_packed_route(uint64_t route, char name[40])
+{
+    snprintf(name, 40, "route-%" PRIu64 ".csv", route);
+}
+
+static bool set_text(json_t *object, const char *key, const char *text)
+{
+    return json_object_set_new(object, key, json_string(text)) == 0;
+}
+
+/* What the scene says of its models' files. */
+static ebpo_status name_files(json_t *root, const ebpo_scene *scene, const ebpo_scene_packed *files,
+                              ebpo_error *error)
+{
+    json_t *models = json_object_get(root, "models");
+    bool set = true;
+    for (uint64_t i = 0; i < scene->models_count; i++) {
+        const ebpo_scene_model_entry *m = &scene->models[i];
+        json_t *model = json_object_get(models, m->name);
+        char name[40], digest[65], source[65];
+        scene_packed_name(m->file, name);
+        ebpo_sha256_hex(files[m->file].digest, digest);
+        ebpo_sha256_hex(files[m->file].source_digest, source);
+        set = set && set_text(model, "file", name) && set_text(model, "content_sha256", digest) &&
+              set_text(model, "subset_of", source);
+    }
+    return set ? EBPO_OK : ebpo_fail_memory(error, 1);
+}
+
+static ebpo_status write_in(const char *folder, const char *name, const void *data, size_t size,
+                            ebpo_error *error)
+{
+    char *path = malloc(strlen(folder) + strlen(name) + 2);
+    if (!path)
+        return ebpo_fail_memory(error, strlen(folder));
+    sprintf(path, "%s/%s", folder, name);
+    ebpo_status status = ebpo_write_file(path, data, size, error);
+    free(path);
+    return status;
+}
+
+/* Byte for byte: poses stay what they are. */
+static ebpo_status copy_poses(const ebpo_scene *scene, const char *csv, const char *folder,
+                              const char *name, ebpo_error *error)
+{
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
+    char *path = ebpo_scene_join_path(scene->folder, csv);
+    ebpo_status status = path ? EBPO_OK : ebpo_fail_memory(error, strlen(csv));
+    if (status == EBPO_OK && !scene->outside)
+        status = ebpo_scene_stays_within(scene->folder, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_open(&file, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_unchanged(&file, path, error);
+    if (status == EBPO_OK)
+        status = write_in(folder, name, file.data, file.size, error);
+    ebpo_whole_file_close(&file);
+    free(path);
+    return status;
+}
+
+static ebpo_status copy_routes(json_t *root, const ebpo_scene *scene, const char *folder,
+                               ebpo_error *error)
+{
+    json_t *routes = json_object_get(root, "routes");
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < scene->routes_count && status == EBPO_OK; i++) {
+        json_t *route = json_object_get(routes, scene->routes[i].name);
+        const char *csv = json_string_value(json_object_get(route, "csv"));
+        char name[40];
+        scene_packed_route(i, name);
+        if (csv)
+            status = copy_poses(scene, csv, folder, name, error);
+        if (csv && status == EBPO_OK && !set_text(route, "csv", name))
+            status = ebpo_fail_memory(error, 1);
+    }
+    return status;
+}
+
+/* Writes the scene into the folder, and files of poses. files: [scene->files_count] */
+static ebpo_status scene_write_packed(const ebpo_scene *scene, const ebpo_scene_packed *files,
+                                      const char *folder, ebpo_error *error)
+{
+    /* it has been read once already */
+    json_t *root = json_loadb(scene->text, scene->text_size,
+                              JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, NULL);
+    if (!root)
+        return ebpo_fail_memory(error, scene->text_size);
+    ebpo_status status = name_files(root, scene, files, error);
+    if (status == EBPO_OK)
+        status = copy_routes(root, scene, folder, error);
+    char *text =
+        status == EBPO_OK ? json_dumps(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+    if (status == EBPO_OK)
+        status = text ? write_in(folder, SCENE_PACKED, text, strlen(text), error)
+                      : ebpo_fail_memory(error, scene->text_size);
+    free(text);
+    json_decref(root);
+    return status;
+}
 
 typedef struct packing {
-    scene_needs needs;
+    ebpo_scene_needs needs;
     ebpo_pack_options how;
     const char *folder;
     char *making; /* the folder until it is whole */
@@ -25,7 +213,7 @@ typedef struct packing {
     ebpo_error *error;
 } packing;
 
-/* ---- folders ---- */
+/* --- folders --- */
 
 static char *path_in(const char *folder, const char *name)
 {
@@ -69,7 +257,7 @@ static ebpo_status publish_folder(packing *p)
     return status;
 }
 
-/* ---- models ---- */
+/* --- models --- */
 
 /* What is on the disk. */
 static ebpo_status look_at(packing *p, const char *path, ebpo_scene_packed *out)
@@ -97,7 +285,7 @@ static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
 {
     ebpo_scene_packed *out = &p->files[number];
     const ebpo_file *file = p->needs.scene->files[number].file;
-    ebpo_subset_options o = scene_need_options(&p->needs, number);
+    ebpo_subset_options o = ebpo_scene_need_options(&p->needs, number);
     char name[40];
     scene_packed_name(number, name);
     char *path = path_in(p->making, name);
@@ -126,7 +314,7 @@ static uint64_t sum_of_files(const packing *p)
 }
 
 /* Too large: each file gives way by the same share, those that nothing is asked of not at all. */
-static ebpo_status shrink(packing *p)
+static ebpo_status pack_shrink(packing *p)
 {
     uint64_t fixed = 0, sum = sum_of_files(p), target = p->how.target_bytes;
     ebpo_status status = EBPO_OK;
@@ -150,12 +338,12 @@ static ebpo_status write_files(packing *p)
         return ebpo_fail_memory(p->error, count * sizeof *p->files);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         status = write_file(p, i, 0);
-    return status == EBPO_OK ? shrink(p) : status;
+    return status == EBPO_OK ? pack_shrink(p) : status;
 }
 
-/* ---- all of it ---- */
+/* --- all of it --- */
 
-static ebpo_status check(packing *p, const ebpo_pack_options *options)
+static ebpo_status pack_check(packing *p, const ebpo_pack_options *options)
 {
     const ebpo_scene *scene = p->needs.scene;
     ebpo_plan_options plan = EBPO_PLAN_OPTIONS_INIT;
@@ -199,7 +387,7 @@ ebpo_status ebpo_scene_pack(ebpo_scene *scene, const char *folder, double from, 
                   .folder = folder,
                   .error = error };
     ebpo_scene_packed *list = NULL;
-    ebpo_status status = check(&p, options);
+    ebpo_status status = pack_check(&p, options);
     if (status == EBPO_OK)
         status = ebpo_folder_begin(folder, &p.making, error);
     if (status == EBPO_OK)

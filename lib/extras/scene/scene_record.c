@@ -1,4 +1,8 @@
-/* What was asked of a scene at several times, in an HDF5 file for other programs. */
+/* Records results of a scene at several times in an HDF5 file, for other programs.
+ *
+ * The file has the names of instances and models, a row for each time, and for each pair that was
+ * found a row with its kind, place and depth. Tables grow by rows while times are added. The file
+ * is published when it is finished, and is absent after a failure. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -174,7 +178,7 @@ static ebpo_status make_tables(ebpo_scene_record *r, ebpo_error *error)
     return status;
 }
 
-static ebpo_status begin(ebpo_scene_record *r, const char *path, ebpo_error *error)
+static ebpo_status record_begin(ebpo_scene_record *r, const char *path, ebpo_error *error)
 {
     ebpo_status status = ebpo_publish_begin(&r->target, path, error);
     if (status == EBPO_OK)
@@ -204,7 +208,7 @@ ebpo_status ebpo_scene_record_new(const ebpo_scene *scene, const char *path,
     r->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
     for (int i = 0; i < TABLES; i++)
         r->table[i] = (ebpo_h5_table)EBPO_H5_TABLE_INIT;
-    ebpo_status status = begin(r, path, error);
+    ebpo_status status = record_begin(r, path, error);
     if (status == EBPO_OK)
         *out = r;
     else
@@ -248,21 +252,21 @@ typedef struct rows {
 } rows;
 
 /* Numbers of nothing become -1. */
-static int64_t number(uint64_t n) { return n > INT64_MAX ? -1 : (int64_t)n; }
+static int64_t record_number(uint64_t n) { return n > INT64_MAX ? -1 : (int64_t)n; }
 
 static void fill_row(rows *out, uint64_t i, const ebpo_scene_meeting *m, int64_t frame)
 {
     out->frame[i] = frame;
-    out->instances[i][0] = number(m->a);
-    out->instances[i][1] = number(m->b);
+    out->instances[i][0] = record_number(m->a);
+    out->instances[i][1] = record_number(m->b);
     out->kind[i] = (uint8_t)m->kind;
     out->relation[i] = (uint8_t)m->relation;
-    out->faces[i][0] = number(m->face_a);
-    out->faces[i][1] = number(m->face_b);
-    out->pairs[i][0] = number(m->touching);
-    out->pairs[i][1] = number(m->coplanar);
-    out->pairs[i][2] = number(m->crossing);
-    out->contacts[i] = number(m->contacts);
+    out->faces[i][0] = record_number(m->face_a);
+    out->faces[i][1] = record_number(m->face_b);
+    out->pairs[i][0] = record_number(m->touching);
+    out->pairs[i][1] = record_number(m->coplanar);
+    out->pairs[i][2] = record_number(m->crossing);
+    out->contacts[i] = record_number(m->contacts);
     out->clearance[i] = m->clearance;
     out->distance[i] = m->distance;
     memcpy(out->place[i], m->place, sizeof m->place);
@@ -289,10 +293,13 @@ static ebpo_status put_rows(ebpo_scene_record *r, const rows *d, uint64_t count,
 static ebpo_status put_frame(ebpo_scene_record *r, const ebpo_scene_frame *f, uint64_t meetings,
                              ebpo_error *error)
 {
-    const int64_t n[] = { r->meetings,           number(meetings),
-                          number(f->asked),      number(f->nanoseconds),
-                          number(f->bytes_read), number(f->models),
-                          number(f->loads) };
+    const int64_t n[] = { r->meetings,
+                          record_number(meetings),
+                          record_number(f->asked),
+                          record_number(f->nanoseconds),
+                          record_number(f->bytes_read),
+                          record_number(f->models),
+                          record_number(f->loads) };
     ebpo_status status = ebpo_h5_append(&r->out, &r->table[TIME], &f->time, 1, error);
     for (int i = FIRST_MEETING; i < FRAME && status == EBPO_OK; i++)
         status = ebpo_h5_append(&r->out, &r->table[i], &n[i - FIRST_MEETING], 1, error);

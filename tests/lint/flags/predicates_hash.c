@@ -7,11 +7,10 @@
 #include <stdio.h>
 
 #include "exact_twin.h"
-#include "geometry/cell.h"
+#include "geometry/cells.h"
 #include "geometry/predicates.h"
-#include "geometry/predicates_expansion.h"
 #include "geometry/distance.h"
-#include "geometry/ray_triangle.h"
+#include "geometry/ray.h"
 
 enum { ROUNDS = 3000 };
 

@@ -10,10 +10,10 @@
 #include "check_main.h"
 #include "format/pick_rows.h"
 #include "format/slice.h"
-#include "geometry/node_types.h"
+#include "geometry/level_nodes.h"
 #include "random_tree.h"
 #include "scratch.h"
-#include "verify/structure.h"
+#include "verify/verify_tree.h"
 
 static const char *path, *other;
 static ebpo_tree tree;

@@ -1,5 +1,5 @@
 // Exact predicates over doubles: a filter in floating point answers nearly always, the rest is done in integers of any size. The same predicates,
-// and the same infinitely small shift, as the library's (lib/geometry/crossing.c, where the reasons stand).
+// and the same infinitely small shift, as the library's (lib/geometry/triangle_predicates.c, where the reasons stand).
 // Source of the filters: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997; of the shift:
 // Edelsbrunner and Muecke, "Simulation of Simplicity", 1990.
 

@@ -1,0 +1,533 @@
+/* Subtrees to stretches of level arrays: a depth-first walk meets the nodes of each level in
+ * octcode order. */
+#include "core/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "construct/planes.h"
+#include "construct/construct_stages.h"
+#include "construct/pieces.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "geometry/level_nodes.h"
+#include "geometry/polytope.h"
+
+struct ebpo_emit_scratch {
+    ebpo_envelope_scratch *envelope;
+    ebpo_triangle *faces; /* of one leaf */
+    uint64_t faces_capacity;
+    ebpo_workspace *workspace;
+    /* [a level][3] halves of the envelopes on the path to a node, along z, y, x; too large for the
+     * stack, and allocated when the first node of the level has children */
+    ebpo_polytope (*half[EBPO_LEVELS_MAX])[3];
+};
+
+typedef struct emitter {
+    const ebpo_builder *b;
+    ebpo_branch *s;
+    ebpo_emit_scratch *scratch;
+} emitter;
+
+ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_workspace *workspace,
+                                   ebpo_error *error)
+{
+    *out = ebpo_alloc_zero(1, sizeof **out);
+    ebpo_status status =
+        *out ? ebpo_scratch_make(&(*out)->envelope, error) : ebpo_fail_memory(error, sizeof **out);
+    if (status != EBPO_OK) {
+        free(*out);
+        *out = NULL;
+    } else {
+        (*out)->workspace = workspace;
+    }
+    return status;
+}
+
+void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch)
+{
+    if (!scratch)
+        return;
+    ebpo_scratch_free(scratch->envelope);
+    ebpo_array_free(scratch->workspace, scratch->faces);
+    for (int level = 0; level < EBPO_LEVELS_MAX; level++)
+        free(scratch->half[level]);
+    free(scratch);
+}
+
+static bool grow_leaf_arrays(ebpo_piece_level *out, uint64_t refs)
+{
+    ebpo_level *l = &out->level;
+    uint64_t n = l->leaf_count + 1, *c = out->capacity;
+#define GROW(array, ID, need) \
+    ebpo_array_grow_late(l->workspace, &l->array, &c[EBPO_A_##ID], need, sizeof *l->array)
+    return GROW(leaf_winding, LEAF_WINDING, n) && GROW(leaf_first, LEAF_SKIP, n) &&
+           GROW(leaf_new, LEAF_NEW, n) && GROW(leaf_ref_count, LEAF_REF_COUNT, n) &&
+           GROW(leaf_plane_counts, LEAF_PLANE_COUNTS, n) &&
+           GROW(leaf_refs, LEAF_REFS, l->ref_count + refs);
+#undef GROW
+}
+
+static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_piece_level *out,
+                      int32_t winding)
+{
+    ebpo_level *l = &out->level;
+    uint64_t refs = d->entry_end - d->entry_begin - d->new_count;
+    if (!grow_leaf_arrays(out, refs))
+        return false;
+    l->leaf_winding[l->leaf_count] = winding;
+    l->leaf_first[l->leaf_count] = d->first;
+    l->leaf_new[l->leaf_count] = d->new_count;
+    l->leaf_ref_count[l->leaf_count] = (uint32_t)refs;
+    for (uint64_t i = d->entry_begin, ref = l->ref_count; i < d->entry_end; i++) {
+        uint32_t place = e->s->entries[i], face = e->s->list[place];
+        if (!(e->s->fresh[place / 8] >> place % 8 & 1) || e->b->number[face] < d->first)
+            l->leaf_refs[ref++] = face;
+    }
+    l->ref_count += refs;
+    l->new_count += d->new_count;
+    return true;
+}
+
+static bool gather_faces(emitter *e, const ebpo_build_detail *d)
+{
+    ebpo_emit_scratch *scratch = e->scratch;
+    uint64_t count = d->entry_end - d->entry_begin;
+    if (!ebpo_array_grow_late(e->b->workspace, &scratch->faces, &scratch->faces_capacity, count,
+                              sizeof *scratch->faces))
+        return false;
+    for (uint64_t i = 0; i < count; i++)
+        ebpo_branch_triangle(e->b, e->s, e->s->entries[d->entry_begin + i], &scratch->faces[i]);
+    return true;
+}
+
+/* Planes that are to be stored: the selection's own. Else readers derive them. -1: out of memory.
+ */
+static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
+                       ebpo_polytope *envelope, uint32_t *codes)
+{
+    const ebpo_builder *b = e->b;
+    const ebpo_build_detail *d = &e->s->details[detail];
+    int count;
+    const uint32_t *proposed = ebpo_proposed(e->s, detail, &count);
+    if (!proposed && !gather_faces(e, d))
+        return -1;
+    if (!proposed)
+        return ebpo_leaf_planes(&b->box, cell, e->scratch->faces, d->entry_end - d->entry_begin,
+                                ebpo_inside_corners(b, winding, d->delta), b->options->epsilon,
+                                envelope, codes);
+    memcpy(codes, proposed, (size_t)count * sizeof *codes);
+    ebpo_planes_cut(envelope, codes, (uint64_t)count);
+    return count;
+}
+
+static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
+                      ebpo_polytope *envelope)
+{
+    const ebpo_builder *b = e->b;
+    const ebpo_build_detail *d = &e->s->details[detail];
+    ebpo_piece_level *out = &e->s->out[cell.level];
+    ebpo_level *l = &out->level;
+    if (!emit_list(e, d, out, winding))
+        return false;
+    uint32_t codes[EBPO_PLANES_STORED];
+    bool stored = b->options->parts & EBPO_PART_LEAF_PLANES;
+    int planes = stored ? leaf_planes(e, detail, cell, winding, envelope, codes) : 0;
+    if (planes < 0)
+        return false;
+    l->leaf_volume += ebpo_polytope_volume(envelope) * ebpo_cell_volume(&b->box, cell.level);
+    l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;
+    if (!stored)
+        return true;
+    if (!ebpo_array_grow_late(l->workspace, &l->leaf_planes, &out->capacity[EBPO_A_LEAF_PLANES],
+                              l->leaf_plane_count + (uint64_t)planes, sizeof *l->leaf_planes))
+        return false;
+    if (planes)
+        memcpy(l->leaf_planes + l->leaf_plane_count, codes, (size_t)planes * sizeof *codes);
+    l->leaf_plane_count += (uint64_t)planes;
+    return true;
+}
+
+static bool emit_empty(emitter *e, ebpo_cell cell, int32_t winding)
+{
+    bool black = e->b->solid && ebpo_rule_inside(e->b->options->rule, winding);
+    return ebpo_piece_level_add_empty(&e->s->out[cell.level], black, winding);
+}
+
+static bool emit_emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
+                      ebpo_polytope *envelope);
+
+static unsigned filled_children(const ebpo_branch *s, uint32_t child)
+{
+    unsigned mask = 0;
+    for (uint32_t o = 0; o < 8; o++)
+        mask |= (unsigned)(s->nodes[child + o].type != EBPO_WHITE) << o;
+    return mask;
+}
+
+/* In octant order; neighbours share the halves that their envelopes are cut from. A half that
+ * rounding leaves nothing of stays the whole cube, and so do its parts: too large, never too small.
+ */
+static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t winding,
+                          const int32_t offset[8], const ebpo_polytope *envelope)
+{
+    unsigned filled = filled_children(e->s, child);
+    ebpo_polytope(**half)[3] = &e->scratch->half[cell.level];
+    if (!*half && !(*half = ebpo_alloc(1, sizeof **half)))
+        return false;
+    ebpo_polytope *z = **half, *y = z + 1, *x = z + 2;
+    for (unsigned o = 0; o < 8; o++) {
+        if (o % 4 == 0 && filled >> o & 15)
+            ebpo_polytope_half(envelope, 2, o >> 2 & 1, z);
+        if (o % 2 == 0 && filled >> o & 3)
+            ebpo_polytope_half(z, 1, o >> 1 & 1, y);
+        if (filled >> o & 1)
+            ebpo_polytope_half(y, 0, o & 1, x);
+        if (!emit_emit(e, child + o, ebpo_cell_child(cell, o), winding + offset[o], x))
+            return false;
+    }
+    return true;
+}
+
+static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, int32_t winding,
+                      ebpo_polytope *envelope)
+{
+    const ebpo_builder *b = e->b;
+    uint32_t codes[EBPO_PLANES_STORED];
+    int planes = 0;
+    if (e->s->out[cell.level].level.gray_count % EBPO_ITEMS_SCATTERED == 0)
+        ebpo_release_pages(b->workspace);
+    if (b->options->parts & EBPO_PART_PLANES)
+        planes = ebpo_gray_planes(b, e->scratch->envelope, e->s, node->detail, cell, winding,
+                                  envelope, codes);
+    if (planes < 0 || !ebpo_piece_level_add_gray(&e->s->out[cell.level], codes, planes,
+                                                 ebpo_polytope_volume(envelope) *
+                                                     ebpo_cell_volume(&b->box, cell.level)))
+        return false;
+    int32_t offset[8];
+    ebpo_child_windings(b, e->s, node->child, offset);
+    uint16_t types = 0;
+    for (uint32_t o = 0; o < 8; o++) {
+        ebpo_node_type type = e->s->nodes[node->child + o].type;
+        if (type == EBPO_WHITE && b->solid &&
+            ebpo_rule_inside(b->options->rule, winding + offset[o]))
+            type = EBPO_BLACK;
+        types |= ebpo_group_of(type, o);
+    }
+    if (!ebpo_piece_level_add_group(&e->s->out[cell.level + 1], types))
+        return false;
+    return emit_children(e, node->child, cell, winding, offset, envelope);
+}
+
+static bool emit_emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
+                      ebpo_polytope *envelope)
+{
+    ebpo_build_node node = e->s->nodes[index];
+    switch (node.type) {
+    case EBPO_LEAF: return emit_leaf(e, node.detail, cell, winding, envelope);
+    case EBPO_GRAY: return emit_gray(e, &node, cell, winding, envelope);
+    default: return emit_empty(e, cell, winding);
+    }
+}
+
+ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s,
+                            ebpo_error *error)
+{
+    emitter e = { b, s, scratch };
+    s->out = ebpo_array_zero(b->workspace, EBPO_LEVELS_MAX, sizeof *s->out);
+    for (int level = 0; s->out && level < EBPO_LEVELS_MAX; level++)
+        s->out[level].level.workspace = b->workspace;
+    if (!s->out || !emit_emit(&e, 0, s->cell, s->winding, s->above))
+        return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
+    return EBPO_OK;
+}
+
+/* All stretches of level arrays joined in depth-first order, which is octcode order in each level.
+ */
+
+typedef struct joiner {
+    ebpo_builder *b;
+    ebpo_piece_level **stretch; /* depth first: pieces of the top and whole subtrees by turns */
+    uint64_t count, capacity;
+    ebpo_piece_level *current;
+    ebpo_level *level; /* what comes out */
+} joiner;
+
+static const char stage[] = "joining levels";
+
+static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
+{
+    return ebpo_workspace_fail_while(b->workspace, "while joining levels", error);
+}
+
+static bool join_levels_push(joiner *j, ebpo_piece_level *out)
+{
+    if (!ebpo_grow(&j->stretch, &j->capacity, j->count + 1, sizeof *j->stretch))
+        return false;
+    j->stretch[j->count++] = out;
+    return true;
+}
+
+static ebpo_piece_level *join_levels_current(joiner *j)
+{
+    if (j->current)
+        return j->current;
+    ebpo_piece_level *out = ebpo_array_zero(j->b->workspace, EBPO_LEVELS_MAX, sizeof *out);
+    if (!out || !join_levels_push(j, out)) {
+        ebpo_array_free(j->b->workspace, out);
+        return NULL;
+    }
+    for (int level = 0; level < EBPO_LEVELS_MAX; level++)
+        out[level].level.workspace = j->b->workspace;
+    return j->current = out;
+}
+
+static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, int32_t winding)
+{
+    ebpo_node_type type = n->type == EBPO_LEAF ? b->sub[n->detail].root_type : n->type;
+    if (type == EBPO_WHITE && b->solid && ebpo_rule_inside(b->options->rule, winding))
+        return EBPO_BLACK;
+    return type;
+}
+
+static bool join_levels_walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
+{
+    ebpo_builder *b = j->b;
+    ebpo_build_node node = b->top.nodes[index];
+    if (node.type == EBPO_LEAF) {
+        ebpo_piece_level *out = b->sub[node.detail].out;
+        b->sub[node.detail].out = NULL;
+        if (!join_levels_push(j, out)) {
+            ebpo_piece_levels_free(out);
+            return false;
+        }
+        j->current = NULL;
+        return true;
+    }
+    ebpo_piece_level *out = join_levels_current(j);
+    if (!out)
+        return false;
+    if (node.type == EBPO_WHITE)
+        return ebpo_piece_level_add_empty(&out[cell.level],
+                                          b->solid && ebpo_rule_inside(b->options->rule, winding),
+                                          winding);
+    const ebpo_top_envelope *t = &b->top_envelope[node.detail];
+    int32_t offset[8];
+    ebpo_child_windings(b, &b->top, node.child, offset);
+    uint16_t types = 0;
+    for (uint32_t o = 0; o < 8; o++)
+        types |= ebpo_group_of(type_of(b, &b->top.nodes[node.child + o], winding + offset[o]), o);
+    if (!ebpo_piece_level_add_gray(&out[cell.level], t->codes, t->count, t->volume) ||
+        !ebpo_piece_level_add_group(&out[cell.level + 1], types))
+        return false;
+    for (uint32_t o = 0; o < 8; o++)
+        if (!join_levels_walk(j, node.child + o, ebpo_cell_child(cell, o), winding + offset[o]))
+            return false;
+    return true;
+}
+
+static void add_counts(const joiner *j, int level, int per)
+{
+    uint64_t total = 0;
+    for (uint64_t i = 0; i < j->count; i++)
+        total += ebpo_level_count(&j->stretch[i][level].level, (ebpo_per)per);
+    ebpo_level_set_count(&j->level[level], (ebpo_per)per, total);
+}
+
+static bool any_has(const joiner *j, int level, int id)
+{
+    for (uint64_t i = 0; i < j->count; i++)
+        if (ebpo_level_array(&j->stretch[i][level].level, id))
+            return true;
+    return false;
+}
+
+static void fill_usual(const joiner *j, char *to, uint64_t bytes, int id)
+{
+    int64_t usual = ebpo_schema[id].usual; /* files are little-endian, and so are we */
+    EBPO_FOR_ITEMS(j->b->workspace, i, 0, bytes / ebpo_schema[id].held_size)
+        memcpy(to + i * ebpo_schema[id].held_size, &usual, ebpo_schema[id].held_size);
+}
+
+/* An array that none of the stretches has stays away. */
+static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
+{
+    uint64_t total = ebpo_level_rows(out, id), size = ebpo_schema[id].held_size;
+    if (!total || !any_has(j, level, id))
+        return true;
+    char *to = ebpo_array_alloc(j->b->workspace, total, size);
+    if (!to)
+        return false;
+    ebpo_level_set_array(out, id, to);
+    EBPO_FOR_ITEMS_EVERY(j->b->workspace, 1, i, 0, j->count) {
+        ebpo_level *from = &j->stretch[i][level].level;
+        void *array = ebpo_level_array(from, id);
+        size_t bytes = (size_t)(ebpo_level_rows(from, id) * size);
+        if (array)
+            ebpo_array_copy(j->b->workspace, to, array, bytes);
+        else /* a stretch in which all elements have the usual value */
+            fill_usual(j, to, bytes, id);
+        to += bytes;
+        if (!j->stretch[i][level].packed)
+            ebpo_array_free(j->b->workspace, array);
+        ebpo_level_set_array(from, id, NULL);
+    }
+    return true;
+}
+
+static int compare_numbers(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void sort_numbers(uint32_t *a, uint64_t n)
+{
+    if (n > 32) {
+        qsort(a, n, sizeof *a, compare_numbers);
+        return;
+    }
+    for (uint64_t i = 1; i < n; i++) {
+        uint32_t v = a[i];
+        uint64_t j = i;
+        for (; j > 0 && a[j - 1] > v; j--)
+            a[j] = a[j - 1];
+        a[j] = v;
+    }
+}
+
+enum { LEAF_GRAIN = 1 << 13 };
+
+typedef struct numbering {
+    const ebpo_builder *b;
+    ebpo_level *level;
+    uint64_t *first; /* of each block of leaves: its start in leaf_refs */
+} numbering;
+
+/* Leaves refer to faces by their numbers along the curve, as other pieces' final ones were not
+ * known: now they are. */
+static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
+{
+    numbering *n = context;
+    ebpo_level *l = n->level;
+    uint32_t *refs = l->leaf_refs + n->first[begin / LEAF_GRAIN];
+    (void)worker, (void)error;
+    EBPO_FOR_ITEMS_SCATTERED(n->b->workspace, i, begin, end) {
+        for (uint32_t k = 0; k < l->leaf_ref_count[i]; k++)
+            refs[k] = n->b->number[refs[k]];
+        sort_numbers(refs, l->leaf_ref_count[i]);
+        refs += l->leaf_ref_count[i];
+    }
+    return EBPO_OK;
+}
+
+/* `all`: references of all levels, of which `before` have been numbered. */
+static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t before, uint64_t all,
+                               ebpo_error *error)
+{
+    if (!l->ref_count)
+        return EBPO_OK;
+    numbering n = { b, l, ebpo_alloc(l->leaf_count / LEAF_GRAIN + 1, sizeof *n.first) };
+    if (!n.first)
+        return no_memory(b, error);
+    uint64_t refs = 0;
+    EBPO_FOR_ITEMS(b->workspace, i, 0, l->leaf_count) {
+        if (i % LEAF_GRAIN == 0)
+            n.first[i / LEAF_GRAIN] = refs;
+        refs += l->leaf_ref_count[i];
+    }
+    ebpo_pass pass = { &b->options->progress, all + before, all + before + l->ref_count, 2 * all };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
+    ebpo_status status = ebpo_parallel_for(b->threads, NULL, l->leaf_count, LEAF_GRAIN,
+                                           number_block, &n, &progress, stage, error);
+    free(n.first);
+    return status;
+}
+
+/* Arrays that say only what is understood anyway, or that belong to parts that are not wanted, are
+ * left out. */
+static void leave_out(const ebpo_builder *b, ebpo_level *l)
+{
+    uint32_t parts = b->options->parts;
+    ebpo_level_drop(l, ~(parts | (b->solid ? EBPO_NEEDS_SOLID : 0) | EBPO_NEEDS_ALWAYS));
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+        if (ebpo_schema[id].if_needed && ebpo_level_is_usual(l, id)) {
+            ebpo_array_free(l->workspace, ebpo_level_array(l, id));
+            ebpo_level_set_array(l, id, NULL);
+        }
+    if (!(parts & EBPO_PART_MESH))
+        l->ref_count = l->new_count = 0;
+}
+
+static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    joiner *j = context;
+    (void)worker;
+    for (uint64_t i = begin; i < end; i++) {
+        int level = (int)(i / EBPO_LEVEL_ARRAYS), id = (int)(i % EBPO_LEVEL_ARRAYS);
+        if (ebpo_schema_is_held(id) && !join_array(j, level, id, &j->level[level]))
+            return no_memory(j->b, error);
+    }
+    return EBPO_OK;
+}
+
+/* Volumes are added in a fixed order, whatever the number of threads. */
+static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uint64_t all,
+                                ebpo_error *error)
+{
+    ebpo_level *out = &j->level[level];
+    for (uint64_t i = 0; i < j->count; i++) {
+        const ebpo_level *l = &j->stretch[i][level].level;
+        out->gray_volume += l->gray_volume;
+        out->leaf_volume += l->leaf_volume;
+    }
+    ebpo_status status = j->b->options->parts & EBPO_PART_MESH
+                             ? number_refs(j->b, out, before, all, error)
+                             : EBPO_OK;
+    leave_out(j->b, out);
+    return status;
+}
+
+static bool root_group(joiner *j)
+{
+    ebpo_builder *b = j->b;
+    ebpo_piece_level *first =
+        join_levels_current(j); /* never a piece's, whose arrays may be packed */
+    return first &&
+           ebpo_piece_level_add_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0], 0));
+}
+
+ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error)
+{
+    joiner j = { .b = b, .level = out->level };
+    ebpo_status status =
+        root_group(&j) && join_levels_walk(&j, 0, b->top.cell, 0) ? EBPO_OK : no_memory(b, error);
+    uint64_t refs = 0, all = 0;
+    for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
+        for (int per = 0; per <= EBPO_PER_GROUP; per++)
+            add_counts(&j, level, per);
+        all += out->level[level].ref_count;
+    }
+    ebpo_pass pass = { &b->options->progress, 0, all, 2 * all };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(b->threads, NULL, EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS, 1,
+                                   join_arrays, &j, &progress, stage, error);
+    for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
+        uint64_t own = out->level[level].ref_count;
+        status = finish_level(&j, level, refs, all, error);
+        refs += own;
+        if (out->level[level].group_count)
+            out->info.level_count = level + 1;
+        out->info.level[level] = ebpo_level_summarise(&out->level[level], ~0u);
+    }
+    for (uint64_t i = 0; i < j.count; i++)
+        ebpo_piece_levels_free(j.stretch[i]);
+    free(j.stretch);
+    ebpo_store_free(b->store);
+    b->store = NULL;
+    return status;
+}

@@ -1,0 +1,385 @@
+/* A tool: a rigid set of points that move together, the contacts that hold it, and the forces that
+ * it returns.
+ *
+ * Points are split at the middle of their longest side into clusters of few points. A rotation is
+ * measured as a length: its angle times the tool's arm.
+ *
+ * The way of a tool is held back by its contacts: the nearest way to the wanted one that takes no
+ * point closer to a face than it may be. Hildreth's method solves that for the contacts that
+ * matter, which are added one at a time, the most violated first.
+ *
+ * Forces are passive: they are reduced where the hand would receive more energy than it gave. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "extras/haptic/tool.h"
+
+static double passive_product(const double *a, const double *b, int n)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
+void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *moved, int n)
+{
+    p->given += passive_product(force, moved, n);
+    p->step_most = fmax(p->step_most, sqrt(passive_product(moved, moved, n)));
+}
+
+/* So that what is given in sum, `given`, never exceeds A = stiffness s^2, s being the longest step
+ * that the hand ever made in a tick. With g = -given, a step of s' gives at most F s', and F s' - g
+ * must not exceed stiffness max(s, s')^2. That is so for all s' where F^2 <= 4 stiffness g; and
+ * where F <= 2 stiffness s and F s - g <= A, as from s on the right side then grows faster than the
+ * left one. A spring that was pressed steadily to the depth d has F = stiffness d and g at least
+ * stiffness d^2 / 2: there the one or the other holds, and nothing is taken off. */
+static double most_force(const ebpo_passive *p)
+{
+    double k = p->stiffness, g = -p->given, s = p->step_most;
+    double by_step = s > 0 ? fmin(2 * k * s, k * s + g / s) : 0;
+    double by_store = g > 0 ? 2 * sqrt(k * g) : 0;
+    return fmax(fmax(by_step, by_store) * (1 - 0x1p-40), 0);
+}
+
+void ebpo_passive_push(const ebpo_passive *p, double damping, const double *depth,
+                       const double *moved, int n, double *force)
+{
+    for (int i = 0; i < n; i++)
+        force[i] = p->stiffness * depth[i] - damping * moved[i];
+    double into = passive_product(force, depth, n), square = passive_product(depth, depth, n);
+    if (into < 0 && square > 0) /* what pulls towards the faces is taken out */
+        for (int i = 0; i < n; i++)
+            force[i] -= into / square * depth[i];
+    double length = sqrt(passive_product(force, force, n)), most = most_force(p);
+    if (length > most)
+        for (int i = 0; i < n; i++)
+            force[i] *= most / length;
+}
+
+bool ebpo_rigid_read(const double place[3], const double turn[4], ebpo_rigid *out)
+{
+    double most = 0, square = 0, unit[4];
+    bool fine = true;
+    for (int i = 0; i < 3; i++)
+        fine &= fabs(place[i]) <= 0x1p200;
+    for (int i = 0; i < 4; i++) {
+        fine &= isfinite(turn[i]) != 0;
+        most = fmax(most, fabs(turn[i]));
+    }
+    if (!fine || !(most >= 0x1p-500))
+        return false;
+    for (int i = 0; i < 4; i++) {
+        unit[i] = turn[i] / most;
+        square += unit[i] * unit[i];
+    }
+    ebpo_vec3_copy(place, out->place);
+    for (int i = 0; i < 4; i++)
+        out->turn[i] = unit[i] / sqrt(square);
+    return true;
+}
+
+static void rigid_multiply(const double a[4], const double b[4], double out[4])
+{
+    double c[3];
+    ebpo_vec3_cross(a, b, c);
+    for (int i = 0; i < 3; i++)
+        out[i] = a[3] * b[i] + b[3] * a[i] + c[i];
+    out[3] = a[3] * b[3] - ebpo_vec3_dot(a, b);
+}
+
+void ebpo_rigid_between(const ebpo_rigid *a, const ebpo_rigid *b, double arm,
+                        double out[EBPO_SCREW])
+{
+    const double back[4] = { -a->turn[0], -a->turn[1], -a->turn[2], a->turn[3] };
+    double q[4];
+    ebpo_vec3_subtract(b->place, a->place, out);
+    rigid_multiply(b->turn, back, q);
+    double sine = sqrt(ebpo_vec3_dot(q, q)), side = q[3] < 0 ? -1 : 1;
+    double angle = 2 * atan2(sine, side * q[3]);
+    for (int i = 0; i < 3; i++)
+        out[3 + i] = sine > 0 ? arm * (side * angle / sine) * q[i] : 0;
+}
+
+void ebpo_rigid_go(const ebpo_rigid *from, const double way[EBPO_SCREW], double part, double arm,
+                   ebpo_rigid *out)
+{
+    double by[4], q[4], place[3];
+    double angle = part * sqrt(ebpo_vec3_dot(way + 3, way + 3)) / arm;
+    for (int i = 0; i < 3; i++) {
+        place[i] = from->place[i] + part * way[i];
+        by[i] = angle > 0 ? sin(angle / 2) / angle * (part * way[3 + i] / arm) : 0;
+    }
+    by[3] = cos(angle / 2);
+    rigid_multiply(by, from->turn, q);
+    *out = *from;
+    (void)ebpo_rigid_read(place, q, out);
+}
+
+void ebpo_rigid_matrix(const ebpo_rigid *r, double out[3][3])
+{
+    const double *q = r->turn;
+    for (int i = 0; i < 3; i++) {
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        out[i][i] = 1 - 2 * (q[j] * q[j] + q[k] * q[k]);
+        out[i][j] = 2 * (q[i] * q[j] - q[3] * q[k]);
+        out[i][k] = 2 * (q[i] * q[k] + q[3] * q[j]);
+    }
+}
+
+/* --- contacts --- */
+
+enum { ACTIVE = 12, SWEEPS = 20 };
+
+static void tool_hold_swap(ebpo_tool_contacts *all, int i, int j)
+{
+    ebpo_tool_contact c = all->at[i];
+    all->at[i] = all->at[j];
+    all->at[j] = c;
+}
+
+static void tool_hold_sink(ebpo_tool_contacts *all)
+{
+    for (int i = 0, child; (child = 2 * i + 1) < all->count; i = child) {
+        if (child + 1 < all->count && all->at[child + 1].gap > all->at[child].gap)
+            child++;
+        if (all->at[child].gap <= all->at[i].gap)
+            return;
+        tool_hold_swap(all, i, child);
+    }
+}
+
+void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *contact)
+{
+    if (all->count == EBPO_CONTACTS_MOST) {
+        if (contact->gap >= all->at[0].gap)
+            return;
+        all->at[0] = *contact;
+        tool_hold_sink(all);
+        return;
+    }
+    int i = all->count++;
+    all->at[i] = *contact;
+    for (; i > 0 && all->at[(i - 1) / 2].gap < all->at[i].gap; i = (i - 1) / 2)
+        tool_hold_swap(all, i, (i - 1) / 2);
+}
+
+typedef struct held {
+    const ebpo_tool_contacts *all;
+    int active[ACTIVE], count;
+    double force[ACTIVE], square[ACTIVE];
+    bool release;
+} held;
+
+static double tool_hold_lacks(const held *h, const ebpo_tool_contact *c,
+                              const double way[EBPO_SCREW])
+{
+    double room = h->release ? c->room : fmax(c->room, 0);
+    return -room - ebpo_screw_dot(c->grip, way);
+}
+
+static void tool_hold_sweep(held *h, double close, double way[EBPO_SCREW])
+{
+    for (int turn = 0; turn < SWEEPS; turn++) {
+        double most = 0;
+        for (int i = 0; i < h->count; i++) {
+            const ebpo_tool_contact *c = &h->all->at[h->active[i]];
+            double by = fmax(tool_hold_lacks(h, c, way) / h->square[i], -h->force[i]);
+            h->force[i] += by;
+            for (int k = 0; k < EBPO_SCREW; k++)
+                way[k] += by * c->grip[k];
+            most = fmax(most, fabs(by) * h->square[i]);
+        }
+        if (most <= close / 8)
+            return;
+    }
+}
+
+static int most_offended(const held *h, double close, const double way[EBPO_SCREW])
+{
+    int found = -1;
+    double most = close;
+    for (int i = 0; i < h->all->count; i++) {
+        double lack = tool_hold_lacks(h, &h->all->at[i], way);
+        if (lack > most) {
+            most = lack;
+            found = i;
+        }
+    }
+    for (int i = 0; i < h->count; i++)
+        if (h->active[i] == found)
+            return -1; /* more sweeps would do; what is left is looked at when points move */
+    return found;
+}
+
+int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW], double close,
+                   bool release, double out[EBPO_SCREW])
+{
+    held h = { .all = all, .release = release };
+    int holding = 0;
+    for (int k = 0; k < EBPO_SCREW; k++)
+        out[k] = want[k];
+    while (h.count < ACTIVE) {
+        int next = most_offended(&h, close, out);
+        if (next < 0)
+            break;
+        h.active[h.count] = next;
+        h.force[h.count] = 0;
+        h.square[h.count++] = ebpo_screw_dot(all->at[next].grip, all->at[next].grip);
+        tool_hold_sweep(&h, close, out);
+    }
+    for (int i = 0; i < h.count; i++)
+        holding += h.force[i] > 0;
+    return holding;
+}
+
+/* --- the tool --- */
+
+typedef struct placed {
+    double p[3];
+    uint32_t number;
+} placed;
+
+static int along_x(const void *a, const void *b)
+{
+    const placed *x = a, *y = b;
+    return x->p[0] != y->p[0] ? (x->p[0] > y->p[0]) - (x->p[0] < y->p[0])
+                              : (x->number > y->number) - (x->number < y->number);
+}
+static int along_y(const void *a, const void *b)
+{
+    const placed *x = a, *y = b;
+    return x->p[1] != y->p[1] ? (x->p[1] > y->p[1]) - (x->p[1] < y->p[1])
+                              : (x->number > y->number) - (x->number < y->number);
+}
+static int along_z(const void *a, const void *b)
+{
+    const placed *x = a, *y = b;
+    return x->p[2] != y->p[2] ? (x->p[2] > y->p[2]) - (x->p[2] < y->p[2])
+                              : (x->number > y->number) - (x->number < y->number);
+}
+
+static int longest_axis(const placed *p, uint64_t count)
+{
+    double side[3];
+    for (int k = 0; k < 3; k++) {
+        double low = p[0].p[k], high = low;
+        for (uint64_t i = 1; i < count; i++) {
+            low = fmin(low, p[i].p[k]);
+            high = fmax(high, p[i].p[k]);
+        }
+        side[k] = high - low;
+    }
+    return side[0] >= side[1] && side[0] >= side[2] ? 0 : side[1] >= side[2] ? 1 : 2;
+}
+
+static double far_from(const double p[3], const double q[3])
+{
+    double d[3];
+    ebpo_vec3_subtract(p, q, d);
+    return sqrt(ebpo_vec3_dot(d, d));
+}
+
+static void add_cluster(ebpo_tool *t, const placed *p, uint64_t first, uint64_t count)
+{
+    ebpo_tool_cluster *c = &t->cluster[t->cluster_count++];
+    *c = (ebpo_tool_cluster){ .first = (uint32_t)first, .count = (uint32_t)count };
+    for (uint64_t i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++)
+            c->middle[k] += p[first + i].p[k] / (double)count;
+    for (uint64_t i = 0; i < count; i++)
+        c->radius = fmax(c->radius, far_from(p[first + i].p, c->middle));
+}
+
+static void tool_new_part(ebpo_tool *t, placed *p, uint64_t first, uint64_t count)
+{
+    static int (*const along[3])(const void *, const void *) = { along_x, along_y, along_z };
+    if (count <= EBPO_TOOL_CLUSTER) {
+        add_cluster(t, p, first, count);
+        return;
+    }
+    qsort(p + first, count, sizeof *p, along[longest_axis(p + first, count)]);
+    tool_new_part(t, p, first, count / 2);
+    tool_new_part(t, p, first + count / 2, count - count / 2);
+}
+
+static void tool_new_fill(ebpo_tool *t, const double (*points)[3], placed *p)
+{
+    const double zero[3] = { 0, 0, 0 };
+    double square = 0;
+    for (uint64_t i = 0; i < t->count; i++) {
+        ebpo_vec3_copy(points[i], p[i].p);
+        p[i].number = (uint32_t)i;
+        double far = far_from(points[i], zero);
+        t->radius = fmax(t->radius, far);
+        square += far * far / (double)t->count;
+    }
+    tool_new_part(t, p, 0, t->count);
+    for (uint64_t i = 0; i < t->count; i++) {
+        ebpo_vec3_copy(p[i].p, t->point[i]);
+        t->number[i] = p[i].number;
+        t->close[i] = (ebpo_tool_close){ 0 };
+    }
+    for (uint64_t i = 0; i < EBPO_TOOL_POOL; i++)
+        t->pool[i] = 0;                     /* no tick is the first to use a page */
+    t->arm = square > 0 ? sqrt(square) : 1; /* one point in the middle: turning does nothing */
+}
+
+uint64_t ebpo_tool_bytes(const ebpo_tool *t)
+{
+    return sizeof *t + EBPO_TOOL_POOL * sizeof *t->pool +
+           t->count * (sizeof *t->point + sizeof *t->number + sizeof *t->free + sizeof *t->close +
+                       sizeof *t->cluster);
+}
+
+ebpo_status ebpo_tool_new(const double (*points)[3], uint64_t count, ebpo_tool **out,
+                          ebpo_error *error)
+{
+    ebpo_tool *t = *out = ebpo_alloc_zero(1, sizeof *t);
+    placed *p = ebpo_alloc(count, sizeof *p);
+    if (t) {
+        t->count = count;
+        t->point = ebpo_alloc(count, sizeof *t->point);
+        t->number = ebpo_alloc(count, sizeof *t->number);
+        t->free = ebpo_alloc(count, sizeof *t->free);
+        t->close = ebpo_alloc(count, sizeof *t->close);
+        t->cluster = ebpo_alloc(count, sizeof *t->cluster);
+        t->pool = ebpo_alloc(EBPO_TOOL_POOL, sizeof *t->pool);
+    }
+    bool fine = t && p && t->point && t->number && t->free && t->close && t->cluster && t->pool;
+    if (fine)
+        tool_new_fill(t, points, p);
+    free(p);
+    return fine ? EBPO_OK : ebpo_fail_memory(error, count * 128 + EBPO_TOOL_POOL * 4);
+}
+
+void ebpo_tool_free(ebpo_tool *t)
+{
+    if (!t)
+        return;
+    free(t->point);
+    free(t->number);
+    free(t->free);
+    free(t->close);
+    free(t->cluster);
+    free(t->pool);
+    free(t);
+}
+
+void ebpo_tool_put(ebpo_tool *t, const ebpo_rigid *at)
+{
+    t->proxy = t->hand = *at;
+    t->stage = EBPO_TOOL_STANDS;
+    t->contacts.count = 0;
+    t->way_count = 0;
+    for (int k = 0; k < EBPO_SCREW; k++)
+        t->force[k] = 0;
+    for (uint64_t i = 0; i < t->cluster_count; i++)
+        t->cluster[i].gone = t->cluster[i].free = 0;
+    for (uint64_t i = 0; i < t->count; i++)
+        t->free[i] = 0;
+}

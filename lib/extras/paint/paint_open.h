@@ -1,0 +1,31 @@
+/* The arrays of a paint file, and which members of strokes and points they hold:
+ * format-spec/paint.md, section 3. */
+#ifndef EBPO_PAINT_PAINT_OPEN_H
+#define EBPO_PAINT_PAINT_OPEN_H
+
+#include "extras/paint/paint_parts.h"
+#include "hdf5_read/chunk.h"
+
+typedef struct ebpo_paint_column {
+    const char *path;
+    uint8_t element; /* bytes, the same in memory */
+    uint8_t cols;    /* 0: one dimension */
+    bool of_points;  /* else of strokes */
+    size_t offset;   /* of the member */
+} ebpo_paint_column;
+
+enum { EBPO_PAINT_COLUMNS = 12 };
+extern const ebpo_paint_column ebpo_paint_columns[EBPO_PAINT_COLUMNS];
+
+static inline uint64_t ebpo_paint_column_rows(const ebpo_paint *p, const ebpo_paint_column *c)
+{
+    return c->of_points ? p->point_count : p->stroke_count;
+}
+
+/* One chunk, of all rows; rows > 0. */
+ebpo_shape ebpo_paint_column_shape(const ebpo_paint_column *column, uint64_t rows);
+
+void ebpo_paint_column_give(const ebpo_paint *paint, const ebpo_paint_column *column,
+                            uint8_t *bytes);
+
+#endif

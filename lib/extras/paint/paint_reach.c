@@ -1,0 +1,505 @@
+/* The reach of a point: the faces that are connected with the point's own face within its ball.
+ *
+ * Faces in the ball's box are joined at common corners and edges, by position, where the ball
+ * holds or crosses these; the set that contains the point's face is the reach. So paint does not
+ * go through a wall thinner than the ball.
+ *
+ * Points of a stroke are evaluated in batches on all cores; a reach is kept until it is asked for.
+ * Results do not depend on the number of threads.
+ *
+ * Source: format-spec/paint.md, section 4. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/parallel.h"
+#include "extras/haptic/face_box.h"
+#include "extras/paint/paint_reach.h"
+#include "query/query_model.h"
+
+enum { FACES_MOST = 1 << 28 };
+
+void ebpo_reach_begin(ebpo_reach *r, ebpo_context *context)
+{
+    const double *size = context->model->info->box_size;
+    *r = (ebpo_reach){ .context = context };
+    r->tolerance = sqrt((size[0] * size[0] + size[1] * size[1]) + size[2] * size[2]) * 0x1p-20;
+}
+
+void ebpo_reach_end(ebpo_reach *r)
+{
+    free(r->face);
+    free(r->position);
+    free(r->edge);
+    free(r->slot);
+    free(r->root);
+    *r = (ebpo_reach){ .context = NULL };
+}
+
+/* --- what is around --- */
+
+static bool reach_take(void *user, const ebpo_triangles *t)
+{
+    ebpo_reach *r = user;
+    r->too_many = r->count + t->count > FACES_MOST;
+    r->short_of_memory =
+        !r->too_many && !ebpo_grow(&r->face, &r->capacity, r->count + t->count, sizeof *r->face);
+    for (uint64_t i = 0; i < t->count && !r->too_many && !r->short_of_memory; i++) {
+        ebpo_reach_face *f = &r->face[r->count++];
+        memcpy(f->corner, t->corners[i], sizeof f->corner);
+        f->face = t->faces[i];
+        f->file_face = t->file_faces[i];
+    }
+    return !r->too_many && !r->short_of_memory;
+}
+
+static int by_number(const void *a, const void *b)
+{
+    const ebpo_reach_face *x = a, *y = b;
+    return (x->file_face > y->file_face) - (x->file_face < y->file_face);
+}
+
+/* A little more than the ball, whose bounds are rounded here. */
+static ebpo_status reach_gather(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo_error *error)
+{
+    double min[3], max[3], wide = fmax(ball->radius, r->tolerance) * (1 + 0x1p-40);
+    for (int i = 0; i < 3; i++) {
+        min[i] = nextafter(ball->place[i] - wide, -INFINITY);
+        max[i] = nextafter(ball->place[i] + wide, INFINITY);
+    }
+    r->count = 0;
+    r->too_many = r->short_of_memory = false;
+    ebpo_status status = ebpo_triangles_in_box(r->context, min, max, reach_take, r, error);
+    if (status == EBPO_OK && r->too_many)
+        status = ebpo_fail(error, EBPO_E_LIMIT,
+                           "the ball of a point meets more than %d faces; take a smaller radius",
+                           FACES_MOST);
+    if (status == EBPO_OK && r->short_of_memory)
+        status = ebpo_fail_memory(error, (r->count + EBPO_TRIANGLES_MOST) * sizeof *r->face);
+    if (status == EBPO_OK && r->count) /* none is there where a place is far from all faces */
+        qsort(r->face, r->count, sizeof *r->face, by_number);
+    return status;
+}
+
+/* --- positions and edges --- */
+
+static uint64_t position_hash(const double p[3])
+{
+    uint64_t key[3];
+    for (int i = 0; i < 3; i++) {
+        double v = p[i] + 0.0; /* -0 is 0 */
+        memcpy(&key[i], &v, sizeof v);
+    }
+    return ebpo_hash_three(key);
+}
+
+static bool same_position(const double a[3], const double b[3])
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+/* An empty table for `count` keys. */
+static bool clear_slots(ebpo_reach *r, uint64_t count)
+{
+    r->slots = ebpo_hash_slots(2 * count);
+    if (!ebpo_grow(&r->slot, &r->slot_capacity, r->slots, sizeof *r->slot))
+        return false;
+    memset(r->slot, 0, r->slots * sizeof *r->slot);
+    return true;
+}
+
+static void find_positions(ebpo_reach *r, const ebpo_reach_ball *ball)
+{
+    double square = ball->radius * ball->radius;
+    uint64_t at;
+    r->position_count = 0;
+    for (uint64_t i = 0; i < 3 * r->count; i++) {
+        ebpo_reach_face *f = &r->face[i / 3];
+        const double *p = f->corner[i % 3];
+        EBPO_HASH_FIND(at, position_hash(p), r->slots - 1,
+                       r->slot[at] == 0 || same_position(r->position[r->slot[at] - 1].p, p));
+        if (r->slot[at] == 0) {
+            ebpo_reach_position *q = &r->position[r->position_count++];
+            memcpy(q->p, p, sizeof q->p);
+            q->within = ebpo_ball_holds(ball->place, square, p);
+            r->slot[at] = (uint32_t)r->position_count;
+        }
+        f->at[i % 3] = r->slot[at] - 1;
+        f->within[i % 3] = r->position[r->slot[at] - 1].within;
+    }
+}
+
+static bool comes_first(const double a[3], const double b[3])
+{
+    for (int i = 0; i < 3; i++)
+        if (a[i] != b[i])
+            return a[i] < b[i];
+    return true;
+}
+
+static bool segment_within(const ebpo_reach_ball *ball, const double p[3], const double q[3])
+{
+    const double *a = comes_first(p, q) ? p : q, *b = a == p ? q : p;
+    double e[3], d[3], at[3], t = 0;
+    for (int i = 0; i < 3; i++) {
+        e[i] = b[i] - a[i];
+        d[i] = ball->place[i] - a[i];
+    }
+    double length = (e[0] * e[0] + e[1] * e[1]) + e[2] * e[2];
+    if (length != 0) {
+        t = ((d[0] * e[0] + d[1] * e[1]) + d[2] * e[2]) / length;
+        t = t > 0 ? t < 1 ? t : 1 : 0;
+    }
+    for (int i = 0; i < 3; i++)
+        at[i] = a[i] + t * e[i];
+    return ebpo_ball_holds(ball->place, ball->radius * ball->radius, at);
+}
+
+/* --- sets --- */
+
+static uint32_t set_of(ebpo_reach *r, uint32_t i)
+{
+    while (r->root[i] != i) {
+        r->root[i] = r->root[r->root[i]];
+        i = r->root[i];
+    }
+    return i;
+}
+
+static void reach_join(ebpo_reach *r, uint64_t a, uint64_t b)
+{
+    uint32_t x = set_of(r, (uint32_t)a), y = set_of(r, (uint32_t)b);
+    if (x < y)
+        r->root[y] = x;
+    else
+        r->root[x] = y;
+}
+
+/* Faces come first in the sets, then positions, then edges. */
+static void join_at_corners(ebpo_reach *r)
+{
+    for (uint64_t i = 0; i < 3 * r->count; i++)
+        if (r->face[i / 3].within[i % 3])
+            reach_join(r, i / 3, r->count + r->face[i / 3].at[i % 3]);
+}
+
+/* Edges with an end within join their faces there already. */
+static void join_at_edges(ebpo_reach *r, const ebpo_reach_ball *ball)
+{
+    uint64_t first = r->count + r->position_count, at;
+    r->edge_count = 0;
+    for (uint64_t i = 0; i < 3 * r->count; i++) {
+        const ebpo_reach_face *f = &r->face[i / 3];
+        uint64_t k = i % 3, next = (k + 1) % 3;
+        if (f->within[k] || f->within[next] || !segment_within(ball, f->corner[k], f->corner[next]))
+            continue;
+        ebpo_reach_edge e = { f->at[k], f->at[next] };
+        if (e.a > e.b)
+            e = (ebpo_reach_edge){ e.b, e.a };
+        EBPO_HASH_FIND(at, ebpo_hash_number((uint64_t)e.a << 32 | e.b), r->slots - 1,
+                       r->slot[at] == 0 || (r->edge[r->slot[at] - 1].a == e.a &&
+                                            r->edge[r->slot[at] - 1].b == e.b));
+        if (r->slot[at] == 0) {
+            r->edge[r->edge_count++] = e;
+            r->slot[at] = (uint32_t)r->edge_count;
+        }
+        reach_join(r, i / 3, first + r->slot[at] - 1);
+    }
+}
+
+static bool make_room(ebpo_reach *r)
+{
+    uint64_t corners = 3 * r->count, all = r->count + 2 * corners;
+    if (!ebpo_grow(&r->position, &r->position_capacity, corners, sizeof *r->position) ||
+        !ebpo_grow(&r->edge, &r->edge_capacity, corners, sizeof *r->edge) ||
+        !ebpo_grow(&r->root, &r->root_capacity, all, sizeof *r->root))
+        return false;
+    for (uint64_t i = 0; i < all; i++)
+        r->root[i] = (uint32_t)i;
+    return clear_slots(r, corners);
+}
+
+static void keep_reach(ebpo_reach *r)
+{
+    uint32_t set = set_of(r, (uint32_t)r->own);
+    uint64_t kept = 0, own = 0;
+    for (uint64_t i = 0; i < r->count; i++) {
+        if (set_of(r, (uint32_t)i) != set)
+            continue;
+        if (i == r->own)
+            own = kept;
+        r->face[kept++] = r->face[i];
+    }
+    r->count = kept;
+    r->own = own;
+}
+
+/* --- all of it --- */
+
+static bool find_own(ebpo_reach *r, uint64_t face)
+{
+    for (r->own = 0; r->own < r->count; r->own++)
+        if (r->face[r->own].face == face)
+            return true;
+    return false;
+}
+
+static ebpo_status fail_place(const ebpo_reach *r, uint64_t face, ebpo_error *error)
+{
+    return ebpo_fail_file(error, EBPO_E_FORMAT, r->context->model->file->in.shown,
+                          "a point of the paint is not on face %llu, where it says to be: the "
+                          "paint does not fit the model",
+                          (unsigned long long)face);
+}
+
+/* Gathers what is around, and finds the face among it. *on: the place is on it. */
+static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *here, bool *on,
+                             ebpo_error *error)
+{
+    const bool subset = r->context->model->info->pruned;
+    ebpo_face_near near;
+    ebpo_error cause = EBPO_ERROR_INIT;
+    *here = *on = false;
+    ebpo_status status = reach_gather(r, ball, &cause);
+    if (status == EBPO_E_ABSENT && subset) /* what hangs together is not known there */
+        return EBPO_OK;
+    if (status != EBPO_OK)
+        return ebpo_fail_with(error, &cause);
+    bool found = find_own(r, ball->face);
+    *here = found || !subset;
+    if (!found)
+        return EBPO_OK;
+    ebpo_face_nearest(ball->place, (const double(*)[3])r->face[r->own].corner, &near);
+    *on = near.distance <= r->tolerance;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_reach_check(ebpo_reach *r, const double place[3], uint64_t face, bool *fits,
+                             ebpo_error *error)
+{
+    const ebpo_reach_ball ball = { { place[0], place[1], place[2] }, 0, face };
+    bool here, on;
+    ebpo_status status = find_face(r, &ball, &here, &on, error);
+    *fits = on || !here;
+    return status;
+}
+
+ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *here,
+                            ebpo_error *error)
+{
+    bool on;
+    ebpo_status status = find_face(r, ball, here, &on, error);
+    if (status != EBPO_OK || !*here)
+        return status;
+    if (!on) {
+        *here = false;
+        return fail_place(r, ball->face, error);
+    }
+    if (!make_room(r))
+        return ebpo_fail_memory(error, r->count * 150);
+    find_positions(r, ball);
+    join_at_corners(r);
+    memset(r->slot, 0, r->slots * sizeof *r->slot);
+    join_at_edges(r, ball);
+    keep_reach(r);
+    return EBPO_OK;
+}
+
+static uint64_t met_faces_find(const ebpo_met_faces *met, uint64_t file_face)
+{
+    uint64_t at;
+    EBPO_HASH_FIND(at, ebpo_hash_number(file_face), met->slots - 1,
+                   met->slot[at] == 0 || met->face[met->slot[at] - 1].file_face == file_face);
+    return at;
+}
+
+/* Twice as many slots, all faces in them. */
+static bool grow_slots(ebpo_met_faces *met)
+{
+    uint64_t slots = ebpo_hash_slots(4 * (met->count + 1));
+    uint32_t *slot = ebpo_alloc_zero(slots, sizeof *slot);
+    if (!slot)
+        return false;
+    free(met->slot);
+    met->slot = slot;
+    met->slots = slots;
+    for (uint64_t i = 0; i < met->count; i++)
+        slot[met_faces_find(met, met->face[i].file_face)] = (uint32_t)i + 1;
+    return true;
+}
+
+ebpo_status ebpo_met_faces_add(ebpo_met_faces *met, const ebpo_reach_face *face, uint32_t *number,
+                               ebpo_error *error)
+{
+    if (2 * (met->count + 1) > met->slots && !grow_slots(met))
+        return ebpo_fail_memory(error, 4 * met->count * sizeof *met->slot);
+    uint64_t at = met_faces_find(met, face->file_face);
+    if (met->slot[at] == 0) {
+        if (met->count == UINT32_MAX - 1)
+            return ebpo_fail(error, EBPO_E_LIMIT, "strokes reach more than 2^32 - 2 faces");
+        if (!ebpo_grow(&met->face, &met->capacity, met->count + 1, sizeof *met->face))
+            return ebpo_fail_memory(error, met->count * sizeof *met->face);
+        ebpo_met_face *f = &met->face[met->count++];
+        *f = (ebpo_met_face){ .face = face->face, .file_face = face->file_face };
+        memcpy(f->corner, face->corner, sizeof f->corner);
+        met->slot[at] = (uint32_t)met->count;
+    }
+    *number = met->slot[at] - 1;
+    return EBPO_OK;
+}
+
+void ebpo_met_faces_free(ebpo_met_faces *met)
+{
+    free(met->face);
+    free(met->slot);
+    *met = (ebpo_met_faces){ 0 };
+}
+
+/* --- many points --- */
+
+/* Points that are looked at together: so many, or fewer when they reach so many faces already. */
+enum { TOGETHER = 1024, FACES_TOGETHER = 1 << 20, GRAIN = 8 };
+
+/* Of a budget, for each thread: more of them load what the others have just dropped. */
+enum { THREAD_ROOM = 1 << 20 };
+
+typedef struct found {
+    ebpo_reached_face *face;
+    uint64_t count, capacity;
+    bool done, here;
+} found;
+
+struct ebpo_reacher {
+    const ebpo_paint *p;
+    unsigned threads;
+    ebpo_reach *reach; /* one for each worker */
+    found found[TOGETHER];
+    uint32_t stroke, first, count; /* of the points at hand */
+    atomic_uint_least64_t faces;
+};
+
+static ebpo_status reached_keep(found *f, const ebpo_reach *reach, ebpo_error *error)
+{
+    f->count = 0;
+    if (!f->here)
+        return EBPO_OK;
+    if (!ebpo_grow(&f->face, &f->capacity, reach->count, sizeof *f->face))
+        return ebpo_fail_memory(error, reach->count * sizeof *f->face);
+    for (uint64_t k = 0; k < reach->count; k++) {
+        ebpo_reached_face *one = &f->face[f->count++];
+        one->face = reach->face[k].face;
+        memcpy(one->within, reach->face[k].within, sizeof one->within);
+    }
+    return EBPO_OK;
+}
+
+/* What is not done as there are too many faces already is asked for again; never the first. */
+static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    ebpo_reacher *r = context;
+    ebpo_reach *reach = &r->reach[worker];
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
+        found *f = &r->found[i];
+        if (i > 0 && atomic_load(&r->faces) > FACES_TOGETHER)
+            break;
+        status = ebpo_paint_reach(reach, r->p, r->stroke, r->first + (uint32_t)i, &f->here, error);
+        if (status == EBPO_OK)
+            status = reached_keep(f, reach, error);
+        atomic_fetch_add(&r->faces, f->count);
+        f->done = status == EBPO_OK;
+    }
+    ebpo_context_let_go(reach->context); /* who waits here shall not keep others from room */
+    return status;
+}
+
+/* Large reaches are freed again: what is kept for all of them is bounded. */
+static void begin_batch(ebpo_reacher *r, uint32_t stroke, uint32_t i)
+{
+    uint32_t left = r->p->stroke[stroke].count - i;
+    r->stroke = stroke;
+    r->first = i;
+    r->count = left < TOGETHER ? left : TOGETHER;
+    atomic_store(&r->faces, 0);
+    for (uint32_t k = 0; k < TOGETHER; k++) {
+        found *f = &r->found[k];
+        if (f->capacity > FACES_TOGETHER / TOGETHER) {
+            free(f->face);
+            f->face = NULL;
+            f->capacity = 0;
+        }
+        f->done = false;
+        f->count = 0;
+    }
+}
+
+ebpo_status ebpo_reacher_find(ebpo_reacher *r, uint32_t stroke, uint32_t i, ebpo_reached *out,
+                              ebpo_error *error)
+{
+    bool among = stroke == r->stroke && i >= r->first && i - r->first < r->count;
+    if (!among || !r->found[i - r->first].done) {
+        begin_batch(r, stroke, i);
+        ebpo_status status =
+            ebpo_parallel_for(r->threads, NULL, r->count, GRAIN, find_some, r, NULL, "", error);
+        if (status != EBPO_OK)
+            return status;
+    }
+    const found *f = &r->found[i - r->first];
+    *out = (ebpo_reached){ f->face, f->count, f->here };
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context, unsigned threads,
+                             ebpo_reacher **out, ebpo_error *error)
+{
+    ebpo_reacher *r = *out = ebpo_alloc_zero(1, sizeof *r);
+    if (!r)
+        return ebpo_fail_memory(error, sizeof *r);
+    r->p = p;
+    uint64_t most = p->point_count / GRAIN + 1, memory = context->model->options.memory;
+    if (memory && memory / THREAD_ROOM < most)
+        most = memory / THREAD_ROOM + 1;
+    r->threads = ebpo_thread_count(threads);
+    r->threads = r->threads < most ? r->threads : (unsigned)most;
+    ebpo_status status = EBPO_OK;
+    r->reach = ebpo_alloc_zero(r->threads, sizeof *r->reach);
+    if (!r->reach)
+        status = ebpo_fail_memory(error, r->threads * sizeof *r->reach);
+    for (unsigned t = 0; t < r->threads && status == EBPO_OK; t++) {
+        ebpo_context *own = context;
+        if (t > 0)
+            status = ebpo_context_new(context->model, &own, error);
+        if (status == EBPO_OK)
+            ebpo_reach_begin(&r->reach[t], own);
+    }
+    if (status != EBPO_OK) {
+        ebpo_reacher_free(r);
+        *out = NULL;
+    }
+    return status;
+}
+
+void ebpo_reacher_free(ebpo_reacher *r)
+{
+    if (!r)
+        return;
+    for (unsigned t = 0; r->reach && t < r->threads; t++) {
+        ebpo_context *own = r->reach[t].context;
+        if (!own)
+            break;
+        ebpo_reach_end(&r->reach[t]);
+        if (t > 0)
+            ebpo_context_free(own);
+    }
+    for (uint32_t k = 0; k < TOGETHER; k++)
+        free(r->found[k].face);
+    free(r->reach);
+    free(r);
+}

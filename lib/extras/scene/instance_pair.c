@@ -1,0 +1,435 @@
+/* Two instances of a scene at a time: where one is in the other's coordinates, how far they move
+ * relative to each other, how far they are apart, and what their files omit that may matter.
+ *
+ * Boxes and lengths are rounded outwards, so that every bound is certain in spite of rounding. A
+ * file that is a subset has only the faces of its kept box: what it omits is bounded by up to six
+ * boxes around that one. Two instances that follow one route have a relative motion of rounding
+ * and scale alone.
+ *
+ * A list of pairs is evaluated on all cores by ebpo_scene_find_in_pairs, each pair by itself with
+ * its own collider, so that results do not depend on the number of threads. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "extras/collide/collider.h"
+#include "extras/scene/instance_pair.h"
+#include "geometry/pose.h"
+
+/* of sums of a few products: far above their rounding */
+static const double slack = 0x1p-44;
+
+static const ebpo_scene_model_entry *left_out_model_of(const ebpo_scene *scene, uint64_t instance)
+{
+    return &scene->models[scene->instances[instance].as.model];
+}
+
+static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double time,
+                             ebpo_posing *out, ebpo_error *error)
+{
+    const ebpo_scene_model_entry *m = left_out_model_of(scene, instance);
+    double reach[3];
+    ebpo_pose pose;
+    for (int k = 0; k < 3; k++)
+        reach[k] = fmax(fabs(m->min[k]), fabs(m->max[k]));
+    ebpo_status status = ebpo_scene_pose(scene, instance, time, &pose, error);
+    return status == EBPO_OK ? ebpo_posing_make(out, &pose, reach, error) : status;
+}
+
+/* Of the box of a model in the world: its middle, and half of it along each of its axes. */
+typedef struct posed_box {
+    double middle[3], half[3][3], size;
+} posed_box;
+
+static void pose_box(const ebpo_posing *p, const ebpo_scene_model_entry *m, posed_box *out)
+{
+    double middle[3];
+    for (int k = 0; k < 3; k++)
+        middle[k] = m->min[k] / 2 + m->max[k] / 2;
+    ebpo_posing_apply(p, middle, out->middle);
+    out->size = 0;
+    for (int i = 0; i < 3; i++) {
+        out->size += fabs(p->translation[i]);
+        for (int k = 0; k < 3; k++) {
+            double reach = fmax(fabs(m->min[k]), fabs(m->max[k]));
+            out->half[k][i] = p->matrix[i][k] * (m->max[k] / 2 - m->min[k] / 2);
+            out->size += fabs(p->matrix[i][k]) * reach;
+        }
+    }
+}
+
+ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
+                                 ebpo_scene_seen *out, ebpo_error *error)
+{
+    const ebpo_scene_model_entry *m = left_out_model_of(scene, of);
+    ebpo_posing from, at;
+    posed_box b;
+    ebpo_status status = posing_of(scene, of, time, &from, error);
+    if (status == EBPO_OK)
+        status = posing_of(scene, other, time, &at, error);
+    if (status != EBPO_OK)
+        return status;
+    pose_box(&at, left_out_model_of(scene, other), &b);
+    double scale = from.scale, sizes = b.size, reach = 0;
+    for (int i = 0; i < 3; i++) {
+        sizes += fabs(from.translation[i]);
+        reach += fmax(fabs(m->min[i]), fabs(m->max[i]));
+    }
+    /* the transposed matrix is the inverse but for the deviation, of points of the model's box */
+    double off = (sizes + reach * scale) * slack / scale + 3 * from.deviation * reach;
+    out->rounding = off;
+    for (int k = 0; k < 3; k++) {
+        double middle = 0, half = off;
+        for (int i = 0; i < 3; i++)
+            middle += from.matrix[i][k] / scale * ((b.middle[i] - from.translation[i]) / scale);
+        for (int j = 0; j < 3; j++) {
+            double sum = 0;
+            for (int i = 0; i < 3; i++)
+                sum += from.matrix[i][k] / scale * (b.half[j][i] / scale);
+            half += fabs(sum);
+        }
+        out->box.min[k] = middle - half;
+        out->box.max[k] = middle + half;
+    }
+    out->unit = scale * (1 - 2 * from.deviation);
+    return EBPO_OK;
+}
+
+double ebpo_scene_space_gap(const ebpo_scene_space *a, const ebpo_scene_space *b)
+{
+    double apart[3];
+    for (int k = 0; k < 3; k++)
+        apart[k] = fmax(fmax(a->min[k] - b->max[k], b->min[k] - a->max[k]), 0);
+    return ebpo_scene_length_above(apart) * (1 - 8 * slack);
+}
+
+/* The part of a model's box whose faces its file has; false: all. */
+static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_space *out)
+{
+    const ebpo_info *info =
+        ebpo_file_info(ebpo_scene_file(scene, scene->instances[instance].as.model));
+    bool mesh = info->parts & EBPO_PART_MESH;
+    if (mesh && !info->pruned)
+        return false;
+    for (int k = 0; k < 3; k++) {
+        bool box = mesh && info->boxed && !info->cut_levels && !(info->kept_error > 0);
+        out->min[k] = box ? info->kept_box[k] : INFINITY;
+        out->max[k] = box ? info->kept_box[3 + k] : -INFINITY;
+    }
+    return true;
+}
+
+/* Of `other` to what is in the box `all` and not in `held`: up to six boxes on its sides. */
+static double gap_around(const ebpo_scene_space *all, const ebpo_scene_space *held,
+                         const ebpo_scene_space *other)
+{
+    double gap = INFINITY;
+    for (int k = 0; k < 3; k++) {
+        ebpo_scene_space side = *all;
+        side.max[k] = fmin(held->min[k], all->max[k]);
+        if (all->min[k] < held->min[k])
+            gap = fmin(gap, ebpo_scene_space_gap(&side, other));
+        side = *all;
+        side.min[k] = fmax(held->max[k], all->min[k]);
+        if (all->max[k] > held->max[k])
+            gap = fmin(gap, ebpo_scene_space_gap(&side, other));
+    }
+    return gap;
+}
+
+static ebpo_status left_out_of(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
+                               double *gap, ebpo_error *error)
+{
+    const ebpo_scene_model_entry *m = left_out_model_of(scene, of);
+    ebpo_scene_space held, all;
+    ebpo_scene_seen seen;
+    *gap = INFINITY;
+    if (!held_box(scene, of, &held))
+        return EBPO_OK;
+    memcpy(all.min, m->min, sizeof all.min);
+    memcpy(all.max, m->max, sizeof all.max);
+    ebpo_status status = ebpo_scene_seen_from(scene, of, other, time, &seen, error);
+    if (status == EBPO_OK)
+        *gap = gap_around(&all, &held, &seen.box) * seen.unit;
+    return status;
+}
+
+ebpo_status ebpo_scene_left_out(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
+                                double *gap, uint64_t *lacking, ebpo_error *error)
+{
+    double of_a, of_b;
+    ebpo_status status = left_out_of(scene, pair->a, pair->b, time, &of_a, error);
+    if (status == EBPO_OK)
+        status = left_out_of(scene, pair->b, pair->a, time, &of_b, error);
+    if (status != EBPO_OK)
+        return status;
+    *gap = fmin(of_a, of_b);
+    *lacking = of_a <= of_b ? pair->a : pair->b;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
+                             double time, bool solids, ebpo_error *error)
+{
+    const ebpo_scene_model_entry *m = left_out_model_of(scene, lacking);
+    return ebpo_fail(
+        error, EBPO_E_ABSENT,
+        "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a "
+        "part of another or has no mesh, and what is not in it may matter; ask a scene "
+        "with more of it%s",
+        scene->instances[pair->a].as.name, scene->instances[pair->b].as.name, time, m->name,
+        solids ? ", such as ebpo scene pack --solids makes" : "");
+}
+
+static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instance)
+{
+    uint64_t route = scene->instances[instance].as.route;
+    return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
+}
+
+/* Both ride on what moves along one route, or along two of the same keys: all that changes between
+ * them is what rounding does, and their size where the route's scale does. */
+static bool pair_rides(const ebpo_scene *scene, const ebpo_scene_pair *pair)
+{
+    const ebpo_scene_route *a = route_of(scene, pair->a), *b = route_of(scene, pair->b);
+    if (!a || !b)
+        return false;
+    return a == b || (a->count == b->count && a->jumps == b->jumps &&
+                      memcmp(a->keys, b->keys, a->count * sizeof *a->keys) == 0);
+}
+
+/* What rounding may do to their distance on all their ways, of the order of it; 0: neither moves.
+ */
+static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair)
+{
+    double sum = 0;
+    for (int i = 0; i < 2; i++) {
+        uint64_t instance = i ? pair->b : pair->a;
+        const ebpo_scene_route *route = route_of(scene, instance);
+        if (route)
+            sum +=
+                ebpo_scene_route_rounding(route,
+                                          ebpo_scene_reach_of(scene, &scene->instances[instance]));
+    }
+    return sum;
+}
+
+/* The pose of the route is the same for both, to the last bit: points of theirs that are `reach`
+ * apart at most where the route begins are scale times that apart. */
+static double pair_motion_ride(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
+                               double to)
+{
+    ebpo_scene_reach a = ebpo_scene_reach_of(scene, &scene->instances[pair->a]);
+    ebpo_scene_reach b = ebpo_scene_reach_of(scene, &scene->instances[pair->b]);
+    return ebpo_scene_route_growth(route_of(scene, pair->a), from, to,
+                                   (ebpo_scene_reach){ a.length + b.length, a.size + b.size });
+}
+
+/* Their distance changes by no more than *out on its way between two times, INFINITY over a jump.
+ * rides: as pair_rides says. */
+static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair, bool rides,
+                               double from, double to, double *out, ebpo_error *error)
+{
+    double a, b;
+    ebpo_status status = ebpo_scene_motion(scene, pair->a, from, to, &a, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_motion(scene, pair->b, from, to, &b, error);
+    if (status != EBPO_OK)
+        return status;
+    *out = (a + b) * (1 + 0x1p-50);
+    if (rides && from < to)
+        *out = fmin(*out, pair_motion_ride(scene, pair, from, to));
+    return EBPO_OK;
+}
+
+double ebpo_scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
+                            double to)
+{
+    double next = to;
+    for (int i = 0; i < 2; i++) {
+        const ebpo_scene_route *route = route_of(scene, i ? pair->b : pair->a);
+        if (route)
+            next = fmin(next, ebpo_scene_route_next(route, from, to));
+    }
+    return next;
+}
+
+/* --- lists of pairs --- */
+
+static bool keep_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count)
+{
+    ebpo_scene_pairs_list *list = user;
+    list->pairs = ebpo_alloc(count, sizeof *pairs);
+    list->count = count;
+    if (list->pairs)
+        memcpy(list->pairs, pairs, count * sizeof *pairs);
+    return true;
+}
+
+ebpo_status ebpo_scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pairs, uint64_t count,
+                                   ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    ebpo_model *model;
+    for (uint64_t i = 0; i < 2 * count && status == EBPO_OK; i++) {
+        uint64_t instance = i % 2 ? pairs[i / 2].b : pairs[i / 2].a;
+        status = ebpo_scene_model(scene, scene->instances[instance].as.model, &model, error);
+    }
+    return status;
+}
+
+ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double to,
+                                  ebpo_scene_pairs_list *out, ebpo_error *error)
+{
+    *out = (ebpo_scene_pairs_list){ 0 };
+    ebpo_status status = ebpo_scene_pairs(scene, from, to, keep_pairs, out, error);
+    if (status == EBPO_OK && out->count && !out->pairs)
+        status = ebpo_fail_memory(error, out->count * sizeof *out->pairs);
+    return status;
+}
+
+/* The same; their models are made. On failure there is nothing to free. */
+static ebpo_status list_pairs(ebpo_scene *scene, double from, double to, ebpo_scene_pairs_list *out,
+                              ebpo_error *error)
+{
+    ebpo_status status = ebpo_scene_keep_pairs(scene, from, to, out, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_make_models(scene, out->pairs, out->count, error);
+    if (status != EBPO_OK) {
+        free(out->pairs);
+        *out = (ebpo_scene_pairs_list){ 0 };
+    }
+    return status;
+}
+
+typedef struct pair_finds {
+    const ebpo_scene_search *search;
+    const ebpo_scene_pair *pairs;
+    char *results;
+} pair_finds;
+
+static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    const pair_finds *f = context;
+    const ebpo_scene_search *s = f->search;
+    ebpo_status status = EBPO_OK;
+    (void)worker;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
+        status = s->find(s->how, &f->pairs[i], f->results + i * s->result_size, error);
+    return status;
+}
+
+ebpo_status ebpo_scene_find_in_pairs(ebpo_scene *scene, double from, double to,
+                                     const ebpo_scene_search *search, void **results,
+                                     uint64_t *count, ebpo_error *error)
+{
+    ebpo_scene_pairs_list list;
+    ebpo_status status = list_pairs(scene, from, to, &list, error);
+    *count = list.count;
+    *results = ebpo_alloc(list.count, search->result_size);
+    if (status == EBPO_OK && !*results)
+        status = ebpo_fail_memory(error, list.count * search->result_size);
+    pair_finds finds = { search, list.pairs, *results };
+    if (status == EBPO_OK)
+        status =
+            ebpo_parallel_for(ebpo_thread_count(search->threads), NULL, list.count, search->grain,
+                              find_some, &finds, search->progress, search->stage, error);
+    free(list.pairs);
+    return status;
+}
+
+static ebpo_model *opened_model(const ebpo_scene *scene, uint64_t instance)
+{
+    return scene->files[scene->models[scene->instances[instance].as.model].file].model;
+}
+
+static bool has_mesh(const ebpo_scene *scene, uint64_t instance)
+{
+    uint64_t model = scene->instances[instance].as.model;
+    return ebpo_file_info(ebpo_scene_file(scene, model))->parts & EBPO_PART_MESH;
+}
+
+ebpo_status ebpo_scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
+                                unsigned threads, ebpo_collider **out, ebpo_error *error)
+{
+    ebpo_collider_options how = EBPO_COLLIDER_OPTIONS_INIT;
+    how.threads = threads;
+    *out = NULL;
+    if (!has_mesh(scene, pair->a) || !has_mesh(scene, pair->b))
+        return EBPO_OK;
+    return ebpo_collider_of_parts(opened_model(scene, pair->a), opened_model(scene, pair->b), &how,
+                                  out, error);
+}
+
+ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
+                                 ebpo_collide_options *out, ebpo_error *error)
+{
+    ebpo_status status = ebpo_scene_pose(scene, pair->a, time, &out->pose_a, error);
+    return status == EBPO_OK ? ebpo_scene_pose(scene, pair->b, time, &out->pose_b, error) : status;
+}
+
+/* Of a collider that is not there: nothing is left to be near. */
+static ebpo_status ask_distance(ebpo_scene_looks *l, double time, double *lo, double *hi,
+                                ebpo_error *error)
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
+    ebpo_clearance found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
+    how.tolerance = l->tolerance;
+    how.warm = true; /* lo and hi may differ by it: each pair has a collider of its own */
+    ebpo_status status = ebpo_scene_pose_pair(l->scene, l->pair, time, &options, error);
+    if (status == EBPO_OK && l->collider)
+        status = ebpo_collide_distance(l->collider, &options, &how, &found, error);
+    *lo = found.distance.lo;
+    *hi = found.distance.hi;
+    return status;
+}
+
+ebpo_status ebpo_scene_look(ebpo_scene_looks *l, double time, double *lo, double *hi,
+                            ebpo_error *error)
+{
+    l->gap = INFINITY;
+    ebpo_status status = ask_distance(l, time, lo, hi, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_left_out(l->scene, l->pair, time, &l->gap, &l->lacking, error);
+    *lo = fmin(*lo, l->gap);
+    return status;
+}
+
+ebpo_status ebpo_scene_looks_begin(ebpo_scene_looks *l, const ebpo_scene *scene,
+                                   const ebpo_scene_pair *pair, double tolerance, ebpo_error *error)
+{
+    *l = (ebpo_scene_looks){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
+    /* finer ones would take long, for digits that the next pose has otherwise */
+    l->tolerance = fmax(l->tolerance, pair_rounding(scene, pair) / 16);
+    l->rides = pair_rides(scene, pair);
+    return ebpo_scene_collider(scene, pair, 1, &l->collider, error);
+}
+
+ebpo_status ebpo_scene_looks_motion(const ebpo_scene_looks *l, double from, double to, double *out,
+                                    ebpo_error *error)
+{
+    return pair_motion(l->scene, l->pair, l->rides, from, to, out, error);
+}
+
+bool ebpo_scene_is_within(double hi, double lo, double tolerance)
+{
+    return hi <= lo || (hi - lo) * (1 + 0x1p-52) <= tolerance;
+}
+
+ebpo_status ebpo_scene_take_way_options(ebpo_scene_way_options *own,
+                                        const ebpo_scene_way_options *options, ebpo_error *error)
+{
+    ebpo_status status = EBPO_TAKE(ebpo_scene_way_options, own, options, error);
+    if (status == EBPO_OK && !(own->tolerance > 0 && own->tolerance < INFINITY))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the tolerance %g is not above 0", own->tolerance);
+    if (!own->most_looks)
+        own->most_looks = 10000;
+    return status;
+}

@@ -1,0 +1,60 @@
+/* Double-double arithmetic for distances and rays, compiled once for each instruction set. With FMA
+ * one instruction gives a product's rounding error. The error bounds hold in each build, so
+ * decisions and results are the same. Pure functions. */
+#ifndef EBPO_GEOMETRY_DOUBLE_DOUBLE_KERNELS_H
+#define EBPO_GEOMETRY_DOUBLE_DOUBLE_KERNELS_H
+
+#include "core/cpu.h"
+#include "geometry/distance.h"
+#include "geometry/expansion.h"
+#include "geometry/ray.h"
+
+/* A distance (head + tail; they may overlap by some bits) with a bound on its relative error, and
+ * the nearest point. */
+typedef struct ebpo_measured {
+    ebpo_pair distance;
+    double error;
+    double point[3];
+} ebpo_measured;
+
+typedef struct ebpo_distance_pairs {
+    /* The triangle's distance when its nearest feature is known. Products of four coordinates, and
+     * their rounding errors, must stay within the doubles. `normal`: what unit_normal gives and
+     * returns, or NULL: true. */
+    bool (*measure)(const double p[3], const double triangle[3][3], ebpo_feature feature,
+                    double *normal, ebpo_measured *out);
+    /* False when the arithmetic does not suffice: numbers beyond its range, or too much
+     * cancellation. */
+    bool (*unit_normal)(const double triangle[3][3], double normal[3]);
+} ebpo_distance_pairs;
+
+EBPO_KERNELS(ebpo_distance_pairs, ebpo_distance_pairs)
+
+/* A value, at most `error` off. */
+typedef struct ebpo_bounded {
+    ebpo_pair x;
+    double error;
+} ebpo_bounded;
+
+/* Where a line meets a triangle's plane: t = numerator / denominator, which is 0 when they are
+ * parallel. */
+typedef struct ebpo_plane_pairs {
+    ebpo_bounded numerator, denominator;
+    /* As ebpo_pair_quotient gives it, where it can. */
+    bool has_quotient;
+    double quotient[2];
+} ebpo_plane_pairs;
+
+typedef struct ebpo_ray_pairs {
+    void (*plane)(const ebpo_segment *ray, const double triangle[3][3], ebpo_plane_pairs *out);
+    /* d . (a x e), e = to - from */
+    void (*edge)(const double d[3], const ebpo_pair a[3], const double from[3], const double to[3],
+                 ebpo_bounded *out);
+} ebpo_ray_pairs;
+
+EBPO_KERNELS(ebpo_ray_pairs, ebpo_ray_pairs)
+
+/* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
+#define EBPO_RAY_SLACK 0x1p-960
+
+#endif

@@ -1,0 +1,766 @@
+/* Distance of a point to a triangle: bounds, values that are correctly rounded, and exact
+ * comparisons.
+ *
+ * The stages, cheapest first: bounds in doubles; signs of products whose errors are relative to
+ * themselves, for points that are far from the triangle for its size; double-double arithmetic
+ * (double_double_kernels.c) while its error bound decides the rounding (Ziv, "Fast evaluation of
+ * elementary mathematical functions with correctly rounded last bit", 1991); integers of any size.
+ *
+ * In all stages the nearest feature (corner, edge or interior) follows from the same signs, with
+ * the corners taken relative to the point p. A corner is nearest when p is behind it along both of
+ * its edges. An edge is nearest when p projects between its ends and outside of it in the plane.
+ * The interior is nearest when p projects inside of all edges. Docs: docs/develop/bounds.md. */
+#include "core/strict_fp.h"
+
+#include <gmp.h>
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "geometry/distance.h"
+#include "geometry/double_double_kernels.h"
+#include "geometry/integer_vectors.h"
+#include "geometry/vec3.h"
+
+/* --- points that are far from the triangle for its size --- */
+
+/* A number, and a bound of its error; 0 without error is exact. */
+typedef struct near {
+    double x, error;
+} near;
+
+/* Roundings of the errors themselves, and of what is below the normal doubles. */
+static const double more = 1 + 0x1p-40, rounding = 0x1p-52, lost = 0x1p-1060;
+
+static near near_multiply(near a, near b)
+{
+    near out = { a.x * b.x, 0 };
+    if ((a.x == 0 && a.error == 0) || (b.x == 0 && b.error == 0))
+        return (near){ 0, 0 };
+    out.error =
+        (fabs(a.x) * b.error + fabs(b.x) * a.error + a.error * b.error + fabs(out.x) * rounding) *
+            more +
+        lost;
+    return out;
+}
+static near near_add(near a, near b)
+{
+    near out = { a.x + b.x, (a.error + b.error) * more };
+    out.error += fabs(out.x) * rounding;
+    return out;
+}
+static near near_negate(near a) { return (near){ -a.x, a.error }; }
+
+static near near_dot(const near a[3], const near b[3])
+{
+    return near_add(near_add(near_multiply(a[0], b[0]), near_multiply(a[1], b[1])),
+                    near_multiply(a[2], b[2]));
+}
+static void near_cross(const near a[3], const near b[3], near out[3])
+{
+    for (int k = 0; k < 3; k++) {
+        int u = (k + 1) % 3, v = (k + 2) % 3;
+        out[k] = near_add(near_multiply(a[u], b[v]), near_negate(near_multiply(a[v], b[u])));
+    }
+}
+static int near_sign(near a) { return a.x > a.error ? 1 : a.x < -a.error ? -1 : 0; }
+static bool near_is_zero(near a) { return a.x == 0 && a.error == 0; }
+
+/* to - from, times 2^-exponent. */
+static near near_difference(double to, double from, int exponent)
+{
+    double d = to - from;
+    near out = { isfinite(d) ? ldexp(d, -exponent) : ldexp(to, -exponent) - ldexp(from, -exponent),
+                 0 };
+    if (d != 0)
+        out.error = fabs(out.x) * rounding + lost;
+    return out;
+}
+
+/* So that no coordinate's difference is above 2. */
+static int exponent_of(const double (*a)[3], int count, const double b[3])
+{
+    double most = 0;
+    int exponent;
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            double d = fabs(a[i][k] - b[k]);
+            most = fmax(most, isfinite(d) ? d : 0x1p1023);
+        }
+    frexp(most, &exponent);
+    return exponent;
+}
+
+typedef struct far_triangle {
+    near corner[3][3], edge[3][3]; /* in units of their own: corners seen from p */
+    near along[3], back[3];        /* corner k . edge k; corner k + 1 . edge k */
+    int exponent, edge_exponent;
+} far_triangle;
+
+/* False: two corners are equal, and which of them is nearest is not told here. */
+static bool relate_far(const double p[3], const double triangle[3][3], far_triangle *t)
+{
+    bool apart = true;
+    t->exponent = exponent_of(triangle, 3, p);
+    t->edge_exponent = exponent_of(triangle, 3, triangle[0]);
+    for (int i = 0; i < 3; i++) {
+        bool any = false;
+        for (int k = 0; k < 3; k++) {
+            t->corner[i][k] = near_difference(triangle[i][k], p[k], t->exponent);
+            t->edge[i][k] =
+                near_difference(triangle[(i + 1) % 3][k], triangle[i][k], t->edge_exponent);
+            any = any || !near_is_zero(t->edge[i][k]);
+        }
+        apart = apart && any;
+    }
+    for (int i = 0; i < 3; i++) {
+        t->along[i] = near_dot(t->corner[i], t->edge[i]);
+        t->back[i] = near_dot(t->corner[(i + 1) % 3], t->edge[i]);
+    }
+    return apart;
+}
+
+static ebpo_feature far_feature_of(const far_triangle *t)
+{
+    near normal[3], outward[3];
+    bool inside = true;
+    near_cross(t->edge[0], t->edge[1], normal);
+    for (int i = 0; i < 3; i++) {
+        const near *along = &t->along[i], *before = &t->back[(i + 2) % 3];
+        /* behind the corner along both of its edges, or right beside it */
+        if ((near_sign(*along) > 0 || near_is_zero(*along)) &&
+            (near_sign(*before) < 0 || near_is_zero(*before)))
+            return (ebpo_feature)(EBPO_NEAR_CORNER0 + i);
+        near_cross(t->edge[i], normal, outward);
+        int side = near_sign(near_dot(outward, t->corner[i]));
+        if (side < 0 && near_sign(*along) < 0 && near_sign(t->back[i]) > 0)
+            return (ebpo_feature)(EBPO_NEAR_EDGE0 + i);
+        inside = inside && side > 0;
+    }
+    return inside ? EBPO_NEAR_INTERIOR : EBPO_NEAR_UNKNOWN;
+}
+
+static double near_length(const near a[3])
+{
+    return sqrt(a[0].x * a[0].x + a[1].x * a[1].x + a[2].x * a[2].x);
+}
+
+/* The nearest corner is at most the triangle's size farther than the nearest point. */
+static void bound_far(const far_triangle *t, ebpo_feature feature, ebpo_distance_bounds *out)
+{
+    double least = INFINITY, size = 0;
+    for (int i = 0; i < 3; i++) {
+        least = fmin(least, near_length(t->corner[i]));
+        size = fmax(size, near_length(t->edge[i]));
+    }
+    if (feature <= EBPO_NEAR_CORNER2) {
+        least = near_length(t->corner[feature]);
+        size = 0;
+    }
+    double low = least * (1 - 0x1p-48) -
+                 ldexp(size, t->edge_exponent - t->exponent) * (1 + 0x1p-40) - 0x1p-1000,
+           high = least * (1 + 0x1p-48) + 0x1p-1000;
+    out->feature = feature;
+    out->lo = low > 0 ? fmax(nextafter(ldexp(low, t->exponent), -INFINITY), 0) : 0;
+    out->hi = nextafter(ldexp(high, t->exponent), INFINITY);
+    /* what overflows may not have before it was rounded */
+    out->lo = fmin(out->lo, 0x1.fffffffffffffp1023);
+}
+
+/* The nearest feature, or EBPO_NEAR_UNKNOWN. `out`, unless NULL: bounds of the distance that are as
+ * near as the triangle is small. */
+static ebpo_feature find_far_feature(const double p[3], const double triangle[3][3],
+                                     ebpo_distance_bounds *out)
+{
+    far_triangle t;
+    ebpo_feature feature = EBPO_NEAR_UNKNOWN;
+    if (relate_far(p, triangle, &t))
+        feature = far_feature_of(&t);
+    if (out && t.exponent - t.edge_exponent > 20)
+        bound_far(&t, feature, out);
+    return feature;
+}
+
+/* |p - a|^2 - |p - b|^2 = (a - b) . ((a - p) + (b - p)) */
+static bool compare_far_corners(const double p[3], const double a[3], const double b[3], int *sign)
+{
+    const double both[2][3] = { { a[0], a[1], a[2] }, { b[0], b[1], b[2] } };
+    int apart = exponent_of((const double(*)[3])both, 1, b),
+        away = exponent_of((const double(*)[3])both, 2, p);
+    near step[3], middle[3];
+    for (int k = 0; k < 3; k++) {
+        step[k] = near_difference(a[k], b[k], apart);
+        middle[k] = near_add(near_difference(a[k], p[k], away), near_difference(b[k], p[k], away));
+    }
+    near d = near_dot(step, middle);
+    *sign = near_sign(d);
+    return *sign || near_is_zero(d);
+}
+
+/* The corners that a feature has; the others become copies of them. */
+static void keep_feature(double t[3][3], ebpo_feature feature)
+{
+    double from[3], to[3];
+    if (feature > EBPO_NEAR_EDGE2)
+        return;
+    int first = feature <= EBPO_NEAR_CORNER2 ? (int)feature : (int)(feature - EBPO_NEAR_EDGE0),
+        last = feature <= EBPO_NEAR_CORNER2 ? first : (first + 1) % 3;
+    memcpy(from, t[first], sizeof from);
+    memcpy(to, t[last], sizeof to);
+    memcpy(t[0], from, sizeof from);
+    memcpy(t[1], to, sizeof to);
+    memcpy(t[2], to, sizeof to);
+}
+
+/* What lies in one plane across an axis is as near as it is to the foot of the point in that plane.
+ * True: p has been moved there, and a and b have become no more than their features. */
+static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b[3][3],
+                        ebpo_feature of_b)
+{
+    bool moved = false;
+    keep_feature(a, of_a);
+    keep_feature(b, of_b);
+    for (int k = 0; k < 3; k++) {
+        bool flat = a[0][k] != p[k];
+        for (int i = 0; i < 3; i++)
+            flat = flat && a[i][k] == a[0][k] && b[i][k] == a[0][k];
+        if (flat) {
+            p[k] = a[0][k];
+            moved = true;
+        }
+    }
+    return moved;
+}
+
+/* --- bounds in doubles --- */
+
+/* Rounding (u = 2^-53; r: 1-norms of the relative corners at most; l: of the edges; s = l^2, at
+ * least the normal's length): relative corners are off by u of themselves, edges likewise. So
+ * products of a corner and an edge are off by 8 u r l, the normal by 8 u l^2 on each axis, products
+ * of a corner with edge x normal by 64 u r l^3. Distances to points of corners and edges are off by
+ * 16 u r. The distance to the plane is off by what tilting the normal by 16 u l^2 / |n| moves the
+ * plane within the triangle, and by 16 u r. Everything below doubles these at least. Numbers whose
+ * fourth powers leave the doubles are scaled first. */
+static const double huge_reach = 0x1p200, tiny_reach = 0x1p-200;
+/* From so many times the triangle's size on, errors that are relative to the greatest product tell
+ * little. */
+static const double far_ratio = 0x1p20;
+
+static inline double greater_of(double a, double b) { return a > b ? a : b; }
+
+static inline double norm_1(const double a[3]) { return fabs(a[0]) + fabs(a[1]) + fabs(a[2]); }
+
+typedef struct relation {
+    double corner[3][3]; /* relative to p */
+    double edge[3][3];   /* corner k to k + 1 */
+    double reach, size;  /* r and l */
+    /* corner k . edge k: how far p is behind corner k along its edge, times the edge's length */
+    double along[3];
+    double back[3]; /* corner k + 1 . edge k */
+    double normal[3];
+    double side[3]; /* positive where p is within edge k */
+} relation;
+
+static void relate_to_point(const double p[3], const double triangle[3][3], relation *r)
+{
+    r->reach = r->size = 0;
+    for (int i = 0; i < 3; i++) {
+        int j = i == 2 ? 0 : i + 1;
+        for (int k = 0; k < 3; k++) {
+            r->corner[i][k] = triangle[i][k] - p[k];
+            r->edge[i][k] = triangle[j][k] - triangle[i][k];
+        }
+        r->reach = greater_of(r->reach, norm_1(r->corner[i]));
+        r->size = greater_of(r->size, norm_1(r->edge[i]));
+    }
+}
+
+static void multiply_relation(relation *r)
+{
+    ebpo_vec3_cross(r->edge[0], r->edge[1], r->normal);
+    for (int i = 0; i < 3; i++) {
+        double outward[3];
+        r->along[i] = ebpo_vec3_dot(r->corner[i], r->edge[i]);
+        r->back[i] = ebpo_vec3_dot(r->corner[i == 2 ? 0 : i + 1], r->edge[i]);
+        ebpo_vec3_cross(r->edge[i], r->normal, outward);
+        r->side[i] = ebpo_vec3_dot(outward, r->corner[i]);
+    }
+}
+
+/* Distance to the line through edge i, p projecting between its ends: to corner plus a share of the
+ * edge. */
+static double edge_distance(const relation *r, int i)
+{
+    double length2 = ebpo_vec3_dot(r->edge[i], r->edge[i]),
+           t = length2 > 0 ? -r->along[i] / length2 : 0, q[3];
+    t = t < 0 ? 0 : t > 1 ? 1 : t;
+    for (int k = 0; k < 3; k++)
+        q[k] = r->corner[i][k] + t * r->edge[i][k];
+    return sqrt(ebpo_vec3_dot(q, q));
+}
+
+static ebpo_feature certain_feature(const relation *r)
+{
+    double flat = 0x1p-48 * r->reach * r->size,
+           solid = 0x1p-44 * r->reach * r->size * r->size * r->size;
+    bool inside = true;
+    for (int i = 0; i < 3; i++) {
+        int before = i == 0 ? 2 : i - 1;
+        /* Behind corner i along edge i, and beyond it along the edge before. */
+        if (r->along[i] > flat && r->back[before] < -flat)
+            return (ebpo_feature)(EBPO_NEAR_CORNER0 + i);
+        if (r->along[i] < -flat && r->back[i] > flat && r->side[i] < -solid)
+            return (ebpo_feature)(EBPO_NEAR_EDGE0 + i);
+        inside = inside && r->side[i] > solid;
+    }
+    return inside ? EBPO_NEAR_INTERIOR : EBPO_NEAR_UNKNOWN;
+}
+
+static double plane_distance(const relation *r, double *error)
+{
+    double length = sqrt(ebpo_vec3_dot(r->normal, r->normal));
+    *error = 0x1p-47 * r->reach + 0x1p-46 * r->size * r->size * r->size / length;
+    return fabs(ebpo_vec3_dot(r->normal, r->corner[0])) / length;
+}
+
+/* The plane is never farther than the triangle; a plane of unknown tilt says nothing, but no point
+ * of the triangle is farther from its edges than its height. */
+static void bound_by_edges(const relation *r, double plane, double error, ebpo_distance_bounds *out)
+{
+    double edges = edge_distance(r, 0), length = sqrt(ebpo_vec3_dot(r->normal, r->normal));
+    for (int i = 1; i < 3; i++) {
+        double other = edge_distance(r, i);
+        edges = other < edges ? other : edges;
+    }
+    double height = length > 0 ? 2 * length / r->size + 0x1p-44 * r->size : 0x1p-44 * r->size;
+    double low = edges - error - 4 * height,
+           tilted = 0x1p-47 * r->reach + 0x1p-46 * r->size * r->size / length * r->reach;
+    if (tilted < 0x1p-20 * r->reach)
+        low = greater_of(low, plane < edges ? plane - tilted : edges - tilted);
+    out->lo = low > 0 ? low : 0;
+    out->hi = edges + error;
+}
+
+static void bound_relation(const relation *r, ebpo_distance_bounds *out)
+{
+    double error = 0x1p-47 * r->reach, d;
+    out->feature = certain_feature(r);
+    if (out->feature <= EBPO_NEAR_CORNER2) {
+        const double *q = r->corner[out->feature];
+        d = sqrt(ebpo_vec3_dot(q, q));
+        error = 0x1p-49 * d;
+    } else if (out->feature <= EBPO_NEAR_EDGE2) {
+        d = edge_distance(r, (int)(out->feature - EBPO_NEAR_EDGE0));
+    } else {
+        double plane_error;
+        d = plane_distance(r, &plane_error);
+        if (out->feature != EBPO_NEAR_INTERIOR || !(plane_error < 0x1p-20 * r->reach)) {
+            bound_by_edges(r, d, error, out);
+            return;
+        }
+        error = plane_error;
+    }
+    out->lo = d > error ? d - error : 0;
+    out->hi = d + error;
+}
+
+/* Scales everything by a power of two so that the largest coordinate is in 1/2 .. 1. Returns the
+ * exponent that undoes it. */
+static int scale_all(const double p[3], const double triangle[3][3], double q[3], double t[3][3])
+{
+    double most = 0;
+    int exponent;
+    for (int k = 0; k < 3; k++) {
+        most = greater_of(most, fabs(p[k]));
+        for (int i = 0; i < 3; i++)
+            most = greater_of(most, fabs(triangle[i][k]));
+    }
+    frexp(most, &exponent);
+    for (int k = 0; k < 3; k++) {
+        q[k] = ldexp(p[k], -exponent);
+        for (int i = 0; i < 3; i++)
+            t[i][k] = ldexp(triangle[i][k], -exponent);
+    }
+    return exponent;
+}
+
+static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_distance_bounds *out)
+{
+    double q[3], t[3][3];
+    int exponent = scale_all(p, triangle, q, t);
+    relation r;
+    relate_to_point(q, (const double(*)[3])t, &r);
+    if (!(r.reach > tiny_reach * 0x1p-100) || !(r.size > tiny_reach || r.size == 0)) {
+        /* Next to a point: only that much is known. */
+        *out = (ebpo_distance_bounds){
+            0, ldexp(r.reach + 0x1p-1000, exponent) * (1 + 0x1p-50) + 0x1p-1074, EBPO_NEAR_UNKNOWN
+        };
+        out->feature = find_far_feature(p, triangle, out);
+        return;
+    }
+    multiply_relation(&r);
+    bound_relation(&r, out);
+    /* Scaling up is exact, scaling down may have lost what lies below 2^-1074. */
+    out->feature = find_far_feature(p, triangle, NULL);
+    out->lo = nextafter(ldexp(out->lo - 0x1p-1000, exponent), -INFINITY);
+    out->lo = out->lo > 0 ? out->lo : 0;
+    out->hi = nextafter(ldexp(out->hi + 0x1p-1000, exponent), INFINITY);
+}
+
+void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3],
+                                   ebpo_distance_bounds *out)
+{
+    relation r;
+    relate_to_point(p, triangle, &r);
+    if (!(r.reach < huge_reach) || !(r.reach > tiny_reach) || !(r.size > tiny_reach)) {
+        bound_scaled(p, triangle, out);
+        return;
+    }
+    multiply_relation(&r);
+    bound_relation(&r, out);
+    if (out->feature == EBPO_NEAR_UNKNOWN && r.reach > far_ratio * r.size)
+        out->feature = find_far_feature(p, triangle, NULL);
+}
+
+/* --- integers of any size: the squared distance is a fraction of integers in a common unit --- */
+
+/* The nearest point is p + numerator / denominator, the squared distance square / denominator2. */
+typedef struct nearest {
+    int unit;
+    ebpo_vectorz p, corner[3], edge[3], normal; /* corners relative to p */
+    mpz_t square, denominator;                  /* squared distance in squared units */
+    ebpo_vectorz offset;                        /* nearest point less p, times offset_denominator */
+    mpz_t offset_denominator;
+    ebpo_feature feature;
+    mpz_t t, u;
+    ebpo_vectorz w;
+} nearest;
+
+static void nearest_init(nearest *n)
+{
+    ebpo_vectorz *all[] = { &n->p,       &n->corner[0], &n->corner[1], &n->corner[2], &n->edge[0],
+                            &n->edge[1], &n->edge[2],   &n->normal,    &n->offset,    &n->w };
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
+        ebpo_vectorz_init(all[i]);
+    mpz_inits(n->square, n->denominator, n->offset_denominator, n->t, n->u, NULL);
+}
+
+static void nearest_clear(nearest *n)
+{
+    ebpo_vectorz *all[] = { &n->p,       &n->corner[0], &n->corner[1], &n->corner[2], &n->edge[0],
+                            &n->edge[1], &n->edge[2],   &n->normal,    &n->offset,    &n->w };
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
+        ebpo_vectorz_clear(all[i]);
+    mpz_clears(n->square, n->denominator, n->offset_denominator, n->t, n->u, NULL);
+}
+
+static void set_points(nearest *n, const double p[3], const double triangle[3][3], int unit)
+{
+    n->unit = unit;
+    for (int k = 0; k < 3; k++) {
+        ebpo_set_integer(n->p.x[k], p[k], unit);
+        for (int i = 0; i < 3; i++) {
+            ebpo_set_integer(n->corner[i].x[k], triangle[i][k], unit);
+            mpz_sub(n->corner[i].x[k], n->corner[i].x[k], n->p.x[k]);
+        }
+    }
+    for (int i = 0; i < 3; i++)
+        ebpo_vectorz_subtract(&n->edge[i], &n->corner[(i + 1) % 3], &n->corner[i]);
+    ebpo_vectorz_cross(&n->normal, &n->edge[0], &n->edge[1]);
+}
+
+static bool try_interior(nearest *n)
+{
+    ebpo_vectorz_dot(n->denominator, &n->normal, &n->normal);
+    if (mpz_sgn(n->denominator) == 0)
+        return false;
+    for (int i = 0; i < 3; i++) {
+        ebpo_vectorz_cross(&n->w, &n->edge[i], &n->normal);
+        ebpo_vectorz_dot(n->t, &n->w, &n->corner[i]);
+        if (mpz_sgn(n->t) <= 0)
+            return false;
+    }
+    ebpo_vectorz_dot(n->t, &n->normal, &n->corner[0]);
+    mpz_mul(n->square, n->t, n->t);
+    for (int k = 0; k < 3; k++)
+        mpz_mul(n->offset.x[k], n->normal.x[k], n->t);
+    mpz_set(n->offset_denominator, n->denominator);
+    n->feature = EBPO_NEAR_INTERIOR;
+    return true;
+}
+
+/* Takes corner or edge when it is nearer than what was found (of equal ones: the corner). */
+static void offer_feature(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
+                          ebpo_feature feature, bool *taken)
+{
+    int sign = -1;
+    *taken = false;
+    if (!first) {
+        mpz_t left, right;
+        mpz_inits(left, right, NULL);
+        mpz_mul(left, square, n->denominator);
+        mpz_mul(right, n->square, denominator);
+        sign = mpz_cmp(left, right);
+        mpz_clears(left, right, NULL);
+    }
+    if (sign > 0 || (sign == 0 && feature >= n->feature))
+        return;
+    mpz_set(n->square, square);
+    mpz_set(n->denominator, denominator);
+    n->feature = feature;
+    *taken = true;
+}
+
+static void offer_edge(nearest *n, int i)
+{
+    mpz_t along, length2, square;
+    bool taken;
+    mpz_inits(along, length2, square, NULL);
+    ebpo_vectorz_dot(along, &n->corner[i], &n->edge[i]);
+    mpz_neg(along, along); /* projection of p on the edge, times its length */
+    ebpo_vectorz_dot(length2, &n->edge[i], &n->edge[i]);
+    if (mpz_sgn(along) > 0 && mpz_cmp(along, length2) < 0) {
+        ebpo_vectorz_dot(square, &n->corner[i], &n->corner[i]);
+        mpz_mul(square, square, length2);
+        mpz_submul(square, along, along);
+        offer_feature(n, false, square, length2, (ebpo_feature)(EBPO_NEAR_EDGE0 + i), &taken);
+        if (taken) {
+            for (int k = 0; k < 3; k++) {
+                mpz_mul(n->offset.x[k], n->corner[i].x[k], length2);
+                mpz_addmul(n->offset.x[k], n->edge[i].x[k], along);
+            }
+            mpz_set(n->offset_denominator, length2);
+        }
+    }
+    mpz_clears(along, length2, square, NULL);
+}
+
+static void offer_corner(nearest *n, int i)
+{
+    mpz_t one, square;
+    bool taken;
+    mpz_inits(one, square, NULL);
+    mpz_set_ui(one, 1);
+    ebpo_vectorz_dot(square, &n->corner[i], &n->corner[i]);
+    offer_feature(n, i == 0, square, one, (ebpo_feature)(EBPO_NEAR_CORNER0 + i), &taken);
+    if (taken) {
+        for (int k = 0; k < 3; k++)
+            mpz_set(n->offset.x[k], n->corner[i].x[k]);
+        mpz_set_ui(n->offset_denominator, 1);
+    }
+    mpz_clears(one, square, NULL);
+}
+
+static void find_nearest(nearest *n)
+{
+    if (try_interior(n))
+        return;
+    for (int i = 0; i < 3; i++)
+        offer_corner(n, i);
+    for (int i = 0; i < 3; i++)
+        offer_edge(n, i);
+}
+
+static void nearest_by_integers(const double p[3], const double triangle[3][3],
+                                ebpo_triangle_nearest *out)
+{
+    nearest n;
+    nearest_init(&n);
+    set_points(&n, p, triangle,
+               ebpo_common_unit(&triangle[0][0], 9, ebpo_common_unit(p, 3, EBPO_UNIT_OF_ZEROS)));
+    find_nearest(&n);
+    out->feature = n.feature;
+    out->distance = ebpo_round_root(n.square, n.denominator, n.unit);
+    for (int k = 0; k < 3; k++) {
+        mpz_addmul(n.offset.x[k], n.p.x[k], n.offset_denominator);
+        out->point[k] = ebpo_round_quotient(n.offset.x[k], n.offset_denominator, n.unit);
+    }
+    if (n.feature <= EBPO_NEAR_CORNER2)
+        memcpy(out->point, triangle[n.feature], sizeof out->point);
+    nearest_clear(&n);
+}
+
+void ebpo_triangle_square_gmp(const double p[3], const double triangle[3][3], int unit,
+                              mpz_t square, mpz_t denominator)
+{
+    nearest n;
+    nearest_init(&n);
+    set_points(&n, p, triangle, unit);
+    find_nearest(&n);
+    mpz_set(square, n.square);
+    mpz_set(denominator, n.denominator);
+    nearest_clear(&n);
+}
+
+static int compare_by_integers(const double p[3], const double a[3][3], const double b[3][3])
+{
+    nearest n, m;
+    nearest_init(&n);
+    nearest_init(&m);
+    int unit =
+        ebpo_common_unit(&b[0][0], 9,
+                         ebpo_common_unit(&a[0][0], 9, ebpo_common_unit(p, 3, EBPO_UNIT_OF_ZEROS)));
+    set_points(&n, p, a, unit);
+    set_points(&m, p, b, unit);
+    find_nearest(&n);
+    find_nearest(&m);
+    mpz_mul(n.t, n.square, m.denominator);
+    mpz_mul(m.t, m.square, n.denominator);
+    int sign = mpz_cmp(n.t, m.t);
+    nearest_clear(&n);
+    nearest_clear(&m);
+    return (sign > 0) - (sign < 0);
+}
+
+static int compare_to_by_integers(const double p[3], const double triangle[3][3], double d)
+{
+    nearest n;
+    nearest_init(&n);
+    set_points(&n, p, triangle,
+               ebpo_common_unit(&triangle[0][0], 9,
+                                ebpo_common_unit(p, 3,
+                                                 ebpo_common_unit(&d, 1, EBPO_UNIT_OF_ZEROS))));
+    find_nearest(&n);
+    ebpo_set_integer(n.t, d, n.unit);
+    mpz_mul(n.t, n.t, n.t);
+    mpz_mul(n.t, n.t, n.denominator);
+    int sign = mpz_cmp(n.square, n.t);
+    nearest_clear(&n);
+    return (sign > 0) - (sign < 0);
+}
+
+static void unit_normal_by_integers(const double triangle[3][3], double normal[3])
+{
+    static const double origin[3];
+    nearest n;
+    nearest_init(&n);
+    set_points(&n, origin, triangle, ebpo_common_unit(&triangle[0][0], 9, EBPO_UNIT_OF_ZEROS));
+    ebpo_vectorz_dot(n.t, &n.normal, &n.normal);
+    for (int k = 0; k < 3; k++) {
+        mpz_mul(n.u, n.normal.x[k], n.normal.x[k]);
+        double size = mpz_sgn(n.t) ? ebpo_round_root(n.u, n.t, 0) : 0;
+        normal[k] = mpz_sgn(n.normal.x[k]) < 0 ? -size : size;
+    }
+    nearest_clear(&n);
+}
+
+/* --- double-double arithmetic first, then integers --- */
+
+/* Beyond these, products of four coordinates or their rounding errors would leave the doubles. */
+static const double most_reach = 0x1p120, least_size = 0x1p-120;
+
+static bool in_pair_range(const double p[3], const double triangle[3][3])
+{
+    double reach = 0, size = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            double r = fabs(triangle[i][k] - p[k]),
+                   l = fabs(triangle[i][k] - triangle[i == 2 ? 0 : i + 1][k]);
+            reach = r > reach ? r : reach;
+            size = l > size ? l : size;
+        }
+    return reach < most_reach && size > least_size;
+}
+
+/* Ziv's test. */
+static bool rounds_certainly(const ebpo_measured *m, double *distance)
+{
+    double error = m->error * m->distance.head;
+    double least = m->distance.head + (m->distance.tail - error),
+           most = m->distance.head + (m->distance.tail + error);
+    *distance = least;
+    return m->error < 0x1p-56 && least == most;
+}
+
+/* A corner of a triangle that is far away: scaled, so that nothing overflows. What gets lost of
+ * small coordinates is below 2^-1000 of the distance. */
+static bool corner_by_pairs(const double p[3], const double triangle[3][3],
+                            const ebpo_distance_bounds *bounds, ebpo_triangle_nearest *out)
+{
+    double q[3], t[3][3];
+    ebpo_measured m;
+    if (bounds->feature > EBPO_NEAR_CORNER2 || !(bounds->lo > 0x1p-900))
+        return false;
+    int exponent = scale_all(p, triangle, q, t);
+    if (ldexp(bounds->lo, -exponent) < 0x1p-10)
+        return false;
+    ebpo_distance_pairs_best()->measure(q, (const double(*)[3])t, bounds->feature, NULL, &m);
+    if (!rounds_certainly(&m, &out->distance))
+        return false;
+    out->distance = ldexp(out->distance, exponent);
+    out->feature = bounds->feature;
+    memcpy(out->point, triangle[out->feature], sizeof out->point);
+    return true;
+}
+
+/* False: the arithmetic does not decide. *known: the normal (if it is wanted) is there. */
+static bool nearest_by_pairs(const double p[3], const double triangle[3][3],
+                             const ebpo_distance_bounds *bounds, double *normal, bool *known,
+                             ebpo_triangle_nearest *out)
+{
+    ebpo_measured m;
+    *known = false;
+    if (bounds->feature == EBPO_NEAR_UNKNOWN || !(bounds->lo > least_size))
+        return false;
+    if (!in_pair_range(p, triangle))
+        return corner_by_pairs(p, triangle, bounds, out);
+    *known = ebpo_distance_pairs_best()->measure(p, triangle, bounds->feature, normal, &m);
+    if (!rounds_certainly(&m, &out->distance))
+        return false;
+    out->feature = bounds->feature;
+    memcpy(out->point, m.point, sizeof out->point);
+    return true;
+}
+
+void ebpo_triangle_nearest_exact(const double p[3], const double triangle[3][3],
+                                 const ebpo_distance_bounds *bounds, double *normal,
+                                 ebpo_triangle_nearest *out)
+{
+    ebpo_distance_bounds b;
+    bool known;
+    if (bounds)
+        b = *bounds;
+    else
+        ebpo_triangle_distance_bounds(p, triangle, &b);
+    if (!nearest_by_pairs(p, triangle, &b, normal, &known, out))
+        nearest_by_integers(p, triangle, out);
+    if (normal && !known)
+        ebpo_triangle_unit_normal(triangle, normal);
+}
+
+int ebpo_triangle_distance_compare(const double p[3], const double a[3][3], const double b[3][3])
+{
+    ebpo_distance_bounds x, y;
+    ebpo_triangle_distance_bounds(p, a, &x);
+    ebpo_triangle_distance_bounds(p, b, &y);
+    if (x.hi < y.lo)
+        return -1;
+    if (x.lo > y.hi)
+        return 1;
+    int sign;
+    if (x.feature <= EBPO_NEAR_CORNER2 && y.feature <= EBPO_NEAR_CORNER2 &&
+        compare_far_corners(p, a[x.feature], b[y.feature], &sign))
+        return sign;
+    double foot[3], c[3][3], d[3][3];
+    memcpy(foot, p, sizeof foot);
+    memcpy(c, a, sizeof c);
+    memcpy(d, b, sizeof d);
+    if (flatten_far(foot, c, x.feature, d, y.feature))
+        return ebpo_triangle_distance_compare(foot, (const double(*)[3])c, (const double(*)[3])d);
+    return compare_by_integers(p, a, b);
+}
+
+int ebpo_triangle_distance_compare_to(const double p[3], const double triangle[3][3], double d)
+{
+    ebpo_distance_bounds b;
+    if (isinf(d))
+        return -1;
+    ebpo_triangle_distance_bounds(p, triangle, &b);
+    return b.hi < d ? -1 : b.lo > d ? 1 : compare_to_by_integers(p, triangle, d);
+}
+
+void ebpo_triangle_unit_normal(const double triangle[3][3], double normal[3])
+{
+    if (!ebpo_distance_pairs_best()->unit_normal(triangle, normal))
+        unit_normal_by_integers(triangle, normal);
+}

@@ -1,0 +1,623 @@
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/endian.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "format/chunk_directory.h"
+#include "format/reader.h"
+#include "hdf5_read/chunk.h"
+#include "hdf5_read/head.h"
+#include "verify/verify_parts.h"
+
+enum { OPEN_MOST = 64, NEAR = 32 };
+
+typedef struct pair {
+    uint64_t a, b;
+} pair;
+
+typedef struct twin {
+    const uint8_t *low, *more, *end;
+    pair open[OPEN_MOST + 1]; /* newest last */
+    size_t count;
+    uint64_t seen;
+} twin;
+
+static void twin_open(twin *t, uint64_t a, uint64_t b)
+{
+    t->open[t->count++] = (pair){ a, b };
+    if (t->count > OPEN_MOST)
+        memmove(t->open, t->open + 1, --t->count * sizeof *t->open);
+}
+
+static void twin_remove(twin *t, size_t at)
+{
+    memmove(t->open + at, t->open + at + 1, (--t->count - at) * sizeof *t->open);
+}
+
+static void twin_pass(twin *t, uint64_t a, uint64_t b)
+{
+    for (size_t back = 1; back <= NEAR && back <= t->count; back++)
+        if (t->open[t->count - back].a == a && t->open[t->count - back].b == b) {
+            twin_remove(t, t->count - back);
+            return;
+        }
+    twin_open(t, b, a);
+}
+
+static bool twin_number(twin *t, uint64_t *vertex)
+{
+    uint64_t number = *t->low++;
+    if (number > 240)
+        return false;
+    if (number == 240) {
+        if (t->end - t->more < 4)
+            return false;
+        number = t->more[0] + 256u * t->more[1] + 65536u * t->more[2] + 16777216ull * t->more[3];
+        t->more += 4;
+    } else if (number >= 224) {
+        if (t->more == t->end)
+            return false;
+        number = 224 + 256 * (number - 224) + *t->more++;
+    }
+    if (number > t->seen)
+        return false;
+    *vertex = t->seen - number;
+    t->seen += number == 0;
+    return true;
+}
+
+/* Place of the newest open edge with that end; count: none. */
+static size_t twin_newest(const twin *t, bool first, uint64_t vertex)
+{
+    for (size_t i = t->count; i > 0; i--)
+        if ((first ? t->open[i - 1].a : t->open[i - 1].b) == vertex)
+            return i - 1;
+    return t->count;
+}
+
+static bool twin_across(twin *t, unsigned gate, unsigned third, uint64_t *face)
+{
+    uint64_t c = 0;
+    unsigned kind = third / 3, k = third % 3;
+    if (gate > t->count)
+        return false;
+    pair e = t->open[t->count - gate];
+    twin_remove(t, t->count - gate);
+    size_t at = kind == 1   ? twin_newest(t, true, e.b)
+                : kind == 2 ? twin_newest(t, false, e.a)
+                : kind >= 4 ? t->count - 1 - (kind - 4)
+                            : 0;
+    if (kind != 0 && kind != 3 && (kind >= 4 ? kind - 4 >= t->count : at == t->count))
+        return false;
+    if (kind == 0)
+        c = t->seen++;
+    else if (kind == 3 && !twin_number(t, &c))
+        return false;
+    else if (kind != 3)
+        c = kind == 1 ? t->open[at].b : t->open[at].a;
+    if (kind == 1 || kind == 2)
+        twin_remove(t, at);
+    if (kind == 0) {
+        twin_open(t, c, e.b);
+        twin_open(t, e.a, c);
+    }
+    if (kind >= 2)
+        twin_pass(t, e.b, c);
+    if (kind == 1 || kind >= 3)
+        twin_pass(t, c, e.a);
+    face[k] = e.a;
+    face[(k + 1) % 3] = e.b;
+    face[(k + 2) % 3] = c;
+    return true;
+}
+
+static bool twin_codes(const uint8_t *in, uint32_t rows, uint64_t *seen, uint32_t *faces)
+{
+    for (size_t i = 0; i < 3 * (size_t)rows; i++) {
+        uint64_t code = 0;
+        for (size_t k = 0; k < 4; k++)
+            code += (uint64_t)in[1 + k * 3 * rows + i] << 8 * k;
+        if (code > *seen)
+            return false;
+        faces[i] = (uint32_t)(*seen - code);
+        *seen += code == 0;
+    }
+    for (size_t i = 12 * (size_t)rows + 1; i < 13 * (size_t)rows; i++)
+        if (in[i])
+            return false;
+    return true;
+}
+
+bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uint32_t *faces)
+{
+    twin t;
+    size_t thirds = 0, numbers = 0;
+    if (in[0] == 1)
+        return twin_codes(in, rows, seen, faces);
+    for (uint32_t i = 0; i < rows; i++)
+        thirds += in[i] != 0;
+    for (size_t i = 0; i < thirds; i++)
+        numbers += in[rows + i] / 3 == 3;
+    const uint8_t *third = in + rows;
+    t.low = third + thirds;
+    t.more = t.low + 3 * (rows - thirds) + numbers;
+    t.end = in + 13 * (size_t)rows;
+    t.count = 0;
+    t.seen = *seen;
+    for (uint32_t i = 0; i < rows; i++) {
+        uint64_t face[3];
+        bool fine = true;
+        if (in[i]) {
+            fine = twin_across(&t, in[i], *third++, face);
+        } else {
+            for (int k = 0; k < 3 && fine; k++)
+                fine = twin_number(&t, &face[k]);
+            for (int k = 0; k < 3 && fine; k++)
+                twin_open(&t, face[(k + 1) % 3], face[k]);
+        }
+        for (int k = 0; k < 3 && fine; k++)
+            faces[3 * i + (uint32_t)k] = (uint32_t)face[k];
+        if (!fine)
+            return false;
+    }
+    for (; t.more < t.end; t.more++)
+        if (*t.more)
+            return false;
+    *seen = t.seen;
+    return true;
+}
+
+/* Faces that are stored across edges, read by the plain twin. */
+
+enum { CORNERS_MOST = EBPO_CHUNK_BYTES_MAX / 4 };
+
+static void gates_compare_chunk(ebpo_tally *tally, const uint8_t *streams, uint32_t *faces,
+                                const ebpo_tree *tree, uint64_t row, uint64_t rows, uint64_t *seen)
+{
+    const uint32_t *corners = tree->mesh.faces + 3 * row;
+    bool same = ebpo_plain_gates_read(streams, (uint32_t)rows, seen, faces);
+    for (uint64_t i = 0; i < 3 * rows && same; i++)
+        same = faces[i] == corners[i];
+    (void)ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, same,
+                           "/mesh/faces, from face %" PRIu64
+                           " on: the streams are read in two ways, with different corners",
+                           row);
+}
+
+static ebpo_status gates_compare(ebpo_tally *tally, const ebpo_file *file, const ebpo_tree *tree,
+                                 ebpo_idle_reader *r, uint32_t *faces, ebpo_error *error)
+{
+    const ebpo_array_in *array = ebpo_reader_array(file, EBPO_A_FACES, 0);
+    ebpo_status status = EBPO_OK;
+    uint64_t seen = 0, rows = array->shape.chunk_rows;
+    for (uint64_t row = 0; row < array->shape.rows && status == EBPO_OK; row += rows) {
+        uint64_t left = array->shape.rows - row;
+        status = ebpo_reader_gates(file, row / rows, &r->reader, r->raw, error);
+        if (status == EBPO_OK)
+            gates_compare_chunk(tally, r->raw, faces, tree, row, left < rows ? left : rows, &seen);
+    }
+    return status;
+}
+
+ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file, const ebpo_tree *tree,
+                             ebpo_error *error)
+{
+    if (!ebpo_reader_array(file, EBPO_A_FACES, 0)->gates)
+        return EBPO_OK;
+    ebpo_idle_reader *r = ebpo_idle_readers_take(&ebpo_reader_own(file)->idle);
+    uint32_t *faces = ebpo_alloc(CORNERS_MOST, sizeof *faces);
+    ebpo_status status = r && faces ? gates_compare(tally, file, tree, r, faces, error)
+                                    : ebpo_fail_memory(error, CORNERS_MOST * sizeof *faces);
+    free(faces);
+    ebpo_idle_readers_give(&ebpo_reader_own(file)->idle, r);
+    return status;
+}
+
+/* The list of all chunks, against HDF5's own index. */
+
+#define PLACES_CHECK(condition, ...) \
+    ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
+
+/* An array as HDF5 tells it, and how many of its chunks the list has had. */
+typedef struct indexed {
+    const ebpo_array_in *array;
+    uint32_t number;
+    ebpo_chunk_place *chunks;
+    uint64_t count, listed;
+} indexed;
+
+enum { MOST = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS };
+
+typedef struct places_comparison {
+    ebpo_tally *tally;
+    const ebpo_file *file;
+    ebpo_head head;
+    indexed array[MOST];
+    unsigned arrays;
+    uint64_t *list, rows;
+    uint64_t top; /* end of what looking up a subtree takes */
+} places_comparison;
+
+/* Numbers as the specification gives them: 64 a level; then the mesh, the maps, the table. */
+static ebpo_status index_array(places_comparison *c, const ebpo_array_in *array, uint32_t number,
+                               ebpo_error *error)
+{
+    ebpo_shape shape;
+    uint64_t stored;
+    if (!array->present)
+        return EBPO_OK;
+    indexed *to = &c->array[c->arrays++];
+    *to = (indexed){ .array = array, .number = number };
+    ebpo_status status =
+        ebpo_head_read_array(&c->head, array->path, UINT64_MAX, EBPO_HEAD_ROWS_POWER, &shape, NULL,
+                             &to->chunks, &stored, error);
+    to->count = status == EBPO_OK ? ebpo_shape_chunks(&shape) : 0;
+    return status;
+}
+
+static ebpo_status index_all(places_comparison *c, ebpo_error *error)
+{
+    static const struct {
+        ebpo_array_id id;
+        uint32_t number;
+    } roots[] = { { EBPO_A_VERTICES, 4096 },       { EBPO_A_FACES, 4097 },
+                  { EBPO_A_FACES_INDEX, 4098 },    { EBPO_A_VERTEX_SOURCE, 4099 },
+                  { EBPO_A_FACE_SOURCE, 4100 },    { EBPO_A_SUBTREE_INDEX, 4112 },
+                  { EBPO_A_SUBTREE_COUNTS, 4113 }, { EBPO_A_SUBTREE_OUTER, 4114 } };
+    ebpo_status status = EBPO_OK;
+    for (int level = 0; level < c->file->info.level_count && status == EBPO_OK; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++)
+            status = index_array(c, &c->file->level_array[level][id], (uint32_t)(64 * level + id),
+                                 error);
+    for (size_t i = 0; i < sizeof roots / sizeof *roots && status == EBPO_OK; i++)
+        status = index_array(c, &c->file->root_array[roots[i].id], roots[i].number, error);
+    return status;
+}
+
+static ebpo_status read_list(places_comparison *c, ebpo_error *error)
+{
+    const ebpo_array_in *a = &c->file->root_array[EBPO_A_PLACES];
+    const char *why = "";
+    uint8_t *stored = ebpo_alloc(a->chunks[0].bytes, 1);
+    c->rows = a->shape.rows;
+    ebpo_status status = stored
+                             ? ebpo_input_read(&ebpo_reader_own(c->file)->in, a->chunks[0].address,
+                                               a->chunks[0].bytes, stored, error)
+                             : ebpo_fail_memory(error, a->chunks[0].bytes);
+    if (status == EBPO_OK)
+        status = ebpo_long_chunk_decode(stored, a->chunks[0].bytes, a->shape.pipeline, c->rows,
+                                        &c->list, &why, error);
+    if (status == EBPO_E_FORMAT)
+        status = ebpo_fail_file(error, status, c->file->in.shown, "/subtrees/places: %s", why);
+    free(stored);
+    return status;
+}
+
+static indexed *places_find(places_comparison *c, uint32_t number)
+{
+    for (unsigned i = 0; i < c->arrays; i++)
+        if (c->array[i].number == number)
+            return &c->array[i];
+    return NULL;
+}
+
+static bool is_top(const places_comparison *c, const indexed *of)
+{
+    return of->number == 4112 ||
+           (of->number < 4096 && of->array->level <= c->file->info.subtree_level);
+}
+
+static void compare_row(places_comparison *c, uint64_t row, uint64_t at, uint32_t bytes)
+{
+    ebpo_tally *tally = c->tally;
+    uint32_t number = (uint32_t)(c->list[row] >> 32);
+    indexed *of = places_find(c, number);
+    if (!of) {
+        PLACES_CHECK(number >= 4096,
+                     "/subtrees/places, row %" PRIu64 ": number %" PRIu32
+                     " is of an array that is not in the file",
+                     row, number);
+        return;
+    }
+    if (!PLACES_CHECK(of->listed < of->count,
+                      "/subtrees/places, row %" PRIu64 ": %s has only %" PRIu64 " chunks", row,
+                      of->array->path, of->count))
+        return;
+    const ebpo_chunk_place *chunk = &of->chunks[of->listed++];
+    PLACES_CHECK(chunk->address == at && chunk->bytes == bytes,
+                 "/subtrees/places, row %" PRIu64 ": %" PRIu32 " bytes at %" PRIu64
+                 " as chunk %" PRIu64 " of %s, but HDF5 has %" PRIu32 " at %" PRIu64,
+                 row, bytes, at, of->listed - 1, of->array->path, chunk->bytes, chunk->address);
+    if (is_top(c, of) && chunk->address + chunk->bytes > c->top)
+        c->top = chunk->address + chunk->bytes;
+}
+
+static void places_compare(places_comparison *c)
+{
+    ebpo_tally *tally = c->tally;
+    uint64_t at = c->array[0].chunks[0].address;
+    for (uint64_t row = 0; row < c->rows; row++) {
+        uint32_t bytes = (uint32_t)c->list[row];
+        compare_row(c, row, at, bytes);
+        at += bytes;
+    }
+    for (unsigned i = 0; i < c->arrays; i++)
+        PLACES_CHECK(c->array[i].listed == c->array[i].count,
+                     "/subtrees/places has %" PRIu64 " of the %" PRIu64 " chunks of %s",
+                     c->array[i].listed, c->array[i].count, c->array[i].array->path);
+    uint64_t top = c->file->info.top_bytes;
+    PLACES_CHECK(top == 0 || (top >= c->top && top <= c->file->info.file_bytes),
+                 "top_bytes states %" PRIu64
+                 ", but what looking up a subtree takes ends at %" PRIu64,
+                 top, c->top);
+}
+
+ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
+                              const ebpo_verify_options *options, ebpo_error *error)
+{
+    ebpo_error own = EBPO_ERROR_INIT;
+    (void)options;
+    if (!file->has_places)
+        return EBPO_OK;
+    places_comparison *c = ebpo_alloc_zero(1, sizeof *c);
+    if (!c)
+        return ebpo_fail_memory(error, sizeof *c);
+    c->tally = tally;
+    c->file = file;
+    c->head = (ebpo_head)EBPO_HEAD_INIT;
+    ebpo_status status = ebpo_head_open(&c->head, &ebpo_reader_own(file)->in, &own);
+    if (status == EBPO_OK)
+        status = index_all(c, &own);
+    status = ebpo_head_close(&c->head, status, &own);
+    if (status == EBPO_OK)
+        status = read_list(c, &own);
+    if (status == EBPO_OK)
+        places_compare(c);
+    for (unsigned i = 0; i < c->arrays; i++)
+        free(c->array[i].chunks);
+    free(c->list);
+    free(c);
+    if (status != EBPO_E_FORMAT)
+        return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
+    PLACES_CHECK(false, "%s", own.message);
+    return EBPO_OK;
+}
+
+/* Bytes of the file that belong to nothing. What stands there changes no answer, but a change of it
+ * shall not go unseen. */
+
+typedef struct survey {
+    const ebpo_file *file;
+    const ebpo_progress *progress;
+    ebpo_head head;
+    ebpo_range *range; /* what belongs to something */
+    uint64_t count, capacity;
+} survey;
+
+static ebpo_status add_range(survey *s, ebpo_range range, ebpo_error *error)
+{
+    if (!ebpo_grow(&s->range, &s->capacity, s->count + 1, sizeof *s->range))
+        return ebpo_fail_memory(error, (s->count + 1) * sizeof *s->range);
+    s->range[s->count++] = range;
+    return EBPO_OK;
+}
+
+static ebpo_status add_array(survey *s, const ebpo_array_in *a, ebpo_head_rows rows,
+                             ebpo_error *error)
+{
+    ebpo_shape shape;
+    ebpo_chunk_place *chunks = NULL;
+    uint64_t stored;
+    if (!a->present)
+        return EBPO_OK;
+    ebpo_status status = ebpo_head_read_array(&s->head, a->path, UINT64_MAX, rows, &shape, NULL,
+                                              &chunks, &stored, error);
+    uint64_t count = status == EBPO_OK ? ebpo_shape_chunks(&shape) : 0;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        status = add_range(s, (ebpo_range){ chunks[i].address, chunks[i].bytes }, error);
+    free(chunks);
+    return status;
+}
+
+static ebpo_status add_arrays(survey *s, ebpo_error *error)
+{
+    const ebpo_file *f = s->file;
+    ebpo_status status = EBPO_OK;
+    for (int level = 0; level < f->info.level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++)
+            status = add_array(s, &f->level_array[level][id],
+                               ebpo_reader_rows_of_chunk(f, (ebpo_array_id)id), error);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS && status == EBPO_OK; id++)
+        status = add_array(s, &f->root_array[id], ebpo_reader_rows_of_chunk(f, (ebpo_array_id)id),
+                           error);
+    for (int i = 0; i < f->attributes.arrays && status == EBPO_OK; i++)
+        status = add_array(s, &f->attributes.array[i],
+                           ebpo_reader_rows_of_chunk(f, EBPO_A_ATTRIBUTE), error);
+    return status;
+}
+
+static ebpo_status add_metadata(survey *s, ebpo_error *error)
+{
+    ebpo_range *kept, superblock = { 0, EBPO_HEAD_SUPERBLOCK_BYTES };
+    uint64_t count;
+    ebpo_status status = ebpo_head_take_ranges(&s->head, &kept, &count, error);
+    if (status == EBPO_OK)
+        status = add_range(s, superblock, error);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        status = add_range(s, kept[i], error);
+    free(kept);
+    return status;
+}
+
+static int by_offset(const void *a, const void *b)
+{
+    uint64_t x = ((const ebpo_range *)a)->offset, y = ((const ebpo_range *)b)->offset;
+    return (x > y) - (x < y);
+}
+
+/* Counts the bytes of a gap that are not zero. It may be nearly all of a large file. */
+static ebpo_status look_at_gap(const survey *s, ebpo_range gap, uint64_t *filled, ebpo_error *error)
+{
+    enum { PIECE = 1 << 14 };
+    uint8_t piece[PIECE];
+    ebpo_input *in = &ebpo_reader_own(s->file)->in;
+    ebpo_status status = EBPO_OK;
+    while (gap.size && status == EBPO_OK) {
+        uint64_t size = gap.size < PIECE ? gap.size : PIECE;
+        if (!ebpo_progress_step(s->progress, "looking at unused bytes", gap.offset, in->source.size,
+                                error))
+            return EBPO_E_CANCELLED;
+        status = ebpo_input_read(in, gap.offset, size, piece, error);
+        for (uint64_t i = 0; i < size && status == EBPO_OK; i++)
+            *filled += piece[i] != 0;
+        gap = (ebpo_range){ gap.offset + size, gap.size - size };
+    }
+    return status;
+}
+
+static ebpo_status look_at_gaps(survey *s, uint64_t *spare, uint64_t *filled, ebpo_error *error)
+{
+    uint64_t file_end = ebpo_reader_own(s->file)->in.source.size;
+    ebpo_status status = add_range(s, (ebpo_range){ file_end, 0 }, error);
+    uint64_t end = 0;
+    if (status == EBPO_OK)
+        qsort(s->range, s->count, sizeof *s->range, by_offset);
+    for (uint64_t i = 0; i < s->count && status == EBPO_OK; i++) {
+        ebpo_range r = s->range[i];
+        if (r.offset > end) {
+            *spare += r.offset - end;
+            status = look_at_gap(s, (ebpo_range){ end, r.offset - end }, filled, error);
+        }
+        if (r.offset + r.size > end)
+            end = r.offset + r.size;
+    }
+    return status;
+}
+
+ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progress, uint64_t *spare,
+                             uint64_t *filled, ebpo_error *error)
+{
+    ebpo_input *in = &ebpo_reader_own(file)->in;
+    survey s = { .file = file, .progress = progress, .head = EBPO_HEAD_INIT };
+    ebpo_error own = EBPO_ERROR_INIT;
+    *spare = *filled = 0;
+    if (ebpo_input_expects(in))
+        return EBPO_OK;
+    ebpo_status status = ebpo_head_open(&s.head, in, &own);
+    if (status == EBPO_OK) {
+        ebpo_head_keep_ranges(&s.head);
+        status = add_arrays(&s, &own);
+    }
+    if (status == EBPO_OK)
+        status = add_metadata(&s, &own);
+    status = ebpo_head_close(&s.head, status, &own);
+    if (status == EBPO_OK)
+        status = look_at_gaps(&s, spare, filled, &own);
+    free(s.range);
+    /* what is damaged is told by those who read it */
+    return status == EBPO_OK || status == EBPO_E_FORMAT ? EBPO_OK : ebpo_fail_with(error, &own);
+}
+
+/* The list of how chunks end, against the chunks: read by itself, without the reader's check. */
+
+#define SUMS_CHECK(condition, ...) \
+    ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
+
+enum { SUM_BYTES = 4, UNKNOWN = 20000 };
+
+typedef struct sums_comparison {
+    ebpo_tally *tally;
+    const ebpo_file *file;
+    const uint64_t *list;
+    uint64_t rows;
+} sums_comparison;
+
+/* Each array's number as the specification gives it. */
+static uint32_t number_of(const ebpo_array_in *a)
+{
+    switch (a->id) {
+    case EBPO_A_VERTICES: return 4096;
+    case EBPO_A_FACES: return 4097;
+    case EBPO_A_FACES_INDEX: return 4098;
+    case EBPO_A_VERTEX_SOURCE: return 4099;
+    case EBPO_A_FACE_SOURCE: return 4100;
+    case EBPO_A_SUBTREE_INDEX: return 4112;
+    case EBPO_A_SUBTREE_COUNTS: return 4113;
+    case EBPO_A_SUBTREE_OUTER: return 4114;
+    case EBPO_A_ATTRIBUTE: return 8191 + (uint32_t)a->level;
+    default: return a->id < EBPO_LEVEL_ARRAYS ? 64 * (uint32_t)a->level + (uint32_t)a->id : UNKNOWN;
+    }
+}
+
+static ebpo_status sums_compare_chunk(sums_comparison *c, const ebpo_array_in *a, uint64_t chunk,
+                                      uint64_t row, ebpo_error *error)
+{
+    ebpo_tally *tally = c->tally;
+    ebpo_chunk_place at = a->chunks[chunk];
+    uint8_t end[SUM_BYTES] = { 0 };
+    if (!SUMS_CHECK(at.bytes >= SUM_BYTES, "%s, chunk %" PRIu64 ": less than four bytes", a->path,
+                    chunk))
+        return EBPO_OK;
+    ebpo_status status = ebpo_input_read(&ebpo_reader_own(c->file)->in,
+                                         at.address + at.bytes - SUM_BYTES, SUM_BYTES, end, error);
+    if (status == EBPO_OK)
+        SUMS_CHECK(ebpo_load32(end) == (uint32_t)c->list[row],
+                   "%s, chunk %" PRIu64 ": /chunk_sums, row %" PRIu64 ", says %08" PRIx32
+                   ", but it ends with %08" PRIx32,
+                   a->path, chunk, row, (uint32_t)c->list[row], ebpo_load32(end));
+    return status;
+}
+
+static ebpo_status compare_array(sums_comparison *c, const ebpo_array_in *a, ebpo_error *error)
+{
+    ebpo_tally *tally = c->tally;
+    ebpo_status status = EBPO_OK;
+    uint32_t number = number_of(a);
+    if (!a->present || number == UNKNOWN)
+        return EBPO_OK;
+    uint64_t found = 0, chunks = ebpo_shape_chunks(&a->shape);
+    for (uint64_t row = 0; row < c->rows && status == EBPO_OK; row++)
+        if ((uint32_t)(c->list[row] >> 32) == number && found++ < chunks)
+            status = sums_compare_chunk(c, a, found - 1, row, error);
+    SUMS_CHECK(found == chunks, "/chunk_sums has %" PRIu64 " rows of the %" PRIu64 " chunks of %s",
+               found, chunks, a->path);
+    return status;
+}
+
+static ebpo_status sums_compare(sums_comparison *c, ebpo_error *error)
+{
+    const ebpo_file *file = c->file;
+    ebpo_status status = EBPO_OK;
+    for (int level = 0; level < file->info.level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++)
+            status = compare_array(c, &file->level_array[level][id], error);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS && status == EBPO_OK; id++)
+        status = compare_array(c, &file->root_array[id], error);
+    for (int i = 0; i < file->attributes.arrays && status == EBPO_OK; i++)
+        status = compare_array(c, &file->attributes.array[i], error);
+    return status;
+}
+
+ebpo_status ebpo_check_sums(ebpo_tally *tally, const ebpo_file *file, ebpo_error *error)
+{
+    const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_SUMS];
+    ebpo_error own = EBPO_ERROR_INIT;
+    uint64_t *list = NULL;
+    /* far away each chunk would take a request: there the reader's own check has to do */
+    if (!file->has_sums || ebpo_input_expects(&ebpo_reader_own(file)->in))
+        return EBPO_OK;
+    ebpo_status status = ebpo_file_locate(file, NULL, &own);
+    if (status == EBPO_OK)
+        status = ebpo_long_chunk_read(file, a, &list, &own);
+    sums_comparison c = { tally, file, list, a->shape.rows };
+    if (status == EBPO_OK)
+        status = sums_compare(&c, &own);
+    free(list);
+    if (status != EBPO_E_FORMAT)
+        return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
+    SUMS_CHECK(false, "%s", own.message);
+    return EBPO_OK;
+}

@@ -1,0 +1,484 @@
+/* A triangle is clipped by the six walls, one after the other (Sutherland and Hodgman, "Reentrant
+ * polygon clipping", 1974). With exact numbers and closed half-spaces the corners that remain span
+ * the intersection, down to a single point of contact. */
+#include "core/strict_fp.h"
+
+#include <gmp.h>
+#include <math.h>
+
+#include "geometry/predicates.h"
+#include "mesh/mesh_parts.h"
+#include "verify/verify_geometry.h"
+
+enum { CORNERS = 9 }; /* three, and at most one more for each wall */
+
+typedef struct polygon {
+    int count;
+    mpq_t at[CORNERS][3]; /* in coordinates of the box, 0 to 1 */
+} polygon;
+
+static void polygon_init(polygon *g)
+{
+    g->count = 0;
+    for (int i = 0; i < CORNERS; i++)
+        for (int k = 0; k < 3; k++)
+            mpq_init(g->at[i][k]);
+}
+
+static void polygon_clear(polygon *g)
+{
+    for (int i = 0; i < CORNERS; i++)
+        for (int k = 0; k < 3; k++)
+            mpq_clear(g->at[i][k]);
+}
+
+static void set_triangle(polygon *g, const double low[3], const double high[3],
+                         const ebpo_corners *face)
+{
+    mpq_t first, size;
+    mpq_inits(first, size, NULL);
+    g->count = 3;
+    for (int k = 0; k < 3; k++) {
+        mpq_set_d(first, low[k]);
+        mpq_set_d(size, high[k]);
+        mpq_sub(size, size, first);
+        for (int i = 0; i < 3; i++) {
+            mpq_set_d(g->at[i][k], face->at[i][k]);
+            mpq_sub(g->at[i][k], g->at[i][k], first);
+            mpq_div(g->at[i][k], g->at[i][k], size);
+        }
+    }
+    mpq_clears(first, size, NULL);
+}
+
+/* Whether a corner keeps to its side of a wall: at least 0, or at most 1. */
+static bool exact_within(const mpq_t x, int wall)
+{
+    return wall == 0 ? mpq_sgn(x) >= 0 : mpq_cmp_ui(x, 1, 1) <= 0;
+}
+
+/* Appends the point where a-b meets the wall; exactly one of the two is within. */
+static void append_crossing(polygon *out, mpq_t a[3], mpq_t b[3], int axis, int wall)
+{
+    mpq_t t, part;
+    mpq_inits(t, part, NULL);
+    mpq_set_si(t, wall, 1);
+    mpq_sub(t, t, a[axis]);
+    mpq_sub(part, b[axis], a[axis]);
+    mpq_div(t, t, part);
+    for (int k = 0; k < 3; k++) {
+        mpq_sub(part, b[k], a[k]);
+        mpq_mul(part, part, t);
+        mpq_add(out->at[out->count][k], a[k], part);
+    }
+    mpq_set_si(out->at[out->count][axis], wall, 1);
+    out->count++;
+    mpq_clears(t, part, NULL);
+}
+
+static void exact_clip(polygon *out, polygon *in, int axis, int wall)
+{
+    out->count = 0;
+    for (int i = 0; i < in->count; i++) {
+        int j = i + 1 < in->count ? i + 1 : 0;
+        bool here = exact_within(in->at[i][axis], wall),
+             there = exact_within(in->at[j][axis], wall);
+        if (here) {
+            for (int k = 0; k < 3; k++)
+                mpq_set(out->at[out->count][k], in->at[i][k]);
+            out->count++;
+        }
+        if (here != there)
+            append_crossing(out, in->at[i], in->at[j], axis, wall);
+    }
+}
+
+/* Leaves the intersection in *g. */
+static void clip_to_box(polygon *g, const double low[3], const double high[3],
+                        const ebpo_corners *face)
+{
+    polygon other;
+    polygon_init(&other);
+    set_triangle(g, low, high, face);
+    for (int axis = 0; axis < 3; axis++) {
+        exact_clip(&other, g, axis, 0);
+        exact_clip(g, &other, axis, 1);
+    }
+    polygon_clear(&other);
+}
+
+bool ebpo_exact_touches(const double low[3], const double high[3], const ebpo_corners *face)
+{
+    polygon g;
+    polygon_init(&g);
+    clip_to_box(&g, low, high, face);
+    bool touches = g.count > 0;
+    polygon_clear(&g);
+    return touches;
+}
+
+static bool corner_satisfies(mpq_t at[3], const int32_t n[3], int32_t d)
+{
+    mpq_t sum, part;
+    mpq_inits(sum, part, NULL);
+    for (int k = 0; k < 3; k++) {
+        mpq_set_si(part, 4096L * n[k], 1);
+        mpq_mul(part, part, at[k]);
+        mpq_add(sum, sum, part);
+    }
+    bool holds = mpq_cmp_si(sum, d, 1) <= 0;
+    mpq_clears(sum, part, NULL);
+    return holds;
+}
+
+bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face,
+                           const int32_t n[3], int32_t d)
+{
+    polygon g;
+    polygon_init(&g);
+    clip_to_box(&g, low, high, face);
+    bool holds = true;
+    for (int i = 0; i < g.count && holds; i++)
+        holds = corner_satisfies(g.at[i], n, d);
+    polygon_clear(&g);
+    return holds;
+}
+
+/* Separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996): the box' normals, the face's
+ * normal, and the products of their edges; for a box and a triangle, also one without area, these
+ * are all that is needed. */
+
+static const double touch_eps = 0x1p-53;
+static const double slack = 0x1p-900; /* covers underflow */
+
+typedef enum verdict { APART, MEET, UNSURE } verdict;
+
+ebpo_frame ebpo_frame_make(const ebpo_box *box, ebpo_cell cell)
+{
+    ebpo_frame frame;
+    for (int k = 0; k < 3; k++) {
+        frame.low[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
+        frame.high[k] = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
+        frame.inverse[k] = 1 / (frame.high[k] - frame.low[k]);
+    }
+    return frame;
+}
+
+void ebpo_local_make(ebpo_local *out, const ebpo_frame *frame, const ebpo_corners *face)
+{
+    out->contained = 0;
+    for (int k = 0; k < 3; k++)
+        out->reach[k] = 1;
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 3; k++) {
+            double x = (face->at[i][k] - frame->low[k]) * frame->inverse[k];
+            out->at[i][k] = x;
+            out->reach[k] = fabs(x) > out->reach[k] ? fabs(x) : out->reach[k];
+        }
+        out->contained |= (unsigned)ebpo_corner_in_cell(frame, face->at[i]) << i;
+    }
+}
+
+/* Intervals [a, b] of the face and [low, high] of the box on an axis; each end is off by at most
+ * `error`. Not-a-number compares false: unsure. */
+static verdict compare_intervals(double a, double b, double low, double high, double error)
+{
+    if (a > high + error || b < low - error)
+        return APART;
+    if (a <= high - error && b >= low + error)
+        return MEET;
+    return UNSURE;
+}
+
+/* (b - a) * inverse, 0 only when a and b are equal; not a number (and so never sure) where it is
+ * too small to compute with. */
+static double scaled_difference(double a, double b, double inverse)
+{
+    double x = (b - a) * inverse;
+    return a != b && fabs(x) < 0x1p-400 ? NAN : x;
+}
+
+/* The axis edge x (unit vector k), edge from corner i to j, l being the third corner. */
+static verdict edge_axis(const ebpo_local *p, const double edge[3], int i, int l, int k)
+{
+    int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+    double eu = edge[u], ev = edge[v];
+    if (eu == 0 && ev == 0)
+        return MEET; /* the edge runs along k: no axis */
+    double a = ev * p->at[i][u] - eu * p->at[i][v];
+    double b = ev * p->at[l][u] - eu * p->at[l][v];
+    double low = (ev < 0 ? ev : 0) - (eu > 0 ? eu : 0),
+           high = (ev > 0 ? ev : 0) - (eu < 0 ? eu : 0);
+    double error = 32 * touch_eps * (fabs(ev) * p->reach[u] + fabs(eu) * p->reach[v]) + slack;
+    return compare_intervals(a < b ? a : b, a < b ? b : a, low, high, error);
+}
+
+static verdict normal_axis(const ebpo_local *p, double edge[3][3])
+{
+    double value = 0, low = 0, high = 0, error = slack;
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        double left = edge[0][u] * edge[1][v], right = edge[0][v] * edge[1][u];
+        double n = left - right;
+        value += n * p->at[0][k];
+        low += n < 0 ? n : 0;
+        high += n > 0 ? n : 0;
+        error += 32 * touch_eps * (fabs(left) + fabs(right)) * p->reach[k];
+    }
+    return compare_intervals(value, value, low, high, error);
+}
+
+/* The axes but the box' own, which the caller decided exactly. */
+static verdict separating_axes(const ebpo_frame *frame, const ebpo_corners *face)
+{
+    ebpo_local p;
+    ebpo_local_make(&p, frame, face);
+    double edge[3][3];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            edge[i][k] =
+                scaled_difference(face->at[i][k], face->at[(i + 1) % 3][k], frame->inverse[k]);
+    verdict all = normal_axis(&p, edge);
+    for (int i = 0; i < 3 && all != APART; i++)
+        for (int k = 0; k < 3 && all != APART; k++) {
+            verdict one = edge_axis(&p, edge[i], i, (i + 2) % 3, k);
+            all = one == APART || all == MEET ? one : all;
+        }
+    return all;
+}
+
+bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_tally *tally)
+{
+    for (int k = 0; k < 3; k++) {
+        double a = face->at[0][k], b = face->at[1][k], c = face->at[2][k];
+        if ((a < frame->low[k] && b < frame->low[k] && c < frame->low[k]) ||
+            (a > frame->high[k] && b > frame->high[k] && c > frame->high[k]))
+            return false;
+    }
+    for (int i = 0; i < 3; i++)
+        if (ebpo_corner_in_cell(frame, face->at[i]))
+            return true;
+    verdict answer = separating_axes(frame, face);
+    if (answer != UNSURE)
+        return answer == MEET;
+    tally->exact_touches++;
+    return ebpo_exact_touches(frame->low, frame->high, face);
+}
+
+/* Seen along the axis, a face winds around the ray once or not at all: the edges that cross a
+ * half-line beside the point are counted. The half-line runs along the axis of the larger shift, so
+ * that the smaller shift decides which end of an edge lies where, and the larger one every tie that
+ * is left. */
+
+void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out)
+{
+    for (uint64_t i = 0; i < 3; i++)
+        ebpo_mesh_position(mesh, mesh->faces[3 * face + i], out->at[i]);
+}
+
+static int orient_in(int u, int v, const double a[3], const double b[3], const double c[3])
+{
+    return ebpo_orient2d((double[2]){ a[u], a[v] }, (double[2]){ b[u], b[v] },
+                         (double[2]){ c[u], c[v] });
+}
+
+/* Turns of the face around p seen in the plane (u, v), counter-clockwise positive. */
+static int winding_turns(const double p[3], int u, int v, const ebpo_corners *face)
+{
+    int sum = 0;
+    for (int i = 0; i < 3; i++) {
+        const double *s = face->at[i], *t = face->at[i == 2 ? 0 : i + 1];
+        bool start_above = s[v] > p[v], end_above = t[v] > p[v];
+        if (start_above == end_above)
+            continue;
+        int side = orient_in(u, v, s, t, p);
+        if (end_above)
+            sum += side > 0;
+        else
+            sum -= side < 0;
+    }
+    return sum;
+}
+
+/* Side of the shifted p of the face's plane: a tie goes to the first component of the normal that
+ * is not 0. */
+static int shifted_side(const double p[3], const ebpo_corners *face)
+{
+    const double *a = face->at[0], *b = face->at[1], *c = face->at[2];
+    int side = ebpo_orient3d(a, b, c, p);
+    if (side == 0)
+        side = orient_in(1, 2, a, b, c);
+    if (side == 0)
+        side = orient_in(2, 0, a, b, c);
+    return side != 0 ? side : orient_in(0, 1, a, b, c);
+}
+
+static bool winding_outside(const double p[3], int k, const ebpo_corners *face)
+{
+    double a = face->at[0][k], b = face->at[1][k], c = face->at[2][k];
+    return (a > p[k] && b > p[k] && c > p[k]) || (a <= p[k] && b <= p[k] && c <= p[k]);
+}
+
+int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face)
+{
+    int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
+    if (winding_outside(p, u, face) || winding_outside(p, v, face))
+        return 0;
+    double a = face->at[0][axis], b = face->at[1][axis], c = face->at[2][axis], x = p[axis];
+    if (a <= x && b <= x && c <= x)
+        return 0;
+    int turn = winding_turns(p, u, v, face);
+    if (axis == 1)
+        turn = -turn; /* (x, z) is left-handed seen along y */
+    if (turn == 0 || (a > x && b > x && c > x))
+        return turn;
+    return shifted_side(p, face) == -turn ? turn : 0;
+}
+
+/* How far the part of a face in its cell reaches in direction n is a linear program; by weak
+ * duality, for any vector m n . x <= max over the face's corners of (n - m) . v  +  max over the
+ * unit cube of m . x, and some m makes it an equality: 0, or one that levels n on an edge of the
+ * face by one wall, or on the face by two walls. So rounded m still give certain bounds, and
+ * nothing has to be clipped. What stays undecided is clipped in rationals. */
+
+static const double containment_eps = 0x1p-53;
+
+void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_twin_tree *view,
+                         const ebpo_twin_node *node)
+{
+    uint32_t count;
+    const uint32_t *codes = ebpo_twin_planes(view, node, &count);
+    out->count = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        int at = out->count;
+        if (!ebpo_plane_decode(codes[i], out->normal[at], &out->d[at]))
+            continue;
+        for (int k = 0; k < 3; k++)
+            out->n[at][k] = out->normal[at][k];
+        out->bound[at] = out->d[at] / 4096.0;
+        out->number[at] = i;
+        out->count++;
+    }
+}
+
+static double containment_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static double containment_highest(const ebpo_local *face, const double n[3])
+{
+    double a = containment_dot(n, face->at[0]), b = containment_dot(n, face->at[1]),
+           c = containment_dot(n, face->at[2]);
+    return fmax(a, fmax(b, c));
+}
+
+/* The bound above for one m, rounding included. */
+static bool containment_certified(const ebpo_local *face, const double n[3], const double m[3],
+                                  double bound)
+{
+    double rest[3], cube = 0, size = 0;
+    for (int k = 0; k < 3; k++) {
+        rest[k] = n[k] - m[k];
+        cube += m[k] > 0 ? m[k] : 0;
+        size += (fabs(n[k]) + fabs(m[k])) * face->reach[k];
+    }
+    return containment_highest(face, rest) + cube + 16 * containment_eps * size <= bound;
+}
+
+/* m along one axis, so that n - m is level along an edge. */
+static bool certified_by_wall(const ebpo_local *face, const double n[3], double bound)
+{
+    for (int i = 0; i < 3; i++) {
+        const double *a = face->at[i], *b = face->at[(i + 1) % 3];
+        double edge[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
+        double rise = containment_dot(n, edge);
+        for (int k = 0; k < 3; k++) {
+            double m[3] = { 0, 0, 0 };
+            m[k] = rise / edge[k];
+            if (edge[k] != 0 && containment_certified(face, n, m, bound))
+                return true;
+        }
+    }
+    return false;
+}
+
+/* m along two axes, so that n - m is normal to the face. */
+static bool certified_by_two_walls(const ebpo_local *face, const double n[3], double bound)
+{
+    double p[3], q[3], normal[3];
+    for (int k = 0; k < 3; k++) {
+        p[k] = face->at[1][k] - face->at[0][k];
+        q[k] = face->at[2][k] - face->at[0][k];
+    }
+    for (int k = 0; k < 3; k++)
+        normal[k] = p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3];
+    for (int j = 0; j < 3; j++) {
+        double m[3], factor = n[j] / normal[j];
+        for (int k = 0; k < 3; k++)
+            m[k] = k == j ? 0 : n[k] - factor * normal[k];
+        if (normal[j] != 0 && containment_certified(face, n, m, bound))
+            return true;
+    }
+    return false;
+}
+
+/* A corner of the face in the cell and surely beyond the plane: no need for rationals. */
+static bool corner_beyond(const ebpo_local *face, const double n[3], double bound, double error)
+{
+    for (int i = 0; i < 3; i++)
+        if ((face->contained >> i & 1) && containment_dot(n, face->at[i]) > bound + error)
+            return true;
+    return false;
+}
+
+static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i,
+                       const ebpo_frame *frame, const ebpo_corners *face, const ebpo_local *local)
+{
+    const double *n = planes->n[i];
+    double bound = planes->bound[i],
+           error = 16 * containment_eps * 511 *
+                   fmax(local->reach[0], fmax(local->reach[1], local->reach[2]));
+    if (containment_highest(local, n) <= bound - error)
+        return true;
+    if (corner_beyond(local, n, bound, error))
+        return false;
+    if (certified_by_wall(local, n, bound) || certified_by_two_walls(local, n, bound))
+        return true;
+    tally->exact_half_spaces++;
+    return ebpo_exact_half_space(frame->low, frame->high, face, planes->normal[i], planes->d[i]);
+}
+
+void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+                               const ebpo_twin_node *node, const ebpo_frame *frame,
+                               const ebpo_corners *face, uint64_t number)
+{
+    ebpo_local local;
+    ebpo_local_make(&local, frame, face);
+    tally->checks[EBPO_VERIFY_CONTAINMENT] += (uint64_t)planes->count;
+    for (int i = 0; i < planes->count; i++)
+        if (!face_keeps(tally, planes, i, frame, face, &local))
+            ebpo_tally_violation(tally, EBPO_VERIFY_CONTAINMENT,
+                                 &(ebpo_verify_place){ node->code, number, planes->number[i] },
+                                 "the plane cuts off a part of the face in the cell");
+}
+
+void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+                                  const ebpo_twin_node *node, unsigned corners)
+{
+    for (int i = 0; i < planes->count; i++)
+        for (unsigned corner = 0; corner < 8; corner++) {
+            if (!(corners >> corner & 1))
+                continue;
+            const int32_t *n = planes->normal[i];
+            int32_t value = 0;
+            for (int k = 0; k < 3; k++)
+                value += corner >> k & 1 ? n[k] : 0;
+            tally->checks[EBPO_VERIFY_CONTAINMENT]++;
+            if (4096 * value > planes->d[i])
+                ebpo_tally_violation(
+                    tally, EBPO_VERIFY_CONTAINMENT,
+                    &(ebpo_verify_place){ node->code, EBPO_NO_FACE, planes->number[i] },
+                    "the plane cuts off corner %u of the cell, which lies in the solid", corner);
+        }
+}

@@ -1,0 +1,97 @@
+/* Triangle against cell in rationals (GMP): the last word where floating point cannot tell. Slow;
+ * pure; any thread. */
+#ifndef EBPO_VERIFY_VERIFY_GEOMETRY_H
+#define EBPO_VERIFY_VERIFY_GEOMETRY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <ebpo/mesh.h>
+
+#include "geometry/cells.h"
+#include "verify/tally.h"
+#include "verify/verify_tree.h"
+
+/* A face: corners in the model's coordinates, exact. */
+typedef struct ebpo_corners {
+    double at[3][3];
+} ebpo_corners;
+
+/* True when the closed face meets the closed box [low, high]. */
+bool ebpo_exact_touches(const double low[3], const double high[3], const ebpo_corners *face);
+
+/* True when every point of the face in the closed box satisfies 4096 * (n . xi) <= d, xi = (point -
+ * low) / (high - low). */
+bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face,
+                           const int32_t n[3], int32_t d);
+
+/* A face in the coordinates of a cell, and whether it touches the closed cell: floating point with
+ * error bounds, rationals when in doubt. */
+
+/* A cell: its walls (exact) and the reciprocals of its sizes (rounded). */
+typedef struct ebpo_frame {
+    double low[3], high[3], inverse[3];
+} ebpo_frame;
+
+ebpo_frame ebpo_frame_make(const ebpo_box *box, ebpo_cell cell);
+
+/* Corners of a face in cell coordinates. Each coordinate is off by at most 4 * 2^-53 of its
+ * absolute value (and 2^-1000). */
+typedef struct ebpo_local {
+    double at[3][3];
+    double reach[3];    /* largest absolute coordinate on each axis, at least 1 */
+    unsigned contained; /* bit i: corner i lies in the closed cell; exact */
+} ebpo_local;
+
+void ebpo_local_make(ebpo_local *out, const ebpo_frame *frame, const ebpo_corners *face);
+
+static inline bool ebpo_corner_in_cell(const ebpo_frame *frame, const double p[3])
+{
+    return p[0] >= frame->low[0] && p[0] <= frame->high[0] && p[1] >= frame->low[1] &&
+           p[1] <= frame->high[1] && p[2] >= frame->low[2] && p[2] <= frame->high[2];
+}
+
+/* Exact: the closed triangle and the closed cell have a point in common. Counts questions that went
+ * to rationals. */
+bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_tally *tally);
+
+/* Winding numbers by rays, made of orientation signs only.
+ *
+ * A point stands for itself shifted by (d0, d1, d2), infinitely small and positive, d0 >> d1 >> d2:
+ * what the format says about the corners of cells. The ray runs in direction +axis; far out the
+ * winding number is 0, so a point's is the sum over the faces that its ray meets, each +1 when the
+ * ray leaves through it (along its normal) and -1 when it enters. */
+
+/* The face's share in the winding number of p: -1, 0 or 1. Exact. */
+int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);
+
+/* Corners of a face of a mesh. */
+void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out);
+
+/* Containment: no point of a face in the cell, and no inside corner of the cell, is cut off by the
+ * node's own planes. */
+
+enum { EBPO_HALF_SPACES_MAX = 255 }; /* counts are bytes */
+
+/* A node's own planes, decoded. Codes that stand for no plane are left out (they are violations
+ * elsewhere). */
+typedef struct ebpo_half_spaces {
+    int count;
+    double n[EBPO_HALF_SPACES_MAX][3], bound[EBPO_HALF_SPACES_MAX]; /* n . xi <= bound; exact */
+    int32_t normal[EBPO_HALF_SPACES_MAX][3], d[EBPO_HALF_SPACES_MAX];
+    uint32_t number[EBPO_HALF_SPACES_MAX]; /* place among the node's codes */
+} ebpo_half_spaces;
+
+void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_twin_tree *view,
+                         const ebpo_twin_node *node);
+
+/* A face that touches the cell. */
+void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+                               const ebpo_twin_node *node, const ebpo_frame *frame,
+                               const ebpo_corners *face, uint64_t number);
+
+/* Cell corners, bit i for corner i (bit 0 x, bit 1 y, bit 2 z). */
+void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+                                  const ebpo_twin_node *node, unsigned corners);
+
+#endif

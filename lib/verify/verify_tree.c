@@ -1,0 +1,705 @@
+#include "core/strict_fp.h"
+
+#include <inttypes.h>
+#include <math.h>
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/wide.h"
+#include "core/workspace.h"
+#include "format/schema.h"
+#include "geometry/polytope.h"
+#include "mesh/mesh_parts.h"
+#include "verify/verify_tree.h"
+
+/* Adds what a group holds to the running counts. */
+static void add_group(ebpo_twin_group *sum, const ebpo_twin_tree *view, const ebpo_level *level,
+                      uint64_t group, unsigned octants)
+{
+    for (unsigned octant = 0; octant < octants; octant++) {
+        ebpo_node_type type = ebpo_twin_type(level, group, octant);
+        uint64_t rank = sum->of_type[type]++;
+        if (type == EBPO_GRAY && view->has_planes)
+            sum->planes += level->plane_counts[rank];
+        if (type == EBPO_LEAF && view->has_mesh)
+            sum->refs += level->leaf_ref_count[rank];
+        if (type == EBPO_LEAF && view->has_leaf_planes)
+            sum->leaf_planes += level->leaf_plane_counts[rank];
+    }
+}
+
+static unsigned octants_at(int level) { return level == 0 ? 1 : 8; }
+
+ebpo_status ebpo_twin_make(ebpo_twin_tree *out, const ebpo_tree *tree, ebpo_workspace *workspace,
+                           ebpo_error *error)
+{
+    *out = (ebpo_twin_tree){ .tree = tree,
+                             .workspace = workspace,
+                             .box.grid_level = tree->info.grid_level };
+    for (int k = 0; k < 3; k++) {
+        out->box.origin[k] = tree->info.box_origin[k];
+        out->box.size[k] = tree->info.box_size[k];
+    }
+    out->has_mesh = tree->info.parts & EBPO_PART_MESH;
+    out->has_planes = tree->info.parts & EBPO_PART_PLANES;
+    out->has_leaf_planes = tree->info.parts & EBPO_PART_LEAF_PLANES;
+    for (int l = 0; l < tree->info.level_count; l++) {
+        const ebpo_level *level = &tree->level[l];
+        out->groups[l] = ebpo_array_alloc(workspace, level->group_count, sizeof *out->groups[l]);
+        if (!out->groups[l]) {
+            ebpo_twin_free(out);
+            return ebpo_workspace_fail(workspace, level->group_count * sizeof *out->groups[l],
+                                       error);
+        }
+        ebpo_twin_group sum = { 0 };
+        EBPO_FOR_ITEMS(workspace, group, 0, level->group_count) {
+            out->groups[l][group] = sum;
+            add_group(&sum, out, level, group, octants_at(l));
+        }
+    }
+    return EBPO_OK;
+}
+
+void ebpo_twin_free(ebpo_twin_tree *view)
+{
+    for (int l = 0; l < EBPO_LEVELS_MAX; l++)
+        ebpo_array_free(view->workspace, view->groups[l]);
+    *view = (ebpo_twin_tree){ 0 };
+}
+
+/* Fills in type and rank. */
+static ebpo_twin_node twin_tree_place(const ebpo_twin_tree *view, ebpo_octcode code, ebpo_cell cell,
+                                      uint64_t group, unsigned octant)
+{
+    const ebpo_level *level = &view->tree->level[cell.level];
+    ebpo_twin_node node = { code, cell, group, octant, ebpo_twin_type(level, group, octant), 0 };
+    node.rank = view->groups[cell.level][group].of_type[node.type];
+    for (unsigned i = 0; i < octant; i++)
+        node.rank += ebpo_twin_type(level, group, i) == node.type;
+    return node;
+}
+
+ebpo_twin_node ebpo_twin_root(const ebpo_twin_tree *view)
+{
+    return twin_tree_place(view, 1, (ebpo_cell){ 0, { 0, 0, 0 } }, 0, 0);
+}
+
+bool ebpo_twin_is_pruned(const ebpo_twin_tree *view, const ebpo_twin_node *node)
+{
+    const ebpo_tree *tree = view->tree;
+    if (!tree->info.pruned || node->type != EBPO_GRAY)
+        return false;
+    return node->cell.level + 1 >= tree->info.level_count ||
+           tree->level[node->cell.level + 1].types[node->rank] == 0;
+}
+
+ebpo_twin_node ebpo_twin_child(const ebpo_twin_tree *view, const ebpo_twin_node *node,
+                               unsigned octant)
+{
+    ebpo_cell cell = { node->cell.level + 1, { 0 } };
+    for (int k = 0; k < 3; k++)
+        cell.at[k] = 2 * node->cell.at[k] + (octant >> k & 1);
+    return twin_tree_place(view, ebpo_octcode_child(node->code, octant), cell, node->rank, octant);
+}
+
+/* Group of `level` that holds the gray node of this rank. */
+static uint64_t group_of_gray(const ebpo_twin_tree *view, int level, uint64_t rank)
+{
+    uint64_t low = 0, high = view->tree->level[level].group_count;
+    while (high - low > 1) {
+        uint64_t middle = low + (high - low) / 2;
+        if (view->groups[level][middle].of_type[EBPO_GRAY] <= rank)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+ebpo_twin_node ebpo_twin_at(const ebpo_twin_tree *view, int level, uint64_t group, unsigned octant)
+{
+    unsigned path[EBPO_LEVELS_MAX];
+    path[level] = octant;
+    for (int l = level - 1; l >= 0; l--) {
+        uint64_t rank = group;
+        group = group_of_gray(view, l, rank);
+        uint64_t before = view->groups[l][group].of_type[EBPO_GRAY];
+        unsigned i = 0;
+        while (i < 7 &&
+               !(ebpo_twin_type(&view->tree->level[l], group, i) == EBPO_GRAY && before++ == rank))
+            i++;
+        path[l] = i;
+    }
+    ebpo_twin_node node = ebpo_twin_root(view);
+    for (int l = 1; l <= level; l++)
+        node = ebpo_twin_child(view, &node, path[l]);
+    return node;
+}
+
+const uint32_t *ebpo_twin_planes(const ebpo_twin_tree *view, const ebpo_twin_node *node,
+                                 uint32_t *count)
+{
+    const ebpo_level *level = &view->tree->level[node->cell.level];
+    const ebpo_twin_group *group = &view->groups[node->cell.level][node->group];
+    bool gray = node->type == EBPO_GRAY;
+    *count = 0;
+    if (gray ? !view->has_planes : node->type != EBPO_LEAF || !view->has_leaf_planes)
+        return NULL;
+    const uint8_t *counts = gray ? level->plane_counts : level->leaf_plane_counts;
+    uint64_t first = gray ? group->planes : group->leaf_planes;
+    for (uint64_t rank = group->of_type[node->type]; rank < node->rank; rank++)
+        first += counts[rank];
+    *count = counts[node->rank];
+    return *count ? (gray ? level->planes : level->leaf_planes) + first : NULL;
+}
+
+const uint32_t *ebpo_twin_refs(const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
+                               uint32_t *count)
+{
+    const ebpo_level *level = &view->tree->level[leaf->cell.level];
+    const ebpo_twin_group *group = &view->groups[leaf->cell.level][leaf->group];
+    uint64_t first = group->refs;
+    for (uint64_t rank = group->of_type[EBPO_LEAF]; rank < leaf->rank; rank++)
+        first += level->leaf_ref_count[rank];
+    *count = level->leaf_ref_count[leaf->rank];
+    return *count ? level->leaf_refs + first : NULL;
+}
+
+int64_t ebpo_twin_winding(const ebpo_twin_tree *view, const ebpo_twin_node *node)
+{
+    const ebpo_level *level = &view->tree->level[node->cell.level];
+    switch (node->type) {
+    case EBPO_WHITE: return level->white_winding ? level->white_winding[node->rank] : 0;
+    case EBPO_BLACK: return level->black_winding ? level->black_winding[node->rank] : 1;
+    case EBPO_LEAF: return level->leaf_winding ? level->leaf_winding[node->rank] : 0;
+    default: return 0;
+    }
+}
+
+enum { NODES_PER_LEVEL = 256, POINTS_PER_NODE = 8, POINT_BITS = 16 };
+
+static void check_codes(ebpo_tally *tally, const ebpo_twin_tree *view, int l, ebpo_node_type type,
+                        const uint8_t *counts)
+{
+    const ebpo_level *level = &view->tree->level[l];
+    EBPO_FOR_ITEMS(level->workspace, group, 0, level->group_count)
+        for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++) {
+            if (ebpo_twin_type(level, group, octant) != type)
+                continue;
+            uint64_t rank = view->groups[l][group].of_type[type];
+            for (unsigned i = 0; i < octant; i++)
+                rank += ebpo_twin_type(level, group, i) == type;
+            ebpo_twin_node node = {
+                .group = group, .octant = octant, .type = type, .rank = rank, .cell.level = l
+            };
+            uint32_t count;
+            const uint32_t *codes = counts[rank] ? ebpo_twin_planes(view, &node, &count) : NULL;
+            for (uint32_t i = 0; i < counts[rank]; i++) {
+                int32_t n[3], d;
+                tally->checks[EBPO_VERIFY_NESTING]++;
+                if (!ebpo_plane_decode(codes[i], n, &d))
+                    ebpo_tally_violation(tally, EBPO_VERIFY_NESTING,
+                                         &(ebpo_verify_place){
+                                             ebpo_twin_at(view, l, group, octant).code,
+                                             EBPO_NO_FACE, i },
+                                         "the code %08x stands for no plane", (unsigned)codes[i]);
+            }
+        }
+}
+
+/* A chain of nodes from the root down. */
+typedef struct chain {
+    int depth;
+    ebpo_twin_node node[EBPO_LEVELS_MAX];
+} chain;
+
+static void chain_to(chain *out, const ebpo_twin_tree *view, const ebpo_twin_node *end)
+{
+    out->depth = end->cell.level;
+    out->node[0] = ebpo_twin_root(view);
+    for (int l = 1; l <= out->depth; l++)
+        out->node[l] = ebpo_twin_child(view, &out->node[l - 1],
+                                       (unsigned)(end->code >> 3 * (out->depth - l) & 7));
+}
+
+/* The point (in 2^-16 of the cell `at`) against a plane of the cell `above`, in the coordinates of
+ * `above`. */
+static bool keeps_above(const ebpo_cell *above, const ebpo_cell *at, const int64_t point[3],
+                        const int32_t n[3], int64_t d)
+{
+    int down = at->level - above->level;
+    ebpo_wide sum = { 0, 0 };
+    for (int k = 0; k < 3; k++) {
+        int64_t offset = (int64_t)at->at[k] - ((int64_t)above->at[k] << down);
+        sum = ebpo_wide_plus(sum,
+                             ebpo_wide_signed_product(n[k], point[k] + offset * (1 << POINT_BITS)));
+    }
+    return ebpo_wide_signed_at_most(ebpo_wide_left(sum, 12),
+                                    ebpo_wide_signed_product(d, INT64_C(1) << (POINT_BITS + down)));
+}
+
+/* The same, with the plane taken down level by level as readers do. */
+static bool keeps_below(const chain *c, int from, int to, const int64_t point[3],
+                        const int32_t n[3], int64_t d)
+{
+    for (int l = from + 1; l <= to; l++)
+        d = ebpo_plane_to_child(n, d, c->node[l].octant);
+    ebpo_wide sum = { 0, 0 };
+    for (int k = 0; k < 3; k++)
+        sum = ebpo_wide_plus(sum, ebpo_wide_signed_product(n[k], point[k]));
+    return ebpo_wide_signed_at_most(ebpo_wide_left(sum, 12),
+                                    ebpo_wide_signed_product(d, 1 << POINT_BITS));
+}
+
+static void check_point(ebpo_tally *tally, const ebpo_twin_tree *view, const chain *c,
+                        const int64_t point[3])
+{
+    const ebpo_cell *at = &c->node[c->depth].cell;
+    for (int l = 0; l < c->depth; l++) {
+        uint32_t count;
+        const uint32_t *codes = ebpo_twin_planes(view, &c->node[l], &count);
+        for (uint32_t i = 0; i < count; i++) {
+            int32_t n[3], d;
+            if (!ebpo_plane_decode(codes[i], n, &d))
+                continue;
+            tally->checks[EBPO_VERIFY_NESTING]++;
+            if (keeps_above(&c->node[l].cell, at, point, n, d) !=
+                keeps_below(c, l, c->depth, point, n, d))
+                ebpo_tally_violation(tally, EBPO_VERIFY_NESTING,
+                                     &(ebpo_verify_place){ c->node[c->depth].code, EBPO_NO_FACE,
+                                                           i },
+                                     "a point of the cell is on different sides of a plane of "
+                                     "level %d in the coordinates of the "
+                                     "two cells",
+                                     l);
+        }
+    }
+}
+
+/* Walls of a cell are walls or the middle of its parent, as doubles too. */
+static void check_walls(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *node)
+{
+    int level = node->cell.level;
+    bool same = true;
+    for (int k = 0; k < 3; k++) {
+        uint32_t even = node->cell.at[k] & ~1u, at = node->cell.at[k];
+        same &= ebpo_wall(&view->box, k, level, even) ==
+                    ebpo_wall(&view->box, k, level - 1, even / 2) &&
+                ebpo_wall(&view->box, k, level, even + 2) ==
+                    ebpo_wall(&view->box, k, level - 1, even / 2 + 1) &&
+                ebpo_wall(&view->box, k, level, at + 1) - ebpo_wall(&view->box, k, level, at) ==
+                    view->box.size[k] / (double)(1u << level);
+    }
+    tally->checks[EBPO_VERIFY_NESTING]++;
+    if (!same)
+        ebpo_tally_violation(tally, EBPO_VERIFY_NESTING,
+                             &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
+                             "the walls of the cell are not walls of its parent's grid");
+}
+
+static uint64_t next_random(uint64_t *state)
+{
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    return *state;
+}
+
+/* Random points of the cell, and its corners. */
+static void nesting_check_node(ebpo_tally *tally, const ebpo_twin_tree *view,
+                               const ebpo_twin_node *node)
+{
+    chain c;
+    chain_to(&c, view, node);
+    check_walls(tally, view, node);
+    uint64_t state = node->code * 0x9e3779b97f4a7c15 | 1;
+    for (unsigned i = 0; i < POINTS_PER_NODE; i++) {
+        int64_t corner[3], inner[3];
+        for (int k = 0; k < 3; k++) {
+            corner[k] = (int64_t)(i >> k & 1) << POINT_BITS;
+            inner[k] = (int64_t)(next_random(&state) >> (64 - POINT_BITS));
+        }
+        check_point(tally, view, &c, corner);
+        check_point(tally, view, &c, inner);
+    }
+}
+
+void ebpo_check_nesting(ebpo_tally *tally, const ebpo_twin_tree *view)
+{
+    for (int l = 0; l < view->tree->info.level_count; l++) {
+        const ebpo_level *level = &view->tree->level[l];
+        if (view->has_planes)
+            check_codes(tally, view, l, EBPO_GRAY, level->plane_counts);
+        if (view->has_leaf_planes)
+            check_codes(tally, view, l, EBPO_LEAF, level->leaf_plane_counts);
+        uint64_t cells = 8 * level->group_count;
+        for (uint64_t i = 0; l > 0 && i < NODES_PER_LEVEL && i < cells; i++) {
+            uint64_t cell = cells <= NODES_PER_LEVEL
+                                ? i
+                                : cells / NODES_PER_LEVEL * i +
+                                      cells % NODES_PER_LEVEL * i / NODES_PER_LEVEL + i % 8;
+            ebpo_twin_node node = ebpo_twin_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
+            nesting_check_node(tally, view, &node);
+        }
+    }
+}
+
+#define STRUCTURE_CHECK(condition, ...) \
+    ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
+
+static bool head_shape(ebpo_tally *tally, const ebpo_info *info)
+{
+    if (!STRUCTURE_CHECK(info->level_count >= 1 && info->level_count <= EBPO_LEVELS_MAX,
+                         "the file has %d levels; 1 to %d are possible", info->level_count,
+                         EBPO_LEVELS_MAX))
+        return false;
+    ebpo_box box = { .grid_level = info->grid_level };
+    for (int k = 0; k < 3; k++) {
+        box.origin[k] = info->box_origin[k];
+        box.size[k] = info->box_size[k];
+    }
+    return STRUCTURE_CHECK(ebpo_box_valid(&box),
+                           "the root box is not on a dyadic grid down to level %d",
+                           info->grid_level) &&
+           STRUCTURE_CHECK(info->level_count - 1 <= info->grid_level,
+                           "level %d lies below the grid level %d, where cells are not exact",
+                           info->level_count - 1, info->grid_level) &&
+           STRUCTURE_CHECK((unsigned)info->rule <= EBPO_RULE_POSITIVE, "unknown rule %d",
+                           (int)info->rule);
+}
+
+static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
+{
+    const ebpo_level *level = &tree->level[l];
+    uint64_t groups = l == 0 ? 1 : tree->level[l - 1].gray_count;
+    if (!STRUCTURE_CHECK(level->group_count == groups,
+                         "level %d has %" PRIu64 " groups of siblings for %" PRIu64
+                         " gray nodes above",
+                         l, level->group_count, groups) ||
+        !STRUCTURE_CHECK(level->types || groups == 0, "level %d has no types", l))
+        return false;
+    uint64_t count[4] = { 0 };
+    EBPO_FOR_ITEMS(level->workspace, group, 0, groups)
+        for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++)
+            count[ebpo_twin_type(level, group, octant)]++;
+    return STRUCTURE_CHECK(count[EBPO_GRAY] == level->gray_count &&
+                               count[EBPO_LEAF] == level->leaf_count &&
+                               count[EBPO_WHITE] == level->white_count &&
+                               count[EBPO_BLACK] == level->black_count,
+                           "level %d: the types do not add up to its counts of nodes", l) &&
+           STRUCTURE_CHECK(l + 1 < tree->info.level_count || level->gray_count == 0 ||
+                               tree->info.pruned,
+                           "level %d, the last one, has gray nodes", l);
+}
+
+/* Per-node counts and the array they share out. */
+static bool counted_shape(ebpo_tally *tally, const ebpo_level *level, int l, const char *what,
+                          uint64_t nodes, const uint8_t *counts, uint64_t total,
+                          const uint32_t *items)
+{
+    if (!STRUCTURE_CHECK((counts || nodes == 0) && (items || total == 0),
+                         "level %d: %s are missing", l, what))
+        return false;
+    uint64_t sum = 0;
+    EBPO_FOR_ITEMS(level->workspace, i, 0, nodes)
+        sum += counts[i];
+    return STRUCTURE_CHECK(sum == total,
+                           "level %d: counts of %s sum to %" PRIu64 ", but there are %" PRIu64, l,
+                           what, sum, total);
+}
+
+static bool windings_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
+{
+    const ebpo_level *level = &tree->level[l];
+    if (tree->info.solid)
+        return STRUCTURE_CHECK(level->leaf_winding || level->leaf_count == 0,
+                               "level %d: winding numbers of leaves are missing", l);
+    return STRUCTURE_CHECK(!level->leaf_winding && !level->black_winding && !level->white_winding,
+                           "level %d: a surface has no winding numbers", l);
+}
+
+static bool leaf_faces_in_range(const ebpo_level *level, uint64_t leaf, uint64_t first_ref,
+                                uint64_t face_count)
+{
+    uint64_t first = level->leaf_first[leaf];
+    if (first > face_count || level->leaf_new[leaf] > face_count - first)
+        return false;
+    const uint32_t *refs = level->leaf_refs ? level->leaf_refs + first_ref : NULL;
+    EBPO_FOR_ITEMS(level->workspace, i, 0, level->leaf_ref_count[leaf])
+        if (refs[i] >= first || (i > 0 && refs[i] <= refs[i - 1]))
+            return false;
+    return true;
+}
+
+static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
+{
+    const ebpo_level *level = &tree->level[l];
+    if (!STRUCTURE_CHECK((level->leaf_first && level->leaf_new && level->leaf_ref_count) ||
+                             level->leaf_count == 0,
+                         "level %d: face lists of leaves are missing", l) ||
+        !STRUCTURE_CHECK(level->leaf_refs || level->ref_count == 0,
+                         "level %d: back-references are missing", l))
+        return false;
+    uint64_t refs = 0, fresh = 0;
+    EBPO_FOR_ITEMS(level->workspace, leaf, 0, level->leaf_count) {
+        refs += level->leaf_ref_count[leaf];
+        fresh += level->leaf_new[leaf];
+    }
+    if (!STRUCTURE_CHECK(refs == level->ref_count && fresh == level->new_count,
+                         "level %d: lists hold %" PRIu64 " new faces and %" PRIu64
+                         " references, counts say %" PRIu64 " and %" PRIu64,
+                         l, fresh, refs, level->new_count, level->ref_count))
+        return false;
+    refs = 0;
+    bool ok = true;
+    EBPO_FOR_ITEMS(level->workspace, leaf, 0, level->leaf_count) {
+        ok &= STRUCTURE_CHECK(
+            leaf_faces_in_range(level, leaf, refs, tree->mesh.face_count),
+            "level %d, leaf %" PRIu64
+            ": its list leaves the faces, or its references do not ascend below its first new face",
+            l, leaf);
+        refs += level->leaf_ref_count[leaf];
+    }
+    return ok;
+}
+
+static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
+{
+    const ebpo_mesh *mesh = &tree->mesh;
+    if (!STRUCTURE_CHECK(mesh->vertex_count == tree->info.vertex_count &&
+                             mesh->face_count == tree->info.face_count,
+                         "the mesh has %" PRIu64 " vertices and %" PRIu64
+                         " faces, the head says %" PRIu64 " and %" PRIu64,
+                         mesh->vertex_count, mesh->face_count, tree->info.vertex_count,
+                         tree->info.face_count) ||
+        !STRUCTURE_CHECK(!!mesh->xyz32 != !!mesh->xyz64 && mesh->faces &&
+                             mesh->vertex_count < UINT32_MAX && mesh->face_count < UINT32_MAX,
+                         "the mesh has no vertices or no faces") ||
+        !STRUCTURE_CHECK(!!mesh->xyz64 == tree->info.double_coordinates,
+                         "the head and the mesh differ about the kind of coordinates"))
+        return false;
+    uint64_t outside = 0, infinite = 0;
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, 3 * mesh->face_count)
+        outside += mesh->faces[i] >= mesh->vertex_count;
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, mesh->vertex_count) {
+        double p[3];
+        ebpo_mesh_position(mesh, i, p);
+        infinite += !isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]);
+    }
+    bool corners_fine =
+        STRUCTURE_CHECK(outside == 0,
+                        "%" PRIu64 " corners of faces name vertices that do not exist", outside);
+    return STRUCTURE_CHECK(infinite == 0, "%" PRIu64 " vertices are not finite", infinite) &&
+           corners_fine;
+}
+
+static bool colours_shape(ebpo_tally *tally, const ebpo_level *level, int l)
+{
+    uint32_t all = 0;
+    EBPO_FOR_ITEMS(level->workspace, i, 0, level->gray_colours ? level->gray_count : 0)
+        all |= level->gray_colours[i];
+    return STRUCTURE_CHECK(all < 1 << 24, "level %d: a colour is above 2^24 - 1", l);
+}
+
+/* What the checks above do not look for by name. Counted only when it fails. */
+static bool arrays_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
+{
+    const ebpo_level *level = &tree->level[l];
+    uint32_t has = ebpo_schema_has(&tree->info);
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
+        const ebpo_array_spec *spec = &ebpo_schema[id];
+        if (!ebpo_schema_is_held(id) || spec->if_needed || !(spec->needs & has) ||
+            ebpo_level_array(level, id) || !ebpo_level_rows(level, id))
+            continue;
+        return STRUCTURE_CHECK(false, "level %d: %s is missing", l, spec->name);
+    }
+    return true;
+}
+
+bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
+{
+    uint32_t parts = tree->info.parts;
+    if (!head_shape(tally, &tree->info) || ((parts & EBPO_PART_MESH) && !mesh_shape(tally, tree)))
+        return false;
+    for (int l = 0; l < tree->info.level_count; l++) {
+        const ebpo_level *level = &tree->level[l];
+        if (!types_shape(tally, tree, l) || !windings_shape(tally, tree, l) ||
+            ((parts & EBPO_PART_MESH) && !lists_shape(tally, tree, l)) ||
+            ((parts & EBPO_PART_PLANES) &&
+             !counted_shape(tally, level, l, "planes", level->gray_count, level->plane_counts,
+                            level->plane_count, level->planes)) ||
+            ((parts & EBPO_PART_LEAF_PLANES) &&
+             !counted_shape(tally, level, l, "leaf planes", level->leaf_count,
+                            level->leaf_plane_counts, level->leaf_plane_count,
+                            level->leaf_planes)) ||
+            !arrays_shape(tally, tree, l) ||
+            ((parts & EBPO_PART_COLOURS) && !colours_shape(tally, level, l)))
+            return false;
+    }
+    return true;
+}
+
+/* What a tree must be beyond fitting its arrays. */
+
+#define STRUCTURE_TREE_CHECK(condition, ...) \
+    ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
+
+/* A volume cannot be more than that of the cells it lies in; the slack is for the rounding of sums.
+ * Coordinates beyond about 1e102 or below 1e-102 have volumes that no double holds: the format
+ * leaves those unspecified. */
+static bool volume_possible(double volume, uint64_t cells, int l, const ebpo_info *info)
+{
+    double cell =
+        ldexp(info->box_size[0], -l) * ldexp(info->box_size[1], -l) * ldexp(info->box_size[2], -l);
+    if (!isnormal(cell))
+        return true;
+    return volume >= 0 && volume <= (double)cells * cell * (1 + 1e-6);
+}
+
+static void check_summary(ebpo_tally *tally, const ebpo_tree *tree, int l)
+{
+    const ebpo_level *level = &tree->level[l];
+    const ebpo_level_summary *stored = &tree->info.level[l];
+    STRUCTURE_TREE_CHECK(stored->gray_count == level->gray_count &&
+                             stored->leaf_count == level->leaf_count &&
+                             stored->white_count == level->white_count &&
+                             stored->black_count == level->black_count,
+                         "level %d: the head's counts of nodes differ from the level's", l);
+    STRUCTURE_TREE_CHECK(stored->plane_count == level->plane_count &&
+                             stored->leaf_plane_count == level->leaf_plane_count,
+                         "level %d: the head's counts of planes differ from the level's", l);
+    STRUCTURE_TREE_CHECK(stored->new_count == level->new_count &&
+                             stored->ref_count == level->ref_count,
+                         "level %d: the head's counts of faces differ from the level's", l);
+    STRUCTURE_TREE_CHECK(stored->gray_volume == level->gray_volume &&
+                             stored->leaf_volume == level->leaf_volume,
+                         "level %d: the head's volumes differ from the level's", l);
+    STRUCTURE_TREE_CHECK(volume_possible(level->gray_volume, level->gray_count, l, &tree->info) &&
+                             volume_possible(level->leaf_volume, level->leaf_count, l, &tree->info),
+                         "level %d: envelopes of volume %g and %g do not fit their cells", l,
+                         level->gray_volume, level->leaf_volume);
+}
+
+typedef struct descent {
+    ebpo_tally *tally;
+    const ebpo_twin_tree *view;
+    uint64_t next_face; /* first face that no leaf before has listed */
+    uint64_t grays;
+    uint64_t pruned[EBPO_LEVELS_MAX];
+} descent;
+
+static void node_check(descent *d, const ebpo_twin_node *node, bool holds, const char *text)
+{
+    d->tally->checks[EBPO_VERIFY_STRUCTURE]++;
+    if (!holds)
+        ebpo_tally_violation(d->tally, EBPO_VERIFY_STRUCTURE,
+                             &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE }, "%s",
+                             text);
+}
+
+static void check_leaf(descent *d, const ebpo_twin_node *leaf)
+{
+    const ebpo_info *info = &d->view->tree->info;
+    const ebpo_level *level = &d->view->tree->level[leaf->cell.level];
+    if (!d->view->has_mesh)
+        return;
+    uint64_t listed = (uint64_t)level->leaf_new[leaf->rank] + level->leaf_ref_count[leaf->rank];
+    node_check(
+        d, leaf, level->leaf_first[leaf->rank] == d->next_face,
+        "the leaf's new faces do not follow those of the leaf before it in depth-first order");
+    node_check(d, leaf, listed > 0, "the leaf lists no face");
+    node_check(d, leaf, leaf->cell.level >= info->max_level || listed <= info->leaf_faces,
+               "the leaf lists more faces than a leaf above the maximum level may");
+    d->next_face = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
+}
+
+static void check_gray(descent *d, const ebpo_twin_node *node);
+
+static void structure_tree_check_node(descent *d, const ebpo_twin_node *node)
+{
+    if (node->type == EBPO_LEAF)
+        check_leaf(d, node);
+    else if (node->type == EBPO_GRAY)
+        check_gray(d, node);
+    else if (node->type == EBPO_BLACK)
+        node_check(d, node, d->view->tree->info.solid,
+                   "a surface has no inside, but the node is black");
+}
+
+static void check_gray(descent *d, const ebpo_twin_node *node)
+{
+    if (ebpo_twin_is_pruned(d->view, node)) { /* may have been a leaf */
+        d->pruned[node->cell.level]++;
+        return;
+    }
+    node_check(d, node, node->cell.level < d->view->tree->info.max_level,
+               "a node at the maximum level is gray");
+    bool touched = false;
+    if (d->grays++ % EBPO_ITEMS_IN_ORDER == 0)
+        ebpo_release_pages(d->view->workspace);
+    for (unsigned octant = 0; octant < 8; octant++) {
+        ebpo_twin_node child = ebpo_twin_child(d->view, node, octant);
+        touched |= child.type >= EBPO_LEAF;
+        structure_tree_check_node(d, &child);
+    }
+    node_check(d, node, touched, "the node is gray, but no child of it is gray or a leaf");
+}
+
+static void check_vertices(ebpo_tally *tally, const ebpo_twin_tree *view)
+{
+    const ebpo_mesh *mesh = &view->tree->mesh;
+    uint64_t outside = 0, first = 0;
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, 3 * mesh->face_count) {
+        double p[3];
+        ebpo_mesh_position(mesh, mesh->faces[i], p);
+        bool within = true;
+        for (int k = 0; k < 3; k++)
+            within &= p[k] > view->box.origin[k] && p[k] < view->box.origin[k] + view->box.size[k];
+        first = within || outside ? first : i;
+        outside += !within;
+    }
+    STRUCTURE_TREE_CHECK(outside == 0,
+                         "%" PRIu64
+                         " corners of faces are not strictly inside the root box, face %" PRIu64
+                         " first",
+                         outside, first / 3);
+}
+
+/* A sum of signed random values, one for each undirected edge: it vanishes when directions cancel,
+ * and else but for one case in 2^64. */
+static bool edges_balance(const ebpo_mesh *mesh)
+{
+    uint64_t sum = 0;
+    EBPO_FOR_ITEMS(mesh->workspace, f, 0, mesh->face_count)
+        for (int i = 0; i < 3; i++) {
+            uint64_t a = mesh->faces[3 * f + (uint64_t)i],
+                     b = mesh->faces[3 * f + (uint64_t)(i + 1) % 3];
+            uint64_t value = a < b ? ebpo_random_mix(a << 32 | b) : -ebpo_random_mix(b << 32 | a);
+            sum += a == b ? 0 : value;
+        }
+    return sum == 0;
+}
+
+void ebpo_check_structure(ebpo_tally *tally, const ebpo_twin_tree *view)
+{
+    const ebpo_tree *tree = view->tree;
+    for (int l = 0; l < tree->info.level_count; l++)
+        check_summary(tally, tree, l);
+    descent d = { .tally = tally, .view = view };
+    ebpo_twin_node root = ebpo_twin_root(view);
+    structure_tree_check_node(&d, &root);
+    for (int l = 0; l < tree->info.level_count; l++)
+        STRUCTURE_TREE_CHECK(d.pruned[l] == tree->info.level[l].pruned_count,
+                             "level %d: %" PRIu64 " nodes are pruned, the head says %" PRIu64, l,
+                             d.pruned[l], tree->info.level[l].pruned_count);
+    if (!view->has_mesh)
+        return;
+    STRUCTURE_TREE_CHECK(d.next_face == tree->mesh.face_count,
+                         "leaves list %" PRIu64 " of %" PRIu64 " faces", d.next_face,
+                         tree->mesh.face_count);
+    check_vertices(tally, view);
+    if (tree->info.solid && !tree->info.pruned) /* a part of a mesh need not balance */
+        STRUCTURE_TREE_CHECK(
+            edges_balance(&tree->mesh),
+            "the file says solid, but the directions of the mesh's edges do not cancel");
+}
