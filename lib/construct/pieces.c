@@ -147,7 +147,7 @@ static size_t reserve_for(uint64_t count, size_t size)
     return (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
 }
 
-static char *take_capacity(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
+static char *store_take(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
 {
     if (!s->block_count || bytes > s->left) {
         size_t block = bytes > STORE_BYTES ? bytes : STORE_BYTES;
@@ -177,17 +177,17 @@ static bool make_store(ebpo_builder *b)
     return b->store != NULL;
 }
 
-static char *pack_reserve(ebpo_builder *b, size_t bytes)
+static char *store_reserve(ebpo_builder *b, size_t bytes)
 {
     pthread_mutex_lock(&b->store->lock);
-    char *at = take_capacity(b, b->store, bytes);
+    char *at = store_take(b, b->store, bytes);
     pthread_mutex_unlock(&b->store->lock);
     return at;
 }
 
 void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes)
 {
-    return make_store(b) ? pack_reserve(b, reserve_for(bytes, 1)) : NULL;
+    return make_store(b) ? store_reserve(b, reserve_for(bytes, 1)) : NULL;
 }
 
 static size_t capacity_of(const ebpo_level *level, int id)

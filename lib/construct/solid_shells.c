@@ -148,7 +148,7 @@ static ebpo_status plant_faces(comparing *c, ebpo_error *error)
                                      error);
 }
 
-static ebpo_status solid_shells_compare(comparing *c, ebpo_error *error)
+static ebpo_status compare_shells(comparing *c, ebpo_error *error)
 {
     const nesting *n = &c->s->nesting;
     ebpo_workspace *workspace = c->s->mesh->workspace;
@@ -173,7 +173,7 @@ static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
 {
     comparing c = { .s = s, .apart = true };
     c.most = STEPS_PER_FACE * s->mesh->face_count + STEPS_AT_LEAST;
-    ebpo_status status = s->nesting.count > 1 ? solid_shells_compare(&c, error) : EBPO_OK;
+    ebpo_status status = s->nesting.count > 1 ? compare_shells(&c, error) : EBPO_OK;
     s->apart = c.apart;
     ebpo_box_tree_free(&c.faces);
     ebpo_array_free(s->mesh->workspace, c.exposed);

@@ -22,8 +22,6 @@ typedef struct ebpo_polyhedra {
     double volume;
 } ebpo_polyhedra;
 
-void ebpo_polyhedra_free(ebpo_polyhedra *piece);
-
 /* Appends the polytope (cell coordinates) of a cell's node as triangle fans; with `walls` false
  * without the polygons on the cell's walls. */
 EBPO_MUST_USE ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p,
@@ -73,12 +71,6 @@ typedef struct ebpo_leaf_scratch {
     ebpo_triangle *faces;
     uint64_t capacity;
 } ebpo_leaf_scratch;
-
-/* Cuts `envelope` (on entry the parent's in this cell) to that of leaf number `leaf` of the cell's
- * level. */
-EBPO_MUST_USE ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
-                                        ebpo_leaf_scratch *scratch, ebpo_polytope *envelope,
-                                        ebpo_error *error);
 
 /* The triangles that a leaf lists, in scratch->faces. */
 EBPO_MUST_USE ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell,

@@ -101,14 +101,14 @@ static void check_node(const judging *j, const ebpo_twin_node *node, const total
                              "its colour %06" PRIx32 " is not the mean of the faces below", colour);
 }
 
-static void colours_judge(judging *j, const ebpo_twin_node *node, totals *above)
+static void judge_node(judging *j, const ebpo_twin_node *node, totals *above)
 {
     totals sum = { { { 0, 0 } } };
     if (node->type == EBPO_LEAF)
         add_list(j, node, &sum);
     for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY; octant++) {
         ebpo_twin_node child = ebpo_twin_child(j->view, node, octant);
-        colours_judge(j, &child, &sum);
+        judge_node(j, &child, &sum);
     }
     if (node->type == EBPO_GRAY)
         check_node(j, node, &sum);
@@ -127,7 +127,7 @@ static bool vertices_differ(const judging *j)
 
 /* Of a tree with colours whose shape was checked; where it has no mesh, its mesh has no colours, or
  * it is a subset, nothing can be said. EBPO_E_MEMORY. */
-static ebpo_status ebpo_check_colours(ebpo_tally *tally, const ebpo_twin_tree *view,
+static ebpo_status check_colours(ebpo_tally *tally, const ebpo_twin_tree *view,
                                       ebpo_error *error)
 {
     const ebpo_tree *tree = view->tree;
@@ -142,7 +142,7 @@ static ebpo_status ebpo_check_colours(ebpo_tally *tally, const ebpo_twin_tree *v
         j.longest = fmax(j.longest, view->box.size[k]);
     totals all = { { { 0, 0 } } };
     ebpo_twin_node root = ebpo_twin_root(view);
-    colours_judge(&j, &root, &all);
+    judge_node(&j, &root, &all);
     ebpo_colours_free(&j.colours);
     return EBPO_OK;
 }
@@ -162,7 +162,7 @@ static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, cons
         return status;
     ebpo_check_structure(tally, &view);
     ebpo_check_nesting(tally, &view);
-    status = ebpo_check_colours(tally, &view, error);
+    status = check_colours(tally, &view, error);
     if (status == EBPO_OK)
         status = ebpo_verify_walk(tally, &view, options, error);
     if (status == EBPO_OK && file)
@@ -185,7 +185,7 @@ static bool is_finding(ebpo_status status)
     return status == EBPO_E_FORMAT || status == EBPO_E_VERSION || status == EBPO_E_LIMIT;
 }
 
-static ebpo_read_options verify_reading(const ebpo_verify_options *options)
+static ebpo_read_options read_options_of(const ebpo_verify_options *options)
 {
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     read.threads = options->threads;
@@ -197,7 +197,7 @@ static ebpo_status check_content(const ebpo_file *file, const ebpo_verify_option
                                  ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
-    ebpo_read_options read = verify_reading(options);
+    ebpo_read_options read = read_options_of(options);
     ebpo_status status = ebpo_file_check_content(file, &read, &own);
     if (status == EBPO_OK || is_finding(status)) {
         ebpo_tally_check(tally, EBPO_VERIFY_CONTENT, status == EBPO_OK, "%s", own.message);
@@ -210,7 +210,7 @@ static ebpo_status check_tree(const ebpo_file *file, const ebpo_verify_options *
                               ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
-    ebpo_read_options read = verify_reading(options);
+    ebpo_read_options read = read_options_of(options);
     ebpo_tree tree = { 0 };
     ebpo_status status = ebpo_file_read_tree(file, &read, &tree, &own);
     if (status == EBPO_OK || is_finding(status))
@@ -227,7 +227,7 @@ static ebpo_status check_source(const ebpo_file *file, const ebpo_verify_options
                                 ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
-    ebpo_read_options read = verify_reading(options);
+    ebpo_read_options read = read_options_of(options);
     read.attributes = options->source->attributes != NULL;
     ebpo_mesh stored;
     bool ordered = false;

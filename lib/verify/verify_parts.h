@@ -60,6 +60,16 @@ EBPO_MUST_USE ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_pro
 EBPO_MUST_USE ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file,
                                            const ebpo_tree *tree, ebpo_error *error);
 
+/* --- face lists of leaves against the faces that touch them (verify_lists.c) --- */
+
+/* `faces`: numbers of the `count` faces that touch the cell, ascending. A leaf must list them all,
+ * a white or black cell has none. */
+void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_twin_tree *view,
+                               const ebpo_twin_node *node, const uint32_t *faces, uint64_t count);
+
+/* Whether the leaves below a gray node list more than `limit` different faces. */
+bool ebpo_lists_more_faces(const ebpo_twin_tree *view, const ebpo_twin_node *node, uint64_t limit);
+
 /* Walking down the tree with the faces that touch each node: containment, lists and labels. */
 
 /* Adds to the tally. The result does not depend on the number of threads. */

@@ -62,7 +62,7 @@ typedef struct recount {
     bool no_memory;
 } recount;
 
-static bool subtrees_add(ebpo_workspace *workspace, numbers *list, uint32_t number)
+static bool add_number(ebpo_workspace *workspace, numbers *list, uint32_t number)
 {
     if (list->count && list->at[list->count - 1] == number)
         return true;
@@ -73,7 +73,7 @@ static bool subtrees_add(ebpo_workspace *workspace, numbers *list, uint32_t numb
     return true;
 }
 
-static int subtrees_ascending(const void *a, const void *b)
+static int compare_numbers(const void *a, const void *b)
 {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x > y) - (x < y);
@@ -83,7 +83,7 @@ static void sort_once(numbers *list)
 {
     uint64_t kept = 0;
     if (list->count)
-        qsort(list->at, list->count, sizeof *list->at, subtrees_ascending);
+        qsort(list->at, list->count, sizeof *list->at, compare_numbers);
     for (uint64_t i = 0; i < list->count; i++)
         if (!kept || list->at[kept - 1] != list->at[i])
             list->at[kept++] = list->at[i];
@@ -97,7 +97,7 @@ static bool add_block(numbers *list, uint32_t block)
         sort_once(list);
         list->different = list->count;
     }
-    return subtrees_add(NULL, list, block);
+    return add_number(NULL, list, block);
 }
 
 static const char *column_name(const recount *c, unsigned column, int *level)
@@ -215,7 +215,7 @@ static void see_leaf(recount *c, const ebpo_twin_node *leaf, uint64_t *row)
         const uint32_t *face = ebpo_twin_refs(c->view, leaf, &references);
         uint64_t end = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
         EBPO_FOR_ITEMS(c->view->workspace, i, 0, references)
-            if (!subtrees_add(c->view->workspace, &c->outer_faces, face[i]))
+            if (!add_number(c->view->workspace, &c->outer_faces, face[i]))
                 c->no_memory = true;
         row[REFERENCES] += references;
         row[END] += end - c->end[leaf->cell.level];

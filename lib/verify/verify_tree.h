@@ -50,8 +50,6 @@ bool ebpo_twin_is_pruned(const ebpo_twin_tree *view, const ebpo_twin_node *node)
 /* Child of a gray node that is not pruned. */
 ebpo_twin_node ebpo_twin_child(const ebpo_twin_tree *view, const ebpo_twin_node *node,
                                unsigned octant);
-/* The node at a place of a level; climbs to the root to find its cell. */
-ebpo_twin_node ebpo_twin_at(const ebpo_twin_tree *view, int level, uint64_t group, unsigned octant);
 
 /* Codes of the node's own planes (gray: the level's planes; leaf: stored leaf planes); NULL and 0
  * when there are none. */

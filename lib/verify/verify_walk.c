@@ -44,7 +44,7 @@ typedef struct upper_node {
     uint32_t *faces;
     uint64_t face_count;
     uint64_t children; /* the first of eight, in the same array */
-    ebpo_corner_windings corners;
+    ebpo_node_windings corners;
 } upper_node;
 
 typedef struct walk {
@@ -146,7 +146,7 @@ static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_twin_node *
 
 /* What is left to do at a gray node when its children are done. */
 static void finish_gray(const walk *w, worker *self, const ebpo_twin_node *node,
-                        const ebpo_corner_windings children[8], ebpo_corner_windings *corners)
+                        const ebpo_node_windings children[8], ebpo_node_windings *corners)
 {
     if (!w->view->tree->info.solid)
         return;
@@ -166,7 +166,7 @@ static bool is_terminal(const walk *w, const ebpo_twin_node *node)
 /* The faces may be all of the mesh. */
 static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_twin_node *node,
                                  const uint32_t *faces, uint64_t count,
-                                 ebpo_corner_windings *corners, ebpo_error *error)
+                                 ebpo_node_windings *corners, ebpo_error *error)
 {
     const ebpo_twin_tree *view = w->view;
     ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
@@ -178,7 +178,7 @@ static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_twin_no
         ebpo_face_corners(&view->tree->mesh, faces[i], &face);
         ebpo_check_face_contained(&self->tally, &self->planes, node, &frame, &face, faces[i]);
     }
-    *corners = (ebpo_corner_windings){ { 0 }, 0 };
+    *corners = (ebpo_node_windings){ { 0 }, 0 };
     if (!view->tree->info.solid || node->type == EBPO_GRAY)
         return EBPO_OK;
     ebpo_check_terminal_label(&self->tally, view, node);
@@ -210,7 +210,7 @@ static bool stack_reserve(face_stack *s, uint64_t need)
 
 /* The node's faces are [first, first + count) on the stack. */
 static ebpo_status walk_down(const walk *w, worker *self, const ebpo_twin_node *node,
-                             uint64_t first, uint64_t count, ebpo_corner_windings *corners,
+                             uint64_t first, uint64_t count, ebpo_node_windings *corners,
                              ebpo_error *error)
 {
     face_stack *s = &self->stack;
@@ -223,7 +223,7 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_twin_node *
     ebpo_half_spaces_of(&self->planes, w->view, node);
     visit_faces(w, self, node, &f, s->faces + first, s->octants + first, count);
     check_worth(w, &self->tally, node, count);
-    ebpo_corner_windings children[8];
+    ebpo_node_windings children[8];
     for (unsigned octant = 0; octant < 8; octant++) {
         uint64_t own = 0;
         for (uint64_t i = 0; i < count; i++)
@@ -368,7 +368,7 @@ static void finish_upper(walk *w)
         upper_node *n = &w->upper[at];
         if (n->children == 0)
             continue;
-        ebpo_corner_windings children[8];
+        ebpo_node_windings children[8];
         for (unsigned octant = 0; octant < 8; octant++)
             children[octant] = w->upper[n->children + octant].corners;
         finish_gray(w, &w->workers[0], &n->node, children, &n->corners);

@@ -1,6 +1,6 @@
 /* What an observer makes of cells: how far, how large, whether seen, what is in front. */
-#ifndef EBPO_LEVELS_FRONTIER_H
-#define EBPO_LEVELS_FRONTIER_H
+#ifndef EBPO_LEVELS_VIEW_CUT_H
+#define EBPO_LEVELS_VIEW_CUT_H
 
 #include <ebpo/base.h>
 #include <ebpo/view.h>
