@@ -1,5 +1,12 @@
-/* Vertices and faces along a Morton curve: then every cell's vertices are one run, and neighbours
- * in space are neighbours in memory. */
+/* Sorts a mesh's vertices and faces along a Morton curve. Afterwards the vertices of every cell are
+ * one run, and neighbours in space are neighbours in memory.
+ *
+ * The curve's box is chosen first: a cell face has to be exact in doubles at every level in use.
+ * Vertices are sorted by the octcode of their cell and, within a cell, by position, so that equal
+ * positions are neighbours; vertices without faces go behind the others. Faces follow their least
+ * vertex. Sorting uses the mesh's workspace, so that meshes larger than memory are sorted too. The
+ * order of the source is kept in the mesh's arrangement. The result depends on the mesh alone, not
+ * on the number of threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -39,7 +46,7 @@ static bool is_referenced(const arranging *a, uint64_t v)
     return a->referenced[v / 8] >> v % 8 & 1;
 }
 
-/* --- what is there --- */
+/* --- marking referenced vertices, choosing the box --- */
 
 static ebpo_status mark_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
@@ -409,12 +416,12 @@ static ebpo_status sort_faces(arranging *a, ebpo_error *error)
     return ebpo_sort_run(&sort, error);
 }
 
-/* --- all --- */
+/* --- the whole mesh --- */
 
 /* A mesh that was arranged already: the source's numbers of vertices come from its own map; those
  * of faces were sorted by. */
 static void compose_maps(const struct ebpo_arrangement *before, ebpo_workspace *workspace,
-                            uint32_t *map, uint64_t count)
+                         uint32_t *map, uint64_t count)
 {
     EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, before ? count : 0)
         map[i] = before->vertex_source[map[i]];
@@ -489,17 +496,17 @@ ebpo_status ebpo_arrange_to_mend(ebpo_mesh *mesh, unsigned threads, const ebpo_p
                                  ebpo_error *error)
 {
     return arrange_by_curve((arranging){ .mesh = mesh,
-                                    .threads = ebpo_thread_count(threads),
-                                    .progress = progress,
-                                    .together = true },
-                       -1, error);
+                                         .threads = ebpo_thread_count(threads),
+                                         .progress = progress,
+                                         .together = true },
+                            -1, error);
 }
 
 ebpo_status ebpo_arrange(ebpo_mesh *mesh, int level, unsigned threads,
                          const ebpo_progress *progress, ebpo_error *error)
 {
     return arrange_by_curve((arranging){ .mesh = mesh,
-                                    .threads = ebpo_thread_count(threads),
-                                    .progress = progress },
-                       level, error);
+                                         .threads = ebpo_thread_count(threads),
+                                         .progress = progress },
+                            level, error);
 }

@@ -1,4 +1,10 @@
-/* From a mesh to a tree: the stages in their order. */
+/* Builds the tree of a mesh: runs the stages that builder.h lists, in their order, and fills in the
+ * facts of the result.
+ *
+ * Between the stages stand only the checks of options and the choice of the deepest level (EBP
+ * 2017, equation 3). Pieces are worked on by all threads; a piece's envelopes need its parent's, so
+ * the top of the tree comes first. With a selection from the leaves up, the planes of all nodes are
+ * chosen before that. ebpo_build takes over the mesh and frees it, also on failure. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -171,7 +177,7 @@ static ebpo_status arrange_for_levels(ebpo_builder *b, ebpo_mesh *mesh, ebpo_err
 }
 
 static ebpo_status builder_begin(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                           const ebpo_build_options *options, ebpo_error *error)
+                                 const ebpo_build_options *options, ebpo_error *error)
 {
     b->options = options;
     b->threads = ebpo_thread_count(options->threads);

@@ -1,5 +1,14 @@
-/* Subtrees to stretches of level arrays: a depth-first walk meets the nodes of each level in
- * octcode order. */
+/* Turns finished pieces into the arrays of the levels.
+ *
+ * A depth-first walk of a piece visits the nodes of each level in octcode order, so a piece's part
+ * of each level array is one stretch. Stretches are joined in the depth-first order of the pieces,
+ * which is octcode order too. The nodes of the top add stretches of their own. Leaves refer to
+ * faces by their numbers along the curve until all pieces are done, as the final numbers of another
+ * piece's faces are not known before.
+ *
+ * Arrays without information are left out: those that the options do not ask for, and those whose
+ * values readers assume anyway. Volumes are added in a fixed order, so the number of threads does
+ * not change the result. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -13,6 +22,8 @@
 #include "core/parallel.h"
 #include "geometry/level_nodes.h"
 #include "geometry/polytope.h"
+
+/* --- a piece's stretches --- */
 
 struct ebpo_emit_scratch {
     ebpo_envelope_scratch *envelope;
@@ -243,8 +254,7 @@ ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, e
     return EBPO_OK;
 }
 
-/* All stretches of level arrays joined in depth-first order, which is octcode order in each level.
- */
+/* --- joining the stretches --- */
 
 typedef struct joiner {
     ebpo_builder *b;
@@ -494,8 +504,7 @@ static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uin
 static bool root_group(joiner *j)
 {
     ebpo_builder *b = j->b;
-    ebpo_piece_level *first =
-        current_stretch(j); /* never a piece's, whose arrays may be packed */
+    ebpo_piece_level *first = current_stretch(j); /* never a piece's, whose arrays may be packed */
     return first &&
            ebpo_piece_level_add_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0], 0));
 }

@@ -1,5 +1,15 @@
-/* Candidate normals of a gray node: those of the faces below it; where there are many, the mean of
- * each occupied bin of the octahedral map, with bins no finer than needed. */
+/* Chooses the planes of gray nodes, from the root down. The candidates are directions of the convex
+ * hull of the solid within the cell.
+ *
+ * - Few points: the facets of their hull.
+ * - Many points, or points that span no volume: the hull of the extreme points. Each round asks how
+ *   far the solid reaches along the facets' normals (supports.h), and the answers are more points.
+ * - Besides, normals of the faces below the node: where there are many, the mean of each occupied
+ *   bin of the octahedral map, with bins no finer than needed.
+ *
+ * The selection (selections.c) takes planes from the candidates. A support is an upper bound, so a
+ * plane never cuts off a part of the solid, however bad a candidate is. The nodes above the pieces
+ * are computed here too, level by level, so that every piece knows its parent's envelope. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,7 +28,7 @@
 #include "geometry/polytope.h"
 #include "geometry/vec3.h"
 
-/* Candidate normals of a gray node, from the faces below it. */
+/* --- candidates: normals of faces --- */
 
 enum { CANDIDATES_SAMPLE = 4096, CANDIDATES_BINS = 16384 };
 
@@ -74,8 +84,8 @@ static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_b
 }
 
 /* Fills the table with bins of `width` codes; false when more than `most` are occupied. */
-static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *sample,
-                      int count, uint32_t width, int most)
+static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *sample, int count,
+                      uint32_t width, int most)
 {
     for (int i = 0; i < *used; i++)
         table[slots[i]].key = 0;
@@ -101,8 +111,8 @@ static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *
 
 /* At most `most` of them; returns how many. */
 static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
-                                 const ebpo_branch *s, const ebpo_build_detail *detail, int most,
-                                 ebpo_candidate *out)
+                            const ebpo_branch *s, const ebpo_build_detail *detail, int most,
+                            ebpo_candidate *out)
 {
     normal_bin *table = scratch->table;
     int used = 0, count = take_sample(b, s, detail, scratch->sample);
@@ -119,9 +129,7 @@ static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
     return used;
 }
 
-/* The planes of a gray node, from the root down: candidates are the directions of the solid's hull
- * in the cell. Few points: their hull. Many, or none that span a volume: the hull of the extreme
- * ones, found by asking in its own directions, and normals of faces. */
+/* --- scratch memory and supports --- */
 
 enum {
     TOP_LEVELS = 4,   /* nearly free of bytes */
@@ -163,7 +171,7 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
 /* A support from which on a plane cannot remove epsilon, nor a needle: a cap of height h of a body
  * of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
 static double hopeless_below(const ebpo_polytope *envelope, double volume, const int32_t n[3],
-                                 double epsilon)
+                             double epsilon)
 {
     double most = -1e300, least = 1e300;
     for (int i = 0; i < envelope->vertex_count; i++) {
@@ -386,8 +394,7 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo
     return count;
 }
 
-/* The nodes above the subtrees: their envelopes level by level, so that every subtree knows its
- * parent's. */
+/* --- the nodes above the pieces, level by level --- */
 
 typedef struct pending {
     uint32_t node; /* gray, in the top */

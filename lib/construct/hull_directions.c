@@ -1,5 +1,12 @@
-/* Incremental: each point beyond the hull takes the place of the facets that it sees. Points that
- * are extreme in some directions come first, so that most others never are. */
+/* Computes a small convex hull, of which only the directions of the facets are used: what rounding
+ * gets wrong costs volume of an envelope, never containment.
+ *
+ * The hull grows point by point: each point beyond the hull replaces the facets that it sees (a
+ * beneath-beyond algorithm in doubles). Points that are extreme along the axes and diagonals come
+ * first, so that most others are never outside. Facets are kept as planes by coordinate, for the
+ * kernel that tests a point against all of them (sweep.h). Limits: EBPO_HULL_POINTS points,
+ * EBPO_HULL_FACETS facets; what does not fit is left out. Ties are ordered by numbers of points, so
+ * that all machines return the same facets in the same order. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -77,7 +84,7 @@ static void set_count(hull *h, int count)
         set_plane(h, i, none, 1e300);
 }
 
-/* --- where to begin --- */
+/* --- the first four facets --- */
 
 /* The most extreme points along the axes and the diagonals, both ways. */
 static void find_extremes(const double (*p)[3], int count, int at[WAYS])
@@ -153,7 +160,7 @@ static bool first_facets(hull *h, const int c[4])
     return true;
 }
 
-/* --- one more point --- */
+/* --- adding a point --- */
 
 /* Edges as from << 16 | to, and turned around; to a multiple of four, with what is none. */
 static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *edges,

@@ -1,5 +1,10 @@
-/* The envelope of a leaf, from its faces: the directions of the hull of what they leave in the
- * cell. */
+/* Computes the envelope of a leaf from its faces (EBP 2017, 3.4). Readers derive the same planes
+ * from the same faces, bit for bit, so most files do not store them.
+ *
+ * The candidates' directions are those of the convex hull of the extreme points: the corners of the
+ * faces' parts in the cell, and the cell's corners inside. With too many points, or with all in one
+ * plane, the directions are the normals of the faces. A plane's offset is the support of all
+ * points, plus what rounding may add, so no part of a face in the cell is cut off. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -66,8 +71,7 @@ static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
     memset(points->number, 0, sizeof points->number);
     for (int i = 0; i < 8; i++)
         if (inside >> i & 1)
-            (void)add_point(points, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 },
-                                        0);
+            (void)add_point(points, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0);
     for (uint64_t i = 0; i < count; i++) {
         double p[9][3], slack;
         int corners = ebpo_clip_triangle(box, cell, &faces[i], p, &slack);

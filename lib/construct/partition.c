@@ -1,6 +1,14 @@
-/* Faces to cells: a piece becomes a subtree, depth first. What a node is depends on its cell and
- * its faces alone, so neither the pieces nor the threads show in the result. Source: EBP 2017, 3.3
- * (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing). */
+/* Assigns faces to cells. First the top of the tree is cut until the pieces below it are small
+ * enough to be processed in parallel; then each piece becomes a subtree, depth first.
+ *
+ * What a node is depends on its cell and its faces alone, and where the top ends on the model
+ * alone, so neither pieces nor threads nor the machine show in the result. Sources: EBP 2017, 3.3
+ * (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing nodes with few faces).
+ *
+ * The cut of the top also computes what a piece has to know of the others: which of its faces no
+ * earlier piece lists ("fresh"), and the winding numbers at its corners. A mesh with huge faces and
+ * a deep maximum level would list every face in millions of cells: leaves and entries are limited
+ * by the number of faces. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -15,6 +23,8 @@
 #include "core/hash.h"
 #include "core/parallel.h"
 #include "geometry/ray.h"
+
+/* --- a piece: limits and lists --- */
 
 enum { RELEASE_FACES = 1 << 13 };
 
@@ -70,7 +80,7 @@ static ebpo_status no_memory_for_cells(ebpo_error *error)
 /* Faces with a vertex outside the cell's run of vertices reach over its walls (or touch an upper
  * one). */
 static bool note_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
-                         const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
+                          const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
 {
     uint64_t begin, end;
     ebpo_build_vertex_range(b, cell, &begin, &end);
@@ -117,8 +127,8 @@ static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, u
 }
 
 /* Splits the list at stack[at] into eight lists at stack[top]. */
-static ebpo_status split_list(grower *g, ebpo_cell cell, uint64_t at, uint64_t count,
-                                   uint64_t top, uint64_t begin[9])
+static ebpo_status split_list(grower *g, ebpo_cell cell, uint64_t at, uint64_t count, uint64_t top,
+                              uint64_t begin[9])
 {
     const ebpo_builder *b = g->b;
     if (!ebpo_array_grow_late(g->b->workspace, &g->mask, &g->mask_capacity, count, 1))
@@ -146,7 +156,7 @@ static ebpo_status split_list(grower *g, ebpo_cell cell, uint64_t at, uint64_t c
     return EBPO_OK;
 }
 
-/* --- coalescing what turned out to be few --- */
+/* --- coalescing nodes with few faces --- */
 
 static uint64_t set_slot(const face_set *set, uint32_t face)
 {
@@ -211,8 +221,8 @@ static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, ui
 }
 
 /* The node's list is stack[at] to stack[at + count - 1]; the stack is free from `top` on. */
-static ebpo_status grow_node(grower *g, uint32_t index, ebpo_cell cell, uint64_t at,
-                                  uint64_t count, uint64_t top)
+static ebpo_status grow_node(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, uint64_t count,
+                             uint64_t top)
 {
     ebpo_branch *s = g->s;
     if (count == 0)
@@ -240,7 +250,7 @@ static ebpo_status grow_node(grower *g, uint32_t index, ebpo_cell cell, uint64_t
         status = no_memory_for_cells(g->error);
     for (unsigned o = 0; o < 8 && status == EBPO_OK; o++)
         status = grow_node(g, child + o, ebpo_cell_child(cell, o), begin[o],
-                                begin[o + 1] - begin[o], begin[8]);
+                           begin[o + 1] - begin[o], begin[8]);
     if (status != EBPO_OK)
         return status;
     d.entry_end = s->entry_count;
@@ -277,10 +287,7 @@ ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *er
     return status;
 }
 
-/* The top of the tree: cut until the pieces are small enough to be processed in parallel. That
- * depends on the model alone, never on the machine. What a piece must know of the others is
- * computed here: which of its faces no earlier piece lists, and the winding numbers at its corners.
- */
+/* --- the top of the tree --- */
 
 /* Pieces have at most this many faces, but there are no more than about PIECES_MOST pieces. */
 enum { PIECE_FACES = 4096, PIECES_MOST = 2048, SPLIT_GRAIN = 1 << 13 };
@@ -540,7 +547,7 @@ static ebpo_status cut_top(ebpo_builder *b, ebpo_error *error)
     return status;
 }
 
-/* --- corners --- */
+/* --- winding numbers at the corners of pieces --- */
 
 static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                      ebpo_error *error)

@@ -1,4 +1,6 @@
-/* Choosing the planes of an envelope, and the support of the solid that bounds them. */
+/* Choosing the planes of an envelope: candidates and selections (selections.c), a leaf's planes
+ * (leaf_planes.c), faces against cells (triangle_cell.c), the small hull (hull_directions.c), and
+ * winding numbers at a cell's corners (corner_windings.c). */
 #ifndef EBPO_CONSTRUCT_PLANES_H
 #define EBPO_CONSTRUCT_PLANES_H
 
@@ -105,7 +107,7 @@ int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *f
                      uint64_t count, unsigned inside_corners, double epsilon,
                      ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX]);
 
-/* A small convex hull, for directions only: what it gets wrong costs volume, never containment. */
+/* --- a small convex hull, for directions only: errors cost volume, never containment --- */
 
 enum { EBPO_HULL_POINTS = 8192, EBPO_HULL_FACETS = 2048 };
 

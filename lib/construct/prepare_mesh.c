@@ -1,4 +1,13 @@
-/* Which repairs make a solid of a mesh: they are tried. */
+/* Prepares a mesh for building, and finds out which repairs make a solid of it.
+ *
+ * ebpo_mesh_prepare sorts the mesh along the curve first, so that each later step goes through
+ * memory in order; then it checks, repairs what the options ask for, sorts again and checks again.
+ * A mesh that is too large for an exact grid is still checked; building refuses it.
+ *
+ * ebpo_mesh_try_repairs applies sequences of repairs to copies of the mesh, shorter sequences
+ * first, until one leaves a solid without doubts. Doubts say why a solid may not be what its author
+ * meant: holes that were filled over much of the surface, a volume that is negative, or one that is
+ * small for the area (a sheet). */
 #include "core/strict_fp.h"
 
 #include <ebpo/repair.h>
@@ -97,7 +106,7 @@ ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh, const ebpo_prepare_options *optio
     return status;
 }
 
-/* --- which repairs make a solid of a mesh: they are tried --- */
+/* --- trying repairs: types --- */
 
 enum {
     WELD = EBPO_MEND_WELD,
@@ -117,7 +126,7 @@ typedef struct trying {
     ebpo_repairs *out;
 } trying;
 
-/* ---- doubts ---- */
+/* --- doubts about a result --- */
 
 /* A loop of n edges was filled with n - 2 faces, which have n - 3 edges of their own. */
 static bool mostly_open(const ebpo_mesh_report *report, const ebpo_mend_record *record)
@@ -171,7 +180,7 @@ uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
     return doubts | doubts_of_volume(report);
 }
 
-/* ---- sequences ---- */
+/* --- sequences of repairs --- */
 
 static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
 {

@@ -1,6 +1,16 @@
-/* Greedy selection: the plane that removes most volume first. Gains only shrink while the envelope
- * does, so a gain computed earlier bounds the present one, and most candidates are never evaluated
- * again (lazy evaluation). */
+/* Selects the planes of an envelope from candidates: one function for each ebpo_selection, and the
+ * table of them at the end. Names and settings of selections are in format/head_facts.c;
+ * CONTRIBUTING.md describes how to add one.
+ *
+ * - greedy (inherit): the plane that removes most volume comes first. Gains only shrink while the
+ *   envelope does, so an earlier gain bounds the present one, and most candidates are never
+ *   evaluated again (lazy evaluation). Volume alone leaves needles; planes that cut off what
+ *   reaches far come last.
+ * - random, offset, k-medoids: the theses' (EBP 2017, 3.3.4.3; BP 2008, 3.4.2). They choose a
+ *   number of candidates, whatever these cut.
+ *
+ * A selection clips the envelope that it is given and returns the codes of its planes. Results
+ * depend on the arguments alone; random choices use the seed of the node. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -12,6 +22,8 @@
 #include "core/hash.h"
 #include "geometry/polytope.h"
 #include "geometry/vec3.h"
+
+/* --- greedy --- */
 
 typedef struct ranked {
     double gain; /* an upper bound; exact for the envelope of `round` */
@@ -30,7 +42,7 @@ typedef struct contest {
 /* The plane that a candidate would be, for ebpo_polytope_clip; false when only the whole cell would
  * do. */
 static bool candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3],
-                          double *offset)
+                            double *offset)
 {
     int32_t v[3], d;
     if (!ebpo_plane_code_decode(ebpo_plane_code_make(candidate->normal, 0), v, &d))
@@ -185,14 +197,11 @@ int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, i
     return cut_needles(envelope, &c, ebpo_needle, most, taken, codes);
 }
 
-/* The theses' selections (EBP 2017, 3.3.4.3; BP 2008, 3.4.2): which of the candidates, whatever
- * they cut. */
-
 /* Clips by the chosen candidates in ascending order of their numbers. Those that cut nothing when
  * their turn comes are not kept. Not more than `most` are chosen (ebpo_selection_wanted):
  * candidates are sorted by direction, and what was left out here would all face one way. */
 static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
-                       uint32_t *codes)
+                          uint32_t *codes)
 {
     int taken = 0;
     for (int i = 0; i < choice->count && taken < choice->most; i++) {
@@ -206,7 +215,7 @@ static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, co
     return taken;
 }
 
-/* --- at random --- */
+/* --- random --- */
 
 static int select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
 {
@@ -472,7 +481,7 @@ static int select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, u
     return taken;
 }
 
-/* The function of each selection; its name and settings: format/head_facts.c. */
+/* --- the table --- */
 
 static const ebpo_select_fn selection_functions[] = {
     [EBPO_SELECT_INHERIT] = ebpo_select_greedy,

@@ -1,9 +1,11 @@
-/* Which closed components are apart. Where no faces of two components have a common point, each
- * component is as a whole in or out of every other one, and winding numbers on its sides follow
- * from the nesting. Faces are compared only where the boxes of their components do not settle it: a
- * face of a component whose box is not within another one's, and that comes to that other box. Both
- * passes stop after a number of steps that grows with the faces only; the components then count as
- * not apart. */
+/* Finds the closed components of a mesh that are apart, and computes which of them bound the solid.
+ *
+ * Where no faces of two components have a common point, each component as a whole is inside or
+ * outside every other one, and the winding numbers on its sides follow from the nesting. Faces are
+ * compared only where the boxes of components do not settle it: a face of a component whose box is
+ * not within another one's, and that comes to that other box. Both passes stop after a number of
+ * steps that is proportional to the faces; the components then count as not apart. The counts serve
+ * `ebpo check`, the apart components the solid's volume. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"
@@ -235,7 +237,7 @@ int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, eb
            (ebpo_rule_inside(rule, one->around + sign) - ebpo_rule_inside(rule, one->around));
 }
 
-/* ---- counting ---- */
+/* --- counting --- */
 
 static void count_one(const nesting *n, const shell *one, ebpo_shells *made)
 {

@@ -1,6 +1,13 @@
-/* Support of runs of vertices by boxes of boxes. Rounding is monotone, so a box's bound computed in
- * the same order of operations is never below that of a point in it: skipping a box never loses the
- * greatest point. */
+/* Computes the support of the solid in a cell: the greatest n . xi over the mesh vertices in the
+ * cell, the points where faces cross the cell's faces, and the corners of the cell inside. It is
+ * the offset of a plane with normal n.
+ *
+ * With few vertices all points are gathered, each once, and searched in stretches that share a box.
+ * With many, only crossings and corners are gathered; vertices are searched by a hierarchy of boxes
+ * over their runs along the curve. Rounding is monotone: a box's bound, computed by the same
+ * operations in the same order, is never below that of a point in it, so skipping a box never loses
+ * the greatest point. Searches stop early once they have reached a support with which the plane
+ * could not gain anything. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -13,6 +20,8 @@
 #include "core/hash.h"
 #include "geometry/cells.h"
 #include "geometry/polytope.h"
+
+/* --- runs of vertices, by boxes of boxes --- */
 
 static void join_box(double (*box)[3], const double low[3], const double high[3])
 {
@@ -101,8 +110,8 @@ static void visit_block(query *q, int level, uint64_t block)
 
 /* Greatest n . xi over vertices [begin, end), in coordinates of the cell that holds them, and
  * `least`; `*at`: the vertex, or EBPO_NO_VERTEX when `least` is the greatest. */
-static double bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin,
-                           uint64_t end, double least, uint64_t *at)
+static double bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3],
+                             uint64_t begin, uint64_t end, double least, uint64_t *at)
 {
     query q = { .b = b, .begin = begin, .end = end, .at = EBPO_NO_VERTEX, .best = least };
     for (int k = 0; k < 3; k++) {
@@ -145,6 +154,8 @@ void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *be
     *begin = lower_bound(b->key, b->vertex_count, code << below);
     *end = *begin + lower_bound(b->key + *begin, b->vertex_count - *begin, (code + 1) << below);
 }
+
+/* --- the points of a node --- */
 
 enum { FEW_VERTICES = 4096, TABLE_MOST = 1 << 16, MANY_POINTS = 1 << 15 };
 
@@ -242,7 +253,7 @@ static bool clear_table(ebpo_supports *s, uint64_t points)
 }
 
 static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch,
-                            const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
+                          const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
 {
     uint64_t begin, end;
     ebpo_build_vertex_range(b, cell, &begin, &end);
@@ -268,7 +279,7 @@ static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
 
 /* Which of the points in a stretch has the value `best`. */
 static void locate_point(const ebpo_supports *s, uint64_t first, const double n[3], double best,
-                            double where[3])
+                         double where[3])
 {
     for (uint64_t i = first; i < s->count && i < first + 4 * EBPO_STRETCH; i++) {
         double(*p)[4] = s->point[i / 4];

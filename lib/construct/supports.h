@@ -1,9 +1,12 @@
-/* Runs of vertices along the curve, and how far they reach in a direction. */
+/* The support of the solid in a gray node's cell, and bounds of runs of vertices along the curve
+ * (supports.c). */
 #ifndef EBPO_CONSTRUCT_SUPPORTS_H
 #define EBPO_CONSTRUCT_SUPPORTS_H
 
 #include "construct/builder.h"
 #include "construct/sweep.h"
+
+/* --- runs of vertices --- */
 
 /* The vertices in a cell. */
 void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *begin, uint64_t *end);
@@ -11,8 +14,7 @@ void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *be
 ebpo_status ebpo_bounds_make(ebpo_builder *b, ebpo_error *error);
 void ebpo_bounds_free(ebpo_bounds *bounds);
 
-/* The support of the solid in a gray node's cell: the greatest n . xi over mesh vertices in the
- * cell, points where faces cross its walls, and its corners inside. */
+/* --- the support of the solid: over vertices, crossings of cell faces, and inside corners --- */
 
 typedef struct ebpo_supports {
     const ebpo_builder *b;

@@ -1,6 +1,6 @@
-/* The two inner loops of hulls and supports, four doubles at a time. They stand in sweep.inc and
- * are compiled twice, for any processor and for those with AVX2; the same operations in the same
- * order, so results are the same. */
+/* The two inner loops of hulls and supports, four doubles at a time (sweep_kernels.c). They are
+ * compiled once for each instruction set, with the same operations in the same order, so results
+ * are the same. */
 #ifndef EBPO_CONSTRUCT_SWEEP_H
 #define EBPO_CONSTRUCT_SWEEP_H
 

@@ -1,4 +1,7 @@
-/* See sweep.h. Included by one source for each kind of processor. */
+/* The two inner loops of hulls and supports, four doubles at a time: planes that a point lies
+ * above, and the greatest value among points. meson.build compiles this file once for each
+ * instruction set; the operations and their order are the same in each, so results are too. The
+ * interface is sweep.h; core/cpu.h chooses the variant. */
 #include "core/strict_fp.h"
 
 #include "construct/sweep.h"
@@ -19,8 +22,8 @@ static int list_bits(unsigned bits, int first, uint16_t *list, int capacity, int
     return count;
 }
 
-static int planes_seen(const ebpo_sweep_planes *planes, const double p[3], double beyond, double above,
-                uint16_t *list, int capacity)
+static int planes_seen(const ebpo_sweep_planes *planes, const double p[3], double beyond,
+                       double above, uint16_t *list, int capacity)
 {
     uint8_t sees[EBPO_SWEEP_PLANES / 4 + 1];
     v4d x = v4d_all(p[0]), y = v4d_all(p[1]), z = v4d_all(p[2]), far = v4d_all(beyond),
@@ -59,7 +62,7 @@ static v4d greater_of(v4d a, v4d b)
 }
 
 static uint64_t highest_value(const ebpo_sweep_points *points, const double n[3], double enough,
-                        double *best)
+                              double *best)
 {
     v4d nx = v4d_all(n[0]), ny = v4d_all(n[1]), nz = v4d_all(n[2]);
     uint64_t stretch = UINT64_MAX;

@@ -1,6 +1,11 @@
-/* A face against a cell: which octants it may touch, and its part in the cell. Everything errs on
- * the safe side by a bound on the rounding, so that no exact arithmetic is needed: including a
- * neighbour costs nothing, missing one is a bug. */
+/* Tests a face against a cell: which octants of the cell it may touch, whether it misses the cell,
+ * and its part within the cell as a polygon.
+ *
+ * Everything errs on the safe side by a bound on the rounding, so no exact arithmetic is needed:
+ * including a neighbour costs little, missing one is an error of the file. The tests use the face's
+ * bounding box, its plane and the cross products of its edges with the axes (separating axes).
+ * Clipping widens the cell by the bound, so that a face that touches the closed cell always leaves
+ * points. */
 #include "core/strict_fp.h"
 
 #include <math.h>

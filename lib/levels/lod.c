@@ -1,3 +1,13 @@
+/* Computes the polygons of a level: the envelopes of its nodes, as triangles.
+ *
+ * The walk goes from the root down, each envelope cut from its parent's by the node's own planes. A
+ * leaf's planes come from the file, or from its faces (construct/leaf_planes.c), or it keeps its
+ * parent's envelope. The top of the tree is walked first; the subtrees below it are independent and
+ * go to all threads. Where the tree is cut depends on the tree alone, and pieces are joined in
+ * octcode order, so the number of threads does not change the result.
+ *
+ * The parts: polyhedra as triangles; the model, which is what a walk reads; leaves; colours of
+ * nodes; the walk. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -15,9 +25,9 @@
 #include "geometry/polytope.h"
 #include "levels/lod.h"
 
-/* Colours of a level's nodes. */
-
 static const uint64_t count_limit = UINT32_MAX - 1;
+
+/* --- polyhedra as triangles --- */
 
 static void polyhedra_free(ebpo_polyhedra *piece)
 {
@@ -173,6 +183,8 @@ ebpo_status ebpo_polyhedra_join(ebpo_mesh *out, ebpo_lod_nodes *out_nodes,
     return EBPO_OK;
 }
 
+/* --- the model --- */
+
 void ebpo_lod_model_free(ebpo_lod_model *model)
 {
     for (int i = 0; i < EBPO_LEVELS_MAX; i++) {
@@ -229,7 +241,7 @@ ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int 
     return status;
 }
 
-/* Envelopes of leaves. */
+/* --- envelopes of leaves --- */
 
 static bool take_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
 {
@@ -309,7 +321,8 @@ ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, ui
 /* Cuts `envelope` (on entry the parent's in this cell) to that of leaf number `leaf` of the cell's
  * level. */
 static ebpo_status cut_to_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
-                          ebpo_leaf_scratch *scratch, ebpo_polytope *envelope, ebpo_error *error)
+                               ebpo_leaf_scratch *scratch, ebpo_polytope *envelope,
+                               ebpo_error *error)
 {
     const ebpo_level *level = &model->level[cell.level];
     const ebpo_level_ranks *ranks = &model->ranks[cell.level];
@@ -323,6 +336,8 @@ static ebpo_status cut_to_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint
         return EBPO_OK;
     return ebpo_lod_leaf_planes(model, cell, leaf, scratch, envelope, codes, &count, error);
 }
+
+/* --- colours of nodes --- */
 
 /* Down from the root: of the last gray node on the way, which is the node or its parent. */
 static bool find_colour(const ebpo_lod_model *model, uint64_t octcode, uint32_t *colour)
@@ -388,9 +403,7 @@ ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes, uint64_t vertex_count,
     return EBPO_OK;
 }
 
-/* A level's envelopes: from the root down, each cut from its parent's. The top of the tree is
- * walked first; the subtrees that hang from it are independent of each other. Where it is cut
- * depends on the tree alone, so the result does not depend on the number of threads. */
+/* --- the walk --- */
 
 enum { SEEDS_WANTED = 128 };
 
@@ -424,7 +437,8 @@ typedef struct walker {
     ebpo_error *error;
 } walker;
 
-static ebpo_status emit_polytope(walker *w, const ebpo_polytope *p, ebpo_cell cell, ebpo_node_type type)
+static ebpo_status emit_polytope(walker *w, const ebpo_polytope *p, ebpo_cell cell,
+                                 ebpo_node_type type)
 {
     ebpo_polyhedra *piece = &w->out[cell.level];
     piece->volume += ebpo_polytope_volume(p) * ebpo_cell_volume(&w->j->model->box, cell.level);

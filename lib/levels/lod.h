@@ -1,4 +1,5 @@
-/* Polyhedra as triangles, collected piece by piece and joined in a fixed order. */
+/* Polygons of a level (lod.c): polyhedra as triangles, the model that a walk reads, and the planes
+ * of leaves. */
 #ifndef EBPO_LEVELS_LOD_H
 #define EBPO_LEVELS_LOD_H
 
@@ -9,6 +10,8 @@
 #include "geometry/cells.h"
 #include "geometry/level_nodes.h"
 #include "geometry/polytope.h"
+
+/* --- polyhedra as triangles, collected piece by piece and joined in a fixed order --- */
 
 /* What one walk found at one level. */
 typedef struct ebpo_polyhedra {
@@ -35,8 +38,8 @@ EBPO_MUST_USE ebpo_status ebpo_polyhedra_join(ebpo_mesh *out, ebpo_lod_nodes *no
                                               ebpo_polyhedra *const *pieces, uint64_t count,
                                               ebpo_error *error);
 
-/* What a walk down the tree needs: the levels, their ranks, and the faces from which leaves derive
- * their planes. Read only while walking. */
+/* --- the model: levels, ranks, and the faces from which leaves derive planes; read only while
+ * walking --- */
 
 typedef enum ebpo_leaf_source {
     EBPO_LEAF_STORED,   /* planes from the file */

@@ -1,10 +1,12 @@
-/* Which way a level's polygons are lit. A polygon on a plane lies nearly as the surface below it.
- * One on a wall between cells, a step from one envelope to the next, says nothing of the surface:
- * it takes the direction that the planes around it have.
+/* Computes normals for the polygons of a level, for shading.
  *
- * For each of the six sides: at every corner of a drawn cell the mean, by area, of the plane
- * polygons of the nodes around it that look to that side; between corners, linearly. Planes of the
- * other side of a thin part do not count. */
+ * A polygon on a plane is nearly parallel to the surface below it and has the plane's direction. A
+ * polygon on a cell face is a step from one envelope to the next and says nothing of the surface:
+ * it gets the direction of the planes around it.
+ *
+ * For each of the six sides: at every corner of a drawn cell, the mean, by area, of the plane
+ * polygons of the nodes around the corner that look to that side; between corners, linear
+ * interpolation. Planes of the other side of a thin part do not count. */
 #include "core/strict_fp.h"
 
 #include <ebpo/lod.h>
@@ -219,7 +221,8 @@ static ebpo_status lighting_prepare(lighting *l, ebpo_error *error)
                                                 nodes * (sizeof *l->at + 8 * sizeof *l->sum));
 }
 
-static ebpo_status check_nodes(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes, ebpo_error *error)
+static ebpo_status check_nodes(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes,
+                               ebpo_error *error)
 {
     uint64_t triangles = 0;
     if (!mesh->xyz64 && mesh->face_count)

@@ -1,3 +1,14 @@
+/* Delivers a file level by level, node by node in octcode order, for readers that show or process a
+ * model while it arrives.
+ *
+ * Of a level that has been passed only the types stay, and with polygons the planes: enough to walk
+ * down to the nodes of the next level. Within a level, the depth-first walk from the root visits
+ * groups, nodes of each type and planes in the order in which they are stored; so running counts
+ * find them, without tables of sums.
+ *
+ * Half-spaces and polygons are converted from a cell's coordinates to the model's with bounded
+ * rounding: a point of the cell that satisfies a plane's code also satisfies the delivered plane.
+ * Points on cell faces get the faces' own coordinates, so that neighbours agree to the last bit. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -16,6 +27,8 @@
 #include "geometry/cells.h"
 #include "geometry/level_nodes.h"
 #include "levels/stream.h"
+
+/* --- from cell to model coordinates --- */
 
 /* With t the cell's shortest side and N = t n / size, the half-space is N . (p - corner) <= t d /
  * 4096. For any normal a, any factor f > 0, and p in the cell: a . p = a . corner + f N . (p -
@@ -51,7 +64,7 @@ void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3]
 /* Vertices of the polytope, rounded; those on the cell's walls get the walls' own coordinates, so
  * that neighbours agree to the last bit. */
 static void polytope_to_world(const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell,
-                            double (*out)[3])
+                              double (*out)[3])
 {
     uint8_t sides[EBPO_POLYTOPE_VERTICES];
     ebpo_polytope_sides(p, sides);
@@ -59,6 +72,8 @@ static void polytope_to_world(const ebpo_polytope *p, const ebpo_box *box, ebpo_
         for (int k = 0; k < 3; k++)
             out[v][k] = ebpo_wall_point(box, cell, k, p->vertex[v][k], sides[v]);
 }
+
+/* --- the members of an ebpo_stream_node --- */
 
 void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
                      ebpo_node_type type)
@@ -99,9 +114,7 @@ void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const eb
     out->corners = capacity->corners;
 }
 
-/* Walking the nodes of one level in octcode order, down from the root through the levels kept.
- * Within a level, depth-first order visits groups, nodes of each type, and planes in the order in
- * which they are stored: so running counts do, and no table of sums is needed. */
+/* --- walking the nodes of one level --- */
 
 typedef struct level_walk_node {
     ebpo_octcode octcode;
@@ -185,7 +198,7 @@ static bool level_walk_next(level_walk *w, level_walk_node *out)
 
 /* Of the ancestor at `depth`, and those above it. */
 static const ebpo_polytope *ancestor_envelope(const level_walk *w, int depth,
-                                                ebpo_envelope_stack *e)
+                                              ebpo_envelope_stack *e)
 {
     const level_walk_node *node = &w->at[depth].node;
     const ebpo_polytope *held = ebpo_envelope_held(e, node->octcode);
@@ -199,16 +212,14 @@ static const ebpo_polytope *ancestor_envelope(const level_walk *w, int depth,
 /* Envelope of the node that ebpo_level_walk_next gave last, in coordinates of its cell; gray nodes
  * and leaves: from the cube down, cut by the planes of all ancestors and its own. Black nodes: the
  * cube. Lent until the next call with these envelopes. */
-static const ebpo_polytope *level_walk_envelope(const level_walk *w,
-                                              const level_walk_node *node,
-                                              ebpo_envelope_stack *e)
+static const ebpo_polytope *level_walk_envelope(const level_walk *w, const level_walk_node *node,
+                                                ebpo_envelope_stack *e)
 {
     return node->type == EBPO_BLACK ? ebpo_envelope_put_cube(e, node->octcode)
                                     : ancestor_envelope(w, w->target, e);
 }
 
-/* Levels one after the other. Of a level that has been passed only its types stay, and with
- * polygons its planes: enough to walk down to the nodes of the next one. */
+/* --- the stream --- */
 
 enum { PIECE = 4096 };
 
@@ -313,7 +324,7 @@ typedef struct volumes {
 typedef struct job {
     const ebpo_stream *stream;
     int target;
-    level_walk *starts;        /* [pieces] */
+    level_walk *starts;             /* [pieces] */
     volumes *found;                 /* [pieces] */
     ebpo_envelope_stack *envelopes; /* [threads] */
 } job;
@@ -330,8 +341,7 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
         for (int k = 0; k < PIECE && level_walk_next(&walk, &node); k++)
             if (node.type != EBPO_WHITE)
                 *(node.type == EBPO_GRAY ? &j->found[i].gray : &j->found[i].uniform_volume) +=
-                    ebpo_polytope_volume(
-                        level_walk_envelope(&walk, &node, &j->envelopes[worker])) *
+                    ebpo_polytope_volume(level_walk_envelope(&walk, &node, &j->envelopes[worker])) *
                     cell;
     }
     return EBPO_OK;
@@ -388,7 +398,7 @@ static volumes stated_volumes(const ebpo_stream *s, int level)
                           (double)summary->black_count * ebpo_cell_volume(&s->box, level) };
 }
 
-/* --- levels --- */
+/* --- advancing to the next level --- */
 
 void ebpo_stream_prefetch(const ebpo_stream *s, int last)
 {
@@ -438,7 +448,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     return EBPO_OK;
 }
 
-/* --- nodes --- */
+/* --- returning nodes --- */
 
 static int32_t winding_of(const ebpo_level *level, const level_walk_node *node)
 {
@@ -452,8 +462,7 @@ static int32_t winding_of(const ebpo_level *level, const level_walk_node *node)
 }
 
 /* Of a node that is not gray: its parent's, which was passed before it. */
-static void add_colour(const ebpo_stream *s, const level_walk_node *node,
-                       ebpo_stream_node *out)
+static void add_colour(const ebpo_stream *s, const level_walk_node *node, ebpo_stream_node *out)
 {
     bool gray = node->type == EBPO_GRAY;
     int level = s->level - !gray;
@@ -480,8 +489,7 @@ ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *m
     if (s->options.planes || s->options.polygons)
         ebpo_node_add_planes(out, &s->box, node.codes, node.code_count, &s->capacity);
     if (s->options.polygons && node.type != EBPO_WHITE)
-        ebpo_node_add_polygons(out, &s->box,
-                               level_walk_envelope(&s->walk, &node, s->envelopes),
+        ebpo_node_add_polygons(out, &s->box, level_walk_envelope(&s->walk, &node, s->envelopes),
                                &s->capacity);
     *more = true;
     return EBPO_OK;

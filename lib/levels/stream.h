@@ -1,4 +1,5 @@
-/* From a cell's coordinates to the model's: half-spaces and polygons. */
+/* Nodes as a stream delivers them (stream.c): half-spaces and polygons in the model's coordinates.
+ * lib/query's subtrees return nodes in the same form. */
 #ifndef EBPO_LEVELS_STREAM_H
 #define EBPO_LEVELS_STREAM_H
 
@@ -10,6 +11,8 @@
 #include "geometry/cells.h"
 #include "geometry/polytope.h"
 
+/* --- half-spaces --- */
+
 /* The code's half-space 4096 (n . xi) <= d as out[0..2] . p <= out[3] with a unit normal (to 4
  * ulps): every real point p of the cell that satisfies the code satisfies this, and also when the
  * left side is evaluated in doubles in any order, for double p. The offset is larger than need be
@@ -17,7 +20,7 @@
 void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3], int32_t d,
                          double out[4]);
 
-/* Filling in an ebpo_stream_node: cell, planes, polygons. */
+/* --- filling in an ebpo_stream_node: cell, planes, polygons --- */
 
 enum { EBPO_NODE_CODES = 255 };
 

@@ -1,3 +1,13 @@
+/* The cut of a view: which nodes of the tree have been delivered, and which of them is refined
+ * next.
+ *
+ * - An observer, made ready as a viewpoint, says of a cell how far it is, how large in pixels, and
+ *   whether it is in the frustum. It gives each node a key: the order of priority. Comparisons
+ *   allow for rounding: a cell that is hardly seen counts as seen.
+ * - The partial tree holds the groups of siblings that have been delivered, each linked to its
+ *   parent once it is complete.
+ * - The frontier holds the gray nodes of the cut in a binary heap, the next one to be refined on
+ *   top. Equal keys are ordered by octcode, so that the order is the same everywhere. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -10,6 +20,8 @@
 #include "geometry/cells.h"
 #include "geometry/vec3.h"
 #include "levels/view_cut.h"
+
+/* --- the observer --- */
 
 /* of a sum of three products, generously: what is hardly seen counts as seen */
 static const double SLACK = 1e-12;
@@ -143,8 +155,7 @@ unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *s, const ebpo_box *box, ebp
 
 /* Octants from the root down, each as seen from the eye: reading them as one number gives the
  * enumeration's order. */
-static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box,
-                                   ebpo_octcode octcode)
+static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_octcode octcode)
 {
     int level = ebpo_octcode_level(octcode);
     ebpo_cell cell = ebpo_cell_of_octcode(octcode);
@@ -179,6 +190,8 @@ uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_p
     default: return octcode;
     }
 }
+
+/* --- the partial tree --- */
 
 void ebpo_partial_free(ebpo_partial *partial)
 {
@@ -267,6 +280,8 @@ const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *g, ebpo_partial_n
     }
     return envelope;
 }
+
+/* --- the frontier --- */
 
 static bool waits_before(const ebpo_waiting *a, const ebpo_waiting *b)
 {

@@ -1,3 +1,13 @@
+/* Delivers a view: one group of siblings after the other, those first that the observer's priority
+ * puts first, until the view's limits are reached.
+ *
+ * Each step takes the top of the frontier (view_cut.h), reads the group of its children, with the
+ * faces of leaves if they are wanted, and returns the siblings; when all are delivered they replace
+ * their parent in the cut. When the observer changes, the frontier is sorted again; what has been
+ * delivered stays.
+ *
+ * For files behind a network, the chunks that a group needs are requested together, and with them
+ * the chunks of the groups that come soon, as far as the reader's memory allows. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -14,8 +24,6 @@
 #include "format/subtree_index.h"
 #include "geometry/cells.h"
 #include "levels/view_cut.h"
-
-/* The faces of leaves in a view stream. */
 
 /* Of the siblings that are being delivered, and which faces have been. */
 typedef struct view_leaves {
@@ -36,15 +44,11 @@ typedef struct view_group {
     uint64_t parent;
 } view_group;
 
-/* What a view stream needs of a file far away: asked for together, and ahead. */
-
 /* To which level the view goes below a node, at most. */
 typedef struct view_depth {
     int (*level)(const void *user, uint64_t octcode);
     const void *user;
 } view_depth;
-
-/* Inside an ebpo_view_stream. */
 
 struct ebpo_view_stream {
     const ebpo_file *file;
@@ -70,8 +74,7 @@ struct ebpo_view_stream {
     double soon_pixels;
 };
 
-static ebpo_status view_leaves_new(view_leaves **out, const ebpo_file *file,
-                                        ebpo_error *error)
+static ebpo_status view_leaves_new(view_leaves **out, const ebpo_file *file, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     *out = NULL;
@@ -111,7 +114,7 @@ static void view_leaves_free(view_leaves *l)
 
 /* The node of an octant of a group that has been read, if it is a leaf. */
 static bool leaf_of_group(const view_group *group, const ebpo_group *read, unsigned octant,
-                              ebpo_node *out)
+                          ebpo_node *out)
 {
     if (ebpo_group_type(read->types, octant) != EBPO_LEAF ||
         octant >= ebpo_group_octants(group->number.level))
@@ -124,7 +127,7 @@ static bool leaf_of_group(const view_group *group, const ebpo_group *read, unsig
     return true;
 }
 
-/* --- reading --- */
+/* --- faces of leaves: reading --- */
 
 static ebpo_status make_room(view_leaves *l, uint64_t faces, ebpo_error *error)
 {
@@ -136,9 +139,8 @@ static ebpo_status make_room(view_leaves *l, uint64_t faces, ebpo_error *error)
 }
 
 /* The faces of all leaves of a group that has been read. On failure there are none. */
-static ebpo_status view_leaves_read(view_leaves *l, ebpo_chunks *chunks,
-                                         const view_group *group, const ebpo_group *read,
-                                         ebpo_error *error)
+static ebpo_status view_leaves_read(view_leaves *l, ebpo_chunks *chunks, const view_group *group,
+                                    const ebpo_group *read, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_node leaf;
@@ -154,13 +156,10 @@ static ebpo_status view_leaves_read(view_leaves *l, ebpo_chunks *chunks,
     return status;
 }
 
-/* --- giving --- */
+/* --- faces of leaves: returning them --- */
 
 /* About no node. */
-static void give_no_leaf(view_leaves *l)
-{
-    l->now = (ebpo_view_faces)EBPO_VIEW_FACES_INIT;
-}
+static void give_no_leaf(view_leaves *l) { l->now = (ebpo_view_faces)EBPO_VIEW_FACES_INIT; }
 
 static void take_face(view_leaves *l, const ebpo_slice *slice, uint32_t face)
 {
@@ -189,6 +188,8 @@ static void give_leaf(view_leaves *l, unsigned octant)
         take_face(l, slice, face);
 }
 
+/* --- fetching: requests --- */
+
 typedef struct fetching {
     ebpo_chunks *chunks;
     const ebpo_partial *partial;
@@ -207,7 +208,7 @@ static view_group children_of(const ebpo_waiting *w)
 /* What comes next, and after it what comes soon; returns how many groups. Of those that stand
  * together in blocks of so many, one. */
 static unsigned coming_groups(const fetching *f, const view_group *first, unsigned block,
-                                  view_group groups[EBPO_FRONTIER_BLOCKS])
+                              view_group groups[EBPO_FRONTIER_BLOCKS])
 {
     uint64_t best[EBPO_FRONTIER_BLOCKS];
     unsigned count = ebpo_frontier_blocks(f->frontier, block, best);
@@ -232,7 +233,7 @@ static void try_group(const fetching *f, const view_group *group)
     }
 }
 
-/* --- subtrees --- */
+/* --- fetching: subtrees --- */
 
 static bool below_subtrees(const fetching *f, const view_group *group)
 {
@@ -263,8 +264,7 @@ typedef struct entering {
 } entering;
 
 /* In which subtrees these groups stand, each once; not what waits at a root. */
-static void enter_groups(const fetching *f, const view_group *groups, unsigned count,
-                         entering *e)
+static void enter_groups(const fetching *f, const view_group *groups, unsigned count, entering *e)
 {
     int level = f->chunks->file->info.subtree_level;
     for (unsigned i = 0; i < count; i++) {
@@ -344,8 +344,7 @@ static bool try_subtrees(const fetching *f, const view_group *groups, unsigned c
 /* The chunks that the group waits for next, and, unless they have been announced before, behind
  * these what the next groups take: so one batch is used up before the next one is told. How many
  * are its own. */
-static unsigned collect_chunks(const fetching *f, const view_group *group,
-                                   ebpo_chunk_keys *keys)
+static unsigned collect_chunks(const fetching *f, const view_group *group, ebpo_chunk_keys *keys)
 {
     enum { FACES_BLOCK = 64, TRIED = 64 }; /* trying is work */
     view_group groups[EBPO_FRONTIER_BLOCKS];
@@ -400,9 +399,9 @@ static ebpo_status fetch_nodes(const fetching *f, const view_group *group, ebpo_
  * of the frontier take: where the file has a table of subtrees, all of the subtrees in which they
  * are. Counted chunks: EBPO_E_LIMIT as ebpo_group_read. */
 static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
-                                   const ebpo_frontier *frontier, const view_group *group,
-                                   unsigned wanted, bool faces, const view_depth *depth,
-                                   ebpo_error *error)
+                               const ebpo_frontier *frontier, const view_group *group,
+                               unsigned wanted, bool faces, const view_depth *depth,
+                               ebpo_error *error)
 {
     fetching f = { chunks, partial, frontier, wanted, faces, depth };
     ebpo_status status = EBPO_OK;
@@ -411,8 +410,6 @@ static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
     return status == EBPO_OK && (faces || below_subtrees(&f, group)) ? fetch_tried(&f, group, error)
                                                                      : status;
 }
-
-/* One group of siblings after the other, chosen from the gray nodes of the cut. */
 
 enum { MEMORY_LEAST = 1 << 20 };
 
@@ -625,8 +622,8 @@ static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo
         if (read_at_once(s, group, wanted))
             return EBPO_OK;
         set_soon(s, group->parent ? group->parent : 1);
-        status = fetch_group(s->chunks, &s->partial, &s->frontier, group, wanted,
-                                 s->leaves != NULL, &depth, error);
+        status = fetch_group(s->chunks, &s->partial, &s->frontier, group, wanted, s->leaves != NULL,
+                             &depth, error);
     }
     return status == EBPO_OK ? read_now(s, group, wanted, error) : status;
 }
@@ -757,7 +754,7 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
     return EBPO_OK;
 }
 
-/* What of a view has been delivered: faces of a leaf, the cut, and figures. */
+/* --- what has been delivered: the cut, statistics, faces --- */
 
 typedef struct visitor {
     ebpo_view_stream *stream;

@@ -1,5 +1,15 @@
-/* From the root down, node by node; no byte is computed: whether it is the right one is a question
- * of two products. */
+/* Verifies a file: runs all checks in order and makes the report. This folder is the judge of the
+ * others: it uses nothing of construct, of the writer or of query, and keeps its own vector
+ * functions. Cells, half-spaces and clipping are computed here in another way than in the builder;
+ * only the exact predicates are shared (tests/lint/test_layers.py checks the folders).
+ *
+ * The order: chunk directory and chunk checksums (verify_chunks.c), the content's checksum, whether
+ * the arrays fit together; only then structure, nesting, colours, the walk (containment, lists,
+ * labels), subtrees, and chunks of faces; last the source mesh and unused bytes. Damage that
+ * reading reports is a violation, not an error of the call.
+ *
+ * Colours of gray nodes are checked here, from the root down. No byte is computed: two products say
+ * whether it is the nearest to the mean. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -17,7 +27,7 @@
 #include "verify/verify_parts.h"
 #include "verify/verify_tree.h"
 
-/* Colours of gray nodes against those of the faces below. */
+/* --- colours of gray nodes --- */
 
 enum { NODES_A_TIME = 128 };
 
@@ -127,8 +137,7 @@ static bool vertices_differ(const judging *j)
 
 /* Of a tree with colours whose shape was checked; where it has no mesh, its mesh has no colours, or
  * it is a subset, nothing can be said. EBPO_E_MEMORY. */
-static ebpo_status check_colours(ebpo_tally *tally, const ebpo_twin_tree *view,
-                                      ebpo_error *error)
+static ebpo_status check_colours(ebpo_tally *tally, const ebpo_twin_tree *view, ebpo_error *error)
 {
     const ebpo_tree *tree = view->tree;
     judging j = { .tally = tally, .view = view };
@@ -147,8 +156,7 @@ static ebpo_status check_colours(ebpo_tally *tally, const ebpo_twin_tree *view,
     return EBPO_OK;
 }
 
-/* Proves a file's promises. Of the builder's geometry only the exact predicates are used: cells,
- * half-spaces and clipping are done here in another way. */
+/* --- the checks in order --- */
 
 /* `file`: where the tree is from, or NULL. */
 static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, const ebpo_tree *tree,

@@ -1,3 +1,11 @@
+/* Verifies how the file stores its chunks (format-spec/README.md, sections 7 and 20).
+ *
+ * - Chunks of faces with the coding `gates` are decoded by a second reader, which follows the
+ *   specification line by line without regard to speed, and compared with what the library decoded.
+ * - The directory of all chunks is compared with HDF5's own index.
+ * - Bytes of the file that belong to nothing are counted. They change no answer, but a change of
+ *   them must not go unseen.
+ * - Chunk checksums are compared with the chunks, which are read without the reader's check. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +19,8 @@
 #include "hdf5_read/chunk.h"
 #include "hdf5_read/head.h"
 #include "verify/verify_parts.h"
+
+/* --- a second reader of the coding gates --- */
 
 enum { OPEN_MOST = 64, NEAR = 32 };
 
@@ -170,7 +180,7 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uin
     return true;
 }
 
-/* Faces that are stored across edges, read by the plain gates_reader. */
+/* --- gates against the reader --- */
 
 enum { CORNERS_MOST = EBPO_CHUNK_BYTES_MAX / 4 };
 
@@ -216,10 +226,9 @@ ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file, const ebp
     return status;
 }
 
-/* The list of all chunks, against HDF5's own index. */
+/* --- the chunk directory --- */
 
-#define CHECK(condition, ...) \
-    ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
+#define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
 /* An array as HDF5 tells it, and how many of its chunks the list has had. */
 typedef struct indexed {
@@ -317,20 +326,20 @@ static void compare_row(places_comparison *c, uint64_t row, uint64_t at, uint32_
     indexed *of = find_indexed(c, number);
     if (!of) {
         CHECK(number >= 4096,
-                     "/subtrees/places, row %" PRIu64 ": number %" PRIu32
-                     " is of an array that is not in the file",
-                     row, number);
+              "/subtrees/places, row %" PRIu64 ": number %" PRIu32
+              " is of an array that is not in the file",
+              row, number);
         return;
     }
     if (!CHECK(of->listed < of->count,
-                      "/subtrees/places, row %" PRIu64 ": %s has only %" PRIu64 " chunks", row,
-                      of->array->path, of->count))
+               "/subtrees/places, row %" PRIu64 ": %s has only %" PRIu64 " chunks", row,
+               of->array->path, of->count))
         return;
     const ebpo_chunk_place *chunk = &of->chunks[of->listed++];
     CHECK(chunk->address == at && chunk->bytes == bytes,
-                 "/subtrees/places, row %" PRIu64 ": %" PRIu32 " bytes at %" PRIu64
-                 " as chunk %" PRIu64 " of %s, but HDF5 has %" PRIu32 " at %" PRIu64,
-                 row, bytes, at, of->listed - 1, of->array->path, chunk->bytes, chunk->address);
+          "/subtrees/places, row %" PRIu64 ": %" PRIu32 " bytes at %" PRIu64 " as chunk %" PRIu64
+          " of %s, but HDF5 has %" PRIu32 " at %" PRIu64,
+          row, bytes, at, of->listed - 1, of->array->path, chunk->bytes, chunk->address);
     if (is_top(c, of) && chunk->address + chunk->bytes > c->top)
         c->top = chunk->address + chunk->bytes;
 }
@@ -346,13 +355,12 @@ static void compare_directory(places_comparison *c)
     }
     for (unsigned i = 0; i < c->arrays; i++)
         CHECK(c->array[i].listed == c->array[i].count,
-                     "/subtrees/places has %" PRIu64 " of the %" PRIu64 " chunks of %s",
-                     c->array[i].listed, c->array[i].count, c->array[i].array->path);
+              "/subtrees/places has %" PRIu64 " of the %" PRIu64 " chunks of %s",
+              c->array[i].listed, c->array[i].count, c->array[i].array->path);
     uint64_t top = c->file->info.top_bytes;
     CHECK(top == 0 || (top >= c->top && top <= c->file->info.file_bytes),
-                 "top_bytes states %" PRIu64
-                 ", but what looking up a subtree takes ends at %" PRIu64,
-                 top, c->top);
+          "top_bytes states %" PRIu64 ", but what looking up a subtree takes ends at %" PRIu64, top,
+          c->top);
 }
 
 ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
@@ -386,8 +394,7 @@ ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
     return EBPO_OK;
 }
 
-/* Bytes of the file that belong to nothing. What stands there changes no answer, but a change of it
- * shall not go unseen. */
+/* --- bytes that belong to nothing --- */
 
 typedef struct survey {
     const ebpo_file *file;
@@ -521,7 +528,7 @@ ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progres
     return status == EBPO_OK || status == EBPO_E_FORMAT ? EBPO_OK : ebpo_fail_with(error, &own);
 }
 
-/* The list of how chunks end, against the chunks: read by itself, without the reader's check. */
+/* --- chunk checksums --- */
 
 enum { SUM_BYTES = 4, UNKNOWN = 20000 };
 
@@ -550,21 +557,21 @@ static uint32_t number_of(const ebpo_array_in *a)
 }
 
 static ebpo_status compare_sum(sums_comparison *c, const ebpo_array_in *a, uint64_t chunk,
-                                      uint64_t row, ebpo_error *error)
+                               uint64_t row, ebpo_error *error)
 {
     ebpo_tally *tally = c->tally;
     ebpo_chunk_place at = a->chunks[chunk];
     uint8_t end[SUM_BYTES] = { 0 };
     if (!CHECK(at.bytes >= SUM_BYTES, "%s, chunk %" PRIu64 ": less than four bytes", a->path,
-                    chunk))
+               chunk))
         return EBPO_OK;
     ebpo_status status = ebpo_input_read(&ebpo_reader_own(c->file)->in,
                                          at.address + at.bytes - SUM_BYTES, SUM_BYTES, end, error);
     if (status == EBPO_OK)
         CHECK(ebpo_load32(end) == (uint32_t)c->list[row],
-                   "%s, chunk %" PRIu64 ": /chunk_sums, row %" PRIu64 ", says %08" PRIx32
-                   ", but it ends with %08" PRIx32,
-                   a->path, chunk, row, (uint32_t)c->list[row], ebpo_load32(end));
+              "%s, chunk %" PRIu64 ": /chunk_sums, row %" PRIu64 ", says %08" PRIx32
+              ", but it ends with %08" PRIx32,
+              a->path, chunk, row, (uint32_t)c->list[row], ebpo_load32(end));
     return status;
 }
 
@@ -580,7 +587,7 @@ static ebpo_status compare_array(sums_comparison *c, const ebpo_array_in *a, ebp
         if ((uint32_t)(c->list[row] >> 32) == number && found++ < chunks)
             status = compare_sum(c, a, found - 1, row, error);
     CHECK(found == chunks, "/chunk_sums has %" PRIu64 " rows of the %" PRIu64 " chunks of %s",
-               found, chunks, a->path);
+          found, chunks, a->path);
     return status;
 }
 

@@ -1,6 +1,11 @@
-/* A triangle is clipped by the six walls, one after the other (Sutherland and Hodgman, "Reentrant
- * polygon clipping", 1974). With exact numbers and closed half-spaces the corners that remain span
- * the intersection, down to a single point of contact. */
+/* Decides whether a face touches a cell, whether a face's part in a cell keeps to the node's
+ * planes, and how often a ray meets a face. Floating point with error bounds decides most cases;
+ * the rest goes to rationals (GMP), so every answer is exact. Nothing is shared with the builder
+ * but the exact predicates.
+ *
+ * The parts, each with its method: clipping in rationals (Sutherland and Hodgman, "Reentrant
+ * polygon clipping", 1974), separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996), winding
+ * numbers by rays, containment by weak duality. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -349,7 +354,6 @@ int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face)
  * face by one wall, or on the face by two walls. So rounded m still give certain bounds, and
  * nothing has to be clipped. What stays undecided is clipped in rationals. */
 
-
 void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_twin_tree *view,
                          const ebpo_twin_node *node)
 {
@@ -381,8 +385,7 @@ static double highest_corner(const local_face *face, const double n[3])
 }
 
 /* The bound above for one m, rounding included. */
-static bool is_certified(const local_face *face, const double n[3], const double m[3],
-                                  double bound)
+static bool is_certified(const local_face *face, const double n[3], const double m[3], double bound)
 {
     double rest[3], cube = 0, size = 0;
     for (int k = 0; k < 3; k++) {
@@ -444,8 +447,7 @@ static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i,
 {
     const double *n = planes->n[i];
     double bound = planes->bound[i],
-           error = 16 * eps * 511 *
-                   fmax(local->reach[0], fmax(local->reach[1], local->reach[2]));
+           error = 16 * eps * 511 * fmax(local->reach[0], fmax(local->reach[1], local->reach[2]));
     if (highest_corner(local, n) <= bound - error)
         return true;
     if (corner_beyond(local, n, bound, error))

@@ -1,5 +1,5 @@
-/* Triangle against cell in rationals (GMP): the last word where floating point cannot tell. Slow;
- * pure; any thread. */
+/* Exact tests of faces against cells and planes, and winding numbers by rays (verify_geometry.c).
+ * Pure; any thread. */
 #ifndef EBPO_VERIFY_VERIFY_GEOMETRY_H
 #define EBPO_VERIFY_VERIFY_GEOMETRY_H
 
@@ -11,6 +11,8 @@
 #include "geometry/cells.h"
 #include "verify/tally.h"
 #include "verify/verify_tree.h"
+
+/* --- rationals: slow, exact --- */
 
 /* A face: corners in the model's coordinates, exact. */
 typedef struct ebpo_corners {
@@ -25,8 +27,7 @@ bool ebpo_exact_touches(const double low[3], const double high[3], const ebpo_co
 bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face,
                            const int32_t n[3], int32_t d);
 
-/* A face in the coordinates of a cell, and whether it touches the closed cell: floating point with
- * error bounds, rationals when in doubt. */
+/* --- floating point with error bounds, rationals when in doubt --- */
 
 /* A cell: its walls (exact) and the reciprocals of its sizes (rounded). */
 typedef struct ebpo_frame {
@@ -58,8 +59,8 @@ int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);
 /* Corners of a face of a mesh. */
 void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out);
 
-/* Containment: no point of a face in the cell, and no inside corner of the cell, is cut off by the
- * node's own planes. */
+/* --- containment: no point of a face in the cell, and no inside corner, is cut off by the node's
+ * planes --- */
 
 enum { EBPO_HALF_SPACES_MAX = 255 }; /* counts are bytes */
 

@@ -1,3 +1,14 @@
+/* Verifies labels: the winding numbers of cells. Two proofs:
+ *
+ * - By links, for all cells: equal points must have equal winding numbers, whichever cell gives
+ *   them. A cell without faces has one number for all its corners; a leaf gives one for its lowest
+ *   corner, and the others follow by signed crossings along its edges; the 64 corners of a gray
+ *   node's children are 27 points. The root's corners are outside. Every cell is linked to the root
+ *   that way, so all numbers are right when all links hold and the lists are complete
+ *   (verify_lists.c).
+ * - By rays through the whole mesh, for all cells or an even sample, without any of that. The
+ *   points are sorted into columns along x, and each face looks for those that it is in front of;
+ *   so the faces are gone through once, in their order, and only the points are held in memory. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -11,6 +22,8 @@
 #include "core/workspace.h"
 #include "verify/verify_labels.h"
 #include "verify/verify_geometry.h"
+
+/* --- rays --- */
 
 enum { SIDE_MAX = 2048, FACE_GRAIN = 1 << 14 };
 
@@ -115,7 +128,7 @@ static void count_hits(const columns *c, const ebpo_corners *face, uint64_t begi
 }
 
 static ebpo_status follow_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
+                                ebpo_error *error)
 {
     const columns *c = context;
     (void)worker;
@@ -128,7 +141,7 @@ static ebpo_status follow_faces(void *context, uint64_t begin, uint64_t end, uns
         /* the columns of a row stand side by side */
         for (uint64_t z = r.from[1]; z <= r.to[1]; z++) {
             count_hits(c, &face, c->first[z * c->side + r.from[0]],
-                      c->first[z * c->side + r.to[0] + 1]);
+                       c->first[z * c->side + r.to[0] + 1]);
             if (++rows % EBPO_ITEMS_SCATTERED == 0)
                 ebpo_release_pages(c->mesh->workspace);
         }
@@ -165,6 +178,8 @@ static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
     return (double)covered * (double)count / (double)(c.side * c.side);
 }
 
+/* --- which cells are checked by rays --- */
+
 enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };
 /* Points looked at by faces, in all: some seconds. */
 static const double ray_work_affordable = 4e8;
@@ -172,9 +187,8 @@ static const double ray_work_affordable = 4e8;
 static uint64_t usual_samples(const ebpo_twin_tree *view, uint64_t cells)
 {
     uint64_t samples = cells <= CELLS_ALL ? cells : SAMPLES_MANY;
-    return rays_work(&view->tree->mesh, &view->box, samples) <= ray_work_affordable
-               ? samples
-               : SAMPLES_LEAST;
+    return rays_work(&view->tree->mesh, &view->box, samples) <= ray_work_affordable ? samples
+                                                                                    : SAMPLES_LEAST;
 }
 
 void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_twin_tree *view, uint64_t samples)
@@ -217,6 +231,8 @@ static bool is_planned(const ebpo_label_plan *plan, const ebpo_twin_node *node)
     /* (rank + 1) * take / cells is another integer than rank * take / cells */
     return ebpo_wide_modulo(ebpo_wide_product(node->rank, take), cells) >= cells - take;
 }
+
+/* --- corners and links --- */
 
 static void corner_position(const ebpo_frame *frame, unsigned corner, double out[3])
 {

@@ -1,3 +1,5 @@
+/* Labels: winding numbers of the cells' corners, verified by links and by rays (verify_labels.c).
+ */
 #ifndef EBPO_VERIFY_VERIFY_LABELS_H
 #define EBPO_VERIFY_VERIFY_LABELS_H
 
@@ -8,9 +10,7 @@
 #include "verify/verify_geometry.h"
 #include "verify/verify_tree.h"
 
-/* Winding numbers of many points by rays through the whole mesh: the points are sorted into columns
- * along x, and every face looks for those that it lies before. So the faces are gone through once,
- * in their order, and what is held is for the points alone. */
+/* --- rays: winding numbers of many points --- */
 
 /* A point, and what the file says about it. */
 typedef struct ebpo_ray_point {
@@ -37,16 +37,7 @@ EBPO_MUST_USE ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_m
                                            const ebpo_box *box, unsigned threads,
                                            const ebpo_progress *progress, ebpo_error *error);
 
-/* Labels: winding numbers of the cells' corners.
- *
- * Two proofs. (1) By links, for all cells: equal points must have equal winding numbers whichever
- * cell tells them. A cell without faces has one number for all its corners; a leaf gives one for
- * its lowest corner and the others follow by signed crossings along its edges; the 64 corners of a
- * gray node's children are 27 points. The root's corners are outside. As every cell is linked to
- * the root that way, all numbers are right when all links hold (and the lists are complete, which
- * is checked elsewhere). (2) By rays through the whole mesh, for all cells or a sample, without any
- * of that.
- */
+/* --- labels --- */
 
 /* Winding numbers of a cell's corners (bit 0 x, bit 1 y, bit 2 z). */
 typedef struct ebpo_node_windings {

@@ -1,4 +1,10 @@
-/* Face lists of leaves against the faces that touch them. */
+/* Verifies the face lists of leaves against the faces that touch them.
+ *
+ * A leaf must list every face that touches its closed cell; a white or black cell has none. A
+ * listed face that does not touch the leaf must touch the cell widened by 1/256, because the
+ * builder's test errs on the safe side; such entries are counted, not reported. For gray nodes that
+ * ought to be leaves, the different faces below are counted up to the limit. When memory is short
+ * the count proves nothing, and the node passes. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -9,7 +15,7 @@
 #include "verify/verify_parts.h"
 
 static void report_unlisted(ebpo_tally *tally, const ebpo_twin_node *node, uint32_t face,
-                           const char *text)
+                            const char *text)
 {
     ebpo_tally_violation(tally, EBPO_VERIFY_LISTS,
                          &(ebpo_verify_place){ node->code, face, EBPO_NO_PLANE }, "%s", text);
@@ -93,10 +99,10 @@ static void check_leaf(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo
     EBPO_FOR_ITEMS(view->workspace, i, 1, list.ref_count)
         if (list.refs[i] <= list.refs[i - 1])
             report_unlisted(tally, leaf, list.refs[i],
-                           "the list names the face twice or not in order");
+                            "the list names the face twice or not in order");
     if (list.ref_count && list.refs[list.ref_count - 1] >= list.first)
         report_unlisted(tally, leaf, list.refs[list.ref_count - 1],
-                       "the list refers to a face that is not below its first new face");
+                        "the list refers to a face that is not below its first new face");
     tally->checks[EBPO_VERIFY_LISTS] += count + list.ref_count + list.new_count;
     uint64_t spare = (uint64_t)list.ref_count + list.new_count - found;
     tally->spare_entries += spare;
@@ -114,8 +120,8 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_twin_tree *view,
     tally->checks[EBPO_VERIFY_LISTS] += count ? count : 1;
     EBPO_FOR_ITEMS(view->workspace, i, 0, count)
         report_unlisted(tally, node, faces[i],
-                       node->type == EBPO_WHITE ? "the face touches a white cell"
-                                                : "the face touches a black cell");
+                        node->type == EBPO_WHITE ? "the face touches a white cell"
+                                                 : "the face touches a black cell");
 }
 
 enum { LIMIT_OF_LISTS = 1 << 16 };

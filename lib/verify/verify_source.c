@@ -1,3 +1,11 @@
+/* Compares the mesh in a file with the mesh that it was made from.
+ *
+ * The recorded repairs are done again on a copy of the source, which must then be bit for bit the
+ * file's mesh. In the source's order vertices and faces are compared one by one, otherwise as
+ * multisets. Of a subset, and of a component's file, the faces and vertices are compared with those
+ * of their numbers in the source. Attributes must be the source's, in its order, but for elements
+ * that were left out. Of a file whose coordinates an earlier version rounded, that is the only
+ * violation. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -133,7 +141,7 @@ static bool same_head(const ebpo_attribute *a, const ebpo_attribute *b)
 
 /* The digest and the bytes of an image that was not there are no claim. */
 static bool image_unknown(const ebpo_attribute *source, uint64_t at, const ebpo_attribute *stored,
-                    uint64_t i)
+                          uint64_t i)
 {
     return !ebpo_texture_list(source, at).count || !ebpo_texture_list(stored, i).count;
 }
@@ -204,7 +212,7 @@ static int compare_faces(const void *a, const void *b, void *mesh)
 
 /* 0 .. count - 1, sorted; NULL when memory is short. */
 static uint32_t *sorted_order(const ebpo_mesh *mesh, uint64_t count,
-                        int (*compare)(const void *, const void *, void *))
+                              int (*compare)(const void *, const void *, void *))
 {
     uint32_t *order = ebpo_array_alloc(mesh->workspace, count, sizeof *order);
     if (!order)
@@ -323,8 +331,8 @@ static bool was_rounded(const ebpo_info *info, const ebpo_mesh *source)
            strncmp(source->source_format, "ply", 3) != 0;
 }
 
-static ebpo_status compare_meshes(ebpo_tally *tally, const ebpo_mesh *mended, const ebpo_mesh *stored,
-                           bool ordered, ebpo_error *error)
+static ebpo_status compare_meshes(ebpo_tally *tally, const ebpo_mesh *mended,
+                                  const ebpo_mesh *stored, bool ordered, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     bool comparable =

@@ -1,6 +1,9 @@
-/* The table of subtrees, counted anew: one visit of the whole tree, leaf by leaf in the order of
- * the faces. Writer and reader go level by level; nothing of theirs is used but how arrays are
- * read. */
+/* Verifies the table of subtrees (format-spec/README.md, section 9) by counting it anew: one visit
+ * of the whole tree, leaf by leaf in the order of the faces.
+ *
+ * Every column of every row is recomputed: ranks, faces, vertices, and the blocks of shared faces
+ * and vertices that are stored with other subtrees, each listed that is needed, and no other.
+ * Writer and reader go level by level; nothing of theirs is used but the reading of arrays. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -108,7 +111,7 @@ static const char *column_name(const recount *c, unsigned column, int *level)
     return level_names[(column - FIRST_LEVEL) % OF_A_LEVEL];
 }
 
-/* --- a subtree is complete --- */
+/* --- comparing a complete subtree with its row --- */
 
 /* The distances that must be listed, against those that are. */
 static void compare_outer(recount *c, const char *what, uint64_t from, const numbers *needed,
@@ -185,7 +188,7 @@ static void check_row(recount *c)
     memset(c->row, 0, sizeof c->row);
 }
 
-/* --- visiting --- */
+/* --- visiting the tree --- */
 
 /* Faces that are new in a leaf, and vertices that are new in these. */
 static void see_faces(recount *c, uint64_t count)

@@ -1,6 +1,11 @@
-/* Nodes with many faces come first, one after the other, with their faces shared out to all
- * threads; what remains below are many smaller subtrees, each walked depth-first by one thread.
- * Every face is tested exactly against every cell that it comes near. */
+/* Walks down the tree with the faces that touch each node, and checks containment, lists and labels
+ * there.
+ *
+ * Nodes with many faces come first, one after the other, with their faces shared out to all
+ * threads. The smaller subtrees below are each walked depth first by one thread. Every face is
+ * tested exactly against every cell that it comes near. Points whose winding number is to be
+ * checked by rays are collected on the way and followed through the mesh at the end. The tally does
+ * not depend on the number of threads. */
 #include "core/strict_fp.h"
 
 #include "verify/verify_parts.h"
@@ -165,8 +170,8 @@ static bool is_terminal(const walk *w, const ebpo_twin_node *node)
 
 /* The faces may be all of the mesh. */
 static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_twin_node *node,
-                                 const uint32_t *faces, uint64_t count,
-                                 ebpo_node_windings *corners, ebpo_error *error)
+                                 const uint32_t *faces, uint64_t count, ebpo_node_windings *corners,
+                                 ebpo_error *error)
 {
     const ebpo_twin_tree *view = w->view;
     ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
