@@ -354,7 +354,7 @@ int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face)
  * face by one wall, or on the face by two walls. So rounded m still give certain bounds, and
  * nothing has to be clipped. What stays undecided is clipped in rationals. */
 
-void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_twin_tree *view,
+void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_twin_tree *view,
                          const ebpo_twin_node *node)
 {
     uint32_t count;
@@ -442,7 +442,7 @@ static bool corner_beyond(const local_face *face, const double n[3], double boun
     return false;
 }
 
-static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i,
+static bool face_keeps(ebpo_tally *tally, const ebpo_node_planes *planes, int i,
                        const ebpo_frame *frame, const ebpo_corners *face, const local_face *local)
 {
     const double *n = planes->n[i];
@@ -458,7 +458,7 @@ static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i,
     return ebpo_exact_half_space(frame->low, frame->high, face, planes->normal[i], planes->d[i]);
 }
 
-void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                const ebpo_twin_node *node, const ebpo_frame *frame,
                                const ebpo_corners *face, uint64_t number)
 {
@@ -472,7 +472,7 @@ void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes
                                  "the plane cuts off a part of the face in the cell");
 }
 
-void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                   const ebpo_twin_node *node, unsigned corners)
 {
     for (int i = 0; i < planes->count; i++)

@@ -62,27 +62,27 @@ void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out);
 /* --- containment: no point of a face in the cell, and no inside corner, is cut off by the node's
  * planes --- */
 
-enum { EBPO_HALF_SPACES_MAX = 255 }; /* counts are bytes */
+enum { EBPO_NODE_PLANES_MAX = 255 }; /* counts are bytes */
 
 /* A node's own planes, decoded. Codes that stand for no plane are left out (they are violations
  * elsewhere). */
-typedef struct ebpo_half_spaces {
+typedef struct ebpo_node_planes {
     int count;
-    double n[EBPO_HALF_SPACES_MAX][3], bound[EBPO_HALF_SPACES_MAX]; /* n . xi <= bound; exact */
-    int32_t normal[EBPO_HALF_SPACES_MAX][3], d[EBPO_HALF_SPACES_MAX];
-    uint32_t number[EBPO_HALF_SPACES_MAX]; /* place among the node's codes */
-} ebpo_half_spaces;
+    double n[EBPO_NODE_PLANES_MAX][3], bound[EBPO_NODE_PLANES_MAX]; /* n . xi <= bound; exact */
+    int32_t normal[EBPO_NODE_PLANES_MAX][3], d[EBPO_NODE_PLANES_MAX];
+    uint32_t number[EBPO_NODE_PLANES_MAX]; /* place among the node's codes */
+} ebpo_node_planes;
 
-void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_twin_tree *view,
+void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_twin_tree *view,
                          const ebpo_twin_node *node);
 
 /* A face that touches the cell. */
-void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                const ebpo_twin_node *node, const ebpo_frame *frame,
                                const ebpo_corners *face, uint64_t number);
 
 /* Cell corners, bit i for corner i (bit 0 x, bit 1 y, bit 2 z). */
-void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                   const ebpo_twin_node *node, unsigned corners);
 
 #endif

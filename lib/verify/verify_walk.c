@@ -38,7 +38,7 @@ typedef struct face_stack {
 typedef struct worker {
     ebpo_tally tally;
     face_stack stack;
-    ebpo_half_spaces planes;
+    ebpo_node_planes planes;
     ebpo_ray_points points;
     uint64_t visited; /* faces */
 } worker;
@@ -159,7 +159,7 @@ static void finish_gray(const walk *w, worker *self, const ebpo_twin_node *node,
     unsigned inside = ebpo_windings_inside(w->view, corners);
     if (inside == 0)
         return;
-    ebpo_half_spaces_of(&self->planes, w->view, node);
+    ebpo_node_planes_of(&self->planes, w->view, node);
     ebpo_check_corners_contained(&self->tally, &self->planes, node, inside);
 }
 
@@ -177,7 +177,7 @@ static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_twin_no
     ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
     if (view->has_mesh && node->type != EBPO_GRAY) /* pruned */
         ebpo_check_terminal_lists(&self->tally, view, node, faces, count);
-    ebpo_half_spaces_of(&self->planes, view, node);
+    ebpo_node_planes_of(&self->planes, view, node);
     EBPO_FOR_ITEMS_SCATTERED(w->options->workspace, i, 0, self->planes.count ? count : 0) {
         ebpo_corners face;
         ebpo_face_corners(&view->tree->mesh, faces[i], &face);
@@ -225,7 +225,7 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_twin_node *
         return ebpo_fail_memory(error, (first + 2 * count) * 5);
     family f;
     family_make(&f, &w->view->box, node);
-    ebpo_half_spaces_of(&self->planes, w->view, node);
+    ebpo_node_planes_of(&self->planes, w->view, node);
     visit_faces(w, self, node, &f, s->faces + first, s->octants + first, count);
     check_worth(w, &self->tally, node, count);
     ebpo_node_windings children[8];
@@ -252,7 +252,7 @@ static ebpo_status shared_task(void *context, uint64_t begin, uint64_t end, unsi
     worker *self = &w->workers[number];
     family f;
     family_make(&f, &w->view->box, &w->shared->node);
-    ebpo_half_spaces_of(&self->planes, w->view, &w->shared->node);
+    ebpo_node_planes_of(&self->planes, w->view, &w->shared->node);
     visit_faces(w, self, &w->shared->node, &f, w->shared->faces + begin, w->shared_octants + begin,
                 end - begin);
     return EBPO_OK;
