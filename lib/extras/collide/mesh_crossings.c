@@ -36,7 +36,7 @@ typedef struct crossings {
 /* --- the model --- */
 
 static ebpo_status crossings_build(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                                   ebpo_error *error)
+                         ebpo_error *error)
 {
     ebpo_build_options how = EBPO_BUILD_OPTIONS_INIT;
     ebpo_mesh_report surface = *report;
@@ -172,7 +172,7 @@ static ebpo_status crossings_paint(crossings *c, ebpo_workspace *workspace, ebpo
 }
 
 static ebpo_status crossings_search(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                                    ebpo_workspace *workspace, ebpo_error *error)
+                          ebpo_workspace *workspace, ebpo_error *error)
 {
     ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
     how.progress = c->options.progress;

@@ -78,7 +78,7 @@ static void sweep_clear(sweep *s)
 
 /* x . (y cross z); `m` is lost. */
 static void pair_sweep_triple(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebpo_vectorz *y,
-                              const ebpo_vectorz *z)
+                   const ebpo_vectorz *z)
 {
     ebpo_vectorz_cross(&s->m, y, z);
     ebpo_vectorz_dot(out, x, &s->m);

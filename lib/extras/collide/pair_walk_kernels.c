@@ -294,8 +294,7 @@ EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b
     return size_a > LONGER * size_b ? 0 : size_b > LONGER * size_a ? 1 : 2;
 }
 
-EBPO_EIGHT bool pair_walk_divide(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uint32_t b,
-                                 bool first)
+EBPO_EIGHT bool pair_walk_divide(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uint32_t b, bool first)
 {
     w->node_pairs++;
     if (!ebpo_pair_walk_room(w, 65))
